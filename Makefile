@@ -1,0 +1,54 @@
+# Everything runs from .venv, which is made on first use and brought up to date when
+# pyproject.toml or constraints.txt change. Only python3 with venv and pip is needed.
+
+PYTHON ?= python3
+
+VENV := .venv
+BIN := $(VENV)/bin
+INSTALL := $(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt
+FRAME := pyproject.toml constraints.txt hatch_build.py semsig_gis/assets/manifest.toml
+RUNTIME := $(VENV)/.runtime
+DEV := $(VENV)/.dev
+
+.DEFAULT_GOAL := help
+.NOTPARALLEL:
+.PHONY: help demo test lint bench docs clean
+
+help: ## show this list
+	@sed -n 's/^\([a-z]*\):.*## \(.*\)/  make \1\t\2/p' $(MAKEFILE_LIST) | expand -t 14
+
+demo: $(RUNTIME) ## the embedded city end to end, into demo/: database, evaluation, map, GeoPackage
+	$(BIN)/semsig demo --out demo
+
+test: $(DEV) ## the whole test suite, with coverage
+	$(BIN)/python -m pytest --cov --cov-report=term:skip-covered
+
+lint: $(DEV) ## style, types, import layers, docstrings
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+	$(BIN)/mypy
+	$(BIN)/lint-imports
+	$(BIN)/numpydoc lint $$(find semsig_gis -name '*.py')
+
+bench: $(DEV) ## the benchmarks
+	$(BIN)/python -m benchmarks
+
+docs: $(DEV) ## the documentation, into docs/_build/html
+	$(BIN)/sphinx-build -W --keep-going -b html docs docs/_build/html
+
+clean: ## remove .venv and everything that the targets write
+	rm -rf $(VENV) demo build dist docs/_build docs/generated htmlcov .coverage .coverage.* \
+		.hypothesis .import_linter_cache .mypy_cache .pytest_cache .ruff_cache
+	find . -name __pycache__ -type d -prune -exec rm -rf {} +
+
+# The demonstration needs no tools, so it has a smaller set-up of its own.
+$(RUNTIME): $(FRAME) | $(BIN)/python
+	$(INSTALL) -e .
+	@touch $@
+
+$(DEV): $(FRAME) | $(BIN)/python
+	$(INSTALL) -e '.[dev]'
+	@touch $(RUNTIME) $@
+
+$(BIN)/python:
+	$(PYTHON) -m venv $(VENV)

@@ -1,0 +1,166 @@
+"""What the tests share: the optional parts of a machine, and no network."""
+
+from __future__ import annotations
+
+import ipaddress
+import os
+import shutil
+import socket
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NoReturn
+
+import hypothesis
+import pytest
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator
+
+    from selenium.webdriver import Chrome
+
+hypothesis.settings.register_profile("semsig", deadline=None)
+hypothesis.settings.register_profile("semsig-ci", deadline=None, derandomize=True, print_blob=True)
+hypothesis.settings.load_profile("semsig-ci" if os.environ.get("CI") else "semsig")
+
+# What a machine may lack. A test that needs one of them skips, with the reason, unless the
+# environment variable SEMSIG_REQUIRE names it: then the missing thing is a failure.
+OPTIONAL = frozenset({"browser", "geodata", "qgis"})
+
+
+def required() -> frozenset[str]:
+    """Return the names that SEMSIG_REQUIRE lists, separated by commas."""
+    listed = os.environ.get("SEMSIG_REQUIRE", "").split(",")
+    return frozenset(name.strip() for name in listed if name.strip())
+
+
+def pytest_configure() -> None:
+    unknown = required() - OPTIONAL
+    if unknown:
+        msg = f"SEMSIG_REQUIRE names {sorted(unknown)}; it may name {sorted(OPTIONAL)}."
+        raise pytest.UsageError(msg)
+
+
+def unavailable(name: str, reason: str) -> NoReturn:
+    """Skip the test, or fail it where SEMSIG_REQUIRE names the missing thing."""
+    if name not in OPTIONAL:
+        msg = f"{name!r} is not one of {sorted(OPTIONAL)}"
+        raise LookupError(msg)
+    if name in required():
+        pytest.fail(f"{reason} (SEMSIG_REQUIRE names {name})", pytrace=False)
+    pytest.skip(reason)
+
+
+def is_local(address: object) -> bool:
+    """Tell whether a socket address stays on this machine."""
+    if not isinstance(address, tuple):
+        return True  # a Unix socket
+    host = address[0]
+    if host in {None, "", "localhost"}:
+        return True
+    try:
+        return ipaddress.ip_address(host).is_loopback
+    except ValueError:
+        return False
+
+
+@pytest.fixture(autouse=True, scope="session")
+def _no_network() -> Iterator[None]:
+    """Refuse every connection and name look-up that would leave the machine."""
+
+    def guarded(original: Callable[..., Any], pick: Callable[..., object]) -> Callable[..., Any]:
+        def call(*args: object, **options: object) -> object:
+            address = pick(*args)
+            if not is_local(address):
+                msg = f"a test tried to reach {address!r}; tests do not use the network"
+                raise RuntimeError(msg)
+            return original(*args, **options)
+
+        return call
+
+    with pytest.MonkeyPatch.context() as patch:
+        for name in ("connect", "connect_ex"):
+            original = getattr(socket.socket, name)
+            patch.setattr(socket.socket, name, guarded(original, lambda _, address: address))
+        resolve = guarded(socket.getaddrinfo, lambda host, *_: (host,))
+        patch.setattr(socket, "getaddrinfo", resolve)
+        yield
+
+
+@pytest.fixture(scope="session")
+def geodata() -> Path:
+    """Return the folder of real open data that SEMSIG_GEODATA names."""
+    folder = os.environ.get("SEMSIG_GEODATA")
+    if not folder:
+        unavailable("geodata", "SEMSIG_GEODATA does not name the folder of real data")
+    if not Path(folder).is_dir():
+        unavailable("geodata", f"SEMSIG_GEODATA names {folder}, which is not a folder")
+    return Path(folder)
+
+
+@pytest.fixture(scope="session")
+def qgis_process() -> Path:
+    """Return QGIS's command-line program; run it with `qgis_environment`."""
+    # The plain name is a shell script in Debian that sets variables for a desktop session.
+    found = shutil.which("qgis_process.bin") or shutil.which("qgis_process")
+    if found is None:
+        unavailable("qgis", "qgis_process is not on this machine")
+    return Path(found)
+
+
+@pytest.fixture
+def qgis_environment(tmp_path: Path) -> dict[str, str]:
+    """Return a clean environment for QGIS, without a screen and with a profile of its own."""
+    # Nothing is inherited: our PYTHONPATH, GDAL_DATA or PROJ_LIB would crash QGIS's own Python.
+    return {
+        "HOME": str(tmp_path),
+        "LANG": "C.UTF-8",
+        "PATH": os.defpath,
+        "QGIS_CUSTOM_CONFIG_PATH": str(tmp_path / "qgis"),
+        "QT_QPA_PLATFORM": "offscreen",
+        "XDG_RUNTIME_DIR": str(tmp_path),
+    }
+
+
+@pytest.fixture(scope="session")
+def _chromium(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Chrome]:
+    from selenium import webdriver
+
+    chromium = shutil.which("chromium") or shutil.which("google-chrome")
+    driver = shutil.which("chromedriver")
+    if chromium is None or driver is None:
+        unavailable("browser", "chromium and chromedriver are not both on this machine")
+    options = webdriver.ChromeOptions()
+    options.binary_location = chromium
+    for argument in (
+        "--headless=new",
+        "--no-sandbox",
+        "--disable-dev-shm-usage",
+        "--disable-gpu",
+        "--disable-quic",
+        "--disable-background-networking",
+        "--disable-component-update",
+        "--disable-sync",
+        "--no-first-run",
+        "--no-default-browser-check",
+        "--host-resolver-rules=MAP * ~NOTFOUND",
+        "--window-size=1200,900",
+        f"--user-data-dir={tmp_path_factory.mktemp('chromium')}",
+    ):
+        options.add_argument(argument)
+    options.set_capability("goog:loggingPrefs", {"browser": "ALL", "performance": "ALL"})
+    service = webdriver.ChromeService(executable_path=driver)
+    browser = webdriver.Chrome(options=options, service=service)
+    yield browser
+    browser.quit()
+
+
+@pytest.fixture
+def browser(_chromium: Chrome) -> Chrome:
+    """Return a headless Chromium that reaches no network, on an empty page, with empty logs.
+
+    ``browser.get_log("browser")`` gives the console messages since then and
+    ``browser.get_log("performance")`` what was requested.
+    """
+    _chromium.get("about:blank")
+    for log in ("browser", "performance"):
+        _chromium.get_log(log)
+    return _chromium
