@@ -1,0 +1,127 @@
+"""Tell where in a city a view was taken from the street objects in it.
+
+The road in one glance::
+
+    catalog = load_catalog("montpellier")
+    found, _ = find_files(catalog.layers, ["montpellier/"])
+    layers = [read_layer(file, spec) for spec, file in found]
+    objects, report = build_objects(layers, taxonomy=catalog.taxonomy, crs=catalog.metric_crs)
+    database = build_database(objects)
+    query = Signature.parse("DDBB", [10, 80, 200, 310], taxonomy=database.taxonomy)
+    localize(database, query).candidates
+"""
+
+from __future__ import annotations
+
+import importlib
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from semsig_gis.catalog import Catalog, LayerSpec, load_catalog, paper_taxonomy
+    from semsig_gis.database import (
+        SignatureDatabase,
+        build_database,
+        open_database,
+        save_database,
+    )
+    from semsig_gis.distortion import Distortion
+    from semsig_gis.errors import SemsigError
+    from semsig_gis.evaluation import Evaluation, evaluate
+    from semsig_gis.export import export_geopackage
+    from semsig_gis.grid import GridSpec
+    from semsig_gis.maps import evaluation_map, localization_map, save_map
+    from semsig_gis.matching import Localization, Method, localize
+    from semsig_gis.objects import StreetObjects, build_objects, open_objects, save_objects
+    from semsig_gis.signatures import Signature, SignatureSpec
+    from semsig_gis.sources import RawLayer, find_files
+    from semsig_gis.sources.synthetic import CitySpec, synthetic_city
+    from semsig_gis.sources.vector_file import read_layer
+    from semsig_gis.taxonomy import ObjectClass, Taxonomy
+
+__version__ = "0.1.0"
+
+# Where each public name lives. Names are imported when they are first used, so that the command
+# line can print its help without loading a GIS stack.
+_HOMES = {
+    "Catalog": "catalog",
+    "CitySpec": "sources.synthetic",
+    "Distortion": "distortion",
+    "Evaluation": "evaluation",
+    "GridSpec": "grid",
+    "LayerSpec": "catalog",
+    "Localization": "matching",
+    "Method": "matching",
+    "ObjectClass": "taxonomy",
+    "RawLayer": "sources",
+    "SemsigError": "errors",
+    "Signature": "signatures",
+    "SignatureDatabase": "database",
+    "SignatureSpec": "signatures",
+    "StreetObjects": "objects",
+    "Taxonomy": "taxonomy",
+    "build_database": "database",
+    "build_objects": "objects",
+    "evaluate": "evaluation",
+    "evaluation_map": "maps",
+    "export_geopackage": "export",
+    "find_files": "sources",
+    "load_catalog": "catalog",
+    "localization_map": "maps",
+    "localize": "matching",
+    "open_database": "database",
+    "open_objects": "objects",
+    "paper_taxonomy": "catalog",
+    "read_layer": "sources.vector_file",
+    "save_database": "database",
+    "save_map": "maps",
+    "save_objects": "objects",
+    "synthetic_city": "sources.synthetic",
+}
+
+__all__ = [
+    "Catalog",
+    "CitySpec",
+    "Distortion",
+    "Evaluation",
+    "GridSpec",
+    "LayerSpec",
+    "Localization",
+    "Method",
+    "ObjectClass",
+    "RawLayer",
+    "SemsigError",
+    "Signature",
+    "SignatureDatabase",
+    "SignatureSpec",
+    "StreetObjects",
+    "Taxonomy",
+    "__version__",
+    "build_database",
+    "build_objects",
+    "evaluate",
+    "evaluation_map",
+    "export_geopackage",
+    "find_files",
+    "load_catalog",
+    "localization_map",
+    "localize",
+    "open_database",
+    "open_objects",
+    "paper_taxonomy",
+    "read_layer",
+    "save_database",
+    "save_map",
+    "save_objects",
+    "synthetic_city",
+]
+
+
+def __getattr__(name: str) -> Any:  # noqa: ANN401 - whatever the name stands for
+    if name not in _HOMES:
+        msg = f"module {__name__!r} has no attribute {name!r}"
+        raise AttributeError(msg)
+    return getattr(importlib.import_module(f"{__name__}.{_HOMES[name]}"), name)
+
+
+def __dir__() -> list[str]:
+    return __all__

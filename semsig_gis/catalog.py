@@ -1,0 +1,469 @@
+"""Catalogues: TOML files that say which layers of which source hold which class of object."""
+
+from __future__ import annotations
+
+import importlib.resources
+import tomllib
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal, get_args
+
+from pyproj import CRS
+from pyproj.exceptions import CRSError
+
+from semsig_gis.errors import CatalogError, CrsError, UnknownNameError, nearest_name
+from semsig_gis.schema import require_metric_crs
+from semsig_gis.taxonomy import ObjectClass, Taxonomy
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Mapping
+    from importlib.resources.abc import Traversable
+
+__all__ = [
+    "Catalog",
+    "ClassBy",
+    "LayerSpec",
+    "catalog_names",
+    "load_catalog",
+    "paper_taxonomy",
+]
+
+Value = str | int | float | bool
+GeometryKind = Literal["point", "line", "polygon"]
+
+# What a catalogue may say, and of which type; every other key is a mistake that gets named.
+CATALOG_KEYS = {
+    "name": str,
+    "title": str,
+    "url": str,
+    "license": str,
+    "attribution": str,
+    "metric_crs": str,
+    "classes": list,
+    "layers": list,
+}
+CLASS_KEYS = {"code": int, "symbol": str, "name": str, "title": str}
+LAYER_KEYS = {
+    "name": str,
+    "class": str,
+    "files": list,
+    "layer": str,
+    "where": dict,
+    "class_by": dict,
+    "id_field": str,
+    "geometry": str,
+    "crs": str,
+    "rows": list,
+    "x_field": str,
+    "y_field": str,
+    "license": str,
+    "attribution": str,
+}
+CLASS_BY_KEYS = {"field": str, "values": dict}
+
+
+@dataclass(frozen=True, slots=True)
+class ClassBy:
+    """A field whose value decides the class of a row.
+
+    Parameters
+    ----------
+    field : str
+        Name of the field.
+    classes : tuple of (value, str)
+        Value of the field and the class name it stands for; a row with another value keeps the
+        class of its layer.
+
+    Examples
+    --------
+    >>> ClassBy("kind", (("Taxi", "taxi_station"),)).field
+    'kind'
+    """
+
+    field: str
+    classes: tuple[tuple[Value, str], ...]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LayerSpec:
+    """One layer of a source and the class of street object it holds.
+
+    Parameters
+    ----------
+    name : str
+        Name of the layer in the catalogue.
+    class_name : str
+        Class of its rows.
+    files : tuple of str
+        File-name patterns (``*``, ``?``) by which the layer's file is recognised.
+    layer : str, optional
+        Layer inside a file that holds several.
+    where : tuple of (str, tuple)
+        Fields and the values of each that are accepted, compared exactly; all must hold.
+    class_by : ClassBy, optional
+        Field that decides the class row by row.
+    id_field : str, optional
+        Field that identifies a row in its source; else the feature's number.
+    geometry : {"point", "line", "polygon"}
+        Geometry that is expected.
+    crs : str, optional
+        Coordinate reference system that is expected; it is used where the file states none.
+    rows : tuple of (int, int), optional
+        Least and largest number of rows that are plausible.
+    x_field, y_field : str, optional
+        Coordinate columns of a CSV file.
+    license, attribution : str
+        Licence of the data and the line that its publisher asks for.
+
+    Examples
+    --------
+    >>> LayerSpec(name="trees", class_name="alignment_tree", files=("*trees*.geojson",)).geometry
+    'point'
+    """
+
+    name: str
+    class_name: str
+    files: tuple[str, ...] = ()
+    layer: str | None = None
+    where: tuple[tuple[str, tuple[Value, ...]], ...] = ()
+    class_by: ClassBy | None = None
+    id_field: str | None = None
+    geometry: GeometryKind = "point"
+    crs: str | None = None
+    rows: tuple[int, int] | None = None
+    x_field: str | None = None
+    y_field: str | None = None
+    license: str = "unknown"
+    attribution: str = ""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Catalog:
+    """A source of open data: its classes, its layers and its licence.
+
+    Parameters
+    ----------
+    name : str
+        Short name.
+    title : str
+        Name to show to people.
+    metric_crs : str
+        Coordinate reference system in metres in which distances are taken.
+    taxonomy : Taxonomy
+        The paper's classes and the catalogue's own.
+    layers : tuple of LayerSpec
+        The layers.
+    url : str
+        Where the data is published.
+    license, attribution : str
+        What holds for every layer that does not say otherwise.
+
+    Examples
+    --------
+    >>> load_catalog("montpellier").layer("trees").class_name
+    'alignment_tree'
+    """
+
+    name: str
+    title: str
+    metric_crs: str
+    taxonomy: Taxonomy
+    layers: tuple[LayerSpec, ...]
+    url: str = ""
+    license: str = "unknown"
+    attribution: str = ""
+
+    def layer(self, name: str) -> LayerSpec:
+        """Return the layer of that name.
+
+        Parameters
+        ----------
+        name : str
+            Name of a layer.
+
+        Returns
+        -------
+        LayerSpec
+            The layer.
+
+        Raises
+        ------
+        UnknownNameError
+            If there is none; the nearest name is offered.
+        """
+        for spec in self.layers:
+            if spec.name == name:
+                return spec
+        known = [spec.name for spec in self.layers]
+        msg = (
+            f"catalogue {self.name!r} has no layer {name!r}{nearest_name(name, known)}; "
+            f"its layers are {', '.join(known)}."
+        )
+        raise UnknownNameError(msg)
+
+
+def paper_taxonomy() -> Taxonomy:
+    """Return the eleven classes of the paper, with its identifiers as codes and its symbols.
+
+    Returns
+    -------
+    Taxonomy
+        Codes 1 to 11 (paper, table of semantic objects).
+
+    Examples
+    --------
+    >>> "".join(item.symbol for item in paper_taxonomy().classes)
+    'BCDEGHIJKLM'
+    """
+    source = _data_folder() / "taxonomy.toml"
+    content = _parse(source.read_text(encoding="utf-8"), "taxonomy.toml")
+    _check_keys(content, {"classes": list}, "taxonomy.toml")
+    return Taxonomy(_classes(content["classes"], "taxonomy.toml"))
+
+
+def catalog_names() -> tuple[str, ...]:
+    """Return the names of the built-in catalogues.
+
+    Returns
+    -------
+    tuple of str
+        Names that `load_catalog` takes, sorted.
+
+    Examples
+    --------
+    >>> "montpellier" in catalog_names()
+    True
+    """
+    names = (Path(item.name) for item in _data_folder().iterdir())
+    return tuple(sorted(p.stem for p in names if p.suffix == ".toml" and p.stem != "taxonomy"))
+
+
+def load_catalog(name: str | Path) -> Catalog:
+    """Read and check a catalogue.
+
+    Parameters
+    ----------
+    name : str or Path
+        Name of a built-in catalogue, or path of a TOML file (it ends in ``.toml``).
+
+    Returns
+    -------
+    Catalog
+        The catalogue; its taxonomy is the paper's classes followed by its own.
+
+    Raises
+    ------
+    UnknownNameError
+        If there is no built-in catalogue of that name.
+    CatalogError
+        If the file is missing, is not TOML, has a key that means nothing, lacks one that is
+        needed, or names a class or CRS that does not exist.
+
+    Examples
+    --------
+    >>> load_catalog("montpellier").metric_crs
+    'EPSG:2154'
+    """
+    text = str(name)
+    source: Path | Traversable
+    if text.endswith(".toml"):
+        source = Path(text)
+        if not source.is_file():
+            msg = f"catalogue {text} does not exist; give a TOML file or one of {_known()}."
+            raise CatalogError(msg)
+    else:
+        if text not in catalog_names():
+            msg = (
+                f"catalogue {text!r} is unknown{nearest_name(text, catalog_names())}; "
+                f"give one of {_known()}, or the path of a .toml file."
+            )
+            raise UnknownNameError(msg)
+        source = _data_folder() / f"{text}.toml"
+    try:
+        content = source.read_text(encoding="utf-8-sig")  # some editors write a BOM
+    except UnicodeDecodeError as error:
+        msg = f"catalogue {text} is not UTF-8 text ({error}); save it as UTF-8."
+        raise CatalogError(msg) from error
+    except OSError as error:
+        msg = f"catalogue {text} cannot be read ({error.strerror}); give a file that you can read."
+        raise CatalogError(msg) from error
+    return _catalog(_parse(content, text), text)
+
+
+def _known() -> str:
+    return ", ".join(repr(name) for name in catalog_names())
+
+
+def _data_folder() -> Traversable:
+    """Return the folder of shipped catalogues: in the wheel, or at the top of a checkout."""
+    shipped = importlib.resources.files("semsig_gis") / "data_sources"
+    if shipped.is_dir():
+        return shipped
+    return Path(__file__).resolve().parent.parent / "data_sources"
+
+
+def _parse(text: str, where: str) -> dict[str, Any]:
+    try:
+        return tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
+        msg = f"{where} is not valid TOML: {error}."
+        raise CatalogError(msg) from error
+
+
+def _check_keys(
+    table: Mapping[str, Any],
+    allowed: Mapping[str, type],
+    where: str,
+    needed: Iterable[str] = (),
+) -> None:
+    for key, value in table.items():
+        if key not in allowed:
+            msg = (
+                f"{where} has the key {key!r}, which means nothing"
+                f"{nearest_name(key, allowed)}; the keys are {', '.join(allowed)}."
+            )
+            raise CatalogError(msg)
+        # bool is an int to Python, never to a catalogue
+        if not isinstance(value, allowed[key]) or isinstance(value, bool):
+            msg = f"{where} has {key} = {value!r}; write a {_TOML_TYPES[allowed[key]]}."
+            raise CatalogError(msg)
+    for key in needed:
+        if key not in table:
+            msg = f"{where} lacks the key {key!r}; add it."
+            raise CatalogError(msg)
+
+
+_TOML_TYPES: dict[type, str] = {str: "string", int: "whole number", list: "list", dict: "table"}
+
+
+def _catalog(content: dict[str, Any], where: str) -> Catalog:
+    where = f"catalogue {where}"
+    _check_keys(content, CATALOG_KEYS, where, ("name", "title", "metric_crs", "layers"))
+    own = _classes(content.get("classes", []), where)
+    try:
+        taxonomy = paper_taxonomy().extended(own)
+        require_metric_crs(content["metric_crs"])
+    except (CatalogError, CrsError) as error:
+        msg = f"{where}: {error}"
+        raise CatalogError(msg) from error
+    shared = {
+        "license": content.get("license", "unknown"),
+        "attribution": content.get("attribution", ""),
+    }
+    layers = tuple(_layer(item, where, taxonomy, shared) for item in content["layers"])
+    names = [spec.name for spec in layers]
+    double = next((name for name in names if names.count(name) > 1), None)
+    if double is not None or not names:
+        what = f"two layers named {double!r}; rename one" if names else "no layer; add [[layers]]"
+        msg = f"{where} has {what}."
+        raise CatalogError(msg)
+    return Catalog(
+        name=content["name"],
+        title=content["title"],
+        metric_crs=content["metric_crs"],
+        taxonomy=taxonomy,
+        layers=layers,
+        url=content.get("url", ""),
+        license=shared["license"],
+        attribution=shared["attribution"],
+    )
+
+
+def _classes(items: list[Any], where: str) -> tuple[ObjectClass, ...]:
+    classes = []
+    for number, item in enumerate(items, start=1):
+        place = f"{where}, class {number}"
+        if not isinstance(item, dict):
+            msg = f"{place} is {item!r}; write a [[classes]] table."
+            raise CatalogError(msg)
+        _check_keys(item, CLASS_KEYS, place, CLASS_KEYS)
+        try:
+            classes.append(ObjectClass(**item))
+        except CatalogError as error:
+            msg = f"{place}: {error}"
+            raise CatalogError(msg) from error
+    return tuple(classes)
+
+
+def _layer(item: object, where: str, taxonomy: Taxonomy, shared: Mapping[str, str]) -> LayerSpec:
+    if not isinstance(item, dict):
+        msg = f"{where} has the layer {item!r}; write a [[layers]] table."
+        raise CatalogError(msg)
+    where = f"{where}, layer {item.get('name', '?')!r}"
+    _check_keys(item, LAYER_KEYS, where, ("name", "class", "files"))
+    _require_class(item["class"], taxonomy, where)
+    geometry = item.get("geometry", "point")
+    if geometry not in get_args(GeometryKind):
+        msg = f"{where} has geometry = {geometry!r}; write 'point', 'line' or 'polygon'."
+        raise CatalogError(msg)
+    if "crs" in item:
+        try:
+            CRS.from_user_input(item["crs"])
+        except CRSError as error:
+            msg = (
+                f"{where} has crs = {item['crs']!r}, which is unknown; "
+                "write a code such as 'EPSG:4326'."
+            )
+            raise CatalogError(msg) from error
+    patterns = item["files"]
+    if not patterns or not all(isinstance(pattern, str) and pattern for pattern in patterns):
+        msg = f"{where} has files = {patterns!r}; write a list of file names or patterns."
+        raise CatalogError(msg)
+    class_by = _class_by(item["class_by"], taxonomy, where) if "class_by" in item else None
+    optional = {
+        key: item[key] for key in ("layer", "id_field", "crs", "x_field", "y_field") if key in item
+    }
+    return LayerSpec(
+        name=item["name"],
+        class_name=item["class"],
+        files=tuple(patterns),
+        where=tuple(
+            (field, _values(accepted, field, where))
+            for field, accepted in item.get("where", {}).items()
+        ),
+        class_by=class_by,
+        geometry=geometry,
+        rows=_rows(item["rows"], where) if "rows" in item else None,
+        license=item.get("license", shared["license"]),
+        attribution=item.get("attribution", shared["attribution"]),
+        **optional,
+    )
+
+
+def _require_class(name: str, taxonomy: Taxonomy, where: str) -> None:
+    try:
+        taxonomy.by_name(name)
+    except UnknownNameError as error:
+        msg = f"{where}: {error}"
+        raise CatalogError(msg) from error
+
+
+def _class_by(item: dict[str, Any], taxonomy: Taxonomy, where: str) -> ClassBy:
+    where = f"{where}, class_by"
+    _check_keys(item, CLASS_BY_KEYS, where, CLASS_BY_KEYS)
+    for value, name in item["values"].items():
+        if not isinstance(name, str):
+            msg = f"{where} has {value!r} = {name!r}; write the name of a class."
+            raise CatalogError(msg)
+        _require_class(name, taxonomy, where)
+    return ClassBy(item["field"], tuple(item["values"].items()))
+
+
+def _values(accepted: object, field: str, where: str) -> tuple[Value, ...]:
+    values = accepted if isinstance(accepted, list) else [accepted]
+    if not values or not all(isinstance(value, Value) for value in values):
+        msg = (
+            f"{where} filters {field!r} by {accepted!r}; "
+            "write the accepted value, or a list of accepted values."
+        )
+        raise CatalogError(msg)
+    return tuple(values)
+
+
+def _rows(item: list[Any], where: str) -> tuple[int, int]:
+    match item:
+        # bool is an int to Python, never to a catalogue
+        case [int(least), int(most)] if 0 <= least <= most and bool not in map(type, item):
+            return least, most
+    msg = f"{where} has rows = {item!r}; write [least, most]."
+    raise CatalogError(msg)

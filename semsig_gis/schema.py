@@ -1,0 +1,95 @@
+"""Names of columns, and the rule that distances are taken in a metric coordinate system."""
+
+from __future__ import annotations
+
+import re
+
+from pyproj import CRS
+from pyproj.exceptions import CRSError
+
+from semsig_gis.errors import CrsError
+
+__all__ = [
+    "CLASS_CODE",
+    "CLASS_NAME",
+    "COUNT",
+    "GEOMETRY",
+    "SOURCE",
+    "SOURCE_ID",
+    "require_metric_crs",
+]
+
+CLASS_CODE = "class_code"
+CLASS_NAME = "class_name"
+SOURCE = "source"
+SOURCE_ID = "source_id"
+COUNT = "count"
+GEOMETRY = "geometry"
+
+
+def require_metric_crs(crs: CRS | str | int | None) -> CRS:
+    """Return a coordinate system if true distances in metres can be taken in it.
+
+    Parameters
+    ----------
+    crs : pyproj.CRS, str, int or None
+        Anything that pyproj understands, such as ``"EPSG:2154"``.
+
+    Returns
+    -------
+    pyproj.CRS
+        The projected coordinate system in metres, without a height.
+
+    Raises
+    ------
+    CrsError
+        If it is missing, unknown, in degrees or feet, a Mercator or cylindrical projection,
+        where lengths grow with the latitude (1.5 times at Paris), or if its axes do not point
+        east and north, from which bearings are counted.
+
+    Examples
+    --------
+    >>> require_metric_crs("EPSG:2154").name
+    'RGF93 v1 / Lambert-93'
+    >>> require_metric_crs("EPSG:4326")
+    Traceback (most recent call last):
+    ...
+    semsig_gis.errors.CrsError: WGS 84 is in degrees; give a projected CRS in metres, such as \
+'EPSG:2154' for France or the UTM zone of the city.
+    """
+    advice = (
+        "give a projected CRS in metres, such as 'EPSG:2154' for France or the UTM zone of the city"
+    )
+    if crs is None:
+        msg = f"no coordinate reference system was given; {advice}."
+        raise CrsError(msg)
+    try:
+        system = CRS.from_user_input(crs).to_2d()
+    except CRSError as error:
+        msg = f"coordinate reference system {crs!r} is unknown; {advice}."
+        raise CrsError(msg) from error
+    fault = _fault(system)
+    if fault:
+        msg = f"{system.name} {fault}; {advice}."
+        raise CrsError(msg)
+    return system
+
+
+def _fault(system: CRS) -> str:
+    """Return why distances and bearings cannot be taken in a system, or nothing."""
+    if system.is_geographic:
+        return "is in degrees"
+    if not system.is_projected:
+        return f"is {system.type_name.removesuffix(' CRS').lower()}, not projected"
+    # The operation of a bound system is its datum shift; the projection is its source's.
+    plane = system.source_crs if system.is_bound else system
+    operation = plane.coordinate_operation if plane else None
+    method = operation.method_name.lower() if operation else ""
+    # Transverse and oblique ones (UTM, the Swiss and Hungarian grids) are true near their line.
+    if re.search("mercator|cylindrical", method) and not re.search("transverse|oblique", method):
+        return "is a Mercator or cylindrical projection, whose lengths grow with latitude"
+    if any(axis.unit_conversion_factor != 1.0 for axis in system.axis_info):
+        return "is not in metres"
+    if {axis.direction for axis in system.axis_info} != {"east", "north"}:
+        return "has axes that do not point east and north"
+    return ""

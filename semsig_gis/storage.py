@@ -1,0 +1,246 @@
+"""Files that appear whole or not at all, and GeoParquet files that carry their specs.
+
+Every output of the package is written beside its final place and renamed into it, so that a
+full disk, an error or an interruption leaves the file that was there before.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import os
+import shutil
+import tempfile
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import pyarrow as pa
+import pyarrow.parquet as pq
+from pyproj import CRS
+from pyproj.exceptions import CRSError
+
+from semsig_gis.errors import DatabaseError, InputError
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Sequence
+
+__all__ = ["geo_metadata", "read_geoparquet", "whole_file", "write_geoparquet"]
+
+SPEC_KEY = b"semsig"
+BYTE_TYPES = {pa.string(), pa.large_string(), pa.binary()}
+
+
+@contextlib.contextmanager
+def whole_file(path: str | Path) -> Iterator[Path]:
+    """Give a temporary path that replaces `path` if, and only if, the block succeeds.
+
+    Parameters
+    ----------
+    path : str or Path
+        The file to write. Its folder is made if it does not exist.
+
+    Yields
+    ------
+    Path
+        A path in the same folder, with the same suffix, to write to.
+
+    Raises
+    ------
+    InputError
+        If the folder cannot be made or written to, or `path` is something other than a file.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     target = Path(folder) / "a.txt"
+    ...     with whole_file(target) as partial:
+    ...         _ = partial.write_text("done")
+    ...     target.read_text()
+    'done'
+    """
+    # A link stays, and the file that it names is replaced.
+    target = Path(os.path.realpath(path))
+    if os.path.isdir(target):  # noqa: PTH112 - it answers where Path.is_dir raises
+        msg = f"{path} is a folder; give the name of a file to write."
+        raise InputError(msg)
+    if os.path.exists(target) and not os.path.isfile(target):  # noqa: PTH110, PTH113
+        msg = f"{path} is a device or a pipe; give the name of a file to write."
+        raise InputError(msg)
+    try:
+        target.parent.mkdir(parents=True, exist_ok=True)
+        folder = tempfile.mkdtemp(prefix=".semsig-", dir=target.parent)
+    except OSError as error:
+        msg = f"{path} cannot be written ({_reason(error)}); choose a folder you can write to."
+        raise InputError(msg) from error
+    # A folder of its own, because some formats write companions beside the file (-journal, -wal).
+    partial = Path(folder) / Path(path).name
+    try:
+        yield partial
+        os.replace(partial, target)  # noqa: PTH105 - the rename is the point
+    except OSError as error:
+        if error.errno is None or error.filename not in {None, str(partial), str(target)}:
+            raise
+        msg = (
+            f"{path} could not be written ({_reason(error)}); what was there before is unchanged, "
+            "so make room or choose another place."
+        )
+        raise InputError(msg) from error
+    finally:
+        shutil.rmtree(folder, ignore_errors=True)
+
+
+def _reason(error: OSError) -> str:
+    """Return the system's few words about an error, such as "Permission denied"."""
+    return os.strerror(error.errno) if error.errno else str(error)
+
+
+def geo_metadata(
+    crs: CRS, *, geometry_types: Sequence[str], bounds: Sequence[float]
+) -> dict[str, Any]:
+    """Return the ``geo`` metadata of a GeoParquet 1.1 file with WKB geometry.
+
+    Parameters
+    ----------
+    crs : pyproj.CRS
+        Coordinate reference system of the column ``geometry``.
+    geometry_types : sequence of str
+        Names such as ``"Point"``.
+    bounds : sequence of float
+        ``xmin, ymin, xmax, ymax`` in `crs`.
+
+    Returns
+    -------
+    dict
+        The metadata, ready for JSON.
+
+    Examples
+    --------
+    >>> geo_metadata(CRS(2154), geometry_types=["Point"], bounds=[0, 0, 1, 1])["version"]
+    '1.1.0'
+    """
+    column = {
+        "encoding": "WKB",
+        "geometry_types": list(geometry_types),
+        "crs": crs.to_json_dict(),
+        "bbox": [float(value) for value in bounds],
+    }
+    return {"version": "1.1.0", "primary_column": "geometry", "columns": {"geometry": column}}
+
+
+def write_geoparquet(
+    table: pa.Table, path: str | Path, *, geo: dict[str, Any], specs: dict[str, Any]
+) -> None:
+    """Write an Arrow table as one whole GeoParquet file with specs in its metadata.
+
+    Parameters
+    ----------
+    table : pyarrow.Table
+        Columns to write; ``geometry`` holds WKB.
+    path : str or Path
+        File to write; it appears whole, by rename.
+    geo : dict
+        See `geo_metadata`.
+    specs : dict
+        What made the table, as plain JSON values; stored under the key ``semsig``.
+
+    Examples
+    --------
+    >>> import shapely, tempfile
+    >>> table = pa.table({"geometry": [shapely.to_wkb(shapely.Point(1, 2))]})
+    >>> geo = geo_metadata(CRS(2154), geometry_types=["Point"], bounds=[1, 2, 1, 2])
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     file = Path(folder) / "a.parquet"
+    ...     write_geoparquet(table, file, geo=geo, specs={"kind": "example"})
+    ...     read_geoparquet(file, kind="example")[1]
+    {'kind': 'example'}
+    """
+    metadata = {b"geo": json.dumps(geo).encode(), SPEC_KEY: json.dumps(specs).encode()}
+    # Lengths apart from the bytes, and numbers by their differences: smaller for short rows.
+    encodings = {
+        field.name: "DELTA_BINARY_PACKED"
+        if pa.types.is_integer(field.type)
+        else "DELTA_LENGTH_BYTE_ARRAY"
+        for field in table.schema
+        if pa.types.is_integer(field.type) or field.type in BYTE_TYPES
+    }
+    with whole_file(path) as partial:
+        pq.write_table(
+            table.replace_schema_metadata(metadata),
+            partial,
+            compression="zstd",
+            use_dictionary=False,
+            column_encoding=encodings,
+            write_page_checksum=True,
+        )
+
+
+def read_geoparquet(
+    path: str | Path, *, kind: str, columns: list[str] | None = None
+) -> tuple[pa.Table, dict[str, Any], CRS]:
+    """Read a file that `write_geoparquet` wrote.
+
+    Parameters
+    ----------
+    path : str or Path
+        File to read.
+    kind : str
+        What the file must hold: the value of ``specs["kind"]``.
+    columns : list of str, optional
+        Columns to read; all by default.
+
+    Returns
+    -------
+    table : pyarrow.Table
+        The columns.
+    specs : dict
+        The specs that were stored.
+    crs : pyproj.CRS
+        Coordinate reference system of the geometry.
+
+    Raises
+    ------
+    DatabaseError
+        If the file is missing, damaged, or of another kind.
+
+    Examples
+    --------
+    >>> read_geoparquet("nowhere.parquet", kind="signature database")
+    Traceback (most recent call last):
+    ...
+    semsig_gis.errors.DatabaseError: nowhere.parquet does not exist; give a signature database file.
+    """
+    file = Path(path)
+    if not os.path.isfile(file):  # noqa: PTH113 - it answers where Path.is_file raises
+        what = "is a folder" if os.path.isdir(file) else "does not exist"  # noqa: PTH112
+        msg = f"{file} {what}; give a {kind} file."
+        raise DatabaseError(msg)
+    try:
+        parquet = pq.ParquetFile(file, memory_map=True, page_checksum_verification=True)
+        metadata = parquet.schema_arrow.metadata or {}
+    except PermissionError as error:
+        msg = f"{file} cannot be read ({_reason(error)}); ask its owner for access."
+        raise DatabaseError(msg) from error
+    except (pa.ArrowException, OSError, ValueError) as error:
+        msg = f"{file} is damaged or is not a Parquet file; make the {kind} file again."
+        raise DatabaseError(msg) from error
+    try:
+        specs = json.loads(metadata[SPEC_KEY])
+        crs = CRS.from_user_input(json.loads(metadata[b"geo"])["columns"]["geometry"]["crs"])
+        found = specs["kind"]
+    except (KeyError, TypeError, ValueError, CRSError) as error:
+        msg = f"{file} was not written by semsig; give a {kind} file."
+        raise DatabaseError(msg) from error
+    if found != kind:
+        msg = f"{file} is a {found} file; give a {kind} file."
+        raise DatabaseError(msg)
+    try:
+        table = parquet.read(columns)
+    except (pa.ArrowException, OSError, ValueError) as error:
+        msg = f"{file} is damaged; make the {kind} file again."
+        raise DatabaseError(msg) from error
+    missing = set(columns or ()) - set(table.column_names)
+    if missing:
+        msg = f"{file} lacks the column {min(missing)!r}; make the {kind} file again."
+        raise DatabaseError(msg)
+    return table, specs, crs
