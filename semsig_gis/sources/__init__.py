@@ -1,0 +1,145 @@
+"""Readers of open data: pick the module for the source; each returns a `RawLayer`."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from fnmatch import fnmatchcase
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from semsig_gis.errors import SourceError
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+
+    from geopandas import GeoDataFrame
+
+    from semsig_gis.catalog import LayerSpec
+
+__all__ = ["FILE_SUFFIXES", "RawLayer", "find_files"]
+
+# Files with another suffix (.dbf, .prj, a README) accompany data and are not opened on their own.
+FILE_SUFFIXES = frozenset({".csv", ".fgb", ".geojson", ".gpkg", ".json", ".shp", ".zip"})
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class RawLayer:
+    """One layer as its reader found it; ``read == len(table) + filtered + error_count``.
+
+    Parameters
+    ----------
+    spec : LayerSpec
+        What the catalogue says of the layer.
+    table : GeoDataFrame
+        One row a feature: ``class_name``, ``source_id`` and ``geometry`` (of any type, empty, or
+        None), in the CRS of the source.
+    read : int
+        Features in the source.
+    filtered : int
+        Features that the catalogue's filter leaves out.
+    errors : tuple of str
+        What was wrong with features that could not be read, the first ten of them.
+    error_count : int
+        Features that could not be read.
+    notes : tuple of str
+        Where the source differs from what the catalogue expects of it.
+
+    Examples
+    --------
+    >>> from semsig_gis.sources.synthetic import CitySpec, synthetic_city
+    >>> layer = synthetic_city(CitySpec(size=300.0))[0]
+    >>> layer.spec.class_name, layer.read == len(layer.table)
+    ('alignment_tree', True)
+    """
+
+    spec: LayerSpec
+    table: GeoDataFrame
+    read: int
+    filtered: int = 0
+    errors: tuple[str, ...] = ()
+    error_count: int = 0
+    notes: tuple[str, ...] = ()
+
+
+def find_files(
+    specs: Iterable[LayerSpec], paths: Iterable[str | Path]
+) -> tuple[tuple[tuple[LayerSpec, Path], ...], tuple[LayerSpec, ...]]:
+    """Pair the layers of a catalogue with the files that hold them.
+
+    Parameters
+    ----------
+    specs : iterable of LayerSpec
+        Layers to look for, by the file-name patterns in ``files`` (in upper or lower case).
+    paths : iterable of str or Path
+        Files, and folders to look in (not in the folders below them). A file given by itself goes
+        before one found in a folder. Of a folder's files, a layer takes those that match the
+        first of its patterns that any matches.
+
+    Returns
+    -------
+    pairs : tuple of (LayerSpec, Path)
+        Layers and their files, in the order of `specs`. One file may hold several layers.
+    missing : tuple of LayerSpec
+        Layers that no file matches.
+
+    Raises
+    ------
+    SourceError
+        If a path does not exist or matches no layer, or two files match the same layer.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> from semsig_gis.catalog import LayerSpec
+    >>> trees = LayerSpec(name="trees", class_name="alignment_tree", files=("*trees*.geojson",))
+    >>> lights = LayerSpec(name="lights", class_name="street_light", files=("lights.*",))
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     Path(folder, "City_Trees.geojson").touch()
+    ...     pairs, missing = find_files([trees, lights], [folder])
+    >>> [(spec.name, path.name) for spec, path in pairs], [spec.name for spec in missing]
+    ([('trees', 'City_Trees.geojson')], ['lights'])
+    """
+    specs = tuple(specs)
+    given: list[Path] = []
+    found: list[Path] = []
+    for path in dict.fromkeys(Path(item) for item in paths):
+        if path.is_dir():
+            inside = [p for p in sorted(path.iterdir()) if p.suffix.lower() in FILE_SUFFIXES]
+            _require_match(path, inside, specs)
+            found.extend(inside)
+        elif path.is_file():
+            _require_match(path, [path], specs)
+            given.append(path)
+        else:
+            msg = f"{path} does not exist; give a file or a folder of files."
+            raise SourceError(msg)
+    pairs = []
+    missing = []
+    for spec in specs:
+        by_hand = [path for path in given if _matches(path, spec.files)]
+        in_folder = (
+            [path for path in found if _matches(path, (pattern,))] for pattern in spec.files
+        )
+        candidates = by_hand or next(filter(None, in_folder), [])
+        if len(candidates) > 1:
+            names = " and ".join(str(path) for path in candidates)
+            msg = f"layer {spec.name!r} is matched by {names}; give one of them."
+            raise SourceError(msg)
+        if candidates:
+            pairs.append((spec, candidates[0]))
+        else:
+            missing.append(spec)
+    return tuple(pairs), tuple(missing)
+
+
+def _matches(path: Path, patterns: Iterable[str]) -> bool:
+    name = path.name.casefold()
+    return any(fnmatchcase(name, pattern.casefold()) for pattern in patterns)
+
+
+def _require_match(path: Path, files: Iterable[Path], specs: Iterable[LayerSpec]) -> None:
+    if not any(_matches(file, spec.files) for file in files for spec in specs):
+        known = ", ".join(f"{spec.name} ({', '.join(spec.files)})" for spec in specs)
+        verb = "holds no file of" if path.is_dir() else "is not the file of"
+        msg = f"{path} {verb} any layer; the layers and their files are {known}."
+        raise SourceError(msg)

@@ -1,0 +1,192 @@
+"""From the rows that a reader collects to a `RawLayer`: geometries built and checked at once."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, NamedTuple
+
+import geopandas as gpd
+import numpy as np
+import pandas as pd
+import shapely
+
+from semsig_gis.errors import CrsError
+from semsig_gis.schema import CLASS_NAME, SOURCE_ID
+from semsig_gis.sources import RawLayer
+from semsig_gis.sources._crs import crs_label, fits_the_globe, off_the_globe
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from numpy.typing import NDArray
+    from pyproj import CRS
+
+    from semsig_gis.catalog import LayerSpec
+
+KINDS = {
+    "point": ("Point", "MultiPoint"),
+    "line": ("LineString", "LinearRing", "MultiLineString"),
+    "polygon": ("Polygon", "MultiPolygon"),
+}
+ERRORS_KEPT = 10
+
+# A point as its two coordinates, so that all points are built at once; else a built geometry.
+Position = tuple[float, float] | shapely.Geometry | None
+
+
+class Row(NamedTuple):
+    """A row that is wanted and, so far, good."""
+
+    number: int  # from 1, in the order of the file
+    class_name: str
+    source_id: str
+    position: Position
+
+
+@dataclass(slots=True)
+class Rows:
+    """What a reader has seen so far of a layer.
+
+    Parameters
+    ----------
+    read, filtered : int
+        Rows seen, and rows that the filter leaves out.
+    kept : list of Row
+        Rows that are wanted.
+    errors : dict of int to str
+        What was wrong with the others, by number of the row.
+    """
+
+    read: int = 0
+    filtered: int = 0
+    kept: list[Row] = field(default_factory=list)
+    errors: dict[int, str] = field(default_factory=dict)  # by number of the row
+
+    def refuse(self, bad: Mapping[int, str]) -> None:
+        """Move rows from the kept ones to the errors."""
+        self.errors.update(bad)
+        self.kept = [row for row in self.kept if row.number not in bad]
+
+
+def raw_layer(
+    rows: Rows,
+    spec: LayerSpec,
+    crs: CRS,
+    *,
+    by_file: bool,
+    where: str,
+    notes: tuple[str, ...] = (),
+) -> RawLayer:
+    """Build the geometries of a layer and check them against its CRS and its specification.
+
+    Parameters
+    ----------
+    rows : Rows
+        What was read; rows with impossible coordinates are refused in place.
+    spec : LayerSpec
+        What the catalogue expects.
+    crs : pyproj.CRS
+        CRS of the coordinates.
+    by_file : bool
+        Whether the file itself states that CRS.
+    where : str
+        Layer and file, for messages.
+    notes : tuple of str
+        Notes so far.
+
+    Raises
+    ------
+    CrsError
+        If the CRS is in degrees and most coordinates cannot be.
+    """
+    geometry = _geometries(rows)
+    geometry = _on_globe(rows, geometry, crs, where=where, by_file=by_file)
+    if crs.is_projected and not by_file and fits_the_globe(shapely.get_coordinates(geometry)):
+        notes += (f"the coordinates look like degrees, yet {crs_label(crs)} is stated",)
+    first_errors = sorted(rows.errors.items())[:ERRORS_KEPT]
+    return RawLayer(
+        spec=spec,
+        table=gpd.GeoDataFrame(
+            {
+                CLASS_NAME: pd.Series([row.class_name for row in rows.kept], dtype="str"),
+                SOURCE_ID: pd.Series([row.source_id for row in rows.kept], dtype="str"),
+            },
+            geometry=geometry,
+            crs=crs,
+        ),
+        read=rows.read,
+        filtered=rows.filtered,
+        errors=tuple(f"row {number}: {message}" for number, message in first_errors),
+        error_count=len(rows.errors),
+        notes=(*notes, *_surprises(rows, geometry, spec)),
+    )
+
+
+def _geometries(rows: Rows) -> NDArray[np.object_]:
+    """Build the geometries of the kept rows; those that are not finite are refused."""
+    geometry = np.empty(len(rows.kept), dtype=object)
+    points = []
+    for index, row in enumerate(rows.kept):
+        if isinstance(row.position, tuple):
+            points.append(index)
+        else:
+            geometry[index] = row.position
+    if points:
+        geometry[points] = shapely.points(np.array([rows.kept[index].position for index in points]))
+    xy, owner = shapely.get_coordinates(geometry, return_index=True)
+    wrong = ~np.isfinite(xy).all(axis=1)
+    return _without(rows, geometry, owner[wrong], xy[wrong], "are not finite")
+
+
+def _on_globe(
+    rows: Rows, geometry: NDArray[np.object_], crs: CRS, *, where: str, by_file: bool
+) -> NDArray[np.object_]:
+    """Refuse rows that cannot be longitudes and latitudes where they must be.
+
+    A few are bad rows; if they are most of the layer, then it is the CRS that is wrong.
+    """
+    xy, owner = shapely.get_coordinates(geometry, return_index=True)
+    wrong = off_the_globe(xy, crs)
+    if 2 * wrong.sum() > len(xy):
+        x, y = xy[wrong][0]
+        remedy = "correct the file" if by_file else "state the crs they are in, such as 'EPSG:2154'"
+        msg = (
+            f"{where} has coordinates such as ({x:.12g}, {y:.12g}), which are not the degrees that "
+            f"{crs_label(crs)} means; {remedy}."
+        )
+        raise CrsError(msg)
+    return _without(rows, geometry, owner[wrong], xy[wrong], f"are not in {crs_label(crs)}")
+
+
+def _without(
+    rows: Rows,
+    geometry: NDArray[np.object_],
+    indices: NDArray[np.intp],
+    xy: NDArray[np.float64],
+    what: str,
+) -> NDArray[np.object_]:
+    """Refuse the rows of these indices, for the coordinates beside them."""
+    bad = {
+        rows.kept[index].number: f"its coordinates ({x:.12g}, {y:.12g}) {what}"
+        for index, (x, y) in zip(indices[::-1], xy[::-1], strict=True)  # the first one stays
+    }
+    if not bad:
+        return geometry
+    rows.refuse(bad)
+    return np.delete(geometry, indices)
+
+
+def _surprises(rows: Rows, geometry: NDArray[np.object_], spec: LayerSpec) -> tuple[str, ...]:
+    """Return where a layer is not what its specification expects."""
+    notes = []
+    if rows.read == 0:
+        notes.append("the layer has no rows")
+    elif spec.rows is not None and not spec.rows[0] <= rows.read <= spec.rows[1]:
+        least, most = spec.rows
+        notes.append(f"the layer has {rows.read} rows, and {least} to {most} were expected")
+    types = pd.Series([item.geom_type for item in geometry if item is not None], dtype="str")
+    others = types[~types.isin(KINDS[spec.geometry])]
+    if len(others):
+        names = ", ".join(sorted(others.unique()))
+        notes.append(f"{len(others)} of {rows.read} rows are {names}, not {spec.geometry}")
+    return tuple(notes)

@@ -1,0 +1,124 @@
+"""What a layer's specification says of one row: is it wanted, which class, which identifier."""
+
+from __future__ import annotations
+
+import re
+from typing import TYPE_CHECKING, Any
+
+from semsig_gis.errors import CatalogError, nearest_name
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+    from semsig_gis.catalog import LayerSpec, Value
+
+WHOLE_FLOAT = re.compile(r"(-?\d+)\.0+")
+
+
+class BadFeatureError(ValueError):
+    """A feature cannot be used; readers catch it and report the message."""
+
+
+def as_text(value: object) -> str:
+    """Return a field value as text; a whole number has no decimals."""
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    if isinstance(value, float) and value.is_integer():
+        return str(int(value))
+    return str(value)
+
+
+def matches(value: object, wanted: Value) -> bool:
+    """Tell whether a field value is the one a catalogue names.
+
+    Text compares as text and numbers as numbers, so that the number 3 is found in the text field
+    of a CSV file and the key "3" of a TOML table in a numeric field.
+    """
+    if value is None:
+        return False
+    if isinstance(wanted, str):
+        return as_text(value) == wanted
+    if isinstance(wanted, bool) or isinstance(value, bool):
+        return as_text(value) == as_text(wanted)
+    try:
+        return float(value) == wanted  # type: ignore[arg-type]
+    except (TypeError, ValueError):
+        return False
+
+
+class RowRules:
+    """The filter, the classes and the identifier of one layer, checked against its fields.
+
+    Parameters
+    ----------
+    spec : LayerSpec
+        What the catalogue says.
+    fields : sequence of str
+        Names of the fields that the file has.
+    filters : bool
+        Whether the specification's ``where`` holds.
+    where : str
+        Layer and file, for messages.
+
+    Raises
+    ------
+    CatalogError
+        If a field that the specification names does not exist.
+    """
+
+    def __init__(
+        self, spec: LayerSpec, fields: Sequence[str], *, filters: bool, where: str
+    ) -> None:
+        self._class_name = spec.class_name
+        self._where = spec.where if filters else ()
+        self._class_by = spec.class_by
+        self._id_field = spec.id_field
+        uses = [("where", field) for field, _ in self._where]
+        if spec.class_by is not None:
+            uses.append(("class_by", spec.class_by.field))
+        if spec.id_field is not None:
+            uses.append(("id_field", spec.id_field))
+        for key, field in uses:
+            require_field(field, fields, where=where, key=key)
+        self.fields = tuple(dict.fromkeys(field for _, field in uses))
+
+    def keeps(self, row: Mapping[str, Any]) -> bool:
+        """Tell whether the row passes every condition of the filter."""
+        return all(
+            any(matches(row[field], wanted) for wanted in accepted)
+            for field, accepted in self._where
+        )
+
+    def class_name(self, row: Mapping[str, Any]) -> str:
+        """Return the class of the row."""
+        if self._class_by is not None:
+            value = row[self._class_by.field]
+            for wanted, name in self._class_by.classes:
+                if matches(value, wanted):
+                    return name
+        return self._class_name
+
+    def source_id(self, row: Mapping[str, Any], number: str) -> str:
+        """Return the identifier of the row, or the feature's number where it has none."""
+        value = None if self._id_field is None else row[self._id_field]
+        if value is None:
+            return number
+        text = as_text(value).strip()
+        whole = WHOLE_FLOAT.fullmatch(text)
+        return (whole[1] if whole else text) or number
+
+
+def require_field(field: str, fields: Sequence[str], *, where: str, key: str) -> None:
+    """Refuse a field that a file does not have.
+
+    Raises
+    ------
+    CatalogError
+        With the fields there are, and the nearest.
+    """
+    if field not in fields:
+        msg = (
+            f"{where} has no field {field!r}, which the catalogue names in {key}"
+            f"{nearest_name(field, fields)}; its fields are {', '.join(fields) or 'none at all'}."
+        )
+        raise CatalogError(msg)

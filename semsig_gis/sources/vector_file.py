@@ -1,0 +1,484 @@
+"""Vector files through fiona: shapefile, GeoJSON, GeoPackage, FlatGeobuf and CSV, zipped or not."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import math
+import re
+import zipfile
+import zlib
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import fiona
+import numpy as np
+import shapely
+import shapely.geometry
+
+from semsig_gis.errors import SourceError, UnknownNameError, nearest_name
+from semsig_gis.sources import FILE_SUFFIXES
+from semsig_gis.sources._collect import Row, Rows, raw_layer
+from semsig_gis.sources._crs import (
+    WGS84,
+    crs_label,
+    fits_the_globe,
+    settle_crs,
+    usable_crs,
+)
+from semsig_gis.sources._csv_columns import csv_columns
+from semsig_gis.sources._gdal_log import first_error, listening
+from semsig_gis.sources._rows import BadFeatureError, RowRules
+
+if TYPE_CHECKING:
+    import logging
+    from collections.abc import Iterator
+
+    from pyproj import CRS
+
+    from semsig_gis.catalog import LayerSpec
+    from semsig_gis.sources import RawLayer
+    from semsig_gis.sources._collect import Position
+    from semsig_gis.sources._csv_columns import CsvColumns
+
+__all__ = ["LayerInfo", "list_layers", "read_layer"]
+
+# The only drivers that may open a file: GDAL has some eighty, and a few of them follow links.
+DRIVERS = {
+    ".csv": "CSV",
+    ".fgb": "FlatGeobuf",
+    ".geojson": "GeoJSON",
+    ".gpkg": "GPKG",
+    ".json": "GeoJSON",
+    ".shp": "ESRI Shapefile",
+}
+# In an archive beside other data, these hold a legend or metadata.
+SIDE_SUFFIXES = frozenset({".csv", ".json"})
+NO_GEOMETRY = "None"
+WGS84_NAMES = re.compile(r"4326|CRS84|WGS ?84", re.IGNORECASE)
+
+
+@dataclass(frozen=True, slots=True)
+class LayerInfo:
+    """What one layer of a file is.
+
+    Parameters
+    ----------
+    name : str
+        Name of the layer.
+    geometry : str
+        Its geometry type as GDAL calls it; ``"Point"`` for a CSV file with coordinate columns,
+        ``"None"`` for a table without geometry.
+    crs : str or None
+        Code or name of its coordinate reference system; None where the file does not say, or says
+        too little to transform coordinates.
+    rows : int
+        Number of features.
+    fields : tuple of (str, str)
+        Names and types of its fields.
+
+    Examples
+    --------
+    >>> LayerInfo("trees", "Point", "EPSG:2154", 23972, (("HAUTEUR_M", "int32"),)).rows
+    23972
+    """
+
+    name: str
+    geometry: str
+    crs: str | None
+    rows: int
+    fields: tuple[tuple[str, str], ...]
+
+
+@dataclass(frozen=True, slots=True)
+class _Member:
+    """One layer of a file, or of a file in an archive."""
+
+    file: Path
+    inner: str | None  # name in the archive
+    layer: str | None = None
+
+    @property
+    def driver(self) -> str:
+        return DRIVERS[Path(self.inner or self.file).suffix.lower()]
+
+    @property
+    def address(self) -> str | Path:
+        if self.inner is None:
+            return self.file
+        # GDAL's own form: fiona parses zip:// as a URL and loses what follows a '#' or a '?'.
+        return f"/vsizip/{{{self.file.resolve().as_posix()}}}/{self.inner}"
+
+    def __str__(self) -> str:
+        return str(self.file) if self.inner is None else f"{self.inner} in {self.file}"
+
+    def content(self, size: int = -1) -> bytes:
+        if self.inner is None:
+            with self.file.open("rb") as stream:
+                return stream.read(size)
+        with zipfile.ZipFile(self.file) as archive, archive.open(self.inner) as stream:
+            return stream.read(size)
+
+
+def list_layers(path: str | Path) -> tuple[LayerInfo, ...]:
+    r"""List the layers of a vector file.
+
+    Parameters
+    ----------
+    path : str or Path
+        A ``.shp``, ``.geojson``, ``.json``, ``.gpkg``, ``.fgb`` or ``.csv`` file, or a ``.zip``
+        with such files in it.
+
+    Returns
+    -------
+    tuple of LayerInfo
+        One entry a layer, in the file's order.
+
+    Raises
+    ------
+    SourceError
+        If the file is missing, damaged, or of another kind.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     path = Path(folder, "benches.csv")
+    ...     _ = path.write_text("id;lon;lat\n7;3.88;43.61\n")
+    ...     layer, = list_layers(path)
+    >>> layer.name, layer.geometry, layer.crs, layer.rows, layer.fields[0]
+    ('benches', 'Point', None, 1, ('id', 'str'))
+    """
+    with listening():
+        return tuple(_describe(member) for member in _members(Path(path)))
+
+
+def read_layer(
+    path: str | Path, spec: LayerSpec, *, filters: bool = True, crs: str | None = None
+) -> RawLayer:
+    r"""Read one layer of a vector file.
+
+    Features are streamed. One that cannot be read is counted and reported, and the rest are read.
+
+    Parameters
+    ----------
+    path : str or Path
+        A file that `list_layers` takes.
+    spec : LayerSpec
+        Which layer and rows are wanted, and what they are.
+    filters : bool, default True
+        Whether the specification's ``where`` holds.
+    crs : str, optional
+        CRS of a file that states none; it goes before the specification's.
+
+    Returns
+    -------
+    RawLayer
+        The features in the CRS of the file, and notes where the file is not as expected.
+
+    Raises
+    ------
+    SourceError
+        If the file is missing, damaged or of another kind, or has several layers and `spec` names
+        none.
+    UnknownNameError
+        If the file does not have the layer that `spec` names.
+    CatalogError
+        If the file does not have a field that `spec` names.
+    CrsError
+        If nobody states the CRS, or it is in degrees and most coordinates cannot be.
+
+    Notes
+    -----
+    The file's own CRS holds; what `spec` and `crs` say is for a file without one. A GeoJSON file
+    without a ``crs`` member counts as such: by RFC 7946 it is WGS 84, but that is taken only if
+    nothing else is said and the coordinates fit. A null or empty geometry is passed on; so is a
+    CSV row whose coordinate columns are both blank.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> from semsig_gis.catalog import LayerSpec
+    >>> spec = LayerSpec(name="benches", class_name="bench", crs="EPSG:4326")
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     path = Path(folder, "benches.csv")
+    ...     _ = path.write_text("id;lon;lat\n7;3.88;43.61\n8;here;43.61\n")
+    ...     layer = read_layer(path, spec)
+    >>> len(layer.table), layer.read, layer.errors
+    (1, 2, ("row 2: lon 'here' is not a number",))
+    """
+    where = f"layer {spec.name!r} ({path})"
+    with listening() as heard:
+        member = _pick(Path(path), spec.layer)
+        columns = _columns(member, spec, where=where)
+        with _opened(member, columns) as source:
+            if columns is None and source.schema["geometry"] == NO_GEOMETRY:
+                msg = f"{where} has no geometry; give the layer that holds the positions."
+                raise SourceError(msg)
+            rules = RowRules(spec, list(source.schema["properties"]), filters=filters, where=where)
+        with _opened(member, columns, fields=rules.fields) as source:
+            own, implicit = _own_crs(source)
+            system, notes = settle_crs(
+                own, implicit=implicit, expected=spec.crs, given=crs, where=where
+            )
+            rows = _read_rows(source, rules, columns, heard)
+        if member.driver == "GeoJSON":
+            _refuse_broken(rows, member)
+        if any(record.getMessage().startswith("Failed to decode") for record in heard):
+            notes += ("some text is not UTF-8 and was read as missing",)
+    by_file = own is not None and not implicit
+    return raw_layer(rows, spec, system, by_file=by_file, where=where, notes=notes)
+
+
+# --- Opening ----------------------------------------------------------------------------------
+
+
+def _unreadable(what: object, error: BaseException) -> SourceError:
+    if isinstance(error, UnicodeDecodeError):
+        return SourceError(f"{what} is not UTF-8 text; save it as UTF-8.")
+    cause = " ".join(str(error.__cause__ or error).split()).rpartition(" failed: ")[2].rstrip(".")
+    if "not recognized" in cause:
+        return SourceError(f"{what} is not the kind of file that its name says; get it again.")
+    return SourceError(f"{what} cannot be read ({cause}); it may be damaged, get it again.")
+
+
+@contextlib.contextmanager
+def _opened(
+    member: _Member, columns: CsvColumns | None = None, *, fields: tuple[str, ...] | None = None
+) -> Iterator[fiona.Collection]:
+    """Open a layer; what goes wrong in opening it becomes a `SourceError`."""
+    options: dict[str, Any] = dict(columns.options) if columns else {}
+    if member.driver == "GeoJSON":
+        # Has GDAL keep the members of the file that are not features, `crs` among them.
+        options["NATIVE_DATA"] = "YES"
+    elif fields is not None:  # which GeoJSON's driver cannot select
+        coordinates = (columns.x, columns.y) if columns else ()
+        options["include_fields"] = list(dict.fromkeys([*fields, *filter(None, coordinates)]))
+    try:
+        source = fiona.open(
+            member.address, layer=member.layer, enabled_drivers=[member.driver], **options
+        )
+        source.schema  # noqa: B018 - the names of the fields are decoded here
+    except Exception as error:
+        raise _unreadable(member, error) from error
+    with source:
+        yield source
+
+
+def _members(path: Path) -> tuple[_Member, ...]:
+    """Return the layers of a file, once it is seen to exist and to be of a known kind."""
+    suffix = path.suffix.lower()
+    if not path.is_file():
+        what = "is a folder" if path.is_dir() else "does not exist"
+        msg = f"{path} {what}; give a vector file."
+        raise SourceError(msg)
+    if suffix not in FILE_SUFFIXES:
+        msg = f"{path} is not a vector file; give one of {', '.join(sorted(FILE_SUFFIXES))}."
+        raise SourceError(msg)
+    inner = _archived(path) if suffix == ".zip" else (None,)
+    return tuple(member for name in inner for member in _layers(_Member(path, name)))
+
+
+def _archived(path: Path) -> tuple[str, ...]:
+    """Return the names of the vector files in an archive whose checksums hold."""
+    try:
+        with zipfile.ZipFile(path) as archive:
+            names = [item.filename for item in archive.infolist() if not item.is_dir()]
+            broken = archive.testzip()
+    except (NotImplementedError, OSError, RuntimeError, zipfile.BadZipFile, zlib.error) as error:
+        raise _unreadable(path, error) from error
+    if broken is not None:
+        msg = f"archive {path} is damaged at {broken}; get it again."
+        raise SourceError(msg)
+    usable = [
+        name
+        for name in names
+        if Path(name).suffix.lower() in DRIVERS and not name.startswith("__MACOSX/")
+    ]
+    if not usable:
+        msg = (
+            f"archive {path} holds no vector file, only {', '.join(names) or 'nothing'}; "
+            f"one of {', '.join(sorted(DRIVERS))} is needed."
+        )
+        raise SourceError(msg)
+    data = [name for name in usable if Path(name).suffix.lower() not in SIDE_SUFFIXES]
+    return tuple(data or usable)
+
+
+def _layers(member: _Member) -> Iterator[_Member]:
+    # Opened under the allow-list first, because listing would try every driver of GDAL.
+    with _opened(member):
+        pass
+    try:
+        names = fiona.listlayers(member.address)
+    except Exception as error:
+        raise _unreadable(member, error) from error
+    for name in names:
+        yield _Member(member.file, member.inner, name)
+
+
+def _pick(path: Path, wanted: str | None) -> _Member:
+    """Return the layer that a specification means."""
+    members = _members(path)
+    if wanted is None and len(members) > 1:
+        # A GeoPackage keeps its styles in a table without geometry, which is never meant.
+        drawn = [item for item in members if _describe(item).geometry != NO_GEOMETRY]
+        members = tuple(drawn) or members
+    known = [str(member.layer) for member in members]
+    chosen = [item for item in members if wanted is None or item.layer == wanted]
+    if len(chosen) == 1:
+        return chosen[0]
+    if wanted is not None and not chosen:
+        msg = (
+            f"{path} has no layer {wanted!r}{nearest_name(wanted, known)}; "
+            f"its layers are {', '.join(known)}."
+        )
+        raise UnknownNameError(msg)
+    msg = f"{path} holds {len(chosen)} layers ({', '.join(known)}); name the one that is meant."
+    raise SourceError(msg)
+
+
+def _columns(member: _Member, spec: LayerSpec | None, *, where: str) -> CsvColumns | None:
+    if member.driver != "CSV":
+        return None
+    first = member.content(2**16).splitlines()[:1] or [b""]
+    try:
+        return csv_columns(first[0].decode("utf-8-sig"), spec, where=where)
+    except UnicodeDecodeError as error:
+        raise _unreadable(where, error) from error
+
+
+def _describe(member: _Member) -> LayerInfo:
+    columns = _columns(member, None, where=str(member))
+    with _opened(member, columns) as source:
+        crs, implicit = _own_crs(source)
+        count = _count(source)
+        if implicit and count and not fits_the_globe(np.reshape(source.bounds, (2, 2))):
+            crs = None
+        return LayerInfo(
+            name=str(member.layer),
+            geometry="Point" if columns and columns.x else source.schema["geometry"],
+            crs=None if crs is None else crs_label(crs),
+            rows=sum(1 for _ in source) if count is None else count,
+            fields=tuple(source.schema["properties"].items()),
+        )
+
+
+def _count(source: fiona.Collection) -> int | None:
+    try:
+        return len(source)
+    except TypeError:  # a FlatGeobuf file that was written as a stream, or is empty
+        return None
+
+
+def _own_crs(source: fiona.Collection) -> tuple[CRS | None, bool]:
+    """Return the CRS of a layer, and whether it is only what GeoJSON means by saying nothing."""
+    if source.driver == "GeoJSON":
+        members = json.loads(source.tags(ns="NATIVE_DATA").get("NATIVE_DATA", "{}"))
+        if "crs" not in members:
+            return WGS84, True
+        if usable_crs(source.crs_wkt) == WGS84 and not WGS84_NAMES.search(str(members["crs"])):
+            return None, False  # GDAL takes what it does not understand for WGS 84
+    return usable_crs(source.crs_wkt), False
+
+
+# --- Reading ----------------------------------------------------------------------------------
+
+
+def _read_rows(
+    source: fiona.Collection,
+    rules: RowRules,
+    columns: CsvColumns | None,
+    heard: list[logging.LogRecord],
+) -> Rows:
+    rows = Rows()
+    expected = _count(source) or 0
+    # GDAL parses GeoJSON whole: what it says then belongs to no row (see `_refuse_broken`).
+    by_row = source.driver != "GeoJSON"
+    damage = ""
+    features = iter(source)
+    while len(rows.errors) <= expected:  # one that fails without moving on would fail for ever
+        said = len(heard)
+        try:
+            feature = next(features, None)
+        except Exception as error:  # noqa: BLE001 - of many kinds, and one must not stop the rest
+            rows.read += 1
+            rows.errors[rows.read] = f"cannot be read ({error})"
+            continue
+        if by_row and not damage:
+            damage = first_error(heard[said:])
+        if feature is None:
+            break
+        rows.read += 1
+        try:
+            _read_row(rows, feature, rules, columns, damage)
+        except BadFeatureError as error:
+            rows.errors[rows.read] = str(error)
+    if damage and rows.read < expected:
+        rows.errors.update(dict.fromkeys(range(rows.read + 1, expected + 1), damage))
+        rows.read = expected
+    return rows
+
+
+def _read_row(
+    rows: Rows,
+    feature: fiona.Feature,
+    rules: RowRules,
+    columns: CsvColumns | None,
+    damage: str,
+) -> None:
+    if not rules.keeps(feature.properties):
+        rows.filtered += 1
+        return
+    position: Position
+    if columns is not None:
+        position = columns.position(feature.properties)
+    else:
+        position = _position(feature.geometry)
+    if position is None and damage:
+        # From the first damage on, GDAL gives null for what it cannot read.
+        raise BadFeatureError(damage)
+    class_name = rules.class_name(feature.properties)
+    source_id = rules.source_id(feature.properties, feature.id)
+    rows.kept.append(Row(rows.read, class_name, source_id, position))
+
+
+def _position(geometry: fiona.Geometry | None) -> Position:
+    if geometry is None:
+        return None
+    if geometry.type == "Point":
+        x, y = geometry.coordinates[:2]
+        # A GeoPackage writes an empty point as one of NaN.
+        return shapely.Point() if math.isnan(x) and math.isnan(y) else (x, y)
+    try:
+        with np.errstate(invalid="ignore"):  # NaN is looked for in all geometries at once
+            return shapely.geometry.shape(geometry)
+    except (AttributeError, TypeError, ValueError, shapely.errors.ShapelyError) as error:
+        msg = f"its {geometry.type} is not valid ({error})"
+        raise BadFeatureError(msg) from error
+
+
+def _refuse_broken(rows: Rows, member: _Member) -> None:
+    """Tell the null geometries of a GeoJSON file from those that GDAL could make nothing of."""
+    null = [row.number for row in rows.kept if row.position is None]
+    if not null:
+        return
+    document = json.loads(member.content().decode("utf-8-sig", errors="replace"))
+    listed = document.get("features", [document])
+    features = [item for item in listed if isinstance(item, dict) and item.get("type") == "Feature"]
+    if len(features) != rows.read:
+        return  # GDAL counts otherwise, so that rows cannot be told apart
+    broken = [number for number in null if not _is_nothing(features[number - 1].get("geometry"))]
+    rows.refuse(dict.fromkeys(broken, "its geometry is not valid GeoJSON"))
+
+
+def _is_nothing(geometry: object) -> bool:
+    """Tell whether a GeoJSON geometry is null or properly empty."""
+    if not isinstance(geometry, dict):
+        return geometry is None
+    return _is_blank(geometry.get("coordinates", geometry.get("geometries")))
+
+
+def _is_blank(parts: object) -> bool:
+    return isinstance(parts, list) and all(_is_blank(part) for part in parts)

@@ -1,0 +1,797 @@
+"""Vector files: the real ones of Montpellier, and ones the tests write and damage."""
+
+from __future__ import annotations
+
+import json
+import math
+import shutil
+import struct
+import tempfile
+import zipfile
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import fiona
+import geopandas as gpd
+import numpy as np
+import pandas as pd
+import pytest
+import shapely
+from hypothesis import example, given, settings
+from hypothesis import strategies as st
+from pyproj import CRS
+
+from semsig_gis.catalog import ClassBy, LayerSpec
+from semsig_gis.errors import CatalogError, CrsError, SourceError, UnknownNameError
+from semsig_gis.sources.vector_file import DRIVERS, list_layers, read_layer
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterable
+
+    from semsig_gis.sources import RawLayer
+
+FORMATS = ("csv", "fgb", "geojson", "gpkg", "shp", "zip")
+
+
+def spec_of(**what: Any) -> LayerSpec:  # noqa: ANN401 - any field of a LayerSpec
+    return LayerSpec(**{"name": "things", "class_name": "bench", **what})
+
+
+def frame(xy: Iterable[tuple[float, float]], **columns: Any) -> gpd.GeoDataFrame:  # noqa: ANN401
+    points = shapely.points(np.array(list(xy), dtype=float).reshape(-1, 2))
+    return gpd.GeoDataFrame(columns, geometry=points, crs="EPSG:2154")
+
+
+def write(table: gpd.GeoDataFrame, folder: Path, suffix: str) -> Path:
+    """Write a table in a format of the package's list; a zip holds a shapefile."""
+    path = folder / f"things.{suffix}"
+    if suffix == "csv":
+        columns = table.drop(columns="geometry").assign(x=table.geometry.x, y=table.geometry.y)
+        columns.to_csv(path, sep=";", index=False)
+    elif suffix == "zip":
+        inner = folder / "inner"
+        inner.mkdir()
+        write(table, inner, "shp")
+        pack(inner, path)
+    else:
+        table.to_file(path)
+    return path
+
+
+def pack(folder: Path, archive: Path, inside: str = "") -> Path:
+    with zipfile.ZipFile(archive, "w", zipfile.ZIP_DEFLATED) as target:
+        for file in sorted(folder.iterdir()):
+            target.write(file, inside + file.name)
+    return archive
+
+
+def text_file(folder: Path, name: str, text: str, encoding: str = "utf-8") -> Path:
+    path = folder / name
+    path.write_bytes(text.encode(encoding))
+    return path
+
+
+def geojson(folder: Path, *geometries: object, **members: object) -> Path:
+    features = [
+        {"type": "Feature", "properties": {"n": n}, "geometry": geometry}
+        for n, geometry in enumerate(geometries)
+    ]
+    document = {"type": "FeatureCollection", **members, "features": features}
+    return text_file(folder, "things.geojson", json.dumps(document))
+
+
+def point(*coordinates: object) -> dict[str, object]:
+    return {"type": "Point", "coordinates": coordinates}
+
+
+def crs_member(name: str) -> dict[str, object]:
+    return {"type": "name", "properties": {"name": name}}
+
+
+def xy(layer: RawLayer) -> list[list[float]]:
+    coordinates: list[list[float]] = shapely.get_coordinates(layer.table.geometry.array).tolist()
+    return coordinates
+
+
+def adds_up(layer: RawLayer) -> bool:
+    return layer.read == len(layer.table) + layer.filtered + layer.error_count
+
+
+# --- Montpellier as published -----------------------------------------------------------------
+
+
+@pytest.fixture(scope="session")
+def montpellier(geodata: Path) -> Callable[[str], Path]:
+    return lambda name: geodata / "montpellier" / f"VilleMTP_MTP_{name}"
+
+
+@pytest.mark.parametrize(
+    ("name", "rows", "unique", "epsg"),
+    [
+        ("ArbresAlign", 23972, 23972, 2154),
+        ("EclairagePublic", 29969, 29743, 2154),
+        ("PassagesPiet", 3130, 3130, 2154),
+        ("Horodateurs_2011", 823, 701, 2154),
+        ("PlacesReserv", 309, 309, 2154),
+        ("PlacesGIG", 477, 477, 2154),
+        ("Defibrillateurs", 167, 167, 2154),
+        ("Fontaines", 48, 48, 4171),
+    ],
+)
+def test_published_layers(
+    montpellier: Callable[[str], Path], name: str, rows: int, unique: int, epsg: int
+) -> None:
+    layer = read_layer(montpellier(f"{name}.zip"), spec_of())
+    assert (layer.read, len(layer.table)) == (rows, rows)
+    assert (layer.filtered, layer.error_count, layer.notes) == (0, 0, ())
+    assert list(layer.table.columns) == ["class_name", "source_id", "geometry"]
+    assert layer.table.crs == CRS.from_epsg(epsg)
+    assert len(np.unique(np.round(xy(layer), 6 if epsg == 4171 else 2), axis=0)) == unique
+
+
+def test_published_coordinates_are_not_touched(montpellier: Callable[[str], Path]) -> None:
+    path = montpellier("Horodateurs_2011.zip")
+    with zipfile.ZipFile(path) as archive:
+        shp = archive.read("VilleMTP_MTP_Horodateurs_2011.shp")
+    # Of a point shapefile: a header of 100 bytes, then 8 + 20 bytes a record, x and y at the end.
+    stored = [struct.unpack_from("<2d", shp, 100 + 28 * n + 12) for n in range(823)]
+    assert xy(read_layer(path, spec_of())) == [list(pair) for pair in stored]
+
+
+def test_published_fountains_in_service(montpellier: Callable[[str], Path]) -> None:
+    path = montpellier("FontainesPublic.zip")
+    spec = spec_of(where=(("ETAT", ("en fonction",)),), id_field="ID")
+    layer = read_layer(path, spec)
+    assert (layer.read, layer.filtered, len(layer.table)) == (89, 25, 64)
+    assert layer.table["source_id"].iloc[0] == "1"
+    assert len(read_layer(path, spec, filters=False).table) == 89
+
+
+def test_published_bays_have_classes_by_field(montpellier: Callable[[str], Path]) -> None:
+    spec = spec_of(class_by=ClassBy("F01_TYPE_D", (("Taxi", "taxi_station"),)))
+    classes = read_layer(montpellier("PlacesReserv.zip"), spec).table["class_name"]
+    assert classes.value_counts().to_dict() == {"bench": 303, "taxi_station": 6}
+
+
+def test_published_polygons_and_lines_are_kept_as_they_are(
+    montpellier: Callable[[str], Path],
+) -> None:
+    layer = read_layer(montpellier("Batiments.zip"), spec_of(geometry="polygon"))
+    assert (len(layer.table), layer.error_count, layer.notes) == (3356, 0, ())
+    assert set(layer.table.geom_type) <= {"Polygon", "MultiPolygon"}
+    layer = read_layer(montpellier("AccTrottoir.zip"), spec_of())
+    assert layer.notes == ("7654 of 7654 rows are LineString, not point",)
+
+
+def test_published_geojson_that_is_not_in_degrees(montpellier: Callable[[str], Path]) -> None:
+    path = montpellier("Signalisation.geojson")
+    with pytest.raises(CrsError, match=r"\(767686\.3955, 6279032\.6454\).*state the crs"):
+        read_layer(path, spec_of())
+    by_user = read_layer(path, spec_of(), crs="EPSG:2154")
+    by_catalogue = read_layer(path, spec_of(crs="EPSG:2154"))
+    twin = read_layer(montpellier("Signalisation.zip"), spec_of())
+    assert by_user.table.crs == by_catalogue.table.crs == twin.table.crs
+    assert by_user.notes == by_catalogue.notes == ()
+    np.testing.assert_allclose(xy(by_user), xy(twin), atol=1e-6)
+    assert list_layers(path)[0].crs is None
+
+
+def test_published_crs_without_a_name_is_none(montpellier: Callable[[str], Path]) -> None:
+    path = montpellier("EspacesVertsGlobal.zip")
+    assert list_layers(path)[0].crs is None
+    with pytest.raises(CrsError, match="does not say which CRS"):
+        read_layer(path, spec_of())
+    assert read_layer(path, spec_of(), crs="EPSG:2154").table.crs == CRS.from_epsg(2154)
+
+
+def test_published_crs_goes_before_what_is_expected(montpellier: Callable[[str], Path]) -> None:
+    layer = read_layer(montpellier("Fontaines.zip"), spec_of(crs="EPSG:2154"))
+    assert layer.table.crs == CRS.from_epsg(4171)
+    assert layer.notes == (
+        "the file is in EPSG:4171, not in EPSG:2154 as stated; the file's CRS is used",
+    )
+
+
+def test_published_layers_are_listed(montpellier: Callable[[str], Path]) -> None:
+    (layer,) = list_layers(montpellier("EclairagePublic.zip"))
+    assert (layer.name, layer.geometry) == ("VilleMTP_MTP_EclairagePublic", "Point")
+    assert (layer.crs, layer.rows) == ("EPSG:2154", 29969)
+    assert layer.fields == (("type_lante", "str:50"),)
+
+
+def test_published_paris_geopackage_and_csv(geodata: Path) -> None:
+    layer = read_layer(geodata / "paris" / "gpdtut_paris_trees.gpkg", spec_of())
+    assert (layer.error_count, layer.notes) == (0, ())
+    assert len(layer.table) == layer.read > 1000
+    with pytest.raises(SourceError, match=r"no coordinate columns.*its columns are IDBASE, TYPE"):
+        read_layer(geodata / "paris" / "les-arbres_julien2019.csv", spec_of())
+
+
+@pytest.fixture
+def fountains(montpellier: Callable[[str], Path], tmp_path: Path) -> Path:
+    """Return an unpacked copy of a real shapefile of 89 points."""
+    with zipfile.ZipFile(montpellier("FontainesPublic.zip")) as archive:
+        archive.extractall(tmp_path / "fountains")
+    return tmp_path / "fountains" / "VilleMTP_MTP_FontainesPublic.shp"
+
+
+def cut(path: Path, size: int) -> None:
+    path.write_bytes(path.read_bytes()[:size])
+
+
+def test_truncated_shapefile_loses_only_its_end(fountains: Path, tmp_path: Path) -> None:
+    cut(fountains, 100 + 28 * 50)  # 50 whole records
+    layer = read_layer(fountains, spec_of())
+    assert (layer.read, len(layer.table), layer.error_count) == (89, 50, 39)
+    assert len(layer.errors) == 10
+    assert layer.errors[0].startswith("row 51: Error in fread()")
+    zipped = read_layer(pack(fountains.parent, tmp_path / "cut.zip"), spec_of())
+    assert (zipped.read, len(zipped.table), zipped.error_count) == (89, 50, 39)
+
+
+def test_truncated_attributes_lose_only_their_end(fountains: Path) -> None:
+    cut(fountains.with_suffix(".dbf"), 10_000)
+    layer = read_layer(fountains, spec_of(id_field="ID"))
+    assert (layer.read, len(layer.table), layer.error_count) == (89, 27, 62)
+    assert layer.errors[0] == "row 28: fread(343) failed on DBF file"
+
+
+def test_corrupt_records_are_counted(fountains: Path) -> None:
+    content = bytearray(fountains.read_bytes())
+    struct.pack_into("<d", content, 100 + 28 * 5 + 12, math.nan)  # x of row 6
+    struct.pack_into("<i", content, 100 + 28 * 9 + 8, 0)  # row 10 becomes a null shape
+    struct.pack_into("<i", content, 100 + 28 * 11 + 8, 5)  # row 12 becomes a polygon
+    fountains.write_bytes(content)
+    layer = read_layer(fountains, spec_of())
+    assert (layer.read, len(layer.table), layer.error_count) == (89, 87, 2)
+    assert layer.errors[0].startswith("row 6: its coordinates (nan, 6279715.2637")
+    assert layer.errors[1].startswith("row 12: Corrupted .shp file")
+    assert layer.table.geometry.isna().sum() == 1
+
+
+@pytest.mark.parametrize(
+    ("suffix", "message"),
+    [(".shp", "unreadable, or corrupt"), (".shx", "shx")],
+)
+def test_useless_shapefile(fountains: Path, suffix: str, message: str) -> None:
+    cut(fountains.with_suffix(suffix), 50)
+    with pytest.raises(SourceError, match=f"{message}.*get it again"):
+        read_layer(fountains, spec_of())
+
+
+def test_damaged_archives(montpellier: Callable[[str], Path], tmp_path: Path) -> None:
+    path = Path(shutil.copy(montpellier("FontainesPublic.zip"), tmp_path / "copy.zip"))
+    content = path.read_bytes()
+    path.write_bytes(content[: len(content) // 2])
+    with pytest.raises(SourceError, match=r"copy\.zip cannot be read \(File is not a zip file\)"):
+        list_layers(path)
+    path.write_bytes(content[:3000] + bytes(100) + content[3100:])
+    with pytest.raises(SourceError, match=r"copy\.zip is damaged at VilleMTP_MTP_Fontaines.*shx"):
+        read_layer(path, spec_of())
+
+
+# --- Formats ----------------------------------------------------------------------------------
+
+# Eighths of a metre are exact in binary and in the fifteen digits that text formats keep.
+metres = st.integers(-80_000_000, 80_000_000).map(lambda n: n / 8)
+things = st.lists(
+    st.tuples(metres, metres, st.sampled_from(["bench", "Bänk", "a, b; c", "x"])), min_size=1
+)
+
+
+@pytest.mark.parametrize("suffix", FORMATS)
+@given(rows=things)
+@example(rows=[(0.0, 0.0, "x")])
+@settings(max_examples=20)
+def test_round_trip(suffix: str, rows: list[tuple[float, float, str]]) -> None:
+    x, y, kinds = zip(*rows, strict=True)
+    table = frame(zip(x, y, strict=True), ident=np.arange(len(rows)) + 100, kind=list(kinds))
+    spec = spec_of(id_field="ident", where=(("kind", ("Bänk", "a, b; c")),), crs="EPSG:2154")
+    with tempfile.TemporaryDirectory() as folder:
+        path = write(table, Path(folder), suffix)
+        layer = read_layer(path, spec)
+        (info,) = list_layers(path)
+        numbered = read_layer(path, spec_of(crs="EPSG:2154"), filters=False)
+    assert info.rows == layer.read == len(rows)
+    assert info.crs == (None if suffix == "csv" else "EPSG:2154")
+    assert {"ident", "kind"} <= dict(info.fields).keys()
+    assert adds_up(layer)
+    assert layer.error_count == 0
+    assert layer.table.crs == CRS.from_epsg(2154)
+    expected = {
+        str(100 + n): [a, b] for n, (a, b, kind) in enumerate(rows) if kind in {"Bänk", "a, b; c"}
+    }
+    # FlatGeobuf stores features in the order of a space-filling curve.
+    assert dict(zip(layer.table["source_id"], xy(layer), strict=True)) == expected
+    assert layer.table["source_id"].is_unique
+    assert sorted(xy(numbered)) == sorted([a, b] for a, b, _ in rows)
+    assert numbered.table["source_id"].is_unique
+
+
+@pytest.mark.parametrize("suffix", FORMATS)
+def test_names_that_a_url_would_cut(suffix: str, tmp_path: Path) -> None:
+    plain = tmp_path / "plain"
+    plain.mkdir()
+    path = write(frame([(1, 2)], n=[1]), plain, suffix)
+    folder = plain.rename(tmp_path / "a#b ?c=1&d!e")
+    path = folder / path.name
+    if suffix != "shp":
+        path = path.rename(folder / f"x#y?z! %20.{suffix}")
+    assert read_layer(path, spec_of(crs="EPSG:2154")).read == 1
+    assert list_layers(path)[0].rows == 1
+
+
+@pytest.mark.parametrize("suffix", ["fgb", "geojson", "gpkg", "shp"])
+def test_null_and_empty_geometries_are_no_errors(suffix: str, tmp_path: Path) -> None:
+    table = frame([(1, 2), (3, 4), (5, 6), (7, 8)], n=[1, 2, 3, 4])
+    table.loc[1, "geometry"] = None
+    table.loc[2, "geometry"] = shapely.Point()
+    path = tmp_path / f"things.{suffix}"
+    table.to_file(path, **({"SPATIAL_INDEX": "NO"} if suffix == "fgb" else {}))
+    layer = read_layer(path, spec_of())
+    assert (layer.read, len(layer.table), layer.error_count) == (4, 4, 0)
+    missing = layer.table.geometry.isna() | layer.table.geometry.is_empty
+    assert missing.tolist() == [False, True, True, False]
+
+
+@pytest.mark.parametrize("suffix", ["fgb", "geojson", "gpkg", "shp"])
+def test_empty_layer_is_read(suffix: str, tmp_path: Path) -> None:
+    path = tmp_path / f"things.{suffix}"
+    schema = {"geometry": "Point", "properties": {"kind": "str"}}
+    driver = DRIVERS[path.suffix]
+    with fiona.open(path, "w", driver=driver, crs="EPSG:2154", schema=schema):
+        pass
+    layer = read_layer(path, spec_of(rows=(1, 5)))
+    assert (layer.read, len(layer.table), layer.notes) == (0, 0, ("the layer has no rows",))
+    assert list(layer.table.columns) == ["class_name", "source_id", "geometry"]
+    assert list_layers(path)[0].rows == 0
+
+
+def test_other_geometries_are_noted(tmp_path: Path) -> None:
+    shapes: list[dict[str, object]] = [
+        point(3, 43),
+        {"type": "MultiPoint", "coordinates": [[3, 43], [3, 44]]},
+        {"type": "LineString", "coordinates": [[3, 43], [3, 44]]},
+        {"type": "Polygon", "coordinates": [[[3, 43], [3, 44], [4, 44], [3, 43]]]},
+        {"type": "GeometryCollection", "geometries": [point(3, 43)]},
+    ]
+    path = geojson(tmp_path, *shapes)
+    layer = read_layer(path, spec_of(rows=(10, 20)))
+    assert layer.table.geom_type.tolist() == [shape["type"] for shape in shapes]
+    assert layer.notes == (
+        "the layer has 5 rows, and 10 to 20 were expected",
+        "3 of 5 rows are GeometryCollection, LineString, Polygon, not point",
+    )
+
+
+def test_third_dimension_is_left_out_of_points(tmp_path: Path) -> None:
+    layer = read_layer(geojson(tmp_path, point(3, 43, 12)), spec_of())
+    assert not layer.table.has_z.any()
+
+
+# --- Bad features -----------------------------------------------------------------------------
+
+
+def test_broken_geojson_geometries_are_told_from_null_ones(tmp_path: Path) -> None:
+    good = [
+        point(3, 43),
+        None,
+        point(),
+        {"type": "GeometryCollection", "geometries": []},
+        {"type": "MultiPoint", "coordinates": [[]]},
+    ]
+    bad = [
+        point("a", "b"),
+        {"type": "Point"},
+        {"type": "Dot", "coordinates": [1, 2]},
+        point(1),
+        point(None, None),
+        "text",
+        {"type": "LineString", "coordinates": [[1, 2]]},
+        {"type": "Polygon", "coordinates": [[[1, 2], [2, 3]]]},
+    ]
+    layer = read_layer(geojson(tmp_path, *bad, *good), spec_of())
+    assert (layer.read, len(layer.table), layer.error_count) == (13, 5, 8)
+    assert [message.split(":")[0] for message in layer.errors] == [f"row {n}" for n in range(1, 9)]
+    assert layer.errors[0] == "row 1: its geometry is not valid GeoJSON"
+    assert layer.errors[6].startswith("row 7: its LineString is not valid")
+    zipped = tmp_path / "zipped.zip"
+    with zipfile.ZipFile(zipped, "w") as archive:
+        archive.write(tmp_path / "things.geojson", "below/things.geojson")
+    assert read_layer(zipped, spec_of()).errors == layer.errors
+
+
+def test_coordinates_that_are_not_finite(tmp_path: Path) -> None:
+    line = {"type": "LineString", "coordinates": [[1, 2], [math.nan, 3]]}
+    path = geojson(tmp_path, point(3, 43), point(math.nan, 43), point(3, math.inf), line)
+    layer = read_layer(path, spec_of())
+    assert (layer.read, len(layer.table), layer.error_count) == (4, 1, 3)
+    assert layer.errors == (
+        "row 2: its coordinates (nan, 43) are not finite",
+        "row 3: its coordinates (3, inf) are not finite",
+        "row 4: its coordinates (nan, 3) are not finite",
+    )
+
+
+def test_truncated_flatgeobuf_loses_only_its_end(tmp_path: Path) -> None:
+    path = write(frame([(n, n) for n in range(2000)], n=range(2000)), tmp_path, "fgb")
+    cut(path, 2 * path.stat().st_size // 3)
+    layer = read_layer(path, spec_of())
+    assert adds_up(layer)
+    assert layer.read == 2000
+    assert 0 < len(layer.table) < 2000
+    assert len(layer.errors) == 10
+
+
+@pytest.mark.parametrize("suffix", ["geojson", "gpkg"])
+def test_other_truncated_files_are_refused(suffix: str, tmp_path: Path) -> None:
+    path = write(frame([(n, n) for n in range(2000)], n=range(2000)), tmp_path, suffix)
+    cut(path, path.stat().st_size // 2)
+    with pytest.raises(SourceError, match=r"things.* cannot be read \(.*get it again"):
+        read_layer(path, spec_of())
+
+
+def test_gdal_keeps_quiet(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str], caplog: pytest.LogCaptureFixture
+) -> None:
+    path = write(frame([(n, n) for n in range(9)], n=range(9)), tmp_path, "shp")
+    cut(path, 200)
+    assert read_layer(path, spec_of()).error_count == 6
+    geojson(tmp_path, point("a", "b"), point(3, 43))
+    assert read_layer(tmp_path / "things.geojson", spec_of()).error_count == 1
+    with pytest.raises(SourceError):
+        read_layer(text_file(tmp_path, "none.gpkg", "none"), spec_of())
+    assert caplog.records == []
+    assert capfd.readouterr().err == ""
+    # What others do with fiona still reaches their log.
+    with fiona.open(path) as source:
+        assert len(list(source)) == 9
+    assert "Error in fread" in caplog.text
+
+
+# --- CSV --------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("separator", [";", ",", "\t"])
+@pytest.mark.parametrize("header", ["lon lat", "Longitude LATITUDE", "X Y", "lat lon", "y x"])
+@pytest.mark.parametrize("encoding", ["utf-8", "utf-8-sig"])
+def test_csv_dialects(tmp_path: Path, separator: str, header: str, encoding: str) -> None:
+    names = header.split()
+    values = ["43.5", "3.25"] if names[0] in {"lat", "y"} else ["3.25", "43.5"]
+    lines = [separator.join(["ident", *names]), separator.join(["7", *values])]
+    path = text_file(tmp_path, "things.csv", "\r\n".join(lines) + "\r\n", encoding)
+    layer = read_layer(path, spec_of(crs="EPSG:4326", id_field="ident"))
+    assert xy(layer) == [[3.25, 43.5]]
+    assert layer.table["source_id"].tolist() == ["7"]
+    (info,) = list_layers(path)
+    assert (info.geometry, info.crs) == ("Point", None)
+    assert [name for name, _ in info.fields] == ["ident", *names]
+
+
+def test_csv_columns_by_name_go_first(tmp_path: Path) -> None:
+    text = "x;y;size (a, b, c, d);east;north\n1;2;9,5;765277,5;6275109,25\n"
+    path = text_file(tmp_path, "things.csv", text)
+    named = spec_of(crs="EPSG:2154", x_field="east", y_field="north")
+    assert xy(read_layer(path, named)) == [[765277.5, 6275109.25]]
+    assert xy(read_layer(path, spec_of(crs="EPSG:2154"))) == [[1.0, 2.0]]
+
+
+def test_csv_degrees_go_before_a_plane(tmp_path: Path) -> None:
+    path = text_file(tmp_path, "things.csv", "x,y,lat,lon\n765277,6275109,43.5,3.25\n")
+    assert xy(read_layer(path, spec_of(crs="EPSG:4326"))) == [[3.25, 43.5]]
+
+
+def test_csv_rows_without_numbers_are_errors(tmp_path: Path) -> None:
+    rows = ["1;2", "here;2", "1;", ";", " ; ", "nan;1", "1;inf", "1,5;2", "1", "1;2;3;4"]
+    path = text_file(tmp_path, "things.csv", "x;y\n" + "\n".join(rows) + "\n")
+    layer = read_layer(path, spec_of(crs="EPSG:2154"))
+    assert (layer.read, len(layer.table), layer.error_count) == (10, 5, 5)
+    assert layer.errors == (
+        "row 2: x 'here' is not a number",
+        "row 3: y '' is not a number",
+        "row 6: x 'nan' is not a number",
+        "row 7: y 'inf' is not a number",
+        "row 9: y '' is not a number",
+    )
+    assert layer.table.geometry.isna().sum() == 2
+    assert xy(layer) == [[1.0, 2.0], [1.5, 2.0], [1.0, 2.0]]
+
+
+def test_csv_numeric_headers_are_headers(tmp_path: Path) -> None:
+    path = text_file(tmp_path, "things.csv", "x,y,2014\n1,2,3\n")
+    assert read_layer(path, spec_of(crs="EPSG:2154", where=(("2014", (3,)),))).read == 1
+
+
+def test_csv_needs_coordinates(tmp_path: Path) -> None:
+    path = text_file(tmp_path, "things.csv", "ident;place\n1;here\n")
+    with pytest.raises(SourceError, match=r"x_field and y_field; its columns are ident, place"):
+        read_layer(path, spec_of())
+    with pytest.raises(CatalogError, match=r"'plase'.*x_field; the nearest is 'place'"):
+        read_layer(path, spec_of(x_field="plase", y_field="place"))
+    assert list_layers(path)[0].geometry == "None"
+
+
+def test_csv_in_another_encoding(tmp_path: Path) -> None:
+    path = text_file(tmp_path, "things.csv", "nom;x;y\nété;1;2\n", "latin-1")
+    layer = read_layer(path, spec_of(crs="EPSG:2154", where=(("nom", ("hiver",)),)))
+    assert layer.notes == ("some text is not UTF-8 and was read as missing",)
+    path = text_file(tmp_path, "things.csv", "prénom;x;y\na;1;2\n", "latin-1")
+    with pytest.raises(SourceError, match="is not UTF-8 text; save it as UTF-8"):
+        read_layer(path, spec_of(crs="EPSG:2154"))
+    with pytest.raises(SourceError, match="is not UTF-8 text"):
+        list_layers(text_file(tmp_path, "things.csv", "n;x;y\na;1;2\n", "utf-16"))
+
+
+# --- CRS --------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("suffix", ["csv", "fgb", "gpkg", "shp"])
+@pytest.mark.filterwarnings("ignore:'crs' was not provided")
+def test_missing_crs_is_asked_for(suffix: str, tmp_path: Path) -> None:
+    table = frame([(765277, 6275109)], n=[1]).set_crs(None, allow_override=True)
+    path = write(table, tmp_path, suffix)
+    assert list_layers(path)[0].crs is None
+    with pytest.raises(CrsError, match=r"'things'.*does not say which CRS.*state its crs"):
+        read_layer(path, spec_of())
+    assert read_layer(path, spec_of(crs="EPSG:2154")).table.crs == CRS.from_epsg(2154)
+    layer = read_layer(path, spec_of(crs="EPSG:4326"), crs="EPSG:2154")  # the user knows better
+    assert layer.table.crs == CRS.from_epsg(2154)
+    with pytest.raises(CrsError, match="CRS 'EPSG:99' is unknown"):
+        read_layer(path, spec_of(), crs="EPSG:99")
+
+
+def test_geojson_is_in_degrees_unless_said_otherwise(tmp_path: Path) -> None:
+    path = geojson(tmp_path, point(3, 43))
+    assert read_layer(path, spec_of()).table.crs == CRS.from_epsg(4326)
+    assert list_layers(path)[0].crs == "EPSG:4326"
+    layer = read_layer(path, spec_of(crs="EPSG:2154"))
+    assert layer.table.crs == CRS.from_epsg(2154)
+    assert layer.notes == ("the coordinates look like degrees, yet EPSG:2154 is stated",)
+
+
+def test_geojson_crs_member_holds(tmp_path: Path) -> None:
+    path = geojson(tmp_path, point(765277, 6275109), crs=crs_member("urn:ogc:def:crs:EPSG::2154"))
+    layer = read_layer(path, spec_of(crs="EPSG:2154"))
+    assert (layer.table.crs, layer.notes) == (CRS.from_epsg(2154), ())
+    path = geojson(tmp_path, point(3, 43), crs=crs_member("urn:ogc:def:crs:OGC:1.3:CRS84"))
+    layer = read_layer(path, spec_of(crs="EPSG:2154"))
+    assert layer.table.crs == CRS.from_epsg(4326)
+    assert layer.notes[0].startswith("the file is in EPSG:4326, not in EPSG:2154")
+
+
+@pytest.mark.parametrize("member", [None, crs_member("urn:nobody:knows")])
+def test_geojson_crs_member_that_says_nothing(tmp_path: Path, member: object) -> None:
+    path = geojson(tmp_path, point(3, 43), crs=member)
+    with pytest.raises(CrsError, match="does not say which CRS"):
+        read_layer(path, spec_of())
+    assert list_layers(path)[0].crs is None
+
+
+def test_a_property_named_crs_is_no_crs(tmp_path: Path) -> None:
+    feature = {"type": "Feature", "properties": {"crs": "EPSG:2154"}, "geometry": point(3, 43)}
+    document = {"type": "FeatureCollection", "features": [feature]}
+    path = text_file(tmp_path, "things.geojson", json.dumps(document))
+    assert read_layer(path, spec_of()).table.crs == CRS.from_epsg(4326)
+
+
+def test_a_few_points_off_the_globe_are_bad_rows(tmp_path: Path) -> None:
+    path = geojson(tmp_path, point(3, 43), point(3, 430), point(180, 90), point(-180, -90))
+    layer = read_layer(path, spec_of())
+    assert (len(layer.table), layer.error_count) == (3, 1)
+    assert layer.errors == ("row 2: its coordinates (3, 430) are not in EPSG:4326",)
+
+
+def test_a_file_that_contradicts_itself(tmp_path: Path) -> None:
+    member = crs_member("urn:ogc:def:crs:EPSG::4326")
+    path = geojson(tmp_path, point(765277, 6275109), crs=member)
+    with pytest.raises(CrsError, match="correct the file"):
+        read_layer(path, spec_of(), crs="EPSG:2154")
+
+
+def test_a_crs_of_no_place_is_none(tmp_path: Path) -> None:
+    plane = 'LOCAL_CS["Undefined Cartesian SRS",UNIT["metre",1],AXIS["X",EAST],AXIS["Y",NORTH]]'
+    path = write(frame([(1, 2)], n=[1]), tmp_path, "shp")
+    for wkt in (plane, "nonsense"):
+        path.with_suffix(".prj").write_text(wkt)
+        assert list_layers(path)[0].crs is None
+
+
+# --- Rows -------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("suffix", FORMATS)
+def test_where_compares_values_exactly(suffix: str, tmp_path: Path) -> None:
+    table = frame(
+        [(n, 0) for n in range(5)],
+        kind=["Tree", "tree", "Tree ", "Trees", "Tree"],
+        size=[1, 2, 3, 10, 1],
+        height=[1.0, 1.5, 2.0, 2.5, 1.0],
+    )
+    path = write(table, tmp_path, suffix)
+
+    def kept(*where: tuple[str, tuple[Any, ...]]) -> int:
+        layer = read_layer(path, spec_of(where=where, crs="EPSG:2154"))
+        assert adds_up(layer)
+        return len(layer.table)
+
+    assert kept(("kind", ("tree", "Trees"))) == 2
+    assert kept(("size", (1,))) == kept(("size", (1.0,))) == kept(("size", ("1",))) == 2
+    assert kept(("size", (1, 10))) == 3
+    assert kept(("height", (1.5,))) == kept(("height", ("1.5",))) == 1
+    assert kept(("height", (1,))) == 2
+    assert kept(("kind", ("Tree",)), ("size", (1,))) == 2
+    assert kept(("kind", ("tree",)), ("size", (1,))) == 0
+    assert kept(("kind", (1,))) == 0
+    assert kept(("size", (True,))) == 0
+
+
+def test_where_on_logical_and_missing_values(tmp_path: Path) -> None:
+    rows: list[dict[str, object]] = [{"on": True}, {"on": False}, {"on": None}, {}]
+    features = [{"type": "Feature", "properties": row, "geometry": point(3, 43)} for row in rows]
+    document = {"type": "FeatureCollection", "features": features}
+    path = text_file(tmp_path, "things.geojson", json.dumps(document))
+    assert read_layer(path, spec_of(where=(("on", (True,)),))).filtered == 3
+    assert read_layer(path, spec_of(where=(("on", ("false",)),))).filtered == 3
+    assert read_layer(path, spec_of(where=(("on", (1,)),))).filtered == 4
+
+
+@pytest.mark.parametrize(
+    ("key", "spec"),
+    [
+        ("where", spec_of(where=(("kinds", ("a",)),), crs="EPSG:2154")),
+        ("class_by", spec_of(class_by=ClassBy("kinds", (("a", "bench"),)), crs="EPSG:2154")),
+        ("id_field", spec_of(id_field="kinds", crs="EPSG:2154")),
+    ],
+)
+@pytest.mark.parametrize("suffix", FORMATS)
+def test_missing_fields_are_named(suffix: str, key: str, spec: LayerSpec, tmp_path: Path) -> None:
+    path = write(frame([(1, 2)], kind=["a"], size=[1]), tmp_path, suffix)
+    message = rf"layer 'things' \(.*\) has no field 'kinds'.*in {key}; the nearest is 'kind'.*size"
+    with pytest.raises(CatalogError, match=message):
+        read_layer(path, spec)
+
+
+def test_filter_that_is_not_applied_needs_no_field(tmp_path: Path) -> None:
+    path = write(frame([(1, 2)], kind=["a"]), tmp_path, "gpkg")
+    spec = spec_of(where=(("kinds", ("a",)),))
+    assert len(read_layer(path, spec, filters=False).table) == 1
+
+
+def test_class_by_value(tmp_path: Path) -> None:
+    path = write(frame([(n, 0) for n in range(4)], kind=[1.0, 2.0, 3.0, None]), tmp_path, "gpkg")
+    by = ClassBy("kind", (("1", "bus_stop"), (2, "taxi_station")))
+    classes = read_layer(path, spec_of(class_by=by)).table["class_name"]
+    assert classes.tolist() == ["bus_stop", "taxi_station", "bench", "bench"]
+
+
+def test_identifiers(tmp_path: Path) -> None:
+    path = write(frame([(n, 0) for n in range(3)], n=[123704.0, 1.5, None]), tmp_path, "gpkg")
+    assert read_layer(path, spec_of(id_field="n")).table["source_id"].tolist() == [
+        "123704",
+        "1.5",
+        "3",  # no value: the feature's number
+    ]
+    text = "n;x;y\n123704.0;1;2\n 007 ;1;2\n1.50;1;2\nA1.0;1;2\n;1;2\n"
+    layer = read_layer(text_file(tmp_path, "t.csv", text), spec_of(id_field="n", crs="EPSG:2154"))
+    assert layer.table["source_id"].tolist() == ["123704", "007", "1.50", "A1.0", "5"]
+
+
+# --- Containers and files ---------------------------------------------------------------------
+
+
+@pytest.fixture
+def container(tmp_path: Path) -> Path:
+    path = tmp_path / "city.gpkg"
+    frame([(1, 2)], n=[1]).to_file(path, layer="trees")
+    frame([(1, 2), (3, 4)], n=[1, 2]).to_file(path, layer="lights")
+    return path
+
+
+def test_layers_of_a_container(container: Path) -> None:
+    assert [(layer.name, layer.rows) for layer in list_layers(container)] == [
+        ("trees", 1),
+        ("lights", 2),
+    ]
+    assert read_layer(container, spec_of(layer="lights")).read == 2
+    with pytest.raises(SourceError, match=r"holds 2 layers \(trees, lights\); name the one"):
+        read_layer(container, spec_of())
+    with pytest.raises(UnknownNameError, match=r"no layer 'light'; the nearest is 'lights'"):
+        read_layer(container, spec_of(layer="light"))
+
+
+def test_tables_without_geometry_are_not_meant(container: Path, tmp_path: Path) -> None:
+    alone = tmp_path / "alone.gpkg"
+    frame([(1, 2)], n=[1]).to_file(alone, layer="trees")
+    schema = {"geometry": "None", "properties": {"styleName": "str"}}
+    for path in (alone, container):
+        with fiona.open(path, "w", driver="GPKG", layer="layer_styles", schema=schema) as table:
+            table.write({"geometry": None, "properties": {"styleName": "red"}})
+    assert read_layer(alone, spec_of()).read == 1
+    with pytest.raises(SourceError, match=r"holds 2 layers \(trees, lights\)"):
+        read_layer(container, spec_of())
+    with pytest.raises(SourceError, match="has no geometry"):
+        read_layer(alone, spec_of(layer="layer_styles"))
+    assert list_layers(alone)[1].geometry == "None"
+
+
+def test_archive_with_folders_and_companions(tmp_path: Path) -> None:
+    inner = tmp_path / "inner"
+    inner.mkdir()
+    write(frame([(1, 2)], n=[1]), inner, "shp")
+    text_file(inner, "legend.csv", "code;meaning\n1;oak\n")
+    text_file(inner, "metadata.json", "{}")
+    path = pack(inner, tmp_path / "city.zip", inside="data/2014/")
+    assert [layer.name for layer in list_layers(path)] == ["things"]
+    assert read_layer(path, spec_of()).read == 1
+    geojson(inner, point(3, 43))
+    two = pack(inner, tmp_path / "two.zip")
+    with pytest.raises(SourceError, match="holds 2 layers"):
+        read_layer(two, spec_of())
+
+
+def test_archive_of_a_csv(tmp_path: Path) -> None:
+    inner = tmp_path / "inner"
+    inner.mkdir()
+    text_file(inner, "things.csv", "x;y\n1;2\n", "utf-8-sig")
+    path = pack(inner, tmp_path / "things.zip")
+    assert xy(read_layer(path, spec_of(crs="EPSG:2154"))) == [[1.0, 2.0]]
+
+
+def test_archive_without_a_layer(tmp_path: Path) -> None:
+    inner = tmp_path / "inner"
+    inner.mkdir()
+    text_file(inner, "readme.txt", "nothing")
+    with pytest.raises(SourceError, match=r"holds no vector file, only readme\.txt; one of \.csv"):
+        read_layer(pack(inner, tmp_path / "a.zip"), spec_of())
+    with zipfile.ZipFile(tmp_path / "b.zip", "w"):
+        pass
+    with pytest.raises(SourceError, match="only nothing"):
+        read_layer(tmp_path / "b.zip", spec_of())
+
+
+def test_files_that_are_none(tmp_path: Path) -> None:
+    with pytest.raises(SourceError, match=r"none\.shp does not exist; give a vector file"):
+        read_layer(tmp_path / "none.shp", spec_of())
+    with pytest.raises(SourceError, match="is a folder"):
+        list_layers(tmp_path)
+    with pytest.raises(SourceError, match=r"a\.txt is not a vector file; give one of \.csv"):
+        list_layers(text_file(tmp_path, "a.txt", "x,y\n1,2\n"))
+
+
+@pytest.mark.parametrize("suffix", ["csv", "fgb", "geojson", "gpkg", "json", "shp"])
+@pytest.mark.parametrize("text", ["", '[{"a": 1}]'])
+def test_content_that_belies_its_name(suffix: str, text: str, tmp_path: Path) -> None:
+    path = text_file(tmp_path, f"things.{suffix}", text)
+    with pytest.raises(SourceError, match=rf"things\.{suffix}"):
+        read_layer(path, spec_of(crs="EPSG:4326"))
+
+
+def test_drivers_are_limited(tmp_path: Path) -> None:
+    geojson(tmp_path, point(3, 43))
+    link = (
+        "<OGRVRTDataSource><OGRVRTLayer name='things'>"
+        f"<SrcDataSource>{tmp_path / 'things.geojson'}</SrcDataSource>"
+        "</OGRVRTLayer></OGRVRTDataSource>"
+    )
+    path = text_file(tmp_path, "link.geojson", link)
+    with fiona.open(path, allow_unsupported_drivers=True) as followed:  # GDAL not held back
+        assert followed.driver == "OGR_VRT"
+    with pytest.raises(SourceError, match="not the kind of file that its name says"):
+        list_layers(path)
+
+
+def test_empty_geopackage(tmp_path: Path) -> None:
+    path = tmp_path / "empty.gpkg"
+    frame([(1, 2)], n=[1]).to_file(path)
+    fiona.remove(str(path), driver="GPKG", layer="empty")
+    with pytest.raises(SourceError, match=r"empty\.gpkg"):
+        read_layer(path, spec_of())
+
+
+def test_table_has_text_columns(tmp_path: Path) -> None:
+    for rows in ([], [(1, 2)]):
+        table = frame(rows, n=list(range(len(rows))))
+        layer = read_layer(write(table, tmp_path, "gpkg"), spec_of())
+        assert pd.api.types.is_string_dtype(layer.table["class_name"])
+        assert pd.api.types.is_string_dtype(layer.table["source_id"])
+        assert layer.table.geometry.name == "geometry"
