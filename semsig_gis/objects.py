@@ -1,0 +1,441 @@
+"""Street objects: raw layers become one checked table of points in a metric CRS."""
+
+from __future__ import annotations
+
+import functools
+from dataclasses import asdict, dataclass
+from typing import TYPE_CHECKING, Any
+
+import geopandas as gpd
+import numpy as np
+import pandas as pd
+import pyarrow as pa
+import pyarrow.compute as pc
+import shapely
+
+from semsig_gis import __version__
+from semsig_gis.errors import CrsError, DatabaseError, EmptyResultError
+from semsig_gis.schema import (
+    CLASS_CODE,
+    CLASS_NAME,
+    COUNT,
+    GEOMETRY,
+    SOURCE,
+    SOURCE_ID,
+    require_metric_crs,
+)
+from semsig_gis.storage import geo_metadata, read_geoparquet, write_geoparquet
+from semsig_gis.taxonomy import Taxonomy
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+    from pathlib import Path
+
+    from numpy.typing import NDArray
+    from pyproj import CRS
+
+    from semsig_gis.sources import RawLayer
+
+__all__ = [
+    "LayerReport",
+    "LoadReport",
+    "StreetObjects",
+    "build_objects",
+    "open_objects",
+    "save_objects",
+]
+
+KIND = "street objects"
+# Two objects of a class within the same centimetre are one object listed twice.
+SAME_PLACE_M = 0.01
+# Larger than any projected coordinate; files write -1.8e308 and the like for "no value".
+BEYOND_EARTH_M = 1e8
+
+
+@dataclass(frozen=True, eq=False)
+class StreetObjects:
+    """The street objects of a city.
+
+    Parameters
+    ----------
+    table : GeoDataFrame
+        One row an object: ``class_code`` (uint8), ``source`` (layer name), ``source_id``,
+        ``count`` (rows of the sources that were collapsed into it) and ``geometry`` (point in a
+        metric CRS).
+    taxonomy : Taxonomy
+        The classes that the codes belong to.
+    licenses : tuple of str
+        One line for every publisher and licence: who, under what, which layers.
+
+    Examples
+    --------
+    >>> from semsig_gis.sources.synthetic import CitySpec, synthetic_city
+    >>> from semsig_gis.catalog import paper_taxonomy
+    >>> layers = synthetic_city(CitySpec(size=300.0))
+    >>> objects, _ = build_objects(layers, taxonomy=paper_taxonomy(), crs="EPSG:32631")
+    >>> objects.xy.shape == (len(objects), 2)
+    True
+    """
+
+    table: gpd.GeoDataFrame
+    taxonomy: Taxonomy
+    licenses: tuple[str, ...]
+
+    def __len__(self) -> int:  # noqa: D105
+        return len(self.table)
+
+    @property
+    def crs(self) -> CRS:
+        """Metric coordinate reference system of the positions."""
+        crs: CRS = self.table.crs
+        return crs
+
+    @property
+    def codes(self) -> NDArray[np.uint8]:
+        """Class code of every object, shape (n,)."""
+        codes: NDArray[np.uint8] = self.table[CLASS_CODE].to_numpy(np.uint8)
+        return codes
+
+    @functools.cached_property
+    def xy(self) -> NDArray[np.float64]:
+        """Position of every object in metres, shape (n, 2)."""
+        xy: NDArray[np.float64] = shapely.get_coordinates(self.table.geometry.array)
+        xy.setflags(write=False)
+        return xy
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LayerReport:
+    """What became of the rows of one layer; the numbers add up to `read`.
+
+    Parameters
+    ----------
+    name : str
+        Name of the layer.
+    read : int
+        Rows in the source.
+    unreadable : int
+        Rows that could not be read.
+    filtered : int
+        Rows left out by the catalogue's filter.
+    missing : int
+        Rows without a geometry, or with an empty one.
+    misplaced : int
+        Rows whose position has no finite coordinates in the metric CRS, or is off the Earth.
+    collapsed : int
+        Rows at the same place as an earlier object of the same class.
+    kept : int
+        Objects that remain.
+    notes : tuple of str
+        Warnings, and the first messages about unreadable rows.
+
+    Examples
+    --------
+    >>> LayerReport(name="trees", read=2, unreadable=0, filtered=0, missing=1, misplaced=0,
+    ...             collapsed=0, kept=1).kept
+    1
+    """
+
+    name: str
+    read: int
+    unreadable: int
+    filtered: int
+    missing: int
+    misplaced: int
+    collapsed: int
+    kept: int
+    notes: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class LoadReport:
+    """What became of every layer.
+
+    Parameters
+    ----------
+    layers : tuple of LayerReport
+        One report a layer, in the order they were given.
+
+    Examples
+    --------
+    >>> LoadReport(()).to_list()
+    []
+    """
+
+    layers: tuple[LayerReport, ...]
+
+    def to_list(self) -> list[dict[str, Any]]:
+        """Return the reports as plain mappings, ready for JSON.
+
+        Returns
+        -------
+        list of dict
+            One mapping a layer.
+        """
+        return [asdict(layer) for layer in self.layers]
+
+
+def build_objects(
+    layers: Iterable[RawLayer],
+    *,
+    taxonomy: Taxonomy,
+    crs: CRS | str,
+    collapse: bool = True,
+) -> tuple[StreetObjects, LoadReport]:
+    """Turn raw layers into one table of street objects.
+
+    A geometry that is not a point is represented by its centroid (paper, section on semantic
+    signatures). Rows without a usable position are dropped and counted.
+
+    Parameters
+    ----------
+    layers : iterable of RawLayer
+        What the readers of `semsig_gis.sources` return; each has a coordinate reference system.
+    taxonomy : Taxonomy
+        Classes that the layers name.
+    crs : pyproj.CRS or str
+        Metric coordinate reference system to work in.
+    collapse : bool, default True
+        Whether objects of one class at the same place (within the same centimetre) become one,
+        with their number in ``count``.
+
+    Returns
+    -------
+    objects : StreetObjects
+        The objects, in the order of the layers.
+    report : LoadReport
+        What became of every row.
+
+    Raises
+    ------
+    CrsError
+        If `crs` is not metric, or a layer has no coordinate reference system.
+    UnknownNameError
+        If a layer names a class that `taxonomy` does not have.
+    EmptyResultError
+        If no object remains.
+
+    Examples
+    --------
+    >>> from semsig_gis.sources.synthetic import CitySpec, synthetic_city
+    >>> from semsig_gis.catalog import paper_taxonomy
+    >>> layers = synthetic_city(CitySpec(size=300.0))
+    >>> _, report = build_objects(layers, taxonomy=paper_taxonomy(), crs="EPSG:32631")
+    >>> all(layer.kept == layer.read for layer in report.layers)
+    True
+    """
+    system = require_metric_crs(crs)
+    layers = tuple(layers)
+    parts = [_positions(layer, taxonomy, system) for layer in layers]
+    columns = [SOURCE, SOURCE_ID, CLASS_CODE, "x", "y"]
+    everything = (
+        pd.concat([part for part, _, _ in parts], ignore_index=True)
+        if parts
+        else pd.DataFrame(columns=columns)
+    )
+    if everything.empty:
+        msg = (
+            f"no object remains of {sum(layer.read for layer in layers)} rows in {len(layers)} "
+            "layers; look at the filters, the geometries and the coordinate systems."
+        )
+        raise EmptyResultError(msg)
+    if collapse:
+        first, counts = _first_at_place(everything)
+    else:
+        first, counts = np.arange(len(everything)), np.ones(len(everything), np.int64)
+    kept = everything.iloc[first].reset_index(drop=True)
+    table = gpd.GeoDataFrame(
+        {
+            CLASS_CODE: kept[CLASS_CODE].to_numpy(np.uint8),
+            SOURCE: kept[SOURCE].to_numpy(str).astype(object),
+            SOURCE_ID: kept[SOURCE_ID].to_numpy(str).astype(object),
+            COUNT: counts.astype(np.int32),
+        },
+        geometry=shapely.points(kept["x"].to_numpy(), kept["y"].to_numpy()),
+        crs=system,
+    )
+    # By number, because two layers may bear one name.
+    remaining = np.bincount(
+        np.repeat(np.arange(len(parts)), [len(part) for part, _, _ in parts])[first],
+        minlength=len(parts),
+    ).tolist()
+    reports = tuple(
+        LayerReport(
+            name=layer.spec.name,
+            read=layer.read,
+            unreadable=layer.error_count,
+            filtered=layer.filtered,
+            missing=missing,
+            misplaced=misplaced,
+            collapsed=len(part) - kept_here,
+            kept=kept_here,
+            notes=(*layer.notes, *layer.errors),
+        )
+        for layer, (part, missing, misplaced), kept_here in zip(
+            layers, parts, remaining, strict=True
+        )
+    )
+    return StreetObjects(table, taxonomy, _licenses(layers)), LoadReport(reports)
+
+
+def _positions(layer: RawLayer, taxonomy: Taxonomy, crs: CRS) -> tuple[pd.DataFrame, int, int]:
+    """Return the usable rows of a layer, and how many are missing and misplaced."""
+    table = layer.table
+    if table.crs is None:
+        msg = (
+            f"layer {layer.spec.name!r} has no coordinate reference system; "
+            "state its crs in the catalogue."
+        )
+        raise CrsError(msg)
+    geometry = table.geometry
+    usable = ~(geometry.isna() | geometry.is_empty).to_numpy(bool)
+    points = geometry[usable]
+    if not (points.geom_type == "Point").all():
+        # In the layer's own plane: a street object is small, so the CRS makes no difference.
+        with np.errstate(invalid="ignore", over="ignore"):  # such rows are dropped below
+            centroids = shapely.centroid(points.array)
+        points = gpd.GeoSeries(centroids, index=points.index, crs=table.crs)
+    moved = points if points.crs == crs else points.to_crs(crs)
+    # A broken geometry may have an empty centroid, which has no coordinates at all.
+    xy = np.full((len(moved), 2), np.nan)
+    coordinates, row = shapely.get_coordinates(moved.array, return_index=True)
+    xy[row] = coordinates
+    placed = (np.abs(xy) < BEYOND_EARTH_M).all(axis=1)  # false for NaN too
+    codes = {name: taxonomy.by_name(name).code for name in table[CLASS_NAME].unique()}
+    rows = table[usable][placed]
+    part = pd.DataFrame(
+        {
+            SOURCE: layer.spec.name,
+            SOURCE_ID: rows[SOURCE_ID].to_numpy(),
+            CLASS_CODE: rows[CLASS_NAME].map(codes).to_numpy(),
+            "x": xy[placed, 0],
+            "y": xy[placed, 1],
+        }
+    )
+    return part, int((~usable).sum()), int((~placed).sum())
+
+
+def _first_at_place(
+    everything: pd.DataFrame,
+) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Return the first row of every class and place, in order, and how many rows share it."""
+    keys = np.stack(
+        [
+            everything[CLASS_CODE].to_numpy(np.int64),
+            np.rint(everything["x"].to_numpy() / SAME_PLACE_M).astype(np.int64),
+            np.rint(everything["y"].to_numpy() / SAME_PLACE_M).astype(np.int64),
+        ],
+        axis=1,
+    )
+    _, first, counts = np.unique(keys, axis=0, return_index=True, return_counts=True)
+    order = np.argsort(first)
+    return first[order], counts[order]
+
+
+def _licenses(layers: Iterable[RawLayer]) -> tuple[str, ...]:
+    """Return a line for every publisher and licence, with the layers that they cover."""
+    layers_of: dict[str, list[str]] = {}
+    for layer in layers:
+        publisher = layer.spec.attribution or "no attribution given"
+        names = layers_of.setdefault(f"{publisher} ({layer.spec.license})", [])
+        if layer.spec.name not in names:
+            names.append(layer.spec.name)
+    return tuple(f"{terms}: {', '.join(names)}" for terms, names in layers_of.items())
+
+
+def save_objects(objects: StreetObjects, path: str | Path) -> None:
+    """Save street objects as one GeoParquet file.
+
+    Parameters
+    ----------
+    objects : StreetObjects
+        What to save.
+    path : str or Path
+        File to write; it appears whole, by rename.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> from semsig_gis.sources.synthetic import CitySpec, synthetic_city
+    >>> from semsig_gis.catalog import paper_taxonomy
+    >>> layers = synthetic_city(CitySpec(size=300.0))
+    >>> objects, _ = build_objects(layers, taxonomy=paper_taxonomy(), crs="EPSG:32631")
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     save_objects(objects, f"{folder}/objects.parquet")
+    ...     len(open_objects(f"{folder}/objects.parquet")) == len(objects)
+    True
+    """
+    table = objects.table
+    arrow = pa.table(
+        {
+            CLASS_CODE: pa.array(objects.codes),
+            SOURCE: pa.array(table[SOURCE].tolist(), pa.string()),
+            SOURCE_ID: pa.array(table[SOURCE_ID].tolist(), pa.string()),
+            COUNT: pa.array(table[COUNT].to_numpy(np.int32)),
+            GEOMETRY: pa.array(shapely.to_wkb(table.geometry.array), pa.binary()),
+        }
+    )
+    bounds = (*objects.xy.min(axis=0), *objects.xy.max(axis=0))
+    write_geoparquet(
+        arrow,
+        path,
+        geo=geo_metadata(objects.crs, geometry_types=["Point"], bounds=bounds),
+        specs={
+            "kind": KIND,
+            "version": __version__,
+            "taxonomy": objects.taxonomy.to_list(),
+            "licenses": list(objects.licenses),
+        },
+    )
+
+
+def open_objects(path: str | Path) -> StreetObjects:
+    """Open a file that `save_objects` wrote.
+
+    Parameters
+    ----------
+    path : str or Path
+        File to read.
+
+    Returns
+    -------
+    StreetObjects
+        The objects.
+
+    Raises
+    ------
+    DatabaseError
+        If the file is missing, damaged, or holds something else.
+
+    Examples
+    --------
+    >>> open_objects("nowhere.parquet")
+    Traceback (most recent call last):
+    ...
+    semsig_gis.errors.DatabaseError: nowhere.parquet does not exist; give a street objects file.
+    """
+    arrow, specs, crs = read_geoparquet(path, kind=KIND)
+    try:
+        taxonomy = Taxonomy.from_list(specs["taxonomy"])
+        table = gpd.GeoDataFrame(
+            {
+                CLASS_CODE: arrow[CLASS_CODE].to_numpy(),
+                SOURCE: arrow[SOURCE].to_pylist(),
+                SOURCE_ID: arrow[SOURCE_ID].to_pylist(),
+                COUNT: arrow[COUNT].to_numpy(),
+            },
+            geometry=shapely.from_wkb(arrow[GEOMETRY].to_numpy(zero_copy_only=False)),
+            crs=crs,
+        )
+        for code in pc.unique(arrow[CLASS_CODE]).to_pylist():
+            taxonomy.by_code(code)
+        licenses = tuple(specs["licenses"])
+    except (TypeError, ValueError, LookupError, shapely.errors.ShapelyError) as error:
+        msg = f"{path} is damaged ({error}); load the street objects again."
+        raise DatabaseError(msg) from error
+    xy = shapely.get_coordinates(table.geometry.array)
+    points = (table.geometry.geom_type == "Point").all()
+    if not (points and 0 < len(xy) == len(table) and np.isfinite(xy).all()):
+        msg = f"{path} is damaged (it has rows without a position); load the street objects again."
+        raise DatabaseError(msg)
+    return StreetObjects(table, taxonomy, licenses)
