@@ -1,0 +1,181 @@
+"""Matching over a city the size of Paris, beside RapidFuzz over all cells."""
+
+from __future__ import annotations
+
+from collections import deque
+from dataclasses import dataclass
+from functools import partial
+from itertools import pairwise
+from typing import TYPE_CHECKING
+
+import numpy as np
+from pyproj import CRS
+from rapidfuzz.distance import Levenshtein
+from rapidfuzz.process import cdist
+
+from benchmarks.comparison import compare
+from semsig_gis.catalog import paper_taxonomy
+from semsig_gis.database import BEARING_UNITS, SignatureDatabase
+from semsig_gis.grid import GridSpec
+from semsig_gis.matching import Method, score_cells
+from semsig_gis.signatures import SignatureSpec
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from numpy.typing import NDArray
+
+    from benchmarks.comparison import Comparison
+    from semsig_gis.signatures import Signature
+
+__all__ = ["comparisons", "random_database"]
+
+# Occurrences of the paper's eleven classes over all signatures of Paris, by code.
+_OCCURRENCES = [1752696, 6713, 2299639, 36333, 102240, 14397, 8006, 4421, 2537, 135748, 32320]
+_MEAN_LENGTH = 14.0
+_SPREAD = 2.5  # shape of the gamma distribution of lengths: two cells in five see under ten
+_COPIED = 0.34  # share of cells that look like another: the paper has 66 % distinct by angle
+_SEED = 20
+
+
+@dataclass(frozen=True, slots=True)
+class _Size:
+    """How much is measured."""
+
+    cells: int
+    batch: int
+    repeats: int
+
+
+_SIZES = {"full": _Size(312_134, 1000, 15), "small": _Size(2_000, 20, 2)}
+
+
+def random_database(cells: int, *, seed: int = _SEED) -> SignatureDatabase:
+    """Make a database of random signatures as long, skewed and repeated as those of Paris.
+
+    Parameters
+    ----------
+    cells : int
+        How many cells.
+    seed : int
+        Seed of the random numbers.
+
+    Returns
+    -------
+    SignatureDatabase
+        Cells in one column of the grid.
+    """
+    rng = np.random.default_rng(seed)
+    lengths = 1 + rng.poisson(rng.gamma(_SPREAD, (_MEAN_LENGTH - 1) / _SPREAD, cells))
+    starts = np.cumsum(lengths) - lengths
+    shares = np.array(_OCCURRENCES) / sum(_OCCURRENCES)
+    codes = 1 + rng.choice(len(shares), lengths.sum(), p=shares).astype(np.uint8)
+    units = rng.integers(0, BEARING_UNITS, lengths.sum()).astype(np.uint16)
+    owner = np.repeat(np.arange(cells), lengths)
+    order = np.lexsort((units, owner))
+    # A copy shows what its original, an earlier cell, was drawn to show.
+    copied = rng.random(cells) < _COPIED
+    copied[0] = False
+    source = np.where(copied, rng.integers(0, np.maximum(np.arange(cells), 1)), np.arange(cells))
+    shown = lengths[source]
+    offsets = np.concatenate([[0], np.cumsum(shown)])
+    inside = np.arange(offsets[-1]) - np.repeat(offsets[:-1], shown)
+    entries = order[np.repeat(starts[source], shown) + inside]
+    return SignatureDatabase(
+        columns=np.zeros(cells, np.int32),
+        rows=np.arange(cells, dtype=np.int32),
+        offsets=offsets,
+        codes=codes[entries],
+        bearing_units=units[entries],
+        distance_dm=np.zeros(len(entries), np.uint16),
+        grid=GridSpec(),
+        spec=SignatureSpec(),
+        taxonomy=paper_taxonomy(),
+        crs=CRS("EPSG:2154"),
+    )
+
+
+def comparisons(size: str) -> Iterator[Comparison]:
+    """Measure single queries and a batch.
+
+    Parameters
+    ----------
+    size : str
+        ``"full"`` or ``"small"``.
+
+    Yields
+    ------
+    Comparison
+        One result after the other.
+    """
+    scale = _SIZES[size]
+    database = random_database(scale.cells)
+    picked = np.random.default_rng(_SEED).integers(0, scale.cells, scale.batch).tolist()
+    queries = [database.signature(cell) for cell in picked]
+    of_cells = {
+        "types": _texts(database.codes, database.offsets),
+        "angles": _texts(database.levels, database.offsets),
+    }
+    of_queries = {part: [texts[cell] for cell in picked] for part, texts in of_cells.items()}
+    for part, texts in of_cells.items():
+        _check_equal(database, queries[0], part, of_queries[part][0], texts)
+
+    def score(count: int, method: str, repeat: int) -> None:
+        some = queries[repeat : repeat + count]
+        deque(score_cells(database, some, Method.parse(method)), maxlen=0)
+
+    def peer(count: int, parts: tuple[str, ...], repeat: int) -> None:
+        for part in parts:
+            some = of_queries[part][repeat : repeat + count]
+            cdist(some, of_cells[part], scorer=Levenshtein.distance, dtype=np.uint8)
+
+    cells = f"{scale.cells:,} cells"
+    for part, measure, bar in [
+        ("types", "edit", 10.0),
+        ("angles", "edit", 10.0),
+        ("types", "jaccard", None),
+        ("angles", "jaccard", None),
+        ("types", "histogram", None),
+        ("angles", "histogram", None),
+    ]:
+        yield compare(
+            f"one {measure} query by {part}, {cells}",
+            partial(score, 1, f"{part}:{measure}"),
+            partial(peer, 1, (part,)),
+            peer_name="rapidfuzz.process.cdist([query], cells), edit distance",
+            repeats=scale.repeats,
+            bar=bar,
+        )
+    for method in ("edit+edit", "edit+edit:5%"):
+        yield compare(
+            f"one {method} query, {cells}",
+            partial(score, 1, method),
+            partial(peer, 1, tuple(of_cells)),
+            peer_name="rapidfuzz.process.cdist([query], cells), by types and by angles",
+            repeats=scale.repeats,
+        )
+    yield compare(
+        f"{scale.batch:,} edit queries by types, {cells}",
+        partial(score, scale.batch, "types:edit"),
+        partial(peer, scale.batch, ("types",)),
+        peer_name="rapidfuzz.process.cdist(queries, cells)",
+        repeats=1,
+        bar=2.0,
+    )
+
+
+def _texts(values: NDArray[np.uint8], offsets: NDArray[np.int64]) -> list[str]:
+    """Return the sequence of every cell as text, what RapidFuzz compares fastest."""
+    text, ends = values.tobytes().decode("latin-1"), offsets.tolist()
+    return [text[low:high] for low, high in pairwise(ends)]
+
+
+def _check_equal(
+    database: SignatureDatabase, query: Signature, part: str, text: str, texts: list[str]
+) -> None:
+    """Refuse to compare the times of two different results."""
+    (ours,) = score_cells(database, [query], Method.parse(f"{part}:edit:raw"))
+    theirs = cdist([text], texts, scorer=Levenshtein.distance)[0]
+    if not np.array_equal(ours, theirs):
+        msg = f"the edit distances by {part} differ from those of RapidFuzz."
+        raise ArithmeticError(msg)

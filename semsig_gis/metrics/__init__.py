@@ -1,0 +1,109 @@
+"""Pick a measure: how far a query's sequence is from every distinct sequence of a database.
+
+Each measure is a module with one function ``distances(queries, table, *, normalized, only)``.
+A new one is added to `METRICS`; the laws in ``tests/metrics/test_metrics.py`` then hold it too.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import partial
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Protocol
+
+from semsig_gis.errors import UnknownNameError, nearest_name
+from semsig_gis.metrics import edit, histogram, jaccard
+from semsig_gis.metrics.edit import EditWeights
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+    import numpy as np
+    from numpy.typing import NDArray
+
+    from semsig_gis.sequences import SequenceTable
+
+__all__ = ["METRICS", "Distances", "EditWeights", "Metric", "metric"]
+
+
+class Distances(Protocol):
+    """Distances of some queries to the distinct sequences of a table, lower for more alike."""
+
+    def __call__(
+        self,
+        queries: Sequence[NDArray[np.uint8]],
+        table: SequenceTable,
+        /,
+        *,
+        normalized: bool = True,
+        only: NDArray[np.int64] | None = None,
+    ) -> NDArray[np.float32]:
+        """Return float32 distances of shape (queries, d), or (queries, len(only))."""
+
+
+@dataclass(frozen=True, slots=True)
+class Metric:
+    """A measure by name.
+
+    Parameters
+    ----------
+    name : str
+        The name that methods use.
+    title : str
+        What tables and maps call it.
+    distances : callable
+        The function of the measure's module.
+    """
+
+    name: str
+    title: str
+    distances: Distances
+
+
+METRICS: Mapping[str, Metric] = MappingProxyType(
+    {
+        known.name: known
+        for known in (
+            Metric("jaccard", "Jaccard distance", jaccard.distances),
+            Metric("histogram", "histogram distance", histogram.distances),
+            Metric("edit", "edit distance", edit.distances),
+        )
+    }
+)
+"""Every measure, by name."""
+
+
+def metric(name: str, *, weights: EditWeights | None = None) -> Metric:
+    """Return a measure by its name.
+
+    Parameters
+    ----------
+    name : str
+        One of the keys of `METRICS`.
+    weights : EditWeights, optional
+        Costs for the edit distance; the other measures have none and ignore them.
+
+    Returns
+    -------
+    Metric
+        The measure, with the weights bound to it.
+
+    Raises
+    ------
+    UnknownNameError
+        If there is no measure of that name.
+
+    Examples
+    --------
+    >>> metric("jaccard").title
+    'Jaccard distance'
+    """
+    if name not in METRICS:
+        msg = (
+            f"measure {name!r} is unknown{nearest_name(name, METRICS)}; "
+            f"the measures are {', '.join(METRICS)}."
+        )
+        raise UnknownNameError(msg)
+    if name == "edit" and weights is not None:
+        return Metric(name, METRICS[name].title, partial(edit.distances, weights=weights))
+    return METRICS[name]
