@@ -30,6 +30,10 @@ __all__ = [
 
 Value = str | int | float | bool
 GeometryKind = Literal["point", "line", "polygon"]
+ElementKind = Literal["node", "way", "relation"]
+Role = Literal["objects", "buildings", "streets"]
+# Stands for every value of a tag.
+ANY_VALUE = "*"
 
 # What a catalogue may say, and of which type; every other key is a mistake that gets named.
 CATALOG_KEYS = {
@@ -39,6 +43,10 @@ CATALOG_KEYS = {
     "license": str,
     "attribution": str,
     "metric_crs": str,
+    "reader": str,
+    "endpoints": list,
+    "files": list,
+    "conflate": dict,
     "classes": list,
     "layers": list,
 }
@@ -50,7 +58,17 @@ LAYER_KEYS = {
     "layer": str,
     "where": dict,
     "class_by": dict,
+    "aliases": dict,
     "id_field": str,
+    "unique_id": bool,
+    "dataset": str,
+    "server_where": str,
+    "select": list,
+    "tags": list,
+    "elements": list,
+    "role": str,
+    "optional": bool,
+    "note": str,
     "geometry": str,
     "crs": str,
     "rows": list,
@@ -112,6 +130,28 @@ class LayerSpec:
         Least and largest number of rows that are plausible.
     x_field, y_field : str, optional
         Coordinate columns of a CSV file.
+    aliases : tuple of (str, tuple of str)
+        Fields and the names that they go by in other editions of the file.
+    unique_id : bool
+        Whether rows of the same id are the same object, also across several files.
+    dataset : str, optional
+        Name of the dataset on its portal.
+    server_where : str, optional
+        Filter that the portal applies before it sends, in its own language.
+    select : tuple of str
+        Fields to ask the portal for; all by default.
+    tags : tuple of tuple of (str, tuple of str)
+        OpenStreetMap tags: alternatives, each of keys and accepted values that must all hold;
+        the value ``"*"`` accepts every value.
+    elements : tuple of {"node", "way", "relation"}
+        OpenStreetMap elements that count.
+    role : {"objects", "buildings", "streets"}
+        What the layer is for: street objects, footprints that hide them, or centre lines of
+        streets. Only street objects have a class.
+    optional : bool
+        Whether the layer is read only when it is named.
+    note : str
+        Remark for people, such as how sure a dataset name is.
     license, attribution : str
         Licence of the data and the line that its publisher asks for.
 
@@ -133,6 +173,16 @@ class LayerSpec:
     rows: tuple[int, int] | None = None
     x_field: str | None = None
     y_field: str | None = None
+    aliases: tuple[tuple[str, tuple[str, ...]], ...] = ()
+    unique_id: bool = False
+    dataset: str | None = None
+    server_where: str | None = None
+    select: tuple[str, ...] = ()
+    tags: tuple[tuple[tuple[str, tuple[str, ...]], ...], ...] = ()
+    elements: tuple[ElementKind, ...] = ("node", "way", "relation")
+    role: Role = "objects"
+    optional: bool = False
+    note: str = ""
     license: str = "unknown"
     attribution: str = ""
 
@@ -147,14 +197,21 @@ class Catalog:
         Short name.
     title : str
         Name to show to people.
-    metric_crs : str
-        Coordinate reference system in metres in which distances are taken.
+    metric_crs : str, optional
+        Coordinate reference system in metres in which distances are taken; where it is left
+        out, the UTM zone of the data.
     taxonomy : Taxonomy
         The paper's classes and the catalogue's own.
     layers : tuple of LayerSpec
         The layers.
     url : str
         Where the data is published.
+    reader : str
+        Reader of `semsig_gis.sources` for its files.
+    endpoints : tuple of str
+        Base addresses of the services that send the data, best first.
+    conflate : tuple of (str, float)
+        Classes whose objects from different layers are the same thing within so many metres.
     license, attribution : str
         What holds for every layer that does not say otherwise.
 
@@ -166,10 +223,13 @@ class Catalog:
 
     name: str
     title: str
-    metric_crs: str
     taxonomy: Taxonomy
     layers: tuple[LayerSpec, ...]
+    metric_crs: str | None = None
     url: str = ""
+    reader: str = "vector_file"
+    endpoints: tuple[str, ...] = ()
+    conflate: tuple[tuple[str, float], ...] = ()
     license: str = "unknown"
     attribution: str = ""
 
@@ -324,8 +384,8 @@ def _check_keys(
             )
             raise CatalogError(msg)
         # bool is an int to Python, never to a catalogue
-        if not isinstance(value, allowed[key]) or isinstance(value, bool):
-            msg = f"{where} has {key} = {value!r}; write a {_TOML_TYPES[allowed[key]]}."
+        if not isinstance(value, allowed[key]) or isinstance(value, bool) != (allowed[key] is bool):
+            msg = f"{where} has {key} = {value!r}; write {_TOML_TYPES[allowed[key]]}."
             raise CatalogError(msg)
     for key in needed:
         if key not in table:
@@ -333,22 +393,30 @@ def _check_keys(
             raise CatalogError(msg)
 
 
-_TOML_TYPES: dict[type, str] = {str: "string", int: "whole number", list: "list", dict: "table"}
+_TOML_TYPES: dict[type, str] = {
+    str: "a string",
+    int: "a whole number",
+    list: "a list",
+    dict: "a table",
+    bool: "true or false",
+}
 
 
 def _catalog(content: dict[str, Any], where: str) -> Catalog:
     where = f"catalogue {where}"
-    _check_keys(content, CATALOG_KEYS, where, ("name", "title", "metric_crs", "layers"))
+    _check_keys(content, CATALOG_KEYS, where, ("name", "title", "layers"))
     own = _classes(content.get("classes", []), where)
     try:
         taxonomy = paper_taxonomy().extended(own)
-        require_metric_crs(content["metric_crs"])
+        if "metric_crs" in content:
+            require_metric_crs(content["metric_crs"])
     except (CatalogError, CrsError) as error:
         msg = f"{where}: {error}"
         raise CatalogError(msg) from error
     shared = {
         "license": content.get("license", "unknown"),
         "attribution": content.get("attribution", ""),
+        "files": _texts(content.get("files", []), "files", where),
     }
     layers = tuple(_layer(item, where, taxonomy, shared) for item in content["layers"])
     names = [spec.name for spec in layers]
@@ -360,10 +428,13 @@ def _catalog(content: dict[str, Any], where: str) -> Catalog:
     return Catalog(
         name=content["name"],
         title=content["title"],
-        metric_crs=content["metric_crs"],
+        metric_crs=content.get("metric_crs"),
         taxonomy=taxonomy,
         layers=layers,
         url=content.get("url", ""),
+        reader=content.get("reader", "vector_file"),
+        endpoints=_texts(content.get("endpoints", []), "endpoints", where),
+        conflate=_radii(content.get("conflate", {}), taxonomy, where),
         license=shared["license"],
         attribution=shared["attribution"],
     )
@@ -385,17 +456,19 @@ def _classes(items: list[Any], where: str) -> tuple[ObjectClass, ...]:
     return tuple(classes)
 
 
-def _layer(item: object, where: str, taxonomy: Taxonomy, shared: Mapping[str, str]) -> LayerSpec:
+def _layer(item: object, where: str, taxonomy: Taxonomy, shared: Mapping[str, Any]) -> LayerSpec:
     if not isinstance(item, dict):
         msg = f"{where} has the layer {item!r}; write a [[layers]] table."
         raise CatalogError(msg)
     where = f"{where}, layer {item.get('name', '?')!r}"
-    _check_keys(item, LAYER_KEYS, where, ("name", "class", "files"))
-    _require_class(item["class"], taxonomy, where)
-    geometry = item.get("geometry", "point")
-    if geometry not in get_args(GeometryKind):
-        msg = f"{where} has geometry = {geometry!r}; write 'point', 'line' or 'polygon'."
+    _check_keys(item, LAYER_KEYS, where, ("name",))
+    role = _choice(item.get("role", "objects"), "role", get_args(Role), where)
+    if (role == "objects") != ("class" in item):
+        what = "lacks the key 'class'; add it" if role == "objects" else "needs no class; remove it"
+        msg = f"{where} {what}."
         raise CatalogError(msg)
+    if role == "objects":
+        _require_class(item["class"], taxonomy, where)
     if "crs" in item:
         try:
             CRS.from_user_input(item["crs"])
@@ -405,29 +478,69 @@ def _layer(item: object, where: str, taxonomy: Taxonomy, shared: Mapping[str, st
                 "write a code such as 'EPSG:4326'."
             )
             raise CatalogError(msg) from error
-    patterns = item["files"]
-    if not patterns or not all(isinstance(pattern, str) and pattern for pattern in patterns):
-        msg = f"{where} has files = {patterns!r}; write a list of file names or patterns."
+    files = _texts(item.get("files", list(shared["files"])), "files", where)
+    if not files:
+        msg = f"{where} has files = []; write a list of file names or patterns."
         raise CatalogError(msg)
-    class_by = _class_by(item["class_by"], taxonomy, where) if "class_by" in item else None
-    optional = {
-        key: item[key] for key in ("layer", "id_field", "crs", "x_field", "y_field") if key in item
-    }
+    plain = ("layer", "id_field", "unique_id", "dataset", "server_where", "optional", "note")
+    kinds = _texts(item.get("elements", list(get_args(ElementKind))), "elements", where)
     return LayerSpec(
         name=item["name"],
-        class_name=item["class"],
-        files=tuple(patterns),
+        class_name=item.get("class", ""),
+        role=role,
+        files=files,
         where=tuple(
             (field, _values(accepted, field, where))
             for field, accepted in item.get("where", {}).items()
         ),
-        class_by=class_by,
-        geometry=geometry,
+        class_by=_class_by(item["class_by"], taxonomy, where) if "class_by" in item else None,
+        aliases=tuple(
+            (field, _texts(names, f"aliases of {field!r}", where))
+            for field, names in item.get("aliases", {}).items()
+        ),
+        geometry=_choice(item.get("geometry", "point"), "geometry", get_args(GeometryKind), where),
         rows=_rows(item["rows"], where) if "rows" in item else None,
+        select=_texts(item.get("select", []), "select", where),
+        tags=tuple(_tags(tags, where) for tags in item.get("tags", [])),
+        elements=tuple(_choice(kind, "elements", get_args(ElementKind), where) for kind in kinds),
         license=item.get("license", shared["license"]),
         attribution=item.get("attribution", shared["attribution"]),
-        **optional,
+        **{key: item[key] for key in (*plain, "crs", "x_field", "y_field") if key in item},
     )
+
+
+def _choice(value: str, key: str, choices: tuple[str, ...], where: str) -> Any:  # noqa: ANN401
+    if value not in choices:
+        known = ", ".join(repr(choice) for choice in choices)
+        msg = f"{where} has {key} = {value!r}{nearest_name(value, choices)}; write one of {known}."
+        raise CatalogError(msg)
+    return value
+
+
+def _texts(items: object, key: str, where: str) -> tuple[str, ...]:
+    if not isinstance(items, list) or not all(isinstance(item, str) and item for item in items):
+        msg = f"{where} has {key} = {items!r}; write a list of texts."
+        raise CatalogError(msg)
+    return tuple(items)
+
+
+def _tags(item: object, where: str) -> tuple[tuple[str, tuple[str, ...]], ...]:
+    if not isinstance(item, dict) or not item:
+        msg = f"{where} has the tags {item!r}; write a table of keys and values."
+        raise CatalogError(msg)
+    return tuple(
+        (key, _texts(value if isinstance(value, list) else [value], f"tag {key!r}", where))
+        for key, value in item.items()
+    )
+
+
+def _radii(item: dict[str, Any], taxonomy: Taxonomy, where: str) -> tuple[tuple[str, float], ...]:
+    for name, radius in item.items():
+        _require_class(name, taxonomy, f"{where}, conflate")
+        if isinstance(radius, bool) or not isinstance(radius, int | float) or not 0 < radius < 100:  # noqa: PLR2004
+            msg = f"{where}, conflate has {name} = {radius!r}; write metres above 0 and below 100."
+            raise CatalogError(msg)
+    return tuple((name, float(radius)) for name, radius in item.items())
 
 
 def _require_class(name: str, taxonomy: Taxonomy, where: str) -> None:
