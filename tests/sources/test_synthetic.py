@@ -64,7 +64,7 @@ def spacings(rows: pd.DataFrame) -> list[list[float]]:
     rows = rows.sort_values(["edge", "side", "number"])
     same = (rows[["edge", "side"]] == rows[["edge", "side"]].shift()).all(axis=1)
     gaps = np.hypot(rows["x"].diff(), rows["y"].diff()) / rows["number"].diff()
-    return gaps[same].groupby(rows["edge"]).agg(list).to_list()
+    return [list(part) for _, part in gaps[same].groupby(rows["edge"])]
 
 
 @settings(max_examples=25)
@@ -137,7 +137,7 @@ def test_trees_are_in_rows_with_gaps(city: tuple[RawLayer, ...]) -> None:
     number = rows.sort_values(["edge", "side", "number"]).groupby(["edge", "side"])["number"]
     steps = number.diff().dropna()
     assert 0.06 < (steps > 1).mean() < 0.2  # one in eight trees is missing
-    points = shapely.points(rows[["x", "y"]].to_numpy()).tolist()
+    points = [shapely.Point(x, y) for x, y in rows[["x", "y"]].to_numpy()]
     nearest = shapely.STRtree(points).query_nearest(points, exclusive=True, return_distance=True)[1]
     assert 6 < np.median(nearest) < 10
 

@@ -1,0 +1,130 @@
+"""Printing for the command line: tables, JSON, remarks and progress."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import threading
+from typing import TYPE_CHECKING, Any
+
+import typer
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterable, Iterator
+
+__all__ = ["print_json", "print_rows", "progress", "remark"]
+
+# A bar appears for work that takes longer than this.
+PATIENCE_S = 2.0
+# Whole numbers from here on are identifiers, which read better without separators.
+LARGEST_COUNT = 10**9
+
+
+def remark(text: str) -> None:
+    """Say something on standard error.
+
+    Parameters
+    ----------
+    text : str
+        One sentence.
+    """
+    typer.echo(f"semsig: {text}", err=True)
+
+
+def print_json(value: Any) -> None:  # noqa: ANN401 - whatever JSON can hold
+    """Print a value as JSON on standard output.
+
+    Parameters
+    ----------
+    value : object
+        Plain values without NaN or infinity.
+
+    Examples
+    --------
+    >>> print_json({"cells": 2})
+    {
+      "cells": 2
+    }
+    """
+    typer.echo(json.dumps(value, indent=2, ensure_ascii=False, allow_nan=False))
+
+
+def print_rows(title: str, header: Iterable[str], rows: Iterable[Iterable[object]]) -> None:
+    """Print a table on standard output; text from data is shown as it is, never as markup.
+
+    Parameters
+    ----------
+    title : str
+        Line above the table.
+    header : iterable of str
+        Names of the columns.
+    rows : iterable of iterable
+        Cells; whole numbers get thousands separators.
+    """
+    from rich.console import Console
+    from rich.table import Table
+    from rich.text import Text
+
+    table = Table(title=Text(title), title_justify="left")
+    for name in header:
+        table.add_column(Text(name), overflow="fold")
+    for row in rows:
+        table.add_row(*(Text(_cell_text(cell)) for cell in row))
+    console = Console()
+    if not console.is_terminal:
+        # A file or a pipe has no width to fold to.
+        wide = Console(width=10_000)
+        console = Console(width=max(wide.measure(table).maximum, wide.measure(title).maximum))
+    console.print(table)
+
+
+def _cell_text(cell: object) -> str:
+    if isinstance(cell, int) and abs(cell) < LARGEST_COUNT:
+        return f"{cell:,}"
+    return str(cell)
+
+
+@contextlib.contextmanager
+def progress(label: str) -> Iterator[Callable[[int, int], None]]:
+    """Show a bar on standard error once the work in the block takes a while.
+
+    Parameters
+    ----------
+    label : str
+        What is being done.
+
+    Yields
+    ------
+    callable
+        To be called with how much is done and how much there is in all.
+    """
+    from rich.console import Console
+    from rich.progress import (
+        BarColumn,
+        MofNCompleteColumn,
+        Progress,
+        TextColumn,
+        TimeRemainingColumn,
+    )
+
+    screen = Console(stderr=True)
+    bar = Progress(
+        TextColumn("{task.description}"),
+        BarColumn(),
+        MofNCompleteColumn(),
+        TimeRemainingColumn(),
+        console=screen,
+        transient=True,
+        disable=not screen.is_terminal,
+    )
+    task = bar.add_task(label, total=None)
+    patience = threading.Timer(PATIENCE_S, bar.start)
+    patience.daemon = True
+    patience.start()
+    try:
+        yield lambda done, total: bar.update(task, completed=done, total=total)
+    finally:
+        patience.cancel()
+        # Stopping a bar that never showed, or shows nowhere, would print an empty line.
+        if bar.live.is_started:
+            bar.stop()

@@ -1,0 +1,279 @@
+"""Leaflet and its companions, put into a page so that a map opens without any request.
+
+folium's pages load eleven files from content networks and are blank where there is none. The
+few of them that our maps use are brought when the package is built (``hatch_build.py``, which
+needs ``npm``) into the folder ``assets``; here they replace the links of a finished page. Where
+they were not brought, `available` is false and a map keeps its links.
+"""
+
+from __future__ import annotations
+
+import base64
+import functools
+import hashlib
+import json
+import re
+import tomllib
+from dataclasses import dataclass
+from importlib import resources
+from pathlib import PurePosixPath
+from typing import TYPE_CHECKING
+from urllib.parse import urlsplit
+
+from semsig_gis.errors import InputError, UnknownNameError, nearest_name
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+    from importlib.resources.abc import Traversable
+
+__all__ = ["Asset", "asset_text", "assets", "available", "external_files", "inline_assets"]
+
+# Files that every folium page links and that our maps do without: they only serve
+# `folium.Icon`, Font Awesome and Bootstrap widgets.
+UNUSED = frozenset(
+    {
+        "bootstrap.bundle.min.js",
+        "bootstrap.min.css",
+        "bootstrap-glyphicons.css",
+        "all.min.css",
+        "leaflet.awesome-markers.js",
+        "leaflet.awesome-markers.css",
+        "leaflet.awesome.rotate.min.css",
+    }
+)
+
+_REFERENCE = re.compile(
+    r"""<script\b[^>]*\bsrc\s*=\s*["'](?P<script>[^"']*)["'][^>]*>\s*</script\s*>"""
+    r"""|<link\b[^>]*\bhref\s*=\s*["'](?P<link>[^"']*)["'][^>]*>""",
+    re.IGNORECASE,
+)
+_CSS_IMAGE = re.compile(r"url\(images/(?P<name>[\w-]+\.png)\)")
+_SOURCE_MAP = re.compile(r"\n?//# sourceMappingURL=\S*\s*$")
+
+
+@dataclass(frozen=True, slots=True)
+class Asset:
+    """One third-party file that the package carries.
+
+    Attributes
+    ----------
+    name : str
+        File name in the package, for example ``"leaflet.js"``.
+    package, version, license : str
+        Where it comes from; the licence as an SPDX identifier.
+    sha256 : str
+        Sum of the file, in hexadecimal.
+    stands_for : tuple of str
+        File names, at the end of an address in a page, that this file replaces.
+    """
+
+    name: str
+    package: str
+    version: str
+    license: str
+    sha256: str
+    stands_for: tuple[str, ...]
+
+
+@functools.cache
+def assets() -> Mapping[str, Asset]:
+    """Return the files of the manifest, brought or not, by name.
+
+    Returns
+    -------
+    mapping of str to Asset
+        In the order of the manifest.
+
+    Examples
+    --------
+    >>> assets()["leaflet.js"].license
+    'BSD-2-Clause'
+    """
+    manifest = tomllib.loads(_folder().joinpath("manifest.toml").read_text(encoding="utf-8"))
+    return {
+        file["target"]: Asset(
+            name=file["target"],
+            package=package["name"],
+            version=package["version"],
+            license=package["license"],
+            sha256=file["sha256"],
+            stands_for=tuple(file.get("stands_for", ())),
+        )
+        for package in manifest["package"]
+        for file in package["file"]
+    }
+
+
+def available() -> bool:
+    """Tell whether every file is there, unchanged, so that a map can be self-contained.
+
+    Returns
+    -------
+    bool
+        False when the package was built without ``npm``.
+
+    Examples
+    --------
+    >>> isinstance(available(), bool)
+    True
+    """
+    return all(_content(asset) is not None for asset in assets().values())
+
+
+def asset_text(name: str) -> str:
+    """Return a script or style sheet as it may stand inside a page.
+
+    Images of a style sheet become data URIs, the address of the source map is dropped, and
+    nothing in the text can close the element that it is put into.
+
+    Parameters
+    ----------
+    name : str
+        A file that replaces a link: one with `Asset.stands_for`.
+
+    Returns
+    -------
+    str
+        JavaScript or CSS, without the surrounding element.
+
+    Raises
+    ------
+    UnknownNameError
+        If there is no such script or style sheet.
+    InputError
+        If the package was built without the file.
+
+    Examples
+    --------
+    >>> asset_text("leaf.css")
+    Traceback (most recent call last):
+    ...
+    semsig_gis.errors.UnknownNameError: 'leaf.css' is not a map file; the nearest is 'leaflet.css'.
+    """
+    known = {asset.name: asset for asset in assets().values() if asset.stands_for}
+    if name not in known:
+        msg = f"{name!r} is not a map file{nearest_name(name, known)}."
+        raise UnknownNameError(msg)
+    text = _required(known[name]).decode("utf-8")
+    if name.endswith(".css"):
+        text = _CSS_IMAGE.sub(lambda match: f"url({_data_uri(match['name'])})", text)
+        return re.sub(r"</(style)", r"<\\/\1", text, flags=re.IGNORECASE)
+    text = _SOURCE_MAP.sub("", text)
+    if name == "leaflet.js":
+        text += _default_icon()
+    # Inside <script>, "</script" closes it and "<!--" changes how the rest is read.
+    return re.sub(r"</(script)", r"<\\/\1", text, flags=re.IGNORECASE).replace("<!--", r"<\!--")
+
+
+def external_files(page: str) -> tuple[str, ...]:
+    """Return the addresses of the scripts and style sheets that the head of a page loads.
+
+    Parameters
+    ----------
+    page : str
+        A whole HTML page.
+
+    Returns
+    -------
+    tuple of str
+        In the order of the page; empty for a self-contained page. Map tiles, which a script
+        asks for later, are not among them.
+
+    Examples
+    --------
+    >>> external_files('<head><script src="https://example.org/a.js"></script></head>')
+    ('https://example.org/a.js',)
+    """
+    head, _, _ = page.partition("</head>")
+    return tuple(match["script"] or match["link"] for match in _REFERENCE.finditer(head))
+
+
+def inline_assets(page: str) -> str:
+    """Return a page of folium's with every external script and style sheet put into it.
+
+    Those that our maps do not use (Bootstrap, Font Awesome, awesome-markers) are dropped. The
+    result asks for nothing but the tiles of a tile layer, if the map has one.
+
+    Parameters
+    ----------
+    page : str
+        ``map_.get_root().render()``.
+
+    Returns
+    -------
+    str
+        The page; about 250 kB longer.
+
+    Raises
+    ------
+    InputError
+        If the package was built without the files, or the page needs one that is not among
+        them (a plugin, `folium.Icon`, a colour map drawn by branca).
+
+    Examples
+    --------
+    >>> inline_assets('<head><link rel="stylesheet" href="https://a.org/all.min.css"/></head>')
+    '<head></head>'
+    """
+    replacements = {
+        file: asset.name for asset in assets().values() for file in asset.stands_for
+    } | dict.fromkeys(UNUSED)
+    if "L.AwesomeMarkers." in page:
+        msg = "A self-contained map cannot show folium.Icon markers; use CircleMarker or DivIcon."
+        raise InputError(msg)
+
+    def replace(match: re.Match[str]) -> str:
+        address = match["script"] or match["link"]
+        file = PurePosixPath(urlsplit(address).path).name
+        if file not in replacements:
+            msg = (
+                f"A self-contained map cannot use {address}; the files it may use are "
+                f"{', '.join(sorted(replacements.keys() - UNUSED))}."
+            )
+            raise InputError(msg)
+        name = replacements[file]
+        if name is None:
+            return ""
+        element = "script" if match["script"] else "style"
+        return f"<{element}>\n{asset_text(name)}\n</{element}>"
+
+    head, end, rest = page.partition("</head>")
+    return _REFERENCE.sub(replace, head) + end + rest
+
+
+def _folder() -> Traversable:
+    return resources.files("semsig_gis") / "assets"
+
+
+def _content(asset: Asset) -> bytes | None:
+    """Return the file if it is there and is the one that the manifest names."""
+    path = _folder() / asset.name
+    if not path.is_file():
+        return None
+    content = path.read_bytes()
+    return content if hashlib.sha256(content).hexdigest() == asset.sha256 else None
+
+
+def _required(asset: Asset) -> bytes:
+    content = _content(asset)
+    if content is None:
+        msg = (
+            f"This installation does not carry {asset.name} of {asset.package} {asset.version}; "
+            "make a map that links it, or install semsig_gis again where npm is available."
+        )
+        raise InputError(msg)
+    return content
+
+
+def _data_uri(name: str) -> str:
+    return f"data:image/png;base64,{base64.b64encode(_required(assets()[name])).decode('ascii')}"
+
+
+def _default_icon() -> str:
+    """Return JavaScript that gives Leaflet its default marker, which it looks for beside itself."""
+    images = {
+        "iconUrl": _data_uri("marker-icon.png"),
+        "iconRetinaUrl": _data_uri("marker-icon-2x.png"),
+        "shadowUrl": _data_uri("marker-shadow.png"),
+    }
+    return f"\nL.Icon.Default.imagePath='';L.Icon.Default.mergeOptions({json.dumps(images)});"

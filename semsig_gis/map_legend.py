@@ -1,0 +1,143 @@
+"""Legends of the maps as HTML, and the colours that they explain."""
+
+from __future__ import annotations
+
+import itertools
+from html import escape
+from types import MappingProxyType
+from typing import TYPE_CHECKING
+
+from semsig_gis import __version__
+from semsig_gis.evaluation import SUCCESS_METRES, SUCCESS_PROBABILITY
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Mapping, Sequence
+
+    from semsig_gis.evaluation import Evaluation
+    from semsig_gis.matching import Localization
+
+__all__ = [
+    "CANDIDATE_RAMP",
+    "ERROR_RAMP",
+    "FAILED",
+    "SHADES",
+    "SUCCESSFUL",
+    "evaluation_legend",
+    "localization_legend",
+]
+
+# Blue and orange of Okabe and Ito, which colour-blind people tell apart.
+SUCCESSFUL, FAILED = "#0072b2", "#e69f00"
+
+# Both ramps change their lightness steadily, so that the hue does not matter.
+ERROR_RAMP = ("#fde0dd", "#fa9fb5", "#dd3497", "#7a0177")
+CANDIDATE_RAMP = ("#440154", "#31688e", "#35b779", "#fde725")
+
+SHADES: Mapping[int, str] = MappingProxyType(
+    {1: "#dfdfdb", 5: "#c8c8c2", 10: "#aeaea7", 20: "#8f8f88"}
+)
+"""Colour of a cell by the smallest number of objects that are seen from it."""
+
+_THRESHOLDS = (10, 25, 50, 100)
+
+
+def evaluation_legend(evaluation: Evaluation, *, error_limit: str, licenses: Sequence[str]) -> str:
+    """Return the legend of a map of errors.
+
+    Parameters
+    ----------
+    evaluation : Evaluation
+        What the map shows.
+    error_limit : str
+        The error at the end of the colour ramp, with its unit.
+    licenses : sequence of str
+        One line a source, ``layer: attribution (licence)``.
+
+    Returns
+    -------
+    str
+        HTML in which all text from data is escaped, for a ``details`` element.
+    """
+    distortion, count = evaluation.distortion, len(evaluation.queries)
+    successes = int(evaluation.successful.sum())
+    noise = f", bearing noise {distortion.bearing_sigma:g}°" if distortion.bearing_sigma else ""
+    best = "the best candidate" if evaluation.top == 1 else f"the best of {evaluation.top:,}"
+    shares = "".join(
+        f"<tr><td>P(error ≤ {threshold} m)</td><td>{share:.1%}</td></tr>"
+        for threshold, share in zip(_THRESHOLDS, evaluation.cdf(_THRESHOLDS), strict=True)
+    )
+    return (
+        "<summary>Localization errors</summary>"
+        f"<p>{count:,} queries among {evaluation.database['cells']:,} cells<br>"
+        f"Method: {escape(str(evaluation.method))}, {best}<br>"
+        f"Distortion: {escape(distortion.name)}, {distortion.occurrences} occurrences{noise}</p>"
+        f"<table>{shares}</table>"
+        f"<p>{_sign(SUCCESSFUL)}{successes:,} successful: within {SUCCESS_METRES} m "
+        f"with probability {SUCCESS_PROBABILITY:g} or more<br>"
+        f"{_sign(FAILED)}{count - successes:,} failed</p>"
+        "<p>Mean expected error nearby"
+        f"{_ramp(ERROR_RAMP, '0 m', f'{error_limit}, as bad as a guess', sign='ramp heat')}</p>"
+        f"{_shades()}{_sources(licenses)}"
+    )
+
+
+def localization_legend(localization: Localization) -> str:
+    """Return the legend of a map of candidates.
+
+    Parameters
+    ----------
+    localization : Localization
+        What the map shows.
+
+    Returns
+    -------
+    str
+        HTML in which all text from data is escaped, for a ``details`` element.
+    """
+    query, candidates = localization.query, localization.candidates
+    asked = []
+    if query.codes is not None:
+        asked.append(f"Types: {escape(localization.taxonomy.decode(query.codes))}")
+    if query.bearings is not None:
+        asked.append("Bearings: " + " ".join(f"{degrees:.0f}°" for degrees in query.bearings))
+    more = localization.tied_beyond
+    beyond = f"<br>{more:,} more cells are as good as the last one" if more else ""
+    distances = candidates["distance"]
+    return (
+        "<summary>Candidate places</summary>"
+        f"<p>{'<br>'.join(asked)}<br>"
+        f"Method: {escape(str(localization.method))}, by {escape(localization.used)}</p>"
+        f"<p>The best {len(candidates):,} of {localization.cells:,} cells{beyond}</p>"
+        "<p>Distance to the query (large sign: rank 1)"
+        f"{_ramp(CANDIDATE_RAMP, f'{distances.min():.3f}', f'{distances.max():.3f}')}</p>"
+        f"{_shades()}{_sources(localization.licenses)}"
+    )
+
+
+def _sign(colour: str, shape: str = "round") -> str:
+    return f'<i class="{shape}" style="background:{colour}"></i>'
+
+
+def _ramp(colours: Iterable[str], low: str, high: str, *, sign: str = "ramp") -> str:
+    gradient = f"linear-gradient(to right,{','.join(colours)})"
+    return (
+        f'<i class="{sign}" style="background:{gradient}"></i>'
+        f'<span class="ends"><small>{low}</small><small>{high}</small></span>'
+    )
+
+
+def _shades() -> str:
+    """Return what the shades of the cells mean."""
+    labels = [f"{low}-{high - 1}" for low, high in itertools.pairwise(SHADES)]
+    labels.append(f"{max(SHADES)}+")
+    signs = " &ensp;".join(
+        f"{_sign(colour, 'square')}{label}"
+        for colour, label in zip(SHADES.values(), labels, strict=True)
+    )
+    return f"<p>Objects seen from a cell<br>{signs}</p>"
+
+
+def _sources(licenses: Iterable[str]) -> str:
+    """Return who is to be named for the data, and under which licence."""
+    lines = [f"Data: {escape(line)}<br>" for line in licenses]
+    return f"<p><small>{''.join(lines)}Made with semsig_gis {escape(__version__)}</small></p>"

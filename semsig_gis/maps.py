@@ -1,0 +1,543 @@
+"""Maps to look at in a browser: where localization works, and where a query may be from."""
+
+from __future__ import annotations
+
+import base64
+import itertools
+import math
+import operator
+from typing import TYPE_CHECKING, Any, cast
+
+import folium
+import numpy as np
+from branca.element import Element, MacroElement
+from folium.map import Layer
+from folium.plugins import HeatMap
+from folium.raster_layers import ImageOverlay, WmsTileLayer
+from folium.template import Template
+from folium.utilities import JsCode
+from pyproj import Transformer
+
+from semsig_gis import map_assets
+from semsig_gis.errors import InputError
+from semsig_gis.evaluation import SUCCESS_METRES
+from semsig_gis.map_image import city_image
+from semsig_gis.map_legend import (
+    CANDIDATE_RAMP,
+    ERROR_RAMP,
+    FAILED,
+    SHADES,
+    SUCCESSFUL,
+    evaluation_legend,
+    localization_legend,
+)
+from semsig_gis.map_page import SCRIPT, STYLE, script_json
+from semsig_gis.spatial_index import ObjectIndex
+from semsig_gis.storage import whole_file
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Sequence
+    from pathlib import Path
+
+    from branca.element import Figure
+    from numpy.typing import ArrayLike, NDArray
+    from pyproj import CRS
+
+    from semsig_gis.database import SignatureDatabase
+    from semsig_gis.evaluation import Evaluation
+    from semsig_gis.matching import Localization
+
+__all__ = ["evaluation_map", "localization_map", "save_map"]
+
+_QUERY_FIELDS = (
+    "True cell sees",
+    "Query",
+    "Expected error",
+    f"P(error ≤ {SUCCESS_METRES} m)",
+    "True rank",
+    "True cell",
+    "Best cell",
+    "It sees",
+)
+_CANDIDATE_FIELDS = ("Rank", "Distance", "Signature", "Cell", "Position")
+
+_MAX_ZOOM = 20
+_HEAT_PIXELS = 25
+_SCREEN_PIXELS = 900.0
+_KILOMETRE = 1000
+
+
+def evaluation_map(
+    evaluation: Evaluation,
+    database: SignatureDatabase,
+    *,
+    map_: folium.Map | None = None,
+    tiles: str | None = None,
+) -> folium.Map:
+    """Show where queries were localized, where they failed, and by how much.
+
+    Parameters
+    ----------
+    evaluation : Evaluation
+        What to show.
+    database : SignatureDatabase
+        The database that was evaluated.
+    map_ : folium.Map, optional
+        Map to add the layers to; a new one by default.
+    tiles : str, optional
+        Online background of a new map, by a name that folium knows, such as
+        ``"OpenStreetMap"``; none by default, so that the map needs no network.
+
+    Returns
+    -------
+    folium.Map
+        The map, with these layers: the cells as an image (darker where more objects are seen), a
+        heatmap of the expected errors, the failed and the successful queries with popups, and
+        lines from the true to the estimated places (hidden at first).
+
+    Raises
+    ------
+    InputError
+        If the evaluation was made with another database, `tiles` is not known to folium, or
+        both `tiles` and `map_` are given.
+
+    Notes
+    -----
+    A query is successful when its error is at most 50 m with probability 0.5 or more. In the
+    heatmap an error counts with at most that of a guess: the root mean square distance of two
+    random cells.
+
+    Examples
+    --------
+    >>> from semsig_gis.catalog import paper_taxonomy
+    >>> from semsig_gis.database import build_database
+    >>> from semsig_gis.evaluation import evaluate
+    >>> from semsig_gis.objects import build_objects
+    >>> from semsig_gis.sources.synthetic import CitySpec, synthetic_city
+    >>> layers = synthetic_city(CitySpec(size=300.0))
+    >>> objects, _ = build_objects(layers, taxonomy=paper_taxonomy(), crs="EPSG:32631")
+    >>> database = build_database(objects)
+    >>> evaluation_map(evaluate(database, queries=5), database).options["max_zoom"]
+    20
+    """
+    queries = evaluation.queries
+    successful = evaluation.successful
+    xy = np.stack([queries.geometry.x, queries.geometry.y], axis=1)
+    places = _latlon(xy, database.crs)
+    found = _latlon(queries[["best_x", "best_y"]].to_numpy(np.float64), database.crs)
+    records = _query_records(evaluation, database, places, found)
+    # How far two random cells lie apart (root mean square).
+    limit = math.sqrt(2.0 * float(database.xy.var(axis=0).sum())) or database.grid.step
+    chosen = _prepared(map_, tiles, title="Localization errors")
+    _add_city(chosen, database)
+    _heatmap(xy, places, queries["error_m"].to_numpy(np.float64), limit=limit).add_to(chosen)
+    groups = (("Failed", ~successful, FAILED), ("Successful", successful, SUCCESSFUL))
+    located = np.isfinite(found).all(axis=1)
+    _Drawing(
+        "Lines from true to estimated places",
+        "lines",
+        [
+            [colour, np.stack([places, found], axis=1)[which & located].tolist()]
+            for _, which, colour in groups
+        ],
+        show=False,
+    ).add_to(chosen)
+    for name, which, _ in groups:
+        _Drawing(
+            f"{name} queries ({int(which.sum()):,})",
+            "points",
+            _QUERY_FIELDS,
+            _titles(database),
+            list(itertools.compress(records, which)),
+        ).add_to(chosen)
+    _Legend(
+        evaluation_legend(evaluation, error_limit=_metres(limit), licenses=database.licenses)
+    ).add_to(chosen)
+    return _finished(chosen, places if map_ is None else None)
+
+
+def localization_map(
+    localization: Localization,
+    database: SignatureDatabase,
+    *,
+    map_: folium.Map | None = None,
+    tiles: str | None = None,
+) -> folium.Map:
+    """Show the places where a query may have been taken, the best ones first.
+
+    Parameters
+    ----------
+    localization : Localization
+        What to show.
+    database : SignatureDatabase
+        The database that was searched.
+    map_ : folium.Map, optional
+        Map to add the layers to; a new one by default.
+    tiles : str, optional
+        Online background of a new map, by a name that folium knows; none by default.
+
+    Returns
+    -------
+    folium.Map
+        The map: the cells as an image, and the candidates, coloured by their distance to the
+        query, with popups. The best candidates are larger.
+
+    Raises
+    ------
+    InputError
+        If another database was searched, `tiles` is not known to folium, or both `tiles` and
+        `map_` are given.
+
+    Examples
+    --------
+    >>> from semsig_gis.catalog import paper_taxonomy
+    >>> from semsig_gis.database import build_database
+    >>> from semsig_gis.matching import localize
+    >>> from semsig_gis.objects import build_objects
+    >>> from semsig_gis.sources.synthetic import CitySpec, synthetic_city
+    >>> layers = synthetic_city(CitySpec(size=300.0))
+    >>> objects, _ = build_objects(layers, taxonomy=paper_taxonomy(), crs="EPSG:32631")
+    >>> database = build_database(objects)
+    >>> answer = localize(database, database.signature(0), top=5)
+    >>> localization_map(answer, database).options["max_zoom"]
+    20
+    """
+    candidates = localization.candidates
+    xy = candidates[["x", "y"]].to_numpy(np.float64)
+    places = _latlon(xy, database.crs)
+    records = _candidate_records(localization, database, places)
+    chosen = _prepared(map_, tiles, title="Candidate places")
+    _add_city(chosen, database)
+    _Drawing(
+        f"Candidates ({len(records):,})",
+        "points",
+        _CANDIDATE_FIELDS,
+        _titles(database),
+        records[::-1],  # the best last, so that they lie on top
+    ).add_to(chosen)
+    _Legend(localization_legend(localization)).add_to(chosen)
+    return _finished(chosen, places if map_ is None else None)
+
+
+def save_map(map_: folium.Map, path: str | Path, *, self_contained: bool | None = None) -> bool:
+    """Write a map as one HTML page.
+
+    Parameters
+    ----------
+    map_ : folium.Map
+        The map.
+    path : str or Path
+        File to write; it appears whole, by rename.
+    self_contained : bool, optional
+        True to put Leaflet and all else into the page, False to link them; by default they are
+        put into it where the package carries them and the map needs no others.
+
+    Returns
+    -------
+    bool
+        Whether the page makes no request at all: it holds all scripts and has no online tiles.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be written, or a self-contained page was asked for and is not to be
+        had.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     save_map(folium.Map(tiles=None), f"{folder}/map.html", self_contained=False)
+    False
+    """
+    page = map_.get_root().render()
+    if self_contained or (self_contained is None and map_assets.available()):
+        try:
+            page = map_assets.inline_assets(page)
+        except InputError:
+            if self_contained:
+                raise
+    with whole_file(path) as partial:
+        partial.write_text(page, encoding="utf-8")
+    tiled = any(
+        isinstance(child, folium.TileLayer | WmsTileLayer) for child in _children(map_).values()
+    )
+    return not map_assets.external_files(page) and not tiled
+
+
+class _Furniture(MacroElement):
+    """An element that needs the style and the script of this module in the page, once."""
+
+    def render(self, **kwargs: Any) -> Any:  # noqa: ANN401 - as branca has it
+        """Put the style and script into the page, then the element."""
+        figure = cast("Figure", self.get_root())
+        page = f"<style>{STYLE}</style>\n<script>{SCRIPT}</script>"
+        figure.header.add_child(Element(page), name="semsig")
+        return super().render(**kwargs)  # type: ignore[no-untyped-call]
+
+
+class _Legend(_Furniture):
+    """A box with the meaning of the signs; folds, and is folded on narrow screens."""
+
+    _template = Template(
+        """
+        {% macro script(this, kwargs) %}
+        semsig.legend({{ this.text }}).addTo({{ this._parent.get_name() }});
+        {% endmacro %}
+        """
+    )
+
+    def __init__(self, text: str) -> None:
+        super().__init__()
+        self._name = "SemsigLegend"
+        self.text = script_json(text)
+
+
+class _Drawing(_Furniture, Layer):
+    """A layer that a function of this module's script draws, on a canvas where the map has one."""
+
+    _template = Template(
+        """
+        {% macro script(this, kwargs) %}
+        var {{ this.get_name() }} = semsig.{{ this.function }}({{ this.arguments }});
+        {% endmacro %}
+        """
+    )
+
+    def __init__(self, name: str, function: str, *arguments: object, show: bool = True) -> None:
+        super().__init__(name=name, overlay=True, show=show)
+        self._name = "SemsigDrawing"
+        self.function = function
+        self.arguments = ", ".join(map(script_json, arguments))
+
+
+def _prepared(map_: folium.Map | None, tiles: str | None, *, title: str) -> folium.Map:
+    """Return the map to draw on."""
+    if map_ is not None:
+        if tiles is not None:
+            msg = f"Tiles {tiles!r} were given with a map of your own; add them to that map."
+            raise InputError(msg)
+        return map_
+    try:
+        # Without tiles Leaflet knows no largest zoom.
+        made = folium.Map(tiles=tiles, prefer_canvas=True, control_scale=True, max_zoom=_MAX_ZOOM)
+    except ValueError as error:
+        msg = (
+            f"Tiles {tiles!r} are not known to folium; give a name such as 'OpenStreetMap' or "
+            "'CartoDB positron', or add a tile layer to a map of your own."
+        )
+        raise InputError(msg) from error
+    made.options["max_zoom"] = _MAX_ZOOM
+    cast("Figure", made.get_root()).title = title
+    return made
+
+
+def _finished(chosen: folium.Map, places: NDArray[np.float64] | None) -> folium.Map:
+    """Put the layer control last, where it knows all layers, and show the places if given."""
+    children = _children(chosen)
+    for name in [key for key, child in children.items() if isinstance(child, folium.LayerControl)]:
+        del children[name]
+    narrow = cast("bool", JsCode("window.innerWidth <= 700"))
+    folium.LayerControl(collapsed=narrow).add_to(chosen)
+    if places is not None:
+        corners = [places.min(axis=0).tolist(), places.max(axis=0).tolist()]
+        chosen.fit_bounds(corners, padding=(20, 20), max_zoom=17)
+    return chosen
+
+
+def _children(map_: folium.Map) -> dict[str, Element]:
+    return map_._children  # noqa: SLF001 - branca has no public way to look at them
+
+
+def _rows(
+    ids: ArrayLike, types: Iterable[str], database: SignatureDatabase, *, cells: int, what: str
+) -> NDArray[np.int64]:
+    """Return the rows of cells with these ids and types, of a database with so many cells."""
+    wanted = np.asarray(ids, np.int64)
+    rows = np.searchsorted(database.cell_ids, wanted)
+    same = (
+        cells == len(database)
+        and rows.max(initial=0) < cells
+        and np.array_equal(database.cell_ids[rows], wanted)
+        and all(map(operator.eq, types, map(database.types, rows.tolist())))
+    )
+    if not same:
+        msg = (
+            f"This {what} was not made with this database; give the database that it was made "
+            f"with, or make the {what} again."
+        )
+        raise InputError(msg)
+    return rows
+
+
+def _latlon(xy: NDArray[np.float64], crs: CRS) -> NDArray[np.float64]:
+    """Return latitudes and longitudes to about 0.1 m, shape (n, 2); NaN stays NaN."""
+    to_degrees = Transformer.from_crs(crs, "EPSG:4326", always_xy=True)
+    longitude, latitude = to_degrees.transform(xy[:, 0], xy[:, 1])
+    degrees = np.round(np.stack([latitude, longitude], axis=1), 6)
+    return np.where(np.isfinite(degrees), degrees, np.nan)
+
+
+def _titles(database: SignatureDatabase) -> dict[str, str]:
+    return {item.symbol: item.title for item in database.taxonomy.classes}
+
+
+def _signature(types: str | None, bearings: ArrayLike | None) -> list[Any]:
+    """Return a signature for the popup: symbols and whole degrees."""
+    if bearings is None:
+        return [types, None]
+    degrees = np.rint(np.asarray(bearings, np.float64)).astype(int) % 360
+    return [types, degrees.tolist()]
+
+
+def _cell_signature(database: SignatureDatabase, cell: int) -> list[Any]:
+    return _signature(database.types(cell), database.signature(cell).bearings)
+
+
+def _query_records(
+    evaluation: Evaluation,
+    database: SignatureDatabase,
+    places: NDArray[np.float64],
+    found: NDArray[np.float64],
+) -> list[list[Any]]:
+    """Return what the script draws of each query: place, look, best place, heading, details."""
+    cells, total = len(database), len(evaluation.queries)
+    successful = evaluation.successful.tolist()
+    rows = _rows(
+        evaluation.queries["cell_id"],
+        evaluation.queries["types"],
+        database,
+        cells=evaluation.database["cells"],
+        what="evaluation",
+    )
+    best_rows = np.searchsorted(
+        database.cell_ids, evaluation.queries["best_cell_id"].fillna(0).to_numpy(np.int64)
+    )
+    records = []
+    for number, query in enumerate(evaluation.queries.itertuples(index=False)):
+        asked = [float(one) for one in query.query_bearings.split(",") if one]
+        located = query.tied > 0
+        details = [
+            _cell_signature(database, int(rows[number])),
+            _signature(query.query_types, asked) if query.query_length else "nothing left of it",
+            _metres(query.error_m),
+            f"{getattr(query, f'p{SUCCESS_METRES}'):.2f}",
+            f"{_ranks(query.rank_low, query.rank_high)} of {cells:,}",
+            str(query.cell_id),
+            f"{query.best_cell_id}, distance {query.distance:.3f}{_tie(query.tied)}"
+            if located
+            else "none",
+            _cell_signature(database, int(best_rows[number])) if located else None,
+        ]
+        outcome = "successful" if successful[number] else "failed"
+        records.append(
+            [
+                places[number].tolist(),
+                SUCCESSFUL if successful[number] else FAILED,
+                5,
+                found[number].tolist() if located else None,
+                f"Query {number + 1:,} of {total:,}: {outcome}",
+                details,
+            ]
+        )
+    return records
+
+
+def _candidate_records(
+    localization: Localization, database: SignatureDatabase, places: NDArray[np.float64]
+) -> list[list[Any]]:
+    """Return what the script draws of each candidate, best first."""
+    candidates = localization.candidates
+    rows = _rows(
+        candidates["cell_id"],
+        candidates["types"],
+        database,
+        cells=localization.cells,
+        what="localization",
+    )
+    distances = candidates["distance"].to_numpy(np.float64)
+    spread = np.ptp(distances) or 1.0
+    colours = _ramp((distances - distances.min()) / spread, CANDIDATE_RAMP)
+    records = []
+    for number, candidate in enumerate(candidates.to_dict("records")):
+        rank = _ranks(candidate["rank_low"], candidate["rank_high"])
+        latitude, longitude = places[number].tolist()
+        details = [
+            f"{rank} of {len(database):,}{_tie(candidate['tied'])}",
+            f"{candidate['distance']:.4f}",
+            _cell_signature(database, int(rows[number])),
+            str(candidate["cell_id"]),
+            f"{latitude:.6f}, {longitude:.6f}",
+        ]
+        best = candidate["rank_low"] == 1
+        records.append(
+            [
+                [latitude, longitude],
+                colours[number],
+                9 if best else 6,
+                None,
+                f"Rank {rank}",
+                details,
+            ]
+        )
+    return records
+
+
+def _metres(error: float) -> str:
+    if math.isinf(error):
+        return "infinite, not localized"
+    return f"{error:,.0f} m" if error < _KILOMETRE else f"{error / 1000:,.2f} km"
+
+
+def _ranks(low: int, high: int) -> str:
+    return f"{low:,}" if low == high else f"{low:,} to {high:,}"
+
+
+def _tie(tied: int) -> str:
+    return f", {tied:,} tied" if tied > 1 else ""
+
+
+def _ramp(values: NDArray[np.float64], colours: Sequence[str]) -> list[str]:
+    """Return the colour of each value in [0, 1] between the given ones."""
+    anchors = np.array([list(bytes.fromhex(colour[1:])) for colour in colours])
+    stops = np.linspace(0.0, 1.0, len(colours))
+    mixed = np.stack([np.interp(values, stops, part) for part in anchors.T], axis=1)
+    return [f"#{bytes(row).hex()}" for row in np.rint(mixed).astype(np.uint8)]
+
+
+def _heatmap(
+    xy: NDArray[np.float64],
+    places: NDArray[np.float64],
+    errors: NDArray[np.float64],
+    *,
+    limit: float,
+) -> HeatMap:
+    """Return a heatmap of the errors that looks right where all the queries are seen."""
+    extent = max(float(np.ptp(xy, axis=0).max()), 1000.0)
+    # The heat of queries that are near each other on the screen is laid one over the other. Each
+    # gets a part, so that together they show their mean error, not where most were drawn.
+    reach = extent * _HEAT_PIXELS / _SCREEN_PIXELS
+    neighbours = np.bincount(ObjectIndex(xy).pairs_within(xy, radius=reach)[0])
+    heat = 1.0 - (1.0 - 0.9 * np.minimum(errors / limit, 1.0)) ** (1.0 / neighbours)
+    degrees = max(float(np.ptp(places[:, 1])), 0.01)
+    stops = np.linspace(0.1, 0.9, len(ERROR_RAMP)).round(2).tolist()
+    return HeatMap(
+        np.column_stack([places, heat.round(4)]).tolist(),
+        name="Expected errors",
+        min_opacity=0.0,
+        # Farther out, leaflet.heat weakens what then lies closer together.
+        max_zoom=round(math.log2(_SCREEN_PIXELS / 256.0 * 360.0 / degrees)),
+        radius=_HEAT_PIXELS,
+        blur=_HEAT_PIXELS,
+        gradient=dict(zip(stops, ERROR_RAMP, strict=True)),
+    )
+
+
+def _add_city(chosen: folium.Map, database: SignatureDatabase) -> None:
+    """Add the cells as an image, unless the map shows them already."""
+    image, bounds = city_image(database, SHADES)
+    url = f"data:image/png;base64,{base64.b64encode(image).decode('ascii')}"
+    shown = {child.url for child in _children(chosen).values() if isinstance(child, ImageOverlay)}
+    if url not in shown:
+        # In the pane of tiles, below everything else.
+        ImageOverlay(url, bounds, name="Objects seen from a cell", pane="tilePane").add_to(chosen)

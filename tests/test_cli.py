@@ -1,0 +1,384 @@
+"""The command line as its user meets it: results, exit codes and plain sentences."""
+
+from __future__ import annotations
+
+import json
+import shutil
+import subprocess
+import sys
+import zipfile
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import fiona
+import geopandas as gpd
+import pytest
+import shapely
+
+from semsig_gis import __version__
+from semsig_gis.cli import main
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    Run = Callable[..., tuple[int, str, str]]
+
+CATALOG = """
+name = "tiny"
+title = "A tiny city"
+url = "https://example.org"
+license = "CC0-1.0"
+attribution = "Nobody"
+metric_crs = "EPSG:2154"
+
+[[classes]]
+code = 12
+symbol = "X"
+name = "crossing"
+title = "Crossing"
+
+[[layers]]
+name = "lights"
+class = "street_light"
+files = ["lights.*"]
+crs = "EPSG:2154"
+
+[[layers]]
+name = "crossings"
+class = "crossing"
+files = ["crossings.geojson"]
+where = { state = "painted" }
+"""
+
+
+@pytest.fixture
+def run(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> Run:
+    """Run the command in this process: exit code, standard output, standard error."""
+
+    def call(*arguments: object) -> tuple[int, str, str]:
+        monkeypatch.setattr(sys, "argv", ["semsig", *map(str, arguments)])
+        with pytest.raises(SystemExit) as end:
+            main()
+        printed = capsys.readouterr()
+        return int(end.value.code or 0), printed.out, printed.err
+
+    return call
+
+
+def write_layer(path: Path, points: list[tuple[float, float]], **columns: list[Any]) -> None:
+    gpd.GeoDataFrame(columns, geometry=shapely.points(points), crs=2154).to_file(path)
+
+
+@pytest.fixture
+def city(tmp_path: Path) -> Path:
+    """A folder with a catalogue, two layers, and what the commands make of them."""
+    (tmp_path / "tiny.toml").write_text(CATALOG, encoding="utf-8")
+    lights = [(770000.0 + 23 * i, 6280000.0 + 31 * (i % 3)) for i in range(20)]
+    write_layer(tmp_path / "lights.gpkg", [*lights, lights[0]], kind=["a"] * 21)
+    crossings = [(770010.0, 6280010.0), (770100.0, 6280010.0)]
+    states = ["painted", "worn"]
+    gpd.GeoDataFrame({"state": states}, geometry=shapely.points(crossings), crs=2154).to_crs(
+        4326
+    ).to_file(tmp_path / "crossings.geojson")
+    return tmp_path
+
+
+@pytest.fixture
+def database(city: Path, run: Run) -> Path:
+    objects, path = city / "objects.parquet", city / "city.parquet"
+    assert run("load", city, "--catalog", city / "tiny.toml", "--out", objects)[0] == 0
+    assert run("build", objects, "--out", path)[0] == 0
+    return path
+
+
+def sentence(outcome: tuple[int, str, str], *words: str) -> None:
+    """Check that an input was refused with one plain sentence that holds some words."""
+    code, out, err = outcome
+    assert code == 2, err
+    assert out == ""
+    assert "Traceback" not in err
+    last = err.strip().splitlines()[-1]
+    assert last.startswith("semsig: ")
+    assert last.endswith(".")
+    for word in words:
+        assert word in last
+
+
+def test_the_road_from_files_to_a_place(city: Path, run: Run) -> None:
+    objects, database = city / "objects.parquet", city / "city.parquet"
+    code, out, _ = run("load", city, "--catalog", city / "tiny.toml", "--out", objects, "--json")
+    assert code == 0
+    report = json.loads(out)
+    assert report["objects"] == 21
+    lights, crossings = report["layers"]
+    assert (lights["read"], lights["collapsed"], lights["kept"]) == (21, 1, 20)
+    assert (crossings["read"], crossings["filtered"], crossings["kept"]) == (2, 1, 1)
+
+    code, out, _ = run("build", objects, "--out", database)
+    assert code == 0
+    assert "cells of mean length" in out
+
+    code, out, _ = run("info", database, "--json")
+    assert code == 0
+    facts = json.loads(out)
+    assert "Nobody (CC0-1.0)" in str(facts)
+
+    code, out, _ = run("info", database)
+    assert code == 0
+    assert "Street light (D)" in out
+    assert "Nobody (CC0-1.0): lights, crossings" in out
+
+    query = ("--types", "DX", "--bearings", "200,20")
+    code, out, _ = run("localize", database, *query, "--top", 3, "--json")
+    assert code == 0
+    result = json.loads(out)
+    assert result["query"]["types"] == "XD"
+    assert len(result["candidates"]) == 3
+    best = result["candidates"][0]
+    # The only crossing stands at x = 770010, y = 6280010.
+    assert abs(best["x"] - 770010) <= 30
+    assert abs(best["y"] - 6280010) <= 30
+
+    code, out, _ = run("localize", database, *query, "--map", city / "query.html")
+    assert code == 0
+    assert "rank" in out
+    assert "leaflet" in (city / "query.html").read_text(encoding="utf-8").lower()
+
+
+def test_evaluate_map_and_export(database: Path, city: Path, run: Run) -> None:
+    options = ("--queries", 30, "--distortion", "light", "--seed", 5, "--method", "edit+edit:20%")
+    code, out, _ = run("evaluate", database, *options, "--out", city / "eval", "--json")
+    assert code == 0
+    summary = json.loads(out)
+    assert summary["settings"]["queries"] == 30
+    assert summary["settings"]["method"] == "edit+edit:20%"
+    assert json.loads((city / "eval" / "evaluation.json").read_text(encoding="utf-8")) == summary
+
+    code, out, _ = run("evaluate", database, *options)
+    assert code == 0
+    assert "recall" in out
+
+    code, out, _ = run("map", database, "--evaluation", city / "eval", "--out", city / "map.html")
+    assert code == 0
+    assert "map.html" in out
+    assert (city / "map.html").stat().st_size > 1000
+
+    code, out, _ = run(
+        "export", database, "--objects", city / "objects.parquet", "--out", city / "city.gpkg"
+    )
+    assert code == 0
+    assert set(fiona.listlayers(city / "city.gpkg")) >= {"cells", "objects"}
+    assert set(gpd.read_file(city / "city.gpkg", layer="cells").geom_type) == {"Polygon"}
+
+    code, _, _ = run("export", database, "--geometry", "point", "--out", city / "points.gpkg")
+    assert code == 0
+    assert set(gpd.read_file(city / "points.gpkg", layer="cells").geom_type) == {"Point"}
+
+
+def test_switches_keep_what_filters_and_collapsing_take(city: Path, run: Run) -> None:
+    switches = ("--no-filter", "--no-collapse", "--json")
+    options = ("--catalog", city / "tiny.toml", "--out", city / "all.parquet")
+    assert json.loads(run("load", city, *options, *switches)[1])["objects"] == 23
+    one = run("load", city, *options, "--layer", "crossings", *switches)[1]
+    assert json.loads(one)["objects"] == 2
+
+
+def test_a_layer_without_a_file_is_told_and_left_out(city: Path, run: Run) -> None:
+    (city / "crossings.geojson").unlink()
+    code, _, err = run("load", city, "--catalog", city / "tiny.toml", "--out", city / "o.parquet")
+    assert code == 0
+    assert "layer 'crossings' has no file here" in err
+
+
+def test_origin_moves_the_grid(city: Path, database: Path, run: Run) -> None:
+    moved = city / "moved.parquet"
+    assert run("build", city / "objects.parquet", "--origin", "5,5", "--out", moved)[0] == 0
+    x = gpd.read_parquet(moved).geometry.x
+    assert set(x % 10) == {0.0}
+    assert set(gpd.read_parquet(database).geometry.x % 10) == {5.0}
+
+
+def test_sources(run: Run, city: Path) -> None:
+    code, out, _ = run("sources")
+    assert code == 0
+    assert "montpellier" in out
+    names = [item["name"] for item in json.loads(run("sources", "--json")[1])]
+    assert "montpellier" in names
+    code, out, _ = run("sources", "montpellier")
+    assert code == 0
+    assert "ETAT = en fonction" in out
+    assert "taxi_station" in out
+    assert json.loads(run("sources", city / "tiny.toml", "--json")[1])["title"] == "A tiny city"
+
+
+def test_demo(tmp_path: Path, run: Run) -> None:
+    code, out, _ = run("demo", "--out", tmp_path / "demo", "--queries", 5)
+    assert code == 0
+    for name in ("map.html", "city.gpkg", "city.parquet"):
+        assert name in out
+        assert (tmp_path / "demo" / name).stat().st_size > 0
+
+
+def test_version_and_help_start_without_the_gis_stack() -> None:
+    code = (
+        "import sys; sys.argv = ['semsig', '--version']\n"
+        "from semsig_gis.cli import main\n"
+        "try: main()\n"
+        "except SystemExit: pass\n"
+        "print(sorted({'geopandas', 'numpy', 'folium', 'pandas'} & set(sys.modules)))"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.splitlines() == [f"semsig {__version__}", "[]"]
+
+
+def test_missing_file(city: Path, run: Run) -> None:
+    catalog = ("--catalog", city / "tiny.toml", "--out", city / "o.parquet")
+    sentence(run("load", city / "nowhere.shp", *catalog), "nowhere.shp does not exist")
+    sentence(run("build", city / "no.parquet", "--out", city / "c.parquet"), "does not exist")
+    sentence(run("info", city / "no.parquet"), "no.parquet does not exist")
+    sentence(run("load", city, "--catalog", "no.toml", "--out", city / "o.parquet"), "no.toml")
+    sentence(
+        run("load", city, "--catalog", "montpelier", "--out", city / "o.parquet"),
+        "the nearest is 'montpellier'",
+    )
+
+
+def test_unknown_layer(city: Path, run: Run) -> None:
+    options = ("--catalog", city / "tiny.toml", "--out", city / "o.parquet")
+    sentence(run("load", city, *options, "--layer", "light"), "'light'", "nearest is 'lights'")
+    assert not (city / "o.parquet").exists()
+
+
+def test_file_without_crs(city: Path, run: Run) -> None:
+    catalog = city / "bare.toml"
+    catalog.write_text(
+        CATALOG.replace('crs = "EPSG:2154"\n\n[[layers]]', "\n[[layers]]"), encoding="utf-8"
+    )
+    (city / "lights.gpkg").unlink()
+    with fiona.open(
+        city / "lights.shp",
+        "w",
+        driver="ESRI Shapefile",
+        schema={"geometry": "Point", "properties": {"kind": "str"}},
+    ) as layer:
+        point = {"type": "Point", "coordinates": (770000.0, 6280000.0)}
+        layer.write({"geometry": point, "properties": {"kind": "a"}})
+    options = ("--catalog", catalog, "--layer", "lights", "--out", city / "o.parquet")
+    sentence(run("load", city, *options), "lights.shp")
+    code, _, _ = run("load", city, *options, "--crs", "EPSG:2154")
+    assert code == 0
+    sentence(run("load", city, *options, "--crs", "EPSG:0"), "EPSG:0")
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "words"),
+    [
+        ('class = "street_light"', 'class = "streetlight"', ("streetlight", "'street_light'")),
+        ('symbol = "X"', 'symbol = "D"', ("symbol 'D'", "street_light", "crossing")),
+        ("code = 12", "code = 3", ("code 3",)),
+        ("where =", "wehre =", ("'wehre'", "'where'")),
+        ("attribution =", "atribution =", ("'atribution'", "'attribution'")),
+        ('metric_crs = "EPSG:2154"', 'metric_crs = "EPSG:4326"', ("degrees",)),
+        ('metric_crs = "EPSG:2154"', 'metric_crs = "EPSG:3857"', ("Mercator",)),
+        ("state =", "stat =", ("'stat'", "'state'")),
+        ('name = "tiny"', "name = tiny", ("TOML",)),
+    ],
+)
+def test_bad_catalogue(
+    city: Path,
+    run: Run,
+    old: str,
+    new: str,
+    words: tuple[str, ...],
+) -> None:
+    assert old in CATALOG
+    (city / "tiny.toml").write_text(CATALOG.replace(old, new), encoding="utf-8")
+    options = ("--catalog", city / "tiny.toml", "--out", city / "o.parquet")
+    sentence(run("load", city, *options), *words)
+
+
+def test_damaged_zip(city: Path, run: Run) -> None:
+    (city / "lights.gpkg").unlink()
+    write_layer(city / "s.shp", [(770000.0 + i, 6280000.0) for i in range(500)], kind=["a"] * 500)
+    with zipfile.ZipFile(city / "lights.zip", "w", zipfile.ZIP_DEFLATED) as archive:
+        for suffix in ("shp", "shx", "dbf", "prj"):
+            archive.write(city / f"s.{suffix}", f"s.{suffix}")
+    whole = (city / "lights.zip").read_bytes()
+    options = ("--catalog", city / "tiny.toml", "--layer", "lights", "--out", city / "o.parquet")
+    assert run("load", city, *options)[0] == 0
+    for size in (len(whole) // 2, len(whole) - 10, 0):
+        (city / "lights.zip").write_bytes(whole[:size])
+        sentence(run("load", city, *options), "lights.zip")
+
+
+def test_empty_results(city: Path, database: Path, run: Run) -> None:
+    (city / "tiny.toml").write_text(CATALOG.replace("painted", "flooded"), encoding="utf-8")
+    options = ("--catalog", city / "tiny.toml", "--out", city / "o.parquet")
+    sentence(run("load", city, *options, "--layer", "crossings"), "no object remains")
+    sentence(
+        run("build", city / "objects.parquet", "--step", 5000, "--radius", 1, "--out", database),
+        "no cell sees",
+    )
+    sentence(run("localize", database, "--types", ""), "without objects")
+    sentence(run("localize", database), "types")
+
+
+@pytest.mark.parametrize("radius", ["0", "-5", "nan"])
+def test_radius_out_of_range(city: Path, database: Path, run: Run, radius: str) -> None:
+    before = database.read_bytes()
+    outcome = run("build", city / "objects.parquet", f"--radius={radius}", "--out", database)
+    sentence(outcome, "visibility range")
+    assert database.read_bytes() == before
+
+
+def test_queries_that_do_not_fit(database: Path, run: Run) -> None:
+    sentence(run("localize", database, "--types", "DQ"), "'Q'", "D street light")
+    # A class that the taxonomy has and the city does not.
+    sentence(run("localize", database, "--types", "DB"), "alignment tree", "B")
+    lengths = run("localize", database, "--types", "DD", "--bearings", "10,20,30")
+    sentence(lengths, "2 types and 3 bearings")
+    sentence(run("localize", database, "--types", "D", "--bearings", "ten"), "'ten'")
+    sentence(run("localize", database, "--types", "D", "--bearings", "nan"), "nan")
+    sentence(run("localize", database, "--types", "D", "--method", "edti+edit"), "'edti'", "'edit'")
+    sentence(run("localize", database, "--types", "D", "--method", "angles:edit"), "bearings")
+    sentence(run("localize", database, "--types", "D", "--top", 0))
+    sentence(run("evaluate", database, "--queries", 10**6), "queries")
+    sentence(run("evaluate", database, "--distortion", "mild"), "'mild'")
+
+
+def test_a_database_cut_in_half(database: Path, city: Path, run: Run) -> None:
+    half = city / "half.parquet"
+    half.write_bytes(database.read_bytes()[: database.stat().st_size // 2])
+    for command in (
+        ("info", half),
+        ("localize", half, "--types", "D"),
+        ("evaluate", half),
+        ("export", half, "--out", city / "h.gpkg"),
+    ):
+        sentence(run(*command), "half.parquet is damaged")
+    assert not (city / "h.gpkg").exists()
+    # Each kind of file is told from the other.
+    sentence(run("info", city / "objects.parquet"), "is a street objects file")
+    sentence(run("build", database, "--out", half), "is a signature database file")
+
+
+def test_outputs_that_cannot_be_written(database: Path, city: Path, run: Run) -> None:
+    blocked = city / "tiny.toml" / "x.parquet"
+    sentence(run("build", city / "objects.parquet", "--out", blocked), "cannot be written")
+    sentence(run("build", city / "objects.parquet", "--out", city), "is a folder")
+    sentence(run("export", database, "--out", city / "cells.txt"), ".gpkg")
+    assert not list(city.glob(".*"))
+
+
+def test_usage_errors_exit_2(run: Run) -> None:
+    code, _, err = run("build")
+    assert code == 2
+    assert "Traceback" not in err
+
+
+def test_the_console_script_is_installed() -> None:
+    script = shutil.which("semsig", path=Path(sys.executable).parent)
+    if script is None:
+        pytest.skip("the package is not installed in this environment")
+    done = subprocess.run([script, "--version"], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == f"semsig {__version__}"
