@@ -33,7 +33,7 @@ from semsig_gis.sources._rows import BadFeatureError, RowRules
 
 if TYPE_CHECKING:
     import logging
-    from collections.abc import Iterator
+    from collections.abc import Iterable, Iterator
 
     from pyproj import CRS
 
@@ -42,7 +42,7 @@ if TYPE_CHECKING:
     from semsig_gis.sources._collect import Position
     from semsig_gis.sources._csv_columns import CsvColumns
 
-__all__ = ["LayerInfo", "list_layers", "read_layer"]
+__all__ = ["LayerInfo", "list_layers", "read_layer", "read_layers"]
 
 # The only drivers that may open a file: GDAL has some eighty, and a few of them follow links.
 DRIVERS = {
@@ -229,6 +229,39 @@ def read_layer(
             notes += ("some text is not UTF-8 and was read as missing",)
     by_file = own is not None and not implicit
     return raw_layer(rows, spec, system, by_file=by_file, where=where, notes=notes)
+
+
+def read_layers(
+    path: str | Path,
+    specs: Iterable[LayerSpec],
+    *,
+    filters: bool = True,
+    crs: str | None = None,
+) -> tuple[RawLayer, ...]:
+    """Read several layers of one file.
+
+    Parameters
+    ----------
+    path : str or Path
+        The file.
+    specs : iterable of LayerSpec
+        The layers to look for.
+    filters : bool, default True
+        Whether the filters of the layers apply.
+    crs : str, optional
+        CRS of a file that states none.
+
+    Returns
+    -------
+    tuple of RawLayer
+        One layer for each of `specs`, in their order; see `read_layer` for what it raises.
+
+    Examples
+    --------
+    >>> read_layers("nowhere.shp", [])
+    ()
+    """
+    return tuple(read_layer(path, spec, filters=filters, crs=crs) for spec in specs)
 
 
 # --- Opening ----------------------------------------------------------------------------------
