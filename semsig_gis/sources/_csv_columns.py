@@ -7,7 +7,7 @@ import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from semsig_gis.errors import SourceError
+from semsig_gis.errors import CatalogError, SourceError
 from semsig_gis.sources._rows import BadFeatureError, require_field
 
 if TYPE_CHECKING:
@@ -84,15 +84,17 @@ def csv_columns(header: str, spec: LayerSpec | None, *, where: str) -> CsvColumn
     Raises
     ------
     CatalogError
-        If the columns that `spec` names do not exist.
+        If `spec` names only one column, or one that does not exist.
     SourceError
         If `spec` names none and none is recognised.
     """
-    layouts = {separator: next(csv.reader([header], delimiter=separator), [])
-               for separator in SEPARATORS}  # fmt: skip
+    layouts = {sep: next(csv.reader([header], delimiter=sep), []) for sep in SEPARATORS}
     widest = max(layouts, key=lambda separator: len(layouts[separator]))
-    if spec is not None and spec.x_field and spec.y_field:
+    if spec is not None and (spec.x_field or spec.y_field):
         x, y = spec.x_field, spec.y_field
+        if not (x and y):
+            msg = f"{where} has only one of x_field and y_field in the catalogue; state both."
+            raise CatalogError(msg)
         for separator, names in layouts.items():
             if x in names and y in names:
                 return CsvColumns(separator, x, y)

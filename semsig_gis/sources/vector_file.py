@@ -6,8 +6,6 @@ import contextlib
 import json
 import math
 import re
-import zipfile
-import zlib
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -18,7 +16,6 @@ import shapely
 import shapely.geometry
 
 from semsig_gis.errors import SourceError, UnknownNameError, nearest_name
-from semsig_gis.sources import FILE_SUFFIXES
 from semsig_gis.sources._collect import Row, Rows, raw_layer
 from semsig_gis.sources._crs import (
     WGS84,
@@ -29,6 +26,7 @@ from semsig_gis.sources._crs import (
 )
 from semsig_gis.sources._csv_columns import csv_columns
 from semsig_gis.sources._gdal_log import first_error, listening
+from semsig_gis.sources._member import Member, members, unreadable
 from semsig_gis.sources._rows import BadFeatureError, RowRules
 
 if TYPE_CHECKING:
@@ -44,18 +42,10 @@ if TYPE_CHECKING:
 
 __all__ = ["LayerInfo", "list_layers", "read_layer", "read_layers"]
 
-# The only drivers that may open a file: GDAL has some eighty, and a few of them follow links.
-DRIVERS = {
-    ".csv": "CSV",
-    ".fgb": "FlatGeobuf",
-    ".geojson": "GeoJSON",
-    ".gpkg": "GPKG",
-    ".json": "GeoJSON",
-    ".shp": "ESRI Shapefile",
-}
-# In an archive beside other data, these hold a legend or metadata.
-SIDE_SUFFIXES = frozenset({".csv", ".json"})
 NO_GEOMETRY = "None"
+HEADER_BYTES = 65_536  # enough for the first line of a CSV file
+# A reader that fails so often without a good feature between does not move on.
+FAILURES_IN_A_ROW = 1_000
 WGS84_NAMES = re.compile(r"4326|CRS84|WGS ?84", re.IGNORECASE)
 
 
@@ -91,36 +81,6 @@ class LayerInfo:
     fields: tuple[tuple[str, str], ...]
 
 
-@dataclass(frozen=True, slots=True)
-class _Member:
-    """One layer of a file, or of a file in an archive."""
-
-    file: Path
-    inner: str | None  # name in the archive
-    layer: str | None = None
-
-    @property
-    def driver(self) -> str:
-        return DRIVERS[Path(self.inner or self.file).suffix.lower()]
-
-    @property
-    def address(self) -> str | Path:
-        if self.inner is None:
-            return self.file
-        # GDAL's own form: fiona parses zip:// as a URL and loses what follows a '#' or a '?'.
-        return f"/vsizip/{{{self.file.resolve().as_posix()}}}/{self.inner}"
-
-    def __str__(self) -> str:
-        return str(self.file) if self.inner is None else f"{self.inner} in {self.file}"
-
-    def content(self, size: int = -1) -> bytes:
-        if self.inner is None:
-            with self.file.open("rb") as stream:
-                return stream.read(size)
-        with zipfile.ZipFile(self.file) as archive, archive.open(self.inner) as stream:
-            return stream.read(size)
-
-
 def list_layers(path: str | Path) -> tuple[LayerInfo, ...]:
     r"""List the layers of a vector file.
 
@@ -151,7 +111,7 @@ def list_layers(path: str | Path) -> tuple[LayerInfo, ...]:
     ('benches', 'Point', None, 1, ('id', 'str'))
     """
     with listening():
-        return tuple(_describe(member) for member in _members(Path(path)))
+        return tuple(_describe(member) for member in _layers(Path(path)))
 
 
 def read_layer(
@@ -267,18 +227,9 @@ def read_layers(
 # --- Opening ----------------------------------------------------------------------------------
 
 
-def _unreadable(what: object, error: BaseException) -> SourceError:
-    if isinstance(error, UnicodeDecodeError):
-        return SourceError(f"{what} is not UTF-8 text; save it as UTF-8.")
-    cause = " ".join(str(error.__cause__ or error).split()).rpartition(" failed: ")[2].rstrip(".")
-    if "not recognized" in cause:
-        return SourceError(f"{what} is not the kind of file that its name says; get it again.")
-    return SourceError(f"{what} cannot be read ({cause}); it may be damaged, get it again.")
-
-
 @contextlib.contextmanager
 def _opened(
-    member: _Member, columns: CsvColumns | None = None, *, fields: tuple[str, ...] | None = None
+    member: Member, columns: CsvColumns | None = None, *, fields: tuple[str, ...] | None = None
 ) -> Iterator[fiona.Collection]:
     """Open a layer; what goes wrong in opening it becomes a `SourceError`."""
     options: dict[str, Any] = dict(columns.options) if columns else {}
@@ -294,72 +245,33 @@ def _opened(
         )
         source.schema  # noqa: B018 - the names of the fields are decoded here
     except Exception as error:
-        raise _unreadable(member, error) from error
+        raise unreadable(member, error) from error
     with source:
         yield source
 
 
-def _members(path: Path) -> tuple[_Member, ...]:
-    """Return the layers of a file, once it is seen to exist and to be of a known kind."""
-    suffix = path.suffix.lower()
-    if not path.is_file():
-        what = "is a folder" if path.is_dir() else "does not exist"
-        msg = f"{path} {what}; give a vector file."
-        raise SourceError(msg)
-    if suffix not in FILE_SUFFIXES:
-        msg = f"{path} is not a vector file; give one of {', '.join(sorted(FILE_SUFFIXES))}."
-        raise SourceError(msg)
-    inner = _archived(path) if suffix == ".zip" else (None,)
-    return tuple(member for name in inner for member in _layers(_Member(path, name)))
+def _layers(path: Path) -> tuple[Member, ...]:
+    """Return the layers of a file, or of all the files in an archive."""
+    return tuple(layer for member in members(path) for layer in _layers_in(member))
 
 
-def _archived(path: Path) -> tuple[str, ...]:
-    """Return the names of the vector files in an archive whose checksums hold."""
-    try:
-        with zipfile.ZipFile(path) as archive:
-            names = [item.filename for item in archive.infolist() if not item.is_dir()]
-            broken = archive.testzip()
-    except (NotImplementedError, OSError, RuntimeError, zipfile.BadZipFile, zlib.error) as error:
-        raise _unreadable(path, error) from error
-    if broken is not None:
-        msg = f"archive {path} is damaged at {broken}; get it again."
-        raise SourceError(msg)
-    usable = [
-        name
-        for name in names
-        if Path(name).suffix.lower() in DRIVERS and not name.startswith("__MACOSX/")
-    ]
-    if not usable:
-        msg = (
-            f"archive {path} holds no vector file, only {', '.join(names) or 'nothing'}; "
-            f"one of {', '.join(sorted(DRIVERS))} is needed."
-        )
-        raise SourceError(msg)
-    data = [name for name in usable if Path(name).suffix.lower() not in SIDE_SUFFIXES]
-    return tuple(data or usable)
-
-
-def _layers(member: _Member) -> Iterator[_Member]:
+def _layers_in(member: Member) -> Iterator[Member]:
     # Opened under the allow-list first, because listing would try every driver of GDAL.
     with _opened(member):
         pass
-    try:
-        names = fiona.listlayers(member.address)
-    except Exception as error:
-        raise _unreadable(member, error) from error
-    for name in names:
-        yield _Member(member.file, member.inner, name)
+    for name in fiona.listlayers(member.address):
+        yield Member(member.file, member.inner, name)
 
 
-def _pick(path: Path, wanted: str | None) -> _Member:
+def _pick(path: Path, wanted: str | None) -> Member:
     """Return the layer that a specification means."""
-    members = _members(path)
-    if wanted is None and len(members) > 1:
+    layers = _layers(path)
+    if wanted is None and len(layers) > 1:
         # A GeoPackage keeps its styles in a table without geometry, which is never meant.
-        drawn = [item for item in members if _describe(item).geometry != NO_GEOMETRY]
-        members = tuple(drawn) or members
-    known = [str(member.layer) for member in members]
-    chosen = [item for item in members if wanted is None or item.layer == wanted]
+        drawn = [item for item in layers if _describe(item).geometry != NO_GEOMETRY]
+        layers = tuple(drawn) or layers
+    known = [str(member.layer) for member in layers]
+    chosen = [item for item in layers if wanted is None or item.layer == wanted]
     if len(chosen) == 1:
         return chosen[0]
     if wanted is not None and not chosen:
@@ -372,17 +284,15 @@ def _pick(path: Path, wanted: str | None) -> _Member:
     raise SourceError(msg)
 
 
-def _columns(member: _Member, spec: LayerSpec | None, *, where: str) -> CsvColumns | None:
+def _columns(member: Member, spec: LayerSpec | None, *, where: str) -> CsvColumns | None:
     if member.driver != "CSV":
         return None
-    first = member.content(2**16).splitlines()[:1] or [b""]
-    try:
-        return csv_columns(first[0].decode("utf-8-sig"), spec, where=where)
-    except UnicodeDecodeError as error:
-        raise _unreadable(where, error) from error
+    # What is not UTF-8 here was refused when the file was first opened.
+    head = member.content(HEADER_BYTES).decode("utf-8-sig", errors="replace")
+    return csv_columns(head.splitlines()[0], spec, where=where)
 
 
-def _describe(member: _Member) -> LayerInfo:
+def _describe(member: Member) -> LayerInfo:
     columns = _columns(member, None, where=str(member))
     with _opened(member, columns) as source:
         crs, implicit = _own_crs(source)
@@ -431,14 +341,17 @@ def _read_rows(
     by_row = source.driver != "GeoJSON"
     damage = ""
     features = iter(source)
-    while len(rows.errors) <= expected:  # one that fails without moving on would fail for ever
+    failures = 0
+    while failures < FAILURES_IN_A_ROW:
         said = len(heard)
         try:
             feature = next(features, None)
         except Exception as error:  # noqa: BLE001 - of many kinds, and one must not stop the rest
+            failures += 1
             rows.read += 1
             rows.errors[rows.read] = f"cannot be read ({error})"
             continue
+        failures = 0
         if by_row and not damage:
             damage = first_error(heard[said:])
         if feature is None:
@@ -448,8 +361,9 @@ def _read_rows(
             _read_row(rows, feature, rules, columns, damage)
         except BadFeatureError as error:
             rows.errors[rows.read] = str(error)
-    if damage and rows.read < expected:
-        rows.errors.update(dict.fromkeys(range(rows.read + 1, expected + 1), damage))
+    if rows.read < expected and (damage or failures):
+        rest = range(rows.read + 1, expected + 1)
+        rows.errors.update(dict.fromkeys(rest, damage or "out of reach behind unreadable rows"))
         rows.read = expected
     return rows
 
@@ -492,7 +406,7 @@ def _position(geometry: fiona.Geometry | None) -> Position:
         raise BadFeatureError(msg) from error
 
 
-def _refuse_broken(rows: Rows, member: _Member) -> None:
+def _refuse_broken(rows: Rows, member: Member) -> None:
     """Tell the null geometries of a GeoJSON file from those that GDAL could make nothing of."""
     null = [row.number for row in rows.kept if row.position is None]
     if not null:

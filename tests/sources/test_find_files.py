@@ -9,7 +9,7 @@ import pytest
 from semsig_gis.catalog import LayerSpec, load_catalog
 from semsig_gis.errors import SourceError
 from semsig_gis.sources import FILE_SUFFIXES, find_files
-from semsig_gis.sources.vector_file import DRIVERS
+from semsig_gis.sources._member import DRIVERS
 
 if TYPE_CHECKING:
     from pathlib import Path

@@ -64,7 +64,7 @@ def spacings(rows: pd.DataFrame) -> list[list[float]]:
     rows = rows.sort_values(["edge", "side", "number"])
     same = (rows[["edge", "side"]] == rows[["edge", "side"]].shift()).all(axis=1)
     gaps = np.hypot(rows["x"].diff(), rows["y"].diff()) / rows["number"].diff()
-    return [list(part) for _, part in gaps[same].groupby(rows["edge"])]
+    return [part.to_list() for _, part in gaps[same].groupby(rows["edge"])]
 
 
 @settings(max_examples=25)

@@ -23,7 +23,10 @@ from pyproj import CRS
 
 from semsig_gis.catalog import ClassBy, LayerSpec
 from semsig_gis.errors import CatalogError, CrsError, SourceError, UnknownNameError
-from semsig_gis.sources.vector_file import DRIVERS, list_layers, read_layer
+from semsig_gis.sources import vector_file
+from semsig_gis.sources._member import DRIVERS
+from semsig_gis.sources._rows import RowRules
+from semsig_gis.sources.vector_file import list_layers, read_layer
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable
@@ -401,6 +404,53 @@ def test_broken_geojson_geometries_are_told_from_null_ones(tmp_path: Path) -> No
     assert read_layer(zipped, spec_of()).errors == layer.errors
 
 
+def test_geojson_that_is_one_geometry(tmp_path: Path) -> None:
+    path = text_file(tmp_path, "things.geojson", json.dumps(point(3, 43)))
+    assert xy(read_layer(path, spec_of())) == [[3.0, 43.0]]
+
+
+class Failing:
+    """A source of points of which some raise, as GDAL may; `stuck` is where it stops moving."""
+
+    driver = "GPKG"
+
+    def __init__(self, size: int, *, bad: frozenset[int] = frozenset(), stuck: int = -1) -> None:
+        self.size, self.bad, self.stuck, self.at = size, bad, stuck, 0
+
+    def __len__(self) -> int:
+        return self.size
+
+    def __iter__(self) -> Failing:
+        return self
+
+    def __next__(self) -> fiona.Feature:
+        if self.at == self.stuck:
+            raise OSError(5, "no more")
+        if self.at == self.size:
+            raise StopIteration
+        self.at += 1
+        if self.at - 1 in self.bad:
+            msg = "unlucky"
+            raise ValueError(msg)
+        geometry = fiona.Geometry(coordinates=(self.at, 0.0), type="Point")
+        return fiona.Feature(geometry=geometry, id=str(self.at), properties=fiona.Properties())
+
+
+def test_features_that_raise_do_not_stop_the_rest() -> None:
+    rules = RowRules(spec_of(), [], filters=True, where="here")
+    rows = vector_file._read_rows(Failing(9, bad=frozenset({0, 4, 8})), rules, None, [])
+    assert (rows.read, [row.number for row in rows.kept]) == (9, [2, 3, 4, 6, 7, 8])
+    assert rows.errors == dict.fromkeys((1, 5, 9), "cannot be read (unlucky)")
+
+
+@pytest.mark.parametrize("size", [5, 5000])
+def test_reader_that_is_stuck_comes_to_an_end(size: int) -> None:
+    rules = RowRules(spec_of(), [], filters=True, where="here")
+    rows = vector_file._read_rows(Failing(size, stuck=3), rules, None, [])
+    assert [row.number for row in rows.kept] == [1, 2, 3]
+    assert rows.read == len(rows.kept) + len(rows.errors) == max(size, 1003)
+
+
 def test_coordinates_that_are_not_finite(tmp_path: Path) -> None:
     line = {"type": "LineString", "coordinates": [[1, 2], [math.nan, 3]]}
     path = geojson(tmp_path, point(3, 43), point(math.nan, 43), point(3, math.inf), line)
@@ -508,6 +558,10 @@ def test_csv_needs_coordinates(tmp_path: Path) -> None:
         read_layer(path, spec_of())
     with pytest.raises(CatalogError, match=r"'plase'.*x_field; the nearest is 'place'"):
         read_layer(path, spec_of(x_field="plase", y_field="place"))
+    with pytest.raises(CatalogError, match=r"'placed'.*y_field; the nearest is 'place'"):
+        read_layer(path, spec_of(x_field="place", y_field="placed"))
+    with pytest.raises(CatalogError, match="only one of x_field and y_field"):
+        read_layer(path, spec_of(x_field="place"))
     assert list_layers(path)[0].geometry == "None"
 
 
