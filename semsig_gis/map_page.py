@@ -108,17 +108,21 @@ const semsig = {
       pane: "shadowPane", interactive: false, color: colour, weight: 1, opacity: 0.6,
     })));
   },
-  legend(text) {
+  legend(map, text, view) {
+    const box = L.DomUtil.create("details", "semsig-legend");
+    box.open = window.innerWidth > 700;
+    box.innerHTML = text;
+    L.DomEvent.disableClickPropagation(box);
+    L.DomEvent.disableScrollPropagation(box);
     const control = L.control({position: "bottomleft"});
-    control.onAdd = () => {
-      const box = L.DomUtil.create("details", "semsig-legend");
-      box.open = window.innerWidth > 700;
-      box.innerHTML = text;
-      L.DomEvent.disableClickPropagation(box);
-      L.DomEvent.disableScrollPropagation(box);
-      return box;
-    };
-    return control;
+    control.onAdd = () => box;
+    control.addTo(map);
+    if (view !== null) {
+      const left = box.open ? box.offsetWidth + 20 : 20;
+      map.fitBounds(view, {
+        paddingTopLeft: [left, 20], paddingBottomRight: [20, 20], maxZoom: 17, animate: false,
+      });
+    }
   },
 };
 """
