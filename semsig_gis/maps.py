@@ -135,7 +135,7 @@ def evaluation_map(
     guess = math.sqrt(2.0 * float(database.xy.var(axis=0).sum())) or database.grid.step
     chosen = _prepared(map_, tiles, title="Localization errors")
     _add_city(chosen, database)
-    HeatMap(
+    _Heat(  # type: ignore[no-untyped-call]
         np.column_stack([places, _heat(xy, queries["error_m"] / guess, extent=max(high - low))]),
         name=_free_name(chosen, "Expected errors"),
         min_opacity=0.0,
@@ -326,6 +326,19 @@ class _Drawing(_Furniture, Layer):
         self.arguments = ", ".join(map(script_json, arguments))
 
 
+class _Heat(_Furniture, HeatMap):
+    """A heatmap that can be switched on and off at every zoom."""
+
+    _template = Template(
+        """
+        {% macro script(this, kwargs) %}
+        var {{ this.get_name() }} = semsig.heat(
+          {{ this.data|tojson }}, {{ this.options|tojavascript }});
+        {% endmacro %}
+        """
+    )
+
+
 def _prepared(map_: folium.Map | None, tiles: str | None, *, title: str) -> folium.Map:
     """Return the map to draw on."""
     if map_ is not None:
@@ -342,8 +355,8 @@ def _prepared(map_: folium.Map | None, tiles: str | None, *, title: str) -> foli
         )
         raise InputError(msg) from error
     if tiles is None:
-        # Only tiles tell Leaflet where to stop.
-        made.options["maxZoom"] = _MAX_ZOOM
+        # Only tiles tell Leaflet where to stop, and only they look bad between whole zooms.
+        made.options |= {"maxZoom": _MAX_ZOOM, "zoomSnap": 0.25}
     cast("Figure", made.get_root()).title = title
     return made
 

@@ -162,6 +162,8 @@ def test_an_evaluation_in_a_browser(
         switch(browser, name)
         assert drawn(browser, colour) >= before * 0.9
     assert len(browser.find_elements(By.CSS_SELECTOR, "canvas.leaflet-heatmap-layer")) == 1
+    asked(browser, "map.setZoom(20, {animate: false})")
+    assert browser.find_elements(By.CSS_SELECTOR, "input:disabled") == []
     switch(browser, "Expected errors")
     assert browser.find_elements(By.CSS_SELECTOR, "canvas.leaflet-heatmap-layer") == []
     switch(browser, "Objects seen")
