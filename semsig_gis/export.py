@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import contextlib
 import itertools
 import json
+import sqlite3
 from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, get_args
@@ -116,11 +118,12 @@ def export_geopackage(
             for done in itertools.accumulate(written):
                 if progress is not None:
                     progress(done, rows)
-        except (DataSourceError, DataLayerError, FeatureError) as error:
-            reason = str(error).rstrip(".")
+            _check_indexes(partial, rows)
+        except (DataSourceError, DataLayerError, FeatureError, sqlite3.Error) as error:
+            # GDAL's own words are pages of SQL; they stay with the cause.
             msg = (
-                f"{target} could not be written ({reason}); free some space or choose another "
-                "folder. What was there before is unchanged."
+                f"{target} could not be written whole, so what was there before is unchanged; "
+                "free some space or choose another folder."
             )
             raise InputError(msg) from error
 
@@ -242,6 +245,22 @@ def _write_layer(
             **(first if number == 0 else {}),
         )
         yield len(block)
+
+
+def _check_indexes(path: Path, rows: int) -> None:
+    """Check that all rows are in the spatial indexes.
+
+    They are the last to be written, when a layer is closed, and GDAL keeps quiet if that fails.
+    """
+    with contextlib.closing(sqlite3.connect(path)) as connection:
+        layers = [name for (name,) in connection.execute("SELECT table_name FROM gpkg_contents")]
+        counts = (
+            connection.execute(f"SELECT count(*) FROM rtree_{name}_geom").fetchone()[0]  # noqa: S608
+            for name in layers
+        )
+        if sum(counts) != rows:
+            msg = "the spatial indexes are not complete"
+            raise sqlite3.DatabaseError(msg)
 
 
 def _blocks(rows: int) -> list[slice]:

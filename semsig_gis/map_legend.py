@@ -99,7 +99,8 @@ def localization_legend(localization: Localization) -> str:
     if query.codes is not None:
         asked.append(f"Types: {escape(localization.taxonomy.decode(query.codes))}")
     if query.bearings is not None:
-        asked.append("Bearings: " + " ".join(f"{degrees:.0f}°" for degrees in query.bearings))
+        degrees = (round(bearing) % 360 for bearing in query.bearings.tolist())
+        asked.append("Bearings: " + " ".join(f"{value}°" for value in degrees))
     more = localization.tied_beyond
     beyond = f"<br>{more:,} more cells are as good as the last one" if more else ""
     distances = candidates["distance"]

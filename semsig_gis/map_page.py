@@ -108,17 +108,33 @@ const semsig = {
       pane: "shadowPane", interactive: false, color: colour, weight: 1, opacity: 0.6,
     })));
   },
-  legend(text) {
-    const control = L.control({position: "bottomleft"});
-    control.onAdd = () => {
-      const box = L.DomUtil.create("details", "semsig-legend");
-      box.open = window.innerWidth > 700;
-      box.innerHTML = text;
-      L.DomEvent.disableClickPropagation(box);
-      L.DomEvent.disableScrollPropagation(box);
-      return box;
+  heat(points, {maxZoom, ...options}) {
+    // leaflet.heat means by it where its points are strongest, but the layer control disables a
+    // layer beyond it. So it is there only while the heat is drawn.
+    const layer = L.heatLayer(points, options);
+    const redraw = layer._redraw;
+    layer._redraw = function() {
+      this.options.maxZoom = maxZoom;
+      redraw.call(this);
+      delete this.options.maxZoom;
     };
-    return control;
+    return layer;
+  },
+  legend(map, text, view) {
+    const box = L.DomUtil.create("details", "semsig-legend");
+    box.open = window.innerWidth > 700;
+    box.innerHTML = text;
+    L.DomEvent.disableClickPropagation(box);
+    L.DomEvent.disableScrollPropagation(box);
+    const control = L.control({position: "bottomleft"});
+    control.onAdd = () => box;
+    control.addTo(map);
+    if (view !== null) {
+      const left = box.open ? box.offsetWidth + 20 : 10;
+      map.fitBounds(view, {
+        paddingTopLeft: [left, 10], paddingBottomRight: [10, 10], maxZoom: 17, animate: false,
+      });
+    }
   },
 };
 """

@@ -63,7 +63,10 @@ _CANDIDATE_FIELDS = ("Rank", "Distance", "Signature", "Cell", "Position")
 
 _MAX_ZOOM = 20
 _HEAT_PIXELS = 25
+_HEAT_STOPS = (0.1, 0.35, 0.65, 0.9)
 _SCREEN_PIXELS = 900.0
+_TILE_PIXELS = 256.0
+_MANY = 2000
 _KILOMETRE = 1000
 
 
@@ -117,7 +120,7 @@ def evaluation_map(
     >>> layers = synthetic_city(CitySpec(size=300.0))
     >>> objects, _ = build_objects(layers, taxonomy=paper_taxonomy(), crs="EPSG:32631")
     >>> database = build_database(objects)
-    >>> evaluation_map(evaluate(database, queries=5), database).options["max_zoom"]
+    >>> evaluation_map(evaluate(database, queries=5), database).options["maxZoom"]
     20
     """
     queries = evaluation.queries
@@ -126,15 +129,26 @@ def evaluation_map(
     places = _latlon(xy, database.crs)
     found = _latlon(queries[["best_x", "best_y"]].to_numpy(np.float64), database.crs)
     records = _query_records(evaluation, database, places, found)
+    low, high = database.xy.min(axis=0), database.xy.max(axis=0)
+    view = _latlon(np.stack([low, high]), database.crs)
     # How far two random cells lie apart (root mean square).
-    limit = math.sqrt(2.0 * float(database.xy.var(axis=0).sum())) or database.grid.step
+    guess = math.sqrt(2.0 * float(database.xy.var(axis=0).sum())) or database.grid.step
     chosen = _prepared(map_, tiles, title="Localization errors")
     _add_city(chosen, database)
-    _heatmap(xy, places, queries["error_m"].to_numpy(np.float64), limit=limit).add_to(chosen)
+    _Heat(  # type: ignore[no-untyped-call]
+        np.column_stack([places, _heat(xy, queries["error_m"] / guess, extent=max(high - low))]),
+        name=_free_name(chosen, "Expected errors"),
+        min_opacity=0.0,
+        # Farther out than the whole city, leaflet.heat weakens what comes to lie closer together.
+        max_zoom=_zoom(view),
+        radius=_HEAT_PIXELS,
+        blur=_HEAT_PIXELS,
+        gradient=dict(zip(_HEAT_STOPS, ERROR_RAMP, strict=True)),
+    ).add_to(chosen)
     groups = (("Failed", ~successful, FAILED), ("Successful", successful, SUCCESSFUL))
     located = np.isfinite(found).all(axis=1)
     _Drawing(
-        "Lines from true to estimated places",
+        _free_name(chosen, "Lines from true to estimated places"),
         "lines",
         [
             [colour, np.stack([places, found], axis=1)[which & located].tolist()]
@@ -144,16 +158,15 @@ def evaluation_map(
     ).add_to(chosen)
     for name, which, _ in groups:
         _Drawing(
-            f"{name} queries ({int(which.sum()):,})",
+            _free_name(chosen, f"{name} queries ({int(which.sum()):,})"),
             "points",
             _QUERY_FIELDS,
             _titles(database),
             list(itertools.compress(records, which)),
         ).add_to(chosen)
-    _Legend(
-        evaluation_legend(evaluation, error_limit=_metres(limit), licenses=database.licenses)
-    ).add_to(chosen)
-    return _finished(chosen, places if map_ is None else None)
+    legend = evaluation_legend(evaluation, error_limit=_metres(guess), licenses=database.licenses)
+    _Legend(legend, view if map_ is None else None).add_to(chosen)
+    return _finished(chosen)
 
 
 def localization_map(
@@ -199,7 +212,7 @@ def localization_map(
     >>> objects, _ = build_objects(layers, taxonomy=paper_taxonomy(), crs="EPSG:32631")
     >>> database = build_database(objects)
     >>> answer = localize(database, database.signature(0), top=5)
-    >>> localization_map(answer, database).options["max_zoom"]
+    >>> localization_map(answer, database).options["maxZoom"]
     20
     """
     candidates = localization.candidates
@@ -209,14 +222,14 @@ def localization_map(
     chosen = _prepared(map_, tiles, title="Candidate places")
     _add_city(chosen, database)
     _Drawing(
-        f"Candidates ({len(records):,})",
+        _free_name(chosen, f"Candidates ({len(records):,})"),
         "points",
         _CANDIDATE_FIELDS,
         _titles(database),
         records[::-1],  # the best last, so that they lie on top
     ).add_to(chosen)
-    _Legend(localization_legend(localization)).add_to(chosen)
-    return _finished(chosen, places if map_ is None else None)
+    _Legend(localization_legend(localization), places if map_ is None else None).add_to(chosen)
+    return _finished(chosen)
 
 
 def save_map(map_: folium.Map, path: str | Path, *, self_contained: bool | None = None) -> bool:
@@ -277,20 +290,22 @@ class _Furniture(MacroElement):
 
 
 class _Legend(_Furniture):
-    """A box with the meaning of the signs; folds, and is folded on narrow screens."""
+    """A box with the meaning of the signs, folded on narrow screens, and what to show beside it."""
 
     _template = Template(
         """
         {% macro script(this, kwargs) %}
-        semsig.legend({{ this.text }}).addTo({{ this._parent.get_name() }});
+        semsig.legend({{ this._parent.get_name() }}, {{ this.text }}, {{ this.view }});
         {% endmacro %}
         """
     )
 
-    def __init__(self, text: str) -> None:
-        super().__init__()
+    def __init__(self, text: str, view: NDArray[np.float64] | None) -> None:
+        super().__init__()  # type: ignore[no-untyped-call]
         self._name = "SemsigLegend"
         self.text = script_json(text)
+        corners = None if view is None else [view.min(axis=0).tolist(), view.max(axis=0).tolist()]
+        self.view = script_json(corners)
 
 
 class _Drawing(_Furniture, Layer):
@@ -311,6 +326,19 @@ class _Drawing(_Furniture, Layer):
         self.arguments = ", ".join(map(script_json, arguments))
 
 
+class _Heat(_Furniture, HeatMap):
+    """A heatmap that can be switched on and off at every zoom."""
+
+    _template = Template(
+        """
+        {% macro script(this, kwargs) %}
+        var {{ this.get_name() }} = semsig.heat(
+          {{ this.data|tojson }}, {{ this.options|tojavascript }});
+        {% endmacro %}
+        """
+    )
+
+
 def _prepared(map_: folium.Map | None, tiles: str | None, *, title: str) -> folium.Map:
     """Return the map to draw on."""
     if map_ is not None:
@@ -319,29 +347,27 @@ def _prepared(map_: folium.Map | None, tiles: str | None, *, title: str) -> foli
             raise InputError(msg)
         return map_
     try:
-        # Without tiles Leaflet knows no largest zoom.
-        made = folium.Map(tiles=tiles, prefer_canvas=True, control_scale=True, max_zoom=_MAX_ZOOM)
+        made = folium.Map(tiles=tiles, prefer_canvas=True, control_scale=True)
     except ValueError as error:
         msg = (
             f"Tiles {tiles!r} are not known to folium; give a name such as 'OpenStreetMap' or "
             "'CartoDB positron', or add a tile layer to a map of your own."
         )
         raise InputError(msg) from error
-    made.options["max_zoom"] = _MAX_ZOOM
+    if tiles is None:
+        # Only tiles tell Leaflet where to stop, and only they look bad between whole zooms.
+        made.options |= {"maxZoom": _MAX_ZOOM, "zoomSnap": 0.25}
     cast("Figure", made.get_root()).title = title
     return made
 
 
-def _finished(chosen: folium.Map, places: NDArray[np.float64] | None) -> folium.Map:
-    """Put the layer control last, where it knows all layers, and show the places if given."""
+def _finished(chosen: folium.Map) -> folium.Map:
+    """Put the layer control last, where it knows all layers."""
     children = _children(chosen)
     for name in [key for key, child in children.items() if isinstance(child, folium.LayerControl)]:
         del children[name]
     narrow = cast("bool", JsCode("window.innerWidth <= 700"))
     folium.LayerControl(collapsed=narrow).add_to(chosen)
-    if places is not None:
-        corners = [places.min(axis=0).tolist(), places.max(axis=0).tolist()]
-        chosen.fit_bounds(corners, padding=(20, 20), max_zoom=17)
     return chosen
 
 
@@ -413,6 +439,7 @@ def _query_records(
     best_rows = np.searchsorted(
         database.cell_ids, evaluation.queries["best_cell_id"].fillna(0).to_numpy(np.int64)
     )
+    radius = 5 if total <= _MANY else 3
     records = []
     for number, query in enumerate(evaluation.queries.itertuples(index=False)):
         asked = [float(one) for one in query.query_bearings.split(",") if one]
@@ -434,7 +461,7 @@ def _query_records(
             [
                 places[number].tolist(),
                 SUCCESSFUL if successful[number] else FAILED,
-                5,
+                radius,
                 found[number].tolist() if located else None,
                 f"Query {number + 1:,} of {total:,}: {outcome}",
                 details,
@@ -505,32 +532,29 @@ def _ramp(values: NDArray[np.float64], colours: Sequence[str]) -> list[str]:
     return [f"#{bytes(row).hex()}" for row in np.rint(mixed).astype(np.uint8)]
 
 
-def _heatmap(
-    xy: NDArray[np.float64],
-    places: NDArray[np.float64],
-    errors: NDArray[np.float64],
-    *,
-    limit: float,
-) -> HeatMap:
-    """Return a heatmap of the errors that looks right where all the queries are seen."""
-    extent = max(float(np.ptp(xy, axis=0).max()), 1000.0)
-    # The heat of queries that are near each other on the screen is laid one over the other. Each
-    # gets a part, so that together they show their mean error, not where most were drawn.
+def _heat(xy: NDArray[np.float64], errors: ArrayLike, *, extent: float) -> NDArray[np.float64]:
+    """Return the opacity of each query in the heatmap, from its error as a share of a guess's.
+
+    The heat of queries that are near each other on the screen is laid one over the other. Each
+    gets a part, so that together they show their mean error, not where most were drawn.
+    """
     reach = extent * _HEAT_PIXELS / _SCREEN_PIXELS
     neighbours = np.bincount(ObjectIndex(xy).pairs_within(xy, radius=reach)[0])
-    heat = 1.0 - (1.0 - 0.9 * np.minimum(errors / limit, 1.0)) ** (1.0 / neighbours)
-    degrees = max(float(np.ptp(places[:, 1])), 0.01)
-    stops = np.linspace(0.1, 0.9, len(ERROR_RAMP)).round(2).tolist()
-    return HeatMap(
-        np.column_stack([places, heat.round(4)]).tolist(),
-        name="Expected errors",
-        min_opacity=0.0,
-        # Farther out, leaflet.heat weakens what then lies closer together.
-        max_zoom=round(math.log2(_SCREEN_PIXELS / 256.0 * 360.0 / degrees)),
-        radius=_HEAT_PIXELS,
-        blur=_HEAT_PIXELS,
-        gradient=dict(zip(stops, ERROR_RAMP, strict=True)),
-    )
+    opacity = _HEAT_STOPS[-1] * np.minimum(np.asarray(errors, np.float64), 1.0)
+    return np.round(1.0 - (1.0 - opacity) ** (1.0 / neighbours), 4)
+
+
+def _zoom(view: NDArray[np.float64]) -> int:
+    """Return about the zoom at which places fill a screen."""
+    degrees = max(float(np.ptp(view[:, 1])), 0.001)
+    return round(math.log2(_SCREEN_PIXELS / _TILE_PIXELS * 360.0 / degrees))
+
+
+def _free_name(map_: folium.Map, name: str) -> str:
+    """Return the name for a layer, with a number where the map has one of that name."""
+    taken = {child.layer_name for child in _children(map_).values() if isinstance(child, Layer)}
+    numbered = (f"{name}, {number}" for number in itertools.count(2))
+    return next(one for one in itertools.chain([name], numbered) if one not in taken)
 
 
 def _add_city(chosen: folium.Map, database: SignatureDatabase) -> None:
@@ -540,4 +564,5 @@ def _add_city(chosen: folium.Map, database: SignatureDatabase) -> None:
     shown = {child.url for child in _children(chosen).values() if isinstance(child, ImageOverlay)}
     if url not in shown:
         # In the pane of tiles, below everything else.
-        ImageOverlay(url, bounds, name="Objects seen from a cell", pane="tilePane").add_to(chosen)
+        name = _free_name(chosen, "Objects seen from a cell")
+        ImageOverlay(url, bounds, name=name, pane="tilePane").add_to(chosen)

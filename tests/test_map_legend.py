@@ -1,0 +1,122 @@
+"""Legends: what they say, and that text from data stays text."""
+
+from __future__ import annotations
+
+import dataclasses
+from html.parser import HTMLParser
+from typing import TYPE_CHECKING
+
+import pytest
+
+from semsig_gis.catalog import paper_taxonomy
+from semsig_gis.database import build_database
+from semsig_gis.distortion import Distortion
+from semsig_gis.evaluation import evaluate
+from semsig_gis.map_legend import SHADES, evaluation_legend, localization_legend
+from semsig_gis.matching import localize
+from semsig_gis.objects import build_objects
+from semsig_gis.signatures import Signature
+from semsig_gis.sources.synthetic import CitySpec, synthetic_city
+
+if TYPE_CHECKING:
+    from semsig_gis.database import SignatureDatabase
+    from semsig_gis.evaluation import Evaluation
+
+HOSTILE = "<script>alert(1)</script><img src=x onerror=alert(1)> \"'`${alert(1)} {{7*7}} & \\ é"
+
+
+class Text(HTMLParser):
+    """The text of HTML, and the elements in it."""
+
+    def __init__(self, text: str) -> None:
+        super().__init__()
+        self.shown = ""
+        self.tags: set[str] = set()
+        self.feed(text)
+        self.close()
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:  # noqa: ARG002
+        self.tags.add(tag)
+        self.shown += "\n" if tag in {"p", "br", "tr"} else " "
+
+    def handle_data(self, data: str) -> None:
+        self.shown += data
+
+
+@pytest.fixture(scope="module")
+def database() -> SignatureDatabase:
+    layers = synthetic_city(CitySpec(size=300.0))
+    objects, _ = build_objects(layers, taxonomy=paper_taxonomy(), crs="EPSG:32631")
+    return dataclasses.replace(build_database(objects), licenses=("Town (CC0): trees, lamps",))
+
+
+@pytest.fixture(scope="module")
+def evaluation(database: SignatureDatabase) -> Evaluation:
+    distortion = Distortion(occurrences=3, bearing_sigma=5, name="mild")
+    return evaluate(database, queries=40, distortion=distortion)
+
+
+def test_what_an_evaluation_says(evaluation: Evaluation, database: SignatureDatabase) -> None:
+    text = Text(
+        evaluation_legend(evaluation, error_limit="150 m", licenses=database.licenses)
+    ).shown
+    successful = int(evaluation.successful.sum())
+    for said in (
+        f"40 queries among {len(database):,} cells",
+        "Method: edit+edit, the best candidate",
+        "Distortion: mild, 3 occurrences, bearing noise 5°",
+        f"P(error ≤ 50 m) {evaluation.cdf([50])[0]:.1%}",
+        f"{successful} successful: within 50 m with probability 0.5 or more",
+        f"{40 - successful} failed",
+        "150 m, as bad as a guess",
+        "1-4",
+        "20+",
+        "Data: Town (CC0): trees, lamps",
+        "Made with semsig_gis",
+    ):
+        assert said in text
+
+
+def test_variants_of_an_evaluation(database: SignatureDatabase) -> None:
+    exact = evaluate(database, queries=5, distortion="none", top=3)
+    text = Text(evaluation_legend(exact, error_limit="1 m", licenses=())).shown
+    assert "the best of 3" in text
+    assert "bearing noise" not in text
+    assert "Data" not in text
+
+
+@pytest.mark.parametrize(
+    ("query", "said", "unsaid"),
+    [
+        (Signature.parse("DB", [10, 359.7], taxonomy=paper_taxonomy()), "Types: DB", "Types: D\n"),
+        (Signature.parse("DB", None, taxonomy=paper_taxonomy()), "by types", "Bearings"),
+        (Signature.parse(None, [10, 359.7], taxonomy=paper_taxonomy()), "10° 0°", "Types:"),
+    ],
+)
+def test_what_a_localization_says(
+    query: Signature, said: str, unsaid: str, database: SignatureDatabase
+) -> None:
+    localization = localize(database, query, top=7)
+    text = Text(localization_legend(localization)).shown
+    assert said in text
+    assert unsaid not in text
+    assert f"The best 7 of {len(database):,} cells" in text
+    assert ("more cells are as good" in text) == (localization.tied_beyond > 0)
+    assert f"{localization.candidates['distance'].max():.3f}" in text
+    assert "Data: Town (CC0): trees, lamps" in text
+
+
+def test_text_from_data_stays_text(evaluation: Evaluation, database: SignatureDatabase) -> None:
+    plain = evaluation_legend(evaluation, error_limit="1 m", licenses=["x"])
+    hostile = dataclasses.replace(evaluation, distortion=Distortion(occurrences=3, name=HOSTILE))
+    shown = Text(evaluation_legend(hostile, error_limit="1 m", licenses=[HOSTILE]))
+    assert shown.shown.count(HOSTILE) == 2
+    assert shown.tags == Text(plain).tags
+    localization = localize(database, database.signature(0), top=2)
+    hostile_place = dataclasses.replace(localization, licenses=(HOSTILE,))
+    assert HOSTILE in Text(localization_legend(hostile_place)).shown
+
+
+def test_shades_begin_with_one_object() -> None:
+    assert min(SHADES) == 1
+    assert list(SHADES) == sorted(SHADES)

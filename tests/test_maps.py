@@ -1,0 +1,414 @@
+"""Maps in a real browser: they work without a network, and data cannot harm them."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+import time
+from typing import TYPE_CHECKING, Any
+
+import folium
+import numpy as np
+import pytest
+from conftest import unavailable
+from selenium.webdriver.common.actions.action_builder import ActionBuilder
+from selenium.webdriver.common.by import By
+from sentences import assert_sentence
+
+from semsig_gis import map_assets
+from semsig_gis.catalog import paper_taxonomy
+from semsig_gis.database import build_database
+from semsig_gis.distortion import Distortion
+from semsig_gis.errors import InputError
+from semsig_gis.evaluation import evaluate
+from semsig_gis.map_legend import FAILED, SUCCESSFUL
+from semsig_gis.maps import evaluation_map, localization_map, save_map
+from semsig_gis.matching import localize
+from semsig_gis.objects import build_objects
+from semsig_gis.signatures import Signature
+from semsig_gis.sources.synthetic import CitySpec, synthetic_city
+from semsig_gis.taxonomy import ObjectClass, Taxonomy
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from selenium.webdriver import Chrome
+
+    from semsig_gis.database import SignatureDatabase
+    from semsig_gis.evaluation import Evaluation
+
+HOSTILE = (
+    "<script>alert(1)</script><img src=x onerror=alert(1)>\"'`${alert(1)}`\\</script>"
+    "{{7*7}}{% raw %}{# gone #}&lt;é\u202eabc\u2028]]>"
+)
+QUERIES = 60
+
+# What the script of a page can be asked about its one map.
+ASK = """
+const map = Object.values(window).find((value) => value instanceof L.Map);
+const circles = (colour) => {
+  const found = [];
+  map.eachLayer((layer) => {
+    if (layer instanceof L.CircleMarker && layer.options.fillColor === colour) found.push(layer);
+  });
+  return found;
+};
+"""
+
+
+@pytest.fixture(scope="module")
+def database() -> SignatureDatabase:
+    layers = synthetic_city(CitySpec(size=600.0))
+    objects, _ = build_objects(layers, taxonomy=paper_taxonomy(), crs="EPSG:32631")
+    return build_database(objects)
+
+
+@pytest.fixture(scope="module")
+def evaluation(database: SignatureDatabase) -> Evaluation:
+    return evaluate(database, queries=QUERIES, distortion="medium", seed=1)
+
+
+@pytest.fixture
+def carried() -> None:
+    if not map_assets.available():
+        unavailable("browser", "the package was built without npm, so it carries no map files")
+
+
+def opened(browser: Chrome, map_: folium.Map, folder: Path) -> None:
+    """Save a map as a self-contained page and open it."""
+    file = folder / "map.html"
+    assert save_map(map_, file, self_contained=True)
+    browser.get(file.as_uri())
+
+
+def asked(browser: Chrome, script: str, *arguments: Any) -> Any:  # noqa: ANN401
+    return browser.execute_script(ASK + script, *arguments)
+
+
+def drawn(browser: Chrome, colour: str) -> int:
+    """Return the number of pixels of about this colour on the canvas of the circles."""
+    time.sleep(0.3)  # canvases are drawn with the next frame
+    script = """
+    const canvas = map.getPane("markerPane").querySelector("canvas");
+    const wanted = [1, 3, 5].map((at) => parseInt(arguments[0].slice(at, at + 2), 16));
+    const data = canvas.getContext("2d").getImageData(0, 0, canvas.width, canvas.height).data;
+    let count = 0;
+    for (let at = 0; at < data.length; at += 4) {
+      if (data[at + 3] > 200 && wanted.every((part, i) => Math.abs(data[at + i] - part) < 12)) {
+        count += 1;
+      }
+    }
+    return count;
+    """
+    count: int = asked(browser, script, colour)
+    return count
+
+
+def switch(browser: Chrome, name: str) -> None:
+    """Click a layer in the layer control."""
+    labels = browser.find_elements(By.CSS_SELECTOR, ".leaflet-control-layers-overlays label")
+    next(label for label in labels if label.text.strip().startswith(name)).click()
+
+
+def assert_quiet(browser: Chrome) -> None:
+    """Check that the page reported no error and asked for nothing."""
+    # leaflet.heat reads its canvas back, for which Chromium has an advice, not an error.
+    messages = [
+        entry
+        for entry in browser.get_log("browser")
+        if "willReadFrequently" not in entry["message"]
+    ]
+    assert messages == []
+    assert browser.execute_script("return performance.getEntriesByType('resource').length") == 0
+    events = [json.loads(entry["message"])["message"] for entry in browser.get_log("performance")]
+    asked_for = [
+        event["params"]["request"]["url"]
+        for event in events
+        if event["method"] == "Network.requestWillBeSent"
+    ]
+    assert [url for url in asked_for if not url.startswith(("file:", "data:"))] == []
+    assert sum(url.startswith("file:") for url in asked_for) == 1
+
+
+def hostile_database(database: SignatureDatabase) -> SignatureDatabase:
+    """Return the database with a taxonomy and licences that try to do harm."""
+    classes = tuple(
+        ObjectClass(item.code, item.symbol, item.name, f"{item.symbol} {HOSTILE}")
+        for item in database.taxonomy.classes
+    )
+    return dataclasses.replace(
+        database, taxonomy=Taxonomy(classes), licenses=(f"{HOSTILE}: {HOSTILE}",)
+    )
+
+
+@pytest.mark.usefixtures("carried")
+def test_an_evaluation_in_a_browser(
+    browser: Chrome, evaluation: Evaluation, database: SignatureDatabase, tmp_path: Path
+) -> None:
+    opened(browser, evaluation_map(evaluation, database), tmp_path)
+    successes = int(evaluation.successful.sum())
+    assert 0 < successes < QUERIES
+    assert browser.title == "Localization errors"
+    assert asked(browser, "return circles(arguments[0]).length", SUCCESSFUL) == successes
+    assert asked(browser, "return circles(arguments[0]).length", FAILED) == QUERIES - successes
+    image = browser.find_element(By.CSS_SELECTOR, "img.leaflet-image-layer")
+    assert browser.execute_script("return arguments[0].naturalWidth", image) > 100
+    assert f"{QUERIES} queries" in browser.find_element(By.CSS_SELECTOR, ".semsig-legend").text
+    for name, colour in (("Successful", SUCCESSFUL), ("Failed", FAILED)):
+        before = drawn(browser, colour)
+        assert before > 0
+        switch(browser, name)
+        assert drawn(browser, colour) == 0
+        switch(browser, name)
+        assert drawn(browser, colour) >= before * 0.9
+    assert len(browser.find_elements(By.CSS_SELECTOR, "canvas.leaflet-heatmap-layer")) == 1
+    asked(browser, "map.setZoom(20, {animate: false})")
+    assert browser.find_elements(By.CSS_SELECTOR, "input:disabled") == []
+    switch(browser, "Expected errors")
+    assert browser.find_elements(By.CSS_SELECTOR, "canvas.leaflet-heatmap-layer") == []
+    switch(browser, "Objects seen")
+    assert browser.find_elements(By.CSS_SELECTOR, "img.leaflet-image-layer") == []
+    switch(browser, "Lines")
+    lines = """
+    let count = 0;
+    map.eachLayer((one) => { count += one.getLatLngs ? one.getLatLngs().length : 0; });
+    return count;
+    """
+    assert asked(browser, lines) == int((evaluation.queries["tied"] > 0).sum())
+    assert_quiet(browser)
+
+
+@pytest.mark.usefixtures("carried")
+def test_a_click_shows_the_signature_and_the_place_found(
+    browser: Chrome, evaluation: Evaluation, database: SignatureDatabase, tmp_path: Path
+) -> None:
+    opened(browser, evaluation_map(evaluation, database), tmp_path)
+    row = evaluation.queries.iloc[-1]
+    # Close to, so that no other circle lies on it.
+    centre = """
+    const name = arguments[0];
+    const marker = [...circles(arguments[1]), ...circles(arguments[2])].find(
+      (one) => one.getPopup().getContent()(one).firstChild.textContent.startsWith(name));
+    map.setView(marker.getLatLng(), 20, {animate: false});
+    const point = map.latLngToContainerPoint(marker.getLatLng());
+    return [point.x, point.y];
+    """
+    x, y = asked(browser, centre, f"Query {QUERIES} of", SUCCESSFUL, FAILED)
+    assert browser.find_elements(By.CSS_SELECTOR, ".semsig-details") == []
+    mouse = ActionBuilder(browser)
+    mouse.pointer_action.move_to_location(round(x), round(y)).click()
+    mouse.perform()
+    popup = browser.find_element(By.CSS_SELECTOR, ".semsig-details").text
+    bearings = database.signature(int(row["cell"])).bearings
+    assert bearings is not None
+    first = f"{row['types'][0]} {round(float(bearings[0])) % 360}°"
+    legend = f"{row['types'][0]} {database.taxonomy.by_symbol(row['types'][0]).title}"
+    for said in (row["types"], row["query_types"], first, legend, str(row["cell_id"])):
+        assert said in popup
+    assert f"of {len(database):,}" in popup
+    hint = """
+    let to = null;
+    map.eachLayer((one) => {
+      if (one.options.dashArray && one.getLatLngs) to = one.getLatLngs()[1];
+    });
+    return to && [to.lat, to.lng];
+    """
+    assert asked(browser, hint) is not None
+    asked(browser, "map.closePopup()")
+    assert asked(browser, hint) is None
+    assert_quiet(browser)
+
+
+@pytest.mark.usefixtures("carried")
+def test_a_localization_in_a_browser(
+    browser: Chrome, database: SignatureDatabase, tmp_path: Path
+) -> None:
+    cell = int(np.argmax(database.lengths))
+    localization = localize(database, database.signature(cell), top=50)
+    opened(browser, localization_map(localization, database), tmp_path)
+    popups = asked(
+        browser,
+        """
+        const texts = [];
+        map.eachLayer((one) => {
+          if (!(one instanceof L.CircleMarker)) return;
+          texts.push(one.getPopup().getContent()(one).textContent);
+        });
+        return texts;
+        """,
+    )
+    assert len(popups) == 50
+    best = popups[-1]  # drawn last, on top
+    assert best.startswith("Rank 1Rank1 of ")
+    assert str(database.cell_ids[cell]) in best
+    assert database.types(cell) in best
+    legend = browser.find_element(By.CSS_SELECTOR, ".semsig-legend").text
+    assert f"Types: {database.types(cell)}" in legend
+    switch(browser, "Candidates")
+    assert (
+        asked(browser, "let n = 0; map.eachLayer((one) => { n += !!one.getRadius; }); return n")
+        == 0
+    )
+    assert_quiet(browser)
+
+
+@pytest.mark.usefixtures("carried")
+def test_hostile_data_is_shown_word_for_word_and_never_run(
+    browser: Chrome, evaluation: Evaluation, database: SignatureDatabase, tmp_path: Path
+) -> None:
+    harmful = hostile_database(database)
+    distorted = dataclasses.replace(evaluation, distortion=Distortion(name=HOSTILE))
+    map_ = evaluation_map(distorted, harmful)
+    query = Signature(harmful.signature(0).codes, None)
+    localization_map(localize(harmful, query, top=3), harmful, map_=map_)
+    opened(browser, map_, tmp_path)  # an alert would make the next command fail
+    legends = browser.find_elements(By.CSS_SELECTOR, ".semsig-legend")
+    assert len(legends) == 2
+    texts = [browser.execute_script("return arguments[0].textContent", one) for one in legends]
+    assert sorted(text.count(HOSTILE) for text in texts) == [2, 3]
+    asked(browser, "circles(arguments[0])[0].openPopup()", FAILED)
+    popup = browser.execute_script("return document.querySelector('.semsig-details').textContent")
+    symbol = next(symbol for symbol in evaluation.queries["types"][~evaluation.successful].iloc[0])
+    assert f"{symbol} {symbol} {HOSTILE}" in popup
+    for element in ("script", "img"):
+        inside = f".semsig-legend {element}, .semsig-details {element}"
+        assert browser.find_elements(By.CSS_SELECTOR, inside) == []
+    assert_quiet(browser)
+
+
+@pytest.mark.usefixtures("carried")
+def test_a_narrow_screen_is_not_covered(
+    browser: Chrome, evaluation: Evaluation, database: SignatureDatabase, tmp_path: Path
+) -> None:
+    size = {"width": 400, "height": 800, "deviceScaleFactor": 1, "mobile": True}
+    browser.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", size)
+    try:
+        opened(browser, evaluation_map(evaluation, database), tmp_path)
+        legend = browser.find_element(By.CSS_SELECTOR, ".semsig-legend")
+        assert legend.size["height"] < 60
+        assert browser.find_elements(By.CSS_SELECTOR, ".leaflet-control-layers-expanded") == []
+        browser.find_element(By.CSS_SELECTOR, ".semsig-legend summary").click()
+        assert legend.size["height"] > 200
+        assert legend.size["width"] <= 380
+    finally:
+        browser.execute_cdp_cmd("Emulation.clearDeviceMetricsOverride", {})
+
+
+@pytest.mark.usefixtures("carried")
+def test_maps_are_drawn_one_over_the_other(
+    browser: Chrome, evaluation: Evaluation, database: SignatureDatabase, tmp_path: Path
+) -> None:
+    map_ = folium.Map([43.0, 3.0], zoom_start=12, tiles=None)
+    assert evaluation_map(evaluation, database, map_=map_) is map_
+    localization = localize(database, database.signature(0), top=4)
+    for _ in range(2):
+        assert localization_map(localization, database, map_=map_) is map_
+    opened(browser, map_, tmp_path)
+    labels = browser.find_elements(By.CSS_SELECTOR, ".leaflet-control-layers-overlays label")
+    names = [label.text.strip() for label in labels]
+    assert names[-2:] == ["Candidates (4)", "Candidates (4), 2"]
+    assert names.count("Objects seen from a cell") == 1
+    assert len(names) == 7
+    assert asked(browser, "return map.getZoom()") == 12  # the view is the caller's
+    switch(browser, "Candidates (4), 2")
+    assert_quiet(browser)
+
+
+def test_queries_of_which_nothing_is_left(database: SignatureDatabase, tmp_path: Path) -> None:
+    short = int(np.argmin(database.lengths))
+    few = evaluate(database, queries=len(database), distortion="strong")
+    lost = few.queries["tied"] == 0
+    assert lost.any(), f"cell {short} sees {database.lengths[short]}"
+    only = dataclasses.replace(few, queries=few.queries[lost].reset_index(drop=True))
+    save_map(evaluation_map(only, database), tmp_path / "map.html", self_contained=False)
+    page = (tmp_path / "map.html").read_text(encoding="utf-8")
+    assert page.count("nothing left of it") == int(lost.sum())
+    assert "infinite, not localized" in page
+    assert "NaN" not in page.partition("</head>")[2]
+
+
+def test_ten_thousand_queries_stay_small(
+    evaluation: Evaluation, database: SignatureDatabase, tmp_path: Path
+) -> None:
+    sizes = {}
+    for number in (500, 10_000):
+        rows = np.arange(number) % QUERIES
+        many = dataclasses.replace(
+            evaluation, queries=evaluation.queries.iloc[rows].reset_index(drop=True)
+        )
+        file = tmp_path / f"{number}.html"
+        save_map(evaluation_map(many, database), file, self_contained=False)
+        sizes[number] = file.stat().st_size
+    assert sizes[500] < 500_000
+    assert sizes[10_000] < 8_000_000
+
+
+def test_a_map_says_whether_it_makes_requests(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    plain, tiled = folium.Map(tiles=None), folium.Map()
+    file = tmp_path / "map.html"
+    assert not save_map(plain, file, self_contained=False)
+    assert "https://" in file.read_text(encoding="utf-8")
+    monkeypatch.setattr(map_assets, "available", lambda: True)
+    monkeypatch.setattr(map_assets, "inline_assets", lambda _: "<head></head>")
+    assert save_map(plain, file)
+    assert file.read_text(encoding="utf-8") == "<head></head>"
+    assert not save_map(tiled, file)
+
+
+def test_a_map_that_cannot_be_self_contained(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def refuse(page: str) -> str:
+        raise InputError(page[:0] + "This installation carries no Leaflet.")
+
+    monkeypatch.setattr(map_assets, "available", lambda: True)
+    monkeypatch.setattr(map_assets, "inline_assets", refuse)
+    file = tmp_path / "map.html"
+    assert not save_map(folium.Map(tiles=None), file)
+    before = file.read_bytes()
+    with pytest.raises(InputError, match="carries no Leaflet"):
+        save_map(folium.Map(tiles=None), file, self_contained=True)
+    assert file.read_bytes() == before
+    monkeypatch.setattr(map_assets, "available", lambda: False)
+    assert not save_map(folium.Map(tiles=None), file)
+
+
+def test_a_file_that_cannot_be_written(tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("here")
+    with pytest.raises(InputError) as caught:
+        save_map(folium.Map(tiles=None), tmp_path / "file" / "map.html", self_contained=False)
+    assert_sentence(caught.value, "map.html")
+    assert (tmp_path / "file").read_text() == "here"
+
+
+def test_tiles(evaluation: Evaluation, database: SignatureDatabase) -> None:
+    page: str = evaluation_map(evaluation, database, tiles="OpenStreetMap").get_root().render()
+    assert "tile.openstreetmap.org" in page
+    with pytest.raises(InputError) as caught:
+        evaluation_map(evaluation, database, tiles="Openstreetmop")
+    assert_sentence(caught.value, "Openstreetmop", "OpenStreetMap")
+    localization = localize(database, database.signature(0), top=1)
+    with pytest.raises(InputError) as caught:
+        localization_map(localization, database, tiles="OpenStreetMap", map_=folium.Map(tiles=None))
+    assert_sentence(caught.value, "OpenStreetMap")
+
+
+def test_what_was_made_with_another_database(
+    evaluation: Evaluation, database: SignatureDatabase
+) -> None:
+    layers = synthetic_city(CitySpec(size=600.0, seed=1))
+    objects, _ = build_objects(layers, taxonomy=paper_taxonomy(), crs="EPSG:32631")
+    other = build_database(objects)
+    with pytest.raises(InputError) as caught:
+        evaluation_map(evaluation, other)
+    assert_sentence(caught.value, "evaluation", "database")
+    localization = localize(database, database.signature(0), top=5)
+    with pytest.raises(InputError) as caught:
+        localization_map(localization, other)
+    assert_sentence(caught.value, "localization", "database")
+    # The same cells, but what they see has changed.
+    changed = dataclasses.replace(database, codes=database.codes[::-1].copy())
+    with pytest.raises(InputError):
+        localization_map(localization, changed)
