@@ -17,7 +17,7 @@ import importlib
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from semsig_gis.catalog import Catalog, LayerSpec, load_catalog, paper_taxonomy
+    from semsig_gis.catalog import Catalog, load_catalog, paper_taxonomy
     from semsig_gis.database import (
         SignatureDatabase,
         build_database,
@@ -29,6 +29,7 @@ if TYPE_CHECKING:
     from semsig_gis.evaluation import Evaluation, evaluate
     from semsig_gis.export import export_geopackage
     from semsig_gis.grid import GridSpec
+    from semsig_gis.layer_spec import LayerSpec
     from semsig_gis.maps import evaluation_map, localization_map, save_map
     from semsig_gis.matching import Localization, Method, localize
     from semsig_gis.objects import StreetObjects, build_objects, open_objects, save_objects
@@ -48,7 +49,7 @@ _HOMES = {
     "Distortion": "distortion",
     "Evaluation": "evaluation",
     "GridSpec": "grid",
-    "LayerSpec": "catalog",
+    "LayerSpec": "layer_spec",
     "Localization": "matching",
     "Method": "matching",
     "ObjectClass": "taxonomy",

@@ -6,12 +6,20 @@ import importlib.resources
 import tomllib
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal, get_args
+from typing import TYPE_CHECKING, Any, get_args
 
 from pyproj import CRS
 from pyproj.exceptions import CRSError
 
 from semsig_gis.errors import CatalogError, CrsError, UnknownNameError, nearest_name
+from semsig_gis.layer_spec import (
+    ClassBy,
+    ElementKind,
+    GeometryKind,
+    LayerSpec,
+    Role,
+    Value,
+)
 from semsig_gis.schema import require_metric_crs
 from semsig_gis.taxonomy import ObjectClass, Taxonomy
 
@@ -28,13 +36,8 @@ __all__ = [
     "paper_taxonomy",
 ]
 
-Value = str | int | float | bool
-GeometryKind = Literal["point", "line", "polygon"]
-ElementKind = Literal["node", "way", "relation"]
-Role = Literal["objects", "buildings", "streets"]
-# Stands for every value of a tag.
-ANY_VALUE = "*"
-
+# Shipped beside the catalogues: the paper's classes, and words by which drafts are made.
+NO_CATALOGS = frozenset({"keywords", "taxonomy"})
 # What a catalogue may say, and of which type; every other key is a mistake that gets named.
 CATALOG_KEYS = {
     "name": str,
@@ -45,6 +48,7 @@ CATALOG_KEYS = {
     "metric_crs": str,
     "reader": str,
     "endpoints": list,
+    "geocoder": str,
     "files": list,
     "conflate": dict,
     "classes": list,
@@ -80,113 +84,6 @@ LAYER_KEYS = {
 CLASS_BY_KEYS = {"field": str, "values": dict}
 
 
-@dataclass(frozen=True, slots=True)
-class ClassBy:
-    """A field whose value decides the class of a row.
-
-    Parameters
-    ----------
-    field : str
-        Name of the field.
-    classes : tuple of (value, str)
-        Value of the field and the class name it stands for; a row with another value keeps the
-        class of its layer.
-
-    Examples
-    --------
-    >>> ClassBy("kind", (("Taxi", "taxi_station"),)).field
-    'kind'
-    """
-
-    field: str
-    classes: tuple[tuple[Value, str], ...]
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class LayerSpec:
-    """One layer of a source and the class of street object it holds.
-
-    Parameters
-    ----------
-    name : str
-        Name of the layer in the catalogue.
-    class_name : str
-        Class of its rows.
-    files : tuple of str
-        File-name patterns (``*``, ``?``) by which the layer's file is recognised.
-    layer : str, optional
-        Layer inside a file that holds several.
-    where : tuple of (str, tuple)
-        Fields and the values of each that are accepted, compared exactly; all must hold.
-    class_by : ClassBy, optional
-        Field that decides the class row by row.
-    id_field : str, optional
-        Field that identifies a row in its source; else the feature's number.
-    geometry : {"point", "line", "polygon"}
-        Geometry that is expected.
-    crs : str, optional
-        Coordinate reference system that is expected; it is used where the file states none.
-    rows : tuple of (int, int), optional
-        Least and largest number of rows that are plausible.
-    x_field, y_field : str, optional
-        Coordinate columns of a CSV file.
-    aliases : tuple of (str, tuple of str)
-        Fields and the names that they go by in other editions of the file.
-    unique_id : bool
-        Whether rows of the same id are the same object, also across several files.
-    dataset : str, optional
-        Name of the dataset on its portal.
-    server_where : str, optional
-        Filter that the portal applies before it sends, in its own language.
-    select : tuple of str
-        Fields to ask the portal for; all by default.
-    tags : tuple of tuple of (str, tuple of str)
-        OpenStreetMap tags: alternatives, each of keys and accepted values that must all hold;
-        the value ``"*"`` accepts every value.
-    elements : tuple of {"node", "way", "relation"}
-        OpenStreetMap elements that count.
-    role : {"objects", "buildings", "streets"}
-        What the layer is for: street objects, footprints that hide them, or centre lines of
-        streets. Only street objects have a class.
-    optional : bool
-        Whether the layer is read only when it is named.
-    note : str
-        Remark for people, such as how sure a dataset name is.
-    license, attribution : str
-        Licence of the data and the line that its publisher asks for.
-
-    Examples
-    --------
-    >>> LayerSpec(name="trees", class_name="alignment_tree", files=("*trees*.geojson",)).geometry
-    'point'
-    """
-
-    name: str
-    class_name: str
-    files: tuple[str, ...] = ()
-    layer: str | None = None
-    where: tuple[tuple[str, tuple[Value, ...]], ...] = ()
-    class_by: ClassBy | None = None
-    id_field: str | None = None
-    geometry: GeometryKind = "point"
-    crs: str | None = None
-    rows: tuple[int, int] | None = None
-    x_field: str | None = None
-    y_field: str | None = None
-    aliases: tuple[tuple[str, tuple[str, ...]], ...] = ()
-    unique_id: bool = False
-    dataset: str | None = None
-    server_where: str | None = None
-    select: tuple[str, ...] = ()
-    tags: tuple[tuple[tuple[str, tuple[str, ...]], ...], ...] = ()
-    elements: tuple[ElementKind, ...] = ("node", "way", "relation")
-    role: Role = "objects"
-    optional: bool = False
-    note: str = ""
-    license: str = "unknown"
-    attribution: str = ""
-
-
 @dataclass(frozen=True, kw_only=True)
 class Catalog:
     """A source of open data: its classes, its layers and its licence.
@@ -210,6 +107,8 @@ class Catalog:
         Reader of `semsig_gis.sources` for its files.
     endpoints : tuple of str
         Base addresses of the services that send the data, best first.
+    geocoder : str, optional
+        Base address of the Nominatim service that knows places by name.
     conflate : tuple of (str, float)
         Classes whose objects from different layers are the same thing within so many metres.
     license, attribution : str
@@ -229,6 +128,7 @@ class Catalog:
     url: str = ""
     reader: str = "vector_file"
     endpoints: tuple[str, ...] = ()
+    geocoder: str | None = None
     conflate: tuple[tuple[str, float], ...] = ()
     license: str = "unknown"
     attribution: str = ""
@@ -295,7 +195,8 @@ def catalog_names() -> tuple[str, ...]:
     True
     """
     names = (Path(item.name) for item in _data_folder().iterdir())
-    return tuple(sorted(p.stem for p in names if p.suffix == ".toml" and p.stem != "taxonomy"))
+    stems = (path.stem for path in names if path.suffix == ".toml")
+    return tuple(sorted(stem for stem in stems if stem not in NO_CATALOGS))
 
 
 def load_catalog(name: str | Path) -> Catalog:
@@ -417,6 +318,7 @@ def _catalog(content: dict[str, Any], where: str) -> Catalog:
         "license": content.get("license", "unknown"),
         "attribution": content.get("attribution", ""),
         "files": _texts(content.get("files", []), "files", where),
+        "reader": content.get("reader", "vector_file"),
     }
     layers = tuple(_layer(item, where, taxonomy, shared) for item in content["layers"])
     names = [spec.name for spec in layers]
@@ -434,6 +336,7 @@ def _catalog(content: dict[str, Any], where: str) -> Catalog:
         url=content.get("url", ""),
         reader=content.get("reader", "vector_file"),
         endpoints=_texts(content.get("endpoints", []), "endpoints", where),
+        geocoder=content.get("geocoder"),
         conflate=_radii(content.get("conflate", {}), taxonomy, where),
         license=shared["license"],
         attribution=shared["attribution"],
@@ -503,6 +406,7 @@ def _layer(item: object, where: str, taxonomy: Taxonomy, shared: Mapping[str, An
         select=_texts(item.get("select", []), "select", where),
         tags=tuple(_tags(tags, where) for tags in item.get("tags", [])),
         elements=tuple(_choice(kind, "elements", get_args(ElementKind), where) for kind in kinds),
+        reader=shared["reader"],
         license=item.get("license", shared["license"]),
         attribution=item.get("attribution", shared["attribution"]),
         **{key: item[key] for key in (*plain, "crs", "x_field", "y_field") if key in item},

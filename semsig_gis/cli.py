@@ -10,7 +10,7 @@ from __future__ import annotations
 import enum
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
@@ -19,11 +19,12 @@ from semsig_gis.console import print_json, print_rows, progress, remark
 from semsig_gis.errors import InputError, SemsigError
 
 if TYPE_CHECKING:
-    from semsig_gis.catalog import LayerSpec
     from semsig_gis.database import SignatureDatabase
     from semsig_gis.evaluation import Evaluation
     from semsig_gis.grid import GridSpec
-    from semsig_gis.objects import LoadReport, StreetObjects
+    from semsig_gis.layer_spec import LayerSpec
+    from semsig_gis.loading import Loaded
+    from semsig_gis.objects import StreetObjects
     from semsig_gis.report import Table
     from semsig_gis.signatures import SignatureSpec
 
@@ -42,6 +43,32 @@ DEMO_QUERIES = 200
 
 Database = Annotated[Path, typer.Argument(help="Signature database that `semsig build` wrote.")]
 AsJson = Annotated[bool, typer.Option("--json", help="Print JSON instead of tables.")]
+Catalogs = Annotated[
+    list[str],
+    typer.Option(help="Catalogue, by name or .toml file; several are merged, best source first."),
+]
+Objects = Annotated[Path, typer.Option(help="Street objects to write (.parquet).")]
+Layers = Annotated[
+    list[str] | None,
+    typer.Option(help="Only this layer, optional ones too; may be given several times."),
+]
+MetricCrs = Annotated[
+    str | None,
+    typer.Option(help="CRS in metres to work in; the catalogue's or the UTM zone by default."),
+]
+Filters = Annotated[
+    bool, typer.Option("--filter/--no-filter", help="Apply the catalogue's filters.")
+]
+Collapse = Annotated[bool, typer.Option(help="Collapse objects of a class at the same place.")]
+Merge = Annotated[
+    bool, typer.Option(help="Merge objects of different layers within the catalogue's radii.")
+]
+Buildings = Annotated[
+    Path | None, typer.Option(help="Building footprints to write too (.parquet).")
+]
+Streets = Annotated[
+    Path | None, typer.Option(help="Centre lines of streets to write too (.parquet).")
+]
 MethodText = Annotated[
     str,
     typer.Option(
@@ -129,27 +156,49 @@ def demo(
 
 @app.command()
 def sources(
-    name: Annotated[str | None, typer.Argument(help="A catalogue, by name or .toml file.")] = None,
+    name: Annotated[
+        str | None, typer.Argument(help="A catalogue, by name or .toml file; or `suggest`.")
+    ] = None,
+    file: Annotated[
+        Path | None, typer.Argument(help="With `suggest`: a file to draft a catalogue for.")
+    ] = None,
     *,
     as_json: AsJson = False,
 ) -> None:
-    """List the catalogues, or the layers and classes of one."""
+    """List the catalogues and readers, or the layers of one; `suggest FILE` drafts a new one."""
     import dataclasses
 
     from semsig_gis.catalog import catalog_names, load_catalog
+    from semsig_gis.plugins import installed_readers
+    from semsig_gis.sources import READERS
 
+    if name == "suggest":
+        from semsig_gis.suggest import suggest_catalog
+
+        if file is None:
+            msg = "`semsig sources suggest` needs a file; give the path of a vector file."
+            raise InputError(msg)
+        typer.echo(suggest_catalog(file), nl=False)
+        return
+    if file is not None:
+        msg = f"{file} was given after {name!r}; only `semsig sources suggest` takes a file."
+        raise InputError(msg)
     if name is None:
         catalogs = [load_catalog(known) for known in catalog_names()]
+        readers = sorted({*READERS, *installed_readers(taken=READERS)})
+        listed = [
+            {"name": c.name, "title": c.title, "layers": len(c.layers), "reader": c.reader}
+            for c in catalogs
+        ]
         if as_json:
-            print_json(
-                [{"name": c.name, "title": c.title, "layers": len(c.layers)} for c in catalogs]
-            )
+            print_json({"catalogs": listed, "readers": readers})
             return
         print_rows(
             "Catalogues",
-            ("name", "title", "layers", "licence"),
-            ([c.name, c.title, len(c.layers), c.license] for c in catalogs),
+            ("name", "title", "layers", "reader", "licence"),
+            ([*row.values(), c.license] for row, c in zip(listed, catalogs, strict=True)),
         )
+        typer.echo(f"readers: {', '.join(readers)}")
         return
     catalog = load_catalog(name)
     if as_json:
@@ -157,9 +206,16 @@ def sources(
         return
     print_rows(
         f"{catalog.title} ({catalog.url})",
-        ("layer", "class", "files", "filter", "licence"),
+        ("layer", "class", "from", "filter", "licence", "note"),
         (
-            [spec.name, _class_text(spec), ", ".join(spec.files), _filter_text(spec), spec.license]
+            [
+                f"{spec.name} (optional)" if spec.optional else spec.name,
+                _class_text(spec),
+                _origin_text(spec),
+                _filter_text(spec),
+                spec.license,
+                spec.note,
+            ]
             for spec in catalog.layers
         ),
     )
@@ -178,49 +234,73 @@ def sources(
 def load(
     files: Annotated[list[Path], typer.Argument(help="Files, or a folder that holds them.")],
     *,
-    catalog: Annotated[str, typer.Option(help="Catalogue, by name or .toml file.")],
-    out: Annotated[Path, typer.Option(help="Street objects to write (.parquet).")],
-    layer: Annotated[
-        list[str] | None, typer.Option(help="Only this layer; may be given several times.")
-    ] = None,
+    catalog: Catalogs,
+    out: Objects,
+    layer: Layers = None,
     crs: Annotated[
         str | None, typer.Option(help="CRS of files that state none, such as EPSG:2154.")
     ] = None,
-    filters: Annotated[
-        bool, typer.Option("--filter/--no-filter", help="Apply the catalogue's filters.")
-    ] = True,
-    collapse: Annotated[
-        bool, typer.Option(help="Collapse objects of a class at the same place.")
-    ] = True,
+    metric_crs: MetricCrs = None,
+    filters: Filters = True,
+    collapse: Collapse = True,
+    merge: Merge = True,
+    buildings: Buildings = None,
+    streets: Streets = None,
     as_json: AsJson = False,
 ) -> None:
     """Read local files into one table of street objects."""
     from semsig_gis.catalog import load_catalog
-    from semsig_gis.objects import build_objects, save_objects
-    from semsig_gis.sources import find_files
-    from semsig_gis.sources.vector_file import read_layer
+    from semsig_gis.loading import assemble, choose_layers, combine_catalogs, read_files
 
-    chosen = load_catalog(catalog)
-    specs = [chosen.layer(name) for name in layer] if layer else list(chosen.layers)
-    found, absent = find_files(specs, files)
+    chosen = combine_catalogs([load_catalog(name) for name in catalog])
+    specs = choose_layers(chosen, layer or (), surroundings=bool(buildings or streets))
+    with progress("reading") as advance:
+        layers, absent = read_files(specs, files, filters=filters, crs=crs, progress=advance)
     for spec in absent:
         remark(f"layer {spec.name!r} has no file here ({', '.join(spec.files)}); it is left out")
-    with progress("reading") as advance:
-        layers = []
-        for number, (spec, file) in enumerate(found, start=1):
-            layers.append(read_layer(file, spec, filters=filters, crs=crs))
-            advance(number, len(found))
-    objects, report = build_objects(
-        layers, taxonomy=chosen.taxonomy, crs=chosen.metric_crs, collapse=collapse
-    )
-    save_objects(objects, out)
-    if as_json:
-        print_json(
-            {"objects": len(objects), "crs": objects.crs.to_string(), "layers": report.to_list()}
+    loaded = assemble(layers, chosen, metric_crs=metric_crs, collapse=collapse, merge=merge)
+    _save_loaded(loaded, out, buildings, streets, as_json=as_json)
+
+
+@app.command()
+def fetch(
+    catalog: Annotated[str, typer.Argument(help="Catalogue with a service, by name or .toml.")],
+    *,
+    area: Annotated[
+        str,
+        typer.Option(help="WEST,SOUTH,EAST,NORTH in degrees, a polygon file, or a place name."),
+    ],
+    out: Objects,
+    layer: Layers = None,
+    cache: Annotated[
+        Path | None, typer.Option(help="Folder of the cache; semsig's own by default.")
+    ] = None,
+    offline: Annotated[
+        bool, typer.Option("--offline", help="Take everything from the cache.")
+    ] = False,
+    metric_crs: MetricCrs = None,
+    filters: Filters = True,
+    collapse: Collapse = True,
+    merge: Merge = True,
+    buildings: Buildings = None,
+    streets: Streets = None,
+    as_json: AsJson = False,
+) -> None:
+    """Download an area from the service of a catalogue into one table of street objects."""
+    from semsig_gis.catalog import load_catalog
+    from semsig_gis.loading import assemble, choose_layers, fetch_layers, find_area, open_cache
+
+    chosen = load_catalog(catalog)
+    specs = choose_layers(chosen, layer or (), surroundings=bool(buildings or streets))
+    kept, http = open_cache(cache, offline=offline)
+    unit: Literal["steps", "bytes"] = "steps" if chosen.reader == "osm_file" else "bytes"
+    with progress("fetching", unit=unit) as advance:
+        place = find_area(area, chosen, cache=kept, http=http)
+        layers = fetch_layers(
+            specs, chosen, area=place, cache=kept, http=http, filters=filters, progress=advance
         )
-    else:
-        _print_load(objects, report)
-        typer.echo(f"street objects: {out}")
+    loaded = assemble(layers, chosen, metric_crs=metric_crs, collapse=collapse, merge=merge)
+    _save_loaded(loaded, out, buildings, streets, as_json=as_json)
 
 
 @app.command()
@@ -453,9 +533,19 @@ def _numbers(text: str, option: str) -> list[float]:
 
 def _class_text(spec: LayerSpec) -> str:
     if spec.class_by is None:
-        return spec.class_name
+        return spec.class_name or spec.role
     others = dict.fromkeys(name for _, name in spec.class_by.classes)
     return f"{spec.class_name} ({', '.join(others)} by {spec.class_by.field})"
+
+
+def _origin_text(spec: LayerSpec) -> str:
+    """Say what a layer is made from: tags, a dataset of a portal, or files."""
+    if spec.tags:
+        return " or ".join(
+            " and ".join(f"{key}={'/'.join(values)}" for key, values in tags) for tags in spec.tags
+        )
+    files = ", ".join(spec.files)
+    return files if spec.dataset is None else f"{spec.dataset} ({files})"
 
 
 def _filter_text(spec: LayerSpec) -> str:
@@ -473,27 +563,29 @@ def _tell_if_online(offline: bool) -> None:  # noqa: FBT001
         remark("the map takes Leaflet from the web, so it needs a network to be seen")
 
 
-def _print_load(objects: StreetObjects, report: LoadReport) -> None:
-    print_rows(
-        f"{len(objects):,} street objects in {objects.crs.name}",
-        ("layer", "read", "unreadable", "filtered", "missing", "misplaced", "collapsed", "kept"),
-        (
-            [
-                part.name,
-                part.read,
-                part.unreadable,
-                part.filtered,
-                part.missing,
-                part.misplaced,
-                part.collapsed,
-                part.kept,
-            ]
-            for part in report.layers
-        ),
-    )
-    for part in report.layers:
-        for note in part.notes:
-            remark(f"{part.name}: {note}")
+def _save_loaded(
+    loaded: Loaded, out: Path, buildings: Path | None, streets: Path | None, *, as_json: bool
+) -> None:
+    from semsig_gis.objects import save_objects
+    from semsig_gis.quality import quality_report
+    from semsig_gis.storage import whole_file
+
+    report = quality_report(loaded.objects, loaded.report, loaded.conflation)
+    save_objects(loaded.objects, out)
+    for table, path in ((loaded.buildings, buildings), (loaded.streets, streets)):
+        if table is not None and path is not None:
+            with whole_file(path) as partial:
+                table.to_parquet(partial)
+    for note in loaded.notes:
+        remark(note)
+    if as_json:
+        print_json(report.to_dict())
+        return
+    for title, columns, rows, remarks in report.tables():
+        print_rows(title, columns, rows)
+        if remarks:
+            typer.echo(remarks)
+    typer.echo(f"street objects: {out}")
 
 
 def _print_evaluation(evaluation: Evaluation) -> None:

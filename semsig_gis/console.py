@@ -5,7 +5,7 @@ from __future__ import annotations
 import contextlib
 import json
 import threading
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 import typer
 
@@ -85,13 +85,17 @@ def _cell_text(cell: object) -> str:
 
 
 @contextlib.contextmanager
-def progress(label: str) -> Iterator[Callable[[int, int], None]]:
+def progress(
+    label: str, *, unit: Literal["steps", "bytes"] = "steps"
+) -> Iterator[Callable[[int, int], None]]:
     """Show a bar on standard error once the work in the block takes a while.
 
     Parameters
     ----------
     label : str
         What is being done.
+    unit : {"steps", "bytes"}, default "steps"
+        What is counted; bytes are shown as such, with their speed.
 
     Yields
     ------
@@ -101,18 +105,23 @@ def progress(label: str) -> Iterator[Callable[[int, int], None]]:
     from rich.console import Console
     from rich.progress import (
         BarColumn,
+        DownloadColumn,
         MofNCompleteColumn,
         Progress,
         TextColumn,
         TimeRemainingColumn,
+        TransferSpeedColumn,
     )
 
     screen = Console(stderr=True)
     bar = Progress(
         TextColumn("{task.description}"),
         BarColumn(),
-        MofNCompleteColumn(),
-        TimeRemainingColumn(),
+        *(
+            (DownloadColumn(), TransferSpeedColumn())
+            if unit == "bytes"
+            else (MofNCompleteColumn(), TimeRemainingColumn())
+        ),
         console=screen,
         transient=True,
         disable=not screen.is_terminal,
@@ -122,7 +131,7 @@ def progress(label: str) -> Iterator[Callable[[int, int], None]]:
     patience.daemon = True
     patience.start()
     try:
-        yield lambda done, total: bar.update(task, completed=done, total=total)
+        yield lambda done, total: bar.update(task, completed=done, total=total or None)
     finally:
         patience.cancel()
         # Stopping a bar that never showed, or shows nowhere, would print an empty line.

@@ -20,6 +20,7 @@ from semsig_gis.schema import (
     CLASS_NAME,
     COUNT,
     GEOMETRY,
+    MERGED,
     SOURCE,
     SOURCE_ID,
     require_metric_crs,
@@ -61,7 +62,8 @@ class StreetObjects:
     table : GeoDataFrame
         One row an object: ``class_code`` (uint8), ``source`` (layer name), ``source_id``,
         ``count`` (rows of the sources that were collapsed into it) and ``geometry`` (point in a
-        metric CRS).
+        metric CRS). After `semsig_gis.conflation.conflate` also ``merged``: what other sources
+        say of the same object, as ``"source:id; source:id"``, or empty.
     taxonomy : Taxonomy
         The classes that the codes belong to.
     licenses : tuple of str
@@ -120,6 +122,8 @@ class LayerReport:
         Rows left out by the catalogue's filter.
     missing : int
         Rows without a geometry, or with an empty one.
+    duplicates : int
+        Rows with the id of an earlier one, where the catalogue says that ids are unique.
     misplaced : int
         Rows whose position has no finite coordinates in the metric CRS, or is off the Earth.
     collapsed : int
@@ -144,6 +148,7 @@ class LayerReport:
     misplaced: int
     collapsed: int
     kept: int
+    duplicates: int = 0
     notes: tuple[str, ...] = ()
 
 
@@ -239,6 +244,11 @@ def build_objects(
             "layers; look at the filters, the geometries and the coordinate systems."
         )
         raise EmptyResultError(msg)
+    # By number, because two layers may bear one name.
+    owner = np.repeat(np.arange(len(parts)), [len(part) for part, _, _ in parts])
+    again = _same_id(everything, np.array([layer.spec.unique_id for layer in layers])[owner])
+    repeated = np.bincount(owner[again], minlength=len(parts)).tolist()
+    everything, owner = everything[~again].reset_index(drop=True), owner[~again]
     if collapse:
         first, counts = _first_at_place(everything)
     else:
@@ -254,11 +264,7 @@ def build_objects(
         geometry=shapely.points(kept["x"].to_numpy(), kept["y"].to_numpy()),
         crs=system,
     )
-    # By number, because two layers may bear one name.
-    remaining = np.bincount(
-        np.repeat(np.arange(len(parts)), [len(part) for part, _, _ in parts])[first],
-        minlength=len(parts),
-    ).tolist()
+    remaining = np.bincount(owner[first], minlength=len(parts)).tolist()
     reports = tuple(
         LayerReport(
             name=layer.spec.name,
@@ -266,13 +272,14 @@ def build_objects(
             unreadable=layer.error_count,
             filtered=layer.filtered,
             missing=missing,
+            duplicates=layer.duplicates + twice,
             misplaced=misplaced,
-            collapsed=len(part) - kept_here,
+            collapsed=len(part) - twice - kept_here,
             kept=kept_here,
             notes=(*layer.notes, *layer.errors),
         )
-        for layer, (part, missing, misplaced), kept_here in zip(
-            layers, parts, remaining, strict=True
+        for layer, (part, missing, misplaced), twice, kept_here in zip(
+            layers, parts, repeated, remaining, strict=True
         )
     )
     return StreetObjects(table, taxonomy, _licenses(layers)), LoadReport(reports)
@@ -313,6 +320,13 @@ def _positions(layer: RawLayer, taxonomy: Taxonomy, crs: CRS) -> tuple[pd.DataFr
         }
     )
     return part, int((~usable).sum()), int((~placed).sum())
+
+
+def _same_id(everything: pd.DataFrame, unique: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Tell the rows whose id an earlier row of the layer has, as in a second file of it."""
+    told = unique & (everything[SOURCE_ID] != "").to_numpy(bool)
+    again: NDArray[np.bool_] = everything.duplicated([SOURCE, SOURCE_ID]).to_numpy(bool)
+    return told & again
 
 
 def _first_at_place(
@@ -366,14 +380,16 @@ def save_objects(objects: StreetObjects, path: str | Path) -> None:
     True
     """
     table = objects.table
+    columns = {
+        CLASS_CODE: pa.array(objects.codes),
+        SOURCE: pa.array(table[SOURCE].tolist(), pa.string()),
+        SOURCE_ID: pa.array(table[SOURCE_ID].tolist(), pa.string()),
+        COUNT: pa.array(table[COUNT].to_numpy(np.int32)),
+    }
+    if MERGED in table.columns:
+        columns[MERGED] = pa.array(table[MERGED].tolist(), pa.string())
     arrow = pa.table(
-        {
-            CLASS_CODE: pa.array(objects.codes),
-            SOURCE: pa.array(table[SOURCE].tolist(), pa.string()),
-            SOURCE_ID: pa.array(table[SOURCE_ID].tolist(), pa.string()),
-            COUNT: pa.array(table[COUNT].to_numpy(np.int32)),
-            GEOMETRY: pa.array(shapely.to_wkb(table.geometry.array), pa.binary()),
-        }
+        {**columns, GEOMETRY: pa.array(shapely.to_wkb(table.geometry.array), pa.binary())}
     )
     bounds = (*objects.xy.min(axis=0), *objects.xy.max(axis=0))
     write_geoparquet(
@@ -417,13 +433,16 @@ def open_objects(path: str | Path) -> StreetObjects:
     arrow, specs, crs = read_geoparquet(path, kind=KIND)
     try:
         taxonomy = Taxonomy.from_list(specs["taxonomy"])
+        columns = {
+            CLASS_CODE: arrow[CLASS_CODE].to_numpy(),
+            SOURCE: arrow[SOURCE].to_pylist(),
+            SOURCE_ID: arrow[SOURCE_ID].to_pylist(),
+            COUNT: arrow[COUNT].to_numpy(),
+        }
+        if MERGED in arrow.column_names:  # only conflated objects have it
+            columns[MERGED] = arrow[MERGED].to_pylist()
         table = gpd.GeoDataFrame(
-            {
-                CLASS_CODE: arrow[CLASS_CODE].to_numpy(),
-                SOURCE: arrow[SOURCE].to_pylist(),
-                SOURCE_ID: arrow[SOURCE_ID].to_pylist(),
-                COUNT: arrow[COUNT].to_numpy(),
-            },
+            columns,
             geometry=shapely.from_wkb(arrow[GEOMETRY].to_numpy(zero_copy_only=False)),
             crs=crs,
         )

@@ -14,6 +14,7 @@ __all__ = [
     "CLASS_NAME",
     "COUNT",
     "GEOMETRY",
+    "MERGED",
     "SOURCE",
     "SOURCE_ID",
     "require_metric_crs",
@@ -24,6 +25,7 @@ CLASS_NAME = "class_name"
 SOURCE = "source"
 SOURCE_ID = "source_id"
 COUNT = "count"
+MERGED = "merged"
 GEOMETRY = "geometry"
 
 

@@ -12,15 +12,9 @@ from pyproj import CRS
 from sentences import assert_sentence
 
 from semsig_gis import catalog as catalog_module
-from semsig_gis.catalog import (
-    Catalog,
-    ClassBy,
-    LayerSpec,
-    catalog_names,
-    load_catalog,
-    paper_taxonomy,
-)
+from semsig_gis.catalog import Catalog, catalog_names, load_catalog, paper_taxonomy
 from semsig_gis.errors import CatalogError, UnknownNameError
+from semsig_gis.layer_spec import ClassBy, LayerSpec
 from semsig_gis.schema import require_metric_crs
 
 if TYPE_CHECKING:

@@ -16,8 +16,9 @@ from hypothesis import strategies as st
 from pyproj import CRS, Transformer
 from sentences import assert_sentence
 
-from semsig_gis.catalog import LayerSpec, load_catalog, paper_taxonomy
+from semsig_gis.catalog import load_catalog, paper_taxonomy
 from semsig_gis.errors import CrsError, DatabaseError, EmptyResultError, UnknownNameError
+from semsig_gis.layer_spec import LayerSpec
 from semsig_gis.objects import build_objects, open_objects, save_objects
 from semsig_gis.sources import RawLayer
 from semsig_gis.storage import geo_metadata, write_geoparquet

@@ -1,30 +1,51 @@
-"""Readers of open data: pick the module for the source; each returns a `RawLayer`."""
+"""Readers of open data: pick the module for the source; each returns `RawLayer` values."""
 
 from __future__ import annotations
 
+import importlib
 from dataclasses import dataclass
 from fnmatch import fnmatchcase
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Protocol
 
-from semsig_gis.errors import SourceError
+from semsig_gis.errors import SourceError, UnknownNameError, nearest_name
+from semsig_gis.plugins import installed_readers
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
+    from collections.abc import Iterable, Sequence
 
     from geopandas import GeoDataFrame
 
-    from semsig_gis.catalog import LayerSpec
+    from semsig_gis.layer_spec import LayerSpec
 
-__all__ = ["FILE_SUFFIXES", "RawLayer", "find_files"]
+__all__ = ["FILE_SUFFIXES", "READERS", "RawLayer", "Reader", "find_files", "reader"]
+
+# The module of this package that reads what a catalogue's `reader` names.
+READERS = ("opendatasoft", "osm_file", "overpass", "vector_file")
 
 # Files with another suffix (.dbf, .prj, a README) accompany data and are not opened on their own.
-FILE_SUFFIXES = frozenset({".csv", ".fgb", ".geojson", ".gpkg", ".json", ".shp", ".zip"})
+FILE_SUFFIXES = frozenset(
+    {
+        ".bz2",
+        ".csv",
+        ".fgb",
+        ".geojson",
+        ".gpkg",
+        ".json",
+        ".osm",
+        ".parquet",
+        ".pbf",
+        ".shp",
+        ".zip",
+    }
+)
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class RawLayer:
-    """One layer as its reader found it; ``read == len(table) + filtered + error_count``.
+    """One layer as its reader found it.
+
+    ``read == len(table) + filtered + error_count + duplicates``.
 
     Parameters
     ----------
@@ -43,6 +64,9 @@ class RawLayer:
         Features that could not be read.
     notes : tuple of str
         Where the source differs from what the catalogue expects of it.
+    duplicates : int
+        Features left out because an earlier one has the same id, where the catalogue says that
+        ids are unique.
 
     Examples
     --------
@@ -59,6 +83,76 @@ class RawLayer:
     errors: tuple[str, ...] = ()
     error_count: int = 0
     notes: tuple[str, ...] = ()
+    duplicates: int = 0
+
+
+class Reader(Protocol):
+    """What a reader is: a function that reads layers from one file in one pass."""
+
+    def __call__(
+        self,
+        path: Path,
+        specs: Sequence[LayerSpec],
+        *,
+        filters: bool = True,
+        crs: str | None = None,
+    ) -> tuple[RawLayer, ...]:
+        """Read layers.
+
+        Parameters
+        ----------
+        path : Path
+            The file.
+        specs : sequence of LayerSpec
+            The layers to look for.
+        filters : bool
+            Whether the filters of the layers apply.
+        crs : str, optional
+            CRS of a file that states none.
+
+        Returns
+        -------
+        tuple of RawLayer
+            One layer for each of `specs`, in their order.
+        """
+
+
+def reader(name: str) -> Reader:
+    """Return the reader that a catalogue names.
+
+    Parameters
+    ----------
+    name : str
+        A built-in reader, or one that another package brings by the entry-point group
+        ``semsig_gis.readers``.
+
+    Returns
+    -------
+    Reader
+        The function that reads layers.
+
+    Raises
+    ------
+    UnknownNameError
+        If there is no reader of that name; the nearest is offered.
+
+    Examples
+    --------
+    >>> reader("vector_file").__module__
+    'semsig_gis.sources.vector_file'
+    """
+    if name in READERS:
+        read: Reader = importlib.import_module(f"{__name__}.{name}").read_layers
+        return read
+    others = installed_readers()
+    if name in others:
+        return others[name]
+    known = sorted({*READERS, *others})
+    msg = (
+        f"reader {name!r} is unknown{nearest_name(name, known)}; "
+        f"the readers are {', '.join(known)}."
+    )
+    raise UnknownNameError(msg)
 
 
 def find_files(
@@ -85,12 +179,13 @@ def find_files(
     Raises
     ------
     SourceError
-        If a path does not exist or matches no layer, or two files match the same layer.
+        If a path does not exist or matches no layer, or two files match the same layer, which
+        only a layer whose ids are unique can have.
 
     Examples
     --------
     >>> import tempfile
-    >>> from semsig_gis.catalog import LayerSpec
+    >>> from semsig_gis.layer_spec import LayerSpec
     >>> trees = LayerSpec(name="trees", class_name="alignment_tree", files=("*trees*.geojson",))
     >>> lights = LayerSpec(name="lights", class_name="street_light", files=("lights.*",))
     >>> with tempfile.TemporaryDirectory() as folder:
@@ -113,7 +208,7 @@ def find_files(
         else:
             msg = f"{path} does not exist; give a file or a folder of files."
             raise SourceError(msg)
-    pairs = []
+    pairs: list[tuple[LayerSpec, Path]] = []
     missing = []
     for spec in specs:
         by_hand = [path for path in given if _matches(path, spec.files)]
@@ -121,13 +216,12 @@ def find_files(
             [path for path in found if _matches(path, (pattern,))] for pattern in spec.files
         )
         candidates = by_hand or next(filter(None, in_folder), [])
-        if len(candidates) > 1:
+        if len(candidates) > 1 and not spec.unique_id:
             names = " and ".join(str(path) for path in candidates)
             msg = f"layer {spec.name!r} is matched by {names}; give one of them."
             raise SourceError(msg)
-        if candidates:
-            pairs.append((spec, candidates[0]))
-        else:
+        pairs.extend((spec, path) for path in candidates)
+        if not candidates:
             missing.append(spec)
     return tuple(pairs), tuple(missing)
 

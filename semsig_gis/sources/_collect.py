@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
     from pyproj import CRS
 
-    from semsig_gis.catalog import LayerSpec
+    from semsig_gis.layer_spec import LayerSpec
 
 KINDS = {
     "point": ("Point", "MultiPoint"),
@@ -29,6 +29,8 @@ KINDS = {
     "polygon": ("Polygon", "MultiPolygon"),
 }
 ERRORS_KEPT = 10
+# Rows of one id farther apart than this are told of: about a metre, by unit of the CRS.
+APART_DEGREES, APART_METRES = 1e-5, 1.0
 
 # A point as its two coordinates, so that all points are built at once; else a built geometry.
 Position = tuple[float, float] | shapely.Geometry | None
@@ -101,6 +103,11 @@ def raw_layer(
     """
     geometry = _geometries(rows)
     geometry = _on_globe(rows, geometry, crs, where=where, by_file=by_file)
+    duplicates = 0
+    if spec.unique_id:
+        apart = APART_DEGREES if crs.is_geographic else APART_METRES
+        geometry, duplicates, more = _one_of_each_id(rows, geometry, apart=apart)
+        notes += more
     if crs.is_projected and not by_file and fits_the_globe(shapely.get_coordinates(geometry)):
         notes += (f"the coordinates look like degrees, yet {crs_label(crs)} is stated",)
     first_errors = sorted(rows.errors.items())[:ERRORS_KEPT]
@@ -119,6 +126,7 @@ def raw_layer(
         errors=tuple(f"row {number}: {message}" for number, message in first_errors),
         error_count=len(rows.errors),
         notes=(*notes, *_surprises(rows, geometry, spec)),
+        duplicates=duplicates,
     )
 
 
@@ -174,6 +182,25 @@ def _without(
         return geometry
     rows.refuse(bad)
     return np.delete(geometry, indices)
+
+
+def _one_of_each_id(
+    rows: Rows, geometry: NDArray[np.object_], *, apart: float
+) -> tuple[NDArray[np.object_], int, tuple[str, ...]]:
+    """Keep the first row of every id, but one that has a position rather than one that has none."""
+    ids = pd.Series([row.source_id for row in rows.kept], dtype="str")
+    nowhere = shapely.is_missing(geometry) | shapely.is_empty(geometry)
+    ranked = ids.iloc[np.argsort(nowhere, kind="stable")]
+    firsts = ranked[ranked != ""].drop_duplicates()
+    repeated = ranked.index[ranked.duplicated() & (ranked != "")].to_numpy(np.intp)
+    if not len(repeated):
+        return geometry, 0, ()
+    first_of = pd.Series(firsts.index, index=firsts).loc[ids[repeated]].to_numpy(np.intp)
+    distances = shapely.distance(geometry[repeated], geometry[first_of])
+    far = int((distances > apart).sum())  # NaN where there is no position
+    rows.kept = [rows.kept[index] for index in np.delete(np.arange(len(ids)), repeated)]
+    note = f"{far} rows have the id of a row that stands elsewhere; the first one's place is used"
+    return np.delete(geometry, repeated), len(repeated), (note,) if far else ()
 
 
 def _surprises(rows: Rows, geometry: NDArray[np.object_], spec: LayerSpec) -> tuple[str, ...]:

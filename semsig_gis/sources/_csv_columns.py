@@ -13,7 +13,7 @@ from semsig_gis.sources._rows import BadFeatureError, require_field
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-    from semsig_gis.catalog import LayerSpec
+    from semsig_gis.layer_spec import LayerSpec
 
 # Separators and what GDAL calls them.
 SEPARATORS = {";": "SEMICOLON", ",": "COMMA", "\t": "TAB"}

@@ -8,7 +8,6 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from semsig_gis.errors import SourceError
-from semsig_gis.sources import FILE_SUFFIXES
 
 # The only drivers that may open a file: GDAL has some eighty, and a few of them follow links.
 DRIVERS = {
@@ -89,8 +88,9 @@ def members(path: Path) -> tuple[Member, ...]:
         what = "is a folder" if path.is_dir() else "does not exist"
         msg = f"{path} {what}; give a vector file."
         raise SourceError(msg)
-    if suffix not in FILE_SUFFIXES:
-        msg = f"{path} is not a vector file; give one of {', '.join(sorted(FILE_SUFFIXES))}."
+    suffixes = {*DRIVERS, ".zip"}
+    if suffix not in suffixes:
+        msg = f"{path} is not a vector file; give one of {', '.join(sorted(suffixes))}."
         raise SourceError(msg)
     inner = _archived(path) if suffix == ".zip" else (None,)
     return tuple(Member(path, name) for name in inner)

@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
+import functools
 import re
 from typing import TYPE_CHECKING, Any
 
 from semsig_gis.errors import CatalogError, nearest_name
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Iterable, Mapping, Sequence
 
-    from semsig_gis.catalog import LayerSpec, Value
+    from semsig_gis.layer_spec import LayerSpec, Value
 
 WHOLE_FLOAT = re.compile(r"(-?\d+)\.0+")
+# A value that a catalogue writes between slashes is a pattern.
+BETWEEN_SLASHES = re.compile(r"/(.+)/")
 
 
 class BadFeatureError(ValueError):
@@ -32,18 +35,27 @@ def matches(value: object, wanted: Value) -> bool:
     """Tell whether a field value is the one a catalogue names.
 
     Text compares as text and numbers as numbers, so that the number 3 is found in the text field
-    of a CSV file and the key "3" of a TOML table in a numeric field.
+    of a CSV file and the key "3" of a TOML table in a numeric field. A text between slashes, such
+    as ``"/Taxi.*/"``, is a regular expression, which the whole value must match.
     """
     if value is None:
         return False
     if isinstance(wanted, str):
-        return as_text(value) == wanted
+        pattern = _pattern(wanted)
+        text = as_text(value)
+        return text == wanted if pattern is None else pattern.fullmatch(text) is not None
     if isinstance(wanted, bool) or isinstance(value, bool):
         return as_text(value) == as_text(wanted)
     try:
         return float(value) == wanted  # type: ignore[arg-type]
     except (TypeError, ValueError):
         return False
+
+
+@functools.lru_cache
+def _pattern(wanted: str) -> re.Pattern[str] | None:
+    inner = BETWEEN_SLASHES.fullmatch(wanted)
+    return re.compile(inner[1]) if inner else None
 
 
 class RowRules:
@@ -63,7 +75,7 @@ class RowRules:
     Raises
     ------
     CatalogError
-        If a field that the specification names does not exist.
+        If a field that the specification names does not exist, or a pattern is wrong.
     """
 
     def __init__(
@@ -73,9 +85,13 @@ class RowRules:
         self._where = spec.where if filters else ()
         self._class_by = spec.class_by
         self._id_field = spec.id_field
+        self._unique_id = spec.unique_id
         uses = [("where", field) for field, _ in self._where]
+        values = [wanted for _, accepted in self._where for wanted in accepted]
         if spec.class_by is not None:
             uses.append(("class_by", spec.class_by.field))
+            values.extend(wanted for wanted, _ in spec.class_by.classes)
+        _require_patterns(values, where=where)
         if spec.id_field is not None:
             uses.append(("id_field", spec.id_field))
         for key, field in uses:
@@ -99,13 +115,23 @@ class RowRules:
         return self._class_name
 
     def source_id(self, row: Mapping[str, Any], number: str) -> str:
-        """Return the identifier of the row, or the feature's number where it has none."""
+        """Return the identifier of the row, or the feature's number where it has none.
+
+        Where ids are unique it is empty then, because the number could be another row's id.
+        """
         value = None if self._id_field is None else row[self._id_field]
-        if value is None:
-            return number
-        text = as_text(value).strip()
+        text = "" if value is None else as_text(value).strip()
         whole = WHOLE_FLOAT.fullmatch(text)
-        return (whole[1] if whole else text) or number
+        return (whole[1] if whole else text) or ("" if self._unique_id else number)
+
+
+def _require_patterns(values: Iterable[Value], *, where: str) -> None:
+    for wanted in values:
+        try:
+            _pattern(str(wanted))
+        except re.error as error:
+            msg = f"{where}: pattern {wanted} is not a regular expression ({error}); correct it."
+            raise CatalogError(msg) from error
 
 
 def require_field(field: str, fields: Sequence[str], *, where: str, key: str) -> None:

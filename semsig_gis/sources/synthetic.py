@@ -16,8 +16,8 @@ import numpy as np
 import pandas as pd
 import shapely
 
-from semsig_gis.catalog import LayerSpec
 from semsig_gis.errors import InputError
+from semsig_gis.layer_spec import LayerSpec
 from semsig_gis.schema import CLASS_NAME, SOURCE_ID
 from semsig_gis.sources import RawLayer
 

@@ -35,7 +35,7 @@ if TYPE_CHECKING:
 
     from pyproj import CRS
 
-    from semsig_gis.catalog import LayerSpec
+    from semsig_gis.layer_spec import LayerSpec
     from semsig_gis.sources import RawLayer
     from semsig_gis.sources._collect import Position
     from semsig_gis.sources._csv_columns import CsvColumns
@@ -159,7 +159,7 @@ def read_layer(
     Examples
     --------
     >>> import tempfile
-    >>> from semsig_gis.catalog import LayerSpec
+    >>> from semsig_gis.layer_spec import LayerSpec
     >>> spec = LayerSpec(name="benches", class_name="bench", crs="EPSG:4326")
     >>> with tempfile.TemporaryDirectory() as folder:
     ...     path = Path(folder, "benches.csv")

@@ -8,12 +8,15 @@ from typing import Any
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from sentences import assert_sentence
 
-from semsig_gis.catalog import LayerSpec
-from semsig_gis.sources._rows import RowRules, as_text, matches
+from semsig_gis.errors import CatalogError
+from semsig_gis.layer_spec import LayerSpec
+from semsig_gis.sources._rows import BETWEEN_SLASHES, RowRules, as_text, matches
 
 numbers = st.integers(-(2**53), 2**53) | st.floats(allow_nan=False, allow_infinity=False)
-values = st.none() | st.booleans() | numbers | st.text()
+plain = st.text().filter(lambda text: not BETWEEN_SLASHES.fullmatch(text))
+values = st.none() | st.booleans() | numbers | plain
 
 
 @given(values)
@@ -31,7 +34,7 @@ def test_numbers_compare_as_numbers(a: float, b: float) -> None:
     assert matches(repr(a), b) == (a == b)
 
 
-@given(st.text(), st.text())
+@given(plain, plain)
 def test_text_compares_as_text(a: str, b: str) -> None:
     assert matches(a, b) == (a == b)
 
@@ -63,3 +66,42 @@ def test_whole_identifiers_have_no_decimals(number: int) -> None:
         assert rules.source_id({"n": value}, "7") == str(number)
     for nothing in (None, "", "  "):
         assert rules.source_id({"n": nothing}, "7") == "7"
+
+
+@pytest.mark.parametrize(
+    ("value", "pattern", "expected"),
+    [
+        ("BASTILLE", "/[^a-z]+/", True),
+        ("Bastille", "/[^a-z]+/", False),
+        ("Taxi (nuit)", "/Taxi.*/", True),
+        ("un Taxi", "/Taxi.*/", False),
+        (75012, "/75.../", True),
+        (12.0, "/1./", True),
+        (None, "/.*/", False),
+        ("//", "//", True),
+        ("/", "/", True),
+        ("a/b", "a/b", True),
+    ],
+)
+def test_a_text_between_slashes_is_a_pattern(
+    value: object, pattern: str, *, expected: bool
+) -> None:
+    assert matches(value, pattern) == expected
+
+
+def test_a_pattern_that_is_none() -> None:
+    spec = LayerSpec(name="things", class_name="bench", where=(("kind", ("/[/",)),))
+    with pytest.raises(CatalogError) as caught:
+        RowRules(spec, ["kind"], filters=True, where="layer 'things'")
+    assert_sentence(caught.value, "layer 'things'", "/[/", "regular expression")
+
+
+def test_only_true_ids_may_be_unique() -> None:
+    spec = LayerSpec(name="things", class_name="bench", id_field="n", unique_id=True)
+    rules = RowRules(spec, ["n"], filters=True, where="things")
+    assert [rules.source_id({"n": value}, "7") for value in (3.0, "3.0", None, " ")] == [
+        "3",
+        "3",
+        "",
+        "",
+    ]

@@ -21,8 +21,8 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from pyproj import CRS
 
-from semsig_gis.catalog import ClassBy, LayerSpec
 from semsig_gis.errors import CatalogError, CrsError, SourceError, UnknownNameError
+from semsig_gis.layer_spec import ClassBy, LayerSpec
 from semsig_gis.sources import vector_file
 from semsig_gis.sources._member import DRIVERS
 from semsig_gis.sources._rows import RowRules

@@ -1,0 +1,125 @@
+"""What a catalogue says of one layer: where it is, what it holds, and what is expected of it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+__all__ = ["ANY_VALUE", "ClassBy", "ElementKind", "GeometryKind", "LayerSpec", "Role", "Value"]
+
+Value = str | int | float | bool
+GeometryKind = Literal["point", "line", "polygon"]
+ElementKind = Literal["node", "way", "relation"]
+Role = Literal["objects", "buildings", "streets"]
+# Stands for every value of a tag.
+ANY_VALUE = "*"
+
+
+@dataclass(frozen=True, slots=True)
+class ClassBy:
+    """A field whose value decides the class of a row.
+
+    Parameters
+    ----------
+    field : str
+        Name of the field.
+    classes : tuple of (value, str)
+        Value of the field and the class name it stands for; a row with another value keeps the
+        class of its layer.
+
+    Examples
+    --------
+    >>> ClassBy("kind", (("Taxi", "taxi_station"),)).field
+    'kind'
+    """
+
+    field: str
+    classes: tuple[tuple[Value, str], ...]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LayerSpec:
+    """One layer of a source and the class of street object it holds.
+
+    Parameters
+    ----------
+    name : str
+        Name of the layer in the catalogue.
+    class_name : str
+        Class of its rows.
+    files : tuple of str
+        File-name patterns (``*``, ``?``) by which the layer's file is recognised.
+    layer : str, optional
+        Layer inside a file that holds several.
+    where : tuple of (str, tuple)
+        Fields and the values of each that are accepted, compared exactly; all must hold.
+    class_by : ClassBy, optional
+        Field that decides the class row by row.
+    id_field : str, optional
+        Field that identifies a row in its source; else the feature's number.
+    geometry : {"point", "line", "polygon"}
+        Geometry that is expected.
+    crs : str, optional
+        Coordinate reference system that is expected; it is used where the file states none.
+    rows : tuple of (int, int), optional
+        Least and largest number of rows that are plausible.
+    x_field, y_field : str, optional
+        Coordinate columns of a CSV file.
+    aliases : tuple of (str, tuple of str)
+        Fields and the names that they go by in other editions of the file.
+    unique_id : bool
+        Whether rows of the same id are the same object, also across several files.
+    dataset : str, optional
+        Name of the dataset on its portal.
+    server_where : str, optional
+        Filter that the portal applies before it sends, in its own language.
+    select : tuple of str
+        Fields to ask the portal for; all by default.
+    tags : tuple of tuple of (str, tuple of str)
+        OpenStreetMap tags: alternatives, each of keys and accepted values that must all hold;
+        the value ``"*"`` accepts every value.
+    elements : tuple of {"node", "way", "relation"}
+        OpenStreetMap elements that count.
+    role : {"objects", "buildings", "streets"}
+        What the layer is for: street objects, footprints that hide them, or centre lines of
+        streets. Only street objects have a class.
+    optional : bool
+        Whether the layer is read only when it is named.
+    reader : str
+        Reader of `semsig_gis.sources` for its file.
+    note : str
+        Remark for people, such as how sure a dataset name is.
+    license, attribution : str
+        Licence of the data and the line that its publisher asks for.
+
+    Examples
+    --------
+    >>> LayerSpec(name="trees", class_name="alignment_tree", files=("*trees*.geojson",)).geometry
+    'point'
+    """
+
+    name: str
+    class_name: str
+    files: tuple[str, ...] = ()
+    layer: str | None = None
+    where: tuple[tuple[str, tuple[Value, ...]], ...] = ()
+    class_by: ClassBy | None = None
+    id_field: str | None = None
+    geometry: GeometryKind = "point"
+    crs: str | None = None
+    rows: tuple[int, int] | None = None
+    x_field: str | None = None
+    y_field: str | None = None
+    aliases: tuple[tuple[str, tuple[str, ...]], ...] = ()
+    unique_id: bool = False
+    dataset: str | None = None
+    server_where: str | None = None
+    select: tuple[str, ...] = ()
+    tags: tuple[tuple[tuple[str, tuple[str, ...]], ...], ...] = ()
+    elements: tuple[ElementKind, ...] = ("node", "way", "relation")
+    role: Role = "objects"
+    optional: bool = False
+    reader: str = "vector_file"
+    note: str = ""
+    license: str = "unknown"
+    attribution: str = ""

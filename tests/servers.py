@@ -1,0 +1,270 @@
+"""A real HTTP server on the loopback, which plays the services that the readers talk to.
+
+Each path has a script: answers that are given one after the other, the last of them for ever. An
+answer is an `Answer`, or a function from what was `Seen` to one. What was asked is kept, in order::
+
+    with Server() as server:
+        server.on("/busy", Answer(status=429, headers={"Retry-After": "2"}), Answer(b"[]"))
+        server.on("/trees", published(content, etag='"1"', cuts=[1000]))  # cut once, then resumable
+        server.on("/slow", Answer(content, drip=(1, 0.05)))  # one byte every 0.05 s
+        server.on("/echo", lambda seen: Answer(json.dumps(seen.query).encode()))
+        fetch(server.url + "/busy", ...)  # http://127.0.0.1:PORT/busy
+    assert [seen.path for seen in server.seen] == ["/busy", "/busy"]
+    assert server.seen[0].headers["user-agent"].startswith("semsig")
+
+`server.other_host` is the same server under another name, for redirects that leave the host. A path
+without a script is answered with 404. In a test file::
+
+    @pytest.fixture
+    def server() -> Iterator[Server]:
+        with Server() as running:
+            yield running
+"""
+
+from __future__ import annotations
+
+import contextlib
+import gzip
+import http.server
+import threading
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Self
+from urllib.parse import parse_qsl, urlsplit
+
+import pytest
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+    from types import TracebackType
+
+
+@dataclass(frozen=True, slots=True)
+class Answer:
+    """What the server says.
+
+    Parameters
+    ----------
+    body : bytes
+        The whole body.
+    status : int
+        Status code.
+    type : str
+        Content type; none is sent where it is empty.
+    headers : mapping of str to str
+        Further headers.
+    chunked : bool
+        Whether the length is left unsaid and the body sent in chunks.
+    cut : int, optional
+        Number of bytes of the body after which the connection is closed, as if it had failed.
+    drip : tuple of (int, float), optional
+        Bytes to send at a time, and the seconds to wait after each.
+    """
+
+    body: bytes = b""
+    status: int = 200
+    type: str = "application/json"
+    headers: Mapping[str, str] = field(default_factory=dict)
+    chunked: bool = False
+    cut: int | None = None
+    drip: tuple[int, float] | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Seen:
+    """What the server was asked; the names of the headers are in lower case."""
+
+    method: str
+    path: str
+    query: Mapping[str, str]
+    headers: Mapping[str, str]
+    body: bytes = b""
+
+    @property
+    def form(self) -> Mapping[str, str]:
+        """Return the fields of a form that was posted."""
+        return dict(parse_qsl(self.body.decode("utf-8")))
+
+
+Script = Answer | Callable[[Seen], Answer]
+
+
+def zipped(body: bytes, **what: str) -> Answer:
+    """Return an answer whose body is compressed by gzip; `what` are further headers."""
+    return Answer(gzip.compress(body, mtime=0), headers={"Content-Encoding": "gzip", **what})
+
+
+def published(
+    body: bytes,
+    *,
+    type: str = "application/json",  # noqa: A002 - as in Answer
+    etag: str = "",
+    modified: str = "",
+    ranges: bool = True,
+    cuts: Sequence[int | None] = (),
+) -> Callable[[Seen], Answer]:
+    """Play a file as a good web server does: with conditional requests, and ranges if wanted.
+
+    Parameters
+    ----------
+    body : bytes
+        The file.
+    type : str
+        Its content type.
+    etag, modified : str
+        Its entity tag, quoted, and the date of its last change.
+    ranges : bool
+        Whether a part of it can be asked for.
+    cuts : sequence of int or None
+        Of the first answers that have a body, the number of bytes after which each is cut.
+
+    Returns
+    -------
+    callable
+        A script for `Server.on`.
+    """
+    left = list(cuts)
+
+    def answer(seen: Seen) -> Answer:
+        headers = {"Accept-Ranges": "bytes" if ranges else "none"}
+        headers |= {"ETag": etag} if etag else {}
+        headers |= {"Last-Modified": modified} if modified else {}
+        same_tag = etag and seen.headers.get("if-none-match") == etag
+        same_date = modified and seen.headers.get("if-modified-since") == modified
+        if same_tag or same_date:
+            return Answer(status=304, type="", headers=headers)
+        wanted = seen.headers.get("range", "") if ranges else ""
+        condition = seen.headers.get("if-range")
+        cut = left.pop(0) if left else None
+        if not wanted or condition not in {None, etag, modified}:
+            return Answer(body, type=type, headers=headers, cut=cut)
+        start = int(wanted.removeprefix("bytes=").partition("-")[0])
+        if start >= len(body):
+            return Answer(status=416, headers={"Content-Range": f"bytes */{len(body)}"})
+        headers["Content-Range"] = f"bytes {start}-{len(body) - 1}/{len(body)}"
+        return Answer(body[start:], status=206, type=type, headers=headers, cut=cut)
+
+    return answer
+
+
+@dataclass
+class Server:
+    """A threaded server on a free port of 127.0.0.1, for use as a context manager."""
+
+    seen: list[Seen] = field(default_factory=list)
+    _scripts: dict[str, list[Script]] = field(default_factory=dict)
+    _lock: threading.Lock = field(default_factory=threading.Lock)
+    _closing: threading.Event = field(default_factory=threading.Event)
+    _stack: contextlib.ExitStack = field(default_factory=contextlib.ExitStack)
+    port: int = 0
+
+    @property
+    def url(self) -> str:
+        """Return the address to which a path is added."""
+        return f"http://127.0.0.1:{self.port}"
+
+    @property
+    def other_host(self) -> str:
+        """Return an address of the same server by another host name."""
+        return f"http://localhost:{self.port}"
+
+    def on(self, path: str, *answers: Script) -> None:
+        """Set what is answered to requests for a path, whatever their query."""
+        with self._lock:
+            self._scripts[path] = list(answers)
+
+    def paths(self) -> list[str]:
+        """Return the paths that were asked for."""
+        return [seen.path for seen in self.seen]
+
+    def answer(self, seen: Seen) -> Answer:
+        """Return the next answer to a request."""
+        with self._lock:
+            self.seen.append(seen)
+            script = self._scripts.get(seen.path)
+            if not script:
+                return Answer(b'{"message": "there is no such thing"}', status=404)
+            step = script[0] if len(script) == 1 else script.pop(0)
+            return step(seen) if callable(step) else step
+
+    def wait(self, seconds: float) -> bool:
+        """Wait, but not beyond the server's end; tell whether it is closing."""
+        return self._closing.wait(seconds)
+
+    def __enter__(self) -> Self:
+        handler = type("Handler", (_Handler,), {"playing": self})
+        web = http.server.ThreadingHTTPServer(("127.0.0.1", 0), handler)
+        web.daemon_threads = False  # so that closing waits for the answers under way
+        self.port = web.server_address[1]
+        patch = self._stack.enter_context(pytest.MonkeyPatch.context())
+        for name in ("NO_PROXY", "no_proxy"):
+            patch.setenv(name, "127.0.0.1,localhost")
+        thread = threading.Thread(target=web.serve_forever, kwargs={"poll_interval": 0.01})
+        thread.start()
+        self._stack.callback(thread.join)
+        self._stack.callback(web.server_close)
+        self._stack.callback(web.shutdown)
+        self._stack.callback(self._closing.set)
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self._stack.close()
+
+
+class _Handler(http.server.BaseHTTPRequestHandler):
+    protocol_version = "HTTP/1.1"
+    timeout = 10.0  # for a client that connects and says nothing
+    playing: Server
+
+    def do_GET(self) -> None:
+        self._respond()
+
+    def do_POST(self) -> None:
+        self._respond()
+
+    def do_HEAD(self) -> None:
+        self._respond()
+
+    def log_message(self, format: str, *args: object) -> None:  # noqa: A002 - the base class's name
+        """Say nothing: the tests look at what was seen."""
+
+    def _respond(self) -> None:
+        self.close_connection = True
+        parts = urlsplit(self.path)
+        body = self.rfile.read(int(self.headers.get("Content-Length", 0)))
+        query = dict(parse_qsl(parts.query, keep_blank_values=True))
+        headers = {name.lower(): value for name, value in self.headers.items()}
+        answer = self.playing.answer(Seen(self.command, parts.path, query, headers, body))
+        # A client that has had enough closes the connection, which is no fault.
+        with contextlib.suppress(OSError):
+            self._send(answer)
+
+    def _send(self, answer: Answer) -> None:
+        self.send_response(answer.status)
+        for name, value in answer.headers.items():
+            self.send_header(name, value)
+        if answer.type:
+            self.send_header("Content-Type", answer.type)
+        if answer.chunked:
+            self.send_header("Transfer-Encoding", "chunked")
+        else:
+            self.send_header("Content-Length", str(len(answer.body)))
+        self.send_header("Connection", "close")
+        self.end_headers()
+        if self.command == "HEAD":
+            return
+        body = answer.body[: answer.cut]
+        size, pause = answer.drip or (2**16, 0.0)
+        for start in range(0, len(body), size):
+            piece = body[start : start + size]
+            self.wfile.write(b"%x\r\n%b\r\n" % (len(piece), piece) if answer.chunked else piece)
+            self.wfile.flush()
+            if pause and self.playing.wait(pause):
+                return
+        if answer.chunked and answer.cut is None:
+            self.wfile.write(b"0\r\n\r\n")

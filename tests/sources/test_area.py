@@ -1,0 +1,162 @@
+"""Areas: bounding boxes, files of polygons, and what is inside them."""
+
+from __future__ import annotations
+
+import json
+from typing import TYPE_CHECKING
+
+import geopandas as gpd
+import numpy as np
+import pytest
+import shapely
+from hypothesis import given
+from hypothesis import strategies as st
+from sentences import assert_sentence
+
+from semsig_gis.errors import InputError, SemsigError
+from semsig_gis.layer_spec import LayerSpec
+from semsig_gis.sources import RawLayer
+from semsig_gis.sources._area import clip_layer, join_areas, names_place, parse_area
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+BOX = (3.8, 43.5, 3.9, 43.7)
+
+
+def write(folder: Path, *geometries: shapely.Geometry | None, crs: str | None = "EPSG:4326") -> str:
+    path = folder / "quarter.gpkg"
+    gpd.GeoDataFrame(geometry=list(geometries), crs=crs).to_file(path)
+    return str(path)
+
+
+@given(
+    st.floats(-180, 179, allow_subnormal=False),
+    st.floats(-90, 89, allow_subnormal=False),
+    st.floats(0.001, 1),
+    st.floats(0.001, 1),
+)
+def test_a_bounding_box_comes_back(west: float, south: float, width: float, height: float) -> None:
+    bounds = (west, south, west + width, south + height)
+    area = parse_area(",".join(map(repr, bounds)))
+    assert area.bounds == bounds
+    assert area.polygon.equals(shapely.box(*bounds))
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("1,2,3", "is not four numbers"),
+        ("1,2,3,4,5", "is not four numbers"),
+        ("1 2 3 4", "is not four numbers"),
+        ("2.4,48.8,2.3,48.9", "west below east"),
+        ("2.3,48.9,2.4,48.8", "south below north"),
+        ("600000,6800000,600100,6800100", "in degrees"),
+        ("2.3,48.8,2.3,48.9", "is no area"),
+        ("Helsinki", "neither a bounding box nor a file"),
+        ("nan,1,2,3", "neither a bounding box nor a file"),
+    ],
+)
+def test_what_is_no_area_is_said(text: str, words: str) -> None:
+    with pytest.raises(InputError) as caught:
+        parse_area(text)
+    assert_sentence(caught.value, words)
+
+
+def test_a_place_is_told_from_a_file(tmp_path: Path) -> None:
+    (tmp_path / "plain").touch()
+    assert names_place("Saint-Denis, La Réunion")
+    assert names_place("19th arrondissement")
+    assert not names_place("nowhere.gpkg")
+    assert not names_place("-1.5,2,3e0,4")
+    assert not names_place(str(tmp_path / "plain"))
+
+
+def test_the_polygons_of_a_file_are_joined(tmp_path: Path) -> None:
+    east = shapely.box(3.9, 43.5, 4.0, 43.7)
+    path = write(tmp_path, shapely.box(*BOX), east, shapely.box(5, 5, 6, 6), None)
+    area = parse_area(path)
+    assert area.name == "quarter"
+    assert isinstance(area.polygon, shapely.MultiPolygon)
+    assert len(area.polygon.geoms) == 2
+    assert area.bounds == (3.8, 5, 6, 43.7)
+
+
+def test_a_file_in_metres_becomes_degrees(tmp_path: Path) -> None:
+    box = gpd.GeoSeries([shapely.box(*BOX)], crs="EPSG:4326").to_crs(2154)
+    area = parse_area(write(tmp_path, box.iloc[0], crs="EPSG:2154"))
+    assert area.bounds == pytest.approx(BOX, abs=1e-6)
+
+
+def test_a_polygon_that_crosses_itself_is_mended(tmp_path: Path) -> None:
+    bow = shapely.Polygon([(0, 0), (1, 1), (1, 0), (0, 1)])
+    area = parse_area(write(tmp_path, bow))
+    assert area.polygon.is_valid
+    assert area.polygon.area == pytest.approx(0.5)
+
+
+@pytest.mark.parametrize(
+    ("geometry", "words"),
+    [
+        (shapely.Point(3, 43), "holds Point"),
+        (shapely.LineString([(3, 43), (4, 43)]), "holds LineString"),
+        (None, "holds nothing"),
+        (shapely.Polygon([(0, 0), (1, 1), (0, 0)]), "encloses no area"),
+    ],
+)
+def test_a_file_without_area_is_said(
+    tmp_path: Path, geometry: shapely.Geometry | None, words: str
+) -> None:
+    with pytest.raises(InputError) as caught:
+        parse_area(write(tmp_path, geometry))
+    assert_sentence(caught.value, words, "give a file of polygons")
+
+
+def test_a_polygon_that_cannot_be_read_is_said(tmp_path: Path) -> None:
+    path = tmp_path / "quarter.geojson"
+    broken = {
+        "type": "Feature",
+        "properties": {},
+        "geometry": {"type": "Polygon", "coordinates": 5},
+    }
+    path.write_text(json.dumps({"type": "FeatureCollection", "features": [broken]}))
+    with pytest.raises(InputError) as caught:
+        parse_area(str(path))
+    assert_sentence(caught.value, "polygons that cannot be read", "correct the file")
+
+
+def test_a_file_that_cannot_be_read_is_said(tmp_path: Path) -> None:
+    with pytest.raises(SemsigError) as caught:
+        parse_area(str(tmp_path / "nowhere.geojson"))
+    assert_sentence(caught.value, "does not exist")
+    with pytest.warns(UserWarning, match="'crs' was not provided"):
+        path = write(tmp_path, shapely.box(*BOX), crs=None)
+    with pytest.raises(SemsigError) as caught:
+        parse_area(path)
+    assert_sentence(caught.value, "CRS")
+
+
+@pytest.mark.parametrize(
+    ("role", "kept"), [("objects", ["1", "none"]), ("streets", ["1", "2", "none"])]
+)
+@pytest.mark.parametrize("crs", ["EPSG:4326", "EPSG:2154"])
+def test_a_layer_is_clipped(role: str, kept: list[str], crs: str) -> None:
+    inside = shapely.LineString([(3.81, 43.6), (3.82, 43.6)])
+    across = shapely.LineString([(3.89, 43.6), (4.2, 43.6)])
+    outside = shapely.LineString([(4.1, 43.6), (4.2, 43.6)])
+    table = gpd.GeoDataFrame(
+        {"class_name": [""] * 4, "source_id": ["1", "2", "3", "none"]},
+        geometry=[inside, across, outside, None],
+        crs="EPSG:4326",
+    ).to_crs(crs)
+    spec = LayerSpec(name="x", class_name="", role=role, geometry="line")  # type: ignore[arg-type]
+    layer = RawLayer(spec=spec, table=table, read=9, filtered=5)
+    clipped = clip_layer(layer, parse_area(",".join(map(str, BOX))))
+    assert clipped.table["source_id"].tolist() == kept
+    assert clipped.table.index.tolist() == list(range(len(kept)))
+    assert clipped.table.crs == table.crs
+    assert clipped.read == len(clipped.table) + clipped.filtered
+
+
+def test_nothing_has_no_outline() -> None:
+    assert join_areas(np.array([shapely.Point(1, 2)])) is None
