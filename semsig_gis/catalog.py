@@ -20,6 +20,7 @@ from semsig_gis.layer_spec import (
     Role,
     Value,
 )
+from semsig_gis.plugins import installed_catalogs
 from semsig_gis.schema import require_metric_crs
 from semsig_gis.taxonomy import ObjectClass, Taxonomy
 
@@ -182,21 +183,30 @@ def paper_taxonomy() -> Taxonomy:
 
 
 def catalog_names() -> tuple[str, ...]:
-    """Return the names of the built-in catalogues.
+    """Return the names of the catalogues there are.
 
     Returns
     -------
     tuple of str
-        Names that `load_catalog` takes, sorted.
+        Names that `load_catalog` takes, sorted: the built-in catalogues, and those that other
+        packages bring by the entry-point group ``semsig_gis.catalogs``.
 
     Examples
     --------
     >>> "montpellier" in catalog_names()
     True
     """
-    names = (Path(item.name) for item in _data_folder().iterdir())
-    stems = (path.stem for path in names if path.suffix == ".toml")
-    return tuple(sorted(stem for stem in stems if stem not in NO_CATALOGS))
+    return tuple(sorted(_sources()))
+
+
+def _sources() -> dict[str, Path | Traversable]:
+    """Return the file of every catalogue by name."""
+    shipped: dict[str, Path | Traversable] = {
+        Path(item.name).stem: item
+        for item in _data_folder().iterdir()
+        if item.name.endswith(".toml") and Path(item.name).stem not in NO_CATALOGS
+    }
+    return {**shipped, **installed_catalogs(taken=shipped)}
 
 
 def load_catalog(name: str | Path) -> Catalog:
@@ -205,7 +215,7 @@ def load_catalog(name: str | Path) -> Catalog:
     Parameters
     ----------
     name : str or Path
-        Name of a built-in catalogue, or path of a TOML file (it ends in ``.toml``).
+        Name of a built-in or installed catalogue, or path of a TOML file (it ends in ``.toml``).
 
     Returns
     -------
@@ -215,7 +225,7 @@ def load_catalog(name: str | Path) -> Catalog:
     Raises
     ------
     UnknownNameError
-        If there is no built-in catalogue of that name.
+        If there is no catalogue of that name.
     CatalogError
         If the file is missing, is not TOML, has a key that means nothing, lacks one that is
         needed, or names a class or CRS that does not exist.
@@ -233,13 +243,14 @@ def load_catalog(name: str | Path) -> Catalog:
             msg = f"catalogue {text} does not exist; give a TOML file or one of {_known()}."
             raise CatalogError(msg)
     else:
-        if text not in catalog_names():
+        sources = _sources()
+        if text not in sources:
             msg = (
-                f"catalogue {text!r} is unknown{nearest_name(text, catalog_names())}; "
+                f"catalogue {text!r} is unknown{nearest_name(text, sources)}; "
                 f"give one of {_known()}, or the path of a .toml file."
             )
             raise UnknownNameError(msg)
-        source = _data_folder() / f"{text}.toml"
+        source = sources[text]
     try:
         content = source.read_text(encoding="utf-8-sig")  # some editors write a BOM
     except UnicodeDecodeError as error:

@@ -11,7 +11,7 @@ Value = str | int | float | bool
 GeometryKind = Literal["point", "line", "polygon"]
 ElementKind = Literal["node", "way", "relation"]
 Role = Literal["objects", "buildings", "streets"]
-# Stands for every value of a tag.
+# Stands for every value of a tag but "no".
 ANY_VALUE = "*"
 
 
@@ -77,7 +77,7 @@ class LayerSpec:
         Fields to ask the portal for; all by default.
     tags : tuple of tuple of (str, tuple of str)
         OpenStreetMap tags: alternatives, each of keys and accepted values that must all hold;
-        the value ``"*"`` accepts every value.
+        the value ``"*"`` accepts every value but ``"no"``.
     elements : tuple of {"node", "way", "relation"}
         OpenStreetMap elements that count.
     role : {"objects", "buildings", "streets"}

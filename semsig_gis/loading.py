@@ -327,6 +327,7 @@ def assemble(
         taxonomy=catalog.taxonomy,
         crs=system,
         collapse=collapse,
+        apart=[name for name, _ in catalog.conflate] if merge else (),
     )
     merged = ConflationReport(())
     if merge and catalog.conflate:

@@ -29,7 +29,7 @@ from semsig_gis.storage import geo_metadata, read_geoparquet, write_geoparquet
 from semsig_gis.taxonomy import Taxonomy
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
+    from collections.abc import Collection, Iterable
     from pathlib import Path
 
     from numpy.typing import NDArray
@@ -186,6 +186,7 @@ def build_objects(
     taxonomy: Taxonomy,
     crs: CRS | str,
     collapse: bool = True,
+    apart: Collection[str] = (),
 ) -> tuple[StreetObjects, LoadReport]:
     """Turn raw layers into one table of street objects.
 
@@ -203,6 +204,9 @@ def build_objects(
     collapse : bool, default True
         Whether objects of one class at the same place (within the same centimetre) become one,
         with their number in ``count``.
+    apart : collection of str
+        Classes that are collapsed within each layer only, because they will be conflated (see
+        `semsig_gis.conflation`), which keeps account of where objects came from.
 
     Returns
     -------
@@ -250,7 +254,10 @@ def build_objects(
     repeated = np.bincount(owner[again], minlength=len(parts)).tolist()
     everything, owner = everything[~again].reset_index(drop=True), owner[~again]
     if collapse:
-        first, counts = _first_at_place(everything)
+        codes = [taxonomy.by_name(name).code for name in apart]
+        first, counts = _first_at_place(
+            everything, np.where(everything[CLASS_CODE].isin(codes), owner, -1)
+        )
     else:
         first, counts = np.arange(len(everything)), np.ones(len(everything), np.int64)
     kept = everything.iloc[first].reset_index(drop=True)
@@ -330,11 +337,12 @@ def _same_id(everything: pd.DataFrame, unique: NDArray[np.bool_]) -> NDArray[np.
 
 
 def _first_at_place(
-    everything: pd.DataFrame,
+    everything: pd.DataFrame, group: NDArray[np.int64]
 ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Return the first row of every class and place, in order, and how many rows share it."""
+    """Return the first row of every group, class and place, in order, and how many share it."""
     keys = np.stack(
         [
+            group,
             everything[CLASS_CODE].to_numpy(np.int64),
             np.rint(everything["x"].to_numpy() / SAME_PLACE_M).astype(np.int64),
             np.rint(everything["y"].to_numpy() / SAME_PLACE_M).astype(np.int64),

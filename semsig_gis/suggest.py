@@ -244,7 +244,7 @@ def _identifier(draft: _Draft) -> Iterator[str]:
             return
     yield f"# No field has a value of its own in {some}; rows are told by their number."
     best = max(named, key=lambda column: len(column.counts), default=None)
-    if best is not None and len(best.counts) * FEW_PER_ID >= rows:
+    if best is not None and best.counts and len(best.counts) * FEW_PER_ID >= rows:
         yield f"# id_field = {_text(best.name)}  # {len(best.counts):,} values in {rows:,} rows"
         yield "# unique_id = true  # if rows of the same id are the same object"
 

@@ -18,7 +18,7 @@ def test_every_benchmark_runs_and_is_written(tmp_path: Path) -> None:
         timeout=300,
     )
     results = json.loads(out.read_text(encoding="utf-8"))
-    assert len(results) == len({one["name"] for one in results}) == 10
+    assert len(results) == len({one["name"] for one in results}) == 12
     for one in results:
         assert list(one) == [
             "name",
@@ -32,4 +32,4 @@ def test_every_benchmark_runs_and_is_written(tmp_path: Path) -> None:
         ]
         assert one["ratio"] == pytest.approx(one["peer"] / one["ours"], rel=0.01)
         assert one["met"] == (None if one["bar"] is None else one["ratio"] >= one["bar"])
-    assert sum(one["bar"] is not None for one in results) == 4
+    assert sum(one["bar"] is not None for one in results) == 6

@@ -49,6 +49,7 @@ LAYERS = {
 
 def load(geodata: Path, *, filters: bool, collapse: bool) -> tuple[StreetObjects, LoadReport]:
     catalog = load_catalog("montpellier")
+    assert catalog.metric_crs is not None
     pairs, missing = find_files(catalog.layers, [geodata / "montpellier"])
     assert not missing
     layers = [read_layer(path, spec, filters=filters) for spec, path in pairs]

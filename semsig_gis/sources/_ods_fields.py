@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 def fold(name: str) -> str:
     """Return what the styles of a name share: `TYPE EMPLACEMENT` is `typeemplacement`."""
-    plain = unicodedata.normalize("NFKD", name.casefold())
+    plain = unicodedata.normalize("NFKD", name).casefold()
     return "".join(letter for letter in plain if letter.isalnum())
 
 

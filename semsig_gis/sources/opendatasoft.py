@@ -25,6 +25,8 @@ from semsig_gis.sources._rows import BadFeatureError, RowRules, require_field
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
 
+    from shapely.geometry.base import BaseGeometry
+
     from semsig_gis.sources import RawLayer
     from semsig_gis.sources._area import Area
     from semsig_gis.sources._http import Cache, Fetched
@@ -370,14 +372,14 @@ def _inside(area: Area, field: str) -> str:
     return f"intersects({field}, geom'{_outline(area.polygon)}')"
 
 
-def _outline(polygon: shapely.Polygon | shapely.MultiPolygon) -> str:
+def _outline(polygon: BaseGeometry) -> str:
     """Return an outline as text, short enough for an address and never smaller than it was."""
     text: str = shapely.to_wkt(polygon, rounding_precision=7)
     room = 1e-5  # degrees: about a metre
     while len(text) > LONGEST_OUTLINE:
-        # What is cut off is never wider than what was added, the arcs of which are polygons.
-        larger = polygon.buffer(1.1 * room).simplify(room)
-        text = shapely.to_wkt(larger, rounding_precision=7)
+        # What is cut off is never wider than what was added, whose round corners are cut a little.
+        polygon = polygon.buffer(1.1 * room, quad_segs=2).simplify(room)
+        text = shapely.to_wkt(polygon, rounding_precision=7)
         room *= 2
     return text
 

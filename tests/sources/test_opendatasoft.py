@@ -190,9 +190,9 @@ def test_what_other_programs_made_of_a_file_loads_too(tmp_path: Path, name: str)
         geometry=gpd.points_from_xy(*zip(*[place[:2] for place in PLACES], strict=True)),
         crs="EPSG:4326",
     ).to_crs("EPSG:2154")
-    frame.to_file(tmp_path / name, SPATIAL_INDEX="NO") if name.endswith("fgb") else frame.to_file(
-        tmp_path / name
-    )
+    # FlatGeobuf would put the rows in another order for its index.
+    options = {"SPATIAL_INDEX": "NO"} if name.endswith(".fgb") else {}
+    frame.to_file(tmp_path / name, **options)
     spec = replace(
         TREES,
         where=(("DOMANIALITE", ("Alignement",)),),
@@ -333,6 +333,17 @@ BAD_ROWS = {
         "geo_shape": {"type": "LineString", "coordinates": [[math.nan, 1], [2, 3]]}
     },
 }
+
+
+def test_coordinates_that_are_no_numbers(tmp_path: Path) -> None:
+    path = tmp_path / "a.csv"
+    path.write_text("lat;lng\n48.85;2.35\n48.86;\nhere;2.37\n;\n")
+    layer = read(path, LayerSpec(name="a", class_name="bench", x_field="lng", y_field="lat"))
+    assert layer.errors == (
+        "row 2: its lng '' and lat '48.86' are not two numbers",
+        "row 3: its lng '2.37' and lat 'here' are not two numbers",
+    )
+    assert layer.table.geometry.isna().tolist() == [False, True]
 
 
 @pytest.mark.parametrize("message", BAD_ROWS)
@@ -784,6 +795,13 @@ def test_a_dataset_that_is_not_there(server: Server, cache: Cache) -> None:
     assert_sentence(
         caught.value, server.url, "'les-arbres'", "'trees'", "/explore", "`dataset`", "catalogue"
     )
+
+
+def test_a_dataset_that_is_not_open(server: Server, cache: Cache) -> None:
+    server.on(f"{CATALOG}/les-arbres", Answer(b'{"message": "Log in"}', status=403))
+    with pytest.raises(SourceError) as caught:
+        fetch_layers([TREES], portal=server.url, cache=cache, spec=QUICK)
+    assert_sentence(caught.value, "layer 'trees'", "403", "Log in")
 
 
 def test_a_filter_that_the_portal_does_not_take(server: Server, cache: Cache) -> None:
