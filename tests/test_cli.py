@@ -14,6 +14,8 @@ import fiona
 import geopandas as gpd
 import pytest
 import shapely
+from osm_xml import node, way, write_osm
+from servers import Answer, Server
 
 from semsig_gis import __version__
 from semsig_gis.cli import main
@@ -110,9 +112,13 @@ def test_the_road_from_files_to_a_place(city: Path, run: Run) -> None:
     assert code == 0
     report = json.loads(out)
     assert report["objects"] == 21
-    lights, crossings = report["layers"]
-    assert (lights["read"], lights["collapsed"], lights["kept"]) == (21, 1, 20)
-    assert (crossings["read"], crossings["filtered"], crossings["kept"]) == (2, 1, 1)
+    lights, crossings = report["sources"]
+    assert (lights["read"], lights["collapsed"], lights["objects"]) == (21, 1, 20)
+    assert (crossings["read"], crossings["filtered"], crossings["objects"]) == (2, 1, 1)
+    code, out, _ = run("load", city, "--catalog", city / "tiny.toml", "--out", objects)
+    assert code == 0
+    assert "per km² of hull" in out
+    assert "Nobody (CC0-1.0): lights, crossings" in out
 
     code, out, _ = run("build", objects, "--out", database)
     assert code == 0
@@ -202,13 +208,117 @@ def test_sources(run: Run, city: Path) -> None:
     code, out, _ = run("sources")
     assert code == 0
     assert "montpellier" in out
-    names = [item["name"] for item in json.loads(run("sources", "--json")[1])]
-    assert "montpellier" in names
+    listed = json.loads(run("sources", "--json")[1])
+    assert {"montpellier", "opendata_paris", "openstreetmap"} <= {
+        item["name"] for item in listed["catalogs"]
+    }
+    assert "osm_file" in listed["readers"]
+    code, out, _ = run("sources", "openstreetmap")
+    assert code == 0
+    assert "highway=street_lamp" in out
+    assert "fire_hydrants (optional)" in out
+    assert "les-arbres" in run("sources", "opendata_paris")[1]
     code, out, _ = run("sources", "montpellier")
     assert code == 0
     assert "ETAT = en fonction" in out
     assert "taxi_station" in out
     assert json.loads(run("sources", city / "tiny.toml", "--json")[1])["title"] == "A tiny city"
+
+
+def test_a_draft_is_suggested_and_loads(city: Path, run: Run) -> None:
+    code, draft, _ = run("sources", "suggest", city / "lights.gpkg")
+    assert code == 0
+    assert "[[layers]]" in draft
+    assert 'files = ["lights.gpkg"]' in draft
+    sentence(run("sources", "suggest"), "needs a file")
+    sentence(run("sources", "suggest", city / "none.shp"), "none.shp")
+    sentence(run("sources", "montpellier", city / "lights.gpkg"), "suggest")
+
+
+def test_two_catalogues_are_loaded_and_merged(city: Path, run: Run) -> None:
+    (city / "osm.toml").write_text(
+        """
+name = "survey"
+title = "Survey"
+[[layers]]
+name = "lamps"
+class = "street_light"
+files = ["survey.gpkg"]
+[conflate]
+street_light = 2
+""",
+        encoding="utf-8",
+    )
+    write_layer(city / "survey.gpkg", [(770001.0, 6280000.0), (771000.0, 6280000.0)])
+    catalogs = ("--catalog", city / "tiny.toml", "--catalog", city / "osm.toml")
+    code, out, _ = run("load", city, *catalogs, "--out", city / "both.parquet", "--json")
+    assert code == 0
+    report = json.loads(out)
+    assert report["objects"] == 22
+    assert [item["count"] for item in report["conflated"]] == [1]
+    assert report["conflated"][0]["kept"] == "tiny/lights"
+    options = ("--no-merge", "--json", "--out", city / "apart.parquet")
+    assert json.loads(run("load", city, *catalogs, *options)[1])["objects"] == 23
+
+
+def test_openstreetmap_with_its_surroundings(tmp_path: Path, run: Run) -> None:
+    path = write_osm(
+        tmp_path / "town.osm",
+        node(1, 7.42, 43.73, {"amenity": "bench"}),
+        node(2, 7.42, 43.74),
+        node(3, 7.43, 43.74),
+        way(8, [1, 2], {"highway": "residential"}),
+        way(9, [1, 2, 3, 1], {"building": "yes"}),
+    )
+    surroundings = ("--buildings", tmp_path / "b.parquet", "--streets", tmp_path / "s.parquet")
+    code, out, _ = run(
+        "load", path, "--catalog", "openstreetmap", "--out", tmp_path / "o.parquet", *surroundings
+    )
+    assert code == 0
+    assert "EPSG:32632" in out
+    assert list(gpd.read_parquet(tmp_path / "b.parquet").geom_type) == ["Polygon"]
+    assert list(gpd.read_parquet(tmp_path / "s.parquet").geom_type) == ["LineString"]
+
+
+def test_fetch_from_a_portal_and_again_without_it(tmp_path: Path, run: Run) -> None:
+    datasets = "/api/explore/v2.1/catalog/datasets/benches"
+    point = {"type": "Point", "coordinates": [2.35, 48.85]}
+    feature = {"type": "Feature", "geometry": point, "properties": {"id": 1}}
+    export = {"type": "FeatureCollection", "features": [feature]}
+    fields = {"fields": [{"name": "id", "type": "int"}, {"name": "shape", "type": "geo_shape"}]}
+    options = ("--cache", tmp_path / "cache", "--out", tmp_path / "o.parquet", "--json")
+    catalog = tmp_path / "portal.toml"
+    with Server() as server:
+        server.on(datasets, Answer(json.dumps(fields).encode()))
+        server.on(
+            f"{datasets}/exports/geojson",
+            Answer(json.dumps(export).encode(), type="application/geo+json"),
+        )
+        catalog.write_text(
+            f"""
+name = "portal"
+title = "Portal"
+reader = "opendatasoft"
+endpoints = ["{server.url}"]
+metric_crs = "EPSG:2154"
+[[layers]]
+name = "benches"
+class = "bench"
+dataset = "benches"
+files = ["benches.geojson"]
+""",
+            encoding="utf-8",
+        )
+        code, out, err = run("fetch", catalog, "--area", "2,48,3,49", *options)
+        assert code == 0, err
+        assert json.loads(out)["objects"] == 1
+        sentence(run("fetch", catalog, "--area", "Paris", *options), "'Paris'", "polygon file")
+        sentence(run("fetch", catalog, "--area", "2,48,3", *options), "2,48,3")
+    code, out, _ = run("fetch", catalog, "--area", "2,48,3,49", "--offline", *options)
+    assert code == 0
+    assert json.loads(out)["objects"] == 1
+    sentence(run("fetch", catalog, "--area", "5,48,6,49", "--offline", *options), "127.0.0.1")
+    sentence(run("fetch", "montpellier", "--area", "3,43,4,44", *options), "semsig load")
 
 
 def test_demo(tmp_path: Path, run: Run) -> None:

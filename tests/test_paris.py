@@ -144,8 +144,8 @@ def test_trees_of_all_files_are_one_list_of_ids(paris: Path) -> None:
     [
         ("trees", False, 16_328),
         ("trees", True, 7_055),
-        ("fountains", True, 0),
-        ("traffic_lights", True, 0),
+        ("fountains", True, 1_355),
+        ("traffic_lights", True, 2_010),
     ],
 )
 def test_objects_in_several_files_are_taken_once(
@@ -154,7 +154,6 @@ def test_objects_in_several_files_are_taken_once(
     files = [file for file, layer, *_ in FILES if layer == name]
     layers = [read(paris / file, name, filters=filters) for file in files]
     objects = build(*layers)
-    # Two trees of different ids may have one place.
     assert objects.table["count"].sum() == ids
     assert len({identifier for layer in layers for identifier in layer.table["source_id"]}) == ids
 

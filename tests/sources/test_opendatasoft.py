@@ -484,6 +484,7 @@ def test_an_old_geojson_file_may_state_its_crs(
         ("a.json", b'[{"a": "\xe9"}]', "UTF-8"),
         ("a.csv", "nom;geo_point_2d\nCafé;48,2\n".encode("latin-1"), "UTF-8"),
         ("a.csv", "thé;geo_point_2d\n".encode("latin-1"), "UTF-8"),
+        ("a.csv", b"nom;geo_point_2d\n" + b"a;48,2\n" * 5_000 + b"\xe9;48,2\n", "UTF-8"),
         ("a.csv", b"a;b\n1;2\n", "geo_point_2d"),
         ("a.parquet", b"PAR1" + bytes(100), "Parquet"),
         ("a.parquet", b"PAR1", "Parquet"),

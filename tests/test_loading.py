@@ -1,0 +1,219 @@
+"""From catalogues to street objects in one call."""
+
+from __future__ import annotations
+
+import json
+from typing import TYPE_CHECKING
+
+import geopandas as gpd
+import pytest
+import shapely
+from osm_xml import node, way, write_osm
+from sentences import assert_sentence
+from servers import Answer, Server
+
+from semsig_gis.catalog import Catalog, load_catalog, paper_taxonomy
+from semsig_gis.errors import CatalogError, CrsError, EmptyResultError, InputError, SourceError
+from semsig_gis.layer_spec import LayerSpec
+from semsig_gis.loading import (
+    assemble,
+    choose_layers,
+    combine_catalogs,
+    fetch_layers,
+    find_area,
+    metric_crs_of,
+    open_cache,
+    read_files,
+)
+from semsig_gis.schema import MERGED
+from semsig_gis.sources import RawLayer
+from semsig_gis.taxonomy import ObjectClass
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+    from pathlib import Path
+
+
+BENCH = LayerSpec(name="benches", class_name="bench")
+
+
+def raw(name: str, *places: tuple[float, float], crs: str | None = "EPSG:2154") -> RawLayer:
+    """Return a layer of benches."""
+    table = gpd.GeoDataFrame(
+        {"class_name": ["bench"] * len(places), "source_id": [str(i) for i in range(len(places))]},
+        geometry=shapely.points(places) if places else [],
+        crs=crs,
+    )
+    return RawLayer(spec=LayerSpec(name=name, class_name="bench"), table=table, read=len(places))
+
+
+def catalog_of(**values: object) -> Catalog:
+    plain = {"name": "town", "title": "Town", "taxonomy": paper_taxonomy(), "layers": (BENCH,)}
+    return Catalog(**{**plain, **values})  # type: ignore[arg-type]
+
+
+def test_several_catalogues_become_one() -> None:
+    both = combine_catalogs([load_catalog("openstreetmap"), load_catalog("montpellier")])
+    assert both.name == "openstreetmap+montpellier"
+    assert both.metric_crs == "EPSG:2154"
+    assert both.layer("montpellier/trees").reader == "vector_file"
+    assert both.layer("openstreetmap/trees").reader == "osm_file"
+    assert dict(both.conflate)["bench"] == 4
+    assert both.taxonomy.by_name("pedestrian_crossing").code == 12
+    assert combine_catalogs([load_catalog("montpellier")]) == load_catalog("montpellier")
+
+
+def test_the_first_radius_holds() -> None:
+    first = catalog_of(name="a", conflate=(("bench", 2.0),))
+    second = catalog_of(name="b", conflate=(("bench", 9.0), ("bus_stop", 5.0)))
+    assert dict(combine_catalogs([first, second]).conflate) == {"bench": 2.0, "bus_stop": 5.0}
+
+
+def test_catalogues_that_do_not_go_together() -> None:
+    clash = paper_taxonomy().extended([ObjectClass(12, "Q", "quay", "Quay")])
+    with pytest.raises(CatalogError) as caught:
+        combine_catalogs([load_catalog("montpellier"), catalog_of(taxonomy=clash)])
+    assert_sentence(caught.value, "montpellier", "town", "12")
+    for catalogs in ([], [catalog_of(), catalog_of()]):
+        with pytest.raises(InputError) as refused:
+            combine_catalogs(catalogs)
+        assert_sentence(refused.value, "each once")
+
+
+def test_layers_are_chosen() -> None:
+    osm = load_catalog("openstreetmap")
+    names = [spec.name for spec in choose_layers(osm)]
+    assert "trees" in names
+    assert "fire_hydrants" not in names
+    assert "buildings" not in names
+    assert [spec.name for spec in choose_layers(osm, ["fire_hydrants"])] == ["fire_hydrants"]
+    roles = {spec.role for spec in choose_layers(osm, ["trees"], surroundings=True)}
+    assert roles == {"objects", "buildings", "streets"}
+
+
+def test_a_file_is_read_once_for_all_its_layers(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    osm = load_catalog("openstreetmap")
+    path = write_osm(
+        tmp_path / "town.osm",
+        node(1, 7.42, 43.73, {"amenity": "bench"}),
+        node(2, 7.42, 43.74, {"natural": "tree"}),
+        node(3, 7.43, 43.74),
+        way(9, [1, 2, 3, 1], {"building": "yes"}),
+    )
+    calls = []
+    from semsig_gis.sources import osm_file
+
+    real = osm_file.read_layers
+    monkeypatch.setattr(osm_file, "read_layers", lambda *a, **k: calls.append(a) or real(*a, **k))
+    specs = choose_layers(osm, surroundings=True)
+    done: list[tuple[int, int]] = []
+    layers, absent = read_files(specs, [path], progress=lambda *step: done.append(step))
+    assert (len(calls), absent, done) == (1, (), [(1, 1)])
+    assert [layer.spec for layer in layers] == list(specs)
+    loaded = assemble(layers, osm)
+    assert loaded.objects.crs.to_epsg() == 32632
+    assert sorted(loaded.objects.table["source"]) == ["benches", "trees"]
+    assert loaded.buildings is not None
+    assert list(loaded.buildings.geom_type) == ["Polygon"]
+    assert loaded.buildings.crs == loaded.objects.crs
+    assert loaded.streets is not None
+    assert len(loaded.streets) == 0
+
+
+def test_one_bench_in_two_layers_is_one_bench() -> None:
+    layers = [
+        raw("city", (770000, 6280000), (770050, 6280000)),
+        raw("osm", (770000, 6280000), (770051, 6280000), (770099, 6280000)),
+    ]
+    catalog = catalog_of(metric_crs="EPSG:2154", conflate=(("bench", 3.0),))
+    merged = assemble(layers, catalog)
+    assert len(merged.objects) == 3
+    assert merged.conflation.count == 2
+    # The one at the very same place is accounted for as well.
+    assert merged.objects.table[MERGED].tolist() == ["osm:0", "osm:1", ""]
+    assert merged.buildings is None
+    apart = assemble(layers, catalog, merge=False)
+    assert len(apart.objects) == 4
+    assert apart.conflation.count == 0
+    assert len(assemble(layers, catalog, merge=False, collapse=False).objects) == 5
+
+
+def test_the_zone_of_the_data() -> None:
+    crs, notes = metric_crs_of([raw("a", (7.4, 43.7), crs="EPSG:4326"), raw("b")])
+    assert (crs.to_epsg(), notes) == (32632, ())
+    wide = raw("a", (0.0, 45.0), (9.0, 45.0), crs="EPSG:4326")
+    _, notes = metric_crs_of([wide])
+    assert "9.0 degrees wide" in notes[0]
+    assert assemble([wide], catalog_of()).notes == notes
+    assert assemble([wide], catalog_of(), metric_crs="EPSG:2154").objects.crs.to_epsg() == 2154
+    with pytest.raises(EmptyResultError) as empty:
+        metric_crs_of([raw("a")])
+    assert_sentence(empty.value, "no layer")
+    with pytest.raises(CrsError) as bare:
+        metric_crs_of([raw("a", (1, 1), crs=None)])
+    assert_sentence(bare.value, "'a'")
+
+
+# --- Fetching -----------------------------------------------------------------------------------
+
+
+@pytest.fixture
+def server() -> Iterator[Server]:
+    with Server() as running:
+        yield running
+
+
+def benches(*places: tuple[float, float]) -> bytes:
+    return json.dumps(
+        {
+            "elements": [
+                {"type": "node", "id": i, "lon": x, "lat": y, "tags": {"amenity": "bench"}}
+                for i, (x, y) in enumerate(places, start=1)
+            ]
+        }
+    ).encode()
+
+
+def test_openstreetmap_is_fetched_cut_to_the_area_and_kept(server: Server, tmp_path: Path) -> None:
+    osm = load_catalog("openstreetmap")
+    here = catalog_of(
+        taxonomy=osm.taxonomy,
+        layers=(osm.layer("benches"),),
+        reader="osm_file",
+        endpoints=(f"{server.url}/api",),
+        geocoder=f"{server.url}/search",
+    )
+    server.on("/api/interpreter", Answer(benches((7.42, 43.73), (7.49, 43.73))))
+    cache, http = open_cache(tmp_path / "cache")
+    area = find_area("7.41,43.72,7.43,43.74", here, cache=cache, http=http)
+    (layer,) = fetch_layers(here.layers, here, area=area, cache=cache, http=http)
+    assert layer.table["source_id"].tolist() == ["node/1"]
+    assert (layer.read, layer.filtered) == (2, 1)
+    asked = len(server.seen)
+    _, offline = open_cache(tmp_path / "cache", offline=True)
+    (again,) = fetch_layers(here.layers, here, area=area, cache=cache, http=offline)
+    assert again.table["source_id"].tolist() == ["node/1"]
+    assert len(server.seen) == asked
+    far = find_area("1,2,3,4", here, cache=cache, http=offline)
+    with pytest.raises(SourceError) as caught:
+        fetch_layers(here.layers, here, area=far, cache=cache, http=offline)
+    assert_sentence(caught.value, "127.0.0.1")
+
+
+def test_a_place_is_looked_up_only_where_the_catalogue_says(server: Server, tmp_path: Path) -> None:
+    cache, http = open_cache(tmp_path)
+    with pytest.raises(InputError) as caught:
+        find_area("Monaco", catalog_of(), cache=cache, http=http)
+    assert_sentence(caught.value, "'town'", "'Monaco'", "polygon file")
+    with pytest.raises(InputError) as refused:
+        fetch_layers(
+            [BENCH],
+            catalog_of(),
+            area=find_area("1,2,3,4", catalog_of(), cache=cache, http=http),
+            cache=cache,
+            http=http,
+        )
+    assert_sentence(refused.value, "'town'", "semsig load")
+    assert server.seen == []
