@@ -3,9 +3,8 @@
 The road in one glance::
 
     catalog = load_catalog("montpellier")
-    found, _ = find_files(catalog.layers, ["montpellier/"])
-    layers = [read_layer(file, spec) for spec, file in found]
-    objects, report = build_objects(layers, taxonomy=catalog.taxonomy, crs=catalog.metric_crs)
+    layers, absent = read_files(choose_layers(catalog), ["montpellier/"])
+    objects = assemble(layers, catalog).objects
     database = build_database(objects)
     query = Signature.parse("DDBB", [10, 80, 200, 310], taxonomy=database.taxonomy)
     localize(database, query).candidates
@@ -18,6 +17,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from semsig_gis.catalog import Catalog, load_catalog, paper_taxonomy
+    from semsig_gis.conflation import conflate
     from semsig_gis.database import (
         SignatureDatabase,
         build_database,
@@ -30,13 +30,25 @@ if TYPE_CHECKING:
     from semsig_gis.export import export_geopackage
     from semsig_gis.grid import GridSpec
     from semsig_gis.layer_spec import LayerSpec
+    from semsig_gis.loading import (
+        Loaded,
+        assemble,
+        choose_layers,
+        combine_catalogs,
+        fetch_layers,
+        find_area,
+        open_cache,
+        read_files,
+    )
     from semsig_gis.maps import evaluation_map, localization_map, save_map
     from semsig_gis.matching import Localization, Method, localize
     from semsig_gis.objects import StreetObjects, build_objects, open_objects, save_objects
+    from semsig_gis.quality import quality_report
     from semsig_gis.signatures import Signature, SignatureSpec
     from semsig_gis.sources import RawLayer, find_files
     from semsig_gis.sources.synthetic import CitySpec, synthetic_city
     from semsig_gis.sources.vector_file import read_layer
+    from semsig_gis.suggest import suggest_catalog
     from semsig_gis.taxonomy import ObjectClass, Taxonomy
 
 __version__ = "0.1.0"
@@ -50,6 +62,7 @@ _HOMES = {
     "Evaluation": "evaluation",
     "GridSpec": "grid",
     "LayerSpec": "layer_spec",
+    "Loaded": "loading",
     "Localization": "matching",
     "Method": "matching",
     "ObjectClass": "taxonomy",
@@ -60,22 +73,32 @@ _HOMES = {
     "SignatureSpec": "signatures",
     "StreetObjects": "objects",
     "Taxonomy": "taxonomy",
+    "assemble": "loading",
     "build_database": "database",
     "build_objects": "objects",
+    "choose_layers": "loading",
+    "combine_catalogs": "loading",
+    "conflate": "conflation",
     "evaluate": "evaluation",
     "evaluation_map": "maps",
     "export_geopackage": "export",
+    "fetch_layers": "loading",
+    "find_area": "loading",
     "find_files": "sources",
     "load_catalog": "catalog",
     "localization_map": "maps",
     "localize": "matching",
+    "open_cache": "loading",
     "open_database": "database",
     "open_objects": "objects",
     "paper_taxonomy": "catalog",
+    "quality_report": "quality",
+    "read_files": "loading",
     "read_layer": "sources.vector_file",
     "save_database": "database",
     "save_map": "maps",
     "save_objects": "objects",
+    "suggest_catalog": "suggest",
     "synthetic_city": "sources.synthetic",
 }
 
@@ -86,6 +109,7 @@ __all__ = [
     "Evaluation",
     "GridSpec",
     "LayerSpec",
+    "Loaded",
     "Localization",
     "Method",
     "ObjectClass",
@@ -97,22 +121,32 @@ __all__ = [
     "StreetObjects",
     "Taxonomy",
     "__version__",
+    "assemble",
     "build_database",
     "build_objects",
+    "choose_layers",
+    "combine_catalogs",
+    "conflate",
     "evaluate",
     "evaluation_map",
     "export_geopackage",
+    "fetch_layers",
+    "find_area",
     "find_files",
     "load_catalog",
     "localization_map",
     "localize",
+    "open_cache",
     "open_database",
     "open_objects",
     "paper_taxonomy",
+    "quality_report",
+    "read_files",
     "read_layer",
     "save_database",
     "save_map",
     "save_objects",
+    "suggest_catalog",
     "synthetic_city",
 ]
 

@@ -33,6 +33,7 @@ __all__ = [
     "ClassBy",
     "LayerSpec",
     "catalog_names",
+    "data_folder",
     "load_catalog",
     "paper_taxonomy",
 ]
@@ -176,7 +177,7 @@ def paper_taxonomy() -> Taxonomy:
     >>> "".join(item.symbol for item in paper_taxonomy().classes)
     'BCDEGHIJKLM'
     """
-    source = _data_folder() / "taxonomy.toml"
+    source = data_folder() / "taxonomy.toml"
     content = _parse(source.read_text(encoding="utf-8"), "taxonomy.toml")
     _check_keys(content, {"classes": list}, "taxonomy.toml")
     return Taxonomy(_classes(content["classes"], "taxonomy.toml"))
@@ -203,7 +204,7 @@ def _sources() -> dict[str, Path | Traversable]:
     """Return the file of every catalogue by name."""
     shipped: dict[str, Path | Traversable] = {
         Path(item.name).stem: item
-        for item in _data_folder().iterdir()
+        for item in data_folder().iterdir()
         if item.name.endswith(".toml") and Path(item.name).stem not in NO_CATALOGS
     }
     return {**shipped, **installed_catalogs(taken=shipped)}
@@ -266,8 +267,19 @@ def _known() -> str:
     return ", ".join(repr(name) for name in catalog_names())
 
 
-def _data_folder() -> Traversable:
-    """Return the folder of shipped catalogues: in the wheel, or at the top of a checkout."""
+def data_folder() -> Traversable:
+    """Return the folder of shipped catalogues: in the wheel, or at the top of a checkout.
+
+    Returns
+    -------
+    Traversable
+        The folder ``data_sources``.
+
+    Examples
+    --------
+    >>> (data_folder() / "taxonomy.toml").is_file()
+    True
+    """
     shipped = importlib.resources.files("semsig_gis") / "data_sources"
     if shipped.is_dir():
         return shipped
@@ -392,6 +404,9 @@ def _layer(item: object, where: str, taxonomy: Taxonomy, shared: Mapping[str, An
                 "write a code such as 'EPSG:4326'."
             )
             raise CatalogError(msg) from error
+    if item.get("unique_id", False) and "id_field" not in item:
+        msg = f"{where} has unique_id = true without an id_field; name the field of the ids."
+        raise CatalogError(msg)
     files = _texts(item.get("files", list(shared["files"])), "files", where)
     if not files:
         msg = f"{where} has files = []; write a list of file names or patterns."

@@ -9,7 +9,7 @@ import unicodedata
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from semsig_gis.catalog import _data_folder
+from semsig_gis.catalog import data_folder
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -181,7 +181,7 @@ def keywords(kind: str) -> Keywords:
     >>> [found.name for found in keywords("classes").find("Straßenbäume")]
     ['alignment_tree']
     """
-    text = (_data_folder() / "keywords.toml").read_text(encoding="utf-8")
+    text = (data_folder() / "keywords.toml").read_text(encoding="utf-8")
     content = tomllib.loads(text)
     if kind == "fields":
         groups = content["fields"].items()

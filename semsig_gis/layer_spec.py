@@ -52,7 +52,8 @@ class LayerSpec:
     layer : str, optional
         Layer inside a file that holds several.
     where : tuple of (str, tuple)
-        Fields and the values of each that are accepted, compared exactly; all must hold.
+        Fields and the values of each that are accepted, compared exactly; all must hold. A text
+        between slashes is a regular expression that the whole value must match.
     class_by : ClassBy, optional
         Field that decides the class row by row.
     id_field : str, optional
@@ -66,7 +67,7 @@ class LayerSpec:
     x_field, y_field : str, optional
         Coordinate columns of a CSV file.
     aliases : tuple of (str, tuple of str)
-        Fields and the names that they go by in other editions of the file.
+        Fields and the names that they go by in other editions of the file (Opendatasoft only).
     unique_id : bool
         Whether rows of the same id are the same object, also across several files.
     dataset : str, optional

@@ -235,6 +235,11 @@ MISTAKES = {
         'name = "posts"\ntags = [{ lamps = 2 }]',
         ["tag 'lamps'", "list of texts"],
     ),
+    "unique ids without a field": (
+        'id_field = "ID"',
+        "unique_id = true",
+        ["unique_id", "id_field"],
+    ),
     "number for true": ('name = "posts"', 'name = "posts"\noptional = 1', ["true or false"]),
     "radius of nothing": (
         'title = "Town open data"',
@@ -431,7 +436,7 @@ def test_a_layer_of_montpellier_is_as_its_publisher_left_it(layer: str, geodata:
 
 
 def test_the_shipped_files_are_found() -> None:
-    folder = catalog_module._data_folder()
+    folder = catalog_module.data_folder()
     names = {item.name for item in folder.iterdir()}
     assert {"taxonomy.toml", *(f"{name}.toml" for name in OWN)} <= names
     content = tomllib.loads((folder / "montpellier.toml").read_text(encoding="utf-8"))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import geopandas as gpd
 import pytest
@@ -26,11 +26,11 @@ from semsig_gis.loading import (
     read_files,
 )
 from semsig_gis.schema import MERGED
-from semsig_gis.sources import RawLayer
+from semsig_gis.sources import RawLayer, osm_file
 from semsig_gis.taxonomy import ObjectClass
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Iterator, Sequence
     from pathlib import Path
 
 
@@ -102,11 +102,13 @@ def test_a_file_is_read_once_for_all_its_layers(
         node(3, 7.43, 43.74),
         way(9, [1, 2, 3, 1], {"building": "yes"}),
     )
-    calls = []
-    from semsig_gis.sources import osm_file
+    real, calls = osm_file.read_layers, []
 
-    real = osm_file.read_layers
-    monkeypatch.setattr(osm_file, "read_layers", lambda *a, **k: calls.append(a) or real(*a, **k))
+    def counted(file: Path, specs: Sequence[LayerSpec], **options: Any) -> tuple[RawLayer, ...]:  # noqa: ANN401
+        calls.append(file)
+        return real(file, specs, **options)
+
+    monkeypatch.setattr(osm_file, "read_layers", counted)
     specs = choose_layers(osm, surroundings=True)
     done: list[tuple[int, int]] = []
     layers, absent = read_files(specs, [path], progress=lambda *step: done.append(step))
