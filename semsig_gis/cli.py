@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import enum
 import sys
+import warnings
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
@@ -95,11 +96,18 @@ class FalseClass(enum.StrEnum):
 
 def main() -> None:
     """Run the command; an unusable input ends it with one sentence and exit code 2."""
-    try:
-        app()
-    except SemsigError as error:
-        remark(str(error))
-        sys.exit(2)
+    with warnings.catch_warnings():
+        warnings.showwarning = _show_warning
+        try:
+            app()
+        except SemsigError as error:
+            remark(str(error))
+            sys.exit(2)
+
+
+def _show_warning(message: Warning | str, *_: object, **__: object) -> None:
+    """Show a warning as one sentence, without the line of code that it comes from."""
+    remark(str(message))
 
 
 def _version(wanted: bool) -> None:  # noqa: FBT001 - typer calls it so
@@ -297,7 +305,14 @@ def fetch(
     with progress("fetching", unit=unit) as advance:
         place = find_area(area, chosen, cache=kept, http=http)
         layers = fetch_layers(
-            specs, chosen, area=place, cache=kept, http=http, filters=filters, progress=advance
+            specs,
+            chosen,
+            area=place,
+            cache=kept,
+            http=http,
+            filters=filters,
+            progress=advance,
+            tell=remark,
         )
     loaded = assemble(layers, chosen, metric_crs=metric_crs, collapse=collapse, merge=merge)
     _save_loaded(loaded, out, buildings, streets, as_json=as_json)

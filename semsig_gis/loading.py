@@ -359,6 +359,7 @@ def fetch_layers(
     http: HttpSpec,
     filters: bool = True,
     progress: Callable[[int, int], None] | None = None,
+    tell: Callable[[str], None] | None = None,
 ) -> tuple[RawLayer, ...]:
     """Fetch layers of an area from the service that a catalogue names, and read them.
 
@@ -379,6 +380,8 @@ def fetch_layers(
     progress : callable, optional
         Called with how much has arrived and how much there is, 0 where nobody knows: bytes of
         a portal's file, tiles of OpenStreetMap.
+    tell : callable, optional
+        Called with a line about each layer that has arrived: rows, size and date.
 
     Returns
     -------
@@ -402,8 +405,13 @@ def fetch_layers(
             specs, area=area, endpoints=catalog.endpoints, cache=cache, spec=http, progress=progress
         )
         # Tiles and long outlines cover more than the area.
-        found = overpass.read_layers(files, specs, filters=filters)
-        return tuple(clip_layer(layer, area) for layer in found)
+        found = [
+            clip_layer(layer, area) for layer in overpass.read_layers(files, specs, filters=filters)
+        ]
+        if tell is not None:
+            for layer in found:
+                tell(f"{layer.spec.name}: {len(layer.table):,} rows")
+        return tuple(found)
     fetched = opendatasoft.fetch_layers(
         specs,
         portal=catalog.endpoints[0],
@@ -412,12 +420,17 @@ def fetch_layers(
         spec=http,
         progress=None if progress is None else lambda _, done, total: progress(done, total),
     )
-    read = reader(catalog.reader)
-    return tuple(
-        clip_layer(layer, area)
-        for spec, file in fetched
-        for layer in read(file.path, [spec], filters=filters)
-    )
+    layers: list[RawLayer] = []
+    for spec, file in fetched:
+        read = reader(catalog.reader)(file.path, [spec], filters=filters)
+        layers.extend(clip_layer(layer, area) for layer in read)
+        if tell is not None:
+            source = "the cache" if file.from_cache else "the portal"
+            tell(
+                f"{spec.name}: {sum(layer.read for layer in read):,} rows, "
+                f"{file.bytes / 1e6:.2f} MB, from {source}, fetched {file.fetched_at}"
+            )
+    return tuple(layers)
 
 
 def open_cache(

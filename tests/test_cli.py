@@ -312,10 +312,12 @@ files = ["benches.geojson"]
         code, out, err = run("fetch", catalog, "--area", "2,48,3,49", *options)
         assert code == 0, err
         assert json.loads(out)["objects"] == 1
+        assert "benches: 1 rows, 0.00 MB, from the portal, fetched 20" in err
         sentence(run("fetch", catalog, "--area", "Paris", *options), "'Paris'", "polygon file")
         sentence(run("fetch", catalog, "--area", "2,48,3", *options), "2,48,3")
-    code, out, _ = run("fetch", catalog, "--area", "2,48,3,49", "--offline", *options)
+    code, out, err = run("fetch", catalog, "--area", "2,48,3,49", "--offline", *options)
     assert code == 0
+    assert "from the cache" in err
     assert json.loads(out)["objects"] == 1
     sentence(run("fetch", catalog, "--area", "5,48,6,49", "--offline", *options), "127.0.0.1")
     sentence(run("fetch", "montpellier", "--area", "3,43,4,44", *options), "semsig load")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib
+import json
 import os
 import subprocess
 import sys
@@ -136,6 +137,35 @@ def test_an_installed_package_is_seen_by_a_fresh_program(installed: Path, tmp_pa
         "'testville_broken'",
         "'testville_lost'",
     ]
+
+
+def test_the_command_line_shows_and_uses_an_installed_package(
+    installed: Path, tmp_path: Path
+) -> None:
+    data = tmp_path / "town.benches"
+    data.write_text("a7 770000 6280000\nb8 770020 6280000\n", encoding="utf-8")
+    paths = [str(installed), *os.environ.get("PYTHONPATH", "").split(os.pathsep)]
+    environment = {**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, paths))}
+
+    def semsig(*arguments: str) -> subprocess.CompletedProcess[str]:
+        return subprocess.run(
+            [sys.executable, "-m", "semsig_gis.cli", *arguments],
+            env=environment,
+            check=True,
+            capture_output=True,
+            text=True,
+            encoding="utf-8",
+        )
+
+    shown = semsig("sources")
+    assert "testville" in shown.stdout
+    assert "testville_lines" in shown.stdout
+    assert "semsig: 'testville_broken' of semsig_gis.readers" in shown.stderr
+    assert "Traceback" not in shown.stderr
+    assert ".py:" not in shown.stderr
+    out = tmp_path / "objects.parquet"
+    loaded = semsig("load", str(data), "--catalog", "testville", "--out", str(out), "--json")
+    assert json.loads(loaded.stdout)["objects"] == 2
 
 
 # --- Entries without a package around them ----------------------------------------------------
