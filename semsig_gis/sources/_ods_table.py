@@ -53,6 +53,8 @@ class Table:
         What the file states, which those of a portal never do.
     empty : bool
         Whether there are no rows, and so nothing to know the fields by.
+    rest : int
+        Rows that the portal has beyond these, where the file is a page of a longer answer.
     """
 
     fields: tuple[str, ...]
@@ -60,6 +62,7 @@ class Table:
     has_geometry: bool = False
     crs: CRS | None = None
     empty: bool = False
+    rest: int = 0
 
 
 def open_table(path: Path) -> Table:
@@ -117,7 +120,15 @@ def _json(path: Path) -> Table:
         has_geometry=features or any(record.geometry for record in good),
         crs=_member_crs(content, path) if features else None,
         empty=not records,
+        rest=_rest(content, len(records)),
     )
+
+
+def _rest(content: object, rows: int) -> int:
+    """Return how many rows more a page says that there are, by version 2.1 or 1 of the API."""
+    told = content if isinstance(content, dict) else {}
+    total = told.get("total_count", told.get("nhits"))
+    return max(total - rows, 0) if isinstance(total, int) else 0
 
 
 def _record(item: object) -> Record | str:

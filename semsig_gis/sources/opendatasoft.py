@@ -168,6 +168,11 @@ class _Job:
             given=crs,
             where=self._where,
         )
+        if table.rest:
+            self._notes += (
+                f"the file is one page of a longer answer, which has {table.rest:,} records more; "
+                "export the whole dataset instead",
+            )
         own = _NO_FIELDS if table.empty else settle_fields(spec, table.fields)
         self._rules = RowRules(own, table.fields, filters=filters, where=self._where)
         self._positions = Positions(spec, table, where=self._where)

@@ -556,6 +556,27 @@ def test_spellings_of_a_point_are_one_place(
     assert found.tolist() == [[x, y] for x, y in places for _ in spellings]
 
 
+@pytest.mark.parametrize(
+    ("page", "rest"),
+    [
+        ({"total_count": 1323, "results": 2}, "1,321 records more"),
+        ({"nhits": 3, "records": 2}, "1 records more"),
+        ({"total_count": 2, "results": 2}, None),
+        ({"total_count": "many", "results": 2}, None),
+    ],
+)
+def test_a_page_of_a_longer_answer_is_told(
+    tmp_path: Path, page: dict[str, Any], rest: str | None
+) -> None:
+    row = {"geo_point_2d": {"lon": 2.3, "lat": 48.8}}
+    rows = {key: [row] * 2 if key in {"results", "records"} else page[key] for key in page}
+    path = tmp_path / "page.json"
+    path.write_text(json.dumps(rows), encoding="utf-8")
+    layer = read(path, LayerSpec(name="a", class_name="bench"))
+    assert layer.read == 2
+    assert [rest in note for note in layer.notes] == ([] if rest is None else [True])
+
+
 # --- A portal -----------------------------------------------------------------------------------
 
 CATALOG = "/api/explore/v2.1/catalog/datasets"
