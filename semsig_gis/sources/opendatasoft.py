@@ -170,8 +170,10 @@ class _Job:
         )
         if table.rest:
             self._notes += (
-                f"the file is one page of a longer answer, which has {table.rest:,} records more; "
-                "export the whole dataset instead",
+                (
+                    f"the file is one page of a longer answer, which has {table.rest:,} records more; "
+                    "export the whole dataset instead"
+                ),
             )
         own = _NO_FIELDS if table.empty else settle_fields(spec, table.fields)
         self._rules = RowRules(own, table.fields, filters=filters, where=self._where)
