@@ -169,12 +169,11 @@ class _Job:
             where=self._where,
         )
         if table.rest:
-            self._notes += (
-                (
-                    f"the file is one page of a longer answer, which has {table.rest:,} records more; "
-                    "export the whole dataset instead"
-                ),
+            rest = (
+                f"the file is one page of a longer answer, which has {table.rest:,} records more; "
+                "export the whole dataset instead"
             )
+            self._notes += (rest,)
         own = _NO_FIELDS if table.empty else settle_fields(spec, table.fields)
         self._rules = RowRules(own, table.fields, filters=filters, where=self._where)
         self._positions = Positions(spec, table, where=self._where)
