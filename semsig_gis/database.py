@@ -15,7 +15,7 @@ from semsig_gis.errors import DatabaseError, EmptyResultError, SemsigError
 from semsig_gis.grid import GridSpec, cell_ids, cells_near, split_ids
 from semsig_gis.sequences import SequenceTable
 from semsig_gis.signatures import Signature, SignatureSpec, clockwise_order, quantize
-from semsig_gis.spatial_index import ObjectIndex
+from semsig_gis.spatial_index import PackedIndex
 from semsig_gis.storage import geo_metadata, read_geoparquet, write_geoparquet
 from semsig_gis.taxonomy import Taxonomy
 from semsig_gis.visibility import visible_objects
@@ -235,7 +235,7 @@ def build_database(
     """
     grid = grid or GridSpec()
     spec = spec or SignatureSpec()
-    index = ObjectIndex(objects.xy)
+    index = PackedIndex(objects.xy)
     columns, rows = cells_near(objects.xy, grid=grid, radius=spec.radius)
     blocks = [
         _block(objects, index, grid.viewpoints(columns[part], rows[part]), radius=spec.radius)
@@ -276,7 +276,7 @@ def _parts(cells: int, progress: Callable[[int, int], None] | None) -> Iterator[
 
 
 def _block(
-    objects: StreetObjects, index: ObjectIndex, viewpoints: NDArray[np.float64], *, radius: float
+    objects: StreetObjects, index: PackedIndex, viewpoints: NDArray[np.float64], *, radius: float
 ) -> tuple[NDArray[np.int64], NDArray[np.uint8], NDArray[np.uint16], NDArray[np.uint16]]:
     """Return lengths, codes, bearings and distances of some cells."""
     seen = visible_objects(viewpoints, objects.xy, index=index, radius=radius)

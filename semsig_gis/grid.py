@@ -186,10 +186,17 @@ def cells_near(
             f"larger, at least {radius / (MAX_REACH - 1):.3g} m."
         )
         raise InputError(msg)
-    # Growing along one axis and then the other is cheaper than the whole square at once.
     reach = math.ceil(radius / grid.step + 0.5)
-    offsets = np.arange(-reach, reach + 1)
-    cells = np.unique(cell_ids(*grid.cells_at(xy)))
-    for axis in (ROW_SPAN, 1):
-        cells = np.unique(cells[:, None] + offsets * axis)
-    return split_ids(cells)
+    columns, rows = grid.cells_at(xy)
+    rows, columns = split_ids(_widened(cell_ids(rows, columns), reach))
+    return split_ids(_widened(cell_ids(columns, rows), reach))
+
+
+def _widened(ids: NDArray[np.int64], reach: int) -> NDArray[np.int64]:
+    """Return all numbers at most `reach` from some of the given ones, ascending."""
+    ids = np.unique(ids)
+    new = np.append(True, np.diff(ids) > 2 * reach + 1)
+    first = ids[new] - reach
+    lengths = ids[np.append(new[1:], True)] + reach + 1 - first
+    ends = np.cumsum(lengths)
+    return np.repeat(first - ends + lengths, lengths) + np.arange(ends[-1])

@@ -23,6 +23,7 @@ __all__ = ["Signature", "SignatureSpec", "clockwise_order", "quantize"]
 
 MAX_RADIUS = 6000.0
 MAX_LEVELS = 255
+SHORT_MAX = np.iinfo(np.uint16).max
 
 
 @dataclass(frozen=True, slots=True)
@@ -109,14 +110,21 @@ def clockwise_order(sightings: Sightings, codes: NDArray[np.uint8]) -> NDArray[n
     >>> clockwise_order(seen, np.array([3, 3], np.uint8)).tolist()
     [1, 0]
     """
-    return np.lexsort(
-        (
-            codes[sightings.object],
-            sightings.distance,
-            sightings.bearing,
-            sightings.viewpoint,
-        )
-    )
+    by_bearing = np.argsort(sightings.bearing)
+    viewpoint = sightings.viewpoint[by_bearing]
+    if len(viewpoint) and viewpoint.max() <= SHORT_MAX and viewpoint.min() >= 0:
+        viewpoint = viewpoint.astype(np.uint16)  # which numpy sorts by counting
+    order = by_bearing[np.argsort(viewpoint, kind="stable")]
+    # Objects in one direction are rare, so that the other keys are looked at for them alone.
+    ordered = sightings.viewpoint[order], sightings.bearing[order]
+    same = (ordered[0][1:] == ordered[0][:-1]) & (ordered[1][1:] == ordered[1][:-1])
+    level = np.zeros(len(order), np.bool_)
+    level[1:] = same
+    level[:-1] |= same
+    tied = order[level]
+    keys = (codes[sightings.object], sightings.distance, sightings.bearing, sightings.viewpoint)
+    order[level] = tied[np.lexsort(tuple(key[tied] for key in keys))]
+    return order
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,10 +1,15 @@
-"""The R-tree over street objects: which of them lie near a viewpoint."""
+"""R-trees over street objects: which of them lie near a viewpoint.
+
+Two trees with one question: `ObjectIndex` (libspatialindex) for some places, `PackedIndex` (GEOS)
+for the viewpoints of a whole city.
+"""
 
 from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
 import numpy as np
+import shapely
 from rtree import index as rtree_index
 
 from semsig_gis.errors import InputError
@@ -12,7 +17,10 @@ from semsig_gis.errors import InputError
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-__all__ = ["ObjectIndex"]
+__all__ = ["ObjectIndex", "PackedIndex"]
+
+# More than the distance between neighbouring floats anywhere on Earth.
+ROUNDING_M = 1e-6
 
 
 class ObjectIndex:
@@ -42,12 +50,8 @@ class ObjectIndex:
     """
 
     def __init__(self, xy: NDArray[np.float64]) -> None:
-        points = np.array(xy, dtype=np.float64, order="C")  # a copy, as the tree has one too
-        if len(points) == 0 or not np.isfinite(points).all():
-            msg = "an R-tree needs at least one point, and finite coordinates."
-            raise InputError(msg)
-        self._xy = points
-        self._tree = rtree_index.Index((np.arange(len(points)), points, points))
+        self._xy = _checked(xy)
+        self._tree = rtree_index.Index((np.arange(len(self._xy)), self._xy, self._xy))
 
     def __reduce__(self) -> str | tuple[object, ...]:  # noqa: D105
         return (type(self), (self._xy,))
@@ -70,11 +74,83 @@ class ObjectIndex:
             Row numbers, ordered by viewpoint.
         """
         places = np.ascontiguousarray(viewpoints, dtype=np.float64)
-        # The box is a touch larger than the circle: the exact test below decides alone.
-        reach = np.nextafter(radius, np.inf) * (1 + 1e-12)
+        reach = _a_touch_more(radius)
         found, counts = self._tree.intersection_v(places - reach, places + reach)
         point = found.astype(np.int64)
         viewpoint = np.repeat(np.arange(len(places)), counts.astype(np.int64))
-        delta = self._xy[point] - places[viewpoint]
-        near = np.hypot(delta[:, 0], delta[:, 1]) <= radius
-        return viewpoint[near], point[near]
+        return _near(viewpoint, point, places, self._xy, radius)
+
+
+class PackedIndex:
+    """An R-tree over points that is packed once and asked by very many viewpoints.
+
+    Parameters
+    ----------
+    xy : ndarray of float64, shape (n, 2)
+        Positions in metres, finite.
+
+    Raises
+    ------
+    InputError
+        If there is no point, or one is not finite.
+
+    Examples
+    --------
+    >>> tree = PackedIndex(np.array([[0.0, 0.0], [3.0, 4.0], [50.0, 0.0]]))
+    >>> viewpoints, objects = tree.pairs_within(np.array([[0.0, 0.0]]), radius=5.0)
+    >>> sorted(objects.tolist())
+    [0, 1]
+    """
+
+    def __init__(self, xy: NDArray[np.float64]) -> None:
+        self._xy = _checked(xy)
+        self._tree = shapely.STRtree(shapely.points(self._xy))
+
+    def pairs_within(
+        self, viewpoints: NDArray[np.float64], *, radius: float
+    ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+        """Return every pair of viewpoint and point within a radius.
+
+        Parameters
+        ----------
+        viewpoints : ndarray of float64, shape (v, 2)
+            Places to look from, in metres.
+        radius : float
+            Metres; a point at exactly this distance counts.
+
+        Returns
+        -------
+        viewpoint, point : ndarray of int64, shape (p,)
+            Row numbers, ordered by viewpoint.
+        """
+        places = np.ascontiguousarray(viewpoints, dtype=np.float64)
+        viewpoint, point = self._tree.query(
+            shapely.points(places), predicate="dwithin", distance=_a_touch_more(radius)
+        )
+        return _near(viewpoint, point, places, self._xy, radius)
+
+
+def _checked(xy: NDArray[np.float64]) -> NDArray[np.float64]:
+    points = np.array(xy, dtype=np.float64, order="C")  # a copy, as the tree has one too
+    if len(points) == 0 or not np.isfinite(points).all():
+        msg = "an R-tree needs at least one point, and finite coordinates."
+        raise InputError(msg)
+    return points
+
+
+def _a_touch_more(radius: float) -> float:
+    """Return a reach that no rounding in a tree makes too small; `_near` decides alone."""
+    return radius * (1 + 1e-12) + ROUNDING_M
+
+
+def _near(
+    viewpoint: NDArray[np.int64],
+    point: NDArray[np.int64],
+    places: NDArray[np.float64],
+    xy: NDArray[np.float64],
+    radius: float,
+) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Keep the pairs that are at most so far apart."""
+    delta = xy[point] - places[viewpoint]
+    near = np.hypot(delta[:, 0], delta[:, 1]) <= radius
+    return viewpoint[near], point[near]

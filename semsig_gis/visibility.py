@@ -12,7 +12,7 @@ from semsig_gis.geometry import bearings, wrap_degrees
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from semsig_gis.spatial_index import ObjectIndex
+    from semsig_gis.spatial_index import ObjectIndex, PackedIndex
 
 __all__ = ["Sightings", "visible_objects"]
 
@@ -49,7 +49,7 @@ def visible_objects(
     viewpoints: NDArray[np.float64],
     objects: NDArray[np.float64],
     *,
-    index: ObjectIndex,
+    index: ObjectIndex | PackedIndex,
     radius: float,
 ) -> Sightings:
     """Return what is seen from every viewpoint.
@@ -60,7 +60,7 @@ def visible_objects(
         Places to look from, in metres.
     objects : ndarray of float64, shape (n, 2)
         Positions of the objects, in metres.
-    index : ObjectIndex
+    index : ObjectIndex or PackedIndex
         R-tree over `objects`.
     radius : float
         Visibility range R in metres.

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from sentences import assert_sentence
 
 from semsig_gis.errors import InputError
-from semsig_gis.spatial_index import ObjectIndex
+from semsig_gis.spatial_index import ObjectIndex, PackedIndex
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
@@ -25,13 +25,16 @@ RADII = st.integers(1, 80).map(lambda number: number / 4)
 def found(
     points: list[tuple[float, float]], views: list[tuple[float, float]], radius: float
 ) -> list[tuple[int, int]]:
-    index = ObjectIndex(np.array(points, dtype=float).reshape(-1, 2))
-    viewpoint, point = index.pairs_within(
-        np.array(views, dtype=float).reshape(-1, 2), radius=radius
-    )
-    assert viewpoint.dtype == point.dtype == np.int64
-    assert (np.diff(viewpoint) >= 0).all()
-    return sorted(zip(viewpoint.tolist(), point.tolist(), strict=True))
+    places = np.array(views, dtype=float).reshape(-1, 2)
+    answers = []
+    for kind in (ObjectIndex, PackedIndex):
+        index = kind(np.array(points, dtype=float).reshape(-1, 2))
+        viewpoint, point = index.pairs_within(places, radius=radius)
+        assert viewpoint.dtype == point.dtype == np.int64
+        assert (np.diff(viewpoint) >= 0).all()
+        answers.append(sorted(zip(viewpoint.tolist(), point.tolist(), strict=True)))
+    assert answers[0] == answers[1]
+    return answers[0]
 
 
 @given(
@@ -98,23 +101,28 @@ def test_no_viewpoint_sees_nothing() -> None:
     assert found([(1, 1)], [(9, 9), (8, 8)], 5.0) == []
 
 
-def test_a_copy_made_by_pickling_finds_the_same() -> None:
+@pytest.mark.parametrize("kind", [ObjectIndex, PackedIndex])
+def test_a_copy_made_by_pickling_finds_the_same(kind: type[ObjectIndex | PackedIndex]) -> None:
     points = np.array([[0.0, 0.0], [3.0, 4.0], [50.0, 0.0]])
-    copy = pickle.loads(pickle.dumps(ObjectIndex(points)))  # noqa: S301
+    copy = pickle.loads(pickle.dumps(kind(points)))  # noqa: S301
     assert copy.pairs_within(points[:1], radius=5.0)[1].size == 2
 
 
-def test_the_index_does_not_follow_a_change_of_the_array() -> None:
+@pytest.mark.parametrize("kind", [ObjectIndex, PackedIndex])
+def test_the_index_does_not_follow_a_change_of_the_array(
+    kind: type[ObjectIndex | PackedIndex],
+) -> None:
     points = np.array([[0.0, 0.0], [3.0, 4.0]])
-    index = ObjectIndex(points)
+    index = kind(points)
     points[:] = 1000.0
     assert index.pairs_within(np.zeros((1, 2)), radius=5.0)[1].size == 2
 
 
+@pytest.mark.parametrize("kind", [ObjectIndex, PackedIndex])
 @pytest.mark.parametrize(
     "xy", [np.empty((0, 2)), [[0.0, math.nan]], [[math.inf, 0.0]], [[0.0, 0.0], [math.nan] * 2]]
 )
-def test_nothing_to_index_is_an_error(xy: ArrayLike) -> None:
+def test_nothing_to_index_is_an_error(xy: ArrayLike, kind: type[ObjectIndex | PackedIndex]) -> None:
     with pytest.raises(InputError) as caught:
-        ObjectIndex(np.asarray(xy))
+        kind(np.asarray(xy))
     assert_sentence(caught.value, "at least one point", "finite")
