@@ -104,7 +104,7 @@ class PackedIndex:
 
     def __init__(self, xy: NDArray[np.float64]) -> None:
         self._xy = _checked(xy)
-        self._tree = shapely.STRtree(shapely.points(self._xy[:, 0], self._xy[:, 1]))
+        self._tree = shapely.STRtree(np.asarray(shapely.points(self._xy)))
 
     def pairs_within(
         self, viewpoints: NDArray[np.float64], *, radius: float
