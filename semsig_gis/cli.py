@@ -87,6 +87,14 @@ class CellGeometry(enum.StrEnum):
     point = "point"
 
 
+class Viewpoints(enum.StrEnum):
+    """Which cells `semsig build` looks from."""
+
+    all = "all"
+    outdoor = "outdoor"
+    streets = "streets"
+
+
 class FalseClass(enum.StrEnum):
     """How the class of a false object is drawn."""
 
@@ -329,6 +337,18 @@ def build(
     origin: Annotated[
         str, typer.Option(help="Corner of a cell as X,Y in metres, in the CRS of the objects.")
     ] = "0,0",
+    buildings: Annotated[
+        Path | None, typer.Option(help="Building footprints: what they hide is not seen.")
+    ] = None,
+    streets: Annotated[Path | None, typer.Option(help="Centre lines of streets.")] = None,
+    viewpoints: Annotated[
+        Viewpoints,
+        typer.Option(help="Every cell, those outside --buildings, or those along --streets."),
+    ] = Viewpoints.all,
+    street_width: Annotated[
+        float, typer.Option(help="How far from a centre line a street reaches, in metres.")
+    ] = 8.0,
+    area: Annotated[Path | None, typer.Option(help="Polygons that the cells must lie in.")] = None,
     as_json: AsJson = False,
 ) -> None:
     """Compute the signature of every cell that sees an object."""
@@ -336,11 +356,27 @@ def build(
     from semsig_gis.grid import GridSpec
     from semsig_gis.objects import open_objects
     from semsig_gis.signatures import SignatureSpec
+    from semsig_gis.surroundings import read_area, read_surroundings
+    from semsig_gis.viewpoints import ViewpointSpec
 
     corner = _numbers(origin, "--origin")
     grid = GridSpec(step, tuple(corner))  # type: ignore[arg-type] # GridSpec checks the length
     spec = SignatureSpec(radius, levels)
-    database = _build(open_objects(objects), grid, spec)
+    if streets is not None and viewpoints is not Viewpoints.streets:
+        msg = "--streets was given, which only --viewpoints streets uses; give both or none."
+        raise InputError(msg)
+    opened = open_objects(objects)
+    crs = opened.crs
+    where = ViewpointSpec(
+        mode=viewpoints.value,
+        width=street_width,
+        area=None if area is None else read_area(area, crs=crs),
+    )
+    houses = None if buildings is None else read_surroundings(buildings, role="buildings", crs=crs)
+    lines = None if streets is None else read_surroundings(streets, role="streets", crs=crs)
+    if houses is not None and (invalid := int((~houses.is_valid).sum())):
+        remark(f"{invalid} building footprints in {buildings} are invalid polygons; repaired here")
+    database = _build(opened, grid, spec, viewpoints=where, footprints=houses, streets=lines)
     save_database(database, out)
     if as_json:
         print_json(_info(database, out))
@@ -518,12 +554,15 @@ def export(
 
 
 def _build(
-    objects: StreetObjects, grid: GridSpec | None = None, spec: SignatureSpec | None = None
+    objects: StreetObjects,
+    grid: GridSpec | None = None,
+    spec: SignatureSpec | None = None,
+    **surroundings: Any,  # noqa: ANN401 - as build_database takes them
 ) -> SignatureDatabase:
     from semsig_gis.database import build_database
 
     with progress("building") as advance:
-        return build_database(objects, grid=grid, spec=spec, progress=advance)
+        return build_database(objects, grid=grid, spec=spec, progress=advance, **surroundings)
 
 
 def _evaluation_map(evaluation: Evaluation, database: SignatureDatabase, out: Path) -> bool:

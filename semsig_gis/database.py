@@ -11,19 +11,22 @@ import pyarrow as pa
 import shapely
 
 from semsig_gis import __version__
-from semsig_gis.errors import DatabaseError, EmptyResultError, SemsigError
+from semsig_gis.errors import CrsError, DatabaseError, EmptyResultError, SemsigError
 from semsig_gis.grid import GridSpec, cell_ids, cells_near, split_ids
+from semsig_gis.occlusion import Footprints, hidden
 from semsig_gis.sequences import SequenceTable
 from semsig_gis.signatures import Signature, SignatureSpec, clockwise_order, quantize
 from semsig_gis.spatial_index import PackedIndex
 from semsig_gis.storage import geo_metadata, read_geoparquet, write_geoparquet
 from semsig_gis.taxonomy import Taxonomy
+from semsig_gis.viewpoints import ViewpointSpec, choose_viewpoints
 from semsig_gis.visibility import visible_objects
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
     from pathlib import Path
 
+    import geopandas as gpd
     from numpy.typing import DTypeLike, NDArray
     from pyproj import CRS
 
@@ -69,6 +72,11 @@ class SignatureDatabase:
         Attribution and licence of each source.
     version : str
         Version of the package that built it.
+    viewpoints : ViewpointSpec
+        Which cells were looked from.
+    occlusion : float or None
+        Tolerance in metres with which buildings hide objects (see `semsig_gis.occlusion`); None
+        where no building did.
 
     Examples
     --------
@@ -94,6 +102,8 @@ class SignatureDatabase:
     crs: CRS
     licenses: tuple[str, ...] = ()
     version: str = __version__
+    viewpoints: ViewpointSpec = ViewpointSpec()  # noqa: RUF009 - it is frozen
+    occlusion: float | None = None
 
     def __post_init__(self) -> None:  # noqa: D105
         for name in ("columns", "rows", "offsets", "codes", "bearing_units", "distance_dm"):
@@ -193,6 +203,9 @@ def build_database(
     *,
     grid: GridSpec | None = None,
     spec: SignatureSpec | None = None,
+    viewpoints: ViewpointSpec | None = None,
+    footprints: gpd.GeoDataFrame | None = None,
+    streets: gpd.GeoDataFrame | None = None,
     progress: Callable[[int, int], None] | None = None,
 ) -> SignatureDatabase:
     """Compute the signature of every cell that sees at least one object.
@@ -205,6 +218,12 @@ def build_database(
         The cells; 10 m by default.
     spec : SignatureSpec, optional
         Visibility range and angle levels; 30 m and 16 by default.
+    viewpoints : ViewpointSpec, optional
+        Which cells are looked from; all by default.
+    footprints : GeoDataFrame, optional
+        Buildings (polygons) in any CRS; what they hide is not seen.
+    streets : GeoDataFrame, optional
+        Centre lines in any CRS; a column ``half_width`` holds metres where it is there.
     progress : callable, optional
         Called with the number of cells done and in all.
 
@@ -216,7 +235,12 @@ def build_database(
     Raises
     ------
     EmptyResultError
-        If no cell sees an object, as when the step is much larger than the range.
+        If no cell sees an object, as when the step is much larger than the range, or no cell is
+        a viewpoint.
+    InputError
+        If footprints, streets or viewpoints cannot be used, or those that are needed are missing.
+    CrsError
+        If footprints or streets have no CRS.
 
     Notes
     -----
@@ -237,8 +261,32 @@ def build_database(
     spec = spec or SignatureSpec()
     index = PackedIndex(objects.xy)
     columns, rows = cells_near(objects.xy, grid=grid, radius=spec.radius)
+    viewpoints = viewpoints or ViewpointSpec()
+    buildings = None if footprints is None else Footprints(_moved(footprints, objects.crs))
+    chosen = choose_viewpoints(
+        columns,
+        rows,
+        grid=grid,
+        spec=viewpoints,
+        footprints=buildings,
+        streets=None if streets is None else _moved(streets, objects.crs),
+        widths=None if streets is None else streets.get("half_width"),
+    )
+    columns, rows = columns[chosen], rows[chosen]
+    if len(columns) == 0:
+        msg = (
+            f"none of the {len(chosen):,} cells near an object is a viewpoint "
+            f"({viewpoints.mode}); look at the area, the streets and the buildings."
+        )
+        raise EmptyResultError(msg)
     blocks = [
-        _block(objects, index, grid.viewpoints(columns[part], rows[part]), radius=spec.radius)
+        _block(
+            objects,
+            index,
+            grid.viewpoints(columns[part], rows[part]),
+            radius=spec.radius,
+            footprints=buildings,
+        )
         for part in _parts(len(columns), progress)
     ]
     lengths, codes, bearing_units, distance_dm = (
@@ -248,7 +296,8 @@ def build_database(
     if not seen.any():
         msg = (
             f"no cell sees any of the {len(objects)} objects; make the step ({grid.step:g} m) "
-            f"smaller or the visibility range ({spec.radius:g} m) larger."
+            f"smaller or the visibility range ({spec.radius:g} m) larger"
+            + (", or leave out the buildings." if buildings else ".")
         )
         raise EmptyResultError(msg)
     return SignatureDatabase(
@@ -263,7 +312,18 @@ def build_database(
         taxonomy=objects.taxonomy,
         crs=objects.crs,
         licenses=objects.licenses,
+        viewpoints=viewpoints,
+        occlusion=None if buildings is None else buildings.tolerance,
     )
+
+
+def _moved(table: gpd.GeoDataFrame, crs: CRS) -> NDArray[np.object_]:
+    """Return the geometries of a table in a CRS."""
+    if table.crs is None:
+        msg = "buildings or streets have no coordinate reference system; state their crs."
+        raise CrsError(msg)
+    moved: NDArray[np.object_] = table.geometry.to_crs(crs).to_numpy()
+    return moved
 
 
 def _parts(cells: int, progress: Callable[[int, int], None] | None) -> Iterator[slice]:
@@ -276,10 +336,18 @@ def _parts(cells: int, progress: Callable[[int, int], None] | None) -> Iterator[
 
 
 def _block(
-    objects: StreetObjects, index: PackedIndex, viewpoints: NDArray[np.float64], *, radius: float
+    objects: StreetObjects,
+    index: PackedIndex,
+    viewpoints: NDArray[np.float64],
+    *,
+    radius: float,
+    footprints: Footprints | None,
 ) -> tuple[NDArray[np.int64], NDArray[np.uint8], NDArray[np.uint16], NDArray[np.uint16]]:
     """Return lengths, codes, bearings and distances of some cells."""
     seen = visible_objects(viewpoints, objects.xy, index=index, radius=radius)
+    if footprints is not None:
+        ends = viewpoints[seen.viewpoint], objects.xy[seen.object]
+        seen = seen.only(~hidden(*ends, footprints=footprints))
     order = clockwise_order(seen, objects.codes)
     units = np.floor(seen.bearing[order] * (BEARING_UNITS / 360.0))
     return (
@@ -342,6 +410,8 @@ def save_database(database: SignatureDatabase, path: str | Path) -> None:
             "version": database.version,
             "grid": asdict(database.grid),
             "signature": asdict(database.spec),
+            "viewpoints": database.viewpoints.to_dict(),
+            "occlusion": database.occlusion,
             "taxonomy": database.taxonomy.to_list(),
             "licenses": list(database.licenses),
         },
@@ -389,6 +459,10 @@ def open_database(path: str | Path) -> SignatureDatabase:
         cells = table["cell_id"].to_numpy().astype(np.int64, casting="safe")
         licenses = tuple(specs["licenses"])
         version = specs["version"]
+        # Files that do not say are older: every cell was looked from, and nothing was hidden.
+        chosen = specs.get("viewpoints")
+        viewpoints = ViewpointSpec() if chosen is None else ViewpointSpec.from_dict(chosen)
+        occlusion = None if specs.get("occlusion") is None else float(specs["occlusion"])
     except (KeyError, TypeError, ValueError, SemsigError) as error:
         msg = f"{path} is damaged ({error}); build the database again."
         raise DatabaseError(msg) from error
@@ -422,6 +496,8 @@ def open_database(path: str | Path) -> SignatureDatabase:
         crs=crs,
         licenses=licenses,
         version=version,
+        viewpoints=viewpoints,
+        occlusion=occlusion,
     )
 
 

@@ -44,6 +44,23 @@ class Sightings:
     bearing: NDArray[np.float64]
     distance: NDArray[np.float64]
 
+    def only(self, kept: NDArray[np.bool_]) -> Sightings:
+        """Return some of the pairs.
+
+        Parameters
+        ----------
+        kept : ndarray of bool, shape (p,)
+            Which pairs.
+
+        Returns
+        -------
+        Sightings
+            Those pairs, in the same order.
+        """
+        return Sightings(
+            self.viewpoint[kept], self.object[kept], self.bearing[kept], self.distance[kept]
+        )
+
 
 def visible_objects(
     viewpoints: NDArray[np.float64],

@@ -19,6 +19,7 @@ from servers import Answer, Server
 
 from semsig_gis import __version__
 from semsig_gis.cli import main
+from semsig_gis.database import open_database
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -494,3 +495,61 @@ def test_the_console_script_is_installed() -> None:
         pytest.skip("the package is not installed in this environment")
     done = subprocess.run([script, "--version"], capture_output=True, text=True, check=True)
     assert done.stdout.strip() == f"semsig {__version__}"
+
+
+def test_buildings_streets_and_an_area_narrow_what_is_built(
+    city: Path, database: Path, run: Run
+) -> None:
+    objects, out = city / "objects.parquet", city / "narrow.parquet"
+    houses, area = city / "houses.gpkg", city / "area.parquet"
+    streets = city / "streets.geojson"
+    square = shapely.box(770_000, 6_280_005, 770_400, 6_280_025)
+    gpd.GeoDataFrame(geometry=[square], crs=2154).to_file(houses)
+    gpd.GeoDataFrame(geometry=[square.buffer(60)], crs=2154).to_crs(4326).to_parquet(area)
+    street = shapely.LineString([(770_000, 6_280_000), (770_400, 6_280_000)])
+    gpd.GeoDataFrame(geometry=[street], crs=2154).to_crs(4326).to_file(streets)
+    everything = open_database(database)
+    sizes = {}
+    for name, options in {
+        "buildings": ("--buildings", houses),
+        "outdoor": ("--buildings", houses, "--viewpoints", "outdoor"),
+        "streets": ("--streets", streets, "--viewpoints", "streets"),
+        "wide": ("--streets", streets, "--viewpoints", "streets", "--street-width", 20),
+        "area": ("--area", area),
+    }.items():
+        code, printed, _ = run("build", objects, "--out", out, *options)
+        assert code == 0
+        assert "cells of mean length" in printed
+        opened = open_database(out)
+        sizes[name] = len(opened), int(opened.lengths.sum())
+    bow = shapely.Polygon(
+        [(770_000, 6_280_000), (770_050, 6_280_050), (770_050, 6_280_000), (770_000, 6_280_050)]
+    )
+    gpd.GeoDataFrame(geometry=[bow], crs=2154).to_parquet(city / "bow.parquet")
+    code, _, told = run("build", objects, "--out", out, "--buildings", city / "bow.parquet")
+    assert code == 0
+    assert "1 building footprints in" in told
+    assert "repaired" in told
+    total = int(everything.lengths.sum())
+    assert sizes["outdoor"][0] < sizes["buildings"][0] <= len(everything)
+    assert sizes["buildings"][1] < total
+    assert sizes["streets"][0] < sizes["wide"][0] < len(everything)
+    assert sizes["area"][0] <= len(everything)
+
+
+def test_surroundings_that_cannot_be_used_are_refused(city: Path, database: Path, run: Run) -> None:
+    del database
+    objects, out = city / "objects.parquet", city / "narrow.parquet"
+
+    def build(*options: object) -> tuple[int, str, str]:
+        return run("build", objects, "--out", out, *options)
+
+    sentence(build("--buildings", city / "nowhere.gpkg"), "nowhere.gpkg", "does not exist")
+    sentence(build("--buildings", city / "nowhere.parquet"), "nowhere.parquet", "does not exist")
+    sentence(build("--buildings", city / "lights.gpkg"), "lights.gpkg", "Point", "polygons")
+    sentence(build("--area", city / "lights.gpkg"), "lights.gpkg", "Point", "polygons")
+    sentence(build("--streets", city / "lights.gpkg", "--viewpoints", "streets"), "lines")
+    sentence(build("--viewpoints", "outdoor"), "outdoor", "footprints")
+    sentence(build("--viewpoints", "streets"), "streets", "centre lines")
+    sentence(build("--streets", city / "lights.gpkg"), "--streets", "--viewpoints streets")
+    assert not out.exists()

@@ -28,10 +28,11 @@ from semsig_gis.database import (
     open_database,
     save_database,
 )
-from semsig_gis.errors import DatabaseError, EmptyResultError
+from semsig_gis.errors import CrsError, DatabaseError, EmptyResultError
 from semsig_gis.grid import GridSpec
 from semsig_gis.objects import StreetObjects
 from semsig_gis.signatures import SignatureSpec
+from semsig_gis.viewpoints import ViewpointSpec
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -481,3 +482,102 @@ def test_columns_of_others_in_the_file_do_no_harm(town: World, tmp_path: Path) -
     )
     rewrite(path, table.append_column("note", [["x"] * len(table)]))
     assert_same(open_database(path), town.database)
+
+
+def surroundings(*shapes: shapely.Geometry, **columns: list[float]) -> gpd.GeoDataFrame:
+    # In degrees, so that they have to be moved.
+    return gpd.GeoDataFrame(columns, geometry=list(shapes), crs="EPSG:2154").to_crs("EPSG:4326")
+
+
+def lamps() -> StreetObjects:
+    rng = np.random.default_rng(5)
+    places = rng.uniform(0, 100, (60, 2)) + CORNER
+    return World(tuple((x, y, CODES[0]) for x, y in places)).street_objects
+
+
+def test_what_buildings_hide_is_not_seen() -> None:
+    objects, house = lamps(), shapely.box(*(CORNER + 22), *(CORNER + 71))
+    open_air = build_database(objects)
+    hindered = build_database(objects, footprints=surroundings(house))
+    assert hindered.occlusion == 0.5
+    assert open_air.occlusion is None
+    moved = surroundings(house).to_crs("EPSG:2154").geometry[0]
+    expected = {}
+    for cell, viewpoint in zip(open_air.cell_ids, open_air.xy, strict=True):
+        pairs = [
+            (xy, shapely.LineString([viewpoint, xy]))
+            for xy in objects.xy
+            if np.hypot(*(xy - viewpoint)) <= 30
+        ]
+        deep = moved.buffer(-0.5)
+        free = deep.intersects(shapely.Point(viewpoint))
+        expected[cell] = sum(free or not line.intersects(deep) for _, line in pairs)
+    seen = dict(zip(hindered.cell_ids.tolist(), hindered.lengths.tolist(), strict=True))
+    assert seen == {cell: size for cell, size in expected.items() if size}
+    assert hindered.lengths.sum() < open_air.lengths.sum()
+
+
+def test_only_viewpoints_become_cells(tmp_path: Path) -> None:
+    objects, house = lamps(), shapely.box(*(CORNER + 22), *(CORNER + 71))
+    full = build_database(objects)
+    street = shapely.LineString([CORNER, CORNER + np.array([100, 0])])
+    area = shapely.box(*CORNER, *(CORNER + 50))
+    houses, streets = surroundings(house), surroundings(street)
+    outdoor = build_database(objects, viewpoints=ViewpointSpec(mode="outdoor"), footprints=houses)
+    assert not shapely.contains_xy(house.buffer(-0.1), *outdoor.xy.T).any()
+    spec = ViewpointSpec(mode="streets", width=12.0, area=area)
+    along = build_database(objects, viewpoints=spec, streets=streets)
+    near = (shapely.distance(street, shapely.points(full.xy)) <= 12.0) & shapely.intersects_xy(
+        area, *full.xy.T
+    )
+    assert along.cell_ids.tolist() == full.cell_ids[near].tolist()
+    assert along.lengths.tolist() == full.lengths[near].tolist()
+    wide = build_database(
+        objects,
+        viewpoints=spec,
+        streets=surroundings(street, half_width=[25.0]),
+    )
+    assert len(wide) > len(along)
+
+    for database in (outdoor, along, full):
+        save_database(database, tmp_path / "city.parquet")
+        again = open_database(tmp_path / "city.parquet")
+        assert (again.viewpoints, again.occlusion) == (database.viewpoints, database.occlusion)
+
+
+def test_a_file_that_does_not_tell_its_viewpoints_still_opens(tmp_path: Path) -> None:
+    path = tmp_path / "city.parquet"
+    save_database(build_database(lamps()), path)
+    table = pq.read_table(path)
+    specs = json.loads(table.schema.metadata[b"semsig"])
+    del specs["viewpoints"], specs["occlusion"]
+    metadata = {**table.schema.metadata, b"semsig": json.dumps(specs).encode()}
+    pq.write_table(table.replace_schema_metadata(metadata), path)
+    opened = open_database(path)
+    assert (opened.viewpoints, opened.occlusion) == (ViewpointSpec(), None)
+    specs["viewpoints"] = {"mode": "indoors", "width": 8.0, "area": None}
+    metadata[b"semsig"] = json.dumps(specs).encode()
+    pq.write_table(table.replace_schema_metadata(metadata), path)
+    with pytest.raises(DatabaseError) as caught:
+        open_database(path)
+    assert_sentence(caught.value, "damaged", "indoors")
+
+
+def test_no_viewpoint_and_no_crs_are_told() -> None:
+    far = ViewpointSpec(area=shapely.box(0, 0, 10, 10))
+    with pytest.raises(EmptyResultError) as caught:
+        build_database(lamps(), viewpoints=far)
+    assert_sentence(caught.value, "none of", "viewpoint", "area")
+    bare = gpd.GeoDataFrame(geometry=[shapely.box(0, 0, 10, 10)])
+    with pytest.raises(CrsError) as unplaced:
+        build_database(lamps(), footprints=bare)
+    assert_sentence(unplaced.value, "no coordinate reference system")
+
+
+def test_a_city_that_is_hidden_altogether_is_told() -> None:
+    # The lamp stands deep in a building, and so does no viewpoint that would see it.
+    world = World(((0.0, 0.0, CODES[0]),), radius=12.0)
+    house = gpd.GeoDataFrame(geometry=[shapely.box(-2, -2, 2, 2)], crs="EPSG:2154")
+    with pytest.raises(EmptyResultError) as caught:
+        build_database(world.street_objects, spec=SignatureSpec(12.0), footprints=house)
+    assert_sentence(caught.value, "1 objects", "leave out the buildings")

@@ -50,6 +50,14 @@ def test_objects_in_one_direction_have_one_bearing(dx: int, dy: int, times: int)
     assert seen.bearing[0] == seen.bearing[1]
 
 
+def test_some_of_the_pairs_can_be_left_out() -> None:
+    seen = look([[0, 0]], [[5, 0], [6, 1], [7, 2]])
+    kept = seen.only(seen.object != 1)
+    assert sorted(kept.object.tolist()) == [0, 2]
+    assert kept.distance.tolist() == seen.distance[seen.object != 1].tolist()
+    assert len(kept.viewpoint) == len(kept.bearing) == 2
+
+
 def test_noise_beside_north_is_north() -> None:
     seen = look([[0, 0]], [[-1e-13, 20], [1e-13, 20], [-1e-300, 20], [-5e-7, 20]])
     order = np.argsort(seen.object)

@@ -1,0 +1,145 @@
+"""Files of what surrounds street objects: building footprints, street centre lines, an area."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Literal
+
+import geopandas as gpd
+import pyarrow as pa
+import shapely
+
+from semsig_gis.catalog import load_catalog
+from semsig_gis.errors import InputError, SourceError
+from semsig_gis.layer_spec import LayerSpec
+from semsig_gis.sources import osm_file, vector_file
+from semsig_gis.sources._area import join_areas
+
+if TYPE_CHECKING:
+    from pyproj import CRS
+
+    from semsig_gis.layer_spec import GeometryKind
+
+__all__ = ["read_area", "read_surroundings"]
+
+OSM_SUFFIXES = (".osm", ".osm.pbf", ".osm.bz2")
+DIMENSIONS: dict[GeometryKind, int] = {"line": 1, "polygon": 2}
+
+
+def read_surroundings(
+    path: str | Path, *, role: Literal["buildings", "streets"], crs: CRS | str
+) -> gpd.GeoDataFrame:
+    """Read the buildings or the streets of a city.
+
+    Parameters
+    ----------
+    path : str or Path
+        Any vector file that `semsig_gis.sources.vector_file` reads, an OpenStreetMap file, or a
+        ``.parquet`` file such as ``semsig load --buildings`` writes.
+    role : {"buildings", "streets"}
+        What the file holds: polygons or lines.
+    crs : pyproj.CRS or str
+        CRS to move it to.
+
+    Returns
+    -------
+    GeoDataFrame
+        One row a feature that has a geometry. Of a ``.parquet`` file all columns are kept.
+
+    Raises
+    ------
+    SourceError
+        If the file is missing, damaged, or of another kind.
+    CrsError
+        If nobody knows its CRS.
+    InputError
+        If it holds no polygon or line at all, or something else too.
+
+    Examples
+    --------
+    >>> read_surroundings("nowhere.parquet", role="buildings", crs="EPSG:2154")
+    Traceback (most recent call last):
+    ...
+    semsig_gis.errors.SourceError: nowhere.parquet does not exist; give a file of polygons.
+    """
+    return _read(Path(path), role, "polygon" if role == "buildings" else "line", crs)
+
+
+def read_area(path: str | Path, *, crs: CRS | str) -> shapely.Polygon | shapely.MultiPolygon:
+    """Read an area: what all polygons of a file enclose together.
+
+    Parameters
+    ----------
+    path : str or Path
+        A vector or ``.parquet`` file.
+    crs : pyproj.CRS or str
+        CRS to move it to.
+
+    Returns
+    -------
+    shapely.Polygon or shapely.MultiPolygon
+        The area.
+
+    Raises
+    ------
+    SourceError
+        If the file is missing, damaged, or of another kind.
+    CrsError
+        If nobody knows its CRS.
+    InputError
+        If it holds no polygon, or something else too.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> town = gpd.GeoDataFrame(geometry=[shapely.box(0, 0, 5, 5)], crs="EPSG:2154")
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     town.to_parquet(f"{folder}/town.parquet")
+    ...     read_area(f"{folder}/town.parquet", crs="EPSG:2154").area
+    25.0
+    """
+    area = join_areas(_read(Path(path), "area", "polygon", crs).geometry.to_numpy())
+    if area is None:
+        msg = f"{path} encloses no area; give a file of polygons."
+        raise InputError(msg)
+    return area
+
+
+def _read(path: Path, role: str, kind: GeometryKind, crs: CRS | str) -> gpd.GeoDataFrame:
+    if path.suffix.lower() == ".parquet":
+        table = _read_parquet(path, kind)
+    elif path.name.lower().endswith(OSM_SUFFIXES) and role != "area":
+        spec = load_catalog("openstreetmap").layer(role)
+        table = osm_file.read_layers(path, [spec])[0].table
+    else:
+        layer = vector_file.read_layer(path, LayerSpec(name=role, class_name="", geometry=kind))
+        if layer.error_count:
+            msg = (
+                f"{path} has {layer.error_count} features that cannot be read "
+                f"({layer.errors[0]}); correct the file."
+            )
+            raise SourceError(msg)
+        table = layer.table
+    if table.crs is None:
+        msg = f"{path} states no coordinate reference system; write it with one."
+        raise SourceError(msg)
+    geometry = table.geometry
+    table = table[~(geometry.isna() | geometry.is_empty)].reset_index(drop=True)
+    dimensions = shapely.get_dimensions(table.geometry.to_numpy())
+    others = table.geometry[dimensions != DIMENSIONS[kind]]
+    if len(table) == 0 or len(others):
+        found = f"holds a {others.iloc[0].geom_type}" if len(others) else f"holds no {kind}"
+        msg = f"{path} {found}; give a file of {kind}s."
+        raise InputError(msg)
+    return table.to_crs(crs)
+
+
+def _read_parquet(path: Path, kind: GeometryKind) -> gpd.GeoDataFrame:
+    if not path.is_file():
+        msg = f"{path} does not exist; give a file of {kind}s."
+        raise SourceError(msg)
+    try:
+        return gpd.read_parquet(path)
+    except (pa.ArrowException, ValueError, OSError) as error:
+        msg = f"{path} is damaged or is not GeoParquet; give a file of {kind}s."
+        raise SourceError(msg) from error
