@@ -141,9 +141,14 @@ class SignatureDatabase:
         return _frozen(quantize(self.bearings, self.spec.levels))
 
     @functools.cached_property
+    def occurrences(self) -> NDArray[np.int64]:
+        """How often each class code occurs over all signatures, shape (256,)."""
+        return _frozen(np.bincount(self.codes, minlength=256))
+
+    @functools.cached_property
     def present_codes(self) -> NDArray[np.uint8]:
         """Class codes that occur, ascending."""
-        return _frozen(np.flatnonzero(np.bincount(self.codes, minlength=256)).astype(np.uint8))
+        return _frozen(np.flatnonzero(self.occurrences).astype(np.uint8))
 
     @functools.cached_property
     def type_sequences(self) -> SequenceTable:

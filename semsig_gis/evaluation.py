@@ -489,15 +489,14 @@ def _distorted(
     database: SignatureDatabase, cells: NDArray[np.int64], distortion: Distortion, seed: int
 ) -> tuple[list[Signature], list[float]]:
     """Return the distorted signature of each cell, and a chance to pick among ties by."""
-    occurrences = np.bincount(database.codes)
-    classes = np.flatnonzero(occurrences)
+    classes = database.present_codes
+    weights = database.occurrences[classes]
     asked: list[Signature] = []
     picks: list[float] = []
     for number, cell in enumerate(cells.tolist()):
         # Its own generator, so that no query depends on what happened to another.
         rng = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(number,)))
         true = database.signature(cell)
-        weights = occurrences[classes]
         asked.append(distort(true, distortion, classes=classes, weights=weights, rng=rng))
         picks.append(float(rng.random()))
     return asked, picks

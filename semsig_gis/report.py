@@ -167,7 +167,7 @@ def database_summary(
     >>> facts["groups"]["type"]["count"] <= facts["signatures"]
     True
     """
-    numbers = np.bincount(database.codes, minlength=256)
+    numbers = database.occurrences
     total = int(numbers.sum())
     types, angles = database.type_sequences, database.angle_sequences
     pairs = types.inverse.astype(np.int64) * len(angles) + angles.inverse
