@@ -9,8 +9,9 @@ from typing import TYPE_CHECKING
 from scipy.spatial import cKDTree
 
 from benchmarks.comparison import compare
+from semsig_gis.building import build_database
 from semsig_gis.catalog import paper_taxonomy
-from semsig_gis.database import build_database, save_database
+from semsig_gis.database_file import save_database
 from semsig_gis.objects import build_objects
 from semsig_gis.sources.synthetic import CitySpec, synthetic_city
 

@@ -16,14 +16,11 @@ import importlib
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from semsig_gis.building import build_database
     from semsig_gis.catalog import Catalog, load_catalog, paper_taxonomy
     from semsig_gis.conflation import conflate
-    from semsig_gis.database import (
-        SignatureDatabase,
-        build_database,
-        open_database,
-        save_database,
-    )
+    from semsig_gis.database import SignatureDatabase
+    from semsig_gis.database_file import open_database, save_database
     from semsig_gis.distortion import Distortion
     from semsig_gis.errors import SemsigError
     from semsig_gis.evaluation import Evaluation, evaluate
@@ -74,7 +71,7 @@ _HOMES = {
     "StreetObjects": "objects",
     "Taxonomy": "taxonomy",
     "assemble": "loading",
-    "build_database": "database",
+    "build_database": "building",
     "build_objects": "objects",
     "choose_layers": "loading",
     "combine_catalogs": "loading",
@@ -89,13 +86,13 @@ _HOMES = {
     "localization_map": "maps",
     "localize": "matching",
     "open_cache": "loading",
-    "open_database": "database",
+    "open_database": "database_file",
     "open_objects": "objects",
     "paper_taxonomy": "catalog",
     "quality_report": "quality",
     "read_files": "loading",
     "read_layer": "sources.vector_file",
-    "save_database": "database",
+    "save_database": "database_file",
     "save_map": "maps",
     "save_objects": "objects",
     "suggest_catalog": "suggest",

@@ -143,7 +143,7 @@ def demo(
 ) -> None:
     """Run the whole road on the embedded synthetic city, without a network."""
     from semsig_gis.catalog import paper_taxonomy
-    from semsig_gis.database import save_database
+    from semsig_gis.database_file import save_database
     from semsig_gis.evaluation import evaluate as run
     from semsig_gis.export import export_geopackage
     from semsig_gis.objects import build_objects, save_objects
@@ -352,7 +352,7 @@ def build(
     as_json: AsJson = False,
 ) -> None:
     """Compute the signature of every cell that sees an object."""
-    from semsig_gis.database import save_database
+    from semsig_gis.database_file import save_database
     from semsig_gis.grid import GridSpec
     from semsig_gis.objects import open_objects
     from semsig_gis.signatures import SignatureSpec
@@ -390,7 +390,7 @@ def build(
 @app.command()
 def info(database: Database, *, as_json: AsJson = False) -> None:
     """Print the paper's tables of properties for a database."""
-    from semsig_gis.database import open_database
+    from semsig_gis.database_file import open_database
     from semsig_gis.report import database_tables
 
     opened = open_database(database)
@@ -420,7 +420,7 @@ def localize(
 ) -> None:
     """Rank the cells of a database for one query."""
     from semsig_gis import matching
-    from semsig_gis.database import open_database
+    from semsig_gis.database_file import open_database
     from semsig_gis.signatures import Signature
 
     chosen = matching.Method.parse(method)
@@ -482,7 +482,7 @@ def evaluate(
     """Query a database with distorted signatures of its own and measure the answers."""
     import dataclasses
 
-    from semsig_gis.database import open_database
+    from semsig_gis.database_file import open_database
     from semsig_gis.distortion import named_distortion
     from semsig_gis.evaluation import evaluate as run
     from semsig_gis.matching import Method
@@ -519,7 +519,7 @@ def map_(
     out: Annotated[Path, typer.Option(help="Map to write (.html).")],
 ) -> None:
     """Draw the errors and the query locations of an evaluation."""
-    from semsig_gis.database import open_database
+    from semsig_gis.database_file import open_database
     from semsig_gis.evaluation import Evaluation
 
     results = Evaluation.load(evaluation)
@@ -542,7 +542,7 @@ def export(
     ] = CellGeometry.polygon,
 ) -> None:
     """Write the cells, and the street objects, to a GeoPackage for QGIS."""
-    from semsig_gis.database import open_database
+    from semsig_gis.database_file import open_database
     from semsig_gis.export import export_geopackage
     from semsig_gis.objects import open_objects
 
@@ -559,7 +559,7 @@ def _build(
     spec: SignatureSpec | None = None,
     **surroundings: Any,  # noqa: ANN401 - as build_database takes them
 ) -> SignatureDatabase:
-    from semsig_gis.database import build_database
+    from semsig_gis.building import build_database
 
     with progress("building") as advance:
         return build_database(objects, grid=grid, spec=spec, progress=advance, **surroundings)

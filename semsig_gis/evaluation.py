@@ -112,7 +112,7 @@ class Evaluation:
     Examples
     --------
     >>> from semsig_gis.catalog import paper_taxonomy
-    >>> from semsig_gis.database import build_database
+    >>> from semsig_gis.building import build_database
     >>> from semsig_gis.objects import build_objects
     >>> from semsig_gis.sources.synthetic import CitySpec, synthetic_city
     >>> layers = synthetic_city(CitySpec(size=300.0))
@@ -382,7 +382,7 @@ def evaluate(
     Examples
     --------
     >>> from semsig_gis.catalog import paper_taxonomy
-    >>> from semsig_gis.database import build_database
+    >>> from semsig_gis.building import build_database
     >>> from semsig_gis.objects import build_objects
     >>> from semsig_gis.sources.synthetic import CitySpec, synthetic_city
     >>> layers = synthetic_city(CitySpec(size=300.0))

@@ -18,7 +18,7 @@ import shapely
 from pyogrio.errors import DataLayerError, DataSourceError, FeatureError
 
 from semsig_gis import __version__
-from semsig_gis.database import BEARING_UNITS
+from semsig_gis.database import BEARING_UNITS, DISTANCE_UNITS
 from semsig_gis.errors import InputError, UnknownNameError, nearest_name
 from semsig_gis.schema import CLASS_CODE, CLASS_NAME, COUNT, GEOMETRY, SOURCE, SOURCE_ID
 from semsig_gis.storage import whole_file
@@ -90,7 +90,7 @@ def export_geopackage(
     --------
     >>> import tempfile
     >>> from semsig_gis.catalog import paper_taxonomy
-    >>> from semsig_gis.database import build_database
+    >>> from semsig_gis.building import build_database
     >>> from semsig_gis.objects import build_objects
     >>> from semsig_gis.sources.synthetic import CitySpec, synthetic_city
     >>> layers = synthetic_city(CitySpec(size=300.0))
@@ -140,7 +140,9 @@ def _write_cells(database: SignatureDatabase, path: Path, geometry: CellGeometry
     symbols = pa.array([chr(symbol) for symbol in database.taxonomy.symbol_bytes])
     degrees = pa.array([f"{unit * 360 / BEARING_UNITS:.2f}" for unit in range(BEARING_UNITS)])
     whole_numbers = pa.array([str(level) for level in range(1 << 8)])
-    metres = pa.array([f"{decimetres / 10:.1f}" for decimetres in range(1 << 16)])
+    metres = pa.array(
+        [f"{unit * database.reach / DISTANCE_UNITS:.2f}" for unit in range(DISTANCE_UNITS + 1)]
+    )
     type_groups, angle_groups = database.type_group_sizes, database.angle_group_sizes
 
     def block(rows: slice) -> pa.Table:
@@ -156,7 +158,7 @@ def _write_cells(database: SignatureDatabase, path: Path, geometry: CellGeometry
                 "types": _joined(database.codes, offsets, texts=symbols, separator=""),
                 "bearings": _joined(database.bearing_units, offsets, texts=degrees),
                 "levels": _joined(database.levels, offsets, texts=whole_numbers),
-                "distances": _joined(database.distance_dm, offsets, texts=metres),
+                "distances": _joined(database.distance_units, offsets, texts=metres),
                 "type_group_size": type_groups[rows],
                 "angle_group_size": angle_groups[rows],
                 GEOMETRY: shapely.to_wkb(shapes),

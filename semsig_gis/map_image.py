@@ -52,7 +52,7 @@ def city_image(
     Examples
     --------
     >>> from semsig_gis.catalog import paper_taxonomy
-    >>> from semsig_gis.database import build_database
+    >>> from semsig_gis.building import build_database
     >>> from semsig_gis.objects import build_objects
     >>> from semsig_gis.sources.synthetic import CitySpec, synthetic_city
     >>> layers = synthetic_city(CitySpec(size=300.0))

@@ -160,7 +160,7 @@ def score_cells(
     Examples
     --------
     >>> from semsig_gis.catalog import paper_taxonomy
-    >>> from semsig_gis.database import build_database
+    >>> from semsig_gis.building import build_database
     >>> from semsig_gis.objects import build_objects
     >>> from semsig_gis.sources.synthetic import CitySpec, synthetic_city
     >>> layers = synthetic_city(CitySpec(size=300.0))
@@ -213,7 +213,7 @@ def localize(
     Examples
     --------
     >>> from semsig_gis.catalog import paper_taxonomy
-    >>> from semsig_gis.database import build_database
+    >>> from semsig_gis.building import build_database
     >>> from semsig_gis.objects import build_objects
     >>> from semsig_gis.sources.synthetic import CitySpec, synthetic_city
     >>> layers = synthetic_city(CitySpec(size=300.0))

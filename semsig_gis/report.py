@@ -158,7 +158,7 @@ def database_summary(
     Examples
     --------
     >>> from semsig_gis.catalog import paper_taxonomy
-    >>> from semsig_gis.database import build_database
+    >>> from semsig_gis.building import build_database
     >>> from semsig_gis.objects import build_objects
     >>> from semsig_gis.sources.synthetic import CitySpec, synthetic_city
     >>> layers = synthetic_city(CitySpec(size=300.0))
@@ -228,7 +228,7 @@ def database_tables(
     Examples
     --------
     >>> from semsig_gis.catalog import paper_taxonomy
-    >>> from semsig_gis.database import build_database
+    >>> from semsig_gis.building import build_database
     >>> from semsig_gis.objects import build_objects
     >>> from semsig_gis.sources.synthetic import CitySpec, synthetic_city
     >>> layers = synthetic_city(CitySpec(size=300.0))
@@ -258,7 +258,7 @@ def database_markdown(database: SignatureDatabase, *, file_bytes: int | None = N
     Examples
     --------
     >>> from semsig_gis.catalog import paper_taxonomy
-    >>> from semsig_gis.database import build_database
+    >>> from semsig_gis.building import build_database
     >>> from semsig_gis.objects import build_objects
     >>> from semsig_gis.sources.synthetic import CitySpec, synthetic_city
     >>> layers = synthetic_city(CitySpec(size=300.0))
@@ -290,7 +290,7 @@ def evaluation_tables(evaluation: Evaluation) -> tuple[Table, Table, Table]:
     Examples
     --------
     >>> from semsig_gis.catalog import paper_taxonomy
-    >>> from semsig_gis.database import build_database
+    >>> from semsig_gis.building import build_database
     >>> from semsig_gis.objects import build_objects
     >>> from semsig_gis.sources.synthetic import CitySpec, synthetic_city
     >>> layers = synthetic_city(CitySpec(size=300.0))
@@ -319,7 +319,7 @@ def evaluation_markdown(evaluation: Evaluation) -> str:
     Examples
     --------
     >>> from semsig_gis.catalog import paper_taxonomy
-    >>> from semsig_gis.database import build_database
+    >>> from semsig_gis.building import build_database
     >>> from semsig_gis.objects import build_objects
     >>> from semsig_gis.sources.synthetic import CitySpec, synthetic_city
     >>> layers = synthetic_city(CitySpec(size=300.0))

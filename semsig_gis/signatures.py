@@ -10,6 +10,7 @@ import numpy as np
 
 from semsig_gis.errors import InputError
 from semsig_gis.geometry import FULL_TURN, wrap_degrees
+from semsig_gis.taxonomy import MAX_RANGE_M
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -21,7 +22,7 @@ if TYPE_CHECKING:
 
 __all__ = ["Signature", "SignatureSpec", "clockwise_order", "quantize"]
 
-MAX_RADIUS = 6000.0
+
 MAX_LEVELS = 255
 SHORT_MAX = np.iinfo(np.uint16).max
 
@@ -52,10 +53,10 @@ class SignatureSpec:
     levels: int = 16
 
     def __post_init__(self) -> None:  # noqa: D105
-        if not (math.isfinite(self.radius) and 0 < self.radius <= MAX_RADIUS):
+        if not (math.isfinite(self.radius) and 0 < self.radius <= MAX_RANGE_M):
             msg = (
                 f"visibility range is {self.radius} m; "
-                f"give a number of metres above 0 and up to {MAX_RADIUS:.0f}."
+                f"give a number of metres above 0 and up to {MAX_RANGE_M:.0f}."
             )
             raise InputError(msg)
         if self.levels not in range(1, MAX_LEVELS + 1):

@@ -19,6 +19,7 @@ if TYPE_CHECKING:
 __all__ = ["ObjectClass", "Taxonomy"]
 
 MAX_CODE = 255
+MAX_RANGE_M = 6000.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,11 +36,14 @@ class ObjectClass:
         Lower-case identifier such as ``street_light``.
     title : str
         Name to show to people.
+    range_m : float, optional
+        From how far an object of the class is seen, in metres; None for the range that holds for
+        all.
 
     Raises
     ------
     CatalogError
-        If the code, the symbol or the name is not of that form.
+        If the code, the symbol or the name is not of that form, or the range is not above 0.
 
     Examples
     --------
@@ -51,6 +55,7 @@ class ObjectClass:
     symbol: str
     name: str
     title: str
+    range_m: float | None = None
 
     def __post_init__(self) -> None:  # noqa: D105
         # The type exactly: True is an int to Python, never a code.
@@ -67,6 +72,12 @@ class ObjectClass:
             msg = (
                 f"class name {self.name!r} is not usable; "
                 "write lower-case letters, digits and underscores."
+            )
+            raise CatalogError(msg)
+        if self.range_m is not None and not 0 < self.range_m <= MAX_RANGE_M:  # false for NaN too
+            msg = (
+                f"class {self.name!r} is seen from {self.range_m!r} m; give a number of metres "
+                f"above 0 and up to {MAX_RANGE_M:.0f}."
             )
             raise CatalogError(msg)
 
@@ -116,7 +127,8 @@ class Taxonomy:
         Parameters
         ----------
         items : iterable of mapping
-            Each with ``code``, ``symbol``, ``name`` and ``title``.
+            Each with ``code``, ``symbol``, ``name`` and ``title``, and ``range_m`` where the
+            class has a range of its own.
 
         Returns
         -------
@@ -133,7 +145,10 @@ class Taxonomy:
         list of dict
             One mapping a class.
         """
-        return [asdict(item) for item in self.classes]
+        return [
+            {key: value for key, value in asdict(item).items() if value is not None}
+            for item in self.classes
+        ]
 
     def extended(self, classes: Iterable[ObjectClass]) -> Taxonomy:
         """Return a taxonomy with further classes.
@@ -281,4 +296,23 @@ class Taxonomy:
         for item in self.classes:
             table[item.code] = ord(item.symbol)
         table.setflags(write=False)
+        return table
+
+    def ranges(self, radius: float) -> NDArray[np.float64]:
+        """Return from how far each class is seen.
+
+        Parameters
+        ----------
+        radius : float
+            Visibility range in metres of classes without one of their own.
+
+        Returns
+        -------
+        ndarray of float64, shape (256,)
+            Metres by class code; `radius` where there is no class.
+        """
+        table = np.full(MAX_CODE + 1, float(radius))
+        for item in self.classes:
+            if item.range_m is not None:
+                table[item.code] = item.range_m
         return table

@@ -19,7 +19,7 @@ from servers import Answer, Server
 
 from semsig_gis import __version__
 from semsig_gis.cli import main
-from semsig_gis.database import open_database
+from semsig_gis.database_file import open_database
 
 if TYPE_CHECKING:
     from collections.abc import Callable

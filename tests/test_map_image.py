@@ -41,7 +41,7 @@ def a_city(
         offsets=np.concatenate([[0], np.cumsum(lengths)]),
         codes=np.ones(total, np.uint8),
         bearing_units=np.zeros(total, np.uint16),
-        distance_dm=np.zeros(total, np.uint16),
+        distance_units=np.zeros(total, np.uint8),
         grid=grid or GridSpec(10.0, (765_200.0, 6_275_000.0)),
         spec=SignatureSpec(),
         taxonomy=paper_taxonomy(),

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 
 import pytest
 
+from semsig_gis.building import build_database
 from semsig_gis.catalog import paper_taxonomy
-from semsig_gis.database import build_database
 from semsig_gis.distortion import Distortion
 from semsig_gis.evaluation import evaluate
 from semsig_gis.map_legend import SHADES, evaluation_legend, localization_legend

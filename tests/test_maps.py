@@ -16,8 +16,8 @@ from selenium.webdriver.common.by import By
 from sentences import assert_sentence
 
 from semsig_gis import map_assets
+from semsig_gis.building import build_database
 from semsig_gis.catalog import paper_taxonomy
-from semsig_gis.database import build_database
 from semsig_gis.distortion import Distortion
 from semsig_gis.errors import InputError
 from semsig_gis.evaluation import evaluate

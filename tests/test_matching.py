@@ -44,7 +44,7 @@ def database_of(cells: Sequence[tuple[str, Sequence[float]]]) -> SignatureDataba
         offsets=np.cumsum([0, *lengths]),
         codes=np.concatenate([TAXONOMY.encode(types) for types, _ in cells]),
         bearing_units=np.floor(bearings * (BEARING_UNITS / 360)).astype(np.uint16),
-        distance_dm=np.zeros(sum(lengths), np.uint16),
+        distance_units=np.zeros(sum(lengths), np.uint8),
         grid=GridSpec(origin=(770_000.0, 6_280_000.0)),
         spec=SignatureSpec(),
         taxonomy=TAXONOMY,

@@ -12,8 +12,9 @@ import pandas as pd
 import pyogrio
 import pytest
 
+from semsig_gis.building import build_database
 from semsig_gis.catalog import load_catalog
-from semsig_gis.database import build_database, open_database, save_database
+from semsig_gis.database_file import open_database, save_database
 from semsig_gis.grid import GridSpec, cell_ids
 from semsig_gis.objects import build_objects
 from semsig_gis.sources import find_files
@@ -163,9 +164,10 @@ def check_cells(
     for cell, seen in zip(cells, look_around(objects, viewpoints), strict=True):
         part = slice(database.offsets[cell], database.offsets[cell + 1])
         assert database.codes[part].tolist() == [code for _, _, code in seen]
-        assert database.bearing_units[part].tolist() == [int(b * 180) for b, _, _ in seen]
+        assert database.bearing_units[part].tolist() == [int(b * 20) for b, _, _ in seen]
         assert database.levels[part].tolist() == [int(b / 22.5) for b, _, _ in seen]
-        assert database.distance_dm[part].tolist() == [round(d * 10) for _, d, _ in seen]
+        units = [round(d * (255 / RADIUS)) for _, d, _ in seen]
+        assert database.distance_units[part].tolist() == units
 
 
 def check_counts(
@@ -243,7 +245,7 @@ def test_the_database_survives_its_file(city: SignatureDatabase, tmp_path: Path)
     path = tmp_path / "montpellier.parquet"
     save_database(city, path)
     again = open_database(path)
-    for name in ("columns", "rows", "offsets", "codes", "bearing_units", "distance_dm"):
+    for name in ("columns", "rows", "offsets", "codes", "bearing_units", "distance_units"):
         assert np.array_equal(getattr(again, name), getattr(city, name)), name
     assert (again.grid, again.spec, again.taxonomy) == (city.grid, city.spec, city.taxonomy)
     assert (again.crs, again.licenses) == (city.crs, city.licenses)

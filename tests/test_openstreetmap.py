@@ -13,8 +13,8 @@ import shapely
 from osm_xml import node, relation, way, write_osm
 from osmium.osm import Area, Node, Relation, Way
 
+from semsig_gis.building import build_database
 from semsig_gis.catalog import load_catalog
-from semsig_gis.database import build_database
 from semsig_gis.evaluation import evaluate
 from semsig_gis.objects import build_objects
 from semsig_gis.sources import find_files, reader

@@ -51,8 +51,8 @@ def database() -> SignatureDatabase:
         rows=np.arange(6, dtype=np.int32),
         offsets=np.array([0, 2, 4, 6, 8, 9, 10]),
         codes=taxonomy.encode("".join(types for types, _ in CELLS)),
-        bearing_units=(bearings * 180).astype(np.uint16),
-        distance_dm=np.full(10, 50, np.uint16),
+        bearing_units=(bearings * 20).astype(np.uint16),
+        distance_units=np.full(10, 50, np.uint8),
         grid=GridSpec(step=10.0),
         spec=SignatureSpec(radius=30.0, levels=16),
         taxonomy=taxonomy,
@@ -112,7 +112,7 @@ def test_a_single_group_has_no_deviation(database: SignatureDatabase) -> None:
         offsets=database.offsets[:2],
         codes=database.codes[:2],
         bearing_units=database.bearing_units[:2],
-        distance_dm=database.distance_dm[:2],
+        distance_units=database.distance_units[:2],
     )
     assert database_summary(one)["groups"]["both"]["std"] is None
     assert rows(database_tables(one)[2])["std"][:3] == ("", "", "")
@@ -171,7 +171,7 @@ def test_a_long_sequence_is_shortened(database: SignatureDatabase) -> None:
         offsets=np.array([0, n]),
         codes=np.full(n, 3, np.uint8),
         bearing_units=np.arange(n, dtype=np.uint16),
-        distance_dm=np.zeros(n, np.uint16),
+        distance_units=np.zeros(n, np.uint8),
     )
     largest = rows(database_tables(long)[1])["Largest group by type"][0]
     assert largest == "DDDDDDDDDDDDDDDDDDDD… (30 objects), 1 cells"

@@ -1,0 +1,168 @@
+"""Small worlds of street objects, and what a plain loop sees in them."""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import TYPE_CHECKING
+
+import geopandas as gpd
+import numpy as np
+import pytest
+import shapely
+from hypothesis import strategies as st
+from sentences import assert_sentence
+
+from semsig_gis.building import build_database
+from semsig_gis.catalog import load_catalog
+from semsig_gis.database import BEARING_UNITS, DISTANCE_UNITS
+from semsig_gis.errors import EmptyResultError
+from semsig_gis.grid import GridSpec
+from semsig_gis.objects import StreetObjects
+from semsig_gis.signatures import SignatureSpec
+
+if TYPE_CHECKING:
+    from semsig_gis.database import SignatureDatabase
+
+TAXONOMY = load_catalog("montpellier").taxonomy
+CORNER = np.array([765_200.0, 6_275_000.0])
+CODES = [item.code for item in TAXONOMY.classes]
+ARRAYS = ("columns", "rows", "offsets", "codes", "bearing_units", "distance_units")
+
+
+@dataclass(frozen=True)
+class World:
+    """Objects as (x, y, class code), and how to look at them."""
+
+    objects: tuple[tuple[float, float, int], ...]
+    step: float = 10.0
+    origin: tuple[float, float] = (0.0, 0.0)
+    radius: float = 30.0
+    levels: int = 16
+
+    @property
+    def street_objects(self) -> StreetObjects:
+        x, y, codes = (np.array(part) for part in zip(*self.objects, strict=True))
+        size = len(self.objects)
+        table = gpd.GeoDataFrame(
+            {
+                "class_code": codes.astype(np.uint8),
+                "source": ["world"] * size,
+                "source_id": [str(row) for row in range(size)],
+                "count": np.ones(size, np.int32),
+            },
+            geometry=shapely.points(x.astype(float), y.astype(float)),
+            crs="EPSG:2154",
+        )
+        return StreetObjects(table, TAXONOMY, ("World (CC0): world",))
+
+    @property
+    def database(self) -> SignatureDatabase:
+        return build_database(
+            self.street_objects,
+            grid=GridSpec(self.step, self.origin),
+            spec=SignatureSpec(self.radius, self.levels),
+        )
+
+
+def brute_force(world: World) -> dict[tuple[int, int], list[tuple[float, float, int]]]:
+    """Return (bearing, distance, class code) of what every cell sees, one pair at a time."""
+    cells: dict[tuple[int, int], list[tuple[float, float, int]]] = {}
+    reach = int(world.radius / world.step) + 2
+    for x, y, code in world.objects:
+        middle = (
+            math.floor((x - world.origin[0]) / world.step),
+            math.floor((y - world.origin[1]) / world.step),
+        )
+        for column in range(middle[0] - reach, middle[0] + reach + 1):
+            for row in range(middle[1] - reach, middle[1] + reach + 1):
+                dx = x - (world.origin[0] + (column + 0.5) * world.step)
+                dy = y - (world.origin[1] + (row + 0.5) * world.step)
+                distance = math.hypot(dx, dy)
+                if distance <= world.radius:
+                    bearing = round(math.degrees(math.atan2(dx, dy)) % 360.0, 9) % 360.0
+                    cells.setdefault((column, row), []).append((bearing, distance, code))
+    return {cell: sorted(cells[cell]) for cell in sorted(cells)}
+
+
+def check_against_brute_force(world: World) -> None:
+    expected = brute_force(world)
+    if not expected:
+        with pytest.raises(EmptyResultError) as caught:
+            world.database  # noqa: B018
+        assert_sentence(caught.value, f"{len(world.objects)} objects", "range", "larger")
+        return
+    database = world.database
+    cells = list(zip(database.columns.tolist(), database.rows.tolist(), strict=True))
+    assert cells == list(expected)
+    assert database.lengths.tolist() == [len(seen) for seen in expected.values()]
+    entries = [entry for seen in expected.values() for entry in seen]
+    assert database.codes.tolist() == [code for _, _, code in entries]
+    units = [math.floor(bearing * 20) for bearing, _, _ in entries]
+    assert database.bearing_units.tolist() == units
+    scale = DISTANCE_UNITS / world.radius
+    assert database.distance_units.tolist() == [round(d * scale) for _, d, _ in entries]
+    if BEARING_UNITS % world.levels == 0:
+        levels = [math.floor(bearing / (360 / world.levels)) for bearing, _, _ in entries]
+    else:  # an edge may lie between two units, of which the lower is stored
+        levels = [unit * world.levels // BEARING_UNITS for unit in units]
+    assert database.levels.tolist() == levels
+    ends = database.offsets.tolist()
+    for seen, kind, sizes in (
+        (database.codes, database.type_sequences, database.type_group_sizes),
+        (database.levels, database.angle_sequences, database.angle_group_sizes),
+    ):
+        rows = [tuple(seen[a:b].tolist()) for a, b in pairwise(ends)]
+        groups = Counter(rows)
+        assert sizes.tolist() == [groups[row] for row in rows]
+        assert len(kind) == len(groups)
+        assert [tuple(kind[i].tolist()) for i in kind.inverse] == rows
+
+
+def assert_same(one: SignatureDatabase, other: SignatureDatabase) -> None:
+    for name in ARRAYS:
+        assert getattr(one, name).tolist() == getattr(other, name).tolist(), name
+        assert getattr(one, name).dtype == getattr(other, name).dtype, name
+    for name in ("grid", "spec", "taxonomy", "crs", "licenses", "version"):
+        assert getattr(one, name) == getattr(other, name), name
+
+
+# Quarters of a metre: sums of their squares are exact, so a circle has an exact edge.
+QUARTERS = st.integers(-160, 160).map(lambda number: number / 4)
+LEVELS = st.sampled_from([8, 16, 24, 32, 7])
+
+
+@st.composite
+def worlds(draw: st.DrawFn) -> World:
+    places = st.tuples(QUARTERS, QUARTERS, st.sampled_from(CODES))
+    corner = draw(st.sampled_from([(0.0, 0.0), (765_200.0, 6_275_000.0), (-3e6, -1e6)]))
+    return World(
+        objects=tuple(
+            (x + corner[0], y + corner[1], code)
+            for x, y, code in draw(st.lists(places, min_size=1, max_size=12))
+        ),
+        step=draw(st.sampled_from([5.0, 10.0, 12.5, 40.0])),
+        origin=draw(st.tuples(QUARTERS, QUARTERS)),
+        radius=draw(st.sampled_from([0.25, 5.0, 12.5, 30.0])),
+        levels=draw(LEVELS),
+    )
+
+
+def random_town() -> World:
+    """Return some hundred objects in a square."""
+    rng = np.random.default_rng(7)
+    places = rng.uniform(0, 200, (60, 2)) + CORNER
+    return World(tuple((x, y, int(rng.choice(CODES))) for x, y in places.tolist()))
+
+
+def surroundings(*shapes: shapely.Geometry, **columns: list[float]) -> gpd.GeoDataFrame:
+    # In degrees, so that they have to be moved.
+    return gpd.GeoDataFrame(columns, geometry=list(shapes), crs="EPSG:2154").to_crs("EPSG:4326")
+
+
+def lamps() -> StreetObjects:
+    rng = np.random.default_rng(5)
+    places = rng.uniform(0, 100, (60, 2)) + CORNER
+    return World(tuple((x, y, CODES[0]) for x, y in places)).street_objects
