@@ -13,7 +13,9 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 import pyarrow as pa
+import pyarrow.compute as pc
 
+from semsig_gis.bit_planes import BitPlanes
 from semsig_gis.errors import InputError
 
 if TYPE_CHECKING:
@@ -30,7 +32,9 @@ _UINT16_MAX = 65_535
 
 @dataclass(frozen=True, eq=False)
 class SequenceTable:
-    """The distinct sequences of a list of sequences, in order of first appearance.
+    """The distinct sequences of a list of sequences, short ones first.
+
+    Sequences of one length stand in order of first appearance.
 
     Parameters
     ----------
@@ -54,9 +58,9 @@ class SequenceTable:
     ...     np.array([3, 3, 1, 3, 3], np.uint8), np.array([0, 2, 3, 5])
     ... )
     >>> len(table), table.inverse.tolist(), table.counts.tolist()
-    (2, [0, 1, 0], [2, 1])
+    (2, [1, 0, 1], [1, 2])
     >>> table[0].tolist(), table[1].tolist()
-    ([3, 3], [1])
+    ([1], [3, 3])
     """
 
     values: NDArray[np.uint8]
@@ -91,7 +95,10 @@ class SequenceTable:
         )
         encoded = rows.dictionary_encode()
         distinct = len(encoded.dictionary)
-        _, offset_buffer, value_buffer = encoded.dictionary.buffers()
+        order = np.argsort(pc.binary_length(encoded.dictionary).to_numpy(), kind="stable")
+        rank = np.empty(distinct, np.int64)
+        rank[order] = np.arange(distinct)
+        _, offset_buffer, value_buffer = encoded.dictionary.take(order).buffers()
         # An Arrow array without values may come without buffers.
         distinct_offsets = (
             np.frombuffer(offset_buffer, np.int64)[: distinct + 1].copy()
@@ -103,7 +110,7 @@ class SequenceTable:
             np.frombuffer(value_buffer, np.uint8)[:size].copy() if size else np.empty(0, np.uint8)
         )
         # int64: NumPy gathers with a native index without converting it at every query.
-        inverse = encoded.indices.to_numpy().astype(np.int64)
+        inverse = rank[encoded.indices.to_numpy()]
         counts = np.bincount(inverse, minlength=distinct).astype(np.int64, copy=False)
         for array in (distinct_values, distinct_offsets, inverse, counts):
             array.setflags(write=False)
@@ -117,6 +124,37 @@ class SequenceTable:
         """Return one distinct sequence."""
         return self.values[self.offsets[index] : self.offsets[index + 1]]
 
+    def rows(self, wanted: NDArray[np.int64]) -> NDArray[np.int64]:
+        """Return the rows that hold some of the distinct sequences.
+
+        Parameters
+        ----------
+        wanted : ndarray of int64
+            Distinct sequences.
+
+        Returns
+        -------
+        ndarray of int64
+            The rows of the first of them in their order, then those of the second, and so on.
+
+        Examples
+        --------
+        >>> import numpy as np
+        >>> table = SequenceTable.from_csr(np.array([3, 1, 3], np.uint8), np.arange(4))
+        >>> table.rows(np.array([1, 0])).tolist()
+        [1, 0, 2]
+        """
+        counts = self.counts[wanted]
+        ends = np.cumsum(counts)
+        starts = np.cumsum(self.counts)[wanted] - counts
+        total = int(ends[-1]) if len(ends) else 0
+        return self._grouped_rows[np.repeat(starts - ends + counts, counts) + np.arange(total)]
+
+    @cached_property
+    def _grouped_rows(self) -> NDArray[np.int64]:
+        """All rows, those of one distinct sequence together."""
+        return np.argsort(self.inverse, kind="stable")
+
     @cached_property
     def lengths(self) -> NDArray[np.int64]:
         """Length of each distinct sequence, shape (d,)."""
@@ -128,6 +166,11 @@ class SequenceTable:
         text = self.values.tobytes().decode("latin-1")
         bounds = self.offsets.tolist()
         return [text[low:high] for low, high in pairwise(bounds)]
+
+    @cached_property
+    def planes(self) -> BitPlanes:
+        """The sequences in the form that edit distances are measured fastest in."""
+        return BitPlanes.build(self.values, self.offsets)
 
     @cached_property
     def histogram(self) -> NDArray[np.uint16 | np.uint32]:

@@ -60,12 +60,12 @@ def distances(
     --------
     >>> import numpy as np
     >>> from semsig_gis.sequences import SequenceTable
-    >>> table = SequenceTable.from_csr(np.array([1, 1, 2, 3], np.uint8), np.array([0, 3, 4]))
+    >>> table = SequenceTable.from_csr(np.array([3, 1, 1, 2], np.uint8), np.array([0, 1, 4]))
     >>> query = np.array([2, 1], np.uint8)
     >>> distances([query], table).tolist()
-    [[0.25, 1.0]]
+    [[1.0, 0.25]]
     >>> distances([query], table, normalized=False).tolist()
-    [[-1.5, 0.0]]
+    [[0.0, -1.5]]
     """
     histogram = table.histogram if only is None else table.histogram[only]
     result = np.empty((len(queries), len(histogram)), np.float32)

@@ -57,9 +57,9 @@ def distances(
     --------
     >>> import numpy as np
     >>> from semsig_gis.sequences import SequenceTable
-    >>> table = SequenceTable.from_csr(np.array([1, 1, 2, 3], np.uint8), np.array([0, 3, 4]))
+    >>> table = SequenceTable.from_csr(np.array([3, 1, 1, 2], np.uint8), np.array([0, 1, 4]))
     >>> distances([np.array([2, 1], np.uint8), np.array([2], np.uint8)], table).tolist()
-    [[0.0, 1.0], [0.5, 1.0]]
+    [[1.0, 0.0], [1.0, 0.5]]
     """
     del normalized
     rows = len(table) if only is None else len(only)

@@ -1,6 +1,8 @@
 from __future__ import annotations
 
+import itertools
 import math
+from functools import partial
 
 import numpy as np
 import pytest
@@ -92,6 +94,56 @@ def test_insert_is_what_the_query_missed_and_delete_what_it_saw_falsely() -> Non
 def test_long_sequences_and_heavy_weights_keep_their_cost() -> None:
     weights = EditWeights(insert=100, delete=100, substitute=100)
     assert distance([1] * 300, [2] * 300, normalized=False, weights=weights) == 30_000
+
+
+@pytest.fixture
+def table() -> SequenceTable:
+    rng = np.random.default_rng(4)
+    lengths = rng.integers(0, 60, 500)
+    flat = rng.integers(0, 5, lengths.sum()).astype(np.uint8)
+    return SequenceTable.from_csr(flat, np.cumsum([0, *lengths]))
+
+
+@pytest.mark.parametrize("normalized", [True, False])
+def test_the_kernel_and_rapidfuzz_agree(
+    *, monkeypatch: pytest.MonkeyPatch, table: SequenceTable, normalized: bool
+) -> None:
+    queries = [table[place] for place in range(0, len(table), 50)]
+    some, few = np.arange(0, len(table), 3), np.array([len(table) - 1, 3])
+    measure = partial(edit.distances, queries, table, normalized=normalized)
+    expected = measure()
+    assert "planes" not in table.__dict__
+    np.testing.assert_array_equal(measure(threads=2), expected)
+    monkeypatch.setattr(edit, "_LOADING", 0)
+    np.testing.assert_array_equal(measure(only=few), expected[:, few])
+    assert "planes" not in table.__dict__
+    np.testing.assert_array_equal(measure(), expected)
+    assert "planes" in table.__dict__
+    np.testing.assert_array_equal(measure(threads=2), expected)
+    np.testing.assert_array_equal(measure(only=some), expected[:, some])
+
+
+def test_a_large_table_gets_the_kernel_when_it_is_asked_again(
+    monkeypatch: pytest.MonkeyPatch, table: SequenceTable
+) -> None:
+    monkeypatch.setattr(edit, "_LARGE", len(table.values))
+    first = edit.distances([table[3]], table)
+    assert "planes" not in table.__dict__
+    np.testing.assert_array_equal(edit.distances([table[3]], table), first)
+    assert "planes" in table.__dict__
+
+
+@given(st.lists(st.integers(0, 3), max_size=4), ONE)
+def test_a_wildcard_is_the_best_of_all_values(query: list[int], row: list[int]) -> None:
+    table = SequenceTable.from_csr(np.array(row, np.uint8), np.array([0, len(row)]))
+    found = edit.distances([np.array(query, np.uint8)], table, normalized=False, wildcard=0)
+    meant = itertools.product(*([0, 1, 2, 3] if value == 0 else [value] for value in query))
+    assert found.tolist() == [[min(slow_cost([*one], row, EditWeights()) for one in meant)]]
+
+
+def test_a_wildcard_has_no_weights(table: SequenceTable) -> None:
+    with pytest.raises(InputError, match="wildcard was given with edit weights 2/1/1"):
+        edit.distances([table[0]], table, wildcard=0, weights=EditWeights(insert=2))
 
 
 @pytest.mark.parametrize("weight", [0, -1, 101, 1.5, True, "1", None])
