@@ -20,6 +20,7 @@ from semsig_gis import __version__
 from semsig_gis.cli import _demo  # noqa: F401
 from semsig_gis.cli import _sources  # noqa: F401
 from semsig_gis.cli import _load  # noqa: F401
+from semsig_gis.cli import _synthesize  # noqa: F401
 from semsig_gis.cli import _build  # noqa: F401
 from semsig_gis.cli import _localize  # noqa: F401
 from semsig_gis.cli import _evaluate  # noqa: F401

@@ -12,7 +12,7 @@ from semsig_gis.errors import InputError
 
 if TYPE_CHECKING:
     from semsig_gis.evaluation import Evaluation
-    from semsig_gis.report import Table
+    from semsig_gis.tables import Table
 
 
 app = typer.Typer(
@@ -55,7 +55,7 @@ def tell_if_online(offline: bool) -> None:  # noqa: FBT001
 
 
 def print_evaluation(evaluation: Evaluation) -> None:
-    from semsig_gis.report import evaluation_tables
+    from semsig_gis.evaluation_report import evaluation_tables
 
     for table in evaluation_tables(evaluation):
         print_table(table)

@@ -77,8 +77,8 @@ def load(
     as_json: AsJson = False,
 ) -> None:
     """Read local files into one table of street objects."""
-    from semsig_gis.catalog import load_catalog
-    from semsig_gis.loading import assemble, choose_layers, combine_catalogs, read_files
+    from semsig_gis.catalog import combine_catalogs, load_catalog
+    from semsig_gis.loading import assemble, choose_layers, read_files
 
     chosen = combine_catalogs([load_catalog(name) for name in catalog])
     specs = choose_layers(chosen, layer or (), surroundings=bool(buildings or streets))
@@ -116,7 +116,8 @@ def fetch(
 ) -> None:
     """Download an area from the service of a catalogue into one table of street objects."""
     from semsig_gis.catalog import load_catalog
-    from semsig_gis.loading import assemble, choose_layers, fetch_layers, find_area, open_cache
+    from semsig_gis.fetching import fetch_layers, find_area, open_cache
+    from semsig_gis.loading import assemble, choose_layers
 
     chosen = load_catalog(catalog)
     specs = choose_layers(chosen, layer or (), surroundings=bool(buildings or streets))
@@ -143,14 +144,13 @@ def _save_loaded(
 ) -> None:
     from semsig_gis.objects import save_objects
     from semsig_gis.quality import quality_report
-    from semsig_gis.storage import whole_file
+    from semsig_gis.surroundings import save_surroundings
 
     report = quality_report(loaded.objects, loaded.report, loaded.conflation)
     save_objects(loaded.objects, out)
     for table, path in ((loaded.buildings, buildings), (loaded.streets, streets)):
         if table is not None and path is not None:
-            with whole_file(path) as partial:
-                table.to_parquet(partial)
+            save_surroundings(table, path)
     for note in loaded.notes:
         remark(note)
     if as_json:

@@ -29,10 +29,11 @@ def localize(
     """Rank the cells of a database for one query."""
     from semsig_gis import matching
     from semsig_gis.database_file import open_database
+    from semsig_gis.dataset import open_dataset
     from semsig_gis.signatures import Signature
 
     chosen = matching.Method.parse(method)
-    opened = open_database(database)
+    opened = open_dataset(database) if database.is_dir() else open_database(database)
     angles = None if bearings is None else numbers(bearings, "--bearings")
     query = Signature.parse(types, angles, taxonomy=opened.taxonomy)
     localization = matching.localize(opened, query, method=chosen, top=top)
@@ -40,7 +41,8 @@ def localize(
         from semsig_gis.maps import localization_map, save_map
 
         with progress("drawing the map"):
-            tell_if_online(save_map(localization_map(localization, opened), map_))
+            drawn = localization_map(localization, open_database(database))
+            tell_if_online(save_map(drawn, map_))
     result = localization.to_dict()
     if as_json:
         print_json(result)

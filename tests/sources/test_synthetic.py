@@ -13,8 +13,8 @@ import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from semsig_gis.building import build_database
 from semsig_gis.catalog import paper_taxonomy
-from semsig_gis.database import build_database
 from semsig_gis.errors import InputError
 from semsig_gis.objects import build_objects
 from semsig_gis.occlusion import Footprints
