@@ -1,4 +1,4 @@
-"""Building and saving a signature database, beside the bare search for the pairs behind it."""
+"""Building, saving and opening a signature database, beside the bare parts of that work."""
 
 from __future__ import annotations
 
@@ -6,27 +6,40 @@ import tempfile
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+import numpy as np
+import pyarrow.parquet as pq
 from scipy.spatial import cKDTree
 
-from benchmarks.comparison import compare
+from benchmarks.comparison import Comparison, compare
 from semsig_gis.building import build_database
 from semsig_gis.catalog import paper_taxonomy
-from semsig_gis.database_file import save_database
+from semsig_gis.database_file import open_database, save_database
 from semsig_gis.objects import build_objects
-from semsig_gis.sources.synthetic import CitySpec, synthetic_city
+from semsig_gis.sources.synthetic import (
+    PARIS_LIKE,
+    CitySpec,
+    synthetic_city,
+    synthetic_surroundings,
+)
+from semsig_gis.viewpoints import ViewpointSpec
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from benchmarks.comparison import Comparison
+    from semsig_gis.database import SignatureDatabase
+    from semsig_gis.objects import StreetObjects
 
 __all__ = ["comparisons"]
 
-_SIDES = {"full": 11_200.0, "small": 300.0}  # metres of the procedural city: 200,000 objects
+# 200,000 objects to build from; about 312,134 signatures of mean length 14 to store.
+_BUILT = {"full": CitySpec(size=8_200.0), "small": CitySpec(size=300.0)}
+_STORED = {"full": PARIS_LIKE, "small": CitySpec(size=300.0)}
+_MOST_MB, _MOST_MS = 15.0, 300.0
+_REPEATS = {"full": 5, "small": 1}
 
 
 def comparisons(size: str) -> Iterator[Comparison]:
-    """Measure one city.
+    """Measure two cities.
 
     Parameters
     ----------
@@ -36,26 +49,72 @@ def comparisons(size: str) -> Iterator[Comparison]:
     Yields
     ------
     Comparison
-        The result.
+        The next result.
     """
-    layers = synthetic_city(CitySpec(size=_SIDES[size]))
-    objects, _ = build_objects(layers, taxonomy=paper_taxonomy(), crs="EPSG:32631")
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "city.parquet"
+        yield _building(_objects(_BUILT[size]), path, repeats=_REPEATS[size])
+        city = _STORED[size]
+        _, streets = synthetic_surroundings(city)
+        database = build_database(
+            _objects(city), viewpoints=ViewpointSpec(mode="streets"), streets=streets.table
+        )
+        save_database(database, path)
+        yield from _storing(database, path, repeats=_REPEATS[size])
+
+
+def _objects(city: CitySpec) -> StreetObjects:
+    layers = synthetic_city(city)
+    return build_objects(layers, taxonomy=paper_taxonomy(), crs="EPSG:32631")[0]
+
+
+def _building(objects: StreetObjects, path: Path, *, repeats: int) -> Comparison:
+    """Compare building and saving with the search for the pairs behind it."""
     viewpoints, points = build_database(objects).xy, objects.xy
 
-    with tempfile.TemporaryDirectory() as folder:
+    def ours(_: int) -> None:
+        save_database(build_database(objects), path)
 
-        def ours(_: int) -> None:
-            save_database(build_database(objects), Path(folder) / "city.parquet")
+    def peer(_: int) -> None:
+        near = cKDTree(viewpoints)
+        near.sparse_distance_matrix(cKDTree(points), 30.0, output_type="ndarray")
 
-        def peer(_: int) -> None:
-            near = cKDTree(viewpoints)
-            near.sparse_distance_matrix(cKDTree(points), 30.0, output_type="ndarray")
+    return compare(
+        f"building and saving a database from {len(objects):,} objects",
+        ours,
+        peer,
+        peer_name="scipy.spatial.cKDTree, the pairs alone",
+        repeats=repeats,
+        bar=1 / 3,
+    )
 
-        yield compare(
-            f"building and saving a database from {len(objects):,} objects",
-            ours,
-            peer,
-            peer_name="scipy.spatial.cKDTree, the pairs alone",
-            repeats=1,
-            bar=1 / 3,
-        )
+
+def _storing(database: SignatureDatabase, path: Path, *, repeats: int) -> Iterator[Comparison]:
+    """Compare a file with the same numbers kept plainly."""
+    mean = database.offsets[-1] / len(database)
+    what = f"{len(database):,} signatures of mean length {mean:.1f}"
+    plain = path.with_suffix(".npz")
+    np.savez_compressed(
+        plain,
+        cells=database.cell_ids,
+        lengths=database.lengths.astype(np.int32),
+        codes=database.codes,
+        bearings=database.bearing_units,
+        distances=database.distance_units,
+    )
+    yield Comparison(
+        name=f"file of {what}",
+        unit="MB",
+        ours=path.stat().st_size / 1e6,
+        peer=plain.stat().st_size / 1e6,
+        peer_name="numpy.savez_compressed of the same arrays",
+        bar=None,
+    ).at_most(_MOST_MB)
+    columns = ["cell_id", "types", "bearings", "distances"]
+    yield compare(
+        f"opening the file of {what}",
+        lambda _: open_database(path),
+        lambda _: pq.read_table(path, columns=columns),
+        peer_name="pyarrow.parquet.read_table, the columns unchecked",
+        repeats=repeats,
+    ).at_most(_MOST_MS)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import statistics
 import time
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
@@ -47,6 +47,21 @@ class Comparison:
     def met(self) -> bool | None:
         """Whether the ratio reaches the bar; None without a bar."""
         return None if self.bar is None else self.ratio >= self.bar
+
+    def at_most(self, limit: float) -> Comparison:
+        """Return the line with a bar on ours alone.
+
+        Parameters
+        ----------
+        limit : float
+            What ours may be at most, whatever the peer is.
+
+        Returns
+        -------
+        Comparison
+            The line; its bar is the ratio that the peer has to the limit.
+        """
+        return replace(self, bar=self.peer / limit)
 
     def to_dict(self) -> dict[str, Any]:
         """Return the line as plain values."""

@@ -17,36 +17,42 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from semsig_gis.building import build_database
-    from semsig_gis.catalog import Catalog, load_catalog, paper_taxonomy
+    from semsig_gis.catalog import Catalog, combine_catalogs, load_catalog, paper_taxonomy
     from semsig_gis.conflation import conflate
     from semsig_gis.database import SignatureDatabase
     from semsig_gis.database_file import open_database, save_database
+    from semsig_gis.dataset import PartitionedDatabase, open_dataset
     from semsig_gis.distortion import Distortion
+    from semsig_gis.distributed import build_tiles
     from semsig_gis.errors import SemsigError
     from semsig_gis.evaluation import Evaluation, evaluate
     from semsig_gis.export import export_geopackage
+    from semsig_gis.fetching import fetch_layers, find_area, open_cache
     from semsig_gis.grid import GridSpec
     from semsig_gis.layer_spec import LayerSpec
-    from semsig_gis.loading import (
-        Loaded,
-        assemble,
-        choose_layers,
-        combine_catalogs,
-        fetch_layers,
-        find_area,
-        open_cache,
-        read_files,
-    )
+    from semsig_gis.loading import Loaded, assemble, choose_layers, read_files
     from semsig_gis.maps import evaluation_map, localization_map, save_map
     from semsig_gis.matching import Localization, Method, localize
     from semsig_gis.objects import StreetObjects, build_objects, open_objects, save_objects
+    from semsig_gis.occlusion import Footprints
+    from semsig_gis.properties import database_summary
     from semsig_gis.quality import quality_report
     from semsig_gis.signatures import Signature, SignatureSpec
     from semsig_gis.sources import RawLayer, find_files
-    from semsig_gis.sources.synthetic import CitySpec, synthetic_city
+    from semsig_gis.sources.synthetic import (
+        PARIS_LIKE,
+        CitySpec,
+        synthetic_city,
+        synthetic_surroundings,
+    )
     from semsig_gis.sources.vector_file import read_layer
+    from semsig_gis.store import ObjectStore, open_store, save_with_store
     from semsig_gis.suggest import suggest_catalog
+    from semsig_gis.surroundings import read_surroundings, save_surroundings
     from semsig_gis.taxonomy import ObjectClass, Taxonomy
+    from semsig_gis.tiles import TileSpec
+    from semsig_gis.update import update_database, update_file
+    from semsig_gis.viewpoints import ViewpointSpec
 
 __version__ = "0.1.0"
 
@@ -57,12 +63,16 @@ _HOMES = {
     "CitySpec": "sources.synthetic",
     "Distortion": "distortion",
     "Evaluation": "evaluation",
+    "Footprints": "occlusion",
     "GridSpec": "grid",
     "LayerSpec": "layer_spec",
     "Loaded": "loading",
     "Localization": "matching",
     "Method": "matching",
     "ObjectClass": "taxonomy",
+    "ObjectStore": "store",
+    "PARIS_LIKE": "sources.synthetic",
+    "PartitionedDatabase": "dataset",
     "RawLayer": "sources",
     "SemsigError": "errors",
     "Signature": "signatures",
@@ -70,46 +80,62 @@ _HOMES = {
     "SignatureSpec": "signatures",
     "StreetObjects": "objects",
     "Taxonomy": "taxonomy",
+    "TileSpec": "tiles",
+    "ViewpointSpec": "viewpoints",
     "assemble": "loading",
     "build_database": "building",
     "build_objects": "objects",
+    "build_tiles": "distributed",
     "choose_layers": "loading",
-    "combine_catalogs": "loading",
+    "combine_catalogs": "catalog",
     "conflate": "conflation",
+    "database_summary": "properties",
     "evaluate": "evaluation",
     "evaluation_map": "maps",
     "export_geopackage": "export",
-    "fetch_layers": "loading",
-    "find_area": "loading",
+    "fetch_layers": "fetching",
+    "find_area": "fetching",
     "find_files": "sources",
     "load_catalog": "catalog",
     "localization_map": "maps",
     "localize": "matching",
-    "open_cache": "loading",
+    "open_cache": "fetching",
     "open_database": "database_file",
+    "open_dataset": "dataset",
     "open_objects": "objects",
+    "open_store": "store",
     "paper_taxonomy": "catalog",
     "quality_report": "quality",
     "read_files": "loading",
     "read_layer": "sources.vector_file",
+    "read_surroundings": "surroundings",
     "save_database": "database_file",
     "save_map": "maps",
     "save_objects": "objects",
+    "save_surroundings": "surroundings",
+    "save_with_store": "store",
     "suggest_catalog": "suggest",
     "synthetic_city": "sources.synthetic",
+    "synthetic_surroundings": "sources.synthetic",
+    "update_database": "update",
+    "update_file": "update",
 }
 
 __all__ = [
+    "PARIS_LIKE",
     "Catalog",
     "CitySpec",
     "Distortion",
     "Evaluation",
+    "Footprints",
     "GridSpec",
     "LayerSpec",
     "Loaded",
     "Localization",
     "Method",
     "ObjectClass",
+    "ObjectStore",
+    "PartitionedDatabase",
     "RawLayer",
     "SemsigError",
     "Signature",
@@ -117,13 +143,17 @@ __all__ = [
     "SignatureSpec",
     "StreetObjects",
     "Taxonomy",
+    "TileSpec",
+    "ViewpointSpec",
     "__version__",
     "assemble",
     "build_database",
     "build_objects",
+    "build_tiles",
     "choose_layers",
     "combine_catalogs",
     "conflate",
+    "database_summary",
     "evaluate",
     "evaluation_map",
     "export_geopackage",
@@ -135,16 +165,24 @@ __all__ = [
     "localize",
     "open_cache",
     "open_database",
+    "open_dataset",
     "open_objects",
+    "open_store",
     "paper_taxonomy",
     "quality_report",
     "read_files",
     "read_layer",
+    "read_surroundings",
     "save_database",
     "save_map",
     "save_objects",
+    "save_surroundings",
+    "save_with_store",
     "suggest_catalog",
     "synthetic_city",
+    "synthetic_surroundings",
+    "update_database",
+    "update_file",
 ]
 
 

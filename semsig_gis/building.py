@@ -16,19 +16,19 @@ from semsig_gis.viewpoints import ViewpointSpec, choose_viewpoints
 from semsig_gis.visibility import visible_objects
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
+    from collections.abc import Callable
 
     import geopandas as gpd
     from numpy.typing import NDArray
     from pyproj import CRS
 
     from semsig_gis.objects import StreetObjects
+    from semsig_gis.visibility import Sightings
 
     _Block = tuple[NDArray[np.int64], NDArray[np.uint8], NDArray[np.uint16], NDArray[np.uint8]]
 
 __all__ = ["build_cells", "build_database"]
 
-CELLS_A_BLOCK = 1 << 16
 # Lengths, codes, bearings and distances of no cell.
 _NOTHING: _Block = (
     np.empty(0, np.int64),
@@ -174,7 +174,7 @@ def build_cells(
     >>> from semsig_gis.objects import build_objects
     >>> layers = synthetic_city(CitySpec(size=300.0))
     >>> objects, _ = build_objects(layers, taxonomy=paper_taxonomy(), crs="EPSG:32631")
-    >>> cell = np.array([50_000]), np.array([540_000])
+    >>> cell = GridSpec().cells_at(objects.xy[:1])
     >>> len(build_cells(objects, *cell, grid=GridSpec(), spec=SignatureSpec()))
     1
     """
@@ -190,26 +190,26 @@ def build_cells(
         widths=None if streets is None else streets.get("half_width"),
     )
     columns, rows = columns[chosen], rows[chosen]
-    index = PackedIndex(objects.xy)
-    ranges = objects.taxonomy.ranges(spec.radius)
-    blocks = [
-        _block(
-            objects,
-            index,
-            grid.viewpoints(columns[part], rows[part]),
-            ranges=ranges,
-            footprints=buildings,
-        )
-        for part in _parts(len(columns), progress)
-    ]
+    by_class = objects.taxonomy.ranges(spec.radius)
+    index = PackedIndex(objects.xy, objects.table.geometry.to_numpy())
+    ranges = by_class[objects.codes]
+    blocks = []
+    for cells, seen in visible_objects(
+        columns, rows, objects.xy, grid=grid, index=index, ranges=ranges
+    ):
+        centres = grid.viewpoints(columns[cells], rows[cells])
+        block = _block(objects, centres, seen, reach=by_class.max(), footprints=buildings)
+        blocks.append(block)
+        if progress is not None:
+            progress(cells.stop, len(columns))
     lengths, codes, bearing_units, distance_units = (
         np.concatenate(parts) for parts in zip(_NOTHING, *blocks, strict=True)
     )
-    seen = lengths > 0
+    some = lengths > 0
     return SignatureDatabase(
-        columns=columns[seen].astype(np.int32),
-        rows=rows[seen].astype(np.int32),
-        offsets=np.concatenate([[0], np.cumsum(lengths[seen])]),
+        columns=columns[some].astype(np.int32),
+        rows=rows[some].astype(np.int32),
+        offsets=np.concatenate([[0], np.cumsum(lengths[some])]),
         codes=codes,
         bearing_units=bearing_units,
         distance_units=distance_units,
@@ -232,36 +232,24 @@ def _moved(table: gpd.GeoDataFrame, crs: CRS) -> NDArray[np.object_]:
     return moved
 
 
-def _parts(cells: int, progress: Callable[[int, int], None] | None) -> Iterator[slice]:
-    """Yield the blocks that so many cells are worked through in, and report each when done."""
-    for start in range(0, cells, CELLS_A_BLOCK):
-        stop = min(start + CELLS_A_BLOCK, cells)
-        yield slice(start, stop)
-        if progress is not None:
-            progress(stop, cells)
-
-
 def _block(
     objects: StreetObjects,
-    index: PackedIndex,
-    viewpoints: NDArray[np.float64],
+    centres: NDArray[np.float64],
+    seen: Sightings,
     *,
-    ranges: NDArray[np.float64],
+    reach: float,
     footprints: Footprints | None,
 ) -> _Block:
-    """Return lengths, codes, bearings and distances of some cells."""
-    reach = float(ranges.max())
-    seen = visible_objects(viewpoints, objects.xy, index=index, radius=reach)
-    if (ranges < reach).any():
-        seen = seen.only(seen.distance <= ranges[objects.codes[seen.object]])
+    """Return lengths, codes, bearings and distances of cells with these centres."""
     if footprints is not None:
-        ends = viewpoints[seen.viewpoint], objects.xy[seen.object]
+        seen = seen.only(np.argsort(seen.viewpoint))  # as `hidden` is fastest
+        ends = centres[seen.viewpoint], objects.xy[seen.object]
         seen = seen.only(~hidden(*ends, footprints=footprints))
+    units = np.floor(seen.bearing * (BEARING_UNITS / 360.0))
     order = clockwise_order(seen, objects.codes)
-    units = np.floor(seen.bearing[order] * (BEARING_UNITS / 360.0))
     return (
-        np.bincount(seen.viewpoint, minlength=len(viewpoints)),
-        objects.codes[seen.object[order]],
-        np.minimum(units, BEARING_UNITS - 1).astype(np.uint16),
-        np.rint(seen.distance[order] * (DISTANCE_UNITS / reach)).astype(np.uint8),
+        np.bincount(seen.viewpoint, minlength=len(centres)),
+        objects.codes[seen.object][order],
+        np.minimum(units, BEARING_UNITS - 1).astype(np.uint16)[order],
+        np.rint(seen.distance * (DISTANCE_UNITS / reach)).astype(np.uint8)[order],
     )

@@ -2,37 +2,29 @@
 
 from __future__ import annotations
 
+import dataclasses
 import importlib.resources
-import tomllib
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, get_args
+from typing import TYPE_CHECKING, Any
 
-from pyproj import CRS
-from pyproj.exceptions import CRSError
-
-from semsig_gis.errors import CatalogError, CrsError, UnknownNameError, nearest_name
-from semsig_gis.layer_spec import (
-    ClassBy,
-    ElementKind,
-    GeometryKind,
-    LayerSpec,
-    Role,
-    Value,
-)
+from semsig_gis.errors import CatalogError, CrsError, InputError, UnknownNameError, nearest_name
+from semsig_gis.layer_stanza import layer_of, require_class
 from semsig_gis.plugins import installed_catalogs
 from semsig_gis.schema import require_metric_crs
-from semsig_gis.taxonomy import ObjectClass, Taxonomy
+from semsig_gis.taxonomy import MAX_RANGE_M, ObjectClass, Taxonomy
+from semsig_gis.toml_checks import check_keys, metres, parse_toml, texts
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Mapping
+    from collections.abc import Sequence
     from importlib.resources.abc import Traversable
+
+    from semsig_gis.layer_spec import LayerSpec
 
 __all__ = [
     "Catalog",
-    "ClassBy",
-    "LayerSpec",
     "catalog_names",
+    "combine_catalogs",
     "data_folder",
     "load_catalog",
     "paper_taxonomy",
@@ -53,37 +45,12 @@ CATALOG_KEYS = {
     "geocoder": str,
     "files": list,
     "conflate": dict,
+    "ranges": dict,
     "classes": list,
     "layers": list,
 }
 CLASS_KEYS = {"code": int, "symbol": str, "name": str, "title": str}
-LAYER_KEYS = {
-    "name": str,
-    "class": str,
-    "files": list,
-    "layer": str,
-    "where": dict,
-    "class_by": dict,
-    "aliases": dict,
-    "id_field": str,
-    "unique_id": bool,
-    "dataset": str,
-    "server_where": str,
-    "select": list,
-    "tags": list,
-    "elements": list,
-    "role": str,
-    "optional": bool,
-    "note": str,
-    "geometry": str,
-    "crs": str,
-    "rows": list,
-    "x_field": str,
-    "y_field": str,
-    "license": str,
-    "attribution": str,
-}
-CLASS_BY_KEYS = {"field": str, "values": dict}
+MAX_MERGING_M = 100.0
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -178,8 +145,8 @@ def paper_taxonomy() -> Taxonomy:
     'BCDEGHIJKLM'
     """
     source = data_folder() / "taxonomy.toml"
-    content = _parse(source.read_text(encoding="utf-8"), "taxonomy.toml")
-    _check_keys(content, {"classes": list}, "taxonomy.toml")
+    content = parse_toml(source.read_text(encoding="utf-8"), "taxonomy.toml")
+    check_keys(content, {"classes": list}, "taxonomy.toml")
     return Taxonomy(_classes(content["classes"], "taxonomy.toml"))
 
 
@@ -260,7 +227,66 @@ def load_catalog(name: str | Path) -> Catalog:
     except OSError as error:
         msg = f"catalogue {text} cannot be read ({error.strerror}); give a file that you can read."
         raise CatalogError(msg) from error
-    return _catalog(_parse(content, text), text)
+    return _catalog(parse_toml(content, text), text)
+
+
+def combine_catalogs(catalogs: Sequence[Catalog]) -> Catalog:
+    """Make one catalogue of several, so that their layers can be loaded and merged together.
+
+    Parameters
+    ----------
+    catalogs : sequence of Catalog
+        At least one; the first is trusted most when objects are merged.
+
+    Returns
+    -------
+    Catalog
+        With several, each layer's name begins with its catalogue's. The first of them that says
+        a metric CRS, how far a class is seen, or within how many metres it is merged, decides
+        that.
+
+    Raises
+    ------
+    InputError
+        If there is no catalogue, or one stands twice.
+    CatalogError
+        If two catalogues mean different classes by one name, code or symbol.
+
+    Examples
+    --------
+    >>> both = combine_catalogs([load_catalog("montpellier"), load_catalog("openstreetmap")])
+    >>> both.layers[0].name
+    'montpellier/trees'
+    """
+    names = [catalog.name for catalog in catalogs]
+    if not names or len(set(names)) < len(names):
+        msg = f"the catalogues given are {names}; give one or more, each once."
+        raise InputError(msg)
+    if len(catalogs) == 1:
+        return catalogs[0]
+    classes = [item for catalog in catalogs for item in catalog.taxonomy.classes]
+    ranges = {item.name: item.range_m for item in reversed(classes) if item.range_m is not None}
+    # Catalogues that differ in how far a class is seen mean the same class.
+    kinds = dict.fromkeys(dataclasses.replace(item, range_m=None) for item in classes)
+    try:
+        taxonomy = Taxonomy(tuple(kinds)).with_ranges(ranges)
+    except CatalogError as error:
+        msg = f"catalogues {' and '.join(names)} do not go together: {error}"
+        raise CatalogError(msg) from error
+    return Catalog(
+        name="+".join(names),
+        title=" and ".join(catalog.title for catalog in catalogs),
+        taxonomy=taxonomy,
+        layers=tuple(
+            dataclasses.replace(spec, name=f"{catalog.name}/{spec.name}")
+            for catalog in catalogs
+            for spec in catalog.layers
+        ),
+        metric_crs=next((item.metric_crs for item in catalogs if item.metric_crs), None),
+        conflate=tuple(
+            {name: radius for item in reversed(catalogs) for name, radius in item.conflate}.items()
+        ),
+    )
 
 
 def _known() -> str:
@@ -286,49 +312,9 @@ def data_folder() -> Traversable:
     return Path(__file__).resolve().parent.parent / "data_sources"
 
 
-def _parse(text: str, where: str) -> dict[str, Any]:
-    try:
-        return tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
-        msg = f"{where} is not valid TOML: {error}."
-        raise CatalogError(msg) from error
-
-
-def _check_keys(
-    table: Mapping[str, Any],
-    allowed: Mapping[str, type],
-    where: str,
-    needed: Iterable[str] = (),
-) -> None:
-    for key, value in table.items():
-        if key not in allowed:
-            msg = (
-                f"{where} has the key {key!r}, which means nothing"
-                f"{nearest_name(key, allowed)}; the keys are {', '.join(allowed)}."
-            )
-            raise CatalogError(msg)
-        # bool is an int to Python, never to a catalogue
-        if not isinstance(value, allowed[key]) or isinstance(value, bool) != (allowed[key] is bool):
-            msg = f"{where} has {key} = {value!r}; write {_TOML_TYPES[allowed[key]]}."
-            raise CatalogError(msg)
-    for key in needed:
-        if key not in table:
-            msg = f"{where} lacks the key {key!r}; add it."
-            raise CatalogError(msg)
-
-
-_TOML_TYPES: dict[type, str] = {
-    str: "a string",
-    int: "a whole number",
-    list: "a list",
-    dict: "a table",
-    bool: "true or false",
-}
-
-
 def _catalog(content: dict[str, Any], where: str) -> Catalog:
     where = f"catalogue {where}"
-    _check_keys(content, CATALOG_KEYS, where, ("name", "title", "layers"))
+    check_keys(content, CATALOG_KEYS, where, ("name", "title", "layers"))
     own = _classes(content.get("classes", []), where)
     try:
         taxonomy = paper_taxonomy().extended(own)
@@ -337,13 +323,16 @@ def _catalog(content: dict[str, Any], where: str) -> Catalog:
     except (CatalogError, CrsError) as error:
         msg = f"{where}: {error}"
         raise CatalogError(msg) from error
+    taxonomy = taxonomy.with_ranges(_ranges(content.get("ranges", {}), taxonomy, where))
     shared = {
         "license": content.get("license", "unknown"),
         "attribution": content.get("attribution", ""),
-        "files": _texts(content.get("files", []), "files", where),
+        "files": texts(content.get("files", []), "files", where),
         "reader": content.get("reader", "vector_file"),
     }
-    layers = tuple(_layer(item, where, taxonomy, shared) for item in content["layers"])
+    layers = tuple(
+        layer_of(item, where, taxonomy=taxonomy, shared=shared) for item in content["layers"]
+    )
     names = [spec.name for spec in layers]
     double = next((name for name in names if names.count(name) > 1), None)
     if double is not None or not names:
@@ -358,9 +347,13 @@ def _catalog(content: dict[str, Any], where: str) -> Catalog:
         layers=layers,
         url=content.get("url", ""),
         reader=content.get("reader", "vector_file"),
-        endpoints=_texts(content.get("endpoints", []), "endpoints", where),
+        endpoints=texts(content.get("endpoints", []), "endpoints", where),
         geocoder=content.get("geocoder"),
-        conflate=_radii(content.get("conflate", {}), taxonomy, where),
+        conflate=tuple(
+            _metres_by_class(
+                content.get("conflate", {}), taxonomy, f"{where}, conflate", most=MAX_MERGING_M
+            ).items()
+        ),
         license=shared["license"],
         attribution=shared["attribution"],
     )
@@ -373,7 +366,9 @@ def _classes(items: list[Any], where: str) -> tuple[ObjectClass, ...]:
         if not isinstance(item, dict):
             msg = f"{place} is {item!r}; write a [[classes]] table."
             raise CatalogError(msg)
-        _check_keys(item, CLASS_KEYS, place, CLASS_KEYS)
+        check_keys(item, {**CLASS_KEYS, "range_m": object}, place, CLASS_KEYS)
+        if "range_m" in item:
+            item["range_m"] = metres(item["range_m"], "range_m", place, most=MAX_RANGE_M)
         try:
             classes.append(ObjectClass(**item))
         except CatalogError as error:
@@ -382,131 +377,19 @@ def _classes(items: list[Any], where: str) -> tuple[ObjectClass, ...]:
     return tuple(classes)
 
 
-def _layer(item: object, where: str, taxonomy: Taxonomy, shared: Mapping[str, Any]) -> LayerSpec:
-    if not isinstance(item, dict):
-        msg = f"{where} has the layer {item!r}; write a [[layers]] table."
+def _ranges(item: dict[str, Any], taxonomy: Taxonomy, where: str) -> dict[str, float]:
+    """Return the ranges that a catalogue gives to classes outside their own tables."""
+    found = _metres_by_class(item, taxonomy, f"{where}, ranges", most=MAX_RANGE_M)
+    double = next((name for name in found if taxonomy.by_name(name).range_m is not None), None)
+    if double is not None:
+        msg = f"{where} has a range_m of {double!r} and one in ranges; remove one of them."
         raise CatalogError(msg)
-    where = f"{where}, layer {item.get('name', '?')!r}"
-    _check_keys(item, LAYER_KEYS, where, ("name",))
-    role = _choice(item.get("role", "objects"), "role", get_args(Role), where)
-    if (role == "objects") != ("class" in item):
-        what = "lacks the key 'class'; add it" if role == "objects" else "needs no class; remove it"
-        msg = f"{where} {what}."
-        raise CatalogError(msg)
-    if role == "objects":
-        _require_class(item["class"], taxonomy, where)
-    if "crs" in item:
-        try:
-            CRS.from_user_input(item["crs"])
-        except CRSError as error:
-            msg = (
-                f"{where} has crs = {item['crs']!r}, which is unknown; "
-                "write a code such as 'EPSG:4326'."
-            )
-            raise CatalogError(msg) from error
-    if item.get("unique_id", False) and "id_field" not in item:
-        msg = f"{where} has unique_id = true without an id_field; name the field of the ids."
-        raise CatalogError(msg)
-    files = _texts(item.get("files", list(shared["files"])), "files", where)
-    if not files:
-        msg = f"{where} has files = []; write a list of file names or patterns."
-        raise CatalogError(msg)
-    plain = ("layer", "id_field", "unique_id", "dataset", "server_where", "optional", "note")
-    kinds = _texts(item.get("elements", list(get_args(ElementKind))), "elements", where)
-    return LayerSpec(
-        name=item["name"],
-        class_name=item.get("class", ""),
-        role=role,
-        files=files,
-        where=tuple(
-            (field, _values(accepted, field, where))
-            for field, accepted in item.get("where", {}).items()
-        ),
-        class_by=_class_by(item["class_by"], taxonomy, where) if "class_by" in item else None,
-        aliases=tuple(
-            (field, _texts(names, f"aliases of {field!r}", where))
-            for field, names in item.get("aliases", {}).items()
-        ),
-        geometry=_choice(item.get("geometry", "point"), "geometry", get_args(GeometryKind), where),
-        rows=_rows(item["rows"], where) if "rows" in item else None,
-        select=_texts(item.get("select", []), "select", where),
-        tags=tuple(_tags(tags, where) for tags in item.get("tags", [])),
-        elements=tuple(_choice(kind, "elements", get_args(ElementKind), where) for kind in kinds),
-        reader=shared["reader"],
-        license=item.get("license", shared["license"]),
-        attribution=item.get("attribution", shared["attribution"]),
-        **{key: item[key] for key in (*plain, "crs", "x_field", "y_field") if key in item},
-    )
+    return found
 
 
-def _choice(value: str, key: str, choices: tuple[str, ...], where: str) -> Any:  # noqa: ANN401
-    if value not in choices:
-        known = ", ".join(repr(choice) for choice in choices)
-        msg = f"{where} has {key} = {value!r}{nearest_name(value, choices)}; write one of {known}."
-        raise CatalogError(msg)
-    return value
-
-
-def _texts(items: object, key: str, where: str) -> tuple[str, ...]:
-    if not isinstance(items, list) or not all(isinstance(item, str) and item for item in items):
-        msg = f"{where} has {key} = {items!r}; write a list of texts."
-        raise CatalogError(msg)
-    return tuple(items)
-
-
-def _tags(item: object, where: str) -> tuple[tuple[str, tuple[str, ...]], ...]:
-    if not isinstance(item, dict) or not item:
-        msg = f"{where} has the tags {item!r}; write a table of keys and values."
-        raise CatalogError(msg)
-    return tuple(
-        (key, _texts(value if isinstance(value, list) else [value], f"tag {key!r}", where))
-        for key, value in item.items()
-    )
-
-
-def _radii(item: dict[str, Any], taxonomy: Taxonomy, where: str) -> tuple[tuple[str, float], ...]:
-    for name, radius in item.items():
-        _require_class(name, taxonomy, f"{where}, conflate")
-        if isinstance(radius, bool) or not isinstance(radius, int | float) or not 0 < radius < 100:  # noqa: PLR2004
-            msg = f"{where}, conflate has {name} = {radius!r}; write metres above 0 and below 100."
-            raise CatalogError(msg)
-    return tuple((name, float(radius)) for name, radius in item.items())
-
-
-def _require_class(name: str, taxonomy: Taxonomy, where: str) -> None:
-    try:
-        taxonomy.by_name(name)
-    except UnknownNameError as error:
-        msg = f"{where}: {error}"
-        raise CatalogError(msg) from error
-
-
-def _class_by(item: dict[str, Any], taxonomy: Taxonomy, where: str) -> ClassBy:
-    where = f"{where}, class_by"
-    _check_keys(item, CLASS_BY_KEYS, where, CLASS_BY_KEYS)
-    for value, name in item["values"].items():
-        if not isinstance(name, str):
-            msg = f"{where} has {value!r} = {name!r}; write the name of a class."
-            raise CatalogError(msg)
-        _require_class(name, taxonomy, where)
-    return ClassBy(item["field"], tuple(item["values"].items()))
-
-
-def _values(accepted: object, field: str, where: str) -> tuple[Value, ...]:
-    values = accepted if isinstance(accepted, list) else [accepted]
-    if not values or not all(isinstance(value, Value) for value in values):
-        msg = (
-            f"{where} filters {field!r} by {accepted!r}; "
-            "write the accepted value, or a list of accepted values."
-        )
-        raise CatalogError(msg)
-    return tuple(values)
-
-
-def _rows(item: list[Any], where: str) -> tuple[int, int]:
-    match item:
-        # bool is an int to Python, never to a catalogue
-        case [int(least), int(most)] if 0 <= least <= most and bool not in map(type, item):
-            return least, most
-    msg = f"{where} has rows = {item!r}; write [least, most]."
-    raise CatalogError(msg)
+def _metres_by_class(
+    item: dict[str, Any], taxonomy: Taxonomy, where: str, *, most: float
+) -> dict[str, float]:
+    for name in item:
+        require_class(name, taxonomy, where)
+    return {name: metres(value, name, where, most=most) for name, value in item.items()}

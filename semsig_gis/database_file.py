@@ -2,25 +2,26 @@
 
 from __future__ import annotations
 
+import os
 from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pyarrow as pa
-import shapely
 
-from semsig_gis.database import BEARING_UNITS, SignatureDatabase
+from semsig_gis.database import BEARING_UNITS, SignatureDatabase, join_databases
 from semsig_gis.errors import DatabaseError, SemsigError
 from semsig_gis.grid import GridSpec, split_ids
+from semsig_gis.manifest import part_files
 from semsig_gis.signatures import SignatureSpec
-from semsig_gis.storage import geo_metadata, read_geoparquet, write_geoparquet
+from semsig_gis.storage import geo_metadata, points_to_wkb, read_geoparquet, write_geoparquet
 from semsig_gis.taxonomy import Taxonomy
 from semsig_gis.viewpoints import ViewpointSpec
 
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from numpy.typing import DTypeLike, NDArray
+    from numpy.typing import NDArray
 
 __all__ = ["open_database", "save_database"]
 
@@ -41,9 +42,9 @@ def save_database(database: SignatureDatabase, path: str | Path) -> None:
 
     Notes
     -----
-    Columns: ``cell_id`` (int64), ``types`` (symbols), ``bearings`` (binary, little-endian uint16
-    in 1/20 degree), ``distances`` (binary, uint8 in 1/255 of the largest visibility range),
-    ``length`` (int32) and ``geometry`` (the viewpoint as WKB). The metadata key ``semsig`` holds
+    Columns: ``cell_id`` (int64), ``types`` (symbols), ``bearings`` (list of uint16, in 1/20
+    degree), ``distances`` (list of uint8, in 1/255 of the largest visibility range), ``length``
+    (int32) and ``geometry`` (the viewpoint as WKB). The metadata key ``semsig`` holds
     the specs, the classes and the licences as JSON.
 
     Examples
@@ -61,18 +62,20 @@ def save_database(database: SignatureDatabase, path: str | Path) -> None:
     ...     open_database(f"{folder}/city.parquet").types(0) == database.types(0)
     True
     """
-    symbols = database.taxonomy.symbol_bytes[database.codes]
+    symbols = pa.py_buffer(database.taxonomy.symbol_bytes[database.codes])
+    offsets = pa.array(database.offsets).cast(pa.int32())
     table = pa.table(
         {
             "cell_id": pa.array(database.cell_ids),
-            "types": _ragged(symbols, database.offsets, pa.string()),
-            "bearings": _ragged(database.bearing_units, database.offsets, pa.binary()),
-            "distances": _ragged(database.distance_units, database.offsets, pa.binary()),
+            "types": pa.StringArray.from_buffers(len(database), offsets.buffers()[1], symbols),
+            "bearings": pa.ListArray.from_arrays(offsets, pa.array(database.bearing_units)),
+            "distances": pa.ListArray.from_arrays(offsets, pa.array(database.distance_units)),
             "length": pa.array(database.lengths.astype(np.int32)),
-            "geometry": pa.array(shapely.to_wkb(shapely.points(database.xy)), pa.binary()),
+            "geometry": points_to_wkb(database.xy),
         }
     )
-    bounds = (*database.xy.min(axis=0), *database.xy.max(axis=0))
+    corners = [(part.min(), part.max()) for part in (database.columns, database.rows)]
+    bounds = database.grid.viewpoints(*corners).ravel().tolist()
     write_geoparquet(
         table,
         path,
@@ -92,12 +95,12 @@ def save_database(database: SignatureDatabase, path: str | Path) -> None:
 
 
 def open_database(path: str | Path) -> SignatureDatabase:
-    """Open a file that `save_database` wrote.
+    """Open a file that `save_database` wrote, or a folder of parts.
 
     Parameters
     ----------
     path : str or Path
-        File to read.
+        File to read, or the folder of a database that was built in tiles.
 
     Returns
     -------
@@ -107,7 +110,7 @@ def open_database(path: str | Path) -> SignatureDatabase:
     Raises
     ------
     DatabaseError
-        If the file is missing, damaged, or holds something else.
+        If the file or a part is missing, damaged, or holds something else.
 
     Examples
     --------
@@ -116,6 +119,8 @@ def open_database(path: str | Path) -> SignatureDatabase:
     ...
     semsig_gis.errors.DatabaseError: nowhere.parquet does not exist; give a signature database file.
     """
+    if os.path.isdir(path):  # noqa: PTH112 - it answers where Path.is_dir raises
+        return join_databases([open_database(part) for part in part_files(path)])
     columns = ["cell_id", "types", "bearings", "distances"]
     table, specs, crs = read_geoparquet(path, kind=KIND, columns=columns)
     if specs.get("format") != FORMAT:
@@ -128,13 +133,13 @@ def open_database(path: str | Path) -> SignatureDatabase:
         grid = GridSpec(specs["grid"]["step"], tuple(specs["grid"]["origin"]))
         spec = SignatureSpec(**specs["signature"])
         taxonomy = Taxonomy.from_list(specs["taxonomy"])
-        symbols, offsets = _flat(table["types"], np.uint8)
+        symbols, offsets = _text(table["types"])
         codes_of = np.zeros(256, np.uint8)
         for item in taxonomy.classes:
             codes_of[ord(item.symbol)] = item.code
         codes = codes_of[symbols]
-        bearing_units, bearing_offsets = _flat(table["bearings"], np.dtype("<u2"))
-        distance_units, distance_offsets = _flat(table["distances"], np.uint8)
+        bearing_units, bearing_offsets = _numbers(table["bearings"], pa.uint16())
+        distance_units, distance_offsets = _numbers(table["distances"], pa.uint8())
         cells = table["cell_id"].to_numpy().astype(np.int64, casting="safe")
         licenses = tuple(specs["licenses"])
         version = specs["version"]
@@ -177,26 +182,27 @@ def open_database(path: str | Path) -> SignatureDatabase:
     )
 
 
-def _ragged(values: NDArray[Any], offsets: NDArray[np.int64], kind: pa.DataType) -> pa.Array:
-    """Wrap a flat array and offsets as an Arrow column of strings or bytes, without copying."""
-    width = values.dtype.itemsize
-    flat = np.ascontiguousarray(values, dtype=values.dtype.newbyteorder("<"))
-    ends = pa.py_buffer((offsets * width).astype(np.int32))
-    return pa.Array.from_buffers(kind, len(offsets) - 1, [None, ends, pa.py_buffer(flat)])
+def _text(column: pa.ChunkedArray) -> tuple[NDArray[np.uint8], NDArray[np.int64]]:
+    """Return the flat bytes and offsets of an Arrow column of strings."""
+    array = _whole(column, pa.string())
+    _, ends, flat = array.buffers()
+    offsets = np.frombuffer(ends, np.int32)[array.offset : array.offset + len(array) + 1]
+    return np.frombuffer(flat, np.uint8)[offsets[0] : offsets[-1]], _from_zero(offsets)
 
 
-def _flat(column: pa.ChunkedArray, dtype: DTypeLike) -> tuple[NDArray[Any], NDArray[np.int64]]:
-    """Return the flat array and offsets of an Arrow column of strings or bytes."""
-    if column.null_count or column.type not in {pa.string(), pa.binary()} or not len(column):
+def _numbers(column: pa.ChunkedArray, kind: pa.DataType) -> tuple[NDArray[Any], NDArray[np.int64]]:
+    """Return the flat array and offsets of an Arrow column of lists of numbers."""
+    array = _whole(column, pa.list_(kind))
+    return array.flatten().to_numpy(), _from_zero(array.offsets.to_numpy())
+
+
+def _whole(column: pa.ChunkedArray, kind: pa.DataType) -> pa.Array:
+    """Return a column of some type as one array without missing values."""
+    if column.null_count or column.type != kind or not len(column):
         msg = f"a column holds {len(column)} values of {column.type}, {column.null_count} missing"
         raise ValueError(msg)
-    array = column.combine_chunks()
-    _, ends, flat = array.buffers()
-    width = np.dtype(dtype).itemsize
-    offsets = np.frombuffer(ends, np.int32)[array.offset : array.offset + len(array) + 1]
-    values = np.frombuffer(flat, np.uint8)[offsets[0] : offsets[-1]].view(dtype)
-    whole, rest = np.divmod((offsets - offsets[0]).astype(np.int64), width)
-    if rest.any():
-        msg = "a value ends in the middle of a number"
-        raise ValueError(msg)
-    return values, whole
+    return column.combine_chunks()
+
+
+def _from_zero(offsets: NDArray[np.int32]) -> NDArray[np.int64]:
+    return offsets.astype(np.int64) - np.int64(offsets[0])

@@ -194,7 +194,7 @@ def cells_near(
 
 def _widened(ids: NDArray[np.int64], reach: int) -> NDArray[np.int64]:
     """Return all numbers at most `reach` from some of the given ones, ascending."""
-    ids = np.unique(ids)
+    ids = np.sort(ids)
     new = np.append(True, np.diff(ids) > 2 * reach + 1)
     first = ids[new] - reach
     lengths = ids[np.append(new[1:], True)] + reach + 1 - first

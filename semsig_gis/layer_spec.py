@@ -5,7 +5,17 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
-__all__ = ["ANY_VALUE", "ClassBy", "ElementKind", "GeometryKind", "LayerSpec", "Role", "Value"]
+__all__ = [
+    "ANY_VALUE",
+    "MAX_WIDTH_M",
+    "ClassBy",
+    "ElementKind",
+    "GeometryKind",
+    "LayerSpec",
+    "Role",
+    "Value",
+    "WidthBy",
+]
 
 Value = str | int | float | bool
 GeometryKind = Literal["point", "line", "polygon"]
@@ -13,6 +23,8 @@ ElementKind = Literal["node", "way", "relation"]
 Role = Literal["objects", "buildings", "streets"]
 # Stands for every value of a tag but "no".
 ANY_VALUE = "*"
+# No street is wider; the number is in another unit, or means something else.
+MAX_WIDTH_M = 200.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,6 +49,30 @@ class ClassBy:
     classes: tuple[tuple[Value, str], ...]
 
 
+@dataclass(frozen=True, slots=True)
+class WidthBy:
+    """A field that says of which class a street is, and how wide the streets of a class are.
+
+    Parameters
+    ----------
+    field : str
+        Name of the field.
+    widths : tuple of (value, float)
+        Value of the field, and the width of such a street in metres.
+    default : float, optional
+        Width of streets of other values; None where nobody knows.
+
+    Examples
+    --------
+    >>> WidthBy("highway", (("primary", 24.0), ("residential", 12.0))).default is None
+    True
+    """
+
+    field: str
+    widths: tuple[tuple[Value, float], ...]
+    default: float | None = None
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LayerSpec:
     """One layer of a source and the class of street object it holds.
@@ -56,6 +92,11 @@ class LayerSpec:
         between slashes is a regular expression that the whole value must match.
     class_by : ClassBy, optional
         Field that decides the class row by row.
+    width_by : WidthBy, optional
+        Of streets: the field that says how wide they are by its class of street.
+    width_field : str, optional
+        Of streets: the field that holds their width in metres; where it says nothing usable,
+        `width_by` holds.
     id_field : str, optional
         Field that identifies a row in its source; else the feature's number.
     geometry : {"point", "line", "polygon"}
@@ -105,6 +146,8 @@ class LayerSpec:
     layer: str | None = None
     where: tuple[tuple[str, tuple[Value, ...]], ...] = ()
     class_by: ClassBy | None = None
+    width_by: WidthBy | None = None
+    width_field: str | None = None
     id_field: str | None = None
     geometry: GeometryKind = "point"
     crs: str | None = None
@@ -124,3 +167,18 @@ class LayerSpec:
     note: str = ""
     license: str = "unknown"
     attribution: str = ""
+
+    @property
+    def has_width(self) -> bool:
+        """Whether something is said about the widths of streets."""
+        return self.width_by is not None or self.width_field is not None
+
+    @property
+    def fields(self) -> tuple[tuple[str, str], ...]:
+        """The keys that name a field of the file, but for coordinates, and the fields."""
+        uses = [("where", field) for field, _ in self.where]
+        uses += [("class_by", self.class_by.field)] if self.class_by else []
+        uses += [("width_by", self.width_by.field)] if self.width_by else []
+        uses += [("width_field", self.width_field)] if self.width_field else []
+        uses += [("id_field", self.id_field)] if self.id_field else []
+        return tuple(uses)

@@ -1,45 +1,35 @@
-"""From catalogues to street objects in one call: read or fetch the layers, place and merge them."""
+"""From catalogues to street objects: choose and read the layers, place and merge them."""
 
 from __future__ import annotations
 
-import dataclasses
-import os
 from dataclasses import dataclass
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 import pandas as pd
 
-from semsig_gis.catalog import Catalog
 from semsig_gis.conflation import ConflationReport, conflate
-from semsig_gis.errors import CatalogError, CrsError, EmptyResultError, InputError
+from semsig_gis.errors import CrsError, EmptyResultError
 from semsig_gis.objects import build_objects
 from semsig_gis.schema import CLASS_NAME
-from semsig_gis.sources import find_files, opendatasoft, overpass, reader
-from semsig_gis.sources._area import clip_layer, names_place, parse_area
-from semsig_gis.sources._http import Cache, HttpSpec
-from semsig_gis.taxonomy import Taxonomy
+from semsig_gis.sources import find_files, reader
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Sequence
+    from pathlib import Path
 
     import geopandas as gpd
     from pyproj import CRS
 
+    from semsig_gis.catalog import Catalog
     from semsig_gis.layer_spec import LayerSpec
     from semsig_gis.objects import LoadReport, StreetObjects
     from semsig_gis.sources import RawLayer
-    from semsig_gis.sources._area import Area
 
 __all__ = [
     "Loaded",
     "assemble",
     "choose_layers",
-    "combine_catalogs",
-    "fetch_layers",
-    "find_area",
     "metric_crs_of",
-    "open_cache",
     "read_files",
 ]
 
@@ -60,7 +50,8 @@ class Loaded:
     conflation : ConflationReport
         What was merged between layers.
     buildings, streets : GeoDataFrame, optional
-        Footprints (polygons) and centre lines in the CRS of the objects, where layers hold them.
+        Footprints (polygons) and centre lines in the CRS of the objects, where layers hold them;
+        of streets whose widths a layer knows, ``half_width`` in metres.
     notes : tuple of str
         Remarks for the user.
     """
@@ -71,62 +62,6 @@ class Loaded:
     buildings: gpd.GeoDataFrame | None = None
     streets: gpd.GeoDataFrame | None = None
     notes: tuple[str, ...] = ()
-
-
-def combine_catalogs(catalogs: Sequence[Catalog]) -> Catalog:
-    """Make one catalogue of several, so that their layers can be loaded and merged together.
-
-    Parameters
-    ----------
-    catalogs : sequence of Catalog
-        At least one; the first is trusted most when objects are merged.
-
-    Returns
-    -------
-    Catalog
-        With several, each layer's name begins with its catalogue's; the first metric CRS and the
-        first merging radius of a class hold.
-
-    Raises
-    ------
-    InputError
-        If there is no catalogue, or one stands twice.
-    CatalogError
-        If two catalogues mean different classes by one name, code or symbol.
-
-    Examples
-    --------
-    >>> from semsig_gis.catalog import load_catalog
-    >>> both = combine_catalogs([load_catalog("montpellier"), load_catalog("openstreetmap")])
-    >>> both.layers[0].name
-    'montpellier/trees'
-    """
-    names = [catalog.name for catalog in catalogs]
-    if not names or len(set(names)) < len(names):
-        msg = f"the catalogues given are {names}; give one or more, each once."
-        raise InputError(msg)
-    if len(catalogs) == 1:
-        return catalogs[0]
-    classes = dict.fromkeys(item for catalog in catalogs for item in catalog.taxonomy.classes)
-    try:
-        taxonomy = Taxonomy(tuple(classes))
-    except CatalogError as error:
-        msg = f"catalogues {' and '.join(names)} do not go together: {error}"
-        raise CatalogError(msg) from error
-    return Catalog(
-        name="+".join(names),
-        title=" and ".join(catalog.title for catalog in catalogs),
-        taxonomy=taxonomy,
-        layers=tuple(
-            dataclasses.replace(spec, name=f"{catalog.name}/{spec.name}")
-            for catalog in catalogs
-            for spec in catalog.layers
-        ),
-        metric_crs=next((item.metric_crs for item in catalogs if item.metric_crs), None),
-        conflate=tuple(
-            {name: radius for item in reversed(catalogs) for name, radius in item.conflate}.items()
-        ),
-    )
 
 
 def choose_layers(
@@ -348,162 +283,3 @@ def _surroundings(layers: Sequence[RawLayer], role: str, crs: CRS) -> gpd.GeoDat
         return None
     table = pd.concat(tables, ignore_index=True).drop(columns=CLASS_NAME)
     return table[~(table.geometry.isna() | table.geometry.is_empty)].reset_index(drop=True)
-
-
-def fetch_layers(
-    specs: Sequence[LayerSpec],
-    catalog: Catalog,
-    *,
-    area: Area,
-    cache: Cache,
-    http: HttpSpec,
-    filters: bool = True,
-    progress: Callable[[int, int], None] | None = None,
-    tell: Callable[[str], None] | None = None,
-) -> tuple[RawLayer, ...]:
-    """Fetch layers of an area from the service that a catalogue names, and read them.
-
-    Parameters
-    ----------
-    specs : sequence of LayerSpec
-        The layers.
-    catalog : Catalog
-        Whose endpoints are asked; nothing else is.
-    area : Area
-        What is fetched.
-    cache : Cache
-        Where files are kept; what has not changed is not sent again.
-    http : HttpSpec
-        How requests are made; offline, everything comes from the cache.
-    filters : bool, default True
-        Whether the filters of the layers apply.
-    progress : callable, optional
-        Called with how much has arrived and how much there is, 0 where nobody knows: bytes of
-        a portal's file, tiles of OpenStreetMap.
-    tell : callable, optional
-        Called with a line about each layer that has arrived: rows, size and date.
-
-    Returns
-    -------
-    tuple of RawLayer
-        The layers, cut to the area.
-
-    Raises
-    ------
-    InputError
-        If the catalogue has no service to fetch from.
-    SourceError
-        If a service refuses, fails, or sends something else.
-    """
-    if not catalog.endpoints or catalog.reader not in {"opendatasoft", "osm_file"}:
-        msg = (
-            f"catalogue {catalog.name!r} has no service to fetch from; use `semsig load` on files."
-        )
-        raise InputError(msg)
-    if catalog.reader == "osm_file":
-        files = overpass.fetch_layers(
-            specs, area=area, endpoints=catalog.endpoints, cache=cache, spec=http, progress=progress
-        )
-        # Tiles and long outlines cover more than the area.
-        found = [
-            clip_layer(layer, area) for layer in overpass.read_layers(files, specs, filters=filters)
-        ]
-        if tell is not None:
-            for layer in found:
-                tell(f"{layer.spec.name}: {len(layer.table):,} rows")
-        return tuple(found)
-    fetched = opendatasoft.fetch_layers(
-        specs,
-        portal=catalog.endpoints[0],
-        area=area,
-        cache=cache,
-        spec=http,
-        progress=None if progress is None else lambda _, done, total: progress(done, total),
-    )
-    layers: list[RawLayer] = []
-    for spec, file in fetched:
-        read = reader(catalog.reader)(file.path, [spec], filters=filters)
-        layers.extend(clip_layer(layer, area) for layer in read)
-        if tell is not None:
-            source = "the cache" if file.from_cache else "the portal"
-            tell(
-                f"{spec.name}: {sum(layer.read for layer in read):,} rows, "
-                f"{file.bytes / 1e6:.2f} MB, from {source}, fetched {file.fetched_at}"
-            )
-    return tuple(layers)
-
-
-def open_cache(
-    folder: str | Path | None = None, *, offline: bool = False
-) -> tuple[Cache, HttpSpec]:
-    """Open the cache of downloads.
-
-    Parameters
-    ----------
-    folder : str or Path, optional
-        Where it is; by default ``semsig`` in the user's cache folder (``XDG_CACHE_HOME``, or
-        ``.cache`` in the home folder).
-    offline : bool, default False
-        Whether everything comes from the cache.
-
-    Returns
-    -------
-    cache : Cache
-        The cache.
-    http : HttpSpec
-        How requests are made.
-
-    Examples
-    --------
-    >>> import tempfile
-    >>> with tempfile.TemporaryDirectory() as folder:
-    ...     open_cache(folder, offline=True)[1].offline
-    True
-    """
-    base = os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
-    return Cache(Path(folder or Path(base) / "semsig")), HttpSpec(offline=offline)
-
-
-def find_area(text: str, catalog: Catalog, *, cache: Cache, http: HttpSpec) -> Area:
-    """Return an area from what a user says of it.
-
-    Parameters
-    ----------
-    text : str
-        ``west,south,east,north`` in degrees, the path of a polygon file, or the name of a place.
-    catalog : Catalog
-        Whose geocoder knows places by name.
-    cache : Cache
-        Where the answer about a name is kept.
-    http : HttpSpec
-        How a name is asked for.
-
-    Returns
-    -------
-    Area
-        The area.
-
-    Raises
-    ------
-    InputError
-        If the numbers are no box on the Earth, or the catalogue has no geocoder for a name.
-    SourceError
-        If the file cannot be read, or no place has that name.
-
-    Examples
-    --------
-    >>> from semsig_gis.catalog import load_catalog
-    >>> cache, http = open_cache("unused", offline=True)
-    >>> osm = load_catalog("openstreetmap")
-    >>> find_area("2.3,48.8,2.4,48.9", osm, cache=cache, http=http).bounds
-    (2.3, 48.8, 2.4, 48.9)
-    """
-    if not names_place(text):
-        return parse_area(text)
-    if catalog.geocoder is None:
-        msg = (
-            f"catalogue {catalog.name!r} names no geocoder, so {text!r} cannot be looked up; give "
-            "west,south,east,north in degrees or a polygon file."
-        )
-        raise InputError(msg)
-    return overpass.find_place(text, endpoint=catalog.geocoder, cache=cache, spec=http)

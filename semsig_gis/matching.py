@@ -10,28 +10,28 @@ import math
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
-import geopandas as gpd
 import numpy as np
 import pandas as pd
-from pyproj import Transformer
 
+from semsig_gis.dataset import PartitionedDatabase
 from semsig_gis.errors import InputError
+from semsig_gis.localization import Localization, Shortlist
 from semsig_gis.method import ANGLES, BOTH, DEFAULT_METHOD, TYPES, Method
 from semsig_gis.metrics import metric
-from semsig_gis.scoring import top_candidates
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator, Sequence
+    from collections.abc import Callable, Collection, Iterator, Sequence
 
     from numpy.typing import NDArray
-    from pyproj import CRS
 
     from semsig_gis.database import SignatureDatabase
     from semsig_gis.sequences import SequenceTable
     from semsig_gis.signatures import Signature
     from semsig_gis.taxonomy import Taxonomy
+
+    _SecondStage = Callable[[NDArray[np.int64]], NDArray[np.float32]]
 
 __all__ = ["DEFAULT_METHOD", "Localization", "Method", "localize", "score_cells"]
 
@@ -43,89 +43,6 @@ _BATCH_BYTES = 128 << 20  # distances to distinct sequences held at once
 # For fewer queries, measuring what the first stage kept beats measuring all sequences at once.
 _MANY_QUERIES = 8
 _BATCH_QUERIES = 128  # RapidFuzz compares queries of like length together, so it wants many
-
-
-@dataclass(frozen=True, eq=False, kw_only=True)
-class Localization:
-    """The best cells for a query.
-
-    Parameters
-    ----------
-    query : Signature
-        What was searched for.
-    method : Method
-        How the cells were ranked.
-    used : str
-        Which parts of the query were compared: ``"types"``, ``"angles"`` or ``"types+angles"``.
-    candidates : DataFrame
-        One row a cell, best first, equal distances in the order of the database: ``rank_low``
-        and ``rank_high`` (the first and last rank, from 1, that the cell can have when ties are
-        broken either way), ``tied`` (how many cells share its distance), ``cell`` (row in the
-        database), ``cell_id``, ``x`` and ``y`` (viewpoint, CRS of the database), ``types``
-        (symbols), ``length`` (objects), ``distance``.
-    cells : int
-        How many cells were searched.
-    tied_beyond : int
-        How many cells are as good as the last candidate but are not listed.
-    crs : pyproj.CRS
-        CRS of ``x`` and ``y``.
-    taxonomy : Taxonomy
-        The classes behind the symbols.
-    licenses : tuple of str
-        Where the street objects of the database come from.
-    """
-
-    query: Signature
-    method: Method
-    used: str
-    candidates: pd.DataFrame
-    cells: int
-    tied_beyond: int
-    crs: CRS
-    taxonomy: Taxonomy
-    licenses: tuple[str, ...]
-
-    def to_geodataframe(self) -> gpd.GeoDataFrame:
-        """Return the candidates with their viewpoints as points in the CRS of the database.
-
-        Returns
-        -------
-        GeoDataFrame
-            The columns of `candidates` and ``geometry``.
-        """
-        points = gpd.points_from_xy(self.candidates["x"], self.candidates["y"])
-        return gpd.GeoDataFrame(self.candidates.copy(), geometry=points, crs=self.crs)
-
-    def to_dict(self) -> dict[str, Any]:
-        """Return everything as plain values that JSON can hold.
-
-        Returns
-        -------
-        dict
-            ``query``, ``method``, ``used``, ``cells``, ``tied_beyond``, ``crs``, ``licenses``
-            and ``candidates``, a list with the columns of `candidates` and ``lon``, ``lat``
-            (degrees, WGS 84).
-        """
-        codes, bearings = self.query.codes, self.query.bearings
-        to_degrees = Transformer.from_crs(self.crs, "EPSG:4326", always_xy=True)
-        lon, lat = to_degrees.transform(
-            self.candidates["x"].to_numpy(), self.candidates["y"].to_numpy()
-        )
-        listed = self.candidates.assign(lon=np.round(lon, 7), lat=np.round(lat, 7))
-        return {
-            "query": {
-                "types": None if codes is None else self.taxonomy.decode(codes),
-                "bearings": None if bearings is None else bearings.tolist(),
-                "length": len(self.query),
-            },
-            "method": str(self.method),
-            "used": self.used,
-            "cells": self.cells,
-            "tied_beyond": self.tied_beyond,
-            "crs": self.crs.to_string(),
-            "licenses": list(self.licenses),
-            "candidates": listed.to_dict(orient="records"),
-        }
 
 
 def score_cells(
@@ -180,7 +97,7 @@ def score_cells(
 
 
 def localize(
-    database: SignatureDatabase,
+    database: SignatureDatabase | PartitionedDatabase,
     query: Signature,
     *,
     method: Method = DEFAULT_METHOD,
@@ -190,8 +107,9 @@ def localize(
 
     Parameters
     ----------
-    database : SignatureDatabase
-        The cells.
+    database : SignatureDatabase or PartitionedDatabase
+        The cells. Of a database in parts, one part at a time is in memory; the answer is that of
+        the parts together.
     query : Signature
         What a person or a detector saw; types or bearings may be unknown.
     method : Method
@@ -229,57 +147,57 @@ def localize(
     if len(query) == 0:
         msg = "the query has no objects; give at least one type or bearing."
         raise InputError(msg)
-    _require_present(query, database)
-    (scores,) = score_cells(database, [query], method)
-    better, level = top_candidates(scores, min(top, len(scores)))
-    better = better[np.argsort(scores[better], kind="stable")]
-    listed = np.concatenate([better, level])[:top]
-    distances = scores[listed]
-    ordered = np.concatenate([distances[: len(better)], scores[level]])
-    rank_low = np.searchsorted(ordered, distances, side="left") + 1
-    rank_high = np.searchsorted(ordered, distances, side="right")
-    xy = database.xy[listed]
-    candidates = pd.DataFrame(
-        {
-            "rank_low": rank_low,
-            "rank_high": rank_high,
-            "tied": rank_high - rank_low + 1,
-            "cell": listed,
-            "cell_id": database.cell_ids[listed],
-            "x": xy[:, 0],
-            "y": xy[:, 1],
-            "types": [database.types(cell) for cell in listed.tolist()],
-            "length": database.lengths[listed],
-            "distance": distances.astype(np.float64),
-        }
-    )
+    shortlist = Shortlist(top)
+    for part, scores in _score_parts(database, query, method):
+        shortlist.add(part, scores)
+    _require_present(query, shortlist.present, part.taxonomy)
+    candidates, tied_beyond = shortlist.ranked()
+    if isinstance(database, PartitionedDatabase):
+        candidates["cell"] = database.row_numbers(candidates["cell_id"].to_numpy())
     return Localization(
         query=query,
         method=method,
         used=method.used(query),
         candidates=candidates,
-        cells=len(database),
-        tied_beyond=len(better) + len(level) - len(listed),
-        crs=database.crs,
-        taxonomy=database.taxonomy,
-        licenses=database.licenses,
+        cells=shortlist.cells,
+        tied_beyond=tied_beyond,
+        crs=part.crs,
+        taxonomy=part.taxonomy,
+        licenses=part.licenses,
     )
 
 
-def _require_present(query: Signature, database: SignatureDatabase) -> None:
+def _require_present(query: Signature, present: Collection[int], taxonomy: Taxonomy) -> None:
     """Refuse a class that no cell sees: it could only make every score worse."""
     if query.codes is None:
         return
-    absent = np.setdiff1d(query.codes, database.present_codes)
-    if len(absent):
-        missing = database.taxonomy.by_code(int(absent[0]))
-        seen = [database.taxonomy.by_code(int(code)) for code in database.present_codes]
+    absent = sorted(set(query.codes.tolist()) - set(present))
+    if absent:
+        missing = taxonomy.by_code(absent[0])
+        seen = [taxonomy.by_code(code) for code in sorted(present)]
         legend = ", ".join(f"{item.symbol} {item.title.lower()}" for item in seen)
         msg = (
             f"the query has symbol {missing.symbol!r} ({missing.title.lower()}), which no cell of "
             f"the database sees; leave it out, the symbols seen are {legend}."
         )
         raise InputError(msg)
+
+
+def _score_parts(
+    database: SignatureDatabase | PartitionedDatabase, query: Signature, method: Method
+) -> Iterator[tuple[SignatureDatabase, NDArray[np.float32]]]:
+    """Score a query part by part, as if the parts were one database."""
+    if not isinstance(database, PartitionedDatabase):
+        yield database, next(iter(score_cells(database, [query], method)))
+        return
+    two_stage = method.keep is not None and method.used(query) == BOTH
+    gate = _gate_of_parts(database, query, method) if two_stage else None
+    for part in database.parts():
+        if gate is None:
+            yield part, next(iter(score_cells(part, [query], method)))
+        else:
+            by_types, second_stage = _stages(part, query, method)
+            yield part, _two_stage(method, by_types, part.angle_sequences, second_stage, gate)
 
 
 def _score_run(
@@ -331,24 +249,77 @@ def _two_stage(
     method: Method,
     by_types: NDArray[np.float32],
     angles: SequenceTable,
-    second_stage: Callable[[NDArray[np.int64]], NDArray[np.float32]],
+    second_stage: _SecondStage,
+    gate: _Gate | None = None,
 ) -> NDArray[np.float32]:
     """Re-rank the cells that are best by type; the others follow in their order.
 
-    The second stage gives the distances to the distinct angle sequences that it is asked for.
+    The second stage gives the distances to the distinct angle sequences that it is asked for. The
+    gate is that of all cells, where these are a part of them.
     """
     first = _on_steps(by_types)
-    # Exact: 7 % of 100 cells are 7, though 100 * 0.07 is a little more.
-    count = math.ceil(Fraction(str(method.keep)) * len(first) / 100)
-    cut = np.partition(first, count - 1)[count - 1]
+    cut = _cut(method, first) if gate is None else gate.cut
     kept = np.flatnonzero(first <= cut)
     fused = _fused(method, by_types[kept], second_stage(angles.inverse[kept]))
-    worst = fused.max()
+    worst = fused.max() if gate is None else gate.worst
     # Behind every kept cell even where the gap is lost in rounding, as on a large raw scale.
     behind = np.nextafter(worst, np.float32(np.inf))
     scores: NDArray[np.float32] = np.maximum(worst + (first - cut), behind)
     scores[kept] = fused
     return scores
+
+
+@dataclass(frozen=True, slots=True)
+class _Gate:
+    """What the second stage needs to know of all cells: who passes, and how the last one ranks."""
+
+    cut: np.float32
+    worst: np.float32
+
+
+def _kept(method: Method, cells: int) -> int:
+    """Return how many of so many cells the types pass on, without those that tie with the last."""
+    # Exact: 7 % of 100 cells are 7, though 100 * 0.07 is a little more.
+    return math.ceil(Fraction(str(method.keep)) * cells / 100)
+
+
+def _cut(method: Method, first: NDArray[np.float32]) -> np.float32:
+    """Return the worst score of the first stage that passes."""
+    count = _kept(method, len(first))
+    cut: np.float32 = np.partition(first, count - 1)[count - 1]
+    return cut
+
+
+def _gate_of_parts(database: PartitionedDatabase, query: Signature, method: Method) -> _Gate:
+    """Find the gate of all parts: of each score of the first stage, how many and the worst."""
+    count = _kept(method, len(database))
+    found = pd.DataFrame()
+    cut = np.float32(np.inf)
+    for part in database.parts():
+        by_types, second_stage = _stages(part, query, method)
+        first = _on_steps(by_types)
+        # The cut only falls, so that no cell beyond it has to be measured by angles.
+        near = np.flatnonzero(first <= cut)
+        fused = _fused(method, by_types[near], second_stage(part.angle_sequences.inverse[near]))
+        more = pd.DataFrame({"first": first[near], "size": 1, "worst": fused})
+        groups = pd.concat([found, more]).groupby("first", as_index=False)
+        found = groups.agg({"size": "sum", "worst": "max"})
+        enough = np.flatnonzero(found["size"].cumsum() >= count)
+        if len(enough):
+            found = found.head(enough[0] + 1)
+            cut = found["first"].to_numpy()[-1]
+    return _Gate(cut, found["worst"].to_numpy().max())
+
+
+def _stages(
+    database: SignatureDatabase, query: Signature, method: Method
+) -> tuple[NDArray[np.float32], _SecondStage]:
+    """Measure a query by types, and return how to measure it by angles."""
+    types, angles = database.type_sequences, database.angle_sequences
+    codes = [] if query.codes is None else [query.codes]
+    by_types = _distances(method, TYPES, codes, types)[0][types.inverse]
+    levels = query.levels(database.spec.levels)
+    return by_types, partial(_some, method, levels, angles)
 
 
 def _some(

@@ -14,6 +14,7 @@ import pyarrow.compute as pc
 import shapely
 
 from semsig_gis import __version__
+from semsig_gis.boxes import BBOX, COVERING, GROUP_ROWS, bounds_column, hilbert_order, rows_meeting
 from semsig_gis.errors import CrsError, DatabaseError, EmptyResultError
 from semsig_gis.schema import (
     CLASS_CODE,
@@ -29,7 +30,7 @@ from semsig_gis.storage import geo_metadata, read_geoparquet, write_geoparquet
 from semsig_gis.taxonomy import Taxonomy
 
 if TYPE_CHECKING:
-    from collections.abc import Collection, Iterable
+    from collections.abc import Collection, Iterable, Sequence
     from pathlib import Path
 
     from numpy.typing import NDArray
@@ -365,8 +366,8 @@ def _licenses(layers: Iterable[RawLayer]) -> tuple[str, ...]:
     return tuple(f"{terms}: {', '.join(names)}" for terms, names in layers_of.items())
 
 
-def save_objects(objects: StreetObjects, path: str | Path) -> None:
-    """Save street objects as one GeoParquet file.
+def save_objects(objects: StreetObjects, path: str | Path, *, keep_order: bool = False) -> None:
+    """Save street objects as one GeoParquet file that can be read by box.
 
     Parameters
     ----------
@@ -374,6 +375,15 @@ def save_objects(objects: StreetObjects, path: str | Path) -> None:
         What to save.
     path : str or Path
         File to write; it appears whole, by rename.
+    keep_order : bool, default False
+        Whether the objects stay in their order, for whoever knows them by row number. Else the
+        file holds them in a spatial order, of which a box is read faster, and so does what
+        `open_objects` returns; saving that again does not change the order.
+
+    Notes
+    -----
+    The column ``bbox`` holds the bounds of every object, and the rows are in groups of
+    `semsig_gis.boxes.GROUP_ROWS`.
 
     Examples
     --------
@@ -388,22 +398,26 @@ def save_objects(objects: StreetObjects, path: str | Path) -> None:
     True
     """
     table = objects.table
+    if not keep_order:
+        table = table.iloc[hilbert_order(table.geometry.array)]
     columns = {
-        CLASS_CODE: pa.array(objects.codes),
+        CLASS_CODE: pa.array(table[CLASS_CODE].to_numpy(np.uint8)),
         SOURCE: pa.array(table[SOURCE].tolist(), pa.string()),
         SOURCE_ID: pa.array(table[SOURCE_ID].tolist(), pa.string()),
         COUNT: pa.array(table[COUNT].to_numpy(np.int32)),
     }
     if MERGED in table.columns:
         columns[MERGED] = pa.array(table[MERGED].tolist(), pa.string())
-    arrow = pa.table(
-        {**columns, GEOMETRY: pa.array(shapely.to_wkb(table.geometry.array), pa.binary())}
-    )
+    columns[GEOMETRY] = pa.array(shapely.to_wkb(table.geometry.array), pa.binary())
+    columns[BBOX] = bounds_column(shapely.bounds(table.geometry.array))
     bounds = (*objects.xy.min(axis=0), *objects.xy.max(axis=0))
+    geo = geo_metadata(objects.crs, geometry_types=["Point"], bounds=bounds)
+    geo["columns"]["geometry"]["covering"] = COVERING
     write_geoparquet(
-        arrow,
+        pa.table(columns),
         path,
-        geo=geo_metadata(objects.crs, geometry_types=["Point"], bounds=bounds),
+        geo=geo,
+        group_rows=GROUP_ROWS,
         specs={
             "kind": KIND,
             "version": __version__,
@@ -413,18 +427,20 @@ def save_objects(objects: StreetObjects, path: str | Path) -> None:
     )
 
 
-def open_objects(path: str | Path) -> StreetObjects:
-    """Open a file that `save_objects` wrote.
+def open_objects(path: str | Path, *, box: Sequence[float] | None = None) -> StreetObjects:
+    """Open a file that `save_objects` wrote, or a part of it.
 
     Parameters
     ----------
     path : str or Path
         File to read.
+    box : sequence of float, optional
+        ``xmin, ymin, xmax, ymax`` in metres: only objects in it or on its edge.
 
     Returns
     -------
     StreetObjects
-        The objects.
+        The objects; there is at least one, but in a box there may be none.
 
     Raises
     ------
@@ -438,7 +454,9 @@ def open_objects(path: str | Path) -> StreetObjects:
     ...
     semsig_gis.errors.DatabaseError: nowhere.parquet does not exist; give a street objects file.
     """
-    arrow, specs, crs = read_geoparquet(path, kind=KIND)
+    arrow, specs, crs = read_geoparquet(path, kind=KIND, box=box)
+    if box is not None:
+        arrow = rows_meeting(arrow, box)
     try:
         taxonomy = Taxonomy.from_list(specs["taxonomy"])
         columns = {
@@ -462,7 +480,11 @@ def open_objects(path: str | Path) -> StreetObjects:
         raise DatabaseError(msg) from error
     xy = shapely.get_coordinates(table.geometry.array)
     points = (table.geometry.geom_type == "Point").all()
-    if not (points and 0 < len(xy) == len(table) and np.isfinite(xy).all()):
+    some = len(table) > 0 or box is not None
+    if not (some and points and len(xy) == len(table) and np.isfinite(xy).all()):
         msg = f"{path} is damaged (it has rows without a position); load the street objects again."
         raise DatabaseError(msg)
+    if box is not None:
+        inside = ((xy >= box[:2]) & (xy <= box[2:])).all(axis=1)
+        table = table[inside].reset_index(drop=True)
     return StreetObjects(table, taxonomy, licenses)

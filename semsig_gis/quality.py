@@ -183,7 +183,7 @@ class QualityReport:
         Returns
         -------
         tuple of (str, tuple of str, tuple of tuple of str, str)
-            Title, headings, rows of text and a note, which is what `semsig_gis.report.Table`
+            Title, headings, rows of text and a note, which is what `semsig_gis.tables.Table`
             takes. Objects by class, rows by layer, what was conflated (where something was), the
             place, and the licences.
         """

@@ -14,6 +14,7 @@ __all__ = [
     "CLASS_NAME",
     "COUNT",
     "GEOMETRY",
+    "HALF_WIDTH",
     "MERGED",
     "SOURCE",
     "SOURCE_ID",
@@ -27,6 +28,7 @@ SOURCE_ID = "source_id"
 COUNT = "count"
 MERGED = "merged"
 GEOMETRY = "geometry"
+HALF_WIDTH = "half_width"
 
 
 def require_metric_crs(crs: CRS | str | int | None) -> CRS:

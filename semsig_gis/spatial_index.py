@@ -1,7 +1,7 @@
 """R-trees over street objects: which of them lie near a viewpoint.
 
 Two trees with one question: `ObjectIndex` (libspatialindex) for some places, `PackedIndex` (GEOS)
-for the viewpoints of a whole city.
+for very many; it answers for boxes too.
 """
 
 from __future__ import annotations
@@ -88,6 +88,8 @@ class PackedIndex:
     ----------
     xy : ndarray of float64, shape (n, 2)
         Positions in metres, finite.
+    points : ndarray of shapely.Point, shape (n,), optional
+        The same positions, so that they need not be made again.
 
     Raises
     ------
@@ -102,9 +104,11 @@ class PackedIndex:
     [0, 1]
     """
 
-    def __init__(self, xy: NDArray[np.float64]) -> None:
+    def __init__(self, xy: NDArray[np.float64], points: NDArray[np.object_] | None = None) -> None:
         self._xy = _checked(xy)
-        self._tree = shapely.STRtree(np.asarray(shapely.points(self._xy)))
+        if points is None:
+            points = np.asarray(shapely.points(self._xy))
+        self._tree = shapely.STRtree(points)
 
     def pairs_within(
         self, viewpoints: NDArray[np.float64], *, radius: float
@@ -128,6 +132,30 @@ class PackedIndex:
             shapely.points(places), predicate="dwithin", distance=_a_touch_more(radius)
         )
         return _near(viewpoint, point, places, self._xy, radius)
+
+    def pairs_in(
+        self, low: NDArray[np.float64], high: NDArray[np.float64]
+    ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+        """Return every pair of a box and a point in it.
+
+        Parameters
+        ----------
+        low, high : ndarray of float64, shape (b, 2)
+            Lower left and upper right corners in metres; a point on an edge counts.
+
+        Returns
+        -------
+        box, point : ndarray of int64, shape (p,)
+            Row numbers, ordered by box.
+
+        Examples
+        --------
+        >>> tree = PackedIndex(np.array([[0.0, 0.0], [3.0, 4.0], [50.0, 0.0]]))
+        >>> tree.pairs_in(np.array([[2.0, 3.0]]), np.array([[3.0, 5.0]]))
+        (array([0]), array([1]))
+        """
+        box, point = self._tree.query(shapely.box(*low.T, *high.T))
+        return box, point
 
 
 def _checked(xy: NDArray[np.float64]) -> NDArray[np.float64]:

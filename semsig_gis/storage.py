@@ -7,6 +7,7 @@ full disk, an error or an interruption leaves the file that was there before.
 from __future__ import annotations
 
 import contextlib
+import functools
 import json
 import os
 import shutil
@@ -14,20 +15,27 @@ import tempfile
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 from pyproj import CRS
 from pyproj.exceptions import CRSError
 
+from semsig_gis.boxes import groups_meeting
 from semsig_gis.errors import DatabaseError, InputError
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
-__all__ = ["geo_metadata", "read_geoparquet", "whole_file", "write_geoparquet"]
+    from numpy.typing import NDArray
+
+__all__ = ["geo_metadata", "points_to_wkb", "read_geoparquet", "whole_file", "write_geoparquet"]
 
 SPEC_KEY = b"semsig"
+COMPRESSION = 3
 BYTE_TYPES = {pa.string(), pa.large_string(), pa.binary()}
+# Well-known binary of a point: 1 for little-endian, 1 for a point, and where it is.
+WKB_POINT = np.dtype([("order", "u1"), ("type", "<u4"), ("x", "<f8"), ("y", "<f8")])
 
 
 @contextlib.contextmanager
@@ -128,8 +136,38 @@ def geo_metadata(
     return {"version": "1.1.0", "primary_column": "geometry", "columns": {"geometry": column}}
 
 
+def points_to_wkb(xy: NDArray[np.float64]) -> pa.Array:
+    """Return points as an Arrow column of well-known binary, for very many at once.
+
+    Parameters
+    ----------
+    xy : ndarray of float64, shape (n, 2)
+        Coordinates.
+
+    Returns
+    -------
+    pyarrow.Array
+        Binary, 21 bytes a point.
+
+    Examples
+    --------
+    >>> points_to_wkb(np.array([[1.0, 2.0]]))[0].as_py().hex()
+    '0101000000000000000000f03f0000000000000040'
+    """
+    points = np.ones(len(xy), WKB_POINT)
+    points["x"], points["y"] = xy.T
+    fixed = pa.binary(WKB_POINT.itemsize)
+    column = pa.Array.from_buffers(fixed, len(xy), [None, pa.py_buffer(points)])
+    return column.cast(pa.binary())
+
+
 def write_geoparquet(
-    table: pa.Table, path: str | Path, *, geo: dict[str, Any], specs: dict[str, Any]
+    table: pa.Table,
+    path: str | Path,
+    *,
+    geo: dict[str, Any],
+    specs: dict[str, Any],
+    group_rows: int | None = None,
 ) -> None:
     """Write an Arrow table as one whole GeoParquet file with specs in its metadata.
 
@@ -143,6 +181,8 @@ def write_geoparquet(
         See `geo_metadata`.
     specs : dict
         What made the table, as plain JSON values; stored under the key ``semsig``.
+    group_rows : int, optional
+        How many rows are read together, in a file that is read by box.
 
     Examples
     --------
@@ -156,7 +196,9 @@ def write_geoparquet(
     {'kind': 'example'}
     """
     metadata = {b"geo": json.dumps(geo).encode(), SPEC_KEY: json.dumps(specs).encode()}
-    # Lengths apart from the bytes, and numbers by their differences: smaller for short rows.
+    # Lengths apart from the bytes, and numbers by their differences: smaller for short rows. The
+    # numbers in lists are few different ones, so that a dictionary packs them tighter.
+    lists = [f"{field.name}.list.element" for field in table.schema if pa.types.is_list(field.type)]
     encodings = {
         field.name: "DELTA_BINARY_PACKED"
         if pa.types.is_integer(field.type)
@@ -169,14 +211,20 @@ def write_geoparquet(
             table.replace_schema_metadata(metadata),
             partial,
             compression="zstd",
-            use_dictionary=False,
+            compression_level=COMPRESSION,
+            use_dictionary=lists,
             column_encoding=encodings,
             write_page_checksum=True,
+            row_group_size=group_rows,
         )
 
 
 def read_geoparquet(
-    path: str | Path, *, kind: str, columns: list[str] | None = None
+    path: str | Path,
+    *,
+    kind: str,
+    columns: list[str] | None = None,
+    box: Sequence[float] | None = None,
 ) -> tuple[pa.Table, dict[str, Any], CRS]:
     """Read a file that `write_geoparquet` wrote.
 
@@ -188,6 +236,9 @@ def read_geoparquet(
         What the file must hold: the value of ``specs["kind"]``.
     columns : list of str, optional
         Columns to read; all by default.
+    box : sequence of float, optional
+        ``xmin, ymin, xmax, ymax``: rows that do not meet it may be left out (see
+        `semsig_gis.boxes`).
 
     Returns
     -------
@@ -226,7 +277,7 @@ def read_geoparquet(
         raise DatabaseError(msg) from error
     try:
         specs = json.loads(metadata[SPEC_KEY])
-        crs = CRS.from_user_input(json.loads(metadata[b"geo"])["columns"]["geometry"]["crs"])
+        crs = _crs_of(json.dumps(json.loads(metadata[b"geo"])["columns"]["geometry"]["crs"]))
         found = specs["kind"]
     except (KeyError, TypeError, ValueError, CRSError) as error:
         msg = f"{file} was not written by semsig; give a {kind} file."
@@ -235,7 +286,10 @@ def read_geoparquet(
         msg = f"{file} is a {found} file; give a {kind} file."
         raise DatabaseError(msg)
     try:
-        table = parquet.read(columns)
+        if box is None:
+            table = parquet.read(columns)
+        else:
+            table = parquet.read_row_groups(groups_meeting(parquet, box), columns)
     except (pa.ArrowException, OSError, ValueError) as error:
         msg = f"{file} is damaged; make the {kind} file again."
         raise DatabaseError(msg) from error
@@ -244,3 +298,9 @@ def read_geoparquet(
         msg = f"{file} lacks the column {min(missing)!r}; make the {kind} file again."
         raise DatabaseError(msg)
     return table, specs, crs
+
+
+@functools.lru_cache(maxsize=16)
+def _crs_of(text: str) -> CRS:
+    """Return the CRS that JSON describes; that of one file in many is made once."""
+    return CRS.from_user_input(json.loads(text))

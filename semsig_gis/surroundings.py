@@ -9,25 +9,71 @@ import geopandas as gpd
 import pyarrow as pa
 import shapely
 
+from semsig_gis.boxes import GROUP_ROWS, hilbert_order
 from semsig_gis.catalog import load_catalog
 from semsig_gis.errors import InputError, SourceError
 from semsig_gis.layer_spec import LayerSpec
 from semsig_gis.sources import osm_file, vector_file
 from semsig_gis.sources._area import join_areas
+from semsig_gis.storage import whole_file
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from pyproj import CRS
 
     from semsig_gis.layer_spec import GeometryKind
 
-__all__ = ["read_area", "read_surroundings"]
+__all__ = ["read_area", "read_surroundings", "save_surroundings"]
 
 OSM_SUFFIXES = (".osm", ".osm.pbf", ".osm.bz2")
 DIMENSIONS: dict[GeometryKind, int] = {"line": 1, "polygon": 2}
 
 
+def save_surroundings(table: gpd.GeoDataFrame, path: str | Path) -> None:
+    """Save buildings or streets as one GeoParquet file that can be read by box.
+
+    Parameters
+    ----------
+    table : GeoDataFrame
+        Features, each with a geometry; all columns are kept.
+    path : str or Path
+        File to write; it appears whole, by rename.
+
+    Notes
+    -----
+    The file holds the features in a spatial order, with their bounds in the column ``bbox``.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> houses = gpd.GeoDataFrame(
+    ...     geometry=[shapely.box(0, 0, 5, 5), shapely.box(90, 0, 95, 5)], crs="EPSG:2154"
+    ... )
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     file = f"{folder}/houses.parquet"
+    ...     save_surroundings(houses, file)
+    ...     len(read_surroundings(file, role="buildings", crs="EPSG:2154", box=(0, 0, 9, 9)))
+    1
+    """
+    ordered = table.iloc[hilbert_order(table.geometry.array)]
+    with whole_file(path) as partial:
+        ordered.to_parquet(
+            partial,
+            index=False,
+            compression="zstd",
+            schema_version="1.1.0",
+            write_covering_bbox=True,
+            row_group_size=GROUP_ROWS,
+        )
+
+
 def read_surroundings(
-    path: str | Path, *, role: Literal["buildings", "streets"], crs: CRS | str
+    path: str | Path,
+    *,
+    role: Literal["buildings", "streets"],
+    crs: CRS | str,
+    box: Sequence[float] | None = None,
 ) -> gpd.GeoDataFrame:
     """Read the buildings or the streets of a city.
 
@@ -40,11 +86,15 @@ def read_surroundings(
         What the file holds: polygons or lines.
     crs : pyproj.CRS or str
         CRS to move it to.
+    box : sequence of float, optional
+        ``xmin, ymin, xmax, ymax`` in the CRS of the file, which `save_surroundings` wrote: only
+        features whose bounds meet it.
 
     Returns
     -------
     GeoDataFrame
-        One row a feature that has a geometry. Of a ``.parquet`` file all columns are kept.
+        One row a feature that has a geometry; in a box there may be none. Of a ``.parquet`` file
+        all columns are kept.
 
     Raises
     ------
@@ -62,7 +112,7 @@ def read_surroundings(
     ...
     semsig_gis.errors.SourceError: nowhere.parquet does not exist; give a file of polygons.
     """
-    return _read(Path(path), role, "polygon" if role == "buildings" else "line", crs)
+    return _read(Path(path), role, "polygon" if role == "buildings" else "line", crs, box)
 
 
 def read_area(path: str | Path, *, crs: CRS | str) -> shapely.Polygon | shapely.MultiPolygon:
@@ -105,9 +155,15 @@ def read_area(path: str | Path, *, crs: CRS | str) -> shapely.Polygon | shapely.
     return area
 
 
-def _read(path: Path, role: str, kind: GeometryKind, crs: CRS | str) -> gpd.GeoDataFrame:
+def _read(
+    path: Path,
+    role: str,
+    kind: GeometryKind,
+    crs: CRS | str,
+    box: Sequence[float] | None = None,
+) -> gpd.GeoDataFrame:
     if path.suffix.lower() == ".parquet":
-        table = _read_parquet(path, kind)
+        table = _read_parquet(path, kind, box)
     elif path.name.lower().endswith(OSM_SUFFIXES) and role != "area":
         spec = load_catalog("openstreetmap").layer(role)
         table = osm_file.read_layers(path, [spec])[0].table
@@ -127,19 +183,19 @@ def _read(path: Path, role: str, kind: GeometryKind, crs: CRS | str) -> gpd.GeoD
     table = table[~(geometry.isna() | geometry.is_empty)].reset_index(drop=True)
     dimensions = shapely.get_dimensions(table.geometry.to_numpy())
     others = table.geometry[dimensions != DIMENSIONS[kind]]
-    if len(table) == 0 or len(others):
+    if (len(table) == 0 and box is None) or len(others):
         found = f"holds a {others.iloc[0].geom_type}" if len(others) else f"holds no {kind}"
         msg = f"{path} {found}; give a file of {kind}s."
         raise InputError(msg)
     return table.to_crs(crs)
 
 
-def _read_parquet(path: Path, kind: GeometryKind) -> gpd.GeoDataFrame:
+def _read_parquet(path: Path, kind: GeometryKind, box: Sequence[float] | None) -> gpd.GeoDataFrame:
     if not path.is_file():
         msg = f"{path} does not exist; give a file of {kind}s."
         raise SourceError(msg)
     try:
-        return gpd.read_parquet(path)
+        return gpd.read_parquet(path, bbox=None if box is None else tuple(box))
     except (pa.ArrowException, ValueError, OSError) as error:
         msg = f"{path} is damaged or is not GeoParquet; give a file of {kind}s."
         raise SourceError(msg) from error

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import functools
 import re
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -169,6 +169,41 @@ class Taxonomy:
             If a code, symbol or name is taken.
         """
         return Taxonomy((*self.classes, *classes))
+
+    def with_ranges(self, ranges: Mapping[str, float]) -> Taxonomy:
+        """Return a taxonomy in which some classes are seen from another distance.
+
+        Parameters
+        ----------
+        ranges : mapping of str to float
+            Names of classes, and from how far each is seen in metres.
+
+        Returns
+        -------
+        Taxonomy
+            The same classes; those that are not named keep the range they have, if any.
+
+        Raises
+        ------
+        UnknownNameError
+            If there is no class of a name; the nearest is offered.
+        CatalogError
+            If a range is not above 0, or is too large.
+
+        Examples
+        --------
+        >>> stops = Taxonomy((ObjectClass(11, "M", "bus_stop", "Bus stop"),))
+        >>> stops.with_ranges({"bus_stop": 50.0}).ranges(30.0)[11]
+        np.float64(50.0)
+        """
+        for name in ranges:
+            self.by_name(name)
+        return Taxonomy(
+            tuple(
+                replace(item, range_m=float(ranges[item.name])) if item.name in ranges else item
+                for item in self.classes
+            )
+        )
 
     def by_name(self, name: str) -> ObjectClass:
         """Return the class of that name.

@@ -196,7 +196,10 @@ def _lines(
     given = np.asarray(streets, dtype=object).reshape(-1)
     reaches = np.full(len(given), width)
     if widths is not None:
-        own = np.asarray(widths, dtype=np.float64)
+        try:
+            own = np.asarray(widths, dtype=np.float64)
+        except (TypeError, ValueError):
+            own = np.zeros(0)
         if own.shape != given.shape or (own <= 0).any():
             msg = "the half-widths of streets are not all above 0; give one in metres a street."
             raise InputError(msg)

@@ -3,20 +3,30 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from semsig_gis.geometry import bearings, wrap_degrees
+from semsig_gis.geometry import FULL_TURN, bearings
+from semsig_gis.grid import cell_ids, split_ids
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
+
     from numpy.typing import NDArray
 
-    from semsig_gis.spatial_index import ObjectIndex, PackedIndex
+    from semsig_gis.grid import GridSpec
+    from semsig_gis.spatial_index import PackedIndex
 
 __all__ = ["Sightings", "visible_objects"]
 
 BEARING_DECIMALS = 9
+# So many that the arrays of a block stay in the cache of a processor.
+CELLS_A_BLOCK = 1 << 14
+PAIRS_A_BLOCK = 1 << 20
+TILE_CELLS = 16
+# More than any rounding, so that the measured distance decides alone.
+ROUNDING_CELLS = 1e-3
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -44,18 +54,18 @@ class Sightings:
     bearing: NDArray[np.float64]
     distance: NDArray[np.float64]
 
-    def only(self, kept: NDArray[np.bool_]) -> Sightings:
-        """Return some of the pairs.
+    def only(self, kept: NDArray[np.bool_] | NDArray[np.int64]) -> Sightings:
+        """Return some of the pairs, or all of them in another order.
 
         Parameters
         ----------
-        kept : ndarray of bool, shape (p,)
-            Which pairs.
+        kept : ndarray of bool, shape (p,), or of int64
+            Whether to keep each pair, or the numbers of those to keep.
 
         Returns
         -------
         Sightings
-            Those pairs, in the same order.
+            Those pairs.
         """
         return Sightings(
             self.viewpoint[kept], self.object[kept], self.bearing[kept], self.distance[kept]
@@ -63,41 +73,133 @@ class Sightings:
 
 
 def visible_objects(
-    viewpoints: NDArray[np.float64],
+    columns: NDArray[np.int64],
+    rows: NDArray[np.int64],
     objects: NDArray[np.float64],
     *,
-    index: ObjectIndex | PackedIndex,
-    radius: float,
-) -> Sightings:
-    """Return what is seen from every viewpoint.
+    grid: GridSpec,
+    index: PackedIndex,
+    ranges: NDArray[np.float64],
+) -> Iterator[tuple[slice, Sightings]]:
+    """Yield what is seen from the cells of a grid, block by block.
 
     Parameters
     ----------
-    viewpoints : ndarray of float64, shape (v, 2)
-        Places to look from, in metres.
-    objects : ndarray of float64, shape (n, 2)
+    columns, rows : ndarray of int64, shape (n,)
+        Distinct cells, ordered by column and row; they are looked from at their centres.
+    objects : ndarray of float64, shape (m, 2)
         Positions of the objects, in metres.
-    index : ObjectIndex or PackedIndex
+    grid : GridSpec
+        Where the cells lie.
+    index : PackedIndex
         R-tree over `objects`.
-    radius : float
-        Visibility range R in metres.
+    ranges : ndarray of float64, shape (m,)
+        From how far each object is seen: its visibility range R in metres.
 
-    Returns
-    -------
+    Yields
+    ------
+    cells : slice
+        Rows of the next cells in `columns` and `rows`.
     Sightings
-        The pairs within range, ordered by viewpoint (paper, section on semantic signatures).
+        The pairs within range (paper, section on semantic signatures) of a viewpoint, counted
+        from the first of these cells, and an object, in any order.
+
+    Notes
+    -----
+    The R-tree is asked which objects are near each tile of cells. Around such an object, the
+    cells of one column that see it follow each other, so that two searches in the list of cells
+    find them all. The distance of every pair is then measured.
 
     Examples
     --------
-    >>> from semsig_gis.spatial_index import ObjectIndex
-    >>> places = np.array([[0.0, 10.0], [0.0, 99.0]])
-    >>> tree = ObjectIndex(places)
-    >>> seen = visible_objects(np.array([[0.0, 0.0]]), places, index=tree, radius=30.0)
-    >>> seen.bearing.tolist(), seen.distance.tolist()
-    ([0.0], [10.0])
+    >>> from semsig_gis.grid import GridSpec
+    >>> from semsig_gis.spatial_index import PackedIndex
+    >>> places = np.array([[5.0, 15.0], [5.0, 104.0]])
+    >>> cell, tree, reach = np.array([0]), PackedIndex(places), np.array([30.0, 30.0])
+    >>> blocks = visible_objects(cell, cell, places, grid=GridSpec(), index=tree, ranges=reach)
+    >>> [(seen.bearing.tolist(), seen.distance.tolist()) for _, seen in blocks]
+    [([0.0], [10.0])]
     """
-    viewpoint, item = index.pairs_within(viewpoints, radius=radius)
-    delta = objects[item] - viewpoints[viewpoint]
+    cells = len(columns)
+    starts = range(0, cells, CELLS_A_BLOCK)
+    blocks = [slice(start, min(start + CELLS_A_BLOCK, cells)) for start in reversed(starts)]
+    while blocks:
+        block = blocks.pop()
+        here = columns[block], rows[block]
+        runs = _runs(*here, objects, grid=grid, index=index, ranges=ranges)
+        if runs.size.sum() > PAIRS_A_BLOCK and block.stop - block.start > 1:
+            middle = (block.start + block.stop) // 2
+            blocks += [slice(middle, block.stop), slice(block.start, middle)]
+        else:
+            yield block, _sightings(runs, grid.viewpoints(*here), objects, ranges=ranges)
+
+
+class _Runs(NamedTuple):
+    """Objects, and the cells of one column that may see each: some that follow each other."""
+
+    object: NDArray[np.int64]
+    first: NDArray[np.int64]
+    size: NDArray[np.int64]
+
+
+def _runs(
+    columns: NDArray[np.int64],
+    rows: NDArray[np.int64],
+    objects: NDArray[np.float64],
+    *,
+    grid: GridSpec,
+    index: PackedIndex,
+    ranges: NDArray[np.float64],
+) -> _Runs:
+    """Return where in a list of cells those are that may see an object."""
+    ids = cell_ids(columns, rows)
+    # Tiles, and the corners of the part of them that is in this block.
+    tiles = np.sort(cell_ids(columns // TILE_CELLS, rows // TILE_CELLS))
+    tile = np.stack(split_ids(tiles[np.append(True, np.diff(tiles) > 0)]), axis=-1)
+    low = np.maximum(tile * TILE_CELLS, [columns[0], rows.min()])
+    high = np.minimum((tile + 1) * TILE_CELLS - 1, [columns[-1], rows.max()])
+    furthest = ranges.max() / grid.step + ROUNDING_CELLS
+    corners = grid.viewpoints(*(low - furthest).T), grid.viewpoints(*(high + furthest).T)
+    box, item = index.pairs_in(*corners)
+
+    # The columns in reach of each object, then the rows in each of them.
+    place = (objects[item] - grid.origin) / grid.step - 0.5
+    reach = ranges[item] / grid.step + ROUNDING_CELLS
+    first = np.maximum(np.ceil(place[:, 0] - reach), low[box, 0]).astype(np.int64)
+    last = np.minimum(np.floor(place[:, 0] + reach), high[box, 0]).astype(np.int64)
+    pair, column = _ranges(first, np.maximum(last + 1 - first, 0))
+    half = np.sqrt(np.maximum(reach[pair] ** 2 - (column - place[pair, 0]) ** 2, 0.0))
+    first = np.maximum(np.ceil(place[pair, 1] - half), low[box[pair], 1])
+    last = np.minimum(np.floor(place[pair, 1] + half), high[box[pair], 1])
+    begin = np.searchsorted(ids, cell_ids(column, first))
+    end = np.searchsorted(ids, cell_ids(column, last), side="right")
+    return _Runs(item[pair], begin, np.maximum(end - begin, 0))
+
+
+def _ranges(
+    first: NDArray[np.int64], size: NDArray[np.int64]
+) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Return, for ranges of whole numbers, which range each number is in, and the numbers."""
+    ends = np.cumsum(size)
+    own = np.repeat(np.arange(len(size)), size)
+    return own, np.repeat(first - ends + size, size) + np.arange(len(own))
+
+
+def _sightings(
+    runs: _Runs,
+    viewpoints: NDArray[np.float64],
+    objects: NDArray[np.float64],
+    *,
+    ranges: NDArray[np.float64],
+) -> Sightings:
+    """Return the pairs of some runs that are within range."""
+    run, viewpoint = _ranges(runs.first, runs.size)
+    item = runs.object[run]
+    dx = objects[:, 0][item] - viewpoints[:, 0][viewpoint]
+    dy = objects[:, 1][item] - viewpoints[:, 1][viewpoint]
+    distance = np.hypot(dx, dy)
+    near = distance <= ranges[item]
     # Processors differ in the last digits of an arctangent: they must not decide about ties.
-    bearing = wrap_degrees(np.round(bearings(delta[:, 0], delta[:, 1]), BEARING_DECIMALS))
-    return Sightings(viewpoint, item, bearing, np.hypot(delta[:, 0], delta[:, 1]))
+    bearing = np.round(bearings(dx[near], dy[near]), BEARING_DECIMALS)
+    bearing[bearing >= FULL_TURN] = 0.0
+    return Sightings(viewpoint[near], item[near], bearing, distance[near])

@@ -26,7 +26,7 @@ from worlds import (
     worlds,
 )
 
-from semsig_gis import building
+from semsig_gis import visibility
 from semsig_gis.building import build_cells, build_database
 from semsig_gis.database_file import open_database, save_database
 from semsig_gis.errors import CrsError, EmptyResultError
@@ -105,7 +105,7 @@ def test_nothing_seen_is_an_error() -> None:
 def test_blocks_leave_no_seam(town: World, size: int, monkeypatch: pytest.MonkeyPatch) -> None:
     whole = town.database
     calls: list[tuple[int, int]] = []
-    monkeypatch.setattr(building, "CELLS_A_BLOCK", size)
+    monkeypatch.setattr(visibility, "CELLS_A_BLOCK", size)
     parts = build_database(
         town.street_objects, progress=lambda done, total: calls.append((done, total))
     )

@@ -12,11 +12,17 @@ from pyproj import CRS
 from sentences import assert_sentence
 
 from semsig_gis import catalog as catalog_module
-from semsig_gis.catalog import Catalog, catalog_names, load_catalog, paper_taxonomy
-from semsig_gis.errors import CatalogError, UnknownNameError
-from semsig_gis.layer_spec import ClassBy, LayerSpec
-from semsig_gis.loading import combine_catalogs
+from semsig_gis.catalog import (
+    Catalog,
+    catalog_names,
+    combine_catalogs,
+    load_catalog,
+    paper_taxonomy,
+)
+from semsig_gis.errors import CatalogError, InputError, UnknownNameError
+from semsig_gis.layer_spec import ClassBy, LayerSpec, WidthBy
 from semsig_gis.schema import require_metric_crs
+from semsig_gis.taxonomy import ObjectClass
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -77,6 +83,7 @@ MONTPELLIER = [
     "cameras",
     "crossings",
 ]
+CENTRE_LINES = ["streets"]
 GEOMETRY = {
     "point": {"Point", "MultiPoint"},
     "line": {"LineString", "MultiLineString"},
@@ -173,6 +180,34 @@ def test_a_catalogue_is_what_its_file_says(town: Callable[..., Path]) -> None:
     hash(catalog)
 
 
+def test_ranges_go_into_the_taxonomy(town: Callable[..., Path]) -> None:
+    assert all(item.range_m is None for item in load_catalog(town()).taxonomy.classes)
+    path = town('title = "Kiosk"', 'title = "Kiosk"\nrange_m = 60')
+    kiosk = load_catalog(path).taxonomy.by_name("kiosk")
+    assert kiosk.range_m == 60.0
+    text = 'title = "T"\nranges = { bus_stop = 50, kiosk = 12.5 }'
+    taxonomy = load_catalog(town('title = "Town open data"', text)).taxonomy
+    assert {c.name: c.range_m for c in taxonomy.classes if c.range_m is not None} == {
+        "bus_stop": 50.0,
+        "kiosk": 12.5,
+    }
+    ranges = taxonomy.ranges(30.0)
+    assert (ranges[11], ranges[30], ranges[3]) == (50.0, 12.5, 30.0)
+
+
+def test_streets_say_how_wide_they_are(town: Callable[..., Path]) -> None:
+    old = 'name = "posts"\nclass = "street_light"'
+    new = (
+        'name = "posts"\nrole = "streets"\nwidth_field = "WIDTH"\n'
+        'width_by = { field = "KIND", values = { Avenue = 24, "/R.*/" = 12.5 }, default = 16 }'
+    )
+    spec = load_catalog(town(old, new)).layer("posts")
+    assert spec.width_by == WidthBy("KIND", (("Avenue", 24.0), ("/R.*/", 12.5)), 16.0)
+    assert spec.width_field == "WIDTH"
+    assert spec.has_width
+    assert not load_catalog(town()).layer("posts").has_width
+
+
 def test_a_path_may_be_text_and_the_file_may_have_a_mark(town: Callable[..., Path]) -> None:
     path = town()
     plain = load_catalog(str(path))
@@ -245,6 +280,74 @@ MISTAKES = {
         'title = "Town open data"',
         'title = "T"\nconflate = { street_light = 0 }',
         ["conflate", "street_light = 0", "metres above 0"],
+    ),
+    "radius of a street": (
+        'title = "Town open data"',
+        'title = "T"\nconflate = { street_light = 101 }',
+        ["conflate", "street_light = 101", "up to 100"],
+    ),
+    "range of nothing": (
+        'title = "Town open data"',
+        'title = "T"\nranges = { bus_stop = 0 }',
+        ["ranges", "bus_stop = 0", "metres above 0 and up to 6000"],
+    ),
+    "range of nobody": (
+        'title = "Town open data"',
+        'title = "T"\nranges = { bus_stop = nan }',
+        ["ranges", "bus_stop = nan", "metres above 0"],
+    ),
+    "range of true": (
+        'title = "Town open data"',
+        'title = "T"\nranges = { bus_stop = true }',
+        ["ranges", "bus_stop = True", "metres above 0"],
+    ),
+    "range as text": (
+        'title = "Town open data"',
+        'title = "T"\nranges = { bus_stop = "50 m" }',
+        ["ranges", "bus_stop = '50 m'", "metres above 0"],
+    ),
+    "range of an unknown class": (
+        'title = "Town open data"',
+        'title = "T"\nranges = { bus_shelter = 50 }',
+        ["ranges", "'bus_shelter'"],
+    ),
+    "ranges as a number": (
+        'title = "Town open data"',
+        'title = "T"\nranges = 50',
+        ["ranges = 50", "write a table"],
+    ),
+    "range of an own class": (
+        'title = "Kiosk"',
+        'title = "Kiosk"\nrange_m = -5',
+        ["class 1", "range_m = -5", "metres above 0"],
+    ),
+    "two ranges of one class": (
+        'attribution = "Town of Ville-Élan"\nmetric_crs = "EPSG:2154"\n\n[[classes]]',
+        "ranges = { kiosk = 60 }\n[[classes]]\nrange_m = 50",
+        ["a range_m of 'kiosk'", "one in ranges", "remove one"],
+    ),
+    "widths of lamps": (
+        'name = "posts"',
+        'name = "posts"\nwidth_field = "W"',
+        ["'posts'", "width_field", "only streets"],
+    ),
+    "width of nothing": (
+        'name = "posts"\nclass = "street_light"',
+        'name = "posts"\nrole = "streets"\nwidth_by = { field = "F", values = { A = 0 } }',
+        ["'posts', width_by, values", "'A' = 0", "metres above 0 and up to 200"],
+    ),
+    "default width as text": (
+        'name = "posts"\nclass = "street_light"',
+        (
+            'name = "posts"\nrole = "streets"\n'
+            'width_by = { field = "F", values = {}, default = "wide" }'
+        ),
+        ["'posts', width_by", "default = 'wide'", "metres above 0"],
+    ),
+    "width_by without a field": (
+        'name = "posts"\nclass = "street_light"',
+        'name = "posts"\nrole = "streets"\nwidth_by = { values = { A = 5 } }',
+        ["'posts', width_by", "lacks the key 'field'"],
     ),
     "radius of an unknown class": (
         'title = "Town open data"',
@@ -366,6 +469,61 @@ def test_an_unknown_catalogue_is_named(name: str) -> None:
     assert_sentence(caught.value, repr(name), "'montpellier'", "path of a .toml file")
 
 
+# --- Several together ----------------------------------------------------------------------------
+
+
+BENCH = LayerSpec(name="benches", class_name="bench")
+
+
+def catalog_of(**values: object) -> Catalog:
+    plain = {"name": "town", "title": "Town", "taxonomy": paper_taxonomy(), "layers": (BENCH,)}
+    return Catalog(**{**plain, **values})  # type: ignore[arg-type]
+
+
+def test_several_catalogues_become_one() -> None:
+    both = combine_catalogs([load_catalog("openstreetmap"), load_catalog("montpellier")])
+    assert both.name == "openstreetmap+montpellier"
+    assert both.metric_crs == "EPSG:2154"
+    assert both.layer("montpellier/trees").reader == "vector_file"
+    assert both.layer("openstreetmap/trees").reader == "osm_file"
+    assert dict(both.conflate)["bench"] == 4
+    assert both.taxonomy.by_name("pedestrian_crossing").code == 12
+    assert combine_catalogs([load_catalog("montpellier")]) == load_catalog("montpellier")
+
+
+def test_the_first_radius_holds() -> None:
+    first = catalog_of(name="a", conflate=(("bench", 2.0),))
+    second = catalog_of(name="b", conflate=(("bench", 9.0), ("bus_stop", 5.0)))
+    assert dict(combine_catalogs([first, second]).conflate) == {"bench": 2.0, "bus_stop": 5.0}
+
+
+def test_the_first_range_holds() -> None:
+    kiosk = paper_taxonomy().extended([ObjectClass(30, "Z", "kiosk", "Kiosk")])
+    first = catalog_of(name="a", taxonomy=kiosk.with_ranges({"bench": 20.0}))
+    second = catalog_of(
+        name="b", taxonomy=kiosk.with_ranges({"bench": 25.0, "bus_stop": 50.0, "kiosk": 40.0})
+    )
+    both = combine_catalogs([first, second]).taxonomy
+    assert {c.name: c.range_m for c in both.classes if c.range_m is not None} == {
+        "bench": 20.0,
+        "bus_stop": 50.0,
+        "kiosk": 40.0,
+    }
+    assert [item.name for item in both.classes] == [item.name for item in kiosk.classes]
+    assert combine_catalogs([second, first]).taxonomy.by_name("bench").range_m == 25.0
+
+
+def test_catalogues_that_do_not_go_together() -> None:
+    clash = paper_taxonomy().extended([ObjectClass(12, "Q", "quay", "Quay")])
+    with pytest.raises(CatalogError) as caught:
+        combine_catalogs([load_catalog("montpellier"), catalog_of(taxonomy=clash)])
+    assert_sentence(caught.value, "montpellier", "town", "12")
+    for catalogs in ([], [catalog_of(), catalog_of()]):
+        with pytest.raises(InputError) as refused:
+            combine_catalogs(catalogs)
+        assert_sentence(refused.value, "each once")
+
+
 # --- What is built in -------------------------------------------------------------------------
 
 
@@ -399,6 +557,14 @@ def test_every_layer_says_what_it_needs_to(name: str) -> None:
         assert spec.attribution, spec.name
 
 
+@pytest.mark.parametrize("name", OWN)
+def test_the_classes_of_the_paper_are_seen_from_the_range_of_the_build(name: str) -> None:
+    classes = load_catalog(name).taxonomy.classes
+    assert {item.range_m for item in classes[: len(PAPER)]} == {None}
+    # One that were seen further would make every search wider, whether it occurs or not.
+    assert all(item.range_m is None or item.range_m < 30 for item in classes)
+
+
 def test_the_classes_of_all_catalogues_go_together() -> None:
     together = combine_catalogs([load_catalog(name) for name in OWN])
     assert len(together.taxonomy.classes) == 11 + 7 + 11
@@ -406,10 +572,11 @@ def test_the_classes_of_all_catalogues_go_together() -> None:
 
 
 def test_the_layers_of_montpellier_are_those_of_the_issue() -> None:
-    assert [spec.name for spec in load_catalog("montpellier").layers] == MONTPELLIER
+    layers = [spec.name for spec in load_catalog("montpellier").layers]
+    assert layers == MONTPELLIER + CENTRE_LINES
 
 
-@pytest.mark.parametrize("layer", MONTPELLIER)
+@pytest.mark.parametrize("layer", MONTPELLIER + CENTRE_LINES)
 def test_a_layer_of_montpellier_is_as_its_publisher_left_it(layer: str, geodata: Path) -> None:
     spec = load_catalog("montpellier").layer(layer)
     found = [
@@ -433,6 +600,8 @@ def test_a_layer_of_montpellier_is_as_its_publisher_left_it(layer: str, geodata:
         assert {value for value, _ in spec.class_by.classes} <= set(frame[spec.class_by.field])
     if spec.id_field is not None:
         assert frame[spec.id_field].notna().any()
+    if spec.width_by is not None:
+        assert {value for value, _ in spec.width_by.widths} <= set(frame[spec.width_by.field])
 
 
 def test_the_shipped_files_are_found() -> None:

@@ -514,7 +514,7 @@ def test_buildings_streets_and_an_area_narrow_what_is_built(
         "buildings": ("--buildings", houses),
         "outdoor": ("--buildings", houses, "--viewpoints", "outdoor"),
         "streets": ("--streets", streets, "--viewpoints", "streets"),
-        "wide": ("--streets", streets, "--viewpoints", "streets", "--street-width", 20),
+        "wide": ("--streets", streets, "--viewpoints", "streets", "--street-width", 40),
         "area": ("--area", area),
     }.items():
         code, printed, _ = run("build", objects, "--out", out, *options)

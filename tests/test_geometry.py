@@ -56,6 +56,13 @@ def test_bearings_count_clockwise_from_north(dx: float, dy: float, bearing: floa
     assert bearings(dx, dy) == bearing
 
 
+@given(st.floats(allow_nan=False), st.floats(allow_nan=False))
+def test_a_bearing_is_the_wrapped_arctangent(dx: float, dy: float) -> None:
+    bearing = bearings(dx, dy)
+    assert bearing == wrap_degrees(np.degrees(np.arctan2(dx, dy)))
+    assert not np.signbit(bearing)
+
+
 @given(METRES, METRES)
 def test_a_bearing_points_along_its_displacement(dx: float, dy: float) -> None:
     bearing = float(bearings(dx, dy))

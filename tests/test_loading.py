@@ -1,8 +1,7 @@
-"""From catalogues to street objects in one call."""
+"""From catalogues to street objects."""
 
 from __future__ import annotations
 
-import json
 from typing import TYPE_CHECKING, Any
 
 import geopandas as gpd
@@ -10,27 +9,19 @@ import pytest
 import shapely
 from osm_xml import node, way, write_osm
 from sentences import assert_sentence
-from servers import Answer, Server
 
+from semsig_gis.building import build_database
 from semsig_gis.catalog import Catalog, load_catalog, paper_taxonomy
-from semsig_gis.errors import CatalogError, CrsError, EmptyResultError, InputError, SourceError
+from semsig_gis.database_file import open_database, save_database
+from semsig_gis.errors import CrsError, EmptyResultError
 from semsig_gis.layer_spec import LayerSpec
-from semsig_gis.loading import (
-    assemble,
-    choose_layers,
-    combine_catalogs,
-    fetch_layers,
-    find_area,
-    metric_crs_of,
-    open_cache,
-    read_files,
-)
+from semsig_gis.loading import assemble, choose_layers, metric_crs_of, read_files
+from semsig_gis.objects import open_objects, save_objects
 from semsig_gis.schema import MERGED
 from semsig_gis.sources import RawLayer, osm_file
-from semsig_gis.taxonomy import ObjectClass
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
+    from collections.abc import Sequence
     from pathlib import Path
 
 
@@ -50,34 +41,6 @@ def raw(name: str, *places: tuple[float, float], crs: str | None = "EPSG:2154") 
 def catalog_of(**values: object) -> Catalog:
     plain = {"name": "town", "title": "Town", "taxonomy": paper_taxonomy(), "layers": (BENCH,)}
     return Catalog(**{**plain, **values})  # type: ignore[arg-type]
-
-
-def test_several_catalogues_become_one() -> None:
-    both = combine_catalogs([load_catalog("openstreetmap"), load_catalog("montpellier")])
-    assert both.name == "openstreetmap+montpellier"
-    assert both.metric_crs == "EPSG:2154"
-    assert both.layer("montpellier/trees").reader == "vector_file"
-    assert both.layer("openstreetmap/trees").reader == "osm_file"
-    assert dict(both.conflate)["bench"] == 4
-    assert both.taxonomy.by_name("pedestrian_crossing").code == 12
-    assert combine_catalogs([load_catalog("montpellier")]) == load_catalog("montpellier")
-
-
-def test_the_first_radius_holds() -> None:
-    first = catalog_of(name="a", conflate=(("bench", 2.0),))
-    second = catalog_of(name="b", conflate=(("bench", 9.0), ("bus_stop", 5.0)))
-    assert dict(combine_catalogs([first, second]).conflate) == {"bench": 2.0, "bus_stop": 5.0}
-
-
-def test_catalogues_that_do_not_go_together() -> None:
-    clash = paper_taxonomy().extended([ObjectClass(12, "Q", "quay", "Quay")])
-    with pytest.raises(CatalogError) as caught:
-        combine_catalogs([load_catalog("montpellier"), catalog_of(taxonomy=clash)])
-    assert_sentence(caught.value, "montpellier", "town", "12")
-    for catalogs in ([], [catalog_of(), catalog_of()]):
-        with pytest.raises(InputError) as refused:
-            combine_catalogs(catalogs)
-        assert_sentence(refused.value, "each once")
 
 
 def test_layers_are_chosen() -> None:
@@ -101,6 +64,8 @@ def test_a_file_is_read_once_for_all_its_layers(
         node(2, 7.42, 43.74, {"natural": "tree"}),
         node(3, 7.43, 43.74),
         way(9, [1, 2, 3, 1], {"building": "yes"}),
+        way(10, [1, 2], {"highway": "primary"}),
+        way(11, [2, 3], {"highway": "road"}),
     )
     real, calls = osm_file.read_layers, []
 
@@ -121,7 +86,8 @@ def test_a_file_is_read_once_for_all_its_layers(
     assert list(loaded.buildings.geom_type) == ["Polygon"]
     assert loaded.buildings.crs == loaded.objects.crs
     assert loaded.streets is not None
-    assert len(loaded.streets) == 0
+    assert loaded.streets["half_width"].tolist()[0] == 12.0
+    assert loaded.streets["half_width"].isna().tolist() == [False, True]
 
 
 def test_one_bench_in_two_layers_is_one_bench() -> None:
@@ -142,6 +108,20 @@ def test_one_bench_in_two_layers_is_one_bench() -> None:
     assert len(assemble(layers, catalog, merge=False, collapse=False).objects) == 5
 
 
+def test_ranges_of_the_catalogue_reach_the_database(tmp_path: Path) -> None:
+    taxonomy = paper_taxonomy().with_ranges({"bench": 12.0})
+    loaded = assemble(
+        [raw("city", (770005, 6280005))], catalog_of(metric_crs="EPSG:2154", taxonomy=taxonomy)
+    )
+    save_objects(loaded.objects, tmp_path / "objects.parquet")
+    objects = open_objects(tmp_path / "objects.parquet")
+    assert objects.taxonomy.by_name("bench").range_m == 12.0
+    save_database(build_database(objects), tmp_path / "city.parquet")
+    database = open_database(tmp_path / "city.parquet")
+    assert database.taxonomy == taxonomy
+    assert len(database) == 5  # a cell and those beside it, of the 29 within 30 m
+
+
 def test_the_zone_of_the_data() -> None:
     crs, notes = metric_crs_of([raw("a", (7.4, 43.7), crs="EPSG:4326"), raw("b")])
     assert (crs.to_epsg(), notes) == (32632, ())
@@ -156,66 +136,3 @@ def test_the_zone_of_the_data() -> None:
     with pytest.raises(CrsError) as bare:
         metric_crs_of([raw("a", (1, 1), crs=None)])
     assert_sentence(bare.value, "'a'")
-
-
-# --- Fetching -----------------------------------------------------------------------------------
-
-
-@pytest.fixture
-def server() -> Iterator[Server]:
-    with Server() as running:
-        yield running
-
-
-def benches(*places: tuple[float, float]) -> bytes:
-    return json.dumps(
-        {
-            "elements": [
-                {"type": "node", "id": i, "lon": x, "lat": y, "tags": {"amenity": "bench"}}
-                for i, (x, y) in enumerate(places, start=1)
-            ]
-        }
-    ).encode()
-
-
-def test_openstreetmap_is_fetched_cut_to_the_area_and_kept(server: Server, tmp_path: Path) -> None:
-    osm = load_catalog("openstreetmap")
-    here = catalog_of(
-        taxonomy=osm.taxonomy,
-        layers=(osm.layer("benches"),),
-        reader="osm_file",
-        endpoints=(f"{server.url}/api",),
-        geocoder=f"{server.url}/search",
-    )
-    server.on("/api/interpreter", Answer(benches((7.42, 43.73), (7.49, 43.73))))
-    cache, http = open_cache(tmp_path / "cache")
-    area = find_area("7.41,43.72,7.43,43.74", here, cache=cache, http=http)
-    (layer,) = fetch_layers(here.layers, here, area=area, cache=cache, http=http)
-    assert layer.table["source_id"].tolist() == ["node/1"]
-    assert (layer.read, layer.filtered) == (2, 1)
-    asked = len(server.seen)
-    _, offline = open_cache(tmp_path / "cache", offline=True)
-    (again,) = fetch_layers(here.layers, here, area=area, cache=cache, http=offline)
-    assert again.table["source_id"].tolist() == ["node/1"]
-    assert len(server.seen) == asked
-    far = find_area("1,2,3,4", here, cache=cache, http=offline)
-    with pytest.raises(SourceError) as caught:
-        fetch_layers(here.layers, here, area=far, cache=cache, http=offline)
-    assert_sentence(caught.value, "127.0.0.1")
-
-
-def test_a_place_is_looked_up_only_where_the_catalogue_says(server: Server, tmp_path: Path) -> None:
-    cache, http = open_cache(tmp_path)
-    with pytest.raises(InputError) as caught:
-        find_area("Monaco", catalog_of(), cache=cache, http=http)
-    assert_sentence(caught.value, "'town'", "'Monaco'", "polygon file")
-    with pytest.raises(InputError) as refused:
-        fetch_layers(
-            [BENCH],
-            catalog_of(),
-            area=find_area("1,2,3,4", catalog_of(), cache=cache, http=http),
-            cache=cache,
-            http=http,
-        )
-    assert_sentence(refused.value, "'town'", "semsig load")
-    assert server.seen == []

@@ -1,17 +1,24 @@
 from __future__ import annotations
 
+import gc
 import json
 import math
+import tempfile
+import weakref
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+import pandas as pd
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from pyproj import CRS, Transformer
 
 from semsig_gis.catalog import paper_taxonomy
 from semsig_gis.database import BEARING_UNITS, SignatureDatabase
+from semsig_gis.database_file import open_database, save_database
+from semsig_gis.dataset import PartitionedDatabase
 from semsig_gis.errors import InputError
 from semsig_gis.grid import GridSpec
 from semsig_gis.matching import Method, localize, score_cells
@@ -20,6 +27,10 @@ from semsig_gis.signatures import Signature, SignatureSpec
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
+
+    from numpy.typing import NDArray
+
+    from semsig_gis.localization import Localization
 
 
 TAXONOMY = paper_taxonomy()
@@ -355,3 +366,117 @@ def test_everything_fits_into_json(types: str | None, bearings: list[float] | No
         assert back.transform(one["lon"], one["lat"]) == pytest.approx(
             (one["x"], one["y"]), abs=0.02
         )
+
+
+# --- A database in parts ----------------------------------------------------------------------
+
+
+def in_parts(database: SignatureDatabase, owner: NDArray[np.int64], folder: str) -> Any:  # noqa: ANN401
+    """Save the cells of each owner as a part."""
+    files = []
+    for number in np.unique(owner).tolist():
+        files.append(Path(folder) / f"{number}.parquet")
+        save_database(database.select(owner == number), files[-1])
+    return PartitionedDatabase(tuple(files), len(database))
+
+
+def assert_same_answer(one: Localization, other: Localization) -> None:
+    pd.testing.assert_frame_equal(one.candidates, other.candidates)
+    assert one.to_dict() == other.to_dict()
+
+
+PARTED_METHODS = [
+    *METHODS,
+    *(f"{one}:{keep}%" for one in METHODS if "+" in one for keep in (0.5, 5, 40, 100)),
+]
+
+
+@given(
+    seed=st.integers(0, 10**6),
+    count=st.integers(1, 60),
+    parts=st.integers(1, 5),
+    text=st.sampled_from(PARTED_METHODS),
+    top=st.sampled_from([1, 2, 7, 30, 100]),
+    part=st.sampled_from(["both", "types", "angles"]),
+)
+@settings(max_examples=120)
+def test_a_database_in_parts_answers_as_in_one_piece(
+    *, seed: int, count: int, parts: int, text: str, top: int, part: str
+) -> None:
+    rng = np.random.default_rng(seed)
+    whole = database_of(random_cells(count, seed=seed))
+    # Another one of the cells, or one that a person made up of the classes that there are.
+    query = whole.signature(int(rng.integers(count)))
+    if rng.random() < 0.5:
+        codes = rng.choice(whole.present_codes, int(rng.integers(1, 9)))
+        query = Signature(codes, np.sort(rng.uniform(0, 360, len(codes))))
+    method = Method.parse(text)
+    if part != "both" and part in method.measures:
+        query = Signature(
+            query.codes if part == "types" else None, query.bearings if part == "angles" else None
+        )
+    with tempfile.TemporaryDirectory() as folder:
+        parted = in_parts(whole, rng.integers(0, parts, count), folder)
+        assert_same_answer(
+            localize(parted, query, method=method, top=top),
+            localize(whole, query, method=method, top=top),
+        )
+
+
+def test_the_gate_of_the_second_stage_is_that_of_all_parts(tmp_path: Path) -> None:
+    # More cells are listed than pass, so that the worst that passes shows in the distances.
+    rng = np.random.default_rng(8)
+    for seed in range(12):
+        whole = database_of(random_cells(60, seed=seed))
+        parted = in_parts(whole, rng.integers(0, 4, 60), str(tmp_path))
+        for keep in (1, 10, 50):
+            query, method = whole.signature(seed), Method(keep=keep)
+            assert_same_answer(
+                localize(parted, query, method=method, top=60),
+                localize(whole, query, method=method, top=60),
+            )
+
+
+@pytest.mark.parametrize("text", ["edit+edit:2%:raw:weights=40/50/60", "histogram+edit:2%:raw"])
+def test_on_a_large_raw_scale_parts_rank_the_cells_beyond_the_second_stage_alike(
+    text: str, tmp_path: Path
+) -> None:
+    rng = np.random.default_rng(4)
+    cells = [
+        ("".join(rng.choice(list("DBG"), length)), np.sort(rng.uniform(0, 360, length)).tolist())
+        for length in rng.integers(1, 120, 200)
+    ]
+    whole = database_of(cells)
+    parted = in_parts(whole, rng.integers(0, 3, 200), str(tmp_path))
+    for cell in (0, 100):
+        query, method = whole.signature(cell), Method.parse(text)
+        assert_same_answer(
+            localize(parted, query, method=method, top=200),
+            localize(whole, query, method=method, top=200),
+        )
+
+
+def test_one_part_at_a_time_is_in_memory(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    parted = in_parts(CITY, np.arange(len(CITY)) % 8, str(tmp_path))
+    opened: list[weakref.ref[SignatureDatabase]] = []
+
+    def watched(path: Path) -> SignatureDatabase:
+        gc.collect()
+        assert sum(one() is not None for one in opened) <= 2  # one is taken while one is let go
+        database = open_database(path)
+        opened.append(weakref.ref(database))
+        return database
+
+    monkeypatch.setattr("semsig_gis.dataset.open_database", watched)
+    localize(parted, CITY.signature(3), method=Method(keep=5))
+    assert len(opened) == 16  # twice in two stages
+
+
+def test_a_class_that_no_part_sees_is_refused(tmp_path: Path) -> None:
+    parted = in_parts(CITY, np.arange(len(CITY)) % 3, str(tmp_path))
+    for method in (Method(), Method(keep=5)):
+        with pytest.raises(InputError) as caught:
+            localize(parted, asked("DM", [1.0, 2.0]), method=method)
+        with pytest.raises(InputError) as whole:
+            localize(CITY, asked("DM", [1.0, 2.0]), method=method)
+        assert str(caught.value) == str(whole.value)

@@ -16,6 +16,7 @@ from semsig_gis.building import build_database
 from semsig_gis.catalog import load_catalog
 from semsig_gis.database_file import open_database, save_database
 from semsig_gis.grid import GridSpec, cell_ids
+from semsig_gis.loading import choose_layers
 from semsig_gis.objects import build_objects
 from semsig_gis.sources import find_files
 from semsig_gis.sources.vector_file import read_layer
@@ -51,7 +52,7 @@ LAYERS = {
 def load(geodata: Path, *, filters: bool, collapse: bool) -> tuple[StreetObjects, LoadReport]:
     catalog = load_catalog("montpellier")
     assert catalog.metric_crs is not None
-    pairs, missing = find_files(catalog.layers, [geodata / "montpellier"])
+    pairs, missing = find_files(choose_layers(catalog), [geodata / "montpellier"])
     assert not missing
     layers = [read_layer(path, spec, filters=filters) for spec, path in pairs]
     return build_objects(
@@ -299,3 +300,19 @@ def test_the_figures_with_the_catalogue_as_it_is(
     assert chosen_city.lengths.mean() == pytest.approx(5.97264, abs=5e-6)
     check_counts(chosen_city, chosen[0], (0.0, 0.0))
     check_cells(chosen_city, chosen[0], count=300, seed=3)
+
+
+def test_streets_are_as_wide_as_their_kind_is(geodata: Path) -> None:
+    (pair,), _ = find_files(
+        [load_catalog("montpellier").layer("streets")], [geodata / "montpellier"]
+    )
+    layer = read_layer(pair[1], pair[0])
+    frame = pyogrio.read_dataframe(pair[1])
+    kinds = frame.set_index(frame["IDARC"].astype(str)).loc[layer.table["source_id"], "TYPVOI"]
+    assert (layer.read, layer.filtered, len(layer.table)) == (8_011, 51, 7_960)
+    half = layer.table["half_width"].to_numpy()
+    expected = {"RUE": {7.0}, "AV": {12.0}, "PASS": {3.0}}
+    assert {kind: set(half[kinds == kind]) for kind in expected} == expected
+    assert np.isnan(half[kinds == "PL"]).all()
+    assert np.isnan(half).mean() < 0.1
+    assert layer.notes == (f"{np.isnan(half).sum()} of 7960 streets have no known width",)

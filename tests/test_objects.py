@@ -2,16 +2,19 @@ from __future__ import annotations
 
 import dataclasses
 import math
+import tempfile
 from collections import Counter
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import geopandas as gpd
 import numpy as np
 import pyarrow as pa
+import pyarrow.parquet as pq
 import pytest
 import shapely
 from geopandas.testing import assert_geodataframe_equal
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from pyproj import CRS, Transformer
 from sentences import assert_sentence
@@ -25,7 +28,6 @@ from semsig_gis.storage import geo_metadata, write_geoparquet
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
-    from pathlib import Path
 
     from semsig_gis.objects import StreetObjects
 
@@ -365,7 +367,7 @@ def test_saved_objects_come_back(tmp_path: Path) -> None:
     ]
     objects, _ = build_objects(layers, taxonomy=taxonomy, crs=LAMBERT)
     path = tmp_path / "objects.parquet"
-    save_objects(objects, path)
+    save_objects(objects, path, keep_order=True)
     again = open_objects(str(path))
     assert_geodataframe_equal(again.table, objects.table)
     assert again.table["count"].tolist() == [1, 2]
@@ -376,6 +378,108 @@ def test_saved_objects_come_back(tmp_path: Path) -> None:
     frame = gpd.read_parquet(path)
     assert frame["source_id"].tolist() == ["Écusson n°7 - 東", ""]
     assert frame.crs == CRS(LAMBERT)
+
+
+def scattered(count: int) -> StreetObjects:
+    rng = np.random.default_rng(9)
+    places = rng.uniform(0, 5_000, (count, 2)) + np.array([765_000.0, 6_275_000.0])
+    return build(layer(points(*map(tuple, places.tolist()))))
+
+
+def test_saved_objects_come_back_in_an_order_that_stays() -> None:
+    objects = scattered(3_000)
+    with tempfile.TemporaryDirectory() as folder:
+        one, two = Path(folder) / "one.parquet", Path(folder) / "two.parquet"
+        save_objects(objects, one)
+        again = open_objects(one)
+        # Every object once, whatever the order.
+        by_id = {number: row for row, number in enumerate(objects.table["source_id"])}
+        rows = [by_id[number] for number in again.table["source_id"]]
+        assert sorted(rows) == list(range(len(objects)))
+        expected = objects.table.iloc[rows].reset_index(drop=True)
+        assert_geodataframe_equal(again.table, expected)
+        save_objects(again, two)
+        assert one.read_bytes() == two.read_bytes()
+    # Neighbours in the file are neighbours in the city.
+    steps = np.hypot(*np.diff(again.xy, axis=0).T)
+    assert np.median(steps) < 150
+    assert np.median(np.hypot(*np.diff(objects.xy, axis=0).T)) > 1_500
+
+
+@given(
+    places=st.lists(st.tuples(st.integers(-20, 20), st.integers(-20, 20)), min_size=1, max_size=40),
+    corner=st.tuples(st.integers(-20, 20), st.integers(-20, 20)),
+    size=st.tuples(st.integers(0, 20), st.integers(0, 20)),
+    at=st.sampled_from([(0.0, 0.0), (765_200.1, 6_275_000.7)]),
+    group_rows=st.sampled_from([1, 3, 8192]),
+    keep_order=st.booleans(),
+)
+@settings(max_examples=60)
+def test_a_box_holds_exactly_the_objects_in_it(
+    *,
+    places: list[tuple[int, int]],
+    corner: tuple[int, int],
+    size: tuple[int, int],
+    at: tuple[float, float],
+    group_rows: int,
+    keep_order: bool,
+) -> None:
+    placed = [(x * 0.1 + at[0], y * 0.1 + at[1]) for x, y in places]
+    # The edges of the box go through objects.
+    west, south = corner[0] * 0.1 + at[0], corner[1] * 0.1 + at[1]
+    east, north = (corner[0] + size[0]) * 0.1 + at[0], (corner[1] + size[1]) * 0.1 + at[1]
+    objects, _ = build_objects(
+        [layer(points(*placed))], taxonomy=TAXONOMY, crs=LAMBERT, collapse=False
+    )
+    with tempfile.TemporaryDirectory() as folder, pytest.MonkeyPatch.context() as patch:
+        patch.setattr("semsig_gis.objects.GROUP_ROWS", group_rows)
+        save_objects(objects, f"{folder}/objects.parquet", keep_order=keep_order)
+        found = open_objects(f"{folder}/objects.parquet", box=(west, south, east, north))
+    inside = [
+        number for number, (x, y) in enumerate(placed) if west <= x <= east and south <= y <= north
+    ]
+    assert sorted(int(number) for number in found.table["source_id"]) == inside
+    assert found.xy.shape == (len(inside), 2)
+    assert found.taxonomy == objects.taxonomy
+
+
+def test_only_the_groups_near_a_box_are_read(tmp_path: Path) -> None:
+    objects = scattered(40_000)
+    save_objects(objects, tmp_path / "objects.parquet")
+    read: list[list[int]] = []
+    original = pq.ParquetFile.read_row_groups
+
+    def watched(self: pq.ParquetFile, groups: list[int], *args: object) -> pa.Table:
+        read.append(groups)
+        return original(self, groups, *args)
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(pq.ParquetFile, "read_row_groups", watched)
+        box = (765_100.0, 6_275_100.0, 765_500.0, 6_275_500.0)
+        found = open_objects(tmp_path / "objects.parquet", box=box)
+    assert 100 < len(found) < 500
+    assert [len(groups) for groups in read] == [1]  # of five
+
+
+def test_geopandas_reads_a_box_of_the_file(tmp_path: Path) -> None:
+    objects = scattered(500)
+    path = tmp_path / "objects.parquet"
+    save_objects(objects, path)
+    box = (766_000.0, 6_276_000.0, 768_000.0, 6_277_000.0)
+    frame = gpd.read_parquet(path, bbox=box)
+    found = open_objects(path, box=box)
+    assert frame["source_id"].tolist() == found.table["source_id"].tolist()
+    assert "bbox" not in frame.columns
+
+
+def test_a_file_of_before_is_read_by_box_too(tmp_path: Path) -> None:
+    objects = scattered(50)
+    path = tmp_path / "objects.parquet"
+    save_objects(objects, path)
+    table = pq.read_table(path)
+    pq.write_table(table.drop_columns(["bbox"]), path)
+    box = (*objects.xy[7], *objects.xy[7])
+    assert open_objects(path, box=box).xy.tolist() == [objects.xy[7].tolist()]
 
 
 def test_positions_cannot_be_changed_by_accident() -> None:

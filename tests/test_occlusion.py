@@ -172,6 +172,40 @@ def test_blocks_make_no_difference(monkeypatch: pytest.MonkeyPatch) -> None:
     assert 0 < whole.mean() < 1
 
 
+def test_interiors_and_cores_make_up_the_same() -> None:
+    rng = np.random.default_rng(8)
+    corners, sizes = rng.uniform(0, 120, (40, 2)), rng.uniform(3, 20, (40, 2))
+    footprints = Footprints(np.asarray(shapely.box(*corners.T, *(corners + sizes).T)))
+    assert len(footprints.interiors) > 3
+    for number, interior in enumerate(footprints.interiors):
+        cores = footprints.cores(number)
+        assert shapely.union_all(cores).symmetric_difference(interior).area < 1e-6
+        assert footprints.cores(number) is cores
+
+
+EDGES = st.lists(st.tuples(st.integers(0, 30), st.integers(0, 30)), max_size=40)
+
+
+@given(EDGES)
+def test_what_a_chain_of_pairs_joins_has_one_label(edges: list[tuple[int, int]]) -> None:
+    first, second = np.array(edges, np.int64).reshape(-1, 2).T
+    labels = occlusion._joined(first, second, 31)
+    groups = [{thing} for thing in range(31)]
+    for a, b in edges:
+        joined = groups[a] | groups[b]
+        for thing in joined:
+            groups[thing] = joined
+    assert labels.tolist() == [min(group) for group in groups]
+
+
+def test_a_long_row_of_houses_is_one_block() -> None:
+    order = np.random.default_rng(4).permutation(3000)
+    labels = occlusion._joined(order[:-1], order[1:], 3000)
+    assert not labels.any()
+    row = [shapely.box(8.0 * number, 0, 8.0 * number + 8, 10) for number in order if number < 300]
+    assert len(Footprints(row).interiors) == 1
+
+
 @settings(max_examples=25)
 @given(st.integers(0, 2**32 - 1))
 def test_random_towns_equal_the_oracle(seed: int) -> None:

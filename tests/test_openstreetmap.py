@@ -6,19 +6,23 @@ import functools
 from collections import Counter
 from typing import TYPE_CHECKING
 
+import numpy as np
 import osmium
 import pandas as pd
 import pytest
 import shapely
 from osm_xml import node, relation, way, write_osm
-from osmium.osm import Area, Node, Relation, Way
+from osmium.osm import WAY, Area, Node, Relation, Way
 
 from semsig_gis.building import build_database
 from semsig_gis.catalog import load_catalog
 from semsig_gis.evaluation import evaluate
+from semsig_gis.grid import GridSpec
 from semsig_gis.objects import build_objects
 from semsig_gis.sources import find_files, reader
 from semsig_gis.sources.osm_file import read_layers
+from semsig_gis.surroundings import read_surroundings
+from semsig_gis.viewpoints import ViewpointSpec, choose_viewpoints
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
@@ -452,6 +456,49 @@ def test_buildings_and_streets(geodata: Path, city: str) -> None:
     assert shapely.union_all(metric.array).area > 0.9 * metric.area.sum()
 
 
+def test_a_street_is_as_wide_as_its_class_is(geodata: Path) -> None:
+    """Widths are those of the catalogue by the tag, read by a plain loop."""
+    path = geodata / "osm" / EXTRACTS["helsinki"]
+    table = read_extract(geodata, "helsinki")["streets"].table
+    highways = {
+        f"way/{element.id}": element.tags["highway"]
+        for element in osmium.FileProcessor(str(path), WAY)
+        if "highway" in element.tags
+    }
+    by = CATALOG.layer("streets").width_by
+    assert by is not None
+    half = {value: width / 2 for value, width in by.widths}
+    assert table["half_width"].tolist() == [half[highways[name]] for name in table["source_id"]]
+    assert half["primary"] > half["residential"] > half["living_street"]
+    # What `semsig build --streets FILE.osm.pbf` looks at.
+    streets = read_surroundings(path, role="streets", crs="EPSG:32635")
+    assert streets["half_width"].tolist() == table["half_width"].tolist()
+    assert streets["half_width"].between(6, 15).all()
+
+
+def test_wide_streets_have_more_viewpoints(geodata: Path) -> None:
+    streets = read_surroundings(
+        geodata / "osm" / EXTRACTS["helsinki"], role="streets", crs="EPSG:32635"
+    )
+    west, south, east, north = streets.total_bounds // 10
+    columns, rows = np.meshgrid(np.arange(west, east), np.arange(south, north), indexing="ij")
+    cells = columns.ravel().astype(np.int64), rows.ravel().astype(np.int64)
+    lines, half = streets.geometry.to_numpy(), streets["half_width"].to_numpy()
+    found = choose_viewpoints(
+        *cells, grid=GridSpec(), spec=ViewpointSpec(mode="streets"), streets=lines, widths=half
+    )
+    area = shapely.union_all(shapely.buffer(lines, half))
+    centres = GridSpec().viewpoints(*cells)
+    assert (
+        np.mean(found == shapely.contains_xy(area, *centres.T)) > 0.999
+    )  # round ends are polygons
+    alike = choose_viewpoints(
+        *cells, grid=GridSpec(), spec=ViewpointSpec(mode="streets"), streets=lines
+    )
+    assert (alike & ~found).any()
+    assert found.sum() > alike.sum()
+
+
 def test_areas_are_those_of_pyosmium(geodata: Path) -> None:
     """The areas of multipolygons are those that libosmium assembles."""
     path = geodata / "osm" / EXTRACTS["monaco"]
@@ -485,7 +532,8 @@ def test_an_extract_for_routing(geodata: Path) -> None:
 
 def test_no_tags_and_no_users_are_kept(geodata: Path) -> None:
     for layer in read_extract(geodata, "neukölln").values():
-        assert layer.table.columns.tolist() == ["class_name", "source_id", "geometry"]
+        width = ["half_width"] if layer.spec.role == "streets" else []
+        assert layer.table.columns.tolist() == ["class_name", "source_id", *width, "geometry"]
         assert layer.table.source_id.str.fullmatch(r"(node|way|relation)/\d+").all()
 
 

@@ -15,11 +15,12 @@ from hypothesis import strategies as st
 from semsig_gis.catalog import load_catalog, paper_taxonomy
 from semsig_gis.conflation import conflate
 from semsig_gis.layer_spec import LayerSpec
+from semsig_gis.loading import choose_layers
 from semsig_gis.objects import StreetObjects, build_objects
 from semsig_gis.quality import quality_report
-from semsig_gis.report import Table
 from semsig_gis.sources import RawLayer, find_files
 from semsig_gis.sources.vector_file import read_layer
+from semsig_gis.tables import Table
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -210,7 +211,7 @@ def test_the_report_is_ready_for_json_and_for_printing() -> None:
 
 def test_montpellier(geodata: Path) -> None:
     catalog = load_catalog("montpellier")
-    pairs, _ = find_files(catalog.layers, [geodata / "montpellier"])
+    pairs, _ = find_files(choose_layers(catalog), [geodata / "montpellier"])
     layers = [read_layer(path, spec) for spec, path in pairs]
     objects, load = build_objects(layers, taxonomy=catalog.taxonomy, crs=catalog.metric_crs or "")
     report = quality_report(objects, load)

@@ -112,6 +112,28 @@ def test_order_is_by_viewpoint_bearing_distance_and_class(
     assert order_of(rows) == sorted(rows)
 
 
+# Bearings a hair's breadth apart, and viewpoints that leave few bits of a number to a bearing.
+CLOSE = st.builds(
+    lambda bearing, steps: min(bearing + steps * math.ulp(bearing), math.nextafter(360.0, 0.0)),
+    st.sampled_from([0.0, 1e-9, 90.0, 271.3, 359.9999]),
+    SMALL,
+)
+FAR_APART = st.sampled_from([0, 1, 5, 2**20, 2**40, 2**50 - 1, 2**50])
+
+
+@given(st.lists(st.tuples(FAR_APART, CLOSE | BEARINGS, SMALL, SMALL), min_size=1))
+def test_order_is_exact_where_bearings_hardly_differ(
+    rows: list[tuple[int, float, float, int]],
+) -> None:
+    assert order_of(rows) == sorted(rows)
+
+
+def test_nothing_seen_has_an_order() -> None:
+    nothing = np.empty(0, np.int64)
+    seen = Sightings(nothing, nothing, nothing.astype(float), nothing.astype(float))
+    assert clockwise_order(seen, np.array([3], np.uint8)).tolist() == []
+
+
 def test_on_one_bearing_the_nearer_comes_first_then_the_lower_code() -> None:
     rows = [(0, 90.0, 20.0, 1), (0, 90.0, 10.0, 9), (0, 90.0, 10.0, 3), (0, 0.0, 29.0, 5)]
     assert order_of(rows) == [rows[3], rows[2], rows[1], rows[0]]

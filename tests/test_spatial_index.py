@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
+import shapely
 from hypothesis import given
 from hypothesis import strategies as st
 from sentences import assert_sentence
@@ -99,6 +100,32 @@ def test_points_at_one_place_are_all_found() -> None:
 def test_no_viewpoint_sees_nothing() -> None:
     assert found([(1, 1)], [], 5.0) == []
     assert found([(1, 1)], [(9, 9), (8, 8)], 5.0) == []
+
+
+@given(
+    st.lists(PLACES, min_size=1, max_size=40),
+    st.lists(st.tuples(PLACES, PLACES), max_size=10),
+    st.sampled_from([(0.0, 0.0), (765_200.0, 6_275_000.0), (-5e6, 1e7)]),
+)
+def test_points_in_boxes_are_those_of_a_plain_search(
+    points: list[tuple[float, float]],
+    boxes: list[tuple[tuple[float, float], tuple[float, float]]],
+    corner: tuple[float, float],
+) -> None:
+    xy = np.array(points) + corner
+    ends = np.array(boxes, dtype=float).reshape(-1, 2, 2) + corner
+    low, high = ends.min(axis=1), ends.max(axis=1)
+    box, point = PackedIndex(xy).pairs_in(low, high)
+    again = PackedIndex(xy, np.asarray(shapely.points(xy))).pairs_in(low, high)
+    assert np.array_equal(again, (box, point))
+    expected = [
+        (i, j)
+        for i in range(len(low))
+        for j in range(len(xy))
+        if (low[i] <= xy[j]).all() and (xy[j] <= high[i]).all()
+    ]
+    assert (np.diff(box) >= 0).all()
+    assert sorted(zip(box.tolist(), point.tolist(), strict=True)) == expected
 
 
 @pytest.mark.parametrize("kind", [ObjectIndex, PackedIndex])

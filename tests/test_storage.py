@@ -9,18 +9,28 @@ from pathlib import Path
 from typing import Any, NoReturn
 
 import geopandas as gpd
+import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 import shapely
+from hypothesis import given
+from hypothesis import strategies as st
 from pyproj import CRS
 from sentences import assert_sentence
 
 from semsig_gis.errors import DatabaseError, InputError
-from semsig_gis.storage import geo_metadata, read_geoparquet, whole_file, write_geoparquet
+from semsig_gis.storage import (
+    geo_metadata,
+    points_to_wkb,
+    read_geoparquet,
+    whole_file,
+    write_geoparquet,
+)
 
 NUMBERS = list(range(0, 900, 3))
 TEXTS = [f"café {number}" for number in NUMBERS]
+LISTS = [[number % 7, 7_199] * (number % 4) for number in NUMBERS]
 POINTS = [shapely.Point(700_000 + number, 6_600_000 - number) for number in NUMBERS]
 
 
@@ -31,6 +41,7 @@ def write_example(
         {
             "number": pa.array(NUMBERS, pa.int32()),
             "text": TEXTS,
+            "list": pa.array(LISTS, pa.list_(pa.uint16())),
             "geometry": pa.array(shapely.to_wkb(POINTS), pa.binary()),
         }
     )
@@ -184,6 +195,18 @@ def test_as_long_a_name_as_the_system_takes_can_be_written(tmp_path: Path) -> No
     assert target.read_text() == "new"
 
 
+# --- Points -----------------------------------------------------------------------------------
+
+
+@given(st.lists(st.tuples(*[st.floats(allow_nan=False)] * 2)))
+def test_points_are_the_bytes_that_shapely_writes(places: list[tuple[float, float]]) -> None:
+    xy = np.array(places).reshape(-1, 2)
+    column = points_to_wkb(xy)
+    assert column.type == pa.binary()
+    points = np.asarray(shapely.points(xy))
+    assert column.to_pylist() == [shapely.to_wkb(point, byte_order=1) for point in points]
+
+
 # --- GeoParquet -------------------------------------------------------------------------------
 
 
@@ -191,6 +214,7 @@ def test_what_is_written_is_read_again(example: Path) -> None:
     table, specs, crs = read_geoparquet(example, kind="sample")
     assert table["number"].to_pylist() == NUMBERS
     assert table["text"].to_pylist() == TEXTS
+    assert table["list"].to_pylist() == LISTS
     assert specs == {"kind": "sample"}
     assert crs == CRS(2154)
     some, _, _ = read_geoparquet(example, kind="sample", columns=["text"])
@@ -203,6 +227,7 @@ def test_geopandas_reads_the_file(example: Path) -> None:
     assert frame.geometry.tolist() == POINTS
     assert frame["number"].tolist() == NUMBERS
     assert frame["text"].tolist() == TEXTS
+    assert [row.tolist() for row in frame["list"]] == LISTS
     metadata = json.loads(pq.read_metadata(example).metadata[b"geo"])
     assert metadata["version"] == "1.1.0"
     assert metadata["primary_column"] == "geometry"

@@ -9,7 +9,7 @@ from osm_xml import node, way, write_osm
 from sentences import assert_sentence
 
 from semsig_gis.errors import InputError, SourceError
-from semsig_gis.surroundings import read_area, read_surroundings
+from semsig_gis.surroundings import read_area, read_surroundings, save_surroundings
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -76,3 +76,50 @@ def test_a_file_that_cannot_be_used_is_named(tmp_path: Path) -> None:
     with pytest.raises(SourceError) as caught:
         read_area(tmp_path / "bare.parquet", crs=CRS)
     assert_sentence(caught.value, "bare.parquet", "coordinate reference system")
+
+
+def rows_of_houses() -> gpd.GeoDataFrame:
+    shapes = [
+        shapely.box(770_000 + x, 6_280_000 + y, 770_006 + x, 6_280_006 + y)
+        for x in range(0, 900, 10)
+        for y in range(900, 0, -10)
+    ]
+    return gpd.GeoDataFrame({"n": range(len(shapes))}, geometry=shapes, crs=CRS)
+
+
+def test_saved_surroundings_come_back_by_box(tmp_path: Path) -> None:
+    table = rows_of_houses()
+    path = tmp_path / "new" / "houses.parquet"
+    save_surroundings(table, path)
+    again = read_surroundings(path, role="buildings", crs=CRS)
+    assert again.sort_values("n").reset_index(drop=True).equals(table)
+    box = (770_106.0, 6_280_400.0, 770_130.0, 6_280_456.0)  # from an edge to a corner
+    near = read_surroundings(path, role="buildings", crs=CRS, box=box)
+    assert sorted(near["n"]) == sorted(table["n"][table.intersects(shapely.box(*box))])
+    assert list(near.columns) == ["n", "geometry"]
+    save_surroundings(again, tmp_path / "again.parquet")
+    assert (tmp_path / "again.parquet").read_bytes() == path.read_bytes()
+
+
+def test_a_box_without_any_is_empty(tmp_path: Path) -> None:
+    save_surroundings(rows_of_houses(), tmp_path / "houses.parquet")
+    path = tmp_path / "houses.parquet"
+    near = read_surroundings(path, role="buildings", crs=CRS, box=(0, 0, 9, 9))
+    assert (len(near), near.crs) == (0, CRS)
+    near = read_surroundings(path, role="buildings", crs="EPSG:32631", box=(0, 0, 9, 9))
+    assert (len(near), near.crs) == (0, "EPSG:32631")
+
+
+def test_a_file_without_bounds_is_not_read_by_box(tmp_path: Path) -> None:
+    path = tmp_path / "houses.parquet"
+    rows_of_houses().to_parquet(path)
+    with pytest.raises(SourceError) as caught:
+        read_surroundings(path, role="buildings", crs=CRS, box=(0, 0, 9, 9))
+    assert_sentence(caught.value, "houses.parquet")
+
+
+def test_no_surroundings_at_all_can_be_saved(tmp_path: Path) -> None:
+    save_surroundings(rows_of_houses().iloc[:0], tmp_path / "none.parquet")
+    with pytest.raises(InputError) as caught:
+        read_surroundings(tmp_path / "none.parquet", role="buildings", crs=CRS)
+    assert_sentence(caught.value, "holds no polygon")

@@ -53,7 +53,8 @@ class RawLayer:
         What the catalogue says of the layer.
     table : GeoDataFrame
         One row a feature: ``class_name``, ``source_id`` and ``geometry`` (of any type, empty, or
-        None), in the CRS of the source.
+        None), in the CRS of the source; ``half_width`` (metres from the centre line, or NaN)
+        where the catalogue says something about the widths of streets.
     read : int
         Features in the source.
     filtered : int

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import geopandas as gpd
 import numpy as np
@@ -11,7 +12,7 @@ import pandas as pd
 import shapely
 
 from semsig_gis.errors import CrsError
-from semsig_gis.schema import CLASS_NAME, SOURCE_ID
+from semsig_gis.schema import CLASS_NAME, HALF_WIDTH, SOURCE_ID
 from semsig_gis.sources import RawLayer
 from semsig_gis.sources._crs import crs_label, fits_the_globe, off_the_globe
 
@@ -43,6 +44,7 @@ class Row(NamedTuple):
     class_name: str
     source_id: str
     position: Position
+    half_width: float = math.nan  # metres; of streets
 
 
 @dataclass(slots=True)
@@ -110,17 +112,16 @@ def raw_layer(
         notes += more
     if crs.is_projected and not by_file and fits_the_globe(shapely.get_coordinates(geometry)):
         notes += (f"the coordinates look like degrees, yet {crs_label(crs)} is stated",)
+    columns: dict[str, pd.Series[Any]] = {
+        CLASS_NAME: pd.Series([row.class_name for row in rows.kept], dtype="str"),
+        SOURCE_ID: pd.Series([row.source_id for row in rows.kept], dtype="str"),
+    }
+    if spec.has_width:
+        columns[HALF_WIDTH] = pd.Series([row.half_width for row in rows.kept], dtype="float64")
     first_errors = sorted(rows.errors.items())[:ERRORS_KEPT]
     return RawLayer(
         spec=spec,
-        table=gpd.GeoDataFrame(
-            {
-                CLASS_NAME: pd.Series([row.class_name for row in rows.kept], dtype="str"),
-                SOURCE_ID: pd.Series([row.source_id for row in rows.kept], dtype="str"),
-            },
-            geometry=geometry,
-            crs=crs,
-        ),
+        table=gpd.GeoDataFrame(columns, geometry=geometry, crs=crs),
         read=rows.read,
         filtered=rows.filtered,
         errors=tuple(f"row {number}: {message}" for number, message in first_errors),
@@ -216,4 +217,7 @@ def _surprises(rows: Rows, geometry: NDArray[np.object_], spec: LayerSpec) -> tu
     if len(others):
         names = ", ".join(sorted(others.unique()))
         notes.append(f"{len(others)} of {rows.read} rows are {names}, not {spec.geometry}")
+    unknown = sum(math.isnan(row.half_width) for row in rows.kept) if spec.has_width else 0
+    if unknown:
+        notes.append(f"{unknown} of {len(rows.kept)} streets have no known width")
     return tuple(notes)

@@ -42,10 +42,12 @@ def settle_fields(spec: LayerSpec, fields: Sequence[str]) -> LayerSpec:
     def own(name: str) -> str:
         return find_field(name, spec, fields) or name
 
-    class_by = spec.class_by
+    class_by, width_by = spec.class_by, spec.width_by
     return dataclasses.replace(
         spec,
         id_field=spec.id_field and own(spec.id_field),
+        width_field=spec.width_field and own(spec.width_field),
+        width_by=width_by and dataclasses.replace(width_by, field=own(width_by.field)),
         where=tuple((own(field), accepted) for field, accepted in spec.where),
         class_by=class_by and ClassBy(own(class_by.field), class_by.classes),
         select=tuple(own(field) for field in spec.select),

@@ -114,8 +114,8 @@ def read_layers(
     path : str, Path, or sequence of Path
         A file of Overpass JSON, or the tiles of an area.
     specs : sequence of LayerSpec
-        The layers to look for, by their ``tags`` and ``elements``; fields in ``where`` and
-        ``class_by`` are keys of tags.
+        The layers to look for, by their ``tags`` and ``elements``; fields in ``where``,
+        ``class_by``, ``width_by`` and ``width_field`` are keys of tags.
     filters : bool, default True
         Whether ``where`` holds.
     crs : str, optional
@@ -180,9 +180,7 @@ def read_layers(
 
 
 def _rules(spec: LayerSpec, *, filters: bool, where: str) -> RowRules:
-    fields = [name for name, _ in spec.where]
-    fields += [spec.class_by.field] if spec.class_by else []
-    fields += [spec.id_field] if spec.id_field else []
+    fields = [field for _, field in spec.fields]
     return RowRules(spec, fields, filters=filters, where=where)
 
 
@@ -213,7 +211,8 @@ class _Layer:
             rows.errors[rows.read] = f"{name} is not as Overpass servers send elements"
         else:
             source_id = rules.source_id(values, name)
-            rows.kept.append(Row(rows.read, rules.class_name(values), source_id, position))
+            class_name, half_width = rules.class_name(values), rules.half_width(values)
+            rows.kept.append(Row(rows.read, class_name, source_id, position, half_width))
 
 
 class _Places:

@@ -1,12 +1,14 @@
-"""What a layer's specification says of one row: is it wanted, which class, which identifier."""
+"""What a layer's specification says of one row: is it wanted, of what class and width, which id."""
 
 from __future__ import annotations
 
 import functools
+import math
 import re
 from typing import TYPE_CHECKING, Any
 
 from semsig_gis.errors import CatalogError, nearest_name
+from semsig_gis.layer_spec import MAX_WIDTH_M
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence
@@ -59,7 +61,7 @@ def _pattern(wanted: str) -> re.Pattern[str] | None:
 
 
 class RowRules:
-    """The filter, the classes and the identifier of one layer, checked against its fields.
+    """The filter, classes, widths and identifier of one layer, checked against its fields.
 
     Parameters
     ----------
@@ -86,14 +88,15 @@ class RowRules:
         self._class_by = spec.class_by
         self._id_field = spec.id_field
         self._unique_id = spec.unique_id
-        uses = [("where", field) for field, _ in self._where]
+        self._width_by = spec.width_by
+        self._width_field = spec.width_field
         values = [wanted for _, accepted in self._where for wanted in accepted]
         if spec.class_by is not None:
-            uses.append(("class_by", spec.class_by.field))
             values.extend(wanted for wanted, _ in spec.class_by.classes)
+        if spec.width_by is not None:
+            values.extend(wanted for wanted, _ in spec.width_by.widths)
         _require_patterns(values, where=where)
-        if spec.id_field is not None:
-            uses.append(("id_field", spec.id_field))
+        uses = [use for use in spec.fields if filters or use[0] != "where"]
         for key, field in uses:
             require_field(field, fields, where=where, key=key)
         self.fields = tuple(dict.fromkeys(field for _, field in uses))
@@ -114,6 +117,15 @@ class RowRules:
                     return name
         return self._class_name
 
+    def half_width(self, row: Mapping[str, Any]) -> float:
+        """Return half the width of a street in metres, NaN where nobody knows it."""
+        own = math.nan if self._width_field is None else _metres(row[self._width_field])
+        if math.isnan(own) and self._width_by is not None:
+            value, by = row[self._width_by.field], self._width_by
+            known = (width for wanted, width in by.widths if matches(value, wanted))
+            own = next(known, math.nan if by.default is None else by.default)
+        return own / 2
+
     def source_id(self, row: Mapping[str, Any], number: str) -> str:
         """Return the identifier of the row, or the feature's number where it has none.
 
@@ -123,6 +135,15 @@ class RowRules:
         text = "" if value is None else as_text(value).strip()
         whole = WHOLE_FLOAT.fullmatch(text)
         return (whole[1] if whole else text) or ("" if self._unique_id else number)
+
+
+def _metres(value: object) -> float:
+    """Return a plausible width of a street from a field, or NaN."""
+    try:
+        width = float(as_text(value).strip().removesuffix("m").replace(",", "."))
+    except ValueError:
+        return math.nan
+    return width if 0 < width <= MAX_WIDTH_M else math.nan
 
 
 def _require_patterns(values: Iterable[Value], *, where: str) -> None:

@@ -198,7 +198,8 @@ class _Job:
             return
         position = self._positions.of(record)
         identifier = rules.source_id(row, str(number))
-        self._rows.kept.append(Row(number, rules.class_name(row), identifier, position))
+        half_width = rules.half_width(row)
+        self._rows.kept.append(Row(number, rules.class_name(row), identifier, position, half_width))
 
     def layer(self) -> RawLayer:
         """Return what was read."""

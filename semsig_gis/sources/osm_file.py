@@ -81,8 +81,8 @@ def read_layers(
     path : str or Path
         A ``.osm``, ``.osm.pbf`` or ``.osm.bz2`` file.
     specs : sequence of LayerSpec
-        The layers to look for, by their ``tags`` and ``elements``; fields in ``where`` and
-        ``class_by`` are keys of tags.
+        The layers to look for, by their ``tags`` and ``elements``; fields in ``where``,
+        ``class_by``, ``width_by`` and ``width_field`` are keys of tags.
     filters : bool, default True
         Whether ``where`` holds.
     crs : str, optional
@@ -96,7 +96,7 @@ def read_layers(
         an area; buildings are polygons and streets lines. ``read`` is the number of elements with
         the layer's tags, ``filtered`` of those that are mapped in another way than the layer
         wants, and errors are incomplete (clipped) or broken elements. Of an element nothing but
-        its identifier, class and geometry is kept.
+        its identifier, class, geometry and width is kept.
 
     Raises
     ------
@@ -153,8 +153,7 @@ def _layer(spec: LayerSpec, *, filters: bool) -> _Layer:
             "identify it; remove it."
         )
         raise CatalogError(msg)
-    fields = [field for field, _ in spec.where]
-    fields += [] if spec.class_by is None else [spec.class_by.field]
+    fields = [field for _, field in spec.fields]
     return _Layer(spec, RowRules(spec, fields, filters=filters, where=where), Rows())
 
 
@@ -230,7 +229,8 @@ def _row(layer: _Layer, kind: ElementKind, number: int, tags: Mapping[str, str])
     if not (counts(kind, tags, layer.spec) and rules.keeps(fields)):
         rows.filtered += 1
         return None
-    return Row(rows.read, rules.class_name(fields), f"{kind}/{number}", None)
+    name = f"{kind}/{number}"
+    return Row(rows.read, rules.class_name(fields), name, None, rules.half_width(fields))
 
 
 def _multipolygon(layer: _Layer, row: Row, relation: Relation) -> _Outline:

@@ -388,7 +388,8 @@ def _read_row(
         raise BadFeatureError(damage)
     class_name = rules.class_name(feature.properties)
     source_id = rules.source_id(feature.properties, feature.id)
-    rows.kept.append(Row(rows.read, class_name, source_id, position))
+    half_width = rules.half_width(feature.properties)
+    rows.kept.append(Row(rows.read, class_name, source_id, position, half_width))
 
 
 def _position(geometry: fiona.Geometry | None) -> Position:

@@ -1,18 +1,27 @@
-"""How values of fields compare with what a catalogue says."""
+"""How values of fields compare with what a catalogue says, and what follows from them."""
 
 from __future__ import annotations
 
+import dataclasses
+import json
 import math
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
+import geopandas as gpd
 import pytest
+import shapely
 from hypothesis import given
 from hypothesis import strategies as st
+from osm_xml import node, way, write_osm
 from sentences import assert_sentence
 
 from semsig_gis.errors import CatalogError
-from semsig_gis.layer_spec import LayerSpec
+from semsig_gis.layer_spec import LayerSpec, WidthBy
+from semsig_gis.sources import reader
 from semsig_gis.sources._rows import BETWEEN_SLASHES, RowRules, as_text, matches
+
+if TYPE_CHECKING:
+    from pathlib import Path
 
 numbers = st.integers(-(2**53), 2**53) | st.floats(allow_nan=False, allow_infinity=False)
 plain = st.text().filter(lambda text: not BETWEEN_SLASHES.fullmatch(text))
@@ -105,3 +114,119 @@ def test_only_true_ids_may_be_unique() -> None:
         "",
         "",
     ]
+
+
+# --- Widths of streets --------------------------------------------------------------------------
+
+BY_CLASS = WidthBy("highway", (("primary", 24.0), ("/.*_link/", 14.0)), 12.0)
+
+
+def street(**what: Any) -> LayerSpec:  # noqa: ANN401 - any field of a LayerSpec
+    return LayerSpec(**{"name": "streets", "class_name": "", "role": "streets", **what})
+
+
+def half_width(spec: LayerSpec, **row: object) -> float:
+    return RowRules(spec, list(row), filters=True, where="streets").half_width(row)
+
+
+@pytest.mark.parametrize(
+    ("value", "expected"),
+    [("primary", 12.0), ("trunk_link", 7.0), ("road", 6.0), (None, 6.0)],
+)
+def test_the_class_of_a_street_says_its_width(value: str | None, expected: float) -> None:
+    assert half_width(street(width_by=BY_CLASS), highway=value) == expected
+
+
+def test_a_street_of_an_unknown_class_has_no_width() -> None:
+    spec = street(width_by=WidthBy("highway", (("primary", 24.0),)))
+    assert math.isnan(half_width(spec, highway="road"))
+    assert math.isnan(half_width(street(), highway="primary"))
+
+
+@pytest.mark.parametrize(
+    ("value", "expected"),
+    [(9, 4.5), (9.5, 4.75), ("9.5", 4.75), ("9,5 m", 4.75), ("10m", 5.0), (True, 6.0)]
+    + [(bad, 6.0) for bad in (0, -3, math.nan, math.inf, 201, "wide", "", None, "9'")],
+)
+def test_a_field_of_widths_goes_before_the_class(value: object, expected: float) -> None:
+    spec = street(width_by=BY_CLASS, width_field="width")
+    assert half_width(spec, highway="service", width=value) == expected
+
+
+@given(values)
+def test_a_width_is_plausible_or_unknown(value: Any) -> None:  # noqa: ANN401
+    half = half_width(street(width_field="width"), width=value)
+    assert math.isnan(half) or 0 < half <= 100
+
+
+def test_a_field_of_widths_must_exist() -> None:
+    for spec, key in (
+        (street(width_by=BY_CLASS), "width_by"),
+        (street(width_field="highway"), "width_field"),
+    ):
+        with pytest.raises(CatalogError) as caught:
+            RowRules(spec, ["highways"], filters=True, where="streets")
+        assert_sentence(caught.value, "'highway'", key, "the nearest is 'highways'")
+
+
+def test_every_reader_gives_the_widths(tmp_path: Path) -> None:
+    places = [(7.40, 43.70), (7.41, 43.70), (7.42, 43.70)]
+    tags = [{"highway": "primary"}, {"highway": "primary_link", "width": "8"}]
+    table = gpd.GeoDataFrame(
+        {"highway": ["primary", "primary_link"], "width": [None, 8.0]},
+        geometry=[shapely.LineString(places[:2]), shapely.LineString(places[1:])],
+        crs="EPSG:4326",
+    )
+    table.to_file(tmp_path / "streets.gpkg")
+    table.to_file(tmp_path / "streets.geojson")
+    nodes = [node(number, *place) for number, place in enumerate(places, start=1)]
+    ways = [way(10 + n, [1 + n, 2 + n], tags[n]) for n in range(2)]
+    write_osm(tmp_path / "streets.osm", *nodes, *ways)
+    elements = [
+        {
+            "type": "way",
+            "id": 10 + n,
+            "tags": tags[n],
+            "geometry": [{"lon": x, "lat": y} for x, y in places[n : n + 2]],
+        }
+        for n in range(2)
+    ]
+    (tmp_path / "tile.json").write_text(json.dumps({"elements": elements}), encoding="utf-8")
+    spec = street(
+        geometry="line",
+        tags=((("highway", ("*",)),),),
+        width_by=BY_CLASS,
+        width_field="width",
+    )
+    for name, file in (
+        ("vector_file", "streets.gpkg"),
+        ("vector_file", "streets.geojson"),
+        ("osm_file", "streets.osm"),
+        ("overpass", "tile.json"),
+        ("opendatasoft", "streets.geojson"),
+    ):
+        (layer,) = reader(name)(tmp_path / file, [spec])
+        assert layer.table["half_width"].tolist() == [12.0, 4.0], name
+        assert layer.notes == ()
+        assert layer.table["half_width"].dtype == "float64"
+        bare = dataclasses.replace(spec, width_by=None, width_field=None)
+        assert "half_width" not in reader(name)(tmp_path / file, [bare])[0].table
+        unknown = dataclasses.replace(spec, width_by=None)
+        (layer,) = reader(name)(tmp_path / file, [unknown])
+        assert layer.notes == ("1 of 2 streets have no known width",)
+
+
+def test_a_portal_may_spell_the_fields_otherwise(tmp_path: Path) -> None:
+    path = tmp_path / "voies.csv"
+    path.write_text(
+        'Largeur (m);TYPE VOIE;geo_shape\n;Rue;"{""type"": ""LineString"", '
+        '""coordinates"": [[2.3, 48.8], [2.4, 48.8]]}"\n',
+        encoding="utf-8",
+    )
+    spec = street(
+        geometry="line",
+        width_field="largeur_m",
+        width_by=WidthBy("type_voie", (("Rue", 13.0),)),
+    )
+    (layer,) = reader("opendatasoft")(path, [spec])
+    assert layer.table["half_width"].tolist() == [6.5]

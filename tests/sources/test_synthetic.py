@@ -1,4 +1,4 @@
-"""The procedural city: the same for a seed, and built to its rules."""
+"""The synthetic city: the same for a seed, built to its rules, and as full as the paper's Paris."""
 
 from __future__ import annotations
 
@@ -13,35 +13,48 @@ import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from semsig_gis.building import build_database
 from semsig_gis.catalog import paper_taxonomy
 from semsig_gis.errors import InputError
-from semsig_gis.sources import synthetic
-from semsig_gis.sources.synthetic import CENTRE, CitySpec, synthetic_city
+from semsig_gis.objects import build_objects
+from semsig_gis.occlusion import Footprints
+from semsig_gis.sources import _city_streets, synthetic
+from semsig_gis.sources.synthetic import (
+    PARIS_LIKE,
+    CitySpec,
+    synthetic_city,
+    synthetic_surroundings,
+)
+from semsig_gis.viewpoints import ViewpointSpec
 
 if TYPE_CHECKING:
-    from semsig_gis.sources import RawLayer
+    from numpy.typing import NDArray
 
-# Share of each class among what the paper's signatures of Paris see, in per cent.
+    from semsig_gis.sources import RawLayer
+    from semsig_gis.sources._city_streets import Network
+
+# How often the paper's 312,134 signatures of Paris hold each class.
+CELLS = 312_134
 PARIS = {
-    "alignment_tree": 39.9,
-    "water_fountain": 0.15,
-    "street_light": 52.3,
-    "indicator": 0.83,
-    "traffic_light": 2.3,
-    "bike_station": 0.33,
-    "automatic_wc": 0.18,
-    "car_station": 0.10,
-    "taxi_station": 0.06,
-    "bench": 3.1,
-    "bus_stop": 0.74,
+    "alignment_tree": 1_752_696,
+    "street_light": 2_299_639,
+    "bench": 135_748,
+    "traffic_light": 102_240,
+    "indicator": 36_333,
+    "bus_stop": 32_320,
+    "bike_station": 14_397,
+    "automatic_wc": 8_006,
+    "water_fountain": 6_713,
+    "car_station": 4_421,
+    "taxi_station": 2_537,
 }
+COMMON = ("alignment_tree", "street_light", "bench", "traffic_light", "indicator", "bus_stop")
 
 cities = st.builds(
     CitySpec,
-    size=st.floats(100, 1500),
-    block=st.floats(60, 300),
-    avenue_share=st.floats(0, 1),
+    size=st.floats(100, 1200),
     seed=st.integers(0, 2**64),
+    centre=st.tuples(st.floats(2e5, 8e5), st.floats(1e6, 9e6)),
 )
 
 
@@ -49,48 +62,117 @@ def of_class(layers: tuple[RawLayer, ...], name: str) -> RawLayer:
     return next(layer for layer in layers if layer.spec.class_name == name)
 
 
-def rows_of(layer: RawLayer) -> pd.DataFrame:
-    """Return x, y, edge, side and number of every object."""
-    parts = [re.fullmatch(r"(\d+)([LR])(\d+)", text) for text in layer.table["source_id"]]
-    xy = shapely.get_coordinates(layer.table.geometry.array)
+def places(layer: RawLayer) -> NDArray[np.float64]:
+    return shapely.get_coordinates(layer.table.geometry.array)
+
+
+def network_of(spec: CitySpec) -> Network:
+    return _city_streets.lay_streets(spec.size, synthetic._random(spec, "streets"))
+
+
+def along_streets(layer: RawLayer, network: Network, spec: CitySpec) -> pd.DataFrame:
+    """Return edge, side, number, metres along and metres from the centre line of every object.
+
+    Objects on open ground are left out.
+    """
+    parts = [re.fullmatch(r"(\d+)([LR]+)(\d+)", text) for text in layer.table["source_id"]]
     frame = pd.DataFrame(
         [part.groups() for part in parts if part], columns=["edge", "side", "number"]
-    )
-    return frame.astype({"edge": int, "number": int}).assign(x=xy[:, 0], y=xy[:, 1])
+    ).astype({"edge": int, "number": int})
+    edge = frame["edge"].to_numpy()
+    kept = np.array([part is not None for part in parts], bool)
+    away = places(layer)[kept] - spec.centre - network.start[edge]
+    along = network.along[edge]
+    across = away[:, 0] * along[:, 1] - away[:, 1] * along[:, 0]
+    assert ((across > 0) == frame["side"].str.startswith("R")).all()
+    return frame.assign(t=(away * along).sum(axis=1), across=np.abs(across))
 
 
-def spacings(rows: pd.DataFrame) -> list[list[float]]:
-    """Return the distances per number between neighbours on one side, a list an edge."""
-    rows = rows.sort_values(["edge", "side", "number"])
-    same = (rows[["edge", "side"]] == rows[["edge", "side"]].shift()).all(axis=1)
-    gaps = np.hypot(rows["x"].diff(), rows["y"].diff()) / rows["number"].diff()
-    return [part.to_list() for _, part in gaps[same].groupby(rows["edge"])]
+def rows_of(frame: pd.DataFrame) -> list[pd.DataFrame]:
+    """Return the objects of each row, in order, where there are at least two."""
+    ordered = frame.sort_values(["edge", "side", "number"])
+    return [part for _, part in ordered.groupby(["edge", "side"]) if len(part) > 1]
 
 
-@settings(max_examples=25)
+@pytest.fixture(scope="module")
+def spec() -> CitySpec:
+    return CitySpec()
+
+
+@pytest.fixture(scope="module")
+def network(spec: CitySpec) -> Network:
+    return network_of(spec)
+
+
+@pytest.fixture(scope="module")
+def city(spec: CitySpec) -> tuple[RawLayer, ...]:
+    return synthetic_city(spec)
+
+
+@pytest.fixture(scope="module")
+def surroundings(spec: CitySpec) -> tuple[RawLayer, RawLayer]:
+    return synthetic_surroundings(spec)
+
+
+@settings(max_examples=20, deadline=None)
 @given(spec=cities)
 def test_same_seed_same_city_within_its_square(spec: CitySpec) -> None:
-    layers = synthetic_city(spec)
-    for layer, again in zip(layers, synthetic_city(spec), strict=True):
-        pd.testing.assert_frame_equal(layer.table, again.table)
+    layers = (*synthetic_city(spec), *synthetic_surroundings(spec))
+    again = (*synthetic_city(spec), *synthetic_surroundings(spec))
+    for layer, twin in zip(layers, again, strict=True):
+        pd.testing.assert_frame_equal(layer.table, twin.table)
         assert layer.read == len(layer.table)
         assert (layer.filtered, layer.error_count, layer.notes) == (0, 0, ())
-        assert list(layer.table.columns) == ["class_name", "source_id", "geometry"]
+        assert list(layer.table.columns)[:3] == ["class_name", "source_id", "geometry"]
         assert (layer.table["class_name"] == layer.spec.class_name).all()
         assert layer.table["source_id"].is_unique
         assert layer.table.crs == layer.spec.crs == "EPSG:32631"
-        xy = shapely.get_coordinates(layer.table.geometry.array)
-        assert np.isfinite(xy).all()
-        assert (np.abs(xy - CENTRE) <= spec.size / 2 + 0.005).all()
+        assert layer.table.geometry.is_valid.all()
+        assert (np.abs(places(layer) - spec.centre) <= spec.size / 2 + 0.006).all()
+
+
+@settings(max_examples=20, deadline=None)
+@given(spec=cities)
+def test_houses_leave_the_streets_free(spec: CitySpec) -> None:
+    buildings, streets = synthetic_surroundings(spec)
+    houses = Footprints(buildings.table.geometry.to_numpy())
+    for layer in synthetic_city(spec):
+        assert not houses.cover(places(layer)).any()
+    rng = np.random.default_rng(0)
+    anywhere = rng.uniform(-spec.size / 2, spec.size / 2, size=(4000, 2)) + spec.centre
+    points = np.asarray(shapely.points(anywhere))
+    lines = streets.table.geometry.to_numpy()
+    point, street = shapely.STRtree(lines).query(points, predicate="dwithin", distance=25.0)
+    near = shapely.distance(points[point], lines[street])
+    within = near <= streets.table["half_width"].to_numpy()[street] - 0.02
+    assert not houses.cover(anywhere[np.unique(point[within])]).any()
 
 
 def test_layers_are_the_classes_of_the_paper() -> None:
     layers = synthetic_city(CitySpec(size=200.0))
     names = [item.name for item in paper_taxonomy().classes]
     assert [layer.spec.class_name for layer in layers] == names
-    assert len({layer.spec.name for layer in layers}) == len(names)
-    assert {layer.spec.license for layer in layers} == {"CC0-1.0"}
-    assert all("synthetic" in layer.spec.attribution for layer in layers)
+    assert [layer.spec.name for layer in layers] == [f"synthetic_{name}" for name in names]
+    assert {(layer.spec.role, layer.spec.geometry) for layer in layers} == {("objects", "point")}
+
+
+def test_every_layer_says_that_it_is_no_real_place() -> None:
+    spec = CitySpec(size=200.0, seed=7)
+    for layer in (*synthetic_city(spec), *synthetic_surroundings(spec)):
+        assert layer.spec.license == "CC0-1.0"
+        assert layer.spec.attribution == "synthetic city of semsig_gis, seed 7: no real place"
+        assert layer.spec.name.startswith("synthetic_")
+
+
+def test_surroundings_are_polygons_and_lines(surroundings: tuple[RawLayer, RawLayer]) -> None:
+    buildings, streets = surroundings
+    assert (buildings.spec.role, buildings.spec.geometry) == ("buildings", "polygon")
+    assert (streets.spec.role, streets.spec.geometry) == ("streets", "line")
+    assert set(buildings.table.geometry.geom_type) == {"Polygon"}
+    assert set(streets.table.geometry.geom_type) == {"LineString"}
+    assert list(streets.table.columns) == ["class_name", "source_id", "geometry", "half_width"]
+    assert streets.table["half_width"].dtype == np.float64
+    assert streets.table["half_width"].between(5.0, 21.0).all()
 
 
 def test_other_seeds_are_other_cities() -> None:
@@ -101,94 +183,177 @@ def test_other_seeds_are_other_cities() -> None:
             assert len(np.intersect1d(one.to_wkb(), other.to_wkb())) == 0
 
 
-@pytest.fixture(scope="module")
-def city() -> tuple[RawLayer, ...]:
-    return synthetic_city()
+def test_the_centre_moves_the_city_and_no_more() -> None:
+    here, there = CitySpec(size=400.0), CitySpec(size=400.0, centre=(300_000.0, 5_000_000.0))
+    one = (*synthetic_city(here), *synthetic_surroundings(here))
+    other = (*synthetic_city(there), *synthetic_surroundings(there))
+    for layer, moved in zip(one, other, strict=True):
+        assert layer.table["source_id"].equals(moved.table["source_id"])
+        shift = places(moved) - places(layer)
+        np.testing.assert_allclose(shift, np.full_like(shift, (-200_000.0, -400_000.0)), atol=1e-6)
 
 
 @pytest.mark.parametrize("seed", range(4))
-def test_shares_are_about_those_of_paris(seed: int) -> None:
+def test_a_small_city_has_about_the_shares_of_paris(seed: int) -> None:
     layers = synthetic_city(CitySpec(seed=seed))
     counts = {layer.spec.class_name: layer.read for layer in layers}
     total = sum(counts.values())
-    assert 4000 < total < 10_000
-    for name, share in PARIS.items():
-        expected = total * share / 100
-        # Twice or half the share, and the chance of a small number.
-        slack = 4 * math.sqrt(expected)
-        assert expected / 2 - slack < counts[name] < expected * 2 + slack, name
+    assert 9_000 < total < 15_000
+    for name, occurrences in PARIS.items():
+        expected = total * occurrences / sum(PARIS.values())
+        # A third more or less, and the chance of a small number.
+        assert abs(counts[name] - expected) < expected / 3 + 3 * math.sqrt(expected), name
 
 
-def test_lights_are_even_along_a_street(city: tuple[RawLayer, ...]) -> None:
-    gaps = spacings(rows_of(of_class(city, "street_light")))
-    assert len(gaps) > 400
-    flat = np.concatenate(gaps)
-    assert 13.95 < flat.min() < 16
-    assert 28 < flat.max() < 30.05
-    for row in gaps:  # positions are rounded to centimetres
-        assert np.ptp(row) < 0.05
+def test_the_faces_are_enclosed_by_the_edges(network: Network) -> None:
+    lines = shapely.union_all(shapely.buffer(network.lines, 0.01))
+    whole = network.faces[shapely.within(network.faces, shapely.box(-1000, -1000, 1000, 1000))]
+    assert len(whole) > 200
+    assert shapely.covers(lines, shapely.boundary(whole)).all()
+    assert not shapely.intersects(shapely.point_on_surface(whole), lines).any()
 
 
-def test_trees_are_in_rows_with_gaps(city: tuple[RawLayer, ...]) -> None:
-    rows = rows_of(of_class(city, "alignment_tree"))
-    gaps = np.concatenate(spacings(rows))
-    assert gaps.min() > 5.95
-    assert gaps.max() < 10.05
-    number = rows.sort_values(["edge", "side", "number"]).groupby(["edge", "side"])["number"]
-    steps = number.diff().dropna()
-    assert 0.06 < (steps > 1).mean() < 0.2  # one in eight trees is missing
-    points = [shapely.Point(x, y) for x, y in rows[["x", "y"]].to_numpy()]
-    nearest = shapely.STRtree(points).query_nearest(points, exclusive=True, return_distance=True)[1]
-    assert 6 < np.median(nearest) < 10
+def test_avenues_lead_on(network: Network) -> None:
+    avenue = network.avenue
+    assert 0.3 < network.length[avenue].sum() / network.length.sum() < 0.45
+    assert network.half_width[avenue].min() > network.half_width[~avenue].max()
+    ends = network.start[avenue] + network.along[avenue] * network.length[avenue, None]
+    inside = (np.abs(np.concatenate([network.start[avenue], ends])) < 1000).all(axis=1)
+    at = np.concatenate([network.junction[avenue, 0], network.junction[avenue, 1]])
+    meeting = np.bincount(at)
+    assert (meeting[at[inside]] >= 2).all()
+    for values in (network.half_width, network.avenue):
+        of_street = pd.Series(values).groupby(network.street)
+        assert (of_street.min() == of_street.max()).all()
 
 
-def test_trees_and_most_signals_stand_on_avenues(city: tuple[RawLayer, ...]) -> None:
-    spec = CitySpec()
-    streets = synthetic._streets(spec, synthetic._random(spec, "streets"))
-    avenue = streets.avenue
-    assert 0.2 < streets.length[avenue].sum() / streets.length.sum() < 0.35
-    trees = rows_of(of_class(city, "alignment_tree"))["edge"].to_numpy()
-    assert avenue[trees].all()
-    signals = rows_of(of_class(city, "traffic_light"))["edge"].to_numpy()
-    assert avenue[signals].mean() > 0.5
-    assert streets.signals[signals].any(axis=1).all()
-    lights = rows_of(of_class(city, "street_light"))
-    sides = lights.groupby("edge")["side"].nunique()
-    lit = streets.length > 90  # shorter ones may have a single light
-    assert (sides[avenue[sides.index] & lit[sides.index]] == 2).mean() > 0.9
-    assert 0.1 < (sides[~avenue[sides.index]] == 2).mean() < 0.4  # the alternating ones
-    benches = rows_of(of_class(city, "bench"))["edge"].to_numpy()
-    per_metre = [
-        avenue[benches].sum() / streets.length[avenue].sum(),
-        (~avenue[benches]).sum() / streets.length[~avenue].sum(),
-    ]
-    assert 4 < per_metre[0] / per_metre[1] < 25  # ten times, but for chance
+def test_lights_are_even_along_a_street(
+    city: tuple[RawLayer, ...], network: Network, spec: CitySpec
+) -> None:
+    rows = rows_of(along_streets(of_class(city, "street_light"), network, spec))
+    assert len(rows) > 400
+    rhythms = []
+    for row in rows:
+        gaps = (row["t"].diff() / row["number"].diff()).dropna().to_numpy()
+        assert np.ptp(gaps) < 4 * 0.3 + 0.05  # they stand up to 0.3 m off
+        rhythms.append(gaps.mean())
+    assert min(rhythms) > 5.3
+    assert max(rhythms) < 32.7
+    assert np.std(rhythms) > 3.0  # each street has its own
 
 
-def test_objects_stand_beside_the_carriageway(city: tuple[RawLayer, ...]) -> None:
-    spec = CitySpec()
-    streets = synthetic._streets(spec, synthetic._random(spec, "streets"))
+def test_trees_are_in_rows_with_gaps(
+    city: tuple[RawLayer, ...], network: Network, spec: CitySpec
+) -> None:
+    trees = along_streets(of_class(city, "alignment_tree"), network, spec)
+    assert network.avenue[trees["edge"]].mean() > 0.9
+    rows = rows_of(trees)
+    steps = pd.concat([row["number"].diff().dropna() for row in rows])
+    assert 0.08 < (steps > 1).mean() < 0.25  # one in seven is missing
+    gaps = pd.concat([(row["t"].diff() / row["number"].diff()).dropna() for row in rows])
+    assert gaps.between(3.4, 8.1).all()
+    assert {"R", "L", "RR", "LL"} == set(trees["side"])
+
+
+def test_objects_stand_on_the_pavement(
+    city: tuple[RawLayer, ...], network: Network, spec: CitySpec
+) -> None:
     for layer in city:
-        rows = rows_of(layer)
-        edge = rows["edge"].to_numpy()
-        away = rows[["x", "y"]].to_numpy() - streets.start[edge]
-        along = streets.along[edge]
-        t = (away * along).sum(axis=1)
-        across = away[:, 0] * along[:, 1] - away[:, 1] * along[:, 0]  # positive on the right
-        assert (np.abs(across) > streets.width[edge] / 2).all()
-        assert (np.abs(across) < streets.width[edge] / 2 + 3).all()
-        assert ((across > 0) == (rows["side"] == "R")).all()
-        assert (t > streets.clear[edge, 0] - 0.02).all()
-        assert (t < streets.length[edge] - streets.clear[edge, 1] + 0.02).all()
+        frame = along_streets(layer, network, spec)
+        edge = frame["edge"].to_numpy()
+        assert (frame["across"] > network.kerb[edge]).all()
+        assert (frame["across"] < network.half_width[edge]).all()
+        clear = network.clear[edge] - 0.6  # rows are not quite even
+        assert (frame["t"] > clear[:, 0]).all()
+        assert (frame["t"] < network.length[edge] - clear[:, 1]).all()
 
 
-def test_avenue_share_counts_lines() -> None:
-    for share in (0.0, 0.1, 0.5, 1.0):
-        spec = CitySpec(size=4000.0, avenue_share=share)
-        streets = synthetic._streets(spec, synthetic._random(spec, "streets"))
-        lines = pd.Series(streets.avenue).groupby(streets.line).first()
-        assert abs(lines.mean() - share) < 0.04
-    assert synthetic_city(CitySpec(avenue_share=0.0))[0].read == 0
+def test_objects_name_the_street_they_stand_in(
+    city: tuple[RawLayer, ...], surroundings: tuple[RawLayer, RawLayer]
+) -> None:
+    streets = surroundings[1].table.set_index("source_id")
+    for layer in city:
+        edges = layer.table["source_id"].str.extract(r"^(\d+)[LR]")[0]
+        known = edges.isin(streets.index)  # the others stand at the edge of the square
+        assert len(edges) < 20 or known.sum() > 0.95 * edges.notna().sum()
+        own = streets.loc[edges[known]]
+        points = layer.table.geometry[known].to_numpy()
+        away = shapely.distance(points, own.geometry.to_numpy())
+        inside = away <= own["half_width"].to_numpy()
+        assert inside.mean() > 0.99 or len(inside) == 0
+
+
+def test_signals_stand_at_corners_of_avenues(
+    city: tuple[RawLayer, ...], network: Network, spec: CitySpec
+) -> None:
+    signals = along_streets(of_class(city, "traffic_light"), network, spec)
+    meeting = np.bincount(network.junction[network.avenue].ravel())
+    corner = network.junction[signals["edge"], signals["number"]]
+    assert (meeting[corner] >= 2).all()
+    assert (meeting[corner] == 3).any()
+    assert (meeting[corner] == 2).any()
+    assert not signals.duplicated(["edge", "number"]).any()
+
+
+def test_other_classes_are_ten_times_as_frequent_on_avenues(
+    city: tuple[RawLayer, ...], network: Network, spec: CitySpec
+) -> None:
+    scattered = set(PARIS) - {"alignment_tree", "street_light", "traffic_light"}
+    frames = [along_streets(of_class(city, name), network, spec) for name in scattered]
+    on_avenue = network.avenue[pd.concat(frames)["edge"]]
+    free = np.maximum(network.length - network.clear.sum(axis=1), 0.0)
+    avenues, others = free[network.avenue].sum(), free[~network.avenue].sum()
+    ratio = (on_avenue.sum() / avenues) / ((~on_avenue).sum() / others)
+    assert 6 < ratio < 16
+
+
+def test_parks_have_trees_and_squares_lights_but_no_houses(
+    city: tuple[RawLayer, ...], surroundings: tuple[RawLayer, RawLayer]
+) -> None:
+    houses = surroundings[0].table.geometry.to_numpy()
+    for name in ("alignment_tree", "street_light"):
+        table = of_class(city, name).table
+        on_ground = table[table["source_id"].str.startswith("p")]
+        assert 20 < len(on_ground) < 0.15 * len(table)
+        ground = on_ground["source_id"].str.split("-").str[0]
+        for _, part in on_ground.groupby(ground):
+            hull = part.geometry.union_all().convex_hull
+            assert not shapely.intersects(houses, hull).any()
+
+
+def test_houses_stand_side_by_side(surroundings: tuple[RawLayer, RawLayer]) -> None:
+    houses = surroundings[0].table.geometry.to_numpy()
+    assert len(houses) > 4000
+    together = shapely.area(shapely.union_all(houses))
+    assert together == pytest.approx(shapely.area(houses).sum(), rel=0.002)
+    assert 0.25 < together / 2000.0**2 < 0.6
+    assert np.quantile(shapely.area(houses), 0.99) < 700
+
+
+@pytest.mark.parametrize("seed", range(30))
+def test_the_smallest_city_is_a_city(seed: int) -> None:
+    spec = CitySpec(size=100.0, seed=seed)
+    assert of_class(synthetic_city(spec), "street_light").read > 0
+    assert synthetic_surroundings(spec)[1].read > 0
+
+
+def test_the_paris_like_city_has_the_counts_of_the_paper() -> None:
+    layers = synthetic_city(PARIS_LIKE)
+    objects, _ = build_objects(layers, taxonomy=paper_taxonomy(), crs="EPSG:32631")
+    streets = synthetic_surroundings(PARIS_LIKE)[1].table
+    database = build_database(objects, viewpoints=ViewpointSpec(mode="streets"), streets=streets)
+    assert len(database) == pytest.approx(CELLS, rel=0.02)
+    assert database.lengths.mean() == pytest.approx(14.0, abs=0.5)
+    for item in paper_taxonomy().classes:
+        slack = 0.05 if item.name in COMMON else 0.15
+        held = database.occurrences[item.code]
+        assert held == pytest.approx(PARIS[item.name], rel=slack), item.name
+    types, angles = database.type_sequences, database.angle_sequences
+    assert len(types) / len(database) == pytest.approx(0.45, abs=0.04)
+    assert len(angles) / len(database) == pytest.approx(0.656, abs=0.04)
+    largest = int(np.argmax(types.counts))
+    assert database.taxonomy.decode(np.frombuffer(types.strings[largest].encode(), "u1")) == "DDD"
+    assert 29_958 / 2 < types.counts[largest] < 29_958 * 2
 
 
 @pytest.mark.parametrize(
@@ -198,9 +363,9 @@ def test_avenue_share_counts_lines() -> None:
         ({"size": -5.0}, "size"),
         ({"size": math.nan}, "size"),
         ({"size": math.inf}, "size"),
-        ({"block": 10.0}, "block of the city is 10.0; give a number from 60 to 1000"),
-        ({"avenue_share": 1.5}, "avenue_share .* from 0 to 1"),
         ({"seed": -1}, "seed of the city is -1; give a whole number, 0 or more"),
+        ({"centre": (0.0, math.nan)}, "centre of the city is .*; give x and y in metres"),
+        ({"centre": (math.inf, 0.0)}, "centre"),
     ],
 )
 def test_impossible_cities(wrong: dict[str, Any], message: str) -> None:

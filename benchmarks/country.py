@@ -1,0 +1,176 @@
+"""Building a country of fifty towns in tiles on two processes of dask, beside one process."""
+
+from __future__ import annotations
+
+import logging
+import tempfile
+import time
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+from distributed import Client, LocalCluster
+
+from benchmarks.comparison import Comparison
+from benchmarks.memory import own_peak
+from semsig_gis.catalog import paper_taxonomy
+from semsig_gis.distributed import build_tiles
+from semsig_gis.grid import GridSpec
+from semsig_gis.objects import build_objects, save_objects
+from semsig_gis.signatures import SignatureSpec
+from semsig_gis.sources.synthetic import CitySpec, synthetic_city
+from semsig_gis.tile_inputs import plan_tiles
+from semsig_gis.tiles import TileSpec, build_tile
+from semsig_gis.viewpoints import ViewpointSpec
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from semsig_gis.manifest import Manifest
+    from semsig_gis.sources import RawLayer
+
+__all__ = ["comparisons"]
+
+_SEED = 50
+_SPACING = 25_000.0  # metres between towns
+_CORNER = np.array([400_000.0, 5_300_000.0])
+_ROW = 10  # towns from west to east
+_SAMPLE = 12  # tiles that are built again and compared
+_MOST_MB = 2048.0
+
+
+@dataclass(frozen=True, slots=True)
+class _Size:
+    """How large the country is, and that with which it is compared."""
+
+    towns: int
+    few: int
+    metres: float
+    tile: float
+
+
+_SIZES = {"full": _Size(50, 10, 2_800.0, 2_000.0), "small": _Size(3, 1, 300.0, 200.0)}
+
+
+@dataclass(frozen=True, slots=True)
+class _Run:
+    """What a build cost, and what it gave."""
+
+    manifest: Manifest
+    seconds: float
+    peak_mb: float
+
+
+def comparisons(size: str) -> Iterator[Comparison]:
+    """Measure one country.
+
+    Parameters
+    ----------
+    size : str
+        ``"full"`` or ``"small"``.
+
+    Yields
+    ------
+    Comparison
+        Seconds and memory.
+    """
+    scale = _SIZES[size]
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        _save_country(folder / "few.parquet", scale.few, scale.metres)
+        _save_country(folder / "country.parquet", scale.towns, scale.metres)
+        few = _build(folder, "few", scale, workers=2)
+        two = _build(folder, "country", scale, workers=2)
+        equal = _check_sample(folder, "country", scale)
+        one = _build(folder, "country", scale, workers=1)
+        if one.manifest != two.manifest:
+            msg = "two processes have built something else than one."
+            raise ArithmeticError(msg)
+    what = f"{two.manifest.cells:,} cells of {scale.towns} towns in {len(two.manifest.parts)} tiles"
+    print(
+        f"{what}: {two.manifest.cells / two.seconds:,.0f} cells a second; the files of one process "
+        f"and of {equal} tiles built here are equal, byte for byte"
+    )
+    yield Comparison(
+        name=f"building {what} by 2 processes",
+        unit="s",
+        ours=two.seconds,
+        peer=one.seconds,
+        peer_name="by 1 process",
+        bar=None,
+    )
+    yield Comparison(
+        name=f"peak memory of a process that builds {what}",
+        unit="MB",
+        ours=two.peak_mb,
+        peer=_MOST_MB,
+        peer_name="2 GB",
+        bar=1.0,
+    )
+    yield Comparison(
+        name=f"growth of that memory from {scale.few} to {scale.towns} towns",
+        unit="MB",
+        ours=two.peak_mb,
+        peer=few.peak_mb,
+        peer_name=f"with {scale.few} towns in {len(few.manifest.parts)} tiles",
+        bar=0.8,
+    )
+
+
+def _save_country(path: Path, towns: int, metres: float) -> None:
+    """Save the street objects of so many towns, some way apart."""
+    rng = np.random.default_rng(_SEED)
+    layers: list[RawLayer] = []
+    for town in range(towns):
+        place = np.array(divmod(town, _ROW)[::-1]) + rng.uniform(-0.2, 0.2, 2)
+        east, north = (_CORNER + place * _SPACING).tolist()
+        layers += synthetic_city(CitySpec(size=metres, seed=town, centre=(east, north)))
+    objects, _ = build_objects(layers, taxonomy=paper_taxonomy(), crs=layers[0].table.crs)
+    save_objects(objects, path)
+
+
+def _build(folder: Path, name: str, scale: _Size, *, workers: int) -> _Run:
+    """Build a country on new processes, so that each starts with little memory."""
+    with (
+        LocalCluster(
+            n_workers=workers,
+            threads_per_worker=1,
+            host="127.0.0.1",
+            memory_limit=0,
+            dashboard_address="127.0.0.1:0",
+            silence_logs=logging.CRITICAL,
+        ) as cluster,
+        Client(cluster, set_as_default=False) as client,
+    ):
+        client.run(paper_taxonomy)  # so that the modules are there
+        start = time.perf_counter()
+        manifest = build_tiles(
+            folder / f"{name}.parquet",
+            folder / name,
+            tile=TileSpec(scale.tile),
+            scheduler=cluster.scheduler_address,
+        )
+        seconds = time.perf_counter() - start
+        return _Run(manifest, seconds, max(client.run(own_peak).values()))
+
+
+def _check_sample(folder: Path, name: str, scale: _Size) -> int:
+    """Build some tiles in this process and refuse files that differ; return how many there are."""
+    plan = plan_tiles(
+        folder / f"{name}.parquet",
+        folder / "sample",
+        tile=TileSpec(scale.tile),
+        grid=GridSpec(),
+        spec=SignatureSpec(),
+        viewpoints=ViewpointSpec(),
+    )
+    files = sorted((folder / name).glob("*.parquet"))
+    chosen = np.random.default_rng(_SEED).permutation(len(files))[:_SAMPLE]
+    for file in (files[number] for number in chosen.tolist()):
+        _, column, row = file.stem.split("_")
+        part = build_tile(plan, (int(column), int(row)))
+        if part is None or (plan.folder / part.file).read_bytes() != file.read_bytes():
+            msg = f"{file.name} differs from what this process builds."
+            raise ArithmeticError(msg)
+    return len(chosen)

@@ -1,0 +1,20 @@
+"""How much memory a process has needed."""
+
+from __future__ import annotations
+
+import resource
+import sys
+from pathlib import Path
+
+__all__ = ["own_peak"]
+
+
+def own_peak() -> float:
+    """Return the peak memory of this process in MB."""
+    status = Path("/proc/self/status")
+    if status.exists():
+        # What Linux tells by getrusage includes the process that started this one.
+        lines = status.read_text(encoding="ascii").splitlines()
+        return float(dict(line.split(":", 1) for line in lines)["VmHWM"].split()[0]) / 2**10
+    unit = 2**20 if sys.platform == "darwin" else 2**10
+    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / unit

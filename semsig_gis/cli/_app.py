@@ -1,0 +1,67 @@
+"""The command itself, and what several of its subcommands share."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from semsig_gis.console import print_rows, remark
+from semsig_gis.errors import InputError
+
+if TYPE_CHECKING:
+    from semsig_gis.evaluation import Evaluation
+    from semsig_gis.tables import Table
+
+
+app = typer.Typer(
+    name="semsig",
+    help="Tell where in a city a view was taken from the street objects in it.",
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+    rich_markup_mode=None,
+)
+
+
+Database = Annotated[Path, typer.Argument(help="Signature database that `semsig build` wrote.")]
+
+
+AsJson = Annotated[bool, typer.Option("--json", help="Print JSON instead of tables.")]
+
+
+MethodText = Annotated[
+    str,
+    typer.Option(
+        "--method",
+        help="TYPES+ANGLES (edit, histogram, jaccard), or one part as types:edit or angles:edit; "
+        "add :5% for two stages, :alpha=0.7, :raw or :weights=INSERT/DELETE/SUBSTITUTE.",
+    ),
+]
+
+
+def numbers(text: str, option: str) -> list[float]:
+    try:
+        return [float(part) for part in text.split(",")] if text.strip() else []
+    except ValueError as error:
+        msg = f"{option} was given as {text!r}; give numbers with commas between them."
+        raise InputError(msg) from error
+
+
+def tell_if_online(offline: bool) -> None:  # noqa: FBT001
+    if not offline:
+        remark("the map takes Leaflet from the web, so it needs a network to be seen")
+
+
+def print_evaluation(evaluation: Evaluation) -> None:
+    from semsig_gis.evaluation_report import evaluation_tables
+
+    for table in evaluation_tables(evaluation):
+        print_table(table)
+
+
+def print_table(table: Table) -> None:
+    print_rows(table.title, table.columns, table.rows)
+    if table.note:
+        typer.echo(table.note)

@@ -1,0 +1,152 @@
+"""A city's drift report: what an update has changed."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from semsig_gis.changes import ClassChange
+
+if TYPE_CHECKING:
+    from semsig_gis.database import SignatureDatabase
+    from semsig_gis.quality import PlainTable
+
+__all__ = ["UpdateReport", "differing_cells"]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class UpdateReport:
+    """How far a city has drifted.
+
+    Parameters
+    ----------
+    classes : tuple of ClassChange
+        What changed in the objects, by class.
+    replaced, kept : tuple of str
+        The layers that were loaded anew, and those that were not.
+    cells_before, cells : int
+        Cells of the database before and after.
+    recomputed : int
+        Cells within range of a change, whether they see it or not.
+    changed, appeared, vanished : int
+        Cells whose signature is another one, that see something for the first time, and that see
+        nothing any more.
+    notes : tuple of str
+        What a user should know.
+
+    Examples
+    --------
+    >>> UpdateReport(classes=(), replaced=(), kept=(), cells_before=10, cells=9, recomputed=5,
+    ...              changed=2, appeared=0, vanished=1).share
+    0.3
+    """
+
+    classes: tuple[ClassChange, ...]
+    replaced: tuple[str, ...]
+    kept: tuple[str, ...]
+    cells_before: int
+    cells: int
+    recomputed: int
+    changed: int
+    appeared: int
+    vanished: int
+    notes: tuple[str, ...] = ()
+
+    @property
+    def share(self) -> float:
+        """Share of all cells, before or after, that are not what they were."""
+        drifted = self.changed + self.appeared + self.vanished
+        return drifted / (self.cells_before + self.appeared)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the report as plain values, ready for JSON.
+
+        Returns
+        -------
+        dict
+            The fields of the report and ``share``.
+        """
+        return {**asdict(self), "share": self.share}
+
+    def tables(self) -> tuple[PlainTable, ...]:
+        """Return the report as tables to print.
+
+        Returns
+        -------
+        tuple of (str, tuple of str, tuple of tuple of str, str)
+            Title, headings, rows of text and a note, which is what `semsig_gis.tables.Table`
+            takes: objects by class, cells.
+        """
+        names = [name for name in ClassChange.__slots__ if name not in {"class_name", "moved_m"}]
+        numbers = [[getattr(item, name) for name in names] for item in self.classes]
+        totals = np.array(numbers, np.int64).reshape(-1, len(names)).sum(axis=0).tolist()
+        rows = [
+            (item.class_name, *(f"{number:,}" for number in row), _metres(item.moved_m))
+            for item, row in zip(self.classes, numbers, strict=True)
+        ]
+        rows.append(("all", *(f"{number:,}" for number in totals), ""))
+        cells = (
+            ("before", self.cells_before),
+            ("after", self.cells),
+            ("computed again", self.recomputed),
+            ("changed", self.changed),
+            ("appeared", self.appeared),
+            ("vanished", self.vanished),
+        )
+        layers = f"Layers replaced: {', '.join(self.replaced)}."
+        if self.kept:
+            layers += f" Layers that stay as they were: {', '.join(self.kept)}."
+        return (
+            ("Objects by class", ("class", *names, "moved by, m"), tuple(rows), layers),
+            (
+                "Cells",
+                ("what", "cells"),
+                tuple((name, f"{number:,}") for name, number in cells),
+                f"The city has drifted by {self.share:.2%} of its cells.",
+            ),
+        )
+
+
+def _metres(number: float | None) -> str:
+    return "" if number is None else f"{number:,.2f}"
+
+
+def differing_cells(before: SignatureDatabase, after: SignatureDatabase) -> tuple[int, int]:
+    """Compare the cells that are in two databases.
+
+    Parameters
+    ----------
+    before, after : SignatureDatabase
+        Databases of one grid, made in the same way.
+
+    Returns
+    -------
+    differing : int
+        Cells in both whose signatures differ: in classes, bearings or distances.
+    common : int
+        Cells in both.
+
+    Examples
+    --------
+    >>> from semsig_gis.building import build_database
+    >>> from semsig_gis.sources.synthetic import CitySpec, synthetic_city
+    >>> from semsig_gis.catalog import paper_taxonomy
+    >>> from semsig_gis.objects import build_objects
+    >>> layers = synthetic_city(CitySpec(size=300.0))
+    >>> objects, _ = build_objects(layers, taxonomy=paper_taxonomy(), crs="EPSG:32631")
+    >>> database = build_database(objects)
+    >>> differing_cells(database, database.select(slice(3)))
+    (0, 3)
+    """
+    _, first, second = np.intersect1d(
+        before.cell_ids, after.cell_ids, assume_unique=True, return_indices=True
+    )
+    longer = before.lengths[first] != after.lengths[second]
+    one, other = before.select(first[~longer]), after.select(second[~longer])
+    differs = np.zeros(len(one.codes), bool)
+    for name in ("codes", "bearing_units", "distance_units"):
+        differs |= getattr(one, name) != getattr(other, name)
+    cell = np.repeat(np.arange(len(one)), one.lengths)
+    return int(longer.sum()) + len(np.unique(cell[differs])), len(first)

@@ -1,0 +1,252 @@
+"""What a catalogue's file says of one layer: a ``[[layers]]`` table, checked."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, get_args
+
+from pyproj import CRS
+from pyproj.exceptions import CRSError
+
+from semsig_gis.errors import CatalogError, UnknownNameError
+from semsig_gis.layer_spec import (
+    MAX_WIDTH_M,
+    ClassBy,
+    ElementKind,
+    GeometryKind,
+    LayerSpec,
+    Role,
+    Value,
+    WidthBy,
+)
+from semsig_gis.toml_checks import check_keys, metres, one_of, texts
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from semsig_gis.taxonomy import Taxonomy
+
+__all__ = ["layer_of", "require_class"]
+
+LAYER_KEYS = {
+    "name": str,
+    "class": str,
+    "files": list,
+    "layer": str,
+    "where": dict,
+    "class_by": dict,
+    "width_by": dict,
+    "width_field": str,
+    "aliases": dict,
+    "id_field": str,
+    "unique_id": bool,
+    "dataset": str,
+    "server_where": str,
+    "select": list,
+    "tags": list,
+    "elements": list,
+    "role": str,
+    "optional": bool,
+    "note": str,
+    "geometry": str,
+    "crs": str,
+    "rows": list,
+    "x_field": str,
+    "y_field": str,
+    "license": str,
+    "attribution": str,
+}
+CLASS_BY_KEYS = {"field": str, "values": dict}
+WIDTH_BY_KEYS = {"field": str, "values": dict, "default": object}
+# Keys whose values are taken as they are.
+PLAIN_KEYS = (
+    "layer",
+    "id_field",
+    "unique_id",
+    "dataset",
+    "server_where",
+    "optional",
+    "note",
+    "crs",
+    "x_field",
+    "y_field",
+    "width_field",
+)
+
+
+def layer_of(
+    item: object, where: str, *, taxonomy: Taxonomy, shared: Mapping[str, Any]
+) -> LayerSpec:
+    """Return what a ``[[layers]]`` table says.
+
+    Parameters
+    ----------
+    item : object
+        The table.
+    where : str
+        Catalogue, for messages.
+    taxonomy : Taxonomy
+        The classes that there are.
+    shared : mapping
+        What holds for layers that do not say otherwise: ``files``, ``reader``, ``license``,
+        ``attribution``.
+
+    Returns
+    -------
+    LayerSpec
+        The layer, checked.
+
+    Raises
+    ------
+    CatalogError
+        If a key means nothing, one that is needed is missing, or a value makes no sense.
+
+    Examples
+    --------
+    >>> from semsig_gis.taxonomy import ObjectClass, Taxonomy
+    >>> known = Taxonomy((ObjectClass(10, "L", "bench", "Bench"),))
+    >>> shared = {"files": (), "reader": "vector_file", "license": "CC0", "attribution": "Town"}
+    >>> item = {"name": "benches", "class": "bench", "files": ["benches.shp"]}
+    >>> layer_of(item, "town.toml", taxonomy=known, shared=shared).license
+    'CC0'
+    """
+    if not isinstance(item, dict):
+        msg = f"{where} has the layer {item!r}; write a [[layers]] table."
+        raise CatalogError(msg)
+    where = f"{where}, layer {item.get('name', '?')!r}"
+    check_keys(item, LAYER_KEYS, where, ("name",))
+    role = one_of(item.get("role", "objects"), "role", get_args(Role), where)
+    if (role == "objects") != ("class" in item):
+        what = "lacks the key 'class'; add it" if role == "objects" else "needs no class; remove it"
+        msg = f"{where} {what}."
+        raise CatalogError(msg)
+    if role == "objects":
+        require_class(item["class"], taxonomy, where)
+    if "crs" in item:
+        try:
+            CRS.from_user_input(item["crs"])
+        except CRSError as error:
+            msg = (
+                f"{where} has crs = {item['crs']!r}, which is unknown; "
+                "write a code such as 'EPSG:4326'."
+            )
+            raise CatalogError(msg) from error
+    if role != "streets" and (width := {"width_by", "width_field"} & set(item)):
+        msg = f"{where} has {min(width)}, which only streets have; remove it or add its role."
+        raise CatalogError(msg)
+    if item.get("unique_id", False) and "id_field" not in item:
+        msg = f"{where} has unique_id = true without an id_field; name the field of the ids."
+        raise CatalogError(msg)
+    files = texts(item.get("files", list(shared["files"])), "files", where)
+    if not files:
+        msg = f"{where} has files = []; write a list of file names or patterns."
+        raise CatalogError(msg)
+    kinds = texts(item.get("elements", list(get_args(ElementKind))), "elements", where)
+    return LayerSpec(
+        name=item["name"],
+        class_name=item.get("class", ""),
+        role=role,
+        files=files,
+        where=tuple(
+            (field, _values(accepted, field, where))
+            for field, accepted in item.get("where", {}).items()
+        ),
+        class_by=_class_by(item["class_by"], taxonomy, where) if "class_by" in item else None,
+        width_by=_width_by(item["width_by"], where) if "width_by" in item else None,
+        aliases=tuple(
+            (field, texts(names, f"aliases of {field!r}", where))
+            for field, names in item.get("aliases", {}).items()
+        ),
+        geometry=one_of(item.get("geometry", "point"), "geometry", get_args(GeometryKind), where),
+        rows=_rows(item["rows"], where) if "rows" in item else None,
+        select=texts(item.get("select", []), "select", where),
+        tags=tuple(_tags(tags, where) for tags in item.get("tags", [])),
+        elements=tuple(one_of(kind, "elements", get_args(ElementKind), where) for kind in kinds),
+        reader=shared["reader"],
+        license=item.get("license", shared["license"]),
+        attribution=item.get("attribution", shared["attribution"]),
+        **{key: item[key] for key in PLAIN_KEYS if key in item},
+    )
+
+
+def _tags(item: object, where: str) -> tuple[tuple[str, tuple[str, ...]], ...]:
+    if not isinstance(item, dict) or not item:
+        msg = f"{where} has the tags {item!r}; write a table of keys and values."
+        raise CatalogError(msg)
+    return tuple(
+        (key, texts(value if isinstance(value, list) else [value], f"tag {key!r}", where))
+        for key, value in item.items()
+    )
+
+
+def require_class(name: str, taxonomy: Taxonomy, where: str) -> None:
+    """Refuse a class that does not exist.
+
+    Parameters
+    ----------
+    name : str
+        Name of a class.
+    taxonomy : Taxonomy
+        The classes that there are.
+    where : str
+        Catalogue and table, for messages.
+
+    Raises
+    ------
+    CatalogError
+        With the nearest name.
+
+    Examples
+    --------
+    >>> from semsig_gis.taxonomy import ObjectClass, Taxonomy
+    >>> require_class("bench", Taxonomy((ObjectClass(10, "L", "bench", "Bench"),)), "town.toml")
+    """
+    try:
+        taxonomy.by_name(name)
+    except UnknownNameError as error:
+        msg = f"{where}: {error}"
+        raise CatalogError(msg) from error
+
+
+def _class_by(item: dict[str, Any], taxonomy: Taxonomy, where: str) -> ClassBy:
+    where = f"{where}, class_by"
+    check_keys(item, CLASS_BY_KEYS, where, CLASS_BY_KEYS)
+    for value, name in item["values"].items():
+        if not isinstance(name, str):
+            msg = f"{where} has {value!r} = {name!r}; write the name of a class."
+            raise CatalogError(msg)
+        require_class(name, taxonomy, where)
+    return ClassBy(item["field"], tuple(item["values"].items()))
+
+
+def _width_by(item: dict[str, Any], where: str) -> WidthBy:
+    where = f"{where}, width_by"
+    check_keys(item, WIDTH_BY_KEYS, where, ("field", "values"))
+    default = item.get("default")
+    return WidthBy(
+        item["field"],
+        tuple(
+            (value, metres(width, repr(value), f"{where}, values", most=MAX_WIDTH_M))
+            for value, width in item["values"].items()
+        ),
+        None if default is None else metres(default, "default", where, most=MAX_WIDTH_M),
+    )
+
+
+def _values(accepted: object, field: str, where: str) -> tuple[Value, ...]:
+    values = accepted if isinstance(accepted, list) else [accepted]
+    if not values or not all(isinstance(value, Value) for value in values):
+        msg = (
+            f"{where} filters {field!r} by {accepted!r}; "
+            "write the accepted value, or a list of accepted values."
+        )
+        raise CatalogError(msg)
+    return tuple(values)
+
+
+def _rows(item: list[Any], where: str) -> tuple[int, int]:
+    match item:
+        # bool is an int to Python, never to a catalogue
+        case [int(least), int(most)] if 0 <= least <= most and bool not in map(type, item):
+            return least, most
+    msg = f"{where} has rows = {item!r}; write [least, most]."
+    raise CatalogError(msg)

@@ -1,0 +1,100 @@
+"""Tables as rows of text, for a terminal or for Markdown."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+__all__ = ["Table", "escaped", "percent"]
+
+
+@dataclass(frozen=True, slots=True)
+class Table:
+    """A table to print.
+
+    Parameters
+    ----------
+    title : str
+        What it shows.
+    columns : tuple of str
+        Headings; the first column is text, the others are numbers with their units.
+    rows : tuple of tuple of str
+        Cells as text, one for each column; empty where there is nothing to say.
+    note : str, default ""
+        What a reader must know to read it rightly.
+
+    Examples
+    --------
+    >>> Table("Sizes", ("What", "m"), (("step", "10"),)).note
+    ''
+    """
+
+    title: str
+    columns: tuple[str, ...]
+    rows: tuple[tuple[str, ...], ...]
+    note: str = ""
+
+    def markdown(self) -> str:
+        """Return the table as a Markdown section.
+
+        Returns
+        -------
+        str
+            A heading of the third level, the table and the note, ending in a newline.
+
+        Examples
+        --------
+        >>> print(Table("Sizes", ("What", "m"), (("step", "10"),)).markdown(), end="")
+        ### Sizes
+        <BLANKLINE>
+        | What | m |
+        | --- | ---: |
+        | step | 10 |
+        """
+        rules = ["---", *["---:"] * (len(self.columns) - 1)]
+        lines = [self.columns, tuple(rules), *self.rows]
+        table = "\n".join(f"| {' | '.join(escaped(cell) for cell in line)} |" for line in lines)
+        note = f"\n{escaped(self.note)}\n" if self.note else ""
+        return f"### {escaped(self.title)}\n\n{table}\n{note}"
+
+
+def percent(share: float) -> str:
+    """Return a share as text.
+
+    Parameters
+    ----------
+    share : float
+        From 0 to 1.
+
+    Returns
+    -------
+    str
+        Percent with one decimal.
+
+    Examples
+    --------
+    >>> percent(0.418)
+    '41.8 %'
+    """
+    return f"{100 * share:.1f} %"
+
+
+def escaped(text: str) -> str:
+    """Return text from data so that it cannot break a Markdown table or become HTML.
+
+    Parameters
+    ----------
+    text : str
+        Anything.
+
+    Returns
+    -------
+    str
+        The text on one line.
+
+    Examples
+    --------
+    >>> escaped("trees  of <b>")
+    'trees of &lt;b>'
+    """
+    plain = " ".join(text.split())
+    return plain.replace("&", "&amp;").replace("<", "&lt;").replace("|", "\\|")

@@ -1,0 +1,206 @@
+"""Checks on TOML that people write: every key known, every value of its type, else a sentence."""
+
+from __future__ import annotations
+
+import tomllib
+from typing import TYPE_CHECKING, Any
+
+from semsig_gis.errors import CatalogError, nearest_name
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Mapping
+
+__all__ = ["check_keys", "metres", "one_of", "parse_toml", "texts"]
+
+TYPE_NAMES: dict[type, str] = {
+    str: "a string",
+    int: "a whole number",
+    list: "a list",
+    dict: "a table",
+    bool: "true or false",
+}
+
+
+def parse_toml(text: str, where: str) -> dict[str, Any]:
+    """Parse TOML.
+
+    Parameters
+    ----------
+    text : str
+        Content of a file.
+    where : str
+        Name of the file, for messages.
+
+    Returns
+    -------
+    dict
+        The values.
+
+    Raises
+    ------
+    CatalogError
+        If the text is not TOML.
+
+    Examples
+    --------
+    >>> parse_toml("rows = [1, 10]", "town.toml")
+    {'rows': [1, 10]}
+    """
+    try:
+        return tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
+        msg = f"{where} is not valid TOML: {error}."
+        raise CatalogError(msg) from error
+
+
+def check_keys(
+    table: Mapping[str, Any],
+    allowed: Mapping[str, type],
+    where: str,
+    needed: Iterable[str] = (),
+) -> None:
+    """Refuse a table with an unknown key, a value of another type, or a key too few.
+
+    Parameters
+    ----------
+    table : mapping
+        What the file says.
+    allowed : mapping of str to type
+        Keys and the types of their values; ``object`` for a value that is checked elsewhere.
+    where : str
+        File and table, for messages.
+    needed : iterable of str
+        Keys that must be there.
+
+    Raises
+    ------
+    CatalogError
+        With the key, and the nearest known one.
+
+    Examples
+    --------
+    >>> check_keys({"title": "Town"}, {"title": str}, "town.toml", ["title"])
+    """
+    for key, value in table.items():
+        if key not in allowed:
+            msg = (
+                f"{where} has the key {key!r}, which means nothing"
+                f"{nearest_name(key, allowed)}; the keys are {', '.join(allowed)}."
+            )
+            raise CatalogError(msg)
+        kind = allowed[key]
+        if kind is object:
+            continue
+        # bool is an int to Python, never to a catalogue
+        if not isinstance(value, kind) or isinstance(value, bool) != (kind is bool):
+            msg = f"{where} has {key} = {value!r}; write {TYPE_NAMES[kind]}."
+            raise CatalogError(msg)
+    for key in needed:
+        if key not in table:
+            msg = f"{where} lacks the key {key!r}; add it."
+            raise CatalogError(msg)
+
+
+def one_of(value: str, key: str, choices: tuple[str, ...], where: str) -> Any:  # noqa: ANN401
+    """Return a value that must be one of some.
+
+    Parameters
+    ----------
+    value : str
+        What the file says.
+    key : str
+        Its key.
+    choices : tuple of str
+        What may be said.
+    where : str
+        File and table, for messages.
+
+    Returns
+    -------
+    str
+        The value; its type is left open so that it may be a `Literal`.
+
+    Raises
+    ------
+    CatalogError
+        If it is none of them; the nearest is offered.
+
+    Examples
+    --------
+    >>> one_of("line", "geometry", ("line", "point"), "town.toml")
+    'line'
+    """
+    if value not in choices:
+        known = ", ".join(repr(choice) for choice in choices)
+        msg = f"{where} has {key} = {value!r}{nearest_name(value, choices)}; write one of {known}."
+        raise CatalogError(msg)
+    return value
+
+
+def texts(items: object, key: str, where: str) -> tuple[str, ...]:
+    """Return a list of texts, none of them empty.
+
+    Parameters
+    ----------
+    items : object
+        What the file says.
+    key : str
+        Its key.
+    where : str
+        File and table, for messages.
+
+    Returns
+    -------
+    tuple of str
+        The texts.
+
+    Raises
+    ------
+    CatalogError
+        If it is something else.
+
+    Examples
+    --------
+    >>> texts(["trees*.geojson"], "files", "town.toml")
+    ('trees*.geojson',)
+    """
+    if not isinstance(items, list) or not all(isinstance(item, str) and item for item in items):
+        msg = f"{where} has {key} = {items!r}; write a list of texts."
+        raise CatalogError(msg)
+    return tuple(items)
+
+
+def metres(value: object, key: str, where: str, *, most: float) -> float:
+    """Return a length.
+
+    Parameters
+    ----------
+    value : object
+        What the file says.
+    key : str
+        Its key.
+    where : str
+        File and table, for messages.
+    most : float
+        The largest length that makes sense.
+
+    Returns
+    -------
+    float
+        Metres, above 0 and up to `most`.
+
+    Raises
+    ------
+    CatalogError
+        If it is something else.
+
+    Examples
+    --------
+    >>> metres(50, "bus_stop", "town.toml, ranges", most=6000)
+    50.0
+    """
+    # bool is an int to Python, never to a catalogue; NaN is not above 0
+    if isinstance(value, bool) or not isinstance(value, int | float) or not 0 < value <= most:
+        msg = f"{where} has {key} = {value!r}; write metres above 0 and up to {most:g}."
+        raise CatalogError(msg)
+    return float(value)

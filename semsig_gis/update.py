@@ -1,0 +1,316 @@
+"""Updating a signature database: only the cells that see a changed object are computed again."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+import shapely
+
+from semsig_gis import __version__
+from semsig_gis.building import build_cells
+from semsig_gis.changes import compare_objects, replace_layers
+from semsig_gis.database import join_databases
+from semsig_gis.database_file import open_database
+from semsig_gis.drift import UpdateReport, differing_cells
+from semsig_gis.errors import DatabaseError, EmptyResultError, InputError
+from semsig_gis.grid import cell_ids, cells_near
+from semsig_gis.schema import HALF_WIDTH, SOURCE
+from semsig_gis.spatial_index import PackedIndex
+from semsig_gis.store import open_store, save_with_store
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+    from pathlib import Path
+
+    import geopandas as gpd
+    from numpy.typing import NDArray
+
+    from semsig_gis.changes import ObjectChanges
+    from semsig_gis.database import SignatureDatabase
+    from semsig_gis.objects import StreetObjects
+    from semsig_gis.store import ObjectStore
+
+    _Cells = tuple[NDArray[np.int64], NDArray[np.int64]]  # columns and rows
+
+__all__ = ["update_database", "update_file"]
+
+# More than the tolerance of occlusion, and than what it counts as a gap between buildings.
+TOUCHING_M = 1.0
+
+
+def update_file(
+    path: str | Path,
+    objects: StreetObjects,
+    *,
+    out: str | Path | None = None,
+    progress: Callable[[int, int], None] | None = None,
+) -> UpdateReport:
+    """Update the file of a database, and the object store beside it.
+
+    Parameters
+    ----------
+    path : str or Path
+        File of the database.
+    objects : StreetObjects
+        The layers that were loaded anew, whole (see `semsig_gis.changes.replace_layers`).
+    out : str or Path, optional
+        Another file to write to; `path` itself by default.
+    progress : callable, optional
+        Called with the number of cells done and in all.
+
+    Returns
+    -------
+    UpdateReport
+        What changed.
+
+    Raises
+    ------
+    DatabaseError
+        If the database or its store is missing or damaged.
+    InputError
+        If the new objects do not fit the database, or the files cannot be written; nothing has
+        changed then.
+    CrsError
+        If the new objects are in another CRS.
+    EmptyResultError
+        If no cell would see an object any more.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> from semsig_gis.building import build_database
+    >>> from semsig_gis.sources.synthetic import CitySpec, synthetic_city
+    >>> from semsig_gis.catalog import paper_taxonomy
+    >>> from semsig_gis.objects import StreetObjects, build_objects
+    >>> from semsig_gis.store import ObjectStore
+    >>> layers = synthetic_city(CitySpec(size=300.0))
+    >>> objects, _ = build_objects(layers, taxonomy=paper_taxonomy(), crs="EPSG:32631")
+    >>> fewer = StreetObjects(objects.table[1:], objects.taxonomy, objects.licenses)
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     file = f"{folder}/city.parquet"
+    ...     save_with_store(build_database(objects), ObjectStore.of(objects), file)
+    ...     report = update_file(file, fewer)
+    >>> sum(item.removed for item in report.classes), 0 < report.share < 0.5
+    (1, True)
+    """
+    database, store = open_database(path), open_store(path)
+    database, store, report = update_database(database, store, objects, progress=progress)
+    save_with_store(database, store, path if out is None else out)
+    return report
+
+
+def update_database(
+    database: SignatureDatabase,
+    store: ObjectStore,
+    objects: StreetObjects,
+    *,
+    progress: Callable[[int, int], None] | None = None,
+) -> tuple[SignatureDatabase, ObjectStore, UpdateReport]:
+    """Replace layers of a database, and compute again what the changes are seen from.
+
+    Parameters
+    ----------
+    database : SignatureDatabase
+        The database.
+    store : ObjectStore
+        What it was built from.
+    objects : StreetObjects
+        The layers that were loaded anew, whole; layers that none of these objects comes from stay
+        as they are (see `semsig_gis.changes.replace_layers`).
+    progress : callable, optional
+        Called with the number of cells done and in all.
+
+    Returns
+    -------
+    database : SignatureDatabase
+        What `semsig_gis.building.build_database` would make of the new store.
+    store : ObjectStore
+        All objects as they are now.
+    report : UpdateReport
+        What changed.
+
+    Raises
+    ------
+    InputError
+        If the new objects use a class code for something else, or one of their classes is seen
+        from further away than all classes before.
+    CrsError
+        If the new objects are in another CRS.
+    DatabaseError
+        If the store lacks the buildings or streets that the database was built with.
+    EmptyResultError
+        If no cell would see an object any more.
+
+    Examples
+    --------
+    >>> from semsig_gis.building import build_database
+    >>> from semsig_gis.sources.synthetic import CitySpec, synthetic_city
+    >>> from semsig_gis.catalog import paper_taxonomy
+    >>> from semsig_gis.objects import build_objects
+    >>> from semsig_gis.store import ObjectStore
+    >>> layers = synthetic_city(CitySpec(size=300.0))
+    >>> objects, _ = build_objects(layers, taxonomy=paper_taxonomy(), crs="EPSG:32631")
+    >>> database, store = build_database(objects), ObjectStore.of(objects)
+    >>> _, _, report = update_database(database, store, objects)
+    >>> report.recomputed
+    0
+    """
+    _require_surroundings(database, store)
+    merged, kept, notes = replace_layers(store.objects, objects)
+    new = replace(database, taxonomy=merged.taxonomy, licenses=merged.licenses, version=__version__)
+    _require_reach(database, new)
+    changes = compare_objects(store.objects, merged)
+    cells = _cells_in_range(new, store.objects, merged, changes)
+    old_row = np.full(len(merged), -1)
+    old_row[changes.same[:, 1]] = changes.same[:, 0]
+    index = store.index.edited(merged.xy, old_row)
+    after = replace(store, objects=merged, index=index, notes=())
+    stale = np.isin(database.cell_ids, cell_ids(*cells))
+    places = _places(store.objects, merged, changes)
+    fresh = _recomputed(new, after, places, cells, progress=progress)
+    updated = join_databases([new.select(~stale), fresh])
+    if len(updated) == 0:
+        msg = f"no cell would see any of the {len(merged):,} objects; look at the new objects."
+        raise EmptyResultError(msg)
+    seen_before, seen_now = database.select(stale), fresh
+    layers = {*store.objects.table[SOURCE].unique(), *merged.table[SOURCE].unique()}
+    changed, common = differing_cells(seen_before, seen_now)
+    report = UpdateReport(
+        classes=changes.classes,
+        replaced=tuple(sorted(layers - set(kept))),
+        kept=kept,
+        cells_before=len(database),
+        cells=len(updated),
+        recomputed=len(cells[0]),
+        changed=changed,
+        appeared=len(seen_now) - common,
+        vanished=len(seen_before) - common,
+        notes=(*store.notes, *notes),
+    )
+    return updated, after, report
+
+
+def _require_surroundings(database: SignatureDatabase, store: ObjectStore) -> None:
+    lacking = []
+    if store.footprints is None and database.occlusion is not None:
+        lacking.append("buildings")
+    if store.streets is None and database.viewpoints.mode == "streets":
+        lacking.append("streets")
+    if lacking:
+        msg = (
+            f"the object store lacks the {' and '.join(lacking)} that the database was built with; "
+            "build the database again."
+        )
+        raise DatabaseError(msg)
+
+
+def _require_reach(old: SignatureDatabase, new: SignatureDatabase) -> None:
+    """Raise where the unit in which all distances are stored would be another one."""
+    if new.reach > old.reach:
+        furthest = max(new.taxonomy.classes, key=lambda item: item.range_m or 0.0)
+        msg = (
+            f"class {furthest.name!r} is seen from {new.reach:g} m, further than any class of the "
+            f"database ({old.reach:g} m), which concerns every cell; build the database again."
+        )
+        raise InputError(msg)
+
+
+def _places(old: StreetObjects, new: StreetObjects, changes: ObjectChanges) -> NDArray[np.float64]:
+    """Return every place where an object is gone or has come, shape (c, 2)."""
+    return np.concatenate([old.xy[changes.gone], new.xy[changes.come]])
+
+
+def _cells_in_range(
+    database: SignatureDatabase, old: StreetObjects, new: StreetObjects, changes: ObjectChanges
+) -> _Cells:
+    """Return the cells that an object which is gone or has come may be seen from."""
+    places = _places(old, new, changes)
+    nothing = np.empty(0, np.int64)
+    if len(places) == 0:
+        return nothing, nothing
+    codes = np.concatenate([old.codes[changes.gone], new.codes[changes.come]])
+    ranges = database.taxonomy.ranges(database.spec.radius)[codes]
+    reach = float(ranges.max())
+    columns, rows = cells_near(places, grid=database.grid, radius=reach)
+    viewpoints = database.grid.viewpoints(columns, rows)
+    cell, place = PackedIndex(places).pairs_within(viewpoints, radius=reach)
+    if (ranges < reach).any():
+        delta = places[place] - viewpoints[cell]
+        cell = cell[np.hypot(delta[:, 0], delta[:, 1]) <= ranges[place]]
+    near = np.unique(cell)
+    return columns[near], rows[near]
+
+
+def _recomputed(
+    database: SignatureDatabase,
+    store: ObjectStore,
+    places: NDArray[np.float64],
+    cells: _Cells,
+    *,
+    progress: Callable[[int, int], None] | None,
+) -> SignatureDatabase:
+    """Return some cells around some places as they are now."""
+    if len(places) == 0:
+        return database.select(slice(0))
+    # A viewpoint is at most the reach from a place, and all it looks at as far from it again.
+    around = 2.0 * database.reach + TOUCHING_M
+    near = np.unique(store.index.pairs_within(places, radius=around)[1])
+    if len(near) == 0:
+        return database.select(slice(0))
+    objects = replace(store.objects, table=store.objects.table.iloc[near])
+    footprints, streets, viewpoints = store.footprints, store.streets, database.viewpoints
+    if footprints is not None:
+        footprints = _buildings_near(footprints, places, around)
+        if len(footprints) == 0:
+            footprints = None  # so that none of the cells is in a building either
+            if viewpoints.mode == "outdoor":
+                viewpoints = replace(viewpoints, mode="all")
+    if viewpoints.mode == "streets" and streets is not None:
+        streets = _streets_near(streets, database.grid.viewpoints(*cells), viewpoints.width)
+        if len(streets) == 0:
+            return database.select(slice(0))
+    fresh = build_cells(
+        objects,
+        *cells,
+        grid=database.grid,
+        spec=database.spec,
+        viewpoints=viewpoints,
+        footprints=footprints,
+        streets=streets,
+        progress=progress,
+    )
+    if footprints is None:
+        fresh = replace(fresh, occlusion=database.occlusion)
+    return replace(fresh, viewpoints=database.viewpoints)
+
+
+def _buildings_near(
+    footprints: gpd.GeoDataFrame, places: NDArray[np.float64], distance: float
+) -> gpd.GeoDataFrame:
+    """Return the buildings around some places, with all that they are joined to.
+
+    A block of houses is one shape to occlusion, which comes out the same only from all of them.
+    """
+    polygons = footprints.geometry.to_numpy()
+    tree = shapely.STRtree(polygons)
+    chosen = np.zeros(len(polygons), bool)
+    found = tree.query(shapely.points(places), predicate="dwithin", distance=distance)[1]
+    while len(found):
+        chosen[found] = True
+        touching = tree.query(polygons[found], predicate="dwithin", distance=TOUCHING_M)[1]
+        found = np.unique(touching[~chosen[touching]])
+    return footprints[chosen]
+
+
+def _streets_near(
+    streets: gpd.GeoDataFrame, viewpoints: NDArray[np.float64], width: float
+) -> gpd.GeoDataFrame:
+    """Return the streets that some viewpoints may be in."""
+    widest = max(width, np.nan_to_num(streets.get(HALF_WIDTH, np.array([width]))).max())
+    tree = shapely.STRtree(streets.geometry.to_numpy())
+    found = tree.query(
+        shapely.points(viewpoints), predicate="dwithin", distance=widest + TOUCHING_M
+    )[1]
+    return streets.iloc[np.unique(found)]

@@ -1,0 +1,97 @@
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pytest
+from six_cells import rows, six_cells
+
+from semsig_gis.distortion import Distortion
+from semsig_gis.evaluation import evaluate
+from semsig_gis.evaluation_report import evaluation_markdown, evaluation_tables
+from semsig_gis.matching import Method
+
+if TYPE_CHECKING:
+    from semsig_gis.evaluation import Evaluation
+
+
+@pytest.fixture(scope="module")
+def evaluation() -> Evaluation:
+    return evaluate(six_cells(), queries=6, method=Method.parse("edit+edit:5%"), seed=1)
+
+
+def test_settings_and_figures_of_an_evaluation(evaluation: Evaluation) -> None:
+    settings, figures, by_length = evaluation_tables(evaluation)
+    assert rows(settings)["Method"] == ("edit+edit:5%",)
+    assert rows(settings)["Distortion"] == ("medium, 7 occurrences",)
+    assert rows(settings)["Bearing noise"] == ("5°, at most 30°",)
+    assert rows(settings)["After the noise"] == ("sorted again",)
+    assert rows(settings)["Class of a false object"] == ("uniform",)
+    shown = rows(figures)
+    assert shown["P(error ≤ 50 m)"] == (f"{evaluation.cdf([50])[0]:.4f}", "0.3733")
+    assert shown["recall@10 %"] == (f"{evaluation.recall(10):.4f}", "0.6462")
+    assert shown["P(error ≤ 10 m)"][1] == ""
+    assert "Paris" in figures.note
+    assert [row[0] for row in by_length.rows] == ["1-4", "5-9", "10-19", "20+"]
+    assert by_length.rows[3][1:] == ("0", "", "", "", "", "", "")
+    for table in (settings, figures, by_length):
+        assert all(len(row) == len(table.columns) for row in table.rows)
+
+
+@pytest.mark.parametrize(
+    "changed",
+    [
+        {"top": 100},
+        {"method": Method.parse("edit+edit")},
+        {"method": Method.parse("edit+edit:5%:weights=2/1/1")},
+        {"distortion": Distortion(occurrences=1)},
+        {"distortion": Distortion(bearing_sigma=0.0)},
+        {"step_m": 5.0},
+        {"radius_m": 35.0},
+    ],
+)
+def test_other_settings_are_not_compared_with_the_paper(
+    evaluation: Evaluation, changed: dict[str, object]
+) -> None:
+    facts = {key: value for key, value in changed.items() if key.endswith("_m")}
+    settings = {key: value for key, value in changed.items() if key not in facts}
+    other = replace(evaluation, database={**evaluation.database, **facts}, **settings)  # type: ignore[arg-type]
+    figures = evaluation_tables(other)[1]
+    assert figures.columns == ("Figure", "Ours")
+    assert all(len(row) == 2 for row in figures.rows)
+    assert "Paris" not in figures.note
+
+
+@pytest.mark.parametrize(
+    ("radius", "levels", "p50", "recall10"),
+    [(20.0, 16, "0.1793", "0.5110"), (40.0, 16, "0.4946", "0.7269"), (30.0, 24, "0.3861", "")],
+)
+def test_the_paper_has_figures_for_other_ranges_and_levels(
+    evaluation: Evaluation, radius: float, levels: int, p50: str, recall10: str
+) -> None:
+    facts = {**evaluation.database, "radius_m": radius, "levels": levels}
+    figures = rows(evaluation_tables(replace(evaluation, database=facts))[1])
+    assert figures["P(error ≤ 50 m)"][1] == p50
+    assert figures["recall@10 %"][1] == recall10
+
+
+def test_settings_without_noise(evaluation: Evaluation) -> None:
+    quiet = Distortion(bearing_sigma=0.0, resort=False, false_class="frequency", name="mine")
+    settings = rows(evaluation_tables(replace(evaluation, distortion=quiet))[0])
+    assert settings["Bearing noise"] == ("none",)
+    assert settings["After the noise"] == ("order kept",)
+    assert settings["Class of a false object"] == ("by frequency",)
+
+
+def test_an_infinite_median_is_told(evaluation: Evaluation) -> None:
+    lost = evaluation.queries.assign(error_m=np.inf)
+    figures = rows(evaluation_tables(replace(evaluation, queries=lost))[1])
+    assert figures["Median error"][0] == "infinite"
+
+
+def test_markdown_of_an_evaluation(evaluation: Evaluation) -> None:
+    text = evaluation_markdown(evaluation)
+    assert text.startswith("## Evaluation\n\n### Settings\n")
+    assert "| P(error ≤ 50 m) |" in text
+    assert text.endswith("|\n")
