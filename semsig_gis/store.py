@@ -207,7 +207,10 @@ def save_with_store(database: SignatureDatabase, store: ObjectStore, path: str |
     final = store_path(path)
     _settle(Path(path))  # what waits there may be needed until the new database is in place
     with whole_file(path) as partial:
-        save_database(database, partial)
+        try:
+            save_database(database, partial)
+        except InputError as error:  # which knows nothing of the place that was asked for
+            raise InputError(str(error).replace(str(partial), str(path))) from error
         _write(store, _waiting(final), fingerprint=_checksum(partial))
     _settle(Path(path))
 
@@ -270,20 +273,14 @@ def _manifest(folder: Path) -> dict[str, Any]:
         msg = f"{path} is missing or damaged; build the database again."
         raise DatabaseError(msg) from error
     if not known:
-        msg = (
-            f"{folder} was written by another version of semsig ({version}); build the database "
-            "again."
-        )
+        msg = f"{folder} is of another version of semsig ({version}); build the database again."
         raise DatabaseError(msg)
     return dict(manifest)
 
 
 def _read(folder: Path, database: Path) -> ObjectStore:
     if not os.path.isdir(folder):  # noqa: PTH112 - it answers where Path.is_dir raises
-        msg = (
-            f"{database} has no object store ({folder.name} is not beside it); "
-            "build the database again."
-        )
+        msg = f"{database} has no object store ({folder.name} beside it); build the database again."
         raise DatabaseError(msg)
     manifest = _manifest(folder)
     if manifest["database"] != _checksum(database):
@@ -353,7 +350,10 @@ def _box(target: Path) -> Iterator[Path]:
             shutil.rmtree(box, ignore_errors=True)
     except OSError as error:
         reason = os.strerror(error.errno) if error.errno else str(error)
-        msg = f"{target} could not be written ({reason}); make room or choose another place."
+        msg = (
+            f"{target} could not be written ({reason}); what was there before is unchanged, so "
+            "make room or choose another place."
+        )
         raise InputError(msg) from error
 
 

@@ -372,6 +372,22 @@ def test_a_full_disk_leaves_what_was_there(tmp_path: Path, monkeypatch: pytest.M
     assert len(list(tmp_path.iterdir())) == 2
 
 
+def test_a_full_disk_is_told_with_the_name_that_was_given(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = saved(tmp_path)
+
+    def full(_: object, partial: Path) -> None:
+        msg = f"{partial} could not be written (No space left on device); make room."
+        raise InputError(msg)
+
+    monkeypatch.setattr(store_module, "save_database", full)
+    with pytest.raises(InputError) as caught:
+        save_with_store(build_database(fewer(TOWN, 7)), ObjectStore.of(fewer(TOWN, 7)), path)
+    assert str(caught.value).startswith(f"{path} could not be written")
+    assert_fits(open_store(path), TOWN)
+
+
 def test_a_process_that_is_killed_leaves_a_pair_that_fits(tmp_path: Path) -> None:
     """Without any tidying up, between the rename of the database and that of the store."""
     path = saved(tmp_path)

@@ -160,6 +160,8 @@ def update(
 
     with progress("updating") as advance:
         report = update_file(database, open_objects(objects), out=out, progress=advance)
+    for note in report.notes:
+        remark(note)
     if as_json:
         print_json(report.to_dict())
         return
