@@ -12,7 +12,7 @@ DEV := $(VENV)/.dev
 
 .DEFAULT_GOAL := help
 .NOTPARALLEL:
-.PHONY: help demo test lint bench docs clean
+.PHONY: help demo test lint bench accuracy docs clean
 
 help: ## show this list
 	@sed -n 's/^\([a-z]*\):.*## \(.*\)/  make \1\t\2/p' $(MAKEFILE_LIST) | expand -t 14
@@ -32,6 +32,9 @@ lint: $(DEV) ## style, types, import layers, docstrings
 
 bench: $(DEV) ## the benchmarks
 	$(BIN)/python -m benchmarks
+
+accuracy: $(DEV) ## how well the methods localize: figures, half an hour
+	$(BIN)/python -m benchmarks.accuracy
 
 docs: $(DEV) ## the documentation, into docs/_build/html
 	$(BIN)/sphinx-build -W --keep-going -b html docs docs/_build/html

@@ -166,7 +166,7 @@ def comparisons(size: str) -> Iterator[Comparison]:
 
     for part in of_cells:
         yield compare(
-            f"the nearest 100 of {cells} to one edit query by {part}",
+            f"the nearest 100 of {cells} by edit distance of {part}",
             partial(hundred, part),
             partial(peer, 1, (part,)),
             peer_name="rapidfuzz.process.cdist([query], cells), edit distance",
@@ -198,7 +198,7 @@ def _one_of(cells: int, repeats: int) -> Comparison:
 
     ours(0)  # a large table is turned into bit planes when it is asked again
     return compare(
-        f"one edit query by types, {cells:,} cells",
+        f"growth: an edit query by types, {cells:,} cells",
         ours,
         peer,
         peer_name="rapidfuzz.process.cdist([query], cells), edit distance",

@@ -30,11 +30,16 @@ if TYPE_CHECKING:
     from semsig_gis.fetching import fetch_layers, find_area, open_cache
     from semsig_gis.grid import GridSpec
     from semsig_gis.layer_spec import LayerSpec
+    from semsig_gis.likelihood import LikelihoodIndex, build_index
+    from semsig_gis.likelihood_file import stored_index
     from semsig_gis.loading import Loaded, assemble, choose_layers, read_files
+    from semsig_gis.locating import Location, locate
     from semsig_gis.maps import evaluation_map, localization_map, save_map
     from semsig_gis.matching import Localization, Method, localize
+    from semsig_gis.noise import NoiseMixture, NoiseSpec, named_noise
     from semsig_gis.objects import StreetObjects, build_objects, open_objects, save_objects
     from semsig_gis.occlusion import Footprints
+    from semsig_gis.posterior import Posterior
     from semsig_gis.properties import database_summary
     from semsig_gis.quality import quality_report
     from semsig_gis.signatures import Signature, SignatureSpec
@@ -66,13 +71,18 @@ _HOMES = {
     "Footprints": "occlusion",
     "GridSpec": "grid",
     "LayerSpec": "layer_spec",
+    "LikelihoodIndex": "likelihood",
     "Loaded": "loading",
     "Localization": "matching",
+    "Location": "locating",
     "Method": "matching",
+    "NoiseMixture": "noise",
+    "NoiseSpec": "noise",
     "ObjectClass": "taxonomy",
     "ObjectStore": "store",
     "PARIS_LIKE": "sources.synthetic",
     "PartitionedDatabase": "dataset",
+    "Posterior": "posterior",
     "RawLayer": "sources",
     "SemsigError": "errors",
     "Signature": "signatures",
@@ -84,6 +94,7 @@ _HOMES = {
     "ViewpointSpec": "viewpoints",
     "assemble": "loading",
     "build_database": "building",
+    "build_index": "likelihood",
     "build_objects": "objects",
     "build_tiles": "distributed",
     "choose_layers": "loading",
@@ -99,6 +110,8 @@ _HOMES = {
     "load_catalog": "catalog",
     "localization_map": "maps",
     "localize": "matching",
+    "locate": "locating",
+    "named_noise": "noise",
     "open_cache": "fetching",
     "open_database": "database_file",
     "open_dataset": "dataset",
@@ -114,6 +127,7 @@ _HOMES = {
     "save_objects": "objects",
     "save_surroundings": "surroundings",
     "save_with_store": "store",
+    "stored_index": "likelihood_file",
     "suggest_catalog": "suggest",
     "synthetic_city": "sources.synthetic",
     "synthetic_surroundings": "sources.synthetic",
@@ -130,12 +144,17 @@ __all__ = [
     "Footprints",
     "GridSpec",
     "LayerSpec",
+    "LikelihoodIndex",
     "Loaded",
     "Localization",
+    "Location",
     "Method",
+    "NoiseMixture",
+    "NoiseSpec",
     "ObjectClass",
     "ObjectStore",
     "PartitionedDatabase",
+    "Posterior",
     "RawLayer",
     "SemsigError",
     "Signature",
@@ -148,6 +167,7 @@ __all__ = [
     "__version__",
     "assemble",
     "build_database",
+    "build_index",
     "build_objects",
     "build_tiles",
     "choose_layers",
@@ -163,6 +183,8 @@ __all__ = [
     "load_catalog",
     "localization_map",
     "localize",
+    "locate",
+    "named_noise",
     "open_cache",
     "open_database",
     "open_dataset",
@@ -178,6 +200,7 @@ __all__ = [
     "save_objects",
     "save_surroundings",
     "save_with_store",
+    "stored_index",
     "suggest_catalog",
     "synthetic_city",
     "synthetic_surroundings",

@@ -169,6 +169,6 @@ class BitPlanes:
 
 def _kernels() -> ModuleType:
     """Load the compiled loops, which takes about half a second, when they are first needed."""
-    from semsig_gis import bit_kernels  # noqa: PLC0415
+    from semsig_gis import _bit_kernels  # noqa: PLC0415
 
-    return bit_kernels
+    return _bit_kernels

@@ -31,13 +31,15 @@ def remark(text: str) -> None:
     typer.echo(f"semsig: {text}", err=True)
 
 
-def print_json(value: Any) -> None:  # noqa: ANN401 - whatever JSON can hold
+def print_json(value: Any, *, indent: int | None = 2) -> None:  # noqa: ANN401 - any JSON
     """Print a value as JSON on standard output.
 
     Parameters
     ----------
     value : object
         Plain values without NaN or infinity.
+    indent : int or None, default 2
+        Blanks to indent by; None for a single line.
 
     Examples
     --------
@@ -46,7 +48,7 @@ def print_json(value: Any) -> None:  # noqa: ANN401 - whatever JSON can hold
       "cells": 2
     }
     """
-    typer.echo(json.dumps(value, indent=2, ensure_ascii=False, allow_nan=False))
+    typer.echo(json.dumps(value, indent=indent, ensure_ascii=False, allow_nan=False))
 
 
 def print_rows(title: str, header: Iterable[str], rows: Iterable[Iterable[object]]) -> None:

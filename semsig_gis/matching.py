@@ -16,10 +16,12 @@ import numpy as np
 import pandas as pd
 
 from semsig_gis.dataset import PartitionedDatabase
-from semsig_gis.errors import InputError
+from semsig_gis.errors import EmptyResultError, InputError
 from semsig_gis.localization import Localization, Shortlist
 from semsig_gis.method import ANGLES, BOTH, DEFAULT_METHOD, TYPES, Method
-from semsig_gis.metrics import metric
+from semsig_gis.metrics import EditWeights, metric
+from semsig_gis.patterns import PatternIndex
+from semsig_gis.taxonomy import WILDCARD
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Iterator, Sequence
@@ -27,6 +29,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from semsig_gis.database import SignatureDatabase
+    from semsig_gis.patterns import Requirement
     from semsig_gis.sequences import SequenceTable
     from semsig_gis.signatures import Signature
     from semsig_gis.taxonomy import Taxonomy
@@ -39,10 +42,11 @@ __all__ = ["DEFAULT_METHOD", "Localization", "Method", "localize", "score_cells"
 # Real differences between scores are far larger than this step, and float32 holds its multiples
 # exactly up to 256.
 _SCORE_STEP = 2.0**-16
-_BATCH_BYTES = 128 << 20  # distances to distinct sequences held at once
+_BATCH_BYTES = 32 << 20  # distances to distinct sequences held at once
 # For fewer queries, measuring what the first stage kept beats measuring all sequences at once.
 _MANY_QUERIES = 8
 _BATCH_QUERIES = 128  # RapidFuzz compares queries of like length together, so it wants many
+_CELLS_AT_ONCE = 1 << 16  # scores of so many cells stay in a near cache
 
 
 def score_cells(
@@ -101,6 +105,7 @@ def localize(
     query: Signature,
     *,
     method: Method = DEFAULT_METHOD,
+    requirement: Requirement | None = None,
     top: int = 100,
 ) -> Localization:
     """Find the cells whose signature is most like a query.
@@ -114,6 +119,8 @@ def localize(
         What a person or a detector saw; types or bearings may be unknown.
     method : Method
         How the cells are ranked. A fusion uses the part that the query has.
+    requirement : Requirement, optional
+        What a cell must see to be a candidate; nothing by default.
     top : int
         How many cells to list, at least 1.
 
@@ -127,6 +134,8 @@ def localize(
     InputError
         If the query is empty, has no part that the method compares, or has a class that no cell
         of the database sees, or `top` is below 1.
+    EmptyResultError
+        If no cell meets the requirement.
 
     Examples
     --------
@@ -148,12 +157,22 @@ def localize(
         msg = "the query has no objects; give at least one type or bearing."
         raise InputError(msg)
     shortlist = Shortlist(top)
+    met = np.empty(0, np.bool_)
     for part, scores in _score_parts(database, query, method):
-        shortlist.add(part, scores)
+        shortlist.present.update(part.present_codes.tolist())
+        if requirement is None:
+            shortlist.add(part, scores)
+        elif (met := PatternIndex.build(part.type_sequences).meeting(requirement)).any():
+            shortlist.add(part.select(met), scores[met])
     _require_present(query, shortlist.present, part.taxonomy)
+    if shortlist.cells == 0:
+        msg = f"none of the {len(database):,} cells meets the requirement; ask for less."
+        raise EmptyResultError(msg)
     candidates, tied_beyond = shortlist.ranked()
     if isinstance(database, PartitionedDatabase):
         candidates["cell"] = database.row_numbers(candidates["cell_id"].to_numpy())
+    elif requirement is not None:
+        candidates["cell"] = np.flatnonzero(met)[candidates["cell"]]
     return Localization(
         query=query,
         method=method,
@@ -171,7 +190,7 @@ def _require_present(query: Signature, present: Collection[int], taxonomy: Taxon
     """Refuse a class that no cell sees: it could only make every score worse."""
     if query.codes is None:
         return
-    absent = sorted(set(query.codes.tolist()) - set(present))
+    absent = sorted(set(query.codes.tolist()) - {WILDCARD, *present})
     if absent:
         missing = taxonomy.by_code(absent[0])
         seen = [taxonomy.by_code(code) for code in sorted(present)]
@@ -197,7 +216,8 @@ def _score_parts(
             yield part, next(iter(score_cells(part, [query], method)))
         else:
             by_types, second_stage = _stages(part, query, method)
-            yield part, _two_stage(method, by_types, part.angle_sequences, second_stage, gate)
+            tables = part.type_sequences, part.angle_sequences
+            yield part, _two_stage(method, by_types, *tables, second_stage, gate=gate)
 
 
 def _score_run(
@@ -215,7 +235,7 @@ def _score_run(
         else:
             table = _table(database, used)
             for row in _distances(method, used, codes if used == TYPES else levels, table):
-                yield _on_steps(row)[table.inverse]
+                yield _spread(_on_steps(row), table)
 
 
 def _score_both(
@@ -227,17 +247,17 @@ def _score_both(
     """Score a batch of queries by types and angles, in one stage or two."""
     types, angles = database.type_sequences, database.angle_sequences
     by_types = _distances(method, TYPES, codes, types)
-    if method.keep is not None and len(codes) < _MANY_QUERIES:
+    # The kernel for weights of 1 measures all sequences sooner than others measure some.
+    slow = method.angles != "edit" or method.weights != EditWeights()
+    if method.keep is not None and slow and len(codes) < _MANY_QUERIES:
         for first, one in zip(by_types, levels, strict=True):
-            yield _two_stage(
-                method, first[types.inverse], angles, partial(_some, method, one, angles)
-            )
+            yield _two_stage(method, first, types, angles, partial(_some, method, one, angles))
         return
     for first, second in zip(by_types, _distances(method, ANGLES, levels, angles), strict=True):
         if method.keep is None:
-            yield _fused(method, first[types.inverse], second[angles.inverse])
+            yield _fused(method, first, types.inverse, second, angles.inverse)
         else:
-            yield _two_stage(method, first[types.inverse], angles, second.__getitem__)
+            yield _two_stage(method, first, types, angles, second.__getitem__)
 
 
 def _table(database: SignatureDatabase, part: str) -> SequenceTable:
@@ -248,8 +268,10 @@ def _table(database: SignatureDatabase, part: str) -> SequenceTable:
 def _two_stage(
     method: Method,
     by_types: NDArray[np.float32],
+    types: SequenceTable,
     angles: SequenceTable,
     second_stage: _SecondStage,
+    *,
     gate: _Gate | None = None,
 ) -> NDArray[np.float32]:
     """Re-rank the cells that are best by type; the others follow in their order.
@@ -257,10 +279,11 @@ def _two_stage(
     The second stage gives the distances to the distinct angle sequences that it is asked for. The
     gate is that of all cells, where these are a part of them.
     """
-    first = _on_steps(by_types)
+    first = _spread(_on_steps(by_types), types)
     cut = _cut(method, first) if gate is None else gate.cut
     kept = np.flatnonzero(first <= cut)
-    fused = _fused(method, by_types[kept], second_stage(angles.inverse[kept]))
+    second = second_stage(angles.inverse[kept])
+    fused = _fused(method, by_types, types.inverse[kept], second, np.arange(len(kept)))
     worst = fused.max() if gate is None else gate.worst
     # Behind every kept cell even where the gap is lost in rounding, as on a large raw scale.
     behind = np.nextafter(worst, np.float32(np.inf))
@@ -297,10 +320,12 @@ def _gate_of_parts(database: PartitionedDatabase, query: Signature, method: Meth
     cut = np.float32(np.inf)
     for part in database.parts():
         by_types, second_stage = _stages(part, query, method)
-        first = _on_steps(by_types)
+        types = part.type_sequences
+        first = _spread(_on_steps(by_types), types)
         # The cut only falls, so that no cell beyond it has to be measured by angles.
         near = np.flatnonzero(first <= cut)
-        fused = _fused(method, by_types[near], second_stage(part.angle_sequences.inverse[near]))
+        second = second_stage(part.angle_sequences.inverse[near])
+        fused = _fused(method, by_types, types.inverse[near], second, np.arange(len(near)))
         more = pd.DataFrame({"first": first[near], "size": 1, "worst": fused})
         groups = pd.concat([found, more]).groupby("first", as_index=False)
         found = groups.agg({"size": "sum", "worst": "max"})
@@ -317,7 +342,7 @@ def _stages(
     """Measure a query by types, and return how to measure it by angles."""
     types, angles = database.type_sequences, database.angle_sequences
     codes = [] if query.codes is None else [query.codes]
-    by_types = _distances(method, TYPES, codes, types)[0][types.inverse]
+    by_types = _distances(method, TYPES, codes, types)[0]
     levels = query.levels(database.spec.levels)
     return by_types, partial(_some, method, levels, angles)
 
@@ -343,15 +368,39 @@ def _distances(
     only: NDArray[np.int64] | None = None,
 ) -> NDArray[np.float32]:
     """Measure one part of some queries against distinct sequences, as the method says."""
-    measure = metric(method.measures[part], weights=method.weights)
+    name = method.measures[part]
+    wild = part == TYPES and any((sequence == WILDCARD).any() for sequence in sequences)
+    measure = metric(name, weights=method.weights, wildcard=WILDCARD if wild else None)
     return measure.distances(sequences, table, normalized=method.normalized, only=only)
 
 
 def _fused(
-    method: Method, by_types: NDArray[np.float32], by_angles: NDArray[np.float32]
+    method: Method,
+    by_types: NDArray[np.float32],
+    types: NDArray[np.int64],
+    by_angles: NDArray[np.float32],
+    angles: NDArray[np.int64],
 ) -> NDArray[np.float32]:
-    """Return the weighted sum of two distances."""
-    return _on_steps(method.alpha * by_types.astype(np.float64) + (1 - method.alpha) * by_angles)
+    """Return the weighted sums of two distances of cells, given which distances each cell has."""
+    # In steps from the start: a factor that is a power of two changes no digit.
+    left = method.alpha / _SCORE_STEP * by_types.astype(np.float64)
+    right = (1 - method.alpha) / _SCORE_STEP * by_angles
+    scores = np.empty(len(types), np.float32)
+    total, other = np.empty(_CELLS_AT_ONCE), np.empty(_CELLS_AT_ONCE, right.dtype)
+    for low in range(0, len(types), _CELLS_AT_ONCE):
+        high = min(low + _CELLS_AT_ONCE, len(types))
+        some, more = total[: high - low], other[: high - low]
+        left.take(types[low:high], out=some, mode="wrap")
+        some += right.take(angles[low:high], out=more, mode="wrap")
+        np.rint(some, out=some)
+        np.multiply(some, _SCORE_STEP, out=scores[low:high], casting="same_kind")
+    return scores
+
+
+def _spread(distances: NDArray[np.float32], table: SequenceTable) -> NDArray[np.float32]:
+    """Give every cell the distance of its sequence."""
+    # The indices are in range, and "wrap" is the quickest mode.
+    return distances.take(table.inverse, mode="wrap")
 
 
 def _on_steps(scores: NDArray[np.floating]) -> NDArray[np.float32]:

@@ -15,51 +15,18 @@ import numpy as np
 
 from semsig_gis.errors import InputError
 from semsig_gis.sequences import SequenceTable
+from semsig_gis.taxonomy import WILDCARD
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from semsig_gis.taxonomy import Taxonomy
 
-__all__ = ["WILDCARD", "PatternIndex", "Requirement", "encode_pattern"]
+__all__ = ["PatternIndex", "Requirement"]
 
-WILDCARD = 0
-"""The code of an object whose class is not known; no class has it."""
 _ANY = "?"
 _COMPARISON = re.compile(r"(\S)\s*(>=|<=|=)\s*(\d+)")
 _AMOUNT = re.compile(r"(\d*)\s*(\S)")
-
-
-def encode_pattern(symbols: str, taxonomy: Taxonomy) -> NDArray[np.uint8]:
-    """Return the class codes of a type sequence in which ``?`` is an object of unknown class.
-
-    Parameters
-    ----------
-    symbols : str
-        One symbol an object.
-    taxonomy : Taxonomy
-        The classes.
-
-    Returns
-    -------
-    ndarray of uint8
-        Class codes; `WILDCARD` for ``?``.
-
-    Raises
-    ------
-    UnknownNameError
-        If a symbol is not in the taxonomy.
-
-    Examples
-    --------
-    >>> from semsig_gis.catalog import paper_taxonomy
-    >>> encode_pattern("M?B", paper_taxonomy()).tolist()
-    [11, 0, 1]
-    """
-    codes = np.full(len(symbols), WILDCARD, np.uint8)
-    known = [place for place, symbol in enumerate(symbols) if symbol != _ANY]
-    codes[known] = taxonomy.encode(symbols.replace(_ANY, ""))
-    return codes
 
 
 @dataclass(frozen=True, slots=True)

@@ -16,9 +16,11 @@ if TYPE_CHECKING:
 
     from numpy.typing import ArrayLike, NDArray
 
-__all__ = ["ObjectClass", "Taxonomy"]
+__all__ = ["WILDCARD", "ObjectClass", "Taxonomy"]
 
 MAX_CODE = 255
+WILDCARD = 0
+"""The code of an object whose class is not known; no class has it."""
 MAX_RANGE_M = 6000.0
 
 
@@ -286,12 +288,13 @@ class Taxonomy:
         Parameters
         ----------
         symbols : str
-            A type sequence such as ``"DDBL"``, of n characters.
+            A type sequence such as ``"DDBL"``, of n characters; ``?`` is an object of unknown
+            class.
 
         Returns
         -------
         ndarray of uint8, shape (n,)
-            One code a symbol.
+            One code a symbol; `WILDCARD` for ``?``.
 
         Raises
         ------
@@ -299,6 +302,7 @@ class Taxonomy:
             If a symbol belongs to no class.
         """
         codes = {item.symbol: item.code for item in self.classes}
+        codes["?"] = WILDCARD
         unknown = next((symbol for symbol in symbols if symbol not in codes), None)
         if unknown is not None:
             raise self._unknown_symbol(unknown)

@@ -16,9 +16,10 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from semsig_gis.grid import GridSpec
-    from semsig_gis.spatial_index import PackedIndex
+    from semsig_gis.spatial_index import ObjectIndex, PackedIndex
+    from semsig_gis.stored_index import StoredIndex
 
-__all__ = ["Sightings", "visible_objects"]
+__all__ = ["Sightings", "seen_from", "visible_objects"]
 
 BEARING_DECIMALS = 9
 # So many that the arrays of a block stay in the cache of a processor.
@@ -194,7 +195,56 @@ def _sightings(
 ) -> Sightings:
     """Return the pairs of some runs that are within range."""
     run, viewpoint = _ranges(runs.first, runs.size)
-    item = runs.object[run]
+    return _within(viewpoint, runs.object[run], viewpoints, objects, ranges=ranges)
+
+
+def seen_from(
+    places: NDArray[np.float64],
+    objects: NDArray[np.float64],
+    *,
+    index: ObjectIndex | StoredIndex,
+    ranges: NDArray[np.float64],
+) -> Sightings:
+    """Return what is seen from places anywhere.
+
+    Parameters
+    ----------
+    places : ndarray of float64, shape (v, 2)
+        Where to look from, in metres.
+    objects : ndarray of float64, shape (m, 2)
+        Positions of the objects, in metres.
+    index : ObjectIndex or StoredIndex
+        R-tree over `objects`.
+    ranges : ndarray of float64, shape (m,)
+        From how far each object is seen, in metres.
+
+    Returns
+    -------
+    Sightings
+        The pairs within range of a place and an object.
+
+    Examples
+    --------
+    >>> from semsig_gis.spatial_index import ObjectIndex
+    >>> lamps = np.array([[0.0, 10.0], [0.0, 99.0]])
+    >>> reach = np.array([30.0, 30.0])
+    >>> here = np.array([[0.0, 0.0]])
+    >>> seen_from(here, lamps, index=ObjectIndex(lamps), ranges=reach).distance.tolist()
+    [10.0]
+    """
+    pairs = index.pairs_within(places, radius=float(ranges.max()))
+    return _within(*pairs, places, objects, ranges=ranges)
+
+
+def _within(
+    viewpoint: NDArray[np.int64],
+    item: NDArray[np.int64],
+    viewpoints: NDArray[np.float64],
+    objects: NDArray[np.float64],
+    *,
+    ranges: NDArray[np.float64],
+) -> Sightings:
+    """Measure pairs and keep those within range."""
     dx = objects[:, 0][item] - viewpoints[:, 0][viewpoint]
     dy = objects[:, 1][item] - viewpoints[:, 1][viewpoint]
     distance = np.hypot(dx, dy)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import json
 import shutil
 import subprocess
@@ -495,6 +496,65 @@ def test_the_console_script_is_installed() -> None:
         pytest.skip("the package is not installed in this environment")
     done = subprocess.run([script, "--version"], capture_output=True, text=True, check=True)
     assert done.stdout.strip() == f"semsig {__version__}"
+
+
+def test_the_likelihood_answers_or_cannot_tell(city: Path, database: Path, run: Run) -> None:
+    query = "localize", database, "--types", "DDD", "--bearings", "10,80,200"
+    by = "--method", "likelihood"
+    code, out, told = run(*query, *by, "--json", "--top", 3)
+    assert code == 0
+    assert "is built" in told
+    answer = json.loads(out)
+    assert answer["noise"] == "generic"
+    assert len(answer["candidates"]) == 3
+    assert 0 < answer["place"]["chance"] <= 1
+    code, out, told = run(*query, *by, "--noise", "medium", "--heading", "unknown", "--top", 2)
+    assert code == 0
+    assert "best of" in out
+    assert "of the chance is in" in out
+    place = answer["candidates"][0]
+    near = f"{place['x']},{place['y']},15"
+    code, out, told = run(*query, *by, "--near", near, "--require", "D", "--heading", 10)
+    assert (code, "is built" in told) == (0, False)
+    square = shapely.box(place["x"] - 6, place["y"] - 6, place["x"] + 6, place["y"] + 6)
+    gpd.GeoDataFrame(geometry=[square], crs=2154).to_file(city / "square.gpkg")
+    code, out, _ = run(*query, *by, "--area", city / "square.gpkg", "--json")
+    inside = json.loads(out)
+    assert code == 0
+    assert inside["answered"]
+    assert inside["candidates"][0]["cell_id"] == place["cell_id"]
+    for options, words in (
+        (("--heading", "north"), ("'north'", "unknown")),
+        (("--heading", -3), ("-3", "from 0 up")),
+        (("--near", "1,2"), ("X,Y,SIGMA",)),
+        (("--noise", "lihgt"), ("'lihgt'", "light")),
+        (("--noise", city / "noise.toml"), ("noise.toml", "cannot be read")),
+        (("--require", "Q"), ("'Q'",)),
+        (("--map", city / "map.html"), ("--map",)),
+    ):
+        sentence(run(*query, *by, *options), *words)
+    sentence(run(*query, "--heading", "unknown"), "--method likelihood")
+
+
+def test_many_queries_are_answered_line_by_line(
+    city: Path, database: Path, run: Run, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    lines = '{"id": "a", "types": "DD"}\n{"types": "?D", "bearings": [10, 200]}\n'
+    (city / "queries.jsonl").write_text(lines)
+    for method in ("edit+edit", "likelihood"):
+        code, out, _ = run(
+            "localize", database, "--queries", city / "queries.jsonl", "--method", method
+        )
+        assert code == 0
+        answers = [json.loads(line) for line in out.splitlines()]
+        assert [answer["id"] for answer in answers] == ["a", 2]
+        assert all(answer["candidates"] for answer in answers)
+    monkeypatch.setattr("sys.stdin", io.StringIO(lines))
+    code, out, _ = run("localize", database, "--queries", "-", "--require", "2D")
+    assert code == 0
+    assert len(out.splitlines()) == 2
+    sentence(run("localize", database, "--queries", "x.csv", "--types", "D"), "--queries")
+    sentence(run("localize", database, "--queries", city / "x.csv"), "x.csv", "cannot be read")
 
 
 def test_buildings_streets_and_an_area_narrow_what_is_built(

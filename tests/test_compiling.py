@@ -37,7 +37,7 @@ def test_code_is_kept_for_later_processes(tmp_path: Path) -> None:
         "from semsig_gis.bit_planes import BitPlanes\n"
         "values = np.array([1, 2], np.uint8)\n"
         "print(BitPlanes.build(values, np.array([0, 2])).edit_distances([values]))\n"
-        "from semsig_gis.bit_kernels import scan\n"
+        "from semsig_gis._bit_kernels import scan\n"
         "print(sum(scan.stats.cache_hits.values()), sum(scan.stats.cache_misses.values()))\n"
     )
     seen = [
@@ -56,7 +56,7 @@ def test_code_is_kept_for_later_processes(tmp_path: Path) -> None:
 
 
 def test_what_is_compiled_equals_the_loops_themselves() -> None:
-    from semsig_gis import bit_kernels
+    from semsig_gis import _bit_kernels
 
     rng = np.random.default_rng(1)
     values = rng.integers(0, 5, 60).astype(np.uint8)
@@ -64,7 +64,7 @@ def test_what_is_compiled_equals_the_loops_themselves() -> None:
     planes = BitPlanes.build(values, offsets)
     slow = np.zeros_like(planes.planes)
     per_position = int(planes.digits.max()) + 1
-    bit_kernels.pack.py_func(  # type: ignore[attr-defined]
+    _bit_kernels.pack.py_func(  # type: ignore[attr-defined]
         values, offsets, planes.digits, planes.bounds, per_position, slow
     )
     np.testing.assert_array_equal(slow, planes.planes)

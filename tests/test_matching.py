@@ -14,15 +14,18 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from pyproj import CRS, Transformer
+from sentences import assert_sentence
+from worlds import random_town
 
 from semsig_gis.catalog import paper_taxonomy
 from semsig_gis.database import BEARING_UNITS, SignatureDatabase
 from semsig_gis.database_file import open_database, save_database
 from semsig_gis.dataset import PartitionedDatabase
-from semsig_gis.errors import InputError
+from semsig_gis.errors import EmptyResultError, InputError
 from semsig_gis.grid import GridSpec
 from semsig_gis.matching import Method, localize, score_cells
 from semsig_gis.metrics import METRICS
+from semsig_gis.patterns import PatternIndex, Requirement
 from semsig_gis.signatures import Signature, SignatureSpec
 
 if TYPE_CHECKING:
@@ -480,3 +483,37 @@ def test_a_class_that_no_part_sees_is_refused(tmp_path: Path) -> None:
         with pytest.raises(InputError) as whole:
             localize(CITY, asked("DM", [1.0, 2.0]), method=method)
         assert str(caught.value) == str(whole.value)
+
+
+# --- Requirements and unknown classes ---------------------------------------------------------
+
+
+@given(st.integers(0, 2**32 - 1), st.sampled_from(["D", "2B", "D>=1,?<=6", "B=0", "?>=3"]))
+@settings(max_examples=25)
+def test_a_requirement_leaves_cells_out_and_changes_nothing_else(seed: int, text: str) -> None:
+    town = random_town().database
+    cell = int(np.random.default_rng(seed).integers(len(town)))
+    requirement = Requirement.parse(text, town.taxonomy)
+    everything = localize(town, town.signature(cell), top=len(town)).candidates
+    met = PatternIndex.build(town.type_sequences).meeting(requirement)
+    wanted = everything[met[everything["cell"].to_numpy()]]
+    if wanted.empty:
+        with pytest.raises(EmptyResultError):
+            localize(town, town.signature(cell), requirement=requirement)
+        return
+    found = localize(town, town.signature(cell), requirement=requirement, top=len(town))
+    assert found.candidates["cell"].tolist() == wanted["cell"].tolist()
+    assert found.candidates["distance"].tolist() == wanted["distance"].tolist()
+    assert found.cells == int(met.sum())
+
+
+def test_an_object_of_unknown_class_may_be_any() -> None:
+    town = random_town().database
+    cell = int(town.lengths.argmax())
+    types = town.types(cell)
+    query = Signature.parse("?" + types[1:], None, taxonomy=town.taxonomy)
+    best = localize(town, query, method=Method.parse("types:edit"), top=1).candidates
+    assert best["distance"].tolist() == [0.0]
+    with pytest.raises(InputError) as caught:
+        localize(town, query, method=Method.parse("types:jaccard"))
+    assert_sentence(caught.value, "unknown class", "jaccard")

@@ -11,8 +11,9 @@ from hypothesis import strategies as st
 from semsig_gis.catalog import paper_taxonomy
 from semsig_gis.errors import InputError, UnknownNameError
 from semsig_gis.nearest import nearest
-from semsig_gis.patterns import WILDCARD, PatternIndex, Requirement, encode_pattern
+from semsig_gis.patterns import PatternIndex, Requirement
 from semsig_gis.sequences import SequenceTable
+from semsig_gis.taxonomy import WILDCARD
 
 PAPER = paper_taxonomy()
 ROWS = st.lists(st.lists(st.integers(1, 4), max_size=6), max_size=20)
@@ -76,12 +77,12 @@ def test_parts_that_exclude_each_other_and_unknown_symbols() -> None:
     with pytest.raises(UnknownNameError, match="'Z'"):
         Requirement.parse("Z", PAPER)
     with pytest.raises(UnknownNameError, match="'Z'"):
-        encode_pattern("M?Z", PAPER)
+        PAPER.encode("M?Z")
 
 
 def test_a_pattern_finds_the_cells_that_it_may_mean() -> None:
     index = index_of([[11, 1, 1], [11, 3, 1], [11, 1], [3, 3, 3]])
-    pattern = encode_pattern("M?B", PAPER)
+    pattern = PAPER.encode("M?B")
     found = nearest(pattern, index.sequences, 1, wildcard=WILDCARD)
     assert found.rows.tolist() == [0, 1]
     among = index.sequences_meeting(Requirement.parse("2B", PAPER))

@@ -11,7 +11,7 @@ from functools import partial
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Protocol
 
-from semsig_gis.errors import UnknownNameError, nearest_name
+from semsig_gis.errors import InputError, UnknownNameError, nearest_name
 from semsig_gis.metrics import edit, histogram, jaccard
 from semsig_gis.metrics.edit import EditWeights
 
@@ -73,7 +73,7 @@ METRICS: Mapping[str, Metric] = MappingProxyType(
 """Every measure, by name."""
 
 
-def metric(name: str, *, weights: EditWeights | None = None) -> Metric:
+def metric(name: str, *, weights: EditWeights | None = None, wildcard: int | None = None) -> Metric:
     """Return a measure by its name.
 
     Parameters
@@ -82,6 +82,8 @@ def metric(name: str, *, weights: EditWeights | None = None) -> Metric:
         One of the keys of `METRICS`.
     weights : EditWeights, optional
         Costs for the edit distance; the other measures have none and ignore them.
+    wildcard : int, optional
+        A value of the query that stands for any other, which the edit distance alone knows.
 
     Returns
     -------
@@ -92,6 +94,8 @@ def metric(name: str, *, weights: EditWeights | None = None) -> Metric:
     ------
     UnknownNameError
         If there is no measure of that name.
+    InputError
+        If a wildcard is given to a measure that knows none.
 
     Examples
     --------
@@ -104,6 +108,13 @@ def metric(name: str, *, weights: EditWeights | None = None) -> Metric:
             f"the measures are {', '.join(METRICS)}."
         )
         raise UnknownNameError(msg)
-    if name == "edit" and weights is not None:
-        return Metric(name, METRICS[name].title, partial(edit.distances, weights=weights))
+    if name == "edit" and (weights is not None or wildcard is not None):
+        bound = partial(edit.distances, weights=weights, wildcard=wildcard)
+        return Metric(name, METRICS[name].title, bound)
+    if wildcard is not None:
+        msg = (
+            f"the query has objects of unknown class (?), which measure {name!r} cannot compare; "
+            "use 'edit', or leave them out."
+        )
+        raise InputError(msg)
     return METRICS[name]

@@ -1,0 +1,223 @@
+"""Queries of known places: spoiled signatures on and off the grid, turned ones, and routes."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from semsig_gis.distortion import distort, named_distortion
+from semsig_gis.geometry import angular_distance, bearings, wrap_degrees
+from semsig_gis.grid import cell_ids
+from semsig_gis.route import Leg
+from semsig_gis.signatures import Signature
+from semsig_gis.views import views_at
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+    from numpy.typing import NDArray
+
+    from semsig_gis.database import SignatureDatabase
+    from semsig_gis.objects import StreetObjects
+    from semsig_gis.spatial_index import ObjectIndex
+
+__all__ = ["City", "Query", "Walk", "off_grid", "on_grid", "turned", "walks"]
+
+_SEED = 0
+# Streams of random numbers: a kind of query changes none of the others.
+_PLACES, _SPOILED, _ANYWHERE, _WALKS, _LEGS = range(5)
+_APART = (20.0, 22.5)  # metres between the panoramas of a route, as near as cells allow
+_SHARPEST = 90.0  # degrees by which a route turns at most
+
+
+@dataclass(frozen=True, eq=False, slots=True, kw_only=True)
+class City:
+    """A city to be lost in.
+
+    Parameters
+    ----------
+    name : str
+        Its name.
+    database : SignatureDatabase
+        The cells.
+    objects : StreetObjects
+        The street objects that they see.
+    tree : ObjectIndex
+        R-tree of these objects.
+    """
+
+    name: str
+    database: SignatureDatabase
+    objects: StreetObjects
+    tree: ObjectIndex
+
+
+@dataclass(frozen=True, eq=False, slots=True, kw_only=True)
+class Query:
+    """What a detector gave, and where it stood.
+
+    Parameters
+    ----------
+    kept : Signature
+        The spoiled signature in the order that its objects have on the map.
+    seen : Signature
+        The same in the order of its bearings.
+    cell : int
+        Row number of the cell that the detector stood in.
+    xy : tuple of float
+        Where it stood, in metres.
+    length : int
+        How many objects are seen from there.
+    """
+
+    kept: Signature
+    seen: Signature
+    cell: int
+    xy: tuple[float, float]
+    length: int
+
+
+@dataclass(frozen=True, eq=False, slots=True, kw_only=True)
+class Walk:
+    """Queries along a way, and the legs between them by how well they are known, in metres."""
+
+    queries: tuple[Query, ...]
+    legs: Mapping[float, tuple[Leg, ...]]
+
+
+def on_grid(city: City, level: str, count: int) -> list[Query]:
+    """Return queries from the viewpoints of random cells; more of them keep the first ones."""
+    cells = _cells(city.database)[:count]
+    return [
+        _query(city, level, city.database.signature(cell), cell, xy, _random(_SPOILED, number))
+        for number, (cell, xy) in enumerate(zip(cells, _centres(city, cells), strict=True))
+    ]
+
+
+def off_grid(city: City, level: str, count: int) -> list[Query]:
+    """Return queries from anywhere in the same cells, of the objects seen from just there."""
+    database = city.database
+    cells = _cells(database)[:count]
+    aside = _random(_ANYWHERE).uniform(-0.5, 0.5, (len(cells), 2)) * database.grid.step
+    places = database.xy[cells] + aside
+    views = views_at(city.objects, places, index=city.tree, radius=database.spec.radius)
+    queries = []
+    for number, (low, high) in enumerate(pairwise(views.offsets.tolist())):
+        signature = Signature(views.codes[low:high], views.bearings[low:high])
+        rng = _random(_SPOILED, number)
+        x, y = places[number].tolist()
+        queries.append(_query(city, level, signature, cells[number], (x, y), rng))
+    return queries
+
+
+def turned(queries: Sequence[Query], turns: Sequence[float]) -> list[Query]:
+    """Return queries whose north is so many degrees clockwise of the true one."""
+    return [
+        dataclasses.replace(query, kept=_turned(query.seen, turn), seen=_turned(query.seen, turn))
+        for query, turn in zip(queries, turns, strict=True)
+    ]
+
+
+def walks(
+    city: City, level: str, count: int, panoramas: int, *, leg_sigmas: Sequence[float]
+) -> list[Walk]:
+    """Return ways that keep their direction as far as there are cells."""
+    found: list[Walk] = []
+    for start in _random(_WALKS).permutation(len(city.database)).tolist():
+        if len(found) == count:
+            break
+        rng = _random(_WALKS, start)
+        cells = _walk(city.database, start, panoramas, float(rng.uniform(0.0, 360.0)))
+        if len(cells) < panoramas:
+            continue
+        places = _centres(city, cells)
+        queries = tuple(
+            _query(city, level, city.database.signature(cell), cell, xy, rng)
+            for cell, xy in zip(cells, places, strict=True)
+        )
+        slips = _random(_LEGS, start).normal(0.0, 1.0, (panoramas - 1, 2))
+        found.append(
+            Walk(queries=queries, legs={one: _legs(places, slips * one, one) for one in leg_sigmas})
+        )
+    return found
+
+
+def _legs(
+    places: Sequence[tuple[float, float]], slips: NDArray[np.float64], sigma: float
+) -> tuple[Leg, ...]:
+    """Return the legs between places, a little wrong."""
+    ways = np.diff(np.asarray(places), axis=0) + slips
+    return tuple(Leg(dx=dx, dy=dy, sigma=sigma) for dx, dy in ways.tolist())
+
+
+def _walk(database: SignatureDatabase, start: int, panoramas: int, direction: float) -> list[int]:
+    """Return the cells of a way; fewer than wanted where it ends before."""
+    step, ids = database.grid.step, database.cell_ids
+    reach = math.ceil(_APART[1] / step)
+    aside, up = np.mgrid[-reach : reach + 1, -reach : reach + 1].reshape(2, -1)
+    far = np.hypot(aside, up) * step
+    fits = (far >= _APART[0]) & (far <= _APART[1])
+    aside, up = aside[fits], up[fits]
+    ways = bearings(aside, up)
+    cells = [start]
+    while len(cells) < panoramas:
+        here = cells[-1]
+        targets = cell_ids(
+            database.columns[here].astype(np.int64) + aside,
+            database.rows[here].astype(np.int64) + up,
+        )
+        rows = np.minimum(np.searchsorted(ids, targets), len(ids) - 1)
+        turn = np.where(ids[rows] == targets, angular_distance(ways, direction), np.inf)
+        best = int(turn.argmin())
+        if turn[best] > _SHARPEST:
+            break
+        direction = float(ways[best])
+        cells.append(int(rows[best]))
+    return cells
+
+
+def _query(  # noqa: PLR0917 - a private helper of three callers
+    city: City,
+    level: str,
+    signature: Signature,
+    cell: int,
+    xy: tuple[float, float],
+    rng: np.random.Generator,
+) -> Query:
+    """Spoil a signature, the same way for every method."""
+    kept = distort(
+        signature,
+        dataclasses.replace(named_distortion(level), resort=False),
+        classes=city.database.present_codes,
+        rng=rng,
+    )
+    seen = _turned(kept, 0.0)
+    return Query(kept=kept, seen=seen, cell=cell, xy=xy, length=len(signature))
+
+
+def _turned(signature: Signature, turn: float) -> Signature:
+    """Return a signature by another north, in the order of its bearings."""
+    if signature.codes is None or signature.bearings is None:
+        msg = "a query without types or bearings cannot be turned."
+        raise ValueError(msg)
+    seen = wrap_degrees(signature.bearings - turn)
+    order = np.argsort(seen, kind="stable")
+    return Signature(signature.codes[order], seen[order])
+
+
+def _cells(database: SignatureDatabase) -> list[int]:
+    cells: list[int] = _random(_PLACES).permutation(len(database)).tolist()
+    return cells
+
+
+def _centres(city: City, cells: list[int]) -> list[tuple[float, float]]:
+    return [(x, y) for x, y in city.database.xy[cells].tolist()]
+
+
+def _random(*stream: int) -> np.random.Generator:
+    return np.random.default_rng(np.random.SeedSequence(_SEED, spawn_key=stream))

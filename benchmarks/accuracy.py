@@ -1,0 +1,312 @@
+"""Measure how well the methods localize: ``python -m benchmarks.accuracy``.
+
+Cities: one made up as large and as furnished as the paper's Paris, and Montpellier from its open
+data. All methods answer the same spoiled queries. Results go to ``benchmarks/accuracy.json``.
+Times are those of the processor, so that other programs do not count.
+"""
+
+from __future__ import annotations
+
+import argparse
+import dataclasses
+import json
+import math
+import os
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from benchmarks._accuracy_methods import (
+    Way,
+    ask_likelihood,
+    ask_paper,
+    ask_refined,
+    ask_routes,
+)
+from benchmarks._accuracy_queries import City, off_grid, on_grid, turned, walks
+from benchmarks._accuracy_rows import Bar, Row
+from semsig_gis.abstention import calibrate
+from semsig_gis.building import build_database
+from semsig_gis.catalog import load_catalog, paper_taxonomy
+from semsig_gis.likelihood import build_index
+from semsig_gis.loading import choose_layers, read_files
+from semsig_gis.matching import Method
+from semsig_gis.noise import named_noise
+from semsig_gis.objects import build_objects
+from semsig_gis.refinement import cell_noise
+from semsig_gis.sources.synthetic import (
+    PARIS_LIKE,
+    CitySpec,
+    synthetic_city,
+    synthetic_surroundings,
+)
+from semsig_gis.spatial_index import ObjectIndex
+from semsig_gis.viewpoints import ViewpointSpec
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Sequence
+
+    from benchmarks._accuracy_methods import Outcome
+    from benchmarks._accuracy_queries import Query
+    from semsig_gis.likelihood import LikelihoodIndex
+
+__all__ = ["main"]
+
+LEVELS = ("light", "medium", "strong")
+BARS = {"light": (0.66, 0.95), "medium": (0.50, 0.82), "strong": (0.43, 0.70)}
+PANORAMAS = (1, 2, 3, 5)
+ROUTE_BARS = {3: 0.87, 5: 0.97}
+LEG_SIGMA = 2.0
+NORTH_SIGMA = 10.0
+PAPER = Method.parse("edit+edit:5%")  # the best that the paper reports
+REGION_BAR = (0.85, 0.95)
+
+PARIS, MONTPELLIER = "Paris-like", "Montpellier"
+INDEX = "likelihood, noise generic"
+RERANKED = "likelihood, noise generic, re-ranked"
+ON_GRID = "north known; on the grid"
+OFF_GRID = "north known; off the grid"
+
+
+@dataclass(frozen=True, slots=True)
+class _Size:
+    """How much is measured: the main rows, and those that are slow or for the side."""
+
+    city: CitySpec
+    main: int
+    side: int
+
+
+_SIZES = {
+    "full": _Size(PARIS_LIKE, 2000, 400),
+    "small": _Size(CitySpec(size=600.0), 24, 8),
+}
+
+
+def main() -> None:
+    """Read the options, measure, print and write; row by row, so that a part is there early."""
+    parser = argparse.ArgumentParser(prog="python -m benchmarks.accuracy", description=__doc__)
+    parser.add_argument("--size", choices=list(_SIZES), default="full")
+    parser.add_argument("--out", type=Path, default=Path(__file__).with_name("accuracy.json"))
+    parser.add_argument(
+        "--geodata",
+        type=Path,
+        default=os.environ.get("SEMSIG_GEODATA"),
+        metavar="FOLDER",
+        help="folder of open data with montpellier in it (default: what SEMSIG_GEODATA names)",
+    )
+    parser.add_argument("--threads", type=int, default=2)
+    options = parser.parse_args()
+    size = _SIZES[options.size]
+    rows: list[Row] = []
+    for city in _cities(size, options.geodata):
+        print(f"{city.name}: {len(city.database):,} cells", flush=True)
+        for row in _rows(city, size, options.threads):
+            print(row, flush=True)
+            rows.append(row)
+            values = [one.to_dict() for one in rows]
+            options.out.write_text(json.dumps(values, indent=2) + "\n", encoding="utf-8")
+    bars = [bar for row in rows for bar in row.bars]
+    print(f"{sum(bar.met for bar in bars)} of {len(bars)} bars met")
+    for row in rows:
+        for bar in row.bars:
+            if not bar.met:
+                print(f"  {row.city.name}: {bar}")
+
+
+def _cities(size: _Size, geodata: Path | None) -> Iterator[City]:
+    layers = synthetic_city(size.city)
+    objects, _ = build_objects(layers, taxonomy=paper_taxonomy(), crs=layers[0].table.crs)
+    _, streets = synthetic_surroundings(size.city)
+    database = build_database(
+        objects, viewpoints=ViewpointSpec(mode="streets"), streets=streets.table
+    )
+    yield City(name=PARIS, database=database, objects=objects, tree=ObjectIndex(objects.xy))
+    if geodata is None:
+        print("Montpellier is left out: SEMSIG_GEODATA does not name the folder of open data.")
+        return
+    catalog = load_catalog("montpellier")
+    layers, _ = read_files(choose_layers(catalog), [geodata / "montpellier"])
+    crs = catalog.metric_crs or layers[0].table.crs
+    objects, _ = build_objects(layers, taxonomy=catalog.taxonomy, crs=crs)
+    yield City(
+        name=MONTPELLIER,
+        database=build_database(objects),
+        objects=objects,
+        tree=ObjectIndex(objects.xy),
+    )
+
+
+def _rows(city: City, size: _Size, threads: int) -> Iterator[Row]:
+    queries = {level: on_grid(city, level, size.main) for level in LEVELS}
+    generic = build_index(city.database, named_noise("generic"), threads=threads)
+    reranked: dict[str, Row] = {}
+    for level in LEVELS:
+        best = 0.0
+        for row in _paper_rows(city, level, queries[level]):
+            best = max(best, row.share())
+            yield row
+        for method, way in ((INDEX, Way(reranked=False)), (RERANKED, Way())):
+            outcomes = ask_likelihood(city, queries[level], generic, way, threads=threads)
+            row = Row(
+                city=city, distortion=level, method=method, setting=ON_GRID, outcomes=outcomes
+            )
+            if way.reranked:
+                reranked[level] = row
+                row.bars.extend(_main_bars(row, best))
+            yield row
+    yield from _abstention_rows(reranked)
+    side = queries["medium"][: size.side]
+    yield from _north_rows(side, reranked["medium"], generic, threads)
+    yield from _route_rows(city, generic, size.side, threads)
+    yield from _off_grid_rows(city, generic, size.side, threads)
+    del generic  # an index takes a quarter of a gigabyte
+    yield from _told_rows(city, queries["medium"][: size.main // 2], size.side, threads)
+
+
+def _paper_rows(city: City, level: str, queries: Sequence[Query]) -> Iterator[Row]:
+    for kept, order in ((True, "order kept"), (False, "sorted after the noise")):
+        yield Row(
+            city=city,
+            distortion=level,
+            method=f"{PAPER}, {order}",
+            setting=ON_GRID,
+            outcomes=ask_paper(city, queries, PAPER, kept=kept),
+        )
+
+
+def _main_bars(row: Row, best: float) -> Iterator[Bar]:
+    if row.city.name == PARIS:
+        everywhere, many = BARS[row.distortion]
+        yield Bar(what=f"P50 at {row.distortion}", value=row.share(), low=everywhere)
+        yield Bar(
+            what=f"P50 at {row.distortion}, ten objects or more", value=row.share_of_many, low=many
+        )
+    if row.distortion == "medium":
+        ratio = row.share() / best if best else math.inf
+        yield Bar(what="P50 at medium, to the paper's method", value=ratio, low=1.3)
+
+
+def _abstention_rows(reranked: dict[str, Row]) -> Iterator[Row]:
+    """Calibrate when to answer on half of the medium queries, and try it on the other halves."""
+    half = len(reranked["medium"].outcomes) // 2
+    first = reranked["medium"].outcomes[:half]
+    rule = calibrate([one.mass or 0.0 for one in first], [_right(one) for one in first])
+    for level, row in reranked.items():
+        rest = row.outcomes[half:]
+        given = [_right(one) for one in rest if rule.answers(one.mass or 0.0)]
+        coverage = len(given) / len(rest)
+        precision = sum(given) / len(given) if given else None
+        found = dataclasses.replace(
+            row,
+            setting=f"{ON_GRID}; answers only where sure, by other queries at medium",
+            outcomes=rest,
+            coverage=coverage,
+            precision=precision,
+            bars=[],
+        )
+        if level == "medium" and row.city.name == PARIS:
+            found.bars.append(Bar(what="answers that are right", value=precision or 0.0, low=0.98))
+            found.bars.append(Bar(what="queries answered", value=coverage, low=0.4))
+        yield found
+
+
+def _north_rows(
+    queries: Sequence[Query], known: Row, generic: LikelihoodIndex, threads: int
+) -> Iterator[Row]:
+    rng = np.random.default_rng(1)
+    slips = rng.normal(0.0, NORTH_SIGMA, len(queries)).tolist()
+    anyhow = rng.uniform(0.0, 360.0, len(queries)).tolist()
+    for setting, turns, sigma in (
+        (f"north off by N(0, {NORTH_SIGMA:g} deg), modelled", slips, NORTH_SIGMA),
+        (f"north off by N(0, {NORTH_SIGMA:g} deg), ignored", slips, 0.0),
+        ("north unknown", anyhow, math.inf),
+    ):
+        way = Way(north_sigma=sigma)
+        asked = turned(queries, turns)
+        outcomes = ask_likelihood(known.city, asked, generic, way, threads=threads)
+        row = dataclasses.replace(
+            known, setting=f"{setting}; on the grid", outcomes=outcomes, bars=[]
+        )
+        if sigma == math.inf and known.city.name == PARIS:
+            best = known.share(count=len(queries))
+            ratio = row.share() / best if best else math.inf
+            row.bars.append(Bar(what="P50, to that with north known", value=ratio, low=0.8))
+        yield row
+
+
+def _route_rows(city: City, generic: LikelihoodIndex, count: int, threads: int) -> Iterator[Row]:
+    cases = [(panoramas, 0.0) for panoramas in PANORAMAS]
+    cases += [(panoramas, LEG_SIGMA) for panoramas in PANORAMAS if panoramas > 1]
+    routes = walks(city, "medium", count, max(PANORAMAS), leg_sigmas=(0.0, LEG_SIGMA))
+    found = ask_routes(city, routes, generic, cases, threads=threads)
+    for (panoramas, sigma), outcomes in zip(cases, found, strict=True):
+        legs = f"legs known to {sigma:g} m" if sigma else "legs known"
+        setting = f"{panoramas} panoramas 20 m apart, {legs}" if panoramas > 1 else "1 panorama"
+        row = Row(
+            city=city,
+            distortion="medium",
+            method=RERANKED,
+            setting=f"{ON_GRID}; route of {setting}",
+            outcomes=outcomes,
+        )
+        if city.name == PARIS and not sigma and panoramas in ROUTE_BARS:
+            bar = ROUTE_BARS[panoramas]
+            row.bars.append(Bar(what=f"P50, {panoramas} panoramas", value=row.share(), low=bar))
+        yield row
+
+
+def _off_grid_rows(city: City, generic: LikelihoodIndex, count: int, threads: int) -> Iterator[Row]:
+    queries = off_grid(city, "medium", count)
+    yield from (
+        dataclasses.replace(row, setting=OFF_GRID) for row in _paper_rows(city, "medium", queries)
+    )
+    noise = named_noise("generic")
+    way = Way(radius=25.0)
+    wide = build_index(city.database, cell_noise(noise, city.database.grid.step), threads=threads)
+    shares = []
+    for method, outcomes in (
+        (RERANKED, ask_likelihood(city, queries, generic, way, threads=threads)),
+        (
+            f"{RERANKED}, place in the cell unknown",
+            ask_likelihood(city, queries, wide, way, threads=threads),
+        ),
+        (f"{RERANKED}, refined", ask_refined(city, queries, wide, noise)),
+    ):
+        row = Row(
+            city=city, distortion="medium", method=method, setting=OFF_GRID, outcomes=outcomes
+        )
+        shares.append(row.share(25.0))
+        if method.endswith("refined"):
+            ratio = shares[-1] / shares[0] if shares[0] else math.inf
+            row.bars.append(Bar(what="P25 off the grid, to on-grid", value=ratio, low=2.0))
+        yield row
+
+
+def _told_rows(city: City, queries: Sequence[Query], side: int, threads: int) -> Iterator[Row]:
+    """Tell the right level of noise, and wrong ones."""
+    for told, count in (("medium", len(queries)), ("light", side), ("strong", side)):
+        index = build_index(city.database, named_noise(told), threads=threads)
+        outcomes = ask_likelihood(city, queries[:count], index, Way(), threads=threads)
+        row = Row(
+            city=city,
+            distortion="medium",
+            method=f"likelihood, noise {told}, re-ranked",
+            setting=ON_GRID,
+            outcomes=outcomes,
+        )
+        if told == "medium":
+            low, high = REGION_BAR
+            held = row.in_region or 0.0
+            row.bars.append(Bar(what="regions of 90 % that hold", value=held, low=low, high=high))
+        yield row
+
+
+def _right(outcome: Outcome) -> bool:
+    return outcome.within[-1] == 1.0
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,356 @@
+"""The loops of the likelihood index, as machine code.
+
+Each has a slow, obvious twin in the tests.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from semsig_gis.compiling import compiled
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+__all__ = [
+    "LINE",
+    "MANTISSA_BITS",
+    "count_types",
+    "fill_columns",
+    "promising_cells",
+    "scan",
+    "scan_turned",
+]
+
+LINE = 64
+"""Cells that are worked out together: as many as a cache line has bytes."""
+_BLOCK = 4096  # cells whose sums stay in the fastest cache
+MANTISSA_BITS = 9
+"""Of a float32, how many the table of logarithms looks at."""
+_SHIFT = 23 - MANTISSA_BITS
+_ONE = 127 << MANTISSA_BITS  # where the bits of 1.0 begin
+_BINS = 1024  # scores are counted in so many bins to find the best of them
+_BINS_A_NAT = np.float32(16.0)
+
+
+@compiled
+def fill_columns(  # noqa: C901, PLR0912, PLR0917 - a kernel takes no keywords
+    lines: NDArray[np.int64],
+    offsets: NDArray[np.int64],
+    rows: NDArray[np.uint8],
+    bearing_units: NDArray[np.uint16],
+    spread_of: NDArray[np.uint8],
+    spread: NDArray[np.float32],
+    odds: NDArray[np.float32],
+    naming: NDArray[np.float32],
+    logs: NDArray[np.uint8],
+    columns: NDArray[np.uint8],
+) -> None:
+    """Write the columns of some cells: the log of what each symbol adds, in whole steps.
+
+    Parameters
+    ----------
+    lines : ndarray of int64, shape (2,)
+        First and one past the last line of `LINE` cells to write.
+    offsets, rows, bearing_units : ndarray
+        The database: class rows instead of class codes.
+    spread_of : ndarray of uint8, shape (m,)
+        For each entry, which row of `spread` its bearing noise is.
+    spread : ndarray of float32, shape (levels, units, bins)
+        Density a degree of a bearing in each bin, for an object at a unit of bin 0.
+    odds : ndarray of float32, shape (longest + 1, k)
+        Chance of detection over chance of a miss, by length and class.
+    naming : ndarray of float32, shape (longest + 1, k, symbols)
+        Chance that an object of a class is given a name, over the density of such clutter.
+    logs : ndarray of uint8
+        Steps of the logarithm, by the leading bits of a float32 from 1.
+    columns : ndarray of uint8, shape (symbols, bins, n)
+        What to write.
+    """
+    cells = len(offsets) - 1
+    kinds = odds.shape[1]
+    symbols, bins = columns.shape[0], columns.shape[1]
+    units = spread.shape[1]
+    heard = np.zeros((kinds, bins), np.float32)
+    present = np.zeros(kinds, np.bool_)
+    inner = np.empty(bins, np.float32)
+    bits = inner.view(np.int32)
+    top = len(logs) - 1
+    buffer = np.empty((symbols, bins, LINE), np.uint8)
+    for line in range(lines[0], lines[1]):
+        first = line * LINE
+        last = min(first + LINE, cells)
+        for cell in range(first, last):
+            low, high = offsets[cell], offsets[cell + 1]
+            length = min(high - low, len(odds) - 1)
+            present[:] = False
+            for entry in range(low, high):
+                kind = rows[entry]
+                if not present[kind]:
+                    present[kind] = True
+                    heard[kind, :] = np.float32(0.0)
+                level = spread_of[entry]
+                shift = bearing_units[entry] // units
+                unit = bearing_units[entry] - shift * units
+                factor = odds[length, kind]
+                for place in range(bins - shift):
+                    heard[kind, place + shift] += factor * spread[level, unit, place]
+                for place in range(bins - shift, bins):
+                    heard[kind, place + shift - bins] += factor * spread[level, unit, place]
+            for symbol in range(symbols):
+                for place in range(bins):
+                    inner[place] = np.float32(1.0)
+                for kind in range(kinds):
+                    if present[kind]:
+                        share = naming[length, kind, symbol]
+                        for place in range(bins):
+                            inner[place] += share * heard[kind, place]
+                for place in range(bins):
+                    index = (bits[place] >> _SHIFT) - _ONE
+                    buffer[symbol, place, cell - first] = logs[min(index, top)]
+        for symbol in range(symbols):
+            for place in range(bins):
+                for cell in range(first, last):
+                    columns[symbol, place, cell] = buffer[symbol, place, cell - first]
+
+
+@compiled
+def scan(  # noqa: PLR0917
+    columns: NDArray[np.uint8],
+    symbols: NDArray[np.int64],
+    constants: NDArray[np.float32],
+    base: float,
+    step: float,
+    scores: NDArray[np.float32],
+) -> None:
+    """Add up one column for each object of a query.
+
+    Parameters
+    ----------
+    columns : ndarray of uint8, shape (s, n)
+        One row a symbol.
+    symbols : ndarray of int64, shape (q,)
+        The objects of the query, at most 257.
+    constants : ndarray of float32, shape (n,)
+        What each cell adds whatever the query.
+    base : float
+        What the query adds whatever the cell.
+    step : float
+        Size of a step of the columns.
+    scores : ndarray of float32, shape (n,)
+        Filled with the sums.
+    """
+    cells = len(constants)
+    sums = np.empty(_BLOCK, np.uint16)
+    start, scale = np.float32(base), np.float32(step)
+    for low in range(0, cells, _BLOCK):
+        size = min(_BLOCK, cells - low)
+        for cell in range(size):
+            sums[cell] = 0
+        for symbol in symbols:
+            column = columns[symbol, low : low + size]
+            for cell in range(size):
+                sums[cell] += column[cell]
+        for cell in range(size):
+            scores[low + cell] = constants[low + cell] + (start + scale * np.float32(sums[cell]))
+
+
+@compiled
+def scan_turned(  # noqa: PLR0917
+    columns: NDArray[np.uint8],
+    symbols: NDArray[np.int64],
+    turns: NDArray[np.int64],
+    priors: NDArray[np.float32],
+    decay: NDArray[np.float32],
+    constants: NDArray[np.float32],
+    base: float,
+    step: float,
+    scores: NDArray[np.float32],
+    best: NDArray[np.int16],
+) -> None:
+    """Add up columns for a query turned in several ways, and sum over the ways.
+
+    Parameters
+    ----------
+    columns : ndarray of uint8, shape (s, n)
+        One row a symbol.
+    symbols : ndarray of int64, shape (r, q)
+        The objects of the query, for each turn; at most 257.
+    turns : ndarray of int64, shape (r,)
+        Number that stands for each turn.
+    priors : ndarray of float32, shape (r,)
+        Chance of each turn.
+    decay : ndarray of float32, shape (d,)
+        ``exp(-step * i)``; beyond its end nothing counts.
+    constants : ndarray of float32, shape (n,)
+        What each cell adds whatever the query.
+    base : float
+        What the query adds whatever the cell.
+    step : float
+        Size of a step of the columns.
+    scores : ndarray of float32, shape (n,)
+        Filled with the logarithms of the sums.
+    best : ndarray of int16, shape (n,)
+        Filled with the turn that is likeliest for each cell.
+    """
+    cells = len(constants)
+    sums = np.empty(_BLOCK, np.uint16)
+    peak = np.empty(_BLOCK, np.int32)
+    mass = np.empty(_BLOCK, np.float32)
+    first = np.empty(_BLOCK, np.float32)
+    reach = len(decay)
+    for low in range(0, cells, _BLOCK):
+        size = min(_BLOCK, cells - low)
+        peak[:] = 0
+        mass[:] = 0.0
+        first[:] = 0.0
+        for turn in range(len(turns)):
+            for cell in range(size):
+                sums[cell] = 0
+            for symbol in symbols[turn]:
+                column = columns[symbol, low : low + size]
+                for cell in range(size):
+                    sums[cell] += column[cell]
+            prior = priors[turn]
+            for cell in range(size):
+                rise = np.int32(sums[cell]) - peak[cell]
+                if rise > 0:
+                    scale = decay[rise] if rise < reach else np.float32(0.0)
+                    mass[cell] *= scale
+                    first[cell] *= scale
+                    peak[cell] += rise
+                    part = prior
+                else:
+                    part = prior * decay[-rise] if -rise < reach else np.float32(0.0)
+                mass[cell] += part
+                if part > first[cell]:
+                    first[cell] = part
+                    best[low + cell] = turns[turn]
+        for cell in range(size):
+            total = base + step * peak[cell] + math.log(mass[cell])
+            scores[low + cell] = constants[low + cell] + np.float32(total)
+
+
+@compiled
+def promising_cells(scores: NDArray[np.float32], count: int) -> NDArray[np.int64]:
+    """Return the cells of the highest scores and a few more, without sorting them.
+
+    Parameters
+    ----------
+    scores : ndarray of float32, shape (n,)
+        Higher is better; not NaN.
+    count : int
+        How many are wanted at least, 1 to n.
+
+    Returns
+    -------
+    ndarray of int64
+        Row numbers, ascending; every cell that is left out is worse than `count` that are in.
+    """
+    top = scores[0]
+    for score in scores:
+        top = max(top, score)
+    if top == -np.inf:
+        return np.arange(len(scores))
+    counts = np.zeros(_BINS, np.int64)
+    for score in scores:
+        counts[int(min((top - score) * _BINS_A_NAT, np.float32(_BINS - 1)))] += 1
+    last, inside = 0, counts[0]
+    while inside < count:
+        last += 1
+        inside += counts[last]
+    chosen = np.empty(inside, np.int64)
+    found = 0
+    for cell in range(len(scores)):
+        place = int(min((top - scores[cell]) * _BINS_A_NAT, np.float32(_BINS - 1)))
+        if place <= last:
+            chosen[found] = cell
+            found += 1
+    return chosen
+
+
+@compiled
+def count_types(  # noqa: C901, PLR0917
+    offsets: NDArray[np.int64],
+    codes: NDArray[np.uint8],
+    row_of: NDArray[np.int64],
+    wanted: NDArray[np.int64],
+    detected: NDArray[np.float64],
+    named: NDArray[np.float64],
+    clutter: NDArray[np.float64],
+    scores: NDArray[np.float32],
+) -> None:
+    """Compare how many objects of each class a query and each sequence of types have.
+
+    Parameters
+    ----------
+    offsets, codes : ndarray
+        Sequences of class codes.
+    row_of : ndarray of int64, shape (256,)
+        Row of each class code in the tables below.
+    wanted : ndarray of int64, shape (k + 1,)
+        Objects of each class in the query; those of unknown class last.
+    detected : ndarray of float64, shape (longest + 1, k)
+        Chance of detection, by length and class.
+    named : ndarray of float64, shape (longest + 1, k, k)
+        Chance of each name.
+    clutter : ndarray of float64, shape (k,)
+        False objects a signature.
+    scores : ndarray of float32, shape (d,)
+        Filled with the log-likelihoods.
+    """
+    kinds = len(clutter)
+    most = 0
+    for row in range(len(offsets) - 1):
+        most = max(most, offsets[row + 1] - offsets[row])
+    asked = wanted.sum()
+    factorials = np.zeros(max(most, asked) + 1)
+    for number in range(1, len(factorials)):
+        factorials[number] = factorials[number - 1] + math.log(number)
+    share = (asked - wanted[kinds]) / asked  # of the detections whose class is known
+    counts = np.empty(kinds, np.int64)
+    for row in range(len(scores)):
+        length = min(offsets[row + 1] - offsets[row], len(detected) - 1)
+        counts[:] = 0
+        for entry in range(offsets[row], offsets[row + 1]):
+            counts[row_of[codes[entry]]] += 1
+        total = 0.0
+        unnamed = 0.0
+        for name in range(kinds):
+            stray = clutter[name]  # expected detections of other things under this name
+            for kind in range(kinds):
+                if counts[kind] > 0 and kind != name:
+                    stray += counts[kind] * detected[length, kind] * named[length, kind, name]
+            unnamed += clutter[name] + counts[name] * detected[length, name]
+            stray *= share
+            chance = share * detected[length, name] * named[length, name, name]
+            own, given = counts[name], wanted[name]
+            if stray == 0.0:
+                continue  # no class of the query is known
+            # Binomial hits and Poisson strays that make up the number given.
+            peak = -np.inf
+            mass = 0.0
+            for hits in range(min(own, given) + 1):
+                part = (
+                    factorials[own]
+                    - factorials[hits]
+                    - factorials[own - hits]
+                    + hits * math.log(chance)
+                    + (own - hits) * math.log1p(-chance)
+                    + (given - hits) * math.log(stray)
+                    - factorials[given - hits]
+                    - stray
+                )
+                if part > peak:
+                    mass = mass * math.exp(peak - part) + 1.0
+                    peak = part
+                else:
+                    mass += math.exp(part - peak)
+            total += peak + math.log(mass)
+        if wanted[kinds] > 0:
+            unnamed *= 1.0 - share
+            total += wanted[kinds] * math.log(unnamed) - factorials[wanted[kinds]] - unnamed
+        scores[row] = total

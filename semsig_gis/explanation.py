@@ -1,0 +1,310 @@
+"""Why a place: which detections are which street objects, which were missed, which look false."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import geopandas as gpd
+import numpy as np
+import pandas as pd
+
+from semsig_gis.association import associate_pairs, near_pairs, pair_weights
+from semsig_gis.errors import InputError
+from semsig_gis.noise_table import LONGEST_TABLE, noise_tables
+from semsig_gis.schema import SOURCE, SOURCE_ID
+from semsig_gis.taxonomy import WILDCARD
+from semsig_gis.views import views_at
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from semsig_gis.noise import Noise
+    from semsig_gis.objects import StreetObjects
+    from semsig_gis.occlusion import Footprints
+    from semsig_gis.signatures import Signature
+    from semsig_gis.spatial_index import ObjectIndex
+    from semsig_gis.stored_index import StoredIndex
+    from semsig_gis.taxonomy import Taxonomy
+    from semsig_gis.views import Views
+
+__all__ = ["Explanation", "explain"]
+
+UNKNOWN_NAME = "unknown"
+LEAST_CHANCE = 0.01  # of two things being one, to be set beside each other
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Explanation:
+    """What a query and a place have in common, and what not.
+
+    Parameters
+    ----------
+    table : GeoDataFrame
+        One row for each object of the query, then one for each street object that none of them
+        is likely to be; `geometry` is the street object, where there is one.
+
+        - ``verdict``: ``"matched"`` (more likely an object than not), ``"misnamed"`` (the same,
+          of another class), ``"false"`` or ``"missed"``;
+        - ``chance``: that the verdict holds: that the two are one thing, that the detection is
+          no object at all, that the object was not detected;
+        - ``query``: number of the object in the query; ``query_class``, ``query_bearing``
+          (degrees, turned by `heading`);
+        - ``object``: row in the table of objects, ``source``, ``source_id``, ``object_class``,
+          ``object_bearing``, ``distance`` in metres;
+        - ``bearing_error``: degrees clockwise from the object to the detection.
+
+        What does not apply is missing.
+    xy : tuple of float
+        The place in metres.
+    heading : float
+        Degrees that were added to the bearings of the query.
+    loglik : float
+        Log-likelihood of the query at the place.
+
+    Examples
+    --------
+    >>> empty = gpd.GeoDataFrame({"verdict": ["false"]}, geometry=[None], crs="EPSG:2154")
+    >>> Explanation(table=empty, xy=(0.0, 0.0), heading=0.0, loglik=-3.0).counts
+    {'matched': 0, 'misnamed': 0, 'missed': 0, 'false': 1}
+    """
+
+    table: gpd.GeoDataFrame
+    xy: tuple[float, float]
+    heading: float
+    loglik: float
+
+    @property
+    def counts(self) -> dict[str, int]:
+        """How many rows there are of each verdict."""
+        found = self.table["verdict"].value_counts()
+        return {
+            name: int(found.get(name, 0)) for name in ("matched", "misnamed", "missed", "false")
+        }
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return everything as plain values, ready for JSON.
+
+        Returns
+        -------
+        dict
+            The place and ``rows``, where what does not apply is None.
+        """
+        plain = pd.DataFrame(self.table.drop(columns="geometry"))
+        rows = plain.astype(object).where(plain.notna(), None).to_dict("records")
+        return {
+            "x": self.xy[0],
+            "y": self.xy[1],
+            "heading": self.heading,
+            "loglik": self.loglik,
+            "counts": self.counts,
+            "rows": rows,
+        }
+
+
+def explain(
+    query: Signature,
+    xy: tuple[float, float],
+    noise: Noise,
+    *,
+    objects: StreetObjects,
+    index: ObjectIndex | StoredIndex,
+    radius: float = 30.0,
+    heading: float = 0.0,
+    footprints: Footprints | None = None,
+) -> Explanation:
+    """Say which objects of a query are which street objects, if it was seen from a place.
+
+    Parameters
+    ----------
+    query : Signature
+        At least one object, with bearings; types may be unknown, all or some.
+    xy : tuple of float
+        The place in metres, such as the viewpoint of a candidate or a refined place.
+    noise : NoiseSpec or NoiseMixture
+        The noise model.
+    objects : StreetObjects
+        The objects of the city.
+    index : ObjectIndex or StoredIndex
+        R-tree over them.
+    radius : float, default 30
+        Visibility range in metres of classes that have none of their own.
+    heading : float, default 0
+        Degrees to add to the bearings of the query.
+    footprints : Footprints, optional
+        Buildings; what they hide is not seen.
+
+    Returns
+    -------
+    Explanation
+        The verdicts.
+
+    Raises
+    ------
+    InputError
+        If the query is empty, has no bearings, or has a class that the city does not have.
+
+    Notes
+    -----
+    Chances are those of all one-to-one associations together (see `semsig_gis.association`), each
+    model of a mixture counting as much as the query speaks for it here. An object of the query
+    is set beside the street object that it most likely is.
+
+    Examples
+    --------
+    >>> from semsig_gis.catalog import paper_taxonomy
+    >>> from semsig_gis.noise import NoiseSpec
+    >>> from semsig_gis.objects import build_objects
+    >>> from semsig_gis.signatures import Signature
+    >>> from semsig_gis.sources.synthetic import CitySpec, synthetic_city
+    >>> from semsig_gis.spatial_index import ObjectIndex
+    >>> layers = synthetic_city(CitySpec(size=300.0))
+    >>> objects, _ = build_objects(layers, taxonomy=paper_taxonomy(), crs="EPSG:32631")
+    >>> place = tuple((objects.xy[0] - [3.0, 4.0]).tolist())
+    >>> tree = ObjectIndex(objects.xy)
+    >>> query = Signature(objects.codes[:1], np.array([38.0]))
+    >>> why = explain(query, place, NoiseSpec(), objects=objects, index=tree, radius=6.0)
+    >>> why.table["verdict"].iloc[0], float(why.table["bearing_error"].iloc[0].round(2))
+    ('matched', 1.13)
+    """
+    if query.bearings is None:
+        msg = "the query has no bearings to explain; give them."
+        raise InputError(msg)
+    place = np.array([xy], dtype=np.float64)
+    view = views_at(objects, place, index=index, radius=radius, footprints=footprints)
+    turned = (query.bearings + heading) % 360.0
+    chances, loglik = _chances(query, turned, view, noise, objects)
+    table = _table(query, turned, view, chances, objects)
+    return Explanation(table=table, xy=(float(xy[0]), float(xy[1])), heading=heading, loglik=loglik)
+
+
+def _chances(
+    query: Signature,
+    turned: NDArray[np.float64],
+    view: Views,
+    noise: Noise,
+    objects: StreetObjects,
+) -> tuple[NDArray[np.float64], float]:
+    """Return the chance that each object is each detection, and the log-likelihood of the query."""
+    tables, weights = noise_tables(
+        noise,
+        taxonomy=objects.taxonomy,
+        codes=np.unique(objects.codes),
+        longest=LONGEST_TABLE,
+    )
+    names = tables[0].query_rows(query)
+    kinds = tables[0].row_of[view.codes]
+    pairs = near_pairs(view.offsets, view.bearings, np.array([0, len(query)]), turned)
+    logliks = np.log(weights)
+    each = np.zeros((len(tables), len(view.codes), len(query)))
+    length = min(len(kinds), LONGEST_TABLE)
+    for number, table in enumerate(tables):
+        found = associate_pairs(
+            pairs,
+            pair_weights(
+                table,
+                pairs,
+                kinds=kinds,
+                distances=view.distances,
+                lengths=np.full(len(kinds), len(kinds)),
+                names=names,
+            ),
+        )
+        each[number, pairs.objects, pairs.detections] = found.chances
+        logliks[number] += (
+            found.log_sums.sum()
+            + np.log(table.missed[length, kinds]).sum()
+            + np.log(table.density[names]).sum()
+            - table.clutter.sum()
+        )
+    loglik = float(np.logaddexp.reduce(logliks))
+    return np.tensordot(np.exp(logliks - loglik), each, axes=1), loglik
+
+
+def _table(
+    query: Signature,
+    turned: NDArray[np.float64],
+    view: Views,
+    chances: NDArray[np.float64],
+    objects: StreetObjects,
+) -> gpd.GeoDataFrame:
+    """Return the verdicts as a table."""
+    codes = np.full(len(query), WILDCARD) if query.codes is None else query.codes
+    rows: list[dict[str, Any]] = []
+    partners = _partners(chances)
+    for number, code in enumerate(codes.tolist()):
+        whole = float(chances[:, number].sum())
+        row = {
+            "verdict": "false",
+            "chance": max(1.0 - whole, 0.0),
+            "query": number,
+            "query_class": _name(code, objects.taxonomy),
+            "query_bearing": float(turned[number]),
+        }
+        if number in partners:
+            entry = partners[number]
+            other = code not in {WILDCARD, int(view.codes[entry])}
+            away = (turned[number] - view.bearings[entry] + 180.0) % 360.0 - 180.0
+            row |= {
+                "verdict": "misnamed" if other else "matched",
+                "chance": float(chances[entry, number]),
+                "bearing_error": float(away),
+                **_object(entry, view, objects),
+            }
+        rows.append(row)
+    for entry in range(len(view.codes)):
+        if entry not in partners.values():
+            chance = max(1.0 - float(chances[entry].sum()), 0.0)
+            rows.append({"verdict": "missed", "chance": chance, **_object(entry, view, objects)})
+    table = pd.DataFrame(rows, columns=COLUMNS)
+    for name in ("query", "object"):
+        table[name] = table[name].astype("Int64")
+    points = objects.table.geometry.array
+    shapes = [None if pd.isna(row) else points[int(row)] for row in table["object"]]
+    return gpd.GeoDataFrame(table, geometry=shapes, crs=objects.crs)
+
+
+def _partners(chances: NDArray[np.float64]) -> dict[int, int]:
+    """Return the object that each detection most likely is, no object twice."""
+    real = chances.sum(axis=0) > 0.5  # noqa: PLR2004 - more likely than not
+    found: dict[int, int] = {}
+    for place in np.argsort(-chances, axis=None, kind="stable").tolist():
+        entry, number = divmod(place, chances.shape[1])
+        if chances[entry, number] <= LEAST_CHANCE:
+            break
+        if real[number] and number not in found and entry not in found.values():
+            found[number] = entry
+    return found
+
+
+COLUMNS = [
+    "verdict",
+    "chance",
+    "query",
+    "query_class",
+    "query_bearing",
+    "object",
+    "source",
+    "source_id",
+    "object_class",
+    "object_bearing",
+    "distance",
+    "bearing_error",
+]
+
+
+def _object(entry: int, view: Views, objects: StreetObjects) -> dict[str, Any]:
+    """Return what a row of the table says of a street object."""
+    row = int(view.objects[entry])
+    return {
+        "object": row,
+        "source": str(objects.table[SOURCE].iloc[row]),
+        "source_id": str(objects.table[SOURCE_ID].iloc[row]),
+        "object_class": _name(int(view.codes[entry]), objects.taxonomy),
+        "object_bearing": float(view.bearings[entry]),
+        "distance": float(view.distances[entry]),
+    }
+
+
+def _name(code: int, taxonomy: Taxonomy) -> str:
+    return UNKNOWN_NAME if code == WILDCARD else taxonomy.by_code(code).name

@@ -1,0 +1,346 @@
+"""The likelihood of a query in every cell, from an index that is built once.
+
+A query is a random finite set: each object of a cell is detected or missed, detected ones may be
+given another class and a bearing that is a little out, and false objects come on top. For a cell
+with objects i and a query with detections j of class t and bearing a,
+
+    log L = sum_i log(1 - p_i) + sum_j log(lambda(t_j) + sum_i o_i C(i, t_j) N(a_j - theta_i))
+
+with detection chance p, odds ``o = p / (1 - p)``, class confusion C, clutter density lambda, and
+N the normal density wrapped round the turn. Order does not matter. The second sum runs over the
+objects of the query, so that for each of the few hundred symbols (class, bearing in steps of five
+degrees) one column over all cells holds the inner logarithm, in one byte; a query adds up the
+columns of its objects. Turning the query, where north is not known, only takes other columns.
+"""
+
+from __future__ import annotations
+
+import functools
+import hashlib
+import json
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from semsig_gis._likelihood_columns import BIN_DEGREES, BINS, index_shape, write_columns
+from semsig_gis.errors import InputError
+from semsig_gis.noise_table import database_tables, mean_table
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from numpy.typing import NDArray
+
+    from semsig_gis.database import SignatureDatabase
+    from semsig_gis.noise import Noise
+    from semsig_gis.noise_table import NoiseTable
+    from semsig_gis.signatures import Signature
+
+__all__ = [
+    "CellScores",
+    "LikelihoodIndex",
+    "build_index",
+    "index_fingerprint",
+    "index_of_columns",
+]
+
+VERSION = 1  # of the index: raised whenever the same database and noise give other columns
+MOST_OBJECTS = 257  # whose bytes add up within 16 bits
+LEAST_PRIOR = 1e-7  # turns that are less likely than this, against the likeliest, are left out
+LEAST_MASS = 1e-6  # below which a turn adds nothing to the sum
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class CellScores:
+    """The log-likelihood of a query in every cell.
+
+    Parameters
+    ----------
+    loglik : ndarray of float32 or float64, shape (n,)
+        Natural logarithm of the likelihood; higher is better.
+    heading : ndarray of float32, shape (n,), or None
+        Degrees, clockwise, in [-180, 180), to add to the bearings of the query where it was seen
+        from each cell; None where north was known or the query has no bearings.
+    """
+
+    loglik: NDArray[np.floating]
+    heading: NDArray[np.float32] | None = None
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class LikelihoodIndex:
+    """What the cells of a database add to the likelihood of each symbol.
+
+    Parameters
+    ----------
+    database : SignatureDatabase
+        The cells.
+    noise : NoiseSpec or NoiseMixture
+        The noise model; the index holds the mean of a mixture (see `semsig_gis.alignment` for
+        the mixture itself).
+    columns : ndarray of uint8, shape (k + 1, 72, n)
+        Inner logarithms in steps, by class and bearing; the last class is "not known".
+    constants : ndarray of float32, shape (n,)
+        What each cell adds to any query.
+    step : float
+        Size of a step.
+    tables : tuple of NoiseTable
+        The noise model in numbers, or each model of the mixture.
+    weights : ndarray of float64
+        Chance of each of them.
+    fingerprint : str
+        Stands for the database, the noise model and the version of the index.
+
+    Examples
+    --------
+    >>> from semsig_gis.catalog import paper_taxonomy
+    >>> from semsig_gis.building import build_database
+    >>> from semsig_gis.noise import named_noise
+    >>> from semsig_gis.objects import build_objects
+    >>> from semsig_gis.sources.synthetic import CitySpec, synthetic_city
+    >>> layers = synthetic_city(CitySpec(size=300.0))
+    >>> objects, _ = build_objects(layers, taxonomy=paper_taxonomy(), crs="EPSG:32631")
+    >>> database = build_database(objects)
+    >>> index = build_index(database, named_noise("light"))
+    >>> longest = int(database.lengths.argmax())
+    >>> int(index.scores(database.signature(longest)).loglik.argmax()) == longest
+    True
+    """
+
+    database: SignatureDatabase
+    noise: Noise
+    columns: NDArray[np.uint8]
+    constants: NDArray[np.float32]
+    step: float
+    tables: tuple[NoiseTable, ...]
+    weights: NDArray[np.float64]
+    fingerprint: str
+
+    @functools.cached_property
+    def table(self) -> NoiseTable:
+        """The noise model that the columns hold."""
+        return mean_table(self.tables, self.weights)
+
+    def scores(self, query: Signature, *, north_sigma: float = 0.0) -> CellScores:
+        """Return the log-likelihood of a query in every cell.
+
+        Parameters
+        ----------
+        query : Signature
+            At least one object. Types may be unknown, all or those of code 0; bearings
+            may be unknown, and then the order of the types plays no part.
+        north_sigma : float, default 0
+            Standard deviation in degrees of the north of the query: 0 where it is known,
+            infinite where it is not known at all. The likelihood is summed over the turns of the
+            query in steps of five degrees.
+
+        Returns
+        -------
+        CellScores
+            Log-likelihoods, and the likeliest turn for each cell.
+
+        Raises
+        ------
+        InputError
+            If the query is empty or has a class that no cell sees, or `north_sigma` is negative.
+        """
+        if not north_sigma >= 0:
+            msg = f"the deviation of north is {north_sigma} degrees; give 0 or more, or infinity."
+            raise InputError(msg)
+        rows = self.table.query_rows(query)
+        if query.bearings is None:
+            return CellScores(loglik=self._by_counts(rows))
+        base = float(np.log(self.table.density[rows]).sum())
+        bins = np.floor(query.bearings / BIN_DEGREES).astype(np.int64)
+        if north_sigma == 0:
+            return CellScores(loglik=self._known(rows, bins, base))
+        return self._turned(rows, bins, base, north_sigma)
+
+    def _known(
+        self, rows: NDArray[np.int64], bins: NDArray[np.int64], base: float
+    ) -> NDArray[np.float32]:
+        from semsig_gis._likelihood_kernels import scan  # noqa: PLC0415 - numba loads slowly
+
+        flat = self.columns.reshape(-1, len(self.constants))
+        symbols = rows * BINS + bins
+        scores = np.empty(len(self.constants), np.float32)
+        constants = self.constants
+        for low in range(0, len(symbols), MOST_OBJECTS):
+            scan(flat, symbols[low : low + MOST_OBJECTS], constants, base, self.step, scores)
+            constants, base = scores, 0.0
+        return scores
+
+    def _turned(
+        self, rows: NDArray[np.int64], bins: NDArray[np.int64], base: float, north_sigma: float
+    ) -> CellScores:
+        from semsig_gis._likelihood_kernels import scan_turned  # noqa: PLC0415
+
+        turns = np.arange(-BINS // 2, BINS // 2)
+        priors = np.exp(-0.5 * (turns * BIN_DEGREES / north_sigma) ** 2)
+        kept = priors > LEAST_PRIOR * priors.max()
+        turns, priors = turns[kept], priors[kept] / priors[kept].sum()
+        # Likelier turns first, so that sums are rarely rescaled.
+        order = np.argsort(-priors, kind="stable")
+        turns, priors = turns[order], priors[order].astype(np.float32)
+        symbols = rows * BINS + (bins + turns[:, None]) % BINS
+        if symbols.shape[1] > MOST_OBJECTS:
+            msg = (
+                f"the query has {symbols.shape[1]} objects and its north is not known; give at "
+                f"most {MOST_OBJECTS} objects."
+            )
+            raise InputError(msg)
+        decay = np.exp(-self.step * np.arange(math.ceil(-math.log(LEAST_MASS) / self.step)))
+        scores = np.empty(len(self.constants), np.float32)
+        best = np.empty(len(self.constants), np.int16)
+        scan_turned(
+            self.columns.reshape(-1, len(self.constants)),
+            symbols,
+            turns,
+            priors,
+            decay.astype(np.float32),
+            self.constants,
+            base,
+            self.step,
+            scores,
+            best,
+        )
+        return CellScores(loglik=scores, heading=best * np.float32(BIN_DEGREES))
+
+    def _by_counts(self, rows: NDArray[np.int64]) -> NDArray[np.float32]:
+        from semsig_gis._likelihood_kernels import count_types  # noqa: PLC0415
+
+        types = self.database.type_sequences
+        wanted = np.bincount(rows, minlength=len(self.table.codes) + 1)
+        distinct = np.empty(len(types), np.float32)
+        count_types(
+            types.offsets,
+            types.values,
+            self.table.row_of,
+            wanted,
+            1.0 - self.table.missed,
+            self.table.named,
+            self.table.clutter,
+            distinct,
+        )
+        return distinct[types.inverse]
+
+
+def build_index(
+    database: SignatureDatabase,
+    noise: Noise,
+    *,
+    out: NDArray[np.uint8] | None = None,
+    progress: Callable[[int, int], None] | None = None,
+    threads: int = 1,
+) -> LikelihoodIndex:
+    """Work out the index of a database for a noise model.
+
+    Parameters
+    ----------
+    database : SignatureDatabase
+        The cells.
+    noise : NoiseSpec or NoiseMixture
+        The noise model.
+    out : ndarray of uint8, shape `index_shape`, optional
+        Where to put the columns, such as a mapped file.
+    progress : callable, optional
+        Called with the number of cells done and in all.
+    threads : int, default 1
+        How many blocks of cells are worked out at once.
+
+    Returns
+    -------
+    LikelihoodIndex
+        The index.
+
+    Raises
+    ------
+    InputError
+        If the noise model does not fit the classes of the database.
+    """
+    table = mean_table(*database_tables(database, noise))
+    columns = np.empty(index_shape(database), np.uint8) if out is None else out
+    step = write_columns(database, table, columns, progress=progress, threads=threads)
+    return index_of_columns(
+        database,
+        noise,
+        columns=columns,
+        constants=table.nothing_seen(database).astype(np.float32),
+        step=step,
+        fingerprint=index_fingerprint(database, noise),
+    )
+
+
+def index_of_columns(
+    database: SignatureDatabase,
+    noise: Noise,
+    *,
+    columns: NDArray[np.uint8],
+    constants: NDArray[np.float32],
+    step: float,
+    fingerprint: str,
+) -> LikelihoodIndex:
+    """Return the index whose columns are there already.
+
+    Parameters
+    ----------
+    database : SignatureDatabase
+        The cells.
+    noise : NoiseSpec or NoiseMixture
+        The noise model.
+    columns : ndarray of uint8, shape `index_shape`
+        The columns.
+    constants : ndarray of float32, shape (n,)
+        What each cell adds to any query.
+    step : float
+        Size of a step of the columns.
+    fingerprint : str
+        `index_fingerprint` of the database and the noise model.
+
+    Returns
+    -------
+    LikelihoodIndex
+        The index.
+    """
+    tables, weights = database_tables(database, noise)
+    return LikelihoodIndex(
+        database=database,
+        noise=noise,
+        columns=columns,
+        constants=constants,
+        step=step,
+        tables=tables,
+        weights=weights,
+        fingerprint=fingerprint,
+    )
+
+
+def index_fingerprint(database: SignatureDatabase, noise: Noise) -> str:
+    """Return a text that changes with the database, the noise model and the kind of index.
+
+    Parameters
+    ----------
+    database : SignatureDatabase
+        The cells.
+    noise : NoiseSpec or NoiseMixture
+        The noise model.
+
+    Returns
+    -------
+    str
+        32 hexadecimal digits.
+    """
+    said = json.dumps([VERSION, noise.to_dict(), database.taxonomy.to_list(), database.reach])
+    digest = hashlib.blake2b(said.encode(), digest_size=16)
+    for array in (
+        database.columns,
+        database.rows,
+        database.offsets,
+        database.codes,
+        database.bearing_units,
+        database.distance_units,
+    ):
+        digest.update(np.ascontiguousarray(array).data)
+    return digest.hexdigest()

@@ -1,0 +1,78 @@
+"""The files of noise models: JSON, or TOML written by hand."""
+
+from __future__ import annotations
+
+import json
+import tomllib
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from semsig_gis.errors import InputError
+from semsig_gis.noise import noise_from_dict
+from semsig_gis.storage import whole_file
+
+if TYPE_CHECKING:
+    from semsig_gis.noise import Noise
+
+__all__ = ["open_noise", "save_noise"]
+
+
+def open_noise(path: str | Path) -> Noise:
+    """Read a noise model from a file.
+
+    Parameters
+    ----------
+    path : str or Path
+        A JSON file, or a TOML file with the suffix ``.toml``.
+
+    Returns
+    -------
+    NoiseSpec or NoiseMixture
+        The model.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be read or does not hold a noise model.
+
+    Examples
+    --------
+    >>> open_noise("nowhere.toml")
+    Traceback (most recent call last):
+    ...
+    semsig_gis.errors.InputError: noise file nowhere.toml cannot be read (No such file or
+    directory); give a JSON or TOML file.
+    """
+    file = Path(path)
+    try:
+        text = file.read_text(encoding="utf-8")
+        values = tomllib.loads(text) if file.suffix.lower() == ".toml" else json.loads(text)
+    except (OSError, ValueError) as error:
+        reason = error.strerror if isinstance(error, OSError) else error
+        msg = f"noise file {file} cannot be read ({reason}); give a JSON or TOML file."
+        raise InputError(msg) from error
+    return noise_from_dict(values)
+
+
+def save_noise(noise: Noise, path: str | Path) -> None:
+    """Write a noise model to a JSON file.
+
+    Parameters
+    ----------
+    noise : NoiseSpec or NoiseMixture
+        The model.
+    path : str or Path
+        File to write; it appears whole, by rename.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> from semsig_gis.noise import NoiseSpec
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     save_noise(NoiseSpec(clutter=2.0), f"{folder}/noise.json")
+    ...     open_noise(f"{folder}/noise.json").clutter
+    2.0
+    """
+    with whole_file(path) as partial:
+        text = json.dumps(noise.to_dict(), indent=2, allow_nan=False, ensure_ascii=False)
+        partial.write_text(text + "\n", encoding="utf-8")

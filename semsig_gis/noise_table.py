@@ -1,0 +1,372 @@
+"""A noise model as tables of numbers, for the classes and lengths of one database."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from semsig_gis.errors import InputError, nearest_name
+from semsig_gis.noise import NoiseMixture
+from semsig_gis.taxonomy import WILDCARD
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from numpy.typing import NDArray
+
+    from semsig_gis.database import SignatureDatabase
+    from semsig_gis.noise import Noise, NoiseSpec
+    from semsig_gis.signatures import Signature
+    from semsig_gis.taxonomy import Taxonomy
+
+__all__ = ["NoiseTable", "database_tables", "mean_table", "noise_tables"]
+
+# No chance is quite nought or one: a model that excludes something is wrong one day, and then
+# excludes the true place.
+LEAST_CHANCE = 1e-3
+MOST_CHANCE = 0.95
+LEAST_CLUTTER = 1e-3
+FULL_TURN = 360.0
+WIDEST_SIGMA = 180.0
+LONGEST_TABLE = 400  # lengths that have chances of their own; longer signatures take the last
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class NoiseTable:
+    """One noise model for k classes, and signatures of every length up to a longest.
+
+    Parameters
+    ----------
+    codes : ndarray of uint8, shape (k,)
+        Class codes, in the order of the other arrays.
+    missed : ndarray of float64, shape (longest + 1, k)
+        Chance that an object of a class, in a signature of a length, is missed.
+    misnamed : ndarray of float64, shape (longest + 1, k)
+        Chance that it is given another class, once detected.
+    others : ndarray of float64, shape (k, k)
+        Which other class a misnamed object is given: rows sum to one, the diagonal is nought.
+    clutter : ndarray of float64, shape (k,)
+        False objects a signature, by class.
+    sigma : ndarray of float64, shape (k,)
+        Standard deviation of a bearing in degrees.
+    position_sigma : float
+        Standard deviation of the observer's place in metres.
+    """
+
+    codes: NDArray[np.uint8]
+    missed: NDArray[np.float64]
+    misnamed: NDArray[np.float64]
+    others: NDArray[np.float64]
+    clutter: NDArray[np.float64]
+    sigma: NDArray[np.float64]
+    position_sigma: float
+
+    @cached_property
+    def density(self) -> NDArray[np.float64]:
+        """False objects a degree by class, and of any class, shape (k + 1,)."""
+        return np.append(self.clutter, self.clutter.sum()) / FULL_TURN
+
+    @cached_property
+    def odds(self) -> NDArray[np.float64]:
+        """Chance of detection over the chance of a miss, shape (longest + 1, k)."""
+        return (1.0 - self.missed) / self.missed
+
+    @cached_property
+    def named(self) -> NDArray[np.float64]:
+        """Chance of each name, by length, class and name, shape (longest + 1, k, k)."""
+        names = self.misnamed[:, :, None] * self.others
+        kinds = np.arange(len(self.codes))
+        names[:, kinds, kinds] = 1.0 - self.misnamed
+        return np.asarray(names)
+
+    @cached_property
+    def naming(self) -> NDArray[np.float64]:
+        """`named`, and one for a class that is not known, over `density`, (..., k, k + 1)."""
+        anything = np.ones((*self.missed.shape, 1))
+        return np.asarray(np.concatenate([self.named, anything], axis=2) / self.density)
+
+    @cached_property
+    def row_of(self) -> NDArray[np.int64]:
+        """Row of each class code, shape (256,); k for `WILDCARD`, -1 for other codes."""
+        rows = np.full(256, -1)
+        rows[self.codes] = np.arange(len(self.codes))
+        rows[WILDCARD] = len(self.codes)
+        return rows
+
+    def sigmas(self, reach: float) -> NDArray[np.float64]:
+        """Return the deviation of a bearing by class and distance.
+
+        Parameters
+        ----------
+        reach : float
+            Distance in metres that 255 units are.
+
+        Returns
+        -------
+        ndarray of float64, shape (k, 256)
+            Degrees, at most 180; by class and distance unit.
+        """
+        distances = np.maximum(np.arange(256), 0.5) * (reach / 255.0)
+        turned = np.degrees(self.position_sigma / distances)
+        return np.asarray(np.minimum(np.hypot(self.sigma[:, None], turned), WIDEST_SIGMA))
+
+    def nothing_seen(
+        self, database: SignatureDatabase, cells: NDArray[np.int64] | None = None
+    ) -> NDArray[np.float64]:
+        """Return the log-likelihood that nothing at all is detected in cells.
+
+        Parameters
+        ----------
+        database : SignatureDatabase
+            The cells; their classes are those of the table.
+        cells : ndarray of int, shape (c,), optional
+            Row numbers in the database; all by default.
+
+        Returns
+        -------
+        ndarray of float64, shape (c,)
+            ``sum_i log(missed_i) - sum_t clutter_t``.
+        """
+        lengths, codes = database.lengths, database.codes
+        if cells is not None:
+            lengths = lengths[cells]
+            starts = database.offsets[cells] - np.cumsum(lengths) + lengths
+            codes = codes[np.repeat(starts, lengths) + np.arange(lengths.sum())]
+        rows = np.minimum(lengths, len(self.missed) - 1)
+        each = np.log(self.missed)[np.repeat(rows, lengths), self.row_of[codes]]
+        sums = np.bincount(np.repeat(np.arange(len(lengths)), lengths), each, len(lengths))
+        return np.asarray(sums - self.clutter.sum())
+
+    def query_rows(self, query: Signature) -> NDArray[np.int64]:
+        """Return the row of the class of each object of a query.
+
+        Parameters
+        ----------
+        query : Signature
+            Its types may be unknown, all or some.
+
+        Returns
+        -------
+        ndarray of int64, shape (q,)
+            Rows of the tables; k where the class is not known.
+
+        Raises
+        ------
+        InputError
+            If the query has no objects, or a class that the tables do not have.
+        """
+        if len(query) == 0:
+            msg = "the query has no objects; give at least one type or bearing."
+            raise InputError(msg)
+        if query.codes is None:
+            return np.full(len(query), len(self.codes))
+        rows = self.row_of[query.codes]
+        if (rows < 0).any():
+            msg = (
+                f"the query has an object of class code {int(query.codes[rows < 0][0])}, which no "
+                "cell of the database sees; leave it out, or give its class as not known "
+                f"(code {WILDCARD})."
+            )
+            raise InputError(msg)
+        return rows
+
+
+def noise_tables(
+    noise: Noise, *, taxonomy: Taxonomy, codes: NDArray[np.uint8], longest: int
+) -> tuple[tuple[NoiseTable, ...], NDArray[np.float64]]:
+    """Return the tables of a noise model.
+
+    Parameters
+    ----------
+    noise : NoiseSpec or NoiseMixture
+        The model.
+    taxonomy : Taxonomy
+        The classes that its names may mean.
+    codes : ndarray of uint8, shape (k,)
+        The classes that count; what the model says of others is left out.
+    longest : int
+        Length of the longest signature.
+
+    Returns
+    -------
+    tables : tuple of NoiseTable
+        One for each model of a mixture.
+    weights : ndarray of float64
+        Chance of each.
+
+    Raises
+    ------
+    InputError
+        If the model names a class that the taxonomy does not have, or gives a class no chance at
+        all of being named as one that counts.
+
+    Examples
+    --------
+    >>> from semsig_gis.catalog import paper_taxonomy
+    >>> from semsig_gis.noise import named_noise
+    >>> codes = np.array([1, 3], np.uint8)
+    >>> tables, weights = noise_tables(
+    ...     named_noise("generic"), taxonomy=paper_taxonomy(), codes=codes, longest=20
+    ... )
+    >>> len(tables), round(float(tables[1].missed[14, 0]), 3)
+    (3, 0.159)
+    """
+    specs, weights = (
+        (noise.specs, noise.weights) if isinstance(noise, NoiseMixture) else ((noise,), (1.0,))
+    )
+    names = {item.name: item.code for item in taxonomy.classes}
+    tables = tuple(_table(spec, names, codes, longest) for spec in specs)
+    return tables, np.asarray(weights, dtype=np.float64)
+
+
+def database_tables(
+    database: SignatureDatabase, noise: Noise
+) -> tuple[tuple[NoiseTable, ...], NDArray[np.float64]]:
+    """Return the tables of a noise model for the classes and lengths of a database.
+
+    Parameters
+    ----------
+    database : SignatureDatabase
+        The cells.
+    noise : NoiseSpec or NoiseMixture
+        The model.
+
+    Returns
+    -------
+    tables : tuple of NoiseTable
+        One for each model of a mixture.
+    weights : ndarray of float64
+        Chance of each.
+
+    Raises
+    ------
+    InputError
+        If the model does not fit the classes.
+    """
+    return noise_tables(
+        noise,
+        taxonomy=database.taxonomy,
+        codes=database.present_codes,
+        longest=min(int(database.lengths.max()), LONGEST_TABLE),
+    )
+
+
+def mean_table(tables: tuple[NoiseTable, ...], weights: NDArray[np.float64]) -> NoiseTable:
+    """Return one model in the middle of several.
+
+    Parameters
+    ----------
+    tables : tuple of NoiseTable
+        Models for the same classes and lengths.
+    weights : ndarray of float64
+        Chance of each; they sum to one.
+
+    Returns
+    -------
+    NoiseTable
+        Weighted means of the chances, and of the squares of the deviations.
+
+    Examples
+    --------
+    >>> from semsig_gis.catalog import paper_taxonomy
+    >>> from semsig_gis.noise import named_noise
+    >>> codes = np.array([1, 3], np.uint8)
+    >>> given = noise_tables(
+    ...     named_noise("generic"), taxonomy=paper_taxonomy(), codes=codes, longest=20
+    ... )
+    >>> mean_table(*given).clutter.round(3).tolist()
+    [1.167, 1.167]
+    """
+    names = np.stack([table.misnamed.mean(axis=0)[:, None] * table.others for table in tables])
+    named = np.tensordot(weights, names, axes=1)
+    totals = named.sum(axis=1, keepdims=True)
+    plain = np.tensordot(weights, np.stack([table.others for table in tables]), axes=1)
+    position = sum(
+        weight * table.position_sigma**2 for weight, table in zip(weights, tables, strict=True)
+    )
+
+    def mean(name: str, power: int = 1) -> NDArray[np.float64]:
+        stacked = np.stack([getattr(table, name) for table in tables]) ** power
+        return np.asarray(np.tensordot(weights, stacked, axes=1) ** (1 / power))
+
+    return NoiseTable(
+        codes=tables[0].codes,
+        missed=mean("missed"),
+        misnamed=mean("misnamed"),
+        others=np.divide(named, totals, out=plain, where=totals > 0),
+        clutter=mean("clutter"),
+        sigma=mean("sigma", 2),
+        position_sigma=float(position) ** 0.5,
+    )
+
+
+def _table(
+    spec: NoiseSpec, names: Mapping[str, int], codes: NDArray[np.uint8], longest: int
+) -> NoiseTable:
+    """Return the table of one model."""
+    rows = {code: row for row, code in enumerate(codes.tolist())}
+    count = len(codes)
+
+    def by_class(overall: float, special: Mapping[str, float]) -> NDArray[np.float64]:
+        values = np.full(count, float(overall))
+        for name, value in special.items():
+            code = _code(names, name)
+            if code in rows:
+                values[rows[code]] = value
+        return values
+
+    misnamed = by_class(spec.misnamed, spec.misnamed_by_class)
+    others = np.full((count, count), 1.0 / max(count - 1, 1))
+    np.fill_diagonal(others, 0.0)
+    for name, shares in spec.confusion.items():
+        row = _confusion_row(name, {_code(names, other): shares[other] for other in shares}, codes)
+        if _code(names, name) in rows:
+            kind = rows[names[name]]
+            misnamed[kind] = 1.0 - row[kind]
+            row[kind] = 0.0
+            if row.sum() > 0:
+                others[kind] = row / row.sum()
+    clutter = np.full(count, spec.clutter / count)
+    if spec.clutter_shares:
+        clutter = spec.clutter * by_class(0.0, spec.clutter_shares)
+    # A draw among L objects leaves each of them alone with chance 1 - 1/L.
+    spared = 1.0 - 1.0 / np.maximum(np.arange(longest + 1), 1)
+    kept = np.outer(spared**spec.missed_each, by_class(spec.detection, spec.detection_by_class))
+    right = np.outer(spared**spec.misnamed_each, 1.0 - misnamed)
+    return NoiseTable(
+        codes=codes,
+        missed=np.clip(1.0 - kept, LEAST_CHANCE, MOST_CHANCE),
+        misnamed=np.clip(1.0 - right, LEAST_CHANCE, MOST_CHANCE) if count > 1 else 0.0 * right,
+        others=others,
+        clutter=np.maximum(clutter, LEAST_CLUTTER / count),
+        sigma=by_class(spec.bearing_sigma, spec.bearing_sigma_by_class),
+        position_sigma=spec.position_sigma,
+    )
+
+
+def _confusion_row(
+    name: str, shares: Mapping[int, float], codes: NDArray[np.uint8]
+) -> NDArray[np.float64]:
+    """Return the chance of each class that counts, whatever the others had."""
+    row = np.array([shares.get(code, 0.0) for code in codes.tolist()])
+    if row.sum() <= 0:
+        msg = (
+            f"confusion row {name!r} of the noise gives no chance to any class that is seen; "
+            "give some chance to the class itself."
+        )
+        raise InputError(msg)
+    return np.asarray(row / row.sum())
+
+
+def _code(names: Mapping[str, int], name: str) -> int:
+    """Return the code of a class that a noise model names."""
+    if name not in names:
+        msg = (
+            f"the noise model names a class {name!r} that the database does not know"
+            f"{nearest_name(name, names)}; its classes are {', '.join(names)}."
+        )
+        raise InputError(msg)
+    return names[name]

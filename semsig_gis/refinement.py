@@ -1,0 +1,312 @@
+"""Where between the viewpoints of the grid a query was seen, from the street objects themselves.
+
+Five metres sideways turn the bearing of an object fifteen metres away by eighteen degrees, so that
+a query from between the viewpoints fits none of them well. The cells that are worth it are divided
+into four again and again, and each part is measured by what is seen from its middle, with the
+uncertainty of the place that is left in it.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from semsig_gis.errors import InputError
+from semsig_gis.noise import NoiseMixture
+from semsig_gis.noise_table import LONGEST_TABLE, noise_tables
+from semsig_gis.place_likelihood import place_loglik
+from semsig_gis.views import views_at
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from semsig_gis.noise import Noise
+    from semsig_gis.noise_table import NoiseTable
+    from semsig_gis.objects import StreetObjects
+    from semsig_gis.occlusion import Footprints
+    from semsig_gis.signatures import Signature
+    from semsig_gis.spatial_index import ObjectIndex
+    from semsig_gis.stored_index import StoredIndex
+
+__all__ = ["Refinement", "cell_noise", "refine"]
+
+KEPT = (1000, 400, 200, 100)
+"""How many parts are divided, level by level: cells, their quarters, and so on."""
+LEAST_CHANCE = 1e-6  # of a part, against the likeliest, to be divided
+TURNS = (7.5, 6.0, 4.5, 3.0)  # degrees to each side that are tried, level by level
+TURNS_A_SIDE = 3
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Refinement:
+    """The chances of places on and off the grid.
+
+    Parameters
+    ----------
+    places : ndarray of float64, shape (p, 2)
+        Middle of each square part of a cell, in metres.
+    sizes : ndarray of float64, shape (p,)
+        Length of its sides in metres.
+    loglik : ndarray of float64, shape (p,)
+        Log-likelihood of the query there, the mean over the part.
+    headings : ndarray of float64, shape (p,)
+        Degrees to add to the bearings of the query, the mean in each part; 0 where north is known.
+    heading_sigmas : ndarray of float64, shape (p,)
+        Their standard deviations.
+    chances : ndarray of float64, shape (p,)
+        Chances of the parts; they sum to one.
+    near : float
+        Metres around the best place over which it is averaged.
+
+    Examples
+    --------
+    >>> found = Refinement(
+    ...     places=np.array([[0.0, 0.0], [2.0, 0.0], [90.0, 0.0]]), sizes=np.full(3, 2.0),
+    ...     loglik=np.zeros(3), headings=np.zeros(3), heading_sigmas=np.zeros(3),
+    ...     chances=np.array([0.3, 0.3, 0.4]), near=25.0,
+    ... )
+    >>> found.xy, round(found.mass, 6)
+    ((1.0, 0.0), 0.6)
+    """
+
+    places: NDArray[np.float64]
+    sizes: NDArray[np.float64]
+    loglik: NDArray[np.float64]
+    headings: NDArray[np.float64]
+    heading_sigmas: NDArray[np.float64]
+    chances: NDArray[np.float64]
+    near: float
+
+    @property
+    def best(self) -> int:
+        """The part around which most of the chance lies."""
+        return self._around()[0]
+
+    @property
+    def mass(self) -> float:
+        """Chance that the place is within `near` of the best one."""
+        _, inside = self._around()
+        return float(self.chances[inside].sum())
+
+    @property
+    def xy(self) -> tuple[float, float]:
+        """The mean place around the best one, in metres."""
+        _, inside = self._around()
+        x, y = np.average(self.places[inside], axis=0, weights=self.chances[inside]).tolist()
+        return x, y
+
+    @property
+    def heading(self) -> float:
+        """Degrees to add to the bearings of the query there, in [-180, 180)."""
+        _, inside = self._around()
+        angles = np.radians(self.headings[inside])
+        mean = np.exp(1j * angles) @ self.chances[inside]
+        return (math.degrees(float(np.angle(mean))) + 180.0) % 360.0 - 180.0
+
+    @property
+    def covariance(self) -> NDArray[np.float64]:
+        """Of x, y (metres) and heading (degrees) around the best place, shape (3, 3)."""
+        _, inside = self._around()
+        weights = self.chances[inside] / self.chances[inside].sum()
+        turned = (self.headings[inside] - self.heading + 180.0) % 360.0 - 180.0
+        away = np.column_stack([self.places[inside] - self.xy, turned])
+        covariance = (weights[:, None] * away).T @ away
+        # The place may be anywhere in a part.
+        covariance[[0, 1], [0, 1]] += weights @ self.sizes[inside] ** 2 / 12.0
+        covariance[2, 2] += weights @ self.heading_sigmas[inside] ** 2
+        return np.asarray(covariance)
+
+    def _around(self) -> tuple[int, NDArray[np.bool_]]:
+        """Return the best part, and which parts are near it."""
+        order = np.argsort(-self.chances, kind="stable")[:BEST]
+        away = self.places[order, None] - self.places[None]
+        inside = np.hypot(away[..., 0], away[..., 1]) <= self.near
+        best = int(np.round(inside @ self.chances, 9).argmax())
+        return int(order[best]), inside[best]
+
+
+BEST = 300
+"""Likeliest parts among which the best place is looked for."""
+
+
+def cell_noise(noise: Noise, step: float) -> Noise:
+    """Return a noise model for queries from anywhere in a cell, not from its middle alone.
+
+    Parameters
+    ----------
+    noise : NoiseSpec or NoiseMixture
+        The model for a place that is known.
+    step : float
+        Side of a cell in metres.
+
+    Returns
+    -------
+    NoiseSpec or NoiseMixture
+        The model with ``step / 12 ** 0.5`` metres more of uncertainty of the place, each way.
+
+    Examples
+    --------
+    >>> from semsig_gis.noise import NoiseSpec
+    >>> round(cell_noise(NoiseSpec(), 10.0).position_sigma, 2)
+    2.89
+    """
+    if isinstance(noise, NoiseMixture):
+        specs = tuple(cell_noise(spec, step) for spec in noise.specs)
+        return replace(noise, specs=specs)  # type: ignore[arg-type]
+    sigma = math.hypot(noise.position_sigma, step / math.sqrt(12.0))
+    return replace(noise, position_sigma=sigma)
+
+
+def refine(
+    query: Signature,
+    cells: NDArray[np.float64],
+    noise: Noise,
+    *,
+    objects: StreetObjects,
+    index: ObjectIndex | StoredIndex,
+    step: float = 10.0,
+    radius: float = 30.0,
+    near: float = 25.0,
+    north_sigma: float = 0.0,
+    headings: NDArray[np.floating] | None = None,
+    log_prior: NDArray[np.float64] | None = None,
+    footprints: Footprints | None = None,
+) -> Refinement:
+    """Look for the place of a query within some cells.
+
+    Parameters
+    ----------
+    query : Signature
+        At least one object, with bearings; types may be unknown.
+    cells : ndarray of float64, shape (c, 2)
+        Middles of the likeliest cells in metres, likeliest first: of a ranking with the noise
+        model that `cell_noise` gives. Some hundred do.
+    noise : NoiseSpec or NoiseMixture
+        The noise model for a place that is known.
+    objects : StreetObjects
+        The objects of the city.
+    index : ObjectIndex or StoredIndex
+        R-tree over them.
+    step : float, default 10
+        Side of a cell in metres.
+    radius : float, default 30
+        Visibility range in metres of classes that have none of their own.
+    near : float, default 25
+        Metres around the best place that count as near.
+    north_sigma : float, default 0
+        Standard deviation in degrees of the north of the query: 0 where it is known, infinite
+        where it is not known at all.
+    headings : ndarray, shape (c,), optional
+        Likeliest degrees to add to the bearings in each cell (see `CellScores.heading`); needed
+        where north is not known.
+    log_prior : ndarray of float64, shape (c,), optional
+        What else is known of the cells, up to a constant.
+    footprints : Footprints, optional
+        Buildings; what they hide is not seen.
+
+    Returns
+    -------
+    Refinement
+        Chances of places.
+
+    Raises
+    ------
+    InputError
+        If the query has no bearings or a class that the city does not have, there is no cell, or
+        headings are missing.
+
+    Notes
+    -----
+    The likelihood is that of `semsig_gis.alignment`. A part of side s counts with an uncertainty
+    of the place of ``s / 12 ** 0.5`` each way, the deviation of places anywhere in it, so that
+    its likelihood stands for the mean over the part; chances are likelihood times area.
+    """
+    _check(cells, north_sigma, headings)
+    codes = np.unique(objects.codes)
+    tables, weights = noise_tables(
+        noise, taxonomy=objects.taxonomy, codes=codes, longest=LONGEST_TABLE
+    )
+    size = float(step)
+    parts = np.asarray(cells[: KEPT[0]], dtype=np.float64)
+    prior = np.zeros(len(parts)) if log_prior is None else np.asarray(log_prior)[: KEPT[0]]
+    turned = np.zeros(len(parts)) if headings is None else np.asarray(headings)[: KEPT[0]]
+    done: list[tuple[NDArray[np.float64], ...]] = []
+    for level, turn in enumerate(TURNS):
+        parts, prior, turned = _quarters(parts, size), np.repeat(prior, 4), np.repeat(turned, 4)
+        size /= 2.0
+        views = views_at(objects, parts, index=index, radius=radius, footprints=footprints)
+        spread = [_with_place(table, size) for table in tables]
+        reach = float(objects.taxonomy.ranges(radius).max())
+        steps = np.linspace(-turn, turn, 2 * TURNS_A_SIDE + 1) if north_sigma > 0 else np.zeros(1)
+        turns = turned[:, None] + steps
+        found = place_loglik(query, views, spread, weights, turns=turns, reach=reach)
+        if north_sigma > 0:
+            found += _log_chance(turns, steps[1] - steps[0], north_sigma)
+        loglik = np.logaddexp.reduce(found, axis=1)
+        shares = np.exp(found - loglik[:, None])
+        turned = (shares * turns).sum(axis=1)
+        sigmas = np.sqrt((shares * (turns - turned[:, None]) ** 2).sum(axis=1))
+        total = loglik + prior
+        divided = np.zeros(len(parts), np.bool_)
+        if level + 1 < len(TURNS):
+            best = np.argsort(-total, kind="stable")[: KEPT[level + 1]]
+            divided[best] = total[best] > total[best[0]] + math.log(LEAST_CHANCE)
+        kept = ~divided
+        sizes = np.full(len(parts), size)
+        done.append(
+            (parts[kept], sizes[kept], loglik[kept], prior[kept], turned[kept], sigmas[kept])
+        )
+        parts, prior, turned = parts[divided], prior[divided], turned[divided]
+    places, sizes, loglik, prior, turned, sigmas = (
+        np.concatenate(column) for column in zip(*done, strict=True)
+    )
+    weight = loglik + prior + 2.0 * np.log(sizes)
+    chances = np.exp(weight - weight.max())
+    return Refinement(
+        places=places,
+        sizes=sizes,
+        loglik=loglik,
+        headings=(turned + 180.0) % 360.0 - 180.0,
+        heading_sigmas=sigmas,
+        chances=chances / chances.sum(),
+        near=near,
+    )
+
+
+def _check(
+    cells: NDArray[np.float64],
+    north_sigma: float,
+    headings: NDArray[np.floating] | None,
+) -> None:
+    if not north_sigma >= 0:
+        msg = f"the deviation of north is {north_sigma} degrees; give 0 or more, or infinity."
+        raise InputError(msg)
+    if len(cells) == 0 or (headings is None and north_sigma > 0):
+        msg = (
+            f"{len(cells)} cells and {'no' if headings is None else 'some'} headings were given; "
+            "give at least one cell, and headings where north is not known."
+        )
+        raise InputError(msg)
+
+
+def _quarters(parts: NDArray[np.float64], size: float) -> NDArray[np.float64]:
+    """Return the middles of the four quarters of squares."""
+    corners = np.array([[-1.0, -1.0], [-1.0, 1.0], [1.0, -1.0], [1.0, 1.0]]) * (size / 4.0)
+    return np.asarray((parts[:, None] + corners).reshape(-1, 2))
+
+
+def _with_place(table: NoiseTable, size: float) -> NoiseTable:
+    """Return a noise model for places anywhere in a square."""
+    return replace(table, position_sigma=math.hypot(table.position_sigma, size / math.sqrt(12.0)))
+
+
+def _log_chance(turns: NDArray[np.float64], step: float, north_sigma: float) -> NDArray[np.float64]:
+    """Return the logarithm of the chance of a turn, one step wide."""
+    if math.isinf(north_sigma):
+        return np.full(turns.shape, math.log(step / 360.0))
+    away = (turns + 180.0) % 360.0 - 180.0
+    scale = math.log(step / (north_sigma * math.sqrt(2.0 * math.pi)))
+    return np.asarray(scale - 0.5 * (away / north_sigma) ** 2)

@@ -1,0 +1,93 @@
+"""Random databases, queries and noise models for the tests of the likelihood method."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from hypothesis import strategies as st
+from pyproj import CRS
+
+from semsig_gis.catalog import paper_taxonomy
+from semsig_gis.database import BEARING_UNITS, SignatureDatabase
+from semsig_gis.grid import GridSpec
+from semsig_gis.noise import NoiseMixture, NoiseSpec, named_noise
+from semsig_gis.signatures import Signature, SignatureSpec
+
+if TYPE_CHECKING:
+    from semsig_gis.noise import Noise
+
+TAXONOMY = paper_taxonomy()
+
+
+def random_database(
+    seed: int, *, cells: int = 40, longest: int = 12, classes: int = 4
+) -> SignatureDatabase:
+    """Return cells with one to so many random objects of the first classes."""
+    rng = np.random.default_rng(seed)
+    lengths = rng.integers(1, longest + 1, cells)
+    entries = int(lengths.sum())
+    owner = np.repeat(np.arange(cells), lengths)
+    units = rng.integers(0, BEARING_UNITS, entries)
+    order = np.lexsort((units, owner))
+    places = rng.choice(400, cells, replace=False)
+    columns, rows = np.divmod(np.sort(places), 20)
+    return SignatureDatabase(
+        columns=columns.astype(np.int32),
+        rows=rows.astype(np.int32),
+        offsets=np.concatenate([[0], np.cumsum(lengths)]),
+        codes=rng.integers(1, classes + 1, entries).astype(np.uint8),
+        bearing_units=units[order].astype(np.uint16),
+        distance_units=rng.integers(0, 256, entries).astype(np.uint8),
+        grid=GridSpec(),
+        spec=SignatureSpec(),
+        taxonomy=TAXONOMY,
+        crs=CRS("EPSG:2154"),
+    )
+
+
+def random_query(database: SignatureDatabase, seed: int, *, size: int) -> Signature:
+    """Return a query of random objects, one in four near an object of the first cell."""
+    rng = np.random.default_rng([seed, 7])
+    known = np.append(database.present_codes, 0)
+    codes = rng.choice(known, size)
+    bearings = rng.uniform(0, 360, size)
+    near = rng.random(size) < 0.25
+    first = database.bearings[: database.offsets[1]]
+    bearings[near] = (rng.choice(first, int(near.sum())) + 3.0) % 360.0
+    return Signature(codes, bearings)
+
+
+chances = st.floats(0.05, 0.95)
+
+
+@st.composite
+def noise_specs(draw: st.DrawFn) -> NoiseSpec:
+    """Draw a noise model that uses every kind of field."""
+    wrong = draw(st.floats(0.05, 0.5))
+    return NoiseSpec(
+        detection=draw(chances),
+        detection_by_class=draw(st.dictionaries(st.just("street_light"), chances)),
+        misnamed=draw(st.floats(0.0, 0.5)),
+        confusion=draw(
+            st.sampled_from(
+                [{}, {"street_light": {"street_light": 1 - wrong, "alignment_tree": wrong}}]
+            )
+        ),
+        clutter=draw(st.floats(0.05, 8.0)),
+        clutter_shares=draw(
+            st.sampled_from([{}, {"street_light": 0.5, "alignment_tree": 0.25, "indicator": 0.25}])
+        ),
+        bearing_sigma=draw(st.floats(1.0, 60.0)),
+        bearing_sigma_by_class=draw(st.dictionaries(st.just("indicator"), st.floats(1.0, 30.0))),
+        missed_each=draw(st.sampled_from([0.0, 1.5])),
+        misnamed_each=draw(st.sampled_from([0.0, 0.5])),
+    )
+
+
+def mixtures() -> st.SearchStrategy[Noise]:
+    """Draw a noise model, single or mixed."""
+    pair = st.tuples(noise_specs(), noise_specs()).map(
+        lambda two: NoiseMixture(specs=two, weights=(0.3, 0.7))
+    )
+    return st.one_of(noise_specs(), pair, st.just(named_noise("generic")))

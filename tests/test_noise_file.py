@@ -1,0 +1,42 @@
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import pytest
+
+from semsig_gis.errors import InputError
+from semsig_gis.noise import NOISES, NoiseSpec, named_noise
+from semsig_gis.noise_file import open_noise, save_noise
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+
+@pytest.mark.parametrize("name", list(NOISES))
+def test_a_model_survives_a_file(name: str, tmp_path: Path) -> None:
+    save_noise(named_noise(name), tmp_path / "noise.json")
+    assert open_noise(tmp_path / "noise.json") == named_noise(name)
+
+
+def test_a_toml_file_is_read(tmp_path: Path) -> None:
+    file = tmp_path / "noise.toml"
+    file.write_text(
+        "detection = 0.7\n[confusion.bench]\nbench = 0.9\nbus_stop = 0.1\n"
+        "[detection_by_class]\nbench = 0.5\n"
+    )
+    noise = open_noise(file)
+    assert noise == NoiseSpec(
+        detection=0.7,
+        confusion={"bench": {"bench": 0.9, "bus_stop": 0.1}},
+        detection_by_class={"bench": 0.5},
+    )
+
+
+def test_a_file_that_holds_no_model_is_refused(tmp_path: Path) -> None:
+    file = tmp_path / "noise.json"
+    file.write_text("{")
+    with pytest.raises(InputError, match=r"noise\.json cannot be read"):
+        open_noise(file)
+    file.write_text("[1]")
+    with pytest.raises(InputError, match="a table of its fields"):
+        open_noise(file)

@@ -1,0 +1,79 @@
+from __future__ import annotations
+
+import math
+
+import geopandas as gpd
+import numpy as np
+import pytest
+import shapely
+from noisy_cells import random_database
+
+from semsig_gis.errors import CrsError, InputError
+from semsig_gis.posterior import posterior
+from semsig_gis.priors import area_prior, position_prior, weight_prior
+
+DATABASE = random_database(3, cells=120)
+BOX = shapely.box(0.0, 0.0, 100.0, 100.0)
+
+
+def test_an_area_keeps_its_cells_alone() -> None:
+    prior = area_prior(DATABASE, BOX)
+    inside = (DATABASE.xy <= 100.0).all(axis=1)
+    assert inside.any()
+    assert np.array_equal(np.isfinite(prior), inside)
+    assert len(np.unique(prior[inside])) == 1
+
+
+def test_a_place_may_lie_outside_the_area_all_the_same() -> None:
+    chances = np.exp(area_prior(DATABASE, BOX, outside=0.2))
+    inside = (DATABASE.xy <= 100.0).all(axis=1)
+    assert chances[inside].sum() == pytest.approx(0.8)
+    assert chances[~inside].sum() == pytest.approx(0.2)
+
+
+def test_an_area_may_come_in_other_coordinates() -> None:
+    degrees = gpd.GeoSeries([BOX], crs=DATABASE.crs).to_crs("EPSG:4326").iloc[0]
+    prior = area_prior(DATABASE, degrees, crs="EPSG:4326")
+    assert np.array_equal(np.isfinite(prior), np.isfinite(area_prior(DATABASE, BOX)))
+
+
+def test_a_position_is_a_normal_density() -> None:
+    prior = position_prior(DATABASE, (50.0, 70.0), sigma=20.0)
+    chances = np.exp(prior)
+    assert chances.sum() == pytest.approx(1.0)
+    away = np.hypot(*(DATABASE.xy - [50.0, 70.0]).T)
+    slow = [math.exp(-0.5 * (one / 20.0) ** 2) for one in away]
+    assert chances == pytest.approx(np.array(slow) / sum(slow))
+    far = position_prior(DATABASE, (1e7, 0.0), sigma=1.0)
+    assert np.isfinite(far).any()
+
+
+def test_weights_and_priors_add_up() -> None:
+    weights = np.arange(len(DATABASE), dtype=float)
+    both = weight_prior(DATABASE, weights) + area_prior(DATABASE, BOX)
+    chances = posterior(DATABASE, np.zeros(len(DATABASE)), log_prior=both).chances
+    inside = (DATABASE.xy <= 100.0).all(axis=1)
+    assert chances == pytest.approx(weights * inside / (weights * inside).sum())
+
+
+def test_priors_that_say_nothing_usable_are_refused() -> None:
+    with pytest.raises(InputError, match="excludes every cell of the database; widen it"):
+        area_prior(DATABASE, shapely.box(-9, -9, -8, -8))
+    with pytest.raises(InputError, match="give a polygon"):
+        area_prior(DATABASE, shapely.Point(3, 3))
+    with pytest.raises(InputError, match="give 0 to below 1"):
+        area_prior(DATABASE, BOX, outside=1.0)
+    with pytest.raises(CrsError, match="'EPSG:0' of the area cannot be read"):
+        area_prior(DATABASE, BOX, crs="EPSG:0")
+    for sigma in (0.0, math.nan, math.inf):
+        with pytest.raises(InputError, match="give metres above 0"):
+            position_prior(DATABASE, (0.0, 0.0), sigma=sigma)
+    with pytest.raises(InputError, match="give x and y in metres"):
+        position_prior(DATABASE, (math.nan, 0.0), sigma=1.0)
+    with pytest.raises(InputError, match="3 weights for 120 cells"):
+        weight_prior(DATABASE, [1, 2, 3])
+    for bad in (-1.0, math.nan):
+        with pytest.raises(InputError, match="give 0 or more"):
+            weight_prior(DATABASE, np.full(120, bad))
+    with pytest.raises(InputError, match="excludes every cell"):
+        weight_prior(DATABASE, np.zeros(120))
