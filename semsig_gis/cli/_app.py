@@ -7,11 +7,13 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from semsig_gis.console import print_rows, remark
+from semsig_gis.console import print_json, print_rows, remark
 from semsig_gis.errors import InputError
 
 if TYPE_CHECKING:
+    from semsig_gis.drift import UpdateReport
     from semsig_gis.evaluation import Evaluation
+    from semsig_gis.quality import QualityReport
     from semsig_gis.tables import Table
 
 
@@ -59,6 +61,16 @@ def print_evaluation(evaluation: Evaluation) -> None:
 
     for table in evaluation_tables(evaluation):
         print_table(table)
+
+
+def print_report(report: QualityReport | UpdateReport, *, as_json: bool) -> None:
+    if as_json:
+        print_json(report.to_dict())
+        return
+    for title, columns, rows, note in report.tables():
+        print_rows(title, columns, rows)
+        if note:
+            typer.echo(note)
 
 
 def print_table(table: Table) -> None:

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from semsig_gis.cli._app import AsJson, Database, app, numbers, print_table
-from semsig_gis.console import print_json, print_rows, progress, remark
+from semsig_gis.cli._app import AsJson, Database, app, numbers, print_report, print_table
+from semsig_gis.console import print_json, progress, remark
 from semsig_gis.errors import DatabaseError, InputError
 
 if TYPE_CHECKING:
@@ -162,13 +162,7 @@ def update(
         report = update_file(database, open_objects(objects), out=out, progress=advance)
     for note in report.notes:
         remark(note)
-    if as_json:
-        print_json(report.to_dict())
-        return
-    for title, columns, rows, note in report.tables():
-        print_rows(title, columns, rows)
-        if note:
-            typer.echo(note)
+    print_report(report, as_json=as_json)
 
 
 @app.command()

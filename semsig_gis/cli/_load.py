@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
-from semsig_gis.cli._app import AsJson, app
-from semsig_gis.console import print_json, print_rows, progress, remark
+from semsig_gis.cli._app import AsJson, app, print_report
+from semsig_gis.console import progress, remark
 
 if TYPE_CHECKING:
     from semsig_gis.loading import Loaded
@@ -153,11 +153,6 @@ def _save_loaded(
             save_surroundings(table, path)
     for note in loaded.notes:
         remark(note)
-    if as_json:
-        print_json(report.to_dict())
-        return
-    for title, columns, rows, remarks in report.tables():
-        print_rows(title, columns, rows)
-        if remarks:
-            typer.echo(remarks)
-    typer.echo(f"street objects: {out}")
+    print_report(report, as_json=as_json)
+    if not as_json:
+        typer.echo(f"street objects: {out}")
