@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     from semsig_gis.grid import GridSpec
     from semsig_gis.layer_spec import LayerSpec
     from semsig_gis.likelihood import LikelihoodIndex, build_index
-    from semsig_gis.likelihood_file import stored_index
+    from semsig_gis.likelihood_file import ready_index
     from semsig_gis.loading import Loaded, assemble, choose_layers, read_files
     from semsig_gis.locating import Location, locate
     from semsig_gis.maps import evaluation_map, localization_map, save_map
@@ -122,12 +122,12 @@ _HOMES = {
     "read_files": "loading",
     "read_layer": "sources.vector_file",
     "read_surroundings": "surroundings",
+    "ready_index": "likelihood_file",
     "save_database": "database_file",
     "save_map": "maps",
     "save_objects": "objects",
     "save_surroundings": "surroundings",
     "save_with_store": "store",
-    "stored_index": "likelihood_file",
     "suggest_catalog": "suggest",
     "synthetic_city": "sources.synthetic",
     "synthetic_surroundings": "sources.synthetic",
@@ -195,12 +195,12 @@ __all__ = [
     "read_files",
     "read_layer",
     "read_surroundings",
+    "ready_index",
     "save_database",
     "save_map",
     "save_objects",
     "save_surroundings",
     "save_with_store",
-    "stored_index",
     "suggest_catalog",
     "synthetic_city",
     "synthetic_surroundings",

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from semsig_gis.likelihood import LikelihoodIndex
     from semsig_gis.noise import Noise
 
-__all__ = ["SUFFIX", "index_path", "open_index", "save_index", "stored_index"]
+__all__ = ["SUFFIX", "index_path", "open_index", "ready_index", "save_index"]
 
 SUFFIX = ".likelihood"
 KIND = "semsig likelihood index"
@@ -62,7 +62,7 @@ def index_path(database_path: str | Path, noise: Noise) -> Path:
     return path.with_name(f"{path.name}.{plain}-{mark}{SUFFIX}")
 
 
-def stored_index(
+def ready_index(
     database: SignatureDatabase,
     noise: Noise,
     path: str | Path,
@@ -106,8 +106,8 @@ def stored_index(
     >>> database = build_database(objects)
     >>> with tempfile.TemporaryDirectory() as folder:
     ...     path = f"{folder}/city.likelihood"
-    ...     index = stored_index(database, named_noise("light"), path, note=print)
-    ...     again = stored_index(database, named_noise("light"), path, note=print)
+    ...     index = ready_index(database, named_noise("light"), path, note=print)
+    ...     again = ready_index(database, named_noise("light"), path, note=print)
     The likelihood index does not exist yet and is built.
     """
 

@@ -86,18 +86,13 @@ class Localization:
             and ``candidates``, a list with the columns of `candidates` and ``lon``, ``lat``
             (degrees, WGS 84).
         """
-        codes, bearings = self.query.codes, self.query.bearings
         to_degrees = Transformer.from_crs(self.crs, "EPSG:4326", always_xy=True)
         lon, lat = to_degrees.transform(
             self.candidates["x"].to_numpy(), self.candidates["y"].to_numpy()
         )
         listed = self.candidates.assign(lon=np.round(lon, 7), lat=np.round(lat, 7))
         return {
-            "query": {
-                "types": None if codes is None else self.taxonomy.decode(codes),
-                "bearings": None if bearings is None else bearings.tolist(),
-                "length": len(self.query),
-            },
+            "query": self.query.to_dict(self.taxonomy),
             "method": str(self.method),
             "used": self.used,
             "cells": self.cells,

@@ -103,13 +103,8 @@ class Location:
             self.candidates["x"].to_numpy(), self.candidates["y"].to_numpy()
         )
         listed = self.candidates.assign(lon=np.round(lon, 7), lat=np.round(lat, 7))
-        codes, bearings = self.query.codes, self.query.bearings
         return {
-            "query": {
-                "types": None if codes is None else database.taxonomy.decode(codes),
-                "bearings": None if bearings is None else bearings.tolist(),
-                "length": len(self.query),
-            },
+            "query": self.query.to_dict(database.taxonomy),
             "noise": self.noise,
             "cells": len(database),
             "answered": self.answer.given,

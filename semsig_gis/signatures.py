@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -194,6 +194,31 @@ class Signature:
     def __len__(self) -> int:  # noqa: D105
         part = self.codes if self.codes is not None else self.bearings
         return 0 if part is None else len(part)
+
+    def to_dict(self, taxonomy: Taxonomy) -> dict[str, Any]:
+        """Return the signature as plain values that JSON can hold.
+
+        Parameters
+        ----------
+        taxonomy : Taxonomy
+            Classes of the codes.
+
+        Returns
+        -------
+        dict
+            ``types`` (symbols) and ``bearings`` (degrees), None where unknown, and ``length``.
+
+        Examples
+        --------
+        >>> from semsig_gis.catalog import paper_taxonomy
+        >>> Signature(np.array([3, 1], np.uint8), None).to_dict(paper_taxonomy())
+        {'types': 'DB', 'bearings': None, 'length': 2}
+        """
+        return {
+            "types": None if self.codes is None else taxonomy.decode(self.codes),
+            "bearings": None if self.bearings is None else self.bearings.tolist(),
+            "length": len(self),
+        }
 
     def levels(self, levels: int) -> NDArray[np.uint8]:
         """Return the angle levels.

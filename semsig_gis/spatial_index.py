@@ -15,9 +15,9 @@ from rtree import index as rtree_index
 from semsig_gis.errors import InputError
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
+    from numpy.typing import ArrayLike, NDArray
 
-__all__ = ["ObjectIndex", "PackedIndex"]
+__all__ = ["ObjectIndex", "PackedIndex", "checked_points", "tree_pairs"]
 
 # More than the distance between neighbouring floats anywhere on Earth.
 ROUNDING_M = 1e-6
@@ -50,7 +50,7 @@ class ObjectIndex:
     """
 
     def __init__(self, xy: NDArray[np.float64]) -> None:
-        self._xy = _checked(xy)
+        self._xy = checked_points(xy)
         self._tree = rtree_index.Index((np.arange(len(self._xy)), self._xy, self._xy))
 
     def __reduce__(self) -> str | tuple[object, ...]:  # noqa: D105
@@ -73,12 +73,7 @@ class ObjectIndex:
         viewpoint, point : ndarray of int64, shape (p,)
             Row numbers, ordered by viewpoint.
         """
-        places = np.ascontiguousarray(viewpoints, dtype=np.float64)
-        reach = _a_touch_more(radius)
-        found, counts = self._tree.intersection_v(places - reach, places + reach)
-        point = found.astype(np.int64)
-        viewpoint = np.repeat(np.arange(len(places)), counts.astype(np.int64))
-        return _near(viewpoint, point, places, self._xy, radius)
+        return tree_pairs(self._tree, self._xy, viewpoints, radius=radius)
 
 
 class PackedIndex:
@@ -105,7 +100,7 @@ class PackedIndex:
     """
 
     def __init__(self, xy: NDArray[np.float64], points: NDArray[np.object_] | None = None) -> None:
-        self._xy = _checked(xy)
+        self._xy = checked_points(xy)
         if points is None:
             points = np.asarray(shapely.points(self._xy))
         self._tree = shapely.STRtree(points)
@@ -158,12 +153,77 @@ class PackedIndex:
         return box, point
 
 
-def _checked(xy: NDArray[np.float64]) -> NDArray[np.float64]:
+def checked_points(xy: ArrayLike) -> NDArray[np.float64]:
+    """Return a copy of the points of an R-tree, or say why there can be none.
+
+    Parameters
+    ----------
+    xy : array_like, shape (n, 2)
+        Positions in metres.
+
+    Returns
+    -------
+    ndarray of float64, shape (n, 2)
+        The same, in rows that follow each other.
+
+    Raises
+    ------
+    InputError
+        If there is no point, or one is not finite.
+
+    Examples
+    --------
+    >>> checked_points([(0, 1)]).tolist()
+    [[0.0, 1.0]]
+    """
     points = np.array(xy, dtype=np.float64, order="C")  # a copy, as the tree has one too
     if len(points) == 0 or not np.isfinite(points).all():
         msg = "an R-tree needs at least one point, and finite coordinates."
         raise InputError(msg)
     return points
+
+
+def tree_pairs(
+    tree: rtree_index.Index,
+    xy: NDArray[np.float64],
+    viewpoints: ArrayLike,
+    *,
+    radius: float,
+    rows: NDArray[np.int64] | None = None,
+) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Return every pair of viewpoint and point within a radius, as a tree finds them.
+
+    Parameters
+    ----------
+    tree : rtree.index.Index
+        Over the points, by number.
+    xy : ndarray of float64, shape (n, 2)
+        Positions of the points in metres.
+    viewpoints : array_like, shape (v, 2)
+        Places to look from, in metres.
+    radius : float
+        Metres; a point at exactly this distance counts.
+    rows : ndarray of int64, optional
+        Row in `xy` of each number of the tree; the number itself by default.
+
+    Returns
+    -------
+    viewpoint, point : ndarray of int64, shape (p,)
+        Row numbers, ordered by viewpoint.
+
+    Examples
+    --------
+    >>> xy = np.array([[0.0, 0.0], [50.0, 0.0]])
+    >>> tree = rtree_index.Index((np.arange(2), xy, xy))
+    >>> tree_pairs(tree, xy, [(3.0, 4.0)], radius=5.0)
+    (array([0]), array([0]))
+    """
+    places = np.ascontiguousarray(viewpoints, dtype=np.float64)
+    reach = _a_touch_more(radius)
+    found, counts = tree.intersection_v(places - reach, places + reach)
+    number = found.astype(np.int64)
+    viewpoint = np.repeat(np.arange(len(places)), counts.astype(np.int64))
+    return _near(viewpoint, number if rows is None else rows[number], places, xy, radius)
 
 
 def _a_touch_more(radius: float) -> float:

@@ -15,6 +15,7 @@ from rtree import index as rtree_index
 from rtree.exceptions import RTreeError
 
 from semsig_gis.errors import InputError
+from semsig_gis.spatial_index import checked_points, tree_pairs
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -39,8 +40,6 @@ EDIT_BYTES = 256
 EDITS_BYTES = 1 << 16
 # So few edits are quick in any case.
 FEW_EDITS = 1000
-# More than the distance between neighbouring floats anywhere on Earth.
-ROUNDING_M = 1e-6
 
 
 class StoredIndex:
@@ -114,7 +113,7 @@ class StoredIndex:
         InputError
             If there is no point, or one is not finite, or the temporary folder is full.
         """
-        points = _checked(xy)
+        points = checked_points(xy)
         numbers = np.arange(len(points))
         with _new_folder() as folder:
             packed = _tree(folder, (numbers, points, points))
@@ -144,7 +143,7 @@ class StoredIndex:
             If the points are not as many as were saved, or the files are damaged or cannot be
             copied.
         """
-        points = _checked(xy)
+        points = checked_points(xy)
         try:
             numbers = np.load(Path(folder, NUMBERS_FILE), allow_pickle=False)
         except (OSError, ValueError) as error:
@@ -192,7 +191,7 @@ class StoredIndex:
         >>> moved.pairs_within(np.array([[0.0, 0.0]]), radius=5.0)[1].tolist()
         [1]
         """
-        points = _checked(xy)
+        points = checked_points(xy)
         gone = np.ones(len(self), bool)
         gone[kept[kept >= 0]] = False
         new = np.flatnonzero(kept < 0)
@@ -232,14 +231,7 @@ class StoredIndex:
         viewpoint, point : ndarray of int64, shape (p,)
             Row numbers, ordered by viewpoint.
         """
-        places = np.ascontiguousarray(viewpoints, dtype=np.float64)
-        reach = radius * (1 + 1e-12) + ROUNDING_M  # the distance below decides alone
-        found, counts = self._tree.intersection_v(places - reach, places + reach)
-        viewpoint = np.repeat(np.arange(len(places)), counts.astype(np.int64))
-        point = self._rows[found.astype(np.int64)]
-        delta = self._xy[point] - places[viewpoint]
-        near = np.hypot(delta[:, 0], delta[:, 1]) <= radius
-        return viewpoint[near], point[near]
+        return tree_pairs(self._tree, self._xy, viewpoints, radius=radius, rows=self._rows)
 
 
 def _tree(
@@ -254,14 +246,6 @@ def _tree(
         pagesize=PAGE_BYTES,
     )
     return rtree_index.Index(str(folder / NAME), *arrays, properties=properties)
-
-
-def _checked(xy: ArrayLike) -> NDArray[np.float64]:
-    points = np.array(xy, dtype=np.float64, order="C")  # a copy, as the tree has one too
-    if len(points) == 0 or not np.isfinite(points).all():
-        msg = "an R-tree needs at least one point, and finite coordinates."
-        raise InputError(msg)
-    return points
 
 
 @contextlib.contextmanager

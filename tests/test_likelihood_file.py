@@ -8,7 +8,7 @@ from noisy_cells import random_database, random_query
 
 from semsig_gis.errors import DatabaseError
 from semsig_gis.likelihood import build_index
-from semsig_gis.likelihood_file import index_path, open_index, save_index, stored_index
+from semsig_gis.likelihood_file import index_path, open_index, ready_index, save_index
 from semsig_gis.noise import NoiseSpec, named_noise
 
 if TYPE_CHECKING:
@@ -66,11 +66,11 @@ def test_a_damaged_file_is_refused_and_then_renewed(how: str, tmp_path: Path) ->
     with pytest.raises(DatabaseError, match="damaged"):
         open_index(DATABASE, NOISE, path)
     notes: list[str] = []
-    index = stored_index(DATABASE, NOISE, path, note=notes.append)
+    index = ready_index(DATABASE, NOISE, path, note=notes.append)
     assert len(notes) == 1
     assert notes[0].startswith("The likelihood index is built again: ")
     assert np.array_equal(index.columns, build_index(DATABASE, NOISE).columns)
-    stored_index(DATABASE, NOISE, path, note=notes.append)
+    ready_index(DATABASE, NOISE, path, note=notes.append)
     assert len(notes) == 1
 
 
@@ -81,7 +81,7 @@ def test_a_stale_file_is_told_and_renewed(tmp_path: Path) -> None:
         open_index(DATABASE, NOISE, path)
     notes: list[str] = []
     done: list[tuple[int, int]] = []
-    stored_index(
+    ready_index(
         DATABASE,
         NOISE,
         path,
@@ -102,7 +102,7 @@ def test_a_missing_file_is_refused(tmp_path: Path) -> None:
 def test_where_no_file_can_be_written_the_index_is_kept_in_memory(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("in the way of a folder")
     notes: list[str] = []
-    index = stored_index(DATABASE, NOISE, tmp_path / "file" / "x", note=notes.append)
+    index = ready_index(DATABASE, NOISE, tmp_path / "file" / "x", note=notes.append)
     assert "kept in memory only" in notes[-1]
     assert len(index.constants) == 150
-    assert stored_index(DATABASE, NOISE, tmp_path / "file" / "x").step == index.step
+    assert ready_index(DATABASE, NOISE, tmp_path / "file" / "x").step == index.step

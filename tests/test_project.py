@@ -145,6 +145,11 @@ def test_every_module_is_documented_and_tested() -> None:
     assert {f"test_{name}" for name in untested} - tests == set()
 
 
+def test_no_public_name_is_also_a_module() -> None:
+    # Importing such a module would put it in the place of the name.
+    assert {f"semsig_gis.{name}" for name in semsig_gis.__all__} & modules() == set()
+
+
 def test_the_layers_are_told_as_they_are_checked(pyproject: dict[str, Any]) -> None:
     contracts = pyproject["tool"]["importlinter"]["contracts"]
     (layers,) = (contract["layers"] for contract in contracts if contract["type"] == "layers")

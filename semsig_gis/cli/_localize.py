@@ -142,7 +142,7 @@ def _by_likelihood(
     **known: Any,  # noqa: ANN401 - as _prior takes them
 ) -> tuple[Taxonomy, Callable[[Signature], Location]]:
     from semsig_gis.database_file import open_database
-    from semsig_gis.likelihood_file import index_path, stored_index
+    from semsig_gis.likelihood_file import index_path, ready_index
     from semsig_gis.locating import locate
     from semsig_gis.noise import NOISES, named_noise
     from semsig_gis.noise_file import open_noise
@@ -152,7 +152,7 @@ def _by_likelihood(
     opened = open_database(path)
     prior = _prior(opened, **known)
     with progress("building the likelihood index") as advance:
-        index = stored_index(opened, model, index_path(path, model), note=remark, progress=advance)
+        index = ready_index(opened, model, index_path(path, model), note=remark, progress=advance)
 
     def answer(query: Signature) -> Location:
         return locate(index, query, north_sigma=north_sigma, log_prior=prior, top=top)
