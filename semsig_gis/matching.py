@@ -10,7 +10,7 @@ import math
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import partial
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
 import pandas as pd
@@ -37,6 +37,8 @@ if TYPE_CHECKING:
     _SecondStage = Callable[[NDArray[np.int64]], NDArray[np.float32]]
 
 __all__ = ["DEFAULT_METHOD", "Localization", "Method", "localize", "score_cells"]
+
+_Value = TypeVar("_Value", bound=np.generic)
 
 # Equal scores must come out equal, however they were added up, or ties are broken by rounding.
 # Real differences between scores are far larger than this step, and float32 holds its multiples
@@ -279,15 +281,15 @@ def _two_stage(
     The second stage gives the distances to the distinct angle sequences that it is asked for. The
     gate is that of all cells, where these are a part of them.
     """
-    first = _spread(_on_steps(by_types), types)
-    cut = _cut(method, first) if gate is None else gate.cut
-    kept = np.flatnonzero(first <= cut)
+    first = _on_steps(by_types)
+    cut = _cut(method, first, types) if gate is None else gate.cut
+    kept = np.flatnonzero(_spread(first <= cut, types))
     second = second_stage(angles.inverse[kept])
     fused = _fused(method, by_types, types.inverse[kept], second, np.arange(len(kept)))
     worst = fused.max() if gate is None else gate.worst
     # Behind every kept cell even where the gap is lost in rounding, as on a large raw scale.
     behind = np.nextafter(worst, np.float32(np.inf))
-    scores: NDArray[np.float32] = np.maximum(worst + (first - cut), behind)
+    scores = _spread(np.maximum(worst + (first - cut), behind), types)
     scores[kept] = fused
     return scores
 
@@ -306,11 +308,15 @@ def _kept(method: Method, cells: int) -> int:
     return math.ceil(Fraction(str(method.keep)) * cells / 100)
 
 
-def _cut(method: Method, first: NDArray[np.float32]) -> np.float32:
-    """Return the worst score of the first stage that passes."""
-    count = _kept(method, len(first))
-    cut: np.float32 = np.partition(first, count - 1)[count - 1]
-    return cut
+def _cut(method: Method, first: NDArray[np.float32], types: SequenceTable) -> np.float32:
+    """Return the worst score of the first stage that passes, given that of each sequence."""
+    count = _kept(method, len(types.inverse))
+    if not method.normalized:  # raw distances may be negative, or large
+        each = _spread(first, types)
+        return np.float32(np.partition(each, count - 1)[count - 1])
+    steps = np.rint(first / _SCORE_STEP).astype(np.int64)
+    cells = np.bincount(steps, weights=types.counts)
+    return np.float32(np.searchsorted(np.cumsum(cells), count) * _SCORE_STEP)
 
 
 def _gate_of_parts(database: PartitionedDatabase, query: Signature, method: Method) -> _Gate:
@@ -397,10 +403,10 @@ def _fused(
     return scores
 
 
-def _spread(distances: NDArray[np.float32], table: SequenceTable) -> NDArray[np.float32]:
-    """Give every cell the distance of its sequence."""
+def _spread(values: NDArray[_Value], table: SequenceTable) -> NDArray[_Value]:
+    """Give every cell the value of its sequence."""
     # The indices are in range, and "wrap" is the quickest mode.
-    return distances.take(table.inverse, mode="wrap")
+    return values.take(table.inverse, mode="wrap")
 
 
 def _on_steps(scores: NDArray[np.floating]) -> NDArray[np.float32]:

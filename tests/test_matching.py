@@ -5,6 +5,7 @@ import json
 import math
 import tempfile
 import weakref
+from fractions import Fraction
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -113,7 +114,8 @@ def slow_scores(database: SignatureDatabase, query: Signature, method: Method) -
     if method.keep is None:
         return fused
     first_stage = [float(np.rint(value * 2**16)) / 2**16 for value in found["types"]]
-    cut = sorted(first_stage)[math.ceil(len(first_stage) * method.keep / 100) - 1]
+    count = math.ceil(Fraction(str(method.keep)) * len(first_stage) / 100)
+    cut = sorted(first_stage)[count - 1]
     worst = max(value for value, one in zip(fused, first_stage, strict=True) if one <= cut)
     return [
         value if one <= cut else worst + one - cut
@@ -224,6 +226,20 @@ def test_the_rest_follows_in_the_order_of_the_first_stage(method: str, keep: flo
         np.unique(scores[rest], return_inverse=True)[1],
         np.unique(first[rest], return_inverse=True)[1],
     )
+
+
+@settings(max_examples=40)
+@given(
+    st.integers(0, 1000),
+    st.sampled_from(["edit+edit", "histogram+jaccard", "jaccard+edit:raw", "histogram+edit:raw"]),
+    st.floats(0.01, 100),
+)
+def test_what_is_kept_is_what_sorting_all_cells_keeps(seed: int, text: str, keep: float) -> None:
+    database = database_of(random_cells(80, seed=seed))
+    method = Method.parse(f"{text}:{keep}%")
+    query = database.signature(seed % 80)
+    (scores,) = score_cells(database, [query], method)
+    np.testing.assert_allclose(scores, slow_scores(database, query, method), atol=2**-15)
 
 
 def test_the_rest_stays_behind_where_the_gap_is_lost_in_rounding() -> None:
