@@ -16,12 +16,14 @@ import shapely
 from semsig_gis.errors import CrsError, InputError
 
 if TYPE_CHECKING:
+    from pathlib import Path
+
     from numpy.typing import ArrayLike, NDArray
     from pyproj import CRS
 
     from semsig_gis.database import SignatureDatabase
 
-__all__ = ["area_prior", "position_prior", "weight_prior"]
+__all__ = ["area_prior", "position_prior", "raster_prior", "weight_prior"]
 
 
 def area_prior(
@@ -141,6 +143,82 @@ def position_prior(
     logs = -0.5 * away / sigma**2
     # From the nearest cell on, so that a position far outside excludes nothing by rounding.
     return np.asarray(logs - np.logaddexp.reduce(logs))
+
+
+def raster_prior(
+    database: SignatureDatabase, path: str | Path, *, band: int | None = None
+) -> NDArray[np.float64]:
+    """Return the prior of a raster, such as how many people pass or how many photos were taken.
+
+    Parameters
+    ----------
+    database : SignatureDatabase
+        The cells.
+    path : str or Path
+        Any raster that GDAL reads, in any coordinate reference system. Its values, 0 or more, are
+        taken as a density: a cell weighs as much as the mean over it. A value of 0 excludes a
+        cell. Where the raster has no data or ends, nothing is known, and a cell weighs as little
+        as the least of the others that has any weight.
+    band : int, optional
+        Which band to read, from 1; needed only where there are several.
+
+    Returns
+    -------
+    ndarray of float64, shape (n,)
+        Log-prior by cell.
+
+    Raises
+    ------
+    SourceError
+        If the file cannot be read as a raster.
+    CrsError
+        If the raster does not say its coordinate reference system.
+    InputError
+        If the raster covers no cell, a value is negative or infinite, all are 0, or the band is
+        not there or not named.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> import rasterio
+    >>> from semsig_gis.catalog import paper_taxonomy
+    >>> from semsig_gis.building import build_database
+    >>> from semsig_gis.objects import build_objects
+    >>> from semsig_gis.sources.synthetic import CitySpec, synthetic_city
+    >>> layers = synthetic_city(CitySpec(size=300.0))
+    >>> objects, _ = build_objects(layers, taxonomy=paper_taxonomy(), crs="EPSG:32631")
+    >>> database = build_database(objects)
+    >>> x, y = database.xy.min(axis=0) - 5.0
+    >>> options = {"count": 1, "dtype": "uint8", "crs": "EPSG:32631", "width": 2, "height": 1}
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     path = f"{folder}/people.tif"
+    ...     place = rasterio.Affine(150, 0, x, 0, -400, y + 400)
+    ...     with rasterio.open(path, "w", transform=place, **options) as file:
+    ...         file.write(np.array([[1, 3]], np.uint8), 1)
+    ...     chances = np.exp(raster_prior(database, path))
+    >>> round(float(chances.max() / chances.min()), 6)
+    3.0
+    """
+    from semsig_gis.raster import raster_at_cells  # noqa: PLC0415 - GDAL loads slowly
+
+    weights = raster_at_cells(
+        path,
+        grid=database.grid,
+        columns=database.columns,
+        rows=database.rows,
+        crs=database.crs,
+        band=band,
+    )
+    unknown = np.isnan(weights)
+    if unknown.all():
+        msg = f"{path} has no data at any cell of the database; give a raster of its area."
+        raise InputError(msg)
+    known = weights[~unknown]
+    if np.isinf(known).any() or (known < 0).any():
+        msg = f"{path} holds {known.min():g} to {known.max():g}; give finite values, 0 or more."
+        raise InputError(msg)
+    weights[unknown] = known[known > 0].min(initial=known.max())
+    return weight_prior(database, weights)
 
 
 def weight_prior(database: SignatureDatabase, weights: ArrayLike) -> NDArray[np.float64]:
