@@ -25,7 +25,8 @@ if TYPE_CHECKING:
     from semsig_gis.distortion import Distortion
     from semsig_gis.distributed import build_tiles
     from semsig_gis.errors import SemsigError
-    from semsig_gis.evaluation import Evaluation, evaluate
+    from semsig_gis.evaluation import evaluate
+    from semsig_gis.evaluation_result import Evaluation
     from semsig_gis.export import export_geopackage
     from semsig_gis.fetching import fetch_layers, find_area, open_cache
     from semsig_gis.grid import GridSpec
@@ -67,7 +68,7 @@ _HOMES = {
     "Catalog": "catalog",
     "CitySpec": "sources.synthetic",
     "Distortion": "distortion",
-    "Evaluation": "evaluation",
+    "Evaluation": "evaluation_result",
     "Footprints": "occlusion",
     "GridSpec": "grid",
     "LayerSpec": "layer_spec",

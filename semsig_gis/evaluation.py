@@ -7,35 +7,27 @@ an array order.
 
 from __future__ import annotations
 
-import dataclasses
-import json
 import math
 import platform
 import time
-from dataclasses import dataclass
 from importlib import metadata
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import geopandas as gpd
 import numpy as np
 import pandas as pd
-import pyarrow as pa
 
 from semsig_gis import __version__
-from semsig_gis.distortion import Distortion, distort, named_distortion
-from semsig_gis.errors import DatabaseError, InputError
+from semsig_gis.alignment import rerank
+from semsig_gis.distortion import distort, named_distortion
+from semsig_gis.errors import InputError
+from semsig_gis.evaluation_result import SUCCESS_METRES, SUCCESS_PROBABILITY, Evaluation
 from semsig_gis.grid import cell_ids
-from semsig_gis.matching import DEFAULT_METHOD, Method, score_cells
-from semsig_gis.metrics import EditWeights
-from semsig_gis.scoring import (
-    THRESHOLDS,
-    expected_best,
-    expected_recall,
-    rank_range,
-    top_candidates,
-)
-from semsig_gis.storage import geo_metadata, read_geoparquet, whole_file, write_geoparquet
+from semsig_gis.locating import REGION_SHARE
+from semsig_gis.matching import score_cells
+from semsig_gis.method import DEFAULT_METHOD, LikelihoodMethod, Method
+from semsig_gis.posterior import posterior
+from semsig_gis.scoring import THRESHOLDS, expected_best, rank_range, top_candidates
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -43,299 +35,24 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from semsig_gis.database import SignatureDatabase
+    from semsig_gis.distortion import Distortion
+    from semsig_gis.likelihood import LikelihoodIndex
+    from semsig_gis.posterior import Posterior
     from semsig_gis.signatures import Signature
 
-__all__ = ["Evaluation", "evaluate"]
+    # Scores of all cells, what else is told of the answer, and the seconds they took.
+    _Answer = tuple[NDArray[np.float32], Mapping[str, float], float]
 
-SUCCESS_METRES = 50
-SUCCESS_PROBABILITY = 0.5
+__all__ = ["SUCCESS_METRES", "SUCCESS_PROBABILITY", "Evaluation", "evaluate"]
 
-_HEADLINE = (10, 25, 50, 100)
-_RECALLS = (1, 10)
-_LENGTHS = ((1, 4), (5, 9), (10, 19), (20, None))
-_KIND = "localization evaluation"
-_COLUMNS = (
-    *("cell", "cell_id", "types", "length", "type_group", "angle_group"),
-    *("query_types", "query_bearings", "query_length"),
-    *("best_cell_id", "best_x", "best_y", "distance", "tied", "error_m"),
-    *(f"p{threshold}" for threshold in THRESHOLDS),
-    *("rank_low", "rank_high", "geometry"),
-)
-_QUERIES_FILE = "queries.parquet"
-_SUMMARY_FILE = "evaluation.json"
-
-
-@dataclass(frozen=True, eq=False, kw_only=True)
-class Evaluation:
-    """The outcome of many queries and all that is needed to repeat or redraw it.
-
-    Parameters
-    ----------
-    queries : GeoDataFrame
-        One row a query, in the database's CRS; `geometry` is the true viewpoint.
-
-        - ``cell``, ``cell_id``: row number in the database and id of the true cell;
-        - ``types``, ``length``: its symbols and how many there are;
-        - ``type_group``, ``angle_group``: cells with its type and with its angle sequence;
-        - ``query_types``, ``query_bearings``, ``query_length``: what was asked: symbols, degrees
-          (text, comma-separated) and how many there are;
-        - ``best_cell_id``, ``best_x``, ``best_y``, ``distance``: a best candidate and its score;
-          one drawn from the tied when there are several; missing (score infinite) when
-          unlocalized;
-        - ``tied``: cells that share the best score, 0 when unlocalized;
-        - ``error_m``: expected smallest error among the top t in metres, infinite when
-          unlocalized;
-        - ``p0``, ``p5``, ... (`THRESHOLDS`): probability that this error is at most so many
-          metres;
-        - ``rank_low``, ``rank_high``: first and last rank that ties allow for the true cell, from
-          1; both the number of cells when unlocalized.
-    method : Method
-        What ranked the cells.
-    distortion : Distortion
-        What was done to the queries.
-    top : int
-        How many best candidates count (t).
-    seed : int
-        Seed of the sample and of all chances.
-    seconds_per_query : float
-        Mean time of scoring all cells, without distortion and statistics.
-    database : mapping
-        What was searched, as plain values: ``cells``, ``mean_length``, ``step_m``, ``origin``,
-        ``radius_m``, ``levels``, ``crs``, ``version``.
-    versions : mapping
-        Versions of the software by name.
-
-    Notes
-    -----
-    A query is unlocalized when the distortion left nothing of it.
-
-    Examples
-    --------
-    >>> from semsig_gis.catalog import paper_taxonomy
-    >>> from semsig_gis.building import build_database
-    >>> from semsig_gis.objects import build_objects
-    >>> from semsig_gis.sources.synthetic import CitySpec, synthetic_city
-    >>> layers = synthetic_city(CitySpec(size=300.0))
-    >>> objects, _ = build_objects(layers, taxonomy=paper_taxonomy(), crs="EPSG:32631")
-    >>> evaluation = evaluate(build_database(objects), queries=20, distortion="light")
-    >>> bool(evaluation.cdf([50])[0] <= evaluation.cdf([100])[0])
-    True
-    """
-
-    queries: gpd.GeoDataFrame
-    method: Method
-    distortion: Distortion
-    top: int
-    seed: int
-    seconds_per_query: float
-    database: Mapping[str, Any]
-    versions: Mapping[str, str]
-
-    @property
-    def successful(self) -> NDArray[np.bool_]:
-        """Whether each query has an error of at most 50 m with probability 0.5 or more."""
-        within = self.queries[f"p{SUCCESS_METRES}"].to_numpy(dtype=np.float64)
-        return np.asarray(within >= SUCCESS_PROBABILITY)
-
-    @property
-    def unlocalized(self) -> int:
-        """Number of queries of which the distortion left nothing."""
-        return int((self.queries["query_length"] == 0).sum())
-
-    def cdf(self, thresholds: Sequence[float] = THRESHOLDS) -> NDArray[np.float64]:
-        """Return the share of queries whose error is at most so many metres.
-
-        Parameters
-        ----------
-        thresholds : sequence of float, optional
-            Errors in metres, each one of `THRESHOLDS`.
-
-        Returns
-        -------
-        ndarray of float64
-            Mean probability over the queries, one value a threshold.
-
-        Raises
-        ------
-        InputError
-            If a threshold is not one of those kept.
-        """
-        for value in thresholds:
-            if value not in THRESHOLDS:
-                kept = ", ".join(str(one) for one in THRESHOLDS)
-                msg = f"No probability is kept for an error of {value} m; give some of {kept} m."
-                raise InputError(msg)
-        columns = [f"p{int(value)}" for value in thresholds]
-        return np.asarray(self.queries[columns].to_numpy(dtype=np.float64).mean(axis=0))
-
-    def recall(self, percent: float) -> float:
-        """Return the share of queries whose true cell ranks in the top so many per cent of cells.
-
-        Parameters
-        ----------
-        percent : float
-            Share of the cells kept, above 0 and at most 100. The number kept is rounded down.
-
-        Returns
-        -------
-        float
-            The recall in [0, 1]; the true cell's rank is uniform among the cells it ties with.
-
-        Raises
-        ------
-        InputError
-            If the percentage is out of range.
-        """
-        return float(self._recalls(percent).mean())
-
-    def by_length(self) -> pd.DataFrame:
-        """Return the figures by the length of the true signature.
-
-        Returns
-        -------
-        DataFrame
-            One row a range of lengths: ``length`` (text), ``n``, ``p10``, ``p25``, ``p50``,
-            ``p100``, ``recall1``, ``recall10``. The figures are NaN where ``n`` is 0.
-        """
-        lengths = self.queries["length"].to_numpy()
-        figures = {f"p{x}": self.queries[f"p{x}"].to_numpy() for x in _HEADLINE}
-        figures |= {f"recall{k}": self._recalls(k) for k in _RECALLS}
-        rows: list[dict[str, Any]] = []
-        for low, high in _LENGTHS:
-            chosen = (lengths >= low) & (lengths <= (math.inf if high is None else high))
-            row: dict[str, Any] = {
-                "length": f"{low}+" if high is None else f"{low}-{high}",
-                "n": int(chosen.sum()),
-            }
-            for name, values in figures.items():
-                row[name] = float(values[chosen].mean()) if chosen.any() else math.nan
-            rows.append(row)
-        return pd.DataFrame(rows)
-
-    def summary(self) -> dict[str, Any]:
-        """Return settings, figures and versions as plain values for JSON.
-
-        Returns
-        -------
-        dict
-            ``settings``, ``database``, ``results`` and ``versions``. No value is infinite or
-            NaN: ``median_error_m`` is None when half of the queries or more are unlocalized, and
-            so are the figures of a range of lengths without queries.
-        """
-        median = float(np.median(self.queries["error_m"].to_numpy(dtype=np.float64)))
-        by_length = [
-            {key: None if value != value else value for key, value in row.items()}  # noqa: PLR0124
-            for row in self.by_length().to_dict("records")
-        ]
-        return {
-            "settings": {
-                "method": str(self.method),
-                "distortion": dataclasses.asdict(self.distortion),
-                "top": self.top,
-                "seed": self.seed,
-                "queries": len(self.queries),
-            },
-            "database": dict(self.database),
-            "results": {
-                "p_error_within_m": {
-                    str(x): float(value) for x, value in zip(THRESHOLDS, self.cdf(), strict=True)
-                },
-                "recall_at_percent": {str(k): self.recall(k) for k in _RECALLS},
-                "median_error_m": median if math.isfinite(median) else None,
-                "successful": float(self.successful.mean()),
-                "unlocalized": self.unlocalized,
-                "seconds_per_query": self.seconds_per_query,
-                "by_length": by_length,
-            },
-            "versions": dict(self.versions),
-        }
-
-    def save(self, folder: str | Path) -> None:
-        """Write the evaluation to a folder.
-
-        Parameters
-        ----------
-        folder : str or Path
-            Folder to write to, made when missing. It gets ``queries.parquet`` (GeoParquet, with
-            the settings in its metadata, so that it is enough to load and redraw everything) and
-            ``evaluation.json`` (`summary`, for reading).
-
-        Raises
-        ------
-        InputError
-            If the folder cannot be written to.
-        """
-        plain = pd.DataFrame(self.queries.drop(columns="geometry"))
-        table = pa.Table.from_pandas(plain, preserve_index=False)
-        points = self.queries.geometry
-        table = table.append_column("geometry", pa.array(points.to_wkb()))
-        specs = {
-            "kind": _KIND,
-            "method": dataclasses.asdict(self.method),
-            "distortion": dataclasses.asdict(self.distortion),
-            "top": self.top,
-            "seed": self.seed,
-            "seconds_per_query": self.seconds_per_query,
-            "database": dict(self.database),
-            "versions": dict(self.versions),
-        }
-        geo = geo_metadata(points.crs, geometry_types=["Point"], bounds=points.total_bounds)
-        write_geoparquet(table, Path(folder) / _QUERIES_FILE, geo=geo, specs=specs)
-        with whole_file(Path(folder) / _SUMMARY_FILE) as partial:
-            text = json.dumps(self.summary(), indent=2, allow_nan=False, ensure_ascii=False)
-            partial.write_text(text + "\n", encoding="utf-8")
-
-    @classmethod
-    def load(cls, folder: str | Path) -> Evaluation:
-        """Read an evaluation that `save` wrote.
-
-        Parameters
-        ----------
-        folder : str or Path
-            Folder with ``queries.parquet``.
-
-        Returns
-        -------
-        Evaluation
-            The same evaluation.
-
-        Raises
-        ------
-        DatabaseError
-            If the file is missing, damaged or of another kind.
-        """
-        file = Path(folder) / _QUERIES_FILE
-        table, specs, crs = read_geoparquet(file, kind=_KIND, columns=list(_COLUMNS))
-        try:
-            frame = table.to_pandas()
-            points = gpd.GeoSeries.from_wkb(frame.pop("geometry"), crs=crs)
-            frame["best_cell_id"] = frame["best_cell_id"].astype("Int64")
-            weights = EditWeights(**specs["method"].pop("weights"))
-            return cls(
-                queries=gpd.GeoDataFrame(frame, geometry=points),
-                method=Method(weights=weights, **specs["method"]),
-                distortion=Distortion(**specs["distortion"]),
-                top=specs["top"],
-                seed=specs["seed"],
-                seconds_per_query=specs["seconds_per_query"],
-                database=specs["database"],
-                versions=specs["versions"],
-            )
-        except (AttributeError, LookupError, TypeError, ValueError) as error:
-            msg = f"{file} is damaged ({error}); evaluate again."
-            raise DatabaseError(msg) from error
-
-    def _recalls(self, percent: float) -> NDArray[np.float64]:
-        """Return the chance of each query that its true cell is in the top `percent`."""
-        ranks = self.queries["rank_low"], self.queries["rank_high"]
-        return expected_recall(*ranks, cells=self.database["cells"], percent=percent)
+_UNTOLD = {"chance": math.nan, "right": math.nan, "in_region": math.nan}
 
 
 def evaluate(
     database: SignatureDatabase,
     *,
     queries: int = 500,
-    method: Method = DEFAULT_METHOD,
+    method: Method | LikelihoodIndex = DEFAULT_METHOD,
     distortion: Distortion | str = "medium",
     top: int = 1,
     seed: int = 0,
@@ -349,8 +66,9 @@ def evaluate(
         What to search.
     queries : int, default 500
         How many cells to draw as queries, without replacement; 1 to the number of cells.
-    method : Method, optional
-        What ranks the cells; metric fusion of two edit distances unless given.
+    method : Method or LikelihoodIndex, optional
+        What ranks the cells: measures of distance, or the index of this database for the
+        likelihood method; metric fusion of two edit distances unless given.
     distortion : Distortion or str, default "medium"
         What happens to the signatures, or the name of one of the paper's levels.
     top : int, default 1
@@ -369,7 +87,7 @@ def evaluate(
     Raises
     ------
     InputError
-        If a number is out of range.
+        If a number is out of range, or the index is that of another database.
     UnknownNameError
         If there is no distortion of that name.
 
@@ -378,6 +96,10 @@ def evaluate(
     Paper, section 4.2: the error is the distance from the true viewpoint to the nearest of the
     best t candidates; the recall looks at the rank of the true cell among all cells. False
     objects have the classes that occur in the database.
+
+    The likelihood method, as `semsig_gis.locating` has it, answers with the place around which
+    most of the chance lies. That comes first; then follow the other cells, likeliest first. So
+    the best t candidates are the answer and the t - 1 likeliest other cells.
 
     Examples
     --------
@@ -398,29 +120,36 @@ def evaluate(
         msg = f"A seed of {seed} was given; give a whole number, 0 or more."
         raise InputError(msg)
     chosen_distortion = named_distortion(distortion) if isinstance(distortion, str) else distortion
+    if not isinstance(method, Method) and method.database is not database:
+        msg = "the likelihood index belongs to another database; build that of the one to search."
+        raise InputError(msg)
     # A prefix of one permutation: more queries keep the first ones.
     cells = np.random.default_rng(np.random.SeedSequence(seed)).permutation(n)[:queries]
     asked, picks = _distorted(database, cells, chosen_distortion, seed)
-    answers = _timed_scores(database, [one for one in asked if len(one)], method)
+    truths = [(cell, one) for cell, one in zip(cells.tolist(), asked, strict=True) if len(one)]
+    if isinstance(method, Method):
+        answers = _by_distance(database, [one for _, one in truths], method)
+    else:
+        answers = _by_likelihood(method, truths)
     outcomes: list[dict[str, Any]] = []
     seconds = 0.0
     for number, (cell, query, pick) in enumerate(zip(cells.tolist(), asked, picks, strict=True)):
         if len(query):
-            scores, spent = next(answers)
+            scores, told, spent = next(answers)
             seconds += spent
-            outcomes.append(_outcome(database, scores, cell=cell, top=top, pick=pick))
+            outcome = _outcome(database, scores, cell=cell, top=top, pick=pick)
+            outcomes.append(outcome | dict(told))
         else:
             outcomes.append(_unlocalized(n))
         if progress is not None:
             progress(number + 1, queries)
-    localized = sum(len(one) > 0 for one in asked)
     return Evaluation(
         queries=_query_table(database, cells, asked, outcomes),
-        method=method,
+        method=method if isinstance(method, Method) else LikelihoodMethod(noise=method.noise),
         distortion=chosen_distortion,
         top=top,
         seed=seed,
-        seconds_per_query=seconds / localized if localized else 0.0,
+        seconds_per_query=seconds / len(truths) if truths else 0.0,
         database=_database_summary(database),
         versions=_versions(),
     )
@@ -463,6 +192,7 @@ def _unlocalized(cells: int) -> dict[str, Any]:
         **{f"p{t}": 0.0 for t in THRESHOLDS},
         "rank_low": cells,
         "rank_high": cells,
+        **_UNTOLD,
     }
 
 
@@ -502,10 +232,10 @@ def _distorted(
     return asked, picks
 
 
-def _timed_scores(
+def _by_distance(
     database: SignatureDatabase, queries: Sequence[Signature], method: Method
-) -> Iterator[tuple[NDArray[np.float32], float]]:
-    """Yield the scores of all cells for each query, and the seconds they took."""
+) -> Iterator[_Answer]:
+    """Yield the distances of each query to all cells."""
     if not queries:
         return
     # What the database works out once and keeps is no part of the time of a query.
@@ -514,7 +244,55 @@ def _timed_scores(
     for _ in queries:
         start = time.perf_counter()
         scores = next(rows)
-        yield scores, time.perf_counter() - start
+        yield scores, _UNTOLD, time.perf_counter() - start
+
+
+def _by_likelihood(
+    index: LikelihoodIndex, truths: Sequence[tuple[int, Signature]]
+) -> Iterator[_Answer]:
+    """Yield scores for each true cell and its query: the answer lowest, the likeliest next."""
+    if truths:
+        _located(index, truths[0][1])  # kernels are loaded once
+    for cell, query in truths:
+        start = time.perf_counter()
+        loglik, found, answer, chance = _located(index, query)
+        seconds = time.perf_counter() - start
+        tied = _places_like(found, answer, chance)
+        right = (_errors(index.database, cell, tied) <= SUCCESS_METRES).mean()
+        told = {
+            "distance": -float(loglik[answer]),
+            "chance": chance,
+            "right": float(right),
+            "in_region": _in_region(found, cell),
+        }
+        scores = -loglik.astype(np.float32)
+        scores[tied] = scores.min() - 1.0
+        yield scores, told, seconds
+
+
+def _located(
+    index: LikelihoodIndex, query: Signature
+) -> tuple[NDArray[np.floating], Posterior, int, float]:
+    """Return the log-likelihoods and chances of all cells, the answer and its chance."""
+    loglik = rerank(index, query, index.scores(query)).loglik
+    found = posterior(index.database, loglik)
+    return loglik, found, *found.best_place(SUCCESS_METRES)
+
+
+def _places_like(found: Posterior, answer: int, chance: float) -> NDArray[np.intp]:
+    """Return the cells that might have been the answer as well, and the answer."""
+    alike = np.flatnonzero(found.chances == found.chances[answer])
+    same = np.round(found.mass_within(SUCCESS_METRES, alike), 9) == chance
+    return np.asarray(alike[same])
+
+
+def _in_region(found: Posterior, cell: int) -> float:
+    """Return the probability that a cell is in the region, whose last cell is one of equals."""
+    region = found.credible_cells(REGION_SHARE)
+    least, own = found.chances[region[-1]], found.chances[cell]
+    if own != least:
+        return float(own > least)
+    return float((found.chances[region] == least).sum() / (found.chances == least).sum())
 
 
 def _query_table(

@@ -9,6 +9,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from semsig_gis.locating import DEFAULT_RULE
+from semsig_gis.method import Method
 from semsig_gis.paper_figures import PARIS, PARIS_ACCURACY, PARIS_STEP_M
 from semsig_gis.tables import Table
 
@@ -132,6 +134,15 @@ def _figure_table(evaluation: Evaluation) -> Table:
         ("Unlocalized queries", f"{results['unlocalized']:,}", ""),
         ("Seconds a query", f"{results['seconds_per_query']:.4f}", ""),
     ]
+    said = {
+        "coverage": f"Answered, with a chance of {DEFAULT_RULE.threshold:g} or more",
+        "precision": "Right answers, of these",
+        "in_region": "True cell in the region of 90 %",
+    }
+    rows += [
+        (said[name], "" if np.isnan(value) else f"{value:.4f}", "")
+        for name, value in evaluation.answers().items()
+    ]
     ties = (
         "Ties are scored by expectation. A query is successful when its error is at most 50 m "
         "with probability 0.5 or more."
@@ -146,19 +157,26 @@ def _figure_table(evaluation: Evaluation) -> Table:
 
 
 def _length_table(evaluation: Evaluation) -> Table:
-    figures = ("p10", "p25", "p50", "p100", "recall1", "recall10")
+    titles = {
+        **{f"p{metres}": f"P(≤ {metres} m)" for metres in (10, 25, 50, 100)},
+        **{f"recall{percent}": f"recall@{percent} %" for percent in (1, 10)},
+        "coverage": "Answered",
+        "precision": "Right",
+        "in_region": "In region",
+    }
+    by_length = evaluation.by_length()
+    figures = [name for name in titles if name in by_length]
     rows = tuple(
         (
             row["length"],
             f"{row['n']:,}",
             *("" if np.isnan(row[name]) else f"{row[name]:.4f}" for name in figures),
         )
-        for row in evaluation.by_length().to_dict("records")
+        for row in by_length.to_dict("records")
     )
-    columns = ("Objects", "Queries", "P(≤ 10 m)", "P(≤ 25 m)", "P(≤ 50 m)", "P(≤ 100 m)")
     return Table(
         title="By length of the true signature",
-        columns=(*columns, "recall@1 %", "recall@10 %"),
+        columns=("Objects", "Queries", *(titles[name] for name in figures)),
         rows=rows,
     )
 
@@ -168,7 +186,8 @@ def _paris_accuracy(evaluation: Evaluation) -> tuple[float | None, float | None]
     method, distortion, database = evaluation.method, evaluation.distortion, evaluation.database
     # The paper does not say whether it normalised, sorted again or drew classes by frequency.
     same_method = (
-        (method.types, method.angles, method.alpha, method.keep) == ("edit", "edit", 0.5, 5.0)
+        isinstance(method, Method)
+        and (method.types, method.angles, method.alpha, method.keep) == ("edit", "edit", 0.5, 5.0)
         and method.weights.as_tuple() == (1, 1, 1)
         and evaluation.top == 1
     )

@@ -1,4 +1,4 @@
-"""What a method of matching is: which measures it takes, and how it joins them."""
+"""What a method is: which measures it takes and how it joins them, or the likelihood."""
 
 from __future__ import annotations
 
@@ -9,9 +9,10 @@ from semsig_gis.errors import InputError, SemsigError
 from semsig_gis.metrics import EditWeights, metric
 
 if TYPE_CHECKING:
+    from semsig_gis.noise import Noise
     from semsig_gis.signatures import Signature
 
-__all__ = ["ANGLES", "BOTH", "DEFAULT_METHOD", "TYPES", "Method"]
+__all__ = ["ANGLES", "BOTH", "DEFAULT_METHOD", "TYPES", "LikelihoodMethod", "Method"]
 
 TYPES, ANGLES, BOTH = "types", "angles", "types+angles"
 """Parts of a query that a method may compare."""
@@ -190,6 +191,29 @@ class Method:
 
 DEFAULT_METHOD = Method()
 """Metric fusion of two edit distances in equal shares."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LikelihoodMethod:
+    """The likelihood method with all its steps (see `semsig_gis.locating`).
+
+    Parameters
+    ----------
+    noise : NoiseSpec or NoiseMixture
+        How detectors fail.
+
+    Examples
+    --------
+    >>> from semsig_gis.noise import named_noise
+    >>> str(LikelihoodMethod(noise=named_noise("medium")))
+    'likelihood (medium noise)'
+    """
+
+    noise: Noise
+
+    def __str__(self) -> str:
+        """Return a text for people."""
+        return f"likelihood ({self.noise.name} noise)"
 
 
 def _plain(number: float) -> str:

@@ -498,6 +498,25 @@ def test_the_console_script_is_installed() -> None:
     assert done.stdout.strip() == f"semsig {__version__}"
 
 
+def test_the_likelihood_is_evaluated_and_drawn(database: Path, city: Path, run: Run) -> None:
+    options = ("--queries", 20, "--method", "likelihood", "--noise", "light")
+    code, out, _ = run("evaluate", database, *options, "--out", city / "by_likelihood", "--json")
+    assert code == 0
+    summary = json.loads(out)
+    assert summary["settings"]["method"] == "likelihood (light noise)"
+    assert 0 <= summary["results"]["coverage"] <= 1
+    code, out, err = run("evaluate", database, *options)
+    assert code == 0
+    assert "Answered" in out
+    assert "index" not in err  # it is kept beside the database
+    code, out, _ = run(
+        "map", database, "--evaluation", city / "by_likelihood", "--out", city / "likelihood.html"
+    )
+    assert code == 0
+    assert "likelihood (light noise)" in (city / "likelihood.html").read_text(encoding="utf-8")
+    sentence(run("evaluate", database, "--method", "likelihood", "--noise", "loud"), "'loud'")
+
+
 def test_the_likelihood_answers_or_cannot_tell(city: Path, database: Path, run: Run) -> None:
     query = "localize", database, "--types", "DDD", "--bearings", "10,80,200"
     by = "--method", "likelihood"

@@ -8,7 +8,16 @@ from typing import Annotated
 
 import typer
 
-from semsig_gis.cli._app import AsJson, Database, MethodText, app, print_evaluation
+from semsig_gis.cli._app import (
+    LIKELIHOOD,
+    AsJson,
+    Database,
+    MethodText,
+    NoiseText,
+    app,
+    prepared_index,
+    print_evaluation,
+)
 from semsig_gis.console import print_json, progress
 
 
@@ -32,6 +41,7 @@ def evaluate(
         FalseClass, typer.Option(help="How the class of a false object is drawn.")
     ] = FalseClass.uniform,
     method: MethodText = "edit+edit",
+    noise: NoiseText = "generic",
     top: Annotated[int, typer.Option(help="Number t of best candidates that count.")] = 1,
     seed: Annotated[int, typer.Option(help="Seed of all chances.")] = 0,
     out: Annotated[Path | None, typer.Option(help="Folder for the results.")] = None,
@@ -48,10 +58,13 @@ def evaluate(
     spec = dataclasses.replace(
         named_distortion(distortion), resort=not keep_order, false_class=false_class.value
     )
-    chosen = Method.parse(method)
+    opened = open_database(database)
+    chosen = (
+        prepared_index(database, opened, noise) if method == LIKELIHOOD else Method.parse(method)
+    )
     with progress("evaluating") as advance:
         evaluation = run(
-            open_database(database),
+            opened,
             queries=queries,
             method=chosen,
             distortion=spec,
