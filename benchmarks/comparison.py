@@ -29,6 +29,8 @@ class Comparison:
         What ours is compared with.
     bar : float or None
         The ratio to reach; None where the time is for information.
+    paper : float, optional
+        What the source paper prints, in the same unit.
     """
 
     name: str
@@ -37,6 +39,7 @@ class Comparison:
     peer: float
     peer_name: str
     bar: float | None
+    paper: float | None = None
 
     @property
     def ratio(self) -> float:
@@ -74,6 +77,7 @@ class Comparison:
             "ratio": float(f"{self.ratio:.4g}"),
             "bar": self.bar,
             "met": self.met,
+            "paper": self.paper,
         }
 
     def __str__(self) -> str:
@@ -82,6 +86,8 @@ class Comparison:
             f"{self.name}: {self.ours:.3g} {self.unit}; {self.peer_name}: {self.peer:.3g} "
             f"{self.unit}; ratio {self.ratio:.3g}"
         )
+        if self.paper is not None:
+            line += f"; the paper: {self.paper:.3g} {self.unit}"
         if self.bar is not None:
             line += f", at least {self.bar:.3g} wanted: {'met' if self.met else 'not met'}"
         return line
@@ -95,6 +101,7 @@ def compare(
     peer_name: str,
     repeats: int,
     bar: float | None = None,
+    paper: float | None = None,
 ) -> Comparison:
     """Time two callables in turns and keep the median of each, in milliseconds.
 
@@ -110,6 +117,8 @@ def compare(
         How often each is timed, after one call that is not.
     bar : float, optional
         The ratio to reach.
+    paper : float, optional
+        The milliseconds that the source paper prints.
 
     Returns
     -------
@@ -125,5 +134,11 @@ def compare(
                 seconds.append(time.perf_counter() - start)
     ours_ms, peer_ms = (1e3 * statistics.median(seconds) for seconds in times)
     return Comparison(
-        name=name, unit="ms", ours=ours_ms, peer=peer_ms, peer_name=peer_name, bar=bar
+        name=name,
+        unit="ms",
+        ours=ours_ms,
+        peer=peer_ms,
+        peer_name=peer_name,
+        bar=bar,
+        paper=paper,
     )

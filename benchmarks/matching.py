@@ -14,11 +14,13 @@ from rapidfuzz.distance import Levenshtein
 from rapidfuzz.process import cdist
 
 from benchmarks.comparison import compare
+from benchmarks.likelihood import growth_of_likelihood, likelihood_rows
 from semsig_gis.catalog import paper_taxonomy
 from semsig_gis.database import BEARING_UNITS, SignatureDatabase
 from semsig_gis.grid import GridSpec
 from semsig_gis.matching import Method, score_cells
 from semsig_gis.nearest import nearest
+from semsig_gis.paper_figures import PARIS_QUERY_MS
 from semsig_gis.signatures import SignatureSpec
 
 if TYPE_CHECKING:
@@ -150,14 +152,16 @@ def comparisons(size: str) -> Iterator[Comparison]:
             peer_name="rapidfuzz.process.cdist([query], cells), edit distance",
             repeats=scale.repeats,
             bar=bar,
+            paper=PARIS_QUERY_MS[f"{part}:{measure}"],
         )
-    for method in ("edit+edit", "edit+edit:5%"):
+    for method in ("edit+edit", "edit+edit:5%", "jaccard+jaccard:5%", "histogram+histogram:5%"):
         yield compare(
             f"one {method} query, {cells}",
             partial(score, 1, method),
             partial(peer, 1, tuple(of_cells)),
             peer_name="rapidfuzz.process.cdist([query], cells), by types and by angles",
             repeats=scale.repeats,
+            paper=PARIS_QUERY_MS.get(method),
         )
 
     def hundred(part: str, repeat: int) -> None:
@@ -180,12 +184,19 @@ def comparisons(size: str) -> Iterator[Comparison]:
             repeats=1,
             bar=2.0,
         )
+    yield from likelihood_rows(
+        database,
+        queries,
+        one=partial(peer, 1, ("types",)),
+        many=partial(peer, scale.batch, ("types",)),
+        repeats=scale.repeats,
+    )
     for count in scale.others:
-        yield _one_of(count, min(scale.repeats, 7))
+        yield from _growth(count, min(scale.repeats, 7))
 
 
-def _one_of(cells: int, repeats: int) -> Comparison:
-    """Measure one query by types over so many cells."""
+def _growth(cells: int, repeats: int) -> Iterator[Comparison]:
+    """Measure one query by types and one by likelihood over so many cells."""
     database = random_database(cells)
     texts = _texts(database.codes, database.offsets)
     method = Method.parse("types:edit")
@@ -197,13 +208,14 @@ def _one_of(cells: int, repeats: int) -> Comparison:
         cdist([texts[repeat]], texts, scorer=Levenshtein.distance, dtype=np.uint8)
 
     ours(0)  # a large table is turned into bit planes when it is asked again
-    return compare(
+    yield compare(
         f"growth: an edit query by types, {cells:,} cells",
         ours,
         peer,
         peer_name="rapidfuzz.process.cdist([query], cells), edit distance",
         repeats=repeats,
     )
+    yield growth_of_likelihood(database, peer, repeats=repeats)
 
 
 def _texts(values: NDArray[np.uint8], offsets: NDArray[np.int64]) -> list[str]:

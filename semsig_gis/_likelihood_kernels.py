@@ -118,6 +118,37 @@ def fill_columns(  # noqa: C901, PLR0912, PLR0917 - a kernel takes no keywords
 
 
 @compiled
+def _add_up(
+    columns: NDArray[np.uint8],
+    symbols: NDArray[np.int64],
+    low: int,
+    size: int,
+    sums: NDArray[np.uint16],
+) -> None:
+    """Fill the sums of some columns over a block of cells."""
+    for cell in range(size):
+        sums[cell] = 0
+    # Four columns in one go: a sum is fetched and put back a quarter as often.
+    fours = len(symbols) - len(symbols) % 4
+    for place in range(0, fours, 4):
+        first = columns[symbols[place], low : low + size]
+        second = columns[symbols[place + 1], low : low + size]
+        third = columns[symbols[place + 2], low : low + size]
+        fourth = columns[symbols[place + 3], low : low + size]
+        for cell in range(size):
+            sums[cell] += (
+                np.uint16(first[cell])
+                + np.uint16(second[cell])
+                + np.uint16(third[cell])
+                + np.uint16(fourth[cell])
+            )
+    for symbol in symbols[fours:]:
+        column = columns[symbol, low : low + size]
+        for cell in range(size):
+            sums[cell] += column[cell]
+
+
+@compiled
 def scan(  # noqa: PLR0917
     columns: NDArray[np.uint8],
     symbols: NDArray[np.int64],
@@ -148,12 +179,7 @@ def scan(  # noqa: PLR0917
     start, scale = np.float32(base), np.float32(step)
     for low in range(0, cells, _BLOCK):
         size = min(_BLOCK, cells - low)
-        for cell in range(size):
-            sums[cell] = 0
-        for symbol in symbols:
-            column = columns[symbol, low : low + size]
-            for cell in range(size):
-                sums[cell] += column[cell]
+        _add_up(columns, symbols, low, size, sums)
         for cell in range(size):
             scores[low + cell] = constants[low + cell] + (start + scale * np.float32(sums[cell]))
 
@@ -208,12 +234,7 @@ def scan_turned(  # noqa: PLR0917
         mass[:] = 0.0
         first[:] = 0.0
         for turn in range(len(turns)):
-            for cell in range(size):
-                sums[cell] = 0
-            for symbol in symbols[turn]:
-                column = columns[symbol, low : low + size]
-                for cell in range(size):
-                    sums[cell] += column[cell]
+            _add_up(columns, symbols[turn], low, size, sums)
             prior = priors[turn]
             for cell in range(size):
                 rise = np.int32(sums[cell]) - peak[cell]

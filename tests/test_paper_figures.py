@@ -3,10 +3,12 @@ from __future__ import annotations
 import pytest
 
 from semsig_gis.catalog import paper_taxonomy
+from semsig_gis.method import Method
 from semsig_gis.paper_figures import (
     PARIS_ACCURACY,
     PARIS_GROUPS,
     PARIS_OCCURRENCES,
+    PARIS_QUERY_MS,
     PARIS_STEP_M,
 )
 
@@ -29,3 +31,10 @@ def test_accuracy_grows_with_the_range() -> None:
     assert list(p50) == sorted(p50)
     assert list(recall10) == sorted(recall10)
     assert PARIS_STEP_M == 10.0
+
+
+def test_times_are_of_methods_and_two_stages_take_longer_than_types() -> None:
+    assert [str(Method.parse(name)) for name in PARIS_QUERY_MS] == list(PARIS_QUERY_MS)
+    for name in ("jaccard", "histogram", "edit"):
+        types, angles = (PARIS_QUERY_MS[f"{part}:{name}"] for part in ("types", "angles"))
+        assert types < PARIS_QUERY_MS[f"{name}+{name}:5%"] < angles
