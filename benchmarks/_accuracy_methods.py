@@ -6,6 +6,7 @@ import math
 import time
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from queue import SimpleQueue
 from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
@@ -16,6 +17,7 @@ from semsig_gis.posterior import posterior
 from semsig_gis.refinement import KEPT, refine
 from semsig_gis.route import route_posteriors
 from semsig_gis.scoring import expected_best, rank_range, top_candidates
+from semsig_gis.spatial_index import ObjectIndex
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -66,6 +68,9 @@ class Outcome:
         Whether the true cell is in the region of 90 %; None where there is no region.
     region_mass : float or None
         Chance of that region by the method's own account: of whole cells, so often above 90 %.
+    in_exact_region : float or None
+        The same where the least likely cells of the region, all alike, belong to it only with
+        the chance that makes it one of just 90 %.
     """
 
     length: int
@@ -75,6 +80,7 @@ class Outcome:
     mass: float | None = None
     in_region: bool | None = None
     region_mass: float | None = None
+    in_exact_region: float | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -144,13 +150,17 @@ def ask_likelihood(
 
 
 def ask_refined(
-    city: City, queries: Sequence[Query], index: LikelihoodIndex, noise: Noise
+    city: City, queries: Sequence[Query], index: LikelihoodIndex, noise: Noise, *, threads: int
 ) -> list[Outcome]:
     """Answer with a place off the grid; the index is that of `cell_noise`."""
+    trees: SimpleQueue[ObjectIndex] = SimpleQueue()  # an R-tree serves one thread at a time
+    for _ in range(threads):
+        trees.put(ObjectIndex(city.objects.xy))
 
     def ask(query: Query) -> Outcome:
         if not len(query.seen):
             return _lost(city, query)
+        tree = trees.get()
         start = time.thread_time()
         loglik = _loglik(index, query, Way())
         likely = np.argpartition(-loglik, min(KEPT[0], len(loglik)) - 1)[: KEPT[0]]
@@ -160,12 +170,13 @@ def ask_refined(
             city.database.xy[likely],
             noise,
             objects=city.objects,
-            index=city.tree,
+            index=tree,
             step=city.database.grid.step,
             radius=city.database.spec.radius,
         )
         error = math.dist(found.xy, query.xy)
         seconds = time.thread_time() - start
+        trees.put(tree)
         return Outcome(
             length=query.length,
             within=tuple(float(error <= limit) for limit in NEAR),
@@ -174,7 +185,7 @@ def ask_refined(
             mass=found.mass,
         )
 
-    return [ask(query) for query in queries]  # the R-tree belongs to one thread
+    return _each(ask, queries, threads)
 
 
 def ask_routes(
@@ -229,7 +240,9 @@ def _told(
     """Return what came of an answer: its cell, its chance, and the seconds it took."""
     cell, mass, seconds = told
     (error,) = _errors(city, query, np.array([cell]))
-    region = found.credible_cells(REGION)
+    chances, region = found.chances, found.credible_cells(REGION)
+    least, true = chances[region[-1]], chances[query.cell]
+    part = (REGION - chances[chances > least].sum()) / chances[chances == least].sum()
     return Outcome(
         length=query.length,
         within=tuple(float(error <= limit) for limit in NEAR),
@@ -237,7 +250,8 @@ def _told(
         seconds=seconds,
         mass=mass,
         in_region=bool((region == query.cell).any()),
-        region_mass=float(found.chances[region].sum()),
+        region_mass=float(chances[region].sum()),
+        in_exact_region=float(part if true == least else true > least),
     )
 
 

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from semsig_gis.distortion import distort, named_distortion
-from semsig_gis.geometry import angular_distance, bearings, wrap_degrees
+from semsig_gis.geometry import wrap_degrees
 from semsig_gis.grid import cell_ids
 from semsig_gis.route import Leg
 from semsig_gis.signatures import Signature
@@ -31,8 +31,8 @@ __all__ = ["City", "Query", "Walk", "off_grid", "on_grid", "turned", "walks"]
 _SEED = 0
 # Streams of random numbers: a kind of query changes none of the others.
 _PLACES, _SPOILED, _ANYWHERE, _WALKS, _LEGS = range(5)
-_APART = (20.0, 22.5)  # metres between the panoramas of a route, as near as cells allow
-_SHARPEST = 90.0  # degrees by which a route turns at most
+_APART = 20.0  # metres between the panoramas of a route, as near as cells allow
+_DIRECTIONS = 36
 
 
 @dataclass(frozen=True, eq=False, slots=True, kw_only=True)
@@ -126,14 +126,14 @@ def turned(queries: Sequence[Query], turns: Sequence[float]) -> list[Query]:
 def walks(
     city: City, level: str, count: int, panoramas: int, *, leg_sigmas: Sequence[float]
 ) -> list[Walk]:
-    """Return ways that keep their direction as far as there are cells."""
+    """Return straight ways along the cells of a city."""
     found: list[Walk] = []
     for start in _random(_WALKS).permutation(len(city.database)).tolist():
         if len(found) == count:
             break
         rng = _random(_WALKS, start)
-        cells = _walk(city.database, start, panoramas, float(rng.uniform(0.0, 360.0)))
-        if len(cells) < panoramas:
+        cells = _walk(city.database, start, panoramas, rng)
+        if not cells:
             continue
         places = _centres(city, cells)
         queries = tuple(
@@ -155,30 +155,21 @@ def _legs(
     return tuple(Leg(dx=dx, dy=dy, sigma=sigma) for dx, dy in ways.tolist())
 
 
-def _walk(database: SignatureDatabase, start: int, panoramas: int, direction: float) -> list[int]:
-    """Return the cells of a way; fewer than wanted where it ends before."""
-    step, ids = database.grid.step, database.cell_ids
-    reach = math.ceil(_APART[1] / step)
-    aside, up = np.mgrid[-reach : reach + 1, -reach : reach + 1].reshape(2, -1)
-    far = np.hypot(aside, up) * step
-    fits = (far >= _APART[0]) & (far <= _APART[1])
-    aside, up = aside[fits], up[fits]
-    ways = bearings(aside, up)
-    cells = [start]
-    while len(cells) < panoramas:
-        here = cells[-1]
+def _walk(
+    database: SignatureDatabase, start: int, panoramas: int, rng: np.random.Generator
+) -> list[int]:
+    """Return cells along a straight line in a random direction; none where no line has them."""
+    ids = database.cell_ids
+    far = np.arange(panoramas) * (_APART / database.grid.step)
+    for direction in rng.permutation(_DIRECTIONS) * (2.0 * math.pi / _DIRECTIONS):
         targets = cell_ids(
-            database.columns[here].astype(np.int64) + aside,
-            database.rows[here].astype(np.int64) + up,
+            database.columns[start] + np.rint(far * math.sin(direction)).astype(np.int64),
+            database.rows[start] + np.rint(far * math.cos(direction)).astype(np.int64),
         )
         rows = np.minimum(np.searchsorted(ids, targets), len(ids) - 1)
-        turn = np.where(ids[rows] == targets, angular_distance(ways, direction), np.inf)
-        best = int(turn.argmin())
-        if turn[best] > _SHARPEST:
-            break
-        direction = float(ways[best])
-        cells.append(int(rows[best]))
-    return cells
+        if (ids[rows] == targets).all():
+            return [int(row) for row in rows]
+    return []
 
 
 def _query(  # noqa: PLR0917 - a private helper of three callers

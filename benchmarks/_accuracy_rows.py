@@ -92,10 +92,10 @@ class Row:
     precision: float | None = None
     bars: list[Bar] = field(default_factory=list)
 
-    def share(self, limit: float = 50.0, *, count: int | None = None) -> float:
-        """Return the share of the queries, or of the first ones, that are so near."""
+    def share(self, limit: float = 50.0) -> float:
+        """Return the share of the queries that are so near."""
         place = NEAR.index(limit)
-        return _mean([one.within[place] for one in self.outcomes[:count]])
+        return _mean([one.within[place] for one in self.outcomes])
 
     @property
     def many(self) -> list[Outcome]:
@@ -107,17 +107,16 @@ class Row:
         """The share of these that are within 50 m."""
         return _mean([one.within[NEAR.index(50.0)] for one in self.many])
 
-    @property
-    def in_region(self) -> float | None:
-        """How often the region of 90 % holds the true cell; None where there is none."""
-        held = [float(one.in_region) for one in self.outcomes if one.in_region is not None]
-        return _mean(held) if held else None
+    def _told(self, name: str) -> float | None:
+        """Return the mean of what the outcomes tell beside the place; None where none does."""
+        values = [getattr(one, name) for one in self.outcomes]
+        told = [float(value) for value in values if value is not None]
+        return _mean(told) if told else None
 
     @property
-    def region_mass(self) -> float | None:
-        """How often it does by the method's own account."""
-        masses = [one.region_mass for one in self.outcomes if one.region_mass is not None]
-        return _mean(masses) if masses else None
+    def in_exact_region(self) -> float | None:
+        """How often the region of just 90 % holds the true cell; None where there is none."""
+        return self._told("in_exact_region")
 
     def to_dict(self) -> dict[str, Any]:
         """Return the row as plain values."""
@@ -135,8 +134,10 @@ class Row:
             "recall10pct": float(recalls.mean()),
             "ms_per_query": 1e3 * _mean([one.seconds for one in self.outcomes]),
             "p50_ten": self.share_of_many,
-            "in_region": self.in_region,
-            "region_mass": self.region_mass,
+            "chance": self._told("mass"),
+            "in_exact_region": self.in_exact_region,
+            "in_region": self._told("in_region"),
+            "region_mass": self._told("region_mass"),
             "coverage": self.coverage,
             "precision": self.precision,
         }
@@ -162,7 +163,14 @@ class Row:
             f"{values['p50_ten']}, recall at 10 % {values['recall10pct']}, "
             f"{values['ms_per_query']} ms"
         )
-        for name in ("in_region", "region_mass", "coverage", "precision"):
+        for name in (
+            "chance",
+            "in_exact_region",
+            "in_region",
+            "region_mass",
+            "coverage",
+            "precision",
+        ):
             if values[name] is not None:
                 line += f", {name} {values[name]}"
         return "\n  ".join([line, *map(str, self.bars)])

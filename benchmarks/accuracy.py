@@ -72,16 +72,15 @@ OFF_GRID = "north known; off the grid"
 
 @dataclass(frozen=True, slots=True)
 class _Size:
-    """How much is measured: the main rows, and those that are slow or for the side."""
+    """How much is measured: the city, and the queries of each row."""
 
     city: CitySpec
-    main: int
-    side: int
+    queries: int
 
 
 _SIZES = {
-    "full": _Size(PARIS_LIKE, 2000, 400),
-    "small": _Size(CitySpec(size=600.0), 24, 8),
+    "full": _Size(PARIS_LIKE, 2000),
+    "small": _Size(CitySpec(size=600.0), 24),
 }
 
 
@@ -140,7 +139,7 @@ def _cities(size: _Size, geodata: Path | None) -> Iterator[City]:
 
 
 def _rows(city: City, size: _Size, threads: int) -> Iterator[Row]:
-    queries = {level: on_grid(city, level, size.main) for level in LEVELS}
+    queries = {level: on_grid(city, level, size.queries) for level in LEVELS}
     generic = build_index(city.database, named_noise("generic"), threads=threads)
     reranked: dict[str, Row] = {}
     for level in LEVELS:
@@ -158,12 +157,11 @@ def _rows(city: City, size: _Size, threads: int) -> Iterator[Row]:
                 row.bars.extend(_main_bars(row, best))
             yield row
     yield from _abstention_rows(reranked)
-    side = queries["medium"][: size.side]
-    yield from _north_rows(side, reranked["medium"], generic, threads)
-    yield from _route_rows(city, generic, size.side, threads)
-    yield from _off_grid_rows(city, generic, size.side, threads)
+    yield from _off_grid_rows(city, generic, size.queries, threads)
+    yield from _north_rows(queries["medium"], reranked["medium"], generic, threads)
+    yield from _route_rows(city, generic, size.queries, threads)
     del generic  # an index takes a quarter of a gigabyte
-    yield from _told_rows(city, queries["medium"][: size.main // 2], size.side, threads)
+    yield from _told_rows(city, queries["medium"], threads)
 
 
 def _paper_rows(city: City, level: str, queries: Sequence[Query]) -> Iterator[Row]:
@@ -231,8 +229,7 @@ def _north_rows(
             known, setting=f"{setting}; on the grid", outcomes=outcomes, bars=[]
         )
         if sigma == math.inf and known.city.name == PARIS:
-            best = known.share(count=len(queries))
-            ratio = row.share() / best if best else math.inf
+            ratio = row.share() / known.share() if known.share() else math.inf
             row.bars.append(Bar(what="P50, to that with north known", value=ratio, low=0.8))
         yield row
 
@@ -273,7 +270,7 @@ def _off_grid_rows(city: City, generic: LikelihoodIndex, count: int, threads: in
             f"{RERANKED}, place in the cell unknown",
             ask_likelihood(city, queries, wide, way, threads=threads),
         ),
-        (f"{RERANKED}, refined", ask_refined(city, queries, wide, noise)),
+        (f"{RERANKED}, refined", ask_refined(city, queries, wide, noise, threads=threads)),
     ):
         row = Row(
             city=city, distortion="medium", method=method, setting=OFF_GRID, outcomes=outcomes
@@ -285,11 +282,11 @@ def _off_grid_rows(city: City, generic: LikelihoodIndex, count: int, threads: in
         yield row
 
 
-def _told_rows(city: City, queries: Sequence[Query], side: int, threads: int) -> Iterator[Row]:
+def _told_rows(city: City, queries: Sequence[Query], threads: int) -> Iterator[Row]:
     """Tell the right level of noise, and wrong ones."""
-    for told, count in (("medium", len(queries)), ("light", side), ("strong", side)):
+    for told in ("medium", "light", "strong"):
         index = build_index(city.database, named_noise(told), threads=threads)
-        outcomes = ask_likelihood(city, queries[:count], index, Way(), threads=threads)
+        outcomes = ask_likelihood(city, queries, index, Way(), threads=threads)
         row = Row(
             city=city,
             distortion="medium",
@@ -299,8 +296,10 @@ def _told_rows(city: City, queries: Sequence[Query], side: int, threads: int) ->
         )
         if told == "medium":
             low, high = REGION_BAR
-            held = row.in_region or 0.0
-            row.bars.append(Bar(what="regions of 90 % that hold", value=held, low=low, high=high))
+            held = row.in_exact_region or 0.0
+            row.bars.append(
+                Bar(what="regions of just 90 % that hold", value=held, low=low, high=high)
+            )
         yield row
 
 

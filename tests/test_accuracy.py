@@ -20,7 +20,10 @@ FIGURES = [
     "recall10pct",
     "ms_per_query",
 ]
-SHARES = ["p5", "p25", "p50", "p50_low", "p50_high", "recall10pct", "in_region", "region_mass"]
+SHARES = [
+    *("p5", "p25", "p50", "p50_low", "p50_high", "recall10pct", "chance"),
+    *("in_exact_region", "in_region", "region_mass", "coverage", "precision"),
+]
 # Words of the method and of the setting, and how many rows have both.
 ROWS = {
     ("edit+edit:5%, order kept", "on the grid"): 3,
