@@ -33,7 +33,8 @@ if TYPE_CHECKING:
     from semsig_gis.likelihood import LikelihoodIndex, build_index
     from semsig_gis.likelihood_file import ready_index
     from semsig_gis.loading import Loaded, assemble, choose_layers, read_files
-    from semsig_gis.locating import Location, locate
+    from semsig_gis.locating import locate, locate_route
+    from semsig_gis.location import Location
     from semsig_gis.maps import evaluation_map, localization_map, save_map
     from semsig_gis.matching import Localization, Method, localize
     from semsig_gis.noise import NoiseMixture, NoiseSpec, named_noise
@@ -74,7 +75,7 @@ _HOMES = {
     "LikelihoodIndex": "likelihood",
     "Loaded": "loading",
     "Localization": "matching",
-    "Location": "locating",
+    "Location": "location",
     "Method": "matching",
     "NoiseMixture": "noise",
     "NoiseSpec": "noise",
@@ -111,6 +112,7 @@ _HOMES = {
     "localization_map": "maps",
     "localize": "matching",
     "locate": "locating",
+    "locate_route": "locating",
     "named_noise": "noise",
     "open_cache": "fetching",
     "open_database": "database_file",
@@ -184,6 +186,7 @@ __all__ = [
     "localization_map",
     "localize",
     "locate",
+    "locate_route",
     "named_noise",
     "open_cache",
     "open_database",

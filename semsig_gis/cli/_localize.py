@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
     from semsig_gis.database import SignatureDatabase
     from semsig_gis.localization import Localization
-    from semsig_gis.locating import Location
+    from semsig_gis.location import Location
     from semsig_gis.signatures import Signature
     from semsig_gis.taxonomy import Taxonomy
 
