@@ -115,13 +115,17 @@ def test_a_turned_place_is_refined_with_its_heading() -> None:
 
 def test_buildings_hide_what_is_behind_them() -> None:
     xy = CORNER + np.array([103.0, 97.0])
-    wall = gpd.GeoDataFrame(
-        geometry=[shapely.box(*(xy + [4.0, -40.0]), *(xy + [8.0, 40.0]))], crs="EPSG:2154"
+    east, north = xy.tolist()
+    wall = shapely.box(east + 4.0, north - 40.0, east + 8.0, north + 40.0)
+    houses = gpd.GeoDataFrame(geometry=[wall], crs="EPSG:2154")
+    stores = STORE, ObjectStore.of(WORLD.street_objects, footprints=houses)
+    free, walled = (
+        locate(WIDE, seen_from(xy), store=store, refined=True, explained=1).explanations[0]
+        for store in stores
     )
-    store = ObjectStore.of(WORLD.street_objects, footprints=wall)
-    found = locate(WIDE, seen_from(xy), store=store, refined=True, explained=1)
-    hidden = locate(WIDE, seen_from(xy), store=STORE, refined=True, explained=1)
-    assert found.explanations[0].counts != hidden.explanations[0].counts
+    assert math.dist(free.xy, xy) < 1.0
+    assert math.dist(walled.xy, xy) > 3.0  # half of what was seen would be hidden here
+    assert walled.loglik < free.loglik - 3.0
 
 
 def test_a_route_settles_what_one_view_leaves_open() -> None:
