@@ -35,6 +35,7 @@ if TYPE_CHECKING:
     from semsig_gis.loading import Loaded, assemble, choose_layers, read_files
     from semsig_gis.locating import locate, locate_route
     from semsig_gis.location import Location
+    from semsig_gis.map_location import location_map
     from semsig_gis.maps import evaluation_map, localization_map, save_map
     from semsig_gis.matching import Localization, Method, localize
     from semsig_gis.noise import NoiseMixture, NoiseSpec, named_noise
@@ -113,6 +114,7 @@ _HOMES = {
     "localize": "matching",
     "locate": "locating",
     "locate_route": "locating",
+    "location_map": "map_location",
     "named_noise": "noise",
     "open_cache": "fetching",
     "open_database": "database_file",
@@ -187,6 +189,7 @@ __all__ = [
     "localize",
     "locate",
     "locate_route",
+    "location_map",
     "named_noise",
     "open_cache",
     "open_database",
