@@ -350,11 +350,10 @@ def _with_parts(
     shares = np.bincount(rows, parts.chances)
     chances = found.chances.copy()
     chances[cells] = shares * found.chances[cells].sum()
-    weights = (parts.sizes / database.grid.step) ** 2
-    top = parts.loglik.max()
+    means = np.full(len(cells), -np.inf)
+    np.logaddexp.at(means, rows, parts.loglik + 2.0 * np.log(parts.sizes / database.grid.step))
     loglik = scores.loglik.astype(np.float64)
-    with np.errstate(divide="ignore"):
-        loglik[cells] = top + np.log(np.bincount(rows, weights * np.exp(parts.loglik - top)))
+    loglik[cells] = means
     heading = scores.heading
     if heading is not None:
         heading = heading.copy()

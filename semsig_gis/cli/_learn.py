@@ -21,7 +21,7 @@ from semsig_gis.cli._likelihood import (
 from semsig_gis.console import print_json, print_rows, progress
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Hashable, Sequence
 
     from numpy.typing import NDArray
 
@@ -115,18 +115,17 @@ def _print_estimate(found: NoiseEstimate) -> None:
         f"Learnt from {found.detections:,} detections at {found.samples:,} places that see "
         f"{found.objects:,} objects{skipped}",
         ("quantity", "class", "value", "its own samples say", "95% interval", "samples"),
-        (
-            [
-                row["quantity"],
-                row["class"],
-                f"{row['value']:.3f}",
-                f"{row['own']:.3f}",
-                f"{row['low_95']:.3f} to {row['high_95']:.3f}",
-                f"{row['samples']:.0f}",
-            ]
-            for row in found.rates.to_dict("records")
-        ),
+        map(_rate, found.rates.to_dict("records")),
     )
+
+
+def _rate(row: dict[Hashable, Any]) -> list[str]:
+    """Return a rate as a row of a table; a class of which there is no sample has none of its own."""
+    high = min(row["high_95"], 180.0)  # no error of a bearing is larger
+    own = (
+        [f"{row['own']:.3f}", f"{row['low_95']:.3f} to {high:.3f}"] if row["samples"] else ["", ""]
+    )
+    return [row["quantity"], row["class"], f"{row['value']:.3f}", *own, f"{row['samples']:.0f}"]
 
 
 @app.command()
