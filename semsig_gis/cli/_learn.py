@@ -120,7 +120,7 @@ def _print_estimate(found: NoiseEstimate) -> None:
 
 
 def _rate(row: dict[Hashable, Any]) -> list[str]:
-    """Return a rate as a row of a table; a class of which there is no sample has none of its own."""
+    """Return a rate as a row of a table; a class without samples has nothing of its own."""
     high = min(row["high_95"], 180.0)  # no error of a bearing is larger
     own = (
         [f"{row['own']:.3f}", f"{row['low_95']:.3f} to {high:.3f}"] if row["samples"] else ["", ""]
