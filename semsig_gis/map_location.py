@@ -129,7 +129,7 @@ class _Drawn:
 
     def latlon(self, xy: ArrayLike) -> list[list[float]]:
         places = np.asarray(xy, dtype=np.float64).reshape(-1, 2)
-        found: list[list[float]] = to_latlon(places, self.database.crs).tolist()
+        found: list[list[float]] = to_latlon(places, self.database.crs, digits=7).tolist()
         return found
 
     def view(self) -> NDArray[np.float64]:
