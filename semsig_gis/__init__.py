@@ -34,7 +34,9 @@ if TYPE_CHECKING:
     from semsig_gis.likelihood import LikelihoodIndex, build_index
     from semsig_gis.likelihood_file import ready_index
     from semsig_gis.loading import Loaded, assemble, choose_layers, read_files
-    from semsig_gis.locating import Location, locate
+    from semsig_gis.locating import locate, locate_route
+    from semsig_gis.location import Location
+    from semsig_gis.map_location import location_map
     from semsig_gis.maps import evaluation_map, localization_map, save_map
     from semsig_gis.matching import Localization, Method, localize
     from semsig_gis.noise import NoiseMixture, NoiseSpec, named_noise
@@ -75,7 +77,7 @@ _HOMES = {
     "LikelihoodIndex": "likelihood",
     "Loaded": "loading",
     "Localization": "matching",
-    "Location": "locating",
+    "Location": "location",
     "Method": "matching",
     "NoiseMixture": "noise",
     "NoiseSpec": "noise",
@@ -112,6 +114,8 @@ _HOMES = {
     "localization_map": "maps",
     "localize": "matching",
     "locate": "locating",
+    "locate_route": "locating",
+    "location_map": "map_location",
     "named_noise": "noise",
     "open_cache": "fetching",
     "open_database": "database_file",
@@ -185,6 +189,8 @@ __all__ = [
     "localization_map",
     "localize",
     "locate",
+    "locate_route",
+    "location_map",
     "named_noise",
     "open_cache",
     "open_database",

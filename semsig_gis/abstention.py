@@ -10,7 +10,7 @@ import json
 import math
 from dataclasses import asdict, dataclass, fields
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeGuard
 
 import numpy as np
 
@@ -71,10 +71,10 @@ class AnswerRule:
     def __post_init__(self) -> None:  # noqa: D105
         for name in ("precision", "confidence"):
             _check_share(name, getattr(self, name))
-        if not self.threshold >= 0:
+        if not (_is_number(self.threshold) and self.threshold >= 0):
             msg = f"threshold of the answers is {self.threshold!r}; give a chance, 0 or more."
             raise InputError(msg)
-        if not 0 < self.radius < math.inf:
+        if not (_is_number(self.radius) and 0 < self.radius < math.inf):
             msg = f"radius of the answers is {self.radius!r}; give metres above 0."
             raise InputError(msg)
         if not 0 <= self.wrong <= self.answered <= self.queries:
@@ -288,7 +288,11 @@ def open_rule(path: str | Path) -> AnswerRule:
         raise InputError(msg) from error
 
 
+def _is_number(value: object) -> TypeGuard[float]:
+    return isinstance(value, (int, float))
+
+
 def _check_share(name: str, value: object) -> None:
-    if not (isinstance(value, (int, float)) and 0 < value < 1):
+    if not (_is_number(value) and 0 < value < 1):
         msg = f"{name} of the answers is {value!r}; give a share above 0 and below 1."
         raise InputError(msg)

@@ -23,7 +23,7 @@ from semsig_gis.distortion import distort, named_distortion
 from semsig_gis.errors import InputError
 from semsig_gis.evaluation_result import SUCCESS_METRES, SUCCESS_PROBABILITY, Evaluation
 from semsig_gis.grid import cell_ids
-from semsig_gis.locating import REGION_SHARE
+from semsig_gis.location import REGION_SHARE
 from semsig_gis.matching import score_cells
 from semsig_gis.method import DEFAULT_METHOD, LikelihoodMethod, Method
 from semsig_gis.posterior import posterior

@@ -8,17 +8,20 @@ from typing import TYPE_CHECKING, Any
 import geopandas as gpd
 import numpy as np
 import pandas as pd
+import shapely
 
 from semsig_gis.association import associate_pairs, near_pairs, pair_weights
 from semsig_gis.errors import InputError
 from semsig_gis.noise_table import LONGEST_TABLE, noise_tables
 from semsig_gis.schema import SOURCE, SOURCE_ID
 from semsig_gis.taxonomy import WILDCARD
-from semsig_gis.views import views_at
+from semsig_gis.views import views_at, views_in
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
+    from pyproj import CRS
 
+    from semsig_gis.database import SignatureDatabase
     from semsig_gis.noise import Noise
     from semsig_gis.objects import StreetObjects
     from semsig_gis.occlusion import Footprints
@@ -28,7 +31,7 @@ if TYPE_CHECKING:
     from semsig_gis.taxonomy import Taxonomy
     from semsig_gis.views import Views
 
-__all__ = ["Explanation", "explain"]
+__all__ = ["Explanation", "explain", "explain_cell"]
 
 UNKNOWN_NAME = "unknown"
 LEAST_CHANCE = 0.01  # of two things being one, to be set beside each other
@@ -167,15 +170,95 @@ def explain(
     >>> why.table["verdict"].iloc[0], float(why.table["bearing_error"].iloc[0].round(2))
     ('matched', 1.13)
     """
+    place = np.array([xy], dtype=np.float64)
+    view = views_at(objects, place, index=index, radius=radius, footprints=footprints)
+    city = _City(objects.taxonomy, np.unique(objects.codes), objects.crs, objects)
+    return _explained(query, (float(xy[0]), float(xy[1])), noise, city, view, heading)
+
+
+def explain_cell(
+    query: Signature,
+    cell: int,
+    noise: Noise,
+    *,
+    database: SignatureDatabase,
+    heading: float = 0.0,
+) -> Explanation:
+    """Say which objects of a query are which objects of a cell, by the database alone.
+
+    Parameters
+    ----------
+    query : Signature
+        At least one object, with bearings; types may be unknown, all or some.
+    cell : int
+        Row number in the database.
+    noise : NoiseSpec or NoiseMixture
+        The noise model.
+    database : SignatureDatabase
+        The cells. They do not know which objects they see: columns ``object``, ``source`` and
+        ``source_id`` are missing, and where an object stands is told to some decimetres.
+    heading : float, default 0
+        Degrees to add to the bearings of the query.
+
+    Returns
+    -------
+    Explanation
+        The verdicts.
+
+    Raises
+    ------
+    InputError
+        If the query is empty, has no bearings, or has a class that no cell sees.
+
+    Examples
+    --------
+    >>> from semsig_gis.catalog import paper_taxonomy
+    >>> from semsig_gis.building import build_database
+    >>> from semsig_gis.noise import NoiseSpec
+    >>> from semsig_gis.objects import build_objects
+    >>> from semsig_gis.sources.synthetic import CitySpec, synthetic_city
+    >>> layers = synthetic_city(CitySpec(size=300.0))
+    >>> objects, _ = build_objects(layers, taxonomy=paper_taxonomy(), crs="EPSG:32631")
+    >>> database = build_database(objects)
+    >>> why = explain_cell(database.signature(7), 7, NoiseSpec(), database=database)
+    >>> why.counts["matched"] == int(database.lengths[7])
+    True
+    """
+    view = views_in(database, np.array([cell]))
+    city = _City(database.taxonomy, database.present_codes, database.crs)
+    x, y = database.xy[cell].tolist()
+    return _explained(query, (x, y), noise, city, view, heading)
+
+
+@dataclass(frozen=True, slots=True)
+class _City:
+    """What there is to see."""
+
+    taxonomy: Taxonomy
+    codes: NDArray[np.uint8]
+    crs: CRS
+    objects: StreetObjects | None = None
+
+    def class_name(self, code: int) -> str:
+        return UNKNOWN_NAME if code == WILDCARD else self.taxonomy.by_code(code).name
+
+
+def _explained(  # noqa: PLR0917 - two callers that have just these
+    query: Signature,
+    xy: tuple[float, float],
+    noise: Noise,
+    city: _City,
+    view: Views,
+    heading: float,
+) -> Explanation:
     if query.bearings is None:
         msg = "the query has no bearings to explain; give them."
         raise InputError(msg)
-    place = np.array([xy], dtype=np.float64)
-    view = views_at(objects, place, index=index, radius=radius, footprints=footprints)
     turned = (query.bearings + heading) % 360.0
-    chances, loglik = _chances(query, turned, view, noise, objects)
-    table = _table(query, turned, view, chances, objects)
-    return Explanation(table=table, xy=(float(xy[0]), float(xy[1])), heading=heading, loglik=loglik)
+    chances, loglik = _chances(query, turned, view, noise, city)
+    table = _table(query, turned, view, chances, city)
+    placed = gpd.GeoDataFrame(table, geometry=_places(table, xy, city), crs=city.crs)
+    return Explanation(table=placed, xy=xy, heading=heading, loglik=loglik)
 
 
 def _chances(
@@ -183,14 +266,11 @@ def _chances(
     turned: NDArray[np.float64],
     view: Views,
     noise: Noise,
-    objects: StreetObjects,
+    city: _City,
 ) -> tuple[NDArray[np.float64], float]:
     """Return the chance that each object is each detection, and the log-likelihood of the query."""
     tables, weights = noise_tables(
-        noise,
-        taxonomy=objects.taxonomy,
-        codes=np.unique(objects.codes),
-        longest=LONGEST_TABLE,
+        noise, taxonomy=city.taxonomy, codes=city.codes, longest=LONGEST_TABLE
     )
     names = tables[0].query_rows(query)
     kinds = tables[0].row_of[view.codes]
@@ -226,9 +306,9 @@ def _table(
     turned: NDArray[np.float64],
     view: Views,
     chances: NDArray[np.float64],
-    objects: StreetObjects,
-) -> gpd.GeoDataFrame:
-    """Return the verdicts as a table."""
+    city: _City,
+) -> pd.DataFrame:
+    """Return the verdicts as a table, without geometry."""
     codes = np.full(len(query), WILDCARD) if query.codes is None else query.codes
     rows: list[dict[str, Any]] = []
     partners = _partners(chances)
@@ -238,7 +318,7 @@ def _table(
             "verdict": "false",
             "chance": max(1.0 - whole, 0.0),
             "query": number,
-            "query_class": _name(code, objects.taxonomy),
+            "query_class": city.class_name(code),
             "query_bearing": float(turned[number]),
         }
         if number in partners:
@@ -249,19 +329,33 @@ def _table(
                 "verdict": "misnamed" if other else "matched",
                 "chance": float(chances[entry, number]),
                 "bearing_error": float(away),
-                **_object(entry, view, objects),
+                **_object(entry, view, city),
             }
         rows.append(row)
     for entry in range(len(view.codes)):
         if entry not in partners.values():
             chance = max(1.0 - float(chances[entry].sum()), 0.0)
-            rows.append({"verdict": "missed", "chance": chance, **_object(entry, view, objects)})
+            rows.append({"verdict": "missed", "chance": chance, **_object(entry, view, city)})
     table = pd.DataFrame(rows, columns=COLUMNS)
     for name in ("query", "object"):
         table[name] = table[name].astype("Int64")
-    points = objects.table.geometry.array
-    shapes = [None if pd.isna(row) else points[int(row)] for row in table["object"]]
-    return gpd.GeoDataFrame(table, geometry=shapes, crs=objects.crs)
+    return table
+
+
+def _places(
+    table: pd.DataFrame, xy: tuple[float, float], city: _City
+) -> list[shapely.Point | None]:
+    """Return where the street objects of a table stand."""
+    if city.objects is not None:
+        points = city.objects.table.geometry.array
+        return [None if pd.isna(row) else points[int(row)] for row in table["object"]]
+    angle = np.radians(table["object_bearing"].to_numpy(np.float64))
+    away = table["distance"].to_numpy(np.float64)
+    x, y = xy[0] + away * np.sin(angle), xy[1] + away * np.cos(angle)
+    seen = np.isfinite(away)
+    return [
+        shapely.Point(*place) if there else None for *place, there in zip(x, y, seen, strict=True)
+    ]
 
 
 def _partners(chances: NDArray[np.float64]) -> dict[int, int]:
@@ -293,18 +387,19 @@ COLUMNS = [
 ]
 
 
-def _object(entry: int, view: Views, objects: StreetObjects) -> dict[str, Any]:
+def _object(entry: int, view: Views, city: _City) -> dict[str, Any]:
     """Return what a row of the table says of a street object."""
-    row = int(view.objects[entry])
-    return {
-        "object": row,
-        "source": str(objects.table[SOURCE].iloc[row]),
-        "source_id": str(objects.table[SOURCE_ID].iloc[row]),
-        "object_class": _name(int(view.codes[entry]), objects.taxonomy),
+    found: dict[str, Any] = {
+        "object_class": city.class_name(int(view.codes[entry])),
         "object_bearing": float(view.bearings[entry]),
         "distance": float(view.distances[entry]),
     }
-
-
-def _name(code: int, taxonomy: Taxonomy) -> str:
-    return UNKNOWN_NAME if code == WILDCARD else taxonomy.by_code(code).name
+    if city.objects is not None:
+        row = int(view.objects[entry])
+        of_object = city.objects.table.iloc[row]
+        found |= {
+            "object": row,
+            "source": str(of_object[SOURCE]),
+            "source_id": str(of_object[SOURCE_ID]),
+        }
+    return found

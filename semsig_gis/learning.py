@@ -33,10 +33,12 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from numpy.typing import NDArray
+    from pyproj import CRS
 
     from semsig_gis.noise_fit import Evidence
     from semsig_gis.noise_table import NoiseTable
     from semsig_gis.objects import StreetObjects
+    from semsig_gis.occlusion import Footprints
     from semsig_gis.samples import Sample
     from semsig_gis.views import Views
 
@@ -65,7 +67,7 @@ class NoiseEstimate:
     samples, objects, detections : int
         What it was learnt from.
     skipped : int
-        Samples that were left out, as their cell is not in the database.
+        Samples that were left out, as nothing is in sight of their place.
     rounds : int
         Rounds until it settled.
     log_likelihood : float
@@ -118,6 +120,7 @@ def learn_noise(
     *,
     radius: float = 30.0,
     position_sigma: float = 0.0,
+    footprints: Footprints | None = None,
     name: str = "learned",
 ) -> NoiseEstimate:
     """Estimate a noise model from detections whose true place is known.
@@ -128,13 +131,15 @@ def learn_noise(
         The detections; some hundred signatures serve well.
     city : SignatureDatabase or StreetObjects
         What there is to see. With a database a sample is looked up by its cell, and seen from
-        the middle of it; with street objects it is seen from where it was, but nothing is hidden.
+        the middle of it; with street objects it is seen from where it was.
     radius : float, default 30
         Visibility range in metres, with street objects; a database has its own.
     position_sigma : float, default 0
         Known standard deviation in metres, each way, of the true places given (with a database,
         of the place in its cell: ``step / 12 ** 0.5`` for places anywhere in it). What it turns
         the bearings by is not counted as bearing noise.
+    footprints : Footprints, optional
+        Buildings, with street objects; what they hide is not seen.
     name : str, default "learned"
         Name of the model.
 
@@ -159,7 +164,7 @@ def learn_noise(
     if not (math.isfinite(position_sigma) and position_sigma >= 0):
         msg = f"the deviation of the places is {position_sigma} m; give metres, 0 or more."
         raise InputError(msg)
-    views, used = _true_views(samples, city, radius)
+    views, used = _true_views(samples, city, radius, footprints)
     detected = [samples[row].signature for row in used]
     evidence = gather_evidence(views, detected, taxonomy=city.taxonomy)
     model = starting_model(evidence, position_sigma=position_sigma)
@@ -184,7 +189,10 @@ def learn_noise(
 
 
 def _true_views(
-    samples: Sequence[Sample], city: SignatureDatabase | StreetObjects, radius: float
+    samples: Sequence[Sample],
+    city: SignatureDatabase | StreetObjects,
+    radius: float,
+    footprints: Footprints | None,
 ) -> tuple[Views, list[int]]:
     """Return what there was to see in the samples that can be used, and which these are."""
     if not samples:
@@ -196,8 +204,13 @@ def _true_views(
             msg = "a sample gives its cell alone; give x and y, or a database instead of objects."
             raise InputError(msg)
         index = ObjectIndex(city.xy)
-        used = list(range(len(samples)))
-        return views_at(city, np.array(places), index=index, radius=radius), used
+        xy = np.array(places)
+        views = views_at(city, xy, index=index, radius=radius, footprints=footprints)
+        found = np.flatnonzero(views.lengths)
+        if len(found) < len(places):  # as a cell that sees nothing is not in a database
+            _require_some(len(found), len(places), city.crs)
+            views = views_at(city, xy[found], index=index, radius=radius, footprints=footprints)
+        return views, found.tolist()
     wanted = np.array(
         [
             sample.cell_id
@@ -209,13 +222,17 @@ def _true_views(
     ids = city.cell_ids
     cells = np.minimum(np.searchsorted(ids, wanted), len(ids) - 1)
     found = np.flatnonzero(ids[cells] == wanted)
-    if len(found) == 0:
+    _require_some(len(found), len(samples), city.crs)
+    return views_in(city, cells[found]), found.tolist()
+
+
+def _require_some(found: int, samples: int, crs: CRS) -> None:
+    if found == 0:
         msg = (
-            f"none of the {len(samples)} samples lies in a cell of the database; give places in "
-            f"its coordinate reference system ({city.crs.to_string()}), or its cell ids."
+            f"none of the {samples} samples lies where an object of the city is in sight; give "
+            f"places in its coordinate reference system ({crs.to_string()}), or its cell ids."
         )
         raise InputError(msg)
-    return views_in(city, cells[found]), found.tolist()
 
 
 def _spec(evidence: Evidence, rates: pd.DataFrame, model: NoiseTable, name: str) -> NoiseSpec:

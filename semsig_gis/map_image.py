@@ -13,13 +13,13 @@ from pyproj import Transformer
 from semsig_gis.grid import cell_ids
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Callable, Mapping, Sequence
 
     from numpy.typing import NDArray
 
     from semsig_gis.database import SignatureDatabase
 
-__all__ = ["city_image"]
+__all__ = ["city_image", "level_image"]
 
 _BLOCKS = 2048
 _LATTICE = 64
@@ -61,13 +61,69 @@ def city_image(
     >>> image[:4]
     b'\x89PNG'
     """
+
+    def mean_shades(members: NDArray[np.int64]) -> NDArray[np.uint8]:
+        means = np.bincount(members, weights=database.lengths) / np.bincount(members)
+        return np.digitize(means, list(shades)).astype(np.uint8)
+
+    return _drawn(database, mean_shades, list(shades.values()))
+
+
+def level_image(
+    database: SignatureDatabase, levels: NDArray[np.uint8], colours: Sequence[str]
+) -> tuple[bytes, list[list[float]]]:
+    r"""Draw a level of every cell.
+
+    Parameters
+    ----------
+    database : SignatureDatabase
+        The cells.
+    levels : ndarray of uint8, shape (n,)
+        Level of each cell from 1, or 0 for nothing.
+    colours : sequence of str
+        Colour (``#rrggbb``) of each level.
+
+    Returns
+    -------
+    image : bytes
+        A PNG (see `city_image`). Of several cells in a block the highest level is shown.
+    bounds : list of [latitude, longitude]
+        South-western and north-eastern corner in degrees, WGS 84.
+
+    Examples
+    --------
+    >>> from semsig_gis.catalog import paper_taxonomy
+    >>> from semsig_gis.building import build_database
+    >>> from semsig_gis.objects import build_objects
+    >>> from semsig_gis.sources.synthetic import CitySpec, synthetic_city
+    >>> layers = synthetic_city(CitySpec(size=300.0))
+    >>> objects, _ = build_objects(layers, taxonomy=paper_taxonomy(), crs="EPSG:32631")
+    >>> database = build_database(objects)
+    >>> image, bounds = level_image(database, np.ones(len(database), np.uint8), ["#cccccc"])
+    >>> image[:4]
+    b'\x89PNG'
+    """
+
+    def highest(members: NDArray[np.int64]) -> NDArray[np.uint8]:
+        found = np.zeros(int(members.max()) + 1, np.uint8)
+        np.maximum.at(found, members, levels)
+        return found
+
+    return _drawn(database, highest, colours)
+
+
+def _drawn(
+    database: SignatureDatabase,
+    values_of: Callable[[NDArray[np.int64]], NDArray[np.uint8]],
+    colours: Sequence[str],
+) -> tuple[bytes, list[list[float]]]:
+    """Draw a value of each block of cells, from the number of the block of every cell."""
     columns, rows = database.columns.astype(np.int64), database.rows.astype(np.int64)
     cells = max(int(np.ptp(columns)), int(np.ptp(rows))) + 1
     block = math.ceil(cells / _BLOCKS)
     columns, rows = columns // block, rows // block
     blocks, members = np.unique(cell_ids(columns, rows), return_inverse=True)
-    means = np.bincount(members, weights=database.lengths) / np.bincount(members)
-    values = np.digitize(means, list(shades)).astype(np.uint8)
+    values = values_of(members)
     side = database.grid.step * block
     origin = np.array(database.grid.origin)
     low = origin + side * np.array([columns.min(), rows.min()])
@@ -82,7 +138,7 @@ def city_image(
         wanted = cell_ids(*np.floor((places - origin[:, None]) / side).astype(np.int64))
         found = np.minimum(np.searchsorted(blocks, wanted), len(blocks) - 1)
         pixels[line] = np.where(blocks[found] == wanted, values[found], 0)
-    return _png(pixels, list(shades.values())), corners
+    return _png(pixels, colours), corners
 
 
 def _lattice_places(

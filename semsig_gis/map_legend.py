@@ -14,16 +14,22 @@ if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence
 
     from semsig_gis.evaluation import Evaluation
+    from semsig_gis.location import Location
     from semsig_gis.matching import Localization
+    from semsig_gis.signatures import Signature
+    from semsig_gis.taxonomy import Taxonomy
 
 __all__ = [
     "CANDIDATE_RAMP",
+    "CHANCES",
     "ERROR_RAMP",
     "FAILED",
     "SHADES",
     "SUCCESSFUL",
+    "VERDICTS",
     "evaluation_legend",
     "localization_legend",
+    "location_legend",
 ]
 
 # Blue and orange of Okabe and Ito, which colour-blind people tell apart.
@@ -37,6 +43,14 @@ SHADES: Mapping[int, str] = MappingProxyType(
     {1: "#dfdfdb", 5: "#c8c8c2", 10: "#aeaea7", 20: "#8f8f88"}
 )
 """Colour of a cell by the smallest number of objects that are seen from it."""
+
+CHANCES: Mapping[float, str] = MappingProxyType({0.5: "#54278f", 0.9: "#9e9ac8", 0.99: "#dadaeb"})
+"""Colour of the fewest cells that hold a share of the chance."""
+
+VERDICTS: Mapping[str, str] = MappingProxyType(
+    {"matched": "#009e73", "misnamed": "#cc79a7", "missed": "#ffffff", "false": "#d55e00"}
+)
+"""Colour of what became of an object."""
 
 _THRESHOLDS = (10, 25, 50, 100)
 
@@ -94,25 +108,82 @@ def localization_legend(localization: Localization) -> str:
     str
         HTML in which all text from data is escaped, for a ``details`` element.
     """
-    query, candidates = localization.query, localization.candidates
-    asked = []
-    if query.codes is not None:
-        asked.append(f"Types: {escape(localization.taxonomy.decode(query.codes))}")
-    if query.bearings is not None:
-        degrees = (round(bearing) % 360 for bearing in query.bearings.tolist())
-        asked.append("Bearings: " + " ".join(f"{value}°" for value in degrees))
+    candidates = localization.candidates
     more = localization.tied_beyond
     beyond = f"<br>{more:,} more cells are as good as the last one" if more else ""
     distances = candidates["distance"]
     return (
         "<summary>Candidate places</summary>"
-        f"<p>{'<br>'.join(asked)}<br>"
+        f"<p>{_asked(localization.query, localization.taxonomy)}"
         f"Method: {escape(str(localization.method))}, by {escape(localization.used)}</p>"
         f"<p>The best {len(candidates):,} of {localization.cells:,} cells{beyond}</p>"
         "<p>Distance to the query (large sign: rank 1)"
         f"{_ramp(CANDIDATE_RAMP, f'{distances.min():.3f}', f'{distances.max():.3f}')}</p>"
         f"{_shades()}{_sources(localization.licenses)}"
     )
+
+
+def location_legend(location: Location) -> str:
+    """Return the legend of a map of chances.
+
+    Parameters
+    ----------
+    location : Location
+        What the map shows.
+
+    Returns
+    -------
+    str
+        HTML in which all text from data is escaped, for a ``details`` element.
+    """
+    database, estimate = location.posterior.database, location.estimate
+    colour = SUCCESSFUL if location.answer.given else FAILED
+    told = "The answer" if location.answer.given else "Cannot tell; the best place"
+    cells = {share: len(location.posterior.credible_cells(share)) for share in CHANCES}
+    shares = "<br>".join(
+        f"{_sign(CHANCES[share], 'square')}{share:.0%} in {_cells(cells[share])}"
+        for share in CHANCES
+    )
+    explained = "".join(
+        f"<br>{_sign(VERDICTS[verdict])}{text}"
+        for verdict, text in (
+            ("matched", "matched: a street object"),
+            ("misnamed", "misnamed: one of another class"),
+            ("missed", "missed: a street object not in the query"),
+            ("false", "false: no street object"),
+        )
+    )
+    rays = (
+        f"<p>Objects of the query, as rays where they were seen{explained}</p>"
+        if location.explanations
+        else ""
+    )
+    return (
+        "<summary>Where it was seen</summary>"
+        f"<p>{_asked(location.query, database.taxonomy)}"
+        f"Method: likelihood, {escape(location.noise)} noise, {len(database):,} cells</p>"
+        f"<p>{_sign(colour)}<b>{told}</b>: within {location.rule.radius:g} m with a chance of "
+        f"{location.answer.mass:.1%}; if there, ±&nbsp;{estimate.sigma:.1f}&nbsp;m each way "
+        "(ellipse: 90 %)</p>"
+        f"<p>Chance, the fewest cells that hold<br>{shares}</p>"
+        f"<p>{_sign('#ffffff')}Candidates by rank</p>"
+        f"{rays}{_shades()}{_sources(database.licenses)}"
+    )
+
+
+def _cells(number: int) -> str:
+    return "1 cell" if number == 1 else f"{number:,} cells"
+
+
+def _asked(query: Signature, taxonomy: Taxonomy) -> str:
+    """Return what was asked, a line each."""
+    asked = []
+    if query.codes is not None:
+        asked.append(f"Types: {escape(taxonomy.decode(query.codes))}<br>")
+    if query.bearings is not None:
+        degrees = (round(bearing) % 360 for bearing in query.bearings.tolist())
+        asked.append(f"Bearings: {' '.join(f'{value}°' for value in degrees)}<br>")
+    return "".join(asked)
 
 
 def _sign(colour: str, shape: str = "round") -> str:

@@ -39,6 +39,10 @@ STYLE = """\
 .semsig-details th { text-align: left; font-weight: 400; color: #555; white-space: nowrap; }
 .semsig-details th, .semsig-details td { vertical-align: top; padding: 2px 6px 2px 0; }
 .semsig-details code { font-size: 14px; font-weight: 600; }
+.leaflet-tooltip.semsig-number {
+  background: none; border: none; box-shadow: none; padding: 0; color: #222;
+  font: 11px/1 system-ui, sans-serif; }
+.semsig-close .leaflet-image-layer { image-rendering: pixelated; }
 .leaflet-control-layers { font: 13px/1.5 system-ui, sans-serif; }
 """
 
@@ -83,13 +87,19 @@ const semsig = {
   },
   points(fields, titles, records) {
     const group = L.featureGroup();
-    for (const [place, colour, radius, found, name, values] of records) {
+    for (const [place, colour, radius, found, name, values, label] of records) {
       const marker = L.circleMarker(place, {
         pane: "markerPane", radius: radius, color: "#222", weight: 1,
         fillColor: colour, fillOpacity: 0.95,
       });
       marker.bindPopup(() => semsig.details(name, fields, values, titles),
         {maxWidth: 340, minWidth: 220, maxHeight: 400});
+      if (label) {
+        const text = L.DomUtil.create("b", "");
+        text.textContent = label;
+        const look = {permanent: true, direction: "center", className: "semsig-number"};
+        marker.bindTooltip(text, look);
+      }
       if (found !== null) {
         const look = {pane: "shadowPane", interactive: false, color: "#222", weight: 2};
         const hint = L.layerGroup([
@@ -104,9 +114,12 @@ const semsig = {
     return group;
   },
   lines(bundles) {
-    return L.featureGroup(bundles.map(([colour, lines]) => L.polyline(lines, {
-      pane: "shadowPane", interactive: false, color: colour, weight: 1, opacity: 0.6,
+    return L.featureGroup(bundles.map(([look, lines]) => L.polyline(lines, {
+      pane: "shadowPane", interactive: false, weight: 1, opacity: 0.6, ...look,
     })));
+  },
+  drawings(parts) {
+    return L.featureGroup(parts.map(([name, ...values]) => semsig[name](...values)));
   },
   heat(points, {maxZoom, ...options}) {
     // leaflet.heat means by it where its points are strongest, but the layer control disables a
@@ -120,7 +133,7 @@ const semsig = {
     };
     return layer;
   },
-  legend(map, text, view) {
+  legend(map, text, view, zoom) {
     const box = L.DomUtil.create("details", "semsig-legend");
     box.open = window.innerWidth > 700;
     box.innerHTML = text;
@@ -129,12 +142,16 @@ const semsig = {
     const control = L.control({position: "bottomleft"});
     control.onAdd = () => box;
     control.addTo(map);
+    // Cells have edges from near, and melt into each other from afar.
+    const close = () => map.getContainer().classList.toggle("semsig-close", map.getZoom() > 16);
+    map.on("zoomend", close);
     if (view !== null) {
       const left = box.open ? box.offsetWidth + 20 : 10;
       map.fitBounds(view, {
-        paddingTopLeft: [left, 10], paddingBottomRight: [10, 10], maxZoom: 17, animate: false,
+        paddingTopLeft: [left, 10], paddingBottomRight: [10, 10], maxZoom: zoom, animate: false,
       });
     }
+    close();
   },
 };
 """

@@ -2,36 +2,42 @@
 
 from __future__ import annotations
 
-import base64
 import itertools
 import math
 import operator
-from typing import TYPE_CHECKING, Any, cast
+from typing import TYPE_CHECKING, Any
 
 import folium
 import numpy as np
-from branca.element import Element, MacroElement
-from folium.map import Layer
 from folium.plugins import HeatMap
-from folium.raster_layers import ImageOverlay, WmsTileLayer
+from folium.raster_layers import WmsTileLayer
 from folium.template import Template
-from folium.utilities import JsCode
-from pyproj import Transformer
 
 from semsig_gis import map_assets
+from semsig_gis._map_parts import (
+    Drawing,
+    Furniture,
+    Legend,
+    add_city,
+    cell_signature,
+    class_titles,
+    finished_map,
+    free_name,
+    layers_of,
+    popup_signature,
+    prepared_map,
+    to_latlon,
+)
 from semsig_gis.errors import InputError
 from semsig_gis.evaluation import SUCCESS_METRES
-from semsig_gis.map_image import city_image
 from semsig_gis.map_legend import (
     CANDIDATE_RAMP,
     ERROR_RAMP,
     FAILED,
-    SHADES,
     SUCCESSFUL,
     evaluation_legend,
     localization_legend,
 )
-from semsig_gis.map_page import SCRIPT, STYLE, script_json
 from semsig_gis.spatial_index import ObjectIndex
 from semsig_gis.storage import whole_file
 
@@ -39,9 +45,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
     from pathlib import Path
 
-    from branca.element import Figure
     from numpy.typing import ArrayLike, NDArray
-    from pyproj import CRS
 
     from semsig_gis.database import SignatureDatabase
     from semsig_gis.evaluation import Evaluation
@@ -61,7 +65,6 @@ _QUERY_FIELDS = (
 )
 _CANDIDATE_FIELDS = ("Rank", "Distance", "Signature", "Cell", "Position")
 
-_MAX_ZOOM = 20
 _HEAT_PIXELS = 25
 _HEAT_STOPS = (0.1, 0.35, 0.65, 0.9)
 _SCREEN_PIXELS = 900.0
@@ -126,18 +129,18 @@ def evaluation_map(
     queries = evaluation.queries
     successful = evaluation.successful
     xy = np.stack([queries.geometry.x, queries.geometry.y], axis=1)
-    places = _latlon(xy, database.crs)
-    found = _latlon(queries[["best_x", "best_y"]].to_numpy(np.float64), database.crs)
+    places = to_latlon(xy, database.crs)
+    found = to_latlon(queries[["best_x", "best_y"]].to_numpy(np.float64), database.crs)
     records = _query_records(evaluation, database, places, found)
     low, high = database.xy.min(axis=0), database.xy.max(axis=0)
-    view = _latlon(np.stack([low, high]), database.crs)
+    view = to_latlon(np.stack([low, high]), database.crs)
     # How far two random cells lie apart (root mean square).
     guess = math.sqrt(2.0 * float(database.xy.var(axis=0).sum())) or database.grid.step
-    chosen = _prepared(map_, tiles, title="Localization errors")
-    _add_city(chosen, database)
+    chosen = prepared_map(map_, tiles, title="Localization errors")
+    add_city(chosen, database)
     _Heat(  # type: ignore[no-untyped-call]
         np.column_stack([places, _heat(xy, queries["error_m"] / guess, extent=max(high - low))]),
-        name=_free_name(chosen, "Expected errors"),
+        name=free_name(chosen, "Expected errors"),
         min_opacity=0.0,
         # Farther out than the whole city, leaflet.heat weakens what comes to lie closer together.
         max_zoom=_zoom(view),
@@ -147,26 +150,26 @@ def evaluation_map(
     ).add_to(chosen)
     groups = (("Failed", ~successful, FAILED), ("Successful", successful, SUCCESSFUL))
     located = np.isfinite(found).all(axis=1)
-    _Drawing(
-        _free_name(chosen, "Lines from true to estimated places"),
+    Drawing(
+        free_name(chosen, "Lines from true to estimated places"),
         "lines",
         [
-            [colour, np.stack([places, found], axis=1)[which & located].tolist()]
+            [{"color": colour}, np.stack([places, found], axis=1)[which & located].tolist()]
             for _, which, colour in groups
         ],
         show=False,
     ).add_to(chosen)
     for name, which, _ in groups:
-        _Drawing(
-            _free_name(chosen, f"{name} queries ({int(which.sum()):,})"),
+        Drawing(
+            free_name(chosen, f"{name} queries ({int(which.sum()):,})"),
             "points",
             _QUERY_FIELDS,
-            _titles(database),
+            class_titles(database),
             list(itertools.compress(records, which)),
         ).add_to(chosen)
     legend = evaluation_legend(evaluation, error_limit=_metres(guess), licenses=database.licenses)
-    _Legend(legend, view if map_ is None else None).add_to(chosen)
-    return _finished(chosen)
+    Legend(legend, view if map_ is None else None).add_to(chosen)
+    return finished_map(chosen)
 
 
 def localization_map(
@@ -217,19 +220,19 @@ def localization_map(
     """
     candidates = localization.candidates
     xy = candidates[["x", "y"]].to_numpy(np.float64)
-    places = _latlon(xy, database.crs)
+    places = to_latlon(xy, database.crs)
     records = _candidate_records(localization, database, places)
-    chosen = _prepared(map_, tiles, title="Candidate places")
-    _add_city(chosen, database)
-    _Drawing(
-        _free_name(chosen, f"Candidates ({len(records):,})"),
+    chosen = prepared_map(map_, tiles, title="Candidate places")
+    add_city(chosen, database)
+    Drawing(
+        free_name(chosen, f"Candidates ({len(records):,})"),
         "points",
         _CANDIDATE_FIELDS,
-        _titles(database),
+        class_titles(database),
         records[::-1],  # the best last, so that they lie on top
     ).add_to(chosen)
-    _Legend(localization_legend(localization), places if map_ is None else None).add_to(chosen)
-    return _finished(chosen)
+    Legend(localization_legend(localization), places if map_ is None else None).add_to(chosen)
+    return finished_map(chosen)
 
 
 def save_map(map_: folium.Map, path: str | Path, *, self_contained: bool | None = None) -> bool:
@@ -273,60 +276,12 @@ def save_map(map_: folium.Map, path: str | Path, *, self_contained: bool | None 
     with whole_file(path) as partial:
         partial.write_text(page, encoding="utf-8")
     tiled = any(
-        isinstance(child, folium.TileLayer | WmsTileLayer) for child in _children(map_).values()
+        isinstance(child, folium.TileLayer | WmsTileLayer) for child in layers_of(map_).values()
     )
     return not map_assets.external_files(page) and not tiled
 
 
-class _Furniture(MacroElement):
-    """An element that needs the style and the script of this module in the page, once."""
-
-    def render(self, **kwargs: Any) -> Any:  # noqa: ANN401 - as branca has it
-        """Put the style and script into the page, then the element."""
-        figure = cast("Figure", self.get_root())
-        page = f"<style>{STYLE}</style>\n<script>{SCRIPT}</script>"
-        figure.header.add_child(Element(page), name="semsig")
-        return super().render(**kwargs)  # type: ignore[no-untyped-call]
-
-
-class _Legend(_Furniture):
-    """A box with the meaning of the signs, folded on narrow screens, and what to show beside it."""
-
-    _template = Template(
-        """
-        {% macro script(this, kwargs) %}
-        semsig.legend({{ this._parent.get_name() }}, {{ this.text }}, {{ this.view }});
-        {% endmacro %}
-        """
-    )
-
-    def __init__(self, text: str, view: NDArray[np.float64] | None) -> None:
-        super().__init__()  # type: ignore[no-untyped-call]
-        self._name = "SemsigLegend"
-        self.text = script_json(text)
-        corners = None if view is None else [view.min(axis=0).tolist(), view.max(axis=0).tolist()]
-        self.view = script_json(corners)
-
-
-class _Drawing(_Furniture, Layer):
-    """A layer that a function of this module's script draws, on a canvas where the map has one."""
-
-    _template = Template(
-        """
-        {% macro script(this, kwargs) %}
-        var {{ this.get_name() }} = semsig.{{ this.function }}({{ this.arguments }});
-        {% endmacro %}
-        """
-    )
-
-    def __init__(self, name: str, function: str, *arguments: object, show: bool = True) -> None:
-        super().__init__(name=name, overlay=True, show=show)
-        self._name = "SemsigDrawing"
-        self.function = function
-        self.arguments = ", ".join(map(script_json, arguments))
-
-
-class _Heat(_Furniture, HeatMap):
+class _Heat(Furniture, HeatMap):
     """A heatmap that can be switched on and off at every zoom."""
 
     _template = Template(
@@ -337,42 +292,6 @@ class _Heat(_Furniture, HeatMap):
         {% endmacro %}
         """
     )
-
-
-def _prepared(map_: folium.Map | None, tiles: str | None, *, title: str) -> folium.Map:
-    """Return the map to draw on."""
-    if map_ is not None:
-        if tiles is not None:
-            msg = f"Tiles {tiles!r} were given with a map of your own; add them to that map."
-            raise InputError(msg)
-        return map_
-    try:
-        made = folium.Map(tiles=tiles, prefer_canvas=True, control_scale=True)
-    except ValueError as error:
-        msg = (
-            f"Tiles {tiles!r} are not known to folium; give a name such as 'OpenStreetMap' or "
-            "'CartoDB positron', or add a tile layer to a map of your own."
-        )
-        raise InputError(msg) from error
-    if tiles is None:
-        # Only tiles tell Leaflet where to stop, and only they look bad between whole zooms.
-        made.options |= {"maxZoom": _MAX_ZOOM, "zoomSnap": 0.25}
-    cast("Figure", made.get_root()).title = title
-    return made
-
-
-def _finished(chosen: folium.Map) -> folium.Map:
-    """Put the layer control last, where it knows all layers."""
-    children = _children(chosen)
-    for name in [key for key, child in children.items() if isinstance(child, folium.LayerControl)]:
-        del children[name]
-    narrow = cast("bool", JsCode("window.innerWidth <= 700"))
-    folium.LayerControl(collapsed=narrow).add_to(chosen)
-    return chosen
-
-
-def _children(map_: folium.Map) -> dict[str, Element]:
-    return map_._children  # noqa: SLF001 - branca has no public way to look at them
 
 
 def _rows(
@@ -394,30 +313,6 @@ def _rows(
         )
         raise InputError(msg)
     return rows
-
-
-def _latlon(xy: NDArray[np.float64], crs: CRS) -> NDArray[np.float64]:
-    """Return latitudes and longitudes to about 0.1 m, shape (n, 2); NaN stays NaN."""
-    to_degrees = Transformer.from_crs(crs, "EPSG:4326", always_xy=True)
-    longitude, latitude = to_degrees.transform(xy[:, 0], xy[:, 1])
-    degrees = np.round(np.stack([latitude, longitude], axis=1), 6)
-    return np.where(np.isfinite(degrees), degrees, np.nan)
-
-
-def _titles(database: SignatureDatabase) -> dict[str, str]:
-    return {item.symbol: item.title for item in database.taxonomy.classes}
-
-
-def _signature(types: str | None, bearings: ArrayLike | None) -> list[Any]:
-    """Return a signature for the popup: symbols and whole degrees."""
-    if bearings is None:
-        return [types, None]
-    degrees = np.rint(np.asarray(bearings, np.float64)).astype(int) % 360
-    return [types, degrees.tolist()]
-
-
-def _cell_signature(database: SignatureDatabase, cell: int) -> list[Any]:
-    return _signature(database.types(cell), database.signature(cell).bearings)
 
 
 def _query_records(
@@ -445,8 +340,10 @@ def _query_records(
         asked = [float(one) for one in query.query_bearings.split(",") if one]
         located = query.tied > 0
         details = [
-            _cell_signature(database, int(rows[number])),
-            _signature(query.query_types, asked) if query.query_length else "nothing left of it",
+            cell_signature(database, int(rows[number])),
+            popup_signature(query.query_types, asked)
+            if query.query_length
+            else "nothing left of it",
             _metres(query.error_m),
             f"{getattr(query, f'p{SUCCESS_METRES}'):.2f}",
             f"{_ranks(query.rank_low, query.rank_high)} of {cells:,}",
@@ -454,7 +351,7 @@ def _query_records(
             f"{query.best_cell_id}, distance {query.distance:.3f}{_tie(query.tied)}"
             if located
             else "none",
-            _cell_signature(database, int(best_rows[number])) if located else None,
+            cell_signature(database, int(best_rows[number])) if located else None,
         ]
         outcome = "successful" if successful[number] else "failed"
         records.append(
@@ -492,7 +389,7 @@ def _candidate_records(
         details = [
             f"{rank} of {len(database):,}{_tie(candidate['tied'])}",
             f"{candidate['distance']:.4f}",
-            _cell_signature(database, int(rows[number])),
+            cell_signature(database, int(rows[number])),
             str(candidate["cell_id"]),
             f"{latitude:.6f}, {longitude:.6f}",
         ]
@@ -548,21 +445,3 @@ def _zoom(view: NDArray[np.float64]) -> int:
     """Return about the zoom at which places fill a screen."""
     degrees = max(float(np.ptp(view[:, 1])), 0.001)
     return round(math.log2(_SCREEN_PIXELS / _TILE_PIXELS * 360.0 / degrees))
-
-
-def _free_name(map_: folium.Map, name: str) -> str:
-    """Return the name for a layer, with a number where the map has one of that name."""
-    taken = {child.layer_name for child in _children(map_).values() if isinstance(child, Layer)}
-    numbered = (f"{name}, {number}" for number in itertools.count(2))
-    return next(one for one in itertools.chain([name], numbered) if one not in taken)
-
-
-def _add_city(chosen: folium.Map, database: SignatureDatabase) -> None:
-    """Add the cells as an image, unless the map shows them already."""
-    image, bounds = city_image(database, SHADES)
-    url = f"data:image/png;base64,{base64.b64encode(image).decode('ascii')}"
-    shown = {child.url for child in _children(chosen).values() if isinstance(child, ImageOverlay)}
-    if url not in shown:
-        # In the pane of tiles, below everything else.
-        name = _free_name(chosen, "Objects seen from a cell")
-        ImageOverlay(url, bounds, name=name, pane="tilePane").add_to(chosen)

@@ -16,11 +16,13 @@ if TYPE_CHECKING:
 
     from numpy.typing import ArrayLike, NDArray
 
-__all__ = ["TOLERANCE_M", "Footprints", "hidden"]
+__all__ = ["TOLERANCE_M", "TOUCHING_M", "Footprints", "buildings_near", "hidden"]
 
 TOLERANCE_M = 0.5
 # Houses nearer to each other than twice this share a wall.
 GAP_M = 0.05
+TOUCHING_M = 1.0
+"""Metres; more than the tolerance, and than what counts as a gap between buildings."""
 PAIRS_A_BLOCK = 1 << 17
 POLYGONAL = 2  # dimensions
 
@@ -276,6 +278,45 @@ def _joined(first: NDArray[np.int64], second: NDArray[np.int64], size: int) -> N
         label = label[label]
         if np.array_equal(label, before):
             return label
+
+
+def buildings_near(
+    polygons: NDArray[np.object_], places: NDArray[np.float64], *, distance: float
+) -> NDArray[np.int64]:
+    """Return the buildings around some places, with all that they are joined to.
+
+    Parameters
+    ----------
+    polygons : ndarray of shapely.Geometry, shape (n,)
+        Footprints in a metric CRS.
+    places : ndarray of float64, shape (p, 2)
+        Places in metres.
+    distance : float
+        Metres around each of them.
+
+    Returns
+    -------
+    ndarray of int64
+        Row numbers, rising.
+
+    Notes
+    -----
+    A block of houses is one shape to occlusion, which comes out the same only from all of them.
+
+    Examples
+    --------
+    >>> row = np.array([shapely.box(x, 0, x + 8, 8) for x in (0, 8, 50)])
+    >>> buildings_near(row, np.array([[-5.0, 0.0]]), distance=6.0).tolist()
+    [0, 1]
+    """
+    tree = shapely.STRtree(polygons)
+    chosen = np.zeros(len(polygons), bool)
+    found = tree.query(shapely.points(places), predicate="dwithin", distance=distance)[1]
+    while len(found):
+        chosen[found] = True
+        touching = tree.query(polygons[found], predicate="dwithin", distance=TOUCHING_M)[1]
+        found = np.unique(touching[~chosen[touching]])
+    return np.flatnonzero(chosen)
 
 
 def _parts(size: int) -> Iterator[slice]:

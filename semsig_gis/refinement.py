@@ -31,13 +31,14 @@ if TYPE_CHECKING:
     from semsig_gis.spatial_index import ObjectIndex
     from semsig_gis.stored_index import StoredIndex
 
-__all__ = ["Refinement", "cell_noise", "refine"]
+__all__ = ["Refinement", "cell_noise", "place_noise", "refine"]
 
 KEPT = (1000, 400, 200, 100)
 """How many parts are divided, level by level: cells, their quarters, and so on."""
 LEAST_CHANCE = 1e-6  # of a part, against the likeliest, to be divided
 TURNS = (7.5, 6.0, 4.5, 3.0)  # degrees to each side that are tried, level by level
 TURNS_A_SIDE = 3
+ROUNDING = 1e-6  # square metres
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -158,6 +159,45 @@ def cell_noise(noise: Noise, step: float) -> Noise:
         return replace(noise, specs=specs)  # type: ignore[arg-type]
     sigma = math.hypot(noise.position_sigma, step / math.sqrt(12.0))
     return replace(noise, position_sigma=sigma)
+
+
+def place_noise(noise: Noise, step: float) -> Noise:
+    """Return the noise model for a place that is known, the inverse of `cell_noise`.
+
+    Parameters
+    ----------
+    noise : NoiseSpec or NoiseMixture
+        The model for queries from anywhere in a cell.
+    step : float
+        Side of a cell in metres.
+
+    Returns
+    -------
+    NoiseSpec or NoiseMixture
+        The model without the uncertainty of the place in a cell.
+
+    Raises
+    ------
+    InputError
+        If the model has less of it than that.
+
+    Examples
+    --------
+    >>> from semsig_gis.noise import NoiseSpec
+    >>> place_noise(cell_noise(NoiseSpec(), 10.0), 10.0).position_sigma
+    0.0
+    """
+    if isinstance(noise, NoiseMixture):
+        specs = tuple(place_noise(spec, step) for spec in noise.specs)
+        return replace(noise, specs=specs)  # type: ignore[arg-type]
+    known = noise.position_sigma**2 - step**2 / 12.0
+    if known < -ROUNDING:
+        msg = (
+            f"noise model {noise.name!r} is for queries from the middles of cells; build the index "
+            f"for cell_noise(noise, {step:g}), which is for queries from anywhere in them."
+        )
+        raise InputError(msg)
+    return replace(noise, position_sigma=0.0 if known < ROUNDING else math.sqrt(known))
 
 
 def refine(

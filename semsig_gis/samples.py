@@ -2,24 +2,20 @@
 
 from __future__ import annotations
 
-import csv
-import json
-import math
-import re
 from dataclasses import dataclass
-from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from semsig_gis.errors import InputError, SemsigError
-from semsig_gis.geometry import wrap_degrees
+from semsig_gis.errors import InputError
+from semsig_gis.row_file import given, read_rows, row_signature
 from semsig_gis.signatures import Signature
 from semsig_gis.taxonomy import WILDCARD
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping
+    from pathlib import Path
 
+    from semsig_gis.row_file import Row
     from semsig_gis.taxonomy import Taxonomy
 
 __all__ = ["Sample", "read_samples"]
@@ -96,6 +92,7 @@ def read_samples(path: str | Path, *, taxonomy: Taxonomy) -> list[Sample]:
     Examples
     --------
     >>> import tempfile
+    >>> from pathlib import Path
     >>> from semsig_gis.catalog import paper_taxonomy
     >>> with tempfile.TemporaryDirectory() as folder:
     ...     path = Path(folder, "seen.csv")
@@ -104,64 +101,19 @@ def read_samples(path: str | Path, *, taxonomy: Taxonomy) -> list[Sample]:
     >>> sample.xy, sample.signature.bearings.tolist()
     ((500000.0, 5400000.0), [200.0, 350.0])
     """
-    file = Path(path)
-    samples = []
-    try:
-        text = file.read_text(encoding="utf-8-sig")
-    except (OSError, ValueError) as error:
-        reason = error.strerror if isinstance(error, OSError) else error
-        msg = f"samples file {file} cannot be read ({reason}); give a CSV or JSON lines file."
-        raise InputError(msg) from error
-    for line, row in _rows(text, json_lines=file.suffix.lower() != ".csv"):
-        try:
-            samples.append(_sample(row() if callable(row) else row, taxonomy))
-        except (SemsigError, ValueError, TypeError, OverflowError) as error:
-            reason = str(error).rstrip(".")
-            msg = f"line {line} of {file} is not a sample ({reason}); correct it or take it out."
-            raise InputError(msg) from error
-    if not samples:
-        msg = f"samples file {file} has no rows; give one row for each place."
-        raise InputError(msg)
-    return samples
+    rows = read_rows(path, lambda row: _sample(row, taxonomy), what="sample")
+    return [sample for _, sample in rows]
 
 
-def _rows(text: str, *, json_lines: bool) -> Iterator[tuple[int, Any]]:
-    """Yield the number of each line and its values, or what gives them."""
-    if not json_lines:
-        reader = csv.DictReader(text.splitlines())
-        for row in reader:
-            yield reader.line_num, row
-        return
-    for line, part in enumerate(text.splitlines(), start=1):
-        if part.strip():
-            yield line, lambda part=part: json.loads(part)
-
-
-def _sample(row: Mapping[str, Any], taxonomy: Taxonomy) -> Sample:
-    if not isinstance(row, dict):
-        msg = "it is not a table of names and values"
-        raise InputError(msg)
+def _sample(row: Row, taxonomy: Taxonomy) -> Sample:
     for name in ("types", "bearings"):
         if row.get(name) is None:
             msg = f"it has no {name}"
             raise InputError(msg)
-    signature = _signature(str(row["types"]).strip(), row["bearings"], taxonomy)
-    if row.get("x") not in {None, ""} and row.get("y") not in {None, ""}:
-        return Sample(signature=signature, xy=(float(row["x"]), float(row["y"])))
-    if row.get("cell_id") not in {None, ""}:
-        return Sample(signature=signature, cell_id=int(row["cell_id"]))
-    return Sample(signature=signature)
-
-
-def _signature(types: str, bearings: Any, taxonomy: Taxonomy) -> Signature:  # noqa: ANN401
-    parts = re.split(r"[\s,;]+", bearings.strip()) if isinstance(bearings, str) else bearings
-    if not isinstance(parts, list):
-        parts = [parts]
-    angles = [float(part) for part in parts if part != ""]
-    if not types and not angles:
-        return Signature(np.empty(0, np.uint8), np.empty(0))
-    wrong = [angle for angle in angles if not (math.isfinite(angle) and abs(angle) <= 360)]  # noqa: PLR2004
-    if wrong:
-        msg = f"bearing {wrong[0]:g} is not usable"
-        raise InputError(msg)
-    return Signature(taxonomy.encode(types), wrap_degrees(angles))
+    signature = row_signature(row, taxonomy)
+    if signature is None:
+        signature = Signature(np.empty(0, np.uint8), np.empty(0))
+    x, y, cell = (given(row, name) for name in ("x", "y", "cell_id"))
+    if x is not None and y is not None:
+        return Sample(signature=signature, xy=(float(x), float(y)))
+    return Sample(signature=signature, cell_id=None if cell is None else int(cell))

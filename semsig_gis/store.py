@@ -24,12 +24,16 @@ from semsig_gis import __version__
 from semsig_gis.database_file import save_database
 from semsig_gis.errors import CrsError, DatabaseError, InputError
 from semsig_gis.objects import open_objects, save_objects
+from semsig_gis.occlusion import Footprints, buildings_near
 from semsig_gis.schema import HALF_WIDTH
 from semsig_gis.storage import whole_file
 from semsig_gis.stored_index import INDEX_FILES, StoredIndex
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
+
+    import numpy as np
+    from numpy.typing import NDArray
 
     from semsig_gis.database import SignatureDatabase
     from semsig_gis.objects import StreetObjects
@@ -119,6 +123,29 @@ class ObjectStore:
             footprints=None if footprints is None else _surroundings(footprints, objects),
             streets=None if streets is None else _surroundings(streets, objects),
         )
+
+    def buildings_around(
+        self, places: NDArray[np.float64], *, distance: float
+    ) -> Footprints | None:
+        """Return the buildings around some places, ready to be looked at.
+
+        Parameters
+        ----------
+        places : ndarray of float64, shape (p, 2)
+            Places in metres.
+        distance : float
+            Metres around each of them.
+
+        Returns
+        -------
+        Footprints or None
+            The buildings with all that they are joined to; None where there are none.
+        """
+        if self.footprints is None:
+            return None
+        polygons = self.footprints.geometry.to_numpy()
+        near = buildings_near(polygons, places, distance=distance)
+        return Footprints(polygons[near]) if len(near) else None
 
 
 def _surroundings(table: gpd.GeoDataFrame, objects: StreetObjects) -> gpd.GeoDataFrame:
@@ -215,13 +242,15 @@ def save_with_store(database: SignatureDatabase, store: ObjectStore, path: str |
     _settle(Path(path))
 
 
-def open_store(database: str | Path) -> ObjectStore:
+def open_store(database: str | Path, folder: str | Path | None = None) -> ObjectStore:
     """Open the object store of a database.
 
     Parameters
     ----------
     database : str or Path
         File of the database.
+    folder : str or Path, optional
+        The store, where it does not lie beside the database.
 
     Returns
     -------
@@ -251,7 +280,7 @@ def open_store(database: str | Path) -> ObjectStore:
             what = "is a folder, and only a database in one file has an object store"
         msg = f"{database} {what}; give a signature database file."
         raise DatabaseError(msg)
-    return _read(_settle(Path(database)), Path(database))
+    return _read(_settle(Path(database)) if folder is None else Path(folder), Path(database))
 
 
 def _belongs(folder: Path, fingerprint: str) -> bool:

@@ -16,6 +16,7 @@ from semsig_gis.database_file import open_database
 from semsig_gis.drift import UpdateReport, differing_cells
 from semsig_gis.errors import DatabaseError, EmptyResultError, InputError
 from semsig_gis.grid import cell_ids, cells_near
+from semsig_gis.occlusion import TOUCHING_M, buildings_near
 from semsig_gis.schema import HALF_WIDTH, SOURCE
 from semsig_gis.spatial_index import PackedIndex
 from semsig_gis.store import open_store, save_with_store
@@ -35,9 +36,6 @@ if TYPE_CHECKING:
     _Cells = tuple[NDArray[np.int64], NDArray[np.int64]]  # columns and rows
 
 __all__ = ["update_database", "update_file"]
-
-# More than the tolerance of occlusion, and than what it counts as a gap between buildings.
-TOUCHING_M = 1.0
 
 
 def update_file(
@@ -262,7 +260,8 @@ def _recomputed(
     objects = replace(store.objects, table=store.objects.table.iloc[near])
     footprints, streets, viewpoints = store.footprints, store.streets, database.viewpoints
     if footprints is not None:
-        footprints = _buildings_near(footprints, places, around)
+        polygons = footprints.geometry.to_numpy()
+        footprints = footprints.iloc[buildings_near(polygons, places, distance=around)]
         if len(footprints) == 0:
             footprints = None  # so that none of the cells is in a building either
             if viewpoints.mode == "outdoor":
@@ -284,24 +283,6 @@ def _recomputed(
     if footprints is None:
         fresh = replace(fresh, occlusion=database.occlusion)
     return replace(fresh, viewpoints=database.viewpoints)
-
-
-def _buildings_near(
-    footprints: gpd.GeoDataFrame, places: NDArray[np.float64], distance: float
-) -> gpd.GeoDataFrame:
-    """Return the buildings around some places, with all that they are joined to.
-
-    A block of houses is one shape to occlusion, which comes out the same only from all of them.
-    """
-    polygons = footprints.geometry.to_numpy()
-    tree = shapely.STRtree(polygons)
-    chosen = np.zeros(len(polygons), bool)
-    found = tree.query(shapely.points(places), predicate="dwithin", distance=distance)[1]
-    while len(found):
-        chosen[found] = True
-        touching = tree.query(polygons[found], predicate="dwithin", distance=TOUCHING_M)[1]
-        found = np.unique(touching[~chosen[touching]])
-    return footprints[chosen]
 
 
 def _streets_near(

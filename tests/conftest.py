@@ -6,6 +6,7 @@ import ipaddress
 import os
 import shutil
 import socket
+import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NoReturn
 
@@ -16,6 +17,8 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
 
     from selenium.webdriver import Chrome
+
+    Run = Callable[..., tuple[int, str, str]]
 
 hypothesis.settings.register_profile("semsig", deadline=None)
 hypothesis.settings.register_profile("semsig-ci", deadline=None, derandomize=True, print_blob=True)
@@ -118,6 +121,31 @@ def qgis_environment(tmp_path: Path) -> dict[str, str]:
         "QT_QPA_PLATFORM": "offscreen",
         "XDG_RUNTIME_DIR": str(tmp_path),
     }
+
+
+@pytest.fixture
+def run(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> Run:
+    """Run the command in this process: exit code, standard output, standard error."""
+
+    from semsig_gis.cli import main
+
+    def call(*arguments: object) -> tuple[int, str, str]:
+        monkeypatch.setattr(sys, "argv", ["semsig", *map(str, arguments)])
+        with pytest.raises(SystemExit) as end:
+            main()
+        printed = capsys.readouterr()
+        return int(end.value.code or 0), printed.out, printed.err
+
+    return call
+
+
+@pytest.fixture
+def carried() -> None:
+    """Need the map files that a package built with npm carries."""
+    from semsig_gis import map_assets
+
+    if not map_assets.available():
+        unavailable("browser", "the package was built without npm, so it carries no map files")
 
 
 @pytest.fixture(scope="session")

@@ -14,3 +14,16 @@ def assert_sentence(error: BaseException, *words: str) -> None:
     assert "Traceback" not in message, message
     for word in words:
         assert word in message, f"{word!r} is not in: {message}"
+
+
+def sentence(outcome: tuple[int, str, str], *words: str) -> None:
+    """Check that an input was refused with one plain sentence that holds some words."""
+    code, out, err = outcome
+    assert code == 2, err
+    assert out == ""
+    assert "Traceback" not in err
+    last = err.strip().splitlines()[-1]
+    assert last.startswith("semsig: ")
+    assert last.endswith(".")
+    for word in words:
+        assert word in last, f"{word!r} is not in: {last}"

@@ -16,16 +16,14 @@ import geopandas as gpd
 import pytest
 import shapely
 from osm_xml import node, way, write_osm
+from sentences import sentence
 from servers import Answer, Server
 
 from semsig_gis import __version__
-from semsig_gis.cli import main
 from semsig_gis.database_file import open_database
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    Run = Callable[..., tuple[int, str, str]]
+    from conftest import Run
 
 CATALOG = """
 name = "tiny"
@@ -55,20 +53,6 @@ where = { state = "painted" }
 """
 
 
-@pytest.fixture
-def run(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> Run:
-    """Run the command in this process: exit code, standard output, standard error."""
-
-    def call(*arguments: object) -> tuple[int, str, str]:
-        monkeypatch.setattr(sys, "argv", ["semsig", *map(str, arguments)])
-        with pytest.raises(SystemExit) as end:
-            main()
-        printed = capsys.readouterr()
-        return int(end.value.code or 0), printed.out, printed.err
-
-    return call
-
-
 def write_layer(path: Path, points: list[tuple[float, float]], **columns: list[Any]) -> None:
     gpd.GeoDataFrame(columns, geometry=shapely.points(points), crs=2154).to_file(path)
 
@@ -93,19 +77,6 @@ def database(city: Path, run: Run) -> Path:
     assert run("load", city, "--catalog", city / "tiny.toml", "--out", objects)[0] == 0
     assert run("build", objects, "--out", path)[0] == 0
     return path
-
-
-def sentence(outcome: tuple[int, str, str], *words: str) -> None:
-    """Check that an input was refused with one plain sentence that holds some words."""
-    code, out, err = outcome
-    assert code == 2, err
-    assert out == ""
-    assert "Traceback" not in err
-    last = err.strip().splitlines()[-1]
-    assert last.startswith("semsig: ")
-    assert last.endswith(".")
-    for word in words:
-        assert word in last
 
 
 def test_the_road_from_files_to_a_place(city: Path, run: Run) -> None:
@@ -515,44 +486,6 @@ def test_the_likelihood_is_evaluated_and_drawn(database: Path, city: Path, run: 
     assert code == 0
     assert "likelihood (light noise)" in (city / "likelihood.html").read_text(encoding="utf-8")
     sentence(run("evaluate", database, "--method", "likelihood", "--noise", "loud"), "'loud'")
-
-
-def test_the_likelihood_answers_or_cannot_tell(city: Path, database: Path, run: Run) -> None:
-    query = "localize", database, "--types", "DDD", "--bearings", "10,80,200"
-    by = "--method", "likelihood"
-    code, out, told = run(*query, *by, "--json", "--top", 3)
-    assert code == 0
-    assert "is built" in told
-    answer = json.loads(out)
-    assert answer["noise"] == "generic"
-    assert len(answer["candidates"]) == 3
-    assert 0 < answer["place"]["chance"] <= 1
-    code, out, told = run(*query, *by, "--noise", "medium", "--heading", "unknown", "--top", 2)
-    assert code == 0
-    assert "best of" in out
-    assert "of the chance is in" in out
-    place = answer["candidates"][0]
-    near = f"{place['x']},{place['y']},15"
-    code, out, told = run(*query, *by, "--near", near, "--require", "D", "--heading", 10)
-    assert (code, "is built" in told) == (0, False)
-    square = shapely.box(place["x"] - 6, place["y"] - 6, place["x"] + 6, place["y"] + 6)
-    gpd.GeoDataFrame(geometry=[square], crs=2154).to_file(city / "square.gpkg")
-    code, out, _ = run(*query, *by, "--area", city / "square.gpkg", "--json")
-    inside = json.loads(out)
-    assert code == 0
-    assert inside["answered"]
-    assert inside["candidates"][0]["cell_id"] == place["cell_id"]
-    for options, words in (
-        (("--heading", "north"), ("'north'", "unknown")),
-        (("--heading", -3), ("-3", "from 0 up")),
-        (("--near", "1,2"), ("X,Y,SIGMA",)),
-        (("--noise", "lihgt"), ("'lihgt'", "light")),
-        (("--noise", city / "noise.toml"), ("noise.toml", "cannot be read")),
-        (("--require", "Q"), ("'Q'",)),
-        (("--map", city / "map.html"), ("--map",)),
-    ):
-        sentence(run(*query, *by, *options), *words)
-    sentence(run(*query, "--heading", "unknown"), "--method likelihood")
 
 
 def test_many_queries_are_answered_line_by_line(

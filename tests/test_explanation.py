@@ -8,7 +8,7 @@ from sentences import assert_sentence
 from worlds import CODES, World
 
 from semsig_gis.errors import InputError
-from semsig_gis.explanation import explain
+from semsig_gis.explanation import explain, explain_cell
 from semsig_gis.noise import NoiseSpec, named_noise
 from semsig_gis.signatures import Signature
 from semsig_gis.spatial_index import ObjectIndex
@@ -84,3 +84,17 @@ def test_bearings_are_needed() -> None:
     with pytest.raises(InputError) as caught:
         explain(Signature(np.array([TREE]), None), (0.0, 0.0), NOISE, objects=OBJECTS, index=INDEX)
     assert_sentence(caught.value, "bearings")
+
+
+def test_a_cell_is_explained_without_the_street_objects() -> None:
+    database = WORLD.database
+    cell = int(np.flatnonzero((database.xy == [5.0, 5.0]).all(axis=1))[0])
+    query = database.signature(cell)
+    found = explain_cell(query, cell, NOISE, database=database)
+    exact = explain(query, (5.0, 5.0), NOISE, objects=OBJECTS, index=INDEX)
+    assert found.counts == exact.counts
+    assert found.loglik == pytest.approx(exact.loglik, abs=0.1)
+    assert found.table["object"].isna().all()
+    apart = found.table.geometry.distance(exact.table.geometry)
+    assert apart.max() < 0.2
+    assert found.table.crs == OBJECTS.crs

@@ -168,6 +168,9 @@ def test_places_in_cells_turn_bearings() -> None:
     exact = learn_noise(samples, objects)
     assert exact.spec.bearing_sigma == pytest.approx(2.0, abs=0.15)
     assert exact.spec.detection > 0.99
+    lost = Sample(signature=samples[0].signature, xy=(9e6, 9e6))
+    with_lost = learn_noise([lost, *samples], objects)
+    assert (with_lost.skipped, with_lost.spec) == (exact.skipped + 1, exact.spec)
     naive = learn_noise(samples, database)
     told = learn_noise(samples, database, position_sigma=10 / math.sqrt(12))
     assert naive.spec.bearing_sigma > 2 * told.spec.bearing_sigma
@@ -199,7 +202,7 @@ def test_what_cannot_be_learnt_from() -> None:
         ([elsewhere], database, ["none of the 1", "EPSG:2154"]),
         ([nothing], database, ["0 detections"]),
         ([nothing], objects, ["x and y"]),
-        ([elsewhere], objects, ["0 objects"]),
+        ([elsewhere], objects, ["none of the 1"]),
     ):
         with pytest.raises(InputError) as caught:
             learn_noise(samples, city)

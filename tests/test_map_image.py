@@ -14,7 +14,7 @@ from semsig_gis import map_image
 from semsig_gis.catalog import paper_taxonomy
 from semsig_gis.database import SignatureDatabase
 from semsig_gis.grid import GridSpec
-from semsig_gis.map_image import city_image
+from semsig_gis.map_image import city_image, level_image
 from semsig_gis.signatures import SignatureSpec
 
 if TYPE_CHECKING:
@@ -142,3 +142,20 @@ def test_a_wide_city_is_drawn_in_blocks_with_their_means(monkeypatch: pytest.Mon
     middles = np.array(database.grid.origin) + (corners + 0.5) * block * database.grid.step
     expected = np.digitize([np.mean(lengths) for lengths in blocks.values()], list(SHADES))
     assert (seen_at(image, bounds, middles, database.crs) == expected).all()
+
+
+def test_levels_are_where_the_cells_are() -> None:
+    city = a_city(*scattered(40, 0.4))
+    levels = np.random.default_rng(3).integers(0, 4, len(city)).astype(np.uint8)
+    image, bounds = level_image(city, levels, ["#111111", "#222222", "#333333"])
+    assert seen_at(image, bounds, city.xy, city.crs).tolist() == levels.tolist()
+    assert decoded(image)[1] == bytes([0, 0, 0, 17, 17, 17, 34, 34, 34, 51, 51, 51])
+
+
+def test_a_block_has_its_highest_level(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(map_image, "_BLOCKS", 8)
+    city = a_city(*scattered(16, 1.0))
+    levels = np.zeros(len(city), np.uint8)
+    levels[[5, 200]] = 2, 1
+    image, _ = level_image(city, levels, ["#111111", "#222222"])
+    assert set(np.unique(decoded(image)[0])) == {0, 1, 2}

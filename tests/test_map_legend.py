@@ -8,12 +8,16 @@ from typing import TYPE_CHECKING
 
 import pytest
 
+from semsig_gis.abstention import AnswerRule
 from semsig_gis.building import build_database
 from semsig_gis.catalog import paper_taxonomy
 from semsig_gis.distortion import Distortion
 from semsig_gis.evaluation import evaluate
-from semsig_gis.map_legend import SHADES, evaluation_legend, localization_legend
+from semsig_gis.likelihood import build_index
+from semsig_gis.locating import locate
+from semsig_gis.map_legend import SHADES, evaluation_legend, localization_legend, location_legend
 from semsig_gis.matching import localize
+from semsig_gis.noise import named_noise
 from semsig_gis.objects import build_objects
 from semsig_gis.signatures import Signature
 from semsig_gis.sources.synthetic import CitySpec, synthetic_city
@@ -115,6 +119,22 @@ def test_text_from_data_stays_text(evaluation: Evaluation, database: SignatureDa
     localization = localize(database, database.signature(0), top=2)
     hostile_place = dataclasses.replace(localization, licenses=(HOSTILE,))
     assert HOSTILE in Text(localization_legend(hostile_place)).shown
+
+
+def test_what_a_location_says(database: SignatureDatabase) -> None:
+    cell = int(database.lengths.argmax())
+    index = build_index(database, named_noise("light"))
+    location = locate(index, database.signature(cell), explained=1)
+    shown = Text(location_legend(location))
+    for said in ("The answer", f"Types: {database.types(cell)}", "light noise", "50% in 1 cell"):
+        assert said in shown.shown
+    assert "misnamed" in shown.shown
+    unsure = locate(index, database.signature(cell), rule=AnswerRule(threshold=2.0))
+    assert "Cannot tell; the best place" in Text(location_legend(unsure)).shown
+    assert "misnamed" not in Text(location_legend(unsure)).shown
+    hostile = Text(location_legend(dataclasses.replace(location, noise=HOSTILE)))
+    assert hostile.shown.count(HOSTILE) == 1
+    assert hostile.tags == shown.tags
 
 
 def test_shades_begin_with_one_object() -> None:

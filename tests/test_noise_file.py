@@ -1,8 +1,12 @@
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from noisy_cells import mixtures
 
 from semsig_gis.errors import InputError
 from semsig_gis.noise import NOISES, NoiseSpec, named_noise
@@ -11,11 +15,24 @@ from semsig_gis.noise_file import open_noise, save_noise
 if TYPE_CHECKING:
     from pathlib import Path
 
+    from semsig_gis.noise import Noise
 
+
+@pytest.mark.parametrize("suffix", ["json", "toml", "TOML"])
 @pytest.mark.parametrize("name", list(NOISES))
-def test_a_model_survives_a_file(name: str, tmp_path: Path) -> None:
-    save_noise(named_noise(name), tmp_path / "noise.json")
-    assert open_noise(tmp_path / "noise.json") == named_noise(name)
+def test_a_model_survives_a_file(name: str, suffix: str, tmp_path: Path) -> None:
+    file = tmp_path / f"noise.{suffix}"
+    save_noise(named_noise(name), file)
+    assert open_noise(file) == named_noise(name)
+
+
+@given(mixtures(), st.text(st.characters(codec="utf-8")))
+def test_any_model_survives_a_toml_file(
+    tmp_path_factory: pytest.TempPathFactory, noise: Noise, name: str
+) -> None:
+    file = tmp_path_factory.mktemp("noise") / "noise.toml"
+    save_noise(replace(noise, name=name), file)
+    assert open_noise(file) == replace(noise, name=name)
 
 
 def test_a_toml_file_is_read(tmp_path: Path) -> None:

@@ -13,7 +13,7 @@ from sentences import assert_sentence
 from semsig_gis import occlusion
 from semsig_gis.catalog import load_catalog
 from semsig_gis.errors import InputError
-from semsig_gis.occlusion import Footprints, hidden
+from semsig_gis.occlusion import Footprints, buildings_near, hidden
 from semsig_gis.sources import osm_file
 
 if TYPE_CHECKING:
@@ -232,3 +232,11 @@ def test_montpellier_equals_the_oracle(geodata: Path) -> None:
     rng = np.random.default_rng(2)
     share = check_against_oracle(polygons, *random_pairs(polygons, 2000, rng))
     assert 0.2 < share < 0.8
+
+
+def test_whole_blocks_of_houses_are_looked_at() -> None:
+    row = [shapely.box(10 * number, 0, 10 * number + 10, 8) for number in range(30)]
+    houses = np.array([shapely.box(40, 20, 45, 25), *row])
+    near = buildings_near(houses, np.array([[0.0, -5.0]]), distance=20.0)
+    assert near.tolist() == list(range(1, 31))
+    assert len(buildings_near(houses, np.array([[0.0, -50.0]]), distance=20.0)) == 0

@@ -58,7 +58,7 @@ def test_a_part_may_be_missing_and_lines_are_numbered() -> None:
 @pytest.mark.parametrize(
     ("text", "words"),
     [
-        ("", ("no queries",)),
+        ("", ("no rows",)),
         ("{", ("line 1", "not JSON")),
         ("[1]", ("line 1", "no query")),
         ('{"types": "Z"}', ("line 1", "'Z'")),

@@ -11,7 +11,7 @@ from worlds import CODES, CORNER, World
 from semsig_gis.errors import InputError
 from semsig_gis.noise import NoiseMixture, NoiseSpec, named_noise
 from semsig_gis.occlusion import Footprints
-from semsig_gis.refinement import Refinement, cell_noise, refine
+from semsig_gis.refinement import Refinement, cell_noise, place_noise, refine
 from semsig_gis.signatures import Signature
 from semsig_gis.spatial_index import ObjectIndex
 from semsig_gis.views import views_at
@@ -117,6 +117,18 @@ def test_a_mixture_of_noise_is_widened() -> None:
     twice = cell_noise(cell_noise(NoiseSpec(), 3.0), 4.0)
     assert isinstance(twice, NoiseSpec)
     assert twice.position_sigma == pytest.approx(5.0 / math.sqrt(12.0))
+
+
+@pytest.mark.parametrize("sigma", [0.0, 1e-3, 0.7, 30.0])
+def test_the_noise_of_a_known_place_comes_back(sigma: float) -> None:
+    for noise in (NoiseSpec(position_sigma=sigma), named_noise("generic")):
+        back = place_noise(cell_noise(noise, 10.0), 10.0)
+        specs = (noise, back) if isinstance(noise, NoiseSpec) else (noise.specs[0], back.specs[0])  # type: ignore[union-attr]
+        one, other = (spec.position_sigma for spec in specs)  # type: ignore[union-attr]
+        assert one == pytest.approx(other, abs=2e-3)
+    with pytest.raises(InputError) as caught:
+        place_noise(named_noise("light"), 10.0)
+    assert_sentence(caught.value, "'light'", "cell_noise")
 
 
 def test_headings_are_averaged_over_north() -> None:

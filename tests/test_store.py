@@ -137,6 +137,25 @@ def test_a_store_goes_where_its_database_goes(tmp_path: Path) -> None:
     assert_fits(open_store(tmp_path / "link.parquet"), TOWN)
 
 
+def test_a_store_may_lie_elsewhere(tmp_path: Path) -> None:
+    path = saved(tmp_path)
+    store_path(path).rename(tmp_path / "elsewhere")
+    assert_fits(open_store(path, tmp_path / "elsewhere"), TOWN)
+    with pytest.raises(DatabaseError) as caught:
+        open_store(path, tmp_path / "nowhere")
+    assert_sentence(caught.value, "nowhere")
+
+
+def test_buildings_around_places() -> None:
+    north, south = (shapely.box(*(CORNER + low), *(CORNER + low + 8.0)) for low in (50.0, 10.0))
+    store = ObjectStore.of(TOWN, footprints=surroundings(north, south))
+    near = store.buildings_around(CORNER[None], distance=20.0)
+    assert near is not None
+    assert len(near) == 1
+    assert store.buildings_around(CORNER[None] - 500.0, distance=20.0) is None
+    assert ObjectStore.of(TOWN).buildings_around(CORNER[None], distance=20.0) is None
+
+
 def test_no_database_may_be_called_as_a_store(tmp_path: Path) -> None:
     database = build_database(TOWN)
     with pytest.raises(InputError) as caught:

@@ -24,7 +24,7 @@ from semsig_gis.objects import StreetObjects
 from semsig_gis.spatial_index import ObjectIndex
 from semsig_gis.store import ObjectStore, open_store, save_with_store, store_path
 from semsig_gis.taxonomy import ObjectClass, Taxonomy
-from semsig_gis.update import _buildings_near, update_database, update_file
+from semsig_gis.update import update_database, update_file
 from semsig_gis.viewpoints import ViewpointSpec
 
 if TYPE_CHECKING:
@@ -226,15 +226,6 @@ def test_far_from_buildings_and_streets(mode: Mode) -> None:
         assert_index_fits(store)
         assert report.recomputed > 100
         assert (report.vanished > 0) == (mode == "outdoor")
-
-
-def test_whole_blocks_of_houses_are_looked_at() -> None:
-    row = [shapely.box(10 * number, 0, 10 * number + 10, 8) for number in range(30)]
-    alone = shapely.box(40, 20, 45, 25)
-    table = gpd.GeoDataFrame(geometry=[alone, *row], crs="EPSG:2154")
-    near = _buildings_near(table, np.array([[0.0, -5.0]]), 20.0)
-    assert near.index.tolist() == list(range(1, 31))
-    assert len(_buildings_near(table, np.array([[0.0, -50.0]]), 20.0)) == 0
 
 
 @pytest.fixture

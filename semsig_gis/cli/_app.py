@@ -7,14 +7,12 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from semsig_gis.console import print_json, print_rows, progress, remark
+from semsig_gis.console import print_json, print_rows, remark
 from semsig_gis.errors import InputError
 
 if TYPE_CHECKING:
-    from semsig_gis.database import SignatureDatabase
     from semsig_gis.drift import UpdateReport
     from semsig_gis.evaluation import Evaluation
-    from semsig_gis.likelihood import LikelihoodIndex
     from semsig_gis.quality import QualityReport
     from semsig_gis.tables import Table
 
@@ -48,27 +46,6 @@ MethodText = Annotated[
 
 LIKELIHOOD = "likelihood"
 """What `--method` says for the likelihood method."""
-
-
-NoiseText = Annotated[
-    str,
-    typer.Option(
-        "--noise",
-        help="With likelihood, how the detector fails: light, medium, strong, generic (which of "
-        "them is not known), or a file.",
-    ),
-]
-
-
-def prepared_index(path: Path, database: SignatureDatabase, noise: str) -> LikelihoodIndex:
-    """Return the likelihood index beside a database; it is built where it is not there."""
-    from semsig_gis.likelihood_file import index_path, ready_index
-    from semsig_gis.noise import NOISES, named_noise
-    from semsig_gis.noise_file import open_noise
-
-    model = open_noise(noise) if noise not in NOISES and Path(noise).suffix else named_noise(noise)
-    with progress("building the likelihood index") as advance:
-        return ready_index(database, model, index_path(path, model), note=remark, progress=advance)
 
 
 def numbers(text: str, option: str) -> list[float]:

@@ -13,11 +13,10 @@ from semsig_gis.cli._app import (
     AsJson,
     Database,
     MethodText,
-    NoiseText,
     app,
-    prepared_index,
     print_evaluation,
 )
+from semsig_gis.cli._likelihood import NoiseName, prepared_index, read_noise
 from semsig_gis.console import print_json, progress
 
 
@@ -41,7 +40,7 @@ def evaluate(
         FalseClass, typer.Option(help="How the class of a false object is drawn.")
     ] = FalseClass.uniform,
     method: MethodText = "edit+edit",
-    noise: NoiseText = "generic",
+    noise: NoiseName = "generic",
     top: Annotated[int, typer.Option(help="Number t of best candidates that count.")] = 1,
     seed: Annotated[int, typer.Option(help="Seed of all chances.")] = 0,
     out: Annotated[Path | None, typer.Option(help="Folder for the results.")] = None,
@@ -60,7 +59,9 @@ def evaluate(
     )
     opened = open_database(database)
     chosen = (
-        prepared_index(database, opened, noise) if method == LIKELIHOOD else Method.parse(method)
+        prepared_index(database, opened, read_noise(noise))
+        if method == LIKELIHOOD
+        else Method.parse(method)
     )
     with progress("evaluating") as advance:
         evaluation = run(
