@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import geopandas as gpd
 import numpy as np
 import pytest
+import rasterio
 import shapely
 from sentences import sentence
 from worlds import CORNER, World, random_town
@@ -99,6 +100,21 @@ def test_the_likelihood_answers_or_cannot_tell(city: Path, run: Run) -> None:
     assert sum(row["chance"] for row in inside["candidates"][:4]) == pytest.approx(1.0)
 
 
+def test_a_raster_tells_where_people_are(city: Path, run: Run) -> None:
+    x, y = PLACE
+    people = city.with_name("people.tif")
+    spec = {"width": 3, "height": 3, "count": 1, "dtype": "uint8", "crs": "EPSG:2154"}
+    place = rasterio.Affine(200.0, 0.0, x - 300.0, 0.0, -200.0, y + 300.0)
+    with rasterio.open(people, "w", transform=place, **spec) as file:
+        file.write(np.array([[0, 0, 0], [0, 9, 0], [0, 0, 0]], np.uint8), 1)
+    query = "localize", city, "--types", SEEN["types"][:1], *BY
+    found = json.loads(run(*query, "--popularity", people, "--json", "--top", 500)[1])
+    likely = [row for row in found["candidates"] if row["chance"] > 0]
+    assert likely
+    assert all(abs(row["x"] - x) < 110 and abs(row["y"] - y) < 110 for row in likely)
+    sentence(run(*query, "--popularity", city), "cannot be read as a raster")
+
+
 def test_a_query_from_the_middle_of_a_cell(city: Path, run: Run) -> None:
     cell = int(CITY.lengths.argmax())
     query = "localize", city, *options(seen_from(CITY.xy[cell])), *BY, "--json"
@@ -111,7 +127,7 @@ def test_a_query_from_the_middle_of_a_cell(city: Path, run: Run) -> None:
 
 def test_a_place_is_refined_explained_and_drawn(city: Path, run: Run) -> None:
     page = city.with_name("map.html")
-    query = "localize", city, *options(SEEN), *BY, "--refine", "--explain"
+    query = "localize", city, *options(SEEN), *BY, "--explain"
     code, out, _ = run(*query, "--map", page)
     assert code == 0
     assert "Rank 1, at x" in out
@@ -140,10 +156,10 @@ def test_street_objects_from_elsewhere_or_from_nowhere(city: Path, run: Run) -> 
     sentence(run(*query, "--refine"), "no object store", "build the database again")
     code, out, told = run(*query, "--explain", "--json")
     assert code == 0
-    assert "without street objects" in told
+    assert "street objects are not at hand" in told
     rows = json.loads(out)["candidates"][0]["explanation"]["rows"]
     assert {row["source_id"] for row in rows} == {None}
-    assert json.loads(run(*query, "--refine", "--objects", moved, "--json")[1])["place"]["refined"]
+    assert json.loads(run(*query, "--objects", moved, "--json")[1])["place"]["refined"]
     file = city.with_name("objects.parquet")
     save_objects(WORLD.street_objects, file)
     assert json.loads(run(*query, "--refine", "--objects", file, "--json")[1])["place"]["refined"]
@@ -151,7 +167,8 @@ def test_street_objects_from_elsewhere_or_from_nowhere(city: Path, run: Run) -> 
     other = type(WORLD.street_objects)(table, WORLD.street_objects.taxonomy, ())
     save_objects(other, file)
     sentence(run(*query, "--refine", "--objects", file), "EPSG:32631", "EPSG:2154")
-    sentence(run(*query, "--objects", file), "--objects", "--refine or --explain")
+    sentence(run(*query, "--no-refine", "--objects", file), "--objects and --no-refine")
+    sentence(run(*query, "--on-grid", "--objects", file), "--objects and --on-grid")
     sentence(run(*query, "--refine", "--objects", city.with_name("none")), "none")
     sentence(run(*query, "--refine", "--on-grid", "--objects", moved), "--on-grid and --refine")
 
@@ -163,7 +180,7 @@ def test_a_route_is_answered_line_by_line(
     rows[1] = {"types": "", "bearings": [], "distance": 15.0, "bearing": 90.0, "sigma": 1.0}
     file = written(city.with_name("route.jsonl"), rows)
     query = "localize", city, *BY, "--route", "--queries"
-    for more in ((), ("--refine", "--explain"), ("--heading", "unknown")):
+    for more in (("--no-refine",), ("--refine", "--explain"), ("--heading", "unknown")):
         code, out, _ = run(*query, file, *more)
         assert code == 0
         answers = [json.loads(line) for line in out.splitlines()]
@@ -241,7 +258,7 @@ def test_noise_is_learnt_without_a_store(city: Path, run: Run) -> None:
         file = written(city.with_name("s.jsonl"), rows)
         code, _, told = run("learn", database, "--samples", file, "--out", out)
         assert code == 0
-        assert ("without street objects" in told) == (database != city)
+        assert ("street objects are not at hand" in told) == (database != city)
         assert open_noise(out).to_dict()["position_sigma"] == 0.0
 
 
@@ -251,13 +268,13 @@ def test_a_rule_is_calibrated_and_used(city: Path, run: Run) -> None:
     )
     out = city.with_name("rule.json")
     calibrate = "calibrate", city, "--samples", file, "--out", out, "--precision", 0.9
-    code, printed, _ = run(*calibrate)
+    code, printed, _ = run(*calibrate, "--no-refine")
     assert code == 0
     assert "Answers from a chance of" in printed
     rule = open_rule(out)
     assert rule.queries == 121
     assert 0 < rule.answered < 121
-    told = json.loads(run(*calibrate, "--refine", "--json")[1])
+    told = json.loads(run(*calibrate, "--json")[1])
     assert told["coverage"] >= rule.coverage
     assert told["precision"] == 0.9
     query = "localize", city, *options(SEEN), *BY, "--json", "--rule", out
@@ -305,7 +322,7 @@ def test_a_damaged_or_stale_index_is_built_again(city: Path, run: Run) -> None:
 def test_a_database_of_one_cell(city: Path, run: Run) -> None:
     save_with_store(CITY.select(slice(40, 41)), STORE, city)
     seen = seen_from(CITY.xy[40])
-    for more in ((), ("--refine", "--explain", "--heading", "unknown")):
+    for more in (("--no-refine",), ("--explain", "--heading", "unknown")):
         code, out, _ = run("localize", city, *options(seen), *BY, *more, "--json")
         assert code == 0
         answer = json.loads(out)
@@ -317,7 +334,7 @@ def test_a_query_longer_than_any_signature(city: Path, run: Run) -> None:
     symbols = CITY.taxonomy.decode(CITY.present_codes) * 60
     angles = ",".join(str(number * 360 / len(symbols)) for number in range(len(symbols)))
     query = "localize", city, "--types", symbols, "--bearings", angles, "--json"
-    for more in (BY, (*BY, "--refine"), ()):
+    for more in (BY, (*BY, "--no-refine"), ()):
         code, out, _ = run(*query, *more)
         assert code == 0
         assert json.loads(out)["query"]["length"] == len(symbols) > 257

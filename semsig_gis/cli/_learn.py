@@ -140,7 +140,7 @@ def calibrate(
     noise: NoiseName = "generic",
     heading: Heading = "known",
     on_grid: OnGrid = False,
-    refine: Refine = False,
+    refine: Refine = None,
     objects: Objects = None,
     as_json: AsJson = False,
 ) -> None:

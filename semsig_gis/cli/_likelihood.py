@@ -54,18 +54,20 @@ OnGrid = Annotated[
     ),
 ]
 Refine = Annotated[
-    bool,
+    bool | None,
     typer.Option(
-        "--refine",
-        help="With likelihood: look for the place between the middles of the cells, too.",
+        "--refine/--no-refine",
+        help="With likelihood: look for the place between the middles of the cells, too; by "
+        "default where the street objects are there and the query has bearings.",
+        show_default=False,
     ),
 ]
 Objects = Annotated[
     Path | None,
     typer.Option(
         "--objects",
-        help="Street objects of --refine and --explain: a file that `semsig load` wrote, or an "
-        "object store; that beside the database by default.",
+        help="With likelihood, the street objects: a file that `semsig load` wrote, or an object "
+        "store; that beside the database by default.",
     ),
 ]
 
@@ -76,6 +78,8 @@ class Locator:
 
     index: LikelihoodIndex
     options: dict[str, Any]
+    lenient: bool
+    """Whether what has no bearings is answered without being refined."""
 
     @property
     def database(self) -> SignatureDatabase:
@@ -84,12 +88,16 @@ class Locator:
     def locate(self, query: Signature) -> Location:
         from semsig_gis.locating import locate
 
-        return locate(self.index, query, **self.options)
+        return locate(self.index, query, **self._options_for([query]))
 
     def route(self, queries: Sequence[Signature], legs: Sequence[Leg]) -> tuple[Location, ...]:
         from semsig_gis.locating import locate_route
 
-        return locate_route(self.index, queries, legs, **self.options)
+        return locate_route(self.index, queries, legs, **self._options_for(queries))
+
+    def _options_for(self, queries: Sequence[Signature]) -> dict[str, Any]:
+        blind = any(len(query) and query.bearings is None for query in queries)
+        return self.options | ({"refined": False} if self.lenient and blind else {})
 
 
 def locator(
@@ -99,7 +107,7 @@ def locator(
     heading: str,
     on_grid: bool,
     objects: Path | None,
-    refine: bool,
+    refine: bool | None,
     explain: bool = False,
     rule: Path | None = None,
     top: int = 10,
@@ -115,14 +123,16 @@ def locator(
         msg = "--on-grid and --refine were given; a place on the grid is not to be refined, so "
         msg += "leave out one of them."
         raise InputError(msg)
-    if objects is not None and not (refine or explain):
-        msg = "--objects was given without --refine or --explain, which look at them; add one."
+    wanted = not on_grid if refine is None else refine
+    if objects is not None and not (wanted or explain):
+        given = "--on-grid" if on_grid else "--no-refine"
+        msg = f"--objects and {given} were given, so that nothing looks at them; leave out one."
         raise InputError(msg)
     options: dict[str, Any] = {
         "north_sigma": north_sigma(heading),
         "rule": DEFAULT_RULE if rule is None else open_rule(rule),
         "top": top,
-        "refined": refine,
+        "refined": False,
         "explained": EXPLAINED if explain else 0,
     }
     model = read_noise(noise)
@@ -131,9 +141,11 @@ def locator(
         model = cell_noise(model, opened.grid.step)
     if known is not None:
         options["log_prior"] = _prior(opened, **known)
-    if refine or explain:
-        options["store"] = object_store(path, opened, objects, needed=refine)
-    return Locator(index=prepared_index(path, opened, model), options=options)
+    if wanted or explain:
+        store = object_store(path, opened, objects, needed=bool(refine))
+        options |= {"store": store, "refined": wanted and store is not None}
+    index = prepared_index(path, opened, model)
+    return Locator(index=index, options=options, lenient=refine is None)
 
 
 def prepared_index(path: Path, opened: SignatureDatabase, model: Noise) -> LikelihoodIndex:
@@ -173,7 +185,7 @@ def object_store(
     except DatabaseError as error:
         if needed or objects is not None:
             raise
-        remark(f"without street objects, those of the cells have no identifiers: {error}")
+        remark(f"the street objects are not at hand, so the cells must do: {error}")
         return None
     for note in store.notes:
         remark(note)

@@ -94,7 +94,7 @@ def localize(
             "chance of 0.9 by default."
         ),
     ] = None,
-    refine: Refine = False,
+    refine: Refine = None,
     explain: Annotated[
         bool,
         typer.Option(
@@ -126,7 +126,7 @@ def localize(
                 "--area": area is not None,
                 "--popularity": popularity is not None,
                 "--rule": rule is not None,
-                "--refine": refine,
+                "--refine": refine is not None,
                 "--explain": explain,
                 "--objects": objects is not None,
                 "--route": route,
