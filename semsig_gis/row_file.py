@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
     from semsig_gis.taxonomy import Taxonomy
 
-__all__ = ["Row", "given", "parse_rows", "read_rows", "row_signature"]
+__all__ = ["given", "parse_rows", "read_rows", "row_signature"]
 
 Row = dict[str, Any]
 """The values of a row by name."""
