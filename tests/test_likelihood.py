@@ -49,13 +49,14 @@ def slow_loglik(index: LikelihoodIndex, query: Signature, cell: int, turn: float
     for kind in kinds:
         total += math.log(table.missed[length, kind])
     for name, seen in zip(table.query_rows(query).tolist(), query.bearings.tolist(), strict=True):
-        density = table.density[name]
+        density = alone = table.density[name]
         for kind, bearing, sigma in zip(kinds, bearings, sigmas, strict=True):
             missed = table.missed[length, kind]
             chance = 1.0 if name == len(table.codes) else table.named[length, kind, name]
             odds = (1 - missed) / missed * chance
             density += odds * bin_density(bearing, (seen + turn) % 360.0, sigma)
-        total += math.log(density)
+        # A byte holds no more than what four objects in one direction add.
+        total += min(math.log(density), math.log(alone) + 255 * index.step)
     return total
 
 
