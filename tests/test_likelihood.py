@@ -13,7 +13,7 @@ from noisy_cells import mixtures, noise_specs, random_database, random_query
 from semsig_gis._likelihood_columns import BIN_DEGREES, BINS, write_columns
 from semsig_gis._likelihood_kernels import promising_cells
 from semsig_gis.errors import InputError
-from semsig_gis.likelihood import build_index, index_fingerprint
+from semsig_gis.likelihood import LEAST_PRIOR, build_index, index_fingerprint
 from semsig_gis.noise import NoiseMixture, NoiseSpec, named_noise
 from semsig_gis.signatures import Signature
 
@@ -152,6 +152,7 @@ def test_turns_are_summed_over_with_their_chances(seed: int, sigma: float) -> No
     assert query.bearings is not None
     turns = np.arange(-36, 36) * BIN_DEGREES
     chances = np.exp(-0.5 * (turns / sigma) ** 2)
+    chances[chances <= LEAST_PRIOR] = 0.0  # the likeliest has 1
     chances /= chances.sum()
     each = np.stack(
         [
