@@ -57,7 +57,6 @@ def test_the_levels_of_the_paper() -> None:
         "strong": 13,
     }
     for name, one in DISTORTIONS.items():
-        assert one.name == name
         noise = (one.bearing_sigma, one.bearing_clip)
         assert noise == ((0.0, 30.0) if name == "none" else (5.0, 30.0))
     assert named_distortion("light") is DISTORTIONS["light"]

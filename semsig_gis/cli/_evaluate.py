@@ -32,7 +32,12 @@ def evaluate(
     database: Database,
     *,
     queries: Annotated[int, typer.Option(help="Number of queries.")] = 500,
-    distortion: Annotated[str, typer.Option(help="none, light, medium or strong.")] = "medium",
+    distortion: Annotated[
+        str,
+        typer.Option(
+            help="none, light, medium or strong; or several, such as medium,compass:10,view:90."
+        ),
+    ] = "medium",
     keep_order: Annotated[
         bool, typer.Option("--keep-order", help="Do not re-sort after the bearing noise.")
     ] = False,
@@ -50,13 +55,17 @@ def evaluate(
     import dataclasses
 
     from semsig_gis.database_file import open_database
-    from semsig_gis.distortion import named_distortion
+    from semsig_gis.distortion import Distortion
+    from semsig_gis.distortion_chain import parse_chain
     from semsig_gis.evaluation import evaluate as run
     from semsig_gis.matching import Method
 
-    spec = dataclasses.replace(
-        named_distortion(distortion), resort=not keep_order, false_class=false_class.value
-    )
+    chain = [
+        dataclasses.replace(one, resort=not keep_order, false_class=false_class.value)
+        if isinstance(one, Distortion)
+        else one
+        for one in parse_chain(distortion)
+    ]
     opened = open_database(database)
     chosen = (
         prepared_index(database, opened, read_noise(noise))
@@ -68,7 +77,7 @@ def evaluate(
             opened,
             queries=queries,
             method=chosen,
-            distortion=spec,
+            distortion=chain,
             top=top,
             seed=seed,
             progress=advance,
