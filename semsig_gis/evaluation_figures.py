@@ -34,6 +34,7 @@ __all__ = [
     "grouped_means",
     "length_labels",
     "percentile",
+    "plain_records",
     "query_figures",
 ]
 
@@ -366,6 +367,33 @@ def calibration_bins(queries: pd.DataFrame) -> pd.DataFrame:
         ends = {"from": number / BINS, "to": (number + 1) / BINS}
         rows.append({**ends, "n": size, "stated": stated, "true": true, "low": low, "high": high})
     return pd.DataFrame(rows)
+
+
+def plain_records(table: pd.DataFrame) -> list[dict[str, Any]]:
+    """Return the rows of a table as plain values for JSON.
+
+    Parameters
+    ----------
+    table : DataFrame
+        Of texts and numbers.
+
+    Returns
+    -------
+    list of dict
+        One a row; None for what is infinite or not a number.
+
+    Examples
+    --------
+    >>> plain_records(pd.DataFrame({"n": [2], "p50": [math.nan]}))
+    [{'n': 2, 'p50': None}]
+    """
+    return [
+        {
+            str(name): None if isinstance(value, float) and not math.isfinite(value) else value
+            for name, value in row.items()
+        }
+        for row in table.to_dict("records")
+    ]
 
 
 def _ranges(sizes: NDArray[np.int64], labels: Sequence[str]) -> list[str]:

@@ -32,6 +32,7 @@ from semsig_gis.evaluation_figures import (
     grouped_means,
     length_labels,
     percentile,
+    plain_records,
     query_figures,
 )
 from semsig_gis.method import LikelihoodMethod, parse_method
@@ -428,11 +429,11 @@ class Evaluation:
                 "successful": float(self.successful.mean()),
                 "unlocalized": self.unlocalized,
                 **{name: _plain(value) for name, value in self.answers().items()},
-                "intervals": _records(self.means().reset_index()),
-                "by_length": _records(self.by_length()),
-                "by_ambiguity": _records(self.by_ambiguity()),
-                "coverage_curve": _records(self.coverage_curve()) if by_chance else [],
-                "calibration": _records(self.calibration()) if by_chance else [],
+                "intervals": plain_records(self.means().reset_index()),
+                "by_length": plain_records(self.by_length()),
+                "by_ambiguity": plain_records(self.by_ambiguity()),
+                "coverage_curve": plain_records(self.coverage_curve()) if by_chance else [],
+                "calibration": plain_records(self.calibration()) if by_chance else [],
             },
             "versions": dict(self.versions),
             "timing": self._timing(),
@@ -541,14 +542,3 @@ class Evaluation:
 def _plain(value: float) -> float | None:
     """Return a number, or None for what JSON cannot hold."""
     return value if math.isfinite(value) else None
-
-
-def _records(table: pd.DataFrame) -> list[dict[str, Any]]:
-    """Return the rows of a table as plain values, None for what JSON cannot hold."""
-    return [
-        {
-            str(name): _plain(value) if isinstance(value, float) else value
-            for name, value in row.items()
-        }
-        for row in table.to_dict("records")
-    ]
