@@ -12,6 +12,7 @@ from geopandas.testing import assert_geodataframe_equal
 from noisy_cells import random_database
 from six_cells import rows
 
+from semsig_gis.detector import Detector
 from semsig_gis.errors import DatabaseError, InputError
 from semsig_gis.evaluation import evaluate
 from semsig_gis.evaluation_report import evaluation_tables
@@ -107,6 +108,23 @@ def test_places_that_tie_are_scored_by_expectation() -> None:
     assert (table["chance"] <= 0.5 + 1e-9).all()
     assert found.answers()["coverage"] == 0
     assert math.isnan(found.answers()["precision"])
+
+
+def test_what_the_model_draws_comes_true_as_often_as_it_says() -> None:
+    # In far more cells than a handful, so that some places are hard to tell.
+    cells = random_database(11, cells=300, longest=6, classes=2)
+    noise = NoiseSpec(detection=0.8, misnamed=0.1, clutter=0.7, bearing_sigma=12.0, name="mine")
+    detector = Detector(noise=noise)
+    found = evaluate(cells, queries=300, method=build_index(cells, noise), distortion=detector)
+    told = found.queries.dropna(subset=["chance"])
+    spread = math.sqrt(float((told["chance"] * (1.0 - told["chance"])).sum()))
+    assert abs(float((told["right"] - told["chance"]).sum())) < 4.0 * spread
+    assert 0.2 < told["chance"].mean() < 0.95
+    assert 0.86 < told["in_region"].mean() < 0.99
+    # A detector that is worse than the method believes: its chances are too high.
+    bad = Detector(noise=replace(noise, detection=0.5, clutter=3.0, bearing_sigma=30.0))
+    wrong = evaluate(cells, queries=300, method=build_index(cells, noise), distortion=bad).queries
+    assert wrong["chance"].mean() > wrong["right"].mean() + 0.1
 
 
 def test_more_candidates_never_hurt(index: LikelihoodIndex) -> None:
