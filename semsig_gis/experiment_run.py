@@ -378,29 +378,21 @@ def _require_same(folder: Path, wanted: dict[str, Any]) -> None:
     except (OSError, TypeError, ValueError) as error:
         msg = f"{folder} is not the results of an experiment; choose another folder."
         raise InputError(msg) from error
-    other = next(
-        (
-            f"its {what}: {difference}"
-            for what in wanted
-            if (difference := _difference(found.get(what), wanted[what]))
-        ),
-        None,
-    )
-    if other is not None:
-        msg = (
-            f"{folder} holds the results of another experiment, which differs in {other}; choose "
-            "another folder, or delete that one."
-        )
-        raise InputError(msg)
+    for what, values in wanted.items():
+        if found.get(what) != values:
+            name = _difference(found.get(what), values)
+            told = name if what == "experiment" else f"{what}, {name}"
+            msg = (
+                f"{folder} holds the results of another experiment, which differs in {told}; "
+                "choose another folder, or delete that one."
+            )
+            raise InputError(msg)
 
 
-def _difference(found: Any, wanted: dict[str, Any]) -> str | None:  # noqa: ANN401
+def _difference(found: Any, wanted: dict[str, Any]) -> str:  # noqa: ANN401 - whatever JSON holds
     """Return the name of the first thing in which two tables differ."""
-    if found == wanted:
-        return None
-    if not isinstance(found, dict):
-        return "everything"
-    return str(next(name for name in {**wanted, **found} if found.get(name) != wanted.get(name)))
+    others = found if isinstance(found, dict) else {}
+    return next(name for name in {**wanted, **others} if others.get(name) != wanted.get(name))
 
 
 def _answer_all(work: _Work, parts: Path, progress: Callable[[int, int], None] | None) -> None:

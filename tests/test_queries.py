@@ -11,13 +11,19 @@ import shapely
 from sentences import assert_sentence
 from worlds import CORNER, TAXONOMY, World, random_town
 
+from semsig_gis.building import build_database
+from semsig_gis.catalog import load_catalog
 from semsig_gis.distortion_chain import parse_chain
 from semsig_gis.errors import CrsError, InputError, UnknownNameError
+from semsig_gis.loading import assemble, choose_layers, read_files
 from semsig_gis.queries import QuerySpec, draw_queries
 from semsig_gis.store import ObjectStore
 from semsig_gis.taxonomy import Taxonomy
+from semsig_gis.viewpoints import ViewpointSpec
 
 if TYPE_CHECKING:
+    from pathlib import Path
+
     from semsig_gis.database import SignatureDatabase
     from semsig_gis.queries import Query, SeenFrom
 
@@ -202,3 +208,32 @@ def test_specs_that_are_refused(options: dict[str, Any], words: list[str]) -> No
     wrong: Any = "anywere"
     with pytest.raises(UnknownNameError, match="nearest is 'anywhere'"):
         QuerySpec(seen_from=wrong)
+
+
+def monaco(geodata: Path, year: int) -> tuple[SignatureDatabase, ObjectStore]:
+    catalog = load_catalog("openstreetmap")
+    layers, _ = read_files(
+        choose_layers(catalog, surroundings=True), [geodata / "osm" / f"monaco_{year}.osm.pbf"]
+    )
+    loaded = assemble(layers, catalog)
+    database = build_database(
+        loaded.objects, viewpoints=ViewpointSpec(mode="outdoor"), footprints=loaded.buildings
+    )
+    return database, ObjectStore.of(loaded.objects, footprints=loaded.buildings)
+
+
+def test_monaco_a_year_later(geodata: Path) -> None:
+    database, _ = monaco(geodata, 2021)
+    city, store = monaco(geodata, 2022)
+    drawn = draw_queries(database, replace(ANYWHERE, number=200), store=store, city=city)
+    unknown = sum(query.cell < 0 for query in drawn)
+    assert 5 < unknown < 100  # new objects, where nothing was to be seen
+    present = set(database.present_codes.tolist())
+    assert all(set(query.asked.codes.tolist()) <= present for query in drawn)
+    houses = store.footprints
+    assert houses is not None
+    places = gpd.GeoSeries([shapely.Point(query.xy) for query in drawn], crs=city.crs)
+    assert len(houses.sindex.query(places, predicate="intersects")[0]) == 0
+    # What is asked is as much as the cells of that year see.
+    seen = np.mean([query.length for query in drawn])
+    assert seen == pytest.approx(city.lengths.mean(), rel=0.3)
