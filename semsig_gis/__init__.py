@@ -29,7 +29,8 @@ if TYPE_CHECKING:
     from semsig_gis.evaluation import evaluate
     from semsig_gis.evaluation_result import Evaluation
     from semsig_gis.experiment import ExperimentSpec, open_experiment_spec
-    from semsig_gis.experiment_run import open_results, run_experiment
+    from semsig_gis.experiment_folder import open_results
+    from semsig_gis.experiment_run import run_experiment
     from semsig_gis.export import export_geopackage
     from semsig_gis.fetching import fetch_layers, find_area, open_cache
     from semsig_gis.grid import GridSpec
@@ -127,7 +128,7 @@ _HOMES = {
     "open_dataset": "dataset",
     "open_experiment_spec": "experiment",
     "open_objects": "objects",
-    "open_results": "experiment_run",
+    "open_results": "experiment_folder",
     "open_store": "store",
     "paper_taxonomy": "catalog",
     "quality_report": "quality",

@@ -126,7 +126,7 @@ def common_cases(
     Parameters
     ----------
     first, second : mapping of str to Evaluation
-        See `semsig_gis.experiment_run.open_results`.
+        See `semsig_gis.experiment_folder.open_results`.
 
     Returns
     -------

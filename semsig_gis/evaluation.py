@@ -141,7 +141,7 @@ def evaluate(
         answerer = Answerer(database=database, method=by_likelihood, index=method)
     drawn = draw_queries(database, spec)
     scored = score_queries(answerer, drawn, tops=(top,), progress=progress)[top]
-    return make_evaluation(answerer, spec, scored, top=top)
+    return make_evaluation(database, answerer.method, spec, scored, top=top)
 
 
 def score_queries(
@@ -208,7 +208,8 @@ def score_queries(
 
 
 def make_evaluation(
-    answerer: Answerer,
+    database: SignatureDatabase,
+    method: Method | LikelihoodMethod,
     spec: QuerySpec,
     scored: pd.DataFrame,
     *,
@@ -220,8 +221,10 @@ def make_evaluation(
 
     Parameters
     ----------
-    answerer : Answerer
-        The method.
+    database : SignatureDatabase
+        What was searched.
+    method : Method or LikelihoodMethod
+        What answered.
     spec : QuerySpec
         Which queries were asked.
     scored : DataFrame
@@ -238,17 +241,17 @@ def make_evaluation(
     Evaluation
         The queries, the settings and the mean time a query.
     """
-    points = gpd.points_from_xy(scored["x"], scored["y"], crs=answerer.database.crs)
+    points = gpd.points_from_xy(scored["x"], scored["y"], crs=database.crs)
     seconds = scored["seconds"].to_numpy(dtype=np.float64)
     timed = seconds[~np.isnan(seconds)]
     return Evaluation(
         queries=gpd.GeoDataFrame(scored[list(QUERY_COLUMNS)], geometry=points),
-        method=answerer.method,
+        method=method,
         asked=spec,
         city=city,
         top=top,
         seconds_per_query=float(timed.mean()) if timed.size else 0.0,
-        database=_database_summary(answerer.database, file_bytes),
+        database=_database_summary(database, file_bytes),
         versions=versions(),
     )
 

@@ -1,21 +1,17 @@
 """Run experiments: part by part, so that an interrupted run goes on where it was.
 
-The run works in ``OUT.partial``. The experiment, its inputs and the versions are written there
-first; then each method answers the queries a hundred at a time, and each hundred is kept. When
-all are there, the evaluations are put together and the folder is renamed to ``OUT``. But for
-``timing.json``, every file is the same however often the run was interrupted.
+Each method answers the queries a hundred at a time, and each hundred is kept. When all are there,
+the evaluations are put together. But for ``timing.json``, every file is the same however often the
+run was interrupted.
 """
 
 from __future__ import annotations
 
-import json
-import os
-import shutil
 from dataclasses import dataclass, field
 from functools import cached_property
 from itertools import product
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import geopandas as gpd
 import pandas as pd
@@ -23,12 +19,17 @@ import pyarrow as pa
 
 from semsig_gis.answering import Answerer
 from semsig_gis.database_file import open_database
-from semsig_gis.errors import DatabaseError, InputError, SourceError
+from semsig_gis.errors import DatabaseError, SourceError
 from semsig_gis.evaluation import check_count, make_evaluation, score_queries, versions
 from semsig_gis.evaluation_figures import district_labels
-from semsig_gis.evaluation_result import Evaluation
-from semsig_gis.experiment import parse_experiment
-from semsig_gis.experiment_report import experiment_figures, experiment_markdown
+from semsig_gis.experiment_folder import (
+    PARTS,
+    begin_run,
+    finish_run,
+    finished_run,
+    open_results,
+    write_results,
+)
 from semsig_gis.likelihood_file import index_path, ready_index
 from semsig_gis.manifest import digest, part_files
 from semsig_gis.method import LikelihoodMethod
@@ -41,22 +42,15 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
     from semsig_gis.database import SignatureDatabase
+    from semsig_gis.evaluation_result import Evaluation
     from semsig_gis.experiment import Case, ExperimentSpec
     from semsig_gis.likelihood import LikelihoodIndex
     from semsig_gis.queries import Query
     from semsig_gis.store import ObjectStore
 
-__all__ = ["open_results", "run_experiment"]
+__all__ = ["run_experiment"]
 
-SPEC = "experiment.toml"
-INPUTS = "inputs.json"
-FIGURES = "figures.csv"
-REPORT = "report.md"
-DISTRICTS = "districts.csv"
-PARTS = "_parts"
 QUERIES_A_PART = 100
-# Files that were being written when a run was killed (see semsig_gis.storage).
-HALF_WRITTEN = ".semsig-"
 
 
 def run_experiment(
@@ -108,6 +102,7 @@ def run_experiment(
     >>> from semsig_gis.building import build_database
     >>> from semsig_gis.catalog import paper_taxonomy
     >>> from semsig_gis.database_file import save_database
+    >>> from semsig_gis.experiment import parse_experiment
     >>> from semsig_gis.objects import build_objects
     >>> from semsig_gis.sources.synthetic import CitySpec, synthetic_city
     >>> layers = synthetic_city(CitySpec(size=300.0))
@@ -125,66 +120,16 @@ def run_experiment(
     (['phone/paper-top1'], 10)
     """
     work = _Work(spec, Path(folder), note)
-    target = Path(os.path.realpath(out))
-    wanted = {"experiment": spec.to_dict(), "inputs": work.digests(), "versions": versions()}
-    if target.exists():
-        _require_same(target, wanted)
-        shutil.rmtree(target / PARTS, ignore_errors=True)  # of a run killed at the very end
-        return open_results(target)
-    partial = target.with_name(f"{target.name}.partial")
-    _begin(partial, wanted, spec)
+    identity = {"experiment": spec.to_dict(), "inputs": work.digests(), "versions": versions()}
+    if finished_run(out, identity):
+        return open_results(out)
+    partial = begin_run(out, spec, identity)
     work.check()
     _answer_all(work, partial / PARTS, progress)
     found = {case.name: work.evaluation(case, partial / PARTS) for case in spec.cases}
-    _write(found, work, partial)
-    try:
-        partial.rename(target)
-    except OSError as error:
-        msg = (
-            f"{target} could not be put in its place ({os.strerror(error.errno or 0)}); the "
-            f"results are in {partial}, so run the same command again."
-        )
-        raise InputError(msg) from error
-    shutil.rmtree(target / PARTS)
+    write_results(partial, spec, found, districts=work.districts)
+    finish_run(partial)
     return found
-
-
-def open_results(folder: str | Path) -> dict[str, Evaluation]:
-    """Open the results of an experiment, or of one evaluation.
-
-    Parameters
-    ----------
-    folder : str or Path
-        What `run_experiment` or `Evaluation.save` wrote.
-
-    Returns
-    -------
-    dict of str to Evaluation
-        The evaluations by the names of their cases; that of one evaluation is ``""``.
-
-    Raises
-    ------
-    DatabaseError
-        If the folder holds neither, or an evaluation is missing or damaged.
-
-    Examples
-    --------
-    >>> open_results("nowhere")
-    Traceback (most recent call last):
-    ...
-    semsig_gis.errors.DatabaseError: nowhere holds no results; give a folder that `semsig evaluate`
-    wrote.
-    """
-    place = Path(folder)
-    if (place / "queries.parquet").is_file():
-        return {"": Evaluation.load(place)}
-    try:
-        text = (place / SPEC).read_text(encoding="utf-8")
-    except OSError as error:
-        msg = f"{place} holds no results; give a folder that `semsig evaluate` wrote."
-        raise DatabaseError(msg) from error
-    spec = parse_experiment(text, where=str(place / SPEC))
-    return {case.name: Evaluation.load(place / case.name) for case in spec.cases}
 
 
 @dataclass(frozen=True)
@@ -233,7 +178,7 @@ class _Work:
         """Refuse what does not fit the database before the first query is answered."""
         for top in self.spec.top:
             check_count("candidates", top, len(self.database))
-        if self.spec.districts is not None:
+        if self.districts is not None and self.spec.districts is not None:
             nowhere = gpd.GeoDataFrame(geometry=[], crs=self.database.crs)
             district_labels(nowhere, self.districts, self.spec.districts.name)
         for distortion in self.spec.distortions:
@@ -250,9 +195,11 @@ class _Work:
         return None if self.spec.city is None else open_database(self.folder / self.spec.city)
 
     @cached_property
-    def districts(self) -> gpd.GeoDataFrame:
-        """The polygons by which figures are told."""
-        file = self.folder / (self.spec.districts.file if self.spec.districts else "")
+    def districts(self) -> gpd.GeoDataFrame | None:
+        """The polygons by which figures are told, if any."""
+        if self.spec.districts is None:
+            return None
+        file = self.folder / self.spec.districts.file
         try:
             return gpd.read_file(file)
         except Exception as error:  # whatever the many readers raise
@@ -289,7 +236,8 @@ class _Work:
         scored = pd.concat([pd.read_parquet(file) for file in files], ignore_index=True)
         chosen = scored[scored.pop("top") == case.top].reset_index(drop=True)
         return make_evaluation(
-            self.answerer(case.method),
+            self.database,
+            self.spec.methods[case.method],
             self.spec.asked(case.distortion),
             chosen,
             top=case.top,
@@ -341,60 +289,6 @@ def _part(parts: Path, distortion: str, method: str, number: int) -> Path:
     return parts / f"{distortion}.{method}.{number:05d}.parquet"
 
 
-def _begin(partial: Path, wanted: dict[str, Any], spec: ExperimentSpec) -> None:
-    """Begin a run, or take up an unfinished one."""
-    if partial.exists() and not any((partial / PARTS).glob("*")):
-        _require_ours(partial)
-        shutil.rmtree(partial)  # it has not come to anything
-    if partial.exists():
-        _require_same(partial, wanted)
-        for left in [*partial.rglob(f"{HALF_WRITTEN}*")]:
-            shutil.rmtree(left, ignore_errors=True)
-        return
-    identity = {name: wanted[name] for name in ("inputs", "versions")}
-    for name, text in ((INPUTS, json.dumps(identity, indent=2) + "\n"), (SPEC, spec.to_toml())):
-        _write_text(partial / name, text)
-
-
-def _require_ours(folder: Path) -> None:
-    """Refuse a folder with anything in it that no run wrote."""
-    ours = {SPEC, INPUTS, PARTS}
-    others = [
-        path.name
-        for path in folder.iterdir()
-        if path.name not in ours and not path.name.startswith(HALF_WRITTEN)
-    ]
-    if others:
-        msg = f"{folder} holds {min(others)!r}, which no experiment wrote; choose another folder."
-        raise InputError(msg)
-
-
-def _require_same(folder: Path, wanted: dict[str, Any]) -> None:
-    """Refuse a folder with the results of another experiment, or of none."""
-    try:
-        text = (folder / SPEC).read_text(encoding="utf-8")
-        found = json.loads((folder / INPUTS).read_text(encoding="utf-8"))
-        found["experiment"] = parse_experiment(text, where=str(folder / SPEC)).to_dict()
-    except (OSError, TypeError, ValueError) as error:
-        msg = f"{folder} is not the results of an experiment; choose another folder."
-        raise InputError(msg) from error
-    for what, values in wanted.items():
-        if found.get(what) != values:
-            name = _difference(found.get(what), values)
-            told = name if what == "experiment" else f"{what}, {name}"
-            msg = (
-                f"{folder} holds the results of another experiment, which differs in {told}; "
-                "choose another folder, or delete that one."
-            )
-            raise InputError(msg)
-
-
-def _difference(found: Any, wanted: dict[str, Any]) -> str:  # noqa: ANN401 - whatever JSON holds
-    """Return the name of the first thing in which two tables differ."""
-    others = found if isinstance(found, dict) else {}
-    return next(name for name in {**wanted, **others} if others.get(name) != wanted.get(name))
-
-
 def _answer_all(work: _Work, parts: Path, progress: Callable[[int, int], None] | None) -> None:
     """Let every method answer all queries that it has not answered before."""
     spec = work.spec
@@ -425,20 +319,3 @@ def _is_whole(file: Path, *, rows: int) -> bool:
         return len(pd.read_parquet(file)) == rows
     except (OSError, ValueError, pa.ArrowException):
         return False
-
-
-def _write(found: dict[str, Evaluation], work: _Work, folder: Path) -> None:
-    """Write the results of a run, all but the experiment itself."""
-    districts = work.spec.districts
-    for name, evaluation in found.items():
-        evaluation.save(folder / name)
-        if districts is not None:
-            by_district = evaluation.by_district(work.districts, districts.name)
-            _write_text(folder / name / DISTRICTS, by_district.to_csv(index=False))
-    _write_text(folder / FIGURES, experiment_figures(found).to_csv(index=False))
-    _write_text(folder / REPORT, experiment_markdown(work.spec, found))
-
-
-def _write_text(path: Path, text: str) -> None:
-    with whole_file(path) as half:
-        half.write_text(text, encoding="utf-8")

@@ -23,7 +23,8 @@ from worlds import CORNER, World, random_town
 from semsig_gis.errors import DatabaseError, InputError, SemsigError
 from semsig_gis.evaluation import evaluate
 from semsig_gis.experiment import Districts, parse_experiment
-from semsig_gis.experiment_run import QUERIES_A_PART, open_results, run_experiment
+from semsig_gis.experiment_folder import open_results
+from semsig_gis.experiment_run import QUERIES_A_PART, run_experiment
 from semsig_gis.method import Method
 from semsig_gis.store import ObjectStore, save_with_store
 

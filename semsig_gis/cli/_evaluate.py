@@ -140,8 +140,8 @@ def compare(first: Results, second: Results, *, as_json: AsJson = False) -> None
     """Tell by how much two results differ that asked queries from the same places."""
     from semsig_gis.comparison import common_cases, compare_evaluations
     from semsig_gis.evaluation_figures import plain_records
+    from semsig_gis.experiment_folder import open_results
     from semsig_gis.experiment_report import comparison_table
-    from semsig_gis.experiment_run import open_results
 
     pairs = common_cases(open_results(first), open_results(second))
     found = {name: compare_evaluations(*pair) for name, pair in pairs.items()}
