@@ -7,8 +7,6 @@ from __future__ import annotations
 
 import json
 import math
-import os
-import platform
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -18,8 +16,7 @@ import numpy as np
 import pandas as pd
 import pyarrow as pa
 
-from semsig_gis.detector import Detector
-from semsig_gis.distortion_chain import chain_text, parse_chain
+from semsig_gis.distortion_chain import chain_text
 from semsig_gis.errors import DatabaseError, InputError
 from semsig_gis.evaluation_figures import (
     AMBIGUITIES,
@@ -35,29 +32,20 @@ from semsig_gis.evaluation_figures import (
     plain_records,
     query_figures,
 )
-from semsig_gis.method import LikelihoodMethod, parse_method
-from semsig_gis.noise import noise_from_dict
-from semsig_gis.queries import QuerySpec
+from semsig_gis.evaluation_settings import machine, settings_from_dict, settings_to_dict
+from semsig_gis.method import LikelihoodMethod
 from semsig_gis.scoring import NEAR_PLACES, THRESHOLDS, expected_recall
 from semsig_gis.storage import geo_metadata, read_geoparquet, whole_file, write_geoparquet
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Mapping, Sequence
+    from collections.abc import Mapping, Sequence
 
     from numpy.typing import NDArray
 
-    from semsig_gis.distortion_chain import QueryDistortion
     from semsig_gis.method import Method
-    from semsig_gis.noise import Noise
+    from semsig_gis.queries import QuerySpec
 
-__all__ = [
-    "QUERY_COLUMNS",
-    "SUCCESS_METRES",
-    "SUCCESS_PROBABILITY",
-    "Evaluation",
-    "machine",
-    "used_noises",
-]
+__all__ = ["QUERY_COLUMNS", "SUCCESS_METRES", "SUCCESS_PROBABILITY", "Evaluation"]
 
 SUCCESS_METRES = 50
 SUCCESS_PROBABILITY = 0.5
@@ -77,71 +65,6 @@ QUERY_COLUMNS = (
 _QUERIES_FILE = "queries.parquet"
 _SUMMARY_FILE = "evaluation.json"
 _TIMING_FILE = "timing.json"
-
-
-def machine() -> dict[str, Any]:
-    """Return what decides how long things take here.
-
-    Returns
-    -------
-    dict
-        ``system``, ``processor``, ``processors`` (how many may be used) and ``memory_gb`` (None
-        where the system does not tell).
-
-    Examples
-    --------
-    >>> machine()["processors"] >= 1
-    True
-    """
-    pages = "SC_PHYS_PAGES" in getattr(os, "sysconf_names", ())
-    memory = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES") / 1e9 if pages else None
-    return {
-        "system": platform.platform(),
-        "processor": platform.processor() or platform.machine(),
-        "processors": os.cpu_count() or 1,
-        "memory_gb": None if memory is None else round(memory, 1),
-    }
-
-
-def used_noises(
-    methods: Iterable[Method | LikelihoodMethod], distortions: Iterable[QueryDistortion]
-) -> dict[str, Noise]:
-    """Return the noise models of methods and distortions by the names that stand for them.
-
-    Parameters
-    ----------
-    methods : iterable
-        Methods, of which those by likelihood have a noise model.
-    distortions : iterable
-        Distortions, of which detectors have one.
-
-    Returns
-    -------
-    dict of str to Noise
-        By name.
-
-    Raises
-    ------
-    InputError
-        If two models have one name, or a name has a sign that means something else in texts.
-
-    Examples
-    --------
-    >>> from semsig_gis.noise import named_noise
-    >>> list(used_noises([LikelihoodMethod(noise=named_noise("light"))], []))
-    ['light']
-    """
-    found: dict[str, Noise] = {}
-    models = [one.noise for one in methods if isinstance(one, LikelihoodMethod)]
-    models += [one.noise for one in distortions if isinstance(one, Detector)]
-    for noise in models:
-        if set(noise.name) & set(",:/="):
-            msg = f"a noise model is called {noise.name!r}; give it a name without , : / and =."
-            raise InputError(msg)
-        if found.setdefault(noise.name, noise) != noise:
-            msg = f"two noise models are called {noise.name!r}; give each a name of its own."
-            raise InputError(msg)
-    return found
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -198,7 +121,7 @@ class Evaluation:
     versions : mapping
         Versions of the software by name.
     machine : mapping
-        What it ran on (see `machine`).
+        What it ran on (see `semsig_gis.evaluation_settings.machine`).
 
     Notes
     -----
@@ -465,17 +388,7 @@ class Evaluation:
         table = table.append_column("geometry", pa.array(points.to_wkb()))
         specs = {
             "kind": _KIND,
-            "method": str(self.method),
-            "asked": {
-                "number": self.asked.number,
-                "seeds": list(self.asked.seeds),
-                "seen_from": self.asked.seen_from,
-                "distortions": [chain_text([one]) for one in self.asked.distortions],
-            },
-            "noises": {
-                name: noise.to_dict()
-                for name, noise in used_noises([self.method], self.asked.distortions).items()
-            },
+            **settings_to_dict(self.method, self.asked),
             "city": self.city,
             "top": self.top,
             "database": dict(self.database),
@@ -516,17 +429,13 @@ class Evaluation:
             frame = table.to_pandas()
             points = gpd.GeoSeries.from_wkb(frame.pop("geometry"), crs=crs)
             frame["best_cell_id"] = frame["best_cell_id"].astype("Int64")
-            noises = {name: noise_from_dict(one) for name, one in specs["noises"].items()}
-            asked = specs["asked"]
-            distortions = parse_chain(asked["distortions"], noises=noises)
+            method, asked = settings_from_dict(specs)
             told = json.loads(timing.read_text("utf-8")) if timing.exists() else {}
             seconds = told.get("seconds_per_query")
             return cls(
                 queries=gpd.GeoDataFrame(frame, geometry=points),
-                method=parse_method(specs["method"], noises=noises),
-                asked=QuerySpec(
-                    **{**asked, "seeds": tuple(asked["seeds"]), "distortions": distortions}
-                ),
+                method=method,
+                asked=asked,
                 city=specs["city"],
                 top=specs["top"],
                 seconds_per_query=math.nan if seconds is None else seconds,

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from semsig_gis.distortion_chain import chain_text, parse_chain
 from semsig_gis.errors import CatalogError, InputError
-from semsig_gis.evaluation_result import used_noises
+from semsig_gis.evaluation_settings import used_noises
 from semsig_gis.method import parse_method
 from semsig_gis.noise import NOISES, noise_from_dict
 from semsig_gis.noise_file import open_noise
