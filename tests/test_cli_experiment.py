@@ -94,4 +94,14 @@ def test_distortions_on_the_command_line(spec: Path, run: Run) -> None:
     assert code == 0
     settings = json.loads(shown)["settings"]
     assert settings["distortions"] == ["medium:resort=false", "missing:bench", "view:120"]
+    text = "light:resort=false:false_class=frequency"
+    for more, said in (
+        ((), text),
+        (("--false-class", "uniform"), "light:resort=false"),
+        (("--distortion", "light", "--false-class", "frequency"), "light:false_class=frequency"),
+    ):
+        few = ("--queries", 5, "--distortion", text, "--json")
+        code, shown, _ = run("evaluate", database, *few, *more)
+        assert code == 0
+        assert json.loads(shown)["settings"]["distortions"] == [said]
     sentence(run("evaluate", database, "--distortion", "medium,veiw:120"), "nearest is 'view'")

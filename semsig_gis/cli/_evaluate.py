@@ -50,8 +50,9 @@ def evaluate(
         bool, typer.Option("--keep-order", help="Do not re-sort after the bearing noise.")
     ] = False,
     false_class: Annotated[
-        FalseClass, typer.Option(help="How the class of a false object is drawn.")
-    ] = FalseClass.uniform,
+        FalseClass | None,
+        typer.Option(help="How the class of a false object is drawn; uniform by default."),
+    ] = None,
     method: MethodText = "edit+edit",
     noise: NoiseName = "generic",
     top: Annotated[int, typer.Option(help="Number t of best candidates that count.")] = 1,
@@ -72,7 +73,11 @@ def evaluate(
     from semsig_gis.matching import Method
 
     chain = [
-        dataclasses.replace(one, resort=not keep_order, false_class=false_class.value)
+        dataclasses.replace(
+            one,
+            resort=one.resort and not keep_order,
+            false_class=one.false_class if false_class is None else false_class.value,
+        )
         if isinstance(one, Distortion)
         else one
         for one in parse_chain(distortion)
