@@ -346,14 +346,16 @@ class _Pool:
             places[self.scores.argmin()] = answer.place
         # So that a cell 50 m away is not a rounding beyond 50 m.
         self.errors = np.round(np.hypot(*(places - np.array(query.xy)).T), 6)
+        self.better = self.tied = np.empty(0)
 
     def best(self, count: int, thresholds: Sequence[float]) -> tuple[float, NDArray[np.float64]]:
         """Return what to expect of the smallest error among the best."""
-        better, tied = top_candidates(self.scores, min(count, len(self.scores)))
-        slots = min(count, len(self.scores)) - len(better)
-        return expected_best(
-            self.errors[better], self.errors[tied], slots=slots, thresholds=thresholds
-        )
+        slots = min(count, len(self.scores)) - len(self.better)
+        if not 0 < slots <= len(self.tied):  # else the cut is among the same cells as before
+            better, tied = top_candidates(self.scores, min(count, len(self.scores)))
+            self.better, self.tied = self.errors[better], np.sort(self.errors[tied])
+            slots = min(count, len(self.scores)) - len(better)
+        return expected_best(self.better, self.tied, slots=slots, thresholds=thresholds)
 
 
 def _outcome(pool: _Pool, top: int) -> dict[str, Any]:
