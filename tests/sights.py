@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from math import sqrt
 from typing import TYPE_CHECKING
 
 import numpy as np
 from hypothesis import strategies as st
+from scipy.stats import binom
 
 from semsig_gis.catalog import paper_taxonomy
 from semsig_gis.sight import CitySights, Sight
@@ -70,6 +70,6 @@ def away(bearings: NDArray[np.float64], middle: float) -> NDArray[np.float64]:
 
 
 def assert_rate(hits: float, trials: int, chance: float) -> None:
-    """Check a rate; one test in five hundred million would fail by chance."""
-    spread = sqrt(trials * chance * (1.0 - chance))
-    assert abs(hits - trials * chance) <= 6.0 * spread + 1e-9, (hits / trials, chance)
+    """Check a rate: neither tail of the binomial is unheard of."""
+    low, high = binom.cdf(hits, trials, chance), binom.sf(hits - 1, trials, chance)
+    assert min(low, high) > 1e-9, (hits / trials, chance)
