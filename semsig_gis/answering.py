@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from semsig_gis.database import SignatureDatabase
+    from semsig_gis.distance_memo import DistanceMemo
     from semsig_gis.likelihood import LikelihoodIndex
     from semsig_gis.location import Location
     from semsig_gis.posterior import Posterior
@@ -62,7 +63,7 @@ class RankedAnswer:
     seconds: float
 
 
-@dataclass(frozen=True, eq=False, slots=True, kw_only=True)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class Answerer:
     """A method with all that it needs to answer.
 
@@ -115,13 +116,18 @@ class Answerer:
             )
             raise InputError(msg)
 
-    def answers(self, queries: Sequence[Signature]) -> Iterator[RankedAnswer]:
+    def answers(
+        self, queries: Sequence[Signature], *, memo: DistanceMemo | None = None
+    ) -> Iterator[RankedAnswer]:
         """Yield the answers to some queries.
 
         Parameters
         ----------
         queries : sequence of Signature
             Each with at least one object.
+        memo : DistanceMemo, optional
+            Distances of these queries that other methods have needed. How long it took to measure
+            them counts for each method.
 
         Yields
         ------
@@ -131,18 +137,28 @@ class Answerer:
         if not queries:
             return
         if isinstance(self.method, Method):
-            yield from self._by_distance(queries, self.method)
+            yield from self._by_distance(queries, self.method, memo)
         elif self.index is not None:
             yield from self._by_likelihood(queries, self.method, self.index)
 
-    def _by_distance(self, queries: Sequence[Signature], method: Method) -> Iterator[RankedAnswer]:
+    @functools.cached_property
+    def _ready(self) -> set[str]:
+        """The parts of a query that have been compared before."""
+        return set()
+
+    def _by_distance(
+        self, queries: Sequence[Signature], method: Method, memo: DistanceMemo | None
+    ) -> Iterator[RankedAnswer]:
         # What the database works out once and keeps is no part of the time of a query.
-        next(iter(score_cells(self.database, queries[:1], method)))
-        rows = iter(score_cells(self.database, queries, method))
+        parts = method.used(queries[0])
+        if parts not in self._ready:
+            next(iter(score_cells(self.database, queries[:1], method)))
+            self._ready.add(parts)
+        rows = iter(score_cells(self.database, queries, method, memo=memo))
         for _ in queries:
-            start = time.perf_counter()
+            start, spared = time.perf_counter(), memo.spared if memo else 0.0
             scores = next(rows)
-            seconds = time.perf_counter() - start
+            seconds = time.perf_counter() - start + (memo.spared - spared if memo else 0.0)
             yield RankedAnswer(scores=scores, best_score=float(scores.min()), seconds=seconds)
 
     def _by_likelihood(

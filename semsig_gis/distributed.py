@@ -7,18 +7,11 @@ depends on the size of a tile, not on their number, and the files do not depend 
 from __future__ import annotations
 
 import contextlib
-import logging
 import shutil
-import signal
-import tempfile
-import threading
-from concurrent.futures import CancelledError
-from dataclasses import dataclass
 from functools import partial
 from typing import TYPE_CHECKING
 
-from semsig_gis import __version__
-from semsig_gis.errors import DatabaseError, EmptyResultError, InputError, SemsigError
+from semsig_gis.errors import DatabaseError, EmptyResultError
 from semsig_gis.grid import GridSpec
 from semsig_gis.manifest import part_name
 from semsig_gis.signatures import SignatureSpec
@@ -26,12 +19,11 @@ from semsig_gis.tile_inputs import plan_tiles
 from semsig_gis.tiles import TileSpec, build_tile, touched_tiles
 from semsig_gis.unfinished import abandon, finished_tiles, publish
 from semsig_gis.viewpoints import ViewpointSpec
+from semsig_gis.workers import check_workers, run_tasks
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Generator, Iterator, Sequence
+    from collections.abc import Callable
     from pathlib import Path
-
-    from distributed import Client
 
     from semsig_gis.manifest import Manifest, Part
     from semsig_gis.tiles import TilePlan
@@ -40,20 +32,8 @@ if TYPE_CHECKING:
 
 __all__ = ["build_tiles"]
 
-ATTEMPTS = 3
 # When so many have failed, the rest would too.
 MOST_FAILED = 10
-# For a scheduler to answer, in seconds.
-PATIENCE_S = 10
-
-
-@dataclass(frozen=True, slots=True)
-class _Outcome:
-    """What became of a tile: a part, nothing to see, or why it failed."""
-
-    tile: Tile
-    part: Part | None = None
-    reason: str | None = None
 
 
 def build_tiles(
@@ -138,12 +118,7 @@ def build_tiles(
     ...     len(open_database(f"{folder}/town")) == parts.cells
     True
     """
-    if workers < 0 or (workers and scheduler is not None) or scheduler == "":
-        msg = (
-            f"{workers} workers and the scheduler {scheduler!r} were given; give a number of "
-            "workers from 0 up, or the address of a scheduler."
-        )
-        raise InputError(msg)
+    check_workers(workers, scheduler)
     plan = plan_tiles(
         objects,
         out,
@@ -183,12 +158,20 @@ def _run(
         tell(f"an unfinished run has left {len(done):,} of {len(tiles):,} tiles; it goes on")
     todo = [one for one in tiles if one not in done]
     failed: dict[Tile, str] = {}
-    with contextlib.closing(_outcomes(plan, todo, workers, scheduler)) as outcomes:
+    paths = [plan.folder, plan.objects, plan.buildings, plan.streets]
+    running = run_tasks(
+        partial(build_tile, plan),
+        todo,
+        workers=workers,
+        scheduler=scheduler,
+        files=[path for path in paths if path is not None],
+    )
+    with contextlib.closing(running) as outcomes:
         for outcome in outcomes:
             if outcome.reason is None:
-                done[outcome.tile] = outcome.part
+                done[outcome.task] = outcome.value
             else:
-                failed[outcome.tile] = outcome.reason
+                failed[outcome.task] = outcome.reason
             if len(failed) == MOST_FAILED:
                 break
             if progress is not None:
@@ -203,124 +186,3 @@ def _run(
         )
         raise DatabaseError(msg)
     return sorted(part for part in done.values() if part is not None)
-
-
-def _outcomes(
-    plan: TilePlan, tiles: Sequence[Tile], workers: int, scheduler: str | None
-) -> Generator[_Outcome]:
-    """Build tiles, here or on workers, and yield each when it is done or has failed."""
-    if not tiles:
-        return
-    if not workers and scheduler is None:
-        for tile in tiles:
-            yield _attempt(plan, tile)
-        return
-    from distributed import KilledWorker, as_completed  # noqa: PLC0415 - only where it is used
-
-    with _client(workers, scheduler) as client:
-        _require_same_view(client, plan)
-        futures = client.map(partial(_attempt, plan), tiles, pure=False)
-        tile_of = {future.key: tile for future, tile in zip(futures, tiles, strict=True)}
-        for future in as_completed(futures, loop=client.loop):
-            tile = tile_of[future.key]
-            try:
-                yield future.result()
-            except KilledWorker:
-                yield _Outcome(tile, reason=f"{ATTEMPTS} processes died while they built it")
-            except CancelledError:
-                yield _Outcome(tile, reason="the connection to the scheduler was lost")
-
-
-def _attempt(plan: TilePlan, tile: Tile) -> _Outcome:
-    """Build a tile, again where it fails; what went wrong is returned as words, not raised."""
-    reason = ""
-    for _ in range(ATTEMPTS):
-        try:
-            return _Outcome(tile, part=build_tile(plan, tile))
-        except SemsigError as error:
-            reason = str(error).removesuffix(".")
-        except Exception as error:  # noqa: BLE001 - one tile must not end the run
-            reason = f"{type(error).__name__}: {error}"
-    return _Outcome(tile, reason=reason)
-
-
-@contextlib.contextmanager
-def _client(workers: int, scheduler: str | None) -> Iterator[Client]:
-    """Give a client of the scheduler, or of processes that end with the block."""
-    import dask  # noqa: PLC0415 - only where it is used
-    from distributed import Client, LocalCluster  # noqa: PLC0415
-
-    with contextlib.ExitStack() as stack:
-        scratch = stack.enter_context(tempfile.TemporaryDirectory(prefix="semsig-"))
-        settings = {
-            "temporary-directory": scratch,
-            "distributed.scheduler.allowed-failures": ATTEMPTS - 1,
-            # A tile that kills its worker must not take the tiles down that wait there.
-            "distributed.scheduler.worker-saturation": 1.0,
-        }
-        stack.enter_context(dask.config.set(settings))
-        where: str | LocalCluster = scheduler or ""
-        if scheduler is None:
-            with _interrupts_ignored():
-                where = LocalCluster(
-                    n_workers=workers,
-                    threads_per_worker=1,
-                    host="127.0.0.1",
-                    memory_limit=0,
-                    dashboard_address="127.0.0.1:0",
-                    silence_logs=logging.CRITICAL,
-                )
-            stack.enter_context(where)
-        try:
-            client = Client(where, timeout=PATIENCE_S, set_as_default=False)
-        except (OSError, ValueError) as error:
-            msg = (
-                f"the scheduler {scheduler} cannot be reached; give the address that `dask "
-                "scheduler` printed, such as tcp://10.0.0.5:8786."
-            )
-            raise InputError(msg) from error
-        yield stack.enter_context(client)
-
-
-@contextlib.contextmanager
-def _interrupts_ignored() -> Iterator[None]:
-    """Start processes that leave it to this one to answer the interrupt key."""
-    if threading.current_thread() is not threading.main_thread():
-        yield
-        return
-    before = signal.signal(signal.SIGINT, signal.SIG_IGN)
-    try:
-        yield
-    finally:
-        signal.signal(signal.SIGINT, before)
-
-
-def _require_same_view(client: Client, plan: TilePlan) -> None:
-    """Refuse workers that have another version of the package, or other files."""
-    paths = [plan.folder, plan.objects, plan.buildings, plan.streets]
-    given = [path for path in paths if path is not None]
-    ours = _view(given)
-    views = client.run(_view, given, on_error="return")
-    if not views:
-        msg = "the scheduler has no workers; start some with `dask worker ADDRESS`."
-        raise InputError(msg)
-    for worker, view in views.items():
-        if isinstance(view, BaseException):
-            msg = f"the worker {worker} cannot run semsig_gis ({view}); install it there."
-            raise InputError(msg) from view
-        if view[0] != ours[0]:
-            msg = f"the worker {worker} has semsig_gis {view[0]}; install {ours[0]} there."
-            raise InputError(msg)
-        for path, here, there in zip(given, ours[1:], view[1:], strict=True):
-            if here != there:
-                msg = (
-                    f"the worker {worker} does not see {path} as it is here; give paths on a file "
-                    "system that all machines share."
-                )
-                raise InputError(msg)
-
-
-def _view(paths: Sequence[Path]) -> tuple[str | int | None, ...]:
-    """Return what a process sees: its version of the package, and the sizes of files."""
-    sizes = [path.stat().st_size if path.exists() else None for path in paths]
-    return (__version__, *sizes)

@@ -48,6 +48,7 @@ if TYPE_CHECKING:
 
     from semsig_gis.answering import RankedAnswer
     from semsig_gis.database import SignatureDatabase
+    from semsig_gis.distance_memo import DistanceMemo
     from semsig_gis.likelihood import LikelihoodIndex
     from semsig_gis.posterior import Posterior
     from semsig_gis.queries import Query
@@ -149,6 +150,7 @@ def score_queries(
     queries: Sequence[Query],
     *,
     tops: Sequence[int] = (1,),
+    memo: DistanceMemo | None = None,
     progress: Callable[[int, int], None] | None = None,
 ) -> dict[int, pd.DataFrame]:
     """Let a method answer queries of known places, and score the answers.
@@ -161,6 +163,8 @@ def score_queries(
         The queries and the truth about them.
     tops : sequence of int, default (1,)
         How many best candidates count.
+    memo : DistanceMemo, optional
+        Distances of these queries that other methods have needed.
     progress : callable, optional
         Called with the number of queries done and the number of queries.
 
@@ -185,7 +189,8 @@ def score_queries(
     [0, 1, 2]
     """
     database = answerer.database
-    answers = answerer.answers([one.asked.signature for one in queries if len(one.asked)])
+    asked = [one.asked.signature for one in queries if len(one.asked)]
+    answers = answerer.answers(asked, memo=memo)
     outcomes: dict[int, list[dict[str, Any]]] = {top: [] for top in tops}
     for done, query in enumerate(queries, start=1):
         if len(query.asked):

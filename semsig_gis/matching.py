@@ -29,6 +29,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from semsig_gis.database import SignatureDatabase
+    from semsig_gis.distance_memo import DistanceMemo
     from semsig_gis.patterns import Requirement
     from semsig_gis.sequences import SequenceTable
     from semsig_gis.signatures import Signature
@@ -52,7 +53,11 @@ _CELLS_AT_ONCE = 1 << 16  # scores of so many cells stay in a near cache
 
 
 def score_cells(
-    database: SignatureDatabase, queries: Sequence[Signature], method: Method = DEFAULT_METHOD
+    database: SignatureDatabase,
+    queries: Sequence[Signature],
+    method: Method = DEFAULT_METHOD,
+    *,
+    memo: DistanceMemo | None = None,
 ) -> Iterator[NDArray[np.float32]]:
     """Give the distance of each query to every cell, one query after the other.
 
@@ -64,6 +69,9 @@ def score_cells(
         What to search for. An empty query is compared like any other.
     method : Method
         How the cells are ranked.
+    memo : DistanceMemo, optional
+        Distances of these very queries to this database that other methods have needed; what is
+        measured is added. It holds a number for each query and distinct sequence.
 
     Yields
     ------
@@ -98,7 +106,7 @@ def score_cells(
     # Checked here, not when the first score is asked for. A run compares the same parts.
     runs = [(part, list(run)) for part, run in itertools.groupby(queries, key=method.used)]
     return itertools.chain.from_iterable(
-        _score_run(database, run, method, part) for part, run in runs
+        _score_run(database, run, method, part, memo) for part, run in runs
     )
 
 
@@ -223,7 +231,11 @@ def _score_parts(
 
 
 def _score_run(
-    database: SignatureDatabase, queries: Sequence[Signature], method: Method, used: str
+    database: SignatureDatabase,
+    queries: Sequence[Signature],
+    method: Method,
+    used: str,
+    memo: DistanceMemo | None,
 ) -> Iterator[NDArray[np.float32]]:
     """Score queries that use the same parts, batch by batch."""
     distinct = sum(len(_table(database, part)) for part in used.split("+"))
@@ -233,10 +245,11 @@ def _score_run(
         codes = [query.codes for query in batch if query.codes is not None]
         levels = [query.levels(database.spec.levels) for query in batch if used != TYPES]
         if used == BOTH:
-            yield from _score_both(database, codes, levels, method)
+            yield from _score_both(database, codes, levels, method, memo)
         else:
             table = _table(database, used)
-            for row in _distances(method, used, codes if used == TYPES else levels, table):
+            parts = codes if used == TYPES else levels
+            for row in _distances(method, used, parts, table, memo=memo):
                 yield _spread(_on_steps(row), table)
 
 
@@ -245,17 +258,19 @@ def _score_both(
     codes: Sequence[NDArray[np.uint8]],
     levels: Sequence[NDArray[np.uint8]],
     method: Method,
+    memo: DistanceMemo | None,
 ) -> Iterator[NDArray[np.float32]]:
     """Score a batch of queries by types and angles, in one stage or two."""
     types, angles = database.type_sequences, database.angle_sequences
-    by_types = _distances(method, TYPES, codes, types)
+    by_types = _distances(method, TYPES, codes, types, memo=memo)
     # The kernel for weights of 1 measures all sequences sooner than others measure some.
     slow = method.angles != "edit" or method.weights != EditWeights()
     if method.keep is not None and slow and len(codes) < _MANY_QUERIES:
         for first, one in zip(by_types, levels, strict=True):
             yield _two_stage(method, first, types, angles, partial(_some, method, one, angles))
         return
-    for first, second in zip(by_types, _distances(method, ANGLES, levels, angles), strict=True):
+    by_angles = _distances(method, ANGLES, levels, angles, memo=memo)
+    for first, second in zip(by_types, by_angles, strict=True):
         if method.keep is None:
             yield _fused(method, first, types.inverse, second, angles.inverse)
         else:
@@ -372,12 +387,17 @@ def _distances(
     table: SequenceTable,
     *,
     only: NDArray[np.int64] | None = None,
+    memo: DistanceMemo | None = None,
 ) -> NDArray[np.float32]:
     """Measure one part of some queries against distinct sequences, as the method says."""
     name = method.measures[part]
     wild = part == TYPES and any((sequence == WILDCARD).any() for sequence in sequences)
     measure = metric(name, weights=method.weights, wildcard=WILDCARD if wild else None)
-    return measure.distances(sequences, table, normalized=method.normalized, only=only)
+    find = partial(measure.distances, sequences, table, normalized=method.normalized, only=only)
+    if memo is None:
+        return find()
+    asked = tuple(sequence.tobytes() for sequence in sequences)
+    return memo.get((part, name, method.normalized, method.weights, asked), find)
 
 
 def _fused(

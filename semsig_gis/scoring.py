@@ -144,7 +144,8 @@ def expected_best(
     >>> expected, within.tolist()
     (50.0, [0.25, 0.5])
     """
-    ordered = np.sort(np.asarray(tied, dtype=np.float64))
+    # Stable sorting finds at once that they are in order already, as they often are.
+    ordered = np.sort(np.asarray(tied, dtype=np.float64), kind="stable")
     sure = np.asarray(better, dtype=np.float64)
     nearest = float(sure.min()) if sure.size else math.inf
     left = np.arange(ordered.size, 0, -1, dtype=np.float64)

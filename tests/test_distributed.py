@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import logging
 import multiprocessing
 import os
 import signal
@@ -19,7 +18,7 @@ import pytest
 from sentences import assert_sentence
 from worlds import CODES, CORNER, World, assert_same
 
-from semsig_gis import __version__, distributed
+from semsig_gis import distributed
 from semsig_gis.database_file import open_database
 from semsig_gis.distributed import build_tiles
 from semsig_gis.errors import DatabaseError, InputError
@@ -27,8 +26,6 @@ from semsig_gis.objects import save_objects
 from semsig_gis.tiles import TileSpec, build_tile
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
-
     from distributed import LocalCluster
 
     from semsig_gis.manifest import Part
@@ -64,25 +61,6 @@ def serial(tmp_path_factory: pytest.TempPathFactory) -> dict[str, bytes]:
     return build(tmp_path_factory.mktemp("serial"))
 
 
-@pytest.fixture(scope="module")
-def cluster(tmp_path_factory: pytest.TempPathFactory) -> Iterator[LocalCluster]:
-    import dask
-    from distributed import LocalCluster
-
-    with (
-        dask.config.set({"temporary-directory": str(tmp_path_factory.mktemp("dask"))}),
-        LocalCluster(
-            n_workers=2,
-            threads_per_worker=1,
-            host="127.0.0.1",
-            memory_limit=0,
-            dashboard_address="127.0.0.1:0",
-            silence_logs=logging.CRITICAL,
-        ) as running,
-    ):
-        yield running
-
-
 def script(folder: Path, body: str) -> list[str]:
     """Return the command of a script that builds the town."""
     path = folder / "script.py"
@@ -113,6 +91,7 @@ def test_the_parts_are_the_whole(serial: dict[str, bytes], tmp_path: Path) -> No
 def test_workers_write_the_same_files_as_one_process(
     serial: dict[str, bytes], tmp_path: Path, workers: int, capfd: pytest.CaptureFixture[str]
 ) -> None:
+    others = multiprocessing.active_children()
     told: list[tuple[int, int]] = []
     found = build(tmp_path, workers=workers, progress=lambda *done: told.append(done))
     assert found == serial
@@ -120,7 +99,7 @@ def test_workers_write_the_same_files_as_one_process(
     total = told[-1][1]
     assert told == [(done, total) for done in range(1, total + 1)]
     assert capfd.readouterr() == ("", "")
-    assert multiprocessing.active_children() == []
+    assert multiprocessing.active_children() == others
 
 
 def test_a_scheduler_elsewhere_gives_the_same_files(
@@ -249,15 +228,15 @@ def test_a_tile_that_kills_its_workers_is_named_and_the_others_are_kept(
     monkeypatch: pytest.MonkeyPatch,
     capfd: pytest.CaptureFixture[str],
 ) -> None:
-    original = distributed._attempt
+    original = build_tile
     deadly = (3827, 31376)
 
-    def attempt(plan: TilePlan, tile: tuple[int, int]) -> object:
+    def deadly_build(plan: TilePlan, tile: tuple[int, int]) -> Part | None:
         if tile == deadly:
             os.kill(os.getpid(), signal.SIGKILL)
         return original(plan, tile)
 
-    monkeypatch.setattr(distributed, "_attempt", attempt)
+    monkeypatch.setattr(distributed, "build_tile", deadly_build)
     with pytest.raises(DatabaseError) as caught:
         build(tmp_path, workers=2)
     assert_sentence(
@@ -349,7 +328,7 @@ def test_a_full_disk_leaves_the_database_that_was_there(tmp_path: Path) -> None:
     assert same == ["True", "True"]
 
 
-# --- Options and clusters that cannot be used -------------------------------------------------
+# --- Options that cannot be used ---------------------------------------------------------------
 
 
 @pytest.mark.parametrize(
@@ -359,58 +338,3 @@ def test_options_that_do_not_fit_are_refused(tmp_path: Path, options: dict[str, 
     with pytest.raises(InputError) as caught:
         build(tmp_path, **options)
     assert_sentence(caught.value, "workers", "scheduler", "from 0 up")
-
-
-@pytest.mark.parametrize("address", ["tcp://127.0.0.1:9", "127.0.0.1:9", "carrier://pigeon:1", "x"])
-def test_a_scheduler_that_does_not_answer_is_named(
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-    address: str,
-    capfd: pytest.CaptureFixture[str],
-) -> None:
-    monkeypatch.setattr(distributed, "PATIENCE_S", 0.3)
-    with pytest.raises(InputError) as caught:
-        build(tmp_path, scheduler=address)
-    assert_sentence(caught.value, address, "cannot be reached", "dask scheduler")
-    assert capfd.readouterr() == ("", "")
-    assert [path.name for path in tmp_path.iterdir()] == ["objects.parquet"]
-
-
-def test_a_scheduler_without_workers_is_named(tmp_path: Path) -> None:
-    from distributed import LocalCluster
-
-    empty = LocalCluster(n_workers=0, host="127.0.0.1", dashboard_address="127.0.0.1:0")
-    with empty, pytest.raises(InputError) as caught:
-        build(tmp_path, scheduler=empty.scheduler_address)
-    assert_sentence(caught.value, "no workers", "dask worker")
-
-
-@pytest.mark.parametrize(
-    ("there", "words"),
-    [
-        ((__version__, None, 0, 0), ("does not see", "city.partial", "share")),
-        (("0.0.0", 0, 0, 0), ("has semsig_gis 0.0.0", f"install {__version__}")),
-        (None, ("cannot run semsig_gis", "No module named 'semsig_gis'", "install it")),
-    ],
-)
-def test_workers_that_see_something_else_are_named(
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-    cluster: LocalCluster,
-    there: tuple[object, ...] | None,
-    words: tuple[str, ...],
-) -> None:
-    here = os.getpid()
-
-    def view(paths: list[Path]) -> tuple[object, ...]:
-        if os.getpid() == here:
-            return (__version__, *[0 for _ in paths])
-        if there is None:
-            msg = "No module named 'semsig_gis'"
-            raise ModuleNotFoundError(msg)
-        return there[: len(paths) + 1]
-
-    monkeypatch.setattr(distributed, "_view", view)
-    with pytest.raises(InputError) as caught:
-        build(tmp_path, scheduler=cluster.scheduler_address)
-    assert_sentence(caught.value, "the worker tcp://127.0.0.1", *words)

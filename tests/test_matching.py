@@ -22,6 +22,7 @@ from semsig_gis.catalog import paper_taxonomy
 from semsig_gis.database import BEARING_UNITS, SignatureDatabase
 from semsig_gis.database_file import open_database, save_database
 from semsig_gis.dataset import PartitionedDatabase
+from semsig_gis.distance_memo import DistanceMemo
 from semsig_gis.errors import EmptyResultError, InputError
 from semsig_gis.grid import GridSpec
 from semsig_gis.matching import Method, localize, score_cells
@@ -174,6 +175,25 @@ def test_batches_do_not_change_scores(keep: float | None, monkeypatch: pytest.Mo
     monkeypatch.setattr("semsig_gis.matching._BATCH_BYTES", 1)
     alone = np.array(list(score_cells(CITY, queries, Method(keep=keep))))
     np.testing.assert_array_equal(alone, together)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_methods_that_share_a_memo_score_as_alone(seed: int) -> None:
+    database = CITY
+    rng = np.random.default_rng(seed)
+    queries = [database.signature(int(cell)) for cell in rng.integers(0, len(database), 9)]
+    texts = [
+        *("types:edit", "angles:edit", "edit+edit", "edit+edit:5%", "edit+edit:alpha=0.3"),
+        *("edit+edit:raw", "edit+edit:5%:raw", "edit+edit:weights=2/1/1", "edit+jaccard:20%"),
+        *("types:jaccard", "jaccard+histogram"),
+    ]
+    memo = DistanceMemo()
+    for text in rng.permutation([*texts, *texts]).tolist():
+        method = Method.parse(text)
+        alone = list(score_cells(database, queries, method))
+        shared = list(score_cells(database, queries, method, memo=memo))
+        np.testing.assert_array_equal(shared, alone)
+    assert memo.spared > 0
 
 
 def test_a_query_without_the_part_is_refused_at_once() -> None:
