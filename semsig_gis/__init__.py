@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from semsig_gis.evaluation_result import Evaluation
     from semsig_gis.experiment import ExperimentSpec, open_experiment_spec
     from semsig_gis.experiment_folder import open_results
-    from semsig_gis.experiment_run import run_experiment
+    from semsig_gis.experiment_run import run_experiment, run_experiments
     from semsig_gis.export import export_geopackage
     from semsig_gis.fetching import fetch_layers, find_area, open_cache
     from semsig_gis.grid import GridSpec
@@ -137,6 +137,7 @@ _HOMES = {
     "read_surroundings": "surroundings",
     "ready_index": "likelihood_file",
     "run_experiment": "experiment_run",
+    "run_experiments": "experiment_run",
     "save_database": "database_file",
     "save_map": "maps",
     "save_objects": "objects",
@@ -217,6 +218,7 @@ __all__ = [
     "read_surroundings",
     "ready_index",
     "run_experiment",
+    "run_experiments",
     "save_database",
     "save_map",
     "save_objects",

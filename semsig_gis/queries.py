@@ -130,6 +130,7 @@ def draw_queries(
     *,
     store: ObjectStore | None = None,
     city: SignatureDatabase | None = None,
+    part: slice = slice(None),
 ) -> list[Query]:
     """Draw queries of known places.
 
@@ -145,6 +146,8 @@ def draw_queries(
     city : SignatureDatabase, optional
         The city that is looked at, if it is not the one that the database tells of: the same city
         at another date, say, in the same coordinate reference system. Places are in its cells.
+    part : slice, optional
+        Which of the queries to draw, those of the first seed first; all by default.
 
     Returns
     -------
@@ -196,19 +199,18 @@ def draw_queries(
     spoil = ready_chain(spec.distortions, CitySights.of(database))
     known = _known_codes(looked_at, database)
     queries = []
-    for seed in spec.seeds:
-        places, sights = _seen(looked_at, spec, seed, store)
+    for seed, numbers in _numbers(spec, part):
+        places, sights = _seen(looked_at, spec, seed, numbers, store)
         cells = _cells_of(database, places)
-        for number, sight in enumerate(sights):
+        for number, place, cell, sight in zip(numbers, places, cells, sights, strict=True):
             codes = known[sight.codes]
             true = replace(sight, codes=codes).only(codes > 0)
-            x, y = places[number].tolist()
             queries.append(
                 Query(
                     seed=seed,
                     number=number,
-                    xy=(x, y),
-                    cell=int(cells[number]),
+                    xy=(float(place[0]), float(place[1])),
+                    cell=int(cell),
                     length=len(sight),
                     asked=spoil(true, seed, number),
                     pick=float(_random(seed, "pick", number).random()),
@@ -217,16 +219,30 @@ def draw_queries(
     return queries
 
 
+def _numbers(spec: QuerySpec, part: slice) -> Iterator[tuple[int, range]]:
+    """Yield the numbers of the queries of each seed that are in a part."""
+    start, stop, _ = part.indices(spec.number * len(spec.seeds))
+    for place, seed in enumerate(spec.seeds):
+        first = place * spec.number
+        low, high = max(start - first, 0), min(stop - first, spec.number)
+        if low < high:
+            yield seed, range(low, high)
+
+
 def _seen(
-    city: SignatureDatabase, spec: QuerySpec, seed: int, store: ObjectStore | None
+    city: SignatureDatabase,
+    spec: QuerySpec,
+    seed: int,
+    numbers: range,
+    store: ObjectStore | None,
 ) -> tuple[NDArray[np.float64], Iterator[Sight]]:
     """Return places, and what is seen from each."""
     # The first cells of one permutation: more queries keep the first ones.
     cells = np.random.default_rng(np.random.SeedSequence(seed)).permutation(len(city))
     if spec.seen_from == "cells" or store is None:
-        chosen = cells[: spec.number]
+        chosen = cells[numbers.start : numbers.stop]
         return city.xy[chosen], (_cell_sight(city, cell) for cell in chosen.tolist())
-    places = _places(city, cells, spec.number, seed, store)
+    places = _places(city, cells, spec.number, seed, store)[numbers.start : numbers.stop]
     views = views_at(
         store.objects,
         places,

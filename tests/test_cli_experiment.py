@@ -49,6 +49,10 @@ def test_an_experiment_is_run_and_compared(spec: Path, run: Run) -> None:
     assert (code, err) == (0, "")
     found = json.loads(again)
     assert list(found) == ["phone/paper-top1", "phone/refined-top1"]
+    side_by_side = spec.parent / "side-by-side"
+    code, shown, _ = run("evaluate", spec, "--out", side_by_side, "--workers", 2)
+    assert code == 0
+    assert (side_by_side / "figures.csv").read_text() == (out / "figures.csv").read_text()
     cases = [out / name for name in found]
     code, shown, _ = run("compare", *cases)
     assert code == 0
@@ -69,6 +73,10 @@ def test_what_is_refused(spec: Path, run: Run) -> None:
     out = spec.parent / "results"
     sentence(run("evaluate", spec), "--out")
     sentence(run("evaluate", spec, "--out", out, "--queries", 9), "--queries", "spec.toml")
+    sentence(run("evaluate", spec, "--out", out, "--workers", -1), "-1 workers", "from 0 up")
+    for option, value in (("--workers", 2), ("--scheduler", "tcp://127.0.0.1:9")):
+        refused = run("evaluate", spec.parent / "city.parquet", option, value)
+        sentence(refused, f"{option} was given with a database", ".toml")
     sentence(run("evaluate", spec.parent / "no.toml", "--out", out), "no.toml", "cannot be read")
     spec.write_text(SPEC.replace("edit+edit", "edti+edit"), encoding="utf-8")
     sentence(run("evaluate", spec, "--out", out), "'edti'", "nearest is 'edit'")

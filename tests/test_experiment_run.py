@@ -10,7 +10,7 @@ import subprocess
 import sys
 import time
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import geopandas as gpd
 import pandas as pd
@@ -21,17 +21,23 @@ from sentences import assert_sentence
 from worlds import CORNER, World, random_town
 
 from semsig_gis.errors import DatabaseError, InputError, SemsigError
-from semsig_gis.evaluation import evaluate
+from semsig_gis.evaluation import evaluate, score_queries
 from semsig_gis.experiment import Districts, parse_experiment
 from semsig_gis.experiment_folder import open_results
-from semsig_gis.experiment_run import QUERIES_A_PART, run_experiment
+from semsig_gis.experiment_run import run_experiment, run_experiments
+from semsig_gis.experiment_work import QUERIES_A_PART
 from semsig_gis.method import Method
 from semsig_gis.store import ObjectStore, save_with_store
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
     from pathlib import Path
 
+    from distributed import LocalCluster
+
+    from semsig_gis.answering import Answerer
     from semsig_gis.experiment import ExperimentSpec
+    from semsig_gis.queries import Query
 
 TOWN = random_town()
 SPEC = parse_experiment("""
@@ -176,6 +182,59 @@ def test_a_run_that_was_killed_ends_with_the_same_bytes(
     assert contents(out) == contents(results)
 
 
+@pytest.mark.parametrize("where", ["processes", "scheduler"])
+def test_workers_write_the_same_files_as_one_process(
+    where: str, folder: Path, results: Path, tmp_path: Path, cluster: LocalCluster
+) -> None:
+    seen: list[int] = []
+    run_experiment(
+        SPEC,
+        tmp_path / "out",
+        folder=folder,
+        workers=2 if where == "processes" else 0,
+        scheduler=cluster.scheduler_address if where == "scheduler" else None,
+        progress=lambda done, _: seen.append(done),
+    )
+    assert contents(tmp_path / "out") == contents(results)
+    assert len(seen) == 4
+    assert seen[-1] == 520
+
+
+def test_several_experiments_at_once_are_as_one_by_one(
+    folder: Path, results: Path, tmp_path: Path
+) -> None:
+    other = replace(SPEC, queries=20, seeds=(3, 4))
+    run_experiment(other, tmp_path / "alone", folder=folder)
+    specs = {tmp_path / "a": SPEC, tmp_path / "b": other}
+    found = run_experiments(specs, folder=folder, workers=2)
+    assert contents(tmp_path / "a") == contents(results)
+    assert contents(tmp_path / "b") == contents(tmp_path / "alone")
+    again = run_experiments(specs, folder=folder)
+    for out, evaluations in found.items():
+        assert list(again[out]) == list(evaluations)
+
+
+def test_parts_that_fail_are_told_and_the_others_are_kept(
+    folder: Path, results: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def fail(answerer: Answerer, queries: Sequence[Query], **options: Any) -> object:  # noqa: ANN401
+        if len(queries) < QUERIES_A_PART:
+            msg = "the disk hiccups"
+            raise OSError(msg)
+        return score_queries(answerer, queries, **options)
+
+    monkeypatch.setattr("semsig_gis.experiment_work.score_queries", fail)
+    with pytest.raises(DatabaseError) as caught:
+        run_experiment(SPEC, tmp_path / "out", folder=folder)
+    assert_sentence(caught.value, "2 of the 4 parts", "disk hiccups", "out.partial", "kept")
+    monkeypatch.undo()
+    parts = tmp_path / "out.partial" / "_parts"
+    kept = {path.name: path.stat().st_mtime_ns for path in parts.iterdir()}
+    assert len(kept) == 4
+    run_experiment(SPEC, tmp_path / "out", folder=folder)
+    assert contents(tmp_path / "out") == contents(results)
+
+
 def test_killed_at_the_very_end(folder: Path, results: Path, tmp_path: Path) -> None:
     out = tmp_path / "out"
     shutil.copytree(results, out)
@@ -208,7 +267,7 @@ def test_results_that_are_there_are_not_made_again(
     def never(*_: object, **__: object) -> None:
         raise AssertionError
 
-    monkeypatch.setattr("semsig_gis.experiment_run.score_queries", never)
+    monkeypatch.setattr("semsig_gis.experiment_work.score_queries", never)
     before = contents(results)
     found = run_experiment(SPEC, results, folder=folder)
     assert list(found) == [case.name for case in SPEC.cases]
@@ -347,6 +406,6 @@ def test_progress_counts_every_answer(folder: Path, tmp_path: Path) -> None:
         note=notes.append,
         progress=lambda done, total: seen.append((done, total)),
     )
-    assert [done for done, _ in seen] == [100, 130, 230, 260, 360, 390, 490, 520]
+    assert [done for done, _ in seen] == [200, 260, 460, 520]
     assert {total for _, total in seen} == {520}
     assert all("index" in note for note in notes)

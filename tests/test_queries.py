@@ -87,6 +87,17 @@ def test_more_queries_keep_the_first_ones(seen_from: SeenFrom) -> None:
         assert (one.xy, one.pick, rows(one)) == (other.xy, other.pick, rows(other))
 
 
+@pytest.mark.parametrize("seen_from", ["cells", "anywhere"])
+def test_parts_are_parts_of_the_whole(seen_from: SeenFrom) -> None:
+    spec = QuerySpec(number=5, seeds=(2, 7), seen_from=seen_from)
+    whole = draw_queries(DATABASE, spec, store=STORE)
+    for start, stop in ((0, 10), (0, 3), (3, 7), (5, 10), (9, 20), (10, 12)):
+        part = draw_queries(DATABASE, spec, store=STORE, part=slice(start, stop))
+        assert [(one.seed, one.number, one.xy, rows(one)) for one in part] == [
+            (one.seed, one.number, one.xy, rows(one)) for one in whole[start:stop]
+        ]
+
+
 def test_each_seed_has_queries_of_its_own() -> None:
     spec = replace(PLAIN, number=20, seeds=(3, 1))
     drawn = draw_queries(DATABASE, spec)

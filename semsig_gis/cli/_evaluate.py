@@ -35,7 +35,7 @@ def evaluate(
         Path,
         typer.Argument(
             help="Signature database that `semsig build` wrote; or an experiment, a .toml file "
-            "that says all but --out and --json."
+            "that says all but --out, --workers, --scheduler and --json."
         ),
     ],
     *,
@@ -58,12 +58,25 @@ def evaluate(
     top: Annotated[int, typer.Option(help="Number t of best candidates that count.")] = 1,
     seed: Annotated[int, typer.Option(help="Seed of all chances.")] = 0,
     out: Annotated[Path | None, typer.Option(help="Folder for the results.")] = None,
+    workers: Annotated[
+        int, typer.Option(help="Run an experiment in so many processes of this machine.")
+    ] = 0,
+    scheduler: Annotated[
+        str | None, typer.Option(help="Run an experiment on a dask cluster: tcp://HOST:PORT.")
+    ] = None,
     as_json: AsJson = False,
 ) -> None:
     """Query a database with distorted signatures of its own and measure the answers."""
     if database.suffix == ".toml":
-        _experiment(context, database, out, as_json=as_json)
+        _experiment(context, database, out, workers, scheduler, as_json=as_json)
         return
+    if workers or scheduler is not None:
+        option = "--workers" if workers else "--scheduler"
+        msg = (
+            f"{option} was given with a database; it is for experiments, so write a .toml file, or "
+            "leave it out."
+        )
+        raise InputError(msg)
     import dataclasses
 
     from semsig_gis.database_file import open_database
@@ -108,14 +121,22 @@ def evaluate(
         typer.echo(f"results: {out}")
 
 
-def _experiment(context: typer.Context, file: Path, out: Path | None, *, as_json: bool) -> None:
+def _experiment(
+    context: typer.Context,
+    file: Path,
+    out: Path | None,
+    workers: int,
+    scheduler: str | None,
+    *,
+    as_json: bool,
+) -> None:
     from semsig_gis.experiment import open_experiment_spec
     from semsig_gis.experiment_report import experiment_tables
     from semsig_gis.experiment_run import run_experiment
 
     for name in context.params:
         source = context.get_parameter_source(name)
-        free = {"database", "out", "as_json"}
+        free = {"database", "out", "workers", "scheduler", "as_json"}
         if name in free or source is None or source.name != "COMMANDLINE":
             continue
         option = name.replace("_", "-")
@@ -126,7 +147,15 @@ def _experiment(context: typer.Context, file: Path, out: Path | None, *, as_json
         raise InputError(msg)
     spec = open_experiment_spec(file)
     with progress("answering") as advance:
-        results = run_experiment(spec, out, folder=file.parent, note=remark, progress=advance)
+        results = run_experiment(
+            spec,
+            out,
+            folder=file.parent,
+            workers=workers,
+            scheduler=scheduler,
+            note=remark,
+            progress=advance,
+        )
     if as_json:
         print_json({name: evaluation.summary() for name, evaluation in results.items()})
         return

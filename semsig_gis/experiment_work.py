@@ -1,0 +1,338 @@
+"""The work of an experiment: the files that it names, its queries, and what its methods answer.
+
+Queries are answered a hundred at a time. Each method's answers to a hundred are a file of their
+own, so that little is lost when a run is interrupted, and many processes can share the work.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import TYPE_CHECKING, NamedTuple
+
+import geopandas as gpd
+import pandas as pd
+import pyarrow as pa
+
+from semsig_gis.answering import Answerer
+from semsig_gis.database_file import open_database
+from semsig_gis.distance_memo import DistanceMemo
+from semsig_gis.errors import DatabaseError, SourceError
+from semsig_gis.evaluation import check_count, make_evaluation, score_queries
+from semsig_gis.evaluation_figures import district_labels
+from semsig_gis.likelihood_file import index_path, ready_index
+from semsig_gis.manifest import digest, part_files
+from semsig_gis.method import LikelihoodMethod, Method
+from semsig_gis.queries import draw_queries
+from semsig_gis.refinement import cell_noise
+from semsig_gis.storage import whole_file
+from semsig_gis.store import open_store, store_path
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator, Sequence
+    from pathlib import Path
+
+    from semsig_gis.database import SignatureDatabase
+    from semsig_gis.evaluation_result import Evaluation
+    from semsig_gis.experiment import Case, ExperimentSpec
+    from semsig_gis.likelihood import LikelihoodIndex
+    from semsig_gis.queries import Query
+    from semsig_gis.store import ObjectStore
+
+__all__ = ["QUERIES_A_PART", "ExperimentWork", "Part"]
+
+QUERIES_A_PART = 100
+MEMO_BYTES = 256 << 20  # distances that the methods of an experiment share
+MEASURES = 3  # each of types and of angles
+
+
+class Part(NamedTuple):
+    """Some queries of an experiment, to be answered by all its methods.
+
+    Parameters
+    ----------
+    distortion : str
+        What happens to them, by its name in the experiment.
+    number : int
+        Which hundred of them, from 0.
+    """
+
+    distortion: str
+    number: int
+
+
+@dataclass(frozen=True, eq=False)
+class ExperimentWork:
+    """An experiment with the files that it names.
+
+    Parameters
+    ----------
+    spec : ExperimentSpec
+        The experiment.
+    folder : Path
+        Where the files are looked for.
+    note : callable, optional
+        Called with a sentence where an index is built or a file was put right.
+    """
+
+    spec: ExperimentSpec
+    folder: Path
+    note: Callable[[str], None] | None = None
+    _stored: dict[str, ObjectStore] = field(default_factory=dict)
+    _indexes: dict[Path, LikelihoodIndex] = field(default_factory=dict)
+
+    def digests(self) -> dict[str, str]:
+        """Return what stands for the content of the files that are looked at.
+
+        Returns
+        -------
+        dict of str to str
+            By name.
+
+        Raises
+        ------
+        SemsigError
+            If a file is missing.
+        """
+        found = {}
+        for name in dict.fromkeys([self.spec.database, self.spec.city or self.spec.database]):
+            found[name] = digest(*_files(self.folder / name))
+        for name in self._stores():
+            store = store_path(self.folder / name)
+            if store.is_dir():
+                key = f"{name.removesuffix('.parquet')}{store.suffix}"
+                found[key] = digest(*sorted(store.glob("*.parquet")))
+        if self.spec.districts is not None:
+            file = self.folder / self.spec.districts.file
+            if not file.is_file():
+                msg = f"districts {file} do not exist; give a file of polygons."
+                raise SourceError(msg)
+            found[self.spec.districts.file] = digest(file)
+        return found
+
+    def _stores(self) -> list[str]:
+        """Return the databases of which the street objects are looked at."""
+        some = []
+        if self.spec.seen_from == "anywhere":
+            some.append(self.spec.city or self.spec.database)
+        if any(
+            isinstance(method, LikelihoodMethod) and method.refined
+            for method in self.spec.methods.values()
+        ):
+            some.append(self.spec.database)
+        return list(dict.fromkeys(some))
+
+    def prepare(self) -> None:
+        """Refuse what does not fit the database, and build the indexes that methods need.
+
+        Raises
+        ------
+        SemsigError
+            If a file cannot be read, or something does not fit the database.
+        """
+        for top in self.spec.top:
+            check_count("candidates", top, len(self.database))
+        if self.districts is not None and self.spec.districts is not None:
+            nowhere = gpd.GeoDataFrame(geometry=[], crs=self.database.crs)
+            district_labels(nowhere, self.districts, self.spec.districts.name)
+        for distortion in self.spec.distortions:
+            self._queries(distortion, slice(1))
+        for method in self.spec.methods.values():
+            self._answerer(method)
+
+    @cached_property
+    def database(self) -> SignatureDatabase:
+        """What is searched."""
+        return open_database(self.folder / self.spec.database)
+
+    @cached_property
+    def city(self) -> SignatureDatabase | None:
+        """What is looked at, if it is something else."""
+        return None if self.spec.city is None else open_database(self.folder / self.spec.city)
+
+    @cached_property
+    def districts(self) -> gpd.GeoDataFrame | None:
+        """The polygons by which figures are told, if any."""
+        if self.spec.districts is None:
+            return None
+        file = self.folder / self.spec.districts.file
+        try:
+            return gpd.read_file(file)
+        except Exception as error:  # whatever the many readers raise
+            msg = f"districts {file} cannot be read ({error}); give a file of polygons."
+            raise SourceError(msg) from error
+
+    @property
+    def parts(self) -> tuple[Part, ...]:
+        """All parts of the work."""
+        numbers = range(math.ceil(self._queries_of_each / QUERIES_A_PART))
+        return tuple(Part(name, number) for name in self.spec.distortions for number in numbers)
+
+    def queries_in(self, part: Part) -> int:
+        """Return how many queries are in a part.
+
+        Parameters
+        ----------
+        part : Part
+            The part.
+
+        Returns
+        -------
+        int
+            Up to a hundred.
+        """
+        before = part.number * QUERIES_A_PART
+        return min(QUERIES_A_PART, self._queries_of_each - before)
+
+    def answer(self, place: Path, part: Part) -> None:
+        """Let every method answer the queries of a part, unless it has done so before.
+
+        Parameters
+        ----------
+        place : Path
+            Folder of the files with the answers.
+        part : Part
+            Which queries.
+        """
+        count = self.queries_in(part) * len(self.spec.top)
+        files = {name: _part_file(place, part, name) for name in self.spec.methods}
+        left = {name: file for name, file in files.items() if not _is_whole(file, rows=count)}
+        if not left:
+            return
+        start = part.number * QUERIES_A_PART
+        queries = self._queries(part.distortion, slice(start, start + QUERIES_A_PART))
+        by_distance = [name for name in left if isinstance(self.spec.methods[name], Method)]
+        for names in (by_distance, *([name] for name in left if name not in by_distance)):
+            for name, scored in self._scored(names, queries):
+                with whole_file(left[name]) as half:
+                    scored.to_parquet(half)
+
+    def _scored(
+        self, names: Sequence[str], queries: Sequence[Query]
+    ) -> Iterator[tuple[str, pd.DataFrame]]:
+        """Yield the scored answers of some methods that share what they measure."""
+        found: dict[str, list[pd.DataFrame]] = {name: [] for name in names}
+        step = self._batch if len(names) > 1 else len(queries)
+        for start in range(0, len(queries), step):
+            memo = DistanceMemo() if len(names) > 1 else None
+            for name in names:
+                scored = score_queries(
+                    self._answerer(self.spec.methods[name]),
+                    queries[start : start + step],
+                    tops=self.spec.top,
+                    memo=memo,
+                )
+                found[name] += [table.assign(top=top) for top, table in scored.items()]
+        for name, tables in found.items():
+            yield name, pd.concat(tables, ignore_index=True)
+
+    @property
+    def _batch(self) -> int:
+        """For how many queries the distances are kept that methods share."""
+        distinct = len(self.database.type_sequences) + len(self.database.angle_sequences)
+        return max(1, min(QUERIES_A_PART, MEMO_BYTES // (4 * MEASURES * max(distinct, 1))))
+
+    def evaluation(self, case: Case, place: Path) -> Evaluation:
+        """Return an evaluation, when all its queries are answered.
+
+        Parameters
+        ----------
+        case : Case
+            Which.
+        place : Path
+            Folder of the files with the answers.
+
+        Returns
+        -------
+        Evaluation
+            The evaluation.
+        """
+        files = [
+            _part_file(place, part, case.method)
+            for part in self.parts
+            if part.distortion == case.distortion
+        ]
+        scored = pd.concat([pd.read_parquet(file) for file in files], ignore_index=True)
+        chosen = scored[scored.pop("top") == case.top].reset_index(drop=True)
+        return make_evaluation(
+            self.database,
+            self.spec.methods[case.method],
+            self.spec.asked(case.distortion),
+            chosen,
+            top=case.top,
+            city=self.spec.city,
+            file_bytes=sum(
+                file.stat().st_size for file in _files(self.folder / self.spec.database)
+            ),
+        )
+
+    @property
+    def _queries_of_each(self) -> int:
+        """How many queries each distortion has."""
+        return self.spec.queries * len(self.spec.seeds)
+
+    def _queries(self, distortion: str, part: slice) -> list[Query]:
+        """Return some of the queries after a distortion."""
+        looked_at = self.spec.city or self.spec.database
+        return draw_queries(
+            self.database,
+            self.spec.asked(distortion),
+            store=self._store(looked_at) if self.spec.seen_from == "anywhere" else None,
+            city=self.city,
+            part=part,
+        )
+
+    def _answerer(self, method: Method | LikelihoodMethod) -> Answerer:
+        """Return a method with all that it needs."""
+        if not isinstance(method, LikelihoodMethod):
+            return Answerer(database=self.database, method=method)
+        return Answerer(
+            database=self.database,
+            method=method,
+            index=self._index(method),
+            store=self._store(self.spec.database) if method.refined else None,
+        )
+
+    def _store(self, name: str) -> ObjectStore:
+        if name not in self._stored:
+            self._stored[name] = open_store(self.folder / name)
+            for sentence in self._stored[name].notes:
+                self._say(sentence)
+        return self._stored[name]
+
+    def _index(self, method: LikelihoodMethod) -> LikelihoodIndex:
+        step = self.database.grid.step
+        noise = method.noise if method.on_grid else cell_noise(method.noise, step)
+        path = index_path(self.folder / self.spec.database, noise)
+        if path not in self._indexes:
+            self._indexes[path] = ready_index(self.database, noise, path, note=self.note)
+        return self._indexes[path]
+
+    def _say(self, sentence: str) -> None:
+        if self.note is not None:
+            self.note(sentence)
+
+
+def _files(database: Path) -> tuple[Path, ...]:
+    """Return the files of a database."""
+    if database.is_dir():
+        return part_files(database)
+    if not database.is_file():
+        msg = f"{database} does not exist; give a signature database file."
+        raise DatabaseError(msg)
+    return (database,)
+
+
+def _part_file(place: Path, part: Part, method: str) -> Path:
+    return place / f"{part.distortion}.{method}.{part.number:05d}.parquet"
+
+
+def _is_whole(file: Path, *, rows: int) -> bool:
+    """Tell whether a part is there and can be read."""
+    if not file.is_file():
+        return False
+    try:
+        return len(pd.read_parquet(file)) == rows
+    except (OSError, ValueError, pa.ArrowException):
+        return False
