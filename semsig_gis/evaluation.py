@@ -36,6 +36,7 @@ from semsig_gis.scoring import (
     NEAR_PLACES,
     THRESHOLDS,
     best_cells,
+    chance_within,
     expected_best,
     rank_range,
     top_candidates,
@@ -206,10 +207,12 @@ def score_queries(
         if progress is not None:
             progress(done, len(queries))
     about = _query_table(database, queries)
-    return {
-        top: pd.concat([about, pd.DataFrame(rows).astype({"best_cell_id": "Int64"})], axis=1)
-        for top, rows in outcomes.items()
-    }
+    scored = {}
+    for top, rows in outcomes.items():
+        told = pd.DataFrame(rows)
+        told["best_cell_id"] = told["best_cell_id"].astype("Int64")
+        scored[top] = pd.concat([about, told], axis=1)
+    return scored
 
 
 def make_evaluation(
@@ -353,27 +356,31 @@ class _Pool:
         self.errors = np.round(np.hypot(*(places - np.array(query.xy)).T), 6)
         self.better = self.tied = np.empty(0)
 
-    def best(self, count: int, thresholds: Sequence[float]) -> tuple[float, NDArray[np.float64]]:
-        """Return what to expect of the smallest error among the best."""
-        slots = min(count, len(self.scores)) - len(self.better)
+    def cut(self, count: int) -> dict[str, Any]:
+        """Return the errors of those that are surely among so many best, and of the tied."""
+        count = min(count, len(self.scores))
+        slots = count - len(self.better)
         if not 0 < slots <= len(self.tied):  # else the cut is among the same cells as before
-            better, tied = top_candidates(self.scores, min(count, len(self.scores)))
-            self.better, self.tied = self.errors[better], np.sort(self.errors[tied])
-            slots = min(count, len(self.scores)) - len(better)
-        return expected_best(self.better, self.tied, slots=slots, thresholds=thresholds)
+            better, tied = top_candidates(self.scores, count)
+            self.better, self.tied = self.errors[better], self.errors[tied]
+            slots = count - len(better)
+        return {"better": self.better, "tied": self.tied, "slots": slots}
 
 
 def _outcome(pool: _Pool, top: int) -> dict[str, Any]:
     """Return the columns that depend on how many candidates count."""
-    expected, within = pool.best(top, THRESHOLDS)
+    expected, within = expected_best(**pool.cut(top))
     chances = {f"p{t}": float(p) for t, p in zip(THRESHOLDS, within, strict=True)}
     return {"error_m": expected, **chances}
 
 
 def _near(pool: _Pool, *, judged: bool) -> dict[str, float]:
     """Return the chances that one of the best places is near, and that the answer is right."""
-    near = {f"near{count}": float(pool.best(count, [NEAR_METRES])[1][0]) for count in NEAR_PLACES}
-    right = float(pool.best(1, [SUCCESS_METRES])[1][0]) if judged else math.nan
+    near = {
+        f"near{count}": chance_within(**pool.cut(count), metres=NEAR_METRES)
+        for count in NEAR_PLACES
+    }
+    right = chance_within(**pool.cut(1), metres=SUCCESS_METRES) if judged else math.nan
     return {**near, "right": right}
 
 

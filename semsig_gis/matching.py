@@ -271,7 +271,9 @@ def _score_both(
         return
     by_angles = _distances(method, ANGLES, levels, angles, memo=memo)
     for first, second in zip(by_types, by_angles, strict=True):
-        if method.keep is None:
+        if len(codes) >= _MANY_QUERIES:
+            yield _joined(method, first, types, second, angles)
+        elif method.keep is None:
             yield _fused(method, first, types.inverse, second, angles.inverse)
         else:
             yield _two_stage(method, first, types, angles, second.__getitem__)
@@ -280,6 +282,36 @@ def _score_both(
 def _table(database: SignatureDatabase, part: str) -> SequenceTable:
     """Return the distinct sequences of one part; the other part's are not looked for."""
     return database.type_sequences if part == TYPES else database.angle_sequences
+
+
+def _joined(
+    method: Method,
+    by_types: NDArray[np.float32],
+    types: SequenceTable,
+    by_angles: NDArray[np.float32],
+    angles: SequenceTable,
+) -> NDArray[np.float32]:
+    """Return what `_fused` or `_two_stage` gives, compiled: it pays for many queries."""
+    from semsig_gis import _fusion_kernels as kernels  # noqa: PLC0415 - loads a compiler
+
+    left, right = _shares(method, by_types, by_angles)
+    scores = np.empty(len(types.inverse), np.float32)
+    first, cut = by_types, math.inf
+    if method.keep is not None:
+        first = _on_steps(by_types)
+        if method.normalized:
+            cells = np.zeros(round(1 / _SCORE_STEP) + 1, np.int64)
+            kernels.count_steps(first, types.counts, _SCORE_STEP, cells)
+            cut = float(_cut_at(method, cells))
+        else:
+            cut = float(_cut(method, first, types))
+    worst = kernels.fuse(
+        first, cut, left, types.inverse, right, angles.inverse, _SCORE_STEP, scores
+    )
+    if method.keep is not None:
+        rest = _behind(first, np.float32(cut), np.float32(worst))
+        kernels.fill_rest(first, cut, rest, types.inverse, scores)
+    return scores
 
 
 def _two_stage(
@@ -302,11 +334,16 @@ def _two_stage(
     second = second_stage(angles.inverse[kept])
     fused = _fused(method, by_types, types.inverse[kept], second, np.arange(len(kept)))
     worst = fused.max() if gate is None else gate.worst
-    # Behind every kept cell even where the gap is lost in rounding, as on a large raw scale.
-    behind = np.nextafter(worst, np.float32(np.inf))
-    scores = _spread(np.maximum(worst + (first - cut), behind), types)
+    scores = _spread(_behind(first, cut, worst), types)
     scores[kept] = fused
     return scores
+
+
+def _behind(first: NDArray[np.float32], cut: np.float32, worst: np.float32) -> NDArray[np.float32]:
+    """Return the scores of what is not kept, in the order of the first stage."""
+    # Behind every kept cell even where the gap is lost in rounding, as on a large raw scale.
+    least = np.nextafter(worst, np.float32(np.inf))
+    return np.asarray(np.maximum(worst + (first - cut), least))
 
 
 @dataclass(frozen=True, slots=True)
@@ -325,12 +362,17 @@ def _kept(method: Method, cells: int) -> int:
 
 def _cut(method: Method, first: NDArray[np.float32], types: SequenceTable) -> np.float32:
     """Return the worst score of the first stage that passes, given that of each sequence."""
-    count = _kept(method, len(types.inverse))
     if not method.normalized:  # raw distances may be negative, or large
+        count = _kept(method, len(types.inverse))
         each = _spread(first, types)
         return np.float32(np.partition(each, count - 1)[count - 1])
     steps = np.rint(first / _SCORE_STEP).astype(np.int64)
-    cells = np.bincount(steps, weights=types.counts)
+    return _cut_at(method, np.bincount(steps, weights=types.counts))
+
+
+def _cut_at(method: Method, cells: NDArray[np.int64] | NDArray[np.float64]) -> np.float32:
+    """Return the worst score that passes, given how many cells are at each whole step."""
+    count = _kept(method, int(cells.sum()))
     return np.float32(np.searchsorted(np.cumsum(cells), count) * _SCORE_STEP)
 
 
@@ -408,9 +450,7 @@ def _fused(
     angles: NDArray[np.int64],
 ) -> NDArray[np.float32]:
     """Return the weighted sums of two distances of cells, given which distances each cell has."""
-    # In steps from the start: a factor that is a power of two changes no digit.
-    left = method.alpha / _SCORE_STEP * by_types.astype(np.float64)
-    right = (1 - method.alpha) / _SCORE_STEP * by_angles
+    left, right = _shares(method, by_types, by_angles)
     scores = np.empty(len(types), np.float32)
     total, other = np.empty(_CELLS_AT_ONCE), np.empty(_CELLS_AT_ONCE, right.dtype)
     for low in range(0, len(types), _CELLS_AT_ONCE):
@@ -421,6 +461,15 @@ def _fused(
         np.rint(some, out=some)
         np.multiply(some, _SCORE_STEP, out=scores[low:high], casting="same_kind")
     return scores
+
+
+def _shares(
+    method: Method, by_types: NDArray[np.float32], by_angles: NDArray[np.float32]
+) -> tuple[NDArray[np.float64], NDArray[np.float32]]:
+    """Return what each of two distances adds to a fusion, in steps."""
+    # In steps from the start: a factor that is a power of two changes no digit.
+    left = method.alpha / _SCORE_STEP * by_types.astype(np.float64)
+    return left, (1 - method.alpha) / _SCORE_STEP * by_angles
 
 
 def _spread(values: NDArray[_Value], table: SequenceTable) -> NDArray[_Value]:

@@ -23,6 +23,7 @@ __all__ = [
     "NEAR_PLACES",
     "THRESHOLDS",
     "best_cells",
+    "chance_within",
     "expected_best",
     "expected_recall",
     "rank_range",
@@ -146,15 +147,58 @@ def expected_best(
     """
     # Stable sorting finds at once that they are in order already, as they often are.
     ordered = np.sort(np.asarray(tied, dtype=np.float64), kind="stable")
-    sure = np.asarray(better, dtype=np.float64)
-    nearest = float(sure.min()) if sure.size else math.inf
-    left = np.arange(ordered.size, 0, -1, dtype=np.float64)
-    steps = np.maximum(left - slots, 0.0) / left
-    beyond = np.concatenate([[1.0], np.cumprod(steps)])  # by the number of errors at most x
-    expected = float(np.dot(beyond[:-1] - beyond[1:], np.minimum(ordered, nearest)))
+    nearest = _nearest(better)
     limits = np.asarray(thresholds, dtype=np.float64)
-    drawn = 1.0 - beyond[np.searchsorted(ordered, limits, side="right")]
+    inside = np.searchsorted(ordered, limits, side="right")
+    if slots == 1:
+        expected = float(np.minimum(ordered, nearest).mean())
+        drawn = inside / ordered.size
+    else:
+        left = np.arange(ordered.size, 0, -1, dtype=np.float64)
+        steps = np.maximum(left - slots, 0.0) / left
+        beyond = np.concatenate([[1.0], np.cumprod(steps)])  # by the number of errors at most x
+        expected = float(np.dot(beyond[:-1] - beyond[1:], np.minimum(ordered, nearest)))
+        drawn = 1.0 - beyond[inside]
     return expected, np.where(limits >= nearest, 1.0, drawn)
+
+
+def chance_within(better: ArrayLike, tied: ArrayLike, *, slots: int, metres: float) -> float:
+    """Return the chance that the smallest error is small when a cut falls among tied candidates.
+
+    Parameters
+    ----------
+    better : array_like of float, shape (b,)
+        Errors in metres of the candidates that are in for sure.
+    tied : array_like of float, shape (g,)
+        Errors of the tied candidates, of which `slots` are drawn without replacement.
+    slots : int
+        How many are drawn, 1 to g.
+    metres : float
+        What is small.
+
+    Returns
+    -------
+    float
+        The probability that `expected_best` gives for this threshold, sooner for few draws.
+
+    Examples
+    --------
+    Two of four are drawn; two of them are within 50 m.
+
+    >>> round(chance_within([], [0, 40, 60, 100], slots=2, metres=50), 6)
+    0.833333
+    """
+    if _nearest(better) <= metres:
+        return 1.0
+    errors = np.asarray(tied, dtype=np.float64)
+    draws = np.arange(slots)
+    outside = int(np.count_nonzero(errors > metres))
+    return 1.0 - float(np.prod(np.maximum(outside - draws, 0) / (errors.size - draws)))
+
+
+def _nearest(errors: ArrayLike) -> float:
+    values = np.asarray(errors, dtype=np.float64)
+    return float(values.min()) if values.size else math.inf
 
 
 def rank_range(scores: NDArray[np.float32], cell: int) -> tuple[int, int]:

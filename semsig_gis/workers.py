@@ -176,6 +176,11 @@ def _client(workers: int, scheduler: str | None) -> Iterator[Client]:
             "distributed.scheduler.allowed-failures": ATTEMPTS - 1,
             # A task that kills its worker must not take the tasks down that wait there.
             "distributed.scheduler.worker-saturation": 1.0,
+            # Not with a MALLOC_TRIM_THRESHOLD_: giving all memory back at once takes twice the
+            # time of the work.
+            "distributed.nanny.pre-spawn-environ": {
+                f"{name}_NUM_THREADS": 1 for name in ("MKL", "OMP", "OPENBLAS")
+            },
         }
         stack.enter_context(dask.config.set(settings))
         where: str | LocalCluster = scheduler or ""

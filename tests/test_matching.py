@@ -25,7 +25,7 @@ from semsig_gis.dataset import PartitionedDatabase
 from semsig_gis.distance_memo import DistanceMemo
 from semsig_gis.errors import EmptyResultError, InputError
 from semsig_gis.grid import GridSpec
-from semsig_gis.matching import Method, localize, score_cells
+from semsig_gis.matching import _MANY_QUERIES, Method, localize, score_cells
 from semsig_gis.metrics import METRICS
 from semsig_gis.patterns import PatternIndex, Requirement
 from semsig_gis.signatures import Signature, SignatureSpec
@@ -175,6 +175,20 @@ def test_batches_do_not_change_scores(keep: float | None, monkeypatch: pytest.Mo
     monkeypatch.setattr("semsig_gis.matching._BATCH_BYTES", 1)
     alone = np.array(list(score_cells(CITY, queries, Method(keep=keep))))
     np.testing.assert_array_equal(alone, together)
+
+
+@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("raw", ["", ":raw"])
+def test_many_queries_are_scored_as_one(seed: int, raw: str) -> None:
+    rng = np.random.default_rng(seed)
+    queries = [CITY.signature(int(cell)) for cell in rng.integers(0, len(CITY), _MANY_QUERIES)]
+    for text in ("edit+edit", "edit+edit:alpha=0.3", "edit+edit:5%", "histogram+jaccard:33%"):
+        method = Method.parse(text + raw)
+        together = list(score_cells(CITY, queries, method))
+        for query, scores in zip(queries, together, strict=True):
+            (alone,) = score_cells(CITY, [query], method)
+            np.testing.assert_array_equal(scores, alone)
+            assert scores.dtype == alone.dtype
 
 
 @pytest.mark.parametrize("seed", range(4))

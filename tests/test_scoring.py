@@ -12,6 +12,7 @@ from semsig_gis.errors import InputError
 from semsig_gis.scoring import (
     THRESHOLDS,
     best_cells,
+    chance_within,
     expected_best,
     expected_recall,
     rank_range,
@@ -45,6 +46,16 @@ def test_a_better_cell_within_reach_decides() -> None:
     expected, within = expected_best([20], [10, 1000], slots=1, thresholds=[10, 19, 20])
     assert expected == pytest.approx(15)
     assert within == pytest.approx([0.5, 0.5, 1])
+
+
+@given(better=Errors, tied=Errors.filter(len), metres=st.integers(0, 60), data=st.data())
+def test_the_chance_of_one_threshold_is_that_of_all(
+    better: list[float], tied: list[float], metres: int, data: st.DataObject
+) -> None:
+    slots = data.draw(st.integers(1, len(tied)))
+    _, (chance,) = expected_best(better, tied, slots=slots, thresholds=[metres])
+    found = chance_within(better, tied, slots=slots, metres=metres)
+    assert found == pytest.approx(chance, abs=1e-12)
 
 
 def test_the_formula_of_combinations() -> None:
