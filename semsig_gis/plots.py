@@ -130,7 +130,7 @@ def _all_x(plot: Plot) -> Iterable[float]:
 def _draw_curve(axes: Axes, curve: Curve, number: int, curves: int) -> None:
     look = _look(number)
     x, y = np.asarray(curve.x, np.float64), np.asarray(curve.y, np.float64)
-    few = len(x) <= FEW_POINTS
+    few = int((np.isfinite(x) & np.isfinite(y)).sum()) <= FEW_POINTS
     if curve.low:
         low, high = np.asarray(curve.low, np.float64), np.asarray(curve.high, np.float64)
         if few:

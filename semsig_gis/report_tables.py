@@ -17,10 +17,11 @@ if TYPE_CHECKING:
 __all__ = ["NumberCell", "NumberGroup", "NumberRow", "NumberTable", "number_table"]
 
 OURS, INTERVAL, PAPER, DIFFERENCE = "ours", "95 %", "paper", "difference"
+NARROW = {DIFFERENCE: "diff."}
 NOTHING = "\u2013"
 
 # In letters: what fits on A4 paper and on 900 pixels, and what labels take before they wrap.
-WIDEST, WIDEST_LABEL = 88, 28
+WIDEST, WIDEST_LABEL = 92, 28
 
 OUTSIDE = "Bold: the paper's figure is outside our interval of 95 %."
 
@@ -53,7 +54,7 @@ class NumberGroup:
     name : str
         What they tell.
     columns : tuple of str
-        Some of ``ours``, ``95 %``, ``paper`` and ``difference``.
+        Some of ``ours``, ``95 %``, ``paper`` and ``difference`` (or ``diff.``).
     """
 
     name: str
@@ -110,17 +111,18 @@ class NumberTable:
     @property
     def firsts(self) -> frozenset[int]:
         """At which columns a group begins, where groups have names."""
-        starts = itertools.accumulate((len(group.columns) for group in self.groups), initial=0)
-        named = self.grouped and any(group.name for group in self.groups)
-        return frozenset(starts) if named else frozenset()
+        if not self.grouped or not any(group.name for group in self.groups):
+            return frozenset()
+        widths = [len(group.columns) for group in self.groups]
+        return frozenset(itertools.accumulate(widths[:-1], initial=0))
 
     @property
     def headings(self) -> tuple[str, ...]:
         """One heading a column, for where groups cannot be shown."""
         return tuple(
-            ": ".join(part for part in (group.name, column) if part)
-            if self.grouped
-            else group.name or column
+            group.name
+            if group.name and len(group.columns) == 1
+            else ": ".join(part for part in (group.name, column) if part)
             for group in self.groups
             for column in group.columns
         )
@@ -196,7 +198,12 @@ def _side_by_side(numbers: Sequence[Number], names: dict[str, str], units: Units
             number = placed.get((row, column))
             cells += _cells(number, shown, with_unit=units[column] is None, own=own)
         rows.append(NumberRow((one_line(row),), tuple(cells)))
-    groups = tuple(NumberGroup(names[column], shown) for column, shown in kinds.items())
+    groups = tuple(
+        NumberGroup(
+            names[column], shown if own else tuple(NARROW.get(kind, kind) for kind in shown)
+        )
+        for column, shown in kinds.items()
+    )
     return groups, tuple(rows)
 
 

@@ -136,7 +136,8 @@ def _look(looks: dict[int, _Look], code: int) -> _Look:
 def _draw_map(axes: Axes, scene: Scene, looks: dict[int, _Look]) -> None:
     away = math.hypot(*scene.answer) if scene.answer else 0.0
     drawn = away if away < FARTHEST * scene.radius else 0.0
-    reach = max(AROUND * scene.radius, 1.12 * drawn)
+    farthest = max((math.hypot(item.east, item.north) for item in scene.objects), default=0.0)
+    reach = max(AROUND * scene.radius, 1.08 * farthest, 1.12 * drawn)
     axes.set(xlim=(-reach, reach), ylim=(-reach, reach), xticks=[], yticks=[], aspect="equal")
     axes.set_facecolor("#fafaf8")
     axes.add_patch(
@@ -291,15 +292,15 @@ def _draw_scale(axes: Axes, reach: float) -> None:
 
 def _round_length(longest: float) -> float:
     """Return the largest of 1, 2, 5, 10, 20, 50... that is not longer."""
-    power = 10 ** math.floor(math.log10(longest))
-    return next(float(power * step) for step in (5, 2, 1) if power * step <= longest)
+    power = 10 ** math.floor(math.log10(longest))  # half an ulp below it, log10 rounds up
+    return next(float(power * step) for step in (5, 2, 1, 0.5) if power * step <= longest)
 
 
 def _told(scene: Scene) -> list[str]:
     """Return the lines below the map."""
     types = label(scene.types, TYPE_LETTERS * TYPE_LINES)
     signature = textwrap.wrap(types, TYPE_LETTERS) or ["sees nothing"]
-    return [*signature, f"{scene.lon:.6f}°, {scene.lat:.6f}°    {_error(scene)}"]
+    return [*signature, f"{scene.lon:.6f}°, {scene.lat:.6f}° · {_error(scene)}"]
 
 
 def _error(scene: Scene) -> str:
@@ -315,7 +316,7 @@ def _keys(scene: Scene, looks: dict[int, _Look]) -> list[tuple[Line2D, str]]:
         count = f" ({seen[code]})" if seen[code] else ""
         sign = Line2D([], [], linestyle="", marker=look.marker, color=look.colour, markersize=7)
         sign.set_alpha(None if seen[code] else 0.25)
-        keys.append((sign, f"{look.symbol}  {label(look.title, CLASS_LETTERS)}{count}"))
+        keys.append((sign, f"{look.symbol} {label(look.title, CLASS_LETTERS)}{count}"))
     if scene.answer:
         keys.append((Line2D([], [], **_ANSWER_LOOK), "answer"))
     return keys
