@@ -26,7 +26,9 @@ __all__ = ["draw_plot"]
 
 # So many colours, dashes and markers that no two curves of a plot look alike.
 DASHES = ("-", (0, (5, 1.6)), (0, (6, 1.6, 1.2, 1.6)), (0, (1.4, 1.2)))
-MARKERS = ("o", "s", "^", "D", "v", "P", "X")
+# Each with the size at which it looks as large as the others.
+MARKERS = (("o", 5.2), ("s", 5.0), ("^", 6.4), ("D", 4.8), ("v", 6.4), ("P", 7.0), ("X", 7.0))
+BAND_SHADE, MANY_BANDS = 0.16, 4
 FEW_POINTS = 12
 FEW_TICKS = 6
 MARKERS_APART = 0.14  # share of the diagonal
@@ -138,19 +140,21 @@ def _draw_curve(axes: Axes, curve: Curve, number: int, curves: int) -> None:
             for ends in (low, high):
                 axes.plot(x, ends, linestyle="", marker="_", color=look["color"], markersize=6)
         else:
-            axes.fill_between(x, low, high, color=look["color"], alpha=0.16, linewidth=0)
+            shade = BAND_SHADE if curves <= MANY_BANDS else 0.6 * BAND_SHADE
+            axes.fill_between(x, low, high, color=look["color"], alpha=shade, linewidth=0)
     # Each curve has its markers elsewhere, so that curves on one another are seen.
     every = None if few else (MARKERS_APART * number / curves, MARKERS_APART)
     axes.plot(x, y, markevery=every, zorder=3, **look)
 
 
 def _look(number: int) -> dict[str, Any]:
+    marker, size = MARKERS[number % len(MARKERS)]
     return {
         "color": COLOURS[number % len(COLOURS)],
         "linestyle": DASHES[number % len(DASHES)],
-        "marker": MARKERS[number % len(MARKERS)],
+        "marker": marker,
         "linewidth": 1.6,
-        "markersize": 5.2,
+        "markersize": size,
         "markeredgecolor": WHITE,
         "markeredgewidth": 0.6,
     }
