@@ -150,6 +150,39 @@ def test_a_page_in_a_browser(browser: Chrome, tmp_path: Path, width: int) -> Non
         browser.execute_cdp_cmd("Emulation.clearDeviceMetricsOverride", {})
 
 
+@pytest.mark.parametrize(("width", "media"), [(900, "screen"), (680, "print")])  # A4 has 680
+def test_tables_fit_a_screen_and_a_sheet(
+    browser: Chrome, tmp_path: Path, width: int, media: str
+) -> None:
+    times = [
+        Number(row=f"{row} distance", column=column, ours=61.2, paper=1850.0, unit="ms", decimals=1)
+        for row in ("Jaccard", "Histogram", "Edit")
+        for column in ("type", "angle", "type + angle, 5 %")
+    ]
+    many = [
+        Number(row="edit + edit (0.5, 0.5), 5 %", column=f"P(error <= {metres} m)", ours=0.5)
+        for metres in range(6)
+    ]
+    tables = [
+        Section(name=name, title=name, numbers=tuple(numbers))
+        for name, numbers in (("times", times), ("many", many))
+    ]
+    file = tmp_path / "report.html"
+    file.write_text(html_page(report(*tables), {}), encoding="utf-8")
+    size = {"width": width, "height": 900, "deviceScaleFactor": 1, "mobile": False}
+    browser.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", size)
+    browser.execute_cdp_cmd("Emulation.setEmulatedMedia", {"media": media})
+    try:
+        browser.get(file.as_uri())
+        assert len(browser.find_elements(By.CSS_SELECTOR, "tbody tr")) == 4
+        for table in browser.find_elements(By.CSS_SELECTOR, ".wide table"):
+            room = browser.execute_script("return arguments[0].parentNode.clientWidth", table)
+            assert table.size["width"] <= room
+    finally:
+        browser.execute_cdp_cmd("Emulation.clearDeviceMetricsOverride", {})
+        browser.execute_cdp_cmd("Emulation.setEmulatedMedia", {"media": ""})
+
+
 @pytest.mark.parametrize("harm", [HARM, LONG])
 def test_harm_in_a_browser(browser: Chrome, tmp_path: Path, harm: str) -> None:
     write_report(hostile_report(harm), tmp_path)
