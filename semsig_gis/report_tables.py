@@ -20,8 +20,9 @@ OURS, INTERVAL, PAPER, DIFFERENCE = "ours", "95 %", "paper", "difference"
 NARROW = {DIFFERENCE: "diff."}
 NOTHING = "\u2013"
 
-# In letters: what fits on A4 paper and on 900 pixels, and what labels take before they wrap.
-WIDEST, WIDEST_LABEL = 92, 28
+# In letters: what fits on A4 paper and on 900 pixels; labels take so much before they wrap.
+WIDEST = 102
+NARROWEST_LABEL, WIDEST_LABEL, GAP = 14, 28, 3
 
 OUTSIDE = "Bold: the paper's figure is outside our interval of 95 %."
 
@@ -278,14 +279,16 @@ def _is_outside(number: Number) -> bool:
 def _width(table: Parts) -> int:
     """Return about how many letters wide a table is."""
     groups, rows = table
-    gap = 2
-    labels = min(max(len(row.labels[0]) for row in rows), WIDEST_LABEL)
-    columns = [(group, column) for group in groups for column in group.columns]
-    widths = [
-        max(len(column), *(_letters(row.cells[at]) for row in rows)) + gap
-        for at, (_, column) in enumerate(columns)
+    longest = max(len(label) for row in rows for label in row.labels)
+    total = min(max(longest, NARROWEST_LABEL), WIDEST_LABEL)
+    headings = [
+        column if len(group.columns) > 1 else max(group.name.split(), key=len, default=column)
+        for group in groups
+        for column in group.columns
     ]
-    return labels + sum(widths)
+    for at, heading in enumerate(headings):
+        total += GAP + max(len(heading), *(_letters(row.cells[at]) for row in rows))
+    return total
 
 
 def _letters(cell: NumberCell) -> int:
