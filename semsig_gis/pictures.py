@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import bisect
 import contextlib
 import io
+import itertools
 import math
+import unicodedata
 import warnings
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
@@ -155,7 +158,7 @@ def label(text: str, length: int) -> str:
     text : str
         Anything.
     length : int
-        The most characters.
+        The most letters; a Chinese one, say, counts as two.
 
     Returns
     -------
@@ -168,7 +171,15 @@ def label(text: str, length: int) -> str:
     'alignment trees o…'
     """
     plain = one_line(text)
-    return plain if len(plain) <= length else plain[: length - 1].rstrip() + "…"
+    ends = list(itertools.accumulate(map(_letter_width, plain)))
+    if not ends or ends[-1] <= length:
+        return plain
+    return plain[: bisect.bisect_right(ends, length - 1)].rstrip() + "…"
+
+
+def _letter_width(letter: str) -> int:
+    """Return 2 for a letter as wide as the Chinese, else 1."""
+    return 2 if unicodedata.east_asian_width(letter) in "WF" else 1
 
 
 def draw_legend(

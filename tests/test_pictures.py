@@ -72,6 +72,12 @@ def test_a_label_fits(text: str, length: int) -> None:
     assert cut == label(text, 1000) or cut.endswith("…")
 
 
+def test_wide_letters_count_twice() -> None:
+    assert label("\u4e2d\u6587\u6a39", 6) == "\u4e2d\u6587\u6a39"
+    assert label("\u4e2d\u6587\u6a39", 5) == "\u4e2d\u6587…"
+    assert label("\u4e2d\u6587\u6a39", 4) == "\u4e2d…"
+
+
 def test_a_legend_shows_every_key_in_columns() -> None:
     keys = [(Line2D([], [], color=colour), f"_{colour}") for colour in COLOURS]
     with blank_figure(6, 2) as figure:
