@@ -190,6 +190,11 @@ class Section:
     plots: tuple[Plot, ...] = ()
     scenes: tuple[Scene, ...] = ()
 
+    @property
+    def drawn(self) -> tuple[Plot | Scene, ...]:
+        """Everything of which there is a picture."""
+        return (*self.plots, *self.scenes)
+
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Report:

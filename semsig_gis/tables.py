@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+import unicodedata
 from dataclasses import dataclass
 
-__all__ = ["Table", "escaped", "percent"]
+__all__ = ["Table", "escaped", "one_line", "percent"]
+
+# They join letters and emoji; every other character of their kind only hides or turns text.
+JOINERS = "\u200c\u200d"
 
 
 @dataclass(frozen=True, slots=True)
@@ -98,3 +102,33 @@ def escaped(text: str) -> str:
     """
     plain = " ".join(text.split())
     return plain.replace("&", "&amp;").replace("<", "&lt;").replace("|", "\\|")
+
+
+def one_line(text: str) -> str:
+    r"""Return text from data on one line, without characters that hide or turn other text.
+
+    Parameters
+    ----------
+    text : str
+        Anything.
+
+    Returns
+    -------
+    str
+        The text with single spaces, without control characters and marks of direction; halves of
+        characters, which no file can hold, become U+FFFD.
+
+    Examples
+    --------
+    >>> one_line(" plane\n trees\u202e ")
+    'plane trees'
+    """
+    plain = " ".join(text.split())
+    return plain if plain.isprintable() else "".join(map(_shown, plain)).strip()
+
+
+def _shown(character: str) -> str:
+    kind = unicodedata.category(character)
+    if kind == "Cs" or ord(character) & 0xFFFE == 0xFFFE:  # noqa: PLR2004 - Unicode's own number
+        return "\ufffd"
+    return "" if kind in {"Cc", "Cf"} and character not in JOINERS else character

@@ -104,6 +104,7 @@ def test_the_wheel_is_complete(wheel: dict[str, str]) -> None:
     assert data | code <= wheel.keys()
     assert "semsig_gis/py.typed" in wheel
     assert "semsig_gis/assets/manifest.toml" in wheel
+    assert "semsig_gis/templates/report.html" in wheel
     if map_assets.available():
         assert {f"semsig_gis/assets/{name}" for name in map_assets.assets()} <= wheel.keys()
     assert {name.partition("/")[0] for name in wheel} == {

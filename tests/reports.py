@@ -1,0 +1,106 @@
+"""Reports to write: an ordinary one, and one whose texts try to do harm."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from map_pages import HOSTILE
+
+from semsig_gis.catalog import paper_taxonomy
+from semsig_gis.report_parts import Curve, Number, Plot, Report, Scene, SceneObject, Section
+from semsig_gis.taxonomy import ObjectClass, Taxonomy
+
+FORMULA = '=cmd|"/C calc"!A0'
+HARM = f"{FORMULA} $\\frac{{}}$ _x_ ![a](http://example.org/a.png)\0\r\n# | {HOSTILE}"
+LONG = f"{HARM} {'long ' * 2000}{'M' * 10_000}"
+
+
+def plot(name: str = "errors", *, curves: int = 2, points: int = 30, **options: Any) -> Plot:  # noqa: ANN401
+    """Return a plot of curves that rise."""
+    steps = range(points)
+    made = tuple(
+        Curve(
+            label=f"curve {number}",
+            x=tuple(float(step) for step in steps),
+            y=tuple((step / points) ** (1 + number) for step in steps),
+            low=tuple((step / points) ** (1 + number) * 0.9 for step in steps),
+            high=tuple((step / points) ** (1 + number) * 1.1 for step in steps),
+        )
+        for number in range(curves)
+    )
+    given = {"title": "Errors", "x_label": "error (m)", "y_label": "share", **options}
+    return Plot(name=name, curves=made, **given)
+
+
+def scene(name: str = "place", *, objects: int = 3, **options: Any) -> Scene:  # noqa: ANN401
+    """Return a scene with objects of the paper's classes all around."""
+    seen = tuple(
+        SceneObject(code=1 + number % 11, east=-20.0 + number % 40, north=number / 3)
+        for number in range(objects)
+    )
+    others = (SceneObject(code=3, east=-30.0, north=20.0),)
+    types = paper_taxonomy().decode([item.code for item in seen])
+    given: dict[str, Any] = {"title": "A place", "error_m": 12.0, "types": types}
+    place = {"lon": 2.3, "lat": 48.8, "radius": 30.0}
+    return Scene(name=name, objects=seen, others=others, **{**given, **place, **options})
+
+
+def report(*sections: Section, **options: Any) -> Report:  # noqa: ANN401
+    return Report(
+        **{"title": "Report", "taxonomy": paper_taxonomy(), "sections": sections, **options}
+    )
+
+
+def ordinary_report() -> Report:
+    """Return a report with something of every kind."""
+    numbers = (
+        Number(row="R = 20 m", column="P", ours=0.21, low=0.2, high=0.22, paper=0.1793),
+        Number(row="R = 20 m", column="recall", ours=0.5, paper=0.511),
+        Number(row="R = 30 m", column="P", ours=None, paper=0.3733),
+        Number(row="R = 30 m", column="median", ours=float("inf"), unit="m", decimals=1),
+    )
+    return report(
+        Section(name="range", title="Range", text=("Words.",), numbers=numbers, plots=(plot(),)),
+        Section(name="places", title="Places", scenes=(scene(), scene("other", answer=(9.0, 2.0)))),
+        text=("What it is.",),
+        settings=(("Database", "city.parquet"),),
+        facts={"versions": {"numpy": "2"}, "share": float("nan")},
+    )
+
+
+def hostile_report(harm: str = HARM) -> Report:
+    """Return a report in which every text that can come from data tries to do harm."""
+    classes = tuple(
+        ObjectClass(item.code, item.symbol, item.name, f"{item.symbol}{harm}")
+        for item in paper_taxonomy().classes
+    )
+    curve = Curve(label=harm, x=(0.0, 1.0), y=(0.5, float("nan")))
+    section = Section(
+        name="all",
+        title=harm,
+        text=(harm, f"- {harm}", f"1. {harm}"),
+        numbers=(
+            Number(row=harm, column=harm, ours=1.0, paper=2.0, unit=harm),
+            Number(row=harm, column="b", ours=1.0, paper=2.0, unit="m"),
+            Number(row="b", column="b", ours=1.0, paper=2.0, unit=harm),
+        ),
+        plots=(
+            Plot(
+                name="errors",
+                title=harm,
+                x_label=harm,
+                y_label=harm,
+                curves=(curve,),
+                paper=((0.5, 0.5, harm),),
+            ),
+        ),
+        scenes=(scene(title=harm, types=harm, objects=11, error_m=float("inf")),),
+    )
+    return report(
+        section,
+        title=harm,
+        text=(harm,),
+        settings=((harm, harm),),
+        taxonomy=Taxonomy(classes),
+        facts={"path": harm},
+    )
