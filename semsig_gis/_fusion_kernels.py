@@ -11,7 +11,7 @@ from semsig_gis.compiling import compiled
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-__all__ = ["count_steps", "fill_rest", "fuse"]
+__all__ = ["count_steps", "fuse", "put_behind", "worst_kept"]
 
 
 @compiled  # pragma: no cover - coverage does not see machine code
@@ -37,23 +37,17 @@ def count_steps(
 
 @compiled  # pragma: no cover - coverage does not see machine code
 def fuse(  # noqa: PLR0917
-    first: NDArray[np.float32],
-    cut: float,
     left: NDArray[np.float64],
     types: NDArray[np.int64],
     right: NDArray[np.float32],
     angles: NDArray[np.int64],
     step: float,
     scores: NDArray[np.float32],
-) -> float:
-    """Add up two distances of the cells that the first stage keeps.
+) -> None:
+    """Add up two distances of every cell.
 
     Parameters
     ----------
-    first : ndarray of float32, shape (d,)
-        Scores of the first stage of the distinct type sequences.
-    cut : float
-        The worst of them that is kept.
     left : ndarray of float64, shape (d,)
         What each type sequence adds, in steps.
     types : ndarray of int64, shape (n,)
@@ -65,47 +59,63 @@ def fuse(  # noqa: PLR0917
     step : float
         The step.
     scores : ndarray of float32, shape (n,)
-        To be filled where cells are kept.
+        To be filled.
+    """
+    for cell in range(len(types)):
+        scores[cell] = np.rint(left[types[cell]] + right[angles[cell]]) * step
+
+
+@compiled  # pragma: no cover - coverage does not see machine code
+def worst_kept(first: NDArray[np.float32], cut: float, fused: NDArray[np.float32]) -> float:
+    """Find the worst score of the cells that the first stage keeps.
+
+    Parameters
+    ----------
+    first : ndarray of float32, shape (n,)
+        Scores of the first stage.
+    cut : float
+        The worst of them that is kept.
+    fused : ndarray of float32, shape (n,)
+        Scores of the second stage.
 
     Returns
     -------
     float
-        The worst of these scores.
+        The worst score.
     """
-    worst = -np.inf
-    for cell in range(len(types)):
-        kind = types[cell]
-        if first[kind] <= cut:
-            score = np.rint(left[kind] + right[angles[cell]]) * step
-            worst = max(worst, score)
-            scores[cell] = score
-    return worst
+    worst = fused.dtype.type(-np.inf)
+    for cell in range(len(first)):
+        score = fused[cell] if first[cell] <= cut else worst
+        worst = max(worst, score)
+    return float(worst)
 
 
 @compiled  # pragma: no cover - coverage does not see machine code
-def fill_rest(
+def put_behind(  # noqa: PLR0917
     first: NDArray[np.float32],
-    cut: float,
-    rest: NDArray[np.float32],
-    types: NDArray[np.int64],
+    cut: np.float32,
+    fused: NDArray[np.float32],
+    worst: np.float32,
+    least: np.float32,
     scores: NDArray[np.float32],
 ) -> None:
-    """Fill in the scores of the cells that the first stage does not keep.
+    """Rank the cells that the first stage does not keep behind those that it keeps.
 
     Parameters
     ----------
-    first : ndarray of float32, shape (d,)
-        Scores of the first stage of the distinct type sequences.
-    cut : float
+    first : ndarray of float32, shape (n,)
+        Scores of the first stage.
+    cut : float32
         The worst of them that is kept.
-    rest : ndarray of float32, shape (d,)
-        Score of each type sequence that is not kept.
-    types : ndarray of int64, shape (n,)
-        Type sequence of each cell.
+    fused : ndarray of float32, shape (n,)
+        Scores of the second stage.
+    worst : float32
+        The worst of them of a cell that is kept.
+    least : float32
+        The best score of a cell that is not.
     scores : ndarray of float32, shape (n,)
         To be filled.
     """
-    for cell in range(len(types)):
-        kind = types[cell]
-        if first[kind] > cut:
-            scores[cell] = rest[kind]
+    for cell in range(len(first)):
+        behind = max(worst + (first[cell] - cut), least)
+        scores[cell] = fused[cell] if first[cell] <= cut else behind

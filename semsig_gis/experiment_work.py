@@ -45,6 +45,7 @@ __all__ = ["QUERIES_A_PART", "ExperimentWork", "Part"]
 QUERIES_A_PART = 100
 MEMO_BYTES = 256 << 20  # distances that the methods of an experiment share
 MEASURES = 3  # each of types and of angles
+STAGES = 2
 
 
 class Part(NamedTuple):
@@ -231,7 +232,8 @@ class ExperimentWork:
     def _batch(self) -> int:
         """For how many queries the distances are kept that methods share."""
         distinct = len(self.database.type_sequences) + len(self.database.angle_sequences)
-        return max(1, min(QUERIES_A_PART, MEMO_BYTES // (4 * MEASURES * max(distinct, 1))))
+        of_each = 4 * (MEASURES * distinct + STAGES * len(self.database))
+        return max(1, min(QUERIES_A_PART, MEMO_BYTES // max(of_each, 1)))
 
     def evaluation(self, case: Case, place: Path) -> Evaluation:
         """Return an evaluation, when all its queries are answered.

@@ -24,7 +24,7 @@ from semsig_gis.patterns import PatternIndex
 from semsig_gis.taxonomy import WILDCARD
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Collection, Iterator, Sequence
+    from collections.abc import Callable, Collection, Hashable, Iterator, Sequence
 
     from numpy.typing import NDArray
 
@@ -270,13 +270,25 @@ def _score_both(
             yield _two_stage(method, first, types, angles, partial(_some, method, one, angles))
         return
     by_angles = _distances(method, ANGLES, levels, angles, memo=memo)
-    for first, second in zip(by_types, by_angles, strict=True):
+    for place, (first, second) in enumerate(zip(by_types, by_angles, strict=True)):
         if len(codes) >= _MANY_QUERIES:
-            yield _joined(method, first, types, second, angles)
+            known = None
+            if memo is not None:
+                known = _known_of(memo, method, codes[place], levels[place])
+            yield _joined(method, first, types, second, angles, known=known)
         elif method.keep is None:
             yield _fused(method, first, types.inverse, second, angles.inverse)
         else:
             yield _two_stage(method, first, types, angles, second.__getitem__)
+
+
+def _known_of(
+    memo: DistanceMemo, method: Method, codes: NDArray[np.uint8], levels: NDArray[np.uint8]
+) -> Callable[[Hashable, Callable[[], NDArray[np.float32]]], NDArray[np.float32]]:
+    """Return how to ask a memo for what is known of one query, whatever percentage is kept."""
+    kind = method.types, method.angles, method.normalized, method.weights
+    of = (*kind, codes.tobytes(), levels.tobytes())
+    return lambda what, work_out: memo.get((what, *of), work_out)
 
 
 def _table(database: SignatureDatabase, part: str) -> SequenceTable:
@@ -290,27 +302,34 @@ def _joined(
     types: SequenceTable,
     by_angles: NDArray[np.float32],
     angles: SequenceTable,
+    *,
+    known: Callable[[Hashable, Callable[[], NDArray[np.float32]]], NDArray[np.float32]] | None,
 ) -> NDArray[np.float32]:
     """Return what `_fused` or `_two_stage` gives, compiled: it pays for many queries."""
     from semsig_gis import _fusion_kernels as kernels  # noqa: PLC0415 - loads a compiler
 
-    left, right = _shares(method, by_types, by_angles)
-    scores = np.empty(len(types.inverse), np.float32)
-    first, cut = by_types, math.inf
-    if method.keep is not None:
-        first = _on_steps(by_types)
-        if method.normalized:
-            cells = np.zeros(round(1 / _SCORE_STEP) + 1, np.int64)
-            kernels.count_steps(first, types.counts, _SCORE_STEP, cells)
-            cut = float(_cut_at(method, cells))
-        else:
-            cut = float(_cut(method, first, types))
-    worst = kernels.fuse(
-        first, cut, left, types.inverse, right, angles.inverse, _SCORE_STEP, scores
-    )
-    if method.keep is not None:
-        rest = _behind(first, np.float32(cut), np.float32(worst))
-        kernels.fill_rest(first, cut, rest, types.inverse, scores)
+    def fuse() -> NDArray[np.float32]:
+        left, right = _shares(method, by_types, by_angles)
+        scores = np.empty(len(types.inverse), np.float32)
+        kernels.fuse(left, types.inverse, right, angles.inverse, _SCORE_STEP, scores)
+        return scores
+
+    if method.keep is None:
+        return fuse()
+    on_steps = _on_steps(by_types)
+    if method.normalized:
+        cells = np.zeros(round(1 / _SCORE_STEP) + 1, np.int64)
+        kernels.count_steps(on_steps, types.counts, _SCORE_STEP, cells)
+        cut = _cut_at(method, cells)
+    else:
+        cut = _cut(method, on_steps, types)
+    # The percentage that is kept changes neither of these.
+    fused = fuse() if known is None else known(("fused", method.alpha), fuse)
+    spread = partial(_spread, on_steps, types)
+    first = spread() if known is None else known("first", spread)
+    worst = np.float32(kernels.worst_kept(first, float(cut), fused))
+    scores = np.empty(len(first), np.float32)
+    kernels.put_behind(first, cut, fused, worst, _next(worst), scores)
     return scores
 
 
@@ -341,9 +360,12 @@ def _two_stage(
 
 def _behind(first: NDArray[np.float32], cut: np.float32, worst: np.float32) -> NDArray[np.float32]:
     """Return the scores of what is not kept, in the order of the first stage."""
-    # Behind every kept cell even where the gap is lost in rounding, as on a large raw scale.
-    least = np.nextafter(worst, np.float32(np.inf))
-    return np.asarray(np.maximum(worst + (first - cut), least))
+    return np.asarray(np.maximum(worst + (first - cut), _next(worst)))
+
+
+def _next(worst: np.float32) -> np.float32:
+    """Return what is behind every kept cell even where the gap is lost in rounding."""
+    return np.float32(np.nextafter(worst, np.float32(np.inf)))
 
 
 @dataclass(frozen=True, slots=True)

@@ -71,8 +71,9 @@ def best_cells(scores: NDArray[np.float32], count: int) -> NDArray[np.intp]:
     [1, 2, 3, 4]
     """
     blocks = len(scores) // BLOCK
-    some = np.arange(len(scores))
-    if blocks >= count:
+    if blocks < count:
+        some = np.arange(len(scores))
+    else:
         least = scores[: blocks * BLOCK].reshape(blocks, BLOCK).min(axis=1)
         some = np.flatnonzero(scores <= np.partition(least, count - 1)[count - 1])
     cut = np.partition(scores[some], count - 1)[count - 1]

@@ -20,6 +20,8 @@ if TYPE_CHECKING:
     from distributed import LocalCluster
     from selenium.webdriver import Chrome
 
+    from semsig_gis.reproduction import Reproduction
+
     Run = Callable[..., tuple[int, str, str]]
 
 hypothesis.settings.register_profile("semsig", deadline=None)
@@ -213,3 +215,26 @@ def cluster(tmp_path_factory: pytest.TempPathFactory) -> Iterator[LocalCluster]:
         ) as running,
     ):
         yield running
+
+
+@pytest.fixture(scope="session")
+def reproduced(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return a folder in which the experiments of the paper were run on a small town."""
+    from reproductions import QUERIES, save_town
+
+    from semsig_gis.reproduction import reproduce
+
+    place = tmp_path_factory.mktemp("reproduced")
+    reproduce(place / "out", database=save_town(place), queries=QUERIES)
+    return place / "out"
+
+
+@pytest.fixture(scope="session")
+def reproduction(reproduced: Path) -> Reproduction:
+    """Return what was found there."""
+    from reproductions import QUERIES
+
+    from semsig_gis.reproduction import reproduce
+
+    database = reproduced.parent / "city.parquet"
+    return reproduce(reproduced, database=database, queries=QUERIES)
