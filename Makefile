@@ -12,7 +12,7 @@ DEV := $(VENV)/.dev
 
 .DEFAULT_GOAL := help
 .NOTPARALLEL:
-.PHONY: help demo test lint bench accuracy docs clean
+.PHONY: help demo test lint bench accuracy reproduce docs clean
 
 help: ## show this list
 	@sed -n 's/^\([a-z]*\):.*## \(.*\)/  make \1\t\2/p' $(MAKEFILE_LIST) | expand -t 14
@@ -38,11 +38,16 @@ accuracy: $(DEV) ## how well the methods localize: figures, an hour
 	$(BIN)/python -m benchmarks.accuracy
 	$(BIN)/python -m benchmarks.tables
 
+reproduce: $(DEV) ## the paper's experiments, into reproduction/: report and figures, a quarter of an hour
+	$(BIN)/semsig reproduce --out reproduction --json > reproduction.json
+	mv reproduction.json benchmarks/reproduction.json
+	$(BIN)/python -m benchmarks.tables
+
 docs: $(DEV) ## the documentation, into docs/_build/html
 	$(BIN)/sphinx-build -W --keep-going -b html docs docs/_build/html
 
 clean: ## remove .venv and everything that the targets write
-	rm -rf $(VENV) demo build dist docs/_build docs/generated htmlcov .coverage .coverage.* \
+	rm -rf $(VENV) demo reproduction reproduction.json build dist docs/_build docs/generated htmlcov .coverage .coverage.* \
 		.hypothesis .import_linter_cache .mypy_cache .pytest_cache .ruff_cache
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +
 

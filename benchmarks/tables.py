@@ -1,4 +1,4 @@
-"""Write the page of figures from the two result files: ``python -m benchmarks.tables``."""
+"""Write the page of figures from the result files: ``python -m benchmarks.tables``."""
 
 from __future__ import annotations
 
@@ -16,9 +16,9 @@ PAGE = FOLDER.parent / "docs" / "figures.md"
 
 _HEAD = """# Figures
 
-This page is written by `python -m benchmarks.tables`, which `make bench` and `make accuracy` end
-with. All figures are from one machine with two cores that other programs share, so ratios say
-more than times.
+This page is written by `python -m benchmarks.tables`, which `make bench`, `make accuracy` and
+`make reproduce` end with. All figures are from one machine with two cores that other programs
+share, so ratios say more than times.
 """
 _ACCURACY = """## Accuracy
 
@@ -44,6 +44,13 @@ _BARS = """## What was asked for
 
 The figures that accuracy was to reach, and what came out.
 """
+_PAPER = """## The paper's experiments
+
+`make reproduce` runs them on a made-up city as large and as furnished as the paper's Paris, with
+10,000 queries of each, and writes a report with all plots into `reproduction/`; these are its
+numbers of which the paper prints one too. Intervals are those of 95 %. What the paper only reads
+off its plots is marked in the report.
+"""
 _SPEED = """## Speed
 
 `make bench` times ours and a peer in turns, in one process, and keeps the medians. The paper's
@@ -53,17 +60,22 @@ times are those that it prints, for 312,134 cells on a machine of its own.
 
 def main() -> None:
     """Write the page."""
-    PAGE.write_text(page(_results("accuracy.json"), _results("results.json")), encoding="utf-8")
+    names = ("accuracy.json", "results.json", "reproduction.json")
+    PAGE.write_text(page(*map(_results, names)), encoding="utf-8")
     print(f"wrote {PAGE.relative_to(FOLDER.parent)}")
 
 
-def page(accuracy: Sequence[dict[str, Any]], speed: Sequence[dict[str, Any]]) -> str:
+def page(
+    accuracy: Sequence[dict[str, Any]],
+    speed: Sequence[dict[str, Any]],
+    paper: Sequence[dict[str, Any]],
+) -> str:
     """Return the page.
 
     Parameters
     ----------
-    accuracy, speed : sequence of dict
-        Rows of ``accuracy.json`` and ``results.json``.
+    accuracy, speed, paper : sequence of dict
+        Rows of ``accuracy.json``, ``results.json`` and ``reproduction.json``.
 
     Returns
     -------
@@ -84,11 +96,32 @@ def page(accuracy: Sequence[dict[str, Any]], speed: Sequence[dict[str, Any]]) ->
         (_CHANCES, told, _chance_table),
         (_SURE, sure, _answer_table),
         (_BARS, bars, _bar_table),
+        (_PAPER, list(paper), _paper_table),
         (_SPEED, list(speed), _speed_table),
     ):
         if rows:
             parts += [text, table(rows)]
     return "\n".join(parts)
+
+
+def _paper_table(rows: Iterable[dict[str, Any]]) -> str:
+    return _table(
+        "experiment | what | | ours | interval | the paper",
+        (
+            (
+                *(row["section"], row["row"], row["column"]),
+                _number(row["ours"], row["unit"]),
+                "" if row["low"] is None else f"{row['low']:.4f}-{row['high']:.4f}",
+                _number(row["paper"], row["unit"]),
+            )
+            for row in rows
+        ),
+    )
+
+
+def _number(value: float, unit: str) -> str:
+    large = abs(value) >= 1000  # noqa: PLR2004 - then it is a count
+    return f"{value:,.0f}{unit and ' '}{unit}" if large else f"{value:.4g}{unit and ' '}{unit}"
 
 
 def _accuracy_table(rows: Iterable[dict[str, Any]]) -> str:

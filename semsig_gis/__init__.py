@@ -49,6 +49,7 @@ if TYPE_CHECKING:
     from semsig_gis.posterior import Posterior
     from semsig_gis.properties import database_summary
     from semsig_gis.quality import quality_report
+    from semsig_gis.reproduction import Reproduction, reproduce
     from semsig_gis.signatures import Signature, SignatureSpec
     from semsig_gis.sources import RawLayer, find_files
     from semsig_gis.sources.synthetic import (
@@ -92,6 +93,7 @@ _HOMES = {
     "PartitionedDatabase": "dataset",
     "Posterior": "posterior",
     "RawLayer": "sources",
+    "Reproduction": "reproduction",
     "SemsigError": "errors",
     "Signature": "signatures",
     "SignatureDatabase": "database",
@@ -136,6 +138,7 @@ _HOMES = {
     "read_layer": "sources.vector_file",
     "read_surroundings": "surroundings",
     "ready_index": "likelihood_file",
+    "reproduce": "reproduction",
     "run_experiment": "experiment_run",
     "run_experiments": "experiment_run",
     "save_database": "database_file",
@@ -172,6 +175,7 @@ __all__ = [
     "PartitionedDatabase",
     "Posterior",
     "RawLayer",
+    "Reproduction",
     "SemsigError",
     "Signature",
     "SignatureDatabase",
@@ -217,6 +221,7 @@ __all__ = [
     "read_layer",
     "read_surroundings",
     "ready_index",
+    "reproduce",
     "run_experiment",
     "run_experiments",
     "save_database",
