@@ -30,12 +30,15 @@ if TYPE_CHECKING:
     from semsig_gis.export import export_geopackage
     from semsig_gis.fetching import fetch_layers, find_area, open_cache
     from semsig_gis.grid import GridSpec
+    from semsig_gis.identifiability import Identifiability, identify
+    from semsig_gis.identifiability_file import open_identifiability, save_identifiability
     from semsig_gis.layer_spec import LayerSpec
     from semsig_gis.likelihood import LikelihoodIndex, build_index
     from semsig_gis.likelihood_file import ready_index
     from semsig_gis.loading import Loaded, assemble, choose_layers, read_files
     from semsig_gis.locating import locate, locate_route
     from semsig_gis.location import Location
+    from semsig_gis.map_identifiability import identifiability_map
     from semsig_gis.map_location import location_map
     from semsig_gis.maps import evaluation_map, localization_map, save_map
     from semsig_gis.matching import Localization, Method, localize
@@ -73,6 +76,7 @@ _HOMES = {
     "Evaluation": "evaluation_result",
     "Footprints": "occlusion",
     "GridSpec": "grid",
+    "Identifiability": "identifiability",
     "LayerSpec": "layer_spec",
     "LikelihoodIndex": "likelihood",
     "Loaded": "loading",
@@ -110,6 +114,8 @@ _HOMES = {
     "fetch_layers": "fetching",
     "find_area": "fetching",
     "find_files": "sources",
+    "identifiability_map": "map_identifiability",
+    "identify": "identifiability",
     "load_catalog": "catalog",
     "localization_map": "maps",
     "localize": "matching",
@@ -120,6 +126,7 @@ _HOMES = {
     "open_cache": "fetching",
     "open_database": "database_file",
     "open_dataset": "dataset",
+    "open_identifiability": "identifiability_file",
     "open_objects": "objects",
     "open_store": "store",
     "paper_taxonomy": "catalog",
@@ -129,6 +136,7 @@ _HOMES = {
     "read_surroundings": "surroundings",
     "ready_index": "likelihood_file",
     "save_database": "database_file",
+    "save_identifiability": "identifiability_file",
     "save_map": "maps",
     "save_objects": "objects",
     "save_surroundings": "surroundings",
@@ -148,6 +156,7 @@ __all__ = [
     "Evaluation",
     "Footprints",
     "GridSpec",
+    "Identifiability",
     "LayerSpec",
     "LikelihoodIndex",
     "Loaded",
@@ -185,6 +194,8 @@ __all__ = [
     "fetch_layers",
     "find_area",
     "find_files",
+    "identifiability_map",
+    "identify",
     "load_catalog",
     "localization_map",
     "localize",
@@ -195,6 +206,7 @@ __all__ = [
     "open_cache",
     "open_database",
     "open_dataset",
+    "open_identifiability",
     "open_objects",
     "open_store",
     "paper_taxonomy",
@@ -204,6 +216,7 @@ __all__ = [
     "read_surroundings",
     "ready_index",
     "save_database",
+    "save_identifiability",
     "save_map",
     "save_objects",
     "save_surroundings",

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
 import enum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -15,6 +14,7 @@ from semsig_gis.errors import DatabaseError, InputError
 
 if TYPE_CHECKING:
     from semsig_gis.database import SignatureDatabase
+    from semsig_gis.identifiability import Identifiability
 
 
 class Viewpoints(enum.StrEnum):
@@ -172,10 +172,15 @@ def info(database: Database, *, as_json: AsJson = False) -> None:
         print_json(_info(database))
         return
     from semsig_gis.database_report import database_tables
+    from semsig_gis.identifiability_report import identifiability_tables
 
     opened, facts = _opened(database)
     for table in database_tables(opened, **facts):
         print_table(table)
+    told = _identifiability(database, opened)
+    if told is not None:
+        for table in identifiability_tables(told, object_counts=facts.get("object_counts")):
+            print_table(table)
     for line in opened.licenses:
         typer.echo(line)
 
@@ -184,22 +189,49 @@ def _info(path: Path) -> dict[str, Any]:
     from semsig_gis.properties import database_summary
 
     opened, facts = _opened(path)
-    return database_summary(opened, **facts)
+    told = _identifiability(path, opened)
+    more = {}
+    if told is not None:
+        counts = facts.get("object_counts")
+        more["identifiability"] = told.summary(object_counts=counts)
+    return database_summary(opened, **facts) | more
+
+
+def _identifiability(path: Path, opened: SignatureDatabase) -> Identifiability | None:
+    """Return what `semsig identify` found out, where it was run."""
+    from semsig_gis.identifiability_file import identifiability_path, open_identifiability
+
+    file = identifiability_path(path)
+    if not file.exists():
+        return None
+    try:
+        return open_identifiability(opened, file)
+    except DatabaseError as error:
+        remark(str(error))
+        return None
 
 
 def _opened(path: Path) -> tuple[SignatureDatabase, dict[str, Any]]:
     """Open a database; return also what its files tell of it."""
-    import numpy as np
-
     from semsig_gis.database_file import open_database
-    from semsig_gis.store import open_store
 
     opened = open_database(path)
     facts: dict[str, Any] = {"file_bytes": _bytes(path)}
-    with contextlib.suppress(DatabaseError):  # a database may do without its objects
+    counts = object_counts(path)
+    return opened, facts if counts is None else facts | {"object_counts": counts}
+
+
+def object_counts(path: Path) -> dict[int, int] | None:
+    """Return how many objects of each class a database has, where its store is at hand."""
+    import numpy as np
+
+    from semsig_gis.store import open_store
+
+    try:
         codes, counts = np.unique(open_store(path).objects.codes, return_counts=True)
-        facts["object_counts"] = dict(zip(codes.tolist(), counts.tolist(), strict=True))
-    return opened, facts
+    except DatabaseError:  # a database may do without its objects
+        return None
+    return dict(zip(codes.tolist(), counts.tolist(), strict=True))
 
 
 def _bytes(path: Path) -> int:

@@ -10,6 +10,11 @@ import typer
 
 from semsig_gis.cli._app import Database, app, tell_if_online
 from semsig_gis.console import progress
+from semsig_gis.errors import InputError
+
+Identifiability = Annotated[
+    Path | None, typer.Option("--identifiability", help="Table that `semsig identify` wrote.")
+]
 
 
 class CellGeometry(enum.StrEnum):
@@ -23,17 +28,30 @@ class CellGeometry(enum.StrEnum):
 def map_(
     database: Database,
     *,
-    evaluation: Annotated[Path, typer.Option(help="Folder that `semsig evaluate --out` wrote.")],
+    evaluation: Annotated[
+        Path | None, typer.Option(help="Folder that `semsig evaluate --out` wrote.")
+    ] = None,
+    identifiability: Identifiability = None,
     out: Annotated[Path, typer.Option(help="Map to write (.html).")],
 ) -> None:
-    """Draw the errors and the query locations of an evaluation."""
+    """Draw an evaluation, or where a query can be placed at all."""
     from semsig_gis.database_file import open_database
     from semsig_gis.evaluation import Evaluation
+    from semsig_gis.identifiability_file import open_identifiability
+    from semsig_gis.map_identifiability import identifiability_map
     from semsig_gis.maps import evaluation_map, save_map
 
-    results = Evaluation.load(evaluation)
+    if (evaluation is None) == (identifiability is None):
+        msg = "a map shows --evaluation or --identifiability; give one of them."
+        raise InputError(msg)
+    results = None if evaluation is None else Evaluation.load(evaluation)
     with progress("drawing the map"):
-        offline = save_map(evaluation_map(results, open_database(database)), out)
+        opened = open_database(database)
+        if results is not None:
+            drawn = evaluation_map(results, opened)
+        elif identifiability is not None:
+            drawn = identifiability_map(open_identifiability(opened, identifiability))
+        offline = save_map(drawn, out)
     typer.echo(f"map: {out}")
     tell_if_online(offline)
 
@@ -46,6 +64,7 @@ def export(
     objects: Annotated[
         Path | None, typer.Option(help="Street objects to add as a second layer.")
     ] = None,
+    identifiability: Identifiability = None,
     geometry: Annotated[
         CellGeometry, typer.Option(help="How a cell is drawn.")
     ] = CellGeometry.polygon,
@@ -53,10 +72,19 @@ def export(
     """Write the cells, and the street objects, to a GeoPackage for QGIS."""
     from semsig_gis.database_file import open_database
     from semsig_gis.export import export_geopackage
+    from semsig_gis.identifiability_file import open_identifiability
     from semsig_gis.objects import open_objects
 
     opened = open_database(database)
+    told = None if identifiability is None else open_identifiability(opened, identifiability)
     seen = None if objects is None else open_objects(objects)
     with progress("writing the GeoPackage") as advance:
-        export_geopackage(opened, out, objects=seen, geometry=geometry.value, progress=advance)
+        export_geopackage(
+            opened,
+            out,
+            objects=seen,
+            identifiability=told,
+            geometry=geometry.value,
+            progress=advance,
+        )
     typer.echo(f"GeoPackage: {out}")
