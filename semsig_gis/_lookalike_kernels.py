@@ -89,35 +89,29 @@ def _sum_around(  # noqa: PLR0917 - a kernel takes no keywords
     octaves: float,
     ids: NDArray[np.int64],
     circle: NDArray[np.int64],
-    marks: NDArray[np.bool_],
 ) -> float:
-    """Return the sum of the powers of the cells around the one of a number, but marked ones."""
+    """Return the sum of the powers of the cells around the one of a number."""
     total = 0.0
     for line in range(len(circle)):
         last = middle + circle[line, 1]
         for cell in range(np.searchsorted(ids, middle + circle[line, 0]), len(ids)):
             if ids[cell] > last:
                 break
-            if not marks[cell]:
-                total += 2.0 ** min(max((scores[cell] - own) * octaves, -_OCTAVES), _OCTAVES)
+            total += 2.0 ** min(max((scores[cell] - own) * octaves, -_OCTAVES), _OCTAVES)
     return total
 
 
 @compiled
-def _mark(
-    middle: int,
-    ids: NDArray[np.int64],
-    circle: NDArray[np.int64],
-    marks: NDArray[np.bool_],
-    value: bool,  # noqa: FBT001
+def _blot_out(
+    middle: int, scores: NDArray[np.float32], ids: NDArray[np.int64], circle: NDArray[np.int64]
 ) -> None:
-    """Mark the cells around the one of a number."""
+    """Take all likelihood from the cells around the one of a number."""
     for line in range(len(circle)):
         last = middle + circle[line, 1]
         for cell in range(np.searchsorted(ids, middle + circle[line, 0]), len(ids)):
             if ids[cell] > last:
                 break
-            marks[cell] = value
+            scores[cell] = -np.inf
 
 
 @compiled
@@ -182,11 +176,13 @@ def compare_cells(  # noqa: C901, PLR0915, PLR0917 - a kernel takes no keywords
     best = np.empty(_CANDIDATES, np.float32)
     apart = np.empty(_CANDIDATES, np.int64)
     whose = np.empty(_CANDIDATES, np.int64)
-    marks = np.zeros(count, np.bool_)
     for number in range(len(cells)):
         cell = cells[number]
         _score(symbols[offsets[cell] : offsets[cell + 1]], flat, constants, step, scores)
         own = scores[cell]
+        near[number] = _sum_around(ids[cell], scores, own, octaves, ids, circle)
+        # A difference of sums would drown what is far from a cell that is like no other.
+        _blot_out(ids[cell], scores, ids, circle)
         sums[:] = 0.0
         best[:] = -np.inf
         last = best[_CANDIDATES - 1]
@@ -221,9 +217,7 @@ def compare_cells(  # noqa: C901, PLR0915, PLR0917 - a kernel takes no keywords
                 last = best[_CANDIDATES - 1]
             value = min(max((last - own) * factor, -_OCTAVES), _OCTAVES)
             least = np.int32(np.floor(value) + _BIAS) << _SHIFT
-        near[number] = _sum_around(ids[cell], scores, own, octaves, ids, circle, marks)
-        far[number] = max(_sum(sums) - near[number], 0.0)
-        _mark(ids[cell], ids, circle, marks, True)  # noqa: FBT003
+        far[number] = _sum(sums)
         like[number] = -1
         chosen = 0
         for candidate in range(found):
@@ -238,11 +232,8 @@ def compare_cells(  # noqa: C901, PLR0915, PLR0917 - a kernel takes no keywords
                 free = free and across * across + along * along > 4 * limit
             if free:
                 like[number, chosen] = new
-                share[number, chosen] = _sum_around(
-                    ids[new], scores, own, octaves, ids, circle, marks
-                )
+                share[number, chosen] = _sum_around(ids[new], scores, own, octaves, ids, circle)
                 chosen += 1
-        _mark(ids[cell], ids, circle, marks, False)  # noqa: FBT003
 
 
 @compiled
@@ -286,10 +277,8 @@ def compare_without(  # noqa: PLR0917 - a kernel takes no keywords
         without each.
     """
     count = len(sample)
-    octaves = temperature * _OCTAVES_A_NAT
-    factor = np.float32(octaves)
+    factor = np.float32(temperature * _OCTAVES_A_NAT)
     numbers = ids[sample]
-    marks = np.zeros(count, np.bool_)
     nothing = np.zeros(count, np.float32)
     bases = np.empty((len(constants), count), np.float32)
     for left_out in range(len(constants)):
@@ -319,6 +308,6 @@ def compare_without(  # noqa: PLR0917 - a kernel takes no keywords
                 _score(mine, sampled, nothing, step, part)
                 for other in range(count):
                     scores[other] -= part[other]
+            _blot_out(ids[cell], scores, numbers, circle)
             _powers(scores, own, factor, bits, powers)
-            near = _sum_around(ids[cell], scores, own, octaves, numbers, circle, marks)
-            far[number, left_out] = max(_sum(powers) - near, 0.0)
+            far[number, left_out] = _sum(powers)

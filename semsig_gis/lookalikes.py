@@ -128,7 +128,7 @@ def find_lookalikes(
     Notes
     -----
     Each cell is a query of the index, so that the time grows with the square of the number of
-    cells.
+    cells. A ratio beyond 2 to the power of 100, or below its inverse, counts as that.
 
     Examples
     --------
