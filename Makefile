@@ -32,9 +32,11 @@ lint: $(DEV) ## style, types, import layers, docstrings
 
 bench: $(DEV) ## the benchmarks
 	$(BIN)/python -m benchmarks
+	$(BIN)/python -m benchmarks.tables
 
-accuracy: $(DEV) ## how well the methods localize: figures, half an hour
+accuracy: $(DEV) ## how well the methods localize: figures, an hour
 	$(BIN)/python -m benchmarks.accuracy
+	$(BIN)/python -m benchmarks.tables
 
 docs: $(DEV) ## the documentation, into docs/_build/html
 	$(BIN)/sphinx-build -W --keep-going -b html docs docs/_build/html

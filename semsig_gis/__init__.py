@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from semsig_gis.building import build_database
     from semsig_gis.catalog import Catalog, combine_catalogs, load_catalog, paper_taxonomy
+    from semsig_gis.comparison import compare_evaluations
     from semsig_gis.conflation import conflate
     from semsig_gis.database import SignatureDatabase
     from semsig_gis.database_file import open_database, save_database
@@ -27,6 +28,9 @@ if TYPE_CHECKING:
     from semsig_gis.errors import SemsigError
     from semsig_gis.evaluation import evaluate
     from semsig_gis.evaluation_result import Evaluation
+    from semsig_gis.experiment import ExperimentSpec, open_experiment_spec
+    from semsig_gis.experiment_folder import open_results
+    from semsig_gis.experiment_run import run_experiment
     from semsig_gis.export import export_geopackage
     from semsig_gis.fetching import fetch_layers, find_area, open_cache
     from semsig_gis.grid import GridSpec
@@ -74,6 +78,7 @@ _HOMES = {
     "CitySpec": "sources.synthetic",
     "Distortion": "distortion",
     "Evaluation": "evaluation_result",
+    "ExperimentSpec": "experiment",
     "Footprints": "occlusion",
     "GridSpec": "grid",
     "Identifiability": "identifiability",
@@ -106,6 +111,7 @@ _HOMES = {
     "build_tiles": "distributed",
     "choose_layers": "loading",
     "combine_catalogs": "catalog",
+    "compare_evaluations": "comparison",
     "conflate": "conflation",
     "database_summary": "properties",
     "evaluate": "evaluation",
@@ -126,8 +132,10 @@ _HOMES = {
     "open_cache": "fetching",
     "open_database": "database_file",
     "open_dataset": "dataset",
+    "open_experiment_spec": "experiment",
     "open_identifiability": "identifiability_file",
     "open_objects": "objects",
+    "open_results": "experiment_folder",
     "open_store": "store",
     "paper_taxonomy": "catalog",
     "quality_report": "quality",
@@ -135,6 +143,7 @@ _HOMES = {
     "read_layer": "sources.vector_file",
     "read_surroundings": "surroundings",
     "ready_index": "likelihood_file",
+    "run_experiment": "experiment_run",
     "save_database": "database_file",
     "save_identifiability": "identifiability_file",
     "save_map": "maps",
@@ -154,6 +163,7 @@ __all__ = [
     "CitySpec",
     "Distortion",
     "Evaluation",
+    "ExperimentSpec",
     "Footprints",
     "GridSpec",
     "Identifiability",
@@ -186,6 +196,7 @@ __all__ = [
     "build_tiles",
     "choose_layers",
     "combine_catalogs",
+    "compare_evaluations",
     "conflate",
     "database_summary",
     "evaluate",
@@ -206,8 +217,10 @@ __all__ = [
     "open_cache",
     "open_database",
     "open_dataset",
+    "open_experiment_spec",
     "open_identifiability",
     "open_objects",
+    "open_results",
     "open_store",
     "paper_taxonomy",
     "quality_report",
@@ -215,6 +228,7 @@ __all__ = [
     "read_layer",
     "read_surroundings",
     "ready_index",
+    "run_experiment",
     "save_database",
     "save_identifiability",
     "save_map",

@@ -7,11 +7,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from semsig_gis.detector import draw_detections
 from semsig_gis.likelihood import build_index
 from semsig_gis.noise import NoiseMixture
 from semsig_gis.signatures import Signature
-from semsig_gis.trials import try_queries
+from semsig_gis.trials import draw_trials, try_queries
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -126,7 +125,7 @@ def try_without_classes(
     True
     """
     codes = index.table.codes.tolist()
-    queries = list(draw_detections(index.database, cells.tolist(), index.noise, seed=seed))
+    queries = list(draw_trials(index, cells, seed=seed))
     near = np.zeros((len(cells), len(codes)))
     bits = np.full((len(cells), len(codes)), np.log2(len(index.database)))
     names = {item.code: item.name for item in index.database.taxonomy.classes}

@@ -1,105 +1,146 @@
-"""Detections drawn from a noise model: what a detector would give at the middle of a cell."""
+"""A detector that fails as a noise model says, and worse the farther things are.
+
+The likelihood method rests on a noise model; here queries are drawn from one. Drawn from the model
+that the method has, they show the method at its best and its chances must come true; drawn from
+another, they show what a wrong model costs.
+"""
 
 from __future__ import annotations
 
+import math
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from semsig_gis.database import BEARING_UNITS
-from semsig_gis.geometry import wrap_degrees
-from semsig_gis.noise_table import database_tables
-from semsig_gis.signatures import Signature
+from semsig_gis.errors import InputError
+from semsig_gis.geometry import FULL_TURN, bearings, wrap_degrees
+from semsig_gis.noise_table import LONGEST_TABLE, noise_tables
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator
-
-    from numpy.typing import NDArray
-
-    from semsig_gis.database import SignatureDatabase
     from semsig_gis.noise import Noise
     from semsig_gis.noise_table import NoiseTable
+    from semsig_gis.sight import CitySights, Sight, Spoiling
 
-__all__ = ["draw_detections"]
+__all__ = ["Detector"]
 
 
-def draw_detections(
-    database: SignatureDatabase, cells: Iterable[int], noise: Noise, *, seed: int = 0
-) -> Iterator[Signature]:
-    """Give what a detector sees in cells, if it fails as a noise model says.
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Detector:
+    """A detector that fails as a noise model says.
 
     Parameters
     ----------
-    database : SignatureDatabase
-        The cells.
-    cells : iterable of int
-        Row numbers in the database; a cell may come several times.
     noise : NoiseSpec or NoiseMixture
-        The noise model; of a mixture, each query has one of the models.
-    seed : int, default 0
-        Seed of all chances. Query number i is the same whatever the number of queries.
-
-    Yields
-    ------
-    Signature
-        The detections in one cell, in clockwise order; perhaps none.
+        How it misses, misnames and makes up objects, by class if wanted, and how far bearings
+        are off; of a mixture, one model is drawn for each query.
+    half : float, default infinity
+        Distance in metres at which only half of the objects are left that it would detect close
+        by; above 0.
 
     Raises
     ------
     InputError
-        If the noise model does not fit the classes of the database.
+        If the distance is not above 0.
 
     Notes
     -----
-    Every object is detected with its chance, named by the confusion of its class and given a
-    normal error of its bearing; the false objects of a class are Poisson in number and anywhere
-    all round: just what `semsig_gis.likelihood` supposes.
+    An object at distance d is detected with chance ``p * 2 ** -((d / half) ** 2)``, where p is
+    that of the model. False objects come as a Poisson number a class. An uncertain place of the
+    model (``position_sigma``) is a step aside of the observer, which turns the bearings of near
+    objects most. The chances are those of `semsig_gis.noise_table`, with which the likelihood
+    method computes: none is quite nought or one.
 
     Examples
     --------
     >>> from semsig_gis.catalog import paper_taxonomy
-    >>> from semsig_gis.building import build_database
     >>> from semsig_gis.noise import NoiseSpec
-    >>> from semsig_gis.objects import build_objects
-    >>> from semsig_gis.sources.synthetic import CitySpec, synthetic_city
-    >>> layers = synthetic_city(CitySpec(size=200.0))
-    >>> objects, _ = build_objects(layers, taxonomy=paper_taxonomy(), crs="EPSG:32631")
-    >>> database = build_database(objects)
-    >>> careful = NoiseSpec(detection=1.0, misnamed=0.0, clutter=0.0, bearing_sigma=0.01)
-    >>> (seen,) = draw_detections(database, [0], careful)
-    >>> database.taxonomy.decode(seen.codes) == database.types(0)
+    >>> from semsig_gis.sight import CitySights, Sight
+    >>> city = CitySights(
+    ...     taxonomy=paper_taxonomy(), codes=np.array([1, 3], np.uint8),
+    ...     frequencies=np.array([5, 9]), reach=30.0,
+    ... )
+    >>> lamps = Sight(
+    ...     codes=np.full(1000, 3, np.uint8), bearings=np.full(1000, 90.0),
+    ...     distances=np.full(1000, 20.0),
+    ... )
+    >>> careless = Detector(noise=NoiseSpec(detection=0.8, misnamed=0.0, clutter=0.0), half=20.0)
+    >>> 350 < len(careless.ready(city)(lamps, np.random.default_rng(0))) < 450
     True
     """
-    tables, weights = database_tables(database, noise)
-    reach = database.reach
-    sigmas = [table.sigmas(reach) for table in tables]
-    for number, cell in enumerate(cells):
-        # Its own generator, so that no query depends on what happened to another.
-        rng = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(number,)))
-        which = int(rng.choice(len(tables), p=weights))
-        yield _detections(database, cell, tables[which], sigmas[which], rng)
+
+    noise: Noise
+    half: float = math.inf
+
+    def __post_init__(self) -> None:  # noqa: D105
+        if not self.half > 0:
+            msg = (
+                f"a detector that sees half at {self.half!r} m was given; give metres above 0, or "
+                "infinity where distance does not matter."
+            )
+            raise InputError(msg)
+
+    def ready(self, city: CitySights) -> Spoiling:
+        """Return what is done to a query.
+
+        Parameters
+        ----------
+        city : CitySights
+            The classes that it may name.
+
+        Returns
+        -------
+        callable
+            From what is seen and a generator to what seems to be seen.
+
+        Raises
+        ------
+        InputError
+            If the noise model names a class that the city does not have.
+        """
+        tables, weights = noise_tables(
+            self.noise, taxonomy=city.taxonomy, codes=city.codes, longest=LONGEST_TABLE
+        )
+
+        def spoil(sight: Sight, rng: np.random.Generator) -> Sight:
+            table = tables[int(rng.choice(len(tables), p=weights))]
+            moved = _from_aside(sight, table.position_sigma, rng)
+            return _with_false(self._detected(moved, table, rng), table, city, rng).clockwise()
+
+        return spoil
+
+    def _detected(self, sight: Sight, table: NoiseTable, rng: np.random.Generator) -> Sight:
+        """Return the objects that are detected, under the names and bearings they are given."""
+        length = min(len(sight), len(table.missed) - 1)
+        chances = 1.0 - table.missed[length, table.row_of[sight.codes]]
+        chances *= np.exp2(-((sight.distances / self.half) ** 2))
+        found = sight.only(rng.random(len(sight)) < chances)
+        kinds = table.row_of[found.codes]
+        names = np.cumsum(table.named[length, kinds], axis=1)
+        given = (rng.random(len(found))[:, None] * names[:, -1:] >= names).sum(axis=1)
+        off = rng.normal(0.0, table.sigma[kinds])
+        return replace(found, codes=table.codes[given], bearings=wrap_degrees(found.bearings + off))
 
 
-def _detections(
-    database: SignatureDatabase,
-    cell: int,
-    table: NoiseTable,
-    sigmas: NDArray[np.float64],
-    rng: np.random.Generator,
-) -> Signature:
-    """Return the detections in one cell."""
-    part = slice(database.offsets[cell], database.offsets[cell + 1])
-    kinds = table.row_of[database.codes[part]]
-    length = min(len(kinds), len(table.missed) - 1)
-    seen = rng.random(len(kinds)) >= table.missed[length, kinds]
-    kinds = kinds[seen]
-    chances = table.named[length, kinds].cumsum(axis=1)
-    given = (rng.random((len(kinds), 1)) > chances[:, :-1]).sum(axis=1)
-    middle = (database.bearing_units[part][seen] + 0.5) * (360.0 / BEARING_UNITS)
-    sigma = sigmas[kinds, database.distance_units[part][seen]]
-    bearings = middle + rng.normal(0.0, 1.0, len(kinds)) * sigma
-    false = np.repeat(np.arange(len(table.codes)), rng.poisson(table.clutter))
-    rows = np.concatenate([given, false])
-    everything = wrap_degrees(np.concatenate([bearings, rng.uniform(0.0, 360.0, len(false))]))
-    order = np.argsort(everything, kind="stable")
-    return Signature(table.codes[rows[order]], everything[order])
+def _from_aside(sight: Sight, sigma: float, rng: np.random.Generator) -> Sight:
+    """Return what is seen a step aside."""
+    if not sigma:
+        return sight
+    turned = np.radians(sight.bearings)
+    dx, dy = rng.normal(0.0, sigma, 2)
+    x = sight.distances * np.sin(turned) - dx
+    y = sight.distances * np.cos(turned) - dy
+    return replace(sight, bearings=bearings(x, y), distances=np.hypot(x, y))
+
+
+def _with_false(
+    sight: Sight, table: NoiseTable, city: CitySights, rng: np.random.Generator
+) -> Sight:
+    """Return the objects and the false ones after them."""
+    codes = np.repeat(table.codes, rng.poisson(table.clutter))
+    return replace(
+        sight,
+        codes=np.concatenate([sight.codes, codes]),
+        bearings=np.concatenate([sight.bearings, rng.uniform(0.0, FULL_TURN, len(codes))]),
+        distances=np.concatenate([sight.distances, city.false_distances(len(codes), rng)]),
+    )

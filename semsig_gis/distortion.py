@@ -1,4 +1,4 @@
-"""Spoil a signature the way a detector does: objects missed, invented, misnamed, misplaced.
+"""Spoil a signature as the paper does: objects missed, invented, misnamed, misplaced.
 
 A distortion is a number of occurrences, each a miss, a false detection or a false
 classification with equal chance, followed by noise on every bearing (paper, section 4.2).
@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from bisect import bisect_right
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Literal, get_args
 
@@ -22,6 +22,8 @@ if TYPE_CHECKING:
     from collections.abc import Mapping
 
     from numpy.typing import ArrayLike, NDArray
+
+    from semsig_gis.sight import CitySights, Sight, Spoiling
 
 __all__ = ["DISTORTIONS", "Distortion", "FalseClass", "distort", "named_distortion"]
 
@@ -49,8 +51,6 @@ class Distortion:
     false_class : {"uniform", "frequency"}, default "uniform"
         Whether the class of a false object is drawn with equal chances or by how often each
         class is seen in the database.
-    name : str, default "custom"
-        Name to print.
 
     Raises
     ------
@@ -66,7 +66,7 @@ class Distortion:
 
     Examples
     --------
-    >>> Distortion(occurrences=2, name="mild").bearing_clip
+    >>> Distortion(occurrences=2).bearing_clip
     30.0
     >>> Distortion(occurrences=-1)
     Traceback (most recent call last):
@@ -79,7 +79,6 @@ class Distortion:
     bearing_clip: float = 30.0
     resort: bool = True
     false_class: FalseClass = "uniform"
-    name: str = "custom"
 
     def __post_init__(self) -> None:
         """Refuse numbers out of range and unknown names."""
@@ -96,13 +95,42 @@ class Distortion:
             msg = f"{self.false_class!r} is no way to draw a false class; give {names}{hint}."
             raise UnknownNameError(msg)
 
+    def ready(self, city: CitySights) -> Spoiling:
+        """Return what is done to a query.
+
+        Parameters
+        ----------
+        city : CitySights
+            The classes that a false object may have, and how often each is seen.
+
+        Returns
+        -------
+        callable
+            From what is seen and a generator to what seems to be seen.
+        """
+        chances = _class_chances(
+            city.codes, city.frequencies, by_frequency=self.false_class == "frequency"
+        )
+
+        def spoil(sight: Sight, rng: np.random.Generator) -> Sight:
+            codes, bearings, rows = _spoiled(
+                sight.codes, sight.bearings, self, (city.codes, chances), rng
+            )
+            distances = np.empty(len(rows))
+            real = rows >= 0
+            distances[real] = sight.distances[rows[real]]
+            distances[~real] = city.false_distances(int((~real).sum()), rng)
+            return replace(sight, codes=codes, bearings=bearings, distances=distances)
+
+        return spoil
+
 
 DISTORTIONS: Mapping[str, Distortion] = MappingProxyType(
     {
-        "none": Distortion(name="none", occurrences=0, bearing_sigma=0.0),
-        "light": Distortion(name="light", occurrences=1),
-        "medium": Distortion(name="medium", occurrences=7),
-        "strong": Distortion(name="strong", occurrences=13),
+        "none": Distortion(occurrences=0, bearing_sigma=0.0),
+        "light": Distortion(occurrences=1),
+        "medium": Distortion(occurrences=7),
+        "strong": Distortion(occurrences=13),
     }
 )
 
@@ -196,27 +224,43 @@ def distort(
         raise InputError(msg)
     known = np.asarray(classes, dtype=np.uint8)
     chances = _class_chances(known, weights, by_frequency=distortion.false_class == "frequency")
-    codes: list[int] = signature.codes.tolist()
-    bearings: list[float] = signature.bearings.tolist()
+    codes, bearings, _ = _spoiled(
+        signature.codes, signature.bearings, distortion, (known, chances), rng
+    )
+    return Signature(codes=codes, bearings=bearings)
+
+
+def _spoiled(
+    true_codes: NDArray[np.uint8],
+    true_bearings: NDArray[np.float64],
+    distortion: Distortion,
+    false_classes: tuple[NDArray[np.uint8], NDArray[np.float64]],
+    rng: np.random.Generator,
+) -> tuple[NDArray[np.uint8], NDArray[np.float64], NDArray[np.int64]]:
+    """Return codes, bearings, and which object each was; -1 for a false one."""
+    codes: list[int] = true_codes.tolist()
+    bearings: list[float] = true_bearings.tolist()
+    rows = list(range(len(codes)))
     for _ in range(distortion.occurrences):
         operation = int(rng.integers(_OPERATIONS))
         if operation == _FALSE_DETECTION:
             bearing = float(rng.uniform(0.0, 360.0))
             place = bisect_right(bearings, bearing)
             bearings.insert(place, bearing)
-            codes.insert(place, int(rng.choice(known, p=chances)))
+            codes.insert(place, int(rng.choice(false_classes[0], p=false_classes[1])))
+            rows.insert(place, -1)
         elif codes:
             place = int(rng.integers(len(codes)))
             if operation == _MISS:
-                del codes[place], bearings[place]
+                del codes[place], bearings[place], rows[place]
             else:
-                codes[place] = _other_class(codes[place], known, chances, rng)
+                codes[place] = _other_class(codes[place], *false_classes, rng)
     noise = rng.normal(0.0, distortion.bearing_sigma, len(bearings))
     limit = distortion.bearing_clip
     seen = wrap_degrees(np.asarray(bearings, dtype=np.float64) + np.clip(noise, -limit, limit))
     # A stable sort, so that objects on one bearing stay in the order they were in.
     order = np.argsort(seen, kind="stable") if distortion.resort else np.arange(len(seen))
-    return Signature(codes=np.array(codes, dtype=np.uint8)[order], bearings=seen[order])
+    return np.array(codes, np.uint8)[order], seen[order], np.array(rows, np.int64)[order]
 
 
 def _class_chances(

@@ -1,4 +1,4 @@
-"""Measure localization: distort known signatures, rank the cells, score errors and ranks.
+"""Measure localization: draw queries of known places, let a method answer, score errors and ranks.
 
 Equal scores are common (a street with three lamps looks like thousands of others), so every
 figure is an expectation over all orders of the tied cells, worked out exactly, never the luck of
@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import math
 import platform
-import time
 from importlib import metadata
 from typing import TYPE_CHECKING, Any
 
@@ -18,34 +17,49 @@ import numpy as np
 import pandas as pd
 
 from semsig_gis import __version__
-from semsig_gis.alignment import rerank
-from semsig_gis.distortion import distort, named_distortion
+from semsig_gis.answering import Answerer
+from semsig_gis.distortion_chain import QueryDistortion, parse_chain
 from semsig_gis.errors import InputError
-from semsig_gis.evaluation_result import SUCCESS_METRES, SUCCESS_PROBABILITY, Evaluation
+from semsig_gis.evaluation_result import (
+    QUERY_COLUMNS,
+    SUCCESS_METRES,
+    SUCCESS_PROBABILITY,
+    Evaluation,
+)
+from semsig_gis.geometry import angular_distance
 from semsig_gis.grid import cell_ids
 from semsig_gis.location import REGION_SHARE
-from semsig_gis.matching import score_cells
 from semsig_gis.method import DEFAULT_METHOD, LikelihoodMethod, Method
-from semsig_gis.posterior import posterior
-from semsig_gis.scoring import THRESHOLDS, expected_best, rank_range, top_candidates
+from semsig_gis.queries import QuerySpec, draw_queries
+from semsig_gis.scoring import (
+    NEAR_METRES,
+    NEAR_PLACES,
+    THRESHOLDS,
+    best_cells,
+    expected_best,
+    rank_range,
+    top_candidates,
+)
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator, Mapping, Sequence
+    from collections.abc import Callable, Sequence
 
     from numpy.typing import NDArray
 
+    from semsig_gis.answering import RankedAnswer
     from semsig_gis.database import SignatureDatabase
-    from semsig_gis.distortion import Distortion
     from semsig_gis.likelihood import LikelihoodIndex
     from semsig_gis.posterior import Posterior
-    from semsig_gis.signatures import Signature
+    from semsig_gis.queries import Query
 
-    # Scores of all cells, what else is told of the answer, and the seconds they took.
-    _Answer = tuple[NDArray[np.float32], Mapping[str, float], float]
-
-__all__ = ["SUCCESS_METRES", "SUCCESS_PROBABILITY", "Evaluation", "evaluate"]
-
-_UNTOLD = {"chance": math.nan, "right": math.nan, "in_region": math.nan}
+__all__ = [
+    "SUCCESS_METRES",
+    "SUCCESS_PROBABILITY",
+    "Evaluation",
+    "evaluate",
+    "make_evaluation",
+    "score_queries",
+]
 
 
 def evaluate(
@@ -53,7 +67,7 @@ def evaluate(
     *,
     queries: int = 500,
     method: Method | LikelihoodIndex = DEFAULT_METHOD,
-    distortion: Distortion | str = "medium",
+    distortion: str | QueryDistortion | Sequence[QueryDistortion] = "medium",
     top: int = 1,
     seed: int = 0,
     progress: Callable[[int, int], None] | None = None,
@@ -69,8 +83,9 @@ def evaluate(
     method : Method or LikelihoodIndex, optional
         What ranks the cells: measures of distance, or the index of this database for the
         likelihood method; metric fusion of two edit distances unless given.
-    distortion : Distortion or str, default "medium"
-        What happens to the signatures, or the name of one of the paper's levels.
+    distortion : str, distortion or sequence of distortions, default "medium"
+        What happens to the signatures: one of the paper's levels, or any of
+        `semsig_gis.distortion_chain`, as text or as values.
     top : int, default 1
         How many best candidates count (t); 1 to the number of cells.
     seed : int, default 0
@@ -101,6 +116,9 @@ def evaluate(
     most of the chance lies. That comes first; then follow the other cells, likeliest first. So
     the best t candidates are the answer and the t - 1 likeliest other cells.
 
+    Queries from anywhere, and several methods on the same queries, are for
+    `semsig_gis.experiment`.
+
     Examples
     --------
     >>> from semsig_gis.catalog import paper_taxonomy
@@ -113,101 +131,148 @@ def evaluate(
     >>> len(evaluation.queries), evaluation.recall(100)
     (20, 1.0)
     """
-    n = len(database)
-    _check_count("queries", queries, n)
-    _check_count("candidates", top, n)
-    if seed < 0:
-        msg = f"A seed of {seed} was given; give a whole number, 0 or more."
-        raise InputError(msg)
-    chosen_distortion = named_distortion(distortion) if isinstance(distortion, str) else distortion
-    if not isinstance(method, Method) and method.database is not database:
-        msg = "the likelihood index belongs to another database; build that of the one to search."
-        raise InputError(msg)
-    # A prefix of one permutation: more queries keep the first ones.
-    cells = np.random.default_rng(np.random.SeedSequence(seed)).permutation(n)[:queries]
-    asked, picks = _distorted(database, cells, chosen_distortion, seed)
-    truths = [(cell, one) for cell, one in zip(cells.tolist(), asked, strict=True) if len(one)]
+    check_count("queries", queries, len(database))
+    check_count("candidates", top, len(database))
+    spec = QuerySpec(number=queries, seeds=(seed,), distortions=_chain(distortion))
     if isinstance(method, Method):
-        answers = _by_distance(database, [one for _, one in truths], method)
+        answerer = Answerer(database=database, method=method)
     else:
-        answers = _by_likelihood(method, truths)
-    outcomes: list[dict[str, Any]] = []
-    seconds = 0.0
-    for number, (cell, query, pick) in enumerate(zip(cells.tolist(), asked, picks, strict=True)):
-        if len(query):
-            scores, told, spent = next(answers)
-            seconds += spent
-            outcome = _outcome(database, scores, cell=cell, top=top, pick=pick)
-            outcomes.append(outcome | dict(told))
+        by_likelihood = LikelihoodMethod(noise=method.noise, on_grid=True)
+        answerer = Answerer(database=database, method=by_likelihood, index=method)
+    drawn = draw_queries(database, spec)
+    scored = score_queries(answerer, drawn, tops=(top,), progress=progress)[top]
+    return make_evaluation(database, answerer.method, spec, scored, top=top)
+
+
+def score_queries(
+    answerer: Answerer,
+    queries: Sequence[Query],
+    *,
+    tops: Sequence[int] = (1,),
+    progress: Callable[[int, int], None] | None = None,
+) -> dict[int, pd.DataFrame]:
+    """Let a method answer queries of known places, and score the answers.
+
+    Parameters
+    ----------
+    answerer : Answerer
+        The method.
+    queries : sequence of Query
+        The queries and the truth about them.
+    tops : sequence of int, default (1,)
+        How many best candidates count.
+    progress : callable, optional
+        Called with the number of queries done and the number of queries.
+
+    Returns
+    -------
+    dict of int to DataFrame
+        For each of `tops` one row a query: the columns of `Evaluation.queries` without
+        ``geometry``, but with ``x``, ``y`` and ``seconds``, which is NaN where nothing was asked.
+
+    Examples
+    --------
+    >>> from semsig_gis.catalog import paper_taxonomy
+    >>> from semsig_gis.building import build_database
+    >>> from semsig_gis.objects import build_objects
+    >>> from semsig_gis.sources.synthetic import CitySpec, synthetic_city
+    >>> layers = synthetic_city(CitySpec(size=300.0))
+    >>> objects, _ = build_objects(layers, taxonomy=paper_taxonomy(), crs="EPSG:32631")
+    >>> database = build_database(objects)
+    >>> drawn = draw_queries(database, QuerySpec(number=3))
+    >>> scored = score_queries(Answerer(database=database, method=DEFAULT_METHOD), drawn)
+    >>> scored[1]["number"].tolist()
+    [0, 1, 2]
+    """
+    database = answerer.database
+    answers = answerer.answers([one.asked.signature for one in queries if len(one.asked)])
+    outcomes: dict[int, list[dict[str, Any]]] = {top: [] for top in tops}
+    for done, query in enumerate(queries, start=1):
+        if len(query.asked):
+            answer = next(answers)
+            pool = _Pool(database, query, answer, max(*tops, *NEAR_PLACES))
+            shared = _told(database, query, answer)
+            shared |= _near(pool, judged=answer.posterior is not None)
+            for top in tops:
+                outcomes[top].append(shared | _outcome(pool, top))
         else:
-            outcomes.append(_unlocalized(n))
+            for top in tops:
+                outcomes[top].append(_unlocalized(len(database)))
         if progress is not None:
-            progress(number + 1, queries)
+            progress(done, len(queries))
+    about = _query_table(database, queries)
+    return {
+        top: pd.concat([about, pd.DataFrame(rows).astype({"best_cell_id": "Int64"})], axis=1)
+        for top, rows in outcomes.items()
+    }
+
+
+def make_evaluation(
+    database: SignatureDatabase,
+    method: Method | LikelihoodMethod,
+    spec: QuerySpec,
+    scored: pd.DataFrame,
+    *,
+    top: int,
+    city: str | None = None,
+    file_bytes: int | None = None,
+) -> Evaluation:
+    """Return what an evaluation found, from all its scored queries.
+
+    Parameters
+    ----------
+    database : SignatureDatabase
+        What was searched.
+    method : Method or LikelihoodMethod
+        What answered.
+    spec : QuerySpec
+        Which queries were asked.
+    scored : DataFrame
+        All of them, as `score_queries` gives them.
+    top : int
+        How many best candidates counted.
+    city : str, optional
+        The city that was looked at, if not the one that was searched.
+    file_bytes : int, optional
+        Size of the files of the database.
+
+    Returns
+    -------
+    Evaluation
+        The queries, the settings and the mean time a query.
+    """
+    points = gpd.points_from_xy(scored["x"], scored["y"], crs=database.crs)
+    seconds = scored["seconds"].to_numpy(dtype=np.float64)
+    timed = seconds[~np.isnan(seconds)]
     return Evaluation(
-        queries=_query_table(database, cells, asked, outcomes),
-        method=method if isinstance(method, Method) else LikelihoodMethod(noise=method.noise),
-        distortion=chosen_distortion,
+        queries=gpd.GeoDataFrame(scored[list(QUERY_COLUMNS)], geometry=points),
+        method=method,
+        asked=spec,
+        city=city,
         top=top,
-        seed=seed,
-        seconds_per_query=seconds / len(truths) if truths else 0.0,
-        database=_database_summary(database),
-        versions=_versions(),
+        seconds_per_query=float(timed.mean()) if timed.size else 0.0,
+        database=_database_summary(database, file_bytes),
+        versions=versions(),
     )
 
 
-def _outcome(
-    database: SignatureDatabase, scores: NDArray[np.float32], *, cell: int, top: int, pick: float
-) -> dict[str, Any]:
-    """Return the columns that depend on the scores; `pick` in [0, 1) chooses among ties."""
-    better, tied = top_candidates(scores, top)
-    expected, within = expected_best(
-        _errors(database, cell, better), _errors(database, cell, tied), slots=top - len(better)
-    )
-    best = better[scores[better] == scores[better].min()] if len(better) else tied
-    shown = best[int(pick * len(best))]
-    x, y = database.xy[shown].tolist()
-    low, high = rank_range(scores, cell)
-    return {
-        "best_cell_id": int(cell_ids(database.columns[shown], database.rows[shown])),
-        "best_x": x,
-        "best_y": y,
-        "distance": float(scores[shown]),
-        "tied": len(best),
-        "error_m": expected,
-        **{f"p{t}": float(p) for t, p in zip(THRESHOLDS, within, strict=True)},
-        "rank_low": low,
-        "rank_high": high,
-    }
+def check_count(what: str, count: int, cells: int) -> None:
+    """Refuse a number of queries or candidates that the database does not have.
 
+    Parameters
+    ----------
+    what : str
+        What is counted.
+    count : int
+        How many.
+    cells : int
+        How many cells there are.
 
-def _unlocalized(cells: int) -> dict[str, Any]:
-    """Return the same columns for a query that had nothing to compare."""
-    return {
-        "best_cell_id": None,
-        "best_x": math.nan,
-        "best_y": math.nan,
-        "distance": math.inf,
-        "tied": 0,
-        "error_m": math.inf,
-        **{f"p{t}": 0.0 for t in THRESHOLDS},
-        "rank_low": cells,
-        "rank_high": cells,
-        **_UNTOLD,
-    }
-
-
-def _errors(
-    database: SignatureDatabase, cell: int, others: NDArray[np.intp]
-) -> NDArray[np.float64]:
-    """Return the distances of other cells from one, in metres."""
-    # From whole cell numbers, so that a cell 50 m away is not a rounding beyond 50 m.
-    columns = database.columns[others].astype(np.int64) - int(database.columns[cell])
-    rows = database.rows[others].astype(np.int64) - int(database.rows[cell])
-    return np.asarray(database.grid.step * np.sqrt(columns**2 + rows**2))
-
-
-def _check_count(what: str, count: int, cells: int) -> None:
-    """Refuse a number of queries or candidates that the database does not have."""
+    Raises
+    ------
+    InputError
+        If the number is not between 1 and that of the cells.
+    """
     if not 1 <= count <= cells:
         msg = (
             f"{count} {what} were asked for; give a number from 1 to {cells}, the number of cells."
@@ -215,79 +280,118 @@ def _check_count(what: str, count: int, cells: int) -> None:
         raise InputError(msg)
 
 
-def _distorted(
-    database: SignatureDatabase, cells: NDArray[np.int64], distortion: Distortion, seed: int
-) -> tuple[list[Signature], list[float]]:
-    """Return the distorted signature of each cell, and a chance to pick among ties by."""
-    classes = database.present_codes
-    weights = database.occurrences[classes]
-    asked: list[Signature] = []
-    picks: list[float] = []
-    for number, cell in enumerate(cells.tolist()):
-        # Its own generator, so that no query depends on what happened to another.
-        rng = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(number,)))
-        true = database.signature(cell)
-        asked.append(distort(true, distortion, classes=classes, weights=weights, rng=rng))
-        picks.append(float(rng.random()))
-    return asked, picks
+def versions() -> dict[str, str]:
+    """Return the versions that decide the figures and their speed.
+
+    Returns
+    -------
+    dict of str to str
+        Versions by name.
+    """
+    parts = {name: metadata.version(name) for name in ("numpy", "pandas", "rapidfuzz")}
+    return {"semsig_gis": __version__, "python": platform.python_version(), **parts}
 
 
-def _by_distance(
-    database: SignatureDatabase, queries: Sequence[Signature], method: Method
-) -> Iterator[_Answer]:
-    """Yield the distances of each query to all cells."""
-    if not queries:
-        return
-    # What the database works out once and keeps is no part of the time of a query.
-    next(iter(score_cells(database, queries[:1], method)))
-    rows = iter(score_cells(database, queries, method))
-    for _ in queries:
-        start = time.perf_counter()
-        scores = next(rows)
-        yield scores, _UNTOLD, time.perf_counter() - start
+def _chain(
+    distortion: str | QueryDistortion | Sequence[QueryDistortion],
+) -> tuple[QueryDistortion, ...]:
+    if isinstance(distortion, str):
+        return parse_chain(distortion)
+    return (distortion,) if isinstance(distortion, QueryDistortion) else tuple(distortion)
 
 
-def _by_likelihood(
-    index: LikelihoodIndex, truths: Sequence[tuple[int, Signature]]
-) -> Iterator[_Answer]:
-    """Yield scores for each true cell and its query: the answer lowest, the likeliest next."""
-    if truths:
-        _located(index, truths[0][1])  # kernels are loaded once
-    for cell, query in truths:
-        start = time.perf_counter()
-        loglik, found, answer, chance = _located(index, query)
-        seconds = time.perf_counter() - start
-        tied = _places_like(found, answer, chance)
-        right = (_errors(index.database, cell, tied) <= SUCCESS_METRES).mean()
-        told = {
-            "distance": -float(loglik[answer]),
-            "chance": chance,
-            "right": float(right),
-            "in_region": _in_region(found, cell),
-        }
-        scores = -loglik.astype(np.float32)
-        scores[tied] = scores.min() - 1.0
-        yield scores, told, seconds
+def _told(database: SignatureDatabase, query: Query, answer: RankedAnswer) -> dict[str, Any]:
+    """Return the columns that do not depend on how many candidates count."""
+    scores = answer.scores
+    low, high = rank_range(scores, query.cell) if query.cell >= 0 else (len(scores),) * 2
+    found = answer.posterior
+    off = math.nan
+    if answer.heading is not None:
+        off = float(angular_distance(answer.heading, query.asked.heading))
+    return {
+        "distance": answer.best_score,
+        "rank_low": low,
+        "rank_high": high,
+        "chance": answer.chance,
+        "in_region": math.nan if found is None else _in_region(found, query.cell),
+        "heading_error": off,
+        "seconds": answer.seconds,
+        **_shown(database, query, answer),
+    }
 
 
-def _located(
-    index: LikelihoodIndex, query: Signature
-) -> tuple[NDArray[np.floating], Posterior, int, float]:
-    """Return the log-likelihoods and chances of all cells, the answer and its chance."""
-    loglik = rerank(index, query, index.scores(query)).loglik
-    found = posterior(index.database, loglik)
-    return loglik, found, *found.best_place(SUCCESS_METRES)
+def _shown(database: SignatureDatabase, query: Query, answer: RankedAnswer) -> dict[str, Any]:
+    """Return the best candidate, or one of equals."""
+    best = np.flatnonzero(answer.scores == answer.scores.min())
+    shown = best[int(query.pick * len(best))]
+    x, y = database.xy[shown].tolist() if answer.place is None else answer.place
+    return {
+        "best_cell_id": int(cell_ids(database.columns[shown], database.rows[shown])),
+        "best_x": x,
+        "best_y": y,
+        "tied": len(best),
+    }
 
 
-def _places_like(found: Posterior, answer: int, chance: float) -> NDArray[np.intp]:
-    """Return the cells that might have been the answer as well, and the answer."""
-    alike = np.flatnonzero(found.chances == found.chances[answer])
-    same = np.round(found.mass_within(SUCCESS_METRES, alike), 9) == chance
-    return np.asarray(alike[same])
+class _Pool:
+    """The best cells of an answer with all that tie with the last of them, and their errors."""
+
+    def __init__(
+        self, database: SignatureDatabase, query: Query, answer: RankedAnswer, count: int
+    ) -> None:
+        cells = best_cells(answer.scores, min(count, len(database)))
+        places = database.xy[cells]
+        self.scores = answer.scores[cells]
+        if answer.place is not None:
+            places[self.scores.argmin()] = answer.place
+        # So that a cell 50 m away is not a rounding beyond 50 m.
+        self.errors = np.round(np.hypot(*(places - np.array(query.xy)).T), 6)
+        self.better = self.tied = np.empty(0)
+
+    def best(self, count: int, thresholds: Sequence[float]) -> tuple[float, NDArray[np.float64]]:
+        """Return what to expect of the smallest error among the best."""
+        slots = min(count, len(self.scores)) - len(self.better)
+        if not 0 < slots <= len(self.tied):  # else the cut is among the same cells as before
+            better, tied = top_candidates(self.scores, min(count, len(self.scores)))
+            self.better, self.tied = self.errors[better], np.sort(self.errors[tied])
+            slots = min(count, len(self.scores)) - len(better)
+        return expected_best(self.better, self.tied, slots=slots, thresholds=thresholds)
+
+
+def _outcome(pool: _Pool, top: int) -> dict[str, Any]:
+    """Return the columns that depend on how many candidates count."""
+    expected, within = pool.best(top, THRESHOLDS)
+    chances = {f"p{t}": float(p) for t, p in zip(THRESHOLDS, within, strict=True)}
+    return {"error_m": expected, **chances}
+
+
+def _near(pool: _Pool, *, judged: bool) -> dict[str, float]:
+    """Return the chances that one of the best places is near, and that the answer is right."""
+    near = {f"near{count}": float(pool.best(count, [NEAR_METRES])[1][0]) for count in NEAR_PLACES}
+    right = float(pool.best(1, [SUCCESS_METRES])[1][0]) if judged else math.nan
+    return {**near, "right": right}
+
+
+def _unlocalized(cells: int) -> dict[str, Any]:
+    """Return the same columns for a query that had nothing to compare."""
+    untold = ("chance", "right", "in_region", "heading_error", "seconds", "best_x", "best_y")
+    return {
+        "best_cell_id": None,
+        "distance": math.inf,
+        "tied": 0,
+        "error_m": math.inf,
+        **{f"p{t}": 0.0 for t in THRESHOLDS},
+        **{f"near{count}": 0.0 for count in NEAR_PLACES},
+        "rank_low": cells,
+        "rank_high": cells,
+        **dict.fromkeys(untold, math.nan),
+    }
 
 
 def _in_region(found: Posterior, cell: int) -> float:
     """Return the probability that a cell is in the region, whose last cell is one of equals."""
+    if cell < 0:
+        return 0.0
     region = found.credible_cells(REGION_SHARE)
     least, own = found.chances[region[-1]], found.chances[cell]
     if own != least:
@@ -295,44 +399,40 @@ def _in_region(found: Posterior, cell: int) -> float:
     return float((found.chances[region] == least).sum() / (found.chances == least).sum())
 
 
-def _query_table(
-    database: SignatureDatabase,
-    cells: NDArray[np.int64],
-    asked: Sequence[Signature],
-    outcomes: Sequence[Mapping[str, Any]],
-) -> gpd.GeoDataFrame:
-    """Return one row a query."""
-    table = pd.DataFrame(
+def _query_table(database: SignatureDatabase, queries: Sequence[Query]) -> pd.DataFrame:
+    """Return what was asked, and the truth, one row a query."""
+    cells = np.array([one.cell for one in queries], np.int64)
+    known = cells >= 0
+    places = np.array([one.xy for one in queries], np.float64).reshape(-1, 2)
+    return pd.DataFrame(
         {
+            "seed": np.array([one.seed for one in queries], np.int64),
+            "number": np.array([one.number for one in queries], np.int64),
             "cell": cells,
-            "cell_id": database.cell_ids[cells],
-            "types": [database.types(cell) for cell in cells.tolist()],
-            "length": database.lengths[cells].astype(np.int64),
-            "type_group": database.type_group_sizes[cells],
-            "angle_group": database.angle_group_sizes[cells],
-            "query_types": [
-                "" if one.codes is None else database.taxonomy.decode(one.codes) for one in asked
-            ],
-            "query_bearings": [_bearing_text(one) for one in asked],
-            "query_length": [len(one) for one in asked],
+            "cell_id": cell_ids(*database.grid.cells_at(places)),
+            "types": [database.types(cell) if cell >= 0 else "" for cell in cells.tolist()],
+            "length": np.array([one.length for one in queries], np.int64),
+            "type_group": np.where(known, database.type_group_sizes[cells], 0),
+            "angle_group": np.where(known, database.angle_group_sizes[cells], 0),
+            "query_types": [database.taxonomy.decode(one.asked.codes) for one in queries],
+            "query_bearings": [_bearing_text(one.asked.bearings) for one in queries],
+            "query_length": np.array([len(one.asked) for one in queries], np.int64),
+            "heading": np.array([one.asked.heading for one in queries], np.float64),
+            "x": places[:, 0],
+            "y": places[:, 1],
         }
     )
-    scored = pd.DataFrame(list(outcomes)).astype({"best_cell_id": "Int64"})
-    places = database.xy[cells]
-    points = gpd.points_from_xy(places[:, 0], places[:, 1], crs=database.crs)
-    return gpd.GeoDataFrame(pd.concat([table, scored], axis=1), geometry=points)
 
 
-def _bearing_text(signature: Signature) -> str:
+def _bearing_text(bearings: NDArray[np.float64]) -> str:
     """Return bearings as the command line takes them, to a tenth of a degree."""
-    if signature.bearings is None:
-        return ""
-    tenths = np.floor(signature.bearings * 10.0) / 10.0  # down, so that none becomes 360
+    tenths = np.floor(bearings * 10.0) / 10.0  # down, so that none becomes 360
     return ",".join(f"{value:.1f}" for value in tenths)
 
 
-def _database_summary(database: SignatureDatabase) -> dict[str, Any]:
+def _database_summary(database: SignatureDatabase, file_bytes: int | None) -> dict[str, Any]:
     """Return what identifies a database, as plain values."""
+    covered = len(database) * database.grid.step**2 / 1e6
     return {
         "cells": len(database),
         "mean_length": float(database.lengths.mean()),
@@ -342,10 +442,5 @@ def _database_summary(database: SignatureDatabase) -> dict[str, Any]:
         "levels": int(database.spec.levels),
         "crs": database.crs.to_string(),
         "version": database.version,
+        "mb_per_km2": None if file_bytes is None else file_bytes / 1e6 / covered,
     }
-
-
-def _versions() -> dict[str, str]:
-    """Return the versions that decide the figures and their speed."""
-    parts = {name: metadata.version(name) for name in ("numpy", "pandas", "rapidfuzz")}
-    return {"semsig_gis": __version__, "python": platform.python_version(), **parts}

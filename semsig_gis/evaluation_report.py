@@ -5,23 +5,47 @@ The same numbers as plain values are in `Evaluation.summary`.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from dataclasses import replace
+from typing import TYPE_CHECKING, get_args
 
 import numpy as np
 
+from semsig_gis.distortion import DISTORTIONS, FalseClass
+from semsig_gis.distortion_chain import chain_text
+from semsig_gis.evaluation_figures import percentile
 from semsig_gis.locating import DEFAULT_RULE
 from semsig_gis.method import Method
 from semsig_gis.paper_figures import PARIS, PARIS_ACCURACY, PARIS_STEP_M
+from semsig_gis.scoring import NEAR_METRES, NEAR_PLACES
 from semsig_gis.tables import Table
 
 if TYPE_CHECKING:
+    import pandas as pd
+
     from semsig_gis.evaluation import Evaluation
 
 __all__ = ["evaluation_markdown", "evaluation_tables"]
 
 
-def evaluation_tables(evaluation: Evaluation) -> tuple[Table, Table, Table]:
-    """Return the settings, the figures and the figures by signature length of an evaluation.
+_FIGURES = {
+    **{f"p{metres}": f"P(error ≤ {metres} m)" for metres in (5, 10, 25, 50, 100)},
+    **{f"recall{percent}": f"recall@{percent} %" for percent in (1, 10)},
+    **{f"near{count}": f"recall@{count} within {NEAR_METRES} m" for count in NEAR_PLACES},
+    "coverage": f"Answered, with a chance of {DEFAULT_RULE.threshold:g} or more",
+    "precision": "Right answers, of these",
+    "in_region": "True cell in the region of 90 %",
+}
+_GROUPED = {
+    **{f"p{metres}": f"P(≤ {metres} m)" for metres in (10, 25, 50, 100)},
+    **{f"recall{percent}": f"recall@{percent} %" for percent in (1, 10)},
+    "coverage": "Answered",
+    "precision": "Right",
+    "in_region": "In region",
+}
+
+
+def evaluation_tables(evaluation: Evaluation) -> tuple[Table, ...]:
+    """Return the settings and the figures of an evaluation, in all and group by group.
 
     Parameters
     ----------
@@ -31,8 +55,9 @@ def evaluation_tables(evaluation: Evaluation) -> tuple[Table, Table, Table]:
     Returns
     -------
     tuple of Table
-        Settings, figures and figures by length. The paper's figures stand beside ours only
-        where it published them for these settings.
+        Settings, figures, figures by length and by ambiguity; of the likelihood method, also
+        what stated chances are worth. The paper's figures stand beside ours only where it
+        published them for these settings.
 
     Examples
     --------
@@ -47,7 +72,15 @@ def evaluation_tables(evaluation: Evaluation) -> tuple[Table, Table, Table]:
     >>> evaluation_tables(evaluation)[0].rows[0]
     ('Method', 'edit+edit')
     """
-    return _setting_table(evaluation), _figure_table(evaluation), _length_table(evaluation)
+    tables = (
+        _setting_table(evaluation),
+        _figure_table(evaluation),
+        _group_table(evaluation.by_length(), "By length of the true signature", "Objects"),
+        _group_table(evaluation.by_ambiguity(), "By ambiguity", "Cells of the same types"),
+    )
+    if evaluation.queries["chance"].isna().all():
+        return tables
+    return (*tables, _chance_table(evaluation), _rule_table(evaluation))
 
 
 def evaluation_markdown(evaluation: Evaluation) -> str:
@@ -81,109 +114,138 @@ def evaluation_markdown(evaluation: Evaluation) -> str:
 
 
 def _setting_table(evaluation: Evaluation) -> Table:
-    distortion, database = evaluation.distortion, evaluation.database
+    asked, database = evaluation.asked, evaluation.database
+    megabytes = database["mb_per_km2"]
     rows = (
         ("Method", str(evaluation.method)),
         ("Best candidates that count (t)", f"{evaluation.top:,}"),
-        ("Distortion", f"{distortion.name}, {distortion.occurrences} occurrences"),
-        (
-            "Bearing noise",
-            f"{distortion.bearing_sigma:g}°, at most {distortion.bearing_clip:g}°"
-            if distortion.bearing_sigma
-            else "none",
-        ),
-        ("After the noise", "sorted again" if distortion.resort else "order kept"),
-        (
-            "Class of a false object",
-            "by frequency" if distortion.false_class == "frequency" else "uniform",
-        ),
+        ("Distortions", chain_text(asked.distortions) or "none"),
         ("Queries", f"{len(evaluation.queries):,}"),
-        ("Seed", str(evaluation.seed)),
+        ("Seen from", asked.seen_from if evaluation.city is None else _elsewhere(evaluation)),
+        ("Seeds", ", ".join(map(str, asked.seeds))),
         ("Cells", f"{database['cells']:,}"),
         ("Mean length", f"{database['mean_length']:.3f} objects"),
         ("Visibility range", f"{database['radius_m']:g} m"),
         ("Grid step", f"{database['step_m']:g} m"),
         ("Angle levels", str(database["levels"])),
+        *((("Size", f"{megabytes:.3f} MB a km²"),) if megabytes is not None else ()),
     )
     return Table(title="Settings", columns=("Setting", "Value"), rows=rows)
 
 
+def _elsewhere(evaluation: Evaluation) -> str:
+    return f"{evaluation.asked.seen_from} of {evaluation.city}"
+
+
 def _figure_table(evaluation: Evaluation) -> Table:
-    results = evaluation.summary()["results"]
+    """Return the figures, the paper's beside those that it has."""
+    means = evaluation.means()
     p50, recall10 = _paris_accuracy(evaluation)
-    median = results["median_error_m"]
+    theirs = {"p50": p50, "recall10": recall10}
     rows = [
-        (
-            f"P(error ≤ {x} m)",
-            f"{results['p_error_within_m'][x]:.4f}",
-            f"{p50:.4f}" if x == "50" and p50 is not None else "",
-        )
-        for x in ("10", "25", "50", "100")
+        (said, *_shares(means, name), _share(theirs.get(name)))
+        for name, said in _FIGURES.items()
+        if name in means.index
     ]
+    errors = evaluation.queries["error_m"].to_numpy(dtype=np.float64)
+    turns = evaluation.queries["heading_error"].to_numpy(dtype=np.float64)
     rows += [
-        (
-            f"recall@{k} %",
-            f"{results['recall_at_percent'][k]:.4f}",
-            f"{recall10:.4f}" if k == "10" and recall10 is not None else "",
-        )
-        for k in ("1", "10")
+        ("Median error", *_amounts(percentile(errors, 50), "m"), ""),
+        ("90th percentile of the error", *_amounts(percentile(errors, 90), "m"), ""),
     ]
+    if not np.isnan(turns).all():
+        rows.append(("Median error of the heading", *_amounts(percentile(turns, 50), "°"), ""))
+    seconds = evaluation.seconds_per_query
     rows += [
-        ("Median error", "infinite" if median is None else f"{median:,.1f} m", ""),
-        ("Successful queries", f"{results['successful']:.4f}", ""),
-        ("Unlocalized queries", f"{results['unlocalized']:,}", ""),
-        ("Seconds a query", f"{results['seconds_per_query']:.4f}", ""),
-    ]
-    said = {
-        "coverage": f"Answered, with a chance of {DEFAULT_RULE.threshold:g} or more",
-        "precision": "Right answers, of these",
-        "in_region": "True cell in the region of 90 %",
-    }
-    rows += [
-        (said[name], "" if np.isnan(value) else f"{value:.4f}", "")
-        for name, value in evaluation.answers().items()
+        ("Successful queries", f"{evaluation.successful.mean():.4f}", "", ""),
+        ("Unlocalized queries", f"{evaluation.unlocalized:,}", "", ""),
+        ("Seconds a query", _share(None if np.isnan(seconds) else seconds), "", ""),
     ]
     ties = (
         "Ties are scored by expectation. A query is successful when its error is at most 50 m "
         "with probability 0.5 or more."
     )
     paris = "" if p50 is None else " The paper's figures are for another city, Paris."
+    columns = ("Figure", "Ours", "95 %")
     return Table(
         title="Figures",
-        columns=("Figure", "Ours", PARIS) if p50 is not None else ("Figure", "Ours"),
-        rows=tuple(row if p50 is not None else row[:2] for row in rows),
+        columns=columns if p50 is None else (*columns, PARIS),
+        rows=tuple(row[:3] if p50 is None else row for row in rows),
         note=ties + paris,
     )
 
 
-def _length_table(evaluation: Evaluation) -> Table:
-    titles = {
-        **{f"p{metres}": f"P(≤ {metres} m)" for metres in (10, 25, 50, 100)},
-        **{f"recall{percent}": f"recall@{percent} %" for percent in (1, 10)},
-        "coverage": "Answered",
-        "precision": "Right",
-        "in_region": "In region",
-    }
-    by_length = evaluation.by_length()
-    figures = [name for name in titles if name in by_length]
+def _share(value: float | None) -> str:
+    return "" if value is None or np.isnan(value) else f"{value:.4f}"
+
+
+def _shares(means: pd.DataFrame, name: str) -> tuple[str, str]:
+    """Return a mean and its interval."""
+    value, low, high = (float(means[part][name]) for part in ("value", "low", "high"))
+    return _share(value), "" if np.isnan(value) else f"{low:.4f} to {high:.4f}"
+
+
+def _amounts(values: tuple[float, float, float], unit: str) -> tuple[str, str]:
+    """Return a percentile and its interval."""
+    value, low, high = ("infinite" if np.isinf(one) else f"{one:,.1f}" for one in values)
+    blank = "" if unit == "°" else " "
+    shown = value if value == "infinite" else f"{value}{blank}{unit}"
+    return shown, f"{low} to {high}"
+
+
+def _group_table(found: pd.DataFrame, title: str, heading: str) -> Table:
+    """Return figures group by group."""
+    figures = [name for name in _GROUPED if name in found]
     rows = tuple(
         (
-            row["length"],
+            str(row[found.columns[0]]),
             f"{row['n']:,}",
-            *("" if np.isnan(row[name]) else f"{row[name]:.4f}" for name in figures),
+            *(_share(row[name]) for name in figures),
         )
-        for row in by_length.to_dict("records")
+        for row in found.to_dict("records")
     )
     return Table(
-        title="By length of the true signature",
-        columns=("Objects", "Queries", *(titles[name] for name in figures)),
+        title=title,
+        columns=(heading, "Queries", *(_GROUPED[name] for name in figures)),
         rows=rows,
     )
 
 
+def _chance_table(evaluation: Evaluation) -> Table:
+    """Return what stated chances are worth."""
+    rows = tuple(
+        (
+            f"{row['from']:g} to {row['to']:g}",
+            f"{row['n']:,}",
+            _share(row["stated"]),
+            _share(row["true"]),
+            "" if np.isnan(row["true"]) else f"{row['low']:.4f} to {row['high']:.4f}",
+        )
+        for row in evaluation.calibration().to_dict("records")
+    )
+    columns = ("Chance stated", "Queries", "Its mean", "Came true", "95 %")
+    return Table(title="Stated chances", columns=columns, rows=rows)
+
+
+def _rule_table(evaluation: Evaluation) -> Table:
+    """Return what each rule of answering gives."""
+    rows = tuple(
+        (
+            f"{row['threshold']:g}",
+            f"{row['answered']:,}",
+            _share(row["coverage"]),
+            _share(row["precision"]),
+            "" if np.isnan(row["precision"]) else f"{row['low']:.4f} to {row['high']:.4f}",
+        )
+        for row in evaluation.coverage_curve().to_dict("records")
+    )
+    columns = ("Answered from a chance of", "Answers", "Coverage", "Right", "95 %")
+    return Table(title="Coverage and precision", columns=columns, rows=rows)
+
+
 def _paris_accuracy(evaluation: Evaluation) -> tuple[float | None, float | None]:
     """Return the paper's P(error <= 50 m) and recall@10 % if it ran these settings."""
-    method, distortion, database = evaluation.method, evaluation.distortion, evaluation.database
+    method, asked, database = evaluation.method, evaluation.asked, evaluation.database
     # The paper does not say whether it normalised, sorted again or drew classes by frequency.
     same_method = (
         isinstance(method, Method)
@@ -191,11 +253,12 @@ def _paris_accuracy(evaluation: Evaluation) -> tuple[float | None, float | None]
         and method.weights.as_tuple() == (1, 1, 1)
         and evaluation.top == 1
     )
-    same_noise = (
-        distortion.occurrences,
-        distortion.bearing_sigma,
-        distortion.bearing_clip,
-    ) == (7, 5.0, 30.0)
+    medium = DISTORTIONS["medium"]
+    same_noise = asked.seen_from == "cells" and any(
+        asked.distortions == (replace(medium, resort=resort, false_class=false_class),)
+        for resort in (True, False)
+        for false_class in get_args(FalseClass)
+    )
     if not (same_method and same_noise and database["step_m"] == PARIS_STEP_M):
         return None, None
     key = (database["radius_m"], database["levels"])

@@ -5,10 +5,9 @@ Every figure is an expectation over all orders of the tied cells.
 
 from __future__ import annotations
 
-import dataclasses
 import json
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -17,13 +16,25 @@ import numpy as np
 import pandas as pd
 import pyarrow as pa
 
-from semsig_gis.distortion import Distortion
+from semsig_gis.distortion_chain import chain_text
 from semsig_gis.errors import DatabaseError, InputError
-from semsig_gis.locating import DEFAULT_RULE
-from semsig_gis.method import LikelihoodMethod, Method
-from semsig_gis.metrics import EditWeights
-from semsig_gis.noise import noise_from_dict
-from semsig_gis.scoring import THRESHOLDS, expected_recall
+from semsig_gis.evaluation_figures import (
+    AMBIGUITIES,
+    LENGTHS,
+    ambiguity_labels,
+    calibration_bins,
+    coverage_curve,
+    district_labels,
+    figure_means,
+    grouped_means,
+    length_labels,
+    percentile,
+    plain_records,
+    query_figures,
+)
+from semsig_gis.evaluation_settings import machine, settings_from_dict, settings_to_dict
+from semsig_gis.method import LikelihoodMethod
+from semsig_gis.scoring import NEAR_PLACES, THRESHOLDS, expected_recall
 from semsig_gis.storage import geo_metadata, read_geoparquet, whole_file, write_geoparquet
 
 if TYPE_CHECKING:
@@ -31,24 +42,29 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-__all__ = ["SUCCESS_METRES", "SUCCESS_PROBABILITY", "Evaluation"]
+    from semsig_gis.method import Method
+    from semsig_gis.queries import QuerySpec
+
+__all__ = ["QUERY_COLUMNS", "SUCCESS_METRES", "SUCCESS_PROBABILITY", "Evaluation"]
 
 SUCCESS_METRES = 50
 SUCCESS_PROBABILITY = 0.5
 
-_HEADLINE = (10, 25, 50, 100)
 _RECALLS = (1, 10)
-_LENGTHS = ((1, 4), (5, 9), (10, 19), (20, None))
 _KIND = "localization evaluation"
-_COLUMNS = (
-    *("cell", "cell_id", "types", "length", "type_group", "angle_group"),
-    *("query_types", "query_bearings", "query_length"),
+QUERY_COLUMNS = (
+    *("seed", "number", "cell", "cell_id", "types", "length", "type_group", "angle_group"),
+    *("query_types", "query_bearings", "query_length", "heading"),
     *("best_cell_id", "best_x", "best_y", "distance", "tied", "error_m"),
     *(f"p{threshold}" for threshold in THRESHOLDS),
-    *("rank_low", "rank_high", "chance", "right", "in_region", "geometry"),
+    *(f"near{count}" for count in NEAR_PLACES),
+    *("rank_low", "rank_high", "chance", "right", "in_region", "heading_error"),
 )
+"""Columns of the table of queries, in their order; ``geometry`` comes last."""
+
 _QUERIES_FILE = "queries.parquet"
 _SUMMARY_FILE = "evaluation.json"
+_TIMING_FILE = "timing.json"
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -58,41 +74,54 @@ class Evaluation:
     Parameters
     ----------
     queries : GeoDataFrame
-        One row a query, in the database's CRS; `geometry` is the true viewpoint.
+        One row a query, in the database's CRS; `geometry` is the true place.
 
-        - ``cell``, ``cell_id``: row number in the database and id of the true cell;
-        - ``types``, ``length``: its symbols and how many there are;
-        - ``type_group``, ``angle_group``: cells with its type and with its angle sequence;
+        - ``seed``, ``number``: its seed, and its number from 0;
+        - ``cell``, ``cell_id``: row number in the database and id of the cell of that place; the
+          row number is -1 where the database has no such cell;
+        - ``types``: the symbols that the database says are seen there; ``length``: how many
+          objects really are;
+        - ``type_group``, ``angle_group``: cells with its type and with its angle sequence, 0
+          where the database has no such cell;
         - ``query_types``, ``query_bearings``, ``query_length``: what was asked: symbols, degrees
-          (text, comma-separated) and how many there are;
-    @@
+          (text, comma-separated) and how many there are; ``heading``: degrees to add to the
+          bearings to have them from true north;
+        - ``best_cell_id``, ``best_x``, ``best_y``, ``distance``: the best candidate, drawn from
+          the tied when several share the best score; missing when unlocalized. Of the likelihood
+          method it is the answer, and the distance its negative log-likelihood; where the place
+          was refined, it is the place in the cell;
         - ``tied``: cells that share the best score, 0 when unlocalized;
         - ``error_m``: expected smallest error among the top t in metres, infinite when
           unlocalized;
         - ``p0``, ``p5``, ... (`THRESHOLDS`): probability that this error is at most so many
           metres;
+        - ``near1``, ``near5``, ...: probability that one of the N best cells (the answer first)
+          is at most 25 m away;
         - ``rank_low``, ``rank_high``: first and last rank that ties allow for the true cell, from
-          1; both the number of cells when unlocalized;
+          1; both the number of cells when unlocalized or when the database has no such cell;
         - ``chance``: by the likelihood method's own account, that its answer is right, within
           50 m; missing for other methods and when unlocalized, as the next two;
         - ``right``: probability that its answer was right;
         - ``in_region``: probability that its region of 90 % held the true cell; between 0 and 1
-          only where the true cell ties with the last of the region.
+          only where the true cell ties with the last of the region;
+        - ``heading_error``: by how many degrees the heading was off, where it was looked for.
     method : Method or LikelihoodMethod
         What ranked the cells.
-    distortion : Distortion
-        What was done to the queries.
+    asked : QuerySpec
+        Which queries were asked, and what happened to them.
+    city : str, optional
+        The city that was looked at, if not the one that was searched.
     top : int
         How many best candidates count (t).
-    seed : int
-        Seed of the sample and of all chances.
     seconds_per_query : float
-        Mean time of scoring all cells, without distortion and statistics.
+        Mean time of an answer, without distortion and statistics; NaN where it is not known.
     database : mapping
         What was searched, as plain values: ``cells``, ``mean_length``, ``step_m``, ``origin``,
-        ``radius_m``, ``levels``, ``crs``, ``version``.
+        ``radius_m``, ``levels``, ``crs``, ``version``, ``mb_per_km2`` (or None).
     versions : mapping
         Versions of the software by name.
+    machine : mapping
+        What it ran on (see `semsig_gis.evaluation_settings.machine`).
 
     Notes
     -----
@@ -114,12 +143,18 @@ class Evaluation:
 
     queries: gpd.GeoDataFrame
     method: Method | LikelihoodMethod
-    distortion: Distortion
+    asked: QuerySpec
     top: int
-    seed: int
     seconds_per_query: float
     database: Mapping[str, Any]
     versions: Mapping[str, str]
+    city: str | None = None
+    machine: Mapping[str, Any] = field(default_factory=machine)
+
+    @property
+    def figures(self) -> pd.DataFrame:
+        """What each query adds to each figure (see `semsig_gis.evaluation_figures`)."""
+        return query_figures(self.queries, cells=self.database["cells"])
 
     @property
     def successful(self) -> NDArray[np.bool_]:
@@ -176,31 +211,68 @@ class Evaluation:
         InputError
             If the percentage is out of range.
         """
-        return float(self._recalls(percent).mean())
+        ranks = self.queries["rank_low"], self.queries["rank_high"]
+        chances = expected_recall(*ranks, cells=self.database["cells"], percent=percent)
+        return float(chances.mean())
 
-    def by_length(self) -> pd.DataFrame:
-        """Return the figures by the length of the true signature.
+    def means(self) -> pd.DataFrame:
+        """Return all figures that are shares of queries.
 
         Returns
         -------
         DataFrame
-            One row a range of lengths: ``length`` (text), ``n``, ``p10``, ``p25``, ``p50``,
-            ``p100``, ``recall1``, ``recall10``, and, of the likelihood method, ``coverage``,
-            ``precision`` and ``in_region`` (see `answers`). NaN where there is no query to tell.
+            By figure ``value``, ``low`` and ``high`` (95 %) and ``n`` (see
+            `semsig_gis.evaluation_figures.query_figures`).
         """
-        lengths = self.queries["length"].to_numpy()
-        figures = {f"p{x}": self.queries[f"p{x}"].to_numpy() for x in _HEADLINE}
-        figures |= {f"recall{k}": self._recalls(k) for k in _RECALLS}
-        figures |= self._answers()
-        rows: list[dict[str, Any]] = []
-        for low, high in _LENGTHS:
-            chosen = (lengths >= low) & (lengths <= (math.inf if high is None else high))
-            row: dict[str, Any] = {
-                "length": f"{low}+" if high is None else f"{low}-{high}",
-                "n": int(chosen.sum()),
-            }
-            rows.append(row | {name: _mean(values[chosen]) for name, values in figures.items()})
-        return pd.DataFrame(rows)
+        return figure_means(self.figures)
+
+    def by_length(self) -> pd.DataFrame:
+        """Return the figures by how many objects are really seen.
+
+        Returns
+        -------
+        DataFrame
+            One row a range: ``length`` (text), ``n``, the figures, ``p50_low`` and ``p50_high``.
+            NaN where there is no query to tell.
+        """
+        return self._grouped(length_labels(self.queries), by="length", ranges=LENGTHS)
+
+    def by_ambiguity(self) -> pd.DataFrame:
+        """Return the figures by how many cells have the types of the true one.
+
+        Returns
+        -------
+        DataFrame
+            One row a range: ``cells_alike`` (text), ``n``, the figures, ``p50_low``,
+            ``p50_high``; first comes ``"0"`` where some true cells are not in the database.
+        """
+        labels = ambiguity_labels(self.queries)
+        return self._grouped(labels, by="cells_alike", ranges=AMBIGUITIES)
+
+    def by_district(self, districts: gpd.GeoDataFrame, name: str) -> pd.DataFrame:
+        """Return the figures by the district that was seen.
+
+        Parameters
+        ----------
+        districts : GeoDataFrame
+            Polygons in any CRS.
+        name : str
+            Their column that names them.
+
+        Returns
+        -------
+        DataFrame
+            One row a district with queries: ``district``, ``n``, the figures, ``p50_low``,
+            ``p50_high``; ``elsewhere`` for those in none.
+        """
+        labels = district_labels(self.queries, districts, name)
+        order = [*dict.fromkeys(districts[name].astype(str)), "elsewhere"]
+        found = [one for one in order if one in labels]
+        return grouped_means(self.figures, labels, by="district", order=found)
+
+    def _grouped(self, labels: list[str], *, by: str, ranges: Sequence[str]) -> pd.DataFrame:
+        order = [*(["0"] if "0" in labels else []), *ranges]
+        return grouped_means(self.figures, labels, by=by, order=order)
 
     def answers(self) -> dict[str, float]:
         """Return how the likelihood method answers and declines.
@@ -214,7 +286,33 @@ class Evaluation:
             90 % that hold the true cell. NaN where there is no query to tell; empty for other
             methods.
         """
-        return {name: _mean(values) for name, values in self._answers().items()}
+        if not isinstance(self.method, LikelihoodMethod):
+            return {}
+        means = self.means()["value"]
+        return {
+            name: float(means.get(name, math.nan))
+            for name in ("coverage", "precision", "in_region")
+        }
+
+    def coverage_curve(self) -> pd.DataFrame:
+        """Return how many queries are answered, and answered right, rule by rule.
+
+        Returns
+        -------
+        DataFrame
+            See `semsig_gis.evaluation_figures.coverage_curve`.
+        """
+        return coverage_curve(self.queries)
+
+    def calibration(self) -> pd.DataFrame:
+        """Return how often stated chances come true.
+
+        Returns
+        -------
+        DataFrame
+            See `semsig_gis.evaluation_figures.calibration_bins`.
+        """
+        return calibration_bins(self.queries)
 
     def summary(self) -> dict[str, Any]:
         """Return settings, figures and versions as plain values for JSON.
@@ -222,18 +320,21 @@ class Evaluation:
         Returns
         -------
         dict
-            ``settings``, ``database``, ``results`` and ``versions``. No value is infinite or
-            NaN: ``median_error_m`` is None when half of the queries or more are unlocalized, and
-            so are figures without a query to tell.
+            ``settings``, ``database``, ``results``, ``versions`` and ``timing``; all but the last
+            are the same whenever it is repeated. No value is infinite or NaN: an error is None
+            where it is infinite, and a figure where there is no query to tell.
         """
-        median = float(np.median(self.queries["error_m"].to_numpy(dtype=np.float64)))
-        by_length = [_plain(row) for row in self.by_length().to_dict("records")]
+        errors = self.queries["error_m"].to_numpy(dtype=np.float64)
+        turns = self.queries["heading_error"].to_numpy(dtype=np.float64)
+        by_chance = isinstance(self.method, LikelihoodMethod)
         return {
             "settings": {
                 "method": str(self.method),
-                "distortion": dataclasses.asdict(self.distortion),
+                "distortions": [chain_text([one]) for one in self.asked.distortions],
+                "seen_from": self.asked.seen_from,
+                "city": self.city,
                 "top": self.top,
-                "seed": self.seed,
+                "seeds": list(self.asked.seeds),
                 "queries": len(self.queries),
             },
             "database": dict(self.database),
@@ -242,15 +343,28 @@ class Evaluation:
                     str(x): float(value) for x, value in zip(THRESHOLDS, self.cdf(), strict=True)
                 },
                 "recall_at_percent": {str(k): self.recall(k) for k in _RECALLS},
-                "median_error_m": median if math.isfinite(median) else None,
+                "recall_of_best_within_25_m": {
+                    str(count): float(self.queries[f"near{count}"].mean()) for count in NEAR_PLACES
+                },
+                "median_error_m": _plain(percentile(errors, 50)[0]),
+                "p90_error_m": _plain(percentile(errors, 90)[0]),
+                "median_heading_error": _plain(percentile(turns, 50)[0]),
                 "successful": float(self.successful.mean()),
                 "unlocalized": self.unlocalized,
-                **_plain(self.answers()),
-                "seconds_per_query": self.seconds_per_query,
-                "by_length": by_length,
+                **{name: _plain(value) for name, value in self.answers().items()},
+                "intervals": plain_records(self.means().reset_index()),
+                "by_length": plain_records(self.by_length()),
+                "by_ambiguity": plain_records(self.by_ambiguity()),
+                "coverage_curve": plain_records(self.coverage_curve()) if by_chance else [],
+                "calibration": plain_records(self.calibration()) if by_chance else [],
             },
             "versions": dict(self.versions),
+            "timing": self._timing(),
         }
+
+    def _timing(self) -> dict[str, Any]:
+        seconds = _plain(self.seconds_per_query)
+        return {"seconds_per_query": seconds, "machine": dict(self.machine)}
 
     def save(self, folder: str | Path) -> None:
         """Write the evaluation to a folder.
@@ -259,8 +373,9 @@ class Evaluation:
         ----------
         folder : str or Path
             Folder to write to, made when missing. It gets ``queries.parquet`` (GeoParquet, with
-            the settings in its metadata, so that it is enough to load and redraw everything) and
-            ``evaluation.json`` (`summary`, for reading).
+            the settings in its metadata, so that it is enough to load and redraw everything),
+            ``evaluation.json`` (`summary`, for reading) and ``timing.json``, the one file that
+            differs when the same is done again.
 
         Raises
         ------
@@ -273,19 +388,20 @@ class Evaluation:
         table = table.append_column("geometry", pa.array(points.to_wkb()))
         specs = {
             "kind": _KIND,
-            "method": _method_specs(self.method),
-            "distortion": dataclasses.asdict(self.distortion),
+            **settings_to_dict(self.method, self.asked),
+            "city": self.city,
             "top": self.top,
-            "seed": self.seed,
-            "seconds_per_query": self.seconds_per_query,
             "database": dict(self.database),
             "versions": dict(self.versions),
         }
         geo = geo_metadata(points.crs, geometry_types=["Point"], bounds=points.total_bounds)
         write_geoparquet(table, Path(folder) / _QUERIES_FILE, geo=geo, specs=specs)
-        with whole_file(Path(folder) / _SUMMARY_FILE) as partial:
-            text = json.dumps(self.summary(), indent=2, allow_nan=False, ensure_ascii=False)
-            partial.write_text(text + "\n", encoding="utf-8")
+        values = self.summary()
+        timing = values.pop("timing")
+        for name, content in ((_SUMMARY_FILE, values), (_TIMING_FILE, timing)):
+            with whole_file(Path(folder) / name) as partial:
+                text = json.dumps(content, indent=2, allow_nan=False, ensure_ascii=False)
+                partial.write_text(text + "\n", encoding="utf-8")
 
     @classmethod
     def load(cls, folder: str | Path) -> Evaluation:
@@ -307,64 +423,31 @@ class Evaluation:
             If the file is missing, damaged or of another kind.
         """
         file = Path(folder) / _QUERIES_FILE
-        table, specs, crs = read_geoparquet(file, kind=_KIND, columns=list(_COLUMNS))
+        table, specs, crs = read_geoparquet(file, kind=_KIND, columns=[*QUERY_COLUMNS, "geometry"])
+        timing = Path(folder) / _TIMING_FILE
         try:
             frame = table.to_pandas()
             points = gpd.GeoSeries.from_wkb(frame.pop("geometry"), crs=crs)
             frame["best_cell_id"] = frame["best_cell_id"].astype("Int64")
+            method, asked = settings_from_dict(specs)
+            told = json.loads(timing.read_text("utf-8")) if timing.exists() else {}
+            seconds = told.get("seconds_per_query")
             return cls(
                 queries=gpd.GeoDataFrame(frame, geometry=points),
-                method=_method_of(specs["method"]),
-                distortion=Distortion(**specs["distortion"]),
+                method=method,
+                asked=asked,
+                city=specs["city"],
                 top=specs["top"],
-                seed=specs["seed"],
-                seconds_per_query=specs["seconds_per_query"],
+                seconds_per_query=math.nan if seconds is None else seconds,
                 database=specs["database"],
                 versions=specs["versions"],
+                machine=told.get("machine", {}),
             )
         except (AttributeError, LookupError, TypeError, ValueError) as error:
             msg = f"{file} is damaged ({error}); evaluate again."
             raise DatabaseError(msg) from error
 
-    def _recalls(self, percent: float) -> NDArray[np.float64]:
-        """Return the chance of each query that its true cell is in the top `percent`."""
-        ranks = self.queries["rank_low"], self.queries["rank_high"]
-        return expected_recall(*ranks, cells=self.database["cells"], percent=percent)
 
-    def _answers(self) -> dict[str, NDArray[np.float64]]:
-        """Return what `answers` is the mean of, query by query; NaN where a query has no say."""
-        if not isinstance(self.method, LikelihoodMethod):
-            return {}
-        columns = ("chance", "right", "in_region")
-        chance, right, held = (self.queries[name].to_numpy(dtype=np.float64) for name in columns)
-        answered = chance >= DEFAULT_RULE.threshold
-        return {
-            "coverage": answered.astype(np.float64),
-            "precision": np.where(answered, right, np.nan),
-            "in_region": held,
-        }
-
-
-def _mean(values: NDArray[np.float64]) -> float:
-    """Return the mean of what is a number; NaN if nothing is."""
-    told = values[~np.isnan(values)]
-    return float(told.mean()) if told.size else math.nan
-
-
-def _plain(figures: Mapping[Any, Any]) -> dict[Any, Any]:
-    """Return figures with None for what JSON cannot hold."""
-    return {key: None if value != value else value for key, value in figures.items()}  # noqa: PLR0124
-
-
-def _method_specs(method: Method | LikelihoodMethod) -> dict[str, Any]:
-    """Return a method as plain values."""
-    if isinstance(method, LikelihoodMethod):
-        return {"noise": method.noise.to_dict()}
-    return dataclasses.asdict(method)
-
-
-def _method_of(specs: Mapping[str, Any]) -> Method | LikelihoodMethod:
-    """Return the method of plain values."""
-    if "noise" in specs:
-        return LikelihoodMethod(noise=noise_from_dict(specs["noise"]))
-    return Method(**{**specs, "weights": EditWeights(**specs["weights"])})
+def _plain(value: float) -> float | None:
+    """Return a number, or None for what JSON cannot hold."""
+    return value if math.isfinite(value) else None

@@ -7,7 +7,13 @@ from statistics import NormalDist
 
 from semsig_gis.errors import InputError
 
-__all__ = ["binomial_tail", "log_interval", "poisson_interval", "wilson_interval"]
+__all__ = [
+    "binomial_tail",
+    "log_interval",
+    "poisson_interval",
+    "quantile_ranks",
+    "wilson_interval",
+]
 
 
 def wilson_interval(share: float, trials: float, *, percent: float = 95.0) -> tuple[float, float]:
@@ -95,6 +101,39 @@ def log_interval(value: float, deviation: float, *, percent: float = 95.0) -> tu
     """
     factor = math.exp(min(_deviations(percent) * deviation, 700.0))
     return value / factor, value * factor
+
+
+def quantile_ranks(size: int, share: float, *, percent: float = 95.0) -> tuple[int, int]:
+    """Return between which values of an ordered sample a quantile lies.
+
+    Parameters
+    ----------
+    size : int
+        How many values there are, at least 1.
+    share : float
+        Share of all values that are below the quantile, above 0 and below 1.
+    percent : float, default 95
+        How often the interval shall hold the true quantile.
+
+    Returns
+    -------
+    low, high : int
+        Ranks from 1; the least and the largest where the sample is too small to say more.
+
+    Notes
+    -----
+    Whatever the distribution, the number of values below the quantile is binomial; here it is
+    taken as normal.
+
+    Examples
+    --------
+    >>> quantile_ranks(100, 0.5)
+    (40, 61)
+    """
+    half = _deviations(percent) * math.sqrt(size * share * (1.0 - share))
+    low = math.floor(size * share - half)
+    high = math.ceil(size * share + half) + 1
+    return min(max(low, 1), size), max(min(high, size), 1)
 
 
 def binomial_tail(hits: int, trials: int, chance: float) -> float:

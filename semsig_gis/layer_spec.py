@@ -8,6 +8,7 @@ from typing import Literal
 __all__ = [
     "ANY_VALUE",
     "MAX_WIDTH_M",
+    "MIN_WIDTH_M",
     "ClassBy",
     "ElementKind",
     "GeometryKind",
@@ -23,7 +24,8 @@ ElementKind = Literal["node", "way", "relation"]
 Role = Literal["objects", "buildings", "streets"]
 # Stands for every value of a tag but "no".
 ANY_VALUE = "*"
-# No street is wider; the number is in another unit, or means something else.
+# No street is narrower or wider; the number is in another unit, or means something else.
+MIN_WIDTH_M = 0.1
 MAX_WIDTH_M = 200.0
 
 

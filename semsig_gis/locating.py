@@ -265,6 +265,7 @@ class _Task:
             rule=self.rule,
             region=found.credible_cells(REGION_SHARE),
             posterior=found,
+            loglik=scores.loglik,
             explanations=tuple(self._explanation(query, cell, scores, parts) for cell in first),
         )
 

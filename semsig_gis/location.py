@@ -54,6 +54,8 @@ class Location:
         Row numbers of the fewest cells that hold 90 % of the chance, likeliest first.
     posterior : Posterior
         The chance of every cell.
+    loglik : ndarray of float, shape (n,)
+        Natural logarithm of the likelihood of every cell.
     explanations : tuple of Explanation
         Of the first candidates, in their order: which detections are which street objects.
     """
@@ -66,6 +68,7 @@ class Location:
     rule: AnswerRule
     region: NDArray[np.int64]
     posterior: Posterior
+    loglik: NDArray[np.floating]
     explanations: tuple[Explanation, ...] = ()
 
     @property

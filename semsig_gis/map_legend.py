@@ -8,6 +8,7 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING
 
 from semsig_gis import __version__
+from semsig_gis.distortion_chain import chain_text
 from semsig_gis.evaluation import SUCCESS_METRES, SUCCESS_PROBABILITY
 
 if TYPE_CHECKING:
@@ -91,9 +92,8 @@ def evaluation_legend(evaluation: Evaluation, *, error_limit: str, licenses: Seq
     str
         HTML in which all text from data is escaped, for a ``details`` element.
     """
-    distortion, count = evaluation.distortion, len(evaluation.queries)
+    count, distortions = len(evaluation.queries), chain_text(evaluation.asked.distortions)
     successes = int(evaluation.successful.sum())
-    noise = f", bearing noise {distortion.bearing_sigma:g}°" if distortion.bearing_sigma else ""
     best = "the best candidate" if evaluation.top == 1 else f"the best of {evaluation.top:,}"
     shares = "".join(
         f"<tr><td>P(error ≤ {threshold} m)</td><td>{share:.1%}</td></tr>"
@@ -103,7 +103,7 @@ def evaluation_legend(evaluation: Evaluation, *, error_limit: str, licenses: Seq
         "<summary>Localization errors</summary>"
         f"<p>{count:,} queries among {evaluation.database['cells']:,} cells<br>"
         f"Method: {escape(str(evaluation.method))}, {best}<br>"
-        f"Distortion: {escape(distortion.name)}, {distortion.occurrences} occurrences{noise}</p>"
+        f"Distortion: {escape(distortions) or 'none'}</p>"
         f"<table>{shares}</table>"
         f"<p>{_sign(SUCCESSFUL)}{successes:,} successful: within {SUCCESS_METRES} m "
         f"with probability {SUCCESS_PROBABILITY:g} or more<br>"

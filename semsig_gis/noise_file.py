@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 import json
-import re
 import tomllib
-from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from semsig_gis.errors import InputError
 from semsig_gis.noise import noise_from_dict
 from semsig_gis.storage import whole_file
+from semsig_gis.toml_text import toml_text
 
 if TYPE_CHECKING:
     from semsig_gis.noise import Noise
@@ -77,38 +76,8 @@ def save_noise(noise: Noise, path: str | Path) -> None:
     """
     values = noise.to_dict()
     if Path(path).suffix.lower() == ".toml":
-        text = _toml(values)
+        text = toml_text(values)
     else:
         text = json.dumps(values, indent=2, allow_nan=False, ensure_ascii=False) + "\n"
     with whole_file(path) as partial:
         partial.write_text(text, encoding="utf-8")
-
-
-def _toml(values: Mapping[str, Any], *above: str) -> str:
-    """Return values as TOML: numbers and texts first, then a section for each table."""
-    tables = {name: part for name, part in values.items() if isinstance(part, Mapping)}
-    lines = [
-        f"{_key(name)} = {_inline(part)}\n" for name, part in values.items() if name not in tables
-    ]
-    for name, part in tables.items():
-        path = (*above, _key(name))
-        plain = not any(isinstance(one, Mapping) for one in part.values())
-        lines += [f"\n[{'.'.join(path)}]\n"] if plain and part else []
-        lines.append(_toml(part, *path))
-    return "".join(lines)
-
-
-def _inline(value: Any) -> str:  # noqa: ANN401 - any value of JSON
-    if isinstance(value, Mapping):
-        return f"{{ {', '.join(f'{_key(n)} = {_inline(one)}' for n, one in value.items())} }}"
-    if isinstance(value, list):
-        return f"[{', '.join(map(_inline, value))}]"
-    return _text(value) if isinstance(value, str) else json.dumps(value, allow_nan=False)
-
-
-def _key(name: str) -> str:
-    return name if re.fullmatch("[A-Za-z0-9_-]+", name) else _text(name)
-
-
-def _text(text: str) -> str:
-    return json.dumps(text, ensure_ascii=False).replace("\x7f", "\\u007f")

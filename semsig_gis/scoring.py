@@ -18,13 +18,64 @@ if TYPE_CHECKING:
 
     from numpy.typing import ArrayLike, NDArray
 
-__all__ = ["THRESHOLDS", "expected_best", "expected_recall", "rank_range", "top_candidates"]
+__all__ = [
+    "NEAR_METRES",
+    "NEAR_PLACES",
+    "THRESHOLDS",
+    "best_cells",
+    "expected_best",
+    "expected_recall",
+    "rank_range",
+    "top_candidates",
+]
 
 THRESHOLDS = (
     *(0, 5, 10, 15, 20, 25, 30, 40, 50, 60, 70, 80, 90, 100),
     *(150, 200, 300, 400, 500, 1000, 2000, 5000),
 )
 """Errors in metres whose probability is kept for every query, in the columns ``p0``, ``p5``..."""
+
+NEAR_PLACES = (1, 5, 10, 20)
+"""Numbers N of best places of which one may be near, in the columns ``near1``, ``near5``..."""
+
+NEAR_METRES = 25
+"""How near, in metres, as recall@N is told in visual place recognition."""
+
+BLOCK = 256  # cells of which only the best is looked at first
+
+
+def best_cells(scores: NDArray[np.float32], count: int) -> NDArray[np.intp]:
+    """Return the best cells, and all that tie with the last of them.
+
+    Parameters
+    ----------
+    scores : ndarray of float32, shape (n,)
+        Distance of every cell to the query, lower is better.
+    count : int
+        How many best cells are wanted, 1 to n.
+
+    Returns
+    -------
+    ndarray of int, shape (b,)
+        Row numbers, ascending; b >= `count`.
+
+    Notes
+    -----
+    The best of each block of cells are looked at first. As many cells as are wanted are at most
+    as bad as the last of the best blocks, so that few others need to be ordered.
+
+    Examples
+    --------
+    >>> best_cells(np.float32([3, 1, 2, 2, 2]), 2).tolist()
+    [1, 2, 3, 4]
+    """
+    blocks = len(scores) // BLOCK
+    some = np.arange(len(scores))
+    if blocks >= count:
+        least = scores[: blocks * BLOCK].reshape(blocks, BLOCK).min(axis=1)
+        some = np.flatnonzero(scores <= np.partition(least, count - 1)[count - 1])
+    cut = np.partition(scores[some], count - 1)[count - 1]
+    return np.asarray(some[scores[some] <= cut])
 
 
 def top_candidates(

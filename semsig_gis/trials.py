@@ -10,11 +10,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from semsig_gis.alignment import rerank
-from semsig_gis.detector import draw_detections
+from semsig_gis.detector import Detector
+from semsig_gis.distortion_chain import ready_chain
 from semsig_gis.posterior import posterior
+from semsig_gis.sight import CitySights, Sight
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable
+    from collections.abc import Callable, Iterable, Iterator
 
     from numpy.typing import NDArray
 
@@ -22,7 +24,7 @@ if TYPE_CHECKING:
     from semsig_gis.likelihood import LikelihoodIndex
     from semsig_gis.signatures import Signature
 
-__all__ = ["Trials", "trial_cells", "try_cells", "try_queries"]
+__all__ = ["Trials", "draw_trials", "trial_cells", "try_cells", "try_queries"]
 
 HOPELESS = 20.0  # nats below the likeliest cell, at which a cell is left out of the sums
 
@@ -83,6 +85,47 @@ def trial_cells(cells: int, count: int, *, seed: int = 0) -> NDArray[np.int64]:
     return np.concatenate([np.zeros(0, np.int64), *rounds])[:count]
 
 
+def draw_trials(
+    index: LikelihoodIndex, cells: NDArray[np.int64], *, seed: int = 0
+) -> Iterator[Signature]:
+    """Draw what a detector tells of cells, if it fails as the noise model says.
+
+    Parameters
+    ----------
+    index : LikelihoodIndex
+        The cells and the noise model.
+    cells : ndarray of int, shape (m,)
+        Row numbers of the cells; one may come several times.
+    seed : int, default 0
+        Seed of the detections. Query number i is the same whatever the number of queries.
+
+    Yields
+    ------
+    Signature
+        The detections in each cell, clockwise; perhaps none.
+
+    Examples
+    --------
+    >>> from semsig_gis.catalog import paper_taxonomy
+    >>> from semsig_gis.building import build_database
+    >>> from semsig_gis.likelihood import build_index
+    >>> from semsig_gis.noise import NoiseSpec
+    >>> from semsig_gis.objects import build_objects
+    >>> from semsig_gis.sources.synthetic import CitySpec, synthetic_city
+    >>> layers = synthetic_city(CitySpec(size=200.0))
+    >>> objects, _ = build_objects(layers, taxonomy=paper_taxonomy(), crs="EPSG:32631")
+    >>> careful = NoiseSpec(detection=1.0, misnamed=0.0, clutter=0.0, bearing_sigma=0.01)
+    >>> index = build_index(build_database(objects), careful)
+    >>> (seen,) = draw_trials(index, np.array([0]))
+    >>> index.database.taxonomy.decode(seen.codes) == index.database.types(0)
+    True
+    """
+    detector = Detector(noise=index.noise)
+    spoil = ready_chain((detector,), CitySights.of(index.database))
+    for number, cell in enumerate(cells.tolist()):
+        yield spoil(Sight.of_cell(index.database, cell), seed, number).signature
+
+
 def try_cells(
     index: LikelihoodIndex,
     cells: NDArray[np.int64],
@@ -130,7 +173,7 @@ def try_cells(
     >>> bool(trials.found.mean() > 0.5), bool((trials.itself <= trials.near).all())
     (True, True)
     """
-    queries = draw_detections(index.database, cells.tolist(), index.noise, seed=seed)
+    queries = draw_trials(index, cells, seed=seed)
     return try_queries(index, cells, queries, radius=radius, threads=threads, progress=progress)
 
 

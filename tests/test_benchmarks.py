@@ -7,6 +7,8 @@ from pathlib import Path
 
 import pytest
 
+from benchmarks import tables
+
 # Words of the name of what is measured, and whether it has a bar.
 PARTS = {
     "one edit query by types": True,
@@ -78,3 +80,11 @@ def test_every_benchmark_runs_and_is_written(tmp_path: Path) -> None:
         assert one["ratio"] == pytest.approx(one["peer"] / one["ours"], rel=0.01)
         assert one["met"] == (None if one["bar"] is None else one["ratio"] >= one["bar"])
         assert (one["paper"] is None) == (one["name"].split(",")[0] not in OF_THE_PAPER)
+
+
+def test_the_page_of_figures_is_that_of_the_results() -> None:
+    accuracy, speed = (
+        json.loads((tables.FOLDER / name).read_text(encoding="utf-8"))
+        for name in ("accuracy.json", "results.json")
+    )
+    assert tables.PAGE.read_text(encoding="utf-8") == tables.page(accuracy, speed)

@@ -131,6 +131,7 @@ def test_evaluate_map_and_export(database: Path, city: Path, run: Run) -> None:
     summary = json.loads(out)
     assert summary["settings"]["queries"] == 30
     assert summary["settings"]["method"] == "edit+edit:20%"
+    assert summary.pop("timing")["seconds_per_query"] > 0
     assert json.loads((city / "eval" / "evaluation.json").read_text(encoding="utf-8")) == summary
 
     code, out, _ = run("evaluate", database, *options)
@@ -474,7 +475,7 @@ def test_the_likelihood_is_evaluated_and_drawn(database: Path, city: Path, run: 
     code, out, _ = run("evaluate", database, *options, "--out", city / "by_likelihood", "--json")
     assert code == 0
     summary = json.loads(out)
-    assert summary["settings"]["method"] == "likelihood (light noise)"
+    assert summary["settings"]["method"] == "likelihood:light:on_grid"
     assert 0 <= summary["results"]["coverage"] <= 1
     code, out, err = run("evaluate", database, *options)
     assert code == 0
@@ -484,7 +485,7 @@ def test_the_likelihood_is_evaluated_and_drawn(database: Path, city: Path, run: 
         "map", database, "--evaluation", city / "by_likelihood", "--out", city / "likelihood.html"
     )
     assert code == 0
-    assert "likelihood (light noise)" in (city / "likelihood.html").read_text(encoding="utf-8")
+    assert "likelihood:light:on_grid" in (city / "likelihood.html").read_text(encoding="utf-8")
     sentence(run("evaluate", database, "--method", "likelihood", "--noise", "loud"), "'loud'")
 
 

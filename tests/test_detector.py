@@ -1,85 +1,170 @@
-"""Detections that are drawn follow the noise model."""
-
 from __future__ import annotations
 
-from itertools import islice
+from math import degrees, inf, nan, sqrt
 from typing import TYPE_CHECKING
 
 import numpy as np
+import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from noisy_cells import mixtures, random_database
+from noisy_cells import mixtures, noise_specs
+from scipy.stats import poisson
+from sentences import assert_sentence
+from sights import CITY, CLASSES, REACH, assert_rate, away, many, rows, seeds, sights
 
-from semsig_gis.detector import draw_detections
-from semsig_gis.noise import NoiseSpec
-from semsig_gis.noise_table import database_tables
+from semsig_gis.detector import Detector
+from semsig_gis.errors import InputError, UnknownNameError
+from semsig_gis.noise import NoiseMixture, NoiseSpec, named_noise
+from semsig_gis.noise_table import LONGEST_TABLE, noise_tables
 
 if TYPE_CHECKING:
     from semsig_gis.noise import Noise
+    from semsig_gis.noise_table import NoiseTable
+    from semsig_gis.sight import Sight
 
-DATABASE = random_database(1, cells=20, longest=8, classes=3)
-
-
-@settings(max_examples=30, deadline=None)
-@given(mixtures(), st.integers(0, 100), st.integers(0, 19))
-def test_a_query_is_in_order_and_does_not_depend_on_the_others(
-    noise: Noise, seed: int, cell: int
-) -> None:
-    cells = [3, 7, cell, 5]
-    queries = list(draw_detections(DATABASE, cells, noise, seed=seed))
-    again = list(islice(draw_detections(DATABASE, [0, 0, cell], noise, seed=seed), 2, 3))
-    for query in queries:
-        assert query.codes is not None
-        assert query.bearings is not None
-        assert set(query.codes.tolist()) <= set(DATABASE.present_codes.tolist())
-        assert ((query.bearings >= 0) & (query.bearings < 360)).all()
-        assert (np.diff(query.bearings) >= 0).all()
-    assert again[0].codes.tolist() == queries[2].codes.tolist()  # type: ignore[union-attr]
-    assert again[0].bearings.tolist() == queries[2].bearings.tolist()  # type: ignore[union-attr]
+TRIALS = 4000
+PERFECT = NoiseSpec(detection=1.0, misnamed=0.0, clutter=0.0, bearing_sigma=1e-9)
+NAMES = {1: "alignment_tree", 3: "street_light", 4: "indicator", 5: "traffic_light", 10: "bench"}
 
 
-def test_a_careful_detector_gives_the_signature() -> None:
-    noise = NoiseSpec(detection=1.0, misnamed=0.0, clutter=0.0, bearing_sigma=1e-6)
-    cells = range(len(DATABASE))
-    # No chance is quite nought: one object in a thousand is missed or misnamed all the same.
-    same = [
-        query.codes.tolist() == DATABASE.signature(cell).codes.tolist()  # type: ignore[union-attr]
-        for cell, query in zip(cells, draw_detections(DATABASE, cells, noise), strict=True)
-    ]
-    assert np.mean(same) > 0.9
-
-
-def test_rates_are_those_of_the_model() -> None:
-    noise = NoiseSpec(
-        detection=0.8,
-        misnamed=0.1,
-        clutter=1.5,
-        clutter_shares={"street_light": 0.5, "alignment_tree": 0.5},
-        bearing_sigma=4.0,
-        misnamed_each=0.3,
+def table_of(noise: Noise) -> NoiseTable:
+    (table, *_), _ = noise_tables(
+        noise, taxonomy=CITY.taxonomy, codes=CITY.codes, longest=LONGEST_TABLE
     )
-    (table,), _ = database_tables(DATABASE, noise)
-    cell, draws = int(DATABASE.lengths.argmax()), 4000
-    true = DATABASE.signature(cell)
-    assert true.codes is not None
-    assert true.bearings is not None
-    kinds = table.row_of[true.codes]
-    length = len(kinds)
-    counts = np.zeros(len(table.codes))
-    close = 0
-    for query in draw_detections(DATABASE, [cell] * draws, noise):
-        assert query.codes is not None
-        assert query.bearings is not None
-        counts += np.bincount(table.row_of[query.codes], minlength=len(table.codes))
-        away = (query.bearings - true.bearings[0] + 180.0) % 360.0 - 180.0
-        close += int(((np.abs(away) <= 4.0) & (query.codes == true.codes[0])).sum())
-    detected = 1.0 - table.missed[length, kinds]
-    expected = (detected[:, None] * table.named[length, kinds]).sum(axis=0) + table.clutter
-    assert np.allclose(counts / draws, expected, atol=5 * np.sqrt(expected / draws))
-    # By the density of each object and of clutter, four degrees around the first object.
-    steps = np.linspace(-4.0, 4.0, 81)[:-1] + 0.05
-    away = (true.bearings[0] + steps[:, None] - true.bearings - 0.025 + 180.0) % 360.0 - 180.0
-    density = np.exp(-0.5 * (away / 4.0) ** 2) / (4.0 * np.sqrt(2 * np.pi))
-    named = detected * table.named[length, kinds, kinds[0]]
-    mean = float((density @ named).sum() * 0.1) + 8.0 * table.density[kinds[0]]
-    assert abs(close / draws - mean) < 5 * np.sqrt(mean / draws)
+    return table
+
+
+@given(one=sights, noise=mixtures(), half=st.floats(1.0, 100.0), seed=seeds)
+def test_invariants(one: Sight, noise: Noise, half: float, seed: int) -> None:
+    before = rows(one)
+    spoil = Detector(noise=noise, half=half).ready(CITY)
+    seen = spoil(one, np.random.default_rng(seed))
+    assert set(seen.codes.tolist()) <= set(CLASSES)
+    assert ((seen.bearings >= 0) & (seen.bearings < 360)).all()
+    assert (np.diff(seen.bearings) >= 0).all()
+    assert (seen.distances >= 0).all()
+    assert seen.heading == one.heading
+    assert rows(spoil(one, np.random.default_rng(seed))) == rows(seen)
+    assert rows(one) == before
+
+
+@given(noise=noise_specs(), code=st.sampled_from(CLASSES), seed=seeds)
+def test_detection_naming_and_bearings_are_those_of_the_model(
+    noise: NoiseSpec, code: int, seed: int
+) -> None:
+    table = table_of(noise)
+    kind = int(table.row_of[code])
+    seen = Detector(noise=noise).ready(CITY)(
+        many(TRIALS, code=code, distance=17.0), np.random.default_rng(seed)
+    )
+    true = seen.only(seen.distances == 17.0)  # false objects seem to be anywhere else
+    assert_rate(len(true), TRIALS, 1.0 - table.missed[LONGEST_TABLE, kind])
+    for name, chance in zip(table.codes, table.named[LONGEST_TABLE, kind], strict=True):
+        assert_rate(int((true.codes == name).sum()), len(true), float(min(chance, 1.0)))
+    sigma = float(table.sigma[kind])
+    off = np.exp(1j * np.radians(true.bearings - 90.0)).mean() if len(true) else 1.0
+    # The mean direction of a wrapped normal is exp(-sigma^2 / 2) long.
+    expected = np.exp(-(np.radians(sigma) ** 2) / 2.0)
+    assert abs(off - expected) < 6.0 / sqrt(max(len(true), 1))
+
+
+@settings(max_examples=25)
+@given(noise=noise_specs(), seed=seeds)
+def test_false_objects_are_those_of_the_model(noise: NoiseSpec, seed: int) -> None:
+    table = table_of(noise)
+    spoil = Detector(noise=noise).ready(CITY)
+    rng = np.random.default_rng(seed)
+    found = [spoil(many(0), rng) for _ in range(600)]
+    for code, mean in zip(table.codes, table.clutter, strict=True):
+        count = sum(int((one.codes == code).sum()) for one in found)
+        # Poisson, too, with the mean of all: neither tail is unheard of.
+        assert min(poisson.cdf(count, 600 * mean), poisson.sf(count - 1, 600 * mean)) > 1e-9
+    bearings = np.concatenate([one.bearings for one in found])
+    if len(bearings) > 50:
+        assert abs(np.exp(1j * np.radians(bearings)).mean()) < 6.0 / sqrt(len(bearings))
+
+
+@given(half=st.floats(3.0, 60.0), distance=st.floats(0.0, REACH), seed=seeds)
+def test_detection_falls_with_distance(half: float, distance: float, seed: int) -> None:
+    spoil = Detector(noise=PERFECT, half=half).ready(CITY)
+    seen = spoil(many(TRIALS, distance=distance), np.random.default_rng(seed))
+    nearby = 1.0 - float(table_of(PERFECT).missed[LONGEST_TABLE, 1])
+    chance = nearby * 0.5 ** ((distance / half) ** 2)
+    # Hardly a false object in a thousand signatures.
+    true = int((seen.distances == distance).sum())
+    assert_rate(true, TRIALS, chance)
+
+
+def test_half_of_the_objects_are_left_at_half() -> None:
+    spoil = Detector(noise=PERFECT, half=20.0).ready(CITY)
+    rng = np.random.default_rng(4)
+    shares = [len(spoil(many(TRIALS, distance=d), rng)) / TRIALS for d in (0.0, 20.0, 30.0)]
+    assert shares == pytest.approx([1.0, 0.5, 0.21], abs=0.03)
+
+
+def test_a_class_may_be_worse_than_another() -> None:
+    noise = NoiseSpec(
+        detection=0.9, detection_by_class={"bench": 0.3}, misnamed=0.0, clutter=0.0,
+        bearing_sigma_by_class={"bench": 20.0},
+    )  # fmt: skip
+    spoil = Detector(noise=noise).ready(CITY)
+    rng = np.random.default_rng(9)
+    benches, lamps = (spoil(many(TRIALS, code=code), rng) for code in (10, 3))
+    assert_rate(len(benches), TRIALS, 0.3)
+    assert_rate(len(lamps), TRIALS, 0.9)
+    assert away(benches.bearings, 90.0).std() == pytest.approx(20.0, rel=0.1)
+    assert away(lamps.bearings, 90.0).std() == pytest.approx(5.0, rel=0.1)
+
+
+def test_a_step_aside_turns_near_objects_most() -> None:
+    noise = NoiseSpec(
+        detection=1.0, misnamed=0.0, clutter=0.0, bearing_sigma=1e-9, position_sigma=0.5
+    )
+    spoil = Detector(noise=noise).ready(CITY)
+    rng = np.random.default_rng(1)
+    for distance in (5.0, 25.0):
+        bearings = np.concatenate(
+            [spoil(many(1, distance=distance), rng).bearings for _ in range(TRIALS)]
+        )
+        sigma = degrees(0.5 / distance)
+        turned = away(bearings, 90.0)
+        turned = turned[np.abs(turned) < 8.0 * sigma]  # a few objects are false
+        assert turned.std() == pytest.approx(sigma, rel=0.08)
+        assert abs(turned.mean()) < 6 * sigma / sqrt(TRIALS)
+
+
+def test_of_a_mixture_one_model_makes_a_query() -> None:
+    blind = NoiseSpec(detection=0.05, misnamed=0.0, clutter=0.0)
+    sharp = NoiseSpec(detection=1.0, misnamed=0.0, clutter=0.0)
+    both = NoiseMixture(specs=(blind, sharp), weights=(0.25, 0.75))
+    spoil = Detector(noise=both).ready(CITY)
+    rng = np.random.default_rng(2)
+    shares = np.array([len(spoil(many(200), rng)) / 200 for _ in range(800)])
+    assert ((shares < 0.2) | (shares > 0.9)).all()
+    assert_rate(float((shares > 0.9).sum()), 800, 0.75)
+
+
+def test_the_levels_of_the_paper_lose_objects_by_number() -> None:
+    # Of few objects, seven errors leave a smaller share than of many.
+    spoil = Detector(noise=named_noise("medium")).ready(CITY)
+    rng = np.random.default_rng(3)
+    few, lots = (
+        np.mean([(spoil(many(n), rng).distances == 10.0).sum() / n for _ in range(600)])
+        for n in (4, 40)
+    )
+    assert few == pytest.approx((1 - 1 / 4) ** (7 / 3), abs=0.05)
+    assert lots == pytest.approx((1 - 1 / 40) ** (7 / 3), abs=0.02)
+
+
+@pytest.mark.parametrize("half", [0.0, -3.0, nan])
+def test_distances_that_are_refused(half: float) -> None:
+    with pytest.raises(InputError) as caught:
+        Detector(noise=PERFECT, half=half)
+    assert_sentence(caught.value, str(half), "above 0")
+    assert Detector(noise=PERFECT).half == inf
+
+
+def test_a_model_that_names_a_class_of_another_city() -> None:
+    with pytest.raises((InputError, UnknownNameError)) as caught:
+        Detector(noise=NoiseSpec(detection_by_class={"bnech": 0.5})).ready(CITY)
+    assert_sentence(caught.value, "'bnech'", "nearest is 'bench'")

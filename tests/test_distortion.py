@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+from collections import Counter
 from dataclasses import replace
 from math import erfc, sqrt
 from typing import TYPE_CHECKING, Any
@@ -8,6 +9,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from sights import CITY, REACH, seeds, sights
 
 from semsig_gis.distortion import DISTORTIONS, Distortion, distort, named_distortion
 from semsig_gis.errors import InputError, UnknownNameError
@@ -17,6 +19,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from semsig_gis.distortion import FalseClass
+    from semsig_gis.sight import Sight
 
 CLASSES = [1, 3, 5, 10]
 QUIET = Distortion(occurrences=0, bearing_sigma=0.0)
@@ -57,7 +60,6 @@ def test_the_levels_of_the_paper() -> None:
         "strong": 13,
     }
     for name, one in DISTORTIONS.items():
-        assert one.name == name
         noise = (one.bearing_sigma, one.bearing_clip)
         assert noise == ((0.0, 30.0) if name == "none" else (5.0, 30.0))
     assert named_distortion("light") is DISTORTIONS["light"]
@@ -102,6 +104,22 @@ def test_order_kept_or_sorted_again_hold_the_same_objects(one: Signature, seed: 
         for resort in (False, True)
     )
     assert sorted(zip(*kept, strict=True)) == sorted(zip(*again, strict=True))
+
+
+@given(one=sights, how=Distortions, seed=seeds)
+def test_objects_keep_their_distances(one: Sight, how: Distortion, seed: int) -> None:
+    seen = how.ready(CITY)(one, np.random.default_rng(seed))
+    frequencies = CITY.frequencies.tolist()
+    options: dict[str, Any] = {"classes": CLASSES, "weights": frequencies}
+    plain = distort(one.signature, how, **options, rng=np.random.default_rng(seed))
+    assert seen.codes.tolist() == parts(plain)[0].tolist()
+    assert seen.bearings.tolist() == parts(plain)[1].tolist()
+    assert ((seen.distances >= 0) & (seen.distances <= REACH)).all()
+    lost = Counter(one.distances.tolist()) - Counter(seen.distances.tolist())
+    false = Counter(seen.distances.tolist()) - Counter(one.distances.tolist())
+    assert lost.total() + false.total() <= how.occurrences
+    if how.occurrences == 0:
+        assert sorted(seen.distances.tolist()) == sorted(one.distances.tolist())
 
 
 def test_kept_order_is_that_before_the_noise() -> None:

@@ -15,13 +15,16 @@ from pyproj import CRS
 
 from semsig_gis.catalog import paper_taxonomy
 from semsig_gis.database import SignatureDatabase
+from semsig_gis.detector import Detector
 from semsig_gis.distortion import DISTORTIONS, Distortion
 from semsig_gis.errors import DatabaseError, InputError, UnknownNameError
 from semsig_gis.evaluation import Evaluation, evaluate
 from semsig_gis.grid import GridSpec
 from semsig_gis.matching import Method, score_cells
 from semsig_gis.metrics import EditWeights
-from semsig_gis.scoring import THRESHOLDS
+from semsig_gis.noise import NoiseSpec
+from semsig_gis.queries import QuerySpec
+from semsig_gis.scoring import NEAR_PLACES, THRESHOLDS
 from semsig_gis.signatures import SignatureSpec
 from semsig_gis.storage import read_geoparquet, write_geoparquet
 
@@ -29,7 +32,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
     from pathlib import Path
 
-ALL_MISSED = Distortion(occurrences=1, bearing_sigma=0.0, name="one")
+ALL_MISSED = Distortion(occurrences=1, bearing_sigma=0.0)
 
 
 def database(signatures: Sequence[tuple[str, Sequence[float]]], width: int) -> SignatureDatabase:
@@ -172,6 +175,7 @@ def test_a_query_of_which_nothing_is_left(evaluation: Evaluation) -> None:
     assert evaluation.recall(100) == 1
     assert evaluation.recall(99.9) < 1
     assert evaluation.cdf()[-1] == pytest.approx(1 - len(empty) / 100)
+    assert (empty[[f"near{x}" for x in NEAR_PLACES]] == 0).all(axis=None)
 
 
 def test_nothing_left_of_any_query() -> None:
@@ -183,7 +187,7 @@ def test_nothing_left_of_any_query() -> None:
     summary = result.summary()["results"]
     assert summary["unlocalized"] == 1
     assert summary["median_error_m"] is None
-    assert summary["seconds_per_query"] == 0
+    assert result.seconds_per_query == 0
     assert not result.successful.any()
 
 
@@ -254,13 +258,15 @@ def test_the_time_is_that_of_the_matching(evaluation: Evaluation) -> None:
 
 def test_saved_and_loaded_is_the_same(evaluation: Evaluation, tmp_path: Path) -> None:
     method = Method(types="edit", angles="jaccard", alpha=0.3, weights=EditWeights(insert=2))
-    changed = replace(evaluation, method=method, distortion=replace(ALL_MISSED, resort=False))
+    chain = (replace(ALL_MISSED, resort=False), Detector(noise=NoiseSpec(name="mine"), half=9.0))
+    asked = QuerySpec(number=9, seeds=(4, 2), seen_from="anywhere", distortions=chain)
+    changed = replace(evaluation, method=method, asked=asked, city="other.parquet")
     changed.save(tmp_path / "made" / "here")
     loaded = Evaluation.load(tmp_path / "made" / "here")
     assert_geodataframe_equal(loaded.queries, changed.queries)
     assert loaded.queries["error_m"].isin([math.inf]).any()
-    assert (loaded.method, loaded.distortion) == (changed.method, changed.distortion)
-    assert (loaded.top, loaded.seed) == (changed.top, changed.seed)
+    assert (loaded.method, loaded.asked) == (changed.method, changed.asked)
+    assert (loaded.top, loaded.city) == (changed.top, changed.city)
     assert loaded.summary() == changed.summary()
     assert_frame_equal(pd.DataFrame(loaded.by_length()), pd.DataFrame(changed.by_length()))
 
@@ -271,14 +277,20 @@ def test_the_readable_file_is_strict_json(evaluation: Evaluation, tmp_path: Path
 
     evaluation.save(tmp_path)
     text = (tmp_path / "evaluation.json").read_text(encoding="utf-8")
-    assert json.loads(text, parse_constant=refuse) == evaluation.summary()
+    summary = evaluation.summary()
+    timing = summary.pop("timing")
+    assert json.loads(text, parse_constant=refuse) == summary
+    timed = (tmp_path / "timing.json").read_text(encoding="utf-8")
+    assert json.loads(timed, parse_constant=refuse) == timing
+    assert timing["seconds_per_query"] == evaluation.seconds_per_query
+    assert timing["machine"]["processors"] >= 1
     assert sorted(path.name for path in tmp_path.iterdir()) == [
         "evaluation.json",
         "queries.parquet",
+        "timing.json",
     ]
-    summary = evaluation.summary()
     assert summary["settings"]["method"] == "edit+edit:20%"
-    assert summary["settings"]["distortion"]["occurrences"] == 1
+    assert summary["settings"]["distortions"] == ["light:bearing_sigma=0"]
     assert summary["database"]["cells"] == 120
     assert summary["results"]["recall_at_percent"]["10"] == evaluation.recall(10)
     assert summary["versions"].keys() == {"semsig_gis", "python", "numpy", "pandas", "rapidfuzz"}
@@ -297,9 +309,10 @@ def test_files_that_are_no_evaluation_are_refused(evaluation: Evaluation, tmp_pa
     with pytest.raises(DatabaseError, match="lacks the column 'p50'"):
         Evaluation.load(tmp_path)
     wrongs: list[dict[str, Any]] = [
-        {"method": {**specs["method"], "types": "hamming"}},
-        {"distortion": {"occurrences": 1, "unknown": 2}},
-        {"method": {}},
+        {"method": "hamming+edit"},
+        {"asked": {**specs["asked"], "distortions": ["errors:1:unknown=2"]}},
+        {"asked": {"number": 3}},
+        {"method": 7},
     ]
     for wrong in wrongs:
         write_geoparquet(table, file, geo=geo, specs=specs | wrong)

@@ -7,10 +7,12 @@ import numpy as np
 import pytest
 from six_cells import rows, six_cells
 
-from semsig_gis.distortion import Distortion
+from semsig_gis.distortion_chain import parse_chain
 from semsig_gis.evaluation import evaluate
 from semsig_gis.evaluation_report import evaluation_markdown, evaluation_tables
+from semsig_gis.intervals import wilson_interval
 from semsig_gis.matching import Method
+from semsig_gis.queries import QuerySpec
 
 if TYPE_CHECKING:
     from semsig_gis.evaluation import Evaluation
@@ -22,20 +24,23 @@ def evaluation() -> Evaluation:
 
 
 def test_settings_and_figures_of_an_evaluation(evaluation: Evaluation) -> None:
-    settings, figures, by_length = evaluation_tables(evaluation)
+    settings, figures, by_length, by_ambiguity = evaluation_tables(evaluation)
     assert rows(settings)["Method"] == ("edit+edit:5%",)
-    assert rows(settings)["Distortion"] == ("medium, 7 occurrences",)
-    assert rows(settings)["Bearing noise"] == ("5°, at most 30°",)
-    assert rows(settings)["After the noise"] == ("sorted again",)
-    assert rows(settings)["Class of a false object"] == ("uniform",)
+    assert rows(settings)["Distortions"] == ("medium",)
+    assert rows(settings)["Seen from"] == ("cells",)
+    assert "Size" not in rows(settings)
     shown = rows(figures)
-    assert shown["P(error ≤ 50 m)"] == (f"{evaluation.cdf([50])[0]:.4f}", "0.3733")
-    assert shown["recall@10 %"] == (f"{evaluation.recall(10):.4f}", "0.6462")
-    assert shown["P(error ≤ 10 m)"][1] == ""
+    low, high = wilson_interval(evaluation.cdf([50])[0], 6)
+    told = f"{evaluation.cdf([50])[0]:.4f}", f"{low:.4f} to {high:.4f}", "0.3733"
+    assert shown["P(error ≤ 50 m)"] == told
+    assert shown["recall@10 %"][::2] == (f"{evaluation.recall(10):.4f}", "0.6462")
+    assert shown["P(error ≤ 10 m)"][2] == ""
+    assert shown["recall@5 within 25 m"][0] == f"{evaluation.queries['near5'].mean():.4f}"
     assert "Paris" in figures.note
     assert [row[0] for row in by_length.rows] == ["1-4", "5-9", "10-19", "20+"]
     assert by_length.rows[3][1:] == ("0", "", "", "", "", "", "")
-    for table in (settings, figures, by_length):
+    assert [row[:2] for row in by_ambiguity.rows][:2] == [("1", "1"), ("2-9", "5")]
+    for table in (settings, figures, by_length, by_ambiguity):
         assert all(len(row) == len(table.columns) for row in table.rows)
 
 
@@ -45,8 +50,10 @@ def test_settings_and_figures_of_an_evaluation(evaluation: Evaluation) -> None:
         {"top": 100},
         {"method": Method.parse("edit+edit")},
         {"method": Method.parse("edit+edit:5%:weights=2/1/1")},
-        {"distortion": Distortion(occurrences=1)},
-        {"distortion": Distortion(bearing_sigma=0.0)},
+        {"asked": QuerySpec(distortions=parse_chain("light"))},
+        {"asked": QuerySpec(distortions=parse_chain("medium:bearing_sigma=0"))},
+        {"asked": QuerySpec(distortions=parse_chain("medium, view:90"))},
+        {"asked": QuerySpec(seen_from="anywhere")},
         {"step_m": 5.0},
         {"radius_m": 35.0},
     ],
@@ -58,8 +65,8 @@ def test_other_settings_are_not_compared_with_the_paper(
     settings = {key: value for key, value in changed.items() if key not in facts}
     other = replace(evaluation, database={**evaluation.database, **facts}, **settings)  # type: ignore[arg-type]
     figures = evaluation_tables(other)[1]
-    assert figures.columns == ("Figure", "Ours")
-    assert all(len(row) == 2 for row in figures.rows)
+    assert figures.columns == ("Figure", "Ours", "95 %")
+    assert all(len(row) == 3 for row in figures.rows)
     assert "Paris" not in figures.note
 
 
@@ -72,16 +79,16 @@ def test_the_paper_has_figures_for_other_ranges_and_levels(
 ) -> None:
     facts = {**evaluation.database, "radius_m": radius, "levels": levels}
     figures = rows(evaluation_tables(replace(evaluation, database=facts))[1])
-    assert figures["P(error ≤ 50 m)"][1] == p50
-    assert figures["recall@10 %"][1] == recall10
+    assert figures["P(error ≤ 50 m)"][2] == p50
+    assert figures["recall@10 %"][2] == recall10
 
 
-def test_settings_without_noise(evaluation: Evaluation) -> None:
-    quiet = Distortion(bearing_sigma=0.0, resort=False, false_class="frequency", name="mine")
-    settings = rows(evaluation_tables(replace(evaluation, distortion=quiet))[0])
-    assert settings["Bearing noise"] == ("none",)
-    assert settings["After the noise"] == ("order kept",)
-    assert settings["Class of a false object"] == ("by frequency",)
+def test_distortions_are_told(evaluation: Evaluation) -> None:
+    quiet = parse_chain("medium:resort=false, view:90")
+    settings = rows(evaluation_tables(replace(evaluation, asked=QuerySpec(distortions=quiet)))[0])
+    assert settings["Distortions"] == ("medium:resort=false, view:90",)
+    none = replace(evaluation, asked=QuerySpec(distortions=()))
+    assert rows(evaluation_tables(none)[0])["Distortions"] == ("none",)
 
 
 def test_an_infinite_median_is_told(evaluation: Evaluation) -> None:

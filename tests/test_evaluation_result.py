@@ -12,7 +12,7 @@ from geopandas.testing import assert_geodataframe_equal
 from noisy_cells import random_database
 from six_cells import rows
 
-from semsig_gis.distortion import distort, named_distortion
+from semsig_gis.detector import Detector
 from semsig_gis.errors import DatabaseError, InputError
 from semsig_gis.evaluation import evaluate
 from semsig_gis.evaluation_report import evaluation_tables
@@ -21,6 +21,7 @@ from semsig_gis.likelihood import build_index
 from semsig_gis.locating import locate
 from semsig_gis.method import LikelihoodMethod
 from semsig_gis.noise import NoiseSpec, named_noise
+from semsig_gis.queries import QuerySpec, draw_queries
 from semsig_gis.scoring import THRESHOLDS, expected_recall
 
 if TYPE_CHECKING:
@@ -43,17 +44,10 @@ def evaluation(index: LikelihoodIndex) -> Evaluation:
     return evaluate(DATABASE, queries=QUERIES, method=index, distortion="medium", seed=2)
 
 
-def asked(number: int, cell: int, *, seed: int = 2) -> Signature:
-    """Return the query of a number as an evaluation distorts it."""
-    classes = DATABASE.present_codes
-    rng = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(number,)))
-    return distort(
-        DATABASE.signature(cell),
-        named_distortion("medium"),
-        classes=classes,
-        weights=DATABASE.occurrences[classes],
-        rng=rng,
-    )
+def asked(seed: int = 2) -> list[Signature]:
+    """Return the queries as an evaluation distorts them."""
+    drawn = draw_queries(DATABASE, QuerySpec(number=QUERIES, seeds=(seed,)))
+    return [query.asked.signature for query in drawn]
 
 
 @pytest.mark.parametrize("top", [1, 2, 20, 150])
@@ -61,12 +55,12 @@ def test_the_answer_comes_first_and_the_likeliest_cells_follow(
     index: LikelihoodIndex, top: int
 ) -> None:
     found = evaluate(DATABASE, queries=QUERIES, method=index, top=top, seed=2).queries
-    for number, row in enumerate(found.to_dict("records")):
+    for query, row in zip(asked(), found.to_dict("records"), strict=True):
         if row["query_length"] == 0:
             assert all(math.isnan(row[name]) for name in ("chance", "right", "in_region"))
             assert (row["error_m"], row["rank_low"]) == (math.inf, 150)
             continue
-        told = locate(index, asked(number, row["cell"]), top=len(DATABASE))
+        told = locate(index, query, top=len(DATABASE))
         answer = told.answer.cell
         loglik = told.candidates.set_index("cell")["loglik"].sort_index().to_numpy()
         scores = -loglik.astype(np.float32)
@@ -116,6 +110,23 @@ def test_places_that_tie_are_scored_by_expectation() -> None:
     assert math.isnan(found.answers()["precision"])
 
 
+def test_what_the_model_draws_comes_true_as_often_as_it_says() -> None:
+    # In far more cells than a handful, so that some places are hard to tell.
+    cells = random_database(11, cells=300, longest=6, classes=2)
+    noise = NoiseSpec(detection=0.8, misnamed=0.1, clutter=0.7, bearing_sigma=12.0, name="mine")
+    detector = Detector(noise=noise)
+    found = evaluate(cells, queries=300, method=build_index(cells, noise), distortion=detector)
+    told = found.queries.dropna(subset=["chance"])
+    spread = math.sqrt(float((told["chance"] * (1.0 - told["chance"])).sum()))
+    assert abs(float((told["right"] - told["chance"]).sum())) < 4.0 * spread
+    assert 0.2 < told["chance"].mean() < 0.95
+    assert 0.86 < told["in_region"].mean() < 0.99
+    # A detector that is worse than the method believes: its chances are too high.
+    bad = Detector(noise=replace(noise, detection=0.5, clutter=3.0, bearing_sigma=30.0))
+    wrong = evaluate(cells, queries=300, method=build_index(cells, noise), distortion=bad).queries
+    assert wrong["chance"].mean() > wrong["right"].mean() + 0.1
+
+
 def test_more_candidates_never_hurt(index: LikelihoodIndex) -> None:
     one, five = (
         evaluate(DATABASE, queries=QUERIES, method=index, top=top).queries for top in (1, 5)
@@ -126,7 +137,7 @@ def test_more_candidates_never_hurt(index: LikelihoodIndex) -> None:
 
 
 def test_the_queries_are_those_of_the_other_methods(evaluation: Evaluation) -> None:
-    same = ["cell", "query_types", "query_bearings", "query_length"]
+    same = ["cell", "query_types", "query_bearings", "query_length", "geometry"]
     other = evaluate(DATABASE, queries=QUERIES, seed=2)
     assert other.queries[same].equals(evaluation.queries[same])
     assert other.queries[["chance", "right", "in_region"]].isna().all(axis=None)
@@ -153,17 +164,24 @@ def test_how_it_answers_is_counted(evaluation: Evaluation) -> None:
 
 
 def test_the_report_tells_of_the_answers(evaluation: Evaluation) -> None:
-    settings, figures, by_length = evaluation_tables(evaluation)
-    assert rows(settings)["Method"] == ("likelihood (generic noise)",)
+    settings, figures, by_length, _, chances, rules = evaluation_tables(evaluation)
+    assert rows(settings)["Method"] == ("likelihood:generic:on_grid",)
     told = rows(figures)
     answers = evaluation.answers()
-    assert told["Answered, with a chance of 0.9 or more"] == (f"{answers['coverage']:.4f}",)
-    assert told["Right answers, of these"] == (f"{answers['precision']:.4f}",)
-    assert told["True cell in the region of 90 %"] == (f"{answers['in_region']:.4f}",)
+    assert told["Answered, with a chance of 0.9 or more"][0] == f"{answers['coverage']:.4f}"
+    assert told["Right answers, of these"][0] == f"{answers['precision']:.4f}"
+    assert told["True cell in the region of 90 %"][0] == f"{answers['in_region']:.4f}"
+    curve = evaluation.coverage_curve()
+    (row,) = curve[curve["threshold"] == 0.9].to_dict("records")
+    assert rows(rules)["0.9"][1] == f"{row['coverage']:.4f}"
+    assert row["precision"] == answers["precision"]
+    stated = evaluation.calibration()
+    assert stated["n"].sum() == QUERIES - evaluation.unlocalized
+    assert rows(chances)["0.9 to 1"][0] == str(stated["n"].iloc[-1])
     assert by_length.columns[-3:] == ("Answered", "Right", "In region")
     assert all(len(row) == len(by_length.columns) for row in by_length.rows)
     silent = replace(evaluation, queries=evaluation.queries.assign(chance=0.0))
-    assert rows(evaluation_tables(silent)[1])["Right answers, of these"] == ("",)
+    assert rows(evaluation_tables(silent)[1])["Right answers, of these"] == ("", "")
     assert silent.summary()["results"]["precision"] is None
 
 
@@ -180,7 +198,9 @@ def test_saved_and_loaded_is_the_same(
     assert loaded.method == changed.method
     assert loaded.summary() == changed.summary()
     pd.testing.assert_frame_equal(loaded.by_length(), changed.by_length())
-    assert json.loads((tmp_path / "evaluation.json").read_text("utf-8")) == loaded.summary()
+    summary = loaded.summary()
+    assert json.loads((tmp_path / "timing.json").read_text("utf-8")) == summary.pop("timing")
+    assert json.loads((tmp_path / "evaluation.json").read_text("utf-8")) == summary
 
 
 def test_a_noise_model_that_is_none_is_damage(

@@ -9,7 +9,13 @@ from hypothesis import strategies as st
 from sentences import assert_sentence
 
 from semsig_gis.errors import InputError
-from semsig_gis.intervals import binomial_tail, log_interval, poisson_interval, wilson_interval
+from semsig_gis.intervals import (
+    binomial_tail,
+    log_interval,
+    poisson_interval,
+    quantile_ranks,
+    wilson_interval,
+)
 
 
 @given(st.integers(1, 60), st.floats(0.01, 0.99), st.data())
@@ -20,6 +26,21 @@ def test_the_tail_is_a_sum_of_binomials(trials: int, chance: float, data: st.Dat
         for hit in range(hits + 1)
     )
     assert binomial_tail(hits, trials, chance) == pytest.approx(slow, rel=1e-9)
+
+
+@given(size=st.integers(1, 3000), share=st.floats(0.01, 0.99))
+def test_ranks_of_a_quantile_are_ranks(size: int, share: float) -> None:
+    low, high = quantile_ranks(size, share)
+    assert 1 <= low <= high <= size
+
+
+@pytest.mark.parametrize("share", [0.5, 0.9])
+@pytest.mark.parametrize("size", [60, 400])
+def test_ranks_hold_the_quantile_as_often_as_they_say(size: int, share: float) -> None:
+    low, high = quantile_ranks(size, share)
+    # The quantile is between them when so many values are below it.
+    inside = binomial_tail(high - 1, size, share) - binomial_tail(low - 1, size, share)
+    assert 0.945 < inside < 0.99
 
 
 @pytest.mark.parametrize("chance", [0.05, 0.3, 0.9])

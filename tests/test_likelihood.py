@@ -13,7 +13,7 @@ from noisy_cells import mixtures, noise_specs, random_database, random_query
 from semsig_gis._likelihood_columns import BIN_DEGREES, BINS, write_columns
 from semsig_gis._likelihood_kernels import promising_cells
 from semsig_gis.errors import InputError
-from semsig_gis.likelihood import build_index, index_fingerprint
+from semsig_gis.likelihood import LEAST_PRIOR, build_index, index_fingerprint
 from semsig_gis.noise import NoiseMixture, NoiseSpec, named_noise
 from semsig_gis.signatures import Signature
 
@@ -49,13 +49,14 @@ def slow_loglik(index: LikelihoodIndex, query: Signature, cell: int, turn: float
     for kind in kinds:
         total += math.log(table.missed[length, kind])
     for name, seen in zip(table.query_rows(query).tolist(), query.bearings.tolist(), strict=True):
-        density = table.density[name]
+        density = alone = table.density[name]
         for kind, bearing, sigma in zip(kinds, bearings, sigmas, strict=True):
             missed = table.missed[length, kind]
             chance = 1.0 if name == len(table.codes) else table.named[length, kind, name]
             odds = (1 - missed) / missed * chance
             density += odds * bin_density(bearing, (seen + turn) % 360.0, sigma)
-        total += math.log(density)
+        # A byte holds no more than what four objects in one direction add.
+        total += min(math.log(density), math.log(alone) + 255 * index.step)
     return total
 
 
@@ -151,6 +152,7 @@ def test_turns_are_summed_over_with_their_chances(seed: int, sigma: float) -> No
     assert query.bearings is not None
     turns = np.arange(-36, 36) * BIN_DEGREES
     chances = np.exp(-0.5 * (turns / sigma) ** 2)
+    chances[chances <= LEAST_PRIOR] = 0.0  # the likeliest has 1
     chances /= chances.sum()
     each = np.stack(
         [

@@ -11,14 +11,15 @@ import pytest
 from semsig_gis.abstention import AnswerRule
 from semsig_gis.building import build_database
 from semsig_gis.catalog import paper_taxonomy
-from semsig_gis.distortion import Distortion
 from semsig_gis.evaluation import evaluate
 from semsig_gis.likelihood import build_index
+from semsig_gis.limitations import MissingClasses
 from semsig_gis.locating import locate
 from semsig_gis.map_legend import SHADES, evaluation_legend, localization_legend, location_legend
 from semsig_gis.matching import localize
 from semsig_gis.noise import named_noise
 from semsig_gis.objects import build_objects
+from semsig_gis.queries import QuerySpec
 from semsig_gis.signatures import Signature
 from semsig_gis.sources.synthetic import CitySpec, synthetic_city
 
@@ -56,8 +57,7 @@ def database() -> SignatureDatabase:
 
 @pytest.fixture(scope="module")
 def evaluation(database: SignatureDatabase) -> Evaluation:
-    distortion = Distortion(occurrences=3, bearing_sigma=5, name="mild")
-    return evaluate(database, queries=40, distortion=distortion)
+    return evaluate(database, queries=40, distortion="errors:3, view:200")
 
 
 def test_what_an_evaluation_says(evaluation: Evaluation, database: SignatureDatabase) -> None:
@@ -68,7 +68,7 @@ def test_what_an_evaluation_says(evaluation: Evaluation, database: SignatureData
     for said in (
         f"40 queries among {len(database):,} cells",
         "Method: edit+edit, the best candidate",
-        "Distortion: mild, 3 occurrences, bearing noise 5°",
+        "Distortion: errors:3, view:200",
         f"P(error ≤ 50 m) {evaluation.cdf([50])[0]:.1%}",
         f"{successful} successful: within 50 m with probability 0.5 or more",
         f"{40 - successful} failed",
@@ -85,7 +85,7 @@ def test_variants_of_an_evaluation(database: SignatureDatabase) -> None:
     exact = evaluate(database, queries=5, distortion="none", top=3)
     text = Text(evaluation_legend(exact, error_limit="1 m", licenses=())).shown
     assert "the best of 3" in text
-    assert "bearing noise" not in text
+    assert "Distortion: none" in text
     assert "Data" not in text
 
 
@@ -112,7 +112,8 @@ def test_what_a_localization_says(
 
 def test_text_from_data_stays_text(evaluation: Evaluation, database: SignatureDatabase) -> None:
     plain = evaluation_legend(evaluation, error_limit="1 m", licenses=["x"])
-    hostile = dataclasses.replace(evaluation, distortion=Distortion(occurrences=3, name=HOSTILE))
+    asked = QuerySpec(distortions=(MissingClasses(classes=(HOSTILE,)),))
+    hostile = dataclasses.replace(evaluation, asked=asked)
     shown = Text(evaluation_legend(hostile, error_limit="1 m", licenses=[HOSTILE]))
     assert shown.shown.count(HOSTILE) == 2
     assert shown.tags == Text(plain).tags

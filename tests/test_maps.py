@@ -24,13 +24,14 @@ from sentences import assert_sentence
 from semsig_gis import map_assets
 from semsig_gis.building import build_database
 from semsig_gis.catalog import paper_taxonomy
-from semsig_gis.distortion import Distortion
 from semsig_gis.errors import InputError
 from semsig_gis.evaluation import evaluate
+from semsig_gis.limitations import MissingClasses
 from semsig_gis.map_legend import FAILED, SUCCESSFUL
 from semsig_gis.maps import evaluation_map, localization_map, save_map
 from semsig_gis.matching import localize
 from semsig_gis.objects import build_objects
+from semsig_gis.queries import QuerySpec
 from semsig_gis.signatures import Signature
 from semsig_gis.sources.synthetic import CitySpec, synthetic_city
 
@@ -173,7 +174,8 @@ def test_hostile_data_is_shown_word_for_word_and_never_run(
     browser: Chrome, evaluation: Evaluation, database: SignatureDatabase, tmp_path: Path
 ) -> None:
     harmful = hostile_database(database)
-    distorted = dataclasses.replace(evaluation, distortion=Distortion(name=HOSTILE))
+    spec = QuerySpec(distortions=(MissingClasses(classes=(HOSTILE,)),))
+    distorted = dataclasses.replace(evaluation, asked=spec)
     map_ = evaluation_map(distorted, harmful)
     query = Signature(harmful.signature(0).codes, None)
     localization_map(localize(harmful, query, top=3), harmful, map_=map_)

@@ -1,14 +1,17 @@
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from sentences import assert_sentence
 
 from semsig_gis.errors import InputError, UnknownNameError
-from semsig_gis.method import Method
+from semsig_gis.method import LikelihoodMethod, Method, parse_method
 from semsig_gis.metrics import METRICS, EditWeights
+from semsig_gis.noise import NOISES, NoiseSpec
 
 if TYPE_CHECKING:
     from semsig_gis.errors import SemsigError
@@ -90,3 +93,44 @@ def test_values_that_no_method_has(text: str, error: type[SemsigError], sentence
 def test_a_method_compares_something() -> None:
     with pytest.raises(InputError, match="neither types nor angles"):
         Method(types=None, angles=None)
+
+
+MINE = {**NOISES, "mine": NoiseSpec(detection=0.7, name="mine")}
+
+
+@given(
+    noise=st.sampled_from(list(MINE.values())),
+    place=st.sampled_from([{}, {"refined": True}, {"on_grid": True}]),
+    north_sigma=st.one_of(st.floats(0, 180), st.just(math.inf)),
+)
+def test_every_likelihood_method_has_a_text_of_its_own(
+    noise: NoiseSpec, place: dict[str, bool], north_sigma: float
+) -> None:
+    method = LikelihoodMethod(noise=noise, north_sigma=north_sigma, **place)
+    assert parse_method(str(method), noises=MINE) == method
+
+
+def test_either_kind_is_read() -> None:
+    assert parse_method("edit+jaccard:5%") == Method.parse("edit+jaccard:5%")
+    assert parse_method(" likelihood ") == LikelihoodMethod(noise=NOISES["generic"])
+    assert str(parse_method("likelihood:light:heading=unknown:refined")) == (
+        "likelihood:light:refined:heading=unknown"
+    )
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("likelihood:ligth", ["nearest is 'light'"]),
+        ("likelihood:light:refine", ["cannot be read", "':refined'"]),
+        ("likelihood:light:heading", ["cannot be read"]),
+        ("likelihood:light:heading=north", ["cannot be read"]),
+        ("likelihood:light:heading=-4", ["-4.0 degrees", "0 or more"]),
+        ("likelihood:light:on_grid:refined", ["on the grid", "leave out"]),
+        ("liklihood:light", ["cannot be read"]),
+    ],
+)
+def test_likelihood_methods_that_cannot_be_read(text: str, words: list[str]) -> None:
+    with pytest.raises((InputError, UnknownNameError)) as caught:
+        parse_method(text)
+    assert_sentence(caught.value, *words)

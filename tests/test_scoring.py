@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 from semsig_gis.errors import InputError
 from semsig_gis.scoring import (
     THRESHOLDS,
+    best_cells,
     expected_best,
     expected_recall,
     rank_range,
@@ -18,6 +19,18 @@ from semsig_gis.scoring import (
 )
 
 Errors = st.lists(st.integers(0, 60).map(float), max_size=6)
+
+
+@given(
+    size=st.integers(1, 3000), levels=st.integers(1, 400), seed=st.integers(0, 99), data=st.data()
+)
+def test_the_best_cells_are_those_up_to_the_last_wanted(
+    size: int, levels: int, seed: int, data: st.DataObject
+) -> None:
+    scores = np.random.default_rng(seed).integers(0, levels, size).astype(np.float32)
+    count = data.draw(st.integers(1, size))
+    cut = np.sort(scores)[count - 1]
+    assert best_cells(scores, count).tolist() == np.flatnonzero(scores <= cut).tolist()
 
 
 def test_hand_computed_cut_among_ties() -> None:

@@ -3,20 +3,23 @@
 from __future__ import annotations
 
 import math
+from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from noisy_cells import random_database
+from noisy_cells import mixtures, random_database
 
 from semsig_gis.alignment import rerank
-from semsig_gis.detector import draw_detections
 from semsig_gis.likelihood import build_index
 from semsig_gis.noise import named_noise
 from semsig_gis.posterior import posterior
 from semsig_gis.signatures import Signature
-from semsig_gis.trials import trial_cells, try_cells, try_queries
+from semsig_gis.trials import draw_trials, trial_cells, try_cells, try_queries
+
+if TYPE_CHECKING:
+    from semsig_gis.noise import Noise
 
 
 @pytest.mark.parametrize("noise", ["light", "generic"])
@@ -26,7 +29,7 @@ def test_outcomes_are_those_of_the_whole_method(noise: str, radius: float) -> No
     index = build_index(database, named_noise(noise))
     cells = trial_cells(len(database), 60, seed=2)
     trials = try_cells(index, cells, radius=radius, seed=3)
-    for row, query in enumerate(draw_detections(database, cells.tolist(), index.noise, seed=3)):
+    for row, query in enumerate(draw_trials(index, cells, seed=3)):
         if not len(query):
             assert trials.near[row] == 0
             continue
@@ -72,3 +75,19 @@ def test_all_cells_are_tried_equally_often(cells: int, count: int, seed: int) ->
     assert len(tried) == count
     assert counts.max() - counts.min() <= 1
     assert trial_cells(cells, count + 1, seed=seed)[:count].tolist() == tried.tolist()
+
+
+@settings(max_examples=30, deadline=None)
+@given(mixtures(), st.integers(0, 100), st.integers(0, 19))
+def test_a_query_is_in_order_and_does_not_depend_on_the_others(
+    noise: Noise, seed: int, cell: int
+) -> None:
+    index = build_index(random_database(1, cells=20, longest=8, classes=3), noise)
+    queries = list(draw_trials(index, np.array([3, 7, cell, 5]), seed=seed))
+    *_, again = draw_trials(index, np.array([0, 0, cell]), seed=seed)
+    for query in queries:
+        assert query.codes is not None
+        assert query.bearings is not None
+        assert (np.diff(query.bearings) >= 0).all()
+    for name in ("codes", "bearings"):
+        assert getattr(again, name).tolist() == getattr(queries[2], name).tolist()

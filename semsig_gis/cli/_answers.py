@@ -63,8 +63,12 @@ def _print_place(result: dict[str, Any]) -> None:
     typer.echo(
         f"{region['share']:.0%} of the chance is in {region['cells']:,} "
         f"cell{'' if region['cells'] == 1 else 's'} "
-        f"({region['km2']:.3f} km²)."
+        f"({_area_text(region['km2'])})."
     )
+
+
+def _area_text(km2: float) -> str:
+    return f"{km2:.3f} km²" if km2 >= 0.1 else f"{km2 * 1e6:,.0f} m²"  # noqa: PLR2004 - 10 ha
 
 
 def _print_explanations(candidates: list[dict[str, Any]]) -> None:

@@ -1,4 +1,4 @@
-"""`semsig evaluate`: many distorted queries, and how far off their answers are."""
+"""`semsig evaluate`, `semsig compare`: many distorted queries, and how far off the answers are."""
 
 from __future__ import annotations
 
@@ -11,13 +11,14 @@ import typer
 from semsig_gis.cli._app import (
     LIKELIHOOD,
     AsJson,
-    Database,
     MethodText,
     app,
     print_evaluation,
+    print_table,
 )
 from semsig_gis.cli._likelihood import NoiseName, prepared_index, read_noise
-from semsig_gis.console import print_json, progress
+from semsig_gis.console import print_json, progress, remark
+from semsig_gis.errors import InputError
 
 
 class FalseClass(enum.StrEnum):
@@ -29,16 +30,29 @@ class FalseClass(enum.StrEnum):
 
 @app.command()
 def evaluate(
-    database: Database,
+    context: typer.Context,
+    database: Annotated[
+        Path,
+        typer.Argument(
+            help="Signature database that `semsig build` wrote; or an experiment, a .toml file "
+            "that says all but --out and --json."
+        ),
+    ],
     *,
     queries: Annotated[int, typer.Option(help="Number of queries.")] = 500,
-    distortion: Annotated[str, typer.Option(help="none, light, medium or strong.")] = "medium",
+    distortion: Annotated[
+        str,
+        typer.Option(
+            help="none, light, medium or strong; or several, such as medium,compass:10,view:90."
+        ),
+    ] = "medium",
     keep_order: Annotated[
         bool, typer.Option("--keep-order", help="Do not re-sort after the bearing noise.")
     ] = False,
     false_class: Annotated[
-        FalseClass, typer.Option(help="How the class of a false object is drawn.")
-    ] = FalseClass.uniform,
+        FalseClass | None,
+        typer.Option(help="How the class of a false object is drawn; uniform by default."),
+    ] = None,
     method: MethodText = "edit+edit",
     noise: NoiseName = "generic",
     top: Annotated[int, typer.Option(help="Number t of best candidates that count.")] = 1,
@@ -47,16 +61,27 @@ def evaluate(
     as_json: AsJson = False,
 ) -> None:
     """Query a database with distorted signatures of its own and measure the answers."""
+    if database.suffix == ".toml":
+        _experiment(context, database, out, as_json=as_json)
+        return
     import dataclasses
 
     from semsig_gis.database_file import open_database
-    from semsig_gis.distortion import named_distortion
+    from semsig_gis.distortion import Distortion
+    from semsig_gis.distortion_chain import parse_chain
     from semsig_gis.evaluation import evaluate as run
     from semsig_gis.matching import Method
 
-    spec = dataclasses.replace(
-        named_distortion(distortion), resort=not keep_order, false_class=false_class.value
-    )
+    chain = [
+        dataclasses.replace(
+            one,
+            resort=one.resort and not keep_order,
+            false_class=one.false_class if false_class is None else false_class.value,
+        )
+        if isinstance(one, Distortion)
+        else one
+        for one in parse_chain(distortion)
+    ]
     opened = open_database(database)
     chosen = (
         prepared_index(database, opened, read_noise(noise))
@@ -68,7 +93,7 @@ def evaluate(
             opened,
             queries=queries,
             method=chosen,
-            distortion=spec,
+            distortion=chain,
             top=top,
             seed=seed,
             progress=advance,
@@ -81,3 +106,52 @@ def evaluate(
     print_evaluation(evaluation)
     if out is not None:
         typer.echo(f"results: {out}")
+
+
+def _experiment(context: typer.Context, file: Path, out: Path | None, *, as_json: bool) -> None:
+    from semsig_gis.experiment import open_experiment_spec
+    from semsig_gis.experiment_report import experiment_tables
+    from semsig_gis.experiment_run import run_experiment
+
+    for name in context.params:
+        source = context.get_parameter_source(name)
+        free = {"database", "out", "as_json"}
+        if name in free or source is None or source.name != "COMMANDLINE":
+            continue
+        option = name.replace("_", "-")
+        msg = f"--{option} was given with an experiment; write that into {file} instead."
+        raise InputError(msg)
+    if out is None:
+        msg = "an experiment needs a folder for its results; give --out."
+        raise InputError(msg)
+    spec = open_experiment_spec(file)
+    with progress("answering") as advance:
+        results = run_experiment(spec, out, folder=file.parent, note=remark, progress=advance)
+    if as_json:
+        print_json({name: evaluation.summary() for name, evaluation in results.items()})
+        return
+    for table in experiment_tables(spec, results):
+        print_table(table)
+    typer.echo(f"results: {out}")
+
+
+Results = Annotated[
+    Path, typer.Argument(help="Folder of an experiment, or of one evaluation, to compare.")
+]
+
+
+@app.command()
+def compare(first: Results, second: Results, *, as_json: AsJson = False) -> None:
+    """Tell by how much two results differ that asked queries from the same places."""
+    from semsig_gis.comparison import common_cases, compare_evaluations
+    from semsig_gis.evaluation_figures import plain_records
+    from semsig_gis.experiment_folder import open_results
+    from semsig_gis.experiment_report import comparison_table
+
+    pairs = common_cases(open_results(first), open_results(second))
+    found = {name: compare_evaluations(*pair) for name, pair in pairs.items()}
+    if as_json:
+        print_json({name: plain_records(table) for name, table in found.items()})
+        return
+    for name, table in found.items():
+        print_table(comparison_table(table, f"{name}: " * bool(name) + f"{first} and {second}"))

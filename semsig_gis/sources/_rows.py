@@ -8,7 +8,7 @@ import re
 from typing import TYPE_CHECKING, Any
 
 from semsig_gis.errors import CatalogError, nearest_name
-from semsig_gis.layer_spec import MAX_WIDTH_M
+from semsig_gis.layer_spec import MAX_WIDTH_M, MIN_WIDTH_M
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence
@@ -143,7 +143,7 @@ def _metres(value: object) -> float:
         width = float(as_text(value).strip().removesuffix("m").replace(",", "."))
     except ValueError:
         return math.nan
-    return width if 0 < width <= MAX_WIDTH_M else math.nan
+    return width if MIN_WIDTH_M <= width <= MAX_WIDTH_M else math.nan
 
 
 def _require_patterns(values: Iterable[Value], *, where: str) -> None:

@@ -146,7 +146,7 @@ def test_a_street_of_an_unknown_class_has_no_width() -> None:
 @pytest.mark.parametrize(
     ("value", "expected"),
     [(9, 4.5), (9.5, 4.75), ("9.5", 4.75), ("9,5 m", 4.75), ("10m", 5.0), (True, 6.0)]
-    + [(bad, 6.0) for bad in (0, -3, math.nan, math.inf, 201, "wide", "", None, "9'")],
+    + [(bad, 6.0) for bad in (0, 0.05, -3, math.nan, math.inf, 201, "wide", "", None, "9'")],
 )
 def test_a_field_of_widths_goes_before_the_class(value: object, expected: float) -> None:
     spec = street(width_by=BY_CLASS, width_field="width")
@@ -156,7 +156,7 @@ def test_a_field_of_widths_goes_before_the_class(value: object, expected: float)
 @given(values)
 def test_a_width_is_plausible_or_unknown(value: Any) -> None:  # noqa: ANN401
     half = half_width(street(width_field="width"), width=value)
-    assert math.isnan(half) or 0 < half <= 100
+    assert math.isnan(half) or 0.05 <= half <= 100
 
 
 def test_a_field_of_widths_must_exist() -> None:

@@ -1,0 +1,188 @@
+"""Write the page of figures from the two result files: ``python -m benchmarks.tables``."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Sequence
+
+__all__ = ["main", "page"]
+
+FOLDER = Path(__file__).parent
+PAGE = FOLDER.parent / "docs" / "figures.md"
+
+_HEAD = """# Figures
+
+This page is written by `python -m benchmarks.tables`, which `make bench` and `make accuracy` end
+with. All figures are from one machine with two cores that other programs share, so ratios say
+more than times.
+"""
+_ACCURACY = """## Accuracy
+
+`make accuracy` draws {queries:,} cells of a city, spoils their signatures, and asks every method
+for all of them. `light`, `medium` and `strong` are 1, 7 and 13 errors (missed, false, or of a false
+class) and bearing noise of 5 degrees. `edit+edit:5%` is the best method that the paper reports.
+The errors are those of the one best place; the interval of 95 % is Wilson's. "On the grid", a
+query is seen from the centre of a cell, as in the paper; off the grid, from anywhere in it.
+"""
+_CHANCES = """## Chances
+
+The likelihood method says how sure it is. "Stated" is its mean chance to be within 50 m, "came
+true" how often it was. A region of 90 % is made of whole cells and so holds somewhat more: "holds"
+is how often the true cell is in it, "stated" what the method says of that, and "just 90 %" how
+often it is in a region whose least likely cells count only with the part that is needed.
+"""
+_SURE = """## Answers
+
+The likelihood method gives an answer or says that it cannot tell. The threshold is chosen on half
+of the `medium` queries so that 98 % of the answers are right; these are the other halves.
+"""
+_BARS = """## What was asked for
+
+The figures that accuracy was to reach, and what came out.
+"""
+_SPEED = """## Speed
+
+`make bench` times ours and a peer in turns, in one process, and keeps the medians. The paper's
+times are those that it prints, for 312,134 cells on a machine of its own.
+"""
+
+
+def main() -> None:
+    """Write the page."""
+    PAGE.write_text(page(_results("accuracy.json"), _results("results.json")), encoding="utf-8")
+    print(f"wrote {PAGE.relative_to(FOLDER.parent)}")
+
+
+def page(accuracy: Sequence[dict[str, Any]], speed: Sequence[dict[str, Any]]) -> str:
+    """Return the page.
+
+    Parameters
+    ----------
+    accuracy, speed : sequence of dict
+        Rows of ``accuracy.json`` and ``results.json``.
+
+    Returns
+    -------
+    str
+        Markdown.
+    """
+    parts = [_HEAD]
+    plain = [row for row in accuracy if row["coverage"] is None]
+    if plain:
+        parts.append(_ACCURACY.format(queries=plain[0]["queries"]))
+    for city in dict.fromkeys(row["city"] for row in plain):
+        rows = [row for row in plain if row["city"] == city]
+        parts += [f"### {city}, {rows[0]['cells']:,} cells\n", _accuracy_table(rows)]
+    told = [row for row in plain if row["in_region"] is not None]
+    sure = [row for row in accuracy if row["coverage"] is not None]
+    bars = [{**bar, "city": row["city"]} for row in accuracy for bar in row["bars"]]
+    for text, rows, table in (
+        (_CHANCES, told, _chance_table),
+        (_SURE, sure, _answer_table),
+        (_BARS, bars, _bar_table),
+        (_SPEED, list(speed), _speed_table),
+    ):
+        if rows:
+            parts += [text, table(rows)]
+    return "\n".join(parts)
+
+
+def _accuracy_table(rows: Iterable[dict[str, Any]]) -> str:
+    return _table(
+        "noise | method | what is known | <= 25 m | <= 50 m | interval | ten objects or more | "
+        "recall@10 % | ms",
+        (
+            (
+                *(row["distortion"], f"`{row['method']}`", row["setting"]),
+                *(_share(row["p25"]), _share(row["p50"])),
+                f"{_share(row['p50_low'])}-{_share(row['p50_high'])}",
+                *(_share(row["p50_ten"]), _share(row["recall10pct"])),
+                f"{row['ms_per_query']:.3g}",
+            )
+            for row in rows
+        ),
+    )
+
+
+def _chance_table(rows: Iterable[dict[str, Any]]) -> str:
+    names = ("chance", "p50", "region_mass", "in_region", "in_exact_region")
+    return _table(
+        "city | noise | method | what is known | stated | came true | region: stated | holds | "
+        "just 90 %",
+        (
+            (
+                *(row["city"], row["distortion"], f"`{row['method']}`", row["setting"]),
+                *(_share(row[name]) for name in names),
+            )
+            for row in rows
+        ),
+    )
+
+
+def _answer_table(rows: Iterable[dict[str, Any]]) -> str:
+    return _table(
+        "city | noise | queries | answered | right, of these",
+        (
+            (
+                *(row["city"], row["distortion"], f"{row['queries']:,}"),
+                *(_share(row["coverage"]), _share(row["precision"])),
+            )
+            for row in rows
+        ),
+    )
+
+
+def _bar_table(rows: Iterable[dict[str, Any]]) -> str:
+    return _table(
+        "city | what | wanted | came out | reached",
+        (
+            (
+                *(row["city"], row["what"]),
+                " to ".join(f"{end:g}" for end in (row["low"], row["high"]) if end is not None),
+                f"{row['value']:.3f}",
+                "yes" if row["met"] else "no",
+            )
+            for row in rows
+        ),
+    )
+
+
+def _speed_table(rows: Iterable[dict[str, Any]]) -> str:
+    return _table(
+        "what | ours | peer | times better | wanted | the paper",
+        (
+            (
+                row["name"],
+                f"{row['ours']:,.4g} {row['unit']}",
+                f"{row['peer']:,.4g} {row['unit']} ({row['peer_name']})",
+                f"{row['ratio']:.3g}",
+                "" if row["bar"] is None else f"{row['bar']:.3g}{'' if row['met'] else ', missed'}",
+                "" if row["paper"] is None else f"{row['paper']:,.4g} {row['unit']}",
+            )
+            for row in rows
+        ),
+    )
+
+
+def _table(head: str, rows: Iterable[Sequence[str]]) -> str:
+    """Return a table; the columns of the head are parted by bars."""
+    titles = head.split(" | ")
+    lines = [titles, ["---"] * len(titles), *rows]
+    return "\n".join(f"| {' | '.join(line)} |" for line in lines) + "\n"
+
+
+def _share(value: float | None) -> str:
+    return "" if value is None else f"{value:.3f}"
+
+
+def _results(name: str) -> list[dict[str, Any]]:
+    rows: list[dict[str, Any]] = json.loads((FOLDER / name).read_text(encoding="utf-8"))
+    return rows
+
+
+if __name__ == "__main__":
+    main()

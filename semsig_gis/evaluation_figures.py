@@ -1,0 +1,407 @@
+"""Figures of many scored queries, with intervals: shares, percentiles, groups, calibration.
+
+Every function takes the table of queries that `semsig_gis.evaluation_result` keeps. What a query
+adds to a figure is a chance, an expectation over all orders of the tied cells.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pandas as pd
+
+from semsig_gis.errors import InputError
+from semsig_gis.intervals import quantile_ranks, wilson_interval
+from semsig_gis.locating import DEFAULT_RULE
+from semsig_gis.scoring import NEAR_PLACES, expected_recall
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Sequence
+
+    import geopandas as gpd
+    from numpy.typing import NDArray
+
+__all__ = [
+    "AMBIGUITIES",
+    "LENGTHS",
+    "ambiguity_labels",
+    "calibration_bins",
+    "coverage_curve",
+    "district_labels",
+    "figure_means",
+    "grouped_means",
+    "length_labels",
+    "percentile",
+    "plain_records",
+    "query_figures",
+]
+
+WITHIN = (5, 10, 25, 50, 100)
+RECALLS = (1, 10)
+LENGTHS = ("1-4", "5-9", "10-19", "20+")
+"""Ranges of how many objects are really seen."""
+AMBIGUITIES = ("1", "2-9", "10-99", "100-999", "1000+")
+"""Ranges of how many cells have the types of the true one."""
+ELSEWHERE = "elsewhere"
+RULES = (0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 0.95, 0.98, 0.99)
+BINS = 10
+
+
+def query_figures(queries: pd.DataFrame, *, cells: int) -> pd.DataFrame:
+    """Return what each query adds to each figure.
+
+    Parameters
+    ----------
+    queries : DataFrame
+        Columns as in `Evaluation.queries`.
+    cells : int
+        How many cells were ranked.
+
+    Returns
+    -------
+    DataFrame
+        Chances, one row a query: ``p5``, ``p10``, ``p25``, ``p50``, ``p100`` (error at most so
+        many metres), ``recall1``, ``recall10`` (true cell in the top per cent), ``near1``,
+        ``near5``, ``near10``, ``near20`` (one of the best N places within 25 m) and, where a
+        method states chances, ``coverage`` (answered), ``precision`` (answered and right; NaN
+        where not answered) and ``in_region``.
+
+    Examples
+    --------
+    >>> table = pd.DataFrame({"rank_low": [1], "rank_high": [2], "chance": [np.nan]})
+    >>> for name in ("p5", "p10", "p25", "p50", "p100", "near1", "near5", "near10", "near20"):
+    ...     table[name] = 0.5
+    >>> query_figures(table, cells=100)["recall1"].tolist()
+    [0.5]
+    """
+    names = [*(f"p{metres}" for metres in WITHIN), *(f"near{count}" for count in NEAR_PLACES)]
+    figures = {name: queries[name].to_numpy(dtype=np.float64) for name in names}
+    for percent in RECALLS:
+        figures[f"recall{percent}"] = expected_recall(
+            queries["rank_low"], queries["rank_high"], cells=cells, percent=percent
+        )
+    chance = queries["chance"].to_numpy(dtype=np.float64)
+    if not np.isnan(chance).all():
+        answered = chance >= DEFAULT_RULE.threshold
+        figures["coverage"] = answered.astype(np.float64)
+        figures["precision"] = np.where(answered, queries["right"], np.nan)
+        figures["in_region"] = queries["in_region"].to_numpy(dtype=np.float64)
+    return pd.DataFrame(figures)
+
+
+def figure_means(figures: pd.DataFrame) -> pd.DataFrame:
+    """Return the mean of each figure, with an interval.
+
+    Parameters
+    ----------
+    figures : DataFrame
+        See `query_figures`.
+
+    Returns
+    -------
+    DataFrame
+        By figure: ``value``, ``low`` and ``high`` (95 %), and ``n``, how many queries have a say.
+        NaN where none has.
+
+    Notes
+    -----
+    Wilson's interval. Where ties make a query count with a chance, it is a little too wide: such
+    a count varies less than one of nought or one.
+
+    Examples
+    --------
+    >>> figure_means(pd.DataFrame({"p50": [1.0, 1.0, 0.5, np.nan]})).loc["p50", "n"]
+    np.int64(3)
+    """
+    rows = []
+    for name in figures:
+        values = figures[name].to_numpy(dtype=np.float64)
+        told = values[~np.isnan(values)]
+        value = float(told.mean()) if told.size else math.nan
+        low, high = wilson_interval(value, told.size) if told.size else (math.nan, math.nan)
+        rows.append({"figure": name, "value": value, "low": low, "high": high, "n": told.size})
+    return pd.DataFrame(rows).set_index("figure")
+
+
+def grouped_means(
+    figures: pd.DataFrame, labels: Sequence[str], *, by: str, order: Iterable[str]
+) -> pd.DataFrame:
+    """Return the means of all figures group by group.
+
+    Parameters
+    ----------
+    figures : DataFrame
+        See `query_figures`.
+    labels : sequence of str
+        Group of each query.
+    by : str
+        What they are grouped by.
+    order : iterable of str
+        The groups in the order wanted; groups without queries are told, too.
+
+    Returns
+    -------
+    DataFrame
+        One row a group: the column of the name `by`, ``n``, all figures, and ``p50_low`` and
+        ``p50_high`` (95 %).
+
+    Examples
+    --------
+    >>> table = pd.DataFrame({"p50": [1.0, 0.0, 1.0]})
+    >>> grouped_means(table, ["a", "a", "b"], by="part", order=["a", "b"])["p50"].tolist()
+    [0.5, 1.0]
+    """
+    groups = np.asarray(labels)
+    rows = []
+    for group in order:
+        means = figure_means(figures[groups == group])
+        row: dict[str, Any] = {by: group, "n": int((groups == group).sum())}
+        row |= {str(name): value for name, value in means["value"].items()}
+        row |= {"p50_low": means.loc["p50", "low"], "p50_high": means.loc["p50", "high"]}
+        rows.append(row)
+    return pd.DataFrame(rows)
+
+
+def length_labels(queries: pd.DataFrame) -> list[str]:
+    """Return the range of each query by how many objects are really seen.
+
+    Parameters
+    ----------
+    queries : DataFrame
+        With ``length``.
+
+    Returns
+    -------
+    list of str
+        One of `LENGTHS` each; ``"0"`` where nothing is seen.
+
+    Examples
+    --------
+    >>> length_labels(pd.DataFrame({"length": [1, 19, 400]}))
+    ['1-4', '10-19', '20+']
+    """
+    return _ranges(queries["length"].to_numpy(), LENGTHS)
+
+
+def ambiguity_labels(queries: pd.DataFrame) -> list[str]:
+    """Return the range of each query by how many cells have the types of the true one.
+
+    Parameters
+    ----------
+    queries : DataFrame
+        With ``type_group``.
+
+    Returns
+    -------
+    list of str
+        One of `AMBIGUITIES` each; ``"0"`` where the true cell is not in the database.
+
+    Examples
+    --------
+    >>> ambiguity_labels(pd.DataFrame({"type_group": [1, 9, 29958, 0]}))
+    ['1', '2-9', '1000+', '0']
+    """
+    return _ranges(queries["type_group"].to_numpy(), AMBIGUITIES)
+
+
+def district_labels(queries: gpd.GeoDataFrame, districts: gpd.GeoDataFrame, name: str) -> list[str]:
+    """Return the district that each query was seen in.
+
+    Parameters
+    ----------
+    queries : GeoDataFrame
+        With the true places.
+    districts : GeoDataFrame
+        Polygons in any CRS.
+    name : str
+        Their column that names them.
+
+    Returns
+    -------
+    list of str
+        Names; ``"elsewhere"`` in none of them, and the first of several.
+
+    Raises
+    ------
+    InputError
+        If there is no such column.
+
+    Examples
+    --------
+    >>> import geopandas as gpd
+    >>> import shapely
+    >>> here = gpd.GeoDataFrame(geometry=[shapely.Point(1, 1), shapely.Point(9, 9)], crs=2154)
+    >>> parts = gpd.GeoDataFrame({"part": ["old"]}, geometry=[shapely.box(0, 0, 2, 2)], crs=2154)
+    >>> district_labels(here, parts, "part")
+    ['old', 'elsewhere']
+    """
+    if name not in districts:
+        columns = ", ".join(str(one) for one in districts if one != "geometry")
+        msg = f"the districts have no column {name!r}; give one of {columns}."
+        raise InputError(msg)
+    polygons = districts.to_crs(queries.crs)
+    point, polygon = polygons.sindex.query(queries.geometry, predicate="intersects")
+    labels = [ELSEWHERE] * len(queries)
+    names = districts[name].astype(str).to_list()
+    for one, inside in sorted(zip(point.tolist(), polygon.tolist(), strict=True), reverse=True):
+        labels[one] = names[inside]
+    return labels
+
+
+def percentile(values: NDArray[np.float64], percent: float) -> tuple[float, float, float]:
+    """Return a percentile with an interval.
+
+    Parameters
+    ----------
+    values : ndarray of float64
+        Errors, some perhaps infinite; NaN is left out.
+    percent : float
+        Above 0 and below 100.
+
+    Returns
+    -------
+    value, low, high : float
+        The percentile, and the order statistics between which the true one is with a confidence
+        of about 95 %; NaN where there are no values.
+
+    Notes
+    -----
+    Between two neighbours the percentile is interpolated. The interval supposes nothing of the
+    distribution: how many values are below the true percentile is binomial.
+
+    Examples
+    --------
+    >>> percentile(np.arange(101.0), 90)
+    (90.0, 83.0, 97.0)
+    """
+    ordered = np.sort(values[~np.isnan(values)])
+    if not ordered.size:
+        return math.nan, math.nan, math.nan
+    place = percent / 100.0 * (ordered.size - 1)
+    below, above = ordered[math.floor(place)], ordered[math.ceil(place)]
+    part = place - math.floor(place)
+    # Nothing is interpolated towards infinity.
+    value = below if part == 0.0 or below == above else below + part * (above - below)
+    low, high = quantile_ranks(ordered.size, percent / 100.0)
+    return float(value), float(ordered[low - 1]), float(ordered[high - 1])
+
+
+def coverage_curve(queries: pd.DataFrame) -> pd.DataFrame:
+    """Return how many queries are answered, and how many answers are right, rule by rule.
+
+    Parameters
+    ----------
+    queries : DataFrame
+        With ``chance`` and ``right``.
+
+    Returns
+    -------
+    DataFrame
+        One row a rule: ``threshold`` (least chance that is answered), ``answered`` (queries),
+        ``coverage``, ``precision``, and ``low`` and ``high`` of the precision (95 %).
+
+    Examples
+    --------
+    >>> table = pd.DataFrame({"chance": [0.99, 0.6, np.nan], "right": [1.0, 0.5, np.nan]})
+    >>> curve = coverage_curve(table).set_index("threshold")
+    >>> curve.loc[0.5, "precision"], round(float(curve.loc[0.9, "coverage"]), 4)
+    (np.float64(0.75), 0.3333)
+    """
+    chance = queries["chance"].to_numpy(dtype=np.float64)
+    right = queries["right"].to_numpy(dtype=np.float64)
+    rows = []
+    for threshold in RULES:
+        answered = chance >= threshold
+        told = right[answered]
+        precision = float(told.mean()) if told.size else math.nan
+        low, high = wilson_interval(precision, told.size) if told.size else (math.nan, math.nan)
+        rows.append(
+            {
+                "threshold": threshold,
+                "answered": int(told.size),
+                "coverage": told.size / len(chance),
+                "precision": precision,
+                "low": low,
+                "high": high,
+            }
+        )
+    return pd.DataFrame(rows)
+
+
+def calibration_bins(queries: pd.DataFrame) -> pd.DataFrame:
+    """Return how often stated chances come true, bin by bin.
+
+    Parameters
+    ----------
+    queries : DataFrame
+        With ``chance`` and ``right``.
+
+    Returns
+    -------
+    DataFrame
+        One row for each tenth: ``from`` and ``to`` (chances stated), ``n``, ``stated`` (their
+        mean), ``true`` (share that was right), and ``low`` and ``high`` of that (95 %). NaN where
+        no chance was in the bin.
+
+    Examples
+    --------
+    >>> table = pd.DataFrame({"chance": [0.95, 1.0, 0.2], "right": [1.0, 0.0, 0.0]})
+    >>> calibration_bins(table)["true"].iloc[-1]
+    np.float64(0.5)
+    """
+    chance = queries["chance"].to_numpy(dtype=np.float64)
+    right = queries["right"].to_numpy(dtype=np.float64)
+    told = ~np.isnan(chance)
+    # The last bin holds 1, too. In whole numbers, so that 0.3 is not a rounding below its bin.
+    bins = np.minimum(np.floor(np.round(chance[told] * BINS, 9)), BINS - 1)
+    rows = []
+    for number in range(BINS):
+        inside = bins == number
+        size = int(inside.sum())
+        stated, true = (
+            float(values[told][inside].mean()) if size else math.nan for values in (chance, right)
+        )
+        low, high = wilson_interval(true, size) if size else (math.nan, math.nan)
+        ends = {"from": number / BINS, "to": (number + 1) / BINS}
+        rows.append({**ends, "n": size, "stated": stated, "true": true, "low": low, "high": high})
+    return pd.DataFrame(rows)
+
+
+def plain_records(table: pd.DataFrame) -> list[dict[str, Any]]:
+    """Return the rows of a table as plain values for JSON.
+
+    Parameters
+    ----------
+    table : DataFrame
+        Of texts and numbers.
+
+    Returns
+    -------
+    list of dict
+        One a row; None for what is infinite or not a number.
+
+    Examples
+    --------
+    >>> plain_records(pd.DataFrame({"n": [2], "p50": [math.nan]}))
+    [{'n': 2, 'p50': None}]
+    """
+    return [
+        {
+            str(name): None if isinstance(value, float) and not math.isfinite(value) else value
+            for name, value in row.items()
+        }
+        for row in table.to_dict("records")
+    ]
+
+
+def _ranges(sizes: NDArray[np.int64], labels: Sequence[str]) -> list[str]:
+    """Return the range that each size is in, such as ``5-9`` or ``20+``."""
+    starts = [int(label.rstrip("+").split("-")[0]) for label in labels]
+    return [
+        "0" if size < 1 else labels[int(place)]
+        for size, place in zip(
+            sizes.tolist(), np.searchsorted(starts, sizes, side="right") - 1, strict=True
+        )
+    ]

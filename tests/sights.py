@@ -1,0 +1,75 @@
+"""Things to be seen, for the tests of what happens to them."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from hypothesis import strategies as st
+from scipy.stats import binom
+
+from semsig_gis.catalog import paper_taxonomy
+from semsig_gis.sight import CitySights, Sight
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+CLASSES = [1, 3, 5, 10]
+REACH = 30.0
+CITY = CitySights(
+    taxonomy=paper_taxonomy(),
+    codes=np.array(CLASSES, np.uint8),
+    frequencies=np.array([40, 30, 20, 10]),
+    reach=REACH,
+)
+seeds = st.integers(0, 2**32)
+
+
+def sight(objects: list[tuple[int, float, float]]) -> Sight:
+    """Return objects given as (class code, bearing, distance)."""
+    codes, bearings, distances = zip(*objects, strict=True) if objects else ((), (), ())
+    return Sight(
+        codes=np.array(codes, np.uint8),
+        bearings=np.array(bearings, np.float64),
+        distances=np.array(distances, np.float64),
+    )
+
+
+sights = st.lists(
+    st.tuples(st.sampled_from(CLASSES), st.floats(0, 359.99), st.floats(0, REACH)), max_size=12
+).map(lambda objects: sight(sorted(objects, key=lambda one: one[1])))
+
+
+def many(count: int, *, code: int = 3, distance: float = 10.0, bearing: float = 90.0) -> Sight:
+    """Return equal objects."""
+    return Sight(
+        codes=np.full(count, code, np.uint8),
+        bearings=np.full(count, bearing),
+        distances=np.full(count, distance),
+    )
+
+
+def all_round(count: int, *, distance: float = 10.0) -> Sight:
+    """Return objects all round, evenly."""
+    return Sight(
+        codes=np.full(count, 3, np.uint8),
+        bearings=np.linspace(0.0, 360.0, count, endpoint=False),
+        distances=np.full(count, distance),
+    )
+
+
+def rows(one: Sight) -> list[tuple[int, float, float]]:
+    """Return the objects one by one."""
+    columns = (one.codes.tolist(), one.bearings.tolist(), one.distances.tolist())
+    return list(zip(*columns, strict=True))
+
+
+def away(bearings: NDArray[np.float64], middle: float) -> NDArray[np.float64]:
+    """Return signed angles from a direction."""
+    return np.asarray((bearings - middle + 180.0) % 360.0 - 180.0)
+
+
+def assert_rate(hits: float, trials: int, chance: float) -> None:
+    """Check a rate: neither tail of the binomial is unheard of."""
+    low, high = binom.cdf(hits, trials, chance), binom.sf(hits - 1, trials, chance)
+    assert min(low, high) > 1e-9, (hits / trials, chance)
