@@ -34,8 +34,10 @@ if TYPE_CHECKING:
     from semsig_gis.export import export_geopackage
     from semsig_gis.fetching import fetch_layers, find_area, open_cache
     from semsig_gis.grid import GridSpec
-    from semsig_gis.identifiability import Identifiability, identify
+    from semsig_gis.identifiability import Identifiability
+    from semsig_gis.identifiability_check import IdentifiabilityCheck, check_identifiability
     from semsig_gis.identifiability_file import open_identifiability, save_identifiability
+    from semsig_gis.identifying import identify
     from semsig_gis.layer_spec import LayerSpec
     from semsig_gis.likelihood import LikelihoodIndex, build_index
     from semsig_gis.likelihood_file import ready_index
@@ -82,6 +84,7 @@ _HOMES = {
     "Footprints": "occlusion",
     "GridSpec": "grid",
     "Identifiability": "identifiability",
+    "IdentifiabilityCheck": "identifiability_check",
     "LayerSpec": "layer_spec",
     "LikelihoodIndex": "likelihood",
     "Loaded": "loading",
@@ -109,6 +112,7 @@ _HOMES = {
     "build_index": "likelihood",
     "build_objects": "objects",
     "build_tiles": "distributed",
+    "check_identifiability": "identifiability_check",
     "choose_layers": "loading",
     "combine_catalogs": "catalog",
     "compare_evaluations": "comparison",
@@ -121,7 +125,7 @@ _HOMES = {
     "find_area": "fetching",
     "find_files": "sources",
     "identifiability_map": "map_identifiability",
-    "identify": "identifiability",
+    "identify": "identifying",
     "load_catalog": "catalog",
     "localization_map": "maps",
     "localize": "matching",
@@ -167,6 +171,7 @@ __all__ = [
     "Footprints",
     "GridSpec",
     "Identifiability",
+    "IdentifiabilityCheck",
     "LayerSpec",
     "LikelihoodIndex",
     "Loaded",
@@ -194,6 +199,7 @@ __all__ = [
     "build_index",
     "build_objects",
     "build_tiles",
+    "check_identifiability",
     "choose_layers",
     "combine_catalogs",
     "compare_evaluations",

@@ -278,7 +278,7 @@ def _steps(values: NDArray[np.int32]) -> NDArray[np.int32]:
     return np.diff(values, prepend=np.int32(0))
 
 
-def _chance_bytes(chances: NDArray[np.float32]) -> NDArray[np.uint8]:
+def _chance_bytes(chances: NDArray[np.float64]) -> NDArray[np.uint8]:
     return np.rint(chances * CHANCES).clip(0, CHANCES).astype(np.uint8)
 
 

@@ -1,116 +1,101 @@
-"""The file of what is known of the cells before any query: beside its database, a row a cell."""
+"""Identifiability as columns of the files of its database."""
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
-import pyarrow as pa
 
-from semsig_gis import __version__
+from semsig_gis.added_columns import add_columns, read_added
 from semsig_gis.errors import DatabaseError, SemsigError
 from semsig_gis.identifiability import ClassGain, Identifiability
 from semsig_gis.likelihood import index_fingerprint
 from semsig_gis.noise import noise_from_dict
-from semsig_gis.storage import geo_metadata, points_to_wkb, read_geoparquet, write_geoparquet
 
 if TYPE_CHECKING:
+    from pathlib import Path
+    from typing import Any
+
+    import pyarrow as pa
+
     from semsig_gis.database import SignatureDatabase
+    from semsig_gis.noise import Noise
 
-__all__ = ["identifiability_path", "open_identifiability", "save_identifiability"]
+__all__ = ["open_identifiability", "save_identifiability"]
 
-KIND = "identifiability"
-SUFFIX = ".identifiability.parquet"
-
-
-def identifiability_path(database: str | Path) -> Path:
-    """Return where the identifiability of a database is kept.
-
-    Parameters
-    ----------
-    database : str or Path
-        The database, a file or a folder.
-
-    Returns
-    -------
-    Path
-        A file beside it.
-
-    Examples
-    --------
-    >>> identifiability_path("maps/city.parquet").as_posix()
-    'maps/city.identifiability.parquet'
-    """
-    file = Path(database)
-    return file.with_name(file.name.removesuffix(".parquet") + SUFFIX)
+NAME = "identifiability"
+# Raised whenever the same cells and noise give other numbers, or they are told otherwise.
+FORMAT = 1
 
 
 def save_identifiability(told: Identifiability, path: str | Path) -> None:
-    """Save what is known of the cells as one GeoParquet file.
+    """Put what is known of the cells into the files of their database.
 
     Parameters
     ----------
     told : Identifiability
         What to save.
     path : str or Path
-        File to write; it appears whole, by rename.
-
-    Notes
-    -----
-    Columns: ``cell_id``, those of `Identifiability.table`, and ``geometry``, the viewpoint as WKB.
-    """
-    database = told.database
-    table = told.table().add_column(0, "cell_id", [database.cell_ids])
-    xy = database.xy
-    bounds = [*xy.min(axis=0).tolist(), *xy.max(axis=0).tolist()]
-    write_geoparquet(
-        table.append_column("geometry", points_to_wkb(xy)),
-        path,
-        geo=geo_metadata(database.crs, geometry_types=["Point"], bounds=bounds),
-        specs={
-            "kind": KIND,
-            "version": __version__,
-            "belongs_to": index_fingerprint(database, told.noise),
-            "noise": told.noise.to_dict(),
-            "radius": told.radius,
-            "trials": told.trials,
-            "seed": told.seed,
-            "places": told.lookalikes.shape[1],
-            "classes": [
-                {"code": item.code, "near": item.near, "bits": item.bits} for item in told.classes
-            ],
-            "licenses": list(database.licenses),
-        },
-    )
-
-
-def open_identifiability(database: SignatureDatabase, path: str | Path) -> Identifiability:
-    """Open a file that `save_identifiability` wrote.
-
-    Parameters
-    ----------
-    database : SignatureDatabase
-        The database that it belongs to.
-    path : str or Path
-        File to read.
-
-    Returns
-    -------
-    Identifiability
-        What is known of the cells.
+        File of the database, or folder of its parts; it is replaced whole.
 
     Raises
     ------
     DatabaseError
-        If the file is missing or damaged, or belongs to another database.
+        If it is damaged, or is not the database of `told`.
+    InputError
+        If it cannot be written; it is unchanged then.
+
+    Notes
+    -----
+    The columns are those of `Identifiability.table`. Whoever builds or updates the database gets
+    one without them.
+    """
+    add_columns(
+        path,
+        told.table(),
+        cell_ids=told.database.cell_ids,
+        name=NAME,
+        facts={
+            "format": FORMAT,
+            "belongs_to": index_fingerprint(told.database, told.noise),
+            "noise": told.noise.to_dict(),
+            "radius": told.radius,
+            "trials": told.trials,
+            "seed": told.seed,
+            "classes": [
+                {"code": item.code, "near": item.near, "bits": item.bits} for item in told.classes
+            ],
+        },
+    )
+
+
+def open_identifiability(database: SignatureDatabase, path: str | Path) -> Identifiability | None:
+    """Read what `save_identifiability` put into the files of a database.
+
+    Parameters
+    ----------
+    database : SignatureDatabase
+        The database, opened.
+    path : str or Path
+        Its file, or the folder of its parts.
+
+    Returns
+    -------
+    Identifiability or None
+        What is known of the cells; None where nothing was found out yet.
+
+    Raises
+    ------
+    DatabaseError
+        If the files are damaged, or what they tell belongs to other signatures.
 
     Examples
     --------
     >>> import tempfile
     >>> from semsig_gis.catalog import paper_taxonomy
     >>> from semsig_gis.building import build_database
-    >>> from semsig_gis.identifiability import identify
+    >>> from semsig_gis.database_file import save_database
+    >>> from semsig_gis.identifying import identify
     >>> from semsig_gis.likelihood import build_index
     >>> from semsig_gis.noise import named_noise
     >>> from semsig_gis.objects import build_objects
@@ -120,52 +105,64 @@ def open_identifiability(database: SignatureDatabase, path: str | Path) -> Ident
     >>> database = build_database(objects)
     >>> told = identify(build_index(database, named_noise("light")), trials=20, class_trials=5)
     >>> with tempfile.TemporaryDirectory() as folder:
-    ...     path = f"{folder}/city.identifiability.parquet"
+    ...     path = f"{folder}/city.parquet"
+    ...     save_database(database, path)
+    ...     before = open_identifiability(database, path)
     ...     save_identifiability(told, path)
-    ...     bool((open_identifiability(database, path).found == told.found).all())
-    True
+    ...     after = open_identifiability(database, path)
+    >>> before is None, bool((after.found == told.found).all())
+    (True, True)
     """
-    table, specs, _ = read_geoparquet(path, kind=KIND)
+    table, facts = read_added(path, name=NAME)
+    if table is None or facts is None:
+        return None
     try:
-        noise = noise_from_dict(specs["noise"])
-        same = specs["belongs_to"] == index_fingerprint(database, noise) and np.array_equal(
-            table["cell_id"].to_numpy(), database.cell_ids
+        noise = noise_from_dict(facts["noise"])
+        fits = facts["format"] == FORMAT and (
+            facts["belongs_to"] == index_fingerprint(database, noise)
         )
-        classes = tuple(ClassGain(**item) for item in specs["classes"])
-        names = {item.code: item.name for item in database.taxonomy.classes}
-        columns = {
-            name: table[name].to_numpy()
-            for name in table.column_names
-            if table[name].type == pa.float32()
-        }
-        ids = database.cell_ids
-        places = [f"lookalike_{number + 1}" for number in range(specs["places"])]
-        told = same and Identifiability(
-            database=database,
-            noise=noise,
-            radius=float(specs["radius"]),
-            itself=columns["chance_itself"],
-            near=columns["chance_near"],
-            found=columns["chance_found"],
-            bits=columns["bits_left"],
-            lookalikes=np.stack(
-                [
-                    np.searchsorted(ids, table[name].fill_null(ids[0] - 1).to_numpy(), side="right")
-                    - 1
-                    for name in places
-                ],
-                axis=1,
-            ),
-            lookalike_chances=np.stack([columns[f"{name}_chance"] for name in places], axis=1),
-            gains=np.stack([columns[f"gain_{names[item.code]}"] for item in classes], axis=1),
-            classes=classes,
-            trials=int(specs["trials"]),
-            seed=int(specs["seed"]),
-        )
+        told = _told(database, noise, table, facts) if fits else None
     except (KeyError, TypeError, ValueError, SemsigError) as error:
-        msg = f"{path} is damaged ({error}); run semsig identify again."
+        msg = f"the identifiability in {path} is damaged ({error}); run semsig identify again."
         raise DatabaseError(msg) from error
-    if not told:
-        msg = f"{path} belongs to another database or an older one; run semsig identify again."
+    if told is None:
+        msg = (
+            f"the identifiability in {path} is that of other signatures, or of another version of "
+            "semsig; run semsig identify again."
+        )
         raise DatabaseError(msg)
     return told
+
+
+def _told(
+    database: SignatureDatabase, noise: Noise, table: pa.Table, facts: dict[str, Any]
+) -> Identifiability:
+    """Return what a table and the facts beside it tell."""
+    classes = tuple(ClassGain(**item) for item in facts["classes"])
+    names = {item.code: item.name for item in database.taxonomy.classes}
+    ids = database.cell_ids
+    places = [name for name in table.column_names if name.endswith("_chance")]
+
+    def stacked(columns: list[str]) -> np.ndarray:
+        return np.stack([table[name].to_numpy() for name in columns], axis=1)
+
+    def rows(name: str) -> np.ndarray:
+        cells = table[name]
+        found = np.searchsorted(ids, cells.fill_null(ids[0]).to_numpy())
+        return np.where(cells.is_valid().to_numpy(), found, -1)
+
+    return Identifiability(
+        database=database,
+        noise=noise,
+        radius=float(facts["radius"]),
+        itself=table["chance_itself"].to_numpy(),
+        near=table["chance_near"].to_numpy(),
+        found=table["chance_found"].to_numpy(),
+        bits=table["bits_left"].to_numpy(),
+        lookalikes=np.stack([rows(name.removesuffix("_chance")) for name in places], axis=1),
+        lookalike_chances=stacked(places),
+        gains=stacked([f"gain_{names[item.code]}" for item in classes]),
+        classes=classes,
+        trials=int(facts["trials"]),
+        seed=int(facts["seed"]),
+    )

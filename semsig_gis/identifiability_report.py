@@ -2,16 +2,25 @@
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING
 
 from semsig_gis.tables import Table, percent
+
+SCORES = {
+    "found": "chance to be found",
+    "near": "chance given to the cells near",
+    "length": "number of objects, for comparison",
+    "type_group": "how few cells have the same types, for comparison",
+}
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
     from semsig_gis.identifiability import Identifiability
+    from semsig_gis.identifiability_check import IdentifiabilityCheck
 
-__all__ = ["identifiability_tables"]
+__all__ = ["check_tables", "identifiability_tables"]
 
 
 def identifiability_tables(
@@ -35,7 +44,7 @@ def identifiability_tables(
     --------
     >>> from semsig_gis.catalog import paper_taxonomy
     >>> from semsig_gis.building import build_database
-    >>> from semsig_gis.identifiability import identify
+    >>> from semsig_gis.identifying import identify
     >>> from semsig_gis.likelihood import build_index
     >>> from semsig_gis.noise import named_noise
     >>> from semsig_gis.objects import build_objects
@@ -98,3 +107,59 @@ def identifiability_tables(
         note="To the mean cell: beyond what all other classes tell of it.",
     )
     return whole, classes
+
+
+def check_tables(check: IdentifiabilityCheck) -> tuple[Table, ...]:
+    """Return what came of a check as tables.
+
+    Parameters
+    ----------
+    check : IdentifiabilityCheck
+        What was told beside what came of queries.
+
+    Returns
+    -------
+    tuple of Table
+        The calibration; the rank correlations.
+
+    Examples
+    --------
+    >>> from semsig_gis.identifiability_check import ChanceBin, IdentifiabilityCheck
+    >>> tenth = ChanceBin(
+    ...     low=0.9, high=1.0, queries=50, stated=0.95, true=0.96, true_low=0.86, true_high=0.99
+    ... )
+    >>> check = IdentifiabilityCheck(
+    ...     queries=50, seed=1, found=0.96, correlations={"found": 0.5}, attainable=0.6,
+    ...     bins=(tenth,),
+    ... )
+    >>> check_tables(check)[0].rows[0]
+    ('0.9 to 1', '50', '95.0 %', '96.0 %', '86.0 % to 99.0 %')
+    """
+    calibration = Table(
+        title="Do the chances come true?",
+        columns=("Chance to be found", "Queries", "Stated", "Found", "Interval (95 %)"),
+        rows=tuple(
+            (
+                f"{one.low:g} to {one.high:g}",
+                f"{one.queries:,}",
+                percent(one.stated),
+                percent(one.true),
+                f"{percent(one.true_low)} to {percent(one.true_high)}",
+            )
+            for one in check.bins
+        ),
+        note=f"Of {check.queries:,} fresh queries, {percent(check.found)} were found.",
+    )
+    ranks = Table(
+        title="Do cells with a higher score succeed more often?",
+        columns=("Score of a cell", "Rank correlation with success"),
+        rows=tuple(
+            (SCORES[name], "" if math.isnan(value) else f"{value:+.3f}")
+            for name, value in check.correlations.items()
+        ),
+        note=""
+        if math.isnan(check.attainable)
+        else f"Success is yes or no: chances that are just right would have "
+        f"{check.attainable:.3f}.",
+    )
+    return calibration, ranks

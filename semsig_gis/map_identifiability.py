@@ -56,7 +56,7 @@ def identifiability_map(
     --------
     >>> from semsig_gis.catalog import paper_taxonomy
     >>> from semsig_gis.building import build_database
-    >>> from semsig_gis.identifiability import identify
+    >>> from semsig_gis.identifying import identify
     >>> from semsig_gis.likelihood import build_index
     >>> from semsig_gis.noise import named_noise
     >>> from semsig_gis.objects import build_objects

@@ -8,13 +8,21 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from semsig_gis.cli._app import AsJson, Database, app, numbers, print_report, print_table
+from semsig_gis.cli._app import (
+    AsJson,
+    Database,
+    app,
+    known_identifiability,
+    numbers,
+    object_counts,
+    print_report,
+    print_table,
+)
 from semsig_gis.console import print_json, progress, remark
-from semsig_gis.errors import DatabaseError, InputError
+from semsig_gis.errors import InputError
 
 if TYPE_CHECKING:
     from semsig_gis.database import SignatureDatabase
-    from semsig_gis.identifiability import Identifiability
 
 
 class Viewpoints(enum.StrEnum):
@@ -155,11 +163,15 @@ def update(
     as_json: AsJson = False,
 ) -> None:
     """Apply changed street objects to a database, and tell how far the city has drifted."""
+    from semsig_gis.added_columns import has_added
     from semsig_gis.objects import open_objects
     from semsig_gis.update import update_file
 
+    had_columns = has_added(database)
     with progress("updating") as advance:
         report = update_file(database, open_objects(objects), out=out, progress=advance)
+    if had_columns:
+        remark("the new database is without the columns of semsig identify; run it again")
     for note in report.notes:
         remark(note)
     print_report(report, as_json=as_json)
@@ -177,7 +189,7 @@ def info(database: Database, *, as_json: AsJson = False) -> None:
     opened, facts = _opened(database)
     for table in database_tables(opened, **facts):
         print_table(table)
-    told = _identifiability(database, opened)
+    told = known_identifiability(database, opened)
     if told is not None:
         for table in identifiability_tables(told, object_counts=facts.get("object_counts")):
             print_table(table)
@@ -189,26 +201,12 @@ def _info(path: Path) -> dict[str, Any]:
     from semsig_gis.properties import database_summary
 
     opened, facts = _opened(path)
-    told = _identifiability(path, opened)
+    told = known_identifiability(path, opened)
     more = {}
     if told is not None:
         counts = facts.get("object_counts")
         more["identifiability"] = told.summary(object_counts=counts)
     return database_summary(opened, **facts) | more
-
-
-def _identifiability(path: Path, opened: SignatureDatabase) -> Identifiability | None:
-    """Return what `semsig identify` found out, where it was run."""
-    from semsig_gis.identifiability_file import identifiability_path, open_identifiability
-
-    file = identifiability_path(path)
-    if not file.exists():
-        return None
-    try:
-        return open_identifiability(opened, file)
-    except DatabaseError as error:
-        remark(str(error))
-        return None
 
 
 def _opened(path: Path) -> tuple[SignatureDatabase, dict[str, Any]]:
@@ -219,19 +217,6 @@ def _opened(path: Path) -> tuple[SignatureDatabase, dict[str, Any]]:
     facts: dict[str, Any] = {"file_bytes": _bytes(path)}
     counts = object_counts(path)
     return opened, facts if counts is None else facts | {"object_counts": counts}
-
-
-def object_counts(path: Path) -> dict[int, int] | None:
-    """Return how many objects of each class a database has, where its store is at hand."""
-    import numpy as np
-
-    from semsig_gis.store import open_store
-
-    try:
-        codes, counts = np.unique(open_store(path).objects.codes, return_counts=True)
-    except DatabaseError:  # a database may do without its objects
-        return None
-    return dict(zip(codes.tolist(), counts.tolist(), strict=True))
 
 
 def _bytes(path: Path) -> int:

@@ -8,13 +8,9 @@ from typing import Annotated
 
 import typer
 
-from semsig_gis.cli._app import Database, app, tell_if_online
+from semsig_gis.cli._app import Database, app, known_identifiability, tell_if_online
 from semsig_gis.console import progress
 from semsig_gis.errors import InputError
-
-Identifiability = Annotated[
-    Path | None, typer.Option("--identifiability", help="Table that `semsig identify` wrote.")
-]
 
 
 class CellGeometry(enum.StrEnum):
@@ -31,26 +27,34 @@ def map_(
     evaluation: Annotated[
         Path | None, typer.Option(help="Folder that `semsig evaluate --out` wrote.")
     ] = None,
-    identifiability: Identifiability = None,
+    identifiability: Annotated[
+        bool,
+        typer.Option(
+            "--identifiability", help="Draw where a query can be placed (after `semsig identify`)."
+        ),
+    ] = False,
     out: Annotated[Path, typer.Option(help="Map to write (.html).")],
 ) -> None:
     """Draw an evaluation, or where a query can be placed at all."""
     from semsig_gis.database_file import open_database
     from semsig_gis.evaluation import Evaluation
-    from semsig_gis.identifiability_file import open_identifiability
     from semsig_gis.map_identifiability import identifiability_map
     from semsig_gis.maps import evaluation_map, save_map
 
-    if (evaluation is None) == (identifiability is None):
+    if (evaluation is not None) == identifiability:
         msg = "a map shows --evaluation or --identifiability; give one of them."
         raise InputError(msg)
     results = None if evaluation is None else Evaluation.load(evaluation)
+    opened = open_database(database)
+    told = known_identifiability(database, opened) if identifiability else None
+    if identifiability and told is None:
+        msg = f"{database} does not tell where a query can be placed; run semsig identify first."
+        raise InputError(msg)
     with progress("drawing the map"):
-        opened = open_database(database)
-        if results is not None:
+        if told is not None:
+            drawn = identifiability_map(told)
+        elif results is not None:
             drawn = evaluation_map(results, opened)
-        elif identifiability is not None:
-            drawn = identifiability_map(open_identifiability(opened, identifiability))
         offline = save_map(drawn, out)
     typer.echo(f"map: {out}")
     tell_if_online(offline)
@@ -64,7 +68,6 @@ def export(
     objects: Annotated[
         Path | None, typer.Option(help="Street objects to add as a second layer.")
     ] = None,
-    identifiability: Identifiability = None,
     geometry: Annotated[
         CellGeometry, typer.Option(help="How a cell is drawn.")
     ] = CellGeometry.polygon,
@@ -72,18 +75,16 @@ def export(
     """Write the cells, and the street objects, to a GeoPackage for QGIS."""
     from semsig_gis.database_file import open_database
     from semsig_gis.export import export_geopackage
-    from semsig_gis.identifiability_file import open_identifiability
     from semsig_gis.objects import open_objects
 
     opened = open_database(database)
-    told = None if identifiability is None else open_identifiability(opened, identifiability)
     seen = None if objects is None else open_objects(objects)
     with progress("writing the GeoPackage") as advance:
         export_geopackage(
             opened,
             out,
             objects=seen,
-            identifiability=told,
+            identifiability=known_identifiability(database, opened),
             geometry=geometry.value,
             progress=advance,
         )

@@ -3,15 +3,21 @@
 from __future__ import annotations
 
 import os
-from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from semsig_gis.cli._app import AsJson, Database, app, print_table, tell_if_online
-from semsig_gis.cli._build import object_counts
-from semsig_gis.cli._likelihood import NoiseName, prepared_index, read_noise
-from semsig_gis.console import print_json, progress
+from semsig_gis.cli._app import (
+    AsJson,
+    Database,
+    app,
+    known_identifiability,
+    object_counts,
+    print_table,
+)
+from semsig_gis.cli._likelihood import NoiseName, OnGrid, prepared_index, read_noise
+from semsig_gis.console import print_json, progress, remark
+from semsig_gis.errors import InputError
 
 
 @app.command()
@@ -19,41 +25,59 @@ def identify(
     database: Database,
     *,
     noise: NoiseName = "generic",
-    out: Annotated[
-        Path | None,
-        typer.Option(
-            help="Table to write (.parquet), a row a cell; by default beside the database, where "
-            "`semsig info` looks for it."
-        ),
-    ] = None,
-    map_: Annotated[Path | None, typer.Option("--map", help="Map to write (.html).")] = None,
+    on_grid: OnGrid = False,
+    radius: Annotated[float, typer.Option(help="Metres that count as near.")] = 50.0,
     seed: Annotated[int, typer.Option(help="Seed of the simulated queries.")] = 0,
+    threads: Annotated[
+        int | None, typer.Option(help="How many threads to use; all processors by default.")
+    ] = None,
+    check: Annotated[
+        int | None,
+        typer.Option(help="Ask so many fresh queries, and tell whether the chances come true."),
+    ] = None,
     as_json: AsJson = False,
 ) -> None:
-    """Tell of every cell how well a query from it will be placed, and what it is taken for."""
-    from semsig_gis.database_file import open_database
-    from semsig_gis.identifiability import identify as identified
-    from semsig_gis.identifiability_file import identifiability_path, save_identifiability
-    from semsig_gis.identifiability_report import identifiability_tables
-    from semsig_gis.map_identifiability import identifiability_map
-    from semsig_gis.maps import save_map
+    """Tell of every cell how well a query from it will be placed, and what it is taken for.
 
+    The database gets columns that say so; `semsig info`, `map` and `export` show them.
+    """
+    from semsig_gis.database_file import open_database
+    from semsig_gis.identifiability_check import check_identifiability
+    from semsig_gis.identifiability_file import save_identifiability
+    from semsig_gis.identifiability_report import check_tables, identifiability_tables
+    from semsig_gis.identifying import identify as identified
+    from semsig_gis.refinement import cell_noise
+
+    if check is not None and check < 1:
+        msg = f"--check was given as {check}; give a number of queries from 1."
+        raise InputError(msg)
     model = read_noise(noise)
     opened = open_database(database)
-    index = prepared_index(database, opened, model)
-    with progress("comparing cells") as advance:
-        told = identified(index, seed=seed, threads=os.cpu_count() or 1, progress=advance)
-    table = identifiability_path(database) if out is None else out
-    save_identifiability(told, table)
+    if not on_grid:
+        model = cell_noise(model, opened.grid.step)
+    told = known_identifiability(database, opened)
+    known = told is not None and (told.noise, told.radius, told.seed) == (model, radius, seed)
+    workers = (os.cpu_count() or 1) if threads is None else threads
+    if not known or check is not None:
+        index = prepared_index(database, opened, model)
+    if told is None or not known:
+        with progress("comparing cells") as advance:
+            told = identified(index, radius=radius, seed=seed, threads=workers, progress=advance)
+        save_identifiability(told, database)
+    else:
+        remark("The database has these columns already; they are kept.")
+    checked = None
+    if check is not None:
+        with progress("checking") as advance:
+            checked = check_identifiability(
+                told, index, queries=check, threads=workers, progress=advance
+            )
     counts = object_counts(database)
     if as_json:
-        print_json(told.summary(object_counts=counts))
-    else:
-        for part in identifiability_tables(told, object_counts=counts):
-            print_table(part)
-        typer.echo(f"table: {table}")
-    if map_ is not None:
-        offline = save_map(identifiability_map(told), map_)
-        if not as_json:
-            typer.echo(f"map: {map_}")
-        tell_if_online(offline)
+        more = {} if checked is None else {"check": checked.to_dict()}
+        print_json(told.summary(object_counts=counts) | more)
+        return
+    tables = identifiability_tables(told, object_counts=counts)
+    for part in tables if checked is None else (*tables, *check_tables(checked)):
+        print_table(part)
+    typer.echo(f"columns: {database}")
