@@ -171,7 +171,7 @@ def update(
     with progress("updating") as advance:
         report = update_file(database, open_objects(objects), out=out, progress=advance)
     if had_columns:
-        remark("the new database is without the columns of semsig identify; run it again")
+        remark("the new database lacks the columns of semsig identify; run semsig identify again")
     for note in report.notes:
         remark(note)
     print_report(report, as_json=as_json)
