@@ -114,7 +114,7 @@ semsig.cells = (packed, grid, titles) => {
     const found = [];
     for (let at = cell * grid.places; at < (cell + 1) * grid.places; at += 1) {
       const other = data.lookalikes[at];
-      if (other < 0 || data.lookalikeChances[at] === 0) continue;
+      if (other < 0) continue;
       const [across, along] = placeOf(data, other);
       const metres = step * Math.hypot(across - column, along - row);
       const turn = Math.round(Math.atan2(across - column, along - row) / Math.PI * 4 + 8) % 8;
@@ -139,8 +139,8 @@ semsig.cells = (packed, grid, titles) => {
       ["Found within " + radius + " m", percent(data.found[cell])],
       ["Chance given", percent(data.itself[cell]) + " to this cell, " + percent(data.near[cell])
         + " to all within " + radius + " m"],
-      ["Looks like", Math.round(2 ** bits).toLocaleString("en") + " cells (" + bits.toFixed(1)
-        + " bits are left)"],
+      ["Looks like", "about " + Number((2 ** bits).toPrecision(2)).toLocaleString("en")
+        + " cells (" + bits.toFixed(1) + " bits are left)"],
       ...alike.map((one, at) => ["Taken for " + (at + 1), one.text]),
     ];
     const helpers = [];

