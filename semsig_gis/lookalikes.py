@@ -24,9 +24,10 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+    from semsig_gis.database import SignatureDatabase
     from semsig_gis.likelihood import LikelihoodIndex
 
-__all__ = ["Lookalikes", "cell_circle", "compare_without_classes", "find_lookalikes"]
+__all__ = ["Lookalikes", "cell_circle", "city_extent", "compare_without_classes", "find_lookalikes"]
 
 CELLS_A_TASK = 256
 LEAST_SUM = 1e-30  # of ratios, so that it has a logarithm
@@ -83,6 +84,23 @@ def cell_circle(radius: float, step: float) -> NDArray[np.int64]:
     across = np.arange(-math.floor(reach), math.floor(reach) + 1)
     up = np.floor(np.sqrt(reach**2 - across**2)).astype(np.int64)
     return np.stack([cell_ids(across, -up), cell_ids(across, up)], axis=1)
+
+
+def city_extent(database: SignatureDatabase) -> float:
+    """Return a distance within which all cells are from each other.
+
+    Parameters
+    ----------
+    database : SignatureDatabase
+        The cells.
+
+    Returns
+    -------
+    float
+        Metres: a larger radius finds nothing more, but takes longer.
+    """
+    sides = np.ptp(database.columns), np.ptp(database.rows)
+    return database.grid.step * math.hypot(*sides)
 
 
 def find_lookalikes(
@@ -152,6 +170,7 @@ def find_lookalikes(
     _check(temperature, radius)
     asked = _asked(index, cells)
     step = database.grid.step
+    radius = min(radius, city_extent(database))
     where = np.stack([database.columns, database.rows], axis=1).astype(np.int64)
     symbols, _ = _symbols(index)
     ids, flat = database.cell_ids, index.columns.reshape(-1, len(database))
@@ -269,7 +288,8 @@ def compare_without_classes(
     constants = index.constants - np.concatenate([np.zeros((1, count)), by_class])
     constants = constants.astype(np.float32)
     sampled = np.ascontiguousarray(flat[:, sample])
-    ids, circle = database.cell_ids, cell_circle(radius, database.grid.step)
+    ids = database.cell_ids
+    circle = cell_circle(min(radius, city_extent(database)), database.grid.step)
     far = np.empty((len(asked), classes + 1))
 
     def compare(part: slice) -> None:

@@ -12,6 +12,7 @@ import numpy as np
 from semsig_gis.alignment import rerank
 from semsig_gis.detector import Detector
 from semsig_gis.distortion_chain import ready_chain
+from semsig_gis.lookalikes import city_extent
 from semsig_gis.posterior import posterior
 from semsig_gis.sight import CitySights, Sight
 
@@ -209,6 +210,7 @@ def try_queries(
         The outcomes. A query without objects is not answered: chances of 0.
     """
     places = _without_signatures(index.database)
+    radius = min(radius, city_extent(places))
 
     def ask(cell: int, query: Signature) -> tuple[float, ...]:
         return _outcome(index, places, cell, query, radius)

@@ -16,7 +16,12 @@ from sentences import assert_sentence
 from semsig_gis import lookalikes
 from semsig_gis.errors import InputError
 from semsig_gis.likelihood import build_index
-from semsig_gis.lookalikes import cell_circle, compare_without_classes, find_lookalikes
+from semsig_gis.lookalikes import (
+    cell_circle,
+    city_extent,
+    compare_without_classes,
+    find_lookalikes,
+)
 from semsig_gis.noise import named_noise
 
 if TYPE_CHECKING:
@@ -171,3 +176,10 @@ def test_numbers_out_of_range(options: dict[str, Any], words: tuple[str, ...]) -
         with pytest.raises(InputError) as caught:
             compare(INDEX, **options)
         assert_sentence(caught.value, *words)
+
+
+@given(st.integers(0, 30), st.sampled_from([1, 2, 40]))
+def test_no_two_cells_are_farther_apart_than_the_extent(seed: int, cells: int) -> None:
+    database = random_database(seed, cells=cells)
+    between = np.hypot(*(database.xy[:, None] - database.xy).reshape(-1, 2).T)
+    assert between.max() <= city_extent(database) <= math.sqrt(2.0) * between.max() + 1e-6
