@@ -100,7 +100,7 @@ def city_extent(database: SignatureDatabase) -> float:
         Metres: a larger radius finds nothing more, but takes longer.
     """
     sides = np.ptp(database.columns), np.ptp(database.rows)
-    return database.grid.step * math.hypot(*sides)
+    return database.grid.step * math.ceil(math.hypot(*sides))
 
 
 def find_lookalikes(
