@@ -118,13 +118,13 @@ def identify(
     True
     """
     for what, count, least in (
-        ("trials", trials, 1),
-        ("trials without a class", class_trials, 1),
-        ("threads", threads, 1),
-        ("as the seed", seed, 0),
+        ("number of trials", trials, 1),
+        ("number of trials without a class", class_trials, 1),
+        ("number of threads", threads, 1),
+        ("seed", seed, 0),
     ):
         if count < least:
-            msg = f"{count} {what} was asked for; give a whole number from {least}."
+            msg = f"the {what} was given as {count}; give a whole number from {least}."
             raise InputError(msg)
     if not 0 <= radius < math.inf:
         msg = f"a radius of {radius} m was given; give metres, 0 or more."

@@ -48,9 +48,10 @@ def identify(
     from semsig_gis.identifying import identify as identified
     from semsig_gis.refinement import cell_noise
 
-    if check is not None and check < 1:
-        msg = f"--check was given as {check}; give a number of queries from 1."
-        raise InputError(msg)
+    for option, number in (("--check", check), ("--threads", threads)):
+        if number is not None and number < 1:
+            msg = f"{option} was given as {number}; give a whole number from 1."
+            raise InputError(msg)
     model = read_noise(noise)
     opened = open_database(database)
     if not on_grid:
