@@ -75,7 +75,7 @@ def place_lattices(database: SignatureDatabase) -> PlaceLattices:
     >>> objects, _ = build_objects(layers, taxonomy=paper_taxonomy(), crs="EPSG:32631")
     >>> found = place_lattices(build_database(objects))
     >>> found.degrees[0, 0].round(1).tolist(), len(found.metric_box)
-    ([48.8, 2.3], 4)
+    ([48.8, 3.0], 4)
     """
     step, origin = database.grid.step, np.array(database.grid.origin)
     low = origin + step * np.array([database.columns.min(), database.rows.min()])

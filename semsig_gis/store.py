@@ -215,6 +215,7 @@ def save_with_store(database: SignatureDatabase, store: ObjectStore, path: str |
 
     Examples
     --------
+    >>> import tempfile
     >>> from semsig_gis.building import build_database
     >>> from semsig_gis.sources.synthetic import CitySpec, synthetic_city
     >>> from semsig_gis.catalog import paper_taxonomy
