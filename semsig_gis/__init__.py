@@ -34,12 +34,17 @@ if TYPE_CHECKING:
     from semsig_gis.export import export_geopackage
     from semsig_gis.fetching import fetch_layers, find_area, open_cache
     from semsig_gis.grid import GridSpec
+    from semsig_gis.identifiability import Identifiability
+    from semsig_gis.identifiability_check import IdentifiabilityCheck, check_identifiability
+    from semsig_gis.identifiability_file import open_identifiability, save_identifiability
+    from semsig_gis.identifying import identify
     from semsig_gis.layer_spec import LayerSpec
     from semsig_gis.likelihood import LikelihoodIndex, build_index
     from semsig_gis.likelihood_file import ready_index
     from semsig_gis.loading import Loaded, assemble, choose_layers, read_files
     from semsig_gis.locating import locate, locate_route
     from semsig_gis.location import Location
+    from semsig_gis.map_identifiability import identifiability_map
     from semsig_gis.map_location import location_map
     from semsig_gis.maps import evaluation_map, localization_map, save_map
     from semsig_gis.matching import Localization, Method, localize
@@ -79,6 +84,8 @@ _HOMES = {
     "ExperimentSpec": "experiment",
     "Footprints": "occlusion",
     "GridSpec": "grid",
+    "Identifiability": "identifiability",
+    "IdentifiabilityCheck": "identifiability_check",
     "LayerSpec": "layer_spec",
     "LikelihoodIndex": "likelihood",
     "Loaded": "loading",
@@ -107,6 +114,7 @@ _HOMES = {
     "build_index": "likelihood",
     "build_objects": "objects",
     "build_tiles": "distributed",
+    "check_identifiability": "identifiability_check",
     "choose_layers": "loading",
     "combine_catalogs": "catalog",
     "compare_evaluations": "comparison",
@@ -118,6 +126,8 @@ _HOMES = {
     "fetch_layers": "fetching",
     "find_area": "fetching",
     "find_files": "sources",
+    "identifiability_map": "map_identifiability",
+    "identify": "identifying",
     "load_catalog": "catalog",
     "localization_map": "maps",
     "localize": "matching",
@@ -129,6 +139,7 @@ _HOMES = {
     "open_database": "database_file",
     "open_dataset": "dataset",
     "open_experiment_spec": "experiment",
+    "open_identifiability": "identifiability_file",
     "open_objects": "objects",
     "open_results": "experiment_folder",
     "open_store": "store",
@@ -142,6 +153,7 @@ _HOMES = {
     "run_experiment": "experiment_run",
     "run_experiments": "experiment_run",
     "save_database": "database_file",
+    "save_identifiability": "identifiability_file",
     "save_map": "maps",
     "save_objects": "objects",
     "save_surroundings": "surroundings",
@@ -154,7 +166,6 @@ _HOMES = {
 }
 
 __all__ = [
-    "PARIS_LIKE",
     "Catalog",
     "CitySpec",
     "Distortion",
@@ -162,6 +173,8 @@ __all__ = [
     "ExperimentSpec",
     "Footprints",
     "GridSpec",
+    "Identifiability",
+    "IdentifiabilityCheck",
     "LayerSpec",
     "LikelihoodIndex",
     "Loaded",
@@ -172,6 +185,7 @@ __all__ = [
     "NoiseSpec",
     "ObjectClass",
     "ObjectStore",
+    "PARIS_LIKE",
     "PartitionedDatabase",
     "Posterior",
     "RawLayer",
@@ -190,6 +204,7 @@ __all__ = [
     "build_index",
     "build_objects",
     "build_tiles",
+    "check_identifiability",
     "choose_layers",
     "combine_catalogs",
     "compare_evaluations",
@@ -201,6 +216,8 @@ __all__ = [
     "fetch_layers",
     "find_area",
     "find_files",
+    "identifiability_map",
+    "identify",
     "load_catalog",
     "localization_map",
     "localize",
@@ -212,6 +229,7 @@ __all__ = [
     "open_database",
     "open_dataset",
     "open_experiment_spec",
+    "open_identifiability",
     "open_objects",
     "open_results",
     "open_store",
@@ -225,6 +243,7 @@ __all__ = [
     "run_experiment",
     "run_experiments",
     "save_database",
+    "save_identifiability",
     "save_map",
     "save_objects",
     "save_surroundings",

@@ -30,6 +30,7 @@ if TYPE_CHECKING:
     from pyproj import CRS
 
     from semsig_gis.database import SignatureDatabase
+    from semsig_gis.identifiability import Identifiability
     from semsig_gis.objects import StreetObjects
 
 __all__ = ["CellGeometry", "export_geopackage"]
@@ -46,6 +47,7 @@ def export_geopackage(
     path: str | Path,
     *,
     objects: StreetObjects | None = None,
+    identifiability: Identifiability | None = None,
     geometry: CellGeometry = "polygon",
     progress: Callable[[int, int], None] | None = None,
 ) -> None:
@@ -59,6 +61,8 @@ def export_geopackage(
         File to write, ending in ``.gpkg``; it appears whole, by rename.
     objects : StreetObjects, optional
         The objects that the cells see, for a second layer.
+    identifiability : Identifiability, optional
+        What is known of the cells before any query, for more columns of the cells.
     geometry : {"polygon", "point"}, default "polygon"
         Whether a cell is drawn as its square or as its viewpoint.
     progress : callable, optional
@@ -67,7 +71,8 @@ def export_geopackage(
     Raises
     ------
     InputError
-        If the file does not end in ``.gpkg`` or cannot be written.
+        If the file does not end in ``.gpkg`` or cannot be written, or the identifiability is that
+        of other cells.
     UnknownNameError
         If there is no such geometry.
 
@@ -77,7 +82,8 @@ def export_geopackage(
     ``length`` (objects seen), ``types`` (symbols), ``bearings`` (degrees to 0.01), ``levels``
     (angle levels) and ``distances`` (metres to 0.1), each of these four clockwise from north and
     the numbers separated by spaces; ``type_group_size`` and ``angle_group_size`` (cells that have
-    the same types or the same angle levels, 1 where the cell is alone).
+    the same types or the same angle levels, 1 where the cell is alone); and, where given, the
+    columns of `semsig_gis.identifiability.Identifiability.table`.
 
     Layer ``objects``, in the CRS of the objects: ``class_code``, ``symbol``, ``class_name``,
     ``title``, ``source``, ``source_id``, ``count``.
@@ -109,10 +115,17 @@ def export_geopackage(
         hint = nearest_name(str(geometry), get_args(CellGeometry))
         msg = f"{geometry!r} is no geometry of a cell; give {names}{hint}."
         raise UnknownNameError(msg)
+    if identifiability is not None and not np.array_equal(
+        identifiability.database.cell_ids, database.cell_ids
+    ):
+        msg = (
+            "the identifiability is that of other cells; give that of the database to be exported."
+        )
+        raise InputError(msg)
     rows = len(database) + (0 if objects is None else len(objects))
     with whole_file(target) as partial:
         try:
-            written = _write_cells(database, partial, geometry)
+            written = _write_cells(database, partial, geometry, identifiability)
             if objects is not None:
                 written = itertools.chain(written, _write_objects(objects, partial))
             for done in itertools.accumulate(written):
@@ -128,7 +141,12 @@ def export_geopackage(
             raise InputError(msg) from error
 
 
-def _write_cells(database: SignatureDatabase, path: Path, geometry: CellGeometry) -> Iterator[int]:
+def _write_cells(
+    database: SignatureDatabase,
+    path: Path,
+    geometry: CellGeometry,
+    identifiability: Identifiability | None,
+) -> Iterator[int]:
     """Write the cells, and yield the number of rows of each block."""
     facts = {
         "semsig_version": database.version,
@@ -149,6 +167,10 @@ def _write_cells(database: SignatureDatabase, path: Path, geometry: CellGeometry
         places = database.xy[rows]
         offsets = database.offsets[rows.start : rows.stop + 1]
         shapes = _squares(database, rows) if geometry == "polygon" else shapely.points(places)
+        more = {}
+        if identifiability is not None:
+            told = identifiability.table(rows)
+            more = dict(zip(told.column_names, told.columns, strict=True))
         return pa.table(
             {
                 "cell_id": database.cell_ids[rows],
@@ -161,6 +183,7 @@ def _write_cells(database: SignatureDatabase, path: Path, geometry: CellGeometry
                 "distances": _joined(database.distance_units, offsets, texts=metres),
                 "type_group_size": type_groups[rows],
                 "angle_group_size": angle_groups[rows],
+                **more,
                 GEOMETRY: shapely.to_wkb(shapes),
             }
         )

@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence
 
     from semsig_gis.evaluation import Evaluation
+    from semsig_gis.identifiability import Identifiability
     from semsig_gis.location import Location
     from semsig_gis.matching import Localization
     from semsig_gis.signatures import Signature
@@ -25,10 +26,12 @@ __all__ = [
     "CHANCES",
     "ERROR_RAMP",
     "FAILED",
+    "FOUND_RAMP",
     "SHADES",
     "SUCCESSFUL",
     "VERDICTS",
     "evaluation_legend",
+    "identifiability_legend",
     "localization_legend",
     "location_legend",
 ]
@@ -39,6 +42,21 @@ SUCCESSFUL, FAILED = "#0072b2", "#e69f00"
 # Both ramps change their lightness steadily, so that the hue does not matter.
 ERROR_RAMP = ("#fde0dd", "#fa9fb5", "#dd3497", "#7a0177")
 CANDIDATE_RAMP = ("#440154", "#31688e", "#35b779", "#fde725")
+
+# Ten steps of viridis, whose lightness rises steadily.
+FOUND_RAMP = (
+    "#440154",
+    "#482878",
+    "#3e4989",
+    "#31688e",
+    "#26828e",
+    "#1f9e89",
+    "#35b779",
+    "#6ece58",
+    "#b5de2b",
+    "#fde725",
+)
+"""Colour of a cell by tenths of the chance to be found."""
 
 SHADES: Mapping[int, str] = MappingProxyType(
     {1: "#dfdfdb", 5: "#c8c8c2", 10: "#aeaea7", 20: "#8f8f88"}
@@ -54,6 +72,7 @@ VERDICTS: Mapping[str, str] = MappingProxyType(
 """Colour of what became of an object."""
 
 _THRESHOLDS = (10, 25, 50, 100)
+_HELPERS = 6  # classes that the legend names
 
 
 def evaluation_legend(evaluation: Evaluation, *, error_limit: str, licenses: Sequence[str]) -> str:
@@ -168,6 +187,41 @@ def location_legend(location: Location) -> str:
         f"<p>Chance, the fewest cells that hold<br>{shares}</p>"
         f"<p>{_sign('#ffffff')}Candidates by rank</p>"
         f"{rays}{_shades()}{_sources(database.licenses)}"
+    )
+
+
+def identifiability_legend(told: Identifiability) -> str:
+    """Return the legend of a map of where a query can be placed.
+
+    Parameters
+    ----------
+    told : Identifiability
+        What the map shows.
+
+    Returns
+    -------
+    str
+        HTML in which all text from data is escaped, for a ``details`` element.
+    """
+    facts = told.summary()
+    within = f"within {facts['radius_m']:g} m"
+    bands = "<br>".join(
+        f"{band['from']:.0%} to {band['to']:.0%}: {band['share']:.1%} of the cells"
+        for band in reversed(facts["bands"])
+    )
+    classes = "".join(
+        f"<tr><td>{escape(item['title'])}</td><td>{100 * item['chance_near']:+.1f} %</td></tr>"
+        for item in facts["classes"][:_HELPERS]
+    )
+    return (
+        "<summary>Where a query can be placed</summary>"
+        f"<p>{facts['cells']:,} cells, {escape(facts['noise'])} noise</p>"
+        f"<p>Chance that the answer to a query is {within}; {facts['chance_found']:.1%} for the "
+        f"mean cell{_ramp(FOUND_RAMP, '0 %', '100 %')}</p>"
+        f"<p>{bands}</p>"
+        f"<p>What each class adds to the chance {within}</p><table>{classes}</table>"
+        "<p>Click a cell to see what it is taken for.</p>"
+        f"{_sources(told.database.licenses)}"
     )
 
 

@@ -11,7 +11,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from semsig_gis.geometry import wrap_degrees
+from semsig_gis.database import BEARING_UNITS, DISTANCE_UNITS
+from semsig_gis.geometry import FULL_TURN, wrap_degrees
 from semsig_gis.signatures import Signature
 
 if TYPE_CHECKING:
@@ -66,6 +67,29 @@ class Sight:
     def signature(self) -> Signature:
         """What a detector tells of it."""
         return Signature(self.codes, self.bearings)
+
+    @classmethod
+    def of_cell(cls, database: SignatureDatabase, cell: int) -> Sight:
+        """Return what a database says is seen from a cell.
+
+        Parameters
+        ----------
+        database : SignatureDatabase
+            The cells.
+        cell : int
+            Row number of the cell.
+
+        Returns
+        -------
+        Sight
+            Its objects, clockwise.
+        """
+        part = slice(database.offsets[cell], database.offsets[cell + 1])
+        return cls(
+            codes=database.codes[part],
+            bearings=database.bearing_units[part] * np.float64(FULL_TURN / BEARING_UNITS),
+            distances=database.distance_units[part] * np.float64(database.reach / DISTANCE_UNITS),
+        )
 
     def only(self, chosen: ArrayLike) -> Sight:
         """Return some of the objects.

@@ -29,7 +29,15 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-__all__ = ["geo_metadata", "points_to_wkb", "read_geoparquet", "whole_file", "write_geoparquet"]
+__all__ = [
+    "geo_metadata",
+    "move_folder",
+    "points_to_wkb",
+    "read_geoparquet",
+    "whole_file",
+    "whole_folder",
+    "write_geoparquet",
+]
 
 SPEC_KEY = b"semsig"
 COMPRESSION = 3
@@ -96,6 +104,92 @@ def whole_file(path: str | Path) -> Iterator[Path]:
         raise InputError(msg) from error
     finally:
         shutil.rmtree(folder, ignore_errors=True)
+
+
+@contextlib.contextmanager
+def whole_folder(path: str | Path) -> Iterator[Path]:
+    """Give an empty folder that replaces `path` if, and only if, the block succeeds.
+
+    Parameters
+    ----------
+    path : str or Path
+        The folder to write; one that is there is replaced with all that is in it.
+
+    Yields
+    ------
+    Path
+        A folder of the same name to write to.
+
+    Raises
+    ------
+    InputError
+        If it cannot be written.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     target = Path(folder) / "a"
+    ...     with whole_folder(target) as partial:
+    ...         _ = (partial / "b.txt").write_text("done")
+    ...     (target / "b.txt").read_text()
+    'done'
+    """
+    target = Path(os.path.realpath(path))
+    with _box(target) as box:
+        partial = box / target.name
+        partial.mkdir()
+        yield partial
+        _put(partial, target, aside=box / "old")
+
+
+def move_folder(new: Path, place: Path) -> None:
+    """Rename a folder to its place; what is there is replaced, or stays if that fails.
+
+    Parameters
+    ----------
+    new : Path
+        The folder.
+    place : Path
+        Where it belongs, beside it.
+
+    Raises
+    ------
+    InputError
+        If it cannot be renamed.
+    """
+    with _box(place) as box:
+        _put(new, place, aside=box / "old")
+
+
+@contextlib.contextmanager
+def _box(target: Path) -> Iterator[Path]:
+    """Give a temporary folder beside a folder that is being written."""
+    try:
+        target.parent.mkdir(parents=True, exist_ok=True)
+        box = Path(tempfile.mkdtemp(prefix=".semsig-", dir=target.parent))
+        try:
+            yield box
+        finally:
+            shutil.rmtree(box, ignore_errors=True)
+    except OSError as error:
+        msg = (
+            f"{target} could not be written ({_reason(error)}); what was there before is "
+            "unchanged, so make room or choose another place."
+        )
+        raise InputError(msg) from error
+
+
+def _put(new: Path, place: Path, *, aside: Path) -> None:
+    """Rename a folder to its place; what is there is put aside, or back if that fails."""
+    with contextlib.suppress(FileNotFoundError):
+        place.rename(aside)
+    try:
+        new.rename(place)
+    except OSError:
+        if aside.exists():
+            aside.rename(place)
+        raise
 
 
 def _reason(error: OSError) -> str:
@@ -197,8 +291,10 @@ def write_geoparquet(
     """
     metadata = {b"geo": json.dumps(geo).encode(), SPEC_KEY: json.dumps(specs).encode()}
     # Lengths apart from the bytes, and numbers by their differences: smaller for short rows. The
-    # numbers in lists are few different ones, so that a dictionary packs them tighter.
-    lists = [f"{field.name}.list.element" for field in table.schema if pa.types.is_list(field.type)]
+    # numbers in lists are few different ones, and so are rounded ones: a dictionary packs them
+    # tighter.
+    few = [f"{field.name}.list.element" for field in table.schema if pa.types.is_list(field.type)]
+    few += [field.name for field in table.schema if pa.types.is_floating(field.type)]
     encodings = {
         field.name: "DELTA_BINARY_PACKED"
         if pa.types.is_integer(field.type)
@@ -212,7 +308,7 @@ def write_geoparquet(
             partial,
             compression="zstd",
             compression_level=COMPRESSION,
-            use_dictionary=lists,
+            use_dictionary=few,
             column_encoding=encodings,
             write_page_checksum=True,
             row_group_size=group_rows,

@@ -7,12 +7,8 @@ update needs it, and so does whatever looks at objects from a place off the grid
 
 from __future__ import annotations
 
-import contextlib
-import hashlib
 import json
 import os
-import shutil
-import tempfile
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -21,17 +17,17 @@ import geopandas as gpd
 import pyarrow as pa
 
 from semsig_gis import __version__
+from semsig_gis.added_columns import built_digest
 from semsig_gis.database_file import save_database
 from semsig_gis.errors import CrsError, DatabaseError, InputError
+from semsig_gis.manifest import digest
 from semsig_gis.objects import open_objects, save_objects
 from semsig_gis.occlusion import Footprints, buildings_near
 from semsig_gis.schema import HALF_WIDTH
-from semsig_gis.storage import whole_file
+from semsig_gis.storage import move_folder, whole_file, whole_folder
 from semsig_gis.stored_index import INDEX_FILES, StoredIndex
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
-
     import numpy as np
     from numpy.typing import NDArray
 
@@ -212,13 +208,14 @@ def save_with_store(database: SignatureDatabase, store: ObjectStore, path: str |
     Notes
     -----
     The new store is written whole under another name, then the database is renamed into its
-    place, and at last the store into its own. The store names the checksum of its database, so
+    place, and at last the store into its own. The store names the digest of its database, so
     whoever opens the two sees how far an interrupted run came: `open_store` takes the new store
     as soon as the new database is there, and the old one until then. Any number of programs may
     read meanwhile; of two that write at once, the later one wins.
 
     Examples
     --------
+    >>> import tempfile
     >>> from semsig_gis.building import build_database
     >>> from semsig_gis.sources.synthetic import CitySpec, synthetic_city
     >>> from semsig_gis.catalog import paper_taxonomy
@@ -238,7 +235,7 @@ def save_with_store(database: SignatureDatabase, store: ObjectStore, path: str |
             save_database(database, partial)
         except InputError as error:  # which knows nothing of the place that was asked for
             raise InputError(str(error).replace(str(partial), str(path))) from error
-        _write(store, _waiting(final), fingerprint=_checksum(partial))
+        _write(store, _waiting(final), fingerprint=digest(partial))
     _settle(Path(path))
 
 
@@ -312,11 +309,11 @@ def _read(folder: Path, database: Path) -> ObjectStore:
         msg = f"{database} has no object store ({folder.name} beside it); build the database again."
         raise DatabaseError(msg)
     manifest = _manifest(folder)
-    if manifest["database"] != _checksum(database):
+    if manifest["database"] != built_digest(database):
         msg = f"{folder} belongs to another database than {database}; build the database again."
         raise DatabaseError(msg)
     files = manifest["files"]
-    damaged = [name for name, digest in files.items() if not _is_whole(folder / name, digest)]
+    damaged = [name for name, wanted in files.items() if not _is_whole(folder / name, wanted)]
     lost = [name for name in damaged if name not in INDEX_FILES]
     if lost or OBJECTS not in files:
         msg = f"{folder / min(lost, default=OBJECTS)} is damaged; build the database again."
@@ -347,9 +344,7 @@ def _table(path: Path) -> gpd.GeoDataFrame:
 
 def _write(store: ObjectStore, folder: Path, *, fingerprint: str) -> None:
     """Write a whole store of that name, in the place of another."""
-    with _box(folder) as box:
-        partial = box / folder.name
-        partial.mkdir()
+    with whole_folder(folder) as partial:
         save_objects(store.objects, partial / OBJECTS, keep_order=True)  # as in the R-tree
         store.index.save(partial)
         for name, table in ((FOOTPRINTS, store.footprints), (STREETS, store.streets)):
@@ -361,51 +356,18 @@ def _write(store: ObjectStore, folder: Path, *, fingerprint: str) -> None:
             "version": __version__,
             "database": fingerprint,
             "objects": len(store.objects),
-            "files": {file.name: _checksum(file) for file in sorted(partial.iterdir())},
+            "files": {file.name: digest(file) for file in sorted(partial.iterdir())},
         }
         (partial / MANIFEST).write_text(json.dumps(manifest, indent=2) + "\n", encoding="utf-8")
-        _put(partial, folder, aside=box / "old")
-
-
-@contextlib.contextmanager
-def _box(target: Path) -> Iterator[Path]:
-    """Give a temporary folder beside a folder that is being written."""
-    try:
-        target.parent.mkdir(parents=True, exist_ok=True)
-        box = Path(tempfile.mkdtemp(prefix=".semsig-", dir=target.parent))
-        try:
-            yield box
-        finally:
-            shutil.rmtree(box, ignore_errors=True)
-    except OSError as error:
-        reason = os.strerror(error.errno) if error.errno else str(error)
-        msg = (
-            f"{target} could not be written ({reason}); what was there before is unchanged, so "
-            "make room or choose another place."
-        )
-        raise InputError(msg) from error
-
-
-def _put(new: Path, place: Path, *, aside: Path) -> None:
-    """Rename a folder to its place; what is there is put aside, or back if that fails."""
-    with contextlib.suppress(FileNotFoundError):
-        place.rename(aside)
-    try:
-        new.rename(place)
-    except OSError:
-        if aside.exists():
-            aside.rename(place)
-        raise
 
 
 def _settle(database: Path) -> Path:
     """Finish what an interrupted run left half done; return where the store is to be read."""
     final = store_path(database)
     waiting = _waiting(final)
-    if waiting.exists() and database.exists() and _belongs(waiting, _checksum(database)):
+    if waiting.exists() and database.exists() and _belongs(waiting, built_digest(database)):
         try:
-            with _box(final) as box:
-                _put(waiting, final, aside=box / "old")
+            move_folder(waiting, final)
         except InputError:  # nothing may be written here, or another program was quicker
             return waiting if waiting.exists() else final
     return final
@@ -415,13 +377,8 @@ def _waiting(final: Path) -> Path:
     return final.with_name(final.name + NEXT)
 
 
-def _checksum(path: Path) -> str:
-    with path.open("rb") as file:
-        return hashlib.file_digest(file, "sha256").hexdigest()
-
-
-def _is_whole(path: Path, digest: str) -> bool:
+def _is_whole(path: Path, wanted: str) -> bool:
     try:
-        return _checksum(path) == digest
+        return digest(path) == wanted
     except OSError:
         return False

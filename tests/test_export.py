@@ -16,6 +16,7 @@ import numpy as np
 import pyogrio
 import pytest
 import shapely
+from cells_told import told_of
 from sentences import assert_sentence
 
 from semsig_gis import export
@@ -319,3 +320,25 @@ def test_text_that_no_program_may_stumble_over(tmp_path: Path) -> None:
     assert set(read["source_id"]) == set(read["title"]) == {nasty}
     facts = pyogrio.read_info(file, layer="objects")["layer_metadata"]
     assert json.loads(facts["licenses"]) == [nasty]
+
+
+def test_identifiability_goes_with_the_cells(database: SignatureDatabase, tmp_path: Path) -> None:
+    told, file = told_of(database), tmp_path / "city.gpkg"
+    export_geopackage(database, file, identifiability=told)
+    cells = gpd.read_file(file, layer="cells")
+    table = told.table()
+    assert set(table.column_names) <= set(cells.columns)
+    assert cells["lookalike_3"].isna().tolist() == (told.lookalikes[:, 2] < 0).tolist()
+    for name in table.column_names:
+        expected = np.array(table[name].to_pylist(), dtype=float)
+        assert np.array_equal(cells[name].to_numpy(float), expected, equal_nan=True)
+
+
+def test_identifiability_of_other_cells_is_refused(
+    database: SignatureDatabase, tmp_path: Path
+) -> None:
+    told = told_of(database.select(slice(3, None)))
+    with pytest.raises(InputError) as caught:
+        export_geopackage(database, tmp_path / "city.gpkg", identifiability=told)
+    assert_sentence(caught.value, "that of other cells")
+    assert not list(tmp_path.iterdir())

@@ -14,7 +14,7 @@ from semsig_gis import map_image
 from semsig_gis.catalog import paper_taxonomy
 from semsig_gis.database import SignatureDatabase
 from semsig_gis.grid import GridSpec
-from semsig_gis.map_image import city_image, level_image
+from semsig_gis.map_image import city_image, level_image, place_lattices
 from semsig_gis.signatures import SignatureSpec
 
 if TYPE_CHECKING:
@@ -159,3 +159,40 @@ def test_a_block_has_its_highest_level(monkeypatch: pytest.MonkeyPatch) -> None:
     levels[[5, 200]] = 2, 1
     image, _ = level_image(city, levels, ["#111111", "#222222"])
     assert set(np.unique(decoded(image)[0])) == {0, 1, 2}
+
+
+def between(
+    lattice: NDArray[np.float64], box: list[float], points: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Return values at points by those at the crossings of a lattice, one point at a time."""
+    lines = len(lattice) - 1
+    found = []
+    for point in points:
+        place = (point - np.array(box[:2])) / (np.array(box[2:]) - np.array(box[:2])) * lines
+        column, row = np.minimum(place.astype(int), lines - 1)
+        right, up = place - [column, row]
+        low = lattice[row, column] * (1 - right) + lattice[row, column + 1] * right
+        high = lattice[row + 1, column] * (1 - right) + lattice[row + 1, column + 1] * right
+        found.append(low * (1 - up) + high * up)
+    return np.array(found)
+
+
+@pytest.mark.parametrize(
+    ("crs", "origin"),
+    [
+        ("EPSG:2154", (765_200.0, 6_275_000.0)),
+        ("EPSG:32631", (-3.5, 5_400_000.0)),
+        ("EPSG:32735", (500_000.0, 7_500_000.0)),
+    ],
+)
+def test_lattices_place_cells_to_a_centimetre(crs: str, origin: tuple[float, float]) -> None:
+    database = a_city(*scattered(300, 0.01), crs=crs, grid=GridSpec(10.0, origin))
+    lattices = place_lattices(database)
+    to_degrees = Transformer.from_crs(crs, "EPSG:4326")
+    latlon = np.stack(to_degrees.transform(*database.xy.T), axis=1)
+    found = between(lattices.degrees, lattices.metric_box, database.xy)
+    assert np.abs(found - latlon).max() < 1e-7  # degrees
+    to_mercator = Transformer.from_crs(crs, "EPSG:3857", always_xy=True)
+    web = np.stack(to_mercator.transform(*database.xy.T), axis=1)
+    back = between(lattices.metres, lattices.mercator_box, web)
+    assert np.abs(back - database.xy).max() < 0.01

@@ -7,6 +7,7 @@ from html.parser import HTMLParser
 from typing import TYPE_CHECKING
 
 import pytest
+from cells_told import told_of
 
 from semsig_gis.abstention import AnswerRule
 from semsig_gis.building import build_database
@@ -15,7 +16,13 @@ from semsig_gis.evaluation import evaluate
 from semsig_gis.likelihood import build_index
 from semsig_gis.limitations import MissingClasses
 from semsig_gis.locating import locate
-from semsig_gis.map_legend import SHADES, evaluation_legend, localization_legend, location_legend
+from semsig_gis.map_legend import (
+    SHADES,
+    evaluation_legend,
+    identifiability_legend,
+    localization_legend,
+    location_legend,
+)
 from semsig_gis.matching import localize
 from semsig_gis.noise import named_noise
 from semsig_gis.objects import build_objects
@@ -141,3 +148,27 @@ def test_what_a_location_says(database: SignatureDatabase) -> None:
 def test_shades_begin_with_one_object() -> None:
     assert min(SHADES) == 1
     assert list(SHADES) == sorted(SHADES)
+
+
+def test_what_identifiability_says(database: SignatureDatabase) -> None:
+    told = told_of(database)
+    facts = told.summary()
+    text = Text(identifiability_legend(told)).shown
+    best = facts["classes"][0]
+    for said in (
+        f"{len(database):,} cells, medium noise",
+        f"within 30 m; {facts['chance_found']:.1%} for the mean cell",
+        f"90% to 100%: {facts['bands'][-1]['share']:.1%} of the cells",
+        f"{best['title']} {100 * best['chance_near']:+.1f} %",
+        "Data: Town (CC0): trees, lamps",
+    ):
+        assert said in text
+    assert text.count("+") <= 6  # classes that are named
+
+
+def test_identifiability_lets_no_data_run(database: SignatureDatabase) -> None:
+    noise = dataclasses.replace(named_noise("medium"), name=HOSTILE)
+    told = dataclasses.replace(told_of(database), noise=noise)
+    read = Text(identifiability_legend(told))
+    assert HOSTILE in read.shown
+    assert not {"script", "img"} & read.tags

@@ -1,17 +1,13 @@
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 from noisy_cells import random_database
 from sights import CITY, REACH, rows, seeds, sight, sights
 
-from semsig_gis.sight import CitySights
-
-if TYPE_CHECKING:
-    from semsig_gis.sight import Sight
+from semsig_gis.database import BEARING_UNITS
+from semsig_gis.sight import CitySights, Sight
 
 
 @given(one=sights, turn=st.floats(-400, 400))
@@ -57,3 +53,15 @@ def test_false_things_are_anywhere_in_the_circle(seed: int) -> None:
     shares = (distances / REACH) ** 2
     assert abs(shares.mean() - 0.5) < 6 / np.sqrt(12 * 4000)
     assert abs((shares < 0.25).mean() - 0.25) < 6 * np.sqrt(0.25 * 0.75 / 4000)
+
+
+@given(seed=st.integers(0, 50), cell=st.integers(0, 39))
+def test_what_is_seen_from_a_cell_is_its_signature(seed: int, cell: int) -> None:
+    database = random_database(seed)
+    seen, signature = Sight.of_cell(database, cell), database.signature(cell)
+    assert signature.codes is not None
+    assert signature.bearings is not None
+    assert seen.codes.tolist() == signature.codes.tolist()
+    assert np.allclose(seen.bearings, signature.bearings, atol=360.0 / BEARING_UNITS)
+    units = database.distance_units[database.offsets[cell] : database.offsets[cell + 1]]
+    assert np.allclose(seen.distances, database.reach * units / 255.0)

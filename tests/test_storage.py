@@ -22,9 +22,11 @@ from sentences import assert_sentence
 from semsig_gis.errors import DatabaseError, InputError
 from semsig_gis.storage import (
     geo_metadata,
+    move_folder,
     points_to_wkb,
     read_geoparquet,
     whole_file,
+    whole_folder,
     write_geoparquet,
 )
 
@@ -193,6 +195,81 @@ def test_as_long_a_name_as_the_system_takes_can_be_written(tmp_path: Path) -> No
     with whole_file(target) as partial:
         partial.write_text("new")
     assert target.read_text() == "new"
+
+
+# --- whole_folder -----------------------------------------------------------------------------
+
+
+def contents(folder: Path) -> dict[str, str]:
+    return {path.name: path.read_text() for path in folder.iterdir()}
+
+
+def test_a_folder_replaces_all_that_was_there(tmp_path: Path) -> None:
+    target = tmp_path / "new" / "city"
+    for number in range(2):
+        with whole_folder(str(target)) as partial:
+            assert partial.name == "city"
+            assert list(partial.iterdir()) == []
+            (partial / f"{number}.txt").write_text("whole")
+        assert contents(target) == {f"{number}.txt": "whole"}
+    assert list(target.parent.iterdir()) == [target]
+
+
+@pytest.mark.parametrize("stop", [RuntimeError, KeyboardInterrupt, OSError(28, "No space left")])
+def test_an_error_leaves_the_old_folder_and_nothing_else(
+    tmp_path: Path, stop: type[BaseException] | OSError
+) -> None:
+    target = tmp_path / "city"
+    target.mkdir()
+    (target / "old.txt").write_text("old")
+
+    def half() -> None:
+        with whole_folder(target) as partial:
+            (partial / "new.txt").write_text("half")
+            raise stop
+
+    with pytest.raises((RuntimeError, KeyboardInterrupt, InputError)) as caught:
+        half()
+    if isinstance(stop, OSError):
+        assert_sentence(caught.value, str(target), "No space left on device")
+    assert contents(target) == {"old.txt": "old"}
+    assert list(tmp_path.iterdir()) == [target]
+
+
+def test_a_link_to_a_folder_stays(tmp_path: Path) -> None:
+    (tmp_path / "real").mkdir()
+    (tmp_path / "link").symlink_to(tmp_path / "real")
+    with whole_folder(tmp_path / "link") as partial:
+        (partial / "a.txt").write_text("a")
+    assert (tmp_path / "link").is_symlink()
+    assert contents(tmp_path / "real") == {"a.txt": "a"}
+
+
+def test_a_folder_that_cannot_be_renamed_changes_nothing(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for name in ("new", "old"):
+        (tmp_path / name).mkdir()
+        (tmp_path / name / "a.txt").write_text(name)
+    rename = Path.rename
+
+    def denied(self: Path, target: Path) -> Path:
+        if self.name == "new":
+            raise PermissionError(errno.EACCES, "Permission denied")
+        return rename(self, target)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(Path, "rename", denied)
+        with pytest.raises(InputError) as caught:
+            move_folder(tmp_path / "new", tmp_path / "old")
+    assert_sentence(caught.value, "Permission denied", "is unchanged")
+    assert {name: contents(tmp_path / name)["a.txt"] for name in ("new", "old")} == {
+        "new": "new",
+        "old": "old",
+    }
+    move_folder(tmp_path / "new", tmp_path / "old")
+    assert contents(tmp_path / "old") == {"a.txt": "new"}
+    assert list(tmp_path.iterdir()) == [tmp_path / "old"]
 
 
 # --- Points -----------------------------------------------------------------------------------

@@ -22,6 +22,7 @@ from semsig_gis.building import build_database
 from semsig_gis.database_file import open_database, save_database
 from semsig_gis.errors import CrsError, DatabaseError, InputError
 from semsig_gis.spatial_index import ObjectIndex
+from semsig_gis.storage import move_folder
 from semsig_gis.store import ObjectStore, open_store, save_with_store, store_path
 from semsig_gis.stored_index import INDEX_FILES
 
@@ -356,13 +357,12 @@ def test_another_program_may_finish_it_first(
     path = saved(tmp_path)
     waiting = tmp_path / "city.objects.next"
     shutil.copytree(store_path(path), waiting)
-    put = store_module._put
 
-    def late(new: Path, place: Path, *, aside: Path) -> None:
+    def late(new: Path, place: Path) -> None:
         new.rename(tmp_path / "taken")  # which the other has put in its place
-        put(new, place, aside=aside)
+        move_folder(new, place)
 
-    monkeypatch.setattr(store_module, "_put", late)
+    monkeypatch.setattr(store_module, "move_folder", late)
     assert_fits(open_store(path), TOWN)
     assert not waiting.exists()
     assert store_path(path).is_dir()

@@ -8,11 +8,13 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from semsig_gis.console import print_json, print_rows, remark
-from semsig_gis.errors import InputError
+from semsig_gis.errors import DatabaseError, InputError
 
 if TYPE_CHECKING:
+    from semsig_gis.database import SignatureDatabase
     from semsig_gis.drift import UpdateReport
     from semsig_gis.evaluation import Evaluation
+    from semsig_gis.identifiability import Identifiability
     from semsig_gis.quality import QualityReport
     from semsig_gis.tables import Table
 
@@ -54,6 +56,30 @@ def numbers(text: str, option: str) -> list[float]:
     except ValueError as error:
         msg = f"{option} was given as {text!r}; give numbers with commas between them."
         raise InputError(msg) from error
+
+
+def object_counts(path: Path) -> dict[int, int] | None:
+    """Return how many objects of each class a database has, where its store is at hand."""
+    import numpy as np
+
+    from semsig_gis.store import open_store
+
+    try:
+        codes, counts = np.unique(open_store(path).objects.codes, return_counts=True)
+    except DatabaseError:  # a database may do without its objects
+        return None
+    return dict(zip(codes.tolist(), counts.tolist(), strict=True))
+
+
+def known_identifiability(path: Path, opened: SignatureDatabase) -> Identifiability | None:
+    """Return what the columns of a database tell; None, and say so, where they do not fit it."""
+    from semsig_gis.identifiability_file import open_identifiability
+
+    try:
+        return open_identifiability(opened, path)
+    except DatabaseError as error:
+        remark(str(error))
+        return None
 
 
 def tell_if_online(offline: bool) -> None:  # noqa: FBT001

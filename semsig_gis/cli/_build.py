@@ -2,16 +2,24 @@
 
 from __future__ import annotations
 
-import contextlib
 import enum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from semsig_gis.cli._app import AsJson, Database, app, numbers, print_report, print_table
+from semsig_gis.cli._app import (
+    AsJson,
+    Database,
+    app,
+    known_identifiability,
+    numbers,
+    object_counts,
+    print_report,
+    print_table,
+)
 from semsig_gis.console import print_json, progress, remark
-from semsig_gis.errors import DatabaseError, InputError
+from semsig_gis.errors import InputError
 
 if TYPE_CHECKING:
     from semsig_gis.database import SignatureDatabase
@@ -155,11 +163,15 @@ def update(
     as_json: AsJson = False,
 ) -> None:
     """Apply changed street objects to a database, and tell how far the city has drifted."""
+    from semsig_gis.added_columns import has_added
     from semsig_gis.objects import open_objects
     from semsig_gis.update import update_file
 
+    had_columns = has_added(database)
     with progress("updating") as advance:
         report = update_file(database, open_objects(objects), out=out, progress=advance)
+    if had_columns:
+        remark("the new database lacks the columns of semsig identify; run semsig identify again")
     for note in report.notes:
         remark(note)
     print_report(report, as_json=as_json)
@@ -172,10 +184,15 @@ def info(database: Database, *, as_json: AsJson = False) -> None:
         print_json(_info(database))
         return
     from semsig_gis.database_report import database_tables
+    from semsig_gis.identifiability_report import identifiability_tables
 
     opened, facts = _opened(database)
     for table in database_tables(opened, **facts):
         print_table(table)
+    told = known_identifiability(database, opened)
+    if told is not None:
+        for table in identifiability_tables(told, object_counts=facts.get("object_counts")):
+            print_table(table)
     for line in opened.licenses:
         typer.echo(line)
 
@@ -184,22 +201,22 @@ def _info(path: Path) -> dict[str, Any]:
     from semsig_gis.properties import database_summary
 
     opened, facts = _opened(path)
-    return database_summary(opened, **facts)
+    told = known_identifiability(path, opened)
+    more = {}
+    if told is not None:
+        counts = facts.get("object_counts")
+        more["identifiability"] = told.summary(object_counts=counts)
+    return database_summary(opened, **facts) | more
 
 
 def _opened(path: Path) -> tuple[SignatureDatabase, dict[str, Any]]:
     """Open a database; return also what its files tell of it."""
-    import numpy as np
-
     from semsig_gis.database_file import open_database
-    from semsig_gis.store import open_store
 
     opened = open_database(path)
     facts: dict[str, Any] = {"file_bytes": _bytes(path)}
-    with contextlib.suppress(DatabaseError):  # a database may do without its objects
-        codes, counts = np.unique(open_store(path).objects.codes, return_counts=True)
-        facts["object_counts"] = dict(zip(codes.tolist(), counts.tolist(), strict=True))
-    return opened, facts
+    counts = object_counts(path)
+    return opened, facts if counts is None else facts | {"object_counts": counts}
 
 
 def _bytes(path: Path) -> int:

@@ -8,8 +8,9 @@ from typing import Annotated
 
 import typer
 
-from semsig_gis.cli._app import Database, app, tell_if_online
+from semsig_gis.cli._app import Database, app, known_identifiability, tell_if_online
 from semsig_gis.console import progress
+from semsig_gis.errors import InputError
 
 
 class CellGeometry(enum.StrEnum):
@@ -23,17 +24,38 @@ class CellGeometry(enum.StrEnum):
 def map_(
     database: Database,
     *,
-    evaluation: Annotated[Path, typer.Option(help="Folder that `semsig evaluate --out` wrote.")],
+    evaluation: Annotated[
+        Path | None, typer.Option(help="Folder that `semsig evaluate --out` wrote.")
+    ] = None,
+    identifiability: Annotated[
+        bool,
+        typer.Option(
+            "--identifiability", help="Draw where a query can be placed (after `semsig identify`)."
+        ),
+    ] = False,
     out: Annotated[Path, typer.Option(help="Map to write (.html).")],
 ) -> None:
-    """Draw the errors and the query locations of an evaluation."""
+    """Draw an evaluation, or where a query can be placed at all."""
     from semsig_gis.database_file import open_database
     from semsig_gis.evaluation import Evaluation
+    from semsig_gis.map_identifiability import identifiability_map
     from semsig_gis.maps import evaluation_map, save_map
 
-    results = Evaluation.load(evaluation)
+    if (evaluation is not None) == identifiability:
+        msg = "a map shows --evaluation or --identifiability; give one of them."
+        raise InputError(msg)
+    results = None if evaluation is None else Evaluation.load(evaluation)
+    opened = open_database(database)
+    told = known_identifiability(database, opened) if identifiability else None
+    if identifiability and told is None:
+        msg = f"{database} does not tell where a query can be placed; run semsig identify first."
+        raise InputError(msg)
     with progress("drawing the map"):
-        offline = save_map(evaluation_map(results, open_database(database)), out)
+        if told is not None:
+            drawn = identifiability_map(told)
+        elif results is not None:
+            drawn = evaluation_map(results, opened)
+        offline = save_map(drawn, out)
     typer.echo(f"map: {out}")
     tell_if_online(offline)
 
@@ -58,5 +80,12 @@ def export(
     opened = open_database(database)
     seen = None if objects is None else open_objects(objects)
     with progress("writing the GeoPackage") as advance:
-        export_geopackage(opened, out, objects=seen, geometry=geometry.value, progress=advance)
+        export_geopackage(
+            opened,
+            out,
+            objects=seen,
+            identifiability=known_identifiability(database, opened),
+            geometry=geometry.value,
+            progress=advance,
+        )
     typer.echo(f"GeoPackage: {out}")

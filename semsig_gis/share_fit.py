@@ -1,0 +1,165 @@
+"""How a share depends on a few features: a smooth curve between 0 and 1, from examples."""
+
+from __future__ import annotations
+
+import itertools
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from semsig_gis.errors import InputError
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike, NDArray
+
+__all__ = ["ShareFit", "fit_shares"]
+
+DEGREE = 3
+RIDGE = 1e-3  # keeps a power that tells nothing from growing
+STEPS = 100
+SETTLED = 1e-9
+LARGEST = 30.0  # logits beyond it are as good as certain
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class ShareFit:
+    """A curve that `fit_shares` found.
+
+    Parameters
+    ----------
+    low, high : ndarray of float64, shape (f,)
+        Range of each feature in the examples; beyond it the curve stays what it is at its ends.
+    middle, spread : ndarray of float64, shape (f,)
+        Mean and standard deviation of each feature in the examples.
+    powers : ndarray of int64, shape (p, f)
+        Powers of the features in each term.
+    weights : ndarray of float64, shape (p,)
+        Weight of each term.
+    """
+
+    low: NDArray[np.float64]
+    high: NDArray[np.float64]
+    middle: NDArray[np.float64]
+    spread: NDArray[np.float64]
+    powers: NDArray[np.int64]
+    weights: NDArray[np.float64]
+
+    def predict(self, features: ArrayLike) -> NDArray[np.float64]:
+        """Return the shares to expect.
+
+        Parameters
+        ----------
+        features : array_like of float, shape (n, f)
+            A row a case.
+
+        Returns
+        -------
+        ndarray of float64, shape (n,)
+            From 0 to 1.
+        """
+        inside = np.clip(np.asarray(features, dtype=np.float64), self.low, self.high)
+        terms = _terms((inside - self.middle) / self.spread, self.powers)
+        return _logistic(terms @ self.weights)
+
+
+def fit_shares(features: ArrayLike, shares: ArrayLike) -> ShareFit:
+    """Fit a curve to examples.
+
+    Parameters
+    ----------
+    features : array_like of float, shape (m, f)
+        A row an example; finite.
+    shares : array_like of float, shape (m,)
+        What came of each, from 0 to 1: shares, or 0 and 1.
+
+    Returns
+    -------
+    ShareFit
+        The curve. Over the examples, its mean is that of the shares.
+
+    Raises
+    ------
+    InputError
+        If there is no example, or a number is not finite or out of its range.
+
+    Notes
+    -----
+    Logistic regression on the products of the features up to the third degree, by Newton's method
+    on the log-likelihood less a small penalty on all weights but the constant.
+
+    Examples
+    --------
+    >>> heights = np.linspace(-3.0, 3.0, 200)[:, None]
+    >>> curve = fit_shares(heights, heights[:, 0] > 0)
+    >>> (curve.predict([[-2.0], [2.0]]) > 0.5).tolist()
+    [False, True]
+    """
+    given = np.asarray(features, dtype=np.float64)
+    wanted = np.asarray(shares, dtype=np.float64)
+    if given.ndim != 2 or len(given) != len(wanted) or not len(wanted):  # noqa: PLR2004
+        msg = f"{given.shape} features and {wanted.shape} shares were given; give a row for each."
+        raise InputError(msg)
+    if not (np.isfinite(given).all() and ((wanted >= 0) & (wanted <= 1)).all()):
+        msg = "a feature is not finite or a share is not from 0 to 1; leave such examples out."
+        raise InputError(msg)
+    kinds = given.shape[1]
+    powers = np.array(
+        [one for one in itertools.product(range(DEGREE + 1), repeat=kinds) if sum(one) <= DEGREE]
+    )
+    middle, spread = given.mean(axis=0), given.std(axis=0)
+    spread = np.where(spread > 0, spread, 1.0)
+    terms = _terms((given - middle) / spread, powers)
+    return ShareFit(
+        low=given.min(axis=0),
+        high=given.max(axis=0),
+        middle=middle,
+        spread=spread,
+        powers=powers,
+        weights=_newton(terms, wanted),
+    )
+
+
+def _newton(terms: NDArray[np.float64], shares: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the weights of the terms, the first of which is constant."""
+    penalty = np.full(terms.shape[1], RIDGE * len(shares))
+    penalty[0] = 0.0
+    weights = np.zeros(terms.shape[1])
+    # Where all shares are 0, or all 1, the best constant would be infinite.
+    mean = np.clip(shares.mean(), *_logistic(np.array([-LARGEST, LARGEST]) / 2))
+    weights[0] = np.log(mean / (1.0 - mean))
+    loss = _loss(terms, shares, weights, penalty)
+    for _ in range(STEPS):
+        expected = _logistic(terms @ weights)
+        slope = terms.T @ (shares - expected) - penalty * weights
+        bend = (terms * (expected * (1.0 - expected))[:, None]).T @ terms + np.diag(penalty)
+        step = np.linalg.solve(bend + 1e-9 * np.eye(len(bend)), slope)
+        size = 1.0
+        while (
+            new := _loss(terms, shares, weights + size * step, penalty)
+        ) > loss and size > SETTLED:
+            size /= 2.0
+        if loss - new < SETTLED * len(shares):
+            break
+        weights, loss = weights + size * step, new
+    return weights
+
+
+def _loss(
+    terms: NDArray[np.float64],
+    shares: NDArray[np.float64],
+    weights: NDArray[np.float64],
+    penalty: NDArray[np.float64],
+) -> float:
+    logits = terms @ weights
+    entropy = np.logaddexp(0.0, logits) - shares * logits
+    return float(entropy.sum() + 0.5 * (penalty * weights**2).sum())
+
+
+def _terms(scaled: NDArray[np.float64], powers: NDArray[np.int64]) -> NDArray[np.float64]:
+    """Return the products of powers of the features, shape (n, p)."""
+    return np.asarray((scaled[:, None, :] ** powers).prod(axis=2))
+
+
+def _logistic(logits: NDArray[np.float64]) -> NDArray[np.float64]:
+    return np.asarray(1.0 / (1.0 + np.exp(-np.clip(logits, -LARGEST, LARGEST))))

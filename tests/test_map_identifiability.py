@@ -1,0 +1,130 @@
+"""The map of where a query can be placed, in a real browser."""
+
+from __future__ import annotations
+
+import dataclasses
+import time
+from typing import TYPE_CHECKING, Any
+
+import folium
+import numpy as np
+import pytest
+from cells_told import told_of
+from map_pages import HOSTILE, asked, assert_quiet, hostile_database, opened, switch
+from pyproj import Transformer
+from selenium.webdriver.common.by import By
+from sentences import assert_sentence
+from worlds import random_town
+
+from semsig_gis.errors import InputError
+from semsig_gis.map_identifiability import identifiability_map
+from semsig_gis.noise import named_noise
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from selenium.webdriver import Chrome
+
+    from semsig_gis.identifiability import Identifiability
+
+CITY = random_town().database
+TOLD = told_of(CITY)
+POPUP = "return [...document.querySelectorAll('.semsig-details')].pop()?.innerText"
+
+
+def click(browser: Chrome, told: Identifiability, cell: int) -> dict[str, str]:
+    """Click the middle of a cell; return what its popup says, line by line."""
+    to_degrees = Transformer.from_crs(told.database.crs, "EPSG:4326")
+    latitude, longitude = to_degrees.transform(*told.database.xy[cell])
+    script = "map.fire('click', {latlng: L.latLng(arguments[0], arguments[1])});"
+    asked(browser, script, float(latitude), float(longitude))
+    return popup(browser)
+
+
+def popup(browser: Chrome) -> dict[str, str]:
+    time.sleep(0.4)  # the arrays are unpacked once, and the popup before fades away
+    text = browser.execute_script(POPUP)
+    assert text.startswith("A query from here")
+    lines = [line.split("\t", 1) for line in text.splitlines() if "\t" in line]
+    return {one[0].strip(): one[1].strip() for one in lines}
+
+
+def cell_id(told: Identifiability, cell: int) -> str:
+    return str(int(told.database.cell_ids[cell]))
+
+
+def whole_percent(chance: float) -> str:
+    steps = round(chance * 250) * 0.4
+    if steps < 1:
+        return "below 1 %"
+    return "above 99 %" if steps > 99 else f"{int(steps + 0.5)} %"
+
+
+@pytest.mark.usefixtures("carried")
+def test_a_click_on_any_cell_tells_of_it(browser: Chrome, tmp_path: Path) -> None:
+    opened(browser, identifiability_map(TOLD), tmp_path)
+    assert browser.title == "Where a query can be placed"
+    assert len(browser.find_elements(By.CSS_SELECTOR, "img.leaflet-image-layer")) == 1
+    asked(browser, "map.setZoom(19, {animate: false})")
+    for cell in np.random.default_rng(2).choice(len(CITY), 12, replace=False).tolist():
+        said = click(browser, TOLD, cell)
+        assert said["Cell"] == cell_id(TOLD, cell)
+        assert said["Found within 30 m"] == whole_percent(TOLD.found[cell])
+        assert said["Chance given"].startswith(whole_percent(TOLD.itself[cell]))
+        named = [name for name in said if name.startswith("Taken for")]
+        assert len(named) == int((TOLD.lookalikes[cell] >= 0).sum())
+    assert_quiet(browser)
+
+
+@pytest.mark.usefixtures("carried")
+def test_a_lookalike_is_a_jump_away(browser: Chrome, tmp_path: Path) -> None:
+    opened(browser, identifiability_map(TOLD), tmp_path)
+    cell = int(np.flatnonzero((TOLD.lookalike_chances > 0.1).all(axis=1))[0])
+    assert click(browser, TOLD, cell)["Cell"] == cell_id(TOLD, cell)
+    jump = """
+    const numbers = [];
+    map.eachLayer((layer) => { if (layer.getTooltip && layer.getTooltip()) numbers.push(layer); });
+    numbers[1].fire("click");
+    """
+    asked(browser, jump)
+    other = int(TOLD.lookalikes[cell, 1])
+    assert popup(browser)["Cell"] == cell_id(TOLD, other)
+    shown = asked(browser, "return map.getBounds().contains(map._popup.getLatLng())")
+    assert shown
+    switch(browser, "Cells, by a click")
+    time.sleep(0.5)
+    assert browser.find_elements(By.CSS_SELECTOR, ".semsig-number") == []
+    script = "map.fire('click', {latlng: map.getCenter()});"
+    asked(browser, script)
+    time.sleep(0.3)
+    assert browser.execute_script(POPUP) is None
+    assert_quiet(browser)
+
+
+@pytest.mark.usefixtures("carried")
+def test_hostile_data_is_shown_and_never_run(browser: Chrome, tmp_path: Path) -> None:
+    noise = dataclasses.replace(named_noise("medium"), name=HOSTILE)
+    told = dataclasses.replace(TOLD, database=hostile_database(CITY), noise=noise)
+    opened(browser, identifiability_map(told), tmp_path)  # an alert would fail the next command
+    legend = browser.find_element(By.CSS_SELECTOR, ".semsig-legend")
+    text = browser.execute_script("return arguments[0].textContent", legend)
+    assert HOSTILE in text
+    helped = np.flatnonzero((told.gains > 0.1).any(axis=1))
+    click(browser, told, int(helped[0]))
+    details = browser.execute_script("return document.querySelector('.semsig-details').textContent")
+    assert HOSTILE in details
+    for element in ("script", "img"):
+        inside = f".semsig-legend {element}, .semsig-details {element}"
+        assert browser.find_elements(By.CSS_SELECTOR, inside) == []
+    assert_quiet(browser)
+
+
+def test_maps_of_ones_own() -> None:
+    own = folium.Map([43.0, 3.0], zoom_start=12, tiles=None)
+    assert identifiability_map(TOLD, map_=own) is own
+    assert identifiability_map(TOLD, map_=own) is own
+    names: list[Any] = [getattr(child, "layer_name", "") for child in own._children.values()]
+    assert {"Chance to be found", "Chance to be found, 2", "Cells, by a click, 2"} <= set(names)
+    with pytest.raises(InputError) as caught:
+        identifiability_map(TOLD, map_=own, tiles="OpenStreetMap")
+    assert_sentence(caught.value, "OpenStreetMap")
