@@ -166,6 +166,7 @@ _HOMES = {
 }
 
 __all__ = [
+    "PARIS_LIKE",
     "Catalog",
     "CitySpec",
     "Distortion",
@@ -185,7 +186,6 @@ __all__ = [
     "NoiseSpec",
     "ObjectClass",
     "ObjectStore",
-    "PARIS_LIKE",
     "PartitionedDatabase",
     "Posterior",
     "RawLayer",

@@ -11,7 +11,7 @@ from semsig_gis.compiling import compiled
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-__all__ = ["count_steps", "fuse", "put_behind", "worst_kept"]
+__all__ = ["count_steps", "fuse", "put_behind"]
 
 
 @compiled  # pragma: no cover - coverage does not see machine code
@@ -63,31 +63,6 @@ def fuse(  # noqa: PLR0917
     """
     for cell in range(len(types)):
         scores[cell] = np.rint(left[types[cell]] + right[angles[cell]]) * step
-
-
-@compiled  # pragma: no cover - coverage does not see machine code
-def worst_kept(first: NDArray[np.float32], cut: float, fused: NDArray[np.float32]) -> float:
-    """Find the worst score of the cells that the first stage keeps.
-
-    Parameters
-    ----------
-    first : ndarray of float32, shape (n,)
-        Scores of the first stage.
-    cut : float
-        The worst of them that is kept.
-    fused : ndarray of float32, shape (n,)
-        Scores of the second stage.
-
-    Returns
-    -------
-    float
-        The worst score.
-    """
-    worst = fused.dtype.type(-np.inf)
-    for cell in range(len(first)):
-        score = fused[cell] if first[cell] <= cut else worst
-        worst = max(worst, score)
-    return float(worst)
 
 
 @compiled  # pragma: no cover - coverage does not see machine code

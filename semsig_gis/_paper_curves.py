@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from semsig_gis.intervals import wilson_interval
-from semsig_gis.paper_experiments import BEST, MANY
+from semsig_gis.paper_experiments import BEST, FIRST_STAGE, MANY
 from semsig_gis.report_parts import Curve, Number, Plot
 from semsig_gis.scoring import THRESHOLDS, expected_recall
 
@@ -22,6 +22,7 @@ if TYPE_CHECKING:
 METRES = tuple(one for one in THRESHOLDS if one <= 500)  # noqa: PLR2004 - what plots show
 SHARES = (0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1, 2, 3, 5, 7, *range(10, 101, 5))
 P50, RECALL10 = "P(error ≤ 50 m)", "recall@10 %"
+JUST_5 = "recall@10 %, just 5 % kept"
 ERROR_AXES = ("error in metres", "share of the queries")
 RECALL_AXES = (
     "best ranked cells that are kept, in per cent",
@@ -45,7 +46,15 @@ def case_of(
 
 def level_case(found: Reproduction, name: str) -> Evaluation:
     """Return what the recommended method gives at a level of distortion."""
-    return case_of(found, "medium" if name == "medium" else "levels", BEST, name)
+    return case_of(found, name if name in found.experiments else "levels", BEST, name)
+
+
+def just_kept(found: Reproduction, experiment: str, distortion: str) -> Share:
+    """Return the recall at 10 % if just 5 % of the cells are kept, whatever ties with the last.
+
+    Then the best 10 % are those of the first stage.
+    """
+    return figure_share(case_of(found, experiment, FIRST_STAGE, distortion), "recall10")
 
 
 def share_of(values: NDArray[np.float64]) -> Share:

@@ -353,8 +353,9 @@ class _Pool:
         self.scores = answer.scores[cells]
         if answer.place is not None:
             places[self.scores.argmin()] = answer.place
+        places -= query.xy
         # So that a cell 50 m away is not a rounding beyond 50 m.
-        self.errors = np.round(np.hypot(*(places - np.array(query.xy)).T), 6)
+        self.errors = np.round(np.sqrt((places**2).sum(axis=1)), 6)
         self.better = self.tied = np.empty(0)
 
     def cut(self, count: int) -> dict[str, Any]:

@@ -174,9 +174,7 @@ def run_experiments(
     for out in specs:
         if out in running:
             work, partial_ = running[out]
-            found[out] = {
-                case.name: work.evaluation(case, partial_ / PARTS) for case in work.spec.cases
-            }
+            found[out] = work.evaluations(partial_ / PARTS)
             write_results(partial_, work.spec, found[out], districts=work.districts)
             finish_run(partial_)
         else:

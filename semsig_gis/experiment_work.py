@@ -14,7 +14,9 @@ from typing import TYPE_CHECKING, NamedTuple
 import geopandas as gpd
 import pandas as pd
 import pyarrow as pa
+import pyarrow.parquet as pq
 
+from semsig_gis.added_columns import built_digest
 from semsig_gis.answering import Answerer
 from semsig_gis.database_file import open_database
 from semsig_gis.distance_memo import DistanceMemo
@@ -35,7 +37,7 @@ if TYPE_CHECKING:
 
     from semsig_gis.database import SignatureDatabase
     from semsig_gis.evaluation_result import Evaluation
-    from semsig_gis.experiment import Case, ExperimentSpec
+    from semsig_gis.experiment import ExperimentSpec
     from semsig_gis.likelihood import LikelihoodIndex
     from semsig_gis.queries import Query
     from semsig_gis.store import ObjectStore
@@ -98,7 +100,9 @@ class ExperimentWork:
         """
         found = {}
         for name in dict.fromkeys([self.spec.database, self.spec.city or self.spec.database]):
-            found[name] = digest(*_files(self.folder / name))
+            files = _files(self.folder / name)
+            # Columns that were put into a database later change nothing here.
+            found[name] = built_digest(*files) if len(files) == 1 else digest(*files)
         for name in self._stores():
             store = store_path(self.folder / name)
             if store.is_dir():
@@ -235,39 +239,45 @@ class ExperimentWork:
         of_each = 4 * (MEASURES * distinct + STAGES * len(self.database))
         return max(1, min(QUERIES_A_PART, MEMO_BYTES // max(of_each, 1)))
 
-    def evaluation(self, case: Case, place: Path) -> Evaluation:
-        """Return an evaluation, when all its queries are answered.
+    def evaluations(self, place: Path) -> dict[str, Evaluation]:
+        """Return all evaluations, when all queries are answered.
 
         Parameters
         ----------
-        case : Case
-            Which.
         place : Path
             Folder of the files with the answers.
 
         Returns
         -------
-        Evaluation
-            The evaluation.
+        dict of str to Evaluation
+            By the names of their cases.
         """
+        size = sum(file.stat().st_size for file in _files(self.folder / self.spec.database))
+        found = {}
+        answers: dict[tuple[str, str], pd.DataFrame] = {}
+        for case in self.spec.cases:
+            key = (case.distortion, case.method)
+            if key not in answers:
+                answers = {key: self._answers(place, *key)}  # the last alone is kept
+            scored = answers[key]
+            found[case.name] = make_evaluation(
+                self.database,
+                self.spec.methods[case.method],
+                self.spec.asked(case.distortion),
+                scored[scored["top"] == case.top].reset_index(drop=True),
+                top=case.top,
+                city=self.spec.city,
+                file_bytes=size,
+            )
+        return found
+
+    def _answers(self, place: Path, distortion: str, method: str) -> pd.DataFrame:
+        """Return all answers of a method."""
         files = [
-            _part_file(place, part, case.method)
-            for part in self.parts
-            if part.distortion == case.distortion
+            _part_file(place, part, method) for part in self.parts if part.distortion == distortion
         ]
-        scored = pd.concat([pd.read_parquet(file) for file in files], ignore_index=True)
-        chosen = scored[scored.pop("top") == case.top].reset_index(drop=True)
-        return make_evaluation(
-            self.database,
-            self.spec.methods[case.method],
-            self.spec.asked(case.distortion),
-            chosen,
-            top=case.top,
-            city=self.spec.city,
-            file_bytes=sum(
-                file.stat().st_size for file in _files(self.folder / self.spec.database)
-            ),
-        )
+        found: pd.DataFrame = pa.concat_tables(map(pq.read_table, files)).to_pandas()
+        return found
 
     @property
     def _queries_of_each(self) -> int:
@@ -335,6 +345,6 @@ def _is_whole(file: Path, *, rows: int) -> bool:
     if not file.is_file():
         return False
     try:
-        return len(pd.read_parquet(file)) == rows
+        return bool(pq.read_table(file).num_rows == rows)
     except (OSError, ValueError, pa.ArrowException):
         return False

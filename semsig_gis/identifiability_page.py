@@ -66,10 +66,12 @@ def identifiability_page(
     return Report(
         title=f"Where a query can be placed in {name}",
         text=(
-            "Before any query, every cell is told the chance that one from it will be placed "
-            f"within {facts['radius_m']:g} m, by {facts['trials']:,} simulated queries and by how "
-            f"like the other cells are. {check.queries:,} fresh queries tell whether the chances "
-            "come true.",
+            (
+                "Before any query, every cell is told the chance that one from it will be placed "
+                f"within {facts['radius_m']:g} m, by {facts['trials']:,} simulated queries and by "
+                f"how like the other cells are. {check.queries:,} fresh queries tell whether the "
+                "chances come true."
+            ),
         ),
         settings=(
             ("Database", name),
@@ -179,8 +181,10 @@ def _ranks(check: IdentifiabilityCheck) -> Section:
         ()
         if math.isnan(check.attainable)
         else (
-            "Success is yes or no, so that chances that are just right would have "
-            f"{check.attainable:.3f}.",
+            (
+                "Success is yes or no, so that chances that are just right would have "
+                f"{check.attainable:.3f}."
+            ),
         )
     )
     return Section(

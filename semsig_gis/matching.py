@@ -327,7 +327,7 @@ def _joined(
     fused = fuse() if known is None else known(("fused", method.alpha), fuse)
     spread = partial(_spread, on_steps, types)
     first = spread() if known is None else known("first", spread)
-    worst = np.float32(kernels.worst_kept(first, float(cut), fused))
+    worst = np.where(first <= cut, fused, np.float32(-np.inf)).max()
     scores = np.empty(len(first), np.float32)
     kernels.put_behind(first, cut, fused, worst, _next(worst), scores)
     return scores

@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 __all__ = [
     "BEST",
     "FEWER",
+    "FIRST_STAGE",
     "FUSIONS",
     "LEVELS",
     "OURS",
@@ -77,6 +78,9 @@ PERCENTS: Mapping[int, str] = MappingProxyType(
 
 BEST = "stages-5"
 """The name of the method that the paper recommends."""
+
+FIRST_STAGE = "types-edit"
+"""The name of its first stage alone."""
 
 LEVELS = ("light", "medium", "strong")
 """The paper's levels of distortion."""
@@ -136,11 +140,12 @@ def paper_experiments(
     >>> list(specs)
     ['none', 'medium', 'levels', 'readings', 'ours', 'range-20']
     >>> [case.name for case in specs["range-20"].cases]
-    ['medium/stages-5-top1']
+    ['medium/types-edit-top1', 'medium/stages-5-top1']
     """
     stages = {name: f"edit+edit:{k}%" for k, name in PERCENTS.items() if name not in FUSIONS}
     weights = {name: f"edit+edit:alpha={w}" for w, name in WEIGHTS.items() if name not in FUSIONS}
     best = {BEST: stages[BEST]}
+    stage_one = {FIRST_STAGE: SINGLES[FIRST_STAGE], **best}
 
     def spec(
         distortions: Mapping[str, str],
@@ -171,9 +176,9 @@ def paper_experiments(
     return {
         "none": spec({"none": ""}, {**SINGLES, **FUSIONS, **stages}, top=both),
         "medium": spec(medium, {**SINGLES, **FUSIONS, **weights, **stages}, top=both),
-        "levels": spec({level: kept[level] for level in ("light", "strong")}, best),
+        "levels": spec({level: kept[level] for level in ("light", "strong")}, stage_one),
         "readings": spec(readings, {**best, "raw": "edit+edit:5%:raw"}, number=min(queries, READ)),
         "ours": spec(kept, {OURS: "likelihood:generic:on_grid"}, number=min(queries, FEWER)),
-        **{f"range-{r:g}": spec(medium, best, file=file) for r, file in ranges.items()},
+        **{f"range-{r:g}": spec(medium, stage_one, file=file) for r, file in ranges.items()},
         **{f"levels-{q}": spec(medium, best, file=file) for q, file in scales.items()},
     }

@@ -14,11 +14,9 @@ from typing import TYPE_CHECKING, Literal, get_args
 
 import numpy as np
 
-from semsig_gis.database import BEARING_UNITS, DISTANCE_UNITS
 from semsig_gis.distortion import DISTORTIONS
 from semsig_gis.distortion_chain import ready_chain
 from semsig_gis.errors import CrsError, InputError, UnknownNameError, nearest_name
-from semsig_gis.geometry import FULL_TURN
 from semsig_gis.grid import cell_ids
 from semsig_gis.sight import CitySights, Sight
 from semsig_gis.views import views_at
@@ -241,7 +239,7 @@ def _seen(
     cells = np.random.default_rng(np.random.SeedSequence(seed)).permutation(len(city))
     if spec.seen_from == "cells" or store is None:
         chosen = cells[numbers.start : numbers.stop]
-        return city.xy[chosen], (_cell_sight(city, cell) for cell in chosen.tolist())
+        return city.xy[chosen], (Sight.of_cell(city, cell) for cell in chosen.tolist())
     places = _places(city, cells, spec.number, seed, store)[numbers.start : numbers.stop]
     views = views_at(
         store.objects,
@@ -283,16 +281,6 @@ def _places(
 
 def _outside(places: NDArray[np.float64], buildings: Footprints | None) -> NDArray[np.bool_]:
     return np.ones(len(places), np.bool_) if buildings is None else ~buildings.cover(places)
-
-
-def _cell_sight(city: SignatureDatabase, cell: int) -> Sight:
-    """Return what the database says is seen from a cell."""
-    part = slice(city.offsets[cell], city.offsets[cell + 1])
-    return Sight(
-        codes=city.codes[part],
-        bearings=city.bearing_units[part] * np.float64(FULL_TURN / BEARING_UNITS),
-        distances=city.distance_units[part] * np.float64(city.reach / DISTANCE_UNITS),
-    )
 
 
 def _sights(views: Views) -> Iterator[Sight]:

@@ -13,13 +13,13 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, get_args
 
+from semsig_gis.added_columns import built_digest
 from semsig_gis.building import build_database
 from semsig_gis.catalog import paper_taxonomy
 from semsig_gis.database_file import open_database, save_database
 from semsig_gis.errors import DatabaseError, InputError
 from semsig_gis.evaluation import check_count, versions
 from semsig_gis.experiment_run import run_experiments
-from semsig_gis.manifest import digest
 from semsig_gis.method import Method
 from semsig_gis.objects import build_objects
 from semsig_gis.paper_experiments import QUERIES, RANGES, SCALES, paper_experiments
@@ -158,7 +158,7 @@ def reproduce(
         raise DatabaseError(msg)
     settings = {
         "size": size,
-        "database": None if given is None else digest(given),
+        "database": None if given is None else built_digest(given),
         "queries": queries,
         "seed": seed,
         "versions": versions(),

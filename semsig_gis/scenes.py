@@ -10,6 +10,7 @@ from pyproj import Transformer
 
 from semsig_gis.grid import cell_ids
 from semsig_gis.report_parts import Scene, SceneObject
+from semsig_gis.sight import Sight
 
 if TYPE_CHECKING:
     from semsig_gis.database import SignatureDatabase
@@ -100,12 +101,11 @@ def _drawn(seen: list[_Seen]) -> tuple[SceneObject, ...]:
 
 def _seen_from(database: SignatureDatabase, cell: int) -> list[_Seen]:
     """Return what is seen from a cell, clockwise from north."""
-    part = slice(database.offsets[cell], database.offsets[cell + 1])
-    turned = np.radians(database.bearings[part])
-    away = database.distances[part]
-    east, north = away * np.sin(turned), away * np.cos(turned)
-    codes = database.codes[part].tolist()
-    return [_Seen(*one) for one in zip(codes, east.tolist(), north.tolist(), strict=True)]
+    sight = Sight.of_cell(database, cell)
+    turned = np.radians(sight.bearings)
+    east, north = sight.distances * np.sin(turned), sight.distances * np.cos(turned)
+    seen = zip(sight.codes.tolist(), east.tolist(), north.tolist(), strict=True)
+    return [_Seen(*one) for one in seen]
 
 
 def _seen_around(database: SignatureDatabase, cell: int, own: list[_Seen]) -> list[_Seen]:

@@ -146,21 +146,29 @@ def expected_best(
     >>> expected, within.tolist()
     (50.0, [0.25, 0.5])
     """
-    # Stable sorting finds at once that they are in order already, as they often are.
-    ordered = np.sort(np.asarray(tied, dtype=np.float64), kind="stable")
     nearest = _nearest(better)
+    errors = np.asarray(tied, dtype=np.float64)
     limits = np.asarray(thresholds, dtype=np.float64)
-    inside = np.searchsorted(ordered, limits, side="right")
     if slots == 1:
-        expected = float(np.minimum(ordered, nearest).mean())
-        drawn = inside / ordered.size
+        expected = float(np.minimum(errors, nearest).mean())
+        drawn = _count_within(errors, limits) / errors.size
     else:
+        ordered = np.sort(errors)
         left = np.arange(ordered.size, 0, -1, dtype=np.float64)
         steps = np.maximum(left - slots, 0.0) / left
         beyond = np.concatenate([[1.0], np.cumprod(steps)])  # by the number of errors at most x
         expected = float(np.dot(beyond[:-1] - beyond[1:], np.minimum(ordered, nearest)))
-        drawn = 1.0 - beyond[inside]
+        drawn = 1.0 - beyond[np.searchsorted(ordered, limits, side="right")]
     return expected, np.where(limits >= nearest, 1.0, drawn)
+
+
+def _count_within(errors: NDArray[np.float64], limits: NDArray[np.float64]) -> NDArray[np.int64]:
+    """Count the errors that are at most each limit; there are many errors and few limits."""
+    order = np.argsort(limits)
+    places = np.searchsorted(limits[order], errors)
+    counts = np.empty(len(limits), np.int64)
+    counts[order] = np.bincount(places, minlength=len(limits) + 1).cumsum()[:-1]
+    return counts
 
 
 def chance_within(better: ArrayLike, tied: ArrayLike, *, slots: int, metres: float) -> float:

@@ -46,6 +46,4 @@ def test_correlations_that_there_are_not() -> None:
     ranks = next(one for one in page.sections if one.name == "ranks")
     assert {one.ours for one in ranks.numbers} == {None}
     assert ranks.text == ()
-    assert not any(
-        one.column == "objects" for part in page.sections for one in part.numbers
-    )
+    assert not any(one.column == "objects" for part in page.sections for one in part.numbers)

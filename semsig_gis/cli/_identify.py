@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -19,6 +19,12 @@ from semsig_gis.cli._app import (
 from semsig_gis.cli._likelihood import NoiseName, OnGrid, prepared_index, read_noise
 from semsig_gis.console import print_json, progress, remark
 from semsig_gis.errors import InputError
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from semsig_gis.identifiability import Identifiability
+    from semsig_gis.identifiability_check import IdentifiabilityCheck
 
 
 @app.command()
@@ -52,13 +58,7 @@ def identify(
     from semsig_gis.identifying import identify as identified
     from semsig_gis.refinement import cell_noise
 
-    for option, number in (("--check", check), ("--threads", threads)):
-        if number is not None and number < 1:
-            msg = f"{option} was given as {number}; give a whole number from 1."
-            raise InputError(msg)
-    if out is not None and check is None:
-        msg = "--out was given without --check, of which it is the report; give both or none."
-        raise InputError(msg)
+    _require_numbers(check, threads, out)
     model = read_noise(noise)
     opened = open_database(database)
     if not on_grid:
@@ -82,11 +82,7 @@ def identify(
             )
     counts = object_counts(database)
     if out is not None and checked is not None:
-        from semsig_gis.identifiability_page import identifiability_page
-        from semsig_gis.report_files import write_report
-
-        page = identifiability_page(told, checked, name=database.name, object_counts=counts)
-        write_report(page, out)
+        _write_page(told, checked, database, counts, out)
     if as_json:
         more = {} if checked is None else {"check": checked.to_dict()}
         print_json(told.summary(object_counts=counts) | more)
@@ -97,3 +93,28 @@ def identify(
     typer.echo(f"columns: {database}")
     if out is not None:
         typer.echo(f"report: {out / 'report.html'}")
+
+
+def _write_page(
+    told: Identifiability,
+    checked: IdentifiabilityCheck,
+    database: Path,
+    counts: Mapping[int, int] | None,
+    out: Path,
+) -> None:
+    from semsig_gis.identifiability_page import identifiability_page
+    from semsig_gis.report_files import write_report
+
+    page = identifiability_page(told, checked, name=database.name, object_counts=counts)
+    write_report(page, out)
+
+
+def _require_numbers(check: int | None, threads: int | None, out: Path | None) -> None:
+    """Refuse options that cannot be used."""
+    for option, number in (("--check", check), ("--threads", threads)):
+        if number is not None and number < 1:
+            msg = f"{option} was given as {number}; give a whole number from 1."
+            raise InputError(msg)
+    if out is not None and check is None:
+        msg = "--out was given without --check, of which it is the report; give both or none."
+        raise InputError(msg)

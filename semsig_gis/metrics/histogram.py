@@ -69,14 +69,17 @@ def distances(
     """
     histogram = table.histogram if only is None else table.histogram[only]
     result = np.empty((len(queries), len(histogram)), np.float32)
+    most = int(histogram.max(initial=0))
+    found = np.arange(most + 1)
     for row, query in zip(result, queries, strict=True):
         values, counts = np.unique(checked_sequence(query), return_counts=True)
         total = np.zeros(len(histogram))
         # A value the query lacks adds nothing to the sum, whatever the other sequence has.
         for value, count in zip(values.tolist(), counts.tolist(), strict=True):
             if value < histogram.shape[1]:
-                column = histogram[:, value]
-                total += np.minimum(column, count) / np.maximum(column, count)
+                # There are few different counts, and so few quotients.
+                quotients = np.minimum(found, count) / np.maximum(found, count)
+                total += quotients.take(histogram[:, value], mode="wrap")
         if normalized:
             _, either = table.overlap(query, only=only)
             # Two empty sequences are equal: 1 - 1, not 1 - 0 / 0.
