@@ -55,6 +55,15 @@ if TYPE_CHECKING:
     from semsig_gis.queries import Query
     from semsig_gis.sequences import SequenceTable
 
+# What is told of an answer, in this order.
+OUTCOME_COLUMNS = (
+    *("distance", "rank_low", "rank_high", "chance", "in_region", "heading_error", "seconds"),
+    *("best_cell_id", "best_x", "best_y", "tied"),
+    *(f"near{count}" for count in NEAR_PLACES),
+    *("right", "error_m"),
+    *(f"p{threshold}" for threshold in THRESHOLDS),
+)
+
 __all__ = [
     "SUCCESS_METRES",
     "SUCCESS_PROBABILITY",
@@ -198,7 +207,7 @@ def score_queries(
         if len(query.asked):
             answer = next(answers)
             pool = _Pool(database, query, answer, max(*tops, *NEAR_PLACES))
-            shared = _told(database, query, answer)
+            shared = _told(database, query, answer, pool)
             shared |= _near(pool, judged=answer.posterior is not None)
             for top in tops:
                 outcomes[top].append(shared | _outcome(pool, top))
@@ -210,7 +219,7 @@ def score_queries(
     about = _query_table(database, queries)
     scored = {}
     for top, rows in outcomes.items():
-        told = pd.DataFrame(rows)
+        told = pd.DataFrame(rows, columns=OUTCOME_COLUMNS)
         told["best_cell_id"] = told["best_cell_id"].astype("Int64")
         scored[top] = pd.concat([about, told], axis=1)
     return scored
@@ -309,7 +318,9 @@ def _chain(
     return (distortion,) if isinstance(distortion, QueryDistortion) else tuple(distortion)
 
 
-def _told(database: SignatureDatabase, query: Query, answer: RankedAnswer) -> dict[str, Any]:
+def _told(
+    database: SignatureDatabase, query: Query, answer: RankedAnswer, pool: _Pool
+) -> dict[str, Any]:
     """Return the columns that do not depend on how many candidates count."""
     scores = answer.scores
     low, high = rank_range(scores, query.cell) if query.cell >= 0 else (len(scores),) * 2
@@ -325,13 +336,15 @@ def _told(database: SignatureDatabase, query: Query, answer: RankedAnswer) -> di
         "in_region": math.nan if found is None else _in_region(found, query.cell),
         "heading_error": off,
         "seconds": answer.seconds,
-        **_shown(database, query, answer),
+        **_shown(database, query, answer, pool),
     }
 
 
-def _shown(database: SignatureDatabase, query: Query, answer: RankedAnswer) -> dict[str, Any]:
+def _shown(
+    database: SignatureDatabase, query: Query, answer: RankedAnswer, pool: _Pool
+) -> dict[str, Any]:
     """Return the best candidate, or one of equals."""
-    best = np.flatnonzero(answer.scores == answer.scores.min())
+    best = pool.cells[pool.scores == pool.scores.min()]
     shown = best[int(query.pick * len(best))]
     x, y = database.xy[shown].tolist() if answer.place is None else answer.place
     return {
@@ -348,9 +361,9 @@ class _Pool:
     def __init__(
         self, database: SignatureDatabase, query: Query, answer: RankedAnswer, count: int
     ) -> None:
-        cells = best_cells(answer.scores, min(count, len(database)))
-        places = database.xy[cells]
-        self.scores = answer.scores[cells]
+        self.cells = best_cells(answer.scores, min(count, len(database)))
+        places = database.xy[self.cells]
+        self.scores = answer.scores[self.cells]
         if answer.place is not None:
             places[self.scores.argmin()] = answer.place
         places -= query.xy

@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import geopandas as gpd
 import pandas as pd
@@ -84,6 +84,7 @@ class ExperimentWork:
     note: Callable[[str], None] | None = None
     _stored: dict[str, ObjectStore] = field(default_factory=dict)
     _indexes: dict[Path, LikelihoodIndex] = field(default_factory=dict)
+    _answerers: dict[str, Answerer] = field(default_factory=dict)
 
     def digests(self) -> dict[str, str]:
         """Return what stands for the content of the files that are looked at.
@@ -143,8 +144,8 @@ class ExperimentWork:
             district_labels(nowhere, self.districts, self.spec.districts.name)
         for distortion in self.spec.distortions:
             self._queries(distortion, slice(1))
-        for method in self.spec.methods.values():
-            self._answerer(method)
+        for name in self.spec.methods:
+            self._answerer(name)
 
     @cached_property
     def database(self) -> SignatureDatabase:
@@ -223,7 +224,7 @@ class ExperimentWork:
             memo = DistanceMemo() if len(names) > 1 else None
             for name in names:
                 scored = score_queries(
-                    self._answerer(self.spec.methods[name]),
+                    self._answerer(name),
                     queries[start : start + step],
                     tops=self.spec.top,
                     memo=memo,
@@ -276,7 +277,9 @@ class ExperimentWork:
         files = [
             _part_file(place, part, method) for part in self.parts if part.distortion == distortion
         ]
-        found: pd.DataFrame = pa.concat_tables(map(pq.read_table, files)).to_pandas()
+        found: pd.DataFrame = pa.concat_tables(
+            map(pq.read_table, files), promote_options="default"
+        ).to_pandas()
         return found
 
     @property
@@ -295,16 +298,16 @@ class ExperimentWork:
             part=part,
         )
 
-    def _answerer(self, method: Method | LikelihoodMethod) -> Answerer:
+    def _answerer(self, name: str) -> Answerer:
         """Return a method with all that it needs."""
-        if not isinstance(method, LikelihoodMethod):
-            return Answerer(database=self.database, method=method)
-        return Answerer(
-            database=self.database,
-            method=method,
-            index=self._index(method),
-            store=self._store(self.spec.database) if method.refined else None,
-        )
+        if name not in self._answerers:
+            method = self.spec.methods[name]
+            more: dict[str, Any] = {}
+            if isinstance(method, LikelihoodMethod):
+                more["index"] = self._index(method)
+                more["store"] = self._store(self.spec.database) if method.refined else None
+            self._answerers[name] = Answerer(database=self.database, method=method, **more)
+        return self._answerers[name]
 
     def _store(self, name: str) -> ObjectStore:
         if name not in self._stored:

@@ -43,6 +43,7 @@ NEAR_METRES = 25
 """How near, in metres, as recall@N is told in visual place recognition."""
 
 BLOCK = 256  # cells of which only the best is looked at first
+FEW = 4  # times as many blocks: then it pays to look at some of them alone
 
 
 def best_cells(scores: NDArray[np.float32], count: int) -> NDArray[np.intp]:
@@ -75,7 +76,14 @@ def best_cells(scores: NDArray[np.float32], count: int) -> NDArray[np.intp]:
         some = np.arange(len(scores))
     else:
         least = scores[: blocks * BLOCK].reshape(blocks, BLOCK).min(axis=1)
-        some = np.flatnonzero(scores <= np.partition(least, count - 1)[count - 1])
+        enough = np.partition(least, count - 1)[count - 1]
+        chosen = np.flatnonzero(least <= enough)
+        if FEW * len(chosen) < blocks:
+            inside = (chosen[:, None] * BLOCK + np.arange(BLOCK)).ravel()
+            some = np.concatenate([inside, np.arange(blocks * BLOCK, len(scores))])
+            some = some[scores[some] <= enough]
+        else:
+            some = np.flatnonzero(scores <= enough)
     cut = np.partition(scores[some], count - 1)[count - 1]
     return np.asarray(some[scores[some] <= cut])
 

@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import enum
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from semsig_gis.cli._app import AsJson, app
 from semsig_gis.console import print_json, print_rows, progress, remark
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
 
 
 class Size(enum.StrEnum):
@@ -56,7 +59,12 @@ def reproduce(
 
     if workers is None:
         workers = (os.cpu_count() or 1) if size is Size.full else 0
-    with contextlib.ExitStack() as bars:
+    with contextlib.ExitStack() as bar:
+
+        def show(label: str) -> Callable[[int, int], None]:
+            bar.close()  # one at a time
+            return bar.enter_context(progress(label))
+
         found = run(
             out,
             database=database,
@@ -65,7 +73,7 @@ def reproduce(
             seed=seed,
             workers=workers,
             note=remark,
-            progress=lambda label: bars.enter_context(progress(label)),
+            progress=show,
         )
     with progress("drawing the report"):
         report = reproduction_report(found)
