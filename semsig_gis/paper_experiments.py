@@ -42,10 +42,10 @@ QUERIES = 10_000
 MANY = 100
 """How many best candidates count where the paper does not look at the first alone."""
 
-READ = 2_000
+READ = 1_000
 """Queries of each reading of what the paper leaves open, unless fewer are asked."""
 
-FEWER = 1_000
+FEWER = 500
 """Queries of the likelihood method, unless fewer are asked."""
 
 SINGLES: Mapping[str, str] = MappingProxyType(
@@ -176,7 +176,7 @@ def paper_experiments(
     return {
         "none": spec({"none": ""}, {**SINGLES, **FUSIONS, **stages}, top=both),
         "medium": spec(medium, {**SINGLES, **FUSIONS, **weights, **stages}, top=both),
-        "levels": spec({level: kept[level] for level in ("light", "strong")}, stage_one),
+        "levels": spec({level: kept[level] for level in ("light", "strong")}, best),
         "readings": spec(readings, {**best, "raw": "edit+edit:5%:raw"}, number=min(queries, READ)),
         "ours": spec(kept, {OURS: "likelihood:generic:on_grid"}, number=min(queries, FEWER)),
         **{f"range-{r:g}": spec(medium, stage_one, file=file) for r, file in ranges.items()},

@@ -334,10 +334,9 @@ def _levels(found: Reproduction) -> Section:
             share = figure_share(case, key)
             paper = theirs.get((name, key))
             numbers.append(Number(row=name, column=column, paper=paper, **share._asdict()))
-        experiment = name if name in found.experiments else "levels"
-        kept = just_kept(found, experiment, name)
-        paper = theirs.get((name, "recall10"))
-        numbers.append(Number(row=name, column=JUST_5, paper=paper, **kept._asdict()))
+    theirs_kept = theirs["medium", "recall10"]
+    kept = just_kept(found, "medium", "medium")
+    numbers.append(Number(row="medium", column=JUST_5, paper=theirs_kept, **kept._asdict()))
     return Section(
         name="levels",
         title="The recommended method: edit + edit, 5 %",

@@ -157,7 +157,10 @@ def expected_best(
     nearest = _nearest(better)
     errors = np.asarray(tied, dtype=np.float64)
     limits = np.asarray(thresholds, dtype=np.float64)
-    if slots == 1:
+    if slots == errors.size:  # all are in
+        expected = min(nearest, float(errors.min()))
+        drawn = (limits >= expected).astype(np.float64)
+    elif slots == 1:
         expected = float(np.minimum(errors, nearest).mean())
         drawn = _count_within(errors, limits) / errors.size
     else:
@@ -208,9 +211,11 @@ def chance_within(better: ArrayLike, tied: ArrayLike, *, slots: int, metres: flo
     if _nearest(better) <= metres:
         return 1.0
     errors = np.asarray(tied, dtype=np.float64)
-    draws = np.arange(slots)
     outside = int(np.count_nonzero(errors > metres))
-    return 1.0 - float(np.prod(np.maximum(outside - draws, 0) / (errors.size - draws)))
+    if outside < slots:
+        return 1.0
+    draws = np.arange(slots)
+    return 1.0 - float(np.prod((outside - draws) / (errors.size - draws)))
 
 
 def _nearest(errors: ArrayLike) -> float:
