@@ -106,7 +106,7 @@ def page(
 
 def _paper_table(rows: Iterable[dict[str, Any]]) -> str:
     return _table(
-        "experiment | what | | ours | interval | the paper",
+        "experiment | what | figure | ours | interval | the paper",
         (
             (
                 *(row["section"], row["row"], row["column"]),
