@@ -66,6 +66,11 @@ def test_figures_are_those_of_the_evaluations(report: Report, reproduction: Repr
     recall = numbers(report, "ranges")["R = 40 m", "recall@10 %"]
     assert recall.ours == pytest.approx(experiments["range-40"]["medium/stages-5-top1"].recall(10))
     assert recall.paper == 0.7269
+    wide = experiments["range-40"]["medium/stages-5-top1"].queries
+    some = wide[(wide["length"] >= 10) & (wide["length"] <= 19)]
+    column = "P(error ≤ 50 m) of queries that see 10 to 19 objects"
+    middling = numbers(report, "ranges")["R = 40 m", column].ours
+    assert middling == (pytest.approx(some["p50"].mean()) if len(some) else None)
     assert numbers(report, "scales")["Q = 24", "P(error ≤ 50 m)"].paper == 0.3861
     single = numbers(report, "single")["edit, angles", "medium: recall@20 %"]
     assert single.ours == pytest.approx(
