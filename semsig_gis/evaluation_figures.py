@@ -116,8 +116,7 @@ def figure_means(figures: pd.DataFrame) -> pd.DataFrame:
     np.int64(3)
     """
     rows = []
-    for name in figures:
-        values = figures[name].to_numpy(dtype=np.float64)
+    for name, values in zip(figures, figures.to_numpy(dtype=np.float64).T, strict=True):
         told = values[~np.isnan(values)]
         value = float(told.mean()) if told.size else math.nan
         low, high = wilson_interval(value, told.size) if told.size else (math.nan, math.nan)

@@ -124,7 +124,8 @@ def one_line(text: str) -> str:
     'plane trees'
     """
     plain = " ".join(text.split())
-    return plain if plain.isprintable() else "".join(map(_shown, plain)).strip()
+    # What is left out may have stood between two spaces.
+    return plain if plain.isprintable() else " ".join("".join(map(_shown, plain)).split())
 
 
 def _shown(character: str) -> str:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import matplotlib as mpl
 import pytest
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 from matplotlib.lines import Line2D
 
@@ -65,6 +65,7 @@ def test_text_is_drawn_as_it_is(text: str) -> None:
 
 
 @given(st.text(max_size=30), st.integers(1, 20))
+@example("0 \x1b\r0", 4)
 def test_a_label_fits(text: str, length: int) -> None:
     cut = label(text, length)
     assert len(cut) <= length
