@@ -4,12 +4,15 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from semsig_gis._paper_curves import case_of
+from semsig_gis._paper_curves import case_of, level_case
 from semsig_gis.distortion import DISTORTIONS
 from semsig_gis.paper_experiments import BEST, LEVELS
 from semsig_gis.paper_figures import (
     PARIS_ALONE,
+    PARIS_BEARING_CLIP,
+    PARIS_BEARING_SIGMA,
     PARIS_DATABASE,
+    PARIS_ERRORS,
     PARIS_GROUPS,
     PARIS_OCCURRENCES,
 )
@@ -144,28 +147,28 @@ def distortion_section(found: Reproduction) -> Section:
     numbers = []
     for name in LEVELS:
         level = DISTORTIONS[name]
-        best = case_of(found, "medium" if name == "medium" else "levels", BEST, name)
+        best = level_case(found, name)
         queries = best.queries
         numbers += [
             Number(
                 row=name,
                 column="errors a query",
                 ours=level.occurrences,
-                paper={"light": 1, "medium": 7, "strong": 13}[name],
+                paper=PARIS_ERRORS[name],
                 decimals=0,
             ),
             Number(
                 row=name,
                 column="bearing noise, degrees",
                 ours=level.bearing_sigma,
-                paper=5.0,
+                paper=PARIS_BEARING_SIGMA,
                 decimals=0,
             ),
             Number(
                 row=name,
                 column="noise clipped at, degrees",
                 ours=level.bearing_clip,
-                paper=30.0,
+                paper=PARIS_BEARING_CLIP,
                 decimals=0,
             ),
             Number(

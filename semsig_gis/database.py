@@ -166,15 +166,15 @@ class SignatureDatabase:
         """The distinct angle-level sequences, and which of them every cell has."""
         return SequenceTable.from_csr(self.levels, self.offsets)
 
-    @property
+    @functools.cached_property
     def type_group_sizes(self) -> NDArray[np.int64]:
         """For every cell, how many cells have its type sequence, shape (n,)."""
-        return self.type_sequences.counts[self.type_sequences.inverse]
+        return _frozen(self.type_sequences.counts[self.type_sequences.inverse])
 
-    @property
+    @functools.cached_property
     def angle_group_sizes(self) -> NDArray[np.int64]:
         """For every cell, how many cells have its angle-level sequence, shape (n,)."""
-        return self.angle_sequences.counts[self.angle_sequences.inverse]
+        return _frozen(self.angle_sequences.counts[self.angle_sequences.inverse])
 
     def signature(self, cell: int) -> Signature:
         """Return the signature of one cell.

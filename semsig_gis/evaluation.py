@@ -53,7 +53,6 @@ if TYPE_CHECKING:
     from semsig_gis.likelihood import LikelihoodIndex
     from semsig_gis.posterior import Posterior
     from semsig_gis.queries import Query
-    from semsig_gis.sequences import SequenceTable
 
 # What is told of an answer, in this order.
 OUTCOME_COLUMNS = (
@@ -439,8 +438,8 @@ def _query_table(database: SignatureDatabase, queries: Sequence[Query]) -> pd.Da
             "cell_id": cell_ids(*database.grid.cells_at(places)),
             "types": [database.types(cell) if cell >= 0 else "" for cell in cells.tolist()],
             "length": np.array([one.length for one in queries], np.int64),
-            "type_group": np.where(known, _group_sizes(database.type_sequences, cells), 0),
-            "angle_group": np.where(known, _group_sizes(database.angle_sequences, cells), 0),
+            "type_group": np.where(known, database.type_group_sizes[cells], 0),
+            "angle_group": np.where(known, database.angle_group_sizes[cells], 0),
             "query_types": [database.taxonomy.decode(one.asked.codes) for one in queries],
             "query_bearings": [_bearing_text(one.asked.bearings) for one in queries],
             "query_length": np.array([len(one.asked) for one in queries], np.int64),
@@ -449,11 +448,6 @@ def _query_table(database: SignatureDatabase, queries: Sequence[Query]) -> pd.Da
             "y": places[:, 1],
         }
     )
-
-
-def _group_sizes(table: SequenceTable, cells: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Return how many cells share the sequence of each of some cells."""
-    return np.asarray(table.counts[table.inverse[cells]])
 
 
 def _bearing_text(bearings: NDArray[np.float64]) -> str:

@@ -224,7 +224,7 @@ def _answer(
         scheduler=scheduler,
         files=[work.folder.resolve() / work.spec.database for work, _ in running.values()],
     )
-    done, failed = 0, []
+    done, total, failed = 0, sum(sizes.values()), []
     with contextlib.closing(outcomes):
         for outcome in outcomes:
             if outcome.reason is not None:
@@ -234,7 +234,7 @@ def _answer(
                 continue
             done += sizes[outcome.task]
             if progress is not None:
-                progress(done, sum(sizes.values()))
+                progress(done, total)
     if failed:
         out, reason = failed[0].task.out, failed[0].reason
         msg = (

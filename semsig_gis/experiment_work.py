@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field
 from functools import cached_property
+from itertools import product
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import geopandas as gpd
@@ -23,6 +24,7 @@ from semsig_gis.distance_memo import DistanceMemo
 from semsig_gis.errors import DatabaseError, SourceError
 from semsig_gis.evaluation import check_count, make_evaluation, score_queries
 from semsig_gis.evaluation_figures import district_labels
+from semsig_gis.experiment import Case
 from semsig_gis.likelihood_file import index_path, ready_index
 from semsig_gis.manifest import digest, part_files
 from semsig_gis.method import LikelihoodMethod, Method
@@ -255,21 +257,19 @@ class ExperimentWork:
         """
         size = sum(file.stat().st_size for file in _files(self.folder / self.spec.database))
         found = {}
-        answers: dict[tuple[str, str], pd.DataFrame] = {}
-        for case in self.spec.cases:
-            key = (case.distortion, case.method)
-            if key not in answers:
-                answers = {key: self._answers(place, *key)}  # the last alone is kept
-            scored = answers[key]
-            found[case.name] = make_evaluation(
-                self.database,
-                self.spec.methods[case.method],
-                self.spec.asked(case.distortion),
-                scored[scored["top"] == case.top].reset_index(drop=True),
-                top=case.top,
-                city=self.spec.city,
-                file_bytes=size,
-            )
+        for distortion, method in product(self.spec.distortions, self.spec.methods):
+            scored = self._answers(place, distortion, method)
+            for top in self.spec.top:
+                case = Case(distortion=distortion, method=method, top=top)
+                found[case.name] = make_evaluation(
+                    self.database,
+                    self.spec.methods[method],
+                    self.spec.asked(distortion),
+                    scored[scored["top"] == top].reset_index(drop=True),
+                    top=top,
+                    city=self.spec.city,
+                    file_bytes=size,
+                )
         return found
 
     def _answers(self, place: Path, distortion: str, method: str) -> pd.DataFrame:

@@ -99,6 +99,12 @@ class StreetObjects:
         codes: NDArray[np.uint8] = self.table[CLASS_CODE].to_numpy(np.uint8)
         return codes
 
+    @property
+    def class_counts(self) -> dict[int, int]:
+        """How many objects of each class code there are, of those that there are."""
+        codes, counts = np.unique(self.codes, return_counts=True)
+        return dict(zip(codes.tolist(), counts.tolist(), strict=True))
+
     @functools.cached_property
     def xy(self) -> NDArray[np.float64]:
         """Position of every object in metres, shape (n, 2)."""

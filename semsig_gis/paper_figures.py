@@ -12,7 +12,10 @@ __all__ = [
     "PARIS",
     "PARIS_ACCURACY",
     "PARIS_ALONE",
+    "PARIS_BEARING_CLIP",
+    "PARIS_BEARING_SIGMA",
     "PARIS_DATABASE",
+    "PARIS_ERRORS",
     "PARIS_GROUPS",
     "PARIS_OCCURRENCES",
     "PARIS_QUERY_MS",
@@ -90,6 +93,9 @@ PARIS_READ_OFF: Mapping[str, float] = MappingProxyType(
         "strong_recall": 0.50,
     }
 )
+# Its distortion: errors of each level, and bearing noise in degrees.
+PARIS_ERRORS: Mapping[str, int] = MappingProxyType({"light": 1, "medium": 7, "strong": 13})
+PARIS_BEARING_SIGMA, PARIS_BEARING_CLIP = 5.0, 30.0
 # Milliseconds of one query of length 14 over its 312,134 cells, by method.
 PARIS_QUERY_MS: Mapping[str, float] = MappingProxyType(
     {

@@ -57,6 +57,10 @@ TIMES = "times.json"
 CITY = Path("city") / "city.parquet"
 VARIANTS = Path("variants")
 EXPERIMENTS = Path("experiments")
+NO_RANGES = (
+    "Other visibility ranges need the street objects of the database, which `semsig build` puts "
+    "beside it; they are not there."
+)
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -165,21 +169,21 @@ def reproduce(
     }
     QuerySpec(seeds=(seed,))  # looks at the seed
     check_workers(workers, None)
-    if given is not None and queries is not None:
-        check_count("queries", queries, len(open_database(given)))
+    city = None if given is None else open_database(given)
+    if city is not None:
+        _check_queries(queries, city)
     _take_up(folder, settings)
     file = given or begun.city(CITIES[size])
-    city = open_database(file)
-    if queries is not None:
-        check_count("queries", queries, len(city))
+    if city is None:
+        city = open_database(file)
+        _check_queries(queries, city)
     count = queries or min(QUERIES if size == "full" else SMALL_QUERIES, len(city))
     ranges = begun.ranges(file, city)
     scales = begun.scales(city)
     found = _experiments(begun, file, ranges, scales, queries=count, seed=seed, workers=workers)
     counts = None
     if store_path(file).is_dir():
-        codes = open_store(file).objects.codes
-        counts = {int(code): int((codes == code).sum()) for code in city.present_codes}
+        counts = open_store(file).objects.class_counts
     return Reproduction(
         database=city,
         summary=database_summary(city, file_bytes=file.stat().st_size, object_counts=counts),
@@ -192,8 +196,13 @@ def reproduce(
             "queries": count,
             "seed": seed,
         },
-        missing=tuple(begun.missing),
+        missing=() if ranges else (NO_RANGES,),
     )
+
+
+def _check_queries(queries: int | None, city: SignatureDatabase) -> None:
+    if queries is not None:
+        check_count("queries", queries, len(city))
 
 
 def _experiments(
@@ -235,7 +244,6 @@ class _Begun:
 
     def __init__(self, folder: Path, note: Callable[[str], None], progress: Progress) -> None:
         self.folder, self.note, self.progress = folder, note, progress
-        self.missing: list[str] = []
 
     def city(self, spec: CitySpec) -> Path:
         """Return a city that is made up."""
@@ -258,17 +266,13 @@ class _Begun:
         """Return databases of the other visibility ranges."""
         wanted = [radius for radius in RANGES if radius != city.spec.radius]
         if not store_path(file).is_dir():
-            self.missing.append(
-                "Other visibility ranges need the street objects of the database, which "
-                "`semsig build` puts beside it; they are not there."
-            )
             return {}
         found = {radius: self.folder / VARIANTS / f"range-{radius:g}.parquet" for radius in wanted}
         left = {radius: path for radius, path in found.items() if not path.is_file()}
-        store = open_store(file) if left else None
+        if not left:
+            return found
+        store = open_store(file)
         for radius, path in left.items():
-            if store is None:
-                break
             database = build_database(
                 store.objects,
                 grid=city.grid,

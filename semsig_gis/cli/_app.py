@@ -60,15 +60,12 @@ def numbers(text: str, option: str) -> list[float]:
 
 def object_counts(path: Path) -> dict[int, int] | None:
     """Return how many objects of each class a database has, where its store is at hand."""
-    import numpy as np
-
     from semsig_gis.store import open_store
 
     try:
-        codes, counts = np.unique(open_store(path).objects.codes, return_counts=True)
+        return open_store(path).objects.class_counts
     except DatabaseError:  # a database may do without its objects
         return None
-    return dict(zip(codes.tolist(), counts.tolist(), strict=True))
 
 
 def known_identifiability(path: Path, opened: SignatureDatabase) -> Identifiability | None:
