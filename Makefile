@@ -20,8 +20,8 @@ help: ## show this list
 demo: $(RUNTIME) ## the embedded city end to end, into demo/: database, evaluation, map, GeoPackage
 	$(BIN)/semsig demo --out demo
 
-test: $(DEV) ## the whole test suite, with coverage
-	$(BIN)/python -m pytest --cov --cov-report=term:skip-covered
+test: $(DEV) ## the whole test suite on all processors, with coverage
+	$(BIN)/python -m pytest -n auto --dist loadfile --cov --cov-report=term:skip-covered
 
 lint: $(DEV) ## style, types, import layers, docstrings
 	$(BIN)/ruff check .

@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import time
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Hashable
 
-    import numpy as np
     from numpy.typing import NDArray
 
 __all__ = ["DistanceMemo"]
@@ -31,7 +30,7 @@ class DistanceMemo:
     (True, True)
     """
 
-    _known: dict[Hashable, tuple[NDArray[np.float32], float]] = field(default_factory=dict)
+    _known: dict[Hashable, tuple[NDArray[Any], float]] = field(default_factory=dict)
     _spared: float = 0.0
 
     @property
@@ -39,7 +38,7 @@ class DistanceMemo:
         """Seconds that it would have taken to measure again what was known."""
         return self._spared
 
-    def get(self, key: Hashable, measure: Callable[[], NDArray[np.float32]]) -> NDArray[np.float32]:
+    def get(self, key: Hashable, measure: Callable[[], NDArray[Any]]) -> NDArray[Any]:
         """Return distances, measured now unless they are known.
 
         Parameters
@@ -51,7 +50,7 @@ class DistanceMemo:
 
         Returns
         -------
-        ndarray of float32
+        ndarray
             The distances, not to be written to.
         """
         if key in self._known:

@@ -43,7 +43,7 @@ from semsig_gis.scoring import (
 )
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections.abc import Callable, Mapping, Sequence
 
     from numpy.typing import NDArray
 
@@ -70,6 +70,7 @@ __all__ = [
     "evaluate",
     "make_evaluation",
     "score_queries",
+    "scored_tables",
 ]
 
 
@@ -151,7 +152,8 @@ def evaluate(
         by_likelihood = LikelihoodMethod(noise=method.noise, on_grid=True)
         answerer = Answerer(database=database, method=by_likelihood, index=method)
     drawn = draw_queries(database, spec)
-    scored = score_queries(answerer, drawn, tops=(top,), progress=progress)[top]
+    outcomes = score_queries(answerer, drawn, tops=(top,), progress=progress)
+    scored = scored_tables(database, drawn, outcomes)[top]
     return make_evaluation(database, answerer.method, spec, scored, top=top)
 
 
@@ -162,7 +164,7 @@ def score_queries(
     tops: Sequence[int] = (1,),
     memo: DistanceMemo | None = None,
     progress: Callable[[int, int], None] | None = None,
-) -> dict[int, pd.DataFrame]:
+) -> dict[int, list[dict[str, Any]]]:
     """Let a method answer queries of known places, and score the answers.
 
     Parameters
@@ -180,9 +182,8 @@ def score_queries(
 
     Returns
     -------
-    dict of int to DataFrame
-        For each of `tops` one row a query: the columns of `Evaluation.queries` without
-        ``geometry``, but with ``x``, ``y`` and ``seconds``, which is NaN where nothing was asked.
+    dict of int to list of dict
+        For each of `tops` what came of each query, for `scored_tables`.
 
     Examples
     --------
@@ -195,8 +196,8 @@ def score_queries(
     >>> database = build_database(objects)
     >>> drawn = draw_queries(database, QuerySpec(number=3))
     >>> scored = score_queries(Answerer(database=database, method=DEFAULT_METHOD), drawn)
-    >>> scored[1]["number"].tolist()
-    [0, 1, 2]
+    >>> [round(one["p5000"], 6) for one in scored[1]]
+    [1.0, 1.0, 1.0]
     """
     database = answerer.database
     asked = [one.asked.signature for one in queries if len(one.asked)]
@@ -215,10 +216,49 @@ def score_queries(
                 outcomes[top].append(_unlocalized(len(database)))
         if progress is not None:
             progress(done, len(queries))
+    return outcomes
+
+
+def scored_tables(
+    database: SignatureDatabase,
+    queries: Sequence[Query],
+    outcomes: Mapping[int, Sequence[Mapping[str, Any]]],
+) -> dict[int, pd.DataFrame]:
+    """Put together what was asked and what came of it.
+
+    Parameters
+    ----------
+    database : SignatureDatabase
+        What was searched.
+    queries : sequence of Query
+        The queries and the truth about them.
+    outcomes : mapping of int to sequence of mapping
+        For some numbers of best candidates what `score_queries` gives of these queries.
+
+    Returns
+    -------
+    dict of int to DataFrame
+        For each number one row a query: the columns of `Evaluation.queries` without ``geometry``,
+        but with ``x``, ``y`` and ``seconds``, which is NaN where nothing was asked.
+
+    Examples
+    --------
+    >>> from semsig_gis.catalog import paper_taxonomy
+    >>> from semsig_gis.building import build_database
+    >>> from semsig_gis.objects import build_objects
+    >>> from semsig_gis.sources.synthetic import CitySpec, synthetic_city
+    >>> layers = synthetic_city(CitySpec(size=300.0))
+    >>> objects, _ = build_objects(layers, taxonomy=paper_taxonomy(), crs="EPSG:32631")
+    >>> database = build_database(objects)
+    >>> drawn = draw_queries(database, QuerySpec(number=3))
+    >>> outcomes = score_queries(Answerer(database=database, method=DEFAULT_METHOD), drawn)
+    >>> scored_tables(database, drawn, outcomes)[1]["number"].tolist()
+    [0, 1, 2]
+    """
     about = _query_table(database, queries)
     scored = {}
     for top, rows in outcomes.items():
-        told = pd.DataFrame(rows, columns=OUTCOME_COLUMNS)
+        told = pd.DataFrame(list(rows), columns=OUTCOME_COLUMNS)
         told["best_cell_id"] = told["best_cell_id"].astype("Int64")
         scored[top] = pd.concat([about, told], axis=1)
     return scored
@@ -245,7 +285,7 @@ def make_evaluation(
     spec : QuerySpec
         Which queries were asked.
     scored : DataFrame
-        All of them, as `score_queries` gives them.
+        All of them, as `scored_tables` gives them.
     top : int
         How many best candidates counted.
     city : str, optional
@@ -361,7 +401,7 @@ class _Pool:
         self, database: SignatureDatabase, query: Query, answer: RankedAnswer, count: int
     ) -> None:
         self.cells = best_cells(answer.scores, min(count, len(database)))
-        places = database.xy[self.cells]
+        places = database.xy.take(self.cells, axis=0)
         self.scores = answer.scores[self.cells]
         if answer.place is not None:
             places[self.scores.argmin()] = answer.place

@@ -22,7 +22,7 @@ from semsig_gis.answering import Answerer
 from semsig_gis.database_file import open_database
 from semsig_gis.distance_memo import DistanceMemo
 from semsig_gis.errors import DatabaseError, SourceError
-from semsig_gis.evaluation import check_count, make_evaluation, score_queries
+from semsig_gis.evaluation import check_count, make_evaluation, score_queries, scored_tables
 from semsig_gis.evaluation_figures import district_labels
 from semsig_gis.experiment import Case
 from semsig_gis.likelihood_file import index_path, ready_index
@@ -220,19 +220,24 @@ class ExperimentWork:
         self, names: Sequence[str], queries: Sequence[Query]
     ) -> Iterator[tuple[str, pd.DataFrame]]:
         """Yield the scored answers of some methods that share what they measure."""
-        found: dict[str, list[pd.DataFrame]] = {name: [] for name in names}
+        found: dict[str, dict[int, list[dict[str, Any]]]] = {
+            name: {top: [] for top in self.spec.top} for name in names
+        }
         step = self._batch if len(names) > 1 else len(queries)
         for start in range(0, len(queries), step):
             memo = DistanceMemo() if len(names) > 1 else None
             for name in names:
-                scored = score_queries(
+                outcomes = score_queries(
                     self._answerer(name),
                     queries[start : start + step],
                     tops=self.spec.top,
                     memo=memo,
                 )
-                found[name] += [table.assign(top=top) for top, table in scored.items()]
-        for name, tables in found.items():
+                for top, rows in outcomes.items():
+                    found[name][top] += rows
+        for name, outcomes in found.items():
+            scored = scored_tables(self.database, queries, outcomes)
+            tables = [table.assign(top=top) for top, table in scored.items()]
             yield name, pd.concat(tables, ignore_index=True)
 
     @property

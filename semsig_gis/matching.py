@@ -10,7 +10,7 @@ import math
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import partial
-from typing import TYPE_CHECKING, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 import pandas as pd
@@ -36,6 +36,7 @@ if TYPE_CHECKING:
     from semsig_gis.taxonomy import Taxonomy
 
     _SecondStage = Callable[[NDArray[np.int64]], NDArray[np.float32]]
+    _Known = Callable[[Hashable, Callable[[], NDArray[Any]]], NDArray[Any]]
 
 __all__ = ["DEFAULT_METHOD", "Localization", "Method", "localize", "score_cells"]
 
@@ -272,7 +273,7 @@ def _score_both(
     by_angles = _distances(method, ANGLES, levels, angles, memo=memo)
     for place, (first, second) in enumerate(zip(by_types, by_angles, strict=True)):
         if len(codes) >= _MANY_QUERIES:
-            known = None
+            known: _Known = _worked_out
             if memo is not None:
                 known = _known_of(memo, method, codes[place], levels[place])
             yield _joined(method, first, types, second, angles, known=known)
@@ -284,11 +285,17 @@ def _score_both(
 
 def _known_of(
     memo: DistanceMemo, method: Method, codes: NDArray[np.uint8], levels: NDArray[np.uint8]
-) -> Callable[[Hashable, Callable[[], NDArray[np.float32]]], NDArray[np.float32]]:
+) -> _Known:
     """Return how to ask a memo for what is known of one query, whatever percentage is kept."""
     kind = method.types, method.angles, method.normalized, method.weights
     of = (*kind, codes.tobytes(), levels.tobytes())
     return lambda what, work_out: memo.get((what, *of), work_out)
+
+
+def _worked_out(what: Hashable, work_out: Callable[[], NDArray[Any]]) -> NDArray[Any]:
+    """Return what is not known of a query, because nothing is kept."""
+    del what
+    return work_out()
 
 
 def _table(database: SignatureDatabase, part: str) -> SequenceTable:
@@ -303,7 +310,7 @@ def _joined(
     by_angles: NDArray[np.float32],
     angles: SequenceTable,
     *,
-    known: Callable[[Hashable, Callable[[], NDArray[np.float32]]], NDArray[np.float32]] | None,
+    known: _Known,
 ) -> NDArray[np.float32]:
     """Return what `_fused` or `_two_stage` gives, compiled: it pays for many queries."""
     from semsig_gis import _fusion_kernels as kernels  # noqa: PLC0415 - loads a compiler
@@ -316,18 +323,20 @@ def _joined(
 
     if method.keep is None:
         return fuse()
-    on_steps = _on_steps(by_types)
-    if method.normalized:
+
+    def count() -> NDArray[np.int64]:
         cells = np.zeros(round(1 / _SCORE_STEP) + 1, np.int64)
-        kernels.count_steps(on_steps, types.counts, _SCORE_STEP, cells)
-        cut = _cut_at(method, cells)
+        kernels.count_steps(_on_steps(by_types), types.counts, _SCORE_STEP, cells)
+        return cells.cumsum()
+
+    # The percentage that is kept changes none of these.
+    fused = known(("fused", method.alpha), fuse)
+    first = known("first", lambda: _spread(_on_steps(by_types), types))
+    if method.normalized:
+        cut = _cut_at(method, known("cells up to each step", count))
     else:
-        cut = _cut(method, on_steps, types)
-    # The percentage that is kept changes neither of these.
-    fused = fuse() if known is None else known(("fused", method.alpha), fuse)
-    spread = partial(_spread, on_steps, types)
-    first = spread() if known is None else known("first", spread)
-    worst = np.where(first <= cut, fused, np.float32(-np.inf)).max()
+        cut = _cut(method, _on_steps(by_types), types)
+    worst = fused.compress(first <= cut).max()
     scores = np.empty(len(first), np.float32)
     kernels.put_behind(first, cut, fused, worst, _next(worst), scores)
     return scores
@@ -389,13 +398,13 @@ def _cut(method: Method, first: NDArray[np.float32], types: SequenceTable) -> np
         each = _spread(first, types)
         return np.float32(np.partition(each, count - 1)[count - 1])
     steps = np.rint(first / _SCORE_STEP).astype(np.int64)
-    return _cut_at(method, np.bincount(steps, weights=types.counts))
+    return _cut_at(method, np.bincount(steps, weights=types.counts).cumsum())
 
 
-def _cut_at(method: Method, cells: NDArray[np.int64] | NDArray[np.float64]) -> np.float32:
-    """Return the worst score that passes, given how many cells are at each whole step."""
-    count = _kept(method, int(cells.sum()))
-    return np.float32(np.searchsorted(np.cumsum(cells), count) * _SCORE_STEP)
+def _cut_at(method: Method, cells: NDArray[Any]) -> np.float32:
+    """Return the worst score that passes, given how many cells are up to each whole step."""
+    count = _kept(method, int(cells[-1]))
+    return np.float32(np.searchsorted(cells, count) * _SCORE_STEP)
 
 
 def _gate_of_parts(database: PartitionedDatabase, query: Signature, method: Method) -> _Gate:

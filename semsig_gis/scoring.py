@@ -42,7 +42,7 @@ NEAR_PLACES = (1, 5, 10, 20)
 NEAR_METRES = 25
 """How near, in metres, as recall@N is told in visual place recognition."""
 
-BLOCK = 256  # cells of which only the best is looked at first
+BLOCK = 256  # cells of which only the best is looked at first, far from each other
 FEW = 4  # times as many blocks: then it pays to look at some of them alone
 
 
@@ -75,11 +75,11 @@ def best_cells(scores: NDArray[np.float32], count: int) -> NDArray[np.intp]:
     if blocks < count:
         some = np.arange(len(scores))
     else:
-        least = scores[: blocks * BLOCK].reshape(blocks, BLOCK).min(axis=1)
+        least = scores[: blocks * BLOCK].reshape(BLOCK, blocks).min(axis=0)
         enough = np.partition(least, count - 1)[count - 1]
         chosen = np.flatnonzero(least <= enough)
         if FEW * len(chosen) < blocks:
-            inside = (chosen[:, None] * BLOCK + np.arange(BLOCK)).ravel()
+            inside = (chosen + np.arange(BLOCK)[:, None] * blocks).ravel()
             some = np.concatenate([inside, np.arange(blocks * BLOCK, len(scores))])
             some = some[scores[some] <= enough]
         else:

@@ -203,9 +203,14 @@ class SequenceTable:
             sets[:, word] |= present[:, value].astype(np.uint64) << np.uint64(bit)
         return _frozen(sets)
 
+    @cached_property
+    def value_set_sizes(self) -> NDArray[np.int16]:
+        """How many different values each distinct sequence has, shape (d,)."""
+        return _frozen(np.bitwise_count(self.value_sets).sum(axis=1, dtype=np.int16))
+
     def overlap(
         self, query: NDArray[np.uint8], *, only: NDArray[np.int64] | None = None
-    ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    ) -> tuple[NDArray[np.int16], NDArray[np.int16]]:
         """Count the values that a query and each distinct sequence share, whatever their order.
 
         Parameters
@@ -217,7 +222,7 @@ class SequenceTable:
 
         Returns
         -------
-        both, either : ndarray of int64, shape (d,) or the shape of `only`
+        both, either : ndarray of int16, shape (d,) or the shape of `only`
             How many different values are in both sequences, and in at least one of them.
 
         Examples
@@ -225,7 +230,7 @@ class SequenceTable:
         >>> import numpy as np
         >>> table = SequenceTable.from_csr(np.array([3, 3, 1], np.uint8), np.array([0, 3]))
         >>> table.overlap(np.array([3, 7], np.uint8))
-        (array([1]), array([3]))
+        (array([1], dtype=int16), array([3], dtype=int16))
         """
         sets = self.value_sets if only is None else self.value_sets[only]
         values = np.unique(query)
@@ -234,14 +239,11 @@ class SequenceTable:
             word, bit = divmod(value, _WORD_BITS)
             if word < len(wanted):  # a value past the last word is in no sequence of the table
                 wanted[word] |= 1 << bit
-        both = np.zeros(len(sets), np.int64)
-        either = np.full(len(sets), len(values), np.int64)
+        both = np.zeros(len(sets), np.int16)
         for word, bits in enumerate(wanted):
-            shared = np.bitwise_count(sets[:, word] & np.uint64(bits))
-            both += shared
-            either += np.bitwise_count(sets[:, word])
-            either -= shared
-        return both, either
+            both += np.bitwise_count(sets[:, word] & np.uint64(bits))
+        sizes = self.value_set_sizes if only is None else self.value_set_sizes[only]
+        return both, sizes + np.int16(len(values)) - both
 
 
 def checked_sequence(values: NDArray[np.uint8]) -> NDArray[np.uint8]:

@@ -67,6 +67,8 @@ def distances(
     >>> distances([query], table, normalized=False).tolist()
     [[0.0, -1.5]]
     """
+    from semsig_gis._histogram_kernel import add_quotients  # noqa: PLC0415 - loads a compiler
+
     histogram = table.histogram if only is None else table.histogram[only]
     result = np.empty((len(queries), len(histogram)), np.float32)
     most = int(histogram.max(initial=0))
@@ -79,7 +81,7 @@ def distances(
             if value < histogram.shape[1]:
                 # There are few different counts, and so few quotients.
                 quotients = np.minimum(found, count) / np.maximum(found, count)
-                total += quotients.take(histogram[:, value], mode="wrap")
+                add_quotients(histogram[:, value], quotients, total)
         if normalized:
             _, either = table.overlap(query, only=only)
             # Two empty sequences are equal: 1 - 1, not 1 - 0 / 0.

@@ -67,5 +67,5 @@ def distances(
     for row, query in zip(result, queries, strict=True):
         both, either = table.overlap(checked_sequence(query), only=only)
         # Two empty sequences share all they have: 0 / 1, not 0 / 0.
-        np.divide(either - both, np.maximum(either, 1), out=row, casting="same_kind")
+        np.divide(either - both, np.maximum(either, 1), out=row, dtype=np.float32)
     return result
