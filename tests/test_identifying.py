@@ -22,7 +22,7 @@ from semsig_gis.trials import try_cells
 if TYPE_CHECKING:
     from semsig_gis.identifiability import Identifiability
 
-REPEATS = 25
+REPEATS = 40
 
 
 def ranks(values: np.ndarray) -> np.ndarray:
@@ -65,9 +65,9 @@ def test_chances_are_those_of_very_many_queries(
         (told.bits / np.log2(80), mean(tried.bits) / np.log2(80)),
     ):
         assert abs(ours.mean() - truth.mean()) < 0.05
-        # The means of so few queries are off by 0.1 themselves.
-        assert np.sqrt(((ours - truth) ** 2).mean()) < 0.18
-        assert np.corrcoef(ranks(ours), ranks(truth))[0, 1] > 0.6
+        # The means of so few queries are off by 0.08 themselves.
+        assert np.sqrt(((ours - truth) ** 2).mean()) < 0.15
+        assert np.corrcoef(ranks(ours), ranks(truth))[0, 1] > 0.7
 
 
 def check(told: Identifiability, cells: int, classes: int) -> None:
