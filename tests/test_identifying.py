@@ -67,7 +67,8 @@ def test_chances_are_those_of_very_many_queries(
         assert abs(ours.mean() - truth.mean()) < 0.05
         # The means of so few queries are off by 0.08 themselves.
         assert np.sqrt(((ours - truth) ** 2).mean()) < 0.15
-        assert np.corrcoef(ranks(ours), ranks(truth))[0, 1] > 0.7
+        # Cells that are all told apart alike have no order.
+        assert np.std(truth) < 0.2 or np.corrcoef(ranks(ours), ranks(truth))[0, 1] > 0.7
 
 
 def check(told: Identifiability, cells: int, classes: int) -> None:
