@@ -115,13 +115,20 @@ def figure_means(figures: pd.DataFrame) -> pd.DataFrame:
     >>> figure_means(pd.DataFrame({"p50": [1.0, 1.0, 0.5, np.nan]})).loc["p50", "n"]
     np.int64(3)
     """
-    rows = []
-    for name, values in zip(figures, figures.to_numpy(dtype=np.float64).T, strict=True):
-        told = values[~np.isnan(values)]
+    means = _means(figures.to_numpy(dtype=np.float64))
+    names = pd.Index(figures.columns, name="figure")
+    return pd.DataFrame(means, index=names, columns=["value", "low", "high", "n"])
+
+
+def _means(values: NDArray[np.float64]) -> list[tuple[float, float, float, int]]:
+    """Return for each column the mean, its interval, and how many values are told."""
+    found = []
+    for column in values.T:
+        told = column[~np.isnan(column)]
         value = float(told.mean()) if told.size else math.nan
         low, high = wilson_interval(value, told.size) if told.size else (math.nan, math.nan)
-        rows.append({"figure": name, "value": value, "low": low, "high": high, "n": told.size})
-    return pd.DataFrame(rows).set_index("figure")
+        found.append((value, low, high, told.size))
+    return found
 
 
 def grouped_means(
@@ -152,13 +159,14 @@ def grouped_means(
     >>> grouped_means(table, ["a", "a", "b"], by="part", order=["a", "b"])["p50"].tolist()
     [0.5, 1.0]
     """
-    groups = np.asarray(labels)
+    groups, values = np.asarray(labels), figures.to_numpy(dtype=np.float64)
     rows = []
     for group in order:
-        means = figure_means(figures[groups == group])
-        row: dict[str, Any] = {by: group, "n": int((groups == group).sum())}
-        row |= {str(name): value for name, value in means["value"].items()}
-        row |= {"p50_low": means.loc["p50", "low"], "p50_high": means.loc["p50", "high"]}
+        inside = groups == group
+        means = dict(zip(figures, _means(values[inside]), strict=True))
+        row: dict[str, Any] = {by: group, "n": int(inside.sum())}
+        row |= {str(name): value for name, (value, *_) in means.items()}
+        _, row["p50_low"], row["p50_high"], _ = means["p50"]
         rows.append(row)
     return pd.DataFrame(rows)
 

@@ -5,6 +5,7 @@ Every figure is an expectation over all orders of the tied cells.
 
 from __future__ import annotations
 
+import functools
 import json
 import math
 from dataclasses import dataclass, field
@@ -151,7 +152,7 @@ class Evaluation:
     city: str | None = None
     machine: Mapping[str, Any] = field(default_factory=machine)
 
-    @property
+    @functools.cached_property
     def figures(self) -> pd.DataFrame:
         """What each query adds to each figure (see `semsig_gis.evaluation_figures`)."""
         return query_figures(self.queries, cells=self.database["cells"])
