@@ -106,7 +106,9 @@ def _cells(facts: Mapping[str, Any]) -> Section:
         name="cells",
         title="Cells",
         text=("The first three are of a query from the mean cell, the others shares of cells.",),
-        numbers=tuple(Number(row=row, column="", ours=share) for row, share in (*rows, *bands)),
+        numbers=tuple(
+            Number(row=row, column="share", ours=share) for row, share in (*rows, *bands)
+        ),
     )
 
 
