@@ -101,6 +101,8 @@ def test_a_location_in_a_browser(browser: Chrome, tmp_path: Path) -> None:
     assert asked(browser, "return circles(arguments[0]).length", VERDICTS["matched"]) == other
     switch(browser, "Chance")
     assert len(browser.find_elements(By.CSS_SELECTOR, "img.leaflet-image-layer")) == 1
+    switch(browser, "Regions of 50, 90 and 99 %")
+    assert len(browser.find_elements(By.CSS_SELECTOR, "img.leaflet-image-layer")) == 2
     switch(browser, "Candidates")
     time.sleep(0.5)  # numbers fade away
     assert browser.find_elements(By.CSS_SELECTOR, ".semsig-number") == []
