@@ -138,10 +138,10 @@ semsig.City = class {
       ...this.data[name + ".types"].subarray(...this.part(name, cell)));
   }
   signature(name, cell) {
-    const bins = this.data[name + ".bearings"].subarray(...this.part(name, cell));
-    const degrees = 360 / this.grid.turn;
+    const levels = this.data[name + ".levels"].subarray(...this.part(name, cell));
+    const degrees = 360 / this.grid.levels;
     return [this.types(name, cell),
-      Array.from(bins, (bin) => Math.floor((bin + 0.5) * degrees))];
+      Array.from(levels, (level) => Math.floor((level + 0.5) * degrees))];
   }
 };
 semsig.told = {};
@@ -151,10 +151,11 @@ semsig.cells = (packed, grid, titles, told) => {
   const buttons = (city, map, cell, box, jumps) => {
     for (const [label, goals] of jumps) {
       const line = L.DomUtil.create("div", "semsig-jumps", box);
-      semsig.text(line, "span", label);
-      for (const [text, other] of goals) {
+      if (label) semsig.text(line, "span", label);
+      for (const [text, other, title] of goals) {
         const button = L.DomUtil.create("button", "", line);
         button.textContent = text;
+        button.title = title;
         L.DomEvent.on(button, "click", () => {
           // The map moves, so that the next click finds the button where it was.
           const [from, to] = [cell, other].map(
@@ -201,7 +202,8 @@ semsig.cells = (packed, grid, titles, told) => {
     const box = semsig.details(
       title, rows.map((one) => one[0]), rows.map((one) => one[1]), titles);
     buttons(city, map, cell, box, parts.flatMap((part) => part.jumps));
-    const popup = L.popup({maxWidth: 340, minWidth: 220, maxHeight: 400});
+    const narrow = Math.min(340, map.getSize().x - 70);
+    const popup = L.popup({maxWidth: narrow, minWidth: 220, maxHeight: 400});
     popup.setLatLng(middle).setContent(box);
     popup.on("remove", () => group.removeLayer(drawn));
     group.addLayer(drawn);
@@ -250,8 +252,8 @@ class CellFacts:
     script : str
         JavaScript that defines this function. It returns what there is of ``title``; ``rows``:
         label and value each, as `semsig.details` shows them; ``jumps``: a label and buttons, each
-        with a text and a cell; ``marks``: cells to number and to join by lines; ``dots``: cells
-        and colours.
+        with a text, a cell and a hint; ``marks``: cells to number and to join by lines;
+        ``dots``: cells and colours.
     arrays : mapping of str to list
         Numbers of the cells (see `packed`).
     settings : mapping of str to object
@@ -315,19 +317,19 @@ def packed(array: NDArray[Any], *, steps: bool = False) -> list[Any]:
     kind = array.dtype.newbyteorder("<")
     if steps:
         array = np.diff(array, prepend=array.dtype.type(0))
-    data = zlib.compress(np.ascontiguousarray(array, dtype=kind).tobytes(), 9)
+    data = zlib.compress(np.ascontiguousarray(array, dtype=kind).tobytes())
     text = base64.b64encode(data).decode("ascii")
     return [f"{array.dtype.kind}{array.dtype.itemsize}", int(steps), text]
 
 
 def packed_signatures(
-    name: str, database: SignatureDatabase, bins: NDArray[np.uint8], ends: NDArray[np.int64]
+    name: str, database: SignatureDatabase, ends: NDArray[np.int64]
 ) -> dict[str, list[Any]]:
-    """Return signatures: the bins of all bearings, and where the entries of each cell end."""
+    """Return signatures, with angle levels for bearings, and where those of each cell end."""
     return {
         f"{name}.types": packed(database.taxonomy.symbol_bytes[database.codes]),
         f"{name}.ends": packed(ends.astype(np.int32), steps=True),
-        f"{name}.bearings": packed(bins, steps=True),
+        f"{name}.levels": packed(database.levels),
     }
 
 
@@ -342,6 +344,7 @@ def _cells(database: SignatureDatabase) -> tuple[dict[str, list[Any]], dict[str,
         "degrees": packed(lattices.degrees),
     }
     grid = {
+        "levels": database.spec.levels,
         "step": database.grid.step,
         "origin": list(database.grid.origin),
         "firstColumn": int(database.columns[0]),

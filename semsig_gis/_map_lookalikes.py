@@ -15,7 +15,8 @@ if TYPE_CHECKING:
 
 __all__ = ["lookalike_facts"]
 
-CHANCES = 250  # steps of a chance in a byte
+CHANCES = 100  # steps of a chance in a byte
+LEAST = 0.01  # chance of a place that is named; the others are many, and make a page large
 BITS = 8  # steps of a bit
 HELPERS = 2  # classes that are named
 
@@ -63,6 +64,7 @@ def lookalike_facts(told: Identifiability) -> CellFacts:
     count = min(HELPERS, told.gains.shape[1])
     helpers = np.argsort(-told.gains, axis=1, kind="stable")[:, :count]
     titles = {item.code: item.title for item in told.database.taxonomy.classes}
+    likely = told.lookalike_chances >= LEAST
     return CellFacts(
         name="lookalikes",
         script=SCRIPT,
@@ -71,8 +73,8 @@ def lookalike_facts(told: Identifiability) -> CellFacts:
             "near": _chance_bytes(told.near),
             "itself": _chance_bytes(told.itself),
             "bits": packed(np.rint(told.bits * BITS).clip(0, 255).astype(np.uint8)),
-            "lookalikes": packed(told.lookalikes.astype(np.int32)),
-            "lookalikeChances": _chance_bytes(told.lookalike_chances),
+            "lookalikes": packed(np.where(likely, told.lookalikes, -1).astype(np.int32)),
+            "lookalikeChances": _chance_bytes(np.where(likely, told.lookalike_chances, 0.0)),
             "helpers": packed(helpers.astype(np.uint8)),
             "gains": _chance_bytes(np.take_along_axis(told.gains, helpers, axis=1)),
         },

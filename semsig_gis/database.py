@@ -8,6 +8,7 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
+from pyproj import CRS
 
 from semsig_gis import __version__
 from semsig_gis.errors import DatabaseError
@@ -20,7 +21,6 @@ if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
     from numpy.typing import NDArray
-    from pyproj import CRS
 
     from semsig_gis.grid import GridSpec
     from semsig_gis.signatures import SignatureSpec
@@ -348,7 +348,7 @@ def require_same(
 
 
 def _brief(value: object) -> str:
-    text = str(value)
+    text = value.to_string() if isinstance(value, CRS) else str(value)
     return text if len(text) <= LONGEST_VALUE else f"{text[: LONGEST_VALUE - 3]}..."
 
 

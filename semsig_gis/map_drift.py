@@ -19,7 +19,7 @@ from semsig_gis._map_parts import (
     to_latlon,
 )
 from semsig_gis.changes import compare_objects, joined_taxonomy
-from semsig_gis.database import BEARING_UNITS, join_databases
+from semsig_gis.database import join_databases
 from semsig_gis.drift import compare_cells
 from semsig_gis.errors import CrsError
 from semsig_gis.map_image import level_image
@@ -39,7 +39,6 @@ if TYPE_CHECKING:
 
 __all__ = ["drift_map"]
 
-TURN = 180  # steps of a bearing in the page
 OBJECT_FIELDS = ("Class", "Class before", "Moved by", "Source", "Identifier")
 SAID = ["title", "was", "by", SOURCE, SOURCE_ID]
 PLACE = ["latitude", "longitude"]
@@ -136,7 +135,7 @@ def drift_map(
             **_signatures("before", differing, city),
             **_signatures("now", new, city),
         },
-        settings={"turn": TURN, "kinds": list(DRIFT_COLOURS)},
+        settings={"kinds": list(DRIFT_COLOURS)},
     )
     CellLayer(free_name(chosen, "Cells, by a click"), city, [facts]).add_to(chosen)
     objects = None
@@ -173,8 +172,7 @@ def _signatures(
     """Return the signatures of those cells of the city that the database has."""
     lengths = np.zeros(len(city), np.int32)
     lengths[np.searchsorted(city.cell_ids, database.cell_ids)] = database.lengths
-    bins = (database.bearing_units // (BEARING_UNITS // TURN)).astype(np.uint8)
-    return packed_signatures(name, database, bins, np.cumsum(lengths))
+    return packed_signatures(name, database, np.cumsum(lengths))
 
 
 def _require_crs(objects: StreetObjects, city: SignatureDatabase) -> None:
@@ -208,7 +206,7 @@ def _object_drawings(
             drawn = [["lines", [[{"color": "#222", "weight": 2, "opacity": 0.9}, lines]]]]
         places, said = (facts[some].to_numpy().tolist() for some in (PLACE, SAID))
         records = [
-            [place, DRIFT_COLOURS[kind], 5, None, f"Object {what}", details]
+            [place, DRIFT_COLOURS[kind], 4, None, f"Object {what}", details]
             for place, details in zip(places, said, strict=True)
         ]
         drawn.append(["points", OBJECT_FIELDS, {}, records])

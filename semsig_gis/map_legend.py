@@ -36,6 +36,8 @@ __all__ = [
     "FAILED",
     "FOUND_RAMP",
     "GROUP_COLOURS",
+    "SAME_LEVELS",
+    "SAME_TYPES",
     "SHADES",
     "SUCCESSFUL",
     "VERDICTS",
@@ -98,6 +100,8 @@ GROUP_COLOURS: Mapping[int, str] = MappingProxyType(
     }
 )
 """Colour of a cell by the smallest number of cells with its signature, itself among them."""
+
+SAME_TYPES, SAME_LEVELS = "#ffffff", "#e69f00"
 
 DRIFT_COLOURS: Mapping[str, str] = MappingProxyType(
     {"same": "#d6d6d1", "changed": "#e69f00", "appeared": "#0072b2", "vanished": "#882255"}
@@ -324,7 +328,7 @@ def ambiguity_legend(sizes: Mapping[str, NDArray[np.int64]], *, licenses: Sequen
     """
     starts = list(GROUP_COLOURS)
     labels = [
-        "1: no other",
+        "no other",
         *(f"{low:,} to {high - 1:,}" for low, high in itertools.pairwise(starts[1:])),
         f"{starts[-1]:,} or more",
     ]
@@ -333,7 +337,7 @@ def ambiguity_legend(sizes: Mapping[str, NDArray[np.int64]], *, licenses: Sequen
         for size in sizes.values()
     ]
     rows = "".join(
-        f"<tr><td>{_sign(colour, 'square')}{label}</td>"
+        f"<tr><td>{_sign(colour, 'square')}{label.replace(' ', '&nbsp;')}</td>"
         + "".join(f"<td>{share:.1%}</td>" for share in line)
         + "</tr>"
         for colour, label, *line in zip(GROUP_COLOURS.values(), labels, *shares, strict=True)
@@ -342,9 +346,10 @@ def ambiguity_legend(sizes: Mapping[str, NDArray[np.int64]], *, licenses: Sequen
     cells = len(next(iter(sizes.values())))
     return (
         "<summary>Cells that look the same</summary>"
-        f"<p>Of {cells:,} cells, so many look like as many others of them:</p>"
+        f"<p>{cells:,} cells, by how many look the same</p>"
         f"<table><tr><td></td>{head}</tr>{rows}</table>"
-        "<p>Click a cell to see its signature, and to go to the cells that have it too.</p>"
+        "<p>Click a cell to see its signature, and to go to cells that look the same:<br>"
+        f"{_sign(SAME_TYPES)}same types &ensp;{_sign(SAME_LEVELS)}and angle levels</p>"
         f"{_sources(licenses)}"
     )
 

@@ -35,6 +35,7 @@ STYLE = """\
 .semsig-legend .ends { display: flex; justify-content: space-between; }
 .semsig-legend table, .semsig-details table { border-collapse: collapse; }
 .semsig-legend td { padding: 0 12px 0 0; }
+.semsig-legend td + td { overflow-wrap: normal; }
 .semsig-details { font: 13px/1.4 system-ui, sans-serif; overflow-wrap: anywhere; }
 .semsig-details th { text-align: left; font-weight: 400; color: #555; white-space: nowrap; }
 .semsig-details th, .semsig-details td { vertical-align: top; padding: 2px 6px 2px 0; }

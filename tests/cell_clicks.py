@@ -42,8 +42,9 @@ def jumps(browser: Chrome) -> list[str]:
     return [line.text.replace("\n", " ").strip() for line in lines]
 
 
-def press(browser: Chrome, text: str, *, number: int = 0) -> dict[str, str]:
-    """Press a button of the popup; return what the next one says."""
+def press(browser: Chrome, text: str) -> dict[str, str]:
+    """Press the first button of the popup with a text or hint; return what the next one says."""
     buttons = browser.find_elements(By.CSS_SELECTOR, ".semsig-jumps button")
-    [button for button in buttons if text in button.text][number].click()
+    words = (f"{button.text} {button.get_attribute('title')}" for button in buttons)
+    next(button for button, said in zip(buttons, words, strict=True) if text in said).click()
     return popup(browser)

@@ -62,7 +62,7 @@ def test_a_click_tells_of_the_cells_that_look_the_same(browser: Chrome, tmp_path
                 assert f"{label}:" not in text
             else:
                 at = alike.index(cell) + 1
-                assert f"{label}: cell {at} of {len(alike)} from the west" in text
+                assert f"{label}: {at} of {len(alike)}" in text
     assert_quiet(browser)
 
 
@@ -84,8 +84,7 @@ def test_buttons_go_through_the_group_and_to_its_ends(browser: Chrome, tmp_path:
     # The button stays under the pointer.
     after = asked(browser, "return map.latLngToContainerPoint(map._popup.getLatLng())")
     assert abs(after["x"] - where["x"]) <= 2
-    focused = browser.execute_script("return document.activeElement.textContent")
-    assert focused.startswith("next")
+    assert browser.execute_script("return document.activeElement.title").startswith("next")
     assert press(browser, "next")["Cell"] == str(CITY.cell_ids[alike[0]])
     assert press(browser, "previous")["Cell"] == str(CITY.cell_ids[alike[-1]])
     away = np.hypot(*(CITY.xy[alike] - CITY.xy[alike[-1]]).T)
@@ -130,9 +129,9 @@ def test_what_is_known_of_queries_is_told_too(browser: Chrome, tmp_path: Path) -
     opened(browser, ambiguity_map(CITY, identifiability=told), tmp_path)
     said = click(browser, CITY, LARGEST)
     assert {"It sees", "Found within 30 m", "Taken for 1", "Cell"} <= set(said)
-    assert any(line.startswith("Same types: cell") for line in jumps(browser))
+    assert any(line.startswith("Same types: ") for line in jumps(browser))
     numbers = browser.find_elements(By.CSS_SELECTOR, ".semsig-number")
-    assert len(numbers) == int((told.lookalikes[LARGEST] >= 0).sum())
+    assert len(numbers) == int((told.lookalike_chances[LARGEST] >= 0.01).sum())
     assert_quiet(browser)
 
 

@@ -36,10 +36,10 @@ def cell_id(told: Identifiability, cell: int) -> str:
 
 
 def whole_percent(chance: float) -> str:
-    steps = round(chance * 250) * 0.4
-    if steps < 1:
+    percent = round(chance * 100)
+    if percent < 1:
         return "below 1 %"
-    return "above 99 %" if steps > 99 else f"{int(steps + 0.5)} %"
+    return "above 99 %" if percent > 99 else f"{percent} %"
 
 
 @pytest.mark.usefixtures("carried")
@@ -56,7 +56,7 @@ def test_a_click_on_any_cell_tells_of_it(browser: Chrome, tmp_path: Path) -> Non
         assert said["Found within 30 m"] == whole_percent(TOLD.found[cell])
         assert said["Chance given"].startswith(whole_percent(TOLD.itself[cell]))
         named = [name for name in said if name.startswith("Taken for")]
-        assert len(named) == int((TOLD.lookalikes[cell] >= 0).sum())
+        assert len(named) == int((TOLD.lookalike_chances[cell] >= 0.01).sum())
     assert_quiet(browser)
 
 
