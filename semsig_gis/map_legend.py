@@ -77,9 +77,9 @@ SHADES: Mapping[int, str] = MappingProxyType(
 """Colour of a cell by the smallest number of objects that are seen from it."""
 
 CELL_CHANCES: Mapping[float, str] = MappingProxyType(
-    {1e-5: "#e4e4f1", 1e-4: "#c6c7e1", 1e-3: "#9e9ac8", 1e-2: "#756bb1", 1e-1: "#3f007d"}
+    {1e-5: "#d9bdf2", 1e-4: "#bd8be8", 1e-3: "#9650d2", 1e-2: "#6a1cb0", 1e-1: "#35006b"}
 )
-"""Colour of a cell by the least chance that the place is in it."""
+"""Colour of a cell by the least chance that the place is in it, or near it."""
 
 CHANCES: Mapping[float, str] = MappingProxyType({0.5: "#54278f", 0.9: "#9e9ac8", 0.99: "#dadaeb"})
 """Colour of the fewest cells that hold a share of the chance."""
@@ -200,8 +200,8 @@ def location_legend(location: Location) -> str:
         f"{_sign(CHANCES[share], 'square')}{share:.0%} in {_cells(cells[share])}"
         for share in CHANCES
     )
-    chances = " &ensp;".join(
-        f"{_sign(colour, 'square')}{100.0 * least:g}&nbsp;%"
+    chances = " ".join(
+        f"{_sign(colour, 'square')}{100.0 * least:g}+"
         for least, colour in sorted(CELL_CHANCES.items(), reverse=True)
     )
     explained = "".join(
@@ -225,7 +225,7 @@ def location_legend(location: Location) -> str:
         f"<p>{_sign(colour)}<b>{told}</b>: within {location.rule.radius:g} m with a chance of "
         f"{location.answer.mass:.1%}; if there, ±&nbsp;{estimate.sigma:.1f}&nbsp;m each way "
         "(ellipse: 90 %)</p>"
-        f"<p>Chance of a cell, at least<br>{chances}</p>"
+        f"<p>Chance of a cell, or around it, in percent<br>{chances}</p>"
         f"<p>Regions, the fewest cells that hold<br>{shares}</p>"
         f"<p>{_sign('#ffffff')}Candidates by rank</p>"
         f"{rays}{_shades()}{_sources(database.licenses)}"

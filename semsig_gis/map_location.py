@@ -72,10 +72,11 @@ def location_map(
     Returns
     -------
     folium.Map
-        The map, with these layers: the cells, their chances, and the fewest cells that hold 50,
-        90 and 99 % of the chance (hidden at first) as images; the candidates with their ranks,
-        the best place with its ellipse of 90 %, and for each candidate that was explained the
-        rays of the query and the street objects; all with popups.
+        The map, with these layers: the cells; their chances, those of the places around them, and
+        the fewest cells that hold 50, 90 and 99 % of the chance, as images of which the most
+        telling is shown at first; the candidates with their ranks, the best place with its
+        ellipse of 90 %, and for each candidate that was explained the rays of the query and the
+        street objects; all with popups.
 
     Raises
     ------
@@ -101,9 +102,7 @@ def location_map(
     drawn = _Drawn(location)
     chosen = prepared_map(map_, tiles, title="Where it was seen")
     add_city(chosen, location.posterior.database)
-    add_image(chosen, *_chances(location.posterior), name="Chance", opacity=0.75)
-    regions = _regions(location.posterior)
-    add_image(chosen, *regions, name="Regions of 50, 90 and 99 %", opacity=0.75, show=False)
+    _add_chances(chosen, location)
     for number, why in enumerate(location.explanations, start=1):
         name = free_name(chosen, f"Objects from rank {number}")
         Drawing(name, "drawings", drawn.explanation(why), show=number == 1).add_to(chosen)
@@ -118,9 +117,20 @@ def location_map(
     return finished_map(chosen)
 
 
-def _chances(found: Posterior) -> tuple[bytes, list[list[float]]]:
-    """Return an image of the chance of each cell."""
-    levels = np.digitize(found.chances, list(CELL_CHANCES))
+def _add_chances(chosen: folium.Map, location: Location) -> None:
+    """Add images of the chances: from near those of the cells, from afar those around them."""
+    found, radius, near = location.posterior, location.rule.radius, location.answer.given
+    for name, image, show in (
+        (f"Chance within {radius:g} m", _chances(found, found.mass_within(radius)), not near),
+        ("Chance of a cell", _chances(found, found.chances), near),
+        ("Regions of 50, 90 and 99 %", _regions(found), False),
+    ):
+        add_image(chosen, *image, name=name, opacity=0.85, show=show)
+
+
+def _chances(found: Posterior, chances: NDArray[np.float64]) -> tuple[bytes, list[list[float]]]:
+    """Return an image of a chance of each cell."""
+    levels = np.digitize(chances, list(CELL_CHANCES))
     return _image(found, levels, list(CELL_CHANCES.values()))
 
 

@@ -22,7 +22,7 @@ STYLE = """\
   font: 13px/1.4 system-ui, sans-serif; color: #222; background: rgba(255, 255, 255, 0.93);
   border-radius: 5px; box-shadow: 0 1px 5px rgba(0, 0, 0, 0.4); padding: 7px 10px;
   box-sizing: border-box; width: 290px; max-width: calc(100vw - 20px);
-  max-height: calc(100vh - 90px); overflow: auto; overflow-wrap: anywhere; }
+  max-height: calc(100vh - 120px); overflow: auto; overflow-wrap: anywhere; }
 .semsig-legend summary { font-weight: 600; font-size: 14px; cursor: pointer; }
 .semsig-legend:not([open]) { width: auto; }
 .semsig-legend p { margin: 6px 0; }
