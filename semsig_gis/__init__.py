@@ -44,6 +44,8 @@ if TYPE_CHECKING:
     from semsig_gis.loading import Loaded, assemble, choose_layers, read_files
     from semsig_gis.locating import locate, locate_route
     from semsig_gis.location import Location
+    from semsig_gis.map_ambiguity import ambiguity_map
+    from semsig_gis.map_drift import drift_map
     from semsig_gis.map_identifiability import identifiability_map
     from semsig_gis.map_location import location_map
     from semsig_gis.maps import evaluation_map, localization_map, save_map
@@ -109,6 +111,7 @@ _HOMES = {
     "Taxonomy": "taxonomy",
     "TileSpec": "tiles",
     "ViewpointSpec": "viewpoints",
+    "ambiguity_map": "map_ambiguity",
     "assemble": "loading",
     "build_database": "building",
     "build_index": "likelihood",
@@ -120,6 +123,7 @@ _HOMES = {
     "compare_evaluations": "comparison",
     "conflate": "conflation",
     "database_summary": "properties",
+    "drift_map": "map_drift",
     "evaluate": "evaluation",
     "evaluation_map": "maps",
     "export_geopackage": "export",
@@ -199,6 +203,7 @@ __all__ = [
     "TileSpec",
     "ViewpointSpec",
     "__version__",
+    "ambiguity_map",
     "assemble",
     "build_database",
     "build_index",
@@ -210,6 +215,7 @@ __all__ = [
     "compare_evaluations",
     "conflate",
     "database_summary",
+    "drift_map",
     "evaluate",
     "evaluation_map",
     "export_geopackage",

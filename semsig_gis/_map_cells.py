@@ -1,13 +1,15 @@
 """A layer of a map of which a click on any cell tells what is known of it.
 
 Hundreds of thousands of cells have their numbers in the page: packed arrays, which the script
-unpacks once. Nothing is drawn of them but what a click asks for; an image shows the rest.
+unpacks once. Nothing is drawn of them but what a click asks for; images show the rest. What is
+told of a cell comes from parts (`CellFacts`), each with arrays and a function of its own.
 """
 
 from __future__ import annotations
 
 import base64
 import zlib
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
@@ -15,34 +17,31 @@ from branca.element import Element
 from folium.map import Layer
 from folium.template import Template
 
-from semsig_gis._map_parts import Furniture, class_titles
+from semsig_gis._map_parts import Furniture, class_titles, to_latlon
+from semsig_gis.errors import InputError
 from semsig_gis.map_image import place_lattices
 from semsig_gis.map_page import script_json
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
     from branca.element import Figure
     from numpy.typing import NDArray
 
-    from semsig_gis.identifiability import Identifiability
+    from semsig_gis.database import SignatureDatabase
 
-__all__ = ["CellLayer"]
-
-CHANCES = 250  # steps of a chance in a byte
-BITS = 8  # steps of a bit
-HELPERS = 2  # classes that are named
+__all__ = ["CellFacts", "CellLayer", "city_view", "packed", "packed_signatures"]
 
 SCRIPT = """\
 semsig.unpacked = async (packed) => {
   const kinds = {u1: Uint8Array, i4: Int32Array, f8: Float64Array};
   const arrays = {};
-  for (const [name, [kind, text]] of Object.entries(packed)) {
+  for (const [name, [kind, steps, text]] of Object.entries(packed)) {
     const bytes = Uint8Array.from(atob(text), (sign) => sign.charCodeAt(0));
     const stream = new Blob([bytes]).stream().pipeThrough(new DecompressionStream("deflate"));
-    arrays[name] = new kinds[kind](await new Response(stream).arrayBuffer());
-  }
-  for (const name of ["rows", "columnEnds", "typeEnds"]) {
-    const steps = arrays[name];
-    for (let at = 1; at < steps.length; at += 1) steps[at] += steps[at - 1];
+    const values = new kinds[kind](await new Response(stream).arrayBuffer());
+    if (steps) for (let at = 1; at < values.length; at += 1) values[at] += values[at - 1];
+    arrays[name] = values;
   }
   return arrays;
 };
@@ -63,31 +62,45 @@ semsig.between = (lattice, [west, south, east, north], x, y) => {
     return low * (1 - up) + high * up;
   });
 };
-semsig.cells = (packed, grid, titles) => {
-  const {step, origin, firstColumn, radius} = grid;
-  const group = L.layerGroup();
-  const ready = semsig.unpacked(packed);
-  const firstOf = (low, high, wanted) => {
+// The cells of a page, by their row numbers.
+semsig.City = class {
+  constructor(data, grid) {
+    Object.assign(this, {data, grid, count: data.rows.length});
+  }
+  static firstOf(low, high, wanted) {
     while (low < high) {
       const middle = (low + high) >> 1;
       if (wanted(middle)) high = middle; else low = middle + 1;
     }
     return low;
-  };
-  const placeOf = (data, cell) =>
-    [firstOf(0, data.columnEnds.length, (one) => data.columnEnds[one] > cell), data.rows[cell]];
-  const cellAt = (data, column, row) => {
-    if (column < 0 || column >= data.columnEnds.length) return -1;
-    const high = data.columnEnds[column];
-    const low = column > 0 ? data.columnEnds[column - 1] : 0;
-    const cell = firstOf(low, high, (one) => data.rows[one] >= row);
-    return cell < high && data.rows[cell] === row ? cell : -1;
-  };
-  const latlng = (data, column, row) => semsig.between(data.degrees, grid.metres,
-    origin[0] + step * (firstColumn + column), origin[1] + step * row);
-  const nearest = (data, map, clicked) => {
+  }
+  placeOf(cell) {
+    const ends = this.data.columnEnds;
+    return [semsig.City.firstOf(0, ends.length, (one) => ends[one] > cell), this.data.rows[cell]];
+  }
+  cellAt(column, row) {
+    const {columnEnds: ends, rows} = this.data;
+    if (column < 0 || column >= ends.length) return -1;
+    const cell = semsig.City.firstOf(
+      column > 0 ? ends[column - 1] : 0, ends[column], (one) => rows[one] >= row);
+    return cell < ends[column] && rows[cell] === row ? cell : -1;
+  }
+  latlng(column, row) {
+    const {step, origin, firstColumn, box} = this.grid;
+    return semsig.between(
+      this.data.degrees, box, origin[0] + step * (firstColumn + column), origin[1] + step * row);
+  }
+  middle(cell) {
+    return this.latlng(...this.placeOf(cell).map((corner) => corner + 0.5));
+  }
+  id(cell) {
+    const [column, row] = this.placeOf(cell);
+    return String(BigInt(this.grid.firstColumn + column) * 100000000n + BigInt(row));
+  }
+  nearest(map, clicked) {
+    const {step, origin, firstColumn, mercatorBox} = this.grid;
     const point = L.CRS.EPSG3857.project(clicked);
-    const [x, y] = semsig.between(data.metres, grid.mercator, point.x, point.y);
+    const [x, y] = semsig.between(this.data.metres, mercatorBox, point.x, point.y);
     const column = Math.floor((x - origin[0]) / step) - firstColumn;
     const row = Math.floor((y - origin[1]) / step);
     // From afar a cell is smaller than a finger.
@@ -97,96 +110,111 @@ semsig.cells = (packed, grid, titles) => {
     for (let across = -reach; across <= reach; across += 1) {
       for (let along = -reach; along <= reach; along += 1) {
         const away = across * across + along * along;
-        const cell = away < least ? cellAt(data, column + across, row + along) : -1;
+        const cell = away < least ? this.cellAt(column + across, row + along) : -1;
         if (cell >= 0) [best, least] = [cell, away];
       }
     }
     return best;
-  };
-  const types = (data, cell) => String.fromCharCode(
-    ...data.types.subarray(cell > 0 ? data.typeEnds[cell - 1] : 0, data.typeEnds[cell]));
-  const percent = (steps) => {
-    const value = 100 * steps / grid.chances;
-    return value < 1 ? "below 1 %" : value > 99 ? "above 99 %" : Math.round(value) + " %";
-  };
-  const others = (data, cell) => {
-    const [column, row] = placeOf(data, cell);
-    const found = [];
-    for (let at = cell * grid.places; at < (cell + 1) * grid.places; at += 1) {
-      const other = data.lookalikes[at];
-      if (other < 0) continue;
-      const [across, along] = placeOf(data, other);
-      const metres = step * Math.hypot(across - column, along - row);
-      const turn = Math.round(Math.atan2(across - column, along - row) / Math.PI * 4 + 8) % 8;
-      const seen = types(data, other);
-      found.push({
-        cell: other,
-        place: latlng(data, across + 0.5, along + 0.5),
-        text: percent(data.lookalikeChances[at]) + ": "
-          + (metres < 1000 ? Math.round(metres) + " m" : (metres / 1000).toFixed(1) + " km")
-          + " to the " + ["north", "north-east", "east", "south-east", "south", "south-west",
-            "west", "north-west"][turn]
-          + ", sees " + (seen.length > 16 ? seen.slice(0, 16) + "\\u2026" : seen),
-      });
+  }
+  metres(cell, other) {
+    const [[x, y], [u, v]] = [this.placeOf(cell), this.placeOf(other)];
+    return this.grid.step * Math.hypot(u - x, v - y);
+  }
+  far(cell, other) {
+    const metres = this.metres(cell, other);
+    return metres < 1000 ? Math.round(metres) + " m" : (metres / 1000).toFixed(1) + " km";
+  }
+  // Eighths of a turn, clockwise from north.
+  eighth(cell, other) {
+    const [[x, y], [u, v]] = [this.placeOf(cell), this.placeOf(other)];
+    return Math.round(Math.atan2(u - x, v - y) / Math.PI * 4 + 8) % 8;
+  }
+  part(name, cell) {
+    const ends = this.data[name + ".ends"];
+    return [cell > 0 ? ends[cell - 1] : 0, ends[cell]];
+  }
+  types(name, cell) {
+    return String.fromCharCode(
+      ...this.data[name + ".types"].subarray(...this.part(name, cell)));
+  }
+  signature(name, cell) {
+    const levels = this.data[name + ".levels"].subarray(...this.part(name, cell));
+    const degrees = 360 / this.grid.levels;
+    return [this.types(name, cell),
+      Array.from(levels, (level) => Math.floor((level + 0.5) * degrees))];
+  }
+};
+semsig.told = {};
+semsig.cells = (packed, grid, titles, told) => {
+  const group = L.layerGroup();
+  const ready = semsig.unpacked(packed).then((data) => new semsig.City(data, grid));
+  const buttons = (city, map, cell, box, jumps) => {
+    for (const [label, goals] of jumps) {
+      const line = L.DomUtil.create("div", "semsig-jumps", box);
+      if (label) semsig.text(line, "span", label);
+      for (const [text, other, title] of goals) {
+        const button = L.DomUtil.create("button", "", line);
+        button.textContent = text;
+        button.title = title;
+        L.DomEvent.on(button, "click", () => {
+          // The map moves, so that the next click finds the button where it was.
+          const [from, to] = [cell, other].map(
+            (one) => map.latLngToContainerPoint(city.middle(one)));
+          map.panBy(to.subtract(from), {animate: false});
+          const at = [...box.querySelectorAll("button")].indexOf(button);
+          show(city, map, other).querySelectorAll("button")[at]?.focus();
+        });
+      }
     }
-    return found;
   };
-  const details = (data, cell, alike) => {
-    const [column, row] = placeOf(data, cell);
-    const bits = data.bits[cell] / grid.bits;
-    const facts = [
-      ["It sees", [types(data, cell), null]],
-      ["Found within " + radius + " m", percent(data.found[cell])],
-      ["Chance given", percent(data.itself[cell]) + " to this cell, " + percent(data.near[cell])
-        + " to all within " + radius + " m"],
-      ["Looks like", "about " + Number((2 ** bits).toPrecision(2)).toLocaleString("en")
-        + " cells (" + bits.toFixed(1) + " bits are left)"],
-      ...alike.map((one, at) => ["Taken for " + (at + 1), one.text]),
-    ];
-    const helpers = [];
-    for (let at = cell * grid.helpers; at < (cell + 1) * grid.helpers; at += 1) {
-      const gain = 100 * data.gains[at] / grid.chances;
-      if (gain >= 1) helpers.push(grid.classes[data.helpers[at]] + " +" + Math.round(gain) + " %");
-    }
-    if (helpers.length) facts.push(["Helped by", helpers.join(", ")]);
-    facts.push(["Cell", String(BigInt(firstColumn + column) * 100000000n + BigInt(row))]);
-    return semsig.details("A query from here", facts.map((one) => one[0]),
-      facts.map((one) => one[1]), titles);
-  };
-  const show = (data, map, cell) => {
+  const show = (city, map, cell) => {
     map.closePopup();
     const drawn = L.layerGroup();
-    const [column, row] = placeOf(data, cell);
-    const middle = latlng(data, column + 0.5, row + 0.5);
+    const [column, row] = city.placeOf(cell);
+    const middle = city.middle(cell);
     const look = {pane: "shadowPane", interactive: false, color: "#d55e00", weight: 3};
     const corners = [[0, 0], [1, 0], [1, 1], [0, 1]].map(
-      ([across, along]) => latlng(data, column + across, row + along));
+      ([across, along]) => city.latlng(column + across, row + along));
     drawn.addLayer(L.polygon(corners, {...look, fill: false}));
-    const alike = others(data, cell);
-    alike.forEach((one, at) => {
-      drawn.addLayer(L.polyline([middle, one.place], {...look, weight: 2, dashArray: "5 5"}));
-      const marker = L.circleMarker(one.place, {
-        pane: "markerPane", radius: 9, color: "#222", weight: 1, fillColor: "#fff",
-        fillOpacity: 0.95, bubblingMouseEvents: false,
+    const parts = told.map((name) => ({
+      rows: [], jumps: [], marks: [], dots: [], ...semsig.told[name](city, cell)}));
+    const sign = (other, options) => {
+      const marker = L.circleMarker(city.middle(other), {
+        pane: "markerPane", color: "#222", weight: 1, fillOpacity: 0.95,
+        bubblingMouseEvents: false, ...options,
       });
+      marker.on("click", () => show(city, map, other));
+      return drawn.addLayer(marker), marker;
+    };
+    for (const [other, colour] of parts.flatMap((part) => part.dots)) {
+      sign(other, {radius: 4, fillColor: colour});
+    }
+    parts.flatMap((part) => part.marks).forEach((other, at) => {
+      drawn.addLayer(
+        L.polyline([middle, city.middle(other)], {...look, weight: 2, dashArray: "5 5"}));
       const text = L.DomUtil.create("b", "");
       text.textContent = at + 1;
       const label = {permanent: true, direction: "center", className: "semsig-number"};
-      marker.bindTooltip(text, label);
-      marker.on("click", () => show(data, map, one.cell));
-      drawn.addLayer(marker);
+      sign(other, {radius: 9, fillColor: "#fff"}).bindTooltip(text, label);
     });
-    const popup = L.popup({maxWidth: 340, minWidth: 220, maxHeight: 400});
-    popup.setLatLng(middle).setContent(details(data, cell, alike));
+    const rows = [...parts.flatMap((part) => part.rows), ["Cell", city.id(cell)]];
+    const title = parts.map((part) => part.title).filter(Boolean).pop();
+    const box = semsig.details(
+      title, rows.map((one) => one[0]), rows.map((one) => one[1]), titles);
+    buttons(city, map, cell, box, parts.flatMap((part) => part.jumps));
+    const narrow = Math.min(340, map.getSize().x - 70);
+    const popup = L.popup({maxWidth: narrow, minWidth: 220, maxHeight: 400});
+    popup.setLatLng(middle).setContent(box);
     popup.on("remove", () => group.removeLayer(drawn));
     group.addLayer(drawn);
     popup.openOn(map);
+    return box;
   };
   const click = async (event) => {
     const map = event.target;
-    const data = await ready;
-    const cell = nearest(data, map, event.latlng);
-    if (cell >= 0) show(data, map, cell);
+    const city = await ready;
+    const cell = city.nearest(map, event.latlng);
+    if (cell >= 0) show(city, map, cell);
   };
   group.onAdd = (map) => {
     L.LayerGroup.prototype.onAdd.call(group, map);
@@ -202,11 +230,44 @@ semsig.cells = (packed, grid, titles) => {
   return group;
 };
 """
-STYLE = ".semsig-cells.leaflet-grab { cursor: pointer; }\n"
+STYLE = """\
+.semsig-cells.leaflet-grab { cursor: pointer; }
+.semsig-jumps { margin-top: 5px; }
+.semsig-jumps span { margin-right: 4px; }
+.semsig-jumps button {
+  font: inherit; color: inherit; background: transparent; border: 1px solid #888;
+  border-radius: 4px; padding: 1px 7px; margin: 1px 4px 1px 0; cursor: pointer; }
+.semsig-jumps button:hover, .semsig-jumps button:focus-visible { background: #8883; }
+"""
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class CellFacts:
+    """A part of what a click on a cell tells.
+
+    Parameters
+    ----------
+    name : str
+        Of the function ``semsig.told.NAME(city, cell)`` that tells it.
+    script : str
+        JavaScript that defines this function. It returns what there is of ``title``; ``rows``:
+        label and value each, as `semsig.details` shows them; ``jumps``: a label and buttons, each
+        with a text, a cell and a hint; ``marks``: cells to number and to join by lines;
+        ``dots``: cells and colours.
+    arrays : mapping of str to list
+        Numbers of the cells (see `packed`).
+    settings : mapping of str to object
+        What else it needs, in ``city.grid``.
+    """
+
+    name: str
+    script: str
+    arrays: Mapping[str, list[Any]] = field(default_factory=dict)
+    settings: Mapping[str, Any] = field(default_factory=dict)
 
 
 class CellLayer(Furniture, Layer):
-    """What is known of the cells before any query, told by a click."""
+    """What is known of the cells, told by a click."""
 
     _template = Template(
         """
@@ -216,74 +277,78 @@ class CellLayer(Furniture, Layer):
         """
     )
 
-    def __init__(self, name: str, told: Identifiability) -> None:
+    def __init__(self, name: str, database: SignatureDatabase, facts: Sequence[CellFacts]) -> None:
         super().__init__(name=name, overlay=True, show=True)
         self._name = "SemsigCells"
-        packed, grid = _packed(told)
-        titles = class_titles(told.database)
-        self.arguments = ", ".join(map(script_json, (packed, grid, titles)))
+        self.facts = facts
+        arrays, grid = _cells(database)
+        for part in facts:
+            arrays |= part.arrays
+            grid |= part.settings
+        told = [part.name for part in facts]
+        self.arguments = ", ".join(map(script_json, (arrays, grid, class_titles(database), told)))
 
     def render(self, **kwargs: Any) -> Any:  # noqa: ANN401 - as branca has it
-        """Put the script into the page, then the layer."""
+        """Put the scripts into the page, then the layer."""
         rendered = super().render(**kwargs)
         figure = cast("Figure", self.get_root())
         page = f"<style>{STYLE}</style>\n<script>{SCRIPT}</script>"
         figure.header.add_child(Element(page), name="semsig_cells")
+        for part in self.facts:
+            own = Element(f"<script>{part.script}</script>")
+            figure.header.add_child(own, name=f"semsig_cells_{part.name}")
         return rendered
 
 
-def _packed(told: Identifiability) -> tuple[dict[str, list[str]], dict[str, Any]]:
-    """Return the numbers of all cells, and how to read them."""
-    database = told.database
-    columns = database.columns.astype(np.int64)
-    lattices = place_lattices(database)
-    # The classes that a cell gains most by, best first.
-    count = min(HELPERS, told.gains.shape[1])
-    helpers = np.argsort(-told.gains, axis=1, kind="stable")[:, :count]
-    arrays: dict[str, NDArray[Any]] = {
-        "rows": _steps(database.rows),
-        "columnEnds": np.bincount(columns - columns[0]).astype(np.int32),
-        "types": database.taxonomy.symbol_bytes[database.codes],
-        "typeEnds": database.lengths.astype(np.int32),
-        "found": _chance_bytes(told.found),
-        "near": _chance_bytes(told.near),
-        "itself": _chance_bytes(told.itself),
-        "bits": np.rint(told.bits * BITS).clip(0, 255).astype(np.uint8),
-        "lookalikes": told.lookalikes.astype(np.int32),
-        "lookalikeChances": _chance_bytes(told.lookalike_chances),
-        "helpers": helpers.astype(np.uint8),
-        "gains": _chance_bytes(np.take_along_axis(told.gains, helpers, axis=1)),
-        "metres": lattices.metres,
-        "degrees": lattices.degrees,
+def city_view(database: SignatureDatabase) -> NDArray[np.float64]:
+    """Return the latitudes and longitudes of the corners of all cells."""
+    if len(database) == 0:
+        msg = "the database has no cells to show; give one with at least one cell."
+        raise InputError(msg)
+    corners = np.stack([database.xy.min(axis=0), database.xy.max(axis=0)])
+    return to_latlon(corners, database.crs)
+
+
+def packed(array: NDArray[Any], *, steps: bool = False) -> list[Any]:
+    """Return the kind of an array and its compressed bytes as text.
+
+    With `steps`, of each value less the one before: far smaller where they rise.
+    """
+    kind = array.dtype.newbyteorder("<")
+    if steps:
+        array = np.diff(array, prepend=array.dtype.type(0))
+    data = zlib.compress(np.ascontiguousarray(array, dtype=kind).tobytes())
+    text = base64.b64encode(data).decode("ascii")
+    return [f"{array.dtype.kind}{array.dtype.itemsize}", int(steps), text]
+
+
+def packed_signatures(
+    name: str, database: SignatureDatabase, ends: NDArray[np.int64]
+) -> dict[str, list[Any]]:
+    """Return signatures, with angle levels for bearings, and where those of each cell end."""
+    return {
+        f"{name}.types": packed(database.taxonomy.symbol_bytes[database.codes]),
+        f"{name}.ends": packed(ends.astype(np.int32), steps=True),
+        f"{name}.levels": packed(database.levels),
     }
-    titles = {item.code: item.title for item in database.taxonomy.classes}
+
+
+def _cells(database: SignatureDatabase) -> tuple[dict[str, list[Any]], dict[str, Any]]:
+    """Return where the cells are, and how to read it."""
+    lattices = place_lattices(database)
+    columns = database.columns - database.columns[0]
+    arrays = {
+        "rows": packed(database.rows, steps=True),
+        "columnEnds": packed(np.cumsum(np.bincount(columns)).astype(np.int32), steps=True),
+        "metres": packed(lattices.metres),
+        "degrees": packed(lattices.degrees),
+    }
     grid = {
+        "levels": database.spec.levels,
         "step": database.grid.step,
         "origin": list(database.grid.origin),
-        "firstColumn": int(columns[0]),
-        "radius": told.radius,
-        "places": told.lookalikes.shape[1],
-        "helpers": count,
-        "chances": CHANCES,
-        "bits": BITS,
-        "classes": [titles[item.code] for item in told.classes],
-        "mercator": lattices.mercator_box,
-        "metres": lattices.metric_box,
+        "firstColumn": int(database.columns[0]),
+        "mercatorBox": lattices.mercator_box,
+        "box": lattices.metric_box,
     }
-    return {name: _text(array) for name, array in arrays.items()}, grid
-
-
-def _steps(values: NDArray[np.int32]) -> NDArray[np.int32]:
-    """Return each value less the one before: far smaller once it is compressed."""
-    return np.diff(values, prepend=np.int32(0))
-
-
-def _chance_bytes(chances: NDArray[np.float64]) -> NDArray[np.uint8]:
-    return np.rint(chances * CHANCES).clip(0, CHANCES).astype(np.uint8)
-
-
-def _text(array: NDArray[Any]) -> list[str]:
-    """Return the kind of an array and its compressed bytes as text."""
-    kind = array.dtype.newbyteorder("<")
-    data = zlib.compress(np.ascontiguousarray(array, dtype=kind).tobytes(), 9)
-    return [f"{array.dtype.kind}{array.dtype.itemsize}", base64.b64encode(data).decode("ascii")]
+    return arrays, grid

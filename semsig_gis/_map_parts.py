@@ -176,13 +176,23 @@ def add_city(chosen: folium.Map, database: SignatureDatabase) -> None:
 
 
 def add_image(
-    chosen: folium.Map, image: bytes, bounds: list[list[float]], *, name: str, opacity: float = 1.0
+    chosen: folium.Map,
+    image: bytes,
+    bounds: list[list[float]],
+    *,
+    name: str,
+    opacity: float = 1.0,
+    show: bool = True,
 ) -> None:
     """Add a PNG below everything that is drawn."""
-    free = free_name(chosen, name)
-    ImageOverlay(_data_url(image), bounds, name=free, pane="tilePane", opacity=opacity).add_to(
-        chosen
-    )
+    ImageOverlay(
+        _data_url(image),
+        bounds,
+        name=free_name(chosen, name),
+        pane="tilePane",
+        opacity=opacity,
+        show=show,
+    ).add_to(chosen)
 
 
 def _data_url(image: bytes) -> str:

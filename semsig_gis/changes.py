@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
     from semsig_gis.taxonomy import ObjectClass, Taxonomy
 
-__all__ = ["ClassChange", "ObjectChanges", "compare_objects", "replace_layers"]
+__all__ = ["ClassChange", "ObjectChanges", "compare_objects", "joined_taxonomy", "replace_layers"]
 
 NAME = [SOURCE, SOURCE_ID]
 LOOKS = [CLASS_CODE, "x", "y"]
@@ -295,7 +295,7 @@ def replace_layers(
             f"{_crs_name(old)}; load the new ones with --metric-crs {_crs_name(old)}."
         )
         raise CrsError(msg)
-    taxonomy = _joined_taxonomy(old.taxonomy, new.taxonomy)
+    taxonomy = joined_taxonomy(old.taxonomy, new.taxonomy)
     renewed = set(new.table[SOURCE].unique()).union(*(_layers_of(line) for line in new.licenses))
     stays = ~old.table[SOURCE].isin(renewed).to_numpy()
     if not stays.any():
@@ -309,6 +309,53 @@ def replace_layers(
     )
     kept = tuple(sorted(remaining[SOURCE].unique()))
     return objects, kept, tuple(_doubts(objects, len(remaining), renewed))
+
+
+def joined_taxonomy(old: Taxonomy, new: Taxonomy) -> Taxonomy:
+    """Return classes that two dates of one city both fit.
+
+    Parameters
+    ----------
+    old, new : Taxonomy
+        The classes before and after.
+
+    Returns
+    -------
+    Taxonomy
+        All classes of both, with the titles of the new ones.
+
+    Raises
+    ------
+    InputError
+        If they use one class code or symbol for different classes, or a class is seen from
+        another distance.
+
+    Examples
+    --------
+    >>> from semsig_gis.catalog import paper_taxonomy
+    >>> joined_taxonomy(paper_taxonomy(), paper_taxonomy()) == paper_taxonomy()
+    True
+    """
+    theirs = {item.code: item for item in new.classes}
+    for item in old.classes:
+        other = theirs.get(item.code)
+        if other is not None and replace(other, title=item.title) != item:
+            msg = (
+                f"class code {item.code} means {_brief(item)} before and {_brief(other)} after; "
+                "load both with the same catalogue, or build the database again."
+            )
+            raise InputError(msg)
+    codes = {item.code for item in old.classes}
+    if codes <= set(theirs):
+        return new
+    try:
+        return old.extended(item for item in new.classes if item.code not in codes)
+    except CatalogError as error:
+        msg = (
+            f"the new classes do not fit those of before ({str(error)[:-1]}); load both with the "
+            "same catalogue, or build the database again."
+        )
+        raise InputError(msg) from error
 
 
 def _crs_name(objects: StreetObjects) -> str:
@@ -332,31 +379,6 @@ def _joined_licenses(old: StreetObjects, new: StreetObjects, renewed: set[str]) 
         terms, _, names = line.rpartition(LICENSE_MARK)
         layers_of.setdefault(terms, []).extend(names.split(", "))
     return tuple(f"{terms}{LICENSE_MARK}{', '.join(names)}" for terms, names in layers_of.items())
-
-
-def _joined_taxonomy(old: Taxonomy, new: Taxonomy) -> Taxonomy:
-    """Return a taxonomy that the codes of both fit."""
-    theirs = {item.code: item for item in new.classes}
-    for item in old.classes:
-        other = theirs.get(item.code)
-        if other is not None and replace(other, title=item.title) != item:
-            msg = (
-                f"class code {item.code} means {_brief(item)} in the database and {_brief(other)} "
-                "in the new objects; load these with the catalogue of before, or build the "
-                "database again."
-            )
-            raise InputError(msg)
-    codes = {item.code for item in old.classes}
-    if codes <= set(theirs):
-        return new
-    try:
-        return old.extended(item for item in new.classes if item.code not in codes)
-    except CatalogError as error:
-        msg = (
-            f"the classes of the new objects do not fit those of the database ({str(error)[:-1]}); "
-            "load them with the catalogue of before, or build the database again."
-        )
-        raise InputError(msg) from error
 
 
 def _brief(item: ObjectClass) -> str:

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import functools
 from dataclasses import dataclass, replace
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
+from pyproj import CRS
 
 from semsig_gis import __version__
 from semsig_gis.errors import DatabaseError
@@ -16,16 +18,21 @@ from semsig_gis.signatures import Signature, quantize
 from semsig_gis.viewpoints import ViewpointSpec
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Mapping, Sequence
 
     from numpy.typing import NDArray
-    from pyproj import CRS
 
     from semsig_gis.grid import GridSpec
     from semsig_gis.signatures import SignatureSpec
     from semsig_gis.taxonomy import Taxonomy
 
-__all__ = ["BEARING_UNITS", "DISTANCE_UNITS", "SignatureDatabase", "join_databases"]
+__all__ = [
+    "BEARING_UNITS",
+    "DISTANCE_UNITS",
+    "SignatureDatabase",
+    "join_databases",
+    "require_same",
+]
 
 _Array = TypeVar("_Array", bound="NDArray[Any]")
 
@@ -35,6 +42,16 @@ BEARING_UNITS = 7200
 # In the range that is seen furthest; a unit is 12 cm where that is 30 m.
 DISTANCE_UNITS = 255
 LONGEST_VALUE = 80
+
+_MADE: Mapping[str, str] = MappingProxyType(
+    {
+        "crs": "coordinate reference system",
+        "grid": "grid",
+        "spec": "range or angle levels",
+        "viewpoints": "viewpoints",
+        "occlusion": "occlusion",
+    }
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -273,7 +290,7 @@ def join_databases(parts: Sequence[SignatureDatabase]) -> SignatureDatabase:
         raise DatabaseError(msg)
     first = parts[0]
     for part in parts[1:]:
-        _require_same(first, part)
+        require_same(first, part, {**_MADE, "taxonomy": "classes"})
     ids = np.concatenate([part.cell_ids for part in parts])
     order = np.argsort(ids, kind="stable")
     if (np.diff(ids[order]) == 0).any():
@@ -292,27 +309,46 @@ def join_databases(parts: Sequence[SignatureDatabase]) -> SignatureDatabase:
     return joined if (np.diff(order) == 1).all() else joined.select(order)
 
 
-def _require_same(first: SignatureDatabase, other: SignatureDatabase) -> None:
-    """Raise where two databases were not made in the same way."""
-    for name, what in (
-        ("crs", "coordinate reference system"),
-        ("grid", "grid"),
-        ("spec", "range or angle levels"),
-        ("taxonomy", "classes"),
-        ("viewpoints", "viewpoints"),
-        ("occlusion", "occlusion"),
-    ):
+def require_same(
+    first: SignatureDatabase, other: SignatureDatabase, what: Mapping[str, str] = _MADE
+) -> None:
+    """Raise where two databases were not made in the same way.
+
+    Parameters
+    ----------
+    first, other : SignatureDatabase
+        The databases.
+    what : mapping of str to str, optional
+        Attributes to compare, and what they are called; all but the classes by default.
+
+    Raises
+    ------
+    DatabaseError
+        If they differ in one of them.
+
+    Examples
+    --------
+    >>> from semsig_gis.building import build_database
+    >>> from semsig_gis.sources.synthetic import CitySpec, synthetic_city
+    >>> from semsig_gis.catalog import paper_taxonomy
+    >>> from semsig_gis.objects import build_objects
+    >>> layers = synthetic_city(CitySpec(size=300.0))
+    >>> objects, _ = build_objects(layers, taxonomy=paper_taxonomy(), crs="EPSG:32631")
+    >>> database = build_database(objects)
+    >>> require_same(database, database.select(slice(3)))
+    """
+    for name, title in what.items():
         ours, theirs = getattr(first, name), getattr(other, name)
         if ours != theirs:
             msg = (
-                f"the databases differ in their {what} ({_brief(ours)} and {_brief(theirs)}); "
-                "build both in the same way before joining them."
+                f"the databases differ in their {title} ({_brief(ours)} and {_brief(theirs)}); "
+                "build both in the same way."
             )
             raise DatabaseError(msg)
 
 
 def _brief(value: object) -> str:
-    text = str(value)
+    text = value.to_string() if isinstance(value, CRS) else str(value)
     return text if len(text) <= LONGEST_VALUE else f"{text[: LONGEST_VALUE - 3]}..."
 
 

@@ -8,12 +8,15 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from semsig_gis.changes import ClassChange
+from semsig_gis.database import require_same
 
 if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
     from semsig_gis.database import SignatureDatabase
     from semsig_gis.quality import PlainTable
 
-__all__ = ["UpdateReport", "differing_cells"]
+__all__ = ["CellChanges", "UpdateReport", "compare_cells"]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -113,8 +116,38 @@ def _metres(number: float | None) -> str:
     return "" if number is None else f"{number:,.2f}"
 
 
-def differing_cells(before: SignatureDatabase, after: SignatureDatabase) -> tuple[int, int]:
-    """Compare the cells that are in two databases.
+@dataclass(frozen=True, eq=False, kw_only=True)
+class CellChanges:
+    """Which cells of two databases of one city see what they saw.
+
+    Parameters
+    ----------
+    same : ndarray of int64, shape (s, 2)
+        Rows of the cells in the old and in the new database whose signatures are equal.
+    changed : ndarray of int64, shape (c, 2)
+        The same of those whose signatures differ, in classes, bearings or distances.
+    vanished : ndarray of int64, shape (v,)
+        Other rows of the old database: cells that see nothing any more.
+    appeared : ndarray of int64, shape (a,)
+        Other rows of the new database: cells that saw nothing before.
+
+    Examples
+    --------
+    >>> nothing = np.empty((0, 2), np.int64)
+    >>> changes = CellChanges(same=nothing, changed=np.array([[2, 3]]),
+    ...                       vanished=np.array([0, 1]), appeared=np.array([0, 1, 2]))
+    >>> len(changes.changed)
+    1
+    """
+
+    same: NDArray[np.int64]
+    changed: NDArray[np.int64]
+    vanished: NDArray[np.int64]
+    appeared: NDArray[np.int64]
+
+
+def compare_cells(before: SignatureDatabase, after: SignatureDatabase) -> CellChanges:
+    """Compare the cells of two databases of one city.
 
     Parameters
     ----------
@@ -123,10 +156,13 @@ def differing_cells(before: SignatureDatabase, after: SignatureDatabase) -> tupl
 
     Returns
     -------
-    differing : int
-        Cells in both whose signatures differ: in classes, bearings or distances.
-    common : int
-        Cells in both.
+    CellChanges
+        The cells, those of each kind in their order.
+
+    Raises
+    ------
+    DatabaseError
+        If the databases were not made in the same way.
 
     Examples
     --------
@@ -137,16 +173,26 @@ def differing_cells(before: SignatureDatabase, after: SignatureDatabase) -> tupl
     >>> layers = synthetic_city(CitySpec(size=300.0))
     >>> objects, _ = build_objects(layers, taxonomy=paper_taxonomy(), crs="EPSG:32631")
     >>> database = build_database(objects)
-    >>> differing_cells(database, database.select(slice(3)))
-    (0, 3)
+    >>> changes = compare_cells(database, database.select(slice(3)))
+    >>> len(changes.same), len(changes.vanished) == len(database) - 3
+    (3, True)
     """
+    require_same(before, after)
+    require_same(before, after, {"reach": "longest visibility range"})
     _, first, second = np.intersect1d(
         before.cell_ids, after.cell_ids, assume_unique=True, return_indices=True
     )
-    longer = before.lengths[first] != after.lengths[second]
-    one, other = before.select(first[~longer]), after.select(second[~longer])
-    differs = np.zeros(len(one.codes), bool)
+    differs = before.lengths[first] != after.lengths[second]
+    alike = np.flatnonzero(~differs)
+    one, other = before.select(first[alike]), after.select(second[alike])
+    entry_differs = np.zeros(len(one.codes), bool)
     for name in ("codes", "bearing_units", "distance_units"):
-        differs |= getattr(one, name) != getattr(other, name)
-    cell = np.repeat(np.arange(len(one)), one.lengths)
-    return int(longer.sum()) + len(np.unique(cell[differs])), len(first)
+        entry_differs |= getattr(one, name) != getattr(other, name)
+    differs[np.repeat(alike, one.lengths)[entry_differs]] = True
+    common = np.stack([first, second], axis=1)
+    return CellChanges(
+        same=common[~differs],
+        changed=common[differs],
+        vanished=np.setdiff1d(np.arange(len(before)), first, assume_unique=True),
+        appeared=np.setdiff1d(np.arange(len(after)), second, assume_unique=True),
+    )

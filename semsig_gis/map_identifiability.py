@@ -6,14 +6,15 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from semsig_gis._map_cells import CellLayer
+from semsig_gis._map_cells import CellLayer, city_view
+from semsig_gis._map_groups import group_facts
+from semsig_gis._map_lookalikes import lookalike_facts
 from semsig_gis._map_parts import (
     Legend,
     add_image,
     finished_map,
     free_name,
     prepared_map,
-    to_latlon,
 )
 from semsig_gis.map_image import level_image
 from semsig_gis.map_legend import FOUND_RAMP, identifiability_legend
@@ -69,12 +70,12 @@ def identifiability_map(
     20
     """
     database = told.database
+    view = city_view(database)
     chosen = prepared_map(map_, tiles, title="Where a query can be placed")
     steps = len(FOUND_RAMP)
     levels = np.minimum(np.floor(told.found * steps), steps - 1).astype(np.uint8) + np.uint8(1)
     add_image(chosen, *level_image(database, levels, FOUND_RAMP), name="Chance to be found")
-    CellLayer(free_name(chosen, "Cells, by a click"), told).add_to(chosen)
-    corners = np.stack([database.xy.min(axis=0), database.xy.max(axis=0)])
-    view = to_latlon(corners, database.crs) if map_ is None else None
-    Legend(identifiability_legend(told), view).add_to(chosen)
+    facts = (group_facts(database), lookalike_facts(told))
+    CellLayer(free_name(chosen, "Cells, by a click"), database, facts).add_to(chosen)
+    Legend(identifiability_legend(told), view if map_ is None else None).add_to(chosen)
     return finished_map(chosen)

@@ -7,6 +7,8 @@ from html import escape
 from types import MappingProxyType
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from semsig_gis import __version__
 from semsig_gis.distortion_chain import chain_text
 from semsig_gis.evaluation import SUCCESS_METRES, SUCCESS_PROBABILITY
@@ -14,6 +16,10 @@ from semsig_gis.evaluation import SUCCESS_METRES, SUCCESS_PROBABILITY
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence
 
+    from numpy.typing import NDArray
+
+    from semsig_gis.changes import ObjectChanges
+    from semsig_gis.drift import CellChanges
     from semsig_gis.evaluation import Evaluation
     from semsig_gis.identifiability import Identifiability
     from semsig_gis.location import Location
@@ -23,13 +29,20 @@ if TYPE_CHECKING:
 
 __all__ = [
     "CANDIDATE_RAMP",
+    "CELL_CHANCES",
     "CHANCES",
+    "DRIFT_COLOURS",
     "ERROR_RAMP",
     "FAILED",
     "FOUND_RAMP",
+    "GROUP_COLOURS",
+    "SAME_LEVELS",
+    "SAME_TYPES",
     "SHADES",
     "SUCCESSFUL",
     "VERDICTS",
+    "ambiguity_legend",
+    "drift_legend",
     "evaluation_legend",
     "identifiability_legend",
     "localization_legend",
@@ -63,6 +76,11 @@ SHADES: Mapping[int, str] = MappingProxyType(
 )
 """Colour of a cell by the smallest number of objects that are seen from it."""
 
+CELL_CHANCES: Mapping[float, str] = MappingProxyType(
+    {1e-5: "#d9bdf2", 1e-4: "#bd8be8", 1e-3: "#9650d2", 1e-2: "#6a1cb0", 1e-1: "#35006b"}
+)
+"""Colour of a cell by the least chance that the place is in it, or near it."""
+
 CHANCES: Mapping[float, str] = MappingProxyType({0.5: "#54278f", 0.9: "#9e9ac8", 0.99: "#dadaeb"})
 """Colour of the fewest cells that hold a share of the chance."""
 
@@ -70,6 +88,25 @@ VERDICTS: Mapping[str, str] = MappingProxyType(
     {"matched": "#009e73", "misnamed": "#cc79a7", "missed": "#ffffff", "false": "#d55e00"}
 )
 """Colour of what became of an object."""
+
+GROUP_COLOURS: Mapping[int, str] = MappingProxyType(
+    {
+        1: "#fde725",
+        2: "#7ad151",
+        10: "#22a884",
+        100: "#2a788e",
+        1_000: "#414487",
+        10_000: "#440154",
+    }
+)
+"""Colour of a cell by the smallest number of cells with its signature, itself among them."""
+
+SAME_TYPES, SAME_LEVELS = "#ffffff", "#e69f00"
+
+DRIFT_COLOURS: Mapping[str, str] = MappingProxyType(
+    {"same": "#d6d6d1", "changed": "#e69f00", "appeared": "#0072b2", "vanished": "#882255"}
+)
+"""Colour of a cell or object by what became of it."""
 
 _THRESHOLDS = (10, 25, 50, 100)
 _HELPERS = 6  # classes that the legend names
@@ -163,6 +200,10 @@ def location_legend(location: Location) -> str:
         f"{_sign(CHANCES[share], 'square')}{share:.0%} in {_cells(cells[share])}"
         for share in CHANCES
     )
+    chances = " ".join(
+        f"{_sign(colour, 'square')}{100.0 * least:g}+"
+        for least, colour in sorted(CELL_CHANCES.items(), reverse=True)
+    )
     explained = "".join(
         f"<br>{_sign(VERDICTS[verdict])}{text}"
         for verdict, text in (
@@ -184,7 +225,8 @@ def location_legend(location: Location) -> str:
         f"<p>{_sign(colour)}<b>{told}</b>: within {location.rule.radius:g} m with a chance of "
         f"{location.answer.mass:.1%}; if there, ±&nbsp;{estimate.sigma:.1f}&nbsp;m each way "
         "(ellipse: 90 %)</p>"
-        f"<p>Chance, the fewest cells that hold<br>{shares}</p>"
+        f"<p>Chance of a cell, or around it, in percent<br>{chances}</p>"
+        f"<p>Regions, the fewest cells that hold<br>{shares}</p>"
         f"<p>{_sign('#ffffff')}Candidates by rank</p>"
         f"{rays}{_shades()}{_sources(database.licenses)}"
     )
@@ -267,3 +309,118 @@ def _sources(licenses: Iterable[str]) -> str:
     """Return who is to be named for the data, and under which licence."""
     lines = [f"Data: {escape(line)}<br>" for line in licenses]
     return f"<p><small>{''.join(lines)}Made with semsig_gis {escape(__version__)}</small></p>"
+
+
+def ambiguity_legend(sizes: Mapping[str, NDArray[np.int64]], *, licenses: Sequence[str]) -> str:
+    """Return the legend of a map of how many cells look the same.
+
+    Parameters
+    ----------
+    sizes : mapping of str to ndarray of int64, shape (n,)
+        For every cell, how many look the same, by what is compared.
+    licenses : sequence of str
+        One line a source, ``layer: attribution (licence)``.
+
+    Returns
+    -------
+    str
+        HTML in which all text from data is escaped, for a ``details`` element.
+    """
+    starts = list(GROUP_COLOURS)
+    labels = [
+        "no other",
+        *(f"{low:,} to {high - 1:,}" for low, high in itertools.pairwise(starts[1:])),
+        f"{starts[-1]:,} or more",
+    ]
+    shares = [
+        np.bincount(np.digitize(size, starts), minlength=len(starts) + 1)[1:] / len(size)
+        for size in sizes.values()
+    ]
+    rows = "".join(
+        f"<tr><td>{_sign(colour, 'square')}{label.replace(' ', '&nbsp;')}</td>"
+        + "".join(f"<td>{share:.1%}</td>" for share in line)
+        + "</tr>"
+        for colour, label, *line in zip(GROUP_COLOURS.values(), labels, *shares, strict=True)
+    )
+    head = "".join(f"<td><small>{escape(name)}</small></td>" for name in sizes)
+    cells = len(next(iter(sizes.values())))
+    return (
+        "<summary>Cells that look the same</summary>"
+        f"<p>{cells:,} cells, by how many look the same</p>"
+        f"<table><tr><td></td>{head}</tr>{rows}</table>"
+        "<p>Click a cell to see its signature, and to go to cells that look the same:<br>"
+        f"{_sign(SAME_TYPES)}same types &ensp;{_sign(SAME_LEVELS)}and angle levels</p>"
+        f"{_sources(licenses)}"
+    )
+
+
+def drift_legend(
+    cells: CellChanges,
+    objects: ObjectChanges | None,
+    *,
+    taxonomy: Taxonomy,
+    licenses: Sequence[str],
+) -> str:
+    """Return the legend of a map of what has changed between two dates.
+
+    Parameters
+    ----------
+    cells : CellChanges
+        What became of the cells.
+    objects : ObjectChanges or None
+        What became of the street objects, where they are at hand.
+    taxonomy : Taxonomy
+        Their classes.
+    licenses : sequence of str
+        One line a source, ``layer: attribution (licence)``.
+
+    Returns
+    -------
+    str
+        HTML in which all text from data is escaped, for a ``details`` element.
+    """
+    kinds = {
+        "same": (cells.same, "see what they saw"),
+        "changed": (cells.changed, "see something else"),
+        "appeared": (cells.appeared, "saw nothing before"),
+        "vanished": (cells.vanished, "see nothing any more"),
+    }
+    total = sum(len(rows) for rows, _ in kinds.values())
+    lines = "".join(
+        f"<tr><td>{_sign(DRIFT_COLOURS[kind], 'square')}{title}</td>"
+        f"<td>{len(rows):,}</td><td>{len(rows) / total:.1%}</td></tr>"
+        for kind, (rows, title) in kinds.items()
+    )
+    return (
+        "<summary>What has changed</summary>"
+        f"<p>Cells, of {total:,} before or after</p><table>{lines}</table>"
+        f"{'' if objects is None else _drifted(objects, taxonomy)}"
+        "<p>Click a cell to see its signature before and after.</p>"
+        f"{_sources(licenses)}"
+    )
+
+
+def _drifted(objects: ObjectChanges, taxonomy: Taxonomy) -> str:
+    """Return how many objects have changed, and of which classes most."""
+    kinds = (
+        ("appeared", objects.added, "added"),
+        ("vanished", objects.removed, "removed"),
+        ("changed", objects.moved, "moved, from the end of the line"),
+        ("changed", objects.changed, "of another class now"),
+    )
+    counts = "<br>".join(
+        f"{_sign(DRIFT_COLOURS[kind])}{len(rows):,} {title}" for kind, rows, title in kinds
+    )
+    changes = {
+        item: item.added + item.removed + item.moved + item.gained + item.lost
+        for item in objects.classes
+    }
+    most = sorted((item for item in changes if changes[item]), key=lambda one: -changes[one])
+    rows = "".join(
+        f"<tr><td>{escape(taxonomy.by_name(item.class_name).title)}</td><td>{item.added:,}</td>"
+        f"<td>{item.removed:,}</td><td>{item.moved:,}</td></tr>"
+        for item in most[:_HELPERS]
+    )
+    head = "".join(f"<td><small>{name}</small></td>" for name in ("added", "removed", "moved"))
+    table = f"<table><tr><td></td>{head}</tr>{rows}</table>" if most else ""
+    return f"<p>Street objects<br>{counts}</p>{table}"

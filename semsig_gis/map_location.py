@@ -19,7 +19,14 @@ from semsig_gis._map_parts import (
     to_latlon,
 )
 from semsig_gis.map_image import level_image
-from semsig_gis.map_legend import CHANCES, FAILED, SUCCESSFUL, VERDICTS, location_legend
+from semsig_gis.map_legend import (
+    CELL_CHANCES,
+    CHANCES,
+    FAILED,
+    SUCCESSFUL,
+    VERDICTS,
+    location_legend,
+)
 
 if TYPE_CHECKING:
     import folium
@@ -27,6 +34,7 @@ if TYPE_CHECKING:
 
     from semsig_gis.explanation import Explanation
     from semsig_gis.location import Location
+    from semsig_gis.posterior import Posterior
 
 __all__ = ["location_map"]
 
@@ -64,9 +72,11 @@ def location_map(
     Returns
     -------
     folium.Map
-        The map, with these layers: the cells and their chances as images, the candidates with
-        their ranks, the best place with its ellipse of 90 %, and for each candidate that was
-        explained the rays of the query and the street objects; all with popups.
+        The map, with these layers: the cells; their chances, those of the places around them, and
+        the fewest cells that hold 50, 90 and 99 % of the chance, as images of which the most
+        telling is shown at first; the candidates with their ranks, the best place with its
+        ellipse of 90 %, and for each candidate that was explained the rays of the query and the
+        street objects; all with popups.
 
     Raises
     ------
@@ -92,7 +102,7 @@ def location_map(
     drawn = _Drawn(location)
     chosen = prepared_map(map_, tiles, title="Where it was seen")
     add_city(chosen, location.posterior.database)
-    add_image(chosen, *_chances(location), name="Chance", opacity=0.75)
+    _add_chances(chosen, location)
     for number, why in enumerate(location.explanations, start=1):
         name = free_name(chosen, f"Objects from rank {number}")
         Drawing(name, "drawings", drawn.explanation(why), show=number == 1).add_to(chosen)
@@ -107,16 +117,38 @@ def location_map(
     return finished_map(chosen)
 
 
-def _chances(location: Location) -> tuple[bytes, list[list[float]]]:
+def _add_chances(chosen: folium.Map, location: Location) -> None:
+    """Add images of the chances: from near those of the cells, from afar those around them."""
+    found, radius, near = location.posterior, location.rule.radius, location.answer.given
+    for name, image, show in (
+        (f"Chance within {radius:g} m", _chances(found, found.mass_within(radius)), not near),
+        ("Chance of a cell", _chances(found, found.chances), near),
+        ("Regions of 50, 90 and 99 %", _regions(found), False),
+    ):
+        add_image(chosen, *image, name=name, opacity=0.85, show=show)
+
+
+def _chances(found: Posterior, chances: NDArray[np.float64]) -> tuple[bytes, list[list[float]]]:
+    """Return an image of a chance of each cell."""
+    levels = np.digitize(chances, list(CELL_CHANCES))
+    return _image(found, levels, list(CELL_CHANCES.values()))
+
+
+def _regions(found: Posterior) -> tuple[bytes, list[list[float]]]:
     """Return an image of the fewest cells that hold each share of the chance."""
-    found = location.posterior
     shares = sorted(CHANCES, reverse=True)
-    levels = np.zeros(len(found.database), np.uint8)
+    levels = np.zeros(len(found.database), np.int64)
     for level, share in enumerate(shares, start=1):
         levels[found.credible_cells(share)] = level
-    some = np.flatnonzero(levels)
-    colours = [CHANCES[share] for share in shares]
-    return level_image(found.database.select(some), levels[some], colours)
+    return _image(found, levels, [CHANCES[share] for share in shares])
+
+
+def _image(
+    found: Posterior, levels: NDArray[np.int64], colours: list[str]
+) -> tuple[bytes, list[list[float]]]:
+    """Return an image of the cells that have a level above 0, and of the likeliest."""
+    some = np.union1d(np.flatnonzero(levels), [int(found.chances.argmax())])
+    return level_image(found.database.select(some), levels[some].astype(np.uint8), colours)
 
 
 class _Drawn:

@@ -13,7 +13,7 @@ from semsig_gis.building import build_cells
 from semsig_gis.changes import compare_objects, replace_layers
 from semsig_gis.database import join_databases
 from semsig_gis.database_file import open_database
-from semsig_gis.drift import UpdateReport, differing_cells
+from semsig_gis.drift import UpdateReport, compare_cells
 from semsig_gis.errors import DatabaseError, EmptyResultError, InputError
 from semsig_gis.grid import cell_ids, cells_near
 from semsig_gis.occlusion import TOUCHING_M, buildings_near
@@ -174,7 +174,7 @@ def update_database(
         raise EmptyResultError(msg)
     seen_before, seen_now = database.select(stale), fresh
     layers = {*store.objects.table[SOURCE].unique(), *merged.table[SOURCE].unique()}
-    changed, common = differing_cells(seen_before, seen_now)
+    drifted = compare_cells(seen_before, seen_now)
     report = UpdateReport(
         classes=changes.classes,
         replaced=tuple(sorted(layers - set(kept))),
@@ -182,9 +182,9 @@ def update_database(
         cells_before=len(database),
         cells=len(updated),
         recomputed=len(cells[0]),
-        changed=changed,
-        appeared=len(seen_now) - common,
-        vanished=len(seen_before) - common,
+        changed=len(drifted.changed),
+        appeared=len(drifted.appeared),
+        vanished=len(drifted.vanished),
         notes=(*store.notes, *notes),
     )
     return updated, after, report

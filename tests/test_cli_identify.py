@@ -137,7 +137,7 @@ def test_columns_that_do_not_fit_are_told_and_left_out(city: Path, run: Run) -> 
         (("identify", "--seed", -1), ("seed", "as -1")),
         (("identify", "--threads", 0), ("--threads", "as 0")),
         (("identify", "--noise", "medum"), ("'medum'", "medium")),
-        (("map", "--out", "map.html"), ("--evaluation or --identifiability",)),
+        (("map", "--out", "map.html"), ("--identifiability, --ambiguity or --drift",)),
         (("map", "--identifiability", "--out", "m.html"), ("run semsig identify first",)),
         (("map", "--identifiability", "--evaluation", "e", "--out", "m.html"), ("give one",)),
     ],

@@ -4,10 +4,15 @@ import dataclasses
 import json
 
 import numpy as np
+import pytest
+from sentences import assert_sentence
 from worlds import CODES, random_town
 
 from semsig_gis.changes import ClassChange
-from semsig_gis.drift import UpdateReport, differing_cells
+from semsig_gis.drift import UpdateReport, compare_cells
+from semsig_gis.errors import DatabaseError
+from semsig_gis.grid import GridSpec
+from semsig_gis.taxonomy import Taxonomy
 
 TREES = ClassChange(
     class_name="tree",
@@ -119,10 +124,16 @@ def test_cells_differ_in_length_class_bearing_or_distance() -> None:
     other = dataclasses.replace(
         database, codes=codes, bearing_units=bearings, distance_units=distances
     )
-    assert differing_cells(database, database) == (0, len(database))
-    assert differing_cells(database, other) == (3, len(database))
+    assert compare_cells(database, database).same.tolist() == [
+        [row, row] for row in range(len(database))
+    ]
+    found = compare_cells(database, other)
+    assert found.changed.tolist() == [[row, row] for row in long[:3].tolist()]
+    assert len(found.same) == len(database) - 3
     shared = np.sort(long)
-    assert differing_cells(database.select(shared), other) == (3, 4)
+    found = compare_cells(database.select(shared), other)
+    assert found.changed.tolist() == [[at, row] for at, row in enumerate(long[:3].tolist())]
+    assert found.appeared.tolist() == sorted(set(range(len(database))) - set(shared.tolist()))
     # The signature of another cell in the place of the last one, which sees another number.
     lengths = database.lengths
     cell = int(np.flatnonzero(lengths != lengths[long[3]])[0])
@@ -131,5 +142,21 @@ def test_cells_differ_in_length_class_bearing_or_distance() -> None:
         columns=database.columns[long[3:]],
         rows=database.rows[long[3:]],
     )
-    assert differing_cells(database, swapped) == (1, 1)
-    assert differing_cells(database.select(slice(2)), database.select(slice(2, 5))) == (0, 0)
+    found = compare_cells(database, swapped)
+    assert found.changed.tolist() == [[int(long[3]), 0]]
+    found = compare_cells(database.select(slice(2)), database.select(slice(2, 5)))
+    assert (found.same.size, found.changed.size) == (0, 0)
+    assert (found.vanished.tolist(), found.appeared.tolist()) == ([0, 1], [0, 1, 2])
+
+
+def test_cells_of_different_grids_or_ranges_are_not_compared() -> None:
+    database = random_town().database
+    finer = dataclasses.replace(database, grid=GridSpec(5.0))
+    with pytest.raises(DatabaseError) as caught:
+        compare_cells(database, finer)
+    assert_sentence(caught.value, "grid", "step=5.0", "in the same way")
+    first = database.taxonomy.classes[0]
+    farther = Taxonomy((dataclasses.replace(first, range_m=99.0), *database.taxonomy.classes[1:]))
+    with pytest.raises(DatabaseError) as caught:
+        compare_cells(database, dataclasses.replace(database, taxonomy=farther))
+    assert_sentence(caught.value, "30.0 and 99.0")

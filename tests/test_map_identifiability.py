@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING, Any
 import folium
 import numpy as np
 import pytest
+from cell_clicks import POPUP, click, popup
 from cells_told import told_of
 from map_pages import HOSTILE, asked, assert_quiet, hostile_database, opened, switch
-from pyproj import Transformer
 from selenium.webdriver.common.by import By
 from sentences import assert_sentence
 from worlds import random_town
@@ -29,24 +29,6 @@ if TYPE_CHECKING:
 
 CITY = random_town().database
 TOLD = told_of(CITY)
-POPUP = "return [...document.querySelectorAll('.semsig-details')].pop()?.innerText"
-
-
-def click(browser: Chrome, told: Identifiability, cell: int) -> dict[str, str]:
-    """Click the middle of a cell; return what its popup says, line by line."""
-    to_degrees = Transformer.from_crs(told.database.crs, "EPSG:4326")
-    latitude, longitude = to_degrees.transform(*told.database.xy[cell])
-    script = "map.fire('click', {latlng: L.latLng(arguments[0], arguments[1])});"
-    asked(browser, script, float(latitude), float(longitude))
-    return popup(browser)
-
-
-def popup(browser: Chrome) -> dict[str, str]:
-    time.sleep(0.4)  # the arrays are unpacked once, and the popup before fades away
-    text = browser.execute_script(POPUP)
-    assert text.startswith("A query from here")
-    lines = [line.split("\t", 1) for line in text.splitlines() if "\t" in line]
-    return {one[0].strip(): one[1].strip() for one in lines}
 
 
 def cell_id(told: Identifiability, cell: int) -> str:
@@ -54,10 +36,10 @@ def cell_id(told: Identifiability, cell: int) -> str:
 
 
 def whole_percent(chance: float) -> str:
-    steps = round(chance * 250) * 0.4
-    if steps < 1:
+    percent = round(chance * 100)
+    if percent < 1:
         return "below 1 %"
-    return "above 99 %" if steps > 99 else f"{int(steps + 0.5)} %"
+    return "above 99 %" if percent > 99 else f"{percent} %"
 
 
 @pytest.mark.usefixtures("carried")
@@ -67,12 +49,14 @@ def test_a_click_on_any_cell_tells_of_it(browser: Chrome, tmp_path: Path) -> Non
     assert len(browser.find_elements(By.CSS_SELECTOR, "img.leaflet-image-layer")) == 1
     asked(browser, "map.setZoom(19, {animate: false})")
     for cell in np.random.default_rng(2).choice(len(CITY), 12, replace=False).tolist():
-        said = click(browser, TOLD, cell)
+        said = click(browser, CITY, cell)
+        assert said["title"] == "A query from here"
+        assert said["It sees"].startswith(CITY.types(cell))
         assert said["Cell"] == cell_id(TOLD, cell)
         assert said["Found within 30 m"] == whole_percent(TOLD.found[cell])
         assert said["Chance given"].startswith(whole_percent(TOLD.itself[cell]))
         named = [name for name in said if name.startswith("Taken for")]
-        assert len(named) == int((TOLD.lookalikes[cell] >= 0).sum())
+        assert len(named) == int((TOLD.lookalike_chances[cell] >= 0.01).sum())
     assert_quiet(browser)
 
 
@@ -80,7 +64,7 @@ def test_a_click_on_any_cell_tells_of_it(browser: Chrome, tmp_path: Path) -> Non
 def test_a_lookalike_is_a_jump_away(browser: Chrome, tmp_path: Path) -> None:
     opened(browser, identifiability_map(TOLD), tmp_path)
     cell = int(np.flatnonzero((TOLD.lookalike_chances > 0.1).all(axis=1))[0])
-    assert click(browser, TOLD, cell)["Cell"] == cell_id(TOLD, cell)
+    assert click(browser, CITY, cell)["Cell"] == cell_id(TOLD, cell)
     jump = """
     const numbers = [];
     map.eachLayer((layer) => { if (layer.getTooltip && layer.getTooltip()) numbers.push(layer); });
@@ -110,7 +94,7 @@ def test_hostile_data_is_shown_and_never_run(browser: Chrome, tmp_path: Path) ->
     text = browser.execute_script("return arguments[0].textContent", legend)
     assert HOSTILE in text
     helped = np.flatnonzero((told.gains > 0.1).any(axis=1))
-    click(browser, told, int(helped[0]))
+    click(browser, told.database, int(helped[0]))
     details = browser.execute_script("return document.querySelector('.semsig-details').textContent")
     assert HOSTILE in details
     for element in ("script", "img"):

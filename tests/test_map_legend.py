@@ -6,18 +6,23 @@ import dataclasses
 from html.parser import HTMLParser
 from typing import TYPE_CHECKING
 
+import numpy as np
 import pytest
 from cells_told import told_of
 
 from semsig_gis.abstention import AnswerRule
 from semsig_gis.building import build_database
 from semsig_gis.catalog import paper_taxonomy
+from semsig_gis.changes import ClassChange, ObjectChanges
+from semsig_gis.drift import CellChanges
 from semsig_gis.evaluation import evaluate
 from semsig_gis.likelihood import build_index
 from semsig_gis.limitations import MissingClasses
 from semsig_gis.locating import locate
 from semsig_gis.map_legend import (
     SHADES,
+    ambiguity_legend,
+    drift_legend,
     evaluation_legend,
     identifiability_legend,
     localization_legend,
@@ -172,3 +177,44 @@ def test_identifiability_lets_no_data_run(database: SignatureDatabase) -> None:
     read = Text(identifiability_legend(told))
     assert HOSTILE in read.shown
     assert not {"script", "img"} & read.tags
+
+
+def test_what_groups_of_cells_say() -> None:
+    sizes = np.array([1, 1, 2, 2, 9, 10, 12_345, 12_345])
+    text = Text(
+        ambiguity_legend({"types": sizes, "both": sizes[::-1] // 3 + 1}, licenses=[HOSTILE])
+    )
+    shown = text.shown.replace("\xa0", " ")
+    for said in (
+        "8 cells",
+        "no other 25.0% 50.0%",
+        "2 to 9 37.5% 25.0%",
+        "10 to 99 12.5% 0.0%",
+        "1,000 to 9,999 0.0% 25.0%",
+        "10,000 or more 25.0% 0.0%",
+        HOSTILE,
+    ):
+        assert said in shown
+    assert not {"script", "img"} & text.tags
+
+
+def test_what_drift_says() -> None:
+    pairs = np.zeros((6, 2), np.int64)
+    cells = CellChanges(same=pairs, changed=pairs[:2], vanished=pairs[:1, 0], appeared=pairs[:1, 0])
+    text = Text(drift_legend(cells, None, taxonomy=paper_taxonomy(), licenses=[HOSTILE])).shown
+    for said in ("of 10 before or after", "see what they saw 6 60.0%", "any more 1 10.0%", HOSTILE):
+        assert said in text
+    assert "Street objects" not in text
+    change = ClassChange(
+        class_name="bench", before=3, after=4, added=2, removed=1, moved=5, moved_m=1.0, gained=0,
+        lost=0,
+    )  # fmt: skip
+    still = dataclasses.replace(change, class_name="bus_stop", added=0, removed=0, moved=0)
+    objects = ObjectChanges(
+        same=pairs, moved=pairs[:5], changed=pairs[:0], removed=pairs[:1, 0], added=pairs[:2, 0],
+        classes=(still, change),
+    )  # fmt: skip
+    text = Text(drift_legend(cells, objects, taxonomy=paper_taxonomy(), licenses=())).shown
+    for said in ("2 added", "1 removed", "5 moved", "0 of another class", "Public bench 2 1 5"):
+        assert said in text
+    assert "Bus stop" not in text

@@ -99,8 +99,10 @@ def test_a_location_in_a_browser(browser: Chrome, tmp_path: Path) -> None:
     switch(browser, "Objects from rank 2")
     other = location.explanations[1].counts["matched"]
     assert asked(browser, "return circles(arguments[0]).length", VERDICTS["matched"]) == other
-    switch(browser, "Chance")
+    switch(browser, "Chance of a cell")
     assert len(browser.find_elements(By.CSS_SELECTOR, "img.leaflet-image-layer")) == 1
+    switch(browser, "Regions of 50, 90 and 99 %")
+    assert len(browser.find_elements(By.CSS_SELECTOR, "img.leaflet-image-layer")) == 2
     switch(browser, "Candidates")
     time.sleep(0.5)  # numbers fade away
     assert browser.find_elements(By.CSS_SELECTOR, ".semsig-number") == []
@@ -152,6 +154,9 @@ def test_what_cannot_be_told_is_shown_from_afar(browser: Chrome, tmp_path: Path)
     assert "Cannot tell; the best place" in legend
     assert "matched" not in legend
     assert asked(browser, "return circles(arguments[0]).length", FAILED) == 1
+    boxes = browser.find_elements(By.CSS_SELECTOR, ".leaflet-control-layers-overlays label")
+    on = [one.text for one in boxes if one.find_element(By.TAG_NAME, "input").is_selected()]
+    assert [name.strip() for name in on if "Chance" in name] == ["Chance within 50 m"]
     inside = "return circles('#ffffff').every((one) => map.getBounds().contains(one.getLatLng()))"
     assert asked(browser, inside)
     assert_quiet(browser)
@@ -184,7 +189,7 @@ def test_maps_of_ones_own_and_without_a_store() -> None:
     assert location_map(location, map_=own) is own
     names = [getattr(child, "layer_name", "") for child in own._children.values()]
     assert names.count("Objects seen from a cell") == 1
-    assert {"Best place", "Best place, 2", "Chance, 2", "Candidates (5), 2"} <= set(names)
+    assert {"Best place", "Best place, 2", "Chance of a cell, 2", "Candidates (5), 2"} <= set(names)
     assert "NaN" not in own.get_root().render().partition("</head>")[2]
     with pytest.raises(InputError) as caught:
         location_map(location, map_=own, tiles="OpenStreetMap")

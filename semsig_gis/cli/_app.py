@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from semsig_gis.drift import UpdateReport
     from semsig_gis.evaluation import Evaluation
     from semsig_gis.identifiability import Identifiability
+    from semsig_gis.objects import StreetObjects
     from semsig_gis.quality import QualityReport
     from semsig_gis.tables import Table
 
@@ -58,14 +59,20 @@ def numbers(text: str, option: str) -> list[float]:
         raise InputError(msg) from error
 
 
-def object_counts(path: Path) -> dict[int, int] | None:
-    """Return how many objects of each class a database has, where its store is at hand."""
+def stored_objects(path: Path) -> StreetObjects | None:
+    """Return the objects that a database was built from, where its store is at hand."""
     from semsig_gis.store import open_store
 
     try:
-        return open_store(path).objects.class_counts
+        return open_store(path).objects
     except DatabaseError:  # a database may do without its objects
         return None
+
+
+def object_counts(path: Path) -> dict[int, int] | None:
+    """Return how many objects of each class a database has, where its store is at hand."""
+    objects = stored_objects(path)
+    return None if objects is None else objects.class_counts
 
 
 def known_identifiability(path: Path, opened: SignatureDatabase) -> Identifiability | None:

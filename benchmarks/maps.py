@@ -1,0 +1,196 @@
+"""Maps of a city the size of Paris in Chromium: how large, how soon there, how smooth."""
+
+from __future__ import annotations
+
+import shutil
+import statistics
+import tempfile
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from benchmarks.comparison import Comparison
+from semsig_gis import map_assets
+from semsig_gis.building import build_database
+from semsig_gis.catalog import paper_taxonomy
+from semsig_gis.evaluation import evaluate
+from semsig_gis.likelihood import build_index
+from semsig_gis.map_ambiguity import ambiguity_map
+from semsig_gis.map_drift import drift_map
+from semsig_gis.maps import evaluation_map, save_map
+from semsig_gis.noise import named_noise
+from semsig_gis.objects import StreetObjects, build_objects
+from semsig_gis.sources.synthetic import (
+    PARIS_LIKE,
+    CitySpec,
+    synthetic_city,
+    synthetic_surroundings,
+)
+from semsig_gis.viewpoints import ViewpointSpec
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Sequence
+
+    import folium
+    from selenium.webdriver import Chrome
+
+__all__ = ["comparisons"]
+
+_CITIES = {"full": PARIS_LIKE, "small": CitySpec(size=300.0)}
+_QUERIES = {"full": 10_000, "small": 50}
+_ZOOMS = {"full": (1, 1, 1, -1, -1, -1), "small": (1,)}
+_MOST_MB, _MOST_SECONDS = 8.0, 5.0
+_REPEATS = 3
+_SEED = 20
+_GONE = 0.02  # share of the objects that a year takes away
+
+# Seconds from the start of loading until all layers are drawn.
+_DRAWN = """
+const done = arguments[0];
+const images = [...document.querySelectorAll("img.leaflet-image-layer")];
+Promise.all(images.map((image) => image.decode())).then(() =>
+  requestAnimationFrame(() => requestAnimationFrame(() => done(performance.now() / 1000))));
+"""
+
+# Milliseconds between frames while the map is moved and zoomed by a person.
+_FRAMES = """
+const [zooms, done] = arguments;
+const map = Object.values(window).find((value) => value instanceof L.Map);
+const moved = (name, start) => new Promise((resolve) => { map.once(name, resolve); start(); });
+const times = [];
+let last = null;
+let moving = true;
+const frame = (now) => {
+  if (last !== null) times.push(now - last);
+  last = now;
+  if (moving) requestAnimationFrame(frame);
+};
+(async () => {
+  requestAnimationFrame(frame);
+  for (const zoom of zooms) {
+    await moved("zoomend", () => map.setZoom(map.getZoom() + zoom));
+    for (const side of [[200, 0], [0, 200], [-200, -200]]) {
+      await moved("moveend", () => map.panBy(side, {duration: 0.4}));
+    }
+  }
+  moving = false;
+  done(times);
+})();
+"""
+
+# Switch all layers off.
+_BARE = """
+for (const box of document.querySelectorAll(".leaflet-control-layers-overlays input:checked")) {
+  box.click();
+}
+"""
+
+
+def comparisons(size: str) -> Iterator[Comparison]:
+    """Draw the maps of one city and open each.
+
+    Parameters
+    ----------
+    size : str
+        ``"full"`` or ``"small"``.
+
+    Yields
+    ------
+    Comparison
+        Megabytes and seconds of every map, and the frames of the one with most points; nothing
+        without Chromium, its driver, or the map files that the package is built with.
+    """
+    chromium, driver = shutil.which("chromium"), shutil.which("chromedriver")
+    if chromium is None or driver is None or not map_assets.available():
+        print("maps: not measured, because Chromium, its driver or the map files are not here")
+        return
+    with tempfile.TemporaryDirectory() as folder:
+        browser = _started(chromium, driver, folder)
+        try:
+            for what, drawn in _maps(_CITIES[size], _QUERIES[size]):
+                page = Path(folder, "map.html")
+                save_map(drawn, page, self_contained=True)
+                yield from _measured(browser, page, what)
+            yield _smoothness(browser, what, _ZOOMS[size])
+        finally:
+            browser.quit()
+
+
+def _maps(city: CitySpec, queries: int) -> Iterator[tuple[str, folium.Map]]:
+    """Yield what a map shows, and the map; the one with most points last."""
+    objects = build_objects(synthetic_city(city), taxonomy=paper_taxonomy(), crs="EPSG:32631")[0]
+    streets = synthetic_surroundings(city)[1].table
+    kept = np.random.default_rng(_SEED).random(len(objects)) >= _GONE
+    later = StreetObjects(objects.table[kept], objects.taxonomy, objects.licenses)
+    database, newer = (
+        build_database(one, viewpoints=ViewpointSpec(mode="streets"), streets=streets)
+        for one in (objects, later)
+    )
+    cells = f"{len(database):,} cells"
+    yield f"which of {cells} look the same", ambiguity_map(database)
+    drawn = drift_map(database, newer, objects_before=objects, objects_after=later)
+    yield f"which of {cells} have changed, with {int((~kept).sum()):,} objects", drawn
+    index = build_index(database, named_noise("medium"))
+    evaluation = evaluate(database, queries=queries, method=index)
+    yield f"{queries:,} queries among {cells}", evaluation_map(evaluation, database)
+
+
+def _measured(browser: Chrome, page: Path, what: str) -> Iterator[Comparison]:
+    """Open a map several times."""
+    seconds = []
+    for _ in range(_REPEATS):
+        browser.get("about:blank")
+        browser.get(page.as_uri())
+        seconds.append(browser.execute_async_script(_DRAWN))
+    yield Comparison(
+        name=f"map of {what}",
+        unit="MB",
+        ours=page.stat().st_size / 1e6,
+        peer=_MOST_MB,
+        peer_name="the most that is wanted",
+        bar=1.0,
+    )
+    yield Comparison(
+        name=f"opening the map of {what} in Chromium",
+        unit="s",
+        ours=statistics.median(seconds),
+        peer=_MOST_SECONDS,
+        peer_name="the most that is wanted",
+        bar=1.0,
+    )
+
+
+def _smoothness(browser: Chrome, what: str, zooms: Sequence[int]) -> Comparison:
+    """Move the map that is open, with its layers and without."""
+    with_layers = statistics.quantiles(browser.execute_async_script(_FRAMES, zooms), n=20)[-1]
+    browser.execute_script(_BARE)
+    bare = statistics.quantiles(browser.execute_async_script(_FRAMES, zooms), n=20)[-1]
+    return Comparison(
+        name=f"the longest frame of twenty while the map of {what} is moved",
+        unit="ms",
+        ours=with_layers,
+        peer=bare,
+        peer_name="the same page without its layers",
+        bar=None,
+    )
+
+
+def _started(chromium: str, driver: str, folder: str) -> Chrome:
+    """Start a browser that reaches no network."""
+    from selenium import webdriver  # noqa: PLC0415 - where there is no browser it may be absent
+
+    options = webdriver.ChromeOptions()
+    options.binary_location = chromium
+    for argument in (
+        "--headless=new",
+        "--no-sandbox",
+        "--disable-gpu",
+        "--disable-background-networking",
+        "--no-first-run",
+        "--host-resolver-rules=MAP * ~NOTFOUND",
+        "--window-size=1400,900",
+        f"--user-data-dir={folder}/chromium",
+    ):
+        options.add_argument(argument)
+    return webdriver.Chrome(options=options, service=webdriver.ChromeService(driver))

@@ -1,0 +1,96 @@
+"""A map of how many cells look the same: where a signature says little of the place."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from semsig_gis._map_cells import CellLayer, city_view
+from semsig_gis._map_groups import group_facts
+from semsig_gis._map_lookalikes import lookalike_facts
+from semsig_gis._map_parts import (
+    Legend,
+    add_image,
+    finished_map,
+    free_name,
+    prepared_map,
+)
+from semsig_gis.errors import InputError
+from semsig_gis.map_image import level_image
+from semsig_gis.map_legend import GROUP_COLOURS, ambiguity_legend
+
+if TYPE_CHECKING:
+    import folium
+
+    from semsig_gis.database import SignatureDatabase
+    from semsig_gis.identifiability import Identifiability
+
+__all__ = ["ambiguity_map"]
+
+
+def ambiguity_map(
+    database: SignatureDatabase,
+    *,
+    identifiability: Identifiability | None = None,
+    map_: folium.Map | None = None,
+    tiles: str | None = None,
+) -> folium.Map:
+    """Show how many cells have the same signature, and which.
+
+    Parameters
+    ----------
+    database : SignatureDatabase
+        The cells.
+    identifiability : Identifiability, optional
+        What is known of queries from these cells, to be told by a click as well.
+    map_ : folium.Map, optional
+        Map to add the layers to; a new one by default.
+    tiles : str, optional
+        Online background of a new map, by a name that folium knows; none by default.
+
+    Returns
+    -------
+    folium.Map
+        The map, with these layers: images of how many cells have the same types, and the same
+        types and angle levels (hidden at first), and a layer without signs of its own; while it
+        is on, a click tells of the cell, draws those that look the same, and jumps to them.
+
+    Raises
+    ------
+    InputError
+        If there is no cell, `identifiability` is of another database, `tiles` is not known to
+        folium, or both `tiles` and `map_` are given.
+
+    Examples
+    --------
+    >>> from semsig_gis.catalog import paper_taxonomy
+    >>> from semsig_gis.building import build_database
+    >>> from semsig_gis.objects import build_objects
+    >>> from semsig_gis.sources.synthetic import CitySpec, synthetic_city
+    >>> layers = synthetic_city(CitySpec(size=200.0))
+    >>> objects, _ = build_objects(layers, taxonomy=paper_taxonomy(), crs="EPSG:32631")
+    >>> ambiguity_map(build_database(objects)).options["maxZoom"]
+    20
+    """
+    view = city_view(database)
+    if identifiability is not None and identifiability.database is not database:
+        msg = "what is told of queries is of another database; give that of these cells."
+        raise InputError(msg)
+    chosen = prepared_map(map_, tiles, title="Cells that look the same")
+    types, angles = database.type_sequences, database.angle_sequences
+    pairs = types.inverse * len(angles) + angles.inverse
+    _, pair, counts = np.unique(pairs, return_inverse=True, return_counts=True)
+    sizes = {"Same types": database.type_group_sizes, "Same types and angle levels": counts[pair]}
+    for name, size in sizes.items():
+        levels = np.digitize(size, list(GROUP_COLOURS)).astype(np.uint8)
+        image = level_image(database, levels, list(GROUP_COLOURS.values()))
+        add_image(chosen, *image, name=name, show=name == "Same types")
+    facts = [group_facts(database)]
+    if identifiability is not None:
+        facts.append(lookalike_facts(identifiability))
+    CellLayer(free_name(chosen, "Cells, by a click"), database, facts).add_to(chosen)
+    Legend(
+        ambiguity_legend(sizes, licenses=database.licenses), view if map_ is None else None
+    ).add_to(chosen)
+    return finished_map(chosen)
