@@ -77,4 +77,4 @@ def identifiability_map(
     corners = np.stack([database.xy.min(axis=0), database.xy.max(axis=0)])
     view = to_latlon(corners, database.crs) if map_ is None else None
     Legend(identifiability_legend(told), view).add_to(chosen)
-    return finished_map(chosen)
+    return finished_map(chosen, database)

@@ -92,7 +92,7 @@ def location_map(
     drawn = _Drawn(location)
     chosen = prepared_map(map_, tiles, title="Where it was seen")
     add_city(chosen, location.posterior.database)
-    add_image(chosen, *_chances(location), name="Chance", opacity=0.75)
+    add_image(chosen, *_chances(location), name="Chance", opacity=0.75, flips=True)
     for number, why in enumerate(location.explanations, start=1):
         name = free_name(chosen, f"Objects from rank {number}")
         Drawing(name, "drawings", drawn.explanation(why), show=number == 1).add_to(chosen)
@@ -104,7 +104,7 @@ def location_map(
     Drawing(free_name(chosen, "Best place"), "drawings", drawn.place()).add_to(chosen)
     view = drawn.view() if map_ is None else None
     Legend(location_legend(location), view, zoom=CLOSEST_ZOOM).add_to(chosen)
-    return finished_map(chosen)
+    return finished_map(chosen, location.posterior.database)
 
 
 def _chances(location: Location) -> tuple[bytes, list[list[float]]]:
@@ -220,7 +220,7 @@ class _Drawn:
         looks = [
             [
                 {
-                    "color": "#555555" if verdict == "missed" else colour,
+                    "color": "#808080" if verdict == "missed" else colour,
                     "weight": 1 if verdict == "missed" else 2,
                     "opacity": 0.9,
                     "dashArray": None if verdict in {"matched", "misnamed"} else "3 5",

@@ -169,7 +169,7 @@ def evaluation_map(
         ).add_to(chosen)
     legend = evaluation_legend(evaluation, error_limit=_metres(guess), licenses=database.licenses)
     Legend(legend, view if map_ is None else None).add_to(chosen)
-    return finished_map(chosen)
+    return finished_map(chosen, database)
 
 
 def localization_map(
@@ -232,7 +232,7 @@ def localization_map(
         records[::-1],  # the best last, so that they lie on top
     ).add_to(chosen)
     Legend(localization_legend(localization), places if map_ is None else None).add_to(chosen)
-    return finished_map(chosen)
+    return finished_map(chosen, database)
 
 
 def save_map(map_: folium.Map, path: str | Path, *, self_contained: bool | None = None) -> bool:
