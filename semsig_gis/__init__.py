@@ -44,8 +44,10 @@ if TYPE_CHECKING:
     from semsig_gis.loading import Loaded, assemble, choose_layers, read_files
     from semsig_gis.locating import locate, locate_route
     from semsig_gis.location import Location
+    from semsig_gis.map_ground import ground_map
     from semsig_gis.map_identifiability import identifiability_map
     from semsig_gis.map_location import location_map
+    from semsig_gis.map_objects import objects_map
     from semsig_gis.maps import evaluation_map, localization_map, save_map
     from semsig_gis.matching import Localization, Method, localize
     from semsig_gis.noise import NoiseMixture, NoiseSpec, named_noise
@@ -126,6 +128,7 @@ _HOMES = {
     "fetch_layers": "fetching",
     "find_area": "fetching",
     "find_files": "sources",
+    "ground_map": "map_ground",
     "identifiability_map": "map_identifiability",
     "identify": "identifying",
     "load_catalog": "catalog",
@@ -135,6 +138,7 @@ _HOMES = {
     "locate_route": "locating",
     "location_map": "map_location",
     "named_noise": "noise",
+    "objects_map": "map_objects",
     "open_cache": "fetching",
     "open_database": "database_file",
     "open_dataset": "dataset",
@@ -216,6 +220,7 @@ __all__ = [
     "fetch_layers",
     "find_area",
     "find_files",
+    "ground_map",
     "identifiability_map",
     "identify",
     "load_catalog",
@@ -225,6 +230,7 @@ __all__ = [
     "locate_route",
     "location_map",
     "named_noise",
+    "objects_map",
     "open_cache",
     "open_database",
     "open_dataset",

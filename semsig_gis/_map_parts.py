@@ -167,7 +167,10 @@ def prepared_map(map_: folium.Map | None, tiles: str | None, *, title: str) -> f
 
 
 def finished_map(
-    chosen: folium.Map, source: SignatureDatabase | StreetObjects | None
+    chosen: folium.Map,
+    source: SignatureDatabase | StreetObjects | None,
+    *,
+    licenses: tuple[str, ...] = (),
 ) -> folium.Map:
     """Put around a map what every map has, and the layer control last, where it knows all layers.
 
@@ -175,7 +178,7 @@ def finished_map(
     cells of a database, by x and y the places in its coordinate system.
     """
     children = layers_of(chosen)
-    area, names = (None, ()) if source is None else (_area(source), source.licenses)
+    area, names = (None, licenses) if source is None else (_area(source), source.licenses)
     for name, child in list(children.items()):
         if isinstance(child, Surroundings):
             names = child.names + names
@@ -261,13 +264,13 @@ def free_name(map_: folium.Map, name: str) -> str:
     return next(one for one in itertools.chain([name], numbered) if one not in taken)
 
 
-def add_city(chosen: folium.Map, database: SignatureDatabase) -> None:
+def add_city(chosen: folium.Map, database: SignatureDatabase, *, show: bool = True) -> None:
     """Add the cells as an image, unless the map shows them already."""
     picture = city_image(database, SHADES)
     shown = {child.url for child in layers_of(chosen).values() if isinstance(child, ImageOverlay)}
     if _data_url(picture[0]) not in shown:
         # In the pane of tiles, below everything else.
-        add_image(chosen, *picture, name="Objects seen from a cell", flips=True)
+        add_image(chosen, *picture, name="Objects seen from a cell", flips=True, show=show)
 
 
 def add_image(
@@ -278,6 +281,7 @@ def add_image(
     name: str,
     opacity: float = 1.0,
     flips: bool = False,
+    show: bool = True,
 ) -> None:
     """Add a PNG below everything that is drawn; its lightness flips in the dark, if need be."""
     ImageOverlay(
@@ -287,6 +291,7 @@ def add_image(
         pane="tilePane",
         opacity=opacity,
         class_name="semsig-flip" if flips else "",
+        show=show,
     ).add_to(chosen)
 
 

@@ -26,6 +26,7 @@ semsig.reveal = (map, layer, place) => {
   map.addLayer(outermost);
   map.setView(place, Math.max(map.getZoom(), 18), {animate: false});
 };
+semsig.degrees = (place) => ["Degrees", place.map((part) => part.toFixed(6)).join(", ")];
 // Latitude and longitude of a place in the coordinate system of the data.
 semsig.latlng = ({middle, half, terms}, x, y) => {
   const [u, v] = [(x - middle[0]) / half, (y - middle[1]) / half];
@@ -37,9 +38,8 @@ semsig.latlng = ({middle, half, terms}, x, y) => {
 semsig.point = (map, name, place, facts, corners) => {
   const look = {pane: "shadowPane", interactive: false, color: "#d55e00", weight: 3, fill: false};
   const mark = corners ? L.polygon(corners, look) : L.circleMarker(place, {...look, radius: 10});
-  const rows = [...facts, ["Place", place.map((part) => part.toFixed(6)).join(", ")]];
   const popup = L.popup({maxWidth: 300, minWidth: 180}).setLatLng(place).setContent(
-    semsig.details(name, rows.map((row) => row[0]), rows.map((row) => row[1]), {}));
+    semsig.details(name, facts.map((fact) => fact[0]), facts.map((fact) => fact[1]), {}));
   popup.on("remove", () => mark.remove());
   map.setView(place, Math.max(map.getZoom(), 18), {animate: false});
   mark.addTo(map);
@@ -59,7 +59,8 @@ semsig.cellsCalled = (text, area) => {
   const latlngs = corners.map((corner) => semsig.latlng(area, ...corner));
   const show = (map) => {
     const place = semsig.latlng(area, ...middle);
-    semsig.point(map, "Cell " + text, place, [["Middle", middle.join(", ")]], latlngs);
+    const facts = [["Middle", middle.join(", ") + " in " + area.crs], semsig.degrees(place)];
+    semsig.point(map, "Cell " + text, place, facts, latlngs);
     // A layer that knows the cell tells of it instead.
     map.fire("click", {latlng: L.latLng(place), semsigSearch: true});
   };
@@ -75,15 +76,17 @@ semsig.placesAt = (text, area) => {
   const degrees = Math.abs(first) <= 90 && Math.abs(second) <= 180;
   if (degrees && (!bounds || bounds.contains([first, second]))) {
     const name = first + ", " + second;
-    const show = (map) => semsig.point(map, name, [first, second], []);
-    found.push({name, hint: "latitude, longitude", show});
+    const hint = "latitude, longitude";
+    const show = (map) => semsig.point(map, name, [first, second], [["Is", hint]]);
+    found.push({name, hint, show});
   }
   const [west, south, east, north] = area ? area.box : [0, 0, 0, 0];
   if (area && west <= first && first <= east && south <= second && second <= north) {
     const name = first + ", " + second;
-    const show = (map) => semsig.point(
-      map, name, semsig.latlng(area, first, second), [["In", area.crs]]);
-    found.push({name, hint: "x, y in " + area.crs, show});
+    const hint = "x, y in " + area.crs;
+    const place = semsig.latlng(area, first, second);
+    const show = (map) => semsig.point(map, name, place, [["Is", hint], semsig.degrees(place)]);
+    found.push({name, hint, show});
   }
   return found;
 };
@@ -99,7 +102,7 @@ semsig.search = (map, area) => {
   message.hidden = true;
   for (const [part, values] of [
     [box, {role: "search"}],
-    [input, {type: "search", role: "combobox", placeholder: "Search\u2026", autocomplete: "off",
+    [input, {type: "search", role: "combobox", placeholder: "Cell, place or name\u2026", autocomplete: "off",
       "aria-label": "Search: the number of a cell, latitude and longitude, x and y, or a name",
       title: "The number of a cell, latitude and longitude, x and y, or a name",
       spellcheck: "false", "aria-autocomplete": "list", "aria-expanded": "false",
@@ -215,6 +218,8 @@ semsig.furnish = (map, area, credits) => {
     text.textContent = credit;
     map.attributionControl.addAttribution(text.innerHTML);
   }
+  const told = (is) => () => map.getContainer().classList.toggle("semsig-told", is);
+  map.on("popupopen", told(true)).on("popupclose", told(false));
   semsig.colours(map);
   semsig.search(map, area);
 };

@@ -10,8 +10,8 @@ if TYPE_CHECKING:
 
 __all__ = ["Sign", "class_signs"]
 
-# Those of Okabe and Ito, and two of Tol, which colour-blind people tell apart; in the order of the
-# reports, where green comes first because trees do.
+# Those of Okabe and Ito, and two of Tol, which colour-blind people tell apart, in the order of the
+# reports, where green comes first because trees do; then a lighter or darker one of each.
 COLOURS = (
     "#009e73",
     "#0072b2",
@@ -22,6 +22,15 @@ COLOURS = (
     "#666666",
     "#aa4499",
     "#999933",
+    "#8fdcc0",
+    "#6a4fd8",
+    "#8a5a00",
+    "#f4b6d2",
+    "#8c2d04",
+    "#b8e1f5",
+    "#b4b4b4",
+    "#e3b5e3",
+    "#dddd99",
 )
 # Outlines around (0, 0), of about the same area, and how far below it a letter stands.
 SHAPES = (

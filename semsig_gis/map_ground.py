@@ -7,14 +7,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import shapely
 
-from semsig_gis._map_board import mercator, packed, steps
+from semsig_gis._map_board import mercator, steps
 from semsig_gis._map_parts import Drawing, Legend, finished_map, free_name, prepared_map, to_latlon
 from semsig_gis.boxes import hilbert_order
 from semsig_gis.errors import CrsError, EmptyResultError
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
     import folium
     import geopandas as gpd
     from numpy.typing import NDArray
@@ -31,7 +29,8 @@ def ground_map(
     *,
     buildings: gpd.GeoDataFrame | None = None,
     streets: gpd.GeoDataFrame | None = None,
-    box: Sequence[float] | None = None,
+    box: tuple[float, float, float, float] | None = None,
+    licenses: tuple[str, ...] = (),
     map_: folium.Map | None = None,
 ) -> folium.Map:
     """Show plain streets and buildings, for other things to be seen among.
@@ -42,8 +41,10 @@ def ground_map(
         Polygons in a metric CRS.
     streets : GeoDataFrame, optional
         Centre lines in the same CRS.
-    box : sequence of float, optional
+    box : tuple of float, optional
         ``xmin, ymin, xmax, ymax`` in that CRS: only what meets it. Everything by default.
+    licenses : tuple of str, optional
+        Whom to name for them, a line each.
     map_ : folium.Map, optional
         Map to add the layer to, below all else; a new one by default.
 
@@ -93,10 +94,12 @@ def ground_map(
         bounds = shapely.total_bounds(np.concatenate(list(shapes.values()))).reshape(2, 2)
         text = "<summary>Streets and buildings</summary>"
         Legend(text, to_latlon(bounds, systems[0])).add_to(chosen)
-    return finished_map(chosen, None)
+    return finished_map(chosen, None, licenses=licenses)
 
 
-def _simple(table: gpd.GeoDataFrame, box: Sequence[float] | None) -> NDArray[np.object_]:
+def _simple(
+    table: gpd.GeoDataFrame, box: tuple[float, float, float, float] | None
+) -> NDArray[np.object_]:
     """Return the lines or polygons of a table without small details, neighbours together."""
     shapes = table.geometry.to_numpy()
     if box is not None:
@@ -126,7 +129,7 @@ def _drawn(
     for kind, (lines, owner) in rings.items():
         part = places[start : start + len(points[kind])]
         start += len(part)
-        numbers = {
+        numbers: dict[str, NDArray[Any]] = {
             "x": part[:, 0],
             "y": part[:, 1],
             "ends": np.cumsum(shapely.get_num_coordinates(lines)),

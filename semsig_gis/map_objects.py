@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+import pandas as pd
 
 from semsig_gis._map_board import mercator, packed, steps
 from semsig_gis._map_parts import (
@@ -51,7 +52,8 @@ def objects_map(
     objects : StreetObjects
         What to show.
     database : SignatureDatabase, optional
-        The cells from which they are seen, to show below them and to be found by number.
+        The cells from which they are seen: a layer that is hidden at first, and to be found by
+        number.
     map_ : folium.Map, optional
         Map to add the layers to, where they are hidden at first; a new one by default.
     tiles : str, optional
@@ -86,7 +88,7 @@ def objects_map(
         raise EmptyResultError(msg)
     chosen = prepared_map(map_, tiles, title="Street objects")
     if database is not None:
-        add_city(chosen, database)
+        add_city(chosen, database, show=False)
     key = f"objects{len(layers_of(chosen))}"
     Script("streetObjects", key, *_drawn(objects)).add_to(chosen)
     signs, counts = class_signs(objects.taxonomy), objects.class_counts
@@ -106,7 +108,7 @@ def _drawn(objects: StreetObjects) -> tuple[dict[str, list[str]], dict[str, Any]
     order = near[np.argsort(objects.codes[near], kind="stable")]
     table = objects.table.iloc[order]
     places, about = mercator(objects.xy[order], objects.crs)
-    sources, source = np.unique(table[SOURCE].to_numpy(str), return_inverse=True)
+    source, sources = pd.factorize(table[SOURCE], sort=True)
     arrays: dict[str, NDArray[Any] | list[str]] = {
         "ids": table[SOURCE_ID].astype(str).tolist(),
         "source": source.astype(np.uint16),

@@ -39,7 +39,7 @@ STYLE = """\
 /* What is dark on light is light on dark: the ramps that begin near the colour of paper. */
 .semsig-dark .semsig-flip, .semsig-dark .leaflet-heatmap-layer, .semsig-dark i.heat,
 .semsig-dark img.leaflet-tile {
-  filter: invert(1) hue-rotate(180deg) brightness(1.3); }
+  filter: invert(1) hue-rotate(180deg) brightness(1.15); }
 /* The streets and buildings below the cells are seen through them. */
 .semsig-ground .leaflet-tile-pane .leaflet-image-layer { mix-blend-mode: multiply; }
 .semsig-ground.semsig-dark .leaflet-tile-pane .leaflet-image-layer { mix-blend-mode: screen; }
@@ -65,7 +65,8 @@ STYLE = """\
 .semsig-legend td.count { text-align: right; white-space: nowrap; }
 .semsig-sign { width: 17px; height: 17px; vertical-align: -4px; overflow: visible; }
 .semsig-sign path { stroke: var(--panel); stroke-width: 0.1; }
-.semsig-details { font: 13px/1.4 system-ui, sans-serif; overflow-wrap: anywhere; }
+.semsig-details {
+  font: 13px/1.4 system-ui, sans-serif; overflow-wrap: anywhere; max-width: calc(100vw - 64px); }
 .semsig-details th {
   text-align: left; font-weight: 400; color: var(--faint); white-space: nowrap; }
 .semsig-details th, .semsig-details td { vertical-align: top; padding: 2px 6px 2px 0; }
@@ -82,13 +83,15 @@ STYLE = """\
 .semsig-search { width: 230px; }
 .semsig-search input { width: 100%; height: 34px; padding: 0 9px; border: 0; font-size: 14px; }
 .semsig-search ul {
-  list-style: none; margin: 4px 0 0; padding: 4px; max-height: 50vh; overflow: auto; }
+  position: absolute; z-index: 1; top: 100%; width: 100%; list-style: none; margin: 4px 0 0;
+  padding: 4px; max-height: 50vh; overflow: auto; }
 .semsig-search li {
   padding: 4px 6px; border-radius: 3px; cursor: pointer; overflow-wrap: anywhere;
   max-height: 5.6em; overflow: hidden; }
 .semsig-search li[aria-selected=true] { background: var(--chosen); }
 .semsig-search li small { display: block; color: var(--faint); }
-.semsig-search p { margin: 4px 0 0; padding: 6px 9px; }
+.semsig-search p {
+  position: absolute; z-index: 1; top: 100%; width: 100%; margin: 4px 0 0; padding: 6px 9px; }
 .semsig-search [hidden] { display: none; }
 .leaflet-tooltip.semsig-number {
   background: none; border: none; box-shadow: none; padding: 0; color: #222;
@@ -98,7 +101,9 @@ STYLE = """\
 .leaflet-control-layers-expanded { max-width: min(320px, calc(100vw - 20px)); }
 @media (max-width: 700px) {
   .semsig-search { width: calc(100vw - 80px); max-width: 300px; }
-  .semsig-search input { height: 40px; font-size: 16px; } }
+  .semsig-search input { height: 40px; font-size: 16px; }
+  /* A popup takes the whole width, and goes by a tap beside it. */
+  .semsig-told .leaflet-top { visibility: hidden; } }
 """
 
 SCRIPT = """\
@@ -173,7 +178,7 @@ const semsig = {
   },
   legend(map, text, view, zoom) {
     const box = L.DomUtil.create("details", "semsig-legend");
-    box.open = window.innerWidth > 700;
+    box.open = window.innerWidth > 700 && !document.querySelector(".semsig-legend[open]");
     box.innerHTML = text;
     L.DomEvent.disableClickPropagation(box);
     L.DomEvent.disableScrollPropagation(box);

@@ -61,7 +61,7 @@ _QUERY_FIELDS = (
     "True rank",
     "True cell",
     "Best cell",
-    "It sees",
+    "Best cell sees",
 )
 _CANDIDATE_FIELDS = ("Rank", "Distance", "Signature", "Cell", "Position")
 

@@ -9,6 +9,7 @@ from typing import Annotated
 import typer
 
 from semsig_gis.cli._app import Database, app, known_identifiability, tell_if_online
+from semsig_gis.cli._ground import Buildings, Streets, ground_of
 from semsig_gis.console import progress
 from semsig_gis.errors import InputError
 
@@ -33,16 +34,26 @@ def map_(
             "--identifiability", help="Draw where a query can be placed (after `semsig identify`)."
         ),
     ] = False,
+    objects: Annotated[
+        Path | None, typer.Option(help="Draw the street objects that `semsig load` wrote.")
+    ] = None,
+    buildings: Buildings = None,
+    streets: Streets = None,
     out: Annotated[Path, typer.Option(help="Map to write (.html).")],
 ) -> None:
-    """Draw an evaluation, or where a query can be placed at all."""
+    """Draw an evaluation, where a query can be placed at all, or the street objects."""
     from semsig_gis.database_file import open_database
     from semsig_gis.evaluation import Evaluation
+    from semsig_gis.map_ground import ground_map
     from semsig_gis.map_identifiability import identifiability_map
+    from semsig_gis.map_objects import objects_map
     from semsig_gis.maps import evaluation_map, save_map
+    from semsig_gis.objects import open_objects
 
-    if (evaluation is not None) == identifiability:
-        msg = "a map shows --evaluation or --identifiability; give one of them."
+    given = (evaluation is not None) + identifiability
+    if given > 1 or (given == 0 and objects is None):
+        msg = "a map shows --evaluation or --identifiability, with --objects or without, or "
+        msg += "--objects alone; give one of them."
         raise InputError(msg)
     results = None if evaluation is None else Evaluation.load(evaluation)
     opened = open_database(database)
@@ -50,11 +61,19 @@ def map_(
     if identifiability and told is None:
         msg = f"{database} does not tell where a query can be placed; run semsig identify first."
         raise InputError(msg)
+    seen = None if objects is None else open_objects(objects)
+    ground = ground_of(database, opened, buildings=buildings, streets=streets)
     with progress("drawing the map"):
         if told is not None:
             drawn = identifiability_map(told)
         elif results is not None:
             drawn = evaluation_map(results, opened)
+        elif seen is not None:
+            drawn = objects_map(seen, database=opened)
+        if seen is not None and given:
+            objects_map(seen, map_=drawn)
+        if ground:
+            ground_map(**ground, map_=drawn)
         offline = save_map(drawn, out)
     typer.echo(f"map: {out}")
     tell_if_online(offline)
