@@ -102,7 +102,8 @@ semsig.search = (map, area) => {
   message.hidden = true;
   for (const [part, values] of [
     [box, {role: "search"}],
-    [input, {type: "search", role: "combobox", placeholder: "Cell, place or name\u2026", autocomplete: "off",
+    [input, {type: "search", role: "combobox", autocomplete: "off",
+      placeholder: "Cell, place or name\u2026",
       "aria-label": "Search: the number of a cell, latitude and longitude, x and y, or a name",
       title: "The number of a cell, latitude and longitude, x and y, or a name",
       spellcheck: "false", "aria-autocomplete": "list", "aria-expanded": "false",

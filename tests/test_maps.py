@@ -156,7 +156,8 @@ def test_a_localization_in_a_browser(
     )
     assert len(popups) == 50
     best = popups[-1]  # drawn last, on top
-    assert best.startswith("Rank 1Rank1 of ")
+    assert best.startswith("Rank 1")
+    assert "Rank1 of " in best
     assert str(database.cell_ids[cell]) in best
     assert database.types(cell) in best
     legend = browser.find_element(By.CSS_SELECTOR, ".semsig-legend").text
