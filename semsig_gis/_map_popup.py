@@ -29,19 +29,23 @@ semsig.wheel = (label, types, bearings) => {
   draw("path", {d: "M0,-67L4,-56H-4Z", class: "north"});
   draw("circle", {r: 1.5, class: "north"});
   // Symbols that would lie on one another go nearer to the middle.
-  const circles = [44, 34, 24, 14].map((radius) => ({radius, taken: []}));
+  const size = bearings.length > 16 ? 8 : 11;
+  const circles = [];
+  for (let radius = 53 - size * 0.8; radius > size; radius -= size) {
+    circles.push({radius, taken: []});
+  }
   places.forEach((angle, one) => {
     const room = ({radius, taken}) => Math.min(7, ...taken.map((other) => {
       const turn = Math.abs(angle - other) % (2 * Math.PI);
       return Math.min(turn, 2 * Math.PI - turn);
     })) * radius;
-    const free = circles.find((circle) => room(circle) >= 11)
+    const free = circles.find((circle) => room(circle) >= size)
       || circles.reduce((best, circle) => (room(circle) > room(best) ? circle : best));
     free.taken.push(angle);
-    const [[x, y], [outX, outY]] = [at(angle, free.radius + (types ? 6 : 0)), at(angle, 54)];
+    const [[x, y], [outX, outY]] = [at(angle, free.radius + (types ? size / 2 : 0)), at(angle, 54)];
     draw("line", {x1: x, y1: y, x2: outX, y2: outY, class: "ray"});
     const [left, top] = at(angle, free.radius);
-    if (types) draw("text", {x: left, y: top, dy: "0.35em"}, types[one]);
+    if (types) draw("text", {x: left, y: top, dy: "0.35em", "font-size": size}, types[one]);
     else draw("circle", {cx: left, cy: top, r: 3, class: "north"});
   });
   figure.append(drawing);

@@ -79,7 +79,7 @@ STYLE = """\
 .semsig-wheels .ray { stroke: var(--faint); stroke-width: 0.7; }
 .semsig-wheels .north { fill: var(--ink); }
 .semsig-wheels text {
-  font: 700 11px system-ui, sans-serif; fill: var(--ink); text-anchor: middle; }
+  font-family: system-ui, sans-serif; font-weight: 700; fill: var(--ink); text-anchor: middle; }
 .semsig-search { width: 230px; }
 .semsig-search input { width: 100%; height: 34px; padding: 0 9px; border: 0; font-size: 14px; }
 .semsig-search ul {
