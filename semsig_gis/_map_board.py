@@ -345,8 +345,8 @@ semsig.ground = (packed, about) => {
       const dark = semsig.isDark(map);
       ctx.lineWidth = Math.max(0.7, about.width * frame.scale / about.quantum);
       ctx.lineCap = ctx.lineJoin = "round";
-      ctx.strokeStyle = dark ? "#3b4047" : "#d8dade";
-      ctx.fillStyle = dark ? "#272b30" : "#e9e5dd";
+      ctx.strokeStyle = dark ? "#3b4047" : "#cfd3d8";
+      ctx.fillStyle = dark ? "#272b30" : "#e4ded3";
       if (kinds.streets) draw(ctx, kinds.streets, frame, min, max, false);
       if (kinds.buildings) draw(ctx, kinds.buildings, frame, min, max, true);
     });
@@ -392,4 +392,4 @@ def packed(arrays: Mapping[str, NDArray[Any] | Sequence[str]]) -> dict[str, list
 
 
 def _text(content: bytes) -> str:
-    return base64.b64encode(zlib.compress(content, 9)).decode("ascii")
+    return base64.b64encode(zlib.compress(content)).decode("ascii")

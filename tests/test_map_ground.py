@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from semsig_gis.database import SignatureDatabase
 
 BOARD = ".leaflet-tile-pane canvas.semsig-board"
-HOUSE, STREET = "#e9e5dd", "#d8dade"
+HOUSE, STREET = "#e4ded3", "#cfd3d8"
 WORLD = random_town()
 
 
