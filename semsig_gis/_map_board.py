@@ -169,8 +169,8 @@ semsig.streetObjects = (key, packed, about) => {
   };
   // Signs are copied pixel by pixel, many times faster than a canvas draws so many images.
   const paint = (map) => (ctx, min, max) => {
-    if (data === null) return;
     const {width, height} = ctx.canvas;
+    if (data === null || !width || !height) return;  // a page that is not shown has no size
     const image = ctx.createImageData(width, height);
     const pixels = new Uint32Array(image.data.buffer);
     const dots = width / (max.x - min.x);

@@ -29,6 +29,8 @@ if TYPE_CHECKING:
     from pyproj import CRS
 
     from semsig_gis.objects import StreetObjects
+    from semsig_gis.signatures import Signature
+    from semsig_gis.taxonomy import Taxonomy
 
 __all__ = [
     "Drawing",
@@ -45,6 +47,7 @@ __all__ = [
     "layers_of",
     "popup_signature",
     "prepared_map",
+    "query_signature",
     "to_latlon",
 ]
 
@@ -251,6 +254,11 @@ def popup_signature(types: str | None, bearings: ArrayLike | None) -> list[Any]:
         return [types, None]
     degrees = np.rint(np.asarray(bearings, np.float64)).astype(int) % 360
     return [types, degrees.tolist()]
+
+
+def query_signature(query: Signature, taxonomy: Taxonomy) -> list[Any]:
+    types = None if query.codes is None else taxonomy.decode(query.codes)
+    return popup_signature(types, query.bearings)
 
 
 def cell_signature(database: SignatureDatabase, cell: int) -> list[Any]:

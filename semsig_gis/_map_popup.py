@@ -86,7 +86,8 @@ semsig.details = (name, fields, values, titles) => {
     semsig.text(cell, "div", pairs.join(" "));
   });
   if (symbols.size) {
-    const known = [...symbols].sort().map((symbol) => symbol + " " + titles[symbol]);
+    const known = [...symbols].sort().map(
+      (symbol) => symbol + " " + (titles[symbol] || "any class"));
     row("Classes").textContent = known.join(", ");
   }
   return box;

@@ -16,6 +16,7 @@ from semsig_gis._map_parts import (
     finished_map,
     free_name,
     prepared_map,
+    query_signature,
     to_latlon,
 )
 from semsig_gis.map_image import level_image
@@ -31,7 +32,15 @@ if TYPE_CHECKING:
 __all__ = ["location_map"]
 
 PLACE_FIELDS = ("Chance", "Place", "Give or take", "North of the query", "Cell")
-CANDIDATE_FIELDS = ("Chance", "Log-likelihood", "North of the query", "It sees", "Cell", "Place")
+CANDIDATE_FIELDS = (
+    "Query",
+    "Cell sees",
+    "Chance",
+    "Log-likelihood",
+    "North of the query",
+    "Cell",
+    "Place",
+)
 OBJECT_FIELDS = (
     "Chance",
     "Seen as",
@@ -178,14 +187,16 @@ class _Drawn:
     def candidates(self) -> list[list[Any]]:
         """Return the candidates, likeliest first."""
         rows = self.location.candidates
+        asked = query_signature(self.location.query, self.database.taxonomy)
         records = []
         places = self.latlon(rows[["x", "y"]].to_numpy())
         for place, row in zip(places, rows.to_dict("records"), strict=True):
             details = [
+                asked,
+                cell_signature(self.database, row["cell"]),
                 f"{row['chance']:.2%}",
                 f"{row['loglik']:.2f}",
                 _north(row.get("heading")),
-                cell_signature(self.database, row["cell"]),
                 str(row["cell_id"]),
                 _position(place),
             ]

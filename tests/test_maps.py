@@ -35,7 +35,7 @@ from semsig_gis.catalog import paper_taxonomy
 from semsig_gis.errors import InputError
 from semsig_gis.evaluation import evaluate
 from semsig_gis.limitations import MissingClasses
-from semsig_gis.map_legend import FAILED, SUCCESSFUL
+from semsig_gis.map_legend import CANDIDATE_RAMP, FAILED, SUCCESSFUL
 from semsig_gis.maps import evaluation_map, localization_map, save_map
 from semsig_gis.matching import localize
 from semsig_gis.objects import StreetObjects, build_objects
@@ -166,6 +166,15 @@ def test_a_localization_in_a_browser(
     best = popups[-1]  # drawn last, on top
     assert best.startswith("Rank 1")
     assert "Rank1 of " in best
+    # The query and what the cell sees, side by side.
+    captions = asked(
+        browser,
+        "circles(arguments[0])[0].openPopup();"
+        "return [...document.querySelectorAll('figcaption')].map((one) => one.textContent)",
+        CANDIDATE_RAMP[0],
+    )
+    assert captions == ["Query", "Signature"]
+    asked(browser, "map.closePopup()")
     assert str(database.cell_ids[cell]) in best
     assert database.types(cell) in best
     legend = browser.find_element(By.CSS_SELECTOR, ".semsig-legend").text
