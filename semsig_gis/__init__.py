@@ -46,8 +46,10 @@ if TYPE_CHECKING:
     from semsig_gis.location import Location
     from semsig_gis.map_ambiguity import ambiguity_map
     from semsig_gis.map_drift import drift_map
+    from semsig_gis.map_ground import ground_map
     from semsig_gis.map_identifiability import identifiability_map
     from semsig_gis.map_location import location_map
+    from semsig_gis.map_objects import objects_map
     from semsig_gis.maps import evaluation_map, localization_map, save_map
     from semsig_gis.matching import Localization, Method, localize
     from semsig_gis.noise import NoiseMixture, NoiseSpec, named_noise
@@ -130,6 +132,7 @@ _HOMES = {
     "fetch_layers": "fetching",
     "find_area": "fetching",
     "find_files": "sources",
+    "ground_map": "map_ground",
     "identifiability_map": "map_identifiability",
     "identify": "identifying",
     "load_catalog": "catalog",
@@ -139,6 +142,7 @@ _HOMES = {
     "locate_route": "locating",
     "location_map": "map_location",
     "named_noise": "noise",
+    "objects_map": "map_objects",
     "open_cache": "fetching",
     "open_database": "database_file",
     "open_dataset": "dataset",
@@ -222,6 +226,7 @@ __all__ = [
     "fetch_layers",
     "find_area",
     "find_files",
+    "ground_map",
     "identifiability_map",
     "identify",
     "load_catalog",
@@ -231,6 +236,7 @@ __all__ = [
     "locate_route",
     "location_map",
     "named_noise",
+    "objects_map",
     "open_cache",
     "open_database",
     "open_dataset",

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import base64
 import itertools
+from html import escape
 from typing import TYPE_CHECKING, Any, cast
 
 import folium
@@ -15,6 +16,8 @@ from folium.template import Template
 from folium.utilities import JsCode
 from pyproj import Transformer
 
+from semsig_gis import _map_board, _map_popup, _map_search
+from semsig_gis.database import SignatureDatabase
 from semsig_gis.errors import InputError
 from semsig_gis.map_image import city_image
 from semsig_gis.map_legend import SHADES
@@ -25,26 +28,34 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
     from pyproj import CRS
 
-    from semsig_gis.database import SignatureDatabase
+    from semsig_gis.objects import StreetObjects
+    from semsig_gis.signatures import Signature
+    from semsig_gis.taxonomy import Taxonomy
 
 __all__ = [
     "Drawing",
     "Furniture",
     "Legend",
+    "Script",
     "add_city",
     "add_image",
     "cell_signature",
     "class_titles",
     "finished_map",
     "free_name",
+    "layer_text",
     "layers_of",
     "popup_signature",
     "prepared_map",
+    "query_signature",
     "to_latlon",
 ]
 
 MAX_ZOOM = 20
 CLOSE_ZOOM = 17  # the closest that a new map shows by itself
+SCRIPTS = (SCRIPT, _map_popup.SCRIPT, _map_search.SCRIPT, _map_board.SCRIPT)
+POWERS = 4  # of x and y, which tell a place within millimetres in a city
+LATTICE = 9
 
 
 class Furniture(MacroElement):
@@ -53,7 +64,7 @@ class Furniture(MacroElement):
     def render(self, **kwargs: Any) -> Any:  # noqa: ANN401 - as branca has it
         """Put the style and script into the page, then the element."""
         figure = cast("Figure", self.get_root())
-        page = f"<style>{STYLE}</style>\n<script>{SCRIPT}</script>"
+        page = f"<style>{STYLE}</style>\n<script>{''.join(SCRIPTS)}</script>"
         figure.header.add_child(Element(page), name="semsig")
         return super().render(**kwargs)  # type: ignore[no-untyped-call]
 
@@ -99,6 +110,43 @@ class Drawing(Furniture, Layer):
         self.arguments = ", ".join(map(script_json, arguments))
 
 
+class Script(Furniture):
+    """A call of a function of this module's script, which draws nothing by itself."""
+
+    _template = Template(
+        """
+        {% macro script(this, kwargs) %}
+        semsig.{{ this.function }}({{ this.arguments }});
+        {% endmacro %}
+        """
+    )
+
+    def __init__(self, function: str, *arguments: object) -> None:
+        super().__init__()  # type: ignore[no-untyped-call]
+        self._name = "SemsigScript"
+        self.function = function
+        self.arguments = ", ".join(map(script_json, arguments))
+
+
+class Surroundings(Furniture):
+    """What stands around a map: search, light and dark, and who is to be named for the data."""
+
+    _template = Template(
+        """
+        {% macro script(this, kwargs) %}
+        semsig.furnish({{ this._parent.get_name() }}, {{ this.area }}, {{ this.credits_ }});
+        {% endmacro %}
+        """
+    )
+
+    def __init__(self, area: dict[str, Any] | None, names: tuple[str, ...]) -> None:
+        super().__init__()  # type: ignore[no-untyped-call]
+        self._name = "SemsigSurroundings"
+        self.names = names
+        self.found = area
+        self.area, self.credits_ = script_json(area), script_json(names)
+
+
 def prepared_map(map_: folium.Map | None, tiles: str | None, *, title: str) -> folium.Map:
     """Return the map to draw on."""
     if map_ is not None:
@@ -121,14 +169,67 @@ def prepared_map(map_: folium.Map | None, tiles: str | None, *, title: str) -> f
     return made
 
 
-def finished_map(chosen: folium.Map) -> folium.Map:
-    """Put the layer control last, where it knows all layers."""
+def finished_map(
+    chosen: folium.Map,
+    source: SignatureDatabase | StreetObjects | None,
+    *,
+    licenses: tuple[str, ...] = (),
+) -> folium.Map:
+    """Put around a map what every map has, and the layer control last, where it knows all layers.
+
+    The source of what was drawn tells whom to name, and what a search can find: by number the
+    cells of a database, by x and y the places in its coordinate system.
+    """
     children = layers_of(chosen)
-    for name in [key for key, child in children.items() if isinstance(child, folium.LayerControl)]:
-        del children[name]
+    area, names = (None, licenses) if source is None else (_area(source), source.licenses)
+    for name, child in list(children.items()):
+        if isinstance(child, Surroundings):
+            names = child.names + names
+            if area is None or area["grid"] is None:
+                area = child.found or area
+        if isinstance(child, folium.LayerControl | Surroundings):
+            del children[name]
+    Surroundings(area, tuple(dict.fromkeys(names))).add_to(chosen)
     narrow = cast("bool", JsCode("window.innerWidth <= 700"))
     folium.LayerControl(collapsed=narrow).add_to(chosen)
     return chosen
+
+
+def _area(source: SignatureDatabase | StreetObjects) -> dict[str, Any]:
+    """Return where the places of a source are, for the search of the page."""
+    low, high = source.xy.min(axis=0), source.xy.max(axis=0)
+    grid = None
+    edge = 0.0
+    if isinstance(source, SignatureDatabase):
+        edge = source.grid.step
+        grid = {
+            "step": source.grid.step,
+            "origin": list(source.grid.origin),
+            "columns": [int(source.columns.min()), int(source.columns.max())],
+            "rows": [int(source.rows.min()), int(source.rows.max())],
+        }
+    authority = source.crs.to_authority()
+    middle, half = (low + high) / 2.0, max(float((high - low).max()) / 2.0, 1.0)
+    # A polynomial is as good as the projection itself in an area of some hundred kilometres.
+    u, v = (part.ravel() for part in np.meshgrid(*2 * [np.linspace(-1.0, 1.0, LATTICE)]))
+    degrees = to_latlon(middle + half * np.stack([u, v], axis=1), source.crs, digits=9)
+    powers = [(i, j) for i in range(POWERS + 1) for j in range(POWERS + 1 - i)]
+    terms = np.stack([u**i * v**j for i, j in powers], axis=1)
+    weights = np.linalg.lstsq(terms, degrees, rcond=None)[0].tolist()
+    return {
+        "crs": source.crs.name if authority is None else ":".join(authority),
+        "box": [*(low - edge).tolist(), *(high + edge).tolist()],
+        "middle": middle.tolist(),
+        "half": half,
+        "terms": [[*power, *weight] for power, weight in zip(powers, weights, strict=True)],
+        "grid": grid,
+    }
+
+
+def layer_text(text: str) -> str:
+    """Return text for the name of a layer, which the layer control reads as HTML."""
+    # A brace could begin what folium renders once more (see `semsig_gis.map_page`).
+    return escape(text).replace("{", "&#123;")
 
 
 def layers_of(map_: folium.Map) -> dict[str, Element]:
@@ -155,6 +256,11 @@ def popup_signature(types: str | None, bearings: ArrayLike | None) -> list[Any]:
     return [types, degrees.tolist()]
 
 
+def query_signature(query: Signature, taxonomy: Taxonomy) -> list[Any]:
+    types = None if query.codes is None else taxonomy.decode(query.codes)
+    return popup_signature(types, query.bearings)
+
+
 def cell_signature(database: SignatureDatabase, cell: int) -> list[Any]:
     return popup_signature(database.types(cell), database.signature(cell).bearings)
 
@@ -166,13 +272,13 @@ def free_name(map_: folium.Map, name: str) -> str:
     return next(one for one in itertools.chain([name], numbered) if one not in taken)
 
 
-def add_city(chosen: folium.Map, database: SignatureDatabase) -> None:
+def add_city(chosen: folium.Map, database: SignatureDatabase, *, show: bool = True) -> None:
     """Add the cells as an image, unless the map shows them already."""
     picture = city_image(database, SHADES)
     shown = {child.url for child in layers_of(chosen).values() if isinstance(child, ImageOverlay)}
     if _data_url(picture[0]) not in shown:
         # In the pane of tiles, below everything else.
-        add_image(chosen, *picture, name="Objects seen from a cell")
+        add_image(chosen, *picture, name="Objects seen from a cell", flips=True, show=show)
 
 
 def add_image(
@@ -182,15 +288,17 @@ def add_image(
     *,
     name: str,
     opacity: float = 1.0,
+    flips: bool = False,
     show: bool = True,
 ) -> None:
-    """Add a PNG below everything that is drawn."""
+    """Add a PNG below everything that is drawn; its lightness flips in the dark, if need be."""
     ImageOverlay(
         _data_url(image),
         bounds,
         name=free_name(chosen, name),
         pane="tilePane",
         opacity=opacity,
+        class_name="semsig-flip" if flips else "",
         show=show,
     ).add_to(chosen)
 

@@ -93,4 +93,4 @@ def ambiguity_map(
     Legend(
         ambiguity_legend(sizes, licenses=database.licenses), view if map_ is None else None
     ).add_to(chosen)
-    return finished_map(chosen)
+    return finished_map(chosen, database)

@@ -147,7 +147,7 @@ def drift_map(
             Drawing(free_name(chosen, name), "drawings", drawn).add_to(chosen)
     legend = drift_legend(cells, objects, taxonomy=taxonomy, licenses=city.licenses)
     Legend(legend, view if map_ is None else None).add_to(chosen)
-    return finished_map(chosen)
+    return finished_map(chosen, city)
 
 
 def _kinds(

@@ -78,4 +78,4 @@ def identifiability_map(
     facts = (group_facts(database), lookalike_facts(told))
     CellLayer(free_name(chosen, "Cells, by a click"), database, facts).add_to(chosen)
     Legend(identifiability_legend(told), view if map_ is None else None).add_to(chosen)
-    return finished_map(chosen)
+    return finished_map(chosen, database)

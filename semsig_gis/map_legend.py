@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from semsig_gis import __version__
+from semsig_gis._map_signs import class_signs
 from semsig_gis.distortion_chain import chain_text
 from semsig_gis.evaluation import SUCCESS_METRES, SUCCESS_PROBABILITY
 
@@ -24,6 +25,7 @@ if TYPE_CHECKING:
     from semsig_gis.identifiability import Identifiability
     from semsig_gis.location import Location
     from semsig_gis.matching import Localization
+    from semsig_gis.objects import StreetObjects
     from semsig_gis.signatures import Signature
     from semsig_gis.taxonomy import Taxonomy
 
@@ -47,6 +49,7 @@ __all__ = [
     "identifiability_legend",
     "localization_legend",
     "location_legend",
+    "objects_legend",
 ]
 
 # Blue and orange of Okabe and Ito, which colour-blind people tell apart.
@@ -107,6 +110,8 @@ DRIFT_COLOURS: Mapping[str, str] = MappingProxyType(
     {"same": "#d6d6d1", "changed": "#e69f00", "appeared": "#0072b2", "vanished": "#882255"}
 )
 """Colour of a cell or object by what became of it."""
+FLIPPING = "square semsig-flip"
+"""A sign whose lightness flips in the dark, as what it explains does."""
 
 _THRESHOLDS = (10, 25, 50, 100)
 _HELPERS = 6  # classes that the legend names
@@ -197,11 +202,11 @@ def location_legend(location: Location) -> str:
     told = "The answer" if location.answer.given else "Cannot tell; the best place"
     cells = {share: len(location.posterior.credible_cells(share)) for share in CHANCES}
     shares = "<br>".join(
-        f"{_sign(CHANCES[share], 'square')}{share:.0%} in {_cells(cells[share])}"
+        f"{_sign(CHANCES[share], FLIPPING)}{share:.0%} in {_cells(cells[share])}"
         for share in CHANCES
     )
     chances = " ".join(
-        f"{_sign(colour, 'square')}{100.0 * least:g}+"
+        f"{_sign(colour, FLIPPING)}{100.0 * least:g}+"
         for least, colour in sorted(CELL_CHANCES.items(), reverse=True)
     )
     explained = "".join(
@@ -267,6 +272,33 @@ def identifiability_legend(told: Identifiability) -> str:
     )
 
 
+def objects_legend(objects: StreetObjects) -> str:
+    """Return the legend of a map of street objects.
+
+    Parameters
+    ----------
+    objects : StreetObjects
+        What the map shows.
+
+    Returns
+    -------
+    str
+        HTML in which all text from data is escaped, for a ``details`` element.
+    """
+    signs, counts = class_signs(objects.taxonomy), objects.class_counts
+    rows = "".join(
+        f"<tr><td>{signs[code].svg()}</td><td>{escape(objects.taxonomy.by_code(code).title)}</td>"
+        f'<td class="count">{count:,}</td></tr>'
+        for code, count in counts.items()
+    )
+    return (
+        "<summary>Street objects</summary>"
+        f"<p>{len(objects):,} objects of {len(counts)} classes; shapes show from near, letters "
+        f"from nearer, and a click tells what is known of one.</p><table>{rows}</table>"
+        f"{_sources(objects.licenses)}"
+    )
+
+
 def _cells(number: int) -> str:
     return "1 cell" if number == 1 else f"{number:,} cells"
 
@@ -299,7 +331,7 @@ def _shades() -> str:
     labels = [f"{low}-{high - 1}" for low, high in itertools.pairwise(SHADES)]
     labels.append(f"{max(SHADES)}+")
     signs = " &ensp;".join(
-        f"{_sign(colour, 'square')}{label}"
+        f"{_sign(colour, FLIPPING)}{label}"
         for colour, label in zip(SHADES.values(), labels, strict=True)
     )
     return f"<p>Objects seen from a cell<br>{signs}</p>"

@@ -16,6 +16,7 @@ from semsig_gis._map_parts import (
     finished_map,
     free_name,
     prepared_map,
+    query_signature,
     to_latlon,
 )
 from semsig_gis.map_image import level_image
@@ -39,7 +40,15 @@ if TYPE_CHECKING:
 __all__ = ["location_map"]
 
 PLACE_FIELDS = ("Chance", "Place", "Give or take", "North of the query", "Cell")
-CANDIDATE_FIELDS = ("Chance", "Log-likelihood", "North of the query", "It sees", "Cell", "Place")
+CANDIDATE_FIELDS = (
+    "Query",
+    "Cell sees",
+    "Chance",
+    "Log-likelihood",
+    "North of the query",
+    "Cell",
+    "Place",
+)
 OBJECT_FIELDS = (
     "Chance",
     "Seen as",
@@ -114,7 +123,7 @@ def location_map(
     Drawing(free_name(chosen, "Best place"), "drawings", drawn.place()).add_to(chosen)
     view = drawn.view() if map_ is None else None
     Legend(location_legend(location), view, zoom=CLOSEST_ZOOM).add_to(chosen)
-    return finished_map(chosen)
+    return finished_map(chosen, location.posterior.database)
 
 
 def _add_chances(chosen: folium.Map, location: Location) -> None:
@@ -125,7 +134,7 @@ def _add_chances(chosen: folium.Map, location: Location) -> None:
         ("Chance of a cell", _chances(found, found.chances), near),
         ("Regions of 50, 90 and 99 %", _regions(found), False),
     ):
-        add_image(chosen, *image, name=name, opacity=0.85, show=show)
+        add_image(chosen, *image, name=name, opacity=0.85, flips=True, show=show)
 
 
 def _chances(found: Posterior, chances: NDArray[np.float64]) -> tuple[bytes, list[list[float]]]:
@@ -210,14 +219,16 @@ class _Drawn:
     def candidates(self) -> list[list[Any]]:
         """Return the candidates, likeliest first."""
         rows = self.location.candidates
+        asked = query_signature(self.location.query, self.database.taxonomy)
         records = []
         places = self.latlon(rows[["x", "y"]].to_numpy())
         for place, row in zip(places, rows.to_dict("records"), strict=True):
             details = [
+                asked,
+                cell_signature(self.database, row["cell"]),
                 f"{row['chance']:.2%}",
                 f"{row['loglik']:.2f}",
                 _north(row.get("heading")),
-                cell_signature(self.database, row["cell"]),
                 str(row["cell_id"]),
                 _position(place),
             ]
@@ -252,7 +263,7 @@ class _Drawn:
         looks = [
             [
                 {
-                    "color": "#555555" if verdict == "missed" else colour,
+                    "color": "#808080" if verdict == "missed" else colour,
                     "weight": 1 if verdict == "missed" else 2,
                     "opacity": 0.9,
                     "dashArray": None if verdict in {"matched", "misnamed"} else "3 5",

@@ -13,81 +13,105 @@ import re
 __all__ = ["SCRIPT", "STYLE", "script_json"]
 
 STYLE = """\
-.leaflet-container { background: #fcfcfa; }
-.leaflet-container .leaflet-control-attribution { font-size: 11px; }
-.leaflet-control-scale-line { font-size: 11px; }
+.leaflet-container {
+  --paper: #fcfcfa; --panel: rgba(255, 255, 255, 0.95); --ink: #222; --faint: #555;
+  --edge: rgba(0, 0, 0, 0.25); --chosen: #dcebf7; color-scheme: light; background: var(--paper); }
+.leaflet-container.semsig-dark {
+  --paper: #131518; --panel: rgba(36, 39, 44, 0.96); --ink: #e9e9e6; --faint: #b0b4ba;
+  --edge: rgba(255, 255, 255, 0.25); --chosen: #2d4a63; color-scheme: dark; }
+.leaflet-container .leaflet-bar a, .leaflet-container .leaflet-control-layers,
+.leaflet-container .leaflet-popup-content-wrapper, .leaflet-container .leaflet-popup-tip {
+  background-color: var(--panel); color: var(--ink); border-color: var(--edge); }
+.leaflet-container .leaflet-bar a.leaflet-disabled { opacity: 0.5; }
+.leaflet-container a.leaflet-popup-close-button { color: var(--faint); }
+.leaflet-container .leaflet-control-layers-separator { border-color: var(--edge); }
+.semsig-dark .leaflet-control-layers-toggle { filter: invert(0.85); }
+.leaflet-container .leaflet-control-attribution {
+  font-size: 11px; background: var(--panel); color: var(--faint); max-width: 60vw;
+  box-sizing: border-box; overflow: hidden; white-space: nowrap; text-overflow: ellipsis; }
+.leaflet-container .leaflet-control-attribution:hover { white-space: normal; }
+.leaflet-container .leaflet-control-attribution a { color: inherit; }
+.leaflet-container .leaflet-control-scale-line {
+  font-size: 11px; background: var(--panel); color: var(--ink); border-color: var(--faint);
+  text-shadow: none; }
 .leaflet-control-scale-line + .leaflet-control-scale-line { display: none; }
 .leaflet-heatmap-layer, .semsig-legend i.heat { opacity: 0.5; }
+/* What is dark on light is light on dark: the ramps that begin near the colour of paper. */
+.semsig-dark .semsig-flip, .semsig-dark .leaflet-heatmap-layer, .semsig-dark i.heat,
+.semsig-dark img.leaflet-tile {
+  filter: invert(1) hue-rotate(180deg) brightness(1.15); }
+/* The streets and buildings below the cells are seen through them. */
+.semsig-ground .leaflet-tile-pane .leaflet-image-layer { mix-blend-mode: multiply; }
+.semsig-ground.semsig-dark .leaflet-tile-pane .leaflet-image-layer { mix-blend-mode: screen; }
+.semsig-legend, .semsig-search input, .semsig-search ul, .semsig-search p {
+  font: 13px/1.4 system-ui, sans-serif; color: var(--ink); background: var(--panel);
+  border-radius: 5px; box-shadow: 0 1px 5px rgba(0, 0, 0, 0.4); box-sizing: border-box; }
 .semsig-legend {
-  font: 13px/1.4 system-ui, sans-serif; color: #222; background: rgba(255, 255, 255, 0.93);
-  border-radius: 5px; box-shadow: 0 1px 5px rgba(0, 0, 0, 0.4); padding: 7px 10px;
-  box-sizing: border-box; width: 290px; max-width: calc(100vw - 20px);
-  max-height: calc(100vh - 120px); overflow: auto; overflow-wrap: anywhere; }
+  padding: 7px 10px; width: 290px; max-width: calc(100vw - 20px);
+  max-height: calc(100vh - 190px); overflow: auto; overflow-wrap: anywhere; }
 .semsig-legend summary { font-weight: 600; font-size: 14px; cursor: pointer; }
 .semsig-legend:not([open]) { width: auto; }
 .semsig-legend p { margin: 6px 0; }
-.semsig-legend small { color: #555; }
+.semsig-legend small { color: var(--faint); }
 .semsig-legend i {
   display: inline-block; box-sizing: border-box; width: 12px; height: 12px; margin-right: 5px;
-  vertical-align: -1px; border: 1px solid #444; }
+  vertical-align: -1px; border: 1px solid #777; }
 .semsig-legend i.round { border-radius: 50%; }
 .semsig-legend i.ramp { display: block; width: 100%; height: 10px; margin: 2px 0; }
 .semsig-legend .ends { display: flex; justify-content: space-between; }
 .semsig-legend table, .semsig-details table { border-collapse: collapse; }
-.semsig-legend td { padding: 0 12px 0 0; }
+.semsig-legend td { padding: 0 12px 0 0; vertical-align: top; }
 .semsig-legend td + td { overflow-wrap: normal; }
-.semsig-details { font: 13px/1.4 system-ui, sans-serif; overflow-wrap: anywhere; }
-.semsig-details th { text-align: left; font-weight: 400; color: #555; white-space: nowrap; }
+.semsig-legend td:last-child { padding: 0; }
+.semsig-legend td.count { text-align: right; white-space: nowrap; }
+.semsig-sign { width: 17px; height: 17px; vertical-align: -4px; overflow: visible; }
+.semsig-sign path { stroke: var(--panel); stroke-width: 0.1; }
+.semsig-details {
+  font: 13px/1.4 system-ui, sans-serif; overflow-wrap: anywhere; max-width: calc(100vw - 64px); }
+.semsig-details th {
+  text-align: left; font-weight: 400; color: var(--faint); white-space: nowrap; }
 .semsig-details th, .semsig-details td { vertical-align: top; padding: 2px 6px 2px 0; }
 .semsig-details code { font-size: 14px; font-weight: 600; }
+.semsig-wheels { display: flex; flex-wrap: wrap; justify-content: space-around; margin: 4px 0; }
+.semsig-wheels figure { flex: 1 1 90px; max-width: 130px; margin: 0; text-align: center; }
+.semsig-wheels figcaption { color: var(--faint); font-size: 12px; line-height: 1.2; }
+.semsig-wheels svg { display: block; width: 100%; }
+.semsig-wheels .ring { fill: none; stroke: var(--faint); stroke-width: 0.7; }
+.semsig-wheels .ray { stroke: var(--faint); stroke-width: 0.7; }
+.semsig-wheels .north { fill: var(--ink); }
+.semsig-wheels text {
+  font-family: system-ui, sans-serif; font-weight: 700; fill: var(--ink); text-anchor: middle; }
+.semsig-search { width: 230px; }
+.semsig-search input { width: 100%; height: 34px; padding: 0 9px; border: 0; font-size: 14px; }
+.semsig-search ul {
+  position: absolute; z-index: 1; top: 100%; width: 100%; list-style: none; margin: 4px 0 0;
+  padding: 4px; max-height: 50vh; overflow: auto; }
+.semsig-search li {
+  padding: 4px 6px; border-radius: 3px; cursor: pointer; overflow-wrap: anywhere;
+  max-height: 5.6em; overflow: hidden; }
+.semsig-search li[aria-selected=true] { background: var(--chosen); }
+.semsig-search li small { display: block; color: var(--faint); }
+.semsig-search p {
+  position: absolute; z-index: 1; top: 100%; width: 100%; margin: 4px 0 0; padding: 6px 9px; }
+.semsig-search [hidden] { display: none; }
 .leaflet-tooltip.semsig-number {
   background: none; border: none; box-shadow: none; padding: 0; color: #222;
   font: 11px/1 system-ui, sans-serif; }
 .semsig-close .leaflet-image-layer { image-rendering: pixelated; }
-.leaflet-control-layers { font: 13px/1.5 system-ui, sans-serif; }
+.leaflet-control-layers { font: 13px/1.5 system-ui, sans-serif; overflow-wrap: anywhere; }
+.leaflet-control-layers-expanded { max-width: min(320px, calc(100vw - 20px)); }
+@media (max-width: 700px) {
+  .semsig-search { width: calc(100vw - 80px); max-width: 300px; }
+  .semsig-search input { height: 40px; font-size: 16px; }
+  /* A popup takes the whole width, and goes by a tap beside it. */
+  .semsig-told .leaflet-top { visibility: hidden; } }
 """
 
-# Popups are made when they are opened, from text nodes only: nothing in them is read as HTML.
 SCRIPT = """\
 const semsig = {
-  text(parent, tag, text) {
-    L.DomUtil.create(tag, "", parent).textContent = text;
-  },
-  details(name, fields, values, titles) {
-    const box = L.DomUtil.create("div", "semsig-details");
-    semsig.text(box, "b", name);
-    const table = L.DomUtil.create("table", "", box);
-    const row = (label) => {
-      const line = L.DomUtil.create("tr", "", table);
-      semsig.text(line, "th", label);
-      return L.DomUtil.create("td", "", line);
-    };
-    const symbols = new Set();
-    fields.forEach((label, number) => {
-      const value = values[number];
-      if (value === null) return;
-      const cell = row(label);
-      if (!Array.isArray(value)) {
-        cell.textContent = value;
-        return;
-      }
-      const [types, bearings] = value;
-      const places = (bearings || []).map((degrees) => degrees + "\\u00b0");
-      if (types !== null) {
-        semsig.text(cell, "code", types);
-        for (const symbol of types) symbols.add(symbol);
-      }
-      const pairs = places.map((place, at) => (types ? types[at] + "\\u00a0" + place : place));
-      semsig.text(cell, "div", pairs.join(" "));
-    });
-    if (symbols.size) {
-      const known = [...symbols].sort().map((symbol) => symbol + " " + titles[symbol]);
-      row("Classes").textContent = known.join(", ");
-    }
-    return box;
-  },
   points(fields, titles, records) {
     const group = L.featureGroup();
+    const markers = [];
     for (const [place, colour, radius, found, name, values, label] of records) {
       const marker = L.circleMarker(place, {
         pane: "markerPane", radius: radius, color: "#222", weight: 1,
@@ -102,7 +126,7 @@ const semsig = {
         marker.bindTooltip(text, look);
       }
       if (found !== null) {
-        const look = {pane: "shadowPane", interactive: false, color: "#222", weight: 2};
+        const look = {pane: "shadowPane", interactive: false, color: "#d55e00", weight: 2};
         const hint = L.layerGroup([
           L.polyline([place, found], {...look, dashArray: "5 5"}),
           L.circleMarker(found, {...look, radius: 8, fill: false}),
@@ -111,7 +135,20 @@ const semsig = {
         marker.on("popupclose", () => hint.remove());
       }
       marker.addTo(group);
+      markers.push(marker);
     }
+    let names = null;
+    semsig.finders.push((words, limit) => {
+      names = names || records.map((record) => semsig.plain(record[4]));
+      return semsig.matches(names, words, limit).map((at) => ({
+        name: records[at][4],
+        hint: "",
+        show: (map) => {
+          semsig.reveal(map, group, markers[at].getLatLng());
+          markers[at].openPopup();
+        },
+      }));
+    });
     return group;
   },
   lines(bundles) {
@@ -120,7 +157,13 @@ const semsig = {
     })));
   },
   drawings(parts) {
-    return L.featureGroup(parts.map(([name, ...values]) => semsig[name](...values)));
+    const group = L.featureGroup();
+    for (const [name, ...values] of parts) {
+      const part = semsig[name](...values);
+      part.semsigWhole = group;
+      part.addTo(group);
+    }
+    return group;
   },
   heat(points, {maxZoom, ...options}) {
     // leaflet.heat means by it where its points are strongest, but the layer control disables a
@@ -136,7 +179,7 @@ const semsig = {
   },
   legend(map, text, view, zoom) {
     const box = L.DomUtil.create("details", "semsig-legend");
-    box.open = window.innerWidth > 700;
+    box.open = window.innerWidth > 700 && !document.querySelector(".semsig-legend[open]");
     box.innerHTML = text;
     L.DomEvent.disableClickPropagation(box);
     L.DomEvent.disableScrollPropagation(box);

@@ -26,6 +26,7 @@ from semsig_gis._map_parts import (
     layers_of,
     popup_signature,
     prepared_map,
+    query_signature,
     to_latlon,
 )
 from semsig_gis.errors import InputError
@@ -61,9 +62,9 @@ _QUERY_FIELDS = (
     "True rank",
     "True cell",
     "Best cell",
-    "It sees",
+    "Best cell sees",
 )
-_CANDIDATE_FIELDS = ("Rank", "Distance", "Signature", "Cell", "Position")
+_CANDIDATE_FIELDS = ("Query", "Signature", "Rank", "Distance", "Cell", "Position")
 
 _HEAT_PIXELS = 25
 _HEAT_STOPS = (0.1, 0.35, 0.65, 0.9)
@@ -169,7 +170,7 @@ def evaluation_map(
         ).add_to(chosen)
     legend = evaluation_legend(evaluation, error_limit=_metres(guess), licenses=database.licenses)
     Legend(legend, view if map_ is None else None).add_to(chosen)
-    return finished_map(chosen)
+    return finished_map(chosen, database)
 
 
 def localization_map(
@@ -232,7 +233,7 @@ def localization_map(
         records[::-1],  # the best last, so that they lie on top
     ).add_to(chosen)
     Legend(localization_legend(localization), places if map_ is None else None).add_to(chosen)
-    return finished_map(chosen)
+    return finished_map(chosen, database)
 
 
 def save_map(map_: folium.Map, path: str | Path, *, self_contained: bool | None = None) -> bool:
@@ -382,14 +383,16 @@ def _candidate_records(
     distances = candidates["distance"].to_numpy(np.float64)
     spread = np.ptp(distances) or 1.0
     colours = _ramp((distances - distances.min()) / spread, CANDIDATE_RAMP)
+    asked = query_signature(localization.query, database.taxonomy)
     records = []
     for number, candidate in enumerate(candidates.to_dict("records")):
         rank = _ranks(candidate["rank_low"], candidate["rank_high"])
         latitude, longitude = places[number].tolist()
         details = [
+            asked,
+            cell_signature(database, int(rows[number])),
             f"{rank} of {len(database):,}{_tie(candidate['tied'])}",
             f"{candidate['distance']:.4f}",
-            cell_signature(database, int(rows[number])),
             str(candidate["cell_id"]),
             f"{latitude:.6f}, {longitude:.6f}",
         ]

@@ -49,11 +49,12 @@ def asked(browser: Chrome, script: str, *arguments: Any) -> Any:  # noqa: ANN401
     return browser.execute_script(ASK + script, *arguments)
 
 
-def drawn(browser: Chrome, colour: str) -> int:
-    """Return the number of pixels of about this colour on the canvas of the circles."""
+def drawn(browser: Chrome, colour: str, canvas: str = ".leaflet-marker-pane canvas") -> int:
+    """Return the number of pixels of about this colour on a canvas, by default the circles'."""
     time.sleep(0.3)  # canvases are drawn with the next frame
     script = """
-    const canvas = map.getPane("markerPane").querySelector("canvas");
+    const canvas = document.querySelector(arguments[1]);
+    if (canvas === null) return 0;
     const wanted = [1, 3, 5].map((at) => parseInt(arguments[0].slice(at, at + 2), 16));
     const data = canvas.getContext("2d").getImageData(0, 0, canvas.width, canvas.height).data;
     let count = 0;
@@ -64,8 +65,30 @@ def drawn(browser: Chrome, colour: str) -> int:
     }
     return count;
     """
-    count: int = asked(browser, script, colour)
+    count: int = asked(browser, script, colour, canvas)
     return count
+
+
+def searched(browser: Chrome, text: str, *keys: str) -> list[str]:
+    """Type something into the search box, then press keys; return what it offered."""
+    box = browser.find_element(By.CSS_SELECTOR, ".semsig-search input")
+    box.clear()
+    box.send_keys(text)
+    offered = [
+        one.text for one in browser.find_elements(By.CSS_SELECTOR, ".semsig-search [role=option]")
+    ]
+    for key in keys:
+        box.send_keys(key)
+    return offered
+
+
+def popup_text(browser: Chrome) -> str:
+    """Return what the newest popup says; one before it may still fade away."""
+    time.sleep(0.3)
+    text: str = browser.execute_script(
+        "return [...document.querySelectorAll('.semsig-details')].pop().innerText"
+    )
+    return text
 
 
 def switch(browser: Chrome, name: str) -> None:

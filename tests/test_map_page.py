@@ -10,7 +10,8 @@ from folium.template import Template
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from semsig_gis.map_page import SCRIPT, STYLE, script_json
+from semsig_gis._map_parts import SCRIPTS
+from semsig_gis.map_page import STYLE, script_json
 
 nasty = st.text(st.sampled_from(list("{}%#<>&'\"`$\\/-! 7*é\u2028\ud7ff")), max_size=12)
 values = st.recursive(
@@ -44,7 +45,7 @@ def test_numbers_that_json_does_not_have_are_refused(number: float) -> None:
         script_json([number])
 
 
-@pytest.mark.parametrize("text", [STYLE, SCRIPT])
+@pytest.mark.parametrize("text", [STYLE, *SCRIPTS])
 def test_style_and_script_are_no_templates_themselves(text: str) -> None:
     assert Template(text, keep_trailing_newline=True).render() == text
     assert "</" not in text

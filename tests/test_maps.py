@@ -6,8 +6,12 @@ import dataclasses
 from typing import TYPE_CHECKING
 
 import folium
+import geopandas as gpd
 import numpy as np
 import pytest
+import shapely
+from hypothesis import given, settings
+from hypothesis import strategies as st
 from map_pages import (
     HOSTILE,
     asked,
@@ -15,22 +19,26 @@ from map_pages import (
     drawn,
     hostile_database,
     opened,
+    popup_text,
+    searched,
     switch,
 )
+from pyproj import CRS, Transformer
 from selenium.webdriver.common.actions.action_builder import ActionBuilder
 from selenium.webdriver.common.by import By
+from selenium.webdriver.common.keys import Keys
 from sentences import assert_sentence
 
-from semsig_gis import map_assets
+from semsig_gis import _map_parts, map_assets
 from semsig_gis.building import build_database
 from semsig_gis.catalog import paper_taxonomy
 from semsig_gis.errors import InputError
 from semsig_gis.evaluation import evaluate
 from semsig_gis.limitations import MissingClasses
-from semsig_gis.map_legend import FAILED, SUCCESSFUL
+from semsig_gis.map_legend import CANDIDATE_RAMP, FAILED, SUCCESSFUL
 from semsig_gis.maps import evaluation_map, localization_map, save_map
 from semsig_gis.matching import localize
-from semsig_gis.objects import build_objects
+from semsig_gis.objects import StreetObjects, build_objects
 from semsig_gis.queries import QuerySpec
 from semsig_gis.signatures import Signature
 from semsig_gis.sources.synthetic import CitySpec, synthetic_city
@@ -156,7 +164,17 @@ def test_a_localization_in_a_browser(
     )
     assert len(popups) == 50
     best = popups[-1]  # drawn last, on top
-    assert best.startswith("Rank 1Rank1 of ")
+    assert best.startswith("Rank 1")
+    assert "Rank1 of " in best
+    # The query and what the cell sees, side by side.
+    captions = asked(
+        browser,
+        "circles(arguments[0])[0].openPopup();"
+        "return [...document.querySelectorAll('figcaption')].map((one) => one.textContent)",
+        CANDIDATE_RAMP[0],
+    )
+    assert captions == ["Query", "Signature"]
+    asked(browser, "map.closePopup()")
     assert str(database.cell_ids[cell]) in best
     assert database.types(cell) in best
     legend = browser.find_element(By.CSS_SELECTOR, ".semsig-legend").text
@@ -230,6 +248,69 @@ def test_maps_are_drawn_one_over_the_other(
     assert asked(browser, "return map.getZoom()") == 12  # the view is the caller's
     switch(browser, "Candidates (4), 2")
     assert_quiet(browser)
+
+
+@pytest.mark.usefixtures("carried")
+def test_a_popup_draws_signatures_as_wheels(
+    browser: Chrome, evaluation: Evaluation, database: SignatureDatabase, tmp_path: Path
+) -> None:
+    opened(browser, evaluation_map(evaluation, database), tmp_path)
+    query = int(np.argmax(evaluation.queries["query_length"]))
+    name = f"Query {query + 1:,} of {QUERIES}"
+    assert searched(browser, name, Keys.ENTER)[0].startswith(name)
+    assert popup_text(browser).startswith(name)
+    wheels = browser.find_elements(By.CSS_SELECTOR, ".semsig-wheels figure")
+    row = evaluation.queries.iloc[query]
+    seen = (
+        ("True cell sees", row["types"], database.signature(int(row["cell"])).bearings),
+        ("Query", row["query_types"], [float(one) for one in row["query_bearings"].split(",")]),
+    )
+    tops = {wheel.rect["y"] for wheel in wheels}
+    assert len(tops) == 1  # side by side
+    for wheel, (label, types, bearings) in zip(wheels, seen, strict=False):
+        assert bearings is not None
+        assert wheel.find_element(By.TAG_NAME, "figcaption").text == label
+        degrees = [f"{symbol} {round(float(one)) % 360}°"
+                   for symbol, one in zip(types, bearings, strict=True)]  # fmt: skip
+        told = wheel.find_element(By.TAG_NAME, "svg").get_attribute("aria-label")
+        assert told == f"{label}, clockwise from north: {', '.join(degrees)}"
+        signs = wheel.find_elements(By.TAG_NAME, "text")
+        assert len(signs) == len(types)
+        for sign, one in zip(signs, bearings, strict=True):
+            x, y = (float(str(sign.get_attribute(part))) for part in "xy")
+            turn = (np.degrees(np.arctan2(x, -y)) - one + 180.0) % 360.0 - 180.0
+            assert abs(turn) <= 0.51  # north up, clockwise, whole degrees
+            assert np.hypot(x, y) < 54.0
+    assert_quiet(browser)
+
+
+@settings(max_examples=20)
+@given(
+    st.sampled_from(["EPSG:2154", "EPSG:32631", "EPSG:3879", "EPSG:2039", "EPSG:28992"]),
+    st.floats(0.0, 1.0),
+    st.floats(0.0, 1.0),
+    st.floats(10.0, 40_000.0),
+)
+def test_the_search_places_x_and_y_to_the_centimetre(
+    crs: str, across: float, along: float, size: float
+) -> None:
+    system = CRS(crs)
+    assert system.area_of_use is not None
+    west, south, east, north = system.area_of_use.bounds
+    middle = Transformer.from_crs("EPSG:4326", system, always_xy=True).transform(
+        (west + east) / 2, (south + north) / 2
+    )
+    corners = np.array(middle) + size * np.array([[-0.5, -0.5], [0.5, 0.5]])
+    table = gpd.GeoDataFrame(
+        {"class_code": np.array([1, 1], np.uint8)}, geometry=shapely.points(corners), crs=system
+    )
+    area = _map_parts._area(StreetObjects(table, paper_taxonomy(), ()))
+    place = corners[0] + size * np.array([across, along])
+    u, v = (place - area["middle"]) / area["half"]
+    found = sum(u**i * v**j * np.array(weights) for i, j, *weights in area["terms"])
+    expected = _map_parts.to_latlon(place[None], system, digits=12)[0]
+    metres = (found - expected) * 111_320.0 * [1.0, np.cos(np.radians(expected[0]))]
+    assert np.hypot(*metres) < 0.01
 
 
 def test_queries_of_which_nothing_is_left(database: SignatureDatabase, tmp_path: Path) -> None:

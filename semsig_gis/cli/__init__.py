@@ -27,6 +27,7 @@ from semsig_gis.cli import _learn  # noqa: F401
 from semsig_gis.cli import _evaluate  # noqa: F401
 from semsig_gis.cli import _reproduce  # noqa: F401
 from semsig_gis.cli import _identify  # noqa: F401
+from semsig_gis.cli import _map  # noqa: F401
 from semsig_gis.cli import _export  # noqa: F401
 
 # isort: on

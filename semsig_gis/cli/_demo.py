@@ -26,6 +26,7 @@ def demo(
     from semsig_gis.database_file import save_database
     from semsig_gis.evaluation import evaluate as run
     from semsig_gis.export import export_geopackage
+    from semsig_gis.map_objects import objects_map
     from semsig_gis.maps import evaluation_map, save_map
     from semsig_gis.objects import build_objects, save_objects
     from semsig_gis.sources.synthetic import CitySpec, synthetic_city
@@ -42,7 +43,8 @@ def demo(
         evaluation = run(database, queries=queries, seed=seed, progress=advance)
     evaluation.save(out / "evaluation")
     with progress("drawing the map"):
-        offline = save_map(evaluation_map(evaluation, database), out / "map.html")
+        drawn = objects_map(objects, map_=evaluation_map(evaluation, database))
+        offline = save_map(drawn, out / "map.html")
     with progress("writing the GeoPackage") as advance:
         export_geopackage(database, out / "city.gpkg", objects=objects, progress=advance)
     print_evaluation(evaluation)

@@ -1,4 +1,4 @@
-"""`semsig map` and `semsig export`: results for people and for other programs."""
+"""`semsig export`: results for other programs."""
 
 from __future__ import annotations
 
@@ -8,15 +8,8 @@ from typing import Annotated
 
 import typer
 
-from semsig_gis.cli._app import (
-    Database,
-    app,
-    known_identifiability,
-    stored_objects,
-    tell_if_online,
-)
-from semsig_gis.console import progress, remark
-from semsig_gis.errors import InputError
+from semsig_gis.cli._app import Database, app, known_identifiability
+from semsig_gis.console import progress
 
 
 class CellGeometry(enum.StrEnum):
@@ -24,65 +17,6 @@ class CellGeometry(enum.StrEnum):
 
     polygon = "polygon"
     point = "point"
-
-
-@app.command(name="map")
-def map_(
-    database: Database,
-    *,
-    evaluation: Annotated[
-        Path | None, typer.Option(help="Folder that `semsig evaluate --out` wrote.")
-    ] = None,
-    identifiability: Annotated[
-        bool,
-        typer.Option(
-            "--identifiability", help="Draw where a query can be placed (after `semsig identify`)."
-        ),
-    ] = False,
-    ambiguity: Annotated[
-        bool, typer.Option("--ambiguity", help="Draw how many cells look the same.")
-    ] = False,
-    drift: Annotated[
-        Path | None,
-        typer.Option(help="Draw what has changed up to this newer database of the city."),
-    ] = None,
-    out: Annotated[Path, typer.Option(help="Map to write (.html).")],
-) -> None:
-    """Draw an evaluation, where a query can be placed, cells that look the same, or changes."""
-    from semsig_gis.database_file import open_database
-    from semsig_gis.evaluation import Evaluation
-    from semsig_gis.map_ambiguity import ambiguity_map
-    from semsig_gis.map_drift import drift_map
-    from semsig_gis.map_identifiability import identifiability_map
-    from semsig_gis.maps import evaluation_map, save_map
-
-    if sum((evaluation is not None, identifiability, ambiguity, drift is not None)) != 1:
-        msg = (
-            "a map shows --evaluation, --identifiability, --ambiguity or --drift; give one of them."
-        )
-        raise InputError(msg)
-    results = None if evaluation is None else Evaluation.load(evaluation)
-    opened = open_database(database)
-    newer = None if drift is None else (open_database(drift), stored_objects(drift))
-    told = known_identifiability(database, opened) if identifiability or ambiguity else None
-    if identifiability and told is None:
-        msg = f"{database} does not tell where a query can be placed; run semsig identify first."
-        raise InputError(msg)
-    with progress("drawing the map"):
-        if ambiguity:
-            drawn = ambiguity_map(opened, identifiability=told)
-        elif newer is not None:
-            objects = stored_objects(database), newer[1]
-            if None in objects:
-                remark("the street objects of both are not at hand, so only cells are drawn")
-            drawn = drift_map(opened, newer[0], objects_before=objects[0], objects_after=objects[1])
-        elif told is not None:
-            drawn = identifiability_map(told)
-        elif results is not None:
-            drawn = evaluation_map(results, opened)
-        offline = save_map(drawn, out)
-    typer.echo(f"map: {out}")
-    tell_if_online(offline)
 
 
 @app.command()

@@ -1,0 +1,62 @@
+"""Streets and buildings below the maps of the commands."""
+
+from __future__ import annotations
+
+import contextlib
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from semsig_gis.errors import DatabaseError
+
+if TYPE_CHECKING:
+    from semsig_gis.database import SignatureDatabase
+
+AROUND_M = 100.0
+
+Buildings = Annotated[
+    Path | None,
+    typer.Option(
+        help="Footprints to draw below the map; those that the database was built with by default."
+    ),
+]
+Streets = Annotated[
+    Path | None,
+    typer.Option(
+        help="Centre lines to draw below the map; those that the database was built with by "
+        "default."
+    ),
+]
+
+
+def ground_of(
+    path: Path, opened: SignatureDatabase, *, buildings: Path | None, streets: Path | None
+) -> dict[str, Any]:
+    """Return what `ground_map` draws, from files or else from the store; nothing if it is empty."""
+    from semsig_gis.catalog import load_catalog
+    from semsig_gis.store import open_store
+    from semsig_gis.surroundings import OSM_SUFFIXES, read_surroundings
+
+    houses = lines = None
+    if buildings is not None:
+        houses = read_surroundings(buildings, role="buildings", crs=opened.crs)
+    if streets is not None:
+        lines = read_surroundings(streets, role="streets", crs=opened.crs)
+    if houses is None or lines is None:
+        with contextlib.suppress(DatabaseError):  # a map may do without
+            store = open_store(path)
+            houses = store.footprints if houses is None else houses
+            lines = store.streets if lines is None else lines
+    if houses is None and lines is None:
+        return {}
+    low, high = opened.xy.min(axis=0) - AROUND_M, opened.xy.max(axis=0) + AROUND_M
+    catalog = load_catalog("openstreetmap")
+    named = f"{catalog.attribution} ({catalog.license}): streets and buildings"
+    from_osm = any(str(file).endswith(OSM_SUFFIXES) for file in (buildings, streets))
+    return {
+        "buildings": houses,
+        "streets": lines,
+        "box": (*low.tolist(), *high.tolist()),
+        "licenses": (named,) if from_osm else (),
+    }

@@ -1,0 +1,95 @@
+"""`semsig map`: results to look at."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from semsig_gis.cli._app import (
+    Database,
+    app,
+    known_identifiability,
+    stored_objects,
+    tell_if_online,
+)
+from semsig_gis.cli._ground import Buildings, Streets, ground_of
+from semsig_gis.console import progress, remark
+from semsig_gis.errors import InputError
+
+
+@app.command(name="map")
+def map_(
+    database: Database,
+    *,
+    evaluation: Annotated[
+        Path | None, typer.Option(help="Folder that `semsig evaluate --out` wrote.")
+    ] = None,
+    identifiability: Annotated[
+        bool,
+        typer.Option(
+            "--identifiability", help="Draw where a query can be placed (after `semsig identify`)."
+        ),
+    ] = False,
+    ambiguity: Annotated[
+        bool, typer.Option("--ambiguity", help="Draw how many cells look the same.")
+    ] = False,
+    drift: Annotated[
+        Path | None,
+        typer.Option(help="Draw what has changed up to this newer database of the city."),
+    ] = None,
+    objects: Annotated[
+        Path | None, typer.Option(help="Draw the street objects that `semsig load` wrote.")
+    ] = None,
+    buildings: Buildings = None,
+    streets: Streets = None,
+    out: Annotated[Path, typer.Option(help="Map to write (.html).")],
+) -> None:
+    """Draw an evaluation, where queries can be placed, cells that look alike, changes, objects."""
+    from semsig_gis.database_file import open_database
+    from semsig_gis.evaluation import Evaluation
+    from semsig_gis.map_ambiguity import ambiguity_map
+    from semsig_gis.map_drift import drift_map
+    from semsig_gis.map_ground import ground_map
+    from semsig_gis.map_identifiability import identifiability_map
+    from semsig_gis.map_objects import objects_map
+    from semsig_gis.maps import evaluation_map, save_map
+    from semsig_gis.objects import open_objects
+
+    given = sum((evaluation is not None, identifiability, ambiguity, drift is not None))
+    if given > 1 or (given == 0 and objects is None):
+        msg = (
+            "a map shows --evaluation, --identifiability, --ambiguity or --drift, with --objects "
+            "or without, or --objects alone; give one of them."
+        )
+        raise InputError(msg)
+    results = None if evaluation is None else Evaluation.load(evaluation)
+    opened = open_database(database)
+    told = known_identifiability(database, opened) if identifiability or ambiguity else None
+    if identifiability and told is None:
+        msg = f"{database} does not tell where a query can be placed; run semsig identify first."
+        raise InputError(msg)
+    seen = None if objects is None else open_objects(objects)
+    newer = None if drift is None else open_database(drift)
+    ground = ground_of(database, opened, buildings=buildings, streets=streets)
+    with progress("drawing the map"):
+        drawn = None
+        if ambiguity:
+            drawn = ambiguity_map(opened, identifiability=told)
+        elif told is not None:
+            drawn = identifiability_map(told)
+        elif results is not None:
+            drawn = evaluation_map(results, opened)
+        elif drift is not None and newer is not None:
+            before, after = stored_objects(database), stored_objects(drift)
+            if before is None or after is None:
+                remark("the street objects of both are not at hand, so only cells are drawn")
+            drawn = drift_map(opened, newer, objects_before=before, objects_after=after)
+        if seen is not None:
+            drawn = objects_map(seen, database=opened if drawn is None else None, map_=drawn)
+        if drawn is not None and ground:
+            drawn = ground_map(**ground, map_=drawn)
+        offline = drawn is not None and save_map(drawn, out)
+    typer.echo(f"map: {out}")
+    tell_if_online(offline)

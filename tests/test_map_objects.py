@@ -1,0 +1,325 @@
+"""The map of street objects in a real browser."""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import TYPE_CHECKING
+
+import folium
+import geopandas as gpd
+import numpy as np
+import pytest
+import shapely
+from map_pages import (
+    HOSTILE,
+    asked,
+    assert_quiet,
+    drawn,
+    opened,
+    popup_text,
+    searched,
+    switch,
+)
+from selenium.webdriver.common.by import By
+from selenium.webdriver.common.keys import Keys
+from sentences import assert_sentence
+from worlds import random_town
+
+from semsig_gis._map_parts import to_latlon
+from semsig_gis._map_signs import class_signs
+from semsig_gis.errors import EmptyResultError
+from semsig_gis.map_objects import objects_map
+from semsig_gis.maps import localization_map, save_map
+from semsig_gis.matching import localize
+from semsig_gis.objects import StreetObjects
+from semsig_gis.taxonomy import ObjectClass, Taxonomy
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from numpy.typing import NDArray
+    from selenium.webdriver import Chrome
+
+BOARD = ".leaflet-overlay-pane canvas.semsig-board"
+WORLD = random_town()
+CITY = WORLD.database
+OBJECTS = WORLD.street_objects
+SIGNS = class_signs(OBJECTS.taxonomy)
+NUMBER = 7  # of the object that is asked for
+CODE = int(OBJECTS.codes[NUMBER])
+TITLE = OBJECTS.taxonomy.by_code(CODE).title
+COUNT = OBJECTS.class_counts[CODE]
+
+
+def place_of(number: int) -> list[float]:
+    latlon: list[float] = to_latlon(OBJECTS.xy[number : number + 1], OBJECTS.crs)[0].tolist()
+    return latlon
+
+
+def click(browser: Chrome, place: list[float]) -> None:
+    asked(browser, "map.setView(arguments[0], 20, {animate: false})", place)
+    asked(browser, "map.fire('click', {latlng: L.latLng(arguments[0])})", place)
+
+
+@pytest.mark.usefixtures("carried")
+def test_objects_in_a_browser(browser: Chrome, tmp_path: Path) -> None:
+    opened(browser, objects_map(OBJECTS, database=CITY), tmp_path)
+    assert browser.title == "Street objects"
+    names = [
+        label.text.strip()
+        for label in browser.find_elements(
+            By.CSS_SELECTOR, ".leaflet-control-layers-overlays label"
+        )
+    ]
+    # The letter of the sign, then the title.
+    assert any(name.endswith(f"{TITLE} ({COUNT:,})") for name in names)
+    assert len(names) == len(OBJECTS.class_counts) + 1
+    legend = browser.find_element(By.CSS_SELECTOR, ".semsig-legend").text
+    assert f"{len(OBJECTS):,} objects of {len(OBJECTS.class_counts)} classes" in legend
+    credit = browser.find_element(By.CSS_SELECTOR, ".leaflet-control-attribution").text
+    assert OBJECTS.licenses[0] in credit
+    assert drawn(browser, SIGNS[CODE].colour, BOARD) > 0
+    # Layers are switched by the sign beside the name as by the name.
+    for name in names[1:]:
+        switch(browser, name)
+    assert drawn(browser, SIGNS[CODE].colour, BOARD) == 0
+    switch(browser, next(name for name in names if TITLE in name))
+    assert drawn(browser, SIGNS[CODE].colour, BOARD) > 0
+    assert_quiet(browser)
+
+
+@pytest.mark.usefixtures("carried")
+def test_a_click_tells_of_the_nearest_object(browser: Chrome, tmp_path: Path) -> None:
+    table = OBJECTS.table.assign(count=3, merged="osm:node/9")
+    objects = dataclasses.replace(OBJECTS, table=table)
+    opened(browser, objects_map(objects), tmp_path)
+    click(browser, place_of(NUMBER))
+    popup = popup_text(browser)
+    assert popup.startswith(TITLE)
+    for said in ("world", "3 rows of its source", "osm:node/9"):
+        assert said in popup
+    # Whoever lies on it may be told of instead.
+    there = np.hypot(*(OBJECTS.xy - OBJECTS.xy[NUMBER]).T) < 0.5
+    ids = OBJECTS.table["source_id"][there]
+    assert any(f"Identifier\t{one}" in popup for one in ids)
+    assert len(browser.find_elements(By.CSS_SELECTOR, ".leaflet-shadow-pane canvas")) == 1
+    asked(browser, "map.closePopup()")
+    corner = OBJECTS.xy.min(axis=0) - 50.0
+    asked(browser, "map.fire('click', {latlng: L.latLng(arguments[0])})",
+          to_latlon(corner[None], OBJECTS.crs)[0].tolist())  # fmt: skip
+    assert asked(browser, "return map._popup === null || !map._popup.isOpen()")
+    assert_quiet(browser)
+
+
+@pytest.mark.usefixtures("carried")
+def test_the_script_has_every_object_where_it_is(browser: Chrome, tmp_path: Path) -> None:
+    opened(browser, objects_map(OBJECTS), tmp_path)
+    browser.set_script_timeout(30)
+    known = browser.execute_async_script(
+        """
+        const done = arguments[arguments.length - 1];
+        const map = Object.values(window).find((value) => value instanceof L.Map);
+        const found = [];
+        const look = () => {
+          for (let one = 0; one < arguments[0]; one += 1) {
+            const name = semsig.finders.flatMap((finder) => finder(String(one), 99))
+              .find((other) => other.name === String(one));
+            if (!name) return setTimeout(look, 50);
+            name.show(map);
+            const place = map._popup.getLatLng();
+            found.push([place.lat, place.lng]);
+          }
+          done(found);
+        };
+        look();
+        """,
+        40,
+    )
+    expected = np.array([place_of(number) for number in range(40)])
+    assert np.abs(np.array(known) - expected).max() < 4e-6  # a quarter of a metre
+
+
+@pytest.mark.usefixtures("carried")
+def test_the_search_finds_names_cells_and_places(browser: Chrome, tmp_path: Path) -> None:
+    opened(browser, objects_map(OBJECTS, database=CITY), tmp_path)
+    offered = searched(browser, TITLE[:4].upper())
+    assert f"{TITLE}\nall {COUNT:,}" in offered
+    offered = searched(browser, str(len(OBJECTS) - 1), Keys.ENTER)
+    assert offered[0].startswith(f"{len(OBJECTS) - 1}\n")
+    assert f"Identifier\t{len(OBJECTS) - 1}" in popup_text(browser)
+    assert asked(browser, "return map.getZoom()") >= 18
+    middle = len(CITY) // 2
+    x, y = CITY.xy[middle].tolist()
+    latitude, longitude = to_latlon(CITY.xy[middle : middle + 1], CITY.crs)[0].tolist()
+    centre = "const place = map.getCenter(); return [place.lat, place.lng];"
+    for text, said in (
+        (str(CITY.cell_ids[middle]), f"Cell {CITY.cell_ids[middle]}"),
+        (f"{latitude}, {longitude}", "latitude, longitude"),
+        (f"{x} {y}", "x, y in EPSG:2154"),
+    ):
+        asked(browser, "map.setZoom(14, {animate: false})")
+        assert len(searched(browser, text, Keys.ENTER)) == 1
+        assert said in popup_text(browser)
+        # Popups near the edge move the map a little.
+        asked(browser, "map.setView(map._popup.getLatLng(), 19, {animate: false})")
+        assert asked(browser, centre) == pytest.approx([latitude, longitude], abs=2e-6)
+    assert_quiet(browser)
+
+
+@pytest.mark.usefixtures("carried")
+def test_the_search_is_used_by_keyboard(browser: Chrome, tmp_path: Path) -> None:
+    opened(browser, objects_map(OBJECTS, database=CITY), tmp_path)
+    box = browser.find_element(By.CSS_SELECTOR, ".semsig-search input")
+    offered = searched(browser, "1")
+    assert len(offered) == 8
+    chosen = "return document.querySelector('[aria-selected=true]').innerText"
+    assert browser.execute_script(chosen) == offered[0]
+    box.send_keys(Keys.ARROW_DOWN, Keys.ARROW_DOWN)
+    assert browser.execute_script(chosen) == offered[2]
+    active = box.get_attribute("aria-activedescendant")
+    assert browser.find_element(By.ID, str(active)).text == offered[2]
+    box.send_keys(Keys.ARROW_UP, Keys.ESCAPE)
+    assert box.get_attribute("aria-expanded") == "false"
+    for nothing in ("no such thing", "0, 0", "1e400", "99999999999999999999"):
+        assert searched(browser, nothing, Keys.ENTER) == []
+        said = browser.find_element(By.CSS_SELECTOR, ".semsig-search [role=status]")
+        assert said.text == "Nothing on this map is called so, or lies there."
+    assert_quiet(browser)
+
+
+@pytest.mark.usefixtures("carried")
+def test_light_and_dark(browser: Chrome, tmp_path: Path) -> None:
+    dark = {"features": [{"name": "prefers-color-scheme", "value": "dark"}]}
+    panel = "return getComputedStyle(document.querySelector('.semsig-legend')).color"
+    browser.execute_cdp_cmd("Emulation.setEmulatedMedia", dark)
+    try:
+        opened(browser, objects_map(OBJECTS), tmp_path)
+        assert asked(browser, "return semsig.isDark(map)")
+        assert browser.execute_script(panel) == "rgb(233, 233, 230)"
+        button = browser.find_element(By.CSS_SELECTOR, ".semsig-colours")
+        assert button.get_attribute("aria-label") == "Light colours"
+        button.send_keys(Keys.ENTER)
+        assert not asked(browser, "return semsig.isDark(map)")
+        assert browser.execute_script(panel) == "rgb(34, 34, 34)"
+        assert drawn(browser, SIGNS[CODE].colour, BOARD) > 0
+    finally:
+        browser.execute_cdp_cmd("Emulation.setEmulatedMedia", {"features": []})
+    assert_quiet(browser)
+
+
+@pytest.mark.usefixtures("carried")
+def test_a_narrow_screen(browser: Chrome, tmp_path: Path) -> None:
+    size = {"width": 390, "height": 844, "deviceScaleFactor": 2, "mobile": True}
+    browser.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", size)
+    try:
+        opened(browser, objects_map(OBJECTS, database=CITY), tmp_path)
+        box = browser.find_element(By.CSS_SELECTOR, ".semsig-search").rect
+        layers = browser.find_element(By.CSS_SELECTOR, ".leaflet-control-layers").rect
+        assert box["x"] + box["width"] <= layers["x"]
+        assert searched(browser, "3", Keys.ENTER)
+        popup = browser.find_element(By.CSS_SELECTOR, ".leaflet-popup-content-wrapper")
+        assert popup.rect["x"] >= 0
+        assert popup.rect["x"] + popup.rect["width"] <= 390
+        assert not browser.find_element(By.CSS_SELECTOR, ".semsig-search").is_displayed()
+        asked(browser, "map.closePopup()")
+        assert browser.find_element(By.CSS_SELECTOR, ".semsig-search").is_displayed()
+    finally:
+        browser.execute_cdp_cmd("Emulation.clearDeviceMetricsOverride", {})
+    assert_quiet(browser)
+
+
+@pytest.mark.usefixtures("carried")
+def test_hostile_data_is_shown_and_never_run(browser: Chrome, tmp_path: Path) -> None:
+    harm = HOSTILE + "M" * 10_000
+    classes = tuple(
+        ObjectClass(item.code, item.symbol, item.name, f"{item.symbol} {harm}")
+        for item in OBJECTS.taxonomy.classes
+    )
+    table = OBJECTS.table.assign(source=harm, source_id=harm, merged=harm)
+    harmful = StreetObjects(table, Taxonomy(classes), (f"{harm}: {harm}",))
+    opened(browser, objects_map(harmful), tmp_path)  # an alert would fail the next command
+    text = "return document.querySelector(arguments[0]).textContent"
+    for selector, times in (
+        (".semsig-legend", len(OBJECTS.class_counts) + 2),
+        (".leaflet-control-layers-overlays", len(OBJECTS.class_counts)),
+        (".leaflet-control-attribution", 2),
+    ):
+        assert browser.execute_script(text, selector).count(harm) == times
+    click(browser, place_of(NUMBER))
+    popup_text(browser)
+    assert browser.execute_script(text, ".semsig-details").count(harm) == 5
+    asked(browser, "map.closePopup()")
+    offered = searched(browser, "alert")
+    assert len(offered) == 8
+    assert browser.execute_script(text, ".semsig-search ul").count(harm) == 8
+    for element in ("script", "img"):
+        assert browser.find_elements(By.CSS_SELECTOR, f".leaflet-container {element}") == []
+    assert_quiet(browser)
+
+
+@pytest.mark.usefixtures("carried")
+def test_objects_over_another_map(browser: Chrome, tmp_path: Path) -> None:
+    chosen = localization_map(localize(CITY, CITY.signature(0), top=3), CITY)
+    assert objects_map(OBJECTS, map_=chosen) is chosen
+    assert objects_map(OBJECTS, map_=chosen) is chosen
+    opened(browser, chosen, tmp_path)
+    assert browser.find_elements(By.CSS_SELECTOR, BOARD) == []  # hidden at first
+    assert len(browser.find_elements(By.CSS_SELECTOR, ".semsig-search")) == 1
+    assert len(browser.find_elements(By.CSS_SELECTOR, ".semsig-legend[open]")) == 1
+    # Cells are still found by their number, and the credit is given once.
+    assert searched(browser, str(CITY.cell_ids[0]), Keys.ENTER) == [f"Cell {CITY.cell_ids[0]}"]
+    credit = browser.find_element(By.CSS_SELECTOR, ".leaflet-control-attribution")
+    said = browser.execute_script("return arguments[0].textContent", credit)
+    assert said.count(OBJECTS.licenses[0]) == 1
+    assert_quiet(browser)
+
+
+def test_signs_are_told_apart() -> None:
+    many = Taxonomy(
+        tuple(ObjectClass(code, chr(64 + code), f"c{code}", "C") for code in range(1, 27))
+    )
+    signs = class_signs(many)
+    assert len({(sign.colour, sign.outline) for sign in signs.values()}) == 26
+    for sign in signs.values():
+        shades = (bytes.fromhex(colour[1:]) for colour in (sign.colour, sign.ink))
+        light, dark = sorted((luminance(*shade) for shade in shades), reverse=True)
+        assert (light + 0.05) / (dark + 0.05) > 3.0  # the letter is readable
+
+
+def luminance(*channels: int) -> float:
+    shares = np.array(channels) / 255.0
+    linear: NDArray[np.float64] = np.where(
+        shares <= 0.04045, shares / 12.92, ((shares + 0.055) / 1.055) ** 2.4
+    )
+    return float(linear @ [0.2126, 0.7152, 0.0722])
+
+
+def test_a_hundred_thousand_objects_are_a_small_page(tmp_path: Path) -> None:
+    rng = np.random.default_rng(0)
+    size = 100_000
+    table = gpd.GeoDataFrame(
+        {
+            "class_code": rng.choice(OBJECTS.codes, size),
+            "source": "many",
+            "source_id": np.arange(size).astype(str),
+            "count": np.ones(size, np.int32),
+        },
+        geometry=shapely.points(765_000.0 + 10_000.0 * rng.random((size, 2))),
+        crs=OBJECTS.crs,
+    )
+    objects = StreetObjects(table, OBJECTS.taxonomy, OBJECTS.licenses)
+    save_map(objects_map(objects), tmp_path / "map.html", self_contained=False)
+    assert (tmp_path / "map.html").stat().st_size < 1_500_000
+
+
+def test_no_objects() -> None:
+    none = dataclasses.replace(OBJECTS, table=OBJECTS.table.iloc[:0])
+    with pytest.raises(EmptyResultError) as caught:
+        objects_map(none)
+    assert_sentence(caught.value, "no street object")
+
+
+def test_a_map_of_ones_own_keeps_its_view() -> None:
+    own = folium.Map([43.0, 3.0], zoom_start=12, tiles=None)
+    assert objects_map(OBJECTS, map_=own) is own
+    assert "fitBounds(null" not in own.get_root().render()
