@@ -22,7 +22,7 @@ STYLE = """\
   font: 13px/1.4 system-ui, sans-serif; color: #222; background: rgba(255, 255, 255, 0.93);
   border-radius: 5px; box-shadow: 0 1px 5px rgba(0, 0, 0, 0.4); padding: 7px 10px;
   box-sizing: border-box; width: 290px; max-width: calc(100vw - 20px);
-  max-height: calc(100vh - 120px); overflow: auto; overflow-wrap: anywhere; }
+  max-height: calc(100vh - 90px); overflow: auto; overflow-wrap: anywhere; }
 .semsig-legend summary { font-weight: 600; font-size: 14px; cursor: pointer; }
 .semsig-legend:not([open]) { width: auto; }
 .semsig-legend p { margin: 6px 0; }
@@ -35,7 +35,6 @@ STYLE = """\
 .semsig-legend .ends { display: flex; justify-content: space-between; }
 .semsig-legend table, .semsig-details table { border-collapse: collapse; }
 .semsig-legend td { padding: 0 12px 0 0; }
-.semsig-legend td + td { overflow-wrap: normal; }
 .semsig-details { font: 13px/1.4 system-ui, sans-serif; overflow-wrap: anywhere; }
 .semsig-details th { text-align: left; font-weight: 400; color: #555; white-space: nowrap; }
 .semsig-details th, .semsig-details td { vertical-align: top; padding: 2px 6px 2px 0; }
