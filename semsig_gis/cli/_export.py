@@ -72,10 +72,10 @@ def map_(
         if ambiguity:
             drawn = ambiguity_map(opened, identifiability=told)
         elif newer is not None:
-            objects = stored_objects(database), newer[1]
-            if None in objects:
+            before, after = stored_objects(database), newer[1]
+            if before is None or after is None:
                 remark("the street objects of both are not at hand, so only cells are drawn")
-            drawn = drift_map(opened, newer[0], objects_before=objects[0], objects_after=objects[1])
+            drawn = drift_map(opened, newer[0], objects_before=before, objects_after=after)
         elif told is not None:
             drawn = identifiability_map(told)
         elif results is not None:
