@@ -231,6 +231,7 @@ semsig.cells = (packed, grid, titles, told) => {
 };
 """
 STYLE = """\
+.semsig-legend td + td { overflow-wrap: normal; }
 .semsig-cells.leaflet-grab { cursor: pointer; }
 .semsig-jumps { margin-top: 5px; }
 .semsig-jumps span { margin-right: 4px; }

@@ -23,7 +23,7 @@ from semsig_gis.database import join_databases
 from semsig_gis.drift import compare_cells
 from semsig_gis.errors import CrsError
 from semsig_gis.map_image import level_image
-from semsig_gis.map_legend import DRIFT_COLOURS, drift_legend
+from semsig_gis.map_legend import DRIFT_COLOURS, OBJECT_COLOURS, drift_legend
 from semsig_gis.schema import SOURCE, SOURCE_ID
 
 if TYPE_CHECKING:
@@ -189,12 +189,12 @@ def _object_drawings(
 ) -> Iterator[tuple[str, list[list[Any]]]]:
     """Yield name and drawings of a layer of each kind of change that there is."""
     kinds = (
-        ("removed", "vanished", _facts(old, changes.removed), None),
-        ("added", "appeared", _facts(new, changes.added), None),
-        ("moved", "changed", *_pair(old, new, changes.moved)),
-        ("of another class", "changed", *_pair(old, new, changes.changed)),
+        ("removed", _facts(old, changes.removed), None),
+        ("added", _facts(new, changes.added), None),
+        ("moved", *_pair(old, new, changes.moved)),
+        ("of another class", *_pair(old, new, changes.changed)),
     )
-    for what, kind, facts, before in kinds:
+    for what, facts, before in kinds:
         if facts.empty:
             continue
         drawn: list[list[Any]] = []
@@ -206,7 +206,7 @@ def _object_drawings(
             drawn = [["lines", [[{"color": "#222", "weight": 2, "opacity": 0.9}, lines]]]]
         places, said = (facts[some].to_numpy().tolist() for some in (PLACE, SAID))
         records = [
-            [place, DRIFT_COLOURS[kind], 4, None, f"Object {what}", details]
+            [place, OBJECT_COLOURS[what], 5, None, f"Object {what}", details]
             for place, details in zip(places, said, strict=True)
         ]
         drawn.append(["points", OBJECT_FIELDS, {}, records])

@@ -38,6 +38,7 @@ __all__ = [
     "FAILED",
     "FOUND_RAMP",
     "GROUP_COLOURS",
+    "OBJECT_COLOURS",
     "SAME_LEVELS",
     "SAME_TYPES",
     "SHADES",
@@ -107,9 +108,15 @@ GROUP_COLOURS: Mapping[int, str] = MappingProxyType(
 SAME_TYPES, SAME_LEVELS = "#ffffff", "#e69f00"
 
 DRIFT_COLOURS: Mapping[str, str] = MappingProxyType(
-    {"same": "#d6d6d1", "changed": "#e69f00", "appeared": "#0072b2", "vanished": "#882255"}
+    {"same": "#d6d6d1", "changed": "#f0bf5c", "appeared": "#5aa5d6", "vanished": "#b5698f"}
 )
-"""Colour of a cell or object by what became of it."""
+"""Colour of a cell by what became of it."""
+
+OBJECT_COLOURS: Mapping[str, str] = MappingProxyType(
+    {"added": "#0072b2", "removed": "#6d1a47", "moved": "#e69f00", "of another class": "#ffffff"}
+)
+"""Colour of an object by what became of it: that of the cells, but darker."""
+
 FLIPPING = "square semsig-flip"
 """A sign whose lightness flips in the dark, as what it explains does."""
 
@@ -206,7 +213,7 @@ def location_legend(location: Location) -> str:
         for share in CHANCES
     )
     chances = " ".join(
-        f"{_sign(colour, FLIPPING)}{100.0 * least:g}+"
+        f"<span style='white-space:nowrap'>{_sign(colour, FLIPPING)}{100.0 * least:g}+</span>"
         for least, colour in sorted(CELL_CHANCES.items(), reverse=True)
     )
     explained = "".join(
@@ -415,7 +422,7 @@ def drift_legend(
         "same": (cells.same, "see what they saw"),
         "changed": (cells.changed, "see something else"),
         "appeared": (cells.appeared, "saw nothing before"),
-        "vanished": (cells.vanished, "see nothing any more"),
+        "vanished": (cells.vanished, "see nothing now"),
     }
     total = sum(len(rows) for rows, _ in kinds.values())
     lines = "".join(
@@ -434,14 +441,14 @@ def drift_legend(
 
 def _drifted(objects: ObjectChanges, taxonomy: Taxonomy) -> str:
     """Return how many objects have changed, and of which classes most."""
-    kinds = (
-        ("appeared", objects.added, "added"),
-        ("vanished", objects.removed, "removed"),
-        ("changed", objects.moved, "moved, from the end of the line"),
-        ("changed", objects.changed, "of another class now"),
-    )
+    kinds = {
+        "added": objects.added,
+        "removed": objects.removed,
+        "moved": objects.moved,
+        "of another class": objects.changed,
+    }
     counts = "<br>".join(
-        f"{_sign(DRIFT_COLOURS[kind])}{len(rows):,} {title}" for kind, rows, title in kinds
+        f"{_sign(OBJECT_COLOURS[kind])}{len(rows):,} {kind}" for kind, rows in kinds.items()
     )
     changes = {
         item: item.added + item.removed + item.moved + item.gained + item.lost

@@ -20,7 +20,7 @@ from semsig_gis.changes import compare_objects
 from semsig_gis.drift import compare_cells
 from semsig_gis.errors import CrsError, DatabaseError, InputError
 from semsig_gis.map_drift import drift_map
-from semsig_gis.map_legend import DRIFT_COLOURS
+from semsig_gis.map_legend import OBJECT_COLOURS
 from semsig_gis.signatures import SignatureSpec
 from semsig_gis.taxonomy import Taxonomy
 
@@ -90,7 +90,7 @@ def test_cells_before_and_now(browser: Chrome, tmp_path: Path) -> None:
         (CELLS.same, "see what they saw"),
         (CELLS.changed, "see something else"),
         (CELLS.appeared, "saw nothing before"),
-        (CELLS.vanished, "see nothing any more"),
+        (CELLS.vanished, "see nothing now"),
     ):
         assert f"{title} {len(rows):,}" in legend
     assert "Street objects" not in legend
@@ -112,19 +112,16 @@ def test_objects_that_have_changed(browser: Chrome, tmp_path: Path) -> None:
     legend = browser.find_element(By.CSS_SELECTOR, ".semsig-legend").text
     assert "3 removed" in legend
     last = "return [...document.querySelectorAll('.semsig-details')].pop().innerText"
-    for kind, colour, count in (
-        ("removed", DRIFT_COLOURS["vanished"], 3),
-        ("added", DRIFT_COLOURS["appeared"], 1),
-        ("moved", DRIFT_COLOURS["changed"], 2),
-    ):
+    for kind, count in counts.items():
+        colour = OBJECT_COLOURS[kind]
         assert asked(browser, "return circles(arguments[0]).length", colour) == count
         asked(browser, "circles(arguments[0])[0].openPopup()", colour)
-        assert browser.execute_script(last).startswith(f"Object {kind}")
-        if kind == "moved":
-            assert "5.0 m" in browser.execute_script(last)
+        said = browser.execute_script(last)
+        assert said.startswith(f"Object {kind}")
+        assert ("5.0 m" in said) == (kind == "moved")
+        assert ("Class before" in said) == (kind in {"moved", "of another class"})
         switch(browser, f"Objects {kind}")
-        left = asked(browser, "return circles(arguments[0]).length", colour)
-        assert left == (1 if kind == "moved" else 0)
+        assert asked(browser, "return circles(arguments[0]).length", colour) == 0
     assert_quiet(browser)
 
 
@@ -142,7 +139,7 @@ def test_hostile_data_is_shown_and_never_run(browser: Chrome, tmp_path: Path) ->
     opened(browser, map_, tmp_path)  # an alert would fail the next command
     legend = browser.find_element(By.CSS_SELECTOR, ".semsig-legend")
     assert HOSTILE in browser.execute_script("return arguments[0].textContent", legend)
-    asked(browser, "circles(arguments[0])[0].openPopup()", DRIFT_COLOURS["vanished"])
+    asked(browser, "circles(arguments[0])[0].openPopup()", OBJECT_COLOURS["removed"])
     details = browser.execute_script("return document.querySelector('.semsig-details').textContent")
     assert details.count(HOSTILE) == 2  # class and source
     click(browser, new, int(CELLS.changed[0, 1]))
