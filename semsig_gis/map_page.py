@@ -81,6 +81,7 @@ STYLE = """\
 .semsig-wheels text {
   font-family: system-ui, sans-serif; font-weight: 700; fill: var(--ink); text-anchor: middle; }
 .leaflet-container .semsig-search { width: 230px; z-index: 810; }
+.leaflet-container .leaflet-top { z-index: 1001; }
 .semsig-search input { width: 100%; height: 34px; padding: 0 9px; border: 0; font-size: 14px; }
 .semsig-search ul {
   position: absolute; z-index: 1; top: 100%; width: 100%; list-style: none; margin: 4px 0 0;
