@@ -80,7 +80,8 @@ STYLE = """\
 .semsig-wheels .north { fill: var(--ink); }
 .semsig-wheels text {
   font-family: system-ui, sans-serif; font-weight: 700; fill: var(--ink); text-anchor: middle; }
-.semsig-search { width: 230px; }
+.leaflet-container .semsig-search { width: 230px; z-index: 810; }
+.leaflet-container .leaflet-top { z-index: 1001; }
 .semsig-search input { width: 100%; height: 34px; padding: 0 9px; border: 0; font-size: 14px; }
 .semsig-search ul {
   position: absolute; z-index: 1; top: 100%; width: 100%; list-style: none; margin: 4px 0 0;
@@ -100,7 +101,7 @@ STYLE = """\
 .leaflet-control-layers { font: 13px/1.5 system-ui, sans-serif; overflow-wrap: anywhere; }
 .leaflet-control-layers-expanded { max-width: min(320px, calc(100vw - 20px)); }
 @media (max-width: 700px) {
-  .semsig-search { width: calc(100vw - 80px); max-width: 300px; }
+  .leaflet-container .semsig-search { width: calc(100vw - 80px); max-width: 300px; }
   .semsig-search input { height: 40px; font-size: 16px; }
   /* A popup takes the whole width, and goes by a tap beside it. */
   .semsig-told .leaflet-top { visibility: hidden; } }

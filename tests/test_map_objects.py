@@ -79,9 +79,8 @@ def test_objects_in_a_browser(browser: Chrome, tmp_path: Path) -> None:
     credit = browser.find_element(By.CSS_SELECTOR, ".leaflet-control-attribution").text
     assert OBJECTS.licenses[0] in credit
     assert drawn(browser, SIGNS[CODE].colour, BOARD) > 0
-    # Layers are switched by the sign beside the name as by the name.
-    for name in names[1:]:
-        switch(browser, name)
+    boxes = ".leaflet-control-layers-overlays input:checked"
+    asked(browser, "document.querySelectorAll(arguments[0]).forEach((box) => box.click())", boxes)
     assert drawn(browser, SIGNS[CODE].colour, BOARD) == 0
     switch(browser, next(name for name in names if TITLE in name))
     assert drawn(browser, SIGNS[CODE].colour, BOARD) > 0
@@ -174,6 +173,13 @@ def test_the_search_is_used_by_keyboard(browser: Chrome, tmp_path: Path) -> None
     assert len(offered) == 8
     chosen = "return document.querySelector('[aria-selected=true]').innerText"
     assert browser.execute_script(chosen) == offered[0]
+    covered = """
+    return [...document.querySelectorAll('[role=option]')].filter((one) => {
+      const {left, top, height} = one.getBoundingClientRect();
+      return !one.contains(document.elementFromPoint(left + 10, top + height / 2));
+    }).length;
+    """
+    assert browser.execute_script(covered) == 0  # no button lies on what is offered
     box.send_keys(Keys.ARROW_DOWN, Keys.ARROW_DOWN)
     assert browser.execute_script(chosen) == offered[2]
     active = box.get_attribute("aria-activedescendant")
