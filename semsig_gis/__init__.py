@@ -44,6 +44,7 @@ if TYPE_CHECKING:
     from semsig_gis.loading import Loaded, assemble, choose_layers, read_files
     from semsig_gis.locating import locate, locate_route
     from semsig_gis.location import Location
+    from semsig_gis.map_frame import show_map
     from semsig_gis.map_identifiability import identifiability_map
     from semsig_gis.map_location import location_map
     from semsig_gis.maps import evaluation_map, localization_map, save_map
@@ -158,6 +159,7 @@ _HOMES = {
     "save_objects": "objects",
     "save_surroundings": "surroundings",
     "save_with_store": "store",
+    "show_map": "map_frame",
     "suggest_catalog": "suggest",
     "synthetic_city": "sources.synthetic",
     "synthetic_surroundings": "sources.synthetic",
@@ -248,6 +250,7 @@ __all__ = [
     "save_objects",
     "save_surroundings",
     "save_with_store",
+    "show_map",
     "suggest_catalog",
     "synthetic_city",
     "synthetic_surroundings",
