@@ -46,6 +46,7 @@ if TYPE_CHECKING:
     from semsig_gis.location import Location
     from semsig_gis.map_ambiguity import ambiguity_map
     from semsig_gis.map_drift import drift_map
+    from semsig_gis.map_frame import show_map
     from semsig_gis.map_ground import ground_map
     from semsig_gis.map_identifiability import identifiability_map
     from semsig_gis.map_location import location_map
@@ -166,6 +167,7 @@ _HOMES = {
     "save_objects": "objects",
     "save_surroundings": "surroundings",
     "save_with_store": "store",
+    "show_map": "map_frame",
     "suggest_catalog": "suggest",
     "synthetic_city": "sources.synthetic",
     "synthetic_surroundings": "sources.synthetic",
@@ -260,6 +262,7 @@ __all__ = [
     "save_objects",
     "save_surroundings",
     "save_with_store",
+    "show_map",
     "suggest_catalog",
     "synthetic_city",
     "synthetic_surroundings",

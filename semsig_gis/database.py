@@ -20,7 +20,7 @@ from semsig_gis.viewpoints import ViewpointSpec
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-    from numpy.typing import NDArray
+    from numpy.typing import ArrayLike, NDArray
 
     from semsig_gis.grid import GridSpec
     from semsig_gis.signatures import SignatureSpec
@@ -192,6 +192,23 @@ class SignatureDatabase:
     def angle_group_sizes(self) -> NDArray[np.int64]:
         """For every cell, how many cells have its angle-level sequence, shape (n,)."""
         return _frozen(self.angle_sequences.counts[self.angle_sequences.inverse])
+
+    def cells_at(self, xy: ArrayLike) -> NDArray[np.int64]:
+        """Return the cells in which places lie.
+
+        Parameters
+        ----------
+        xy : array_like, shape (p, 2)
+            Places in metres.
+
+        Returns
+        -------
+        ndarray of int64, shape (p,)
+            Row numbers in the database; -1 where it has no cell there.
+        """
+        ids = cell_ids(*self.grid.cells_at(xy))
+        rows = np.minimum(np.searchsorted(self.cell_ids, ids), len(self) - 1)
+        return np.where(self.cell_ids[rows] == ids, rows, -1)
 
     def signature(self, cell: int) -> Signature:
         """Return the signature of one cell.

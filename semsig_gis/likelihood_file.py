@@ -30,6 +30,7 @@ __all__ = ["SUFFIX", "index_path", "open_index", "ready_index", "save_index"]
 
 SUFFIX = ".likelihood"
 KIND = "semsig likelihood index"
+PARQUET = b"PAR1"
 PAGE = 4096
 HEADER_PAGES = 4
 
@@ -93,6 +94,11 @@ def ready_index(
     LikelihoodIndex
         The index; mapped from the file, or in memory where no file can be written.
 
+    Raises
+    ------
+    InputError
+        If the file is a database, which the index would replace.
+
     Examples
     --------
     >>> import tempfile
@@ -115,6 +121,7 @@ def ready_index(
         if note is not None:
             note(sentence)
 
+    _keep_database(path, noise)
     fingerprint = index_fingerprint(database, noise)
     if not Path(path).exists():
         say("The likelihood index does not exist yet and is built.")
@@ -153,7 +160,13 @@ def save_index(
         Called with the number of cells done and in all.
     threads : int, default 1
         How many blocks of cells are worked out at once.
+
+    Raises
+    ------
+    InputError
+        If the file is a database, which the index would replace, or it cannot be written.
     """
+    _keep_database(path, noise)
     shape = index_shape(database)
     start = _columns_start(len(database))
     with whole_file(path) as partial:
@@ -240,6 +253,21 @@ def open_index(
         step=step,
         fingerprint=wanted,
     )
+
+
+def _keep_database(path: str | Path, noise: Noise) -> None:
+    """Refuse to put an index in the place of a database: both are named by one argument."""
+    try:
+        with Path(path).open("rb") as file:
+            begin = file.read(len(PARQUET))
+    except OSError:
+        return  # nothing there, or nothing that can be replaced
+    if begin == PARQUET:
+        msg = (
+            f"{path} is a Parquet file, such as a database, and no likelihood index; "
+            f"give a place of its own, such as {index_path(path, noise)}."
+        )
+        raise InputError(msg)
 
 
 def _columns_start(cells: int) -> int:

@@ -86,6 +86,10 @@ class Picture:
     png: bytes
     description: str
 
+    def _repr_svg_(self) -> str:
+        """Show the picture in a notebook."""
+        return self.svg.decode("utf-8")
+
 
 @contextlib.contextmanager
 def blank_figure(width: float, height: float) -> Iterator[Figure]:

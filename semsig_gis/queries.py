@@ -17,7 +17,6 @@ import numpy as np
 from semsig_gis.distortion import DISTORTIONS
 from semsig_gis.distortion_chain import ready_chain
 from semsig_gis.errors import CrsError, InputError, UnknownNameError, nearest_name
-from semsig_gis.grid import cell_ids
 from semsig_gis.sight import CitySights, Sight
 from semsig_gis.views import views_at
 
@@ -199,7 +198,7 @@ def draw_queries(
     queries = []
     for seed, numbers in _numbers(spec, part):
         places, sights = _seen(looked_at, spec, seed, numbers, store)
-        cells = _cells_of(database, places)
+        cells = database.cells_at(places)
         for number, place, cell, sight in zip(numbers, places, cells, sights, strict=True):
             codes = known[sight.codes]
             true = replace(sight, codes=codes).only(codes > 0)
@@ -290,13 +289,6 @@ def _sights(views: Views) -> Iterator[Sight]:
         yield Sight(
             codes=views.codes[part], bearings=views.bearings[part], distances=views.distances[part]
         )
-
-
-def _cells_of(database: SignatureDatabase, places: NDArray[np.float64]) -> NDArray[np.int64]:
-    """Return the row of the cell that each place lies in; -1 where there is none."""
-    ids = cell_ids(*database.grid.cells_at(places))
-    rows = np.minimum(np.searchsorted(database.cell_ids, ids), len(database) - 1)
-    return np.where(database.cell_ids[rows] == ids, rows, -1)
 
 
 def _known_codes(city: SignatureDatabase, database: SignatureDatabase) -> NDArray[np.uint8]:

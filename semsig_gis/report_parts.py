@@ -147,8 +147,8 @@ class Scene:
         Objects around that are not seen from there.
     answer : tuple of float or None
         Metres east and north to the place that was answered, if near enough to be drawn.
-    error_m : float
-        By how much the answer was off, in metres.
+    error_m : float, optional
+        By how much the answer was off, in metres; None where nothing was asked.
     """
 
     name: str
@@ -160,7 +160,7 @@ class Scene:
     objects: tuple[SceneObject, ...]
     others: tuple[SceneObject, ...] = ()
     answer: tuple[float, float] | None = None
-    error_m: float
+    error_m: float | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

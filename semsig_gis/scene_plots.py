@@ -300,10 +300,13 @@ def _told(scene: Scene) -> list[str]:
     """Return the lines below the map."""
     types = label(scene.types, TYPE_LETTERS * TYPE_LINES)
     signature = textwrap.wrap(types, TYPE_LETTERS) or ["sees nothing"]
-    return [*signature, f"{scene.lon:.6f}°, {scene.lat:.6f}° · {_error(scene)}"]
+    place = f"{scene.lon:.6f}°, {scene.lat:.6f}°"
+    return [*signature, " · ".join(part for part in (place, _error(scene)) if part)]
 
 
 def _error(scene: Scene) -> str:
+    if scene.error_m is None:
+        return ""
     return f"error {scene.error_m:,.1f} m" if math.isfinite(scene.error_m) else "not localized"
 
 
@@ -330,9 +333,5 @@ def _described(scene: Scene, looks: dict[int, _Look]) -> str:
     )
     types = f"Signature {scene.types}, seen" if scene.types else "Nothing is seen"
     place = f"from {scene.lon:.6f}, {scene.lat:.6f}"
-    return f"{scene.title}. {types} {place}{f': {counts}' if counts else ''}. {_error_end(scene)}"
-
-
-def _error_end(scene: Scene) -> str:
-    text = _error(scene)
-    return f"{text[:1].upper()}{text[1:]}."
+    told = (scene.title, f"{types} {place}{f': {counts}' if counts else ''}", _error(scene))
+    return " ".join(f"{part[:1].upper()}{part[1:]}." for part in told if part)

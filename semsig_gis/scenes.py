@@ -1,8 +1,9 @@
-"""Examples of places that were found and of places that were not, with what is seen there."""
+"""Places with what is seen there: cells, and examples of queries that were found or not."""
 
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -16,10 +17,55 @@ if TYPE_CHECKING:
     from semsig_gis.database import SignatureDatabase
     from semsig_gis.evaluation_result import Evaluation
 
-__all__ = ["example_scenes"]
+__all__ = ["cell_scene", "example_scenes"]
 
 SAME_M = 1.0
 """How far apart, in metres, two cells may see one object: bearings and distances are rounded."""
+
+
+def cell_scene(database: SignatureDatabase, cell: int, *, title: str = "") -> Scene:
+    """Return what is seen from a cell.
+
+    Parameters
+    ----------
+    database : SignatureDatabase
+        The database.
+    cell : int
+        Row number in the database.
+    title : str, optional
+        What to call it; the cell's number by default.
+
+    Returns
+    -------
+    Scene
+        The objects of its signature, and those around that only other cells see.
+
+    Examples
+    --------
+    >>> from semsig_gis.building import build_database
+    >>> from semsig_gis.catalog import paper_taxonomy
+    >>> from semsig_gis.objects import build_objects
+    >>> from semsig_gis.sources.synthetic import CitySpec, synthetic_city
+    >>> layers = synthetic_city(CitySpec(size=300.0))
+    >>> objects, _ = build_objects(layers, taxonomy=paper_taxonomy(), crs="EPSG:32631")
+    >>> database = build_database(objects)
+    >>> cell_scene(database, 0, title="A corner").types == database.types(0)
+    True
+    """
+    x, y = database.xy[cell].tolist()
+    lon, lat = Transformer.from_crs(database.crs, 4326, always_xy=True).transform(x, y)
+    number = int(database.cell_ids[cell])
+    own = _seen_from(database, cell)
+    return Scene(
+        name=f"cell-{number}",
+        title=title or f"Cell {number}",
+        lon=lon,
+        lat=lat,
+        radius=database.spec.radius,
+        types=database.types(cell),
+        objects=_drawn(own),
+        others=_drawn(_seen_around(database, cell, own)),
+    )
 
 
 def example_scenes(
@@ -61,25 +107,17 @@ def example_scenes(
     """
     queries = evaluation.queries
     chosen = queries[(evaluation.successful == successful) & (queries["cell"] >= 0)].head(count)
-    to_degrees = Transformer.from_crs(database.crs, 4326, always_xy=True)
     kind = "found" if successful else "lost"
     scenes = []
     for place, row in enumerate(chosen.to_dict("records"), start=1):
         cell = int(row["cell"])
         x, y = database.xy[cell].tolist()
-        lon, lat = to_degrees.transform(x, y)
         aside = (float(row["best_x"]) - x, float(row["best_y"]) - y)
-        own = _seen_from(database, cell)
+        title = f"{'Found' if successful else 'Not found'}: query {int(row['number']):,}"
         scenes.append(
-            Scene(
+            replace(
+                cell_scene(database, cell, title=title),
                 name=f"{kind}-{place}",
-                title=f"{'Found' if successful else 'Not found'}: query {int(row['number']):,}",
-                lon=lon,
-                lat=lat,
-                radius=database.spec.radius,
-                types=database.types(cell),
-                objects=_drawn(own),
-                others=_drawn(_seen_around(database, cell, own)),
                 answer=aside if math.isfinite(aside[0]) else None,
                 error_m=float(row["error_m"]),
             )

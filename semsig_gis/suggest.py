@@ -242,11 +242,24 @@ def _identifier(draft: _Draft) -> Iterator[str]:
             warning = "" if column in named else "; a program gave them, and may give others anew"
             yield f"id_field = {_text(column.name)}  # a value of its own in {some}{warning}"
             return
-    yield f"# No field has a value of its own in {some}; rows are told by their number."
+    yield (
+        f"# No field that is named like an identifier has a value of its own in {some}; rows are "
+        "told by their number."
+    )
     best = max(named, key=lambda column: len(column.counts), default=None)
     if best is not None and best.counts and len(best.counts) * FEW_PER_ID >= rows:
         yield f"# id_field = {_text(best.name)}  # {len(best.counts):,} values in {rows:,} rows"
         yield "# unique_id = true  # if rows of the same id are the same object"
+        return
+    others = (column for column in draft.columns if column.unique and not _measured(column))
+    other = next((column for column in others if column.name not in draft.position), None)
+    if other is not None:
+        yield f"# id_field = {_text(other.name)}  # has one, if it is meant to identify a row"
+
+
+def _measured(column: Column) -> bool:
+    """Tell whether the values are numbers with decimals, which are different by chance."""
+    return any(str(value).count(".") == 1 for value in column.counts)
 
 
 def _place(draft: _Draft) -> Iterator[str]:

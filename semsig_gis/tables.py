@@ -37,6 +37,10 @@ class Table:
     rows: tuple[tuple[str, ...], ...]
     note: str = ""
 
+    def _repr_markdown_(self) -> str:
+        """Show the table in a notebook."""
+        return self.markdown()
+
     def markdown(self) -> str:
         """Return the table as a Markdown section.
 

@@ -47,6 +47,14 @@ def test_cells_are_ordered_and_numbered(town: World) -> None:
     assert set(database.present_codes) <= set(CODES)
 
 
+def test_places_are_in_their_cells(town: World) -> None:
+    cells = np.arange(len(town.database))
+    aside = np.random.default_rng(1).uniform(-4.9, 4.9, (len(cells), 2))
+    assert (town.database.cells_at(town.database.xy + aside) == cells).all()
+    far = town.database.xy.min(axis=0) - 1000.0
+    assert town.database.cells_at([far, town.database.xy[2]]).tolist() == [-1, 2]
+
+
 def test_a_signature_is_a_part_of_the_arrays(town: World) -> None:
     database = town.database
     for cell in range(0, len(database), 37):

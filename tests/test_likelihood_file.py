@@ -5,13 +5,16 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pytest
 from noisy_cells import random_database, random_query
+from sentences import assert_sentence
 
-from semsig_gis.errors import DatabaseError
+from semsig_gis.database_file import save_database
+from semsig_gis.errors import DatabaseError, InputError
 from semsig_gis.likelihood import build_index
 from semsig_gis.likelihood_file import index_path, open_index, ready_index, save_index
 from semsig_gis.noise import NoiseSpec, named_noise
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
     from pathlib import Path
 
 NOISE = named_noise("generic")
@@ -39,6 +42,17 @@ def test_each_model_has_a_file_of_its_own(tmp_path: Path) -> None:
     assert all(name.startswith("city.parquet.") for name in names)
     strange = index_path(tmp_path / "city.parquet", NoiseSpec(name="a/b c"))
     assert strange.parent == tmp_path
+
+
+@pytest.mark.parametrize("make", [ready_index, save_index])
+def test_a_database_is_not_replaced(make: Callable[..., object], tmp_path: Path) -> None:
+    path = tmp_path / "city.parquet"
+    save_database(DATABASE, path)
+    content = path.read_bytes()
+    with pytest.raises(InputError) as caught:
+        make(DATABASE, NOISE, path)
+    assert_sentence(caught.value, str(index_path(path, NOISE)))
+    assert path.read_bytes() == content
 
 
 def damage(path: Path, how: str) -> None:

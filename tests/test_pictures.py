@@ -37,6 +37,7 @@ def test_a_picture_says_what_it_shows() -> None:
     assert [child.text for child in root[:2]] == ["A < B & C", "what is seen"]
     assert texts(made.svg) == ["words"]
     assert made.description == "what is seen"
+    assert made._repr_svg_().encode() == made.svg  # what a notebook shows
     assert struct.unpack(">II", made.png[16:24]) == (600, 400)
 
 

@@ -51,6 +51,12 @@ def test_a_place_that_was_not_found() -> None:
     assert lost.description.endswith("Not localized.")
 
 
+def test_a_place_that_nobody_asked_for() -> None:
+    shown = draw_scene(scene(error_m=None), CLASSES)
+    assert "2.300000°, 48.800000°" in texts(shown.svg)
+    assert "rror" not in shown.description
+
+
 def test_a_class_looks_the_same_whatever_else_is_there() -> None:
     looks = _looks(CLASSES)
     assert len({(look.marker, look.colour) for look in looks.values()}) == len(CLASSES.classes)

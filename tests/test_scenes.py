@@ -8,7 +8,7 @@ import pytest
 from worlds import random_town
 
 from semsig_gis.evaluation import evaluate
-from semsig_gis.scenes import example_scenes
+from semsig_gis.scenes import cell_scene, example_scenes
 
 TOWN = random_town()
 CITY = TOWN.database
@@ -41,6 +41,14 @@ def test_scenes_show_what_is_there(successful: bool) -> None:  # noqa: FBT001
         if scene.answer is not None:
             east, north = scene.answer
             assert (x + east, y + north) == pytest.approx((row["best_x"], row["best_y"]))
+
+
+def test_a_scene_of_a_cell() -> None:
+    scene = cell_scene(CITY, 3)
+    assert scene.types == CITY.types(3)
+    assert scene.title == f"Cell {CITY.cell_ids[3]}"
+    assert (scene.answer, scene.error_m) == (None, None)
+    assert cell_scene(CITY, 3, title="A corner").title == "A corner"
 
 
 def nearest(x: float, y: float, code: int) -> float:

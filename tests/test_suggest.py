@@ -176,6 +176,18 @@ def test_ids_that_come_again_are_offered(tmp_path: Path) -> None:
     assert (spec.id_field, spec.unique_id) == ("code", True)
 
 
+def test_an_id_of_another_name_is_offered(tmp_path: Path) -> None:
+    values: dict[str, list[object]] = {
+        "height": [1.5, 2.5, 3.25],
+        "kind": ["a", "a", "b"],
+        "baumnr": [17, 18, 21],
+    }
+    draft = suggest_catalog(write(tmp_path / "trees.gpkg", values))
+    assert '# id_field = "baumnr"' in draft
+    (spec,) = load(SUGGESTION.sub("", draft), tmp_path).layers
+    assert spec.id_field == "baumnr"
+
+
 # --- Positions and coordinate systems ---------------------------------------------------------
 
 

@@ -13,6 +13,7 @@ def test_a_table_is_markdown() -> None:
     assert table.markdown() == (
         "### A\\|B\n\n| What | m |\n| --- | ---: |\n| a\\|b | &lt;1 |\n| x |  |\n\nsee \\|\n"
     )
+    assert table._repr_markdown_() == table.markdown()  # what a notebook shows
 
 
 def test_text_from_data_breaks_nothing() -> None:
