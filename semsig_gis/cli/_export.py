@@ -9,7 +9,7 @@ from typing import Annotated
 import typer
 
 from semsig_gis.cli._app import Database, app, known_identifiability, tell_if_online
-from semsig_gis.cli._ground import Buildings, Streets, ground_of
+from semsig_gis.cli._ground import Buildings, Streets, draw_ground
 from semsig_gis.console import progress
 from semsig_gis.errors import InputError
 
@@ -44,7 +44,6 @@ def map_(
     """Draw an evaluation, where a query can be placed at all, or the street objects."""
     from semsig_gis.database_file import open_database
     from semsig_gis.evaluation import Evaluation
-    from semsig_gis.map_ground import ground_map
     from semsig_gis.map_identifiability import identifiability_map
     from semsig_gis.map_objects import objects_map
     from semsig_gis.maps import evaluation_map, save_map
@@ -62,7 +61,6 @@ def map_(
         msg = f"{database} does not tell where a query can be placed; run semsig identify first."
         raise InputError(msg)
     seen = None if objects is None else open_objects(objects)
-    ground = ground_of(database, opened, buildings=buildings, streets=streets)
     with progress("drawing the map"):
         if told is not None:
             drawn = identifiability_map(told)
@@ -72,8 +70,7 @@ def map_(
             drawn = objects_map(seen, database=opened)
         if seen is not None and given:
             objects_map(seen, map_=drawn)
-        if ground:
-            ground_map(**ground, map_=drawn)
+        draw_ground(drawn, database, opened, buildings=buildings, streets=streets)
         offline = save_map(drawn, out)
     typer.echo(f"map: {out}")
     tell_if_online(offline)
