@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from semsig_gis.errors import DatabaseError
+from semsig_gis.errors import DatabaseError, EmptyResultError
 
 if TYPE_CHECKING:
     import folium
@@ -62,10 +62,14 @@ def draw_ground(
     catalog = load_catalog("openstreetmap")
     named = f"{catalog.attribution} ({catalog.license}): streets and buildings"
     from_osm = any(str(file).endswith(OSM_SUFFIXES) for file in (buildings, streets))
-    ground_map(
-        buildings=houses,
-        streets=lines,
-        box=(*low.tolist(), *high.tolist()),
-        licenses=(named,) if from_osm else (),
-        map_=drawn,
-    )
+    try:
+        ground_map(
+            buildings=houses,
+            streets=lines,
+            box=(*low.tolist(), *high.tolist()),
+            licenses=(named,) if from_osm else (),
+            map_=drawn,
+        )
+    except EmptyResultError:
+        if buildings is not None or streets is not None:
+            raise
