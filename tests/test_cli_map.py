@@ -68,6 +68,10 @@ def test_streets_and_buildings_of_the_store_or_of_files(city: Path, run: Run) ->
     assert run(*query)[0] == 0
     assert GROUND in city.with_name("query.html").read_text(encoding="utf-8")
 
+    far = surroundings(shapely.box(X + 9000.0, Y, X + 9010.0, Y + 10.0))
+    save_with_store(WORLD.database, ObjectStore.of(WORLD.street_objects, footprints=far), city)
+    assert GROUND not in drawn(run, city, *objects)
+
     save_with_store(WORLD.database, ObjectStore.of(WORLD.street_objects), city)
     save_surroundings(LANE, city.with_name("streets.parquet"))
     page = drawn(run, city, *objects, "--streets", city.with_name("streets.parquet"))
@@ -92,11 +96,14 @@ def test_what_cannot_be_drawn_leaves_the_map_as_it_was(city: Path, run: Run) -> 
     page, objects = city.with_name("map.html"), city.with_name("objects.parquet")
     page.write_text("before")
     save_surroundings(LANE, city.with_name("streets.parquet"))
+    far = surroundings(shapely.LineString([(X + 9000.0, Y), (X + 9100.0, Y)]))
+    save_surroundings(far, city.with_name("far.parquet"))
     for options, words in (
         ((), ("--evaluation", "--identifiability", "--objects")),
         (("--objects", "nowhere.parquet"), ("nowhere.parquet",)),
         (("--objects", objects, "--buildings", "gone.zip"), ("gone.zip",)),
         (("--objects", objects, "--buildings", city.with_name("streets.parquet")), ("polygon",)),
+        (("--objects", objects, "--streets", city.with_name("far.parquet")), ("in the city",)),
     ):
         sentence(run("map", city, *options, "--out", page), *words)
     assert page.read_text() == "before"

@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import contextlib
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from semsig_gis.errors import DatabaseError
+from semsig_gis.errors import DatabaseError, EmptyResultError
 
 if TYPE_CHECKING:
+    import folium
+
     from semsig_gis.database import SignatureDatabase
 
 AROUND_M = 100.0
@@ -30,11 +32,17 @@ Streets = Annotated[
 ]
 
 
-def ground_of(
-    path: Path, opened: SignatureDatabase, *, buildings: Path | None, streets: Path | None
-) -> dict[str, Any]:
-    """Return what `ground_map` draws, from files or else from the store; nothing if it is empty."""
+def draw_ground(
+    drawn: folium.Map,
+    path: Path,
+    opened: SignatureDatabase,
+    *,
+    buildings: Path | None = None,
+    streets: Path | None = None,
+) -> None:
+    """Add streets and buildings to a map: those of files, else of the store of the database."""
     from semsig_gis.catalog import load_catalog
+    from semsig_gis.map_ground import ground_map
     from semsig_gis.store import open_store
     from semsig_gis.surroundings import OSM_SUFFIXES, read_surroundings
 
@@ -49,14 +57,19 @@ def ground_of(
             houses = store.footprints if houses is None else houses
             lines = store.streets if lines is None else lines
     if houses is None and lines is None:
-        return {}
+        return
     low, high = opened.xy.min(axis=0) - AROUND_M, opened.xy.max(axis=0) + AROUND_M
     catalog = load_catalog("openstreetmap")
     named = f"{catalog.attribution} ({catalog.license}): streets and buildings"
     from_osm = any(str(file).endswith(OSM_SUFFIXES) for file in (buildings, streets))
-    return {
-        "buildings": houses,
-        "streets": lines,
-        "box": (*low.tolist(), *high.tolist()),
-        "licenses": (named,) if from_osm else (),
-    }
+    try:
+        ground_map(
+            buildings=houses,
+            streets=lines,
+            box=(*low.tolist(), *high.tolist()),
+            licenses=(named,) if from_osm else (),
+            map_=drawn,
+        )
+    except EmptyResultError:
+        if buildings is not None or streets is not None:
+            raise

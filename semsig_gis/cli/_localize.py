@@ -19,7 +19,7 @@ from semsig_gis.cli._app import (
     numbers,
     tell_if_online,
 )
-from semsig_gis.cli._ground import ground_of
+from semsig_gis.cli._ground import draw_ground
 from semsig_gis.cli._likelihood import (
     Heading,
     NoiseName,
@@ -244,7 +244,6 @@ def _answer_route(ready: Locator, source: str) -> None:
 def _draw(found: Localization | Location, database: Path, out: Path) -> None:
     from semsig_gis.database_file import open_database
     from semsig_gis.localization import Localization
-    from semsig_gis.map_ground import ground_map
     from semsig_gis.map_location import location_map
     from semsig_gis.maps import localization_map, save_map
 
@@ -255,7 +254,5 @@ def _draw(found: Localization | Location, database: Path, out: Path) -> None:
             if isinstance(found, Localization)
             else location_map(found)
         )
-        ground = ground_of(database, opened, buildings=None, streets=None)
-        if ground:
-            ground_map(**ground, map_=drawn)
+        draw_ground(drawn, database, opened)
         tell_if_online(save_map(drawn, out))

@@ -14,7 +14,7 @@ from semsig_gis.cli._app import (
     stored_objects,
     tell_if_online,
 )
-from semsig_gis.cli._ground import Buildings, Streets, ground_of
+from semsig_gis.cli._ground import Buildings, Streets, draw_ground
 from semsig_gis.console import progress, remark
 from semsig_gis.errors import InputError
 
@@ -51,7 +51,6 @@ def map_(
     from semsig_gis.evaluation import Evaluation
     from semsig_gis.map_ambiguity import ambiguity_map
     from semsig_gis.map_drift import drift_map
-    from semsig_gis.map_ground import ground_map
     from semsig_gis.map_identifiability import identifiability_map
     from semsig_gis.map_objects import objects_map
     from semsig_gis.maps import evaluation_map, save_map
@@ -72,7 +71,6 @@ def map_(
         raise InputError(msg)
     seen = None if objects is None else open_objects(objects)
     newer = None if drift is None else open_database(drift)
-    ground = ground_of(database, opened, buildings=buildings, streets=streets)
     with progress("drawing the map"):
         drawn = None
         if ambiguity:
@@ -88,8 +86,9 @@ def map_(
             drawn = drift_map(opened, newer, objects_before=before, objects_after=after)
         if seen is not None:
             drawn = objects_map(seen, database=opened if drawn is None else None, map_=drawn)
-        if drawn is not None and ground:
-            drawn = ground_map(**ground, map_=drawn)
-        offline = drawn is not None and save_map(drawn, out)
+        offline = False
+        if drawn is not None:
+            draw_ground(drawn, database, opened, buildings=buildings, streets=streets)
+            offline = save_map(drawn, out)
     typer.echo(f"map: {out}")
     tell_if_online(offline)
