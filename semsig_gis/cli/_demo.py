@@ -25,7 +25,7 @@ def demo(
     from semsig_gis.catalog import paper_taxonomy
     from semsig_gis.database_file import save_database
     from semsig_gis.evaluation import evaluate as run
-    from semsig_gis.export import export_geopackage
+    from semsig_gis.exports.geopackage import export_geopackage
     from semsig_gis.maps import evaluation_map, save_map
     from semsig_gis.objects import build_objects, save_objects
     from semsig_gis.sources.synthetic import CitySpec, synthetic_city

@@ -19,11 +19,11 @@ import shapely
 from cells_told import told_of
 from sentences import assert_sentence
 
-from semsig_gis import export
 from semsig_gis.building import build_database
 from semsig_gis.catalog import paper_taxonomy
 from semsig_gis.errors import InputError, UnknownNameError
-from semsig_gis.export import export_geopackage
+from semsig_gis.exports import _layers
+from semsig_gis.exports.geopackage import export_geopackage
 from semsig_gis.grid import GridSpec
 from semsig_gis.objects import StreetObjects, build_objects
 from semsig_gis.signatures import SignatureSpec, quantize
@@ -59,7 +59,7 @@ def database(objects: StreetObjects) -> SignatureDatabase:
 
 @pytest.fixture(autouse=True)
 def _several_blocks(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(export, "_ROWS_A_BLOCK", 100)
+    monkeypatch.setattr(_layers.Layer.blocks, "__defaults__", (100,))
 
 
 def query(file: Path, sql: str) -> list[Any]:
@@ -70,7 +70,7 @@ def query(file: Path, sql: str) -> list[Any]:
 def test_cells_read_back_as_they_are(database: SignatureDatabase, tmp_path: Path) -> None:
     file = tmp_path / "city.gpkg"
     export_geopackage(database, file)
-    assert pyogrio.list_layers(file).tolist() == [["cells", "Polygon"]]
+    assert pyogrio.list_layers(file).tolist() == [["cells", "Polygon"], ["layer_styles", None]]
     cells = gpd.read_file(file, layer="cells")
     assert cells.crs == database.crs
     assert len(cells) == len(database) > 300
@@ -124,7 +124,7 @@ def test_objects_read_back_as_they_are(
 ) -> None:
     file = tmp_path / "city.gpkg"
     export_geopackage(database, file, objects=objects)
-    assert fiona.listlayers(file) == ["cells", "objects"]
+    assert fiona.listlayers(file) == ["cells", "objects", "layer_styles"]
     with fiona.open(file, layer="objects") as layer:
         assert layer.crs.to_epsg() == 32631
         assert list(layer.schema["properties"]) == [
@@ -165,8 +165,9 @@ def test_specs_and_licences_travel_along(
     assert [row[:2] for row in contents] == [
         ("cells", "Signature cells"),
         ("objects", "Street objects"),
+        ("layer_styles", "layer_styles"),
     ]
-    assert all(LICENSE in description for *_, description in contents)
+    assert all(LICENSE in description for *_, description in contents[:2])
     assert "12.5 m" in contents[0][2]
 
 
@@ -188,7 +189,7 @@ def test_a_crs_of_its_own(database: SignatureDatabase, tmp_path: Path) -> None:
     local = type(database.crs)("+proj=tmerc +lat_0=43.6 +lon_0=3.88 +ellps=GRS80 +units=m")
     file = tmp_path / "city.gpkg"
     export_geopackage(dataclasses.replace(database, crs=local), file, geometry="point")
-    assert gpd.read_file(file).crs == local
+    assert gpd.read_file(file, layer="cells").crs == local
 
 
 def test_progress(database: SignatureDatabase, objects: StreetObjects, tmp_path: Path) -> None:
