@@ -217,9 +217,10 @@ def evaluation_layers(evaluation: Evaluation, licenses: tuple[str, ...]) -> list
     """Return the queries at their true places, and lines from there to the best places."""
     queries = evaluation.queries
     found, missed, empty = OUTCOMES
-    outcome = np.where(evaluation.successful, found, missed)
-    outcome[(queries["query_length"] == 0).to_numpy()] = empty
-    told = queries.assign(outcome=outcome)
+    nothing = (queries["query_length"] == 0).to_numpy()
+    told = queries.assign(
+        outcome=np.select([nothing, evaluation.successful], [empty, found], missed)
+    )
     placed = told[told["best_x"].notna().to_numpy()]
     truth = shapely.get_coordinates(placed.geometry.array)
     best = placed[["best_x", "best_y"]].to_numpy(np.float64)

@@ -173,10 +173,7 @@ def write_layers(
     rows = sum(layer.rows for layer in layers)
     with whole_file(target) as partial:
         try:
-            blocks = (
-                _write_layer(layer, partial, first=number == 0)
-                for number, layer in enumerate(layers)
-            )
+            blocks = (_write_layer(layer, partial) for layer in layers)
             for done in itertools.accumulate(itertools.chain.from_iterable(blocks)):
                 if progress is not None:
                     progress(done, rows)
@@ -192,22 +189,25 @@ def write_layers(
         _require_closed(target)
 
 
-def _write_layer(layer: Layer, path: Path, *, first: bool) -> Iterator[int]:
+def _write_layer(layer: Layer, path: Path) -> Iterator[int]:
     """Write one layer block by block, and yield the number of rows of each block."""
     code = layer.crs.to_epsg()
-    facts = {
-        name: json.dumps(value, allow_nan=False)
-        for name, value in {**layer.facts, "licenses": list(layer.licenses)}.items()
+    told = {
+        **layer.facts,
+        "licenses": list(layer.licenses),
+        "written_by": f"semsig_gis {__version__}",
     }
+    # Of the layer and not of the file: for that, GDAL leaves a copy beside the file whenever the
+    # file is read.
     once: dict[str, Any] = {
-        "layer_metadata": facts,
+        "layer_metadata": {
+            name: json.dumps(value, allow_nan=False) for name, value in told.items()
+        },
         "layer_options": {
             "IDENTIFIER": layer.title,
             "DESCRIPTION": "\n".join([layer.description, *layer.licenses]),
         },
     }
-    if first:
-        once["dataset_metadata"] = facts | {"written_by": f"semsig_gis {__version__}"}
     for number, block in enumerate(layer.blocks()):
         pyogrio.write_arrow(
             block,
@@ -257,8 +257,8 @@ def _require_closed(path: Path) -> None:
     # os.path answers where Path raises.
     if any(map(os.path.exists, logs)) or (os.path.isfile(real) and _is_locked(real)):  # noqa: PTH113
         msg = (
-            f"{path} is open in another program, such as QGIS; close it there, or give another "
-            "name."
+            f"{path} is open in another program, such as QGIS, or was left half-written by one; "
+            "close it there, or give another name."
         )
         raise InputError(msg)
 
