@@ -7,6 +7,7 @@ import sqlite3
 import tempfile
 from contextlib import closing
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
@@ -18,7 +19,7 @@ from map_pages import HOSTILE, hostile_database
 from pyproj import CRS
 from sentences import assert_sentence
 from small_city import small_city
-from worlds import World
+from worlds import ARRAYS, CORNER, World
 
 from semsig_gis.errors import DatabaseError, EmptyResultError
 from semsig_gis.exports.geopackage import export_geopackage
@@ -31,6 +32,23 @@ if TYPE_CHECKING:
     from semsig_gis.exports._layers import CellGeometry
 
 SPECS = ("grid", "spec", "taxonomy", "crs", "licenses", "version", "viewpoints", "occlusion")
+LOCAL = CRS("+proj=tmerc +lat_0=43.6123456789 +lon_0=3.88 +k=0.99987 +ellps=GRS80 +units=m")
+
+
+def assert_same(database: object, again: object) -> None:
+    for name in ARRAYS:
+        ours, theirs = getattr(database, name), getattr(again, name)
+        assert ours.dtype == theirs.dtype, name
+        assert np.array_equal(ours, theirs), name
+    for name in SPECS:
+        assert getattr(database, name) == getattr(again, name), name
+
+
+objects = st.tuples(
+    st.floats(-60, 60).map(lambda x: CORNER[0] + x),
+    st.floats(-60, 60).map(lambda y: CORNER[1] + y),
+    st.sampled_from([1, 3, 12, 18]),
+)
 
 
 @settings(max_examples=25)
@@ -47,6 +65,7 @@ SPECS = ("grid", "spec", "taxonomy", "crs", "licenses", "version", "viewpoints",
     width=st.floats(1, 50),
 )
 def test_a_database_comes_back_as_it_was(
+    *,
     seen: list[tuple[float, float, int]],
     step: float,
     origin: tuple[float, float],
