@@ -15,10 +15,10 @@ from cells_told import told_of
 from sentences import sentence
 from small_city import small_city, small_evaluation
 
-from semsig_gis.database_file import save_database
+from semsig_gis.database_file import open_database, save_database
 from semsig_gis.exports.geotiff import cell_errors
 from semsig_gis.identifiability_file import save_identifiability
-from semsig_gis.objects import save_objects
+from semsig_gis.objects import open_objects, save_objects
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -32,8 +32,11 @@ def city(tmp_path: Path) -> Path:
     database, objects = small_city()
     path = tmp_path / "city.parquet"
     save_database(database, path)
+    # A coordinate system that was read tells of itself in other words than one that was named.
+    save_database(open_database(path), path)
     save_identifiability(told_of(database), path)
     save_objects(objects, tmp_path / "objects.parquet")
+    save_objects(open_objects(tmp_path / "objects.parquet"), tmp_path / "objects.parquet")
     small_evaluation().save(tmp_path / "evaluation")
     return path
 
@@ -52,7 +55,7 @@ def test_a_city_goes_into_a_geopackage_and_back(city: Path, run: Run) -> None:
     code, out, err = run("import", folder / "city.gpkg", "--out", back, *objects)
     assert (code, err) == (0, "")
     assert f"{len(small_city()[0]):,} cells" in out
-    # With the columns that semsig identify put there.
+    # With the columns that semsig identify put there, of which a -0.0 comes back as 0.0.
     again, before = pq.read_table(back), pq.read_table(city)
     assert again.equals(before)
     assert again.schema.metadata == before.schema.metadata

@@ -44,7 +44,13 @@ def demo(
     with progress("drawing the map"):
         offline = save_map(evaluation_map(evaluation, database), out / "map.html")
     with progress("writing the GeoPackage") as advance:
-        export_geopackage(database, out / "city.gpkg", objects=objects, progress=advance)
+        export_geopackage(
+            database,
+            out / "city.gpkg",
+            objects=objects,
+            evaluation=evaluation,
+            progress=advance,
+        )
     print_evaluation(evaluation)
     typer.echo(f"map:        {out / 'map.html'}  (open it in a browser)")
     typer.echo(f"GeoPackage: {out / 'city.gpkg'}  (open it in QGIS)")

@@ -261,9 +261,10 @@ def _answer(
     if files.map is not None:
         typer.echo(f"map: {files.map}")
     if searched is not None:
+        count = searched["regions"]
         typer.echo(
-            f"to search: {searched['regions']:,} regions, {searched['km2']:.4f} km2, "
-            f"{searched['percent']:.2f} % of the city: {files.out}"
+            f"to search: {count:,} region{'' if count == 1 else 's'}, {searched['km2']:.4g} km2, "
+            f"{searched['percent']:.3g} % of the city: {files.out}"
         )
 
 
