@@ -31,8 +31,11 @@ if TYPE_CHECKING:
     from semsig_gis.experiment import ExperimentSpec, open_experiment_spec
     from semsig_gis.experiment_folder import open_results
     from semsig_gis.experiment_run import run_experiment, run_experiments
-    from semsig_gis.export import export_geopackage
+    from semsig_gis.exports import export_answer, export_database
+    from semsig_gis.exports.geopackage import export_geopackage
+    from semsig_gis.exports.geotiff import export_geotiff
     from semsig_gis.fetching import fetch_layers, find_area, open_cache
+    from semsig_gis.geopackage_reading import GeopackageContents, read_geopackage
     from semsig_gis.grid import GridSpec
     from semsig_gis.identifiability import Identifiability
     from semsig_gis.identifiability_check import IdentifiabilityCheck, check_identifiability
@@ -59,6 +62,7 @@ if TYPE_CHECKING:
     from semsig_gis.posterior import Posterior
     from semsig_gis.properties import database_summary
     from semsig_gis.quality import quality_report
+    from semsig_gis.regions import SearchRegions, search_regions
     from semsig_gis.reproduction import Reproduction, reproduce
     from semsig_gis.signatures import Signature, SignatureSpec
     from semsig_gis.sources import RawLayer, find_files
@@ -88,6 +92,7 @@ _HOMES = {
     "Evaluation": "evaluation_result",
     "ExperimentSpec": "experiment",
     "Footprints": "occlusion",
+    "GeopackageContents": "geopackage_reading",
     "GridSpec": "grid",
     "Identifiability": "identifiability",
     "IdentifiabilityCheck": "identifiability_check",
@@ -106,6 +111,7 @@ _HOMES = {
     "Posterior": "posterior",
     "RawLayer": "sources",
     "Reproduction": "reproduction",
+    "SearchRegions": "regions",
     "SemsigError": "errors",
     "Signature": "signatures",
     "SignatureDatabase": "database",
@@ -129,7 +135,10 @@ _HOMES = {
     "drift_map": "map_drift",
     "evaluate": "evaluation",
     "evaluation_map": "maps",
-    "export_geopackage": "export",
+    "export_answer": "exports",
+    "export_database": "exports",
+    "export_geopackage": "exports.geopackage",
+    "export_geotiff": "exports.geotiff",
     "fetch_layers": "fetching",
     "find_area": "fetching",
     "find_files": "sources",
@@ -155,6 +164,7 @@ _HOMES = {
     "paper_taxonomy": "catalog",
     "quality_report": "quality",
     "read_files": "loading",
+    "read_geopackage": "geopackage_reading",
     "read_layer": "sources.vector_file",
     "read_surroundings": "surroundings",
     "ready_index": "likelihood_file",
@@ -167,6 +177,7 @@ _HOMES = {
     "save_objects": "objects",
     "save_surroundings": "surroundings",
     "save_with_store": "store",
+    "search_regions": "regions",
     "show_map": "map_frame",
     "suggest_catalog": "suggest",
     "synthetic_city": "sources.synthetic",
@@ -183,6 +194,7 @@ __all__ = [
     "Evaluation",
     "ExperimentSpec",
     "Footprints",
+    "GeopackageContents",
     "GridSpec",
     "Identifiability",
     "IdentifiabilityCheck",
@@ -200,6 +212,7 @@ __all__ = [
     "Posterior",
     "RawLayer",
     "Reproduction",
+    "SearchRegions",
     "SemsigError",
     "Signature",
     "SignatureDatabase",
@@ -224,7 +237,10 @@ __all__ = [
     "drift_map",
     "evaluate",
     "evaluation_map",
+    "export_answer",
+    "export_database",
     "export_geopackage",
+    "export_geotiff",
     "fetch_layers",
     "find_area",
     "find_files",
@@ -250,6 +266,7 @@ __all__ = [
     "paper_taxonomy",
     "quality_report",
     "read_files",
+    "read_geopackage",
     "read_layer",
     "read_surroundings",
     "ready_index",
@@ -262,6 +279,7 @@ __all__ = [
     "save_objects",
     "save_surroundings",
     "save_with_store",
+    "search_regions",
     "show_map",
     "suggest_catalog",
     "synthetic_city",

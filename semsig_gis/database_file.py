@@ -22,8 +22,9 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from numpy.typing import NDArray
+    from pyproj import CRS
 
-__all__ = ["open_database", "save_database"]
+__all__ = ["database_of", "database_specs", "open_database", "save_database"]
 
 KIND = "signature database"
 # Raised whenever a file of before would be read wrongly.
@@ -80,18 +81,34 @@ def save_database(database: SignatureDatabase, path: str | Path) -> None:
         table,
         path,
         geo=geo_metadata(database.crs, geometry_types=["Point"], bounds=bounds),
-        specs={
-            "kind": KIND,
-            "format": FORMAT,
-            "version": database.version,
-            "grid": asdict(database.grid),
-            "signature": asdict(database.spec),
-            "viewpoints": database.viewpoints.to_dict(),
-            "occlusion": database.occlusion,
-            "taxonomy": database.taxonomy.to_list(),
-            "licenses": list(database.licenses),
-        },
+        specs=database_specs(database),
     )
+
+
+def database_specs(database: SignatureDatabase) -> dict[str, Any]:
+    """Return all but the cells of a database.
+
+    Parameters
+    ----------
+    database : SignatureDatabase
+        A database.
+
+    Returns
+    -------
+    dict
+        Plain values for JSON.
+    """
+    return {
+        "kind": KIND,
+        "format": FORMAT,
+        "version": database.version,
+        "grid": asdict(database.grid),
+        "signature": asdict(database.spec),
+        "viewpoints": database.viewpoints.to_dict(),
+        "occlusion": database.occlusion,
+        "taxonomy": database.taxonomy.to_list(),
+        "licenses": list(database.licenses),
+    }
 
 
 def open_database(path: str | Path) -> SignatureDatabase:
@@ -122,7 +139,35 @@ def open_database(path: str | Path) -> SignatureDatabase:
     if os.path.isdir(path):  # noqa: PTH112 - it answers where Path.is_dir raises
         return join_databases([open_database(part) for part in part_files(path)])
     columns = ["cell_id", "types", "bearings", "distances"]
-    table, specs, crs = read_geoparquet(path, kind=KIND, columns=columns)
+    return database_of(*read_geoparquet(path, kind=KIND, columns=columns), path=path)
+
+
+def database_of(
+    table: pa.Table, specs: dict[str, Any], crs: CRS, *, path: str | Path
+) -> SignatureDatabase:
+    """Return the database that columns and specs hold.
+
+    Parameters
+    ----------
+    table : pyarrow.Table
+        ``cell_id``, ``types``, ``bearings`` and ``distances`` (see `save_database`).
+    specs : dict
+        What `database_specs` gave.
+    crs : pyproj.CRS
+        Coordinate reference system of the grid.
+    path : str or Path
+        The file that they were read from, to be named in errors.
+
+    Returns
+    -------
+    SignatureDatabase
+        The database.
+
+    Raises
+    ------
+    DatabaseError
+        If they are damaged, or from another version.
+    """
     if specs.get("format") != FORMAT:
         msg = (
             f"{path} was written by another version of semsig ({specs.get('version')}); "

@@ -21,7 +21,12 @@ if TYPE_CHECKING:
     from semsig_gis.database import SignatureDatabase
     from semsig_gis.noise import Noise
 
-__all__ = ["open_identifiability", "save_identifiability"]
+__all__ = [
+    "identifiability_facts",
+    "identifiability_of",
+    "open_identifiability",
+    "save_identifiability",
+]
 
 NAME = "identifiability"
 # Raised whenever the same cells and noise give other numbers, or they are told otherwise.
@@ -55,18 +60,34 @@ def save_identifiability(told: Identifiability, path: str | Path) -> None:
         told.table(),
         cell_ids=told.database.cell_ids,
         name=NAME,
-        facts={
-            "format": FORMAT,
-            "belongs_to": index_fingerprint(told.database, told.noise),
-            "noise": told.noise.to_dict(),
-            "radius": told.radius,
-            "trials": told.trials,
-            "seed": told.seed,
-            "classes": [
-                {"code": item.code, "near": item.near, "bits": item.bits} for item in told.classes
-            ],
-        },
+        facts=identifiability_facts(told),
     )
+
+
+def identifiability_facts(told: Identifiability) -> dict[str, Any]:
+    """Return what is to be known of the columns of `Identifiability.table` to read them again.
+
+    Parameters
+    ----------
+    told : Identifiability
+        What is known of the cells.
+
+    Returns
+    -------
+    dict
+        Plain values for JSON.
+    """
+    return {
+        "format": FORMAT,
+        "belongs_to": index_fingerprint(told.database, told.noise),
+        "noise": told.noise.to_dict(),
+        "radius": told.radius,
+        "trials": told.trials,
+        "seed": told.seed,
+        "classes": [
+            {"code": item.code, "near": item.near, "bits": item.bits} for item in told.classes
+        ],
+    }
 
 
 def open_identifiability(database: SignatureDatabase, path: str | Path) -> Identifiability | None:
@@ -116,6 +137,35 @@ def open_identifiability(database: SignatureDatabase, path: str | Path) -> Ident
     table, facts = read_added(path, name=NAME)
     if table is None or facts is None:
         return None
+    return identifiability_of(database, table, facts, path)
+
+
+def identifiability_of(
+    database: SignatureDatabase, table: pa.Table, facts: dict[str, Any], path: str | Path
+) -> Identifiability:
+    """Return what columns and the facts beside them tell.
+
+    Parameters
+    ----------
+    database : SignatureDatabase
+        The cells.
+    table : pyarrow.Table
+        The columns of `Identifiability.table`, a row a cell.
+    facts : dict
+        What `identifiability_facts` gave.
+    path : str or Path
+        The file that they were read from, to be named in errors.
+
+    Returns
+    -------
+    Identifiability
+        What is known of the cells.
+
+    Raises
+    ------
+    DatabaseError
+        If they are damaged, or belong to other signatures.
+    """
     try:
         noise = noise_from_dict(facts["noise"])
         fits = facts["format"] == FORMAT and (

@@ -43,6 +43,8 @@ __all__ = [
     "LoadReport",
     "StreetObjects",
     "build_objects",
+    "objects_of",
+    "objects_specs",
     "open_objects",
     "save_objects",
 ]
@@ -424,13 +426,29 @@ def save_objects(objects: StreetObjects, path: str | Path, *, keep_order: bool =
         path,
         geo=geo,
         group_rows=GROUP_ROWS,
-        specs={
-            "kind": KIND,
-            "version": __version__,
-            "taxonomy": objects.taxonomy.to_list(),
-            "licenses": list(objects.licenses),
-        },
+        specs=objects_specs(objects),
     )
+
+
+def objects_specs(objects: StreetObjects) -> dict[str, Any]:
+    """Return what is to be known of street objects besides their table.
+
+    Parameters
+    ----------
+    objects : StreetObjects
+        The objects.
+
+    Returns
+    -------
+    dict
+        Plain values for JSON.
+    """
+    return {
+        "kind": KIND,
+        "version": __version__,
+        "taxonomy": objects.taxonomy.to_list(),
+        "licenses": list(objects.licenses),
+    }
 
 
 def open_objects(path: str | Path, *, box: Sequence[float] | None = None) -> StreetObjects:
@@ -463,6 +481,42 @@ def open_objects(path: str | Path, *, box: Sequence[float] | None = None) -> Str
     arrow, specs, crs = read_geoparquet(path, kind=KIND, box=box)
     if box is not None:
         arrow = rows_meeting(arrow, box)
+    return objects_of(arrow, specs, crs, path=path, box=box)
+
+
+def objects_of(
+    arrow: pa.Table,
+    specs: dict[str, Any],
+    crs: CRS,
+    *,
+    path: str | Path,
+    box: Sequence[float] | None = None,
+) -> StreetObjects:
+    """Return the street objects that columns and specs hold.
+
+    Parameters
+    ----------
+    arrow : pyarrow.Table
+        The columns of `StreetObjects.table`, ``geometry`` as WKB.
+    specs : dict
+        What `objects_specs` gave.
+    crs : pyproj.CRS
+        Coordinate reference system of the geometry.
+    path : str or Path
+        The file that they were read from, to be named in errors.
+    box : sequence of float, optional
+        ``xmin, ymin, xmax, ymax`` in metres: only objects in it or on its edge.
+
+    Returns
+    -------
+    StreetObjects
+        The objects; there is at least one, but in a box there may be none.
+
+    Raises
+    ------
+    DatabaseError
+        If they are damaged.
+    """
     try:
         taxonomy = Taxonomy.from_list(specs["taxonomy"])
         columns = {

@@ -1,4 +1,4 @@
-"""Read a raster at the cells of a grid; the home of rasterio."""
+"""Read and write rasters at the cells of a grid; the home of rasterio."""
 
 from __future__ import annotations
 
@@ -7,15 +7,19 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 import rasterio
+import rasterio.shutil
 from rasterio._err import CPLE_BaseError
 from rasterio.enums import ColorInterp, Resampling
 from rasterio.errors import CRSError, NotGeoreferencedWarning, RasterioError
 from rasterio.transform import Affine
 from rasterio.vrt import WarpedVRT
+from rasterio.windows import Window
 
 from semsig_gis.errors import CrsError, InputError, SourceError
+from semsig_gis.storage import whole_file
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
     from pathlib import Path
 
     from numpy.typing import ArrayLike, NDArray
@@ -23,7 +27,11 @@ if TYPE_CHECKING:
 
     from semsig_gis.grid import GridSpec
 
-__all__ = ["raster_at_cells"]
+__all__ = ["raster_at_cells", "write_cells"]
+
+TILE = 512
+# 330 km by 330 km at a step of 10 m; a file of more is a mistake in the data.
+MOST_PIXELS = 1 << 30
 
 
 def raster_at_cells(
@@ -133,3 +141,110 @@ def _chosen_band(source: rasterio.DatasetReader, path: str, band: int | None) ->
         msg = f"{path} has {len(bands)} bands, but {asked}; name one, or give a raster of one band."
         raise InputError(msg)
     return band
+
+
+def write_cells(
+    path: str | Path,
+    values: NDArray[np.float64],
+    *,
+    grid: GridSpec,
+    columns: NDArray[np.int32],
+    rows: NDArray[np.int32],
+    crs: CRS,
+    name: str,
+    unit: str = "",
+    notes: Mapping[str, str],
+) -> None:
+    """Write one number a cell as a Cloud-Optimised GeoTIFF.
+
+    Parameters
+    ----------
+    path : str or Path
+        File to write; it appears whole, by rename.
+    values : ndarray of float64, shape (n,)
+        Numbers; NaN where there is none.
+    grid : GridSpec
+        The grid.
+    columns, rows : ndarray of int32, shape (n,)
+        Cells, at least one, ordered by column.
+    crs : pyproj.CRS
+        Coordinate reference system of the grid.
+    name : str
+        What the numbers are.
+    unit : str, optional
+        Their unit.
+    notes : mapping of str to str
+        What else is to be known of them.
+
+    Raises
+    ------
+    InputError
+        If the cells span too wide an area, or the file cannot be written.
+
+    Notes
+    -----
+    The raster is written in strips, so that memory stays flat.
+    """
+    left, top = int(columns[0]), int(rows.max())
+    width, height = int(columns[-1]) - left + 1, top - int(rows.min()) + 1
+    if width * height > MOST_PIXELS:
+        msg = (
+            f"the cells span {width:,} by {height:,} pixels, which is too wide for a raster; "
+            "export the parts of the city that lie far apart each on its own."
+        )
+        raise InputError(msg)
+    west, north = grid.origin[0] + left * grid.step, grid.origin[1] + (top + 1) * grid.step
+    with whole_file(path) as partial:
+        strips = partial.with_name("strips.tif")
+        try:
+            with rasterio.open(
+                strips,
+                "w",
+                driver="GTiff",
+                width=width,
+                height=height,
+                count=1,
+                dtype="float32",
+                nodata=np.nan,
+                crs=crs.to_wkt(),
+                transform=Affine(grid.step, 0.0, west, 0.0, -grid.step, north),
+                tiled=True,
+                blockxsize=TILE,
+                blockysize=TILE,
+                sparse_ok=True,
+            ) as file:
+                file.update_tags(**notes)
+                file.set_band_description(1, name)
+                file.set_band_unit(1, unit)
+                for start in range(0, width, TILE):
+                    low, high = np.searchsorted(columns, [left + start, left + start + TILE])
+                    strip = np.full((height, min(TILE, width - start)), np.nan, np.float32)
+                    across = columns[low:high] - left - start
+                    strip[top - rows[low:high], across] = values[low:high]
+                    file.write(strip, 1, window=Window(start, 0, strip.shape[1], height))
+            rasterio.shutil.copy(
+                strips,
+                partial,
+                driver="COG",
+                blocksize=TILE,
+                compress="DEFLATE",
+                predictor="YES",
+                overview_resampling="AVERAGE",
+            )
+            _check_blocks(partial)
+        except (CPLE_BaseError, RasterioError) as error:
+            # GDAL's own words do not help; they stay with the cause.
+            msg = (
+                f"{path} could not be written whole, so what was there before is unchanged; free "
+                "some space or choose another folder."
+            )
+            raise InputError(msg) from error
+
+
+def _check_blocks(path: Path) -> None:
+    """Read a raster block by block: what a full disk cuts off is not always told of earlier."""
+    with rasterio.open(path) as file:
+        for level in (None, *range(len(file.overviews(1)))):
+            with rasterio.open(path, overview_level=level) as part:
+                for _, window in part.block_windows(1):
+                    part.read(1, window=window)

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import contextlib
 import functools
+import itertools
 import json
 import os
 import shutil
@@ -21,11 +22,11 @@ import pyarrow.parquet as pq
 from pyproj import CRS
 from pyproj.exceptions import CRSError
 
-from semsig_gis.boxes import groups_meeting
+from semsig_gis.boxes import GROUP_ROWS, groups_meeting
 from semsig_gis.errors import DatabaseError, InputError
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
+    from collections.abc import Iterable, Iterator, Sequence
 
     from numpy.typing import NDArray
 
@@ -37,6 +38,7 @@ __all__ = [
     "whole_file",
     "whole_folder",
     "write_geoparquet",
+    "write_geoparquet_blocks",
 ]
 
 SPEC_KEY = b"semsig"
@@ -289,30 +291,65 @@ def write_geoparquet(
     ...     read_geoparquet(file, kind="example")[1]
     {'kind': 'example'}
     """
-    metadata = {b"geo": json.dumps(geo).encode(), SPEC_KEY: json.dumps(specs).encode()}
+    with whole_file(path) as partial:
+        pq.write_table(
+            table.replace_schema_metadata(_metadata(geo, specs)),
+            partial,
+            row_group_size=group_rows,
+            **_encoding(table.schema),
+        )
+
+
+def write_geoparquet_blocks(
+    blocks: Iterable[pa.Table], path: str | Path, *, geo: dict[str, Any], specs: dict[str, Any]
+) -> None:
+    """Write Arrow tables one after the other as one whole GeoParquet file.
+
+    Parameters
+    ----------
+    blocks : iterable of pyarrow.Table
+        At least one; all have the same columns.
+    path : str or Path
+        File to write; it appears whole, by rename.
+    geo : dict
+        See `geo_metadata`.
+    specs : dict
+        As of `write_geoparquet`.
+    """
+    blocks = iter(blocks)
+    with whole_file(path) as partial:
+        block = next(blocks)
+        schema = block.schema.with_metadata(_metadata(geo, specs))
+        with pq.ParquetWriter(partial, schema, **_encoding(schema)) as writer:
+            for part in itertools.chain([block], blocks):
+                writer.write_table(part.replace_schema_metadata(schema.metadata), GROUP_ROWS)
+
+
+def _metadata(geo: dict[str, Any], specs: dict[str, Any]) -> dict[bytes, bytes]:
+    return {b"geo": json.dumps(geo).encode(), SPEC_KEY: json.dumps(specs).encode()}
+
+
+def _encoding(schema: pa.Schema) -> dict[str, Any]:
+    """Return how the columns of a file are packed."""
     # Lengths apart from the bytes, and numbers by their differences: smaller for short rows. The
     # numbers in lists are few different ones, and so are rounded ones: a dictionary packs them
     # tighter.
-    few = [f"{field.name}.list.element" for field in table.schema if pa.types.is_list(field.type)]
-    few += [field.name for field in table.schema if pa.types.is_floating(field.type)]
+    few = [f"{field.name}.list.element" for field in schema if pa.types.is_list(field.type)]
+    few += [field.name for field in schema if pa.types.is_floating(field.type)]
     encodings = {
         field.name: "DELTA_BINARY_PACKED"
         if pa.types.is_integer(field.type)
         else "DELTA_LENGTH_BYTE_ARRAY"
-        for field in table.schema
+        for field in schema
         if pa.types.is_integer(field.type) or field.type in BYTE_TYPES
     }
-    with whole_file(path) as partial:
-        pq.write_table(
-            table.replace_schema_metadata(metadata),
-            partial,
-            compression="zstd",
-            compression_level=COMPRESSION,
-            use_dictionary=few,
-            column_encoding=encodings,
-            write_page_checksum=True,
-            row_group_size=group_rows,
-        )
+    return {
+        "compression": "zstd",
+        "compression_level": COMPRESSION,
+        "use_dictionary": few,
+        "column_encoding": encodings,
+        "write_page_checksum": True,
+    }
 
 
 def read_geoparquet(

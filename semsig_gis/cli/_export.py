@@ -1,4 +1,4 @@
-"""`semsig export`: results for other programs."""
+"""`semsig export` and `import`: results for other programs, and back."""
 
 from __future__ import annotations
 
@@ -9,7 +9,8 @@ from typing import Annotated
 import typer
 
 from semsig_gis.cli._app import Database, app, known_identifiability
-from semsig_gis.console import progress
+from semsig_gis.console import progress, remark
+from semsig_gis.errors import InputError
 
 
 class CellGeometry(enum.StrEnum):
@@ -23,28 +24,82 @@ class CellGeometry(enum.StrEnum):
 def export(
     database: Database,
     *,
-    out: Annotated[Path, typer.Option(help="GeoPackage to write (.gpkg).")],
-    objects: Annotated[
-        Path | None, typer.Option(help="Street objects to add as a second layer.")
+    out: Annotated[
+        Path,
+        typer.Option(
+            help="File to write: a GeoPackage of all layers for QGIS (.gpkg), one layer as "
+            "GeoParquet (.parquet) or CSV (.csv), or one number a cell as a Cloud-Optimised "
+            "GeoTIFF (.tif)."
+        ),
+    ],
+    objects: Annotated[Path | None, typer.Option(help="Street objects to add as a layer.")] = None,
+    evaluation: Annotated[
+        Path | None,
+        typer.Option(help="Folder that `semsig evaluate --out` wrote, to add its queries."),
+    ] = None,
+    layer: Annotated[
+        str | None,
+        typer.Option(
+            help="What a file of one layer holds: cells, objects, evaluation or evaluation_lines; "
+            "in a GeoTIFF ambiguity, identifiability or error. The first by default."
+        ),
     ] = None,
     geometry: Annotated[
-        CellGeometry, typer.Option(help="How a cell is drawn.")
-    ] = CellGeometry.polygon,
+        CellGeometry | None,
+        typer.Option(
+            help="How a cell is drawn; by default as a polygon, in CSV as a point.",
+            show_default=False,
+        ),
+    ] = None,
 ) -> None:
-    """Write the cells, and the street objects, to a GeoPackage for QGIS."""
+    """Write the cells, and what else there is of the city, for QGIS and other programs."""
     from semsig_gis.database_file import open_database
-    from semsig_gis.export import export_geopackage
+    from semsig_gis.evaluation_result import Evaluation
+    from semsig_gis.exports import export_database
     from semsig_gis.objects import open_objects
 
     opened = open_database(database)
     seen = None if objects is None else open_objects(objects)
-    with progress("writing the GeoPackage") as advance:
-        export_geopackage(
+    results = None if evaluation is None else Evaluation.load(evaluation)
+    with progress(f"writing {out.name}") as advance:
+        export_database(
             opened,
             out,
+            layer=layer,
             objects=seen,
+            evaluation=results,
             identifiability=known_identifiability(database, opened),
-            geometry=geometry.value,
+            geometry=None if geometry is None else geometry.value,
             progress=advance,
         )
-    typer.echo(f"GeoPackage: {out}")
+    typer.echo(f"exported: {out}")
+
+
+@app.command(name="import")
+def import_(
+    geopackage: Annotated[Path, typer.Argument(help="GeoPackage that `semsig export` wrote.")],
+    *,
+    out: Annotated[Path, typer.Option(help="Signature database to write (.parquet).")],
+    objects: Annotated[
+        Path | None, typer.Option(help="Street objects to write, where they were exported too.")
+    ] = None,
+) -> None:
+    """Turn an exported GeoPackage into the database that it was, without loss."""
+    from semsig_gis.database_file import save_database
+    from semsig_gis.geopackage_reading import read_geopackage
+    from semsig_gis.identifiability_file import save_identifiability
+    from semsig_gis.objects import save_objects
+
+    found = read_geopackage(geopackage)
+    if objects is not None and found.objects is None:
+        msg = f"{geopackage} holds no street objects; leave out --objects."
+        raise InputError(msg)
+    for note in found.notes:
+        remark(note)
+    save_database(found.database, out)
+    if found.identifiability is not None:
+        save_identifiability(found.identifiability, out)
+    typer.echo(f"database: {out}  ({len(found.database):,} cells)")
+    if objects is not None and found.objects is not None:
+        save_objects(found.objects, objects, keep_order=True)
+        typer.echo(f"objects:  {objects}")

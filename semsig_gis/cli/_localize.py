@@ -5,7 +5,7 @@ from __future__ import annotations
 import sys
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -107,15 +107,39 @@ def localize(
     objects: Objects = None,
     top: Annotated[int, typer.Option(help="Number of candidates.")] = 10,
     map_: Annotated[Path | None, typer.Option("--map", help="Map to write (.html).")] = None,
+    out: Annotated[
+        Path | None,
+        typer.Option(
+            help="What of the city must be searched: regions and candidates for QGIS (.gpkg), the "
+            "regions alone (.parquet, .csv), or with likelihood the chance of every cell (.tif)."
+        ),
+    ] = None,
+    share: Annotated[
+        float | None,
+        typer.Option(
+            help="For --out, with likelihood: of the chance, that the regions hold; 0.9 by default."
+        ),
+    ] = None,
+    within: Annotated[
+        float, typer.Option(help="For --out: metres around these cells that are searched too.")
+    ] = 0.0,
     as_json: AsJson = False,
 ) -> None:
     """Rank the cells of a database for a query, or for many."""
-    if queries is not None and (types is not None or bearings is not None or map_ is not None):
-        msg = "--queries was given with --types, --bearings or --map; give a file or one query."
+    given = [value for value in (types, bearings, map_, out) if value is not None]
+    if queries is not None and given:
+        msg = (
+            "--queries was given with --types, --bearings, --map or --out; give a file or one "
+            "query."
+        )
+        raise InputError(msg)
+    if out is None and (share is not None or within):
+        msg = "--share and --within are for the regions of --out; give that too."
         raise InputError(msg)
     if route and queries is None:
         msg = "--route was given without --queries; give the file of its views."
         raise InputError(msg)
+    files = _Files(map_, out, share, within)
     if method != LIKELIHOOD:
         _refuse_options(
             method,
@@ -131,10 +155,11 @@ def localize(
                 "--explain": explain,
                 "--objects": objects is not None,
                 "--route": route,
+                "--share": share is not None,
             },
         )
         ranked = _by_distance(database, method, require, top)
-        _answer(ranked, queries, types, bearings, map_, as_json=as_json)
+        _answer(ranked, queries, types, bearings, files, as_json=as_json)
         return
     ready = locator(
         database,
@@ -152,7 +177,7 @@ def localize(
         _answer_route(ready, str(queries))
     else:
         located = _Answerer(database, ready.database.taxonomy, ready.locate)
-        _answer(located, queries, types, bearings, map_, as_json=as_json)
+        _answer(located, queries, types, bearings, files, as_json=as_json)
 
 
 @dataclass(frozen=True, slots=True)
@@ -162,6 +187,16 @@ class _Answerer:
     path: Path
     taxonomy: Taxonomy
     ask: Callable[[Signature], Localization | Location]
+
+
+@dataclass(frozen=True, slots=True)
+class _Files:
+    """What is written of an answer."""
+
+    map: Path | None
+    out: Path | None
+    share: float | None
+    within: float
 
 
 def _by_distance(path: Path, method: str, require: str | None, top: int) -> _Answerer:
@@ -196,7 +231,7 @@ def _answer(
     queries: str | None,
     types: str | None,
     bearings: str | None,
-    map_: Path | None,
+    files: _Files,
     *,
     as_json: bool,
 ) -> None:
@@ -216,14 +251,22 @@ def _answer(
         return
     angles = None if bearings is None else numbers(bearings, "--bearings")
     found = answerer.ask(Signature.parse(types, angles, taxonomy=taxonomy))
-    if map_ is not None:
-        _draw(found, answerer.path, map_)
+    if files.map is not None:
+        _draw(found, answerer.path, files.map)
+    searched = _write(found, answerer.path, files)
+    told = found.to_dict() | ({} if searched is None else {"searched": searched})
     if as_json:
-        print_json(found.to_dict())
+        print_json(told)
         return
-    print_answer(found.to_dict())
-    if map_ is not None:
-        typer.echo(f"map: {map_}")
+    print_answer(told)
+    if files.map is not None:
+        typer.echo(f"map: {files.map}")
+    if searched is not None:
+        count = searched["regions"]
+        typer.echo(
+            f"to search: {count:,} region{'' if count == 1 else 's'}, {searched['km2']:.4g} km2, "
+            f"{searched['percent']:.3g} % of the city: {files.out}"
+        )
 
 
 def _answer_route(ready: Locator, source: str) -> None:
@@ -239,6 +282,20 @@ def _answer_route(ready: Locator, source: str) -> None:
     found = ready.route([query for _, query in queries], legs)
     for (name, _), location in zip(queries, found, strict=True):
         print_json({"id": name, **location.to_dict()}, indent=None)
+
+
+def _write(found: Localization | Location, database: Path, files: _Files) -> dict[str, Any] | None:
+    """Write the regions to search, and return what there is to say of them."""
+    from semsig_gis.database_file import open_database
+    from semsig_gis.exports import export_answer
+    from semsig_gis.location import REGION_SHARE, Location
+
+    if files.out is None:
+        return None
+    opened = found.posterior.database if isinstance(found, Location) else open_database(database)
+    share = REGION_SHARE if files.share is None else files.share
+    regions = export_answer(found, opened, files.out, share=share, within=files.within)
+    return regions.to_dict()
 
 
 def _draw(found: Localization | Location, database: Path, out: Path) -> None:

@@ -4,26 +4,38 @@ from __future__ import annotations
 
 import dataclasses
 import json
+import os
+import re
 import resource
+import shutil
 import sqlite3
 import subprocess
+import sys
+import warnings
 from contextlib import closing, contextmanager
+from pathlib import Path
+from subprocess import PIPE
 from typing import TYPE_CHECKING, Any
+from xml.etree import ElementTree as ET
 
 import fiona
 import geopandas as gpd
 import numpy as np
 import pyogrio
 import pytest
+import rasterio
 import shapely
 from cells_told import told_of
+from conftest import unavailable
+from map_pages import HOSTILE
 from sentences import assert_sentence
+from small_city import small_city, small_evaluation, small_localization, small_location
 
-from semsig_gis import export
 from semsig_gis.building import build_database
 from semsig_gis.catalog import paper_taxonomy
 from semsig_gis.errors import InputError, UnknownNameError
-from semsig_gis.export import export_geopackage
+from semsig_gis.exports import _layers, export_answer
+from semsig_gis.exports.geopackage import export_geopackage
 from semsig_gis.grid import GridSpec
 from semsig_gis.objects import StreetObjects, build_objects
 from semsig_gis.signatures import SignatureSpec, quantize
@@ -31,12 +43,16 @@ from semsig_gis.sources.synthetic import CitySpec, synthetic_city
 from semsig_gis.taxonomy import ObjectClass, Taxonomy
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
-    from pathlib import Path
+    from collections.abc import Callable, Iterator
 
     from semsig_gis.database import SignatureDatabase
+    from semsig_gis.localization import Localization
+    from semsig_gis.location import Location
+
+    Draw = Callable[..., list[dict[str, Any]]]
 
 LICENSE = "Town: é <b>\"quoted\"</b> & 'single' ]]> (CC0): trees, lamps"
+PROGRAM = Path(__file__).parents[1] / "qgis_draw.py"
 FORMULA = '=cmd|"/C calc"!A0 <script>'
 
 
@@ -59,7 +75,7 @@ def database(objects: StreetObjects) -> SignatureDatabase:
 
 @pytest.fixture(autouse=True)
 def _several_blocks(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(export, "_ROWS_A_BLOCK", 100)
+    monkeypatch.setattr(_layers.Layer.blocks, "__defaults__", (100,))
 
 
 def query(file: Path, sql: str) -> list[Any]:
@@ -70,7 +86,7 @@ def query(file: Path, sql: str) -> list[Any]:
 def test_cells_read_back_as_they_are(database: SignatureDatabase, tmp_path: Path) -> None:
     file = tmp_path / "city.gpkg"
     export_geopackage(database, file)
-    assert pyogrio.list_layers(file).tolist() == [["cells", "Polygon"]]
+    assert pyogrio.list_layers(file).tolist() == [["cells", "Polygon"], ["layer_styles", None]]
     cells = gpd.read_file(file, layer="cells")
     assert cells.crs == database.crs
     assert len(cells) == len(database) > 300
@@ -124,7 +140,7 @@ def test_objects_read_back_as_they_are(
 ) -> None:
     file = tmp_path / "city.gpkg"
     export_geopackage(database, file, objects=objects)
-    assert fiona.listlayers(file) == ["cells", "objects"]
+    assert fiona.listlayers(file) == ["cells", "objects", "layer_styles"]
     with fiona.open(file, layer="objects") as layer:
         assert layer.crs.to_epsg() == 32631
         assert list(layer.schema["properties"]) == [
@@ -154,19 +170,20 @@ def test_specs_and_licences_travel_along(
     file = tmp_path / "city.gpkg"
     export_geopackage(database, file, objects=objects)
     cells, things = (pyogrio.read_info(file, layer=name) for name in ("cells", "objects"))
-    for facts in (cells["dataset_metadata"], cells["layer_metadata"]):
-        assert json.loads(facts["grid"]) == {"step": 12.5, "origin": [3.0, -4.0]}
-        assert json.loads(facts["signature"]) == {"radius": 25.0, "levels": 12}
-        assert Taxonomy.from_list(json.loads(facts["taxonomy"])) == database.taxonomy
-        assert json.loads(facts["licenses"]) == [LICENSE]
-    assert cells["dataset_metadata"]["written_by"].startswith("semsig_gis ")
+    facts = cells["layer_metadata"]
+    assert json.loads(facts["grid"]) == {"step": 12.5, "origin": [3.0, -4.0]}
+    assert json.loads(facts["signature"]) == {"radius": 25.0, "levels": 12}
+    assert Taxonomy.from_list(json.loads(facts["taxonomy"])) == database.taxonomy
+    assert json.loads(facts["licenses"]) == [LICENSE]
+    assert json.loads(facts["written_by"]).startswith("semsig_gis ")
     assert json.loads(things["layer_metadata"]["licenses"]) == [LICENSE]
     contents = query(file, "SELECT table_name, identifier, description FROM gpkg_contents")
     assert [row[:2] for row in contents] == [
         ("cells", "Signature cells"),
         ("objects", "Street objects"),
+        ("layer_styles", "layer_styles"),
     ]
-    assert all(LICENSE in description for *_, description in contents)
+    assert all(LICENSE in description for *_, description in contents[:2])
     assert "12.5 m" in contents[0][2]
 
 
@@ -181,6 +198,19 @@ def test_it_is_a_sound_geopackage_1_2(
     assert query(file, "PRAGMA foreign_key_check") == []
     index = "SELECT table_name FROM gpkg_extensions WHERE extension_name = 'gpkg_rtree_index'"
     assert sorted(query(file, index)) == [("cells",), ("objects",)]
+    tables = query(file, "SELECT DISTINCT table_name FROM gpkg_extensions")
+    assert {("gpkg_metadata",), ("gpkg_metadata_reference",)} <= set(tables)
+    kinds = query(file, "SELECT table_name, data_type, srs_id FROM gpkg_contents")
+    system = query(file, "SELECT srs_id FROM gpkg_geometry_columns")[0][0]
+    assert kinds == [
+        ("cells", "features", system),
+        ("objects", "features", system),
+        ("layer_styles", "attributes", 0),
+    ]
+    extents = query(file, "SELECT table_name, min_x, min_y, max_x, max_y FROM gpkg_contents")
+    boxes = {name: box for name, *box in extents}
+    for layer in ("cells", "objects"):
+        assert np.allclose(boxes[layer], gpd.read_file(file, layer=layer).total_bounds)
     assert [path.name for path in tmp_path.iterdir()] == ["city.gpkg"]
 
 
@@ -188,7 +218,7 @@ def test_a_crs_of_its_own(database: SignatureDatabase, tmp_path: Path) -> None:
     local = type(database.crs)("+proj=tmerc +lat_0=43.6 +lon_0=3.88 +ellps=GRS80 +units=m")
     file = tmp_path / "city.gpkg"
     export_geopackage(dataclasses.replace(database, crs=local), file, geometry="point")
-    assert gpd.read_file(file).crs == local
+    assert gpd.read_file(file, layer="cells").crs == local
 
 
 def test_progress(database: SignatureDatabase, objects: StreetObjects, tmp_path: Path) -> None:
@@ -302,6 +332,233 @@ def test_qgis_counts_the_objects_in_the_cells(
     for cell in (columns * 10**8 + rows).tolist():
         expected[cell] += 1  # each object's own cell sees it, so it is in the database
     assert numbers.astype(int).to_dict() == expected
+
+
+def test_every_layer_has_a_style_of_its_own(tmp_path: Path) -> None:
+    city, seen = small_city()
+    file = tmp_path / "city.gpkg"
+    export_geopackage(
+        city,
+        file,
+        objects=seen,
+        identifiability=told_of(city),
+        evaluation=small_evaluation(),
+        answer=small_location(),
+    )
+    styles = query(
+        file,
+        "SELECT f_table_name, f_geometry_column, styleName, useAsDefault, styleQML, update_time "
+        "FROM layer_styles WHERE f_table_schema = '' AND f_table_catalog = ''",
+    )
+    assert [style[:4] for style in styles] == [
+        ("cells", "geom", "Identifiability", 1),
+        ("cells", "geom", "Ambiguity", 0),
+        ("objects", "geom", "Classes", 1),
+        ("evaluation", "geom", "Outcome", 1),
+        ("evaluation_lines", "geom", "Outcome", 1),
+        ("regions", "geom", "Rank", 1),
+        ("candidates", "geom", "Rank", 1),
+    ]
+    for layer, _, _, _, qml, updated in styles:
+        root = ET.fromstring(qml)  # noqa: S314 - our own
+        column = root.find("renderer-v2").attrib["attr"]  # type: ignore[union-attr]
+        assert column in pyogrio.read_info(file, layer=layer)["fields"]
+        used = {item.attrib["symbol"] for item in root.iter() if "symbol" in item.attrib}
+        drawn = {item.attrib["name"] for item in root.findall("renderer-v2/symbols/symbol")}
+        assert used == drawn
+        assert re.fullmatch(r"\d{4}-\d\d-\d\dT\d\d:\d\d:\d\d\.\d{3}Z", updated)
+
+
+def test_queries_and_lines(tmp_path: Path) -> None:
+    city, results, file = small_city()[0], small_evaluation(), tmp_path / "city.gpkg"
+    export_geopackage(city, file, evaluation=results)
+    points = gpd.read_file(file, layer="evaluation")
+    lines = gpd.read_file(file, layer="evaluation_lines")
+    assert points.geometry.geom_equals(results.queries.geometry.reset_index(drop=True)).all()
+    assert set(points["outcome"]) == {"found", "missed", "nothing seen"}
+    assert (points["outcome"] == "nothing seen").sum() == results.unlocalized
+    assert ((points["outcome"] == "found") == results.successful).all()
+    assert len(lines) == len(points) - results.unlocalized
+    ends = points.set_index("number").loc[lines["number"], ["best_x", "best_y"]]
+    assert np.array_equal(shapely.get_coordinates(lines.geometry.array)[1::2], ends.to_numpy())
+    assert np.allclose(lines.geometry.length, lines["off_m"])
+
+
+def test_queries_of_which_nothing_was_left(tmp_path: Path) -> None:
+    city, results, file = small_city()[0], small_evaluation(), tmp_path / "city.gpkg"
+    empty = results.queries[results.queries["query_length"] == 0]
+    export_geopackage(city, file, evaluation=dataclasses.replace(results, queries=empty))
+    assert len(gpd.read_file(file, layer="evaluation_lines")) == 0
+    assert set(gpd.read_file(file, layer="evaluation")["outcome"]) == {"nothing seen"}
+
+
+@pytest.mark.parametrize("answer", [small_location, small_localization])
+def test_answers(answer: Callable[[], Location | Localization], tmp_path: Path) -> None:
+    city, file = small_city()[0], tmp_path / "answer.gpkg"
+    regions = export_answer(answer(), city, file, within=12.0)
+    assert pyogrio.list_layers(file)[:, 0].tolist() == ["regions", "candidates", "layer_styles"]
+    read = gpd.read_file(file, layer="regions")
+    assert read.geometry.geom_equals(regions.table.geometry).all()
+    assert read["searched_percent"].tolist() == regions.table["searched_percent"].tolist()
+    listed = gpd.read_file(file, layer="candidates")
+    assert listed["cell_id"].tolist() == answer().candidates["cell_id"].tolist()
+    facts = pyogrio.read_info(file, layer="regions")["layer_metadata"]
+    assert json.loads(facts["searched"]) == regions.to_dict()
+
+
+def test_a_debian_gdal_reads_it(tmp_path: Path) -> None:
+    ogrinfo = shutil.which("ogrinfo", path=os.defpath)
+    if ogrinfo is None:
+        pytest.skip("ogrinfo is not on this machine")
+    city, seen = small_city()
+    file = tmp_path / "city.gpkg"
+    export_geopackage(city, file, objects=seen, evaluation=small_evaluation())
+    done = subprocess.run(
+        [ogrinfo, "-ro", "-al", "-so", file],
+        check=True,
+        capture_output=True,
+        text=True,
+        env={"LANG": "C.UTF-8"},
+    )
+    assert done.stderr == ""
+    names = re.findall("^Layer name: (.*)$", done.stdout, re.MULTILINE)
+    counts = re.findall("^Feature Count: (.*)$", done.stdout, re.MULTILINE)
+    assert names == ["cells", "objects", "evaluation", "evaluation_lines", "layer_styles"]
+    assert counts[:2] == [str(len(city)), str(len(seen))]
+
+
+# What another program does with the file, until a line comes from standard input.
+HOLDERS = {
+    "reads": "BEGIN; SELECT count(*) FROM cells",
+    "writes": "BEGIN IMMEDIATE; UPDATE cells SET length = 0",
+    "keeps a log": "PRAGMA journal_mode = WAL; CREATE TABLE more (id INTEGER)",
+}
+HOLDER = """
+import sqlite3, sys
+connection = sqlite3.connect(sys.argv[1], isolation_level=None)
+for name, in connection.execute("SELECT name FROM sqlite_master WHERE type = 'trigger'").fetchall():
+    connection.execute(f'DROP TRIGGER "{name}"')
+cursors = [connection.execute(sql).fetchmany(1) for sql in sys.argv[2].split("; ")]
+print("open", flush=True)
+sys.stdin.readline()
+"""
+
+
+@pytest.mark.parametrize("does", HOLDERS)
+def test_a_file_that_is_open_elsewhere_is_left_alone(
+    does: str, database: SignatureDatabase, tmp_path: Path
+) -> None:
+    file, link = tmp_path / "city.gpkg", tmp_path / "link.gpkg"
+    export_geopackage(database, file)
+    link.symlink_to(file)
+    command = [sys.executable, "-c", HOLDER, str(file), HOLDERS[does]]
+    with subprocess.Popen(command, stdin=PIPE, stdout=PIPE, text=True) as other:
+        assert other.stdin is not None
+        assert other.stdout is not None
+        assert other.stdout.readline() == "open\n"
+        before = file.read_bytes()
+        for path in (file, link):
+            with pytest.raises(InputError) as caught:
+                export_geopackage(database, path, geometry="point")
+            assert_sentence(caught.value, path.name, "open in another program", "close it")
+        assert file.read_bytes() == before
+        other.communicate("done\n")
+    export_geopackage(database, file, geometry="point")
+    assert pyogrio.read_info(file, layer="cells")["geometry_type"] == "Point"
+
+
+def test_a_file_that_is_opened_meanwhile_is_left_alone(
+    database: SignatureDatabase, tmp_path: Path
+) -> None:
+    file = tmp_path / "city.gpkg"
+    export_geopackage(database, file)
+    before = file.read_bytes()
+    with closing(sqlite3.connect(file)) as other:
+
+        def lock(done: int, total: int) -> None:
+            if done == total:
+                other.execute("BEGIN IMMEDIATE")
+
+        with pytest.raises(InputError) as caught:
+            export_geopackage(database, file, progress=lock)
+    assert_sentence(caught.value, "open in another program")
+    assert file.read_bytes() == before
+    assert list(tmp_path.iterdir()) == [file]
+
+
+@pytest.fixture
+def qgis_draw(qgis_process: Path, qgis_environment: dict[str, str]) -> Draw:  # noqa: ARG001
+    """Return what draws layers in QGIS: the picture, and what QGIS says of each layer."""
+    python = shutil.which("python3", path=os.defpath)
+    if python is None:
+        unavailable("qgis", "the system has no Python, in which QGIS could run")
+
+    def draw(picture: Path, box: tuple[float, ...], *layers: str) -> list[dict[str, Any]]:
+        extent = ",".join(map(repr, box))
+        done = subprocess.run(
+            [python, PROGRAM, picture, "400x400", extent, *layers],
+            check=False,
+            capture_output=True,
+            text=True,
+            timeout=120,
+            env=qgis_environment,
+        )
+        assert done.returncode == 0, done.stdout + done.stderr
+        return [json.loads(line) for line in done.stdout.splitlines()]
+
+    return draw
+
+
+def colours_of(picture: Path) -> set[tuple[int, int, int]]:
+    """Return the colours of a picture that cover more than a few pixels."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", rasterio.errors.NotGeoreferencedWarning)
+        with rasterio.open(picture) as read:
+            pixels = read.read()[:3].reshape(3, -1).T
+    found, counts = np.unique(pixels, axis=0, return_counts=True)
+    return {
+        tuple(colour) for colour, count in zip(found.tolist(), counts, strict=True) if count > 9
+    }
+
+
+def test_qgis_colours_the_layers_at_once(qgis_draw: Draw, tmp_path: Path) -> None:
+    city, seen = small_city()
+    nasty = HOSTILE + "[% env('HOME') %]" + "é" * 10_000
+    classes = [ObjectClass(one.code, one.symbol, one.name, nasty) for one in seen.taxonomy.classes]
+    hostile = StreetObjects(seen.table, Taxonomy(tuple(classes)), (nasty,))
+    file = tmp_path / "city.gpkg"
+    export_geopackage(
+        dataclasses.replace(city, taxonomy=hostile.taxonomy, licenses=(nasty,)),
+        file,
+        objects=hostile,
+        identifiability=told_of(city),
+        evaluation=small_evaluation(),
+        answer=small_localization(),
+    )
+    names = ("objects", "evaluation", "evaluation_lines", "candidates", "regions", "cells")
+    box = tuple(gpd.read_file(file, layer="cells").total_bounds.tolist())
+    told = qgis_draw(tmp_path / "a.png", box, *(f"{file}|layername={name}" for name in names))
+    assert all(layer["valid"] for layer in told)
+    assert [layer["renderer"].removesuffix("Symbol") for layer in told] == [
+        *("categorized", "categorized", "categorized", "graduated", "graduated", "graduated")
+    ]
+    labels = told[0]["labels"]
+    assert len(labels) == len(seen.class_counts)
+    for label in labels:
+        assert "<script>" in label  # QGIS shows a legend as plain text
+        assert len(label) <= 60
+        assert "[%" not in label
+        assert label.isprintable()
+    assert told[1]["labels"] == ["found", "missed", "nothing seen"]
+    assert told[-1]["labels"][-1] == "90 to 100 %"
+    assert told[-1]["features"] == len(city)
+    found = colours_of(tmp_path / "a.png")
+    green, blue = (0, 0x9E, 0x73), (0, 0x72, 0xB2)
+    assert {green, blue, (255, 255, 255)} <= found
+    # Cells by tenths of their chance, and the file is whole and free when QGIS has left it.
+    qgis_draw(tmp_path / "b.png", box, f"{file}|layername=cells")
+    assert len(colours_of(tmp_path / "b.png")) >= 10
+    export_geopackage(city, file)
 
 
 def test_text_that_no_program_may_stumble_over(tmp_path: Path) -> None:

@@ -1,0 +1,275 @@
+"""GeoPackages: cells, street objects, an evaluation and an answer as layers that QGIS colours."""
+
+from __future__ import annotations
+
+import contextlib
+import itertools
+import json
+import os
+import sqlite3
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import pyogrio
+from pyogrio.errors import DataLayerError, DataSourceError, FeatureError
+
+from semsig_gis import __version__
+from semsig_gis.errors import InputError
+from semsig_gis.exports._layers import answer_layers, cells_layer, evaluation_layers, objects_layer
+from semsig_gis.regions import search_regions
+from semsig_gis.schema import GEOMETRY
+from semsig_gis.storage import whole_file
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator, Sequence
+
+    from semsig_gis.database import SignatureDatabase
+    from semsig_gis.evaluation_result import Evaluation
+    from semsig_gis.exports._layers import CellGeometry, Layer
+    from semsig_gis.identifiability import Identifiability
+    from semsig_gis.localization import Localization
+    from semsig_gis.location import Location
+    from semsig_gis.objects import StreetObjects
+
+__all__ = ["export_geopackage", "write_layers"]
+
+# The newest version that QGIS 3.22 opens without a warning.
+VERSION = "1.2"
+GEOMETRY_TYPES = {"polygon": "Polygon", "line": "LineString", "point": "Point"}
+# As QGIS makes it, but for the dates, which it leaves to the rules of GeoPackages.
+STYLES = """
+CREATE TABLE layer_styles (
+  id INTEGER PRIMARY KEY AUTOINCREMENT NOT NULL,
+  f_table_catalog TEXT(256), f_table_schema TEXT(256), f_table_name TEXT(256),
+  f_geometry_column TEXT(256), styleName TEXT(30), styleQML TEXT, styleSLD TEXT,
+  useAsDefault BOOLEAN, description TEXT, owner TEXT(30), ui TEXT(30),
+  update_time DATETIME DEFAULT (strftime('%Y-%m-%dT%H:%M:%fZ', 'now'))
+);
+INSERT INTO gpkg_contents (table_name, data_type, identifier, description, srs_id)
+VALUES ('layer_styles', 'attributes', 'layer_styles', 'How QGIS draws the layers.', 0);
+"""
+STYLE = """
+INSERT INTO layer_styles (f_table_catalog, f_table_schema, f_table_name, f_geometry_column,
+  styleName, styleQML, styleSLD, useAsDefault, description, owner)
+SELECT '', '', table_name, column_name, ?, ?, '', ?, ?, '' FROM gpkg_geometry_columns
+WHERE table_name = ?
+"""
+
+
+def export_geopackage(
+    database: SignatureDatabase,
+    path: str | Path,
+    *,
+    objects: StreetObjects | None = None,
+    identifiability: Identifiability | None = None,
+    evaluation: Evaluation | None = None,
+    answer: Location | Localization | None = None,
+    geometry: CellGeometry = "polygon",
+    progress: Callable[[int, int], None] | None = None,
+) -> None:
+    """Write the cells, and what else there is of the city, as one GeoPackage 1.2.
+
+    Parameters
+    ----------
+    database : SignatureDatabase
+        The cells.
+    path : str or Path
+        File to write, ending in ``.gpkg``; it appears whole, by rename.
+    objects : StreetObjects, optional
+        The objects that the cells see.
+    identifiability : Identifiability, optional
+        What is known of the cells before any query, for more columns of the cells.
+    evaluation : Evaluation, optional
+        Queries and what was found for them.
+    answer : Location or Localization, optional
+        The answer to a query.
+    geometry : {"polygon", "point"}, default "polygon"
+        Whether a cell is drawn as its square or as its viewpoint.
+    progress : callable, optional
+        Called with the number of rows written and in all.
+
+    Raises
+    ------
+    InputError
+        If the file does not end in ``.gpkg``, is open in another program or cannot be written,
+        or the identifiability or the answer is that of other cells.
+    UnknownNameError
+        If there is no such geometry.
+
+    Notes
+    -----
+    Layer ``cells``, in the CRS of the database: ``cell_id``, ``x`` and ``y`` (viewpoint, metres),
+    ``length`` (objects seen), ``types`` (symbols), ``bearings`` (degrees to 0.01), ``levels``
+    (angle levels) and ``distances`` (metres to 0.01), each of these four clockwise from north and
+    the numbers separated by spaces; ``type_group_size`` and ``angle_group_size`` (cells that have
+    the same types or the same angle levels, 1 where the cell is alone); and, where given, the
+    columns of `semsig_gis.identifiability.Identifiability.table`. Nothing is lost by rounding:
+    `semsig_gis.geopackage_reading.read_geopackage` gives the database back.
+
+    Layer ``objects``, in the CRS of the objects: ``class_code``, ``symbol``, ``class_name``,
+    ``title``, ``source``, ``source_id``, ``merged`` where sources were merged, and ``count``.
+
+    Layers ``evaluation``, the queries at their true places, and ``evaluation_lines``, from there
+    to the best place: the columns of `semsig_gis.evaluation_result.Evaluation.queries` and
+    ``outcome``: ``found`` (the best place is within 50 m), ``missed`` or ``nothing seen``.
+
+    Layers ``regions`` (see `semsig_gis.regions`) and ``candidates``: of the answer.
+
+    The table ``layer_styles`` holds the styles with which QGIS draws them. The metadata of each
+    layer holds the specs, the classes and the licences as JSON; its description holds the
+    licences as text. The rows are written in blocks, so that memory stays flat.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> from semsig_gis.catalog import paper_taxonomy
+    >>> from semsig_gis.building import build_database
+    >>> from semsig_gis.objects import build_objects
+    >>> from semsig_gis.sources.synthetic import CitySpec, synthetic_city
+    >>> layers = synthetic_city(CitySpec(size=300.0))
+    >>> objects, _ = build_objects(layers, taxonomy=paper_taxonomy(), crs="EPSG:32631")
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     export_geopackage(build_database(objects), f"{folder}/city.gpkg", objects=objects)
+    ...     pyogrio.list_layers(f"{folder}/city.gpkg").tolist()
+    [['cells', 'Polygon'], ['objects', 'Point'], ['layer_styles', None]]
+    """
+    layers = [cells_layer(database, identifiability=identifiability, geometry=geometry)]
+    if objects is not None:
+        layers.append(objects_layer(objects))
+    if evaluation is not None:
+        layers += evaluation_layers(evaluation, database.licenses)
+    if answer is not None:
+        layers += answer_layers(answer, search_regions(answer, database))
+    write_layers(layers, path, progress=progress)
+
+
+def write_layers(
+    layers: Sequence[Layer],
+    path: str | Path,
+    *,
+    progress: Callable[[int, int], None] | None = None,
+) -> None:
+    """Write layers as one GeoPackage 1.2.
+
+    Parameters
+    ----------
+    layers : sequence of Layer
+        At least one.
+    path : str or Path
+        File to write, ending in ``.gpkg``; it appears whole, by rename.
+    progress : callable, optional
+        Called with the number of rows written and in all.
+
+    Raises
+    ------
+    InputError
+        If the file does not end in ``.gpkg``, is open in another program or cannot be written.
+    """
+    target = Path(path)
+    if target.suffix.lower() != ".gpkg":
+        msg = f"{target} does not end in .gpkg; give the name of a GeoPackage file."
+        raise InputError(msg)
+    _require_closed(target)
+    rows = sum(layer.rows for layer in layers)
+    with whole_file(target) as partial:
+        try:
+            blocks = (_write_layer(layer, partial) for layer in layers)
+            for done in itertools.accumulate(itertools.chain.from_iterable(blocks)):
+                if progress is not None:
+                    progress(done, rows)
+            _add_styles(layers, partial)
+            _check_indexes(layers, partial)
+        except (DataSourceError, DataLayerError, FeatureError, sqlite3.Error) as error:
+            # GDAL's own words are pages of SQL; they stay with the cause.
+            msg = (
+                f"{target} could not be written whole, so what was there before is unchanged; "
+                "free some space or choose another folder."
+            )
+            raise InputError(msg) from error
+        _require_closed(target)
+
+
+def _write_layer(layer: Layer, path: Path) -> Iterator[int]:
+    """Write one layer block by block, and yield the number of rows of each block."""
+    code = layer.crs.to_epsg()
+    told = {
+        **layer.facts,
+        "licenses": list(layer.licenses),
+        "written_by": f"semsig_gis {__version__}",
+    }
+    # Of the layer and not of the file: for that, GDAL leaves a copy beside the file whenever the
+    # file is read.
+    once: dict[str, Any] = {
+        "layer_metadata": {
+            name: json.dumps(value, allow_nan=False) for name, value in told.items()
+        },
+        "layer_options": {
+            "IDENTIFIER": layer.title,
+            "DESCRIPTION": "\n".join([layer.description, *layer.licenses]),
+        },
+    }
+    for number, block in enumerate(layer.blocks()):
+        pyogrio.write_arrow(
+            block,
+            path,
+            layer=layer.name,
+            driver="GPKG",
+            geometry_name=GEOMETRY,
+            geometry_type=GEOMETRY_TYPES[layer.geometry],
+            crs=layer.crs.to_wkt() if code is None else f"EPSG:{code}",
+            append=number > 0,
+            dataset_options={"VERSION": VERSION},
+            **(once if number == 0 else {}),
+        )
+        yield len(block)
+
+
+def _add_styles(layers: Sequence[Layer], path: Path) -> None:
+    """Write how QGIS draws the layers."""
+    with contextlib.closing(sqlite3.connect(path)) as connection, connection:
+        connection.executescript(STYLES)
+        for layer in layers:
+            for number, style in enumerate(layer.styles):
+                values = (style.name, style.qml, number == 0, layer.title, layer.name)
+                connection.execute(STYLE, values)
+
+
+def _check_indexes(layers: Sequence[Layer], path: Path) -> None:
+    """Check that all rows are in the spatial indexes.
+
+    They are the last to be written, when a layer is closed, and GDAL keeps quiet if that fails.
+    """
+    with contextlib.closing(sqlite3.connect(path)) as connection:
+        for layer in layers:
+            count = f"SELECT count(*) FROM rtree_{layer.name}_geom"  # noqa: S608 - our own names
+            if connection.execute(count).fetchone()[0] != layer.rows:
+                msg = "the spatial indexes are not complete"
+                raise sqlite3.DatabaseError(msg)
+
+
+def _require_closed(path: Path) -> None:
+    """Refuse to replace a GeoPackage that another program has open.
+
+    Its log would be taken for that of the new file, and what it writes would be lost.
+    """
+    real = Path(os.path.realpath(path))
+    logs = [real.with_name(f"{real.name}-{kind}") for kind in ("wal", "journal")]
+    # os.path answers where Path raises.
+    if any(map(os.path.exists, logs)) or (os.path.isfile(real) and _is_locked(real)):  # noqa: PTH113
+        msg = (
+            f"{path} is open in another program, such as QGIS, or was left half-written by one; "
+            "close it there, or give another name."
+        )
+        raise InputError(msg)
+
+
+def _is_locked(path: Path) -> bool:
+    """Return whether another program reads from or writes to an SQLite file just now."""
+    place = f"{path.as_uri()}?mode=rw"
+    try:
+        with contextlib.closing(sqlite3.connect(place, uri=True, timeout=0)) as connection:
+            connection.execute("BEGIN EXCLUSIVE").connection.rollback()
+    except sqlite3.Error as error:
+        # Whatever else it is, it may be replaced.
+        return getattr(error, "sqlite_errorcode", None) == sqlite3.SQLITE_BUSY
+    return False

@@ -1,0 +1,75 @@
+"""GeoParquet 1.1: one layer a file, with a column of bounds by which readers choose rows."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import shapely
+
+from semsig_gis import __version__
+from semsig_gis.boxes import BBOX, COVERING, bounds_column
+from semsig_gis.schema import GEOMETRY
+from semsig_gis.storage import geo_metadata, write_geoparquet_blocks
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator
+    from pathlib import Path
+
+    import pyarrow as pa
+
+    from semsig_gis.exports._layers import Layer
+
+__all__ = ["write_layer"]
+
+GEOMETRY_TYPES = {"polygon": "Polygon", "line": "LineString", "point": "Point"}
+
+
+def write_layer(
+    layer: Layer, path: str | Path, *, progress: Callable[[int, int], None] | None = None
+) -> None:
+    """Write a layer as one GeoParquet 1.1 file.
+
+    Parameters
+    ----------
+    layer : Layer
+        What to write.
+    path : str or Path
+        File to write; it appears whole, by rename.
+    progress : callable, optional
+        Called with the number of rows written and in all.
+
+    Raises
+    ------
+    InputError
+        If it cannot be written.
+
+    Notes
+    -----
+    The column ``bbox`` holds the bounds of every row as float32, rounded outwards, and the
+    metadata names it as the covering of ``geometry``. The metadata key ``semsig`` holds the
+    specs, the classes and the licences as JSON. The rows are in groups of
+    `semsig_gis.boxes.GROUP_ROWS` and in the order of the database, column by column.
+    """
+    geo = geo_metadata(
+        layer.crs, geometry_types=[GEOMETRY_TYPES[layer.geometry]], bounds=layer.bounds
+    )
+    geo["columns"][GEOMETRY]["covering"] = COVERING
+    if not layer.rows:
+        del geo["columns"][GEOMETRY]["bbox"]
+    specs = {
+        **layer.facts,
+        "kind": f"exported {layer.name}",
+        "licenses": list(layer.licenses),
+        "written_by": f"semsig_gis {__version__}",
+    }
+
+    def blocks() -> Iterator[pa.Table]:
+        done = 0
+        for block in layer.blocks():
+            shapes = shapely.from_wkb(block[GEOMETRY].to_numpy(zero_copy_only=False))
+            yield block.append_column(BBOX, bounds_column(shapely.bounds(shapes)))
+            done += len(block)
+            if progress is not None:
+                progress(done, layer.rows)
+
+    write_geoparquet_blocks(blocks(), path, geo=geo, specs=specs)

@@ -1,0 +1,114 @@
+"""Cloud-Optimised GeoTIFF: one number a cell, one pixel a cell."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from semsig_gis.errors import InputError
+from semsig_gis.raster import write_cells
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from numpy.typing import ArrayLike, NDArray
+
+    from semsig_gis.database import SignatureDatabase
+    from semsig_gis.evaluation_result import Evaluation
+
+__all__ = ["cell_errors", "export_geotiff"]
+
+
+def export_geotiff(
+    database: SignatureDatabase, values: ArrayLike, path: str | Path, *, name: str, unit: str = ""
+) -> None:
+    """Write one number a cell as a Cloud-Optimised GeoTIFF.
+
+    Parameters
+    ----------
+    database : SignatureDatabase
+        The cells.
+    values : array_like of float, shape (n,)
+        Numbers such as ``database.type_group_sizes``, ``identifiability.found``,
+        ``location.posterior.chances`` or `cell_errors`; NaN where there is none.
+    path : str or Path
+        File to write; it appears whole, by rename.
+    name : str
+        What the numbers are.
+    unit : str, optional
+        Their unit.
+
+    Raises
+    ------
+    InputError
+        If there is not one number a cell, the cells span too wide an area, or the file cannot be
+        written.
+
+    Notes
+    -----
+    A pixel is a cell of the grid of the database, in its CRS, as float32; NaN is no data. The
+    overviews hold means, so that it is read fast from afar.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> from semsig_gis.building import build_database
+    >>> from semsig_gis.catalog import paper_taxonomy
+    >>> from semsig_gis.objects import build_objects
+    >>> from semsig_gis.raster import raster_at_cells
+    >>> from semsig_gis.sources.synthetic import CitySpec, synthetic_city
+    >>> layers = synthetic_city(CitySpec(size=300.0))
+    >>> objects, _ = build_objects(layers, taxonomy=paper_taxonomy(), crs="EPSG:32631")
+    >>> database = build_database(objects)
+    >>> where = {"grid": database.grid, "columns": database.columns, "rows": database.rows}
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     path = f"{folder}/objects.tif"
+    ...     export_geotiff(database, database.lengths, path, name="objects seen")
+    ...     read = raster_at_cells(path, **where, crs=database.crs)
+    >>> bool((read == database.lengths).all())
+    True
+    """
+    numbers = np.asarray(values, dtype=np.float64)
+    if numbers.shape != (len(database),):
+        msg = f"{numbers.size} numbers were given for {len(database)} cells; give one a cell."
+        raise InputError(msg)
+    write_cells(
+        path,
+        numbers,
+        grid=database.grid,
+        columns=database.columns,
+        rows=database.rows,
+        crs=database.crs,
+        name=name,
+        unit=unit,
+        notes={"licenses": "\n".join(database.licenses), "semsig_version": database.version},
+    )
+
+
+def cell_errors(evaluation: Evaluation, database: SignatureDatabase) -> NDArray[np.float64]:
+    """Return the mean error of the queries from each cell.
+
+    Parameters
+    ----------
+    evaluation : Evaluation
+        The queries.
+    database : SignatureDatabase
+        The cells.
+
+    Returns
+    -------
+    ndarray of float64, shape (n,)
+        Mean expected error in metres; NaN where no query is from, and queries of which the
+        distortion left nothing do not count.
+    """
+    errors = evaluation.queries["error_m"].to_numpy(np.float64)
+    cells = evaluation.queries["cell_id"].to_numpy(np.int64)
+    ids = database.cell_ids
+    rows = np.minimum(np.searchsorted(ids, cells), len(ids) - 1)
+    kept = np.isfinite(errors) & (ids[rows] == cells)
+    counts = np.bincount(rows[kept], minlength=len(ids))
+    sums = np.bincount(rows[kept], errors[kept], minlength=len(ids))
+    means = np.full(len(ids), np.nan)
+    np.divide(sums, counts, out=means, where=counts > 0)
+    return means

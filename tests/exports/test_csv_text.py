@@ -1,0 +1,115 @@
+"""CSV: what is read back is what was there, and no spreadsheet runs any of it."""
+
+from __future__ import annotations
+
+import csv
+import io
+import re
+import resource
+from contextlib import contextmanager
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pandas as pd
+import pytest
+from hypothesis import example, given
+from hypothesis import strategies as st
+from sentences import assert_sentence
+from small_city import small_city
+
+from semsig_gis.errors import InputError
+from semsig_gis.exports import export_database
+from semsig_gis.exports.csv_text import as_written, formula_safe
+from semsig_gis.objects import StreetObjects
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+    from pathlib import Path
+
+FORMULAS = [
+    "=cmd|' /C calc'!A0",
+    "+1;=2",
+    "-1",
+    "@SUM(A1)",
+    "\t=1",
+    "\r=1",
+    "a\n=1",
+    'a"=1',
+    'a;"=HYPERLINK(1)"',
+    "\uff1d1",
+    "'=1",
+    "''",
+    "",
+]
+TEXTS = st.text() | st.text(alphabet="=+-@'\t\r\n;,|\"a") | st.sampled_from(FORMULAS)
+
+
+@given(TEXTS)
+@example("=1")
+def test_text_is_safe_and_comes_back(text: str) -> None:
+    safe = formula_safe(text)
+    assert as_written(safe) == text
+    assert not re.search('(^|[;,|"\t\r\n])[=+@\uff1d\uff0b\uff0d\uff20-]', safe)
+
+
+@pytest.mark.parametrize("separator", [",", ";", "\t", "|"])
+def test_no_spreadsheet_of_any_country_finds_a_formula(separator: str) -> None:
+    for text in FORMULAS:
+        quoted = formula_safe(text).replace('"', '""')
+        line = f'12,"{quoted}",3\n'
+        for row in csv.reader(io.StringIO(line, newline=""), delimiter=separator):
+            assert not any(cell.startswith(tuple("=+-@\t\r")) for cell in row), (text, row)
+
+
+def test_cells_read_back_as_they_are(tmp_path: Path) -> None:
+    database, _ = small_city()
+    file = tmp_path / "cells.csv"
+    export_database(database, file)
+    cells = pd.read_csv(file, dtype={"types": str, "x": str, "y": str})
+    assert cells["cell_id"].tolist() == database.cell_ids.tolist()
+    assert np.array_equal(cells[["x", "y"]].astype(float).to_numpy(), database.xy)
+    assert cells["types"].tolist() == [database.types(cell) for cell in range(len(database))]
+    assert cells["type_group_size"].tolist() == database.type_group_sizes.tolist()
+    assert "WKT" not in cells.columns
+    export_database(database, file, geometry="polygon")
+    assert pd.read_csv(file)["WKT"].str.startswith("POLYGON").all()
+
+
+def test_hostile_objects_come_back(tmp_path: Path) -> None:
+    database, objects = small_city()
+    table = objects.table.copy()
+    texts = [*FORMULAS, "é" * 10_000, "\u202eright", "<script>"]
+    table["source_id"] = [texts[number % len(texts)] for number in range(len(table))]
+    hostile = StreetObjects(table, objects.taxonomy, objects.licenses)
+    file = tmp_path / "objects.csv"
+    export_database(database, file, layer="objects", objects=hostile)
+    with file.open(encoding="utf-8", newline="") as opened:
+        rows = list(csv.DictReader(opened))
+    assert [as_written(row["source_id"]) for row in rows] == table["source_id"].tolist()
+    assert not any(row["source_id"].startswith(tuple("=+-@\t\r\n")) for row in rows)
+    assert [float(row["x"]) for row in rows] == objects.xy[:, 0].tolist()
+
+
+@contextmanager
+def largest_file(size: int) -> Iterator[None]:
+    """Let this process write no file beyond a size, as on a full disk."""
+    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (size, hard))
+    try:
+        yield
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
+
+
+@pytest.mark.parametrize("name", ["cells.csv", "cells.parquet", "cells.tif"])
+@pytest.mark.parametrize("share", [0.0, 0.5, 0.97])
+def test_a_full_disk_leaves_the_old_file(name: str, share: float, tmp_path: Path) -> None:
+    database, _ = small_city()
+    file = tmp_path / name
+    export_database(database, file)
+    before = file.read_bytes()
+    with largest_file(round(share * len(before))), pytest.raises(InputError) as caught:
+        export_database(database, file)
+    assert_sentence(caught.value, name, "unchanged")
+    assert file.read_bytes() == before
+    assert list(tmp_path.iterdir()) == [file]

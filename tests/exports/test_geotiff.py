@@ -1,0 +1,111 @@
+"""GeoTIFFs: every pixel is its cell's number, and the file is cloud-optimised."""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pytest
+import rasterio
+from cells_told import told_of
+from rio_cogeo.cogeo import cog_validate
+from sentences import assert_sentence
+from small_city import small_city, small_evaluation, small_location
+
+from semsig_gis import raster
+from semsig_gis.errors import InputError
+from semsig_gis.exports import export_answer, export_database
+from semsig_gis.exports.geotiff import cell_errors, export_geotiff
+from semsig_gis.grid import GridSpec
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from semsig_gis.database import SignatureDatabase
+
+
+def is_cloud_optimised(file: Path) -> bool:
+    """Ask what ``rio cogeo validate --strict`` asks."""
+    valid, errors, remarks = cog_validate(file, strict=True)
+    return bool(valid) and not errors and not remarks
+
+
+def assert_holds(file: Path, database: SignatureDatabase, values: np.ndarray) -> None:
+    """Look every cell up by its coordinates, and count the pixels that are none."""
+    with rasterio.open(file) as read:
+        assert read.crs == rasterio.CRS.from_wkt(database.crs.to_wkt())
+        assert (read.count, read.dtypes[0]) == (1, "float32")
+        assert np.isnan(read.nodata)
+        found = np.array([value[0] for value in read.sample(database.xy)])
+        assert np.array_equal(found, values.astype(np.float32), equal_nan=True)
+        assert np.isfinite(read.read(1)).sum() == np.isfinite(values).sum()
+
+
+@pytest.mark.parametrize("grid", [GridSpec(), GridSpec(7.5, (3.0, -1e6))])
+def test_pixels_are_cells(grid: GridSpec, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    monkeypatch.setattr(raster, "TILE", 16)
+    database = dataclasses.replace(small_city()[0], grid=grid)
+    values = np.where(database.lengths > 3, database.lengths, np.nan)
+    file = tmp_path / "a.tif"
+    export_geotiff(database, values, file, name="objects seen", unit="objects")
+    assert_holds(file, database, values)
+    with rasterio.open(file) as read:
+        assert read.descriptions == ("objects seen",)
+        assert read.units == ("objects",)
+        assert read.tags()["licenses"] == "\n".join(database.licenses)
+        assert read.overviews(1)
+    assert list(tmp_path.iterdir()) == [file]
+
+
+def test_layers_of_a_city(tmp_path: Path) -> None:
+    database, _ = small_city()
+    told, evaluation = told_of(database), small_evaluation()
+    export_database(database, tmp_path / "a.tif", identifiability=told)
+    assert_holds(tmp_path / "a.tif", database, database.type_group_sizes)
+    export_database(database, tmp_path / "i.tiff", layer="identifiability", identifiability=told)
+    assert_holds(tmp_path / "i.tiff", database, told.found)
+    export_database(database, tmp_path / "e.tif", layer="error", evaluation=evaluation)
+    assert_holds(tmp_path / "e.tif", database, cell_errors(evaluation, database))
+    location = small_location()
+    export_answer(location, database, tmp_path / "p.tif")
+    assert_holds(tmp_path / "p.tif", database, location.posterior.chances)
+    assert is_cloud_optimised(tmp_path / "e.tif")
+    assert is_cloud_optimised(tmp_path / "p.tif")
+
+
+def test_a_large_one_is_cloud_optimised_too(tmp_path: Path) -> None:
+    database, _ = small_city()
+    columns = database.columns + np.where(np.arange(len(database)) < len(database) // 2, 0, 1500)
+    wide = dataclasses.replace(database, columns=columns.astype(np.int32))
+    export_geotiff(wide, wide.lengths, tmp_path / "a.tif", name="a")
+    assert_holds(tmp_path / "a.tif", wide, wide.lengths)
+    assert is_cloud_optimised(tmp_path / "a.tif")
+
+
+def test_errors_of_a_cell_are_means() -> None:
+    database, evaluation = small_city()[0], small_evaluation()
+    expected = np.full(len(database), np.nan)
+    for row, cell in enumerate(database.cell_ids.tolist()):
+        errors = evaluation.queries.loc[evaluation.queries["cell_id"] == cell, "error_m"]
+        finite = errors[np.isfinite(errors)]
+        if len(finite):
+            expected[row] = finite.mean()
+    assert np.isfinite(expected).sum() > 20
+    assert np.allclose(cell_errors(evaluation, database), expected, equal_nan=True)
+    some = database.select(slice(0, None, 2))
+    assert np.allclose(cell_errors(evaluation, some), expected[::2], equal_nan=True)
+
+
+def test_what_cannot_be_a_raster_is_refused(tmp_path: Path) -> None:
+    database, _ = small_city()
+    with pytest.raises(InputError) as caught:
+        export_geotiff(database, [1.0, 2.0], tmp_path / "a.tif", name="a")
+    assert_sentence(caught.value, "2 numbers", f"{len(database)} cells")
+    columns = database.columns.copy()
+    columns[-1] += 10**9
+    far = dataclasses.replace(database, columns=columns)
+    with pytest.raises(InputError) as caught:
+        export_geotiff(far, far.lengths, tmp_path / "a.tif", name="a")
+    assert_sentence(caught.value, "too wide")
+    assert not list(tmp_path.iterdir())

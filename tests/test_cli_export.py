@@ -1,0 +1,124 @@
+"""Exports as their user meets them: export, import, and localize --out."""
+
+from __future__ import annotations
+
+import json
+from typing import TYPE_CHECKING
+
+import geopandas as gpd
+import pandas as pd
+import pyarrow.parquet as pq
+import pyogrio
+import pytest
+import rasterio
+from cells_told import told_of
+from sentences import sentence
+from small_city import small_city, small_evaluation
+
+from semsig_gis.database_file import open_database, save_database
+from semsig_gis.exports.geotiff import cell_errors
+from semsig_gis.identifiability_file import save_identifiability
+from semsig_gis.objects import open_objects, save_objects
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from conftest import Run
+
+
+@pytest.fixture
+def city(tmp_path: Path) -> Path:
+    """Return a database with its identifiability, and objects and an evaluation beside it."""
+    database, objects = small_city()
+    path = tmp_path / "city.parquet"
+    save_database(database, path)
+    # A coordinate system that was read tells of itself in other words than one that was named.
+    save_database(open_database(path), path)
+    save_identifiability(told_of(database), path)
+    save_objects(objects, tmp_path / "objects.parquet")
+    save_objects(open_objects(tmp_path / "objects.parquet"), tmp_path / "objects.parquet")
+    small_evaluation().save(tmp_path / "evaluation")
+    return path
+
+
+def test_a_city_goes_into_a_geopackage_and_back(city: Path, run: Run) -> None:
+    folder = city.parent
+    more = ("--objects", folder / "objects.parquet", "--evaluation", folder / "evaluation")
+    code, out, err = run("export", city, *more, "--out", folder / "city.gpkg")
+    assert (code, err) == (0, "")
+    assert "city.gpkg" in out
+    assert set(pyogrio.list_layers(folder / "city.gpkg")[:, 0]) == {
+        *("cells", "objects", "evaluation", "evaluation_lines", "layer_styles")
+    }
+    back = folder / "back.parquet"
+    objects = ("--objects", folder / "back_objects.parquet")
+    code, out, err = run("import", folder / "city.gpkg", "--out", back, *objects)
+    assert (code, err) == (0, "")
+    assert f"{len(small_city()[0]):,} cells" in out
+    # With the columns that semsig identify put there, of which a -0.0 comes back as 0.0.
+    again, before = pq.read_table(back), pq.read_table(city)
+    assert again.equals(before)
+    assert again.schema.metadata == before.schema.metadata
+    assert (folder / "back_objects.parquet").read_bytes() == (
+        folder / "objects.parquet"
+    ).read_bytes()
+
+
+def test_one_layer(city: Path, run: Run) -> None:
+    folder = city.parent
+    database = small_city()[0]
+    assert run("export", city, "--out", folder / "cells.csv")[0] == 0
+    assert "chance_found" in pd.read_csv(folder / "cells.csv").columns
+    assert run("export", city, "--geometry", "point", "--out", folder / "p.parquet")[0] == 0
+    assert set(gpd.read_parquet(folder / "p.parquet").geom_type) == {"Point"}
+    evaluation = ("--evaluation", folder / "evaluation", "--layer", "error")
+    assert run("export", city, *evaluation, "--out", folder / "e.tif")[0] == 0
+    with rasterio.open(folder / "e.tif") as read:
+        found = [value[0] for value in read.sample(database.xy)]
+    expected = cell_errors(small_evaluation(), database).astype("float32")
+    assert pd.Series(found).equals(pd.Series(expected))
+
+
+@pytest.mark.parametrize("method", ["edit+edit", "likelihood"])
+def test_what_must_be_searched_after_a_query(method: str, city: Path, run: Run) -> None:
+    query = ("--types", small_city()[0].types(7), "--method", method)
+    out = city.parent / "answer.gpkg"
+    code, printed, _ = run("localize", city, *query, "--out", out, "--within", 15)
+    assert code == 0
+    assert "km2" in printed
+    assert "% of the city" in printed
+    told = json.loads(run("localize", city, *query, "--out", out, "--json")[1])["searched"]
+    regions = gpd.read_file(out, layer="regions")
+    assert regions["cells"].sum() == told["cells"]
+    assert regions.geometry.area.sum() == pytest.approx(told["km2"] * 1e6)
+
+
+def test_the_chance_of_every_cell(city: Path, run: Run) -> None:
+    query = ("--types", "DD", "--method", "likelihood", "--share", 0.5)
+    assert run("localize", city, *query, "--out", city.parent / "p.tif")[0] == 0
+    with rasterio.open(city.parent / "p.tif") as read:
+        values = [value[0] for value in read.sample(small_city()[0].xy)]
+    assert sum(values) == pytest.approx(1.0, abs=1e-4)
+
+
+def test_what_does_not_go_together(city: Path, run: Run) -> None:
+    folder = city.parent
+    out = ("--out", folder / "a.gpkg")
+    refused = (
+        (("export", city, "--layer", "cells", *out), "holds all layers"),
+        (("export", city, "--out", folder / "a.txt"), ".gpkg, .parquet, .csv or .tif"),
+        (("export", city, "--evaluation", folder / "nowhere", *out), "does not exist"),
+        (("localize", city, "--types", "D", "--within", 5), "--out"),
+        (("localize", city, "--types", "D", "--share", 0.5, *out), "likelihood"),
+        (("localize", city, "--queries", "-", *out), "--out"),
+        (("localize", city, "--types", "D", "--out", folder / "a.tif"), "likelihood"),
+        (("localize", city, "--types", "D", "--within", -1, *out), "metres, 0 or more"),
+        (("import", folder / "nowhere.gpkg", "--out", folder / "b.parquet"), "does not exist"),
+        (("import", city, "--out", folder / "b.parquet"), "not written by semsig export"),
+    )
+    for command, words in refused:
+        sentence(run(*command), words)
+    assert run("export", city, *out)[0] == 0
+    objects = ("--objects", folder / "o.parquet")
+    sentence(run("import", folder / "a.gpkg", "--out", folder / "b.parquet", *objects), "holds no")
+    assert not (folder / "b.parquet").exists()
