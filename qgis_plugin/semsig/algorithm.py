@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+import html
 import os
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -103,7 +104,10 @@ class SemsigAlgorithm(QgsProcessingAlgorithm):
         """Return what it does, and what each parameter means."""
         parts = [
             *self.HELP.strip().split("\n\n"),
-            *(f"<b>{one.description()}</b><br>{one.help()}" for one in self.parameterDefinitions()),
+            *(
+                f"<b>{one.description()}</b><br>{html.escape(one.help())}"
+                for one in self.parameterDefinitions()
+            ),
         ]
         return "".join(f"<p>{part}</p>" for part in parts)
 
@@ -127,7 +131,7 @@ class SemsigAlgorithm(QgsProcessingAlgorithm):
         except CommandError as error:
             raise QgsProcessingException(str(error)) from error
         except Cancelled:
-            message = "Cancelled; what was there before is unchanged."
+            message = "Cancelled; no file is half-written."
             raise QgsProcessingException(message) from None
 
     def work(
@@ -142,8 +146,13 @@ class SemsigAlgorithm(QgsProcessingAlgorithm):
     def call(self, arguments: list[str], feedback: QgsProcessingFeedback) -> str:
         """Run the command with some arguments and return what it prints."""
 
+        told = ""
+
         def progress(percent: int, label: str) -> None:
-            feedback.setProgressText(label[:1].upper() + label[1:])
+            nonlocal told
+            if label != told:  # each time is a line in the log
+                told = label
+                feedback.setProgressText(label[:1].upper() + label[1:])
             feedback.setProgress(percent)
 
         feedback.pushCommandInfo(" ".join(["semsig", *arguments]))

@@ -193,7 +193,12 @@ def run_command(command: Sequence[str], environment: Mapping[str, str], watcher:
         for reader in readers:
             reader.start()
         try:
-            remarks = list(_listen(said, watcher))
+            last = ""
+            for remark in _listen(said, watcher):
+                # The last one is held back: it says why the command fails, if it does.
+                if last:
+                    watcher.remark(last)
+                last = remark
             code = process.wait()
         except BaseException:  # whoever ends the watching, ends the command
             _stop(process)
@@ -202,7 +207,9 @@ def run_command(command: Sequence[str], environment: Mapping[str, str], watcher:
             for reader in readers:
                 reader.join(PATIENCE_S)
     if code != 0:
-        raise CommandError(_reason(remarks, code))
+        raise CommandError(_reason(last, code))
+    if last:
+        watcher.remark(last)
     return "".join(results)
 
 
@@ -234,7 +241,7 @@ def _collect(process: subprocess.Popen[str], results: list[str]) -> None:
 
 
 def _listen(said: queue.SimpleQueue[str | None], watcher: Watcher) -> Iterator[str]:
-    """Yield the remarks until the command has no more to say."""
+    """Tell of progress, and yield the remarks, until the command has no more to say."""
     while not watcher.cancelled():
         try:
             line = said.get(timeout=BLINK_S)
@@ -246,9 +253,7 @@ def _listen(said: queue.SimpleQueue[str | None], watcher: Watcher) -> Iterator[s
         if told is not None:
             watcher.progress(int(told[1]), told[2])
         elif line:
-            remark = line.removeprefix("semsig: ")
-            watcher.remark(remark)
-            yield remark
+            yield line.removeprefix("semsig: ")
     raise Cancelled
 
 
@@ -265,10 +270,9 @@ def _stop(process: subprocess.Popen[str]) -> None:
         process.wait()
 
 
-def _reason(remarks: Sequence[str], code: int) -> str:
+def _reason(last: str, code: int) -> str:
     """Return why the command failed: its last words, which are a sentence where it is the input."""
-    if not remarks:
-        return f"The semsig command ended with exit code {code} and did not say why."
-    if code == 2:  # noqa: PLR2004 - unusable input
-        return remarks[-1]
-    return f"The semsig command failed with exit code {code}: {remarks[-1]}"
+    if code == 2 and last:  # noqa: PLR2004 - unusable input
+        return last
+    why = f": {last}" if last else " and did not say why."
+    return f"The semsig command failed with exit code {code}{why}"

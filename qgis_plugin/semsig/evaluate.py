@@ -120,7 +120,7 @@ The log has a table of the results; the folder has them for other programs.
             feedback,
         )
         summary = json.loads(Path(folder, "evaluation.json").read_text(encoding="utf-8"))
-        within = summary["results"]["p_error_within_m"]["50.0"]
+        within = summary["results"]["p_error_within_m"]["50"]
         found = {"OUTPUT": folder, "WITHIN_50_M": within}
         if page:
             self.tell(command_line("map", source, evaluation=folder, out=page), feedback)
