@@ -103,7 +103,7 @@ class SemsigAlgorithm(QgsProcessingAlgorithm):
     def shortHelpString(self) -> str:  # noqa: N802
         """Return what it does, and what each parameter means."""
         parts = [
-            *self.HELP.strip().split("\n\n"),
+            *(" ".join(part.split()) for part in self.HELP.split("\n\n")),  # breaks would show
             *(
                 f"<b>{one.description()}</b><br>{html.escape(one.help())}"
                 for one in self.parameterDefinitions()
@@ -145,7 +145,6 @@ class SemsigAlgorithm(QgsProcessingAlgorithm):
 
     def call(self, arguments: list[str], feedback: QgsProcessingFeedback) -> str:
         """Run the command with some arguments and return what it prints."""
-
         told = ""
 
         def progress(percent: int, label: str) -> None:
