@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ast
 import configparser
 import importlib.util
 import json
@@ -97,7 +98,7 @@ def test_styles_and_the_icon_are_sound(path: Path) -> None:
 
 def test_the_plugin_runs_on_an_old_python() -> None:
     for path in PLUGIN.glob("*.py"):
-        compile(path.read_text(encoding="utf-8"), path.name, "exec", flags=0, dont_inherit=True)
+        ast.parse(path.read_text(encoding="utf-8"), path.name, feature_version=(3, 9))
 
 
 # --- In QGIS ------------------------------------------------------------------------------------
