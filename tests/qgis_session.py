@@ -88,8 +88,13 @@ def shown() -> QgsProcessingOutputLayerDefinition:
 def show() -> dict[str, Any]:
     """Run what gives layers, and return how each is drawn."""
     for name, parameters in (
-        ("localize", {"TYPES": "DDB", "CANDIDATES": shown(), "PLACE": shown()}),
-        ("identify", {"NOISE": "light", "CELLS": shown()}),
+        (
+            "localize",
+            {"TYPES": "DDB", "CANDIDATES": shown(), "PLACE": shown(), "REGIONS": shown()},
+        ),
+        ("evaluate", {"QUERIES": 20, "OUTPUT": "TEMPORARY_OUTPUT", "LAYERS": shown()}),
+        ("identify", {"NOISE": "light"}),
+        ("export", {"OBJECTS": str(PLACE / "objects.parquet"), "OUTPUT": shown()}),
     ):
         feedback = Feedback()
         if not run(name, feedback, DATABASE=str(PLACE / "session.parquet"), **parameters):

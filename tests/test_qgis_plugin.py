@@ -204,7 +204,8 @@ def test_localize(qgis: Qgis) -> None:
     cell = int(database.lengths.argmax())
     seen = database.signature(cell)
     assert seen.bearings is not None
-    written = {name: qgis.place / f"{name}.gpkg" for name in ("CANDIDATES", "PLACE")}
+    outputs = ("CANDIDATES", "PLACE", "REGIONS")
+    written = {name: qgis.place / f"{name}.gpkg" for name in outputs}
     qgis.run(
         "localize",
         DATABASE=qgis.place / "city.parquet",
@@ -223,6 +224,8 @@ def test_localize(qgis: Qgis) -> None:
     assert candidates.crs == database.crs
     place = gpd.read_file(written["PLACE"])
     assert place["answered"].tolist() == ["yes"]
+    regions = gpd.read_file(written["REGIONS"], layer="regions")
+    assert regions.geometry[0].distance(candidates.geometry[0]) == 0
     assert place.geometry[0].centroid.distance(candidates.geometry[0]) < 10
     assert "<html" in (qgis.place / "place.html").read_text(encoding="utf-8")[:200].lower()
 
@@ -236,12 +239,15 @@ def test_evaluate(qgis: Qgis) -> None:
         MORE="compass:5",
         METHOD="edit+edit",
         OUTPUT=qgis.place / "evaluation",
+        LAYERS=qgis.place / "evaluation.gpkg",
         MAP=qgis.place / "evaluation.html",
     )
     assert 0 < float(done["WITHIN_50_M"]) <= 1
     summary = json.loads((qgis.place / "evaluation" / "evaluation.json").read_text("utf-8"))
     assert summary["settings"]["queries"] == 20
     assert summary["settings"]["distortions"] == ["light", "compass:5"]
+    assert done["LAYERS"] == f"{qgis.place}/evaluation.gpkg|layername=evaluation"
+    assert len(gpd.read_file(qgis.place / "evaluation.gpkg", layer="evaluation")) == 20
     assert Path(done["MAP"]).is_file()
 
 
@@ -293,7 +299,11 @@ def test_layers_are_shown_with_their_styles(session: dict[str, Any]) -> None:
     assert session["shown"] == {
         "Candidates": ["graduatedSymbol", "rank"],
         "Place": ["categorizedSymbol", "answered"],
+        "Regions to search": ["graduatedSymbol", "rank"],
         "Cells": ["graduatedSymbol", "chance_found"],
+        "Street objects": ["categorizedSymbol", "class_code"],
+        "Queries": ["categorizedSymbol", "outcome"],
+        "From the true to the best place": ["categorizedSymbol", "outcome"],
     }
 
 

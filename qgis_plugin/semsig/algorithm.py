@@ -45,13 +45,12 @@ __all__ = [
     "SemsigAlgorithm",
     "advanced",
     "area",
-    "cells",
     "choice",
     "database",
     "described",
     "file_to_read",
     "file_to_write",
-    "layer_source",
+    "layers_to_write",
     "map_to_write",
     "number",
     "show_layers",
@@ -201,7 +200,7 @@ def _command() -> str:
     return find_command(ProcessingConfig.getSetting(SETTING) or "", os.environ)
 
 
-def show_layers(context: QgsProcessingContext, path: str, names: dict[str, str]) -> None:
+def show_layers(context: QgsProcessingContext, path: str, titles: dict[str, str]) -> str:
     """Let layers of a GeoPackage be shown, where the user wishes to see the file.
 
     Parameters
@@ -210,34 +209,24 @@ def show_layers(context: QgsProcessingContext, path: str, names: dict[str, str])
         Where the file is listed if it shall be shown.
     path : str
         The file.
-    names : dict of str to str
-        Its layers and their titles.
-    """
-    listed = context.layersToLoadOnCompletion()
-    wished = listed.pop(path, None)
-    if wished is not None:
-        for layer, title in names.items():
-            details = QgsProcessingContext.LayerDetails(title, wished.project, wished.outputName)
-            listed[layer_source(path, layer)] = details
-        context.setLayersToLoadOnCompletion(listed)
-
-
-def layer_source(path: str, layer: str) -> str:
-    """Return what QGIS calls a layer of a GeoPackage.
-
-    Parameters
-    ----------
-    path : str
-        The file.
-    layer : str
-        The layer.
+    titles : dict of str to str
+        What its layers are called.
 
     Returns
     -------
     str
-        The source.
+        The first of the layers, as QGIS names it.
     """
-    return f"{path}|layername={layer}"
+    sources = {f"{path}|layername={layer}": title for layer, title in titles.items()}
+    listed = context.layersToLoadOnCompletion()
+    wished = listed.pop(path, None)
+    if wished is not None:
+        for source, title in sources.items():
+            listed[source] = QgsProcessingContext.LayerDetails(
+                title, wished.project, wished.outputName
+            )
+        context.setLayersToLoadOnCompletion(listed)
+    return next(iter(sources))
 
 
 class _Styler(QgsProcessingLayerPostProcessorInterface):
@@ -385,10 +374,10 @@ def map_to_write(text: str) -> QgsProcessingParameterFileDestination:
     return file_to_write("MAP", "Map page", text, kind="Web page (*.html)", optional=True)
 
 
-def cells(
+def layers_to_write(
     name: str, title: str, text: str, *, optional: bool = False
 ) -> QgsProcessingParameterVectorDestination:
-    """Return the parameter for a GeoPackage."""
+    """Return the parameter for a GeoPackage of layers."""
     parameter = QgsProcessingParameterVectorDestination(
         name,
         title,

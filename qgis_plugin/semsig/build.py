@@ -8,15 +8,15 @@ from .algorithm import (
     SemsigAlgorithm,
     advanced,
     area,
-    cells,
     choice,
     file_to_read,
     file_to_write,
+    layers_to_write,
     number,
     whole_number,
 )
 from .arguments import command_line
-from .export import export_cells
+from .export import CELLS, OBJECTS, export_layers
 
 if TYPE_CHECKING:
     from qgis.core import QgsProcessingContext, QgsProcessingFeedback
@@ -82,7 +82,7 @@ ready to be searched; keep it there.
                 )
             ),
             file_to_write("OUTPUT", "Signature database", "The database to write."),
-            cells(
+            layers_to_write(
                 "CELLS",
                 "Cells",
                 "The cells and the street objects as layers, in a GeoPackage.",
@@ -115,7 +115,11 @@ ready to be searched; keep it there.
             ),
             feedback,
         )
-        shown = export_cells(
-            self, written, (parameters, "CELLS"), context, feedback, objects=objects
+        shown = export_layers(
+            self,
+            (parameters, "CELLS", context, feedback),
+            {**CELLS, **OBJECTS},
+            written,
+            objects=objects,
         )
         return {"OUTPUT": written, **shown}

@@ -18,10 +18,12 @@ from .algorithm import (
     choice,
     database,
     described,
+    layers_to_write,
     map_to_write,
     whole_number,
 )
 from .arguments import DISTORTIONS, LIKELIHOOD, METHODS, NOISES, command_line
+from .export import export_layers
 
 if TYPE_CHECKING:
     from qgis.core import (
@@ -30,6 +32,8 @@ if TYPE_CHECKING:
     )
 
 __all__ = ["Evaluate"]
+
+LAYERS = {"evaluation": "Queries", "evaluation_lines": "From the true to the best place"}
 
 
 class Evaluate(SemsigAlgorithm):
@@ -43,7 +47,8 @@ Measures how often answers are right. Cells are drawn as queries, their signatur
 a bad detector would (objects missed, made up or misnamed, bearings off), and the best answer is
 compared with the true place.
 
-The log has a table of the results; the folder has them for other programs.
+The log has a table of the results; the folder has them for other programs, the layers and the
+map page for the eye.
 """
 
     def initAlgorithm(self, configuration: dict[str, Any] | None = None) -> None:  # noqa: N802, ARG002
@@ -80,6 +85,13 @@ The log has a table of the results; the folder has them for other programs.
             ),
             advanced(whole_number("SEED", "Seed", 0, (0, 2**31 - 1), "Of all chances.")),
             described(folder, "The queries, their errors and a summary, for other programs."),
+            layers_to_write(
+                "LAYERS",
+                "Queries",
+                "The queries at their true places, and lines to the places that were found, in a "
+                "GeoPackage.",
+                optional=True,
+            ),
             map_to_write(
                 "A page for the browser: an error heatmap, successful and failed queries."
             ),
@@ -121,7 +133,10 @@ The log has a table of the results; the folder has them for other programs.
         )
         summary = json.loads(Path(folder, "evaluation.json").read_text(encoding="utf-8"))
         within = summary["results"]["p_error_within_m"]["50"]
-        found = {"OUTPUT": folder, "WITHIN_50_M": within}
+        shown = export_layers(
+            self, (parameters, "LAYERS", context, feedback), LAYERS, source, evaluation=folder
+        )
+        found = {"OUTPUT": folder, "WITHIN_50_M": within, **shown}
         if page:
             self.tell(command_line("map", source, evaluation=folder, out=page), feedback)
             found["MAP"] = page

@@ -6,11 +6,10 @@ from typing import TYPE_CHECKING, Any
 
 from .algorithm import (
     SemsigAlgorithm,
-    cells,
     choice,
     database,
     file_to_read,
-    layer_source,
+    layers_to_write,
     show_layers,
 )
 from .arguments import command_line
@@ -18,7 +17,11 @@ from .arguments import command_line
 if TYPE_CHECKING:
     from qgis.core import QgsProcessingContext, QgsProcessingFeedback
 
-__all__ = ["Export", "export_cells"]
+__all__ = ["CELLS", "OBJECTS", "Export", "export_layers"]
+
+CELLS = {"cells": "Cells"}
+OBJECTS = {"objects": "Street objects"}
+"""What layers are called."""
 
 
 class Export(SemsigAlgorithm):
@@ -50,7 +53,7 @@ If “Where queries can be placed” was run, what it found goes with the cells.
                 ("polygon", "point"),
                 "Its square, or its centre.",
             ),
-            cells("OUTPUT", "Cells", "The GeoPackage to write."),
+            layers_to_write("OUTPUT", "Cells", "The GeoPackage to write."),
         ):
             self.addParameter(parameter)
 
@@ -61,59 +64,48 @@ If “Where queries can be placed” was run, what it found goes with the cells.
         feedback: QgsProcessingFeedback,
     ) -> dict[str, Any]:
         """Run `semsig export`."""
-        return export_cells(
+        objects = self.file(parameters, "OBJECTS", context)
+        return export_layers(
             self,
+            (parameters, "OUTPUT", context, feedback),
+            {**CELLS, **OBJECTS} if objects else CELLS,
             self.file(parameters, "DATABASE", context),
-            (parameters, "OUTPUT"),
-            context,
-            feedback,
-            objects=self.file(parameters, "OBJECTS", context),
+            objects=objects,
             geometry=self.text(parameters, "GEOMETRY", context),
         )
 
 
-def export_cells(
+def export_layers(
     algorithm: SemsigAlgorithm,
-    source: str,
-    destination: tuple[dict[str, Any], str],
-    context: QgsProcessingContext,
-    feedback: QgsProcessingFeedback,
-    *,
-    objects: str = "",
-    geometry: str = "",
+    run: tuple[dict[str, Any], str, QgsProcessingContext, QgsProcessingFeedback],
+    titles: dict[str, str],
+    database: str,
+    **options: str,
 ) -> dict[str, Any]:
-    """Write the cells of a database, and let them be shown, where that is wished for.
+    """Write layers to a GeoPackage, and let them be shown, where that is wished for.
 
     Parameters
     ----------
     algorithm : SemsigAlgorithm
         Who asks.
-    source : str
-        The database.
-    destination : tuple of dict and str
-        The values of the parameters, and the name of the one that says where to write to.
-    context : QgsProcessingContext
-        Where layers to be shown are listed.
-    feedback : QgsProcessingFeedback
-        Who hears of it.
-    objects : str, default ""
-        Street objects for a second layer.
-    geometry : str, default ""
-        How a cell is drawn.
+    run : tuple
+        The values of the parameters, the name of the one that says where to write to, the context
+        and the feedback of the run.
+    titles : dict of str to str
+        The layers to be shown, and what they are called.
+    database : str
+        Whose layers they are.
+    **options : str
+        Options of `semsig export`.
 
     Returns
     -------
     dict
-        The layer by the name of its parameter; empty where none is wished for.
+        The first layer by the name of its parameter; empty where none is wished for.
     """
-    parameters, name = destination
+    parameters, name, context, feedback = run
     path = str(algorithm.parameterAsOutputLayer(parameters, name, context) or "")
     if not path:
         return {}
-    algorithm.tell(
-        command_line("export", source, out=path, objects=objects, geometry=geometry), feedback
-    )
-    # The last to be listed is drawn on top.
-    titles = {"cells": "Cells", **({"objects": "Street objects"} if objects else {})}
-    show_layers(context, path, titles)
-    return {name: layer_source(path, "cells")}
+    algorithm.tell(command_line("export", database, out=path, **options), feedback)
+    return {name: show_layers(context, path, titles)}

@@ -7,16 +7,15 @@ from typing import TYPE_CHECKING, Any
 from .algorithm import (
     SemsigAlgorithm,
     advanced,
-    cells,
     choice,
     database,
+    layers_to_write,
     map_to_write,
     number,
-    style_layer,
     whole_number,
 )
 from .arguments import NOISES, command_line
-from .export import export_cells
+from .export import CELLS, export_layers
 
 if TYPE_CHECKING:
     from qgis.core import QgsProcessingContext, QgsProcessingFeedback
@@ -53,7 +52,7 @@ A large city takes minutes. What is known already is not computed again.
             ),
             number("RADIUS", "Near (m)", 50.0, (1.0, 10_000.0), "What counts as found."),
             advanced(whole_number("SEED", "Seed", 0, (0, 2**31 - 1), "Of the simulated queries.")),
-            cells("CELLS", "Cells", "The cells by their chance, in a GeoPackage."),
+            layers_to_write("CELLS", "Cells", "The cells by their chance, in a GeoPackage."),
             map_to_write("A page for the browser, on which cells can be clicked."),
         ):
             self.addParameter(parameter)
@@ -76,9 +75,7 @@ A large city takes minutes. What is known already is not computed again.
             ),
             feedback,
         )
-        shown = export_cells(self, source, (parameters, "CELLS"), context, feedback)
-        for layer in shown.values():
-            style_layer(context, layer, "identifiability")
+        shown = export_layers(self, (parameters, "CELLS", context, feedback), CELLS, source)
         page = self.file_out(parameters, "MAP", context)
         if page:
             self.tell(command_line("map", source, identifiability=True, out=page), feedback)

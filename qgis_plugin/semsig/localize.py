@@ -25,8 +25,10 @@ from .algorithm import (
     choice,
     database,
     described,
+    layers_to_write,
     map_to_write,
     number,
+    show_layers,
     style_layer,
     whole_number,
 )
@@ -117,6 +119,12 @@ they rank cells by a distance, and cells that look the same share a rank.
                 "With likelihood: the ellipse in which the place lies with a chance of 90 %, if "
                 "the answer is right.",
             ),
+            layers_to_write(
+                "REGIONS",
+                "Regions to search",
+                "What of the city must be searched for the query, in a GeoPackage.",
+                optional=True,
+            ),
             map_to_write("A page for the browser with the chances and the candidates."),
         ):
             self.addParameter(parameter)
@@ -129,6 +137,7 @@ they rank cells by a distance, and cells that look the same share a rank.
     ) -> dict[str, Any]:
         """Run `semsig localize` and make layers of its answer."""
         page = self.file_out(parameters, "MAP", context)
+        regions = str(self.parameterAsOutputLayer(parameters, "REGIONS", context) or "")
         method = self.text(parameters, "METHOD", context)
         heading = self.text(parameters, "HEADING", context)
         if heading == "uncertain":
@@ -153,6 +162,7 @@ they rank cells by a distance, and cells that look the same share a rank.
                 require=self.text(parameters, "REQUIRE", context),
                 top=self.parameterAsInt(parameters, "TOP", context),
                 map=page,
+                out=regions,
                 json=True,
             ),
             feedback,
@@ -160,7 +170,10 @@ they rank cells by a distance, and cells that look the same share a rank.
         answer = parse_answer(printed)
         crs = QgsCoordinateReferenceSystem()
         crs.createFromUserInput(answer["crs"])
-        found: dict[str, Any] = {}
+        found: dict[str, Any] = {"MAP": page} if page else {}
+        if regions:
+            titles = {"regions": "Regions to search"}
+            found["REGIONS"] = show_layers(context, regions, titles)
         place = place_row(answer)
         if place is not None:
             outline, values = place
@@ -178,7 +191,7 @@ they rank cells by a distance, and cells that look the same share a rank.
         found.update(
             self._layer(parameters, "CANDIDATES", context, (CANDIDATE_FIELDS, kind, crs), rows)
         )
-        return {**found, "MAP": page} if page else found
+        return found
 
     def _layer(
         self,
