@@ -25,6 +25,7 @@ from qgis.core import (
 )
 from qgis.PyQt.QtGui import QIcon
 
+from .answers import log_text
 from .command import (
     Cancelled,
     CommandError,
@@ -161,7 +162,7 @@ class SemsigAlgorithm(QgsProcessingAlgorithm):
 
     def tell(self, arguments: list[str], feedback: QgsProcessingFeedback) -> None:
         """Run the command and show what it prints."""
-        feedback.pushConsoleInfo(self.call(arguments, feedback).rstrip())
+        feedback.pushConsoleInfo(log_text(self.call(arguments, feedback)))
 
     def file(self, parameters: dict[str, Any], name: str, context: QgsProcessingContext) -> str:
         """Return the path of a file to read, or nothing."""

@@ -1,9 +1,10 @@
-"""What `semsig localize --json` says, as rows for layers. Nothing here imports QGIS."""
+"""What the command prints, as lines for the log and rows for layers. Nothing here imports QGIS."""
 
 from __future__ import annotations
 
 import json
 import math
+import re
 from typing import Any
 
 from .command import CommandError
@@ -12,6 +13,7 @@ __all__ = [
     "CANDIDATE_FIELDS",
     "PLACE_FIELDS",
     "candidate_rows",
+    "log_text",
     "parse_answer",
     "place_row",
     "ring",
@@ -38,6 +40,41 @@ PLACE_FIELDS = {
     "heading": "double",
 }
 CORNERS = 72
+BORDER = re.compile("[┏┡└]")
+BARS = re.compile("[┃│]")
+
+
+def log_text(printed: str) -> str:
+    """Return what the command printed, without the frames of its tables.
+
+    The log of QGIS has letters of different widths and swallows blanks, which breaks frames.
+
+    Parameters
+    ----------
+    printed : str
+        Its standard output.
+
+    Returns
+    -------
+    str
+        The same, with the cells of a table divided by simple bars.
+
+    Examples
+    --------
+    >>> table = ["Rows", "┏━━━━┳━━━┓", "┃ a  ┃ b ┃", "┡━━━━╇━━━┩", "│ 10 │   │", "└────┴───┘"]
+    >>> print(log_text(chr(10).join([*table, "done"])))
+    Rows
+    a | b
+    10 |
+    done
+    """
+    lines = [line for line in printed.splitlines() if not BORDER.match(line)]
+    return "\n".join(
+        " | ".join(cell.strip() for cell in BARS.split(line)[1:-1]).rstrip()
+        if BARS.match(line)
+        else line.rstrip()
+        for line in lines
+    )
 
 
 def parse_answer(printed: str) -> dict[str, Any]:
