@@ -18,9 +18,11 @@ from qgis.core import (
     QgsProcessingFeedback,
     QgsProcessingOutputLayerDefinition,
     QgsProject,
+    QgsRenderContext,
 )
 
 PLACE = Path(sys.argv[1])
+EVERYWHERE = QgsRenderContext()
 
 application = QgsApplication([], True)  # noqa: FBT003 - with a screen, which need not be real
 application.initQgis()
@@ -101,7 +103,7 @@ def show() -> dict[str, Any]:
             raise RuntimeError(feedback.errors)
     layers = QgsProject.instance().mapLayers().values()
     return {
-        layer.name(): [layer.renderer().type(), layer.renderer().classAttribute()]
+        layer.name(): [layer.renderer().type(), *layer.renderer().usedAttributes(EVERYWHERE)]
         for layer in layers
     }
 

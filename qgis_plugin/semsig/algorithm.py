@@ -223,19 +223,19 @@ def show_layers(context: QgsProcessingContext, path: str, titles: dict[str, str]
     wished = listed.pop(path, None)
     if wished is not None:
         for source, title in sources.items():
-            listed[source] = QgsProcessingContext.LayerDetails(
-                title, wished.project, wished.outputName
-            )
+            details = QgsProcessingContext.LayerDetails(title, wished.project, wished.outputName)
+            details.setPostProcessor(_styler())
+            listed[source] = details
         context.setLayersToLoadOnCompletion(listed)
     return next(iter(sources))
 
 
 class _Styler(QgsProcessingLayerPostProcessorInterface):
-    """Gives a layer its style once it is loaded."""
+    """Gives a layer its style once it is loaded: one of ours, or that of its GeoPackage."""
 
-    def __init__(self, file: Path) -> None:
+    def __init__(self, name: str) -> None:
         super().__init__()
-        self.file = file
+        self.name = name
 
     def postProcessLayer(  # noqa: N802
         self,
@@ -243,15 +243,18 @@ class _Styler(QgsProcessingLayerPostProcessorInterface):
         _context: QgsProcessingContext,
         _feedback: QgsProcessingFeedback,
     ) -> None:
-        """Give the layer its style."""
-        layer.loadNamedStyle(str(self.file))
+        """Give the layer its style; Processing itself does not even load the default one."""
+        if self.name:
+            layer.loadNamedStyle(str(HERE / "styles" / f"{self.name}.qml"))
+        else:
+            layer.loadDefaultStyle()
         layer.triggerRepaint()
 
 
 # Kept for good: QGIS does not keep what it is handed, so that it would be gone when it is needed.
 @functools.cache
-def _styler(name: str) -> _Styler:
-    return _Styler(HERE / "styles" / f"{name}.qml")
+def _styler(name: str = "") -> _Styler:
+    return _Styler(name)
 
 
 def style_layer(context: QgsProcessingContext, source: str, style: str) -> None:

@@ -51,7 +51,7 @@ FOREIGN = (
 PLACES = (
     "~/.local/bin",
     "/usr/local/bin",
-    "/opt/homebrew/bin",
+    "/opt/*/bin",
     "~/Library/Python/3.*/bin",
     "~/AppData/Roaming/Python/Python3*/Scripts",
     "~/AppData/Local/Programs/Python/Python3*/Scripts",
