@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-import functools
 import html
 import os
+from collections import deque
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -251,10 +251,15 @@ class _Styler(QgsProcessingLayerPostProcessorInterface):
         layer.triggerRepaint()
 
 
-# Kept for good: QGIS does not keep what it is handed, so that it would be gone when it is needed.
-@functools.cache
 def _styler(name: str = "") -> _Styler:
-    return _Styler(name)
+    """Return a styler for one layer; QGIS deletes it after use, but does not keep it until then."""
+    made = _Styler(name)
+    _STYLERS.append(made)
+    return made
+
+
+# Enough for all layers that are being made at a time.
+_STYLERS: deque[_Styler] = deque(maxlen=1000)
 
 
 def style_layer(context: QgsProcessingContext, source: str, style: str) -> None:
