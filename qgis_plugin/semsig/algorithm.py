@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import html
 import os
+import shlex
 from collections import deque
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -154,7 +155,7 @@ class SemsigAlgorithm(QgsProcessingAlgorithm):
                 feedback.setProgressText(label[:1].upper() + label[1:])
             feedback.setProgress(percent)
 
-        feedback.pushCommandInfo(" ".join(["semsig", *arguments]))
+        feedback.pushCommandInfo(shlex.join(["semsig", *arguments]))
         watcher = Watcher(progress, feedback.pushInfo, feedback.isCanceled)
         return run_command(
             [_command(), *arguments], environment=clean_environment(os.environ), watcher=watcher
