@@ -1,4 +1,4 @@
-"""A session with QGIS, played by its own Python: `qgis_session.py FOLDER`.
+"""A session with QGIS, played by its own Python: `qgis_session.py FOLDER CATALOGUE`.
 
 The last line that is printed is JSON with what happened. This is not a module of the tests.
 """
@@ -132,6 +132,13 @@ def play() -> dict[str, Any]:
     told = {
         "listed": [name for _, name in listed],
         "help": algorithm("localize").shortHelpString(),
+        "loaded": run(
+            "load",
+            Feedback(),
+            FILES=[str(PLACE / "lamps.geojson")],
+            CATALOG_FILE=sys.argv[2],
+            OUTPUT=str(PLACE / "session_lamps.parquet"),
+        ),
         "shown": show(),
         "failed": stop("export", DATABASE=objects, OUTPUT=str(PLACE / "fails.gpkg")),
         "cancelled": stop(

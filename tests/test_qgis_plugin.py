@@ -169,19 +169,26 @@ def qgis(qgis_process: Path, package: ModuleType, tmp_path_factory: pytest.TempP
     return Qgis(place, environment, qgis_process)
 
 
-def test_load_and_build(qgis: Qgis) -> None:
+@pytest.fixture(scope="module")
+def lamps(qgis: Qgis) -> Path:
+    """Return the catalogue of a file with three lamps."""
     lamps = gpd.GeoDataFrame(geometry=gpd.points_from_xy([0, 40, 80], [0, 0, 0]), crs="EPSG:2154")
     lamps.to_file(qgis.place / "lamps.geojson", driver="GeoJSON")
-    (qgis.place / "town.toml").write_text(
+    catalog = qgis.place / "town.toml"
+    catalog.write_text(
         'name = "town"\ntitle = "Town"\nurl = "https://example.org"\nmetric_crs = "EPSG:2154"\n'
         'license = "CC0"\nattribution = "Town"\n'
         '[[layers]]\nname = "lamps"\nclass = "street_light"\nfiles = ["lamps.geojson"]\n'
         'geometry = "point"\n'
     )
+    return catalog
+
+
+def test_load_and_build(qgis: Qgis, lamps: Path) -> None:
     done = qgis.run(
         "load",
-        FILES=qgis.place / "lamps.geojson",
-        CATALOG_FILE=qgis.place / "town.toml",
+        FOLDER=qgis.place,
+        CATALOG_FILE=lamps,
         OUTPUT=qgis.place / "lamps.parquet",
     )
     assert done == {"OUTPUT": str(qgis.place / "lamps.parquet")}
@@ -276,11 +283,11 @@ def test_identify_and_export(qgis: Qgis) -> None:
 
 
 @pytest.fixture(scope="module")
-def session(qgis: Qgis) -> dict[str, Any]:
+def session(qgis: Qgis, lamps: Path) -> dict[str, Any]:
     """Play `qgis_session.py` in QGIS's own Python, and return what it tells."""
     python = shutil.which("python3", path=os.defpath) or "python3"
     shutil.copy(qgis.place / "city.parquet", qgis.place / "session.parquet")
-    done = qgis.process(python, SCRIPT, qgis.place)
+    done = qgis.process(python, SCRIPT, qgis.place, lamps)
     if "No module named 'qgis'" in done.stderr:
         unavailable("qgis", f"{python} does not have QGIS's modules")
     assert done.returncode == 0, done.stdout + done.stderr
@@ -305,6 +312,11 @@ def test_layers_are_shown_with_their_styles(session: dict[str, Any]) -> None:
         "Queries": ["categorizedSymbol", "outcome"],
         "From the true to the best place": ["categorizedSymbol", "outcome"],
     }
+
+
+def test_files_one_by_one(session: dict[str, Any], qgis: Qgis) -> None:
+    assert session["loaded"] is True
+    assert len(open_objects(qgis.place / "session_lamps.parquet")) == 3
 
 
 def test_a_failing_run_shows_the_sentence_and_leaves_nothing(session: dict[str, Any]) -> None:

@@ -123,9 +123,11 @@ The log tells what became of every row: how many are objects, how many were left
         feedback: QgsProcessingFeedback,
     ) -> dict[str, Any]:
         """Run `semsig load`."""
-        given = [str(file) for file in self.parameterAsFileList(parameters, "FILES", context)]
-        folder = self.file(parameters, "FOLDER", context)
-        given += [folder] if folder else []
+        given = [
+            *map(str, self.parameterAsFileList(parameters, "FILES", context)),
+            self.file(parameters, "FOLDER", context),
+        ]
+        given = [path for path in given if path]  # no files are a list of nothing
         if not given:
             message = "No files were given; choose files, or the folder that holds them."
             raise CommandError(message)
