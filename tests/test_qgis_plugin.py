@@ -190,6 +190,7 @@ def test_load_and_build(qgis: Qgis, lamps: Path) -> None:
         FOLDER=qgis.place,
         CATALOG_FILE=lamps,
         OUTPUT=qgis.place / "lamps.parquet",
+        BUILDINGS=qgis.place / "no_buildings.parquet",
     )
     assert done == {"OUTPUT": str(qgis.place / "lamps.parquet")}
     assert len(open_objects(done["OUTPUT"])) == 3

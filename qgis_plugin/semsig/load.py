@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from qgis.core import (
@@ -156,7 +157,8 @@ The log tells what became of every row: how many are objects, how many were left
             ),
             feedback,
         )
-        return {name: path for name, path in written.items() if path}
+        # Not every catalogue has buildings and streets.
+        return {name: path for name, path in written.items() if path and Path(path).is_file()}
 
 
 def _crs_text(crs: QgsCoordinateReferenceSystem) -> str:
