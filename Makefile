@@ -12,7 +12,7 @@ DEV := $(VENV)/.dev
 
 .DEFAULT_GOAL := help
 .NOTPARALLEL:
-.PHONY: help demo test lint bench accuracy reproduce docs clean
+.PHONY: help demo test lint bench accuracy reproduce docs plugin clean
 
 help: ## show this list
 	@sed -n 's/^\([a-z]*\):.*## \(.*\)/  make \1\t\2/p' $(MAKEFILE_LIST) | expand -t 14
@@ -45,6 +45,9 @@ reproduce: $(DEV) ## the paper's experiments, into reproduction/: report and fig
 
 docs: $(DEV) ## the documentation, into docs/_build/html
 	$(BIN)/sphinx-build -W --keep-going -b html docs docs/_build/html
+
+plugin: ## the QGIS plugin, into dist/: a zip file to install
+	$(PYTHON) qgis_plugin/package.py dist
 
 clean: ## remove .venv and everything that the targets write
 	rm -rf $(VENV) demo reproduction reproduction.json build dist docs/_build docs/generated htmlcov .coverage .coverage.* \

@@ -9,6 +9,8 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import typer
 
+from semsig_gis._supervision import progress_line, supervised
+
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator
 
@@ -92,6 +94,8 @@ def progress(
 ) -> Iterator[Callable[[int, int], None]]:
     """Show a bar on standard error once the work in the block takes a while.
 
+    A program that supervises this one gets lines instead (see `semsig_gis._supervision`).
+
     Parameters
     ----------
     label : str
@@ -104,6 +108,9 @@ def progress(
     callable
         To be called with how much is done and how much there is in all.
     """
+    if supervised():
+        yield _progress_lines(label)
+        return
     from rich.console import Console
     from rich.progress import (
         BarColumn,
@@ -139,3 +146,18 @@ def progress(
         # Stopping a bar that never showed, or shows nowhere, would print an empty line.
         if bar.live.is_started:
             bar.stop()
+
+
+def _progress_lines(label: str) -> Callable[[int, int], None]:
+    """Return what prints a line for every percent of the work."""
+    told = -1
+
+    def advance(done: int, total: int) -> None:
+        nonlocal told
+        percent = done * 100 // total if total else 0
+        if percent != told:
+            told = percent
+            typer.echo(progress_line(label, percent), err=True)
+
+    advance(0, 1)
+    return advance

@@ -14,6 +14,7 @@ from typing import Annotated
 import typer
 
 from semsig_gis import __version__
+from semsig_gis._supervision import stop_with_supervisor, supervised
 
 # The order of these imports is that of the help.
 # isort: off
@@ -40,6 +41,8 @@ __all__ = ["app", "main"]
 
 def main() -> None:
     """Run the command; an unusable input ends it with one sentence and exit code 2."""
+    if supervised():
+        stop_with_supervisor()
     with warnings.catch_warnings():
         warnings.showwarning = _show_warning
         try:

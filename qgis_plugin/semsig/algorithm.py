@@ -1,0 +1,397 @@
+"""What the algorithms share: how they call the command, and their common parameters."""
+
+from __future__ import annotations
+
+import html
+import os
+import shlex
+from collections import deque
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from processing.core.ProcessingConfig import ProcessingConfig
+from qgis.core import (
+    QgsProcessing,
+    QgsProcessingAlgorithm,
+    QgsProcessingContext,
+    QgsProcessingException,
+    QgsProcessingLayerPostProcessorInterface,
+    QgsProcessingParameterDefinition,
+    QgsProcessingParameterEnum,
+    QgsProcessingParameterFile,
+    QgsProcessingParameterFileDestination,
+    QgsProcessingParameterNumber,
+    QgsProcessingParameterVectorDestination,
+    QgsProcessingParameterVectorLayer,
+)
+from qgis.PyQt.QtGui import QIcon
+
+from .answers import log_text
+from .command import (
+    Cancelled,
+    CommandError,
+    Watcher,
+    clean_environment,
+    find_command,
+    run_command,
+)
+
+if TYPE_CHECKING:
+    from qgis.core import (
+        QgsProcessingFeedback,
+        QgsVectorLayer,
+    )
+
+__all__ = [
+    "SETTING",
+    "SemsigAlgorithm",
+    "advanced",
+    "area",
+    "choice",
+    "database",
+    "described",
+    "file_to_read",
+    "file_to_write",
+    "layers_to_write",
+    "map_to_write",
+    "number",
+    "show_layers",
+    "style_layer",
+    "whole_number",
+]
+
+SETTING = "SEMSIG_COMMAND"
+"""Name of the setting that says where the command is."""
+
+HERE = Path(__file__).parent
+PARQUET = "GeoParquet (*.parquet)"
+
+
+class SemsigAlgorithm(QgsProcessingAlgorithm):
+    """An algorithm that runs the command; a subclass says what it is called and what it does."""
+
+    NAME = ""
+    TITLE = ""
+    HELP = ""
+    TAGS: tuple[str, ...] = ()
+
+    # The names of these methods are those of QGIS.
+
+    def createInstance(self) -> SemsigAlgorithm:  # noqa: N802
+        """Return a new one of the same kind."""
+        return type(self)()
+
+    def name(self) -> str:
+        """Return the second part of the identifier."""
+        return self.NAME
+
+    def displayName(self) -> str:  # noqa: N802
+        """Return the name in the toolbox."""
+        return self.TITLE
+
+    def tags(self) -> list[str]:
+        """Return further words by which it is found."""
+        return list(self.TAGS)
+
+    def icon(self) -> QIcon:
+        """Return the icon."""
+        return QIcon(self.svgIconPath())
+
+    def svgIconPath(self) -> str:  # noqa: N802
+        """Return where the icon is."""
+        return str(HERE / "icon.svg")
+
+    def shortHelpString(self) -> str:  # noqa: N802
+        """Return what it does, and what each parameter means."""
+        parts = [
+            *(" ".join(part.split()) for part in self.HELP.split("\n\n")),  # breaks would show
+            *(
+                f"<b>{one.description()}</b><br>{html.escape(one.help())}"
+                for one in self.parameterDefinitions()
+            ),
+        ]
+        return "".join(f"<p>{part}</p>" for part in parts)
+
+    def canExecute(self) -> tuple[bool, str]:  # noqa: N802
+        """Tell whether the command is there, and what to do if not."""
+        try:
+            _command()
+        except CommandError as error:
+            return False, str(error)
+        return True, ""
+
+    def processAlgorithm(  # noqa: N802
+        self,
+        parameters: dict[str, Any],
+        context: QgsProcessingContext,
+        feedback: QgsProcessingFeedback,
+    ) -> dict[str, Any]:
+        """Do the work; what goes wrong is told in one sentence."""
+        try:
+            return self.work(parameters, context, feedback)
+        except CommandError as error:
+            raise QgsProcessingException(str(error)) from error
+        except Cancelled:
+            message = "Cancelled; no file is half-written."
+            raise QgsProcessingException(message) from None
+
+    def work(
+        self,
+        parameters: dict[str, Any],
+        context: QgsProcessingContext,
+        feedback: QgsProcessingFeedback,
+    ) -> dict[str, Any]:
+        """Do the work and return the outputs by their names."""
+        raise NotImplementedError
+
+    def call(self, arguments: list[str], feedback: QgsProcessingFeedback) -> str:
+        """Run the command with some arguments and return what it prints."""
+        told = ""
+
+        def progress(percent: int, label: str) -> None:
+            nonlocal told
+            if label != told:  # each time is a line in the log
+                told = label
+                feedback.setProgressText(label[:1].upper() + label[1:])
+            feedback.setProgress(percent)
+
+        feedback.pushCommandInfo(shlex.join(["semsig", *arguments]))
+        watcher = Watcher(progress, feedback.pushInfo, feedback.isCanceled)
+        return run_command(
+            [_command(), *arguments], environment=clean_environment(os.environ), watcher=watcher
+        )
+
+    def tell(self, arguments: list[str], feedback: QgsProcessingFeedback) -> None:
+        """Run the command and show what it prints."""
+        feedback.pushConsoleInfo(log_text(self.call(arguments, feedback)))
+
+    def file(self, parameters: dict[str, Any], name: str, context: QgsProcessingContext) -> str:
+        """Return the path of a file to read, or nothing."""
+        return str(self.parameterAsFile(parameters, name, context))
+
+    def file_out(self, parameters: dict[str, Any], name: str, context: QgsProcessingContext) -> str:
+        """Return the path of a file to write, or nothing."""
+        return str(self.parameterAsFileOutput(parameters, name, context))
+
+    def text(self, parameters: dict[str, Any], name: str, context: QgsProcessingContext) -> str:
+        """Return what was chosen or typed, or nothing."""
+        definition = self.parameterDefinition(name)
+        if isinstance(definition, QgsProcessingParameterEnum):
+            return str(self.parameterAsEnumString(parameters, name, context))
+        return str(self.parameterAsString(parameters, name, context)).strip()
+
+    def polygons(
+        self,
+        parameters: dict[str, Any],
+        name: str,
+        context: QgsProcessingContext,
+        feedback: QgsProcessingFeedback,
+    ) -> str:
+        """Return a file with the polygons of a layer, or nothing."""
+        if self.parameterAsVectorLayer(parameters, name, context) is None:
+            return ""
+        formats = ["gpkg", "shp", "geojson"]
+        return str(
+            self.parameterAsCompatibleSourceLayerPath(
+                parameters, name, context, formats, "gpkg", feedback
+            )
+        )
+
+
+def _command() -> str:
+    return find_command(ProcessingConfig.getSetting(SETTING) or "", os.environ)
+
+
+def show_layers(context: QgsProcessingContext, path: str, titles: dict[str, str]) -> str:
+    """Let layers of a GeoPackage be shown, where the user wishes to see the file.
+
+    Parameters
+    ----------
+    context : QgsProcessingContext
+        Where the file is listed if it shall be shown.
+    path : str
+        The file.
+    titles : dict of str to str
+        What its layers are called.
+
+    Returns
+    -------
+    str
+        The first of the layers, as QGIS names it.
+    """
+    sources = {f"{path}|layername={layer}": title for layer, title in titles.items()}
+    listed = context.layersToLoadOnCompletion()
+    wished = listed.pop(path, None)
+    if wished is not None:
+        for source, title in sources.items():
+            details = QgsProcessingContext.LayerDetails(title, wished.project, wished.outputName)
+            details.setPostProcessor(_styler())
+            listed[source] = details
+        context.setLayersToLoadOnCompletion(listed)
+    return next(iter(sources))
+
+
+class _Styler(QgsProcessingLayerPostProcessorInterface):
+    """Gives a layer its style once it is loaded: one of ours, or that of its GeoPackage."""
+
+    def __init__(self, name: str) -> None:
+        super().__init__()
+        self.name = name
+
+    def postProcessLayer(  # noqa: N802
+        self,
+        layer: QgsVectorLayer,
+        _context: QgsProcessingContext,
+        _feedback: QgsProcessingFeedback,
+    ) -> None:
+        """Give the layer its style; Processing itself does not even load the default one."""
+        if self.name:
+            layer.loadNamedStyle(str(HERE / "styles" / f"{self.name}.qml"))
+        else:
+            layer.loadDefaultStyle()
+        layer.triggerRepaint()
+
+
+def _styler(name: str = "") -> _Styler:
+    """Return a styler for one layer; QGIS deletes it after use, but does not keep it until then."""
+    made = _Styler(name)
+    _STYLERS.append(made)
+    return made
+
+
+# Enough for all layers that are being made at a time.
+_STYLERS: deque[_Styler] = deque(maxlen=1000)
+
+
+def style_layer(context: QgsProcessingContext, source: str, style: str) -> None:
+    """Let a layer have a style of ours, where the user wishes to see it.
+
+    Parameters
+    ----------
+    context : QgsProcessingContext
+        Where it is listed if it shall be shown.
+    source : str
+        The layer.
+    style : str
+        Name of the style's file, without its ending.
+    """
+    if context.willLoadLayerOnCompletion(source):
+        context.layerToLoadOnCompletionDetails(source).setPostProcessor(_styler(style))
+
+
+def described(
+    parameter: QgsProcessingParameterDefinition, text: str
+) -> QgsProcessingParameterDefinition:
+    """Return a parameter with its help."""
+    parameter.setHelp(text)
+    return parameter
+
+
+def advanced(parameter: QgsProcessingParameterDefinition) -> QgsProcessingParameterDefinition:
+    """Return a parameter that is shown under "Advanced"."""
+    parameter.setFlags(parameter.flags() | QgsProcessingParameterDefinition.Flag.FlagAdvanced)
+    return parameter
+
+
+def file_to_read(
+    name: str, title: str, text: str, *, kind: str = PARQUET, optional: bool = False
+) -> QgsProcessingParameterFile:
+    """Return the parameter for a file."""
+    parameter = QgsProcessingParameterFile(
+        name,
+        title,
+        behavior=QgsProcessingParameterFile.Behavior.File,
+        optional=optional,
+        fileFilter=f"{kind};;All files (*.*)",
+    )
+    return described(parameter, text)
+
+
+def database() -> QgsProcessingParameterFile:
+    """Return the parameter for a signature database."""
+    return file_to_read(
+        "DATABASE",
+        "Signature database",
+        "The file that “Build signature database” wrote.",
+    )
+
+
+def area(text: str) -> QgsProcessingParameterVectorLayer:
+    """Return the parameter for polygons."""
+    parameter = QgsProcessingParameterVectorLayer(
+        "AREA", "Area", types=[QgsProcessing.SourceType.TypeVectorPolygon], optional=True
+    )
+    return described(parameter, text)
+
+
+def choice(
+    name: str, title: str, options: tuple[str, ...], text: str, *, default: str | None = None
+) -> QgsProcessingParameterEnum:
+    """Return the parameter for one of several names; the first by default."""
+    parameter = QgsProcessingParameterEnum(
+        name,
+        title,
+        options=list(options),
+        defaultValue=options[0] if default is None else default,
+        usesStaticStrings=True,
+    )
+    return described(parameter, text)
+
+
+def number(
+    name: str, title: str, default: float, bounds: tuple[float, float], text: str
+) -> QgsProcessingParameterNumber:
+    """Return the parameter for a number."""
+    parameter = QgsProcessingParameterNumber(
+        name,
+        title,
+        type=QgsProcessingParameterNumber.Type.Double,
+        defaultValue=default,
+        minValue=bounds[0],
+        maxValue=bounds[1],
+    )
+    parameter.setMetadata({"widget_wrapper": {"decimals": 1}})
+    return described(parameter, text)
+
+
+def whole_number(
+    name: str, title: str, default: int, bounds: tuple[int, int], text: str
+) -> QgsProcessingParameterNumber:
+    """Return the parameter for a whole number."""
+    parameter = QgsProcessingParameterNumber(
+        name,
+        title,
+        type=QgsProcessingParameterNumber.Type.Integer,
+        defaultValue=default,
+        minValue=bounds[0],
+        maxValue=bounds[1],
+    )
+    return described(parameter, text)
+
+
+def file_to_write(
+    name: str, title: str, text: str, *, kind: str = PARQUET, optional: bool = False
+) -> QgsProcessingParameterFileDestination:
+    """Return the parameter for a file to write; an optional one is not written by default."""
+    parameter = QgsProcessingParameterFileDestination(
+        name, title, fileFilter=kind, optional=optional, createByDefault=not optional
+    )
+    return described(parameter, text)
+
+
+def map_to_write(text: str) -> QgsProcessingParameterFileDestination:
+    """Return the parameter for a map page."""
+    return file_to_write("MAP", "Map page", text, kind="Web page (*.html)", optional=True)
+
+
+def layers_to_write(
+    name: str, title: str, text: str, *, optional: bool = False
+) -> QgsProcessingParameterVectorDestination:
+    """Return the parameter for a GeoPackage of layers."""
+    parameter = QgsProcessingParameterVectorDestination(
+        name,
+        title,
+        type=QgsProcessing.SourceType.TypeVectorAnyGeometry,
+        optional=optional,
+    )
+    return described(parameter, text)

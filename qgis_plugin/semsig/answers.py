@@ -1,0 +1,211 @@
+"""What the command prints, as lines for the log and rows for layers. Nothing here imports QGIS."""
+
+from __future__ import annotations
+
+import json
+import math
+import re
+from typing import Any
+
+from .command import CommandError
+
+__all__ = [
+    "CANDIDATE_FIELDS",
+    "PLACE_FIELDS",
+    "candidate_rows",
+    "log_text",
+    "parse_answer",
+    "place_row",
+    "ring",
+]
+
+# Names and types as the provider of memory layers takes them, in every version of QGIS.
+CANDIDATE_FIELDS = {
+    "rank": "integer",
+    "rank_high": "integer",
+    "cell_id": "int8",
+    "types": "string",
+    "length": "integer",
+    "chance": "double",
+    "distance": "double",
+}
+PLACE_FIELDS = {
+    "answered": "string",
+    "chance": "double",
+    "within_m": "double",
+    "sigma_m": "double",
+    "longer_m": "double",
+    "shorter_m": "double",
+    "bearing": "double",
+    "heading": "double",
+}
+CORNERS = 72
+BORDER = re.compile("[┏┡└]")
+BARS = re.compile("[┃│]")
+
+
+def log_text(printed: str) -> str:
+    """Return what the command printed, without the frames of its tables.
+
+    The log of QGIS has letters of different widths and swallows blanks, which breaks frames.
+
+    Parameters
+    ----------
+    printed : str
+        Its standard output.
+
+    Returns
+    -------
+    str
+        The same, with the cells of a table divided by simple bars.
+
+    Examples
+    --------
+    >>> table = ["Rows", "┏━━━━┳━━━┓", "┃ a  ┃ b ┃", "┡━━━━╇━━━┩", "│ 10 │   │", "└────┴───┘"]
+    >>> print(log_text(chr(10).join([*table, "done"])))
+    Rows
+    a | b
+    10 |
+    done
+    """
+    lines = [line for line in printed.splitlines() if not BORDER.match(line)]
+    return "\n".join(
+        " | ".join(cell.strip() for cell in BARS.split(line)[1:-1]).rstrip()
+        if BARS.match(line)
+        else line.rstrip()
+        for line in lines
+    )
+
+
+def parse_answer(printed: str) -> dict[str, Any]:
+    """Return the answer that the command printed.
+
+    Parameters
+    ----------
+    printed : str
+        Its standard output.
+
+    Returns
+    -------
+    dict
+        The answer.
+
+    Raises
+    ------
+    CommandError
+        If it is something else.
+    """
+    try:
+        answer: dict[str, Any] = json.loads(printed)
+        answer["crs"], answer["candidates"]
+    except (KeyError, TypeError, ValueError) as error:
+        message = (
+            "The semsig command gave an answer that this plugin does not understand; install a "
+            "semsig_gis and a plugin of the same version."
+        )
+        raise CommandError(message) from error
+    return answer
+
+
+def candidate_rows(answer: dict[str, Any]) -> list[tuple[float, float, list[Any]]]:
+    """Return x, y and the values of `CANDIDATE_FIELDS` of each candidate.
+
+    Parameters
+    ----------
+    answer : dict
+        See `parse_answer`.
+
+    Returns
+    -------
+    list of tuple
+        Best first.
+    """
+    return [
+        (
+            one["x"],
+            one["y"],
+            [
+                one.get("rank", one.get("rank_low")),
+                one.get("rank", one.get("rank_high")),
+                one["cell_id"],
+                one["types"],
+                one["length"],
+                one.get("chance"),
+                one.get("distance"),
+            ],
+        )
+        for one in answer["candidates"]
+    ]
+
+
+def place_row(answer: dict[str, Any]) -> tuple[list[tuple[float, float]], list[Any]] | None:
+    """Return the outline of the place and the values of `PLACE_FIELDS`.
+
+    Parameters
+    ----------
+    answer : dict
+        See `parse_answer`.
+
+    Returns
+    -------
+    tuple or None
+        The ellipse in which the place lies with a chance of 90 %, if the answer is right; None
+        where the method only ranks cells.
+    """
+    place = answer.get("place")
+    if place is None:
+        return None
+    ellipse = place["ellipse_90"]
+    outline = ring(
+        (place["x"], place["y"]), ellipse["longer"], ellipse["shorter"], ellipse["bearing"]
+    )
+    values = [
+        "yes" if answer["answered"] else "cannot tell",
+        place["chance"],
+        place["within_m"],
+        place["sigma"],
+        ellipse["longer"],
+        ellipse["shorter"],
+        ellipse["bearing"],
+        place["heading"],
+    ]
+    return outline, values
+
+
+def ring(
+    centre: tuple[float, float], longer: float, shorter: float, bearing: float
+) -> list[tuple[float, float]]:
+    """Return the corners of an ellipse, the first again at the end.
+
+    Parameters
+    ----------
+    centre : tuple of float
+        Its middle.
+    longer, shorter : float
+        Half axes.
+    bearing : float
+        Degrees clockwise from north of the longer one.
+
+    Returns
+    -------
+    list of tuple
+        The corners.
+
+    Examples
+    --------
+    >>> [round(part) for part in ring((5.0, 5.0), 2.0, 1.0, 0.0)[0]]
+    [5, 7]
+    """
+    turn = math.radians(bearing)
+    along, across = (math.sin(turn), math.cos(turn)), (math.cos(turn), -math.sin(turn))
+    corners = []
+    for corner in range(CORNERS):
+        angle = math.tau * corner / CORNERS
+        ahead, aside = longer * math.cos(angle), shorter * math.sin(angle)
+        corners.append(
+            (
+                centre[0] + ahead * along[0] + aside * across[0],
+                centre[1] + ahead * along[1] + aside * across[1],
+            )
+        )
+    return [*corners, corners[0]]

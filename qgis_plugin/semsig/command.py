@@ -1,0 +1,278 @@
+"""The `semsig` command as a process of its own: where it is, how it is run, what it tells.
+
+QGIS has its own Python with its own GDAL and PROJ, which must not meet those of `semsig`. Hence a
+process, in an environment from which everything of QGIS is taken out.
+
+Nothing here imports QGIS.
+"""
+
+from __future__ import annotations
+
+import os
+import queue
+import re
+import shutil
+import signal
+import subprocess
+import sys
+import threading
+from pathlib import Path
+from typing import TYPE_CHECKING, NamedTuple
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator, Mapping, Sequence
+
+__all__ = [
+    "Cancelled",
+    "CommandError",
+    "Watcher",
+    "clean_environment",
+    "find_command",
+    "run_command",
+]
+
+# What belongs to QGIS, by how the names of variables begin.
+FOREIGN = (
+    "CPL_",
+    "DYLD_",
+    "GDAL_",
+    "GISBASE",
+    "GRASS_",
+    "LD_",
+    "OGR_",
+    "OSGEO4W_",
+    "PROJ_",
+    "PYTHON",
+    "QGIS_",
+    "QT_",
+    "__PYVENV_LAUNCHER__",
+)
+# Where installers put commands; a program that was started from a desktop menu has a short PATH.
+PLACES = (
+    "~/.local/bin",
+    "/usr/local/bin",
+    "/opt/*/bin",
+    "~/Library/Python/3.*/bin",
+    "~/AppData/Roaming/Python/Python3*/Scripts",
+    "~/AppData/Local/Programs/Python/Python3*/Scripts",
+    "~/mini*3/bin",
+    "~/anaconda3/bin",
+)
+PROGRESS = re.compile(r"semsig progress (\d+)% (.*)")
+# How often a cancel is looked for, and how long the command may take to clean up.
+BLINK_S = 0.1
+PATIENCE_S = 20.0
+
+
+class CommandError(Exception):
+    """The command could not do it; the message is a sentence for people."""
+
+
+class Cancelled(Exception):  # noqa: N818 - nothing went wrong
+    """The work was stopped on request."""
+
+
+class Watcher(NamedTuple):
+    """What hears from a running command, and may stop it."""
+
+    progress: Callable[[int, str], None]
+    """Called with the percent that is done, and of what."""
+    remark: Callable[[str], None]
+    """Called with every other line that the command says beside its results."""
+    cancelled: Callable[[], bool]
+    """Tells whether the work shall end."""
+
+
+def clean_environment(environment: Mapping[str, str]) -> dict[str, str]:
+    """Return the environment for the command: nothing of QGIS, texts in UTF-8, progress as lines.
+
+    Parameters
+    ----------
+    environment : mapping of str to str
+        That of QGIS.
+
+    Returns
+    -------
+    dict
+        That of the command.
+    """
+    kept = {
+        name: value for name, value in environment.items() if not name.upper().startswith(FOREIGN)
+    }
+    return {**kept, "PYTHONUTF8": "1", "SEMSIG_SUPERVISED": "1"}
+
+
+def find_command(
+    chosen: str, environment: Mapping[str, str], places: Sequence[str] = PLACES
+) -> str:
+    """Return the path of the `semsig` command.
+
+    Parameters
+    ----------
+    chosen : str
+        What the settings say; empty where nothing was chosen.
+    environment : mapping of str to str
+        Its ``PATH`` is searched first.
+    places : sequence of str, optional
+        Folders to look in after that; may have wildcards and begin with ``~``.
+
+    Returns
+    -------
+    str
+        The path.
+
+    Raises
+    ------
+    CommandError
+        If it is not there.
+    """
+    where = "Settings > Options > Processing > Providers > Semantic signatures"
+    if chosen:
+        found = shutil.which(os.path.expanduser(chosen))  # noqa: PTH111 - a Path adds nothing
+        if found is None:
+            message = (
+                f"{chosen} is not a program that can be run; choose the semsig command in {where}."
+            )
+            raise CommandError(message)
+        return found
+    folders = [str(folder) for place in places for folder in _folders(place)]
+    path = os.pathsep.join([environment.get("PATH", ""), *folders])
+    found = shutil.which("semsig", path=path)
+    if found is None:
+        message = (
+            "The semsig command is not on this computer, or not where it is looked for; install "
+            f"semsig_gis with pip, or choose the command in {where}."
+        )
+        raise CommandError(message)
+    return found
+
+
+def _folders(place: str) -> Iterator[Path]:
+    """Yield the folders that a place stands for."""
+    path = Path(place).expanduser()
+    root = Path(path.anchor)
+    return root.glob(str(path.relative_to(root)))
+
+
+def run_command(command: Sequence[str], environment: Mapping[str, str], watcher: Watcher) -> str:
+    """Run the command and return its results, which it prints on standard output.
+
+    Parameters
+    ----------
+    command : sequence of str
+        The program and its arguments.
+    environment : mapping of str to str
+        See `clean_environment`.
+    watcher : Watcher
+        Who hears of it.
+
+    Returns
+    -------
+    str
+        The standard output.
+
+    Raises
+    ------
+    CommandError
+        If the command cannot be run or fails; the message is what it says last.
+    Cancelled
+        If the watcher wished so. The command has ended and cleaned up.
+    """
+    try:
+        process = _start(command, environment)
+    except OSError as error:
+        message = f"{command[0]} cannot be run ({error.strerror or error}); choose another program."
+        raise CommandError(message) from error
+    said: queue.SimpleQueue[str | None] = queue.SimpleQueue()
+    results: list[str] = []
+    readers = [
+        threading.Thread(target=_hand_on, args=(process, said), daemon=True),
+        threading.Thread(target=_collect, args=(process, results), daemon=True),
+    ]
+    with process:
+        for reader in readers:
+            reader.start()
+        try:
+            last = ""
+            for remark in _listen(said, watcher):
+                # The last one is held back: it says why the command fails, if it does.
+                if last:
+                    watcher.remark(last)
+                last = remark
+            code = process.wait()
+        except BaseException:  # whoever ends the watching, ends the command
+            _stop(process)
+            raise
+        finally:
+            for reader in readers:
+                reader.join(PATIENCE_S)
+    if code != 0:
+        raise CommandError(_reason(last, code))
+    if last:
+        watcher.remark(last)
+    return "".join(results)
+
+
+def _start(command: Sequence[str], environment: Mapping[str, str]) -> subprocess.Popen[str]:
+    return subprocess.Popen(  # noqa: S603 - the program is what the user installed or chose
+        command,
+        env=dict(environment),
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        encoding="utf-8",
+        errors="replace",
+        # A session of its own, so that it can be ended with all that it started.
+        start_new_session=True,
+        # No console window pops up on Windows.
+        creationflags=getattr(subprocess, "CREATE_NO_WINDOW", 0),
+    )
+
+
+def _hand_on(process: subprocess.Popen[str], said: queue.SimpleQueue[str | None]) -> None:
+    for line in process.stderr or ():
+        said.put(line.rstrip())
+    said.put(None)
+
+
+def _collect(process: subprocess.Popen[str], results: list[str]) -> None:
+    results.extend(process.stdout or ())
+
+
+def _listen(said: queue.SimpleQueue[str | None], watcher: Watcher) -> Iterator[str]:
+    """Tell of progress, and yield the remarks, until the command has no more to say."""
+    while not watcher.cancelled():
+        try:
+            line = said.get(timeout=BLINK_S)
+        except queue.Empty:
+            continue
+        if line is None:
+            return
+        told = PROGRESS.fullmatch(line)
+        if told is not None:
+            watcher.progress(int(told[1]), told[2])
+        elif line:
+            yield line.removeprefix("semsig: ")
+    raise Cancelled
+
+
+def _stop(process: subprocess.Popen[str]) -> None:
+    """End the command: by the end of its input, which lets it clean up, or in the end by force."""
+    process.stdin.close()  # type: ignore[union-attr] # it is a pipe
+    try:
+        process.wait(PATIENCE_S)
+    except subprocess.TimeoutExpired:
+        if sys.platform == "win32":
+            process.kill()
+        else:
+            os.killpg(process.pid, signal.SIGKILL)
+        process.wait()
+
+
+def _reason(last: str, code: int) -> str:
+    """Return why the command failed: its last words, which are a sentence where it is the input."""
+    if code == 2 and last:  # noqa: PLR2004 - unusable input
+        return last
+    why = f": {last}" if last else " and did not say why."
+    return f"The semsig command failed with exit code {code}{why}"

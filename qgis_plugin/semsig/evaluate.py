@@ -1,0 +1,143 @@
+"""Many distorted queries, and how far off the answers are."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from qgis.core import (
+    QgsProcessingOutputNumber,
+    QgsProcessingParameterFolderDestination,
+    QgsProcessingParameterString,
+)
+
+from .algorithm import (
+    SemsigAlgorithm,
+    advanced,
+    choice,
+    database,
+    described,
+    layers_to_write,
+    map_to_write,
+    whole_number,
+)
+from .arguments import DISTORTIONS, LIKELIHOOD, METHODS, NOISES, command_line
+from .export import export_layers
+
+if TYPE_CHECKING:
+    from qgis.core import (
+        QgsProcessingContext,
+        QgsProcessingFeedback,
+    )
+
+__all__ = ["Evaluate"]
+
+LAYERS = {"evaluation": "Queries", "evaluation_lines": "From the true to the best place"}
+
+
+class Evaluate(SemsigAlgorithm):
+    """`semsig evaluate` and `semsig map`."""
+
+    NAME = "evaluate"
+    TITLE = "4. Evaluate"
+    TAGS = ("error", "recall", "queries", "distortion", "accuracy")
+    HELP = """
+Measures how often answers are right. Cells are drawn as queries, their signatures are distorted as
+a bad detector would (objects missed, made up or misnamed, bearings off), and the best answer is
+compared with the true place.
+
+The log has a table of the results; the folder has them for other programs, the layers and the
+map page for the eye.
+"""
+
+    def initAlgorithm(self, configuration: dict[str, Any] | None = None) -> None:  # noqa: N802, ARG002
+        """Say what goes in and out."""
+        more = QgsProcessingParameterString("MORE", "Further distortions", optional=True)
+        folder = QgsProcessingParameterFolderDestination("OUTPUT", "Folder for the results")
+        for parameter in (
+            database(),
+            whole_number("QUERIES", "Queries", 500, (1, 1_000_000), "How many are asked."),
+            choice(
+                "DISTORTION",
+                "Distortion",
+                DISTORTIONS,
+                "How many objects the detector gets wrong: none, 1, 7 or 13.",
+                default="medium",
+            ),
+            advanced(
+                described(
+                    more,
+                    "What else happens to a query, with commas between, such as "
+                    "compass:10,view:90 (a compass that is off by 10°, a view of 90°).",
+                )
+            ),
+            choice("METHOD", "Method", METHODS, "How cells are compared with a query."),
+            choice(
+                "NOISE",
+                "Detector",
+                NOISES,
+                "With likelihood, how much of what is seen may be wrong: light, medium, strong, or "
+                "generic where that is not known.",
+            ),
+            whole_number(
+                "TOP", "Candidates", 1, (1, 100_000), "How many best candidates count as answers."
+            ),
+            advanced(whole_number("SEED", "Seed", 0, (0, 2**31 - 1), "Of all chances.")),
+            described(folder, "The queries, their errors and a summary, for other programs."),
+            layers_to_write(
+                "LAYERS",
+                "Queries",
+                "The queries at their true places, and lines to the places that were found, in a "
+                "GeoPackage.",
+                optional=True,
+            ),
+            map_to_write(
+                "A page for the browser: an error heatmap, successful and failed queries."
+            ),
+        ):
+            self.addParameter(parameter)
+        self.addOutput(
+            QgsProcessingOutputNumber("WITHIN_50_M", "Chance of an error of 50 m or less")
+        )
+
+    def work(
+        self,
+        parameters: dict[str, Any],
+        context: QgsProcessingContext,
+        feedback: QgsProcessingFeedback,
+    ) -> dict[str, Any]:
+        """Run `semsig evaluate`, then `semsig map` where a page is wished for."""
+        source = self.file(parameters, "DATABASE", context)
+        folder = self.file_out(parameters, "OUTPUT", context)
+        page = self.file_out(parameters, "MAP", context)
+        method = self.text(parameters, "METHOD", context)
+        noise = self.text(parameters, "NOISE", context) if method == LIKELIHOOD else ""
+        distortions = [
+            self.text(parameters, "DISTORTION", context),
+            self.text(parameters, "MORE", context),
+        ]
+        self.tell(
+            command_line(
+                "evaluate",
+                source,
+                out=folder,
+                queries=self.parameterAsInt(parameters, "QUERIES", context),
+                distortion=",".join(one for one in distortions if one),
+                method=method,
+                noise=noise,
+                top=self.parameterAsInt(parameters, "TOP", context),
+                seed=self.parameterAsInt(parameters, "SEED", context),
+            ),
+            feedback,
+        )
+        summary = json.loads(Path(folder, "evaluation.json").read_text(encoding="utf-8"))
+        within = summary["results"]["p_error_within_m"]["50"]
+        shown = export_layers(
+            self, (parameters, "LAYERS", context, feedback), LAYERS, source, evaluation=folder
+        )
+        found = {"OUTPUT": folder, "WITHIN_50_M": within, **shown}
+        if page:
+            self.tell(command_line("map", source, evaluation=folder, out=page), feedback)
+            found["MAP"] = page
+        return found

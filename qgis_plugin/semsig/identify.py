@@ -1,0 +1,83 @@
+"""Where in a city a query can be placed, before there is one."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from .algorithm import (
+    SemsigAlgorithm,
+    advanced,
+    choice,
+    database,
+    layers_to_write,
+    map_to_write,
+    number,
+    whole_number,
+)
+from .arguments import NOISES, command_line
+from .export import CELLS, export_layers
+
+if TYPE_CHECKING:
+    from qgis.core import QgsProcessingContext, QgsProcessingFeedback
+
+__all__ = ["Identify"]
+
+
+class Identify(SemsigAlgorithm):
+    """`semsig identify` and `semsig map`."""
+
+    NAME = "identify"
+    TITLE = "5. Where queries can be placed"
+    TAGS = ("identifiability", "ambiguous", "map", "chance", "uniqueness")
+    HELP = """
+Tells of every cell, before any query, how likely one from there will be found, and for which other
+cells it will be taken. A street with three lamps looks like thousands of others; here they are.
+
+The database gets columns that say so, and the cells are shown by their chance. The map page, which
+opens in a browser, shows on a click what a cell is taken for.
+
+A large city takes minutes. What is known already is not computed again.
+"""
+
+    def initAlgorithm(self, configuration: dict[str, Any] | None = None) -> None:  # noqa: N802, ARG002
+        """Say what goes in and out."""
+        for parameter in (
+            database(),
+            choice(
+                "NOISE",
+                "Detector",
+                NOISES,
+                "How much of what is seen will be wrong: light, medium, strong, or generic where "
+                "that is not known.",
+            ),
+            number("RADIUS", "Near (m)", 50.0, (1.0, 10_000.0), "What counts as found."),
+            advanced(whole_number("SEED", "Seed", 0, (0, 2**31 - 1), "Of the simulated queries.")),
+            layers_to_write("CELLS", "Cells", "The cells by their chance, in a GeoPackage."),
+            map_to_write("A page for the browser, on which cells can be clicked."),
+        ):
+            self.addParameter(parameter)
+
+    def work(
+        self,
+        parameters: dict[str, Any],
+        context: QgsProcessingContext,
+        feedback: QgsProcessingFeedback,
+    ) -> dict[str, Any]:
+        """Run `semsig identify`, then `semsig export` and `semsig map`."""
+        source = self.file(parameters, "DATABASE", context)
+        self.tell(
+            command_line(
+                "identify",
+                source,
+                noise=self.text(parameters, "NOISE", context),
+                radius=self.parameterAsDouble(parameters, "RADIUS", context),
+                seed=self.parameterAsInt(parameters, "SEED", context),
+            ),
+            feedback,
+        )
+        shown = export_layers(self, (parameters, "CELLS", context, feedback), CELLS, source)
+        page = self.file_out(parameters, "MAP", context)
+        if page:
+            self.tell(command_line("map", source, identifiability=True, out=page), feedback)
+            shown["MAP"] = page
+        return shown

@@ -1,0 +1,169 @@
+"""Open data become street objects."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from qgis.core import (
+    QgsProcessing,
+    QgsProcessingParameterCrs,
+    QgsProcessingParameterEnum,
+    QgsProcessingParameterFile,
+    QgsProcessingParameterMultipleLayers,
+)
+
+from .algorithm import SemsigAlgorithm, advanced, described, file_to_read, file_to_write
+from .arguments import CATALOGS, command_line
+from .command import CommandError
+
+if TYPE_CHECKING:
+    from qgis.core import (
+        QgsCoordinateReferenceSystem,
+        QgsProcessingContext,
+        QgsProcessingFeedback,
+    )
+
+__all__ = ["Load"]
+
+
+class Load(SemsigAlgorithm):
+    """`semsig load`."""
+
+    NAME = "load"
+    TITLE = "1. Load street objects"
+    TAGS = ("trees", "lamps", "benches", "open data", "openstreetmap", "catalogue")
+    HELP = """
+Reads files of open data (trees, street lights, benches, bus stops...) into one table of street
+objects, which “Build signature database” takes.
+
+A catalogue says which file holds what: the open data of Montpellier and of Paris, and
+OpenStreetMap, are built in; for other data, write one (semsig sources suggest drafts it).
+
+The log tells what became of every row: how many are objects, how many were left out, and why.
+"""
+
+    def initAlgorithm(self, configuration: dict[str, Any] | None = None) -> None:  # noqa: N802, ARG002
+        """Say what goes in and out."""
+        files = QgsProcessingParameterMultipleLayers(
+            "FILES", "Files", layerType=QgsProcessing.SourceType.TypeFile, optional=True
+        )
+        self.addParameter(
+            described(files, "Vector files of any format, .osm or .osm.pbf; zipped is fine.")
+        )
+        folder = QgsProcessingParameterFile(
+            "FOLDER",
+            "Folder",
+            behavior=QgsProcessingParameterFile.Behavior.Folder,
+            optional=True,
+        )
+        self.addParameter(
+            described(
+                folder, "A folder in which the catalogue's files are looked for, instead of files."
+            )
+        )
+        catalogs = QgsProcessingParameterEnum(
+            "CATALOGS",
+            "Catalogues",
+            options=list(CATALOGS),
+            allowMultiple=True,
+            optional=True,
+            usesStaticStrings=True,
+        )
+        self.addParameter(
+            described(
+                catalogs,
+                "What the files hold. With several, objects that two of them have are merged; the "
+                "first is taken for the best source.",
+            )
+        )
+        self.addParameter(
+            file_to_read(
+                "CATALOG_FILE",
+                "Catalogue of your own",
+                "A catalogue file, besides those chosen above or instead of them.",
+                kind="Catalogue (*.toml)",
+                optional=True,
+            )
+        )
+        for name, title, text in (
+            ("CRS", "CRS of the files", "For files that do not state theirs."),
+            (
+                "METRIC_CRS",
+                "CRS to work in",
+                "A CRS in metres; by default that of the catalogue, or the UTM zone.",
+            ),
+        ):
+            crs = QgsProcessingParameterCrs(name, title, optional=True)
+            self.addParameter(advanced(described(crs, text)))
+        self.addParameter(
+            file_to_write("OUTPUT", "Street objects", "The table of street objects to write.")
+        )
+        self.addParameter(
+            file_to_write(
+                "BUILDINGS",
+                "Buildings",
+                "Building footprints to write too, where the files have some. “Build signature "
+                "database” hides what is behind them.",
+                optional=True,
+            )
+        )
+        self.addParameter(
+            file_to_write(
+                "STREETS",
+                "Streets",
+                "Centre lines of streets to write too, where the files have some.",
+                optional=True,
+            )
+        )
+
+    def work(
+        self,
+        parameters: dict[str, Any],
+        context: QgsProcessingContext,
+        feedback: QgsProcessingFeedback,
+    ) -> dict[str, Any]:
+        """Run `semsig load`."""
+        given = [
+            *map(str, self.parameterAsFileList(parameters, "FILES", context)),
+            self.file(parameters, "FOLDER", context),
+        ]
+        given = [path for path in given if path]  # no files are a list of nothing
+        if not given:
+            message = "No files were given; choose files, or the folder that holds them."
+            raise CommandError(message)
+        catalogs = [
+            *map(str, self.parameterAsEnumStrings(parameters, "CATALOGS", context)),
+            self.file(parameters, "CATALOG_FILE", context),
+        ]
+        catalogs = [catalog for catalog in catalogs if catalog]
+        if not catalogs:
+            message = "No catalogue was given; choose one, or a file of your own."
+            raise CommandError(message)
+        written = {
+            name: self.file_out(parameters, name, context)
+            for name in ("OUTPUT", "BUILDINGS", "STREETS")
+        }
+        self.tell(
+            command_line(
+                "load",
+                *given,
+                catalog=catalogs,
+                crs=_crs_text(self.parameterAsCrs(parameters, "CRS", context)),
+                metric_crs=_crs_text(self.parameterAsCrs(parameters, "METRIC_CRS", context)),
+                out=written["OUTPUT"],
+                buildings=written["BUILDINGS"],
+                streets=written["STREETS"],
+            ),
+            feedback,
+        )
+        # Not every catalogue has buildings and streets.
+        return {name: path for name, path in written.items() if path and Path(path).is_file()}
+
+
+def _crs_text(crs: QgsCoordinateReferenceSystem) -> str:
+    """Return what names a CRS, or nothing where none is given."""
+    if not crs.isValid():
+        return ""
+    known = str(crs.authid())
+    return known if known and not known.startswith("USER:") else str(crs.toWkt())

@@ -1,0 +1,229 @@
+"""A query, and where it was seen from."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from qgis.core import (
+    QgsCoordinateReferenceSystem,
+    QgsFeature,
+    QgsFeatureSink,
+    QgsGeometry,
+    QgsPointXY,
+    QgsProcessing,
+    QgsProcessingException,
+    QgsProcessingParameterFeatureSink,
+    QgsProcessingParameterString,
+    QgsVectorLayer,
+    QgsWkbTypes,
+)
+
+from .algorithm import (
+    SemsigAlgorithm,
+    advanced,
+    area,
+    choice,
+    database,
+    described,
+    layers_to_write,
+    map_to_write,
+    number,
+    show_layers,
+    style_layer,
+    whole_number,
+)
+from .answers import CANDIDATE_FIELDS, PLACE_FIELDS, candidate_rows, parse_answer, place_row
+from .arguments import LIKELIHOOD, METHODS, NOISES, command_line
+
+if TYPE_CHECKING:
+    from qgis.core import (
+        QgsFields,
+        QgsProcessingContext,
+        QgsProcessingFeedback,
+    )
+
+__all__ = ["Localize"]
+
+HEADINGS = ("known", "uncertain", "unknown")
+
+
+class Localize(SemsigAlgorithm):
+    """`semsig localize`."""
+
+    NAME = "localize"
+    TITLE = "3. Localize a query"
+    TAGS = ("query", "where", "place", "candidates", "position")
+    HELP = """
+Tells where in the city a view was taken from: what is seen, clockwise from north, is compared with
+the signature of every cell. Types alone or bearings alone are fine.
+
+The likelihood method gives each candidate a chance, tells the place between the middles of the
+cells with its uncertainty, and says when it cannot tell. The other methods are those of the paper;
+they rank cells by a distance, and cells that look the same share a rank.
+"""
+
+    def initAlgorithm(self, configuration: dict[str, Any] | None = None) -> None:  # noqa: N802, ARG002
+        """Say what goes in and out."""
+        types = QgsProcessingParameterString("TYPES", "Types", optional=True)
+        bearings = QgsProcessingParameterString("BEARINGS", "Bearings (°)", optional=True)
+        candidates = QgsProcessingParameterFeatureSink(
+            "CANDIDATES", "Candidates", QgsProcessing.SourceType.TypeVectorPoint
+        )
+        place = QgsProcessingParameterFeatureSink(
+            "PLACE", "Place", QgsProcessing.SourceType.TypeVectorPolygon, optional=True
+        )
+        for parameter in (
+            database(),
+            described(
+                types,
+                "Symbols of what is seen, clockwise from north, such as DDBL; ? where one is "
+                "unknown. The paper's: B tree, C fountain, D street light, E indicator, "
+                "G traffic light, H bike station, I public toilet, J car sharing, K taxi rank, "
+                "L bench, M bus stop; a catalogue may have more.",
+            ),
+            described(
+                bearings,
+                "Where each is seen, in degrees clockwise from north, with commas between them, "
+                "such as 10,80,200,310.",
+            ),
+            choice("METHOD", "Method", METHODS, "How cells are compared with the query."),
+            choice(
+                "NOISE",
+                "Detector",
+                NOISES,
+                "With likelihood, how much of what is seen may be wrong: light, medium, strong, or "
+                "generic where that is not known.",
+            ),
+            choice("HEADING", "North", HEADINGS, "With likelihood, whether the north is known."),
+            number(
+                "HEADING_SIGMA",
+                "North is off by (°)",
+                10.0,
+                (0.1, 180.0),
+                "With likelihood and an uncertain north, the standard deviation.",
+            ),
+            area("With likelihood: polygons that the place lies in."),
+            whole_number(
+                "TOP", "Number of candidates", 10, (1, 100_000), "How many cells to list."
+            ),
+            advanced(
+                described(
+                    QgsProcessingParameterString("REQUIRE", "A cell must see", optional=True),
+                    "Such as M (a bus stop), 2B (two trees or more), B=0 (no tree), ?<=10 (ten "
+                    "objects or fewer).",
+                )
+            ),
+            described(candidates, "The best cells."),
+            described(
+                place,
+                "With likelihood: the ellipse in which the place lies with a chance of 90 %, if "
+                "the answer is right.",
+            ),
+            layers_to_write(
+                "REGIONS",
+                "Regions to search",
+                "What of the city must be searched for the query, in a GeoPackage.",
+                optional=True,
+            ),
+            map_to_write("A page for the browser with the chances and the candidates."),
+        ):
+            self.addParameter(parameter)
+
+    def work(
+        self,
+        parameters: dict[str, Any],
+        context: QgsProcessingContext,
+        feedback: QgsProcessingFeedback,
+    ) -> dict[str, Any]:
+        """Run `semsig localize` and make layers of its answer."""
+        page = self.file_out(parameters, "MAP", context)
+        regions = str(self.parameterAsOutputLayer(parameters, "REGIONS", context) or "")
+        method = self.text(parameters, "METHOD", context)
+        heading = self.text(parameters, "HEADING", context)
+        if heading == "uncertain":
+            heading = str(self.parameterAsDouble(parameters, "HEADING_SIGMA", context))
+        chances = (
+            {
+                "noise": self.text(parameters, "NOISE", context),
+                "heading": heading,
+                "area": self.polygons(parameters, "AREA", context, feedback),
+            }
+            if method == LIKELIHOOD
+            else {}
+        )
+        printed = self.call(
+            command_line(
+                "localize",
+                self.file(parameters, "DATABASE", context),
+                types=self.text(parameters, "TYPES", context),
+                bearings=self.text(parameters, "BEARINGS", context),
+                method=method,
+                **chances,
+                require=self.text(parameters, "REQUIRE", context),
+                top=self.parameterAsInt(parameters, "TOP", context),
+                map=page,
+                out=regions,
+                json=True,
+            ),
+            feedback,
+        )
+        answer = parse_answer(printed)
+        crs = QgsCoordinateReferenceSystem()
+        crs.createFromUserInput(answer["crs"])
+        found: dict[str, Any] = {"MAP": page} if page else {}
+        if regions:
+            titles = {"regions": "Regions to search"}
+            found["REGIONS"] = show_layers(context, regions, titles)
+        place = place_row(answer)
+        if place is not None:
+            outline, values = place
+            ring = [QgsPointXY(x, y) for x, y in outline]
+            rows = [(QgsGeometry.fromPolygonXY([ring]), values)]
+            kind = QgsWkbTypes.Type.Polygon
+            sink = self._layer(parameters, "PLACE", context, (PLACE_FIELDS, kind, crs), rows)
+            found.update(sink)
+            feedback.pushInfo(_said(values))
+        rows = [
+            (QgsGeometry.fromPointXY(QgsPointXY(x, y)), values)
+            for x, y, values in candidate_rows(answer)
+        ]
+        kind = QgsWkbTypes.Type.Point
+        found.update(
+            self._layer(parameters, "CANDIDATES", context, (CANDIDATE_FIELDS, kind, crs), rows)
+        )
+        return found
+
+    def _layer(
+        self,
+        parameters: dict[str, Any],
+        name: str,
+        context: QgsProcessingContext,
+        shape: tuple[dict[str, str], Any, QgsCoordinateReferenceSystem],
+        rows: list[tuple[QgsGeometry, list[Any]]],
+    ) -> dict[str, Any]:
+        """Write a layer, where it is wished for, and return it by the name of its parameter."""
+        fields, kind, crs = shape
+        sink, source = self.parameterAsSink(parameters, name, context, _fields(fields), kind, crs)
+        if sink is None:
+            return {}
+        for geometry, values in rows:
+            feature = QgsFeature()
+            feature.setGeometry(geometry)
+            feature.setAttributes(values)
+            if not sink.addFeature(feature, QgsFeatureSink.Flag.FastInsert):
+                raise QgsProcessingException(self.writeFeatureError(sink, parameters, name))
+        style_layer(context, source, name.lower())
+        return {name: source}
+
+
+def _fields(types: dict[str, str]) -> QgsFields:
+    """Return fields by the words that all versions of QGIS know; Qt's own names differ."""
+    described_so = "&".join(f"field={name}:{kind}" for name, kind in types.items())
+    return QgsVectorLayer(f"None?{described_so}", "", "memory").fields()
+
+
+def _said(place: list[Any]) -> str:
+    """Return the verdict in a sentence."""
+    answered, chance, within = place[:3]
+    verdict = "The place is" if answered == "yes" else "Cannot tell: the best place is"
+    return f"{verdict} within {within:g} m of the ellipse's middle with a chance of {chance:.1%}."

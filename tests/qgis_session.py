@@ -1,0 +1,165 @@
+"""A session with QGIS, played by its own Python: `qgis_session.py FOLDER CATALOGUE`.
+
+The last line that is printed is JSON with what happened. This is not a module of the tests.
+"""
+
+from __future__ import annotations
+
+import json
+import sys
+import time
+from pathlib import Path
+from typing import Any
+
+from qgis.core import (
+    QgsApplication,
+    QgsProcessingAlgRunnerTask,
+    QgsProcessingContext,
+    QgsProcessingFeedback,
+    QgsProcessingOutputLayerDefinition,
+    QgsProject,
+    QgsRenderContext,
+)
+
+PLACE = Path(sys.argv[1])
+EVERYWHERE = QgsRenderContext()
+
+application = QgsApplication([], True)  # noqa: FBT003 - with a screen, which need not be real
+application.initQgis()
+sys.path += [
+    str(Path(application.pkgDataPath(), "python", "plugins")),
+    str(PLACE / "profile" / "profiles" / "default" / "python" / "plugins"),
+]
+
+import semsig  # noqa: E402 - from the profile
+from processing.core.Processing import Processing  # noqa: E402
+from processing.core.ProcessingConfig import ProcessingConfig  # noqa: E402
+from processing.gui.Postprocessing import handleAlgorithmResults  # noqa: E402
+
+
+class Feedback(QgsProcessingFeedback):
+    """Keeps what it is told; cancels at the first sign of progress if it shall."""
+
+    def __init__(self, *, cancelling: bool = False) -> None:
+        super().__init__()
+        self.cancelling = cancelling
+        self.errors: list[str] = []
+        self.percents: list[float] = []
+
+    def setProgress(self, percent: float) -> None:  # noqa: N802
+        """Keep the progress."""
+        self.percents.append(percent)
+
+    def reportError(self, error: str, fatalError: bool = False) -> None:  # noqa: ARG002, FBT001, FBT002, N802, N803
+        """Keep an error."""
+        self.errors.append(error)
+
+    def setProgressText(self, text: str) -> None:  # noqa: N802
+        """Cancel once there is something to cancel."""
+        if self.cancelling and text == "Building":
+            self.cancel()
+
+
+def algorithm(name: str) -> Any:  # noqa: ANN401
+    """Return an algorithm as the toolbox does."""
+    return QgsApplication.processingRegistry().createAlgorithmById(f"semsig:{name}")
+
+
+def run(name: str, feedback: Feedback, **parameters: object) -> bool:
+    """Run an algorithm as its dialog does, and load what it gives."""
+    context = QgsProcessingContext()
+    context.setProject(QgsProject.instance())
+    ready = algorithm(name)
+    task = QgsProcessingAlgRunnerTask(ready, parameters, context, feedback)
+    ended: list[bool] = []
+    task.executed.connect(lambda successful, _results: ended.append(successful))
+    QgsApplication.taskManager().addTask(task)
+    while not ended:
+        application.processEvents()
+        time.sleep(0.01)
+    if ended[0]:
+        handleAlgorithmResults(ready, context, feedback)
+    return ended[0]
+
+
+def shown() -> QgsProcessingOutputLayerDefinition:
+    """Return a temporary output that is loaded."""
+    return QgsProcessingOutputLayerDefinition("TEMPORARY_OUTPUT", QgsProject.instance())
+
+
+def show() -> dict[str, Any]:
+    """Run what gives layers, and return how each is drawn."""
+    for name, parameters in (
+        (
+            "localize",
+            {"TYPES": "DDB", "CANDIDATES": shown(), "PLACE": shown(), "REGIONS": shown()},
+        ),
+        ("evaluate", {"QUERIES": 20, "OUTPUT": "TEMPORARY_OUTPUT", "LAYERS": shown()}),
+        ("identify", {"NOISE": "light"}),
+        ("export", {"OBJECTS": str(PLACE / "objects.parquet"), "OUTPUT": shown()}),
+    ):
+        feedback = Feedback()
+        if not run(name, feedback, DATABASE=str(PLACE / "session.parquet"), **parameters):
+            raise RuntimeError(feedback.errors)
+    layers = QgsProject.instance().mapLayers().values()
+    return {
+        layer.name(): [layer.renderer().type(), *layer.renderer().usedAttributes(EVERYWHERE)]
+        for layer in layers
+    }
+
+
+def stop(name: str, *, cancelling: bool = False, **parameters: object) -> dict[str, Any]:
+    """Run what does not end well, and return what is told and left."""
+    log = PLACE / "processes"
+    before = {*PLACE.rglob("*"), log}
+    feedback = Feedback(cancelling=cancelling)
+    successful = run(name, feedback, **parameters)
+    return {
+        "successful": successful,
+        "errors": feedback.errors,
+        "percents": feedback.percents,
+        "process": int(log.read_text().split()[-1]),
+        "left": [str(path) for path in set(PLACE.rglob("*")) - before],
+    }
+
+
+def play() -> dict[str, Any]:
+    """Play all scenes, and return what each told."""
+    registry = QgsApplication.processingRegistry()
+    provider = registry.providerById("semsig")
+    listed = sorted((one.displayName(), one.name()) for one in provider.algorithms())
+    objects = str(PLACE / "objects.parquet")
+    told = {
+        "listed": [name for _, name in listed],
+        "help": algorithm("localize").shortHelpString(),
+        "loaded": run(
+            "load",
+            Feedback(),
+            FILES=[str(PLACE / "lamps.geojson")],
+            CATALOG_FILE=sys.argv[2],
+            OUTPUT=str(PLACE / "session_lamps.parquet"),
+        ),
+        "shown": show(),
+        "failed": stop("export", DATABASE=objects, OUTPUT=str(PLACE / "fails.gpkg")),
+        "cancelled": stop(
+            "build",
+            cancelling=True,
+            OBJECTS=objects,
+            STEP=1.0,
+            RADIUS=100.0,
+            OUTPUT=str(PLACE / "cancelled.parquet"),
+            CELLS=shown(),
+        ),
+    }
+    ProcessingConfig.setSettingValue("SEMSIG_COMMAND", "")
+    _, told["lost"] = algorithm("build").canExecute()
+    return told
+
+
+Processing.initialize()
+plugin = semsig.classFactory(None)
+plugin.initGui()
+ProcessingConfig.setSettingValue("SEMSIG_COMMAND", str(PLACE / "semsig of this test"))
+happened = play()
+plugin.unload()
+print(json.dumps(happened), flush=True)  # noqa: T201 - that is its purpose

@@ -1,0 +1,309 @@
+"""The parts of the QGIS plugin that need no QGIS: the command, its arguments, its answers."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+import math
+import os
+import sys
+import time
+from pathlib import Path
+
+import pytest
+import typer
+from hypothesis import given
+from hypothesis import strategies as st
+from semsig import answers, arguments
+from semsig.answers import candidate_rows, parse_answer, place_row, ring
+from semsig.arguments import command_line
+from semsig.command import (
+    Cancelled,
+    CommandError,
+    Watcher,
+    clean_environment,
+    find_command,
+    run_command,
+)
+from sentences import assert_sentence
+
+from semsig_gis._supervision import VARIABLE
+from semsig_gis.catalog import catalog_names
+from semsig_gis.cli import app
+from semsig_gis.distortion_chain import parse_chain
+from semsig_gis.matching import Method
+from semsig_gis.noise import NOISES
+
+unix = pytest.mark.skipif(sys.platform == "win32", reason="the stand-ins are shell scripts")
+
+
+@dataclasses.dataclass
+class Heard:
+    """What a watcher heard; it cancels when there are so many of something."""
+
+    percents: list[tuple[int, str]] = dataclasses.field(default_factory=list)
+    remarks: list[str] = dataclasses.field(default_factory=list)
+    cancel_at: float = math.inf
+
+    def watcher(self) -> Watcher:
+        return Watcher(
+            lambda percent, label: self.percents.append((percent, label)),
+            self.remarks.append,
+            lambda: len(self.percents) >= self.cancel_at,
+        )
+
+
+def run_code(code: str, heard: Heard) -> str:
+    return run_command([sys.executable, "-c", code], clean_environment(os.environ), heard.watcher())
+
+
+# --- Where the command is -----------------------------------------------------------------------
+
+
+def program(folder: Path, name: str = "semsig") -> str:
+    folder.mkdir(parents=True, exist_ok=True)
+    file = folder / name
+    file.write_text("#!/bin/sh\n")
+    file.chmod(0o755)
+    return str(file)
+
+
+@unix
+def test_what_was_chosen_comes_first_then_the_path_then_the_usual_places(tmp_path: Path) -> None:
+    chosen = program(tmp_path / "chosen", "semsig-of-mine")
+    on_path, usual = program(tmp_path / "path"), program(tmp_path / "py3.12" / "bin")
+    path = {"PATH": str(tmp_path / "path")}
+    places = (str(tmp_path / "nowhere"), str(tmp_path / "py3.*" / "bin"))
+    assert find_command(chosen, path, places) == chosen
+    assert find_command("", path, places) == on_path
+    assert find_command("", {"PATH": str(tmp_path)}, places) == usual
+    assert find_command("", {}, places) == usual
+
+
+@unix
+def test_the_usual_places_are_in_the_home(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("HOME", str(tmp_path))
+    expected = program(tmp_path / ".local" / "bin")
+    assert find_command("", {"PATH": ""}) == expected
+    assert find_command("~/.local/bin/semsig", {}) == expected
+
+
+def test_a_command_that_is_nowhere(tmp_path: Path) -> None:
+    with pytest.raises(CommandError) as caught:
+        find_command("", {"PATH": str(tmp_path)}, [])
+    assert_sentence(caught.value, "install semsig_gis", "Settings > Options > Processing")
+    (tmp_path / "text").write_text("not a program")
+    for chosen in ("text", "missing"):
+        with pytest.raises(CommandError) as caught:
+            find_command(str(tmp_path / chosen), {"PATH": os.defpath})
+        assert_sentence(caught.value, chosen, "choose the semsig command")
+
+
+# --- The environment ----------------------------------------------------------------------------
+
+
+def test_nothing_of_qgis_is_handed_on() -> None:
+    foreign = dict.fromkeys(
+        (
+            *("PYTHONPATH", "PYTHONHOME", "PythonPath", "GDAL_DATA", "GDAL_DRIVER_PATH"),
+            *("PROJ_LIB", "PROJ_DATA", "PROJ_NETWORK", "LD_LIBRARY_PATH", "LD_PRELOAD"),
+            *("DYLD_LIBRARY_PATH", "QT_QPA_PLATFORM", "QT_PLUGIN_PATH", "QGIS_PREFIX_PATH"),
+            *("OGR_SKIP", "CPL_LOG", "GISBASE", "OSGEO4W_ROOT", "__PYVENV_LAUNCHER__"),
+        ),
+        "qgis",
+    )
+    own = {"PATH": "a:b", "HOME": "c", "SYSTEMROOT": "d", "HTTPS_PROXY": "e", "LANG": "f"}
+    assert clean_environment(foreign | own) == own | {"PYTHONUTF8": "1", VARIABLE: "1"}
+
+
+# --- Running ------------------------------------------------------------------------------------
+
+
+def test_results_progress_and_remarks_are_told_apart() -> None:
+    heard = Heard()
+    code = (
+        "import sys\n"
+        "say = lambda text: print(text, file=sys.stderr)\n"
+        "say('semsig: a remark')\n"
+        "say('semsig progress 0% digging')\n"
+        "say('semsig progress 40% digging')\n"
+        "say('')\n"
+        "say('a bare line about 40%')\n"
+        "print('Défibrillateur ┃ 1')\n"
+        "print('x' * 300_000)\n"
+    )
+    printed = run_code(code, heard)
+    assert printed == "Défibrillateur ┃ 1\n" + "x" * 300_000 + "\n"
+    assert heard.percents == [(0, "digging"), (40, "digging")]
+    assert heard.remarks == ["a remark", "a bare line about 40%"]
+
+
+FAILED = "The semsig command failed with exit code"
+
+
+@pytest.mark.parametrize(
+    ("code", "message", "remarks"),
+    [
+        ("say('semsig: a'); say('semsig: x is wrong; give y.'); exit(2)", "x is wrong; give y.", 1),
+        ("exit(2)", f"{FAILED} 2 and did not say why.", 0),
+        ("say('KeyError: 3'); exit(1)", f"{FAILED} 1: KeyError: 3", 0),
+    ],
+)
+def test_a_failure_is_told_once(code: str, message: str, remarks: int) -> None:
+    heard = Heard()
+    begin = "import sys\nsay = lambda text: print(text, file=sys.stderr)\n"
+    with pytest.raises(CommandError) as caught:
+        run_code(begin + code, heard)
+    assert str(caught.value) == message
+    assert heard.remarks == ["a"] * remarks
+
+
+def test_a_program_that_cannot_be_run(tmp_path: Path) -> None:
+    (tmp_path / "text").write_text("not a program")
+    with pytest.raises(CommandError) as caught:
+        run_command([str(tmp_path / "text")], {}, Heard().watcher())
+    assert_sentence(caught.value, "text cannot be run")
+
+
+WAITS = """
+import sys, threading, _thread
+from pathlib import Path
+print("semsig progress 0% waiting", file=sys.stderr, flush=True)
+try:
+    {wait}
+finally:
+    Path(sys.argv[1]).write_text("cleaned up")
+"""
+
+
+def test_a_cancel_ends_the_command_by_the_end_of_its_input(tmp_path: Path) -> None:
+    heard = Heard(cancel_at=1)
+    code = WAITS.replace("{wait}", "sys.stdin.read()")
+    command = [sys.executable, "-c", code, str(tmp_path / "log")]
+    with pytest.raises(Cancelled):
+        run_command(command, clean_environment(os.environ), heard.watcher())
+    assert (tmp_path / "log").read_text() == "cleaned up"
+
+
+@unix
+def test_a_command_that_does_not_end_is_ended_with_all_it_started(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("semsig.command.PATIENCE_S", 0.3)
+    script = tmp_path / "deaf"
+    script.write_text(
+        "#!/bin/sh\n"
+        f"sleep 100 & echo $! > {tmp_path}/child\n"
+        f"echo $$ > {tmp_path}/parent\n"
+        "echo 'semsig progress 0% sleeping' >&2\nwait\n"
+    )
+    script.chmod(0o755)
+    begin = time.monotonic()
+    with pytest.raises(Cancelled):
+        run_command([str(script)], {"PATH": os.defpath}, Heard(cancel_at=1).watcher())
+    assert time.monotonic() - begin < 20
+    for name in ("parent", "child"):
+        assert_ended(int((tmp_path / name).read_text()))
+
+
+def assert_ended(process: int) -> None:
+    """Check that a process has ended; one that nobody waited for may be left as a zombie."""
+    status = Path(f"/proc/{process}/stat")
+    for _ in range(100):
+        try:
+            os.kill(process, 0)
+        except ProcessLookupError:
+            return
+        if status.exists() and status.read_text().rpartition(")")[2].split()[0] == "Z":
+            return
+        time.sleep(0.1)
+    pytest.fail(f"process {process} is still there")
+
+
+def test_a_watcher_that_fails_ends_the_command_too() -> None:
+    def fail(_percent: int, _label: str) -> None:
+        raise ZeroDivisionError
+
+    code = (
+        "import sys; print('semsig progress 1% a', file=sys.stderr, flush=True); sys.stdin.read()"
+    )
+    with pytest.raises(ZeroDivisionError):
+        run_command(
+            [sys.executable, "-c", code],
+            clean_environment(os.environ),
+            Watcher(fail, print, lambda: False),
+        )
+
+
+# --- Arguments ----------------------------------------------------------------------------------
+
+
+def test_the_command_understands_any_value() -> None:
+    nasty = ["--out=x", "-", "--", "a b", "=", "é \u202e'\"`$(x)\\", "*", "\n"]
+    line = command_line(
+        "load", *nasty, catalog=nasty, out=nasty[0], crs=nasty[5], layer=[], filter=True, merge=None
+    )
+    assert line[0] == "load"
+    load = typer.main.get_command(app).commands["load"]  # type: ignore[attr-defined]
+    values = load.make_context("load", line[1:]).params
+    assert [str(path) for path in values["files"]] == nasty
+    assert values["catalog"] == nasty
+    assert str(values["out"]) == nasty[0]
+    assert values["crs"] == nasty[5]
+    assert values["filters"] is True
+    assert not values["layer"]
+
+
+def test_the_lists_are_those_of_the_command() -> None:
+    assert set(arguments.CATALOGS) == set(catalog_names())
+    assert set(arguments.NOISES) == set(NOISES)
+    for method in arguments.METHODS:
+        assert method == arguments.LIKELIHOOD or str(Method.parse(method))
+    for name in arguments.DISTORTIONS:
+        assert parse_chain(name)
+
+
+# --- Answers ------------------------------------------------------------------------------------
+
+
+@given(
+    centre=st.tuples(st.floats(-1e6, 1e6), st.floats(-1e6, 1e6)),
+    shorter=st.floats(1.0, 50.0),
+    stretch=st.floats(1.0, 5.0),
+    bearing=st.floats(0.0, 180.0),
+)
+def test_an_ellipse_has_its_axes_and_its_middle(
+    centre: tuple[float, float], shorter: float, stretch: float, bearing: float
+) -> None:
+    corners = ring(centre, shorter * stretch, shorter, bearing)
+    assert corners[0] == corners[-1]
+    distances = [math.dist(centre, corner) for corner in corners]
+    assert max(distances) == pytest.approx(shorter * stretch, rel=1e-6)
+    assert min(distances) == pytest.approx(shorter, rel=1e-6)
+    far = corners[distances.index(max(distances))]
+    seen = math.degrees(math.atan2(far[0] - centre[0], far[1] - centre[1]))
+    if stretch > 1.01:
+        assert math.cos(2 * math.radians(seen - bearing)) == pytest.approx(1, abs=1e-6)
+
+
+def test_rows_have_the_fields_that_they_say() -> None:
+    ranked = {"rank_low": 1, "rank_high": 20, "distance": 0.3}
+    likely = {"rank": 2, "chance": 0.5}
+    common = {"cell_id": 7, "types": "DD", "length": 2, "x": 1.0, "y": 2.0}
+    told = [
+        dict(zip(answers.CANDIDATE_FIELDS, values, strict=True))
+        for _, _, values in candidate_rows({"candidates": [common | ranked, common | likely]})
+    ]
+    assert [one["rank"] for one in told] == [1, 2]
+    assert [one["rank_high"] for one in told] == [20, 2]
+    assert [one["chance"] for one in told] == [None, 0.5]
+    assert [one["distance"] for one in told] == [0.3, None]
+    assert place_row({"candidates": []}) is None
+
+
+@pytest.mark.parametrize("printed", ["", "{}", "[]", "3", '{"crs": 1}', "{"])
+def test_something_else_than_an_answer(printed: str) -> None:
+    with pytest.raises(CommandError) as caught:
+        parse_answer(printed)
+    assert_sentence(caught.value, "same version")
+    assert parse_answer(json.dumps({"crs": "EPSG:2154", "candidates": []}))["crs"] == "EPSG:2154"
