@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import enum
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -17,6 +17,9 @@ from semsig_gis.cli._app import (
 )
 from semsig_gis.console import progress, remark
 from semsig_gis.errors import InputError
+
+if TYPE_CHECKING:
+    from semsig_gis.objects import StreetObjects
 
 
 class CellGeometry(enum.StrEnum):
@@ -63,7 +66,6 @@ def map_(
         raise InputError(msg)
     results = None if evaluation is None else Evaluation.load(evaluation)
     opened = open_database(database)
-    newer = None if drift is None else (open_database(drift), stored_objects(drift))
     told = known_identifiability(database, opened) if identifiability or ambiguity else None
     if identifiability and told is None:
         msg = f"{database} does not tell where a query can be placed; run semsig identify first."
@@ -71,11 +73,9 @@ def map_(
     with progress("drawing the map"):
         if ambiguity:
             drawn = ambiguity_map(opened, identifiability=told)
-        elif newer is not None:
-            before, after = stored_objects(database), newer[1]
-            if before is None or after is None:
-                remark("the street objects of both are not at hand, so only cells are drawn")
-            drawn = drift_map(opened, newer[0], objects_before=before, objects_after=after)
+        elif drift is not None:
+            newer = open_database(drift)
+            drawn = drift_map(opened, newer, **_objects_of_both(database, drift))
         elif told is not None:
             drawn = identifiability_map(told)
         elif results is not None:
@@ -83,6 +83,14 @@ def map_(
         offline = save_map(drawn, out)
     typer.echo(f"map: {out}")
     tell_if_online(offline)
+
+
+def _objects_of_both(older: Path, newer: Path) -> dict[str, StreetObjects | None]:
+    """Return the street objects of two dates, where the stores of both have them."""
+    found = {"objects_before": stored_objects(older), "objects_after": stored_objects(newer)}
+    if None in found.values():
+        remark("the street objects of both are not at hand, so only cells are drawn")
+    return found
 
 
 @app.command()
