@@ -75,7 +75,8 @@ def map_(
             drawn = ambiguity_map(opened, identifiability=told)
         elif drift is not None:
             newer = open_database(drift)
-            drawn = drift_map(opened, newer, **_objects_of_both(database, drift))
+            before, after = _objects_of_both(database, drift)
+            drawn = drift_map(opened, newer, objects_before=before, objects_after=after)
         elif told is not None:
             drawn = identifiability_map(told)
         elif results is not None:
@@ -85,12 +86,12 @@ def map_(
     tell_if_online(offline)
 
 
-def _objects_of_both(older: Path, newer: Path) -> dict[str, StreetObjects | None]:
+def _objects_of_both(older: Path, newer: Path) -> tuple[StreetObjects | None, StreetObjects | None]:
     """Return the street objects of two dates, where the stores of both have them."""
-    found = {"objects_before": stored_objects(older), "objects_after": stored_objects(newer)}
-    if None in found.values():
+    before, after = stored_objects(older), stored_objects(newer)
+    if before is None or after is None:
         remark("the street objects of both are not at hand, so only cells are drawn")
-    return found
+    return before, after
 
 
 @app.command()
