@@ -15,11 +15,10 @@ from semsig_gis import map_assets
 from semsig_gis.building import build_database
 from semsig_gis.catalog import paper_taxonomy
 from semsig_gis.evaluation import evaluate
-from semsig_gis.likelihood import build_index
 from semsig_gis.map_ambiguity import ambiguity_map
 from semsig_gis.map_drift import drift_map
 from semsig_gis.maps import evaluation_map, save_map
-from semsig_gis.noise import named_noise
+from semsig_gis.method import Method
 from semsig_gis.objects import StreetObjects, build_objects
 from semsig_gis.sources.synthetic import (
     PARIS_LIKE,
@@ -131,8 +130,7 @@ def _maps(city: CitySpec, queries: int) -> Iterator[tuple[str, folium.Map]]:
     yield f"which of {cells} look the same", ambiguity_map(database)
     drawn = drift_map(database, newer, objects_before=objects, objects_after=later)
     yield f"which of {cells} have changed, with {int((~kept).sum()):,} objects", drawn
-    index = build_index(database, named_noise("medium"))
-    evaluation = evaluate(database, queries=queries, method=index)
+    evaluation = evaluate(database, queries=queries, method=Method.parse("types:edit"))
     yield f"{queries:,} queries among {cells}", evaluation_map(evaluation, database)
 
 

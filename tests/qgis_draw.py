@@ -12,15 +12,15 @@ from typing import Any
 
 
 def main(out: str, size: str, extent: str, *sources: str) -> None:
-    from qgis.core import (  # type: ignore[import-not-found]
+    from qgis.core import (
         QgsApplication,
         QgsMapRendererParallelJob,
         QgsMapSettings,
         QgsRectangle,
         QgsVectorLayer,
     )
-    from qgis.PyQt.QtCore import QSize  # type: ignore[import-not-found]
-    from qgis.PyQt.QtGui import QColor  # type: ignore[import-not-found]
+    from qgis.PyQt.QtCore import QSize
+    from qgis.PyQt.QtGui import QColor
 
     application = QgsApplication([], False)  # noqa: FBT003
     application.initQgis()

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -17,6 +17,9 @@ from semsig_gis.cli._app import (
 from semsig_gis.cli._ground import Buildings, Streets, draw_ground
 from semsig_gis.console import progress, remark
 from semsig_gis.errors import InputError
+
+if TYPE_CHECKING:
+    from semsig_gis.objects import StreetObjects
 
 
 @app.command(name="map")
@@ -72,7 +75,7 @@ def map_(
     seen = None if objects is None else open_objects(objects)
     newer = None if drift is None else open_database(drift)
     with progress("drawing the map"):
-        drawn = None
+        drawn: Any = None  # a map of folium, which the command line does not know
         if ambiguity:
             drawn = ambiguity_map(opened, identifiability=told)
         elif told is not None:
@@ -80,15 +83,20 @@ def map_(
         elif results is not None:
             drawn = evaluation_map(results, opened)
         elif drift is not None and newer is not None:
-            before, after = stored_objects(database), stored_objects(drift)
-            if before is None or after is None:
-                remark("the street objects of both are not at hand, so only cells are drawn")
+            before, after = _objects_of_both(database, drift)
             drawn = drift_map(opened, newer, objects_before=before, objects_after=after)
         if seen is not None:
             drawn = objects_map(seen, database=opened if drawn is None else None, map_=drawn)
-        offline = False
-        if drawn is not None:
-            draw_ground(drawn, database, opened, buildings=buildings, streets=streets)
-            offline = save_map(drawn, out)
+        draw_ground(drawn, database, opened, buildings=buildings, streets=streets)
+        offline = save_map(drawn, out)
     typer.echo(f"map: {out}")
     tell_if_online(offline)
+
+
+def _objects_of_both(before: Path, after: Path) -> tuple[StreetObjects | None, StreetObjects | None]:
+    """Return the street objects of two databases; tell where those of one are not at hand."""
+    old, new = stored_objects(before), stored_objects(after)
+    if old is None or new is None:
+        remark("the street objects of both are not at hand, so only cells are drawn")
+        return None, None
+    return old, new
