@@ -127,14 +127,14 @@ def by_amount(
 def by_rank(column: str, *, geometry: str) -> Style:
     """Return a style of places, the best the darkest."""
     symbols: list[SymbolLayer] = []
+    edge = ERROR_RAMP[-1]  # pale places stand out from a pale map by their edges
     for number, (_, colour) in enumerate(RANKS.values()):
         if geometry == "polygon":
-            fill = {"color": _rgba(colour, 170), "style": "solid", "outline_color": _rgba(colour)}
-            symbols.append(("SimpleFill", {**fill, "outline_style": "solid", "outline_width": 0.5}))
+            fill = {"color": _rgba(colour, 170), "style": "solid", "outline_color": _rgba(edge)}
+            symbols.append(("SimpleFill", {**fill, "outline_style": "solid", "outline_width": 0.4}))
         else:
-            symbols.append(
-                _marker("circle", colour, 12.0 - 2.0 * number, smallest=3.2 - 0.4 * number)
-            )
+            metres, smallest = 12.0 - 2.0 * number, 3.2 - 0.4 * number
+            symbols.append(_marker("circle", colour, metres, smallest=smallest, outline=edge))
     return Style("Rank", _graduated(column, RANKS, symbols, geometry))
 
 
