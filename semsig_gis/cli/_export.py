@@ -4,16 +4,13 @@ from __future__ import annotations
 
 import enum
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
 from semsig_gis.cli._app import Database, app, known_identifiability
 from semsig_gis.console import progress, remark
 from semsig_gis.errors import InputError
-
-if TYPE_CHECKING:
-    from semsig_gis.objects import StreetObjects
 
 
 class CellGeometry(enum.StrEnum):

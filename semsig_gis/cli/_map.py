@@ -93,7 +93,9 @@ def map_(
     tell_if_online(offline)
 
 
-def _objects_of_both(before: Path, after: Path) -> tuple[StreetObjects | None, StreetObjects | None]:
+def _objects_of_both(
+    before: Path, after: Path
+) -> tuple[StreetObjects | None, StreetObjects | None]:
     """Return the street objects of two databases; tell where those of one are not at hand."""
     old, new = stored_objects(before), stored_objects(after)
     if old is None or new is None:
