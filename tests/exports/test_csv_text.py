@@ -5,13 +5,12 @@ from __future__ import annotations
 import csv
 import io
 import re
-import resource
-from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
 import numpy as np
 import pandas as pd
 import pytest
+from full_disk import largest_file
 from hypothesis import example, given
 from hypothesis import strategies as st
 from sentences import assert_sentence
@@ -23,7 +22,6 @@ from semsig_gis.exports.csv_text import as_written, formula_safe
 from semsig_gis.objects import StreetObjects
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
     from pathlib import Path
 
 FORMULAS = [
@@ -88,17 +86,6 @@ def test_hostile_objects_come_back(tmp_path: Path) -> None:
     assert [as_written(row["source_id"]) for row in rows] == table["source_id"].tolist()
     assert not any(row["source_id"].startswith(tuple("=+-@\t\r\n")) for row in rows)
     assert [float(row["x"]) for row in rows] == objects.xy[:, 0].tolist()
-
-
-@contextmanager
-def largest_file(size: int) -> Iterator[None]:
-    """Let this process write no file beyond a size, as on a full disk."""
-    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
-    resource.setrlimit(resource.RLIMIT_FSIZE, (size, hard))
-    try:
-        yield
-    finally:
-        resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
 
 
 @pytest.mark.parametrize("name", ["cells.csv", "cells.parquet", "cells.tif"])

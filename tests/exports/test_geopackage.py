@@ -6,13 +6,12 @@ import dataclasses
 import json
 import os
 import re
-import resource
 import shutil
 import sqlite3
 import subprocess
 import sys
 import warnings
-from contextlib import closing, contextmanager
+from contextlib import closing
 from pathlib import Path
 from subprocess import PIPE
 from typing import TYPE_CHECKING, Any
@@ -27,6 +26,7 @@ import rasterio
 import shapely
 from cells_told import told_of
 from conftest import unavailable
+from full_disk import largest_file
 from map_pages import HOSTILE
 from sentences import assert_sentence
 from small_city import small_city, small_evaluation, small_localization, small_location
@@ -43,7 +43,7 @@ from semsig_gis.sources.synthetic import CitySpec, synthetic_city
 from semsig_gis.taxonomy import ObjectClass, Taxonomy
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
+    from collections.abc import Callable
 
     from semsig_gis.database import SignatureDatabase
     from semsig_gis.localization import Localization
@@ -257,17 +257,6 @@ def test_a_folder_that_cannot_be_written(database: SignatureDatabase, tmp_path: 
         export_geopackage(database, tmp_path / "file" / "city.gpkg")
     assert_sentence(caught.value, "city.gpkg", "folder")
     assert (tmp_path / "file").read_text() == "here"
-
-
-@contextmanager
-def largest_file(size: int) -> Iterator[None]:
-    """Let this process write no file beyond a size, as on a full disk."""
-    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
-    resource.setrlimit(resource.RLIMIT_FSIZE, (size, hard))
-    try:
-        yield
-    finally:
-        resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
 
 
 # A share just below 1 is too little for the spatial index of the objects, which comes last.
