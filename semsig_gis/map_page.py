@@ -62,6 +62,7 @@ STYLE = """\
 .semsig-legend table, .semsig-details table { border-collapse: collapse; }
 .semsig-legend td { padding: 0 12px 0 0; vertical-align: top; }
 .semsig-legend td:last-child { padding: 0; }
+.semsig-legend td.label { white-space: nowrap; }
 .semsig-legend td.count { text-align: right; white-space: nowrap; }
 .semsig-sign { width: 17px; height: 17px; vertical-align: -4px; overflow: visible; }
 .semsig-sign path { stroke: var(--panel); stroke-width: 0.1; }
