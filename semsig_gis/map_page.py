@@ -63,7 +63,8 @@ STYLE = """\
 .semsig-legend td { padding: 0 12px 0 0; vertical-align: top; overflow-wrap: break-word; }
 .semsig-legend td.title { overflow-wrap: anywhere; }
 .semsig-legend td:last-child { padding: 0; }
-.semsig-legend td.count { text-align: right; white-space: nowrap; }
+.semsig-legend td.count { text-align: right; }
+.semsig-legend td.count, .semsig-legend td:has(i) { white-space: nowrap; }
 .semsig-sign { width: 17px; height: 17px; vertical-align: -4px; overflow: visible; }
 .semsig-sign path { stroke: var(--panel); stroke-width: 0.1; }
 .semsig-details {
