@@ -264,7 +264,8 @@ def identifiability_legend(told: Identifiability) -> str:
         for band in reversed(facts["bands"])
     )
     classes = "".join(
-        f"<tr><td>{escape(item['title'])}</td><td>{100 * item['chance_near']:+.1f} %</td></tr>"
+        f"<tr><td class='title'>{escape(item['title'])}</td>"
+        f"<td>{100 * item['chance_near']:+.1f} %</td></tr>"
         for item in facts["classes"][:_HELPERS]
     )
     return (
@@ -294,7 +295,8 @@ def objects_legend(objects: StreetObjects) -> str:
     """
     signs, counts = class_signs(objects.taxonomy), objects.class_counts
     rows = "".join(
-        f"<tr><td>{signs[code].svg()}</td><td>{escape(objects.taxonomy.by_code(code).title)}</td>"
+        f"<tr><td>{signs[code].svg()}</td>"
+        f'<td class="title">{escape(objects.taxonomy.by_code(code).title)}</td>'
         f'<td class="count">{count:,}</td></tr>'
         for code, count in counts.items()
     )
@@ -376,7 +378,7 @@ def ambiguity_legend(sizes: Mapping[str, NDArray[np.int64]], *, licenses: Sequen
         for size in sizes.values()
     ]
     rows = "".join(
-        f'<tr><td class="label">{_sign(colour, "square")}{label}</td>'
+        f"<tr><td>{_sign(colour, 'square')}{label}</td>"
         + "".join(f"<td>{share:.1%}</td>" for share in line)
         + "</tr>"
         for colour, label, *line in zip(GROUP_COLOURS.values(), labels, *shares, strict=True)

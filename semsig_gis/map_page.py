@@ -60,10 +60,11 @@ STYLE = """\
 .semsig-legend i.ramp { display: block; width: 100%; height: 10px; margin: 2px 0; }
 .semsig-legend .ends { display: flex; justify-content: space-between; }
 .semsig-legend table, .semsig-details table { border-collapse: collapse; }
-.semsig-legend td { padding: 0 12px 0 0; vertical-align: top; }
+.semsig-legend td { padding: 0 12px 0 0; vertical-align: top; overflow-wrap: break-word; }
+.semsig-legend td.title { overflow-wrap: anywhere; }
 .semsig-legend td:last-child { padding: 0; }
-.semsig-legend td.label { white-space: nowrap; }
-.semsig-legend td.count { text-align: right; white-space: nowrap; }
+.semsig-legend td.count { text-align: right; }
+.semsig-legend td.count, .semsig-legend td:has(i) { white-space: nowrap; }
 .semsig-sign { width: 17px; height: 17px; vertical-align: -4px; overflow: visible; }
 .semsig-sign path { stroke: var(--panel); stroke-width: 0.1; }
 .semsig-details {
