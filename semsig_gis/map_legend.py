@@ -343,7 +343,7 @@ def ambiguity_legend(sizes: Mapping[str, NDArray[np.int64]], *, licenses: Sequen
         for size in sizes.values()
     ]
     rows = "".join(
-        f"<tr><td>{_sign(colour, 'square')}{label.replace(' ', '&nbsp;')}</td>"
+        f"<tr><td style='white-space:nowrap'>{_sign(colour, 'square')}{label}</td>"
         + "".join(f"<td>{share:.1%}</td>" for share in line)
         + "</tr>"
         for colour, label, *line in zip(GROUP_COLOURS.values(), labels, *shares, strict=True)
