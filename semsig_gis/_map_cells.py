@@ -149,8 +149,9 @@ semsig.cells = (packed, grid, titles, told) => {
   const group = L.layerGroup();
   const ready = semsig.unpacked(packed).then((data) => new semsig.City(data, grid));
   const buttons = (city, map, cell, box, jumps) => {
-    for (const [label, goals] of jumps) {
-      const line = L.DomUtil.create("div", "semsig-jumps", box);
+    // Below the title, so that they are in sight however much there is to tell.
+    const lines = jumps.map(([label, goals]) => {
+      const line = L.DomUtil.create("div", "semsig-jumps");
       if (label) semsig.text(line, "span", label);
       for (const [text, other, title] of goals) {
         const button = L.DomUtil.create("button", "", line);
@@ -165,7 +166,9 @@ semsig.cells = (packed, grid, titles, told) => {
           show(city, map, other).querySelectorAll("button")[at]?.focus();
         });
       }
-    }
+      return line;
+    });
+    box.firstChild.after(...lines);
   };
   const show = (city, map, cell) => {
     map.closePopup();

@@ -77,16 +77,19 @@ def test_buttons_go_through_the_group_and_to_its_ends(browser: Chrome, tmp_path:
         assert f"{int((level + 0.5) * 22.5)}°" in said["text"]
     where = asked(browser, "return map.latLngToContainerPoint(map._popup.getLatLng())")
     seen = [alike[0]]
-    for _ in alike[1:]:
+    for _ in range(3):
         said = press(browser, "next")
         seen.append(int(np.searchsorted(CITY.cell_ids, int(said["Cell"]))))
-    assert seen == alike
+    assert seen == alike[:4]
     # The button stays under the pointer.
     after = asked(browser, "return map.latLngToContainerPoint(map._popup.getLatLng())")
     assert abs(after["x"] - where["x"]) <= 2
     assert browser.execute_script("return document.activeElement.title").startswith("next")
-    assert press(browser, "next")["Cell"] == str(CITY.cell_ids[alike[0]])
+    # After the first comes the last, and the other way round.
+    click(browser, CITY, alike[0])
     assert press(browser, "previous")["Cell"] == str(CITY.cell_ids[alike[-1]])
+    assert press(browser, "next")["Cell"] == str(CITY.cell_ids[alike[0]])
+    click(browser, CITY, alike[-1])
     away = np.hypot(*(CITY.xy[alike] - CITY.xy[alike[-1]]).T)
     nearest = press(browser, f"{np.sort(away)[1]:.0f} m")["Cell"]
     cell = alike[[str(one) for one in CITY.cell_ids[alike]].index(nearest)]
