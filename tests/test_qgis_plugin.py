@@ -259,30 +259,6 @@ def test_evaluate(qgis: Qgis) -> None:
     assert Path(done["MAP"]).is_file()
 
 
-def test_identify_and_export(qgis: Qgis) -> None:
-    source = qgis.place / "told.parquet"
-    shutil.copy(qgis.place / "city.parquet", source)
-    done = qgis.run(
-        "identify",
-        DATABASE=source,
-        NOISE="light",
-        CELLS=qgis.place / "told.gpkg",
-        MAP=qgis.place / "told.html",
-    )
-    assert set(done) == {"CELLS", "MAP"}
-    cells = gpd.read_file(qgis.place / "told.gpkg", layer="cells")
-    assert cells["chance_found"].between(0, 1).all()
-    qgis.run(
-        "export",
-        DATABASE=source,
-        OBJECTS=qgis.place / "objects.parquet",
-        GEOMETRY="point",
-        OUTPUT=qgis.place / "export.gpkg",
-    )
-    layers = dict(pyogrio.list_layers(qgis.place / "export.gpkg").tolist())
-    assert layers["cells"] == layers["objects"] == "Point"
-
-
 @pytest.fixture(scope="module")
 def session(qgis: Qgis, lamps: Path) -> dict[str, Any]:
     """Play `qgis_session.py` in QGIS's own Python, and return what it tells."""
@@ -313,6 +289,30 @@ def test_layers_are_shown_with_their_styles(session: dict[str, Any]) -> None:
         "Queries": ["categorizedSymbol", "outcome"],
         "From the true to the best place": ["categorizedSymbol", "outcome"],
     }
+
+
+@pytest.mark.usefixtures("session")
+def test_identify_and_export(qgis: Qgis) -> None:
+    source = qgis.place / "session.parquet"  # of which everything is known by now
+    done = qgis.run(
+        "identify",
+        DATABASE=source,
+        NOISE="light",
+        CELLS=qgis.place / "told.gpkg",
+        MAP=qgis.place / "told.html",
+    )
+    assert set(done) == {"CELLS", "MAP"}
+    cells = gpd.read_file(qgis.place / "told.gpkg", layer="cells")
+    assert cells["chance_found"].between(0, 1).all()
+    qgis.run(
+        "export",
+        DATABASE=source,
+        OBJECTS=qgis.place / "objects.parquet",
+        GEOMETRY="point",
+        OUTPUT=qgis.place / "export.gpkg",
+    )
+    layers = dict(pyogrio.list_layers(qgis.place / "export.gpkg").tolist())
+    assert layers["cells"] == layers["objects"] == "Point"
 
 
 def test_files_one_by_one(session: dict[str, Any], qgis: Qgis) -> None:
