@@ -54,10 +54,12 @@ if TYPE_CHECKING:
     from semsig_gis.posterior import Posterior
     from semsig_gis.queries import Query
 
+NEXT_CELLS = 4  # that are named after the best candidate
+
 # What is told of an answer, in this order.
 OUTCOME_COLUMNS = (
     *("distance", "rank_low", "rank_high", "chance", "in_region", "heading_error", "seconds"),
-    *("best_cell_id", "best_x", "best_y", "tied"),
+    *("best_cell_id", "best_x", "best_y", "tied", "next_cell_ids"),
     *(f"near{count}" for count in NEAR_PLACES),
     *("right", "error_m"),
     *(f"p{threshold}" for threshold in THRESHOLDS),
@@ -385,12 +387,17 @@ def _shown(
     """Return the best candidate, or one of equals."""
     best = pool.cells[pool.scores == pool.scores.min()]
     shown = best[int(query.pick * len(best))]
+    after = pool.cells[pool.best(NEXT_CELLS + 1)]
+    after = after[after != shown][:NEXT_CELLS]
     x, y = database.xy[shown].tolist() if answer.place is None else answer.place
     return {
         "best_cell_id": int(cell_ids(database.columns[shown], database.rows[shown])),
         "best_x": x,
         "best_y": y,
         "tied": len(best),
+        "next_cell_ids": ",".join(
+            map(str, cell_ids(database.columns[after], database.rows[after]).tolist())
+        ),
     }
 
 
@@ -409,6 +416,12 @@ class _Pool:
         # So that a cell 50 m away is not a rounding beyond 50 m.
         self.errors = np.round(np.sqrt((places**2).sum(axis=1)), 6)
         self.better = self.tied = np.empty(0)
+
+    def best(self, count: int) -> NDArray[np.intp]:
+        """Return the places here of so many best, equals in the order of the cells."""
+        count = min(count, len(self.scores))
+        some = np.flatnonzero(self.scores <= np.partition(self.scores, count - 1)[count - 1])
+        return some[np.argsort(self.scores[some], kind="stable")[:count]]
 
     def cut(self, count: int) -> dict[str, Any]:
         """Return the errors of those that are surely among so many best, and of the tied."""
@@ -443,6 +456,7 @@ def _unlocalized(cells: int) -> dict[str, Any]:
     untold = ("chance", "right", "in_region", "heading_error", "seconds", "best_x", "best_y")
     return {
         "best_cell_id": None,
+        "next_cell_ids": "",
         "distance": math.inf,
         "tied": 0,
         "error_m": math.inf,

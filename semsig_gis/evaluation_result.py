@@ -56,7 +56,7 @@ _KIND = "localization evaluation"
 QUERY_COLUMNS = (
     *("seed", "number", "cell", "cell_id", "types", "length", "type_group", "angle_group"),
     *("query_types", "query_bearings", "query_length", "heading"),
-    *("best_cell_id", "best_x", "best_y", "distance", "tied", "error_m"),
+    *("best_cell_id", "best_x", "best_y", "distance", "tied", "next_cell_ids", "error_m"),
     *(f"p{threshold}" for threshold in THRESHOLDS),
     *(f"near{count}" for count in NEAR_PLACES),
     *("rank_low", "rank_high", "chance", "right", "in_region", "heading_error"),
@@ -91,7 +91,8 @@ class Evaluation:
           the tied when several share the best score; missing when unlocalized. Of the likelihood
           method it is the answer, and the distance its negative log-likelihood; where the place
           was refined, it is the place in the cell;
-        - ``tied``: cells that share the best score, 0 when unlocalized;
+        - ``tied``: cells that share the best score, 0 when unlocalized; ``next_cell_ids``: the
+          four best of the other cells (text, comma-separated), equals in the order of the cells;
         - ``error_m``: expected smallest error among the top t in metres, infinite when
           unlocalized;
         - ``p0``, ``p5``, ... (`THRESHOLDS`): probability that this error is at most so many

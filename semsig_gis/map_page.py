@@ -130,8 +130,10 @@ const semsig = {
       if (found !== null) {
         const look = {pane: "shadowPane", interactive: false, color: "#d55e00", weight: 2};
         const hint = L.layerGroup([
-          L.polyline([place, found], {...look, dashArray: "5 5"}),
-          L.circleMarker(found, {...look, radius: 8, fill: false}),
+          L.polyline([place, found[0]], {...look, dashArray: "5 5"}),
+          ...found.map((one, at) => L.circleMarker(one, {
+            ...look, radius: at ? 5 : 8, weight: at ? 1 : 2, fill: false,
+          })),
         ]);
         marker.on("popupopen", (event) => hint.addTo(event.popup._map));
         marker.on("popupclose", () => hint.remove());

@@ -62,6 +62,7 @@ _QUERY_FIELDS = (
     "True rank",
     "True cell",
     "Best cell",
+    "Next best cells",
     "Best cell sees",
 )
 _CANDIDATE_FIELDS = ("Query", "Signature", "Rank", "Distance", "Cell", "Position")
@@ -322,7 +323,7 @@ def _query_records(
     places: NDArray[np.float64],
     found: NDArray[np.float64],
 ) -> list[list[Any]]:
-    """Return what the script draws of each query: place, look, best place, heading, details."""
+    """Return what the script draws of each query: place, look, best places, heading, details."""
     cells, total = len(database), len(evaluation.queries)
     successful = evaluation.successful.tolist()
     rows = _rows(
@@ -332,6 +333,7 @@ def _query_records(
         cells=evaluation.database["cells"],
         what="evaluation",
     )
+    following, offs = _following(evaluation, database)
     best_rows = np.searchsorted(
         database.cell_ids, evaluation.queries["best_cell_id"].fillna(0).to_numpy(np.int64)
     )
@@ -352,6 +354,7 @@ def _query_records(
             f"{query.best_cell_id}, distance {query.distance:.3f}{_tie(query.tied)}"
             if located
             else "none",
+            ", ".join(f"{_metres(off)} off" for off in offs[number]) or None,
             cell_signature(database, int(best_rows[number])) if located else None,
         ]
         outcome = "successful" if successful[number] else "failed"
@@ -360,12 +363,30 @@ def _query_records(
                 places[number].tolist(),
                 SUCCESSFUL if successful[number] else FAILED,
                 radius,
-                found[number].tolist() if located else None,
+                [found[number].tolist(), *following[number]] if located else None,
                 f"Query {number + 1:,} of {total:,}: {outcome}",
                 details,
             ]
         )
     return records
+
+
+def _following(
+    evaluation: Evaluation, database: SignatureDatabase
+) -> tuple[list[list[list[float]]], list[list[float]]]:
+    """Return the places of the cells after the best of each query, and how far off they are."""
+    queries = evaluation.queries
+    named = [text.split(",") if text else [] for text in queries["next_cell_ids"]]
+    ids = np.array(list(itertools.chain.from_iterable(named)), np.int64)
+    xy = database.xy[np.searchsorted(database.cell_ids, ids)]
+    true = np.stack([queries.geometry.x, queries.geometry.y], axis=1)
+    counts = [len(some) for some in named]
+    off = np.sqrt(((xy - np.repeat(true, counts, axis=0)) ** 2).sum(axis=1))
+    ends = np.cumsum(counts)[:-1]
+    return (
+        [part.tolist() for part in np.split(to_latlon(xy, database.crs), ends)],
+        [part.tolist() for part in np.split(off, ends)],
+    )
 
 
 def _candidate_records(

@@ -89,6 +89,11 @@ def test_hand_computed_row_of_equal_cells() -> None:
     assert table["type_group"].to_list() == [4] * 4 + [1]
     assert table["angle_group"].to_list() == [4] * 4 + [1]
     assert table["distance"].to_list() == [0] * 5
+    ids = [str(one) for one in four.cell_ids]
+    for cell, row in table.iterrows():
+        best = str(row["best_cell_id"])
+        alike = [one for one in ids[:4] if one != best]
+        assert row["next_cell_ids"].split(",") == (alike + ids[4:] if cell != 4 else ids[:4])
 
 
 def test_hand_computed_curve_and_recall() -> None:

@@ -139,6 +139,14 @@ def test_a_click_shows_the_signature_and_the_place_found(
     return to && [to.lat, to.lng];
     """
     assert asked(browser, hint) is not None
+    circles = """
+    let count = 0;
+    map.eachLayer((one) => {
+      if (one instanceof L.CircleMarker && !one.options.fill) count += 1;
+    });
+    return count;
+    """
+    assert asked(browser, circles) == 1 + len(row["next_cell_ids"].split(","))
     asked(browser, "map.closePopup()")
     assert asked(browser, hint) is None
     assert_quiet(browser)
