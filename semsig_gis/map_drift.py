@@ -203,7 +203,7 @@ def _object_drawings(
             facts["by"] = [f"{metres:.1f} m" for metres in moves]
             facts["was"] = before["title"]
             lines = np.stack([before[PLACE], facts[PLACE]], axis=1).tolist()
-            drawn = [["lines", [[{"color": "#222", "weight": 2, "opacity": 0.9}, lines]]]]
+            drawn = [["lines", [[{"color": "#808080", "weight": 2, "opacity": 0.9}, lines]]]]
         places, said = (facts[some].to_numpy().tolist() for some in (PLACE, SAID))
         records = [
             [place, OBJECT_COLOURS[what], 5, None, f"Object {what}", details]

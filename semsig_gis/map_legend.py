@@ -108,7 +108,7 @@ GROUP_COLOURS: Mapping[int, str] = MappingProxyType(
 SAME_TYPES, SAME_LEVELS = "#ffffff", "#e69f00"
 
 DRIFT_COLOURS: Mapping[str, str] = MappingProxyType(
-    {"same": "#d6d6d1", "changed": "#f0bf5c", "appeared": "#5aa5d6", "vanished": "#b5698f"}
+    {"same": "#b3b3ad", "changed": "#f0bf5c", "appeared": "#5aa5d6", "vanished": "#b5698f"}
 )
 """Colour of a cell by what became of it."""
 

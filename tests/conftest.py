@@ -24,6 +24,9 @@ if TYPE_CHECKING:
 
     Run = Callable[..., tuple[int, str, str]]
 
+# QGIS runs these with its own Python.
+collect_ignore = ["qgis_draw.py", "qgis_session.py"]
+
 hypothesis.settings.register_profile("semsig", deadline=None)
 hypothesis.settings.register_profile("semsig-ci", deadline=None, derandomize=True, print_blob=True)
 hypothesis.settings.load_profile("semsig-ci" if os.environ.get("CI") else "semsig")
