@@ -27,8 +27,10 @@ if TYPE_CHECKING:
 # QGIS runs these with its own Python.
 collect_ignore = ["qgis_draw.py", "qgis_session.py"]
 
-hypothesis.settings.register_profile("semsig", deadline=None)
-hypothesis.settings.register_profile("semsig-ci", deadline=None, derandomize=True, print_blob=True)
+# Fifty examples find what a hundred find, in a suite that is run many times.
+plain = hypothesis.settings(deadline=None, max_examples=50)
+hypothesis.settings.register_profile("semsig", plain)
+hypothesis.settings.register_profile("semsig-ci", plain, derandomize=True, print_blob=True)
 hypothesis.settings.load_profile("semsig-ci" if os.environ.get("CI") else "semsig")
 
 # What a machine may lack. A test that needs one of them skips, with the reason, unless the
