@@ -33,7 +33,7 @@ def ranks(values: np.ndarray) -> np.ndarray:
 
 
 # From well told apart to hardly.
-@settings(max_examples=4, deadline=None)
+@settings(max_examples=3, deadline=None)
 @given(
     st.integers(0, 1000),
     st.sampled_from([(6, 2), (12, 4), (9, 3)]),

@@ -129,7 +129,7 @@ def test_the_steps_hardly_change_the_order() -> None:
     assert int(np.argmax(exact)) == int(found.argmax())
 
 
-@settings(max_examples=10)
+@settings(max_examples=6)
 @given(SEEDS, st.floats(0.5, 15.0))
 def test_a_position_that_is_not_known_widens_by_distance(seed: int, metres: float) -> None:
     database = random_database(seed, cells=8)
