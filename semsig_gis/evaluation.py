@@ -420,8 +420,9 @@ class _Pool:
     def best(self, count: int) -> NDArray[np.intp]:
         """Return the places here of so many best, equals in the order of the cells."""
         count = min(count, len(self.scores))
-        some = np.flatnonzero(self.scores <= np.partition(self.scores, count - 1)[count - 1])
-        return some[np.argsort(self.scores[some], kind="stable")[:count]]
+        better, tied = top_candidates(self.scores, count)
+        better = better[np.argsort(self.scores[better], kind="stable")]
+        return np.concatenate([better, tied[: count - len(better)]])
 
     def cut(self, count: int) -> dict[str, Any]:
         """Return the errors of those that are surely among so many best, and of the tied."""
