@@ -2,49 +2,20 @@
 
 from __future__ import annotations
 
-import base64
-import json
-import zlib
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from pyproj import Transformer
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
-
     from numpy.typing import NDArray
     from pyproj import CRS
 
-__all__ = ["SCRIPT", "mercator", "packed", "steps"]
+__all__ = ["SCRIPT", "mercator"]
 
 QUANTUM_M = 0.25  # of Web Mercator
 
 SCRIPT = r"""
-semsig.arrays = async (packed) => {
-  const kinds = {u1: Uint8Array, u2: Uint16Array, i4: Int32Array};
-  const read = async ([kind, text]) => {
-    const bytes = Uint8Array.from(atob(text), (sign) => sign.charCodeAt(0));
-    const stream = new Blob([bytes]).stream().pipeThrough(new DecompressionStream("deflate"));
-    const response = new Response(stream);
-    if (kind === "json") return response.json();
-    if (kind !== "steps") return new kinds[kind](await response.arrayBuffer());
-    // The four bytes of all numbers one after the other; each number is what it is more than the
-    // one before.
-    const planes = new Uint8Array(await response.arrayBuffer());
-    const values = new Int32Array(planes.length / 4);
-    const size = values.length;
-    for (let at = 0, sum = 0; at < size; at += 1) {
-      sum += planes[at] | planes[at + size] << 8 | planes[at + 2 * size] << 16
-        | planes[at + 3 * size] << 24;
-      values[at] = sum;
-    }
-    return values;
-  };
-  const names = Object.keys(packed);
-  const arrays = await Promise.all(names.map((name) => read(packed[name])));
-  return Object.fromEntries(names.map((name, at) => [name, arrays[at]]));
-};
 // From packed numbers to pixels of a layer and back: `x * scale + left`.
 semsig.frame = (map, {origin, quantum}, zoom = map.getZoom()) => {
   const across = 2 * Math.PI * 6378137;
@@ -370,26 +341,3 @@ def mercator(xy: NDArray[np.float64], crs: CRS) -> tuple[NDArray[np.int32], dict
     origin = metres.min(axis=0)
     places = np.rint((metres - origin) / QUANTUM_M).astype(np.int32)
     return places, {"origin": origin.tolist(), "quantum": QUANTUM_M}
-
-
-def steps(values: NDArray[np.int32]) -> list[str]:
-    """Return numbers that change little from one to the next, for `semsig.arrays`."""
-    change = np.diff(values.astype("<i4"), prepend=np.int32(0))
-    return ["steps", _text(change.view(np.uint8).reshape(-1, 4).T.tobytes())]
-
-
-def packed(arrays: Mapping[str, NDArray[Any] | Sequence[str]]) -> dict[str, list[str]]:
-    """Return arrays of u1, u2 or i4, and lists of text, for `semsig.arrays`."""
-    told = {}
-    for name, values in arrays.items():
-        if isinstance(values, np.ndarray):
-            kind = values.dtype.newbyteorder("<")
-            text = _text(np.ascontiguousarray(values, kind).tobytes())
-            told[name] = [f"{kind.kind}{kind.itemsize}", text]
-        else:
-            told[name] = ["json", _text(json.dumps(values).encode())]
-    return told
-
-
-def _text(content: bytes) -> str:
-    return base64.b64encode(zlib.compress(content)).decode("ascii")

@@ -7,8 +7,6 @@ told of a cell comes from parts (`CellFacts`), each with arrays and a function o
 
 from __future__ import annotations
 
-import base64
-import zlib
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, cast
 
@@ -17,6 +15,7 @@ from branca.element import Element
 from folium.map import Layer
 from folium.template import Template
 
+from semsig_gis._map_packing import packed, steps
 from semsig_gis._map_parts import Furniture, class_titles, to_latlon
 from semsig_gis.errors import InputError
 from semsig_gis.map_image import place_lattices
@@ -30,21 +29,9 @@ if TYPE_CHECKING:
 
     from semsig_gis.database import SignatureDatabase
 
-__all__ = ["CellFacts", "CellLayer", "city_view", "packed", "packed_signatures"]
+__all__ = ["CellFacts", "CellLayer", "city_view", "packed_signatures"]
 
 SCRIPT = """\
-semsig.unpacked = async (packed) => {
-  const kinds = {u1: Uint8Array, i4: Int32Array, f8: Float64Array};
-  const arrays = {};
-  for (const [name, [kind, steps, text]] of Object.entries(packed)) {
-    const bytes = Uint8Array.from(atob(text), (sign) => sign.charCodeAt(0));
-    const stream = new Blob([bytes]).stream().pipeThrough(new DecompressionStream("deflate"));
-    const values = new kinds[kind](await new Response(stream).arrayBuffer());
-    if (steps) for (let at = 1; at < values.length; at += 1) values[at] += values[at - 1];
-    arrays[name] = values;
-  }
-  return arrays;
-};
 // A place in a box, by the values at the crossings of a lattice over it.
 semsig.between = (lattice, [west, south, east, north], x, y) => {
   const lines = Math.sqrt(lattice.length / 2) - 1;
@@ -147,7 +134,7 @@ semsig.City = class {
 semsig.told = {};
 semsig.cells = (packed, grid, titles, told) => {
   const group = L.layerGroup();
-  const ready = semsig.unpacked(packed).then((data) => new semsig.City(data, grid));
+  const ready = semsig.arrays(packed).then((data) => new semsig.City(data, grid));
   const buttons = (city, map, cell, box, jumps) => {
     // Below the title, so that they are in sight however much there is to tell.
     const lines = jumps.map(([label, goals]) => {
@@ -259,14 +246,14 @@ class CellFacts:
         with a text, a cell and a hint; ``marks``: cells to number and to join by lines;
         ``dots``: cells and colours.
     arrays : mapping of str to list
-        Numbers of the cells (see `packed`).
+        Numbers of the cells (see `semsig_gis._map_packing`).
     settings : mapping of str to object
         What else it needs, in ``city.grid``.
     """
 
     name: str
     script: str
-    arrays: Mapping[str, list[Any]] = field(default_factory=dict)
+    arrays: Mapping[str, list[str]] = field(default_factory=dict)
     settings: Mapping[str, Any] = field(default_factory=dict)
 
 
@@ -313,37 +300,24 @@ def city_view(database: SignatureDatabase) -> NDArray[np.float64]:
     return to_latlon(corners, database.crs)
 
 
-def packed(array: NDArray[Any], *, steps: bool = False) -> list[Any]:
-    """Return the kind of an array and its compressed bytes as text.
-
-    With `steps`, of each value less the one before: far smaller where they rise.
-    """
-    kind = array.dtype.newbyteorder("<")
-    if steps:
-        array = np.diff(array, prepend=array.dtype.type(0))
-    data = zlib.compress(np.ascontiguousarray(array, dtype=kind).tobytes())
-    text = base64.b64encode(data).decode("ascii")
-    return [f"{array.dtype.kind}{array.dtype.itemsize}", int(steps), text]
-
-
 def packed_signatures(
     name: str, database: SignatureDatabase, ends: NDArray[np.int64]
-) -> dict[str, list[Any]]:
+) -> dict[str, list[str]]:
     """Return signatures, with angle levels for bearings, and where those of each cell end."""
     return {
         f"{name}.types": packed(database.taxonomy.symbol_bytes[database.codes]),
-        f"{name}.ends": packed(ends.astype(np.int32), steps=True),
+        f"{name}.ends": steps(ends.astype(np.int32)),
         f"{name}.levels": packed(database.levels),
     }
 
 
-def _cells(database: SignatureDatabase) -> tuple[dict[str, list[Any]], dict[str, Any]]:
+def _cells(database: SignatureDatabase) -> tuple[dict[str, list[str]], dict[str, Any]]:
     """Return where the cells are, and how to read it."""
     lattices = place_lattices(database)
     columns = database.columns - database.columns[0]
     arrays = {
-        "rows": packed(database.rows, steps=True),
-        "columnEnds": packed(np.cumsum(np.bincount(columns)).astype(np.int32), steps=True),
+        "rows": steps(database.rows),
+        "columnEnds": steps(np.cumsum(np.bincount(columns)).astype(np.int32)),
         "metres": packed(lattices.metres),
         "degrees": packed(lattices.degrees),
     }

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from semsig_gis._map_cells import CellFacts, packed
+from semsig_gis._map_cells import CellFacts
+from semsig_gis._map_packing import packed
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -89,5 +90,5 @@ def lookalike_facts(told: Identifiability) -> CellFacts:
     )
 
 
-def _chance_bytes(chances: NDArray[np.float64]) -> list[Any]:
+def _chance_bytes(chances: NDArray[np.float64]) -> list[str]:
     return packed(np.rint(chances * CHANCES).clip(0, CHANCES).astype(np.uint8))

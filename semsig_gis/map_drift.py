@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pandas as pd
 
-from semsig_gis._map_cells import CellFacts, CellLayer, city_view, packed, packed_signatures
+from semsig_gis._map_cells import CellFacts, CellLayer, city_view, packed_signatures
+from semsig_gis._map_packing import packed
 from semsig_gis._map_parts import (
     Drawing,
     Legend,

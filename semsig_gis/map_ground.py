@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import shapely
 
-from semsig_gis._map_board import mercator, steps
+from semsig_gis._map_board import mercator
+from semsig_gis._map_packing import steps
 from semsig_gis._map_parts import Drawing, Legend, finished_map, free_name, prepared_map, to_latlon
 from semsig_gis.boxes import hilbert_order
 from semsig_gis.errors import CrsError, EmptyResultError

@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pandas as pd
 
-from semsig_gis._map_board import mercator, packed, steps
+from semsig_gis._map_board import mercator
+from semsig_gis._map_packing import packed, steps
 from semsig_gis._map_parts import (
     Drawing,
     Legend,
@@ -137,5 +138,6 @@ def _drawn(objects: StreetObjects) -> tuple[dict[str, list[str]], dict[str, Any]
         # The rare ones last, so that they lie on top.
         "order": np.argsort([-count for count in counts.values()], kind="stable").tolist(),
     }
-    told = packed(arrays) | {name: steps(part) for name, part in zip("xy", places.T, strict=True)}
+    told = {name: packed(values) for name, values in arrays.items()}
+    told |= {name: steps(part) for name, part in zip("xy", places.T, strict=True)}
     return told, about
