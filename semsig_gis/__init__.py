@@ -32,7 +32,6 @@ if TYPE_CHECKING:
     from semsig_gis.experiment_folder import open_results
     from semsig_gis.experiment_run import run_experiment, run_experiments
     from semsig_gis.exports import export_answer, export_database
-    from semsig_gis.exports.geopackage import export_geopackage
     from semsig_gis.exports.geotiff import export_geotiff
     from semsig_gis.fetching import fetch_layers, find_area, open_cache
     from semsig_gis.geopackage_reading import GeopackageContents, read_geopackage
@@ -137,7 +136,6 @@ _HOMES = {
     "evaluation_map": "maps",
     "export_answer": "exports",
     "export_database": "exports",
-    "export_geopackage": "exports.geopackage",
     "export_geotiff": "exports.geotiff",
     "fetch_layers": "fetching",
     "find_area": "fetching",
@@ -239,7 +237,6 @@ __all__ = [
     "evaluation_map",
     "export_answer",
     "export_database",
-    "export_geopackage",
     "export_geotiff",
     "fetch_layers",
     "find_area",

@@ -74,7 +74,7 @@ def read_geopackage(path: str | Path) -> GeopackageContents:
     Parameters
     ----------
     path : str or Path
-        File that `semsig_gis.exports.geopackage.export_geopackage` wrote.
+        File that `semsig_gis.exports.export_database` wrote.
 
     Returns
     -------
@@ -91,14 +91,14 @@ def read_geopackage(path: str | Path) -> GeopackageContents:
     >>> import tempfile
     >>> from semsig_gis.catalog import paper_taxonomy
     >>> from semsig_gis.building import build_database
-    >>> from semsig_gis.exports.geopackage import export_geopackage
+    >>> from semsig_gis.exports import export_database
     >>> from semsig_gis.objects import build_objects
     >>> from semsig_gis.sources.synthetic import CitySpec, synthetic_city
     >>> layers = synthetic_city(CitySpec(size=300.0))
     >>> objects, _ = build_objects(layers, taxonomy=paper_taxonomy(), crs="EPSG:32631")
     >>> database = build_database(objects)
     >>> with tempfile.TemporaryDirectory() as folder:
-    ...     export_geopackage(database, f"{folder}/city.gpkg")
+    ...     export_database(database, f"{folder}/city.gpkg")
     ...     again = read_geopackage(f"{folder}/city.gpkg").database
     >>> bool((again.bearing_units == database.bearing_units).all())
     True
@@ -110,6 +110,9 @@ def read_geopackage(path: str | Path) -> GeopackageContents:
     notes: list[str] = []
     try:
         names = pyogrio.list_layers(path)[:, 0].tolist()
+        if CELLS not in names:
+            msg = f"{path} has no layer {CELLS!r}; give a GeoPackage with the cells of a database."
+            raise DatabaseError(msg)
         specs, crs, fields = _facts(path, CELLS)
         told_fields = [name for name in fields if name.startswith(TOLD)]
         wanted = [*CELL_COLUMNS, *(told_fields if specs["identifiability"] else [])]

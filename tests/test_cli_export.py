@@ -105,7 +105,7 @@ def test_what_does_not_go_together(city: Path, run: Run) -> None:
     folder = city.parent
     out = ("--out", folder / "a.gpkg")
     refused = (
-        (("export", city, "--layer", "cells", *out), "holds all layers"),
+        (("export", city, "--layer", "objects", *out), "no objects"),
         (("export", city, "--out", folder / "a.txt"), ".gpkg, .parquet, .csv or .tif"),
         (("export", city, "--evaluation", folder / "nowhere", *out), "does not exist"),
         (("localize", city, "--types", "D", "--within", 5), "--out"),

@@ -22,7 +22,7 @@ from small_city import small_city
 from worlds import ARRAYS, CORNER, World
 
 from semsig_gis.errors import DatabaseError, EmptyResultError
-from semsig_gis.exports.geopackage import export_geopackage
+from semsig_gis.exports import export_database
 from semsig_gis.geopackage_reading import read_geopackage
 from semsig_gis.identifiability import Identifiability
 from semsig_gis.objects import StreetObjects
@@ -93,7 +93,7 @@ def test_a_database_comes_back_as_it_was(
     )
     with tempfile.TemporaryDirectory() as folder:
         file = Path(folder) / "city.gpkg"
-        export_geopackage(database, file, geometry=geometry)
+        export_database(database, file, geometry=geometry)
         found = read_geopackage(file)
     assert_same(database, found.database)
     assert (found.objects, found.identifiability, found.notes) == (None, None, ())
@@ -105,7 +105,7 @@ def test_all_else_comes_back_too(tmp_path: Path) -> None:
     table = seen.table.assign(merged=[texts[row % 3] for row in range(len(seen))])
     seen = StreetObjects(table, seen.taxonomy, (*seen.licenses, HOSTILE))
     told, file = told_of(database), tmp_path / "city.gpkg"
-    export_geopackage(database, file, objects=seen, identifiability=told)
+    export_database(database, file, objects=seen, identifiability=told)
     found = read_geopackage(file)
     assert_same(database, found.database)
     assert found.notes == ()
@@ -124,7 +124,7 @@ def test_all_else_comes_back_too(tmp_path: Path) -> None:
 
 def test_hostile_classes_and_licences_come_back(tmp_path: Path) -> None:
     database = hostile_database(small_city()[0])
-    export_geopackage(database, tmp_path / "city.gpkg")
+    export_database(database, tmp_path / "city.gpkg")
     assert_same(database, read_geopackage(tmp_path / "city.gpkg").database)
 
 
@@ -137,7 +137,7 @@ def changed(file: Path, sql: str) -> None:
 
 def test_cells_that_were_deleted_are_gone(tmp_path: Path) -> None:
     database, file = small_city()[0], tmp_path / "city.gpkg"
-    export_geopackage(database, file, identifiability=told_of(database))
+    export_database(database, file, identifiability=told_of(database))
     changed(file, "DELETE FROM cells WHERE length < 3")
     found = read_geopackage(file)
     assert_same(database.select(database.lengths >= 3), found.database)
@@ -162,7 +162,7 @@ def test_cells_that_were_deleted_are_gone(tmp_path: Path) -> None:
 )
 def test_a_damaged_file_is_refused(sql: str, tmp_path: Path) -> None:
     file = tmp_path / "city.gpkg"
-    export_geopackage(small_city()[0], file)
+    export_database(small_city()[0], file)
     changed(file, sql)
     with pytest.raises(DatabaseError) as caught:
         read_geopackage(file)
@@ -180,3 +180,8 @@ def test_what_is_no_exported_database_is_refused(tmp_path: Path) -> None:
     with pytest.raises(DatabaseError) as caught:
         read_geopackage(tmp_path / "a.gpkg")
     assert_sentence(caught.value, "a.gpkg", "not written by semsig export")
+    database, objects = small_city()
+    export_database(database, tmp_path / "b.gpkg", layers=["objects"], objects=objects)
+    with pytest.raises(DatabaseError) as caught:
+        read_geopackage(tmp_path / "b.gpkg")
+    assert_sentence(caught.value, "b.gpkg", "no layer 'cells'")

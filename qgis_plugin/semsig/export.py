@@ -92,7 +92,7 @@ def export_layers(
         The values of the parameters, the name of the one that says where to write to, the context
         and the feedback of the run.
     titles : dict of str to str
-        The layers to be shown, and what they are called.
+        The layers to write and to show, and what they are called.
     database : str
         Whose layers they are.
     **options : str
@@ -107,5 +107,7 @@ def export_layers(
     path = str(algorithm.parameterAsOutputLayer(parameters, name, context) or "")
     if not path:
         return {}
-    algorithm.tell(command_line("export", database, out=path, **options), feedback)
+    algorithm.tell(
+        command_line("export", database, out=path, layer=list(titles), **options), feedback
+    )
     return {name: show_layers(context, path, titles)}

@@ -25,7 +25,7 @@ def demo(
     from semsig_gis.catalog import paper_taxonomy
     from semsig_gis.database_file import save_database
     from semsig_gis.evaluation import evaluate as run
-    from semsig_gis.exports.geopackage import export_geopackage
+    from semsig_gis.exports import export_database
     from semsig_gis.map_objects import objects_map
     from semsig_gis.maps import evaluation_map, save_map
     from semsig_gis.objects import build_objects, save_objects
@@ -46,7 +46,7 @@ def demo(
         drawn = objects_map(objects, map_=evaluation_map(evaluation, database))
         offline = save_map(drawn, out / "map.html")
     with progress("writing the GeoPackage") as advance:
-        export_geopackage(
+        export_database(
             database,
             out / "city.gpkg",
             objects=objects,

@@ -27,7 +27,7 @@ def export(
     out: Annotated[
         Path,
         typer.Option(
-            help="File to write: a GeoPackage of all layers for QGIS (.gpkg), one layer as "
+            help="File to write: a GeoPackage of all layers, for QGIS (.gpkg), one layer as "
             "GeoParquet (.parquet) or CSV (.csv), or one number a cell as a Cloud-Optimised "
             "GeoTIFF (.tif)."
         ),
@@ -38,10 +38,11 @@ def export(
         typer.Option(help="Folder that `semsig evaluate --out` wrote, to add its queries."),
     ] = None,
     layer: Annotated[
-        str | None,
+        list[str] | None,
         typer.Option(
-            help="What a file of one layer holds: cells, objects, evaluation or evaluation_lines; "
-            "in a GeoTIFF ambiguity, identifiability or error. The first by default."
+            help="What the file holds: cells, objects, evaluation or evaluation_lines, by default "
+            "the first, in a GeoPackage all that there are (give the option once for each); in a "
+            "GeoTIFF ambiguity (the default), identifiability or error."
         ),
     ] = None,
     geometry: Annotated[
@@ -65,7 +66,7 @@ def export(
         export_database(
             opened,
             out,
-            layer=layer,
+            layers=layer or (),
             objects=seen,
             evaluation=results,
             identifiability=known_identifiability(database, opened),

@@ -1,6 +1,6 @@
 """Hand results on to other programs: pick a format by the suffix of the file.
 
-``.gpkg`` (`semsig_gis.exports.geopackage`) holds all layers, with styles for QGIS; ``.parquet``
+``.gpkg`` (`semsig_gis.exports.geopackage`) holds many layers, with styles for QGIS; ``.parquet``
 (`semsig_gis.exports.geoparquet`) and ``.csv`` (`semsig_gis.exports.csv_text`) hold one; ``.tif``
 (`semsig_gis.exports.geotiff`) holds one number a cell.
 """
@@ -21,11 +21,11 @@ from semsig_gis.location import REGION_SHARE, Location
 from semsig_gis.regions import search_regions
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping
+    from collections.abc import Callable, Mapping, Sequence
 
     from semsig_gis.database import SignatureDatabase
     from semsig_gis.evaluation_result import Evaluation
-    from semsig_gis.exports._layers import CellGeometry
+    from semsig_gis.exports._layers import CellGeometry, Layer
     from semsig_gis.identifiability import Identifiability
     from semsig_gis.localization import Localization
     from semsig_gis.objects import StreetObjects
@@ -36,22 +36,31 @@ if TYPE_CHECKING:
 __all__ = ["LAYERS", "RASTERS", "export_answer", "export_database"]
 
 LAYERS = ("cells", "objects", "evaluation", "evaluation_lines")
-"""What a GeoParquet or CSV file of a database may hold; the first by default."""
+"""What may be written of a database as layers."""
 
 RASTERS = ("ambiguity", "identifiability", "error")
-"""What a GeoTIFF of a database may hold; the first by default."""
+"""What may be written of a database as one number a cell."""
 
 _ONE_LAYER: Mapping[str, Callable[..., None]] = MappingProxyType(
     {".parquet": geoparquet.write_layer, ".csv": csv_text.write_layer}
 )
 _TIFF = (".tif", ".tiff")
+_NEEDS = MappingProxyType(
+    {
+        "objects": "objects",
+        "evaluation": "evaluation",
+        "evaluation_lines": "evaluation",
+        "error": "evaluation",
+        "identifiability": "identifiability",
+    }
+)
 
 
 def export_database(
     database: SignatureDatabase,
     path: str | Path,
     *,
-    layer: str | None = None,
+    layers: Sequence[str] = (),
     objects: StreetObjects | None = None,
     identifiability: Identifiability | None = None,
     evaluation: Evaluation | None = None,
@@ -66,8 +75,9 @@ def export_database(
         The cells.
     path : str or Path
         File to write: ``.gpkg``, ``.parquet``, ``.csv`` or ``.tif``; it appears whole, by rename.
-    layer : str, optional
-        What a file of one layer holds: one of `LAYERS`, or of `RASTERS`. A GeoPackage holds all.
+    layers : sequence of str, optional
+        What the file holds: some of `LAYERS` in a GeoPackage, by default all that is given; one of
+        `LAYERS` in GeoParquet and CSV, one of `RASTERS` in a GeoTIFF, by default the first.
     objects : StreetObjects, optional
         The objects that the cells see.
     identifiability : Identifiability, optional
@@ -82,10 +92,28 @@ def export_database(
     Raises
     ------
     InputError
-        If the suffix is another, the layer needs what was not given or does not hold what was,
-        or the file cannot be written.
+        If the suffix is another, the file holds fewer layers than are named, a layer needs what
+        was not given, what was given is in no layer, the identifiability is that of other cells,
+        or the file is open in another program or cannot be written.
     UnknownNameError
         If there is no such layer or geometry.
+
+    Notes
+    -----
+    Layer ``cells``, in the CRS of the database: ``cell_id``, ``x`` and ``y`` (viewpoint, metres),
+    ``length`` (objects seen), ``types`` (symbols), ``bearings`` (degrees to 0.01), ``levels``
+    (angle levels) and ``distances`` (metres to 0.01), each of these four clockwise from north and
+    the numbers separated by spaces; ``type_group_size`` and ``angle_group_size`` (cells that have
+    the same types or the same angle levels, 1 where the cell is alone); and, where given, the
+    columns of `semsig_gis.identifiability.Identifiability.table`. Nothing is lost by rounding:
+    `semsig_gis.geopackage_reading.read_geopackage` gives the database back.
+
+    Layer ``objects``, in the CRS of the objects: ``class_code``, ``symbol``, ``class_name``,
+    ``title``, ``source``, ``source_id``, ``merged`` where sources were merged, and ``count``.
+
+    Layers ``evaluation``, the queries at their true places, and ``evaluation_lines``, from there
+    to the best place: the columns of `semsig_gis.evaluation_result.Evaluation.queries` and
+    ``outcome``: ``found`` (the best place is within 50 m), ``missed`` or ``nothing seen``.
 
     Examples
     --------
@@ -100,75 +128,79 @@ def export_database(
     >>> database = build_database(objects)
     >>> with tempfile.TemporaryDirectory() as folder:
     ...     export_database(database, f"{folder}/cells.parquet")
+    ...     export_database(database, f"{folder}/city.gpkg", objects=objects)
     ...     len(gpd.read_parquet(f"{folder}/cells.parquet")) == len(database)
+    ...     gpd.list_layers(f"{folder}/city.gpkg")["name"].tolist()
     True
+    ['cells', 'objects', 'layer_styles']
     """
     suffix = _suffix(path, (".gpkg", *_ONE_LAYER, *_TIFF))
-    if suffix == ".gpkg":
-        if layer is not None:
-            msg = f"{path} holds all layers, but only {layer!r} was asked for; name no layer."
-            raise InputError(msg)
-        geopackage.export_geopackage(
-            database,
-            path,
-            objects=objects,
-            identifiability=identifiability,
-            evaluation=evaluation,
-            geometry=geometry or "polygon",
-            progress=progress,
+    given = {
+        name
+        for name, value in (
+            ("objects", objects),
+            ("identifiability", identifiability),
+            ("evaluation", evaluation),
         )
-        return
-    name = _checked_layer(path, layer, known=RASTERS if suffix in _TIFF else LAYERS)
-    given = {"objects": objects, "identifiability": identifiability, "evaluation": evaluation}
-    _require_needed(path, name, {what for what, value in given.items() if value is not None})
+        if value is not None
+    }
+    names = _chosen_layers(path, layers, suffix=suffix, given=given)
     if suffix in _TIFF:
         values, unit = database.type_group_sizes.astype(np.float64), "cells"
-        if name == "error" and evaluation is not None:
+        if names == ["error"] and evaluation is not None:
             values, unit = cell_errors(evaluation, database), "m"
-        elif name == "identifiability" and identifiability is not None:
+        elif names == ["identifiability"] and identifiability is not None:
             values, unit = identifiability.found, ""
-        export_geotiff(database, values, path, name=name, unit=unit)
+        export_geotiff(database, values, path, name=names[0], unit=unit)
         return
-    if name == "objects" and objects is not None:
-        chosen = objects_layer(objects)
-    elif evaluation is not None:
-        chosen = evaluation_layers(evaluation, database.licenses)[name == "evaluation_lines"]
-    else:
+    known: dict[str, Layer] = {}
+    if "cells" in names:
         drawn = geometry or ("point" if suffix == ".csv" else "polygon")
-        chosen = cells_layer(database, identifiability=identifiability, geometry=drawn)
-    _ONE_LAYER[suffix](chosen, path, progress=progress)
+        known["cells"] = cells_layer(database, identifiability=identifiability, geometry=drawn)
+    if objects is not None:
+        known["objects"] = objects_layer(objects)
+    if evaluation is not None:
+        known |= {one.name: one for one in evaluation_layers(evaluation, database.licenses)}
+    chosen = [known[name] for name in names]
+    if suffix == ".gpkg":
+        geopackage.write_layers(chosen, path, progress=progress)
+    else:
+        _ONE_LAYER[suffix](chosen[0], path, progress=progress)
 
 
-def _checked_layer(path: str | Path, layer: str | None, *, known: tuple[str, ...]) -> str:
-    """Return what a file of one layer holds."""
-    if layer is not None and layer not in known:
-        hint = nearest_name(layer, known)
-        msg = f"{path} cannot hold {layer!r}; give one of {', '.join(known)}{hint}."
-        raise UnknownNameError(msg)
-    return layer or known[0]
-
-
-def _require_needed(path: str | Path, name: str, given: set[str]) -> None:
-    """Refuse a file of one layer that lacks what the layer needs, or cannot hold what is given."""
-    needs = {
-        "objects": "objects",
-        "evaluation": "evaluation",
-        "evaluation_lines": "evaluation",
-        "error": "evaluation",
-        "identifiability": "identifiability",
-    }
-    needed = needs.get(name)
-    if needed is not None and needed not in given:
-        msg = f"{path} is to hold the {name}, but there is no {needed}; give that too."
-        raise InputError(msg)
-    # Identifiability is part of a database, wherever it is not asked for.
-    unused = sorted(given - {needed, "identifiability"})
-    if unused:
+def _chosen_layers(
+    path: str | Path, wanted: Sequence[str], *, suffix: str, given: set[str]
+) -> list[str]:
+    """Return what a file holds, and refuse what lacks its data, or data that it would not hold."""
+    known = RASTERS if suffix in _TIFF else LAYERS
+    for name in wanted:
+        if name not in known:
+            hint = nearest_name(name, known)
+            msg = f"{path} cannot hold {name!r}; give one of {', '.join(known)}{hint}."
+            raise UnknownNameError(msg)
+    whole = suffix == ".gpkg"
+    if len(wanted) > 1 and not whole:
         msg = (
-            f"{path} holds the {name} alone, and no {' or '.join(unused)}; leave that out, name "
-            "another layer, or write a GeoPackage, which holds all."
+            f"{path} holds one layer, but {' and '.join(wanted)} were asked for; name one of them, "
+            "or write a GeoPackage."
         )
         raise InputError(msg)
+    all_given = [name for name in known if _NEEDS.get(name, "cells") in {"cells", *given}]
+    names = list(dict.fromkeys(wanted)) or (all_given if whole else [known[0]])
+    needed = {_NEEDS[name] for name in names if name in _NEEDS}
+    for name in names:
+        if name not in all_given:
+            msg = f"{path} is to hold the {name}, but there is no {_NEEDS[name]}; give that too."
+            raise InputError(msg)
+    # Identifiability is part of a database, wherever it is not asked for.
+    unused = sorted(given - needed - {"identifiability"})
+    if unused:
+        msg = (
+            f"{path} holds the {' and '.join(names)} alone, and no {' or '.join(unused)}; leave "
+            "that out, name another layer, or write a GeoPackage, which holds all."
+        )
+        raise InputError(msg)
+    return names
 
 
 def export_answer(

@@ -15,23 +15,15 @@ from pyogrio.errors import DataLayerError, DataSourceError, FeatureError
 
 from semsig_gis import __version__
 from semsig_gis.errors import InputError
-from semsig_gis.exports._layers import answer_layers, cells_layer, evaluation_layers, objects_layer
-from semsig_gis.regions import search_regions
 from semsig_gis.schema import GEOMETRY
 from semsig_gis.storage import whole_file
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
 
-    from semsig_gis.database import SignatureDatabase
-    from semsig_gis.evaluation_result import Evaluation
-    from semsig_gis.exports._layers import CellGeometry, Layer
-    from semsig_gis.identifiability import Identifiability
-    from semsig_gis.localization import Localization
-    from semsig_gis.location import Location
-    from semsig_gis.objects import StreetObjects
+    from semsig_gis.exports._layers import Layer
 
-__all__ = ["export_geopackage", "write_layers"]
+__all__ = ["write_layers"]
 
 # The newest version that QGIS 3.22 opens without a warning.
 VERSION = "1.2"
@@ -56,93 +48,6 @@ WHERE table_name = ?
 """
 
 
-def export_geopackage(
-    database: SignatureDatabase,
-    path: str | Path,
-    *,
-    objects: StreetObjects | None = None,
-    identifiability: Identifiability | None = None,
-    evaluation: Evaluation | None = None,
-    answer: Location | Localization | None = None,
-    geometry: CellGeometry = "polygon",
-    progress: Callable[[int, int], None] | None = None,
-) -> None:
-    """Write the cells, and what else there is of the city, as one GeoPackage 1.2.
-
-    Parameters
-    ----------
-    database : SignatureDatabase
-        The cells.
-    path : str or Path
-        File to write, ending in ``.gpkg``; it appears whole, by rename.
-    objects : StreetObjects, optional
-        The objects that the cells see.
-    identifiability : Identifiability, optional
-        What is known of the cells before any query, for more columns of the cells.
-    evaluation : Evaluation, optional
-        Queries and what was found for them.
-    answer : Location or Localization, optional
-        The answer to a query.
-    geometry : {"polygon", "point"}, default "polygon"
-        Whether a cell is drawn as its square or as its viewpoint.
-    progress : callable, optional
-        Called with the number of rows written and in all.
-
-    Raises
-    ------
-    InputError
-        If the file does not end in ``.gpkg``, is open in another program or cannot be written,
-        or the identifiability or the answer is that of other cells.
-    UnknownNameError
-        If there is no such geometry.
-
-    Notes
-    -----
-    Layer ``cells``, in the CRS of the database: ``cell_id``, ``x`` and ``y`` (viewpoint, metres),
-    ``length`` (objects seen), ``types`` (symbols), ``bearings`` (degrees to 0.01), ``levels``
-    (angle levels) and ``distances`` (metres to 0.01), each of these four clockwise from north and
-    the numbers separated by spaces; ``type_group_size`` and ``angle_group_size`` (cells that have
-    the same types or the same angle levels, 1 where the cell is alone); and, where given, the
-    columns of `semsig_gis.identifiability.Identifiability.table`. Nothing is lost by rounding:
-    `semsig_gis.geopackage_reading.read_geopackage` gives the database back.
-
-    Layer ``objects``, in the CRS of the objects: ``class_code``, ``symbol``, ``class_name``,
-    ``title``, ``source``, ``source_id``, ``merged`` where sources were merged, and ``count``.
-
-    Layers ``evaluation``, the queries at their true places, and ``evaluation_lines``, from there
-    to the best place: the columns of `semsig_gis.evaluation_result.Evaluation.queries` and
-    ``outcome``: ``found`` (the best place is within 50 m), ``missed`` or ``nothing seen``.
-
-    Layers ``regions`` (see `semsig_gis.regions`) and ``candidates``: of the answer.
-
-    The table ``layer_styles`` holds the styles with which QGIS draws them. The metadata of each
-    layer holds the specs, the classes and the licences as JSON; its description holds the
-    licences as text. The rows are written in blocks, so that memory stays flat.
-
-    Examples
-    --------
-    >>> import tempfile
-    >>> from semsig_gis.catalog import paper_taxonomy
-    >>> from semsig_gis.building import build_database
-    >>> from semsig_gis.objects import build_objects
-    >>> from semsig_gis.sources.synthetic import CitySpec, synthetic_city
-    >>> layers = synthetic_city(CitySpec(size=300.0))
-    >>> objects, _ = build_objects(layers, taxonomy=paper_taxonomy(), crs="EPSG:32631")
-    >>> with tempfile.TemporaryDirectory() as folder:
-    ...     export_geopackage(build_database(objects), f"{folder}/city.gpkg", objects=objects)
-    ...     pyogrio.list_layers(f"{folder}/city.gpkg").tolist()
-    [['cells', 'Polygon'], ['objects', 'Point'], ['layer_styles', None]]
-    """
-    layers = [cells_layer(database, identifiability=identifiability, geometry=geometry)]
-    if objects is not None:
-        layers.append(objects_layer(objects))
-    if evaluation is not None:
-        layers += evaluation_layers(evaluation, database.licenses)
-    if answer is not None:
-        layers += answer_layers(answer, search_regions(answer, database))
-    write_layers(layers, path, progress=progress)
-
-
 def write_layers(
     layers: Sequence[Layer],
     path: str | Path,
@@ -164,6 +69,12 @@ def write_layers(
     ------
     InputError
         If the file does not end in ``.gpkg``, is open in another program or cannot be written.
+
+    Notes
+    -----
+    The table ``layer_styles`` holds the styles with which QGIS draws the layers. The metadata of
+    each layer holds the specs, the classes and the licences as JSON; its description holds the
+    licences as text. The rows are written in blocks, so that memory stays flat.
     """
     target = Path(path)
     if target.suffix.lower() != ".gpkg":

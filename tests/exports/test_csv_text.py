@@ -80,7 +80,7 @@ def test_hostile_objects_come_back(tmp_path: Path) -> None:
     table["source_id"] = [texts[number % len(texts)] for number in range(len(table))]
     hostile = StreetObjects(table, objects.taxonomy, objects.licenses)
     file = tmp_path / "objects.csv"
-    export_database(database, file, layer="objects", objects=hostile)
+    export_database(database, file, layers=["objects"], objects=hostile)
     with file.open(encoding="utf-8", newline="") as opened:
         rows = list(csv.DictReader(opened))
     assert [as_written(row["source_id"]) for row in rows] == table["source_id"].tolist()

@@ -40,6 +40,13 @@ def test_a_geopackage_holds_all(tmp_path: Path) -> None:
     }
 
 
+def test_a_geopackage_holds_what_is_named(tmp_path: Path) -> None:
+    file = tmp_path / "queries.gpkg"
+    wanted = ["evaluation", "evaluation_lines"]
+    export_database(small_city()[0], file, layers=wanted, evaluation=small_evaluation())
+    assert pyogrio.list_layers(file)[:, 0].tolist() == [*wanted, "layer_styles"]
+
+
 @pytest.mark.parametrize("suffix", [".csv", ".parquet"])
 @pytest.mark.parametrize("layer", LAYERS)
 def test_other_files_hold_one(layer: str, suffix: str, tmp_path: Path) -> None:
@@ -49,7 +56,7 @@ def test_other_files_hold_one(layer: str, suffix: str, tmp_path: Path) -> None:
         "cells": {},
         "objects": {"objects": objects},
     }.get(layer, {"evaluation": small_evaluation()})
-    export_database(database, file, layer=layer, **given)
+    export_database(database, file, layers=[layer], **given)
     read = pd.read_csv(file) if suffix == ".csv" else gpd.read_parquet(file)
     column = {"cells": "bearings", "objects": "source_id", "evaluation": "query_types"}
     assert column.get(layer, "off_m") in read.columns
@@ -76,16 +83,19 @@ def test_regions_of_an_answer(tmp_path: Path) -> None:
     [
         ("city.shp", {}, ("city.shp", ".gpkg, .parquet, .csv or .tif")),
         ("city", {}, ("does not end in",)),
-        ("city.gpkg", {"layer": "cells"}, ("all layers", "'cells'")),
-        ("city.csv", {"layer": "object"}, ("'object'", "the nearest is 'objects'")),
-        ("city.csv", {"layer": "ambiguity"}, ("'ambiguity'", *LAYERS)),
-        ("city.tif", {"layer": "cells"}, ("'cells'", *RASTERS)),
-        ("city.csv", {"layer": "objects"}, ("no objects",)),
-        ("city.parquet", {"layer": "evaluation_lines"}, ("no evaluation",)),
-        ("city.tif", {"layer": "identifiability"}, ("no identifiability",)),
-        ("city.tif", {"layer": "error"}, ("no evaluation",)),
+        ("city.gpkg", {"layers": ["cell"]}, ("'cell'", "the nearest is 'cells'")),
+        ("city.gpkg", {"layers": ["cells", "objects"]}, ("no objects",)),
+        ("city.gpkg", {"layers": ["cells"], "objects": 1}, ("cells alone", "no objects")),
+        ("city.csv", {"layers": ["cells", "objects"], "objects": 1}, ("one layer", "GeoPackage")),
+        ("city.csv", {"layers": ["object"]}, ("'object'", "the nearest is 'objects'")),
+        ("city.csv", {"layers": ["ambiguity"]}, ("'ambiguity'", *LAYERS)),
+        ("city.tif", {"layers": ["cells"]}, ("'cells'", *RASTERS)),
+        ("city.csv", {"layers": ["objects"]}, ("no objects",)),
+        ("city.parquet", {"layers": ["evaluation_lines"]}, ("no evaluation",)),
+        ("city.tif", {"layers": ["identifiability"]}, ("no identifiability",)),
+        ("city.tif", {"layers": ["error"]}, ("no evaluation",)),
         ("city.csv", {"objects": 1, "evaluation": 1}, ("cells alone", "no evaluation or objects")),
-        ("city.tif", {"layer": "error", "evaluation": 1, "objects": 1}, ("error alone",)),
+        ("city.tif", {"layers": ["error"], "evaluation": 1, "objects": 1}, ("error alone",)),
         ("city.gpkg", {"geometry": "square"}, ("'square'", "'polygon' or 'point'")),
     ],
 )

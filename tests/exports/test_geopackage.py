@@ -34,8 +34,7 @@ from small_city import small_city, small_evaluation, small_localization, small_l
 from semsig_gis.building import build_database
 from semsig_gis.catalog import paper_taxonomy
 from semsig_gis.errors import InputError, UnknownNameError
-from semsig_gis.exports import _layers, export_answer
-from semsig_gis.exports.geopackage import export_geopackage
+from semsig_gis.exports import _layers, export_answer, export_database
 from semsig_gis.grid import GridSpec
 from semsig_gis.objects import StreetObjects, build_objects
 from semsig_gis.signatures import SignatureSpec, quantize
@@ -85,7 +84,7 @@ def query(file: Path, sql: str) -> list[Any]:
 
 def test_cells_read_back_as_they_are(database: SignatureDatabase, tmp_path: Path) -> None:
     file = tmp_path / "city.gpkg"
-    export_geopackage(database, file)
+    export_database(database, file)
     assert pyogrio.list_layers(file).tolist() == [["cells", "Polygon"], ["layer_styles", None]]
     cells = gpd.read_file(file, layer="cells")
     assert cells.crs == database.crs
@@ -114,7 +113,7 @@ def test_cells_read_back_as_they_are(database: SignatureDatabase, tmp_path: Path
 
 def test_a_square_is_the_cell(database: SignatureDatabase, tmp_path: Path) -> None:
     file = tmp_path / "city.gpkg"
-    export_geopackage(database, file)
+    export_database(database, file)
     squares = gpd.read_file(file, layer="cells").geometry
     assert (squares.geom_type == "Polygon").all()
     assert np.allclose(squares.area, 12.5**2, rtol=1e-12)
@@ -130,7 +129,7 @@ def test_a_square_is_the_cell(database: SignatureDatabase, tmp_path: Path) -> No
 
 def test_points(database: SignatureDatabase, tmp_path: Path) -> None:
     file = tmp_path / "CITY.GPKG"
-    export_geopackage(database, file, geometry="point")
+    export_database(database, file, geometry="point")
     cells = gpd.read_file(file, layer="cells")
     assert np.array_equal(shapely.get_coordinates(cells.geometry.array), database.xy)
 
@@ -139,7 +138,7 @@ def test_objects_read_back_as_they_are(
     database: SignatureDatabase, objects: StreetObjects, tmp_path: Path
 ) -> None:
     file = tmp_path / "city.gpkg"
-    export_geopackage(database, file, objects=objects)
+    export_database(database, file, objects=objects)
     assert fiona.listlayers(file) == ["cells", "objects", "layer_styles"]
     with fiona.open(file, layer="objects") as layer:
         assert layer.crs.to_epsg() == 32631
@@ -168,7 +167,7 @@ def test_specs_and_licences_travel_along(
     database: SignatureDatabase, objects: StreetObjects, tmp_path: Path
 ) -> None:
     file = tmp_path / "city.gpkg"
-    export_geopackage(database, file, objects=objects)
+    export_database(database, file, objects=objects)
     cells, things = (pyogrio.read_info(file, layer=name) for name in ("cells", "objects"))
     facts = cells["layer_metadata"]
     assert json.loads(facts["grid"]) == {"step": 12.5, "origin": [3.0, -4.0]}
@@ -191,7 +190,7 @@ def test_it_is_a_sound_geopackage_1_2(
     database: SignatureDatabase, objects: StreetObjects, tmp_path: Path
 ) -> None:
     file = tmp_path / "city.gpkg"
-    export_geopackage(database, file, objects=objects)
+    export_database(database, file, objects=objects)
     assert query(file, "PRAGMA user_version") == [(10200,)]
     assert query(file, "PRAGMA application_id") == [(0x47504B47,)]
     assert query(file, "PRAGMA integrity_check") == [("ok",)]
@@ -217,13 +216,13 @@ def test_it_is_a_sound_geopackage_1_2(
 def test_a_crs_of_its_own(database: SignatureDatabase, tmp_path: Path) -> None:
     local = type(database.crs)("+proj=tmerc +lat_0=43.6 +lon_0=3.88 +ellps=GRS80 +units=m")
     file = tmp_path / "city.gpkg"
-    export_geopackage(dataclasses.replace(database, crs=local), file, geometry="point")
+    export_database(dataclasses.replace(database, crs=local), file, geometry="point")
     assert gpd.read_file(file, layer="cells").crs == local
 
 
 def test_progress(database: SignatureDatabase, objects: StreetObjects, tmp_path: Path) -> None:
     told: list[tuple[int, int]] = []
-    export_geopackage(
+    export_database(
         database,
         tmp_path / "city.gpkg",
         objects=objects,
@@ -240,21 +239,21 @@ def test_other_file_names_are_refused(
     name: str, database: SignatureDatabase, tmp_path: Path
 ) -> None:
     with pytest.raises(InputError) as caught:
-        export_geopackage(database, tmp_path / name)
+        export_database(database, tmp_path / name)
     assert_sentence(caught.value, name, ".gpkg")
     assert list(tmp_path.iterdir()) == []
 
 
 def test_other_geometries_are_refused(database: SignatureDatabase, tmp_path: Path) -> None:
     with pytest.raises(UnknownNameError) as caught:
-        export_geopackage(database, tmp_path / "a.gpkg", geometry="polygons")  # type: ignore[arg-type]
+        export_database(database, tmp_path / "a.gpkg", geometry="polygons")  # type: ignore[arg-type]
     assert_sentence(caught.value, "'polygons'", "the nearest is 'polygon'")
 
 
 def test_a_folder_that_cannot_be_written(database: SignatureDatabase, tmp_path: Path) -> None:
     (tmp_path / "file").write_text("here")
     with pytest.raises(InputError) as caught:
-        export_geopackage(database, tmp_path / "file" / "city.gpkg")
+        export_database(database, tmp_path / "file" / "city.gpkg")
     assert_sentence(caught.value, "city.gpkg", "folder")
     assert (tmp_path / "file").read_text() == "here"
 
@@ -265,10 +264,10 @@ def test_a_full_disk_leaves_the_old_file(
     share: float, database: SignatureDatabase, objects: StreetObjects, tmp_path: Path
 ) -> None:
     file = tmp_path / "city.gpkg"
-    export_geopackage(database, file, objects=objects)
+    export_database(database, file, objects=objects)
     before = file.read_bytes()
     with largest_file(round(share * len(before))), pytest.raises(InputError) as caught:
-        export_geopackage(database, file, objects=objects)
+        export_database(database, file, objects=objects)
     assert_sentence(caught.value, "city.gpkg", "unchanged")
     assert file.read_bytes() == before
     assert list(tmp_path.iterdir()) == [file]
@@ -285,7 +284,7 @@ def test_an_interruption_leaves_the_old_file(
             raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
-        export_geopackage(database, file, objects=objects, progress=stop)
+        export_database(database, file, objects=objects, progress=stop)
     assert file.read_bytes() == b"old"
     assert list(tmp_path.iterdir()) == [file]
 
@@ -298,7 +297,7 @@ def test_qgis_counts_the_objects_in_the_cells(
     tmp_path: Path,
 ) -> None:
     file, counted = tmp_path / "city.gpkg", tmp_path / "counted.gpkg"
-    export_geopackage(database, file, objects=objects)
+    export_database(database, file, objects=objects)
     done = subprocess.run(
         [
             *(qgis_process, "run", "native:countpointsinpolygon", "--"),
@@ -326,20 +325,25 @@ def test_qgis_counts_the_objects_in_the_cells(
 def test_every_layer_has_a_style_of_its_own(tmp_path: Path) -> None:
     city, seen = small_city()
     file = tmp_path / "city.gpkg"
-    export_geopackage(
+    export_database(
         city,
         file,
         objects=seen,
         identifiability=told_of(city),
         evaluation=small_evaluation(),
-        answer=small_location(),
     )
-    styles = query(
-        file,
-        "SELECT f_table_name, f_geometry_column, styleName, useAsDefault, styleQML, update_time "
-        "FROM layer_styles WHERE f_table_schema = '' AND f_table_catalog = ''",
-    )
-    assert [style[:4] for style in styles] == [
+    answer = tmp_path / "answer.gpkg"
+    export_answer(small_location(), city, answer)
+    styles = [
+        (source, *row)
+        for source in (file, answer)
+        for row in query(
+            source,
+            "SELECT f_table_name, f_geometry_column, styleName, useAsDefault, styleQML, "
+            "update_time FROM layer_styles WHERE f_table_schema = '' AND f_table_catalog = ''",
+        )
+    ]
+    assert [style[1:5] for style in styles] == [
         ("cells", "geom", "Identifiability", 1),
         ("cells", "geom", "Ambiguity", 0),
         ("objects", "geom", "Classes", 1),
@@ -348,10 +352,10 @@ def test_every_layer_has_a_style_of_its_own(tmp_path: Path) -> None:
         ("regions", "geom", "Rank", 1),
         ("candidates", "geom", "Rank", 1),
     ]
-    for layer, _, _, _, qml, updated in styles:
+    for source, layer, _, _, _, qml, updated in styles:
         root = ET.fromstring(qml)  # noqa: S314 - our own
         column = root.find("renderer-v2").attrib["attr"]  # type: ignore[union-attr]
-        assert column in pyogrio.read_info(file, layer=layer)["fields"]
+        assert column in pyogrio.read_info(source, layer=layer)["fields"]
         used = {item.attrib["symbol"] for item in root.iter() if "symbol" in item.attrib}
         drawn = {item.attrib["name"] for item in root.findall("renderer-v2/symbols/symbol")}
         assert used == drawn
@@ -360,7 +364,7 @@ def test_every_layer_has_a_style_of_its_own(tmp_path: Path) -> None:
 
 def test_queries_and_lines(tmp_path: Path) -> None:
     city, results, file = small_city()[0], small_evaluation(), tmp_path / "city.gpkg"
-    export_geopackage(city, file, evaluation=results)
+    export_database(city, file, evaluation=results)
     points = gpd.read_file(file, layer="evaluation")
     lines = gpd.read_file(file, layer="evaluation_lines")
     assert points.geometry.geom_equals(results.queries.geometry.reset_index(drop=True)).all()
@@ -376,7 +380,7 @@ def test_queries_and_lines(tmp_path: Path) -> None:
 def test_queries_of_which_nothing_was_left(tmp_path: Path) -> None:
     city, results, file = small_city()[0], small_evaluation(), tmp_path / "city.gpkg"
     empty = results.queries[results.queries["query_length"] == 0]
-    export_geopackage(city, file, evaluation=dataclasses.replace(results, queries=empty))
+    export_database(city, file, evaluation=dataclasses.replace(results, queries=empty))
     assert len(gpd.read_file(file, layer="evaluation_lines")) == 0
     assert set(gpd.read_file(file, layer="evaluation")["outcome"]) == {"nothing seen"}
 
@@ -401,7 +405,7 @@ def test_a_debian_gdal_reads_it(tmp_path: Path) -> None:
         pytest.skip("ogrinfo is not on this machine")
     city, seen = small_city()
     file = tmp_path / "city.gpkg"
-    export_geopackage(city, file, objects=seen, evaluation=small_evaluation())
+    export_database(city, file, objects=seen, evaluation=small_evaluation())
     done = subprocess.run(
         [ogrinfo, "-ro", "-al", "-so", file],
         check=True,
@@ -438,7 +442,7 @@ def test_a_file_that_is_open_elsewhere_is_left_alone(
     does: str, database: SignatureDatabase, tmp_path: Path
 ) -> None:
     file, link = tmp_path / "city.gpkg", tmp_path / "link.gpkg"
-    export_geopackage(database, file)
+    export_database(database, file)
     link.symlink_to(file)
     command = [sys.executable, "-c", HOLDER, str(file), HOLDERS[does]]
     with subprocess.Popen(command, stdin=PIPE, stdout=PIPE, text=True) as other:
@@ -448,11 +452,11 @@ def test_a_file_that_is_open_elsewhere_is_left_alone(
         before = file.read_bytes()
         for path in (file, link):
             with pytest.raises(InputError) as caught:
-                export_geopackage(database, path, geometry="point")
+                export_database(database, path, geometry="point")
             assert_sentence(caught.value, path.name, "open in another program", "close it")
         assert file.read_bytes() == before
         other.communicate("done\n")
-    export_geopackage(database, file, geometry="point")
+    export_database(database, file, geometry="point")
     assert pyogrio.read_info(file, layer="cells")["geometry_type"] == "Point"
 
 
@@ -460,7 +464,7 @@ def test_a_file_that_is_opened_meanwhile_is_left_alone(
     database: SignatureDatabase, tmp_path: Path
 ) -> None:
     file = tmp_path / "city.gpkg"
-    export_geopackage(database, file)
+    export_database(database, file)
     before = file.read_bytes()
     with closing(sqlite3.connect(file)) as other:
 
@@ -469,7 +473,7 @@ def test_a_file_that_is_opened_meanwhile_is_left_alone(
                 other.execute("BEGIN IMMEDIATE")
 
         with pytest.raises(InputError) as caught:
-            export_geopackage(database, file, progress=lock)
+            export_database(database, file, progress=lock)
     assert_sentence(caught.value, "open in another program")
     assert file.read_bytes() == before
     assert list(tmp_path.iterdir()) == [file]
@@ -516,17 +520,22 @@ def test_qgis_colours_the_layers_at_once(qgis_draw: Draw, tmp_path: Path) -> Non
     classes = [ObjectClass(one.code, one.symbol, one.name, nasty) for one in seen.taxonomy.classes]
     hostile = StreetObjects(seen.table, Taxonomy(tuple(classes)), (nasty,))
     file = tmp_path / "city.gpkg"
-    export_geopackage(
+    export_database(
         dataclasses.replace(city, taxonomy=hostile.taxonomy, licenses=(nasty,)),
         file,
         objects=hostile,
         identifiability=told_of(city),
         evaluation=small_evaluation(),
-        answer=small_localization(),
     )
-    names = ("objects", "evaluation", "evaluation_lines", "candidates", "regions", "cells")
+    answer = tmp_path / "answer.gpkg"
+    export_answer(small_localization(), city, answer)
+    sources = [
+        *(f"{file}|layername={name}" for name in ("objects", "evaluation", "evaluation_lines")),
+        *(f"{answer}|layername={name}" for name in ("candidates", "regions")),
+        f"{file}|layername=cells",
+    ]
     box = tuple(gpd.read_file(file, layer="cells").total_bounds.tolist())
-    told = qgis_draw(tmp_path / "a.png", box, *(f"{file}|layername={name}" for name in names))
+    told = qgis_draw(tmp_path / "a.png", box, *sources)
     assert all(layer["valid"] for layer in told)
     assert [layer["renderer"].removesuffix("Symbol") for layer in told] == [
         *("categorized", "categorized", "categorized", "graduated", "graduated", "graduated")
@@ -547,7 +556,7 @@ def test_qgis_colours_the_layers_at_once(qgis_draw: Draw, tmp_path: Path) -> Non
     # Cells by tenths of their chance, and the file is whole and free when QGIS has left it.
     qgis_draw(tmp_path / "b.png", box, f"{file}|layername=cells")
     assert len(colours_of(tmp_path / "b.png")) >= 10
-    export_geopackage(city, file)
+    export_database(city, file)
 
 
 def test_text_that_no_program_may_stumble_over(tmp_path: Path) -> None:
@@ -561,7 +570,7 @@ def test_text_that_no_program_may_stumble_over(tmp_path: Path) -> None:
     ]
     hostile = StreetObjects(table, Taxonomy(tuple(classes)), (nasty,))
     file = tmp_path / "city.gpkg"
-    export_geopackage(build_database(hostile), file, objects=hostile)
+    export_database(build_database(hostile), file, objects=hostile)
     read = gpd.read_file(file, layer="objects")
     assert set(read["source_id"]) == set(read["title"]) == {nasty}
     facts = pyogrio.read_info(file, layer="objects")["layer_metadata"]
@@ -570,7 +579,7 @@ def test_text_that_no_program_may_stumble_over(tmp_path: Path) -> None:
 
 def test_identifiability_goes_with_the_cells(database: SignatureDatabase, tmp_path: Path) -> None:
     told, file = told_of(database), tmp_path / "city.gpkg"
-    export_geopackage(database, file, identifiability=told)
+    export_database(database, file, identifiability=told)
     cells = gpd.read_file(file, layer="cells")
     table = told.table()
     assert set(table.column_names) <= set(cells.columns)
@@ -585,6 +594,6 @@ def test_identifiability_of_other_cells_is_refused(
 ) -> None:
     told = told_of(database.select(slice(3, None)))
     with pytest.raises(InputError) as caught:
-        export_geopackage(database, tmp_path / "city.gpkg", identifiability=told)
+        export_database(database, tmp_path / "city.gpkg", identifiability=told)
     assert_sentence(caught.value, "that of other cells")
     assert not list(tmp_path.iterdir())

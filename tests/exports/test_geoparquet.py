@@ -49,7 +49,7 @@ def test_cells_read_back_as_they_are(tmp_path: Path) -> None:
 def test_the_metadata_says_what_it_is(tmp_path: Path) -> None:
     database, objects = small_city()
     file = tmp_path / "objects.parquet"
-    export_database(database, file, layer="objects", objects=objects)
+    export_database(database, file, layers=["objects"], objects=objects)
     metadata = pq.read_schema(file).metadata
     geo = json.loads(metadata[b"geo"])
     column = geo["columns"]["geometry"]
@@ -78,7 +78,7 @@ def test_a_box_is_read_by_its_bounds(tmp_path: Path) -> None:
 def test_queries(tmp_path: Path) -> None:
     database, _ = small_city()
     evaluation, file = small_evaluation(), tmp_path / "queries.parquet"
-    export_database(database, file, layer="evaluation", evaluation=evaluation)
+    export_database(database, file, layers=["evaluation"], evaluation=evaluation)
     read = gpd.read_parquet(file)
     assert read.geometry.to_wkb().tolist() == evaluation.queries.geometry.to_wkb().tolist()
     assert read["query_types"].tolist() == evaluation.queries["query_types"].tolist()
