@@ -11,6 +11,7 @@ from semsig_gis.errors import CrsError, EmptyResultError
 from semsig_gis.grid import GridSpec, cells_near
 from semsig_gis.occlusion import Footprints, hidden
 from semsig_gis.signatures import SignatureSpec, clockwise_order
+from semsig_gis.surroundings import licenses_of
 from semsig_gis.spatial_index import PackedIndex
 from semsig_gis.viewpoints import ViewpointSpec, choose_viewpoints
 from semsig_gis.visibility import visible_objects
@@ -190,6 +191,7 @@ def build_cells(
         widths=None if streets is None else streets.get("half_width"),
     )
     columns, rows = columns[chosen], rows[chosen]
+    along = streets if viewpoints.mode == "streets" else None
     by_class = objects.taxonomy.ranges(spec.radius)
     index = PackedIndex(objects.xy, objects.table.geometry.to_numpy())
     ranges = by_class[objects.codes]
@@ -217,7 +219,7 @@ def build_cells(
         spec=spec,
         taxonomy=objects.taxonomy,
         crs=objects.crs,
-        licenses=objects.licenses,
+        licenses=(*objects.licenses, *licenses_of(footprints, along)),
         viewpoints=viewpoints,
         occlusion=None if buildings is None else buildings.tolerance,
     )

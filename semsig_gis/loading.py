@@ -9,8 +9,8 @@ import pandas as pd
 
 from semsig_gis.conflation import ConflationReport, conflate
 from semsig_gis.errors import CrsError, EmptyResultError
-from semsig_gis.objects import build_objects
-from semsig_gis.schema import CLASS_NAME
+from semsig_gis.objects import build_objects, license_lines
+from semsig_gis.schema import CLASS_NAME, LICENSES
 from semsig_gis.sources import find_files, reader
 
 if TYPE_CHECKING:
@@ -278,8 +278,11 @@ def assemble(
 
 
 def _surroundings(layers: Sequence[RawLayer], role: str, crs: CRS) -> gpd.GeoDataFrame | None:
-    tables = [layer.table.to_crs(crs) for layer in layers if layer.spec.role == role]
-    if not tables:
+    chosen = [layer for layer in layers if layer.spec.role == role]
+    if not chosen:
         return None
+    tables = [layer.table.to_crs(crs) for layer in chosen]
     table = pd.concat(tables, ignore_index=True).drop(columns=CLASS_NAME)
-    return table[~(table.geometry.isna() | table.geometry.is_empty)].reset_index(drop=True)
+    table = table[~(table.geometry.isna() | table.geometry.is_empty)].reset_index(drop=True)
+    table.attrs[LICENSES] = list(license_lines(chosen))
+    return table

@@ -12,6 +12,7 @@ from semsig_gis._map_packing import steps
 from semsig_gis._map_parts import Drawing, Legend, finished_map, free_name, prepared_map, to_latlon
 from semsig_gis.boxes import hilbert_order
 from semsig_gis.errors import CrsError, EmptyResultError
+from semsig_gis.surroundings import licenses_of
 
 if TYPE_CHECKING:
     import folium
@@ -31,7 +32,6 @@ def ground_map(
     buildings: gpd.GeoDataFrame | None = None,
     streets: gpd.GeoDataFrame | None = None,
     box: tuple[float, float, float, float] | None = None,
-    licenses: tuple[str, ...] = (),
     map_: folium.Map | None = None,
 ) -> folium.Map:
     """Show plain streets and buildings, for other things to be seen among.
@@ -44,15 +44,14 @@ def ground_map(
         Centre lines in the same CRS.
     box : tuple of float, optional
         ``xmin, ymin, xmax, ymax`` in that CRS: only what meets it. Everything by default.
-    licenses : tuple of str, optional
-        Whom to name for them, a line each.
     map_ : folium.Map, optional
         Map to add the layer to, below all else; a new one by default.
 
     Returns
     -------
     folium.Map
-        The map. It needs no network.
+        The map, which names whom to name for them (see `semsig_gis.surroundings.licenses_of`). It
+        needs no network.
 
     Raises
     ------
@@ -95,7 +94,7 @@ def ground_map(
         bounds = shapely.total_bounds(np.concatenate(list(shapes.values()))).reshape(2, 2)
         text = "<summary>Streets and buildings</summary>"
         Legend(text, to_latlon(bounds, systems[0])).add_to(chosen)
-    return finished_map(chosen, None, licenses=licenses)
+    return finished_map(chosen, None, licenses=licenses_of(buildings, streets))
 
 
 def _simple(

@@ -43,6 +43,7 @@ __all__ = [
     "LoadReport",
     "StreetObjects",
     "build_objects",
+    "license_lines",
     "objects_of",
     "objects_specs",
     "open_objects",
@@ -298,7 +299,7 @@ def build_objects(
             layers, parts, repeated, remaining, strict=True
         )
     )
-    return StreetObjects(table, taxonomy, _licenses(layers)), LoadReport(reports)
+    return StreetObjects(table, taxonomy, license_lines(layers)), LoadReport(reports)
 
 
 def _positions(layer: RawLayer, taxonomy: Taxonomy, crs: CRS) -> tuple[pd.DataFrame, int, int]:
@@ -363,8 +364,26 @@ def _first_at_place(
     return first[order], counts[order]
 
 
-def _licenses(layers: Iterable[RawLayer]) -> tuple[str, ...]:
-    """Return a line for every publisher and licence, with the layers that they cover."""
+def license_lines(layers: Iterable[RawLayer]) -> tuple[str, ...]:
+    """Return whom to name for layers.
+
+    Parameters
+    ----------
+    layers : iterable of RawLayer
+        The layers.
+
+    Returns
+    -------
+    tuple of str
+        A line for every publisher and licence, with the names of the layers that they cover.
+
+    Examples
+    --------
+    >>> from semsig_gis.sources.synthetic import CitySpec, synthetic_city
+    >>> for line in license_lines(synthetic_city(CitySpec(size=300.0))[:1]):
+    ...     print(line)
+    synthetic city of semsig_gis, seed 0: no real place (CC0-1.0): synthetic_alignment_tree
+    """
     layers_of: dict[str, list[str]] = {}
     for layer in layers:
         publisher = layer.spec.attribution or "no attribution given"

@@ -15,6 +15,7 @@ __all__ = [
     "COUNT",
     "GEOMETRY",
     "HALF_WIDTH",
+    "LICENSES",
     "MERGED",
     "SOURCE",
     "SOURCE_ID",
@@ -29,6 +30,9 @@ COUNT = "count"
 MERGED = "merged"
 GEOMETRY = "geometry"
 HALF_WIDTH = "half_width"
+
+LICENSES = "licenses"
+"""Whom to name for a table of buildings or streets: a key of its `attrs`."""
 
 
 def require_metric_crs(crs: CRS | str | int | None) -> CRS:

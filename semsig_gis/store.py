@@ -23,9 +23,10 @@ from semsig_gis.errors import CrsError, DatabaseError, InputError
 from semsig_gis.manifest import digest
 from semsig_gis.objects import open_objects, save_objects
 from semsig_gis.occlusion import Footprints, buildings_near
-from semsig_gis.schema import HALF_WIDTH
+from semsig_gis.schema import HALF_WIDTH, LICENSES
 from semsig_gis.storage import move_folder, whole_file, whole_folder
 from semsig_gis.stored_index import INDEX_FILES, StoredIndex
+from semsig_gis.surroundings import licenses_of
 
 if TYPE_CHECKING:
     import numpy as np
@@ -152,9 +153,9 @@ def _surroundings(table: gpd.GeoDataFrame, objects: StreetObjects) -> gpd.GeoDat
     geometry = table.geometry
     kept = table[~(geometry.isna() | geometry.is_empty)]
     columns = {HALF_WIDTH: kept[HALF_WIDTH].to_numpy(float)} if HALF_WIDTH in kept else {}
-    return gpd.GeoDataFrame(columns, geometry=kept.geometry.to_numpy(), crs=table.crs).to_crs(
-        objects.crs
-    )
+    taken = gpd.GeoDataFrame(columns, geometry=kept.geometry.to_numpy(), crs=table.crs)
+    taken.attrs[LICENSES] = list(licenses_of(table))
+    return taken.to_crs(objects.crs)
 
 
 def store_path(database: str | Path) -> Path:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
@@ -13,6 +14,8 @@ from semsig_gis.boxes import GROUP_ROWS, hilbert_order
 from semsig_gis.catalog import load_catalog
 from semsig_gis.errors import InputError, SourceError
 from semsig_gis.layer_spec import LayerSpec
+from semsig_gis.objects import license_lines
+from semsig_gis.schema import LICENSES
 from semsig_gis.sources import osm_file, vector_file
 from semsig_gis.sources._area import join_areas
 from semsig_gis.storage import whole_file
@@ -24,7 +27,7 @@ if TYPE_CHECKING:
 
     from semsig_gis.layer_spec import GeometryKind
 
-__all__ = ["read_area", "read_surroundings", "save_surroundings"]
+__all__ = ["licenses_of", "read_area", "read_surroundings", "save_surroundings"]
 
 OSM_SUFFIXES = (".osm", ".osm.pbf", ".osm.bz2")
 DIMENSIONS: dict[GeometryKind, int] = {"line": 1, "polygon": 2}
@@ -42,7 +45,8 @@ def save_surroundings(table: gpd.GeoDataFrame, path: str | Path) -> None:
 
     Notes
     -----
-    The file holds the features in a spatial order, with their bounds in the column ``bbox``.
+    The file holds the features in a spatial order, with their bounds in the column ``bbox``, and
+    the `attrs` of the table.
 
     Examples
     --------
@@ -94,7 +98,8 @@ def read_surroundings(
     -------
     GeoDataFrame
         One row a feature that has a geometry; in a box there may be none. Of a ``.parquet`` file
-        all columns are kept.
+        all columns are kept. Whom to name for it, where that is known, is in ``attrs["licenses"]``
+        (see `licenses_of`).
 
     Raises
     ------
@@ -113,6 +118,30 @@ def read_surroundings(
     semsig_gis.errors.SourceError: nowhere.parquet does not exist; give a file of polygons.
     """
     return _read(Path(path), role, "polygon" if role == "buildings" else "line", crs, box)
+
+
+def licenses_of(*tables: gpd.GeoDataFrame | None) -> tuple[str, ...]:
+    """Return whom to name for buildings and streets.
+
+    Parameters
+    ----------
+    *tables : GeoDataFrame or None
+        Tables that `read_surroundings` or `semsig_gis.loading.assemble` returned.
+
+    Returns
+    -------
+    tuple of str
+        A line for every publisher and licence.
+
+    Examples
+    --------
+    >>> houses = gpd.GeoDataFrame(geometry=[shapely.box(0, 0, 5, 5)], crs="EPSG:2154")
+    >>> houses.attrs["licenses"] = ["City (CC0-1.0): buildings"]
+    >>> licenses_of(houses, None)
+    ('City (CC0-1.0): buildings',)
+    """
+    lines = [table.attrs.get(LICENSES, ()) for table in tables if table is not None]
+    return tuple(dict.fromkeys(itertools.chain.from_iterable(lines)))
 
 
 def read_area(path: str | Path, *, crs: CRS | str) -> shapely.Polygon | shapely.MultiPolygon:
@@ -166,7 +195,9 @@ def _read(
         table = _read_parquet(path, kind, box)
     elif path.name.lower().endswith(OSM_SUFFIXES) and role != "area":
         spec = load_catalog("openstreetmap").layer(role)
-        table = osm_file.read_layers(path, [spec])[0].table
+        (layer,) = osm_file.read_layers(path, [spec])
+        table = layer.table
+        table.attrs[LICENSES] = list(license_lines([layer]))
     else:
         layer = vector_file.read_layer(path, LayerSpec(name=role, class_name="", geometry=kind))
         if layer.error_count:

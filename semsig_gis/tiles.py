@@ -19,7 +19,7 @@ from semsig_gis.manifest import part_name
 from semsig_gis.objects import open_objects
 from semsig_gis.occlusion import TOLERANCE_M
 from semsig_gis.signatures import SignatureSpec
-from semsig_gis.surroundings import read_surroundings
+from semsig_gis.surroundings import licenses_of, read_surroundings
 from semsig_gis.unfinished import describe, mark_empty
 from semsig_gis.viewpoints import ViewpointSpec
 
@@ -256,10 +256,8 @@ def _seen_from(plan: TilePlan, tile: Tile, objects: StreetObjects) -> SignatureD
     footprints = None
     if plan.buildings is not None:
         footprints = _footprints(plan.buildings, plan.box(tile, plan.reach + MARGIN_M), objects.crs)
-        if footprints.empty:
-            footprints = None
-            if viewpoints.mode == "outdoor":
-                viewpoints = replace(viewpoints, mode="all")
+        if footprints.empty and viewpoints.mode == "outdoor":
+            viewpoints = replace(viewpoints, mode="all")
     database = build_cells(
         objects,
         columns[inside],
@@ -267,12 +265,16 @@ def _seen_from(plan: TilePlan, tile: Tile, objects: StreetObjects) -> SignatureD
         grid=plan.grid,
         spec=plan.spec,
         viewpoints=viewpoints,
-        footprints=footprints,
+        footprints=None if footprints is None or footprints.empty else footprints,
         streets=streets,
     )
     # A tile without buildings was made in the same way as the others.
-    occlusion = None if plan.buildings is None else TOLERANCE_M
-    return replace(database, viewpoints=plan.viewpoints, occlusion=occlusion)
+    return replace(
+        database,
+        viewpoints=plan.viewpoints,
+        occlusion=None if footprints is None else TOLERANCE_M,
+        licenses=(*objects.licenses, *licenses_of(footprints, streets)),
+    )
 
 
 def _footprints(path: Path, box: Box, crs: CRS) -> gpd.GeoDataFrame:

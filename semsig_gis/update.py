@@ -20,6 +20,7 @@ from semsig_gis.occlusion import TOUCHING_M, buildings_near
 from semsig_gis.schema import HALF_WIDTH, SOURCE
 from semsig_gis.spatial_index import PackedIndex
 from semsig_gis.store import open_store, save_with_store
+from semsig_gis.surroundings import licenses_of
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -157,7 +158,9 @@ def update_database(
     """
     _require_surroundings(database, store)
     merged, kept, notes = replace_layers(store.objects, objects)
-    new = replace(database, taxonomy=merged.taxonomy, licenses=merged.licenses, version=__version__)
+    along = store.streets if database.viewpoints.mode == "streets" else None
+    licenses = (*merged.licenses, *licenses_of(store.footprints, along))
+    new = replace(database, taxonomy=merged.taxonomy, licenses=licenses, version=__version__)
     _require_reach(database, new)
     changes = compare_objects(store.objects, merged)
     cells = _cells_in_range(new, store.objects, merged, changes)

@@ -74,9 +74,10 @@ def test_the_ground_lies_below_all_else(
 ) -> None:
     x, y = database.xy.mean(axis=0)
     house = table(shapely.box(x - 50, y - 50, x + 50, y + 50))
+    house.attrs["licenses"] = ["Mapper (CC0)"]
     chosen = localization_map(localize(database, database.signature(0), top=3), database)
     chosen = objects_map(WORLD.street_objects, map_=chosen)
-    assert ground_map(buildings=house, map_=chosen, licenses=("Mapper (CC0)",)) is chosen
+    assert ground_map(buildings=house, map_=chosen) is chosen
     opened(browser, chosen, tmp_path)
     assert browser.title == "Candidate places"
     order = """

@@ -90,6 +90,7 @@ def test_buildings_and_streets_are_kept_in_the_crs_of_the_objects(tmp_path: Path
     houses = surroundings(shapely.box(*CORNER, *(CORNER + 9)), shapely.Polygon())
     houses["name"] = ["town hall", "nothing"]
     streets = surroundings(shapely.LineString([CORNER, CORNER + 50]), half_width=[7.5])
+    houses.attrs["licenses"] = ["City (CC0): houses"]
     store = ObjectStore.of(TOWN, footprints=houses, streets=streets)
     save_with_store(build_database(TOWN, footprints=houses), store, tmp_path / "city.parquet")
     again = open_store(tmp_path / "city.parquet")
@@ -99,6 +100,9 @@ def test_buildings_and_streets_are_kept_in_the_crs_of_the_objects(tmp_path: Path
     # To the last bit, since the sight lines of an update are held against them.
     assert again.footprints.geometry.tolist() == houses.to_crs(TOWN.crs).geometry.tolist()[:1]
     assert again.footprints.columns.tolist() == ["geometry"]
+    assert again.footprints.attrs["licenses"] == ["City (CC0): houses"]
+    licenses = open_database(tmp_path / "city.parquet").licenses
+    assert licenses == (*TOWN.licenses, "City (CC0): houses")
     assert again.streets["half_width"].tolist() == [7.5]
     bare = gpd.GeoDataFrame(geometry=[shapely.box(0, 0, 1, 1)])
     with pytest.raises(CrsError) as caught:

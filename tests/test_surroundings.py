@@ -9,7 +9,7 @@ from osm_xml import node, way, write_osm
 from sentences import assert_sentence
 
 from semsig_gis.errors import InputError, SourceError
-from semsig_gis.surroundings import read_area, read_surroundings, save_surroundings
+from semsig_gis.surroundings import licenses_of, read_area, read_surroundings, save_surroundings
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -41,6 +41,10 @@ def test_an_openstreetmap_file_gives_what_it_tags(tmp_path: Path) -> None:
     houses = read_surroundings(path, role="buildings", crs="EPSG:32635")
     streets = read_surroundings(path, role="streets", crs="EPSG:32635")
     assert (houses.geom_type.tolist(), streets.geom_type.tolist()) == (["Polygon"], ["LineString"])
+    named = tuple(f"OpenStreetMap contributors (ODbL 1.0): {name}" for name in ("buildings", "streets"))
+    assert licenses_of(houses, streets, houses) == named
+    shouted = path.rename(path.with_name("CITY.OSM"))
+    assert licenses_of(read_surroundings(shouted, role="streets", crs=CRS)) == named[1:]
 
 
 def test_a_file_of_something_else_is_refused(tmp_path: Path) -> None:
@@ -89,6 +93,7 @@ def rows_of_houses() -> gpd.GeoDataFrame:
 
 def test_saved_surroundings_come_back_by_box(tmp_path: Path) -> None:
     table = rows_of_houses()
+    table.attrs["licenses"] = ["City (CC0): houses"]
     path = tmp_path / "new" / "houses.parquet"
     save_surroundings(table, path)
     again = read_surroundings(path, role="buildings", crs=CRS)
@@ -97,6 +102,7 @@ def test_saved_surroundings_come_back_by_box(tmp_path: Path) -> None:
     near = read_surroundings(path, role="buildings", crs=CRS, box=box)
     assert sorted(near["n"]) == sorted(table["n"][table.intersects(shapely.box(*box))])
     assert list(near.columns) == ["n", "geometry"]
+    assert licenses_of(near) == licenses_of(again) == ("City (CC0): houses",)
     save_surroundings(again, tmp_path / "again.parquet")
     assert (tmp_path / "again.parquet").read_bytes() == path.read_bytes()
 

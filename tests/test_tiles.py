@@ -159,7 +159,10 @@ def houses_and_streets() -> tuple[gpd.GeoDataFrame, gpd.GeoDataFrame]:
         moved = [shapely.transform(shape, lambda xy: xy + CORNER) for shape in given]
         return gpd.GeoDataFrame(columns, geometry=moved, crs="EPSG:2154")
 
-    return placed(shapes), placed(lines, half_width=[6.0, np.nan, 17.0, 3.0])
+    houses, streets = placed(shapes), placed(lines, half_width=[6.0, np.nan, 17.0, 3.0])
+    houses.attrs["licenses"] = ["City (CC0): houses"]
+    streets.attrs["licenses"] = ["Roads (OGL): lanes"]
+    return houses, streets
 
 
 @pytest.mark.parametrize("mode", ["all", "outdoor", "streets"])

@@ -64,6 +64,8 @@ STREETS = surroundings(
     shapely.LineString([at(110, 0), at(120, SIZE)]),
     half_width=[np.nan, 14.0],
 )
+HOUSES.attrs["licenses"] = ["City (CC0): houses"]
+STREETS.attrs["licenses"] = ["Roads (OGL): lanes"]
 AREA = shapely.Polygon([at(-20, -20), at(400, 0), at(200, 280)])
 
 

@@ -41,10 +41,9 @@ def draw_ground(
     streets: Path | None = None,
 ) -> None:
     """Add streets and buildings to a map: those of files, else of the store of the database."""
-    from semsig_gis.catalog import load_catalog
     from semsig_gis.map_ground import ground_map
     from semsig_gis.store import open_store
-    from semsig_gis.surroundings import OSM_SUFFIXES, read_surroundings
+    from semsig_gis.surroundings import read_surroundings
 
     houses = lines = None
     if buildings is not None:
@@ -59,15 +58,11 @@ def draw_ground(
     if houses is None and lines is None:
         return
     low, high = opened.xy.min(axis=0) - AROUND_M, opened.xy.max(axis=0) + AROUND_M
-    catalog = load_catalog("openstreetmap")
-    named = f"{catalog.attribution} ({catalog.license}): streets and buildings"
-    from_osm = any(str(file).endswith(OSM_SUFFIXES) for file in (buildings, streets))
     try:
         ground_map(
             buildings=houses,
             streets=lines,
             box=(*low.tolist(), *high.tolist()),
-            licenses=(named,) if from_osm else (),
             map_=drawn,
         )
     except EmptyResultError:
