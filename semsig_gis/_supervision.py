@@ -36,12 +36,17 @@ def stop_with_supervisor() -> None:
     """From now on, be interrupted when the standard input ends."""
     # A program that was itself started in the background hands on that interrupts be ignored.
     signal.signal(signal.SIGINT, signal.default_int_handler)
-    threading.Thread(target=_interrupt_at_end_of_input, daemon=True).start()
+    # A copy, with nothing in the place of the original: on Windows, a library that asks for the
+    # kind of the standard input while it is loaded would wait for the read to end.
+    watched, nothing = os.dup(0), os.open(os.devnull, os.O_RDONLY)
+    os.dup2(nothing, 0)
+    os.close(nothing)
+    threading.Thread(target=_interrupt_at_end_of, args=(watched,), daemon=True).start()
 
 
-def _interrupt_at_end_of_input() -> None:
-    # Not sys.stdin, whose lock would be held when the interpreter ends.
-    while os.read(0, 1):
+def _interrupt_at_end_of(watched: int) -> None:
+    # Not a file object, whose lock would be held when the interpreter ends.
+    while os.read(watched, 1):
         pass
     if sys.platform == "win32":
         signal.raise_signal(signal.SIGINT)

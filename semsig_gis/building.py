@@ -11,8 +11,8 @@ from semsig_gis.errors import CrsError, EmptyResultError
 from semsig_gis.grid import GridSpec, cells_near
 from semsig_gis.occlusion import Footprints, hidden
 from semsig_gis.signatures import SignatureSpec, clockwise_order
-from semsig_gis.surroundings import licenses_of
 from semsig_gis.spatial_index import PackedIndex
+from semsig_gis.surroundings import licenses_of
 from semsig_gis.viewpoints import ViewpointSpec, choose_viewpoints
 from semsig_gis.visibility import visible_objects
 

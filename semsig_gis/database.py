@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+import operator
 from dataclasses import dataclass, replace
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, TypeVar
@@ -11,14 +12,14 @@ import numpy as np
 from pyproj import CRS
 
 from semsig_gis import __version__
-from semsig_gis.errors import DatabaseError
+from semsig_gis.errors import DatabaseError, InputError
 from semsig_gis.grid import cell_ids
 from semsig_gis.sequences import SequenceTable
 from semsig_gis.signatures import Signature, quantize
 from semsig_gis.viewpoints import ViewpointSpec
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Iterable, Mapping, Sequence
 
     from numpy.typing import ArrayLike, NDArray
 
@@ -32,6 +33,7 @@ __all__ = [
     "SignatureDatabase",
     "join_databases",
     "require_same",
+    "rows_of_result",
 ]
 
 _Array = TypeVar("_Array", bound="NDArray[Any]")
@@ -362,6 +364,65 @@ def require_same(
                 "build both in the same way."
             )
             raise DatabaseError(msg)
+
+
+def rows_of_result(
+    database: SignatureDatabase, ids: ArrayLike, types: Iterable[str], *, cells: int, what: str
+) -> NDArray[np.int64]:
+    """Return the rows of the cells that a result names, and refuse one of another database.
+
+    Parameters
+    ----------
+    database : SignatureDatabase
+        The database that was searched.
+    ids : array_like of int64, shape (k,)
+        Ids of the cells.
+    types : iterable of str
+        What the result says is seen from each of them.
+    cells : int
+        How many cells it says that there are in all.
+    what : str
+        What kind of result it is, for the sentence that refuses it.
+
+    Returns
+    -------
+    ndarray of int64, shape (k,)
+        Row numbers.
+
+    Raises
+    ------
+    InputError
+        If the database has another number of cells, or lacks one of these or sees other types
+        from it.
+
+    Examples
+    --------
+    >>> from semsig_gis.building import build_database
+    >>> from semsig_gis.sources.synthetic import CitySpec, synthetic_city
+    >>> from semsig_gis.catalog import paper_taxonomy
+    >>> from semsig_gis.objects import build_objects
+    >>> layers = synthetic_city(CitySpec(size=300.0))
+    >>> objects, _ = build_objects(layers, taxonomy=paper_taxonomy(), crs="EPSG:32631")
+    >>> database = build_database(objects)
+    >>> told = {"cells": len(database), "what": "localization"}
+    >>> rows_of_result(database, database.cell_ids[5:6], [database.types(5)], **told).tolist()
+    [5]
+    """
+    wanted = np.asarray(ids, np.int64)
+    rows = np.searchsorted(database.cell_ids, wanted)
+    same = (
+        cells == len(database)
+        and rows.max(initial=0) < cells
+        and np.array_equal(database.cell_ids[rows], wanted)
+        and all(map(operator.eq, types, map(database.types, rows.tolist())))
+    )
+    if not same:
+        msg = (
+            f"This {what} was not made with this database; give the database that it was made "
+            f"with, or make the {what} again."
+        )
+        raise InputError(msg)
+    return rows
 
 
 def _brief(value: object) -> str:

@@ -17,6 +17,7 @@ import numpy as np
 import pandas as pd
 import pyarrow as pa
 
+from semsig_gis.database import rows_of_result
 from semsig_gis.distortion_chain import chain_text
 from semsig_gis.errors import DatabaseError, InputError
 from semsig_gis.evaluation_figures import (
@@ -43,6 +44,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+    from semsig_gis.database import SignatureDatabase
     from semsig_gis.method import Method
     from semsig_gis.queries import QuerySpec
 
@@ -168,6 +170,35 @@ class Evaluation:
     def unlocalized(self) -> int:
         """Number of queries of which the distortion left nothing."""
         return int((self.queries["query_length"] == 0).sum())
+
+    def rows_in(self, database: SignatureDatabase) -> NDArray[np.int64]:
+        """Return where the true cells of the queries are in the database that was searched.
+
+        Parameters
+        ----------
+        database : SignatureDatabase
+            The database.
+
+        Returns
+        -------
+        ndarray of int64, shape (queries,)
+            Row numbers; -1 where the database has no such cell.
+
+        Raises
+        ------
+        InputError
+            If another database was searched.
+        """
+        known = self.queries["cell"].to_numpy() >= 0
+        rows = np.full(len(known), -1)
+        rows[known] = rows_of_result(
+            database,
+            self.queries["cell_id"][known],
+            self.queries["types"][known],
+            cells=self.database["cells"],
+            what="evaluation",
+        )
+        return rows
 
     def cdf(self, thresholds: Sequence[float] = THRESHOLDS) -> NDArray[np.float64]:
         """Return the share of queries whose error is at most so many metres.

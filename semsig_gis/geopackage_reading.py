@@ -135,7 +135,10 @@ def read_geopackage(path: str | Path) -> GeopackageContents:
             except DatabaseError as error:
                 notes.append(str(error))
         objects = _objects(path) if OBJECTS in names else None
-    except (DataSourceError, DataLayerError, CRSError, ValueError, LookupError, TypeError) as error:
+    except (
+        *(DataSourceError, DataLayerError, CRSError, pa.ArrowException),
+        *(OSError, ValueError, LookupError, TypeError),
+    ) as error:
         msg = f"{path} is damaged, or was not written by semsig export; export the database again."
         raise DatabaseError(msg) from error
     return GeopackageContents(
@@ -151,6 +154,12 @@ def _objects(path: str | Path) -> StreetObjects:
         name: table[name].cast(kinds[name]) if name in kinds else table[name]
         for name in table.column_names
     }
+    # What was drawn in QGIS tells neither its source nor how often it was listed.
+    unknown: dict[str, str | int] = {SOURCE: "", SOURCE_ID: "", COUNT: 1}
+    columns |= {name: pc.fill_null(columns[name], value) for name, value in unknown.items()}
+    if pc.min(columns[COUNT]).as_py() < 1:
+        msg = "an object stands for fewer than one"
+        raise ValueError(msg)
     return objects_of(pa.table(columns), specs, crs, path=path)
 
 

@@ -11,6 +11,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pyarrow as pa
 
+from semsig_gis.errors import InputError
+
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
@@ -92,6 +94,23 @@ class Identifiability:
     classes: tuple[ClassGain, ...]
     trials: int
     seed: int
+
+    def require_cells_of(self, database: SignatureDatabase) -> None:
+        """Raise where another database has other cells.
+
+        Parameters
+        ----------
+        database : SignatureDatabase
+            The database.
+
+        Raises
+        ------
+        InputError
+            If its cells are others.
+        """
+        if not np.array_equal(self.database.cell_ids, database.cell_ids):
+            msg = "the identifiability is that of other cells; give that of this database."
+            raise InputError(msg)
 
     def table(self, rows: slice = slice(None)) -> pa.Table:
         """Return what is known of the cells as columns.

@@ -16,7 +16,6 @@ from semsig_gis._map_parts import (
     free_name,
     prepared_map,
 )
-from semsig_gis.errors import InputError
 from semsig_gis.map_image import level_image
 from semsig_gis.map_legend import GROUP_COLOURS, ambiguity_legend
 
@@ -74,9 +73,8 @@ def ambiguity_map(
     20
     """
     view = city_view(database)
-    if identifiability is not None and identifiability.database is not database:
-        msg = "what is told of queries is of another database; give that of these cells."
-        raise InputError(msg)
+    if identifiability is not None:
+        identifiability.require_cells_of(database)
     chosen = prepared_map(map_, tiles, title="Cells that look the same")
     types, angles = database.type_sequences, database.angle_sequences
     pairs = types.inverse * len(angles) + angles.inverse

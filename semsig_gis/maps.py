@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import itertools
 import math
-import operator
 from typing import TYPE_CHECKING, Any
 
 import folium
@@ -29,6 +28,7 @@ from semsig_gis._map_parts import (
     query_signature,
     to_latlon,
 )
+from semsig_gis.database import rows_of_result
 from semsig_gis.errors import InputError
 from semsig_gis.evaluation import SUCCESS_METRES
 from semsig_gis.map_legend import (
@@ -43,7 +43,7 @@ from semsig_gis.spatial_index import ObjectIndex
 from semsig_gis.storage import whole_file
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Sequence
+    from collections.abc import Sequence
     from pathlib import Path
 
     from numpy.typing import ArrayLike, NDArray
@@ -296,27 +296,6 @@ class _Heat(Furniture, HeatMap):
     )
 
 
-def _rows(
-    ids: ArrayLike, types: Iterable[str], database: SignatureDatabase, *, cells: int, what: str
-) -> NDArray[np.int64]:
-    """Return the rows of cells with these ids and types, of a database with so many cells."""
-    wanted = np.asarray(ids, np.int64)
-    rows = np.searchsorted(database.cell_ids, wanted)
-    same = (
-        cells == len(database)
-        and rows.max(initial=0) < cells
-        and np.array_equal(database.cell_ids[rows], wanted)
-        and all(map(operator.eq, types, map(database.types, rows.tolist())))
-    )
-    if not same:
-        msg = (
-            f"This {what} was not made with this database; give the database that it was made "
-            f"with, or make the {what} again."
-        )
-        raise InputError(msg)
-    return rows
-
-
 def _query_records(
     evaluation: Evaluation,
     database: SignatureDatabase,
@@ -326,13 +305,7 @@ def _query_records(
     """Return what the script draws of each query: place, look, best places, heading, details."""
     cells, total = len(database), len(evaluation.queries)
     successful = evaluation.successful.tolist()
-    rows = _rows(
-        evaluation.queries["cell_id"],
-        evaluation.queries["types"],
-        database,
-        cells=evaluation.database["cells"],
-        what="evaluation",
-    )
+    rows = evaluation.rows_in(database)
     following, offs = _following(evaluation, database)
     best_rows = np.searchsorted(
         database.cell_ids, evaluation.queries["best_cell_id"].fillna(0).to_numpy(np.int64)
@@ -343,7 +316,7 @@ def _query_records(
         asked = [float(one) for one in query.query_bearings.split(",") if one]
         located = query.tied > 0
         details = [
-            cell_signature(database, int(rows[number])),
+            cell_signature(database, int(rows[number])) if rows[number] >= 0 else "no such cell",
             popup_signature(query.query_types, asked)
             if query.query_length
             else "nothing left of it",
@@ -394,10 +367,10 @@ def _candidate_records(
 ) -> list[list[Any]]:
     """Return what the script draws of each candidate, best first."""
     candidates = localization.candidates
-    rows = _rows(
+    rows = rows_of_result(
+        database,
         candidates["cell_id"],
         candidates["types"],
-        database,
         cells=localization.cells,
         what="localization",
     )

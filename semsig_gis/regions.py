@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 __all__ = ["SearchRegions", "search_regions"]
 
 
-@dataclass(frozen=True, eq=False, kw_only=True)
+@dataclass(frozen=True, eq=False)
 class SearchRegions:
     """The regions of a city in which a query may have been seen.
 
@@ -39,12 +39,9 @@ class SearchRegions:
         ``best_cell_id``, ``best_x`` and ``best_y`` (its best cell, and the viewpoint of that);
         ``searched_chance``, ``searched_km2`` and ``searched_percent`` (of the city) with all
         regions before it; ``geometry`` (polygon of whole cells that share sides).
-    city_km2 : float
-        Area of all cells of the database.
     """
 
     table: gpd.GeoDataFrame
-    city_km2: float
 
     def to_dict(self) -> dict[str, Any]:
         """Return what is to be searched in all as plain values for JSON.
@@ -113,6 +110,9 @@ def search_regions(
     >>> search_regions(answer, database).to_dict()["cells"]
     5
     """
+    if not 0 < share <= 1:
+        msg = f"regions of a share of {share} were asked for; give a number above 0, at most 1."
+        raise InputError(msg)
     if not (math.isfinite(within) and within >= 0):
         msg = f"regions within {within} m were asked for; give metres, 0 or more."
         raise InputError(msg)
@@ -142,7 +142,6 @@ def search_regions(
     order = np.argsort(first if held is None else -held, kind="stable")
     best = cells[first[order]]
     km2 = counts[order] * database.grid.step**2 / 1e6
-    city_km2 = len(database) * database.grid.step**2 / 1e6
     columns: dict[str, Any] = {"rank": np.arange(1, len(order) + 1)}
     if held is not None:
         columns["chance"] = held[order]
@@ -157,10 +156,7 @@ def search_regions(
         columns["searched_chance"] = np.minimum(np.cumsum(held[order]), 1.0)
     columns["searched_km2"] = np.cumsum(km2)
     columns["searched_percent"] = 100.0 * np.cumsum(counts[order]) / len(database)
-    return SearchRegions(
-        table=gpd.GeoDataFrame(columns, geometry=shapes[order], crs=database.crs),
-        city_km2=city_km2,
-    )
+    return SearchRegions(gpd.GeoDataFrame(columns, geometry=shapes[order], crs=database.crs))
 
 
 def _runs(database: SignatureDatabase, cells: NDArray[np.int64]) -> NDArray[np.object_]:

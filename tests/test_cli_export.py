@@ -94,8 +94,9 @@ def test_what_must_be_searched_after_a_query(method: str, city: Path, run: Run) 
 
 
 def test_the_chance_of_every_cell(city: Path, run: Run) -> None:
-    query = ("--types", "DD", "--method", "likelihood", "--share", 0.5)
-    assert run("localize", city, *query, "--out", city.parent / "p.tif")[0] == 0
+    query = ("--types", "DD", "--method", "likelihood")
+    code, out, _ = run("localize", city, *query, "--out", city.parent / "p.tif")
+    assert (code, out.splitlines()[-1]) == (0, f"chances: {city.parent / 'p.tif'}")
     with rasterio.open(city.parent / "p.tif") as read:
         values = [value[0] for value in read.sample(small_city()[0].xy)]
     assert sum(values) == pytest.approx(1.0, abs=1e-4)
@@ -104,6 +105,7 @@ def test_the_chance_of_every_cell(city: Path, run: Run) -> None:
 def test_what_does_not_go_together(city: Path, run: Run) -> None:
     folder = city.parent
     out = ("--out", folder / "a.gpkg")
+    likely = ("--method", "likelihood")
     refused = (
         (("export", city, "--layer", "objects", *out), "no objects"),
         (("export", city, "--out", folder / "a.txt"), ".gpkg, .parquet, .csv or .tif"),
@@ -113,12 +115,35 @@ def test_what_does_not_go_together(city: Path, run: Run) -> None:
         (("localize", city, "--queries", "-", *out), "--out"),
         (("localize", city, "--types", "D", "--out", folder / "a.tif"), "likelihood"),
         (("localize", city, "--types", "D", "--within", -1, *out), "metres, 0 or more"),
+        (
+            ("localize", city, "--types", "D", *likely, "--share", 0.5, "--out", folder / "a.tif"),
+            "chances of all cells",
+        ),
         (("import", folder / "nowhere.gpkg", "--out", folder / "b.parquet"), "does not exist"),
         (("import", city, "--out", folder / "b.parquet"), "not written by semsig export"),
     )
     for command, words in refused:
         sentence(run(*command), words)
     assert run("export", city, *out)[0] == 0
-    objects = ("--objects", folder / "o.parquet")
-    sentence(run("import", folder / "a.gpkg", "--out", folder / "b.parquet", *objects), "holds no")
+    more = ("--objects", folder / "o.parquet")
+    sentence(run("import", folder / "a.gpkg", "--out", folder / "b.parquet", *more), "holds no")
     assert not (folder / "b.parquet").exists()
+
+
+def test_nothing_is_written_over_what_is_read(city: Path, run: Run) -> None:
+    folder = city.parent
+    objects = folder / "objects.parquet"
+    refused: tuple[tuple[object, ...], ...] = (
+        ("export", city, "--out", city),
+        ("export", city, "--objects", objects, "--layer", "objects", "--out", objects),
+        ("map", city, "--ambiguity", "--out", folder / "x" / ".." / city.name),
+        ("localize", city, "--types", "D", "--map", city),
+        ("localize", city, "--types", "D", "--map", folder / "m", "--out", folder / "m"),
+        ("build", objects, "--out", objects),
+        ("import", folder / "a.gpkg", "--out", folder / "a.gpkg"),
+        ("learn", city, "--samples", folder / "s.csv", "--out", folder / "s.csv"),
+    )
+    before = city.read_bytes()
+    for command in refused:
+        sentence(run(*command), "to be written", "also another file")
+        assert city.read_bytes() == before

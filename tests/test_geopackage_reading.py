@@ -25,7 +25,7 @@ from semsig_gis.errors import DatabaseError, EmptyResultError
 from semsig_gis.exports import export_database
 from semsig_gis.geopackage_reading import read_geopackage
 from semsig_gis.identifiability import Identifiability
-from semsig_gis.objects import StreetObjects
+from semsig_gis.objects import StreetObjects, open_objects, save_objects
 from semsig_gis.viewpoints import ViewpointSpec
 
 if TYPE_CHECKING:
@@ -145,6 +145,33 @@ def test_cells_that_were_deleted_are_gone(tmp_path: Path) -> None:
     assert "other signatures" in found.notes[0]
 
 
+def test_objects_that_were_drawn_are_read(tmp_path: Path) -> None:
+    (database, objects), file = small_city(), tmp_path / "city.gpkg"
+    export_database(database, file, objects=objects)
+    # As QGIS adds a point of which the class alone was told.
+    changed(file, "INSERT INTO objects (geom, class_code) SELECT geom, 3 FROM objects LIMIT 1")
+    found = read_geopackage(file).objects
+    assert found is not None
+    added = found.table.iloc[-1]
+    assert (added["source"], added["source_id"], added["count"]) == ("", "", 1)
+    save_objects(found, tmp_path / "objects.parquet")
+    assert len(open_objects(tmp_path / "objects.parquet")) == len(objects) + 1
+
+
+@pytest.mark.parametrize("start", range(3))
+def test_a_file_with_a_hole_is_refused(start: int, tmp_path: Path) -> None:
+    file = tmp_path / "city.gpkg"
+    export_database(small_city()[0], file)
+    content = bytearray(file.read_bytes())
+    pages = range(4096 * (12 + start), len(content), 3 * 4096)
+    for page in pages:
+        content[page : page + 4096] = bytes(4096)
+    file.write_bytes(content)
+    with pytest.raises(DatabaseError) as caught:
+        read_geopackage(file)
+    assert_sentence(caught.value, "city.gpkg", "damaged")
+
+
 @pytest.mark.parametrize(
     "sql",
     [
@@ -158,11 +185,15 @@ def test_cells_that_were_deleted_are_gone(tmp_path: Path) -> None:
         "DELETE FROM cells",
         "DELETE FROM gpkg_metadata_reference",
         "ALTER TABLE cells DROP COLUMN distances",
+        "UPDATE cells SET bearings = zeroblob(3)",
+        "UPDATE objects SET count = -3 WHERE fid = 2",
+        "UPDATE objects SET class_code = NULL WHERE fid = 2",
     ],
 )
 def test_a_damaged_file_is_refused(sql: str, tmp_path: Path) -> None:
     file = tmp_path / "city.gpkg"
-    export_database(small_city()[0], file)
+    database, objects = small_city()
+    export_database(database, file, objects=objects)
     changed(file, sql)
     with pytest.raises(DatabaseError) as caught:
         read_geopackage(file)

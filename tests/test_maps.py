@@ -334,6 +334,22 @@ def test_queries_of_which_nothing_is_left(database: SignatureDatabase, tmp_path:
     assert "NaN" not in page.partition("</head>")[2]
 
 
+def test_queries_from_cells_that_the_database_has_not(
+    evaluation: Evaluation, database: SignatureDatabase, tmp_path: Path
+) -> None:
+    queries = evaluation.queries.copy()
+    queries.loc[:2, ["cell", "cell_id"]] = -1, -7
+    queries.loc[:2, "types"] = ""
+    elsewhere = dataclasses.replace(evaluation, queries=queries)
+    assert (elsewhere.rows_in(database)[:3] == -1).all()
+    save_map(evaluation_map(elsewhere, database), tmp_path / "map.html", self_contained=False)
+    assert (tmp_path / "map.html").read_text(encoding="utf-8").count("no such cell") == 3
+    queries.loc[5, "types"] = "?"
+    with pytest.raises(InputError) as caught:
+        evaluation_map(dataclasses.replace(evaluation, queries=queries), database)
+    assert_sentence(caught.value, "evaluation was not made with this database")
+
+
 def test_ten_thousand_queries_stay_small(
     evaluation: Evaluation, database: SignatureDatabase, tmp_path: Path
 ) -> None:

@@ -41,7 +41,9 @@ def test_an_openstreetmap_file_gives_what_it_tags(tmp_path: Path) -> None:
     houses = read_surroundings(path, role="buildings", crs="EPSG:32635")
     streets = read_surroundings(path, role="streets", crs="EPSG:32635")
     assert (houses.geom_type.tolist(), streets.geom_type.tolist()) == (["Polygon"], ["LineString"])
-    named = tuple(f"OpenStreetMap contributors (ODbL 1.0): {name}" for name in ("buildings", "streets"))
+    named = tuple(
+        f"OpenStreetMap contributors (ODbL 1.0): {name}" for name in ("buildings", "streets")
+    )
     assert licenses_of(houses, streets, houses) == named
     shouted = path.rename(path.with_name("CITY.OSM"))
     assert licenses_of(read_surroundings(shouted, role="streets", crs=CRS)) == named[1:]

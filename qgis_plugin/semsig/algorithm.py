@@ -302,7 +302,7 @@ def file_to_read(
         title,
         behavior=QgsProcessingParameterFile.Behavior.File,
         optional=optional,
-        fileFilter=f"{kind};;All files (*.*)",
+        fileFilter=f"{kind};;All files (*)",
     )
     return described(parameter, text)
 

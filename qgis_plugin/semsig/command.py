@@ -53,6 +53,7 @@ PLACES = (
     "/usr/local/bin",
     "/opt/*/bin",
     "~/Library/Python/3.*/bin",
+    "/Library/Frameworks/Python.framework/Versions/3.*/bin",
     "~/AppData/Roaming/Python/Python3*/Scripts",
     "~/AppData/Local/Programs/Python/Python3*/Scripts",
     "~/mini*3/bin",

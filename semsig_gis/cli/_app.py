@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -11,6 +12,8 @@ from semsig_gis.console import print_json, print_rows, remark
 from semsig_gis.errors import DatabaseError, InputError
 
 if TYPE_CHECKING:
+    from collections.abc import Iterable
+
     from semsig_gis.database import SignatureDatabase
     from semsig_gis.drift import UpdateReport
     from semsig_gis.evaluation import Evaluation
@@ -49,6 +52,21 @@ MethodText = Annotated[
 
 LIKELIHOOD = "likelihood"
 """What `--method` says for the likelihood method."""
+
+
+def keep_inputs(*written: Path | None, read: Iterable[str | Path | None]) -> None:
+    """Refuse to write over a file that is read, or two results to one file."""
+    taken = {os.path.realpath(path) for path in read if path is not None}
+    for path in written:
+        if path is None:
+            continue
+        if os.path.realpath(path) in taken:
+            msg = (
+                f"{path} is to be written, but it is also another file of this command; "
+                "give it a name of its own."
+            )
+            raise InputError(msg)
+        taken.add(os.path.realpath(path))
 
 
 def numbers(text: str, option: str) -> list[float]:

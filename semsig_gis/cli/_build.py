@@ -12,6 +12,7 @@ from semsig_gis.cli._app import (
     AsJson,
     Database,
     app,
+    keep_inputs,
     known_identifiability,
     numbers,
     object_counts,
@@ -87,6 +88,7 @@ def build(
     if streets is not None and viewpoints is not Viewpoints.streets:
         msg = "--streets was given, which only --viewpoints streets uses; give both or none."
         raise InputError(msg)
+    keep_inputs(out, read=(objects, buildings, streets, area))
     corner = numbers(origin, "--origin")
     specs: dict[str, Any] = {
         "grid": GridSpec(step, tuple(corner)),  # type: ignore[arg-type] # it checks the length
@@ -167,6 +169,7 @@ def update(
     from semsig_gis.objects import open_objects
     from semsig_gis.update import update_file
 
+    keep_inputs(out, read=(objects,))
     had_columns = has_added(database)
     with progress("updating") as advance:
         report = update_file(database, open_objects(objects), out=out, progress=advance)

@@ -8,7 +8,7 @@ from typing import Annotated
 
 import typer
 
-from semsig_gis.cli._app import Database, app, known_identifiability
+from semsig_gis.cli._app import Database, app, keep_inputs, known_identifiability
 from semsig_gis.console import progress, remark
 from semsig_gis.errors import InputError
 
@@ -59,6 +59,7 @@ def export(
     from semsig_gis.exports import export_database
     from semsig_gis.objects import open_objects
 
+    keep_inputs(out, read=(database, objects))
     opened = open_database(database)
     seen = None if objects is None else open_objects(objects)
     results = None if evaluation is None else Evaluation.load(evaluation)
@@ -91,16 +92,18 @@ def import_(
     from semsig_gis.identifiability_file import save_identifiability
     from semsig_gis.objects import save_objects
 
+    keep_inputs(out, objects, read=(geopackage,))
     found = read_geopackage(geopackage)
     if objects is not None and found.objects is None:
         msg = f"{geopackage} holds no street objects; leave out --objects."
         raise InputError(msg)
     for note in found.notes:
         remark(note)
+    if objects is not None and found.objects is not None:
+        save_objects(found.objects, objects, keep_order=True)
     save_database(found.database, out)
     if found.identifiability is not None:
         save_identifiability(found.identifiability, out)
     typer.echo(f"database: {out}  ({len(found.database):,} cells)")
-    if objects is not None and found.objects is not None:
-        save_objects(found.objects, objects, keep_order=True)
+    if objects is not None:
         typer.echo(f"objects:  {objects}")

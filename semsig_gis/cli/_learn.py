@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from semsig_gis.cli._app import AsJson, Database, app
+from semsig_gis.cli._app import AsJson, Database, app, keep_inputs
 from semsig_gis.cli._likelihood import (
     Heading,
     NoiseName,
@@ -54,6 +54,7 @@ def learn(
     from semsig_gis.noise_file import save_noise
     from semsig_gis.samples import read_samples
 
+    keep_inputs(out, read=(database, samples, objects))
     opened = open_database(database)
     with progress("learning"):
         found = _learnt(database, opened, read_samples(samples, taxonomy=opened.taxonomy), objects)
@@ -152,6 +153,7 @@ def calibrate(
     from semsig_gis import abstention
     from semsig_gis.samples import read_samples
 
+    keep_inputs(out, read=(database, samples, noise, objects))
     ready = locator(
         database,
         noise=noise,

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
-from semsig_gis.cli._app import AsJson, app, print_report
+from semsig_gis.cli._app import AsJson, app, keep_inputs, print_report
 from semsig_gis.console import progress, remark
 
 if TYPE_CHECKING:
@@ -80,6 +80,7 @@ def load(
     from semsig_gis.catalog import combine_catalogs, load_catalog
     from semsig_gis.loading import assemble, choose_layers, read_files
 
+    keep_inputs(out, buildings, streets, read=[*files, *catalog])
     chosen = combine_catalogs([load_catalog(name) for name in catalog])
     specs = choose_layers(chosen, layer or (), surroundings=bool(buildings or streets))
     with progress("reading") as advance:
@@ -119,6 +120,7 @@ def fetch(
     from semsig_gis.fetching import fetch_layers, find_area, open_cache
     from semsig_gis.loading import assemble, choose_layers
 
+    keep_inputs(out, buildings, streets, read=(catalog, area))
     chosen = load_catalog(catalog)
     specs = choose_layers(chosen, layer or (), surroundings=bool(buildings or streets))
     kept, http = open_cache(cache, offline=offline)

@@ -16,6 +16,7 @@ from semsig_gis.cli._app import (
     Database,
     MethodText,
     app,
+    keep_inputs,
     numbers,
     tell_if_online,
 )
@@ -139,7 +140,14 @@ def localize(
     if route and queries is None:
         msg = "--route was given without --queries; give the file of its views."
         raise InputError(msg)
+    keep_inputs(map_, out, read=(database, objects, area, popularity, rule, noise))
     files = _Files(map_, out, share, within)
+    if files.holds_chances and (share is not None or within):
+        msg = (
+            f"{out} holds the chances of all cells, not the regions that --share and --within are "
+            "for; leave them out, or write a GeoPackage."
+        )
+        raise InputError(msg)
     if method != LIKELIHOOD:
         _refuse_options(
             method,
@@ -197,6 +205,11 @@ class _Files:
     out: Path | None
     share: float | None
     within: float
+
+    @property
+    def holds_chances(self) -> bool:
+        """Whether the file holds the chances of all cells, and no regions."""
+        return self.out is not None and self.out.suffix.lower() in {".tif", ".tiff"}
 
 
 def _by_distance(path: Path, method: str, require: str | None, top: int) -> _Answerer:
@@ -267,6 +280,8 @@ def _answer(
             f"to search: {count:,} region{'' if count == 1 else 's'}, {searched['km2']:.4g} km2, "
             f"{searched['percent']:.3g} % of the city: {files.out}"
         )
+    elif files.out is not None:
+        typer.echo(f"chances: {files.out}")
 
 
 def _answer_route(ready: Locator, source: str) -> None:
@@ -295,7 +310,7 @@ def _write(found: Localization | Location, database: Path, files: _Files) -> dic
     opened = found.posterior.database if isinstance(found, Location) else open_database(database)
     share = REGION_SHARE if files.share is None else files.share
     regions = export_answer(found, opened, files.out, share=share, within=files.within)
-    return regions.to_dict()
+    return None if files.holds_chances else regions.to_dict()
 
 
 def _draw(found: Localization | Location, database: Path, out: Path) -> None:

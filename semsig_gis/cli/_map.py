@@ -10,6 +10,7 @@ import typer
 from semsig_gis.cli._app import (
     Database,
     app,
+    keep_inputs,
     known_identifiability,
     stored_objects,
     tell_if_online,
@@ -66,6 +67,7 @@ def map_(
             "or without, or --objects alone; give one of them."
         )
         raise InputError(msg)
+    keep_inputs(out, read=(database, drift, objects, buildings, streets))
     results = None if evaluation is None else Evaluation.load(evaluation)
     opened = open_database(database)
     told = known_identifiability(database, opened) if identifiability or ambiguity else None

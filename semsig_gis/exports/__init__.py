@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from semsig_gis.errors import InputError, UnknownNameError, nearest_name
+from semsig_gis.errors import EmptyResultError, InputError, UnknownNameError, nearest_name
 from semsig_gis.exports import csv_text, geopackage, geoparquet
 from semsig_gis.exports._layers import answer_layers, cells_layer, evaluation_layers, objects_layer
 from semsig_gis.exports.geotiff import cell_errors, export_geotiff
@@ -60,7 +60,7 @@ def export_database(
     database: SignatureDatabase,
     path: str | Path,
     *,
-    layers: Sequence[str] = (),
+    layers: str | Sequence[str] = (),
     objects: StreetObjects | None = None,
     identifiability: Identifiability | None = None,
     evaluation: Evaluation | None = None,
@@ -75,7 +75,7 @@ def export_database(
         The cells.
     path : str or Path
         File to write: ``.gpkg``, ``.parquet``, ``.csv`` or ``.tif``; it appears whole, by rename.
-    layers : sequence of str, optional
+    layers : str or sequence of str, optional
         What the file holds: some of `LAYERS` in a GeoPackage, by default all that is given; one of
         `LAYERS` in GeoParquet and CSV, one of `RASTERS` in a GeoTIFF, by default the first.
     objects : StreetObjects, optional
@@ -91,10 +91,13 @@ def export_database(
 
     Raises
     ------
+    EmptyResultError
+        If there is no cell or no object.
     InputError
         If the suffix is another, the file holds fewer layers than are named, a layer needs what
         was not given, what was given is in no layer, the identifiability is that of other cells,
-        or the file is open in another program or cannot be written.
+        the evaluation is that of another database, or the file is open in another program or
+        cannot be written.
     UnknownNameError
         If there is no such layer or geometry.
 
@@ -113,7 +116,8 @@ def export_database(
 
     Layers ``evaluation``, the queries at their true places, and ``evaluation_lines``, from there
     to the best place: the columns of `semsig_gis.evaluation_result.Evaluation.queries` and
-    ``outcome``: ``found`` (the best place is within 50 m), ``missed`` or ``nothing seen``.
+    ``outcome``: ``found`` (with a probability of 0.5 or more the best place is within 50 m; there
+    may be several that are as good), ``missed`` or ``nothing seen``.
 
     Examples
     --------
@@ -141,10 +145,18 @@ def export_database(
             ("objects", objects),
             ("identifiability", identifiability),
             ("evaluation", evaluation),
+            ("geometry", geometry),
         )
         if value is not None
     }
-    names = _chosen_layers(path, layers, suffix=suffix, given=given)
+    wanted = [layers] if isinstance(layers, str) else layers
+    names = _chosen_layers(path, wanted, suffix=suffix, given=given)
+    if len(database) == 0 or (objects is not None and len(objects) == 0):
+        what = "object" if len(database) else "cell"
+        msg = f"there is no {what} to be written to {path}; give some."
+        raise EmptyResultError(msg)
+    if evaluation is not None:
+        evaluation.rows_in(database)
     if suffix in _TIFF:
         values, unit = database.type_group_sizes.astype(np.float64), "cells"
         if names == ["error"] and evaluation is not None:
@@ -185,19 +197,20 @@ def _chosen_layers(
             "or write a GeoPackage."
         )
         raise InputError(msg)
-    all_given = [name for name in known if _NEEDS.get(name, "cells") in {"cells", *given}]
+    all_given = [name for name in known if _NEEDS.get(name) in {None, *given}]
     names = list(dict.fromkeys(wanted)) or (all_given if whole else [known[0]])
-    needed = {_NEEDS[name] for name in names if name in _NEEDS}
     for name in names:
         if name not in all_given:
             msg = f"{path} is to hold the {name}, but there is no {_NEEDS[name]}; give that too."
             raise InputError(msg)
     # Identifiability is part of a database, wherever it is not asked for.
-    unused = sorted(given - needed - {"identifiability"})
+    used = {"identifiability", *(_NEEDS[name] for name in names if name in _NEEDS)}
+    used |= {"geometry"} if "cells" in names else set()
+    unused = sorted(given - used)
     if unused:
         msg = (
             f"{path} holds the {' and '.join(names)} alone, and no {' or '.join(unused)}; leave "
-            "that out, name another layer, or write a GeoPackage, which holds all."
+            f"that out or name another layer{'' if whole else ', or write a GeoPackage'}."
         )
         raise InputError(msg)
     return names

@@ -14,8 +14,8 @@ import shapely
 
 from semsig_gis.database import BEARING_UNITS, DISTANCE_UNITS
 from semsig_gis.database_file import database_specs
-from semsig_gis.errors import InputError, UnknownNameError, nearest_name
-from semsig_gis.evaluation_result import SUCCESS_METRES
+from semsig_gis.errors import UnknownNameError, nearest_name
+from semsig_gis.evaluation_result import SUCCESS_METRES, SUCCESS_PROBABILITY
 from semsig_gis.exports._styles import (
     AMBIGUITY,
     IDENTIFIABILITY,
@@ -46,6 +46,7 @@ if TYPE_CHECKING:
     from semsig_gis.regions import SearchRegions
 
 __all__ = [
+    "GEOMETRY_TYPES",
     "ROWS_A_BLOCK",
     "CellGeometry",
     "Layer",
@@ -59,6 +60,7 @@ __all__ = [
 CellGeometry = Literal["polygon", "point"]
 
 ROWS_A_BLOCK = 1 << 16
+GEOMETRY_TYPES = {"polygon": "Polygon", "line": "LineString", "point": "Point"}
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -77,10 +79,10 @@ class Layer:
     facts: Mapping[str, Any]  # plain values for JSON
     styles: tuple[Style, ...]  # the first is the default
 
-    def blocks(self, rows: int = ROWS_A_BLOCK) -> Iterator[pa.Table]:
+    def blocks(self) -> Iterator[pa.Table]:
         """Read the layer block by block; one without rows is a block without rows."""
-        for low in range(0, max(self.rows, 1), rows):
-            yield self.read(slice(low, min(low + rows, self.rows)))
+        for low in range(0, max(self.rows, 1), ROWS_A_BLOCK):
+            yield self.read(slice(low, min(low + ROWS_A_BLOCK, self.rows)))
 
 
 def cells_layer(
@@ -95,13 +97,8 @@ def cells_layer(
         hint = nearest_name(str(geometry), get_args(CellGeometry))
         msg = f"{geometry!r} is no geometry of a cell; give {names}{hint}."
         raise UnknownNameError(msg)
-    if identifiability is not None and not np.array_equal(
-        identifiability.database.cell_ids, database.cell_ids
-    ):
-        msg = (
-            "the identifiability is that of other cells; give that of the database to be exported."
-        )
-        raise InputError(msg)
+    if identifiability is not None:
+        identifiability.require_cells_of(database)
     symbols = pa.array([chr(symbol) for symbol in database.taxonomy.symbol_bytes])
     degrees = pa.array([f"{unit * 360 / BEARING_UNITS:.2f}" for unit in range(BEARING_UNITS)])
     whole_numbers = pa.array([str(level) for level in range(1 << 8)])
@@ -201,7 +198,7 @@ def objects_layer(objects: StreetObjects) -> Layer:
     return Layer(
         name="objects",
         title="Street objects",
-        description=f"The {len(objects)} street objects that are seen from the cells.",
+        description=f"The {len(objects)} street objects.",
         geometry="point",
         crs=objects.crs,
         rows=len(objects),
@@ -230,7 +227,6 @@ def evaluation_layers(evaluation: Evaluation, licenses: tuple[str, ...]) -> list
     lines = lines.set_geometry(
         shapely.linestrings(np.stack([truth, best], axis=1)), crs=queries.crs
     )
-    within = f"within {SUCCESS_METRES} m"
     summary = evaluation.summary()
     facts = {name: summary[name] for name in ("settings", "database", "versions")}
     return [
@@ -238,7 +234,10 @@ def evaluation_layers(evaluation: Evaluation, licenses: tuple[str, ...]) -> list
             told,
             name="evaluation",
             title="Queries",
-            description=f"{len(told)} queries at their true places; found: the best is {within}.",
+            description=(
+                f"{len(told)} queries at their true places; found: the best place is within "
+                f"{SUCCESS_METRES} m with a probability of {SUCCESS_PROBABILITY:g} or more."
+            ),
             geometry="point",
             licenses=licenses,
             facts=facts,
@@ -308,7 +307,8 @@ def _table_layer(
             numbers = values.to_numpy(np.float64)
             columns[column] = pa.array(numbers, mask=~np.isfinite(numbers))
         else:
-            columns[column] = pa.Array.from_pandas(values)
+            texts = pd.api.types.is_string_dtype(values.dtype)
+            columns[column] = pa.Array.from_pandas(values, type=pa.string() if texts else None)
     table = pa.table({**columns, GEOMETRY: pa.array(shapely.to_wkb(shapes.array), pa.binary())})
     return Layer(
         name=name,

@@ -15,6 +15,7 @@ from pyogrio.errors import DataLayerError, DataSourceError, FeatureError
 
 from semsig_gis import __version__
 from semsig_gis.errors import InputError
+from semsig_gis.exports._layers import GEOMETRY_TYPES
 from semsig_gis.schema import GEOMETRY
 from semsig_gis.storage import whole_file
 
@@ -27,7 +28,6 @@ __all__ = ["write_layers"]
 
 # The newest version that QGIS 3.22 opens without a warning.
 VERSION = "1.2"
-GEOMETRY_TYPES = {"polygon": "Polygon", "line": "LineString", "point": "Point"}
 # As QGIS makes it, but for the dates, which it leaves to the rules of GeoPackages.
 STYLES = """
 CREATE TABLE layer_styles (

@@ -8,6 +8,7 @@ import shapely
 
 from semsig_gis import __version__
 from semsig_gis.boxes import BBOX, COVERING, bounds_column
+from semsig_gis.exports._layers import GEOMETRY_TYPES
 from semsig_gis.schema import GEOMETRY
 from semsig_gis.storage import geo_metadata, write_geoparquet_blocks
 
@@ -20,8 +21,6 @@ if TYPE_CHECKING:
     from semsig_gis.exports._layers import Layer
 
 __all__ = ["write_layer"]
-
-GEOMETRY_TYPES = {"polygon": "Polygon", "line": "LineString", "point": "Point"}
 
 
 def write_layer(
@@ -58,7 +57,7 @@ def write_layer(
         del geo["columns"][GEOMETRY]["bbox"]
     specs = {
         **layer.facts,
-        "kind": f"exported {layer.name}",
+        "kind": f"{layer.title} export".lower(),
         "licenses": list(layer.licenses),
         "written_by": f"semsig_gis {__version__}",
     }

@@ -101,14 +101,17 @@ def cell_errors(evaluation: Evaluation, database: SignatureDatabase) -> NDArray[
     ndarray of float64, shape (n,)
         Mean expected error in metres; NaN where no query is from, and queries of which the
         distortion left nothing do not count.
+
+    Raises
+    ------
+    InputError
+        If another database was searched.
     """
     errors = evaluation.queries["error_m"].to_numpy(np.float64)
-    cells = evaluation.queries["cell_id"].to_numpy(np.int64)
-    ids = database.cell_ids
-    rows = np.minimum(np.searchsorted(ids, cells), len(ids) - 1)
-    kept = np.isfinite(errors) & (ids[rows] == cells)
-    counts = np.bincount(rows[kept], minlength=len(ids))
-    sums = np.bincount(rows[kept], errors[kept], minlength=len(ids))
-    means = np.full(len(ids), np.nan)
+    rows = evaluation.rows_in(database)
+    kept = np.isfinite(errors) & (rows >= 0)
+    counts = np.bincount(rows[kept], minlength=len(database))
+    sums = np.bincount(rows[kept], errors[kept], minlength=len(database))
+    means = np.full(len(database), np.nan)
     np.divide(sums, counts, out=means, where=counts > 0)
     return means

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import dataclasses
 import io
 import re
 from typing import TYPE_CHECKING
@@ -14,7 +15,7 @@ from full_disk import largest_file
 from hypothesis import example, given
 from hypothesis import strategies as st
 from sentences import assert_sentence
-from small_city import small_city
+from small_city import small_city, small_evaluation
 
 from semsig_gis.errors import InputError
 from semsig_gis.exports import export_database
@@ -86,6 +87,16 @@ def test_hostile_objects_come_back(tmp_path: Path) -> None:
     assert [as_written(row["source_id"]) for row in rows] == table["source_id"].tolist()
     assert not any(row["source_id"].startswith(tuple("=+-@\t\r\n")) for row in rows)
     assert [float(row["x"]) for row in rows] == objects.xy[:, 0].tolist()
+
+
+def test_texts_of_queries_are_safe_too(tmp_path: Path) -> None:
+    results = small_evaluation()
+    queries = results.queries.assign(next_cell_ids="-5,-4;=cmd")
+    hostile = dataclasses.replace(results, queries=queries)
+    export_database(small_city()[0], tmp_path / "a.csv", layers="evaluation", evaluation=hostile)
+    texts = pd.read_csv(tmp_path / "a.csv")["next_cell_ids"]
+    assert set(texts) == {formula_safe("-5,-4;=cmd")}
+    assert texts[0].startswith("'-5")
 
 
 @pytest.mark.parametrize("name", ["cells.csv", "cells.parquet", "cells.tif"])

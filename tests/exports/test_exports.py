@@ -12,8 +12,9 @@ from cells_told import told_of
 from sentences import assert_sentence
 from small_city import small_city, small_evaluation, small_localization, small_location
 
-from semsig_gis.errors import InputError, SemsigError, UnknownNameError
+from semsig_gis.errors import EmptyResultError, InputError, SemsigError, UnknownNameError
 from semsig_gis.exports import LAYERS, RASTERS, export_answer, export_database
+from semsig_gis.objects import StreetObjects
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -97,6 +98,8 @@ def test_regions_of_an_answer(tmp_path: Path) -> None:
         ("city.csv", {"objects": 1, "evaluation": 1}, ("cells alone", "no evaluation or objects")),
         ("city.tif", {"layers": ["error"], "evaluation": 1, "objects": 1}, ("error alone",)),
         ("city.gpkg", {"geometry": "square"}, ("'square'", "'polygon' or 'point'")),
+        ("city.tif", {"geometry": "point"}, ("ambiguity alone", "no geometry")),
+        ("city.csv", {"layers": "objects", "objects": 1, "geometry": "point"}, ("no geometry",)),
     ],
 )
 def test_what_does_not_fit_is_refused(
@@ -109,6 +112,25 @@ def test_what_does_not_fit_is_refused(
     assert not list(tmp_path.iterdir())
 
 
+@pytest.mark.parametrize("suffix", [".gpkg", ".parquet", ".csv", ".tif"])
+def test_what_is_of_another_city_or_of_none_is_refused(suffix: str, tmp_path: Path) -> None:
+    database, objects = small_city()
+    layer = "error" if suffix == ".tif" else "evaluation"
+    given: dict[str, Any] = {"layers": layer, "evaluation": small_evaluation()}
+    with pytest.raises(InputError) as caught:
+        export_database(database.select(slice(1, None)), tmp_path / f"a{suffix}", **given)
+    assert_sentence(caught.value, "not made with this database")
+    with pytest.raises(EmptyResultError) as caught_empty:
+        export_database(database.select(slice(0)), tmp_path / f"a{suffix}")
+    assert_sentence(caught_empty.value, f"a{suffix}", "no cell")
+    if suffix != ".tif":
+        nothing = StreetObjects(objects.table[:0], objects.taxonomy, objects.licenses)
+        with pytest.raises(EmptyResultError) as caught_empty:
+            export_database(database, tmp_path / f"a{suffix}", layers="objects", objects=nothing)
+        assert_sentence(caught_empty.value, f"a{suffix}", "no object")
+    assert not list(tmp_path.iterdir())
+
+
 def test_answers_that_do_not_fit_are_refused(tmp_path: Path) -> None:
     database = small_city()[0]
     with pytest.raises(InputError) as caught:
@@ -117,6 +139,9 @@ def test_answers_that_do_not_fit_are_refused(tmp_path: Path) -> None:
     with pytest.raises(InputError) as caught:
         export_answer(small_location(), database, tmp_path / "a.geojson")
     assert_sentence(caught.value, "a.geojson", ".gpkg")
+    with pytest.raises(InputError) as caught:
+        export_answer(small_localization(), database, tmp_path / "a.gpkg", share=7)
+    assert_sentence(caught.value, "share of 7")
 
 
 @pytest.mark.parametrize("suffix", [".gpkg", ".parquet", ".csv", ".tif"])

@@ -74,7 +74,7 @@ def database(objects: StreetObjects) -> SignatureDatabase:
 
 @pytest.fixture(autouse=True)
 def _several_blocks(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(_layers.Layer.blocks, "__defaults__", (100,))
+    monkeypatch.setattr(_layers, "ROWS_A_BLOCK", 100)
 
 
 def query(file: Path, sql: str) -> list[Any]:

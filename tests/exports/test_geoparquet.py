@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 @pytest.fixture(autouse=True)
 def _several_blocks(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(_layers.Layer.blocks, "__defaults__", (100,))
+    monkeypatch.setattr(_layers, "ROWS_A_BLOCK", 100)
 
 
 def test_cells_read_back_as_they_are(tmp_path: Path) -> None:
@@ -92,4 +92,4 @@ def test_it_is_not_taken_for_a_database(tmp_path: Path) -> None:
     export_database(small_city()[0], file)
     with pytest.raises(DatabaseError) as caught:
         open_database(file)
-    assert_sentence(caught.value, "exported cells", "signature database")
+    assert_sentence(caught.value, "signature cells export", "signature database")
