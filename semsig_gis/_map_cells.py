@@ -144,6 +144,7 @@ semsig.cells = (packed, grid, titles, told) => {
         const button = L.DomUtil.create("button", "", line);
         button.textContent = text;
         button.title = title;
+        button.setAttribute("aria-label", title === "near" ? text : title);
         L.DomEvent.on(button, "click", () => {
           // The map moves, so that the next click finds the button where it was.
           const [from, to] = [cell, other].map(
@@ -227,7 +228,9 @@ STYLE = """\
 .semsig-jumps span { margin-right: 4px; }
 .semsig-jumps button {
   font: inherit; color: inherit; background: transparent; border: 1px solid #888;
-  border-radius: 4px; padding: 1px 7px; margin: 1px 4px 1px 0; cursor: pointer; }
+  border-radius: 4px; padding: 2px 8px; margin: 1px 4px 2px 0; cursor: pointer;
+  min-width: 28px; min-height: 26px; }
+@media (pointer: coarse) { .semsig-jumps button { min-width: 40px; min-height: 36px; } }
 .semsig-jumps button:hover, .semsig-jumps button:focus-visible { background: #8883; }
 """
 

@@ -206,6 +206,11 @@ semsig.colours = (map) => {
       chosen = !semsig.isDark(map);
       show();
     });
+    L.DomEvent.on(button, "keydown", (event) => {
+      if (event.key !== " ") return;
+      L.DomEvent.stop(event);
+      button.click();
+    });
     dark.addEventListener("change", show);
     show();
     return bar;

@@ -1,17 +1,22 @@
-"""Maps within a notebook, without a network where the package carries the map files."""
+"""Maps as whole pages, and within a notebook, without a network where that is to be had."""
 
 from __future__ import annotations
 
 import html
+import re
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from semsig_gis import map_assets
+from semsig_gis.errors import InputError
 
 if TYPE_CHECKING:
     import folium
 
-__all__ = ["MapFrame", "show_map"]
+__all__ = ["MapFrame", "page_of_map", "show_map"]
+
+# folium forbids to enlarge a page with two fingers, which is how small text is read on a phone.
+_RIGID = re.compile(r",\s*maximum-scale=1\.0,\s*user-scalable=no")
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,6 +42,44 @@ class MapFrame:
         )
 
 
+def page_of_map(map_: folium.Map, *, self_contained: bool | None = None) -> str:
+    """Return a map as one HTML page.
+
+    Parameters
+    ----------
+    map_ : folium.Map
+        The map.
+    self_contained : bool, optional
+        True to put Leaflet and all else into the page, False to link them; by default they are
+        put into it where the package carries them and the map needs no others.
+
+    Returns
+    -------
+    str
+        The page.
+
+    Raises
+    ------
+    InputError
+        If a self-contained page was asked for and is not to be had.
+
+    Examples
+    --------
+    >>> import folium
+    >>> page_of_map(folium.Map(tiles=None), self_contained=False).splitlines()[:2]
+    ['<!DOCTYPE html>', '<html lang="en">']
+    """
+    page = map_.get_root().render().replace("<html>", '<html lang="en">', 1)
+    page = _RIGID.sub("", page, count=1)
+    if self_contained or (self_contained is None and map_assets.available()):
+        try:
+            return map_assets.inline_assets(page)
+        except InputError:
+            if self_contained:
+                raise
+    return page
+
+
 def show_map(map_: folium.Map, *, height: int = 520) -> MapFrame:
     """Show a map in a notebook, as the last thing of a cell.
 
@@ -53,13 +96,7 @@ def show_map(map_: folium.Map, *, height: int = 520) -> MapFrame:
     -------
     MapFrame
         What a notebook shows. Its page makes no request, but for the tiles of a map that has some;
-        where the package was built without the map files, it links them.
-
-    Raises
-    ------
-    InputError
-        If the map needs a file that the package never carries (see
-        `semsig_gis.map_assets.inline_assets`).
+        where the package was built without the map files, or the map needs others, it links them.
 
     Examples
     --------
@@ -67,5 +104,4 @@ def show_map(map_: folium.Map, *, height: int = 520) -> MapFrame:
     >>> show_map(folium.Map(tiles=None), height=300).height
     300
     """
-    page = map_.get_root().render()
-    return MapFrame(map_assets.inline_assets(page) if map_assets.available() else page, height)
+    return MapFrame(page_of_map(map_), height)

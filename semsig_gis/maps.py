@@ -29,8 +29,8 @@ from semsig_gis._map_parts import (
     to_latlon,
 )
 from semsig_gis.database import rows_of_result
-from semsig_gis.errors import InputError
 from semsig_gis.evaluation import SUCCESS_METRES
+from semsig_gis.map_frame import page_of_map
 from semsig_gis.map_legend import (
     CANDIDATE_RAMP,
     ERROR_RAMP,
@@ -268,13 +268,7 @@ def save_map(map_: folium.Map, path: str | Path, *, self_contained: bool | None 
     ...     save_map(folium.Map(tiles=None), f"{folder}/map.html", self_contained=False)
     False
     """
-    page = map_.get_root().render()
-    if self_contained or (self_contained is None and map_assets.available()):
-        try:
-            page = map_assets.inline_assets(page)
-        except InputError:
-            if self_contained:
-                raise
+    page = page_of_map(map_, self_contained=self_contained)
     with whole_file(path) as partial:
         partial.write_text(page, encoding="utf-8")
     tiled = any(

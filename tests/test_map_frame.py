@@ -6,10 +6,13 @@ import html
 import re
 
 import folium
+import folium.plugins
 import pytest
+from sentences import assert_sentence
 
 from semsig_gis import map_assets
-from semsig_gis.map_frame import show_map
+from semsig_gis.errors import InputError
+from semsig_gis.map_frame import page_of_map, show_map
 
 
 def framed_page(map_: folium.Map) -> str:
@@ -27,6 +30,23 @@ def test_a_framed_map_makes_no_request() -> None:
     page = framed_page(map_)
     assert map_assets.external_files(page) == ()
     assert "L.marker(" in page
+
+
+@pytest.mark.skipif(not map_assets.available(), reason="the package carries no map files")
+def test_a_map_that_needs_other_files_links_them() -> None:
+    map_ = folium.Map(tiles=None)
+    folium.plugins.Draw().add_to(map_)
+    assert any("draw" in address for address in map_assets.external_files(framed_page(map_)))
+    with pytest.raises(InputError) as caught:
+        page_of_map(map_, self_contained=True)
+    assert_sentence(caught.value, "draw")
+
+
+def test_a_page_names_its_language_and_may_be_enlarged() -> None:
+    page = framed_page(folium.Map(tiles=None))
+    assert '<html lang="en">' in page
+    (scale,) = re.findall(r'<meta name="viewport"\s*content="([^"]*)"', page)
+    assert scale == "width=device-width,\n                initial-scale=1.0"
 
 
 def test_a_map_is_shown_without_the_files(monkeypatch: pytest.MonkeyPatch) -> None:

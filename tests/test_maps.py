@@ -123,7 +123,8 @@ def test_a_click_shows_the_signature_and_the_place_found(
     mouse = ActionBuilder(browser)
     mouse.pointer_action.move_to_location(round(x), round(y)).click()
     mouse.perform()
-    popup = browser.find_element(By.CSS_SELECTOR, ".semsig-details").text
+    # Not `text`, which is empty while the popup fades in.
+    popup = browser.find_element(By.CSS_SELECTOR, ".semsig-details").get_property("innerText")
     bearings = database.signature(int(row["cell"])).bearings
     assert bearings is not None
     first = f"{row['types'][0]} {round(float(bearings[0])) % 360}°"
