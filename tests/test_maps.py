@@ -124,7 +124,8 @@ def test_a_click_shows_the_signature_and_the_place_found(
     mouse.pointer_action.move_to_location(round(x), round(y)).click()
     mouse.perform()
     # Not `text`, which is empty while the popup fades in.
-    popup = browser.find_element(By.CSS_SELECTOR, ".semsig-details").get_property("innerText")
+    box = browser.find_element(By.CSS_SELECTOR, ".semsig-details")
+    popup = str(box.get_property("innerText")).replace("\u00a0", " ")
     bearings = database.signature(int(row["cell"])).bearings
     assert bearings is not None
     first = f"{row['types'][0]} {round(float(bearings[0])) % 360}°"
@@ -278,7 +279,7 @@ def test_a_popup_draws_signatures_as_wheels(
     assert len(tops) == 1  # side by side
     for wheel, (label, types, bearings) in zip(wheels, seen, strict=False):
         assert bearings is not None
-        assert wheel.find_element(By.TAG_NAME, "figcaption").text == label
+        assert wheel.find_element(By.TAG_NAME, "figcaption").get_property("innerText") == label
         degrees = [f"{symbol} {round(float(one)) % 360}°"
                    for symbol, one in zip(types, bearings, strict=True)]  # fmt: skip
         told = wheel.find_element(By.TAG_NAME, "svg").get_attribute("aria-label")
