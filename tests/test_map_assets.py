@@ -152,7 +152,9 @@ def test_the_page_works_in_a_browser_and_requests_nothing(browser: Chrome, tmp_p
     assert browser.execute_script("return arguments[0].naturalWidth", marker) == 25
     marker.click()
     popup = browser.find_element("css selector", ".leaflet-popup-content")
-    assert popup.get_property("innerText").strip() == "here"  # `text` is empty while it fades in
+    assert (
+        str(popup.get_property("innerText")).strip() == "here"
+    )  # `text` is empty while it fades in
     assert browser.find_elements("css selector", "canvas.leaflet-heatmap-layer")
     assert browser.get_log("browser") == []
     events = [json.loads(entry["message"])["message"] for entry in browser.get_log("performance")]
