@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from semsig_gis import __version__
-from semsig_gis._map_signs import class_signs
+from semsig_gis._map_signs import sign_svg
+from semsig_gis.class_signs import class_signs
 from semsig_gis.distortion_chain import chain_text
 from semsig_gis.evaluation import SUCCESS_METRES, SUCCESS_PROBABILITY
 
@@ -295,8 +296,8 @@ def objects_legend(objects: StreetObjects) -> str:
     """
     signs, counts = class_signs(objects.taxonomy), objects.class_counts
     rows = "".join(
-        f"<tr><td>{signs[code].svg()}</td>"
-        f'<td class="title">{escape(objects.taxonomy.by_code(code).title)}</td>'
+        f"<tr><td>{sign_svg(signs[code])}</td>"
+        f'<td class="title">{escape(signs[code].title)}</td>'
         f'<td class="count">{count:,}</td></tr>'
         for code, count in counts.items()
     )

@@ -21,8 +21,9 @@ from semsig_gis._map_parts import (
     prepared_map,
     to_latlon,
 )
-from semsig_gis._map_signs import class_signs
+from semsig_gis._map_signs import OUTLINES, sign_svg
 from semsig_gis.boxes import hilbert_order
+from semsig_gis.class_signs import class_signs
 from semsig_gis.errors import EmptyResultError
 from semsig_gis.map_legend import objects_legend
 from semsig_gis.schema import COUNT, MERGED, SOURCE, SOURCE_ID
@@ -94,8 +95,8 @@ def objects_map(
     Script("streetObjects", key, *_drawn(objects)).add_to(chosen)
     signs, counts = class_signs(objects.taxonomy), objects.class_counts
     for number, (code, count) in enumerate(counts.items()):
-        title = layer_text(objects.taxonomy.by_code(code).title)
-        name = free_name(chosen, f"{signs[code].svg()} {title} ({count:,})")
+        title = layer_text(signs[code].title)
+        name = free_name(chosen, f"{sign_svg(signs[code])} {title} ({count:,})")
         Drawing(name, "classLayer", key, number, show=map_ is None).add_to(chosen)
     corners = np.stack([objects.xy.min(axis=0), objects.xy.max(axis=0)])
     view = to_latlon(corners, objects.crs) if map_ is None else None
@@ -120,11 +121,11 @@ def _drawn(objects: StreetObjects) -> tuple[dict[str, list[str]], dict[str, Any]
     ends = np.cumsum(list(counts.values())).tolist()
     classes = [
         {
-            "title": objects.taxonomy.by_code(code).title,
+            "title": signs[code].title,
             "symbol": signs[code].symbol,
             "colour": signs[code].colour,
             "ink": signs[code].ink,
-            "outline": signs[code].outline,
+            "outline": OUTLINES[signs[code].shape],
             "drop": signs[code].drop,
             "start": end - count,
             "end": end,

@@ -5,13 +5,15 @@ from __future__ import annotations
 import math
 import textwrap
 from collections import Counter
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 from matplotlib.collections import LineCollection
 from matplotlib.lines import Line2D
 from matplotlib.patches import Circle
+from matplotlib.path import Path
 
-from semsig_gis.pictures import COLOURS, INK, WHITE, blank_figure, draw_legend, label, saved
+from semsig_gis.class_signs import ClassSign, class_signs
+from semsig_gis.pictures import INK, WHITE, blank_figure, draw_legend, label, saved
 from semsig_gis.tables import one_line
 
 if TYPE_CHECKING:
@@ -23,9 +25,26 @@ if TYPE_CHECKING:
 
 __all__ = ["draw_scene"]
 
-# Shapes with room for a letter. Green comes first because trees do.
-MARKERS = ("o", "s", "D", "p", "8")
-CLASS_COLOURS = (COLOURS[2], COLOURS[0], *COLOURS[4:2:-1], COLOURS[1], *COLOURS[5:])
+# A cross with wider arms than matplotlib's own, so that a letter has room on it.
+CROSS = Path(
+    [
+        *((-6, 11), (6, 11), (6, 6), (11, 6), (11, -6), (6, -6)),
+        *((6, -11), (-6, -11), (-6, -6), (-11, -6), (-11, 6), (-6, 6)),
+        (-6, 11),
+    ],
+    closed=True,
+)
+# The marker of each shape, and its size where that of a circle is 1.
+MARKERS = {
+    "circle": ("o", 1.0),
+    "square": ("s", 0.9),
+    "diamond": ("D", 0.88),
+    "triangle": ("^", 1.2),
+    "hexagon": ("h", 1.15),
+    "triangle_down": ("v", 1.2),
+    "cross": (CROSS, 1.1),
+}
+UNKNOWN = ClassSign("?", "unknown class", "circle", "#777777")
 ANSWER = "#cc0000"
 
 # In visibility ranges: what is drawn around the viewpoint, and at most.
@@ -39,15 +58,6 @@ TITLE_LETTERS = 46
 TYPE_LETTERS, TYPE_LINES = 42, 3
 CLASS_LETTERS = 21
 MANY_OBJECTS = 40
-
-
-class _Look(NamedTuple):
-    """How a class is drawn."""
-
-    symbol: str
-    title: str
-    marker: str
-    colour: str
 
 
 def draw_scene(scene: Scene, taxonomy: Taxonomy) -> Picture:
@@ -79,16 +89,16 @@ def draw_scene(scene: Scene, taxonomy: Taxonomy) -> Picture:
     >>> draw_scene(scene, paper_taxonomy()).description
     'A lamp. Signature D, seen from 2.300000, 48.800000: street light (1). Error 12.0 m.'
     """
-    looks = _looks(taxonomy)
+    signs = class_signs(taxonomy)
     titles = textwrap.wrap(label(scene.title, 2 * TITLE_LETTERS), TITLE_LETTERS)
     told = _told(scene)
-    keys = _keys(scene, looks)
+    keys = _keys(scene, signs)
     above = LINE * len(titles) + 0.14
     below = LINE * (len(told) + math.ceil(len(keys) / 2)) + 0.3
     height = above + MAP + below
     with blank_figure(WIDTH, height) as figure:
         axes = figure.add_axes((MARGIN / WIDTH, below / height, MAP / WIDTH, MAP / height))
-        _draw_map(axes, scene, looks)
+        _draw_map(axes, scene, signs)
         figure.text(
             MARGIN / WIDTH,
             1 - 0.07 / height,
@@ -113,27 +123,10 @@ def draw_scene(scene: Scene, taxonomy: Taxonomy) -> Picture:
             size=8.5,
             sign_width=1,
         )
-        return saved(figure, title=scene.title, description=_described(scene, looks))
+        return saved(figure, title=scene.title, description=_described(scene, signs))
 
 
-def _looks(taxonomy: Taxonomy) -> dict[int, _Look]:
-    classes = sorted(taxonomy.classes, key=lambda item: item.code)
-    return {
-        item.code: _Look(
-            item.symbol,
-            item.title,
-            MARKERS[number % len(MARKERS)],
-            CLASS_COLOURS[number % len(CLASS_COLOURS)],
-        )
-        for number, item in enumerate(classes)
-    }
-
-
-def _look(looks: dict[int, _Look], code: int) -> _Look:
-    return looks.get(code, _Look("?", "unknown class", "o", "#777777"))
-
-
-def _draw_map(axes: Axes, scene: Scene, looks: dict[int, _Look]) -> None:
+def _draw_map(axes: Axes, scene: Scene, signs: dict[int, ClassSign]) -> None:
     away = math.hypot(*scene.answer) if scene.answer else 0.0
     drawn = away if away < FARTHEST * scene.radius else 0.0
     farthest = max((math.hypot(item.east, item.north) for item in scene.objects), default=0.0)
@@ -146,13 +139,10 @@ def _draw_map(axes: Axes, scene: Scene, looks: dict[int, _Look]) -> None:
     lines = [[(0.0, 0.0), (item.east, item.north)] for item in scene.objects]
     axes.add_collection(LineCollection(lines, colors="#999999", linewidths=0.5, zorder=2))
     for item in scene.others:
-        look = _look(looks, item.code)
         axes.plot(
             [item.east],
             [item.north],
-            marker=look.marker,
-            markersize=5,
-            color=look.colour,
+            **_shape(signs.get(item.code, UNKNOWN), 5),
             alpha=0.25,
             markeredgewidth=0,
             zorder=1.5,
@@ -160,7 +150,7 @@ def _draw_map(axes: Axes, scene: Scene, looks: dict[int, _Look]) -> None:
     size = 8 if len(scene.objects) > MANY_OBJECTS else 10
     # The nearest last, so that they lie on top.
     for item in sorted(scene.objects, key=lambda one: -math.hypot(one.east, one.north)):
-        _draw_object(axes, item, _look(looks, item.code), size)
+        _draw_object(axes, item, signs.get(item.code, UNKNOWN), size)
     axes.plot(
         [0],
         [0],
@@ -177,36 +167,33 @@ def _draw_map(axes: Axes, scene: Scene, looks: dict[int, _Look]) -> None:
     _draw_scale(axes, reach)
 
 
-def _draw_object(axes: Axes, item: SceneObject, look: _Look, size: float) -> None:
+def _shape(sign: ClassSign, size: float) -> dict[str, Any]:
+    marker, share = MARKERS[sign.shape]
+    return {"marker": marker, "markersize": share * size, "color": sign.colour}
+
+
+def _draw_object(axes: Axes, item: SceneObject, sign: ClassSign, size: float) -> None:
     axes.plot(
         [item.east],
         [item.north],
-        marker=look.marker,
-        markersize=size,
-        color=look.colour,
+        **_shape(sign, size),
         markeredgecolor=WHITE,
         markeredgewidth=0.7,
         zorder=4,
     )
-    axes.text(
-        item.east,
-        item.north,
-        look.symbol,
+    axes.annotate(
+        sign.symbol,
+        (item.east, item.north),
+        xytext=(0, -sign.drop * size / 2),
+        textcoords="offset points",
         size=0.62 * size,
-        color=_over(look.colour),
+        color=sign.ink,
         weight="bold",
         ha="center",
         va="center_baseline",
         zorder=4,
         clip_on=True,
     )
-
-
-def _over(colour: str) -> str:
-    """Return black or white, whichever reads better on a colour."""
-    red, green, blue = (int(colour[at : at + 2], 16) for at in (1, 3, 5))
-    bright = 140
-    return "#000000" if 0.299 * red + 0.587 * green + 0.114 * blue > bright else WHITE
 
 
 def _draw_answer(axes: Axes, answer: tuple[float, float], away: float, reach: float) -> None:
@@ -310,25 +297,25 @@ def _error(scene: Scene) -> str:
     return f"error {scene.error_m:,.1f} m" if math.isfinite(scene.error_m) else "not localized"
 
 
-def _keys(scene: Scene, looks: dict[int, _Look]) -> list[tuple[Line2D, str]]:
+def _keys(scene: Scene, signs: dict[int, ClassSign]) -> list[tuple[Line2D, str]]:
     seen = Counter(item.code for item in scene.objects)
     keys = []
     for code in sorted({*seen, *(item.code for item in scene.others)}):
-        look = _look(looks, code)
+        sign = signs.get(code, UNKNOWN)
         # An empty count is of a class that is only around.
         count = f" ({seen[code]})" if seen[code] else ""
-        sign = Line2D([], [], linestyle="", marker=look.marker, color=look.colour, markersize=7)
-        sign.set_alpha(None if seen[code] else 0.25)
-        keys.append((sign, f"{look.symbol} {label(look.title, CLASS_LETTERS)}{count}"))
+        key = Line2D([], [], linestyle="", markeredgewidth=0, **_shape(sign, 8))
+        key.set_alpha(None if seen[code] else 0.25)
+        keys.append((key, f"{sign.symbol} {label(sign.title, CLASS_LETTERS)}{count}"))
     if scene.answer:
         keys.append((Line2D([], [], **_ANSWER_LOOK), "answer"))
     return keys
 
 
-def _described(scene: Scene, looks: dict[int, _Look]) -> str:
+def _described(scene: Scene, signs: dict[int, ClassSign]) -> str:
     seen = Counter(item.code for item in scene.objects)
     counts = ", ".join(
-        f"{one_line(_look(looks, code).title).lower()} ({number})"
+        f"{one_line(signs.get(code, UNKNOWN).title).lower()} ({number})"
         for code, number in sorted(seen.items())
     )
     types = f"Signature {scene.types}, seen" if scene.types else "Nothing is seen"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import re
 
 import pytest
 from hypothesis import given
@@ -11,8 +12,9 @@ from reports import HARM, LONG, hostile_report, scene
 from test_pictures import texts
 
 from semsig_gis.catalog import paper_taxonomy
+from semsig_gis.class_signs import class_signs
 from semsig_gis.report_parts import SceneObject
-from semsig_gis.scene_plots import _looks, _round_length, draw_scene
+from semsig_gis.scene_plots import _round_length, draw_scene
 
 CLASSES = paper_taxonomy()
 
@@ -57,11 +59,13 @@ def test_a_place_that_nobody_asked_for() -> None:
     assert "rror" not in shown.description
 
 
-def test_a_class_looks_the_same_whatever_else_is_there() -> None:
-    looks = _looks(CLASSES)
-    assert len({(look.marker, look.colour) for look in looks.values()}) == len(CLASSES.classes)
-    turned = dataclasses.replace(CLASSES, classes=CLASSES.classes[::-1])
-    assert _looks(turned) == looks
+def test_objects_have_the_signs_of_their_classes() -> None:
+    made = draw_scene(scene(objects=11), CLASSES).svg.decode("utf-8")
+    for sign in class_signs(CLASSES).values():
+        assert f"fill: {sign.colour}" in made
+        (style,) = re.findall(rf'<text style="([^"]*)"[^>]*>{sign.symbol}</text>', made)
+        # Black is what an SVG is drawn in unless told otherwise.
+        assert ("fill: #ffffff" in style) == (sign.ink == "#ffffff")
 
 
 def test_an_object_of_no_class() -> None:

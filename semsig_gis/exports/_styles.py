@@ -6,12 +6,14 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING, NamedTuple
 from xml.etree import ElementTree as ET
 
+from semsig_gis.class_signs import class_signs
 from semsig_gis.map_legend import ERROR_RAMP, FAILED, FOUND_RAMP, SUCCESSFUL
 from semsig_gis.tables import one_line
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
 
+    from semsig_gis.class_signs import ClassSign
     from semsig_gis.taxonomy import Taxonomy
 
 __all__ = [
@@ -28,13 +30,17 @@ __all__ = [
 # What is said of the numbers between two, and their colour.
 Classes = Mapping[tuple[float, float], tuple[str, str]]
 
-# Colours that colour-blind people tell apart, and shapes with room for a letter: together, all
-# classes of the paper look different. Green comes first because trees do.
-CLASS_COLOURS = (
-    *("#009e73", "#0072b2", "#e69f00", "#cc79a7", "#d55e00"),
-    *("#56b4e9", "#333333", "#882255", "#999933"),
-)
-CLASS_SHAPES = ("circle", "square", "diamond", "pentagon", "hexagon")
+# How QGIS draws each shape: marker, angle, size and width of the outline, both in diameters of a
+# circle. The arms of its cross are thin; an outline of the same colour makes room for the letter.
+CLASS_MARKERS = {
+    "circle": ("circle", 0, 1.0, 0.0),
+    "square": ("square", 0, 0.9, 0.0),
+    "diamond": ("diamond", 0, 1.25, 0.0),
+    "triangle": ("triangle", 0, 1.2, 0.0),
+    "hexagon": ("hexagon", 0, 1.15, 0.0),
+    "triangle_down": ("triangle", 180, 1.2, 0.0),
+    "cross": ("cross_fill", 0, 0.625, 0.475),
+}
 
 OUTCOMES = {"found": SUCCESSFUL, "missed": FAILED, "nothing seen": "#777777"}
 """Colour of a query by what became of it."""
@@ -67,6 +73,8 @@ LABEL_LETTERS = 60
 CELLS_OPACITY = 0.7
 # Wide enough to be found in a city, small enough not to hide a street: millimetres on the screen.
 SMALLEST_MM, LARGEST_MM = 0.9, 6.0
+# Diameter of a circle, and the height of letters in diameters.
+CIRCLE_METRES, LETTER = 7.0, 0.6
 
 Options = Mapping[str, object]
 # The class of a layer of a symbol, its options, and the symbol that it places along a line.
@@ -86,29 +94,55 @@ def by_class(taxonomy: Taxonomy, codes: Iterable[int]) -> Style:
     categories = ET.SubElement(renderer, "categories")
     symbols = ET.SubElement(renderer, "symbols")
     present = set(codes)
-    for number, item in enumerate(sorted(taxonomy.classes, key=lambda one: one.code)):
-        if item.code not in present:
+    for code, sign in class_signs(taxonomy).items():
+        if code not in present:
             continue
         ET.SubElement(
             categories,
             "category",
-            value=str(item.code),
-            symbol=str(number),
-            label=_label(f"{item.symbol}  {item.title}"),
+            value=str(code),
+            symbol=str(code),
+            label=_label(f"{sign.symbol}  {sign.title}"),
             render="true",
         )
-        shape = CLASS_SHAPES[number % len(CLASS_SHAPES)]
-        colour = CLASS_COLOURS[number % len(CLASS_COLOURS)]
-        letter: Options = {
-            "font": "DejaVu Sans",
-            "chr": item.symbol,
-            "color": _rgba("#ffffff"),
-            **_metres(4.2, smallest=0.0, largest=0.6 * LARGEST_MM),
-            "vertical_anchor_point": 1,
-            "horizontal_anchor_point": 1,
-        }
-        _add_symbol(symbols, number, "marker", _marker(shape, colour, 7.0), ("FontMarker", letter))
+        _add_symbol(symbols, code, "marker", *_class_layers(sign))
     return Style("Classes", _document(renderer, "point"))
+
+
+def _class_layers(sign: ClassSign) -> tuple[SymbolLayer, SymbolLayer]:
+    """Return the shape of a class, and the letter on it."""
+    marker, angle, size, outline = CLASS_MARKERS[sign.shape]
+    edge = _of_circle("outline_width", outline) if outline else {"outline_width": 0.1}
+    shape = {
+        "name": marker,
+        "angle": angle,
+        "color": _rgba(sign.colour),
+        "outline_color": _rgba(sign.colour if outline else "#ffffff"),
+        "joinstyle": "miter",
+        **edge,
+        **_of_circle("size", size),
+    }
+    # The anchor lifts the letter by half its size and the offset lets it down, since QGIS bounds no
+    # length below 0; by a tenth less, since QGIS centres the ascent, which is above capitals.
+    down = sign.drop / 2 + (0.5 - 0.1) * LETTER
+    letter = {
+        "font": "DejaVu Sans",
+        "font_style": "Bold",
+        "chr": sign.symbol,
+        "color": _rgba(sign.ink),
+        "horizontal_anchor_point": 1,
+        "vertical_anchor_point": 2,
+        **_of_circle("size", LETTER, smallest=0.0),
+        **_of_circle("offset", down, smallest=0.0),
+        "offset": f"0,{CIRCLE_METRES * down:.3g}",
+    }
+    return ("SimpleMarker", shape), ("FontMarker", letter)
+
+
+def _of_circle(length: str, share: float, *, smallest: float = SMALLEST_MM) -> Options:
+    """Return a length of a sign that is given in diameters of a circle."""
+    metres, most = CIRCLE_METRES * share, LARGEST_MM * share
+    return _metres(metres, smallest=smallest * share, largest=most, length=length)
 
 
 def by_amount(
@@ -229,12 +263,12 @@ def _marker(
     }
 
 
-def _metres(size: float, *, smallest: float, largest: float) -> Options:
-    """Return the size of a marker on the ground, within bounds in millimetres on the screen."""
+def _metres(size: float, *, smallest: float, largest: float, length: str = "size") -> Options:
+    """Return a length on the ground, within bounds in millimetres on the screen."""
     return {
-        "size": size,
-        "size_unit": "MapUnit",
-        "size_map_unit_scale": f"3x:0,0,{int(smallest > 0)},{smallest},1,{largest}",
+        length: f"{size:.3g}",
+        f"{length}_unit": "MapUnit",
+        f"{length}_map_unit_scale": f"3x:0,0,{int(smallest > 0)},{smallest:.3g},1,{largest:.3g}",
     }
 
 

@@ -33,8 +33,10 @@ from small_city import small_city, small_evaluation, small_localization, small_l
 
 from semsig_gis.building import build_database
 from semsig_gis.catalog import paper_taxonomy
+from semsig_gis.class_signs import class_signs
 from semsig_gis.errors import InputError, UnknownNameError
 from semsig_gis.exports import _layers, export_answer, export_database
+from semsig_gis.exports._styles import CLASS_MARKERS, by_class
 from semsig_gis.grid import GridSpec
 from semsig_gis.objects import StreetObjects, build_objects
 from semsig_gis.signatures import SignatureSpec, quantize
@@ -479,17 +481,63 @@ def test_a_file_that_is_opened_meanwhile_is_left_alone(
     assert list(tmp_path.iterdir()) == [file]
 
 
+def test_objects_have_the_signs_of_their_classes() -> None:
+    taxonomy = paper_taxonomy()
+    root = ET.fromstring(by_class(taxonomy, [1, 5, 11]).qml)  # noqa: S314 - our own
+    symbols = {item.attrib["name"]: item for item in root.iter("symbol")}
+    assert sorted(symbols, key=int) == ["1", "5", "11"]
+    for code, symbol in symbols.items():
+        sign = class_signs(taxonomy)[int(code)]
+        shape, letter = (
+            {
+                option.attrib.get("name"): option.attrib.get("value")
+                for option in layer.iter("Option")
+            }
+            for layer in symbol.iter("layer")
+        )
+        assert shape["name"] == CLASS_MARKERS[sign.shape][0]
+        assert letter["chr"] == sign.symbol
+        for options, colour in ((shape, sign.colour), (letter, sign.ink)):
+            assert options["color"] == ",".join(map(str, (*bytes.fromhex(colour[1:]), 255)))
+
+
+KNOWN = """
+import sys
+from qgis.core import QgsSimpleMarkerSymbolLayerBase as Markers
+print([name for name in sys.argv[1:] if not Markers.decodeShape(name)[1]])
+"""
+
+
 @pytest.fixture
-def qgis_draw(qgis_process: Path, qgis_environment: dict[str, str]) -> Draw:  # noqa: ARG001
-    """Return what draws layers in QGIS: the picture, and what QGIS says of each layer."""
+def qgis_python(qgis_process: Path) -> str:  # noqa: ARG001
+    """Return QGIS's own Python."""
     python = shutil.which("python3", path=os.defpath)
     if python is None:
         unavailable("qgis", "the system has no Python, in which QGIS could run")
+    return python
+
+
+def test_qgis_knows_every_shape(qgis_python: str, qgis_environment: dict[str, str]) -> None:
+    names = [name for name, *_ in CLASS_MARKERS.values()]
+    done = subprocess.run(
+        [qgis_python, "-c", KNOWN, *names],
+        check=True,
+        capture_output=True,
+        text=True,
+        timeout=120,
+        env=qgis_environment,
+    )
+    assert done.stdout == "[]\n"
+
+
+@pytest.fixture
+def qgis_draw(qgis_python: str, qgis_environment: dict[str, str]) -> Draw:
+    """Return what draws layers in QGIS: the picture, and what QGIS says of each layer."""
 
     def draw(picture: Path, box: tuple[float, ...], *layers: str) -> list[dict[str, Any]]:
         extent = ",".join(map(repr, box))
         done = subprocess.run(
-            [python, PROGRAM, picture, "400x400", extent, *layers],
+            [qgis_python, PROGRAM, picture, "400x400", extent, *layers],
             check=False,
             capture_output=True,
             text=True,
@@ -550,9 +598,9 @@ def test_qgis_colours_the_layers_at_once(qgis_draw: Draw, tmp_path: Path) -> Non
     assert told[1]["labels"] == ["found", "missed", "nothing seen"]
     assert told[-1]["labels"][-1] == "90 to 100 %"
     assert told[-1]["features"] == len(city)
-    found = colours_of(tmp_path / "a.png")
-    green, blue = (0, 0x9E, 0x73), (0, 0x72, 0xB2)
-    assert {green, blue, (255, 255, 255)} <= found
+    signs = class_signs(hostile.taxonomy)
+    colours = {tuple(bytes.fromhex(signs[code].colour[1:])) for code in seen.class_counts}
+    assert colours <= colours_of(tmp_path / "a.png")
     # Cells by tenths of their chance, and the file is whole and free when QGIS has left it.
     qgis_draw(tmp_path / "b.png", box, f"{file}|layername=cells")
     assert len(colours_of(tmp_path / "b.png")) >= 10
