@@ -254,6 +254,15 @@ def test_openstreetmap_with_its_surroundings(tmp_path: Path, run: Run) -> None:
     assert list(gpd.read_parquet(tmp_path / "s.parquet").geom_type) == ["LineString"]
 
 
+def test_surroundings_that_a_source_has_not_are_told(city: Path, run: Run) -> None:
+    buildings = city / "b.parquet"
+    options = ("--out", city / "o.parquet", "--buildings", buildings)
+    code, _, told = run("load", city / "lights.gpkg", "--catalog", city / "tiny.toml", *options)
+    assert code == 0
+    assert f"no buildings in what was loaded, so {buildings} is not written" in told
+    assert not buildings.exists()
+
+
 def test_fetch_from_a_portal_and_again_without_it(tmp_path: Path, run: Run) -> None:
     datasets = "/api/explore/v2.1/catalog/datasets/benches"
     point = {"type": "Point", "coordinates": [2.35, 48.85]}

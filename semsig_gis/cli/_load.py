@@ -150,8 +150,13 @@ def _save_loaded(
 
     report = quality_report(loaded.objects, loaded.report, loaded.conflation)
     save_objects(loaded.objects, out)
-    for table, path in ((loaded.buildings, buildings), (loaded.streets, streets)):
-        if table is not None and path is not None:
+    for what, table, path in (
+        ("buildings", loaded.buildings, buildings),
+        ("streets", loaded.streets, streets),
+    ):
+        if path is not None and table is None:
+            remark(f"there are no {what} in what was loaded, so {path} is not written")
+        elif path is not None:
             save_surroundings(table, path)
     for note in loaded.notes:
         remark(note)
