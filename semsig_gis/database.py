@@ -367,7 +367,7 @@ def require_same(
 
 
 def rows_of_result(
-    database: SignatureDatabase, ids: ArrayLike, types: Iterable[str], *, cells: int, what: str
+    database: SignatureDatabase, ids: ArrayLike, types: Iterable[str], *, what: str
 ) -> NDArray[np.int64]:
     """Return the rows of the cells that a result names, and refuse one of another database.
 
@@ -379,8 +379,6 @@ def rows_of_result(
         Ids of the cells.
     types : iterable of str
         What the result says is seen from each of them.
-    cells : int
-        How many cells it says that there are in all.
     what : str
         What kind of result it is, for the sentence that refuses it.
 
@@ -392,27 +390,26 @@ def rows_of_result(
     Raises
     ------
     InputError
-        If the database has another number of cells, or lacks one of these or sees other types
-        from it.
+        If the database lacks one of these cells, or sees other types from it.
 
     Examples
     --------
     >>> from semsig_gis.building import build_database
     >>> from semsig_gis.sources.synthetic import CitySpec, synthetic_city
     >>> from semsig_gis.catalog import paper_taxonomy
+    >>> from semsig_gis.matching import localize
     >>> from semsig_gis.objects import build_objects
     >>> layers = synthetic_city(CitySpec(size=300.0))
     >>> objects, _ = build_objects(layers, taxonomy=paper_taxonomy(), crs="EPSG:32631")
     >>> database = build_database(objects)
-    >>> told = {"cells": len(database), "what": "localization"}
-    >>> rows_of_result(database, database.cell_ids[5:6], [database.types(5)], **told).tolist()
+    >>> found = localize(database, database.signature(5), top=1).candidates
+    >>> rows_of_result(database, found["cell_id"], found["types"], what="localization").tolist()
     [5]
     """
     wanted = np.asarray(ids, np.int64)
     rows = np.searchsorted(database.cell_ids, wanted)
     same = (
-        cells == len(database)
-        and rows.max(initial=0) < cells
+        rows.max(initial=-1) < len(database)
         and np.array_equal(database.cell_ids[rows], wanted)
         and all(map(operator.eq, types, map(database.types, rows.tolist())))
     )

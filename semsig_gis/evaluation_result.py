@@ -189,13 +189,18 @@ class Evaluation:
         InputError
             If another database was searched.
         """
+        if len(database) != self.database["cells"]:
+            msg = (
+                f"This evaluation searched {self.database['cells']:,} cells, but the database has "
+                f"{len(database):,}; give the database that it was made with, or evaluate again."
+            )
+            raise InputError(msg)
         known = self.queries["cell"].to_numpy() >= 0
         rows = np.full(len(known), -1)
         rows[known] = rows_of_result(
             database,
             self.queries["cell_id"][known],
             self.queries["types"][known],
-            cells=self.database["cells"],
             what="evaluation",
         )
         return rows

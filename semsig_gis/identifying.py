@@ -157,7 +157,7 @@ def identify(
         bits=shares["bits"].round(DECIMALS),
         lookalikes=like.cells,
         lookalike_chances=(rest[:, None] * like.sums).round(DECIMALS),
-        gains=gains.round(DECIMALS),
+        gains=gains.round(DECIMALS) + 0.0,  # no -0.0
         classes=classes,
         trials=trials,
         seed=seed,

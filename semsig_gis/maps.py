@@ -361,13 +361,7 @@ def _candidate_records(
 ) -> list[list[Any]]:
     """Return what the script draws of each candidate, best first."""
     candidates = localization.candidates
-    rows = rows_of_result(
-        database,
-        candidates["cell_id"],
-        candidates["types"],
-        cells=localization.cells,
-        what="localization",
-    )
+    rows = rows_of_result(database, candidates["cell_id"], candidates["types"], what="localization")
     distances = candidates["distance"].to_numpy(np.float64)
     spread = np.ptp(distances) or 1.0
     colours = _ramp((distances - distances.min()) / spread, CANDIDATE_RAMP)

@@ -14,6 +14,7 @@ import geopandas as gpd
 import numpy as np
 import shapely
 
+from semsig_gis.database import rows_of_result
 from semsig_gis.errors import InputError
 from semsig_gis.location import REGION_SHARE, Location
 from semsig_gis.posterior import Posterior
@@ -119,16 +120,13 @@ def search_regions(
     chances: NDArray[np.float64] | None = None
     if isinstance(answer, Location):
         chances = answer.posterior.chances
-        cells, ids = answer.posterior.credible_cells(share), answer.posterior.database.cell_ids
-        same = np.array_equal(ids, database.cell_ids)
+        cells = answer.posterior.credible_cells(share)
+        if not np.array_equal(answer.posterior.database.cell_ids, database.cell_ids):
+            msg = "the answer was found in another database; give the database that was searched."
+            raise InputError(msg)
     else:
-        wanted = answer.candidates["cell_id"].to_numpy(np.int64)
-        ids = database.cell_ids
-        cells = np.minimum(np.searchsorted(ids, wanted), len(ids) - 1)
-        same = answer.cells == len(ids) and np.array_equal(ids[cells], wanted)
-    if not same:
-        msg = "the answer was found in another database; give the database that was searched."
-        raise InputError(msg)
+        found = answer.candidates
+        cells = rows_of_result(database, found["cell_id"], found["types"], what="localization")
     if within > 0:
         cells = np.concatenate([cells, _around(database, cells, within)])
     shapes = shapely.get_parts(shapely.union_all(_runs(database, np.sort(cells))))

@@ -102,6 +102,27 @@ def test_the_chance_of_every_cell(city: Path, run: Run) -> None:
     assert sum(values) == pytest.approx(1.0, abs=1e-4)
 
 
+def test_what_is_required_may_be_drawn_and_searched(city: Path, run: Run) -> None:
+    folder = city.parent
+    files = ("--map", folder / "m.html", "--out", folder / "a.gpkg")
+    query = ("--types", "DD", "--require", "D", "--top", 2)
+    code, out, err = run("localize", city, *query, *files, "--json")
+    assert (code, err) == (0, "")
+    told = json.loads(out)
+    assert told["tied_beyond"] > 0
+    # All that are as good as the last candidate are to be searched, and are in the file.
+    candidates = gpd.read_file(folder / "a.gpkg", layer="candidates")
+    assert told["searched"]["cells"] == len(candidates) == 2 + told["tied_beyond"]
+    assert len(set(candidates["distance"])) == 1
+
+
+def test_a_slip_is_told_before_the_index_is_built(city: Path, run: Run) -> None:
+    likely = ("--method", "likelihood")
+    sentence(run("localize", city, "--types", "D!", *likely), "'!'")
+    sentence(run("localize", city, *likely), "types, bearings or both")
+    assert not list(city.parent.glob("*.likelihood"))
+
+
 def test_what_does_not_go_together(city: Path, run: Run) -> None:
     folder = city.parent
     out = ("--out", folder / "a.gpkg")

@@ -150,4 +150,4 @@ def test_other_shares_and_databases_are_refused() -> None:
     for answer in (small_location(), small_localization()):
         with pytest.raises(InputError) as caught:
             search_regions(answer, database.select(slice(1, None)))
-        assert_sentence(caught.value, "another database")
+        assert_sentence(caught.value, "give the database that")

@@ -151,11 +151,15 @@ def calibrate(
     import numpy as np
 
     from semsig_gis import abstention
+    from semsig_gis.database_file import open_database
     from semsig_gis.samples import read_samples
 
     keep_inputs(out, read=(database, samples, noise, objects))
+    opened = open_database(database)
+    known = read_samples(samples, taxonomy=opened.taxonomy)
     ready = locator(
         database,
+        opened,
         noise=noise,
         heading=heading,
         on_grid=on_grid,
@@ -164,7 +168,6 @@ def calibrate(
         top=1,
     )
     radius = ready.options["rule"].radius
-    known = read_samples(samples, taxonomy=ready.database.taxonomy)
     masses, errors = np.zeros(len(known)), np.full(len(known), np.inf)
     with progress("answering") as advance:
         for number, (sample, place) in enumerate(

@@ -102,6 +102,7 @@ class Locator:
 
 def locator(
     path: Path,
+    opened: SignatureDatabase,
     *,
     noise: str,
     heading: str,
@@ -115,7 +116,6 @@ def locator(
 ) -> Locator:
     """Return what answers the queries of a command."""
     from semsig_gis.abstention import open_rule
-    from semsig_gis.database_file import open_database
     from semsig_gis.locating import DEFAULT_RULE
     from semsig_gis.refinement import cell_noise
 
@@ -136,7 +136,6 @@ def locator(
         "explained": EXPLAINED if explain else 0,
     }
     model = read_noise(noise)
-    opened = open_database(path)
     if not on_grid:
         model = cell_noise(model, opened.grid.step)
     if known is not None:
@@ -152,7 +151,7 @@ def prepared_index(path: Path, opened: SignatureDatabase, model: Noise) -> Likel
     """Return the likelihood index beside a database; it is built where it is not there."""
     from semsig_gis.likelihood_file import index_path, ready_index
 
-    with progress("building the likelihood index") as advance:
+    with progress("preparing the likelihood index") as advance:
         return ready_index(opened, model, index_path(path, model), note=remark, progress=advance)
 
 

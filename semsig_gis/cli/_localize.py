@@ -33,11 +33,13 @@ from semsig_gis.console import print_json, progress
 from semsig_gis.errors import InputError
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Sequence
 
     from semsig_gis.cli._likelihood import Locator
     from semsig_gis.localization import Localization
     from semsig_gis.location import Location
+    from semsig_gis.query_file import Queries, Route
+    from semsig_gis.route import Leg
     from semsig_gis.signatures import Signature
     from semsig_gis.taxonomy import Taxonomy
 
@@ -127,6 +129,8 @@ def localize(
     as_json: AsJson = False,
 ) -> None:
     """Rank the cells of a database for a query, or for many."""
+    from semsig_gis.database_file import open_database
+
     given = [value for value in (types, bearings, map_, out) if value is not None]
     if queries is not None and given:
         msg = (
@@ -167,10 +171,16 @@ def localize(
             },
         )
         ranked = _by_distance(database, method, require, top)
-        _answer(ranked, queries, types, bearings, files, as_json=as_json)
+        asked = _asked(ranked.taxonomy, queries, types, bearings)
+        _answer(ranked, asked, files, as_json=as_json)
         return
+    opened = open_database(database)
+    # Before the index, which takes much longer than to find a slip in a query.
+    views = _views(str(queries), opened.taxonomy) if route else None
+    asked = [] if route else _asked(opened.taxonomy, queries, types, bearings)
     ready = locator(
         database,
+        opened,
         noise=noise,
         heading=heading,
         on_grid=on_grid,
@@ -181,11 +191,11 @@ def localize(
         top=top,
         known={"near": near, "area": area, "popularity": popularity, "require": require},
     )
-    if route:
-        _answer_route(ready, str(queries))
+    if views is not None:
+        _answer_route(ready, *views)
     else:
-        located = _Answerer(database, ready.database.taxonomy, ready.locate)
-        _answer(located, queries, types, bearings, files, as_json=as_json)
+        located = _Answerer(database, opened.taxonomy, ready.locate)
+        _answer(located, asked, files, as_json=as_json)
 
 
 @dataclass(frozen=True, slots=True)
@@ -194,7 +204,7 @@ class _Answerer:
 
     path: Path
     taxonomy: Taxonomy
-    ask: Callable[[Signature], Localization | Location]
+    ask: Callable[..., Localization | Location]
 
 
 @dataclass(frozen=True, slots=True)
@@ -222,8 +232,8 @@ def _by_distance(path: Path, method: str, require: str | None, top: int) -> _Ans
     opened = open_dataset(path) if path.is_dir() else open_database(path)
     wanted = None if require is None else Requirement.parse(require, opened.taxonomy)
 
-    def ask(query: Signature) -> Localization:
-        return matching.localize(opened, query, method=chosen, requirement=wanted, top=top)
+    def ask(query: Signature, more: int = 0) -> Localization:
+        return matching.localize(opened, query, method=chosen, requirement=wanted, top=top + more)
 
     return _Answerer(path, opened.taxonomy, ask)
 
@@ -239,34 +249,37 @@ def _refuse_options(method: str, options: dict[str, bool]) -> None:
         raise InputError(msg)
 
 
+def _asked(
+    taxonomy: Taxonomy, queries: str | None, types: str | None, bearings: str | None
+) -> Signature | Queries:
+    """Return the query, or the many with their names."""
+    from semsig_gis.query_file import parse_queries, read_queries
+    from semsig_gis.signatures import Signature
+
+    if queries is None:
+        angles = None if bearings is None else numbers(bearings, "--bearings")
+        return Signature.parse(types, angles, taxonomy=taxonomy)
+    if queries == "-":
+        return parse_queries(sys.stdin.read(), "standard input", taxonomy=taxonomy)
+    return read_queries(queries, taxonomy=taxonomy)
+
+
 def _answer(
     answerer: _Answerer,
-    queries: str | None,
-    types: str | None,
-    bearings: str | None,
+    asked: Signature | Queries,
     files: _Files,
     *,
     as_json: bool,
 ) -> None:
     """Answer a query, or many, and print it."""
-    from semsig_gis.query_file import parse_queries, read_queries
-    from semsig_gis.signatures import Signature
-
-    taxonomy = answerer.taxonomy
-    if queries is not None:
-        many = (
-            parse_queries(sys.stdin.read(), "standard input", taxonomy=taxonomy)
-            if queries == "-"
-            else read_queries(queries, taxonomy=taxonomy)
-        )
-        for name, query in many:
+    if isinstance(asked, list):
+        for name, query in asked:
             print_json({"id": name, **answerer.ask(query).to_dict()}, indent=None)
         return
-    angles = None if bearings is None else numbers(bearings, "--bearings")
-    found = answerer.ask(Signature.parse(types, angles, taxonomy=taxonomy))
+    found = answerer.ask(asked)
     if files.map is not None:
         _draw(found, answerer.path, files.map)
-    searched = _write(found, answerer.path, files)
+    searched = _write(answerer, asked, found, files)
     told = found.to_dict() | ({} if searched is None else {"searched": searched})
     if as_json:
         print_json(told)
@@ -284,22 +297,25 @@ def _answer(
         typer.echo(f"chances: {files.out}")
 
 
-def _answer_route(ready: Locator, source: str) -> None:
-    """Answer the views of a route, each given all of them."""
+def _views(source: str, taxonomy: Taxonomy) -> Route:
+    """Return the views of a route with their names, and the legs between them."""
     from semsig_gis.query_file import parse_route, read_route
 
-    taxonomy = ready.database.taxonomy
-    queries, legs = (
-        parse_route(sys.stdin.read(), "standard input", taxonomy=taxonomy)
-        if source == "-"
-        else read_route(source, taxonomy=taxonomy)
-    )
-    found = ready.route([query for _, query in queries], legs)
-    for (name, _), location in zip(queries, found, strict=True):
+    if source == "-":
+        return parse_route(sys.stdin.read(), "standard input", taxonomy=taxonomy)
+    return read_route(source, taxonomy=taxonomy)
+
+
+def _answer_route(ready: Locator, views: Queries, legs: Sequence[Leg]) -> None:
+    """Answer the views of a route, each given all of them."""
+    found = ready.route([query for _, query in views], legs)
+    for (name, _), location in zip(views, found, strict=True):
         print_json({"id": name, **location.to_dict()}, indent=None)
 
 
-def _write(found: Localization | Location, database: Path, files: _Files) -> dict[str, Any] | None:
+def _write(
+    answerer: _Answerer, query: Signature, found: Localization | Location, files: _Files
+) -> dict[str, Any] | None:
     """Write the regions to search, and return what there is to say of them."""
     from semsig_gis.database_file import open_database
     from semsig_gis.exports import export_answer
@@ -307,7 +323,13 @@ def _write(found: Localization | Location, database: Path, files: _Files) -> dic
 
     if files.out is None:
         return None
-    opened = found.posterior.database if isinstance(found, Location) else open_database(database)
+    if isinstance(found, Location):
+        opened = found.posterior.database
+    else:
+        opened = open_database(answerer.path)
+        if found.tied_beyond:
+            # No cell is left out of the search that is as good as the last candidate.
+            found = answerer.ask(query, found.tied_beyond)
     share = REGION_SHARE if files.share is None else files.share
     regions = export_answer(found, opened, files.out, share=share, within=files.within)
     return None if files.holds_chances else regions.to_dict()

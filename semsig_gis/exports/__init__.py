@@ -96,8 +96,8 @@ def export_database(
     InputError
         If the suffix is another, the file holds fewer layers than are named, a layer needs what
         was not given, what was given is in no layer, the identifiability is that of other cells,
-        the evaluation is that of another database, or the file is open in another program or
-        cannot be written.
+        the evaluation is that of another database, the objects are in another CRS, or the file
+        is open in another program or cannot be written.
     UnknownNameError
         If there is no such layer or geometry.
 
@@ -115,7 +115,8 @@ def export_database(
     ``title``, ``source``, ``source_id``, ``merged`` where sources were merged, and ``count``.
 
     Layers ``evaluation``, the queries at their true places, and ``evaluation_lines``, from there
-    to the best place: the columns of `semsig_gis.evaluation_result.Evaluation.queries` and
+    to the best place where that is another one: the columns of
+    `semsig_gis.evaluation_result.Evaluation.queries` and
     ``outcome``: ``found`` (with a probability of 0.5 or more the best place is within 50 m; there
     may be several that are as good), ``missed`` or ``nothing seen``.
 
@@ -151,12 +152,7 @@ def export_database(
     }
     wanted = [layers] if isinstance(layers, str) else layers
     names = _chosen_layers(path, wanted, suffix=suffix, given=given)
-    if len(database) == 0 or (objects is not None and len(objects) == 0):
-        what = "object" if len(database) else "cell"
-        msg = f"there is no {what} to be written to {path}; give some."
-        raise EmptyResultError(msg)
-    if evaluation is not None:
-        evaluation.rows_in(database)
+    _require_one_city(path, database, objects, evaluation)
     if suffix in _TIFF:
         values, unit = database.type_group_sizes.astype(np.float64), "cells"
         if names == ["error"] and evaluation is not None:
@@ -178,6 +174,27 @@ def export_database(
         geopackage.write_layers(chosen, path, progress=progress)
     else:
         _ONE_LAYER[suffix](chosen[0], path, progress=progress)
+
+
+def _require_one_city(
+    path: str | Path,
+    database: SignatureDatabase,
+    objects: StreetObjects | None,
+    evaluation: Evaluation | None,
+) -> None:
+    """Refuse what is empty, and what is of another city."""
+    if len(database) == 0 or (objects is not None and len(objects) == 0):
+        what = "object" if len(database) else "cell"
+        msg = f"there is no {what} to be written to {path}; give some."
+        raise EmptyResultError(msg)
+    if objects is not None and objects.crs != database.crs:
+        msg = (
+            f"the street objects are in {objects.crs.name} and the cells in {database.crs.name}; "
+            "give the objects that the database was built from."
+        )
+        raise InputError(msg)
+    if evaluation is not None:
+        evaluation.rows_in(database)
 
 
 def _chosen_layers(

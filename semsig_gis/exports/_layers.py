@@ -227,6 +227,7 @@ def evaluation_layers(evaluation: Evaluation, licenses: tuple[str, ...]) -> list
     lines = lines.set_geometry(
         shapely.linestrings(np.stack([truth, best], axis=1)), crs=queries.crs
     )
+    lines = lines[lines["off_m"] > 0]  # a line has a length
     summary = evaluation.summary()
     facts = {name: summary[name] for name in ("settings", "database", "versions")}
     return [

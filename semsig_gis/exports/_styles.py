@@ -48,14 +48,14 @@ OUTCOMES = {"found": SUCCESSFUL, "missed": FAILED, "nothing seen": "#777777"}
 AMBIGUITY: Classes = {
     (1, 1): ("alone", FOUND_RAMP[9]),
     (1, 10): ("2 to 10 alike", FOUND_RAMP[7]),
-    (10, 100): ("11 to 100", FOUND_RAMP[5]),
-    (100, 1000): ("101 to 1,000", FOUND_RAMP[3]),
-    (1000, 1e9): ("more", FOUND_RAMP[0]),
+    (10, 100): ("11 to 100 alike", FOUND_RAMP[5]),
+    (100, 1000): ("101 to 1,000 alike", FOUND_RAMP[3]),
+    (1000, 1e9): ("more alike", FOUND_RAMP[0]),
 }
 """What is said of a cell, and its colour, by how many cells have its types."""
 
 IDENTIFIABILITY: Classes = {
-    (number / 10, (number + 1) / 10): (f"{10 * number} to {10 * (number + 1)} %", colour)
+    (number / 10, (number + 1) / 10): (f"found: {10 * number} to {10 * (number + 1)} %", colour)
     for number, colour in enumerate(FOUND_RAMP)
 }
 """What is said of a cell, and its colour, by the chance that a query from it is found."""
@@ -63,7 +63,10 @@ IDENTIFIABILITY: Classes = {
 RANKS: Classes = {
     (low, high): (label, colour)
     for (low, high, label), colour in zip(
-        ((1, 1, "1"), (1, 3, "2 to 3"), (3, 10, "4 to 10"), (10, 1e9, "11 and more")),
+        (
+            *((1, 1, "rank 1"), (1, 3, "rank 2 to 3"), (3, 10, "rank 4 to 10")),
+            (10, 1e9, "rank 11 and more"),
+        ),
         reversed(ERROR_RAMP),
         strict=True,
     )
@@ -161,15 +164,16 @@ def by_amount(
 def by_rank(column: str, *, geometry: str) -> Style:
     """Return a style of places, the best the darkest."""
     symbols: list[SymbolLayer] = []
-    edge = ERROR_RAMP[-1]  # pale places stand out from a pale map by their edges
     for number, (_, colour) in enumerate(RANKS.values()):
         if geometry == "polygon":
-            fill = {"color": _rgba(colour, 170), "style": "solid", "outline_color": _rgba(edge)}
+            # Its edge is all that is seen of a region from far.
+            fill = {"color": _rgba(colour, 170), "style": "solid", "outline_color": _rgba(colour)}
             symbols.append(("SimpleFill", {**fill, "outline_style": "solid", "outline_width": 0.4}))
         else:
-            metres, smallest = 12.0 - 2.0 * number, 3.2 - 0.4 * number
+            # Pale places stand out from a pale map by their edges.
+            edge, metres, smallest = ERROR_RAMP[-1], 12.0 - 2.0 * number, 3.2 - 0.4 * number
             symbols.append(_marker("circle", colour, metres, smallest=smallest, outline=edge))
-    return Style("Rank", _graduated(column, RANKS, symbols, geometry))
+    return Style("Rank", _graduated(column, RANKS, symbols, geometry, last_first=True))
 
 
 def by_outcome(*, geometry: str) -> Style:
@@ -178,6 +182,8 @@ def by_outcome(*, geometry: str) -> Style:
     categories = ET.SubElement(renderer, "categories")
     symbols = ET.SubElement(renderer, "symbols")
     for number, (outcome, colour) in enumerate(OUTCOMES.items()):
+        if geometry == "line" and outcome == "nothing seen":
+            continue  # it has no best place
         ET.SubElement(
             categories,
             "category",
@@ -188,7 +194,9 @@ def by_outcome(*, geometry: str) -> Style:
         )
         if geometry == "point":
             shape = {"found": "circle", "missed": "triangle"}.get(outcome, "cross2")
-            _add_symbol(symbols, number, "marker", _marker(shape, colour, 12.0, smallest=1.8))
+            edge = colour if shape == "cross2" else ""  # its lines are its outline
+            mark = _marker(shape, colour, 12.0, smallest=1.8, outline=edge)
+            _add_symbol(symbols, number, "marker", mark)
         else:
             line = {"line_color": _rgba(colour, 150), "line_width": 0.26, "line_style": "solid"}
             end = _marker("cross2", colour, 10.0, smallest=1.4, outline=colour)
@@ -209,11 +217,16 @@ def _graduated(
     geometry: str,
     *,
     opacity: float = 1.0,
+    last_first: bool = False,
 ) -> str:
     """Return a document that draws by a number; of two ranges, the first holds their border."""
     renderer = ET.Element(
         "renderer-v2", type="graduatedSymbol", attr=column, graduatedMethod="GraduatedColor"
     )
+    if last_first:  # so that the least number lies on top
+        renderer.set("enableorderby", "1")
+        clause = ET.SubElement(ET.SubElement(renderer, "orderby"), "orderByClause", asc="0")
+        clause.text = f'"{column}"'
     ranges = ET.SubElement(renderer, "ranges")
     symbols = ET.SubElement(renderer, "symbols")
     for number, ((low, high), (label, _)) in enumerate(classes.items()):

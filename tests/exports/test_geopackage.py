@@ -373,7 +373,11 @@ def test_queries_and_lines(tmp_path: Path) -> None:
     assert set(points["outcome"]) == {"found", "missed", "nothing seen"}
     assert (points["outcome"] == "nothing seen").sum() == results.unlocalized
     assert ((points["outcome"] == "found") == results.successful).all()
-    assert len(lines) == len(points) - results.unlocalized
+    assert 0 < len(lines) < len(points) - results.unlocalized
+    truth = shapely.get_coordinates(results.queries.geometry.array)
+    best = results.queries[["best_x", "best_y"]].to_numpy(np.float64)
+    assert len(lines) == (best != truth).any(axis=1).sum() - results.unlocalized
+    assert lines.geometry.is_valid.all()
     ends = points.set_index("number").loc[lines["number"], ["best_x", "best_y"]]
     assert np.array_equal(shapely.get_coordinates(lines.geometry.array)[1::2], ends.to_numpy())
     assert np.allclose(lines.geometry.length, lines["off_m"])
@@ -596,7 +600,8 @@ def test_qgis_colours_the_layers_at_once(qgis_draw: Draw, tmp_path: Path) -> Non
         assert "[%" not in label
         assert label.isprintable()
     assert told[1]["labels"] == ["found", "missed", "nothing seen"]
-    assert told[-1]["labels"][-1] == "90 to 100 %"
+    assert told[2]["labels"] == ["found", "missed"]
+    assert told[-1]["labels"][-1] == "found: 90 to 100 %"
     assert told[-1]["features"] == len(city)
     signs = class_signs(hostile.taxonomy)
     colours = {tuple(bytes.fromhex(signs[code].colour[1:])) for code in seen.class_counts}
