@@ -168,3 +168,13 @@ def test_nothing_is_written_over_what_is_read(city: Path, run: Run) -> None:
     for command in refused:
         sentence(run(*command), "to be written", "also another file")
         assert city.read_bytes() == before
+
+
+def test_a_name_says_what_a_file_will_be(city: Path, run: Run) -> None:
+    folder = city.parent
+    for command in (
+        ("build", folder / "objects.parquet", "--out", folder / "city.gpkg"),
+        ("map", city, "--ambiguity", "--out", folder / "map.png"),
+        ("import", folder / "a.gpkg", "--out", folder / "b.gpkg"),
+    ):
+        sentence(run(*command), "does not end in .", "name it so")

@@ -69,6 +69,14 @@ def keep_inputs(*written: Path | None, read: Iterable[str | Path | None]) -> Non
         taken.add(os.path.realpath(path))
 
 
+def require_suffix(suffix: str, *written: Path | None) -> None:
+    """Refuse a name that says that a file is of another kind than it will be."""
+    for path in written:
+        if path is not None and path.suffix.lower() != suffix and not path.is_dir():
+            msg = f"{path} does not end in {suffix}, which says what it will be; name it so."
+            raise InputError(msg)
+
+
 def numbers(text: str, option: str) -> list[float]:
     try:
         return [float(part) for part in text.split(",")] if text.strip() else []

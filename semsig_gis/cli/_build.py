@@ -18,6 +18,7 @@ from semsig_gis.cli._app import (
     object_counts,
     print_report,
     print_table,
+    require_suffix,
 )
 from semsig_gis.console import print_json, progress, remark
 from semsig_gis.errors import InputError
@@ -102,6 +103,7 @@ def build(
         ),
     }
     if tile is None and not workers and scheduler is None:
+        require_suffix(".parquet", out)
         cells, entries = _build_whole(objects, out, buildings, streets, specs)
     else:
         from semsig_gis.distributed import build_tiles

@@ -8,7 +8,7 @@ from typing import Annotated
 
 import typer
 
-from semsig_gis.cli._app import Database, app, keep_inputs, known_identifiability
+from semsig_gis.cli._app import Database, app, keep_inputs, known_identifiability, require_suffix
 from semsig_gis.console import progress, remark
 from semsig_gis.errors import InputError
 
@@ -93,6 +93,7 @@ def import_(
     from semsig_gis.objects import save_objects
 
     keep_inputs(out, objects, read=(geopackage,))
+    require_suffix(".parquet", out, objects)
     found = read_geopackage(geopackage)
     if objects is not None and found.objects is None:
         msg = f"{geopackage} holds no street objects; leave out --objects."

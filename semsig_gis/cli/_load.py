@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
-from semsig_gis.cli._app import AsJson, app, keep_inputs, print_report
+from semsig_gis.cli._app import AsJson, app, keep_inputs, print_report, require_suffix
 from semsig_gis.console import progress, remark
 
 if TYPE_CHECKING:
@@ -81,6 +81,7 @@ def load(
     from semsig_gis.loading import assemble, choose_layers, read_files
 
     keep_inputs(out, buildings, streets, read=[*files, *catalog])
+    require_suffix(".parquet", out, buildings, streets)
     chosen = combine_catalogs([load_catalog(name) for name in catalog])
     specs = choose_layers(chosen, layer or (), surroundings=bool(buildings or streets))
     with progress("reading") as advance:
@@ -121,6 +122,7 @@ def fetch(
     from semsig_gis.loading import assemble, choose_layers
 
     keep_inputs(out, buildings, streets, read=(catalog, area))
+    require_suffix(".parquet", out, buildings, streets)
     chosen = load_catalog(catalog)
     specs = choose_layers(chosen, layer or (), surroundings=bool(buildings or streets))
     kept, http = open_cache(cache, offline=offline)

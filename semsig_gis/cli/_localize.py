@@ -18,6 +18,7 @@ from semsig_gis.cli._app import (
     app,
     keep_inputs,
     numbers,
+    require_suffix,
     tell_if_online,
 )
 from semsig_gis.cli._ground import draw_ground
@@ -145,6 +146,7 @@ def localize(
         msg = "--route was given without --queries; give the file of its views."
         raise InputError(msg)
     keep_inputs(map_, out, read=(database, objects, area, popularity, rule, noise))
+    require_suffix(".html", map_)
     files = _Files(map_, out, share, within)
     if files.holds_chances and (share is not None or within):
         msg = (

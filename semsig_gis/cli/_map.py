@@ -12,6 +12,7 @@ from semsig_gis.cli._app import (
     app,
     keep_inputs,
     known_identifiability,
+    require_suffix,
     stored_objects,
     tell_if_online,
 )
@@ -68,6 +69,7 @@ def map_(
         )
         raise InputError(msg)
     keep_inputs(out, read=(database, drift, objects, buildings, streets))
+    require_suffix(".html", out)
     results = None if evaluation is None else Evaluation.load(evaluation)
     opened = open_database(database)
     told = known_identifiability(database, opened) if identifiability or ambiguity else None
