@@ -166,8 +166,9 @@ def by_rank(column: str, *, geometry: str) -> Style:
     symbols: list[SymbolLayer] = []
     for number, (_, colour) in enumerate(RANKS.values()):
         if geometry == "polygon":
-            # Its edge is all that is seen of a region from far.
-            fill = {"color": _rgba(colour, 170), "style": "solid", "outline_color": _rgba(colour)}
+            # Its edge is all that is seen of a region from far, and the palest is too pale for it.
+            edge = ERROR_RAMP[1] if colour == ERROR_RAMP[0] else colour
+            fill = {"color": _rgba(colour, 170), "style": "solid", "outline_color": _rgba(edge)}
             symbols.append(("SimpleFill", {**fill, "outline_style": "solid", "outline_width": 0.4}))
         else:
             # Pale places stand out from a pale map by their edges.
