@@ -16,7 +16,7 @@ from folium.template import Template
 from folium.utilities import JsCode
 from pyproj import Transformer
 
-from semsig_gis import _map_board, _map_packing, _map_popup, _map_search
+from semsig_gis import _map_board, _map_heat, _map_packing, _map_popup, _map_search
 from semsig_gis.database import SignatureDatabase
 from semsig_gis.errors import InputError
 from semsig_gis.map_image import city_image
@@ -55,7 +55,7 @@ MAX_ZOOM = 20
 CLOSE_ZOOM = 17  # the closest that a new map shows by itself
 SCRIPTS = (
     *(SCRIPT, _map_popup.SCRIPT, _map_search.SCRIPT),
-    *(_map_packing.SCRIPT, _map_board.SCRIPT),
+    *(_map_packing.SCRIPT, _map_board.SCRIPT, _map_heat.SCRIPT),
 )
 POWERS = 4  # of x and y, which tell a place within millimetres in a city
 LATTICE = 9

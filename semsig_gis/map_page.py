@@ -35,9 +35,9 @@ STYLE = """\
   font-size: 11px; background: var(--panel); color: var(--ink); border-color: var(--faint);
   text-shadow: none; }
 .leaflet-control-scale-line + .leaflet-control-scale-line { display: none; }
-.leaflet-heatmap-layer, .semsig-legend i.heat { opacity: 0.5; }
+.semsig-heat, .semsig-legend i.heat { opacity: 0.5; }
 /* What is dark on light is light on dark: the ramps that begin near the colour of paper. */
-.semsig-dark .semsig-flip, .semsig-dark .leaflet-heatmap-layer, .semsig-dark i.heat,
+.semsig-dark .semsig-flip, .semsig-dark .semsig-heat, .semsig-dark i.heat,
 .semsig-dark img.leaflet-tile {
   filter: invert(1) hue-rotate(180deg) brightness(1.15); }
 /* The streets and buildings below the cells are seen through them. */
@@ -168,18 +168,6 @@ const semsig = {
       part.addTo(group);
     }
     return group;
-  },
-  heat(points, {maxZoom, ...options}) {
-    // leaflet.heat means by it where its points are strongest, but the layer control disables a
-    // layer beyond it. So it is there only while the heat is drawn.
-    const layer = L.heatLayer(points, options);
-    const redraw = layer._redraw;
-    layer._redraw = function() {
-      this.options.maxZoom = maxZoom;
-      redraw.call(this);
-      delete this.options.maxZoom;
-    };
-    return layer;
   },
   legend(map, text, view, zoom) {
     const box = L.DomUtil.create("details", "semsig-legend");

@@ -8,14 +8,13 @@ from typing import TYPE_CHECKING, Any
 
 import folium
 import numpy as np
-from folium.plugins import HeatMap
 from folium.raster_layers import WmsTileLayer
-from folium.template import Template
 
 from semsig_gis import map_assets
+from semsig_gis._map_board import mercator
+from semsig_gis._map_packing import packed
 from semsig_gis._map_parts import (
     Drawing,
-    Furniture,
     Legend,
     add_city,
     cell_signature,
@@ -39,14 +38,13 @@ from semsig_gis.map_legend import (
     evaluation_legend,
     localization_legend,
 )
-from semsig_gis.spatial_index import ObjectIndex
 from semsig_gis.storage import whole_file
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
     from pathlib import Path
 
-    from numpy.typing import ArrayLike, NDArray
+    from numpy.typing import NDArray
 
     from semsig_gis.database import SignatureDatabase
     from semsig_gis.evaluation import Evaluation
@@ -67,10 +65,6 @@ _QUERY_FIELDS = (
 )
 _CANDIDATE_FIELDS = ("Query", "Signature", "Rank", "Distance", "Cell", "Position")
 
-_HEAT_PIXELS = 25
-_HEAT_STOPS = (0.1, 0.35, 0.65, 0.9)
-_SCREEN_PIXELS = 900.0
-_TILE_PIXELS = 256.0
 _MANY = 2000
 _KILOMETRE = 1000
 
@@ -100,8 +94,9 @@ def evaluation_map(
     -------
     folium.Map
         The map, with these layers: the cells as an image (darker where more objects are seen), a
-        heatmap of the expected errors, the failed and the successful queries with popups, and
-        lines from the true to the estimated places (hidden at first).
+        heatmap of the expected errors (at every zoom, the mean of the queries around a pixel), the
+        failed and the successful queries with popups, and lines from the true to the estimated
+        places (hidden at first).
 
     Raises
     ------
@@ -140,16 +135,10 @@ def evaluation_map(
     guess = math.sqrt(2.0 * float(database.xy.var(axis=0).sum())) or database.grid.step
     chosen = prepared_map(map_, tiles, title="Localization errors")
     add_city(chosen, database)
-    _Heat(  # type: ignore[no-untyped-call]
-        np.column_stack([places, _heat(xy, queries["error_m"] / guess, extent=max(high - low))]),
-        name=free_name(chosen, "Expected errors"),
-        min_opacity=0.0,
-        # Farther out than the whole city, leaflet.heat weakens what comes to lie closer together.
-        max_zoom=_zoom(view),
-        radius=_HEAT_PIXELS,
-        blur=_HEAT_PIXELS,
-        gradient=dict(zip(_HEAT_STOPS, ERROR_RAMP, strict=True)),
-    ).add_to(chosen)
+    errors = np.minimum(queries["error_m"].to_numpy(np.float64) / guess, 1.0)
+    Drawing(free_name(chosen, "Expected errors"), "heat", *_heat(xy, errors, database)).add_to(
+        chosen
+    )
     groups = (("Failed", ~successful, FAILED), ("Successful", successful, SUCCESSFUL))
     located = np.isfinite(found).all(axis=1)
     Drawing(
@@ -277,19 +266,6 @@ def save_map(map_: folium.Map, path: str | Path, *, self_contained: bool | None 
     return not map_assets.external_files(page) and not tiled
 
 
-class _Heat(Furniture, HeatMap):
-    """A heatmap that can be switched on and off at every zoom."""
-
-    _template = Template(
-        """
-        {% macro script(this, kwargs) %}
-        var {{ this.get_name() }} = semsig.heat(
-          {{ this.data|tojson }}, {{ this.options|tojavascript }});
-        {% endmacro %}
-        """
-    )
-
-
 def _query_records(
     evaluation: Evaluation,
     database: SignatureDatabase,
@@ -414,19 +390,14 @@ def _ramp(values: NDArray[np.float64], colours: Sequence[str]) -> list[str]:
     return [f"#{bytes(row).hex()}" for row in np.rint(mixed).astype(np.uint8)]
 
 
-def _heat(xy: NDArray[np.float64], errors: ArrayLike, *, extent: float) -> NDArray[np.float64]:
-    """Return the opacity of each query in the heatmap, from its error as a share of a guess's.
-
-    The heat of queries that are near each other on the screen is laid one over the other. Each
-    gets a part, so that together they show their mean error, not where most were drawn.
-    """
-    reach = extent * _HEAT_PIXELS / _SCREEN_PIXELS
-    neighbours = np.bincount(ObjectIndex(xy).pairs_within(xy, radius=reach)[0])
-    opacity = _HEAT_STOPS[-1] * np.minimum(np.asarray(errors, np.float64), 1.0)
-    return np.round(1.0 - (1.0 - opacity) ** (1.0 / neighbours), 4)
-
-
-def _zoom(view: NDArray[np.float64]) -> int:
-    """Return about the zoom at which places fill a screen."""
-    degrees = max(float(np.ptp(view[:, 1])), 0.001)
-    return round(math.log2(_SCREEN_PIXELS / _TILE_PIXELS * 360.0 / degrees))
+def _heat(
+    xy: NDArray[np.float64], errors: NDArray[np.float64], database: SignatureDatabase
+) -> tuple[dict[str, list[str]], dict[str, Any]]:
+    """Return the places and errors, as shares of a guess's, for the script."""
+    places, about = mercator(xy, database.crs)
+    arrays = {
+        "x": packed(np.ascontiguousarray(places[:, 0])),
+        "y": packed(np.ascontiguousarray(places[:, 1])),
+        "error": packed(np.rint(255.0 * errors).astype(np.uint8)),
+    }
+    return arrays, {**about, "colours": ERROR_RAMP}

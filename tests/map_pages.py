@@ -99,7 +99,7 @@ def switch(browser: Chrome, name: str) -> None:
 
 def assert_quiet(browser: Chrome) -> None:
     """Check that the page reported no error and asked for nothing."""
-    # leaflet.heat reads its canvas back, for which Chromium has an advice, not an error.
+    # `drawn` reads canvases back, for which Chromium has an advice, not an error.
     messages = [
         entry
         for entry in browser.get_log("browser")

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import folium
 import pytest
 from conftest import unavailable
-from folium.plugins import HeatMap, MarkerCluster
+from folium.plugins import MarkerCluster
 
 from semsig_gis import map_assets
 from semsig_gis.errors import InputError, UnknownNameError
@@ -30,11 +30,10 @@ carried = pytest.mark.usefixtures("_carried")
 
 
 def a_map(*, tiles: str | None = None) -> folium.Map:
-    """Return a map with one of each element that needs a file: popup, marker, heat, control."""
+    """Return a map with one of each element that needs a file: popup, marker, control."""
     map_ = folium.Map(location=[43.6, 3.88], zoom_start=14, tiles=tiles)
     map_.options["maxZoom"] = 20
     folium.Marker([43.6, 3.88], popup="<b>here</b>").add_to(map_)
-    HeatMap([[43.6, 3.88, 1.0], [43.61, 3.88, 0.5]], name="heat").add_to(map_)
     folium.LayerControl(collapsed=True).add_to(map_)
     return map_
 
@@ -71,7 +70,7 @@ def test_every_link_of_a_folium_page_is_known() -> None:
     assert linked <= known | map_assets.UNUSED
     # and nothing in our lists is left over from an older folium
     assert linked >= map_assets.UNUSED
-    assert linked >= known - {"leaflet-heat.js"}
+    assert linked >= known
 
 
 @carried
@@ -155,7 +154,6 @@ def test_the_page_works_in_a_browser_and_requests_nothing(browser: Chrome, tmp_p
     assert (
         str(popup.get_property("innerText")).strip() == "here"
     )  # `text` is empty while it fades in
-    assert browser.find_elements("css selector", "canvas.leaflet-heatmap-layer")
     assert browser.get_log("browser") == []
     events = [json.loads(entry["message"])["message"] for entry in browser.get_log("performance")]
     requested = {

@@ -13,6 +13,7 @@ import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from map_pages import (
+    ASK,
     HOSTILE,
     asked,
     assert_quiet,
@@ -35,7 +36,7 @@ from semsig_gis.catalog import paper_taxonomy
 from semsig_gis.errors import InputError
 from semsig_gis.evaluation import evaluate
 from semsig_gis.limitations import MissingClasses
-from semsig_gis.map_legend import CANDIDATE_RAMP, FAILED, SUCCESSFUL
+from semsig_gis.map_legend import CANDIDATE_RAMP, ERROR_RAMP, FAILED, SUCCESSFUL
 from semsig_gis.maps import evaluation_map, localization_map, save_map
 from semsig_gis.matching import localize
 from semsig_gis.objects import StreetObjects, build_objects
@@ -86,11 +87,11 @@ def test_an_evaluation_in_a_browser(
         assert drawn(browser, colour) == 0
         switch(browser, name)
         assert drawn(browser, colour) >= before * 0.9
-    assert len(browser.find_elements(By.CSS_SELECTOR, "canvas.leaflet-heatmap-layer")) == 1
+    assert len(browser.find_elements(By.CSS_SELECTOR, "canvas.semsig-heat")) == 1
     asked(browser, "map.setZoom(20, {animate: false})")
     assert browser.find_elements(By.CSS_SELECTOR, "input:disabled") == []
     switch(browser, "Expected errors")
-    assert browser.find_elements(By.CSS_SELECTOR, "canvas.leaflet-heatmap-layer") == []
+    assert browser.find_elements(By.CSS_SELECTOR, "canvas.semsig-heat") == []
     switch(browser, "Objects seen")
     assert browser.find_elements(By.CSS_SELECTOR, "img.leaflet-image-layer") == []
     switch(browser, "Lines")
@@ -100,6 +101,50 @@ def test_an_evaluation_in_a_browser(
     return count;
     """
     assert asked(browser, lines) == int((evaluation.queries["tied"] > 0).sum())
+    assert_quiet(browser)
+
+
+@pytest.mark.usefixtures("carried")
+def test_the_heatmap_shows_mean_errors_at_every_zoom(
+    browser: Chrome, evaluation: Evaluation, database: SignatureDatabase, tmp_path: Path
+) -> None:
+    """The oracle weighs every query for every place, in pixels of the screen."""
+    opened(browser, evaluation_map(evaluation, database), tmp_path)
+    guess = np.sqrt(2.0 * database.xy.var(axis=0).sum())
+    errors = np.minimum(evaluation.queries["error_m"].to_numpy() / guess, 1.0)
+    degrees = evaluation.queries.to_crs("EPSG:4326").geometry
+    places = np.stack([degrees.y, degrees.x], axis=1).tolist()
+    stops = np.linspace(0.0, 1.0, len(ERROR_RAMP))
+    ramp = np.array([list(bytes.fromhex(colour[1:])) for colour in ERROR_RAMP])
+    # The colours at the queries, mixed from the four pixels of the field around each.
+    script = """
+    const [places, zoom, done] = arguments;
+    map.setZoom(map.getZoom() + zoom, {animate: false});
+    requestAnimationFrame(() => requestAnimationFrame(() => {
+      const canvas = document.querySelector("canvas.semsig-heat");
+      const copy = document.createElement("canvas");
+      [copy.width, copy.height] = [canvas.width, canvas.height];
+      const context = copy.getContext("2d", {willReadFrequently: true});
+      context.drawImage(canvas, 0, 0);
+      const box = canvas.getBoundingClientRect();
+      const shape = map.getContainer().getBoundingClientRect();
+      done(places.map((place) => {
+        const {x, y} = map.latLngToContainerPoint(place);
+        const [left, top] = [x + shape.left - box.left, y + shape.top - box.top];
+        return [x, y, ...context.getImageData(Math.round(left), Math.round(top), 1, 1).data];
+      }));
+    }));
+    """
+    for zoom in (0, -1, 2):
+        told = np.array(browser.execute_async_script(ASK + script, places, zoom))
+        away = np.hypot(*(told[:, None, :2] - told[None, :, :2]).T)
+        weights = np.maximum(0.0, 1.0 - (away / 28.0) ** 2) ** 2
+        means = (weights * errors[:, None]).sum(axis=0) / weights.sum(axis=0)
+        seen = told[:, 5] > 250  # what lies outside the canvas is clear
+        assert seen.sum() > 10
+        for part in range(3):
+            expected = np.interp(means, stops, ramp[:, part])
+            assert np.abs(told[seen, 2 + part] - expected[seen]).max() < 16
     assert_quiet(browser)
 
 
