@@ -44,6 +44,7 @@ class Feedback(QgsProcessingFeedback):
         super().__init__()
         self.cancelling = cancelling
         self.errors: list[str] = []
+        self.infos: list[str] = []
         self.percents: list[float] = []
 
     def setProgress(self, percent: float) -> None:  # noqa: N802
@@ -53,6 +54,10 @@ class Feedback(QgsProcessingFeedback):
     def reportError(self, error: str, fatalError: bool = False) -> None:  # noqa: ARG002, FBT001, FBT002, N802, N803
         """Keep an error."""
         self.errors.append(error)
+
+    def pushInfo(self, info: str) -> None:  # noqa: N802
+        """Keep what is said beside."""
+        self.infos.append(info)
 
     def setProgressText(self, text: str) -> None:  # noqa: N802
         """Cancel once there is something to cancel."""
@@ -82,9 +87,48 @@ def run(name: str, feedback: Feedback, **parameters: object) -> bool:
     return ended[0]
 
 
-def shown() -> QgsProcessingOutputLayerDefinition:
-    """Return a temporary output that is loaded."""
-    return QgsProcessingOutputLayerDefinition("TEMPORARY_OUTPUT", QgsProject.instance())
+def shown(place: str = "TEMPORARY_OUTPUT") -> QgsProcessingOutputLayerDefinition:
+    """Return an output that is loaded, a temporary one by default."""
+    return QgsProcessingOutputLayerDefinition(place, QgsProject.instance())
+
+
+def held() -> dict[str, Any]:
+    """Return what the layers hold that are shown, by name: rows, extent and columns."""
+    found: dict[str, Any] = {}
+    for layer in QgsProject.instance().mapLayers().values():
+        rows = len(list(layer.getFeatures()))
+        told = [rows, layer.extent().toString(), layer.fields().names()]
+        found.setdefault(layer.name(), []).append(told)
+    return found
+
+
+def show_twice() -> dict[str, Any]:
+    """Write the same files twice while their layers are shown, and return what each time held."""
+    told = {}
+    regions = str(PLACE / "regions.gpkg")
+    for time_, parameters in (
+        ("first", {"TYPES": "D", "TOP": 20, "METHOD": "edit+edit"}),
+        # The layer is called like its file, which holds another one.
+        (
+            "second",
+            {"TYPES": "DDB", "TOP": 3, "SHARE": 0.5, "AREA": f"{regions}|layername=regions"},
+        ),
+    ):
+        feedback = Feedback()
+        ended = run(
+            "localize",
+            feedback,
+            DATABASE=str(PLACE / "session.parquet"),
+            CANDIDATES=shown(str(PLACE / "new" / "candidates.gpkg")),
+            PLACE=shown(),
+            REGIONS=shown(regions),
+            **parameters,
+        )
+        if not ended:
+            raise RuntimeError(feedback.errors)
+        told[time_] = {**held(), "infos": feedback.infos}
+    QgsProject.instance().clear()
+    return told
 
 
 def show() -> dict[str, Any]:
@@ -106,6 +150,56 @@ def show() -> dict[str, Any]:
         layer.name(): [layer.renderer().type(), *layer.renderer().usedAttributes(EVERYWHERE)]
         for layer in layers
     }
+
+
+def refuse() -> list[list[str]]:
+    """Return what is told of what cannot be."""
+    database, objects = str(PLACE / "session.parquet"), str(PLACE / "objects.parquet")
+    query = {"DATABASE": database, "TYPES": "DDB", "METHOD": "types:edit", "CANDIDATES": shown()}
+    told = []
+    for name, parameters in (
+        (
+            "localize",
+            {**query, "HEADING": "unknown", "AREA": f"{PLACE / 'regions.gpkg'}|layername=regions"},
+        ),
+        ("localize", {**query, "PLACE": str(PLACE / "place.gpkg")}),
+        (
+            "evaluate",
+            {
+                "DATABASE": database,
+                "METHOD": "edit+edit",
+                "NOISE": "light",
+                "OUTPUT": "TEMPORARY_OUTPUT",
+            },
+        ),
+        (
+            "build",
+            {
+                "OBJECTS": objects,
+                "OUTPUT": str(PLACE / "later.parquet"),
+                "CELLS": str(PLACE / "b.shp"),
+            },
+        ),
+        (
+            "identify",
+            {"DATABASE": database, "CELLS": shown(), "MAP": str(PLACE / "told.json")},
+        ),
+        (
+            "evaluate",
+            {
+                "DATABASE": database,
+                "OUTPUT": "TEMPORARY_OUTPUT",
+                "LAYERS": str(PLACE / "lamps.geojson" / "b.gpkg"),
+            },
+        ),
+    ):
+        feedback = Feedback()
+        run(name, feedback, **parameters)
+        told.append(feedback.errors)
+    ProcessingConfig.setSettingValue("SEMSIG_COMMAND", "/bin/true")
+    feedback = Feedback()
+    run("build", feedback, OBJECTS=objects, OUTPUT=str(PLACE / "later.parquet"))
+    return [*told, feedback.errors]
 
 
 def stop(name: str, *, cancelling: bool = False, **parameters: object) -> dict[str, Any]:
@@ -139,7 +233,9 @@ def play() -> dict[str, Any]:
             CATALOG_FILE=sys.argv[2],
             OUTPUT=str(PLACE / "session_lamps.parquet"),
         ),
+        **show_twice(),
         "shown": show(),
+        "order": [layer.name() for layer in QgsProject.instance().layerTreeRoot().layerOrder()],
         "failed": stop("export", DATABASE=objects, OUTPUT=str(PLACE / "fails.gpkg")),
         "cancelled": stop(
             "build",
@@ -151,6 +247,7 @@ def play() -> dict[str, Any]:
             CELLS=shown(),
         ),
     }
+    told["refused"] = refuse()
     ProcessingConfig.setSettingValue("SEMSIG_COMMAND", "")
     _, told["lost"] = algorithm("build").canExecute()
     return told

@@ -15,8 +15,8 @@ import typer
 from hypothesis import given
 from hypothesis import strategies as st
 from semsig import answers, arguments
-from semsig.answers import candidate_rows, parse_answer, place_row, ring
-from semsig.arguments import command_line
+from semsig.answers import answer_lines, candidate_rows, parse_answer, place_row, ring
+from semsig.arguments import check_output, command_line, require_likelihood
 from semsig.command import (
     Cancelled,
     CommandError,
@@ -85,6 +85,9 @@ def test_the_usual_places_are_in_the_home(tmp_path: Path, monkeypatch: pytest.Mo
     monkeypatch.setenv("HOME", str(tmp_path))
     expected = program(tmp_path / ".local" / "bin")
     assert find_command("", {"PATH": ""}) == expected
+    for folder in ("Scripts", "bin"):  # those of the environment of the documentation
+        first = program(tmp_path / "semsig" / folder)
+        assert find_command("", {"PATH": ""}) == first
     assert find_command("~/.local/bin/semsig", {}) == expected
 
 
@@ -138,6 +141,18 @@ def test_results_progress_and_remarks_are_told_apart() -> None:
     assert heard.remarks == ["a remark", "a bare line about 40%"]
 
 
+def test_a_remark_is_not_held_back_until_the_end() -> None:
+    heard: list[str] = []
+    watcher = Watcher(lambda _percent, label: heard.append(label), heard.append, lambda: False)
+    code = (
+        "import sys\n"
+        "for line in ('semsig: a remark', 'semsig progress 0% digging', 'semsig: the last'):\n"
+        "    print(line, file=sys.stderr)\n"
+    )
+    run_command([sys.executable, "-c", code], clean_environment(os.environ), watcher)
+    assert heard == ["a remark", "digging", "the last"]
+
+
 FAILED = "The semsig command failed with exit code"
 
 
@@ -145,8 +160,8 @@ FAILED = "The semsig command failed with exit code"
     ("code", "message", "remarks"),
     [
         ("say('semsig: a'); say('semsig: x is wrong; give y.'); exit(2)", "x is wrong; give y.", 1),
-        ("exit(2)", f"{FAILED} 2 and did not say why.", 0),
-        ("say('KeyError: 3'); exit(1)", f"{FAILED} 1: KeyError: 3", 0),
+        ("say('semsig: a'); say('KeyError: 3'); exit(1)", f"{FAILED} 1: KeyError: 3", 1),
+        ("say('semsig progress 0% a'); exit(9)", f"{FAILED} 9 and did not say why.", 0),
     ],
 )
 def test_a_failure_is_told_once(code: str, message: str, remarks: int) -> None:
@@ -156,6 +171,38 @@ def test_a_failure_is_told_once(code: str, message: str, remarks: int) -> None:
         run_code(begin + code, heard)
     assert str(caught.value) == message
     assert heard.remarks == ["a"] * remarks
+
+
+@pytest.mark.parametrize(
+    ("code", "why"),
+    [
+        ("exit(2)", "(exit code 2)"),
+        ("sys.exit('usage: python')", "(exit code 1: usage: python)"),
+        ("print('hello')", "(it did not write {place})"),
+    ],
+)
+@pytest.mark.parametrize("old", [False, True])
+def test_another_program_than_the_command(tmp_path: Path, code: str, why: str, old: bool) -> None:  # noqa: FBT001
+    place = tmp_path / "city.parquet"
+    if old:
+        place.write_text("from an earlier run")
+    command = [sys.executable, "-c", f"import sys\n{code}"]
+    with pytest.raises(CommandError) as caught:
+        run_command(command, clean_environment(os.environ), Heard().watcher(), written=str(place))
+    why = why.replace("{place}", str(place))
+    assert_sentence(caught.value, f"{sys.executable} is not the semsig command", why, "Settings > ")
+
+
+def test_a_file_that_was_written_anew(tmp_path: Path) -> None:
+    place = tmp_path / "city.parquet"
+    code = (
+        f"import os; from pathlib import Path; part = Path({str(tmp_path / 'part')!r}); "
+        f"part.write_text('city'); os.replace(part, {str(place)!r})"
+    )
+    command = [sys.executable, "-c", code]
+    for _ in range(2):
+        run_command(command, clean_environment(os.environ), Heard().watcher(), written=str(place))
+    assert place.read_text() == "city"
 
 
 def test_a_program_that_cannot_be_run(tmp_path: Path) -> None:
@@ -263,6 +310,44 @@ def test_the_lists_are_those_of_the_command() -> None:
         assert parse_chain(name)
 
 
+def test_what_only_the_likelihood_has() -> None:
+    require_likelihood("likelihood", "Place")
+    with pytest.raises(CommandError) as caught:
+        require_likelihood("types:edit", "Place")
+    assert_sentence(caught.value, "Place", "types:edit", "choose the method likelihood")
+
+
+def test_outputs_are_checked_before_the_work(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "text").write_text("a file")
+    (tmp_path / "folder.gpkg").mkdir()
+    for path, suffix in (
+        ("a.gpkg", "gpkg"),
+        (str(tmp_path / "new" / "folder" / "A.GPKG"), "gpkg"),
+        ("new/folder", ""),
+        (str(tmp_path), ""),
+    ):
+        check_output(path, suffix)
+    for path, suffix, words in (
+        ("b.shp", "gpkg", "does not end in .gpkg"),
+        ("gpkg", "gpkg", "does not end in .gpkg"),
+        ("folder.gpkg", "gpkg", "is a folder"),
+        ("text/b.gpkg", "gpkg", "text is not a folder"),
+        ("text/deep/results", "", "text is not a folder"),
+        ("text", "", "text is not a folder"),
+    ):
+        with pytest.raises(CommandError) as caught:
+            check_output(path, suffix)
+        assert_sentence(caught.value, path, words)
+    monkeypatch.setattr("semsig.arguments.os.access", lambda _path, _mode: False)
+    for path, suffix in (("b.gpkg", "gpkg"), ("new/folder", "")):
+        with pytest.raises(CommandError) as caught:
+            check_output(path, suffix)
+        assert_sentence(caught.value, path, f"{tmp_path} is read-only")
+
+
 # --- Answers ------------------------------------------------------------------------------------
 
 
@@ -299,6 +384,31 @@ def test_rows_have_the_fields_that_they_say() -> None:
     assert [one["chance"] for one in told] == [None, 0.5]
     assert [one["distance"] for one in told] == [0.3, None]
     assert place_row({"candidates": []}) is None
+
+
+def test_what_there_is_to_say_of_an_answer() -> None:
+    ranked = {"candidates": [{"rank_high": 1}], "tied_beyond": 1}
+    assert answer_lines(ranked) == [
+        "The best cell ties with no other.",
+        "1 further cell ties with the last candidate.",
+    ]
+    searched = {"regions": 1, "cells": 13, "km2": 0.0013, "percent": 0.00493, "chance": 0.951}
+    placed = {
+        "answered": False,
+        "place": {"within_m": 50.0, "chance": 0.05},
+        "candidates": [],
+        "searched": searched,
+    }
+    assert answer_lines(placed) == [
+        "Cannot tell: the best place is within 50 m of the ellipse's middle with a chance of 5.0%.",
+        "To search: 1 region, 0.0013 km2, 0.00493 % of the city, with 95.1% of the chance.",
+    ]
+    del searched["chance"]
+    ranked = {"candidates": [{"rank_high": 1200}], "tied_beyond": 0, "searched": searched}
+    assert answer_lines(ranked) == [
+        "The best 1,200 cells share the ranks 1 to 1,200.",
+        "To search: 1 region, 0.0013 km2, 0.00493 % of the city.",
+    ]
 
 
 @pytest.mark.parametrize("printed", ["", "{}", "[]", "3", '{"crs": 1}', "{"])

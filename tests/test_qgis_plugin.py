@@ -224,13 +224,17 @@ def test_localize(qgis: Qgis) -> None:
         MAP=qgis.place / "place.html",
         **written,
     )
-    candidates = gpd.read_file(written["CANDIDATES"])
+    candidates = gpd.read_file(written["CANDIDATES"], layer="CANDIDATES")
     assert candidates["rank"].tolist() == [1, 2, 3]
     assert candidates["cell_id"][0] == database.cell_ids[cell]
     assert candidates["chance"].is_monotonic_decreasing
     assert candidates["distance"].isna().all()
     assert candidates.crs == database.crs
-    place = gpd.read_file(written["PLACE"])
+    for name in ("CANDIDATES", "PLACE"):
+        styles = gpd.read_file(written[name], layer="layer_styles")
+        assert styles["styleName"].tolist() == [name.lower()]
+        assert styles["useAsDefault"].all()
+    place = gpd.read_file(written["PLACE"], layer="PLACE")
     assert place["answered"].tolist() == ["yes"]
     regions = gpd.read_file(written["REGIONS"], layer="regions")
     assert regions.geometry[0].distance(candidates.geometry[0]) == 0
@@ -289,6 +293,44 @@ def test_layers_are_shown_with_their_styles(session: dict[str, Any]) -> None:
         "Queries": ["categorizedSymbol", "outcome"],
         "From the true to the best place": ["categorizedSymbol", "outcome"],
     }
+    order = session["order"]
+    assert order.index("Queries") < order.index("From the true to the best place")
+
+
+def test_a_second_run_into_the_same_files_is_shown(session: dict[str, Any]) -> None:
+    first, second = session["first"], session["second"]
+    for name in ("Candidates", "Regions to search"):
+        ((rows, extent, _),), ((new_rows, new_extent, _),) = first[name], second[name]
+        assert new_rows < rows
+        assert new_extent != extent
+    told, new_told = first["Regions to search"][0][2], second["Regions to search"][0][2]
+    assert "chance" in set(new_told) - set(told)
+    assert "Place" not in first
+    assert "Place" in second
+    shared, tied, searched = first["infos"]
+    assert shared.startswith("The best ")
+    assert tied.endswith("further cells tie with the last candidate.")
+    assert searched.startswith("To search: ")
+    placed, searched = second["infos"][-2:]
+    assert "m of the ellipse's middle with a chance of" in placed
+    assert searched.startswith("To search: ")
+
+
+def test_what_cannot_be_is_refused_before_the_work(session: dict[str, Any]) -> None:
+    refused = iter(session["refused"])
+    for words in (
+        ("--heading and --area are for --method likelihood",),
+        ("Place was given with the method types:edit",),
+        ("Detector was given with the method edit+edit",),
+        ("b.shp does not end in .gpkg",),
+        ("told.json does not end in .html",),
+        ("lamps.geojson is not a folder",),
+        ("/bin/true is not the semsig command", "later.parquet"),
+    ):
+        (sentence,) = next(refused)
+        for word in words:
+            assert word in sentence
+    assert list(refused) == []
 
 
 @pytest.mark.usefixtures("session")

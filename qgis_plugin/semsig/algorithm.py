@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import html
 import os
+import re
 import shlex
 from collections import deque
 from pathlib import Path
@@ -18,15 +19,18 @@ from qgis.core import (
     QgsProcessingLayerPostProcessorInterface,
     QgsProcessingParameterDefinition,
     QgsProcessingParameterEnum,
+    QgsProcessingParameterFeatureSink,
     QgsProcessingParameterFile,
     QgsProcessingParameterFileDestination,
     QgsProcessingParameterNumber,
     QgsProcessingParameterVectorDestination,
     QgsProcessingParameterVectorLayer,
+    QgsVectorLayer,
 )
 from qgis.PyQt.QtGui import QIcon
 
 from .answers import log_text
+from .arguments import check_output
 from .command import (
     Cancelled,
     CommandError,
@@ -37,10 +41,7 @@ from .command import (
 )
 
 if TYPE_CHECKING:
-    from qgis.core import (
-        QgsProcessingFeedback,
-        QgsVectorLayer,
-    )
+    from qgis.core import QgsProcessingFeedback
 
 __all__ = [
     "SETTING",
@@ -52,6 +53,7 @@ __all__ = [
     "described",
     "file_to_read",
     "file_to_write",
+    "keep_style",
     "layers_to_write",
     "map_to_write",
     "number",
@@ -65,6 +67,8 @@ SETTING = "SEMSIG_COMMAND"
 
 HERE = Path(__file__).parent
 PARQUET = "GeoParquet (*.parquet)"
+# How QGIS names what is no file, such as memory: or postgres: (a disk of Windows has one letter).
+NO_FILE = re.compile(r"\w\w+:")
 
 
 class SemsigAlgorithm(QgsProcessingAlgorithm):
@@ -128,6 +132,7 @@ class SemsigAlgorithm(QgsProcessingAlgorithm):
     ) -> dict[str, Any]:
         """Do the work; what goes wrong is told in one sentence."""
         try:
+            self._check_outputs(parameters, context)
             return self.work(parameters, context, feedback)
         except CommandError as error:
             raise QgsProcessingException(str(error)) from error
@@ -144,8 +149,22 @@ class SemsigAlgorithm(QgsProcessingAlgorithm):
         """Do the work and return the outputs by their names."""
         raise NotImplementedError
 
-    def call(self, arguments: list[str], feedback: QgsProcessingFeedback) -> str:
-        """Run the command with some arguments and return what it prints."""
+    def _check_outputs(self, parameters: dict[str, Any], context: QgsProcessingContext) -> None:
+        """Refuse outputs that cannot be written, however late they are."""
+        for output in self.destinationParameterDefinitions():
+            if isinstance(output, QgsProcessingParameterFeatureSink):
+                path = self.sink_file(parameters, output.name(), context)
+                suffix = Path(path).suffix[1:].lower()  # QGIS writes many formats
+            else:
+                path = self.file_out(parameters, output.name(), context)
+                suffix = output.defaultFileExtension()
+            if path:
+                check_output(path, suffix)
+
+    def call(
+        self, arguments: list[str], feedback: QgsProcessingFeedback, written: str | None = None
+    ) -> str:
+        """Run the command, which may write a file, and return what it prints."""
         told = ""
 
         def progress(percent: int, label: str) -> None:
@@ -158,12 +177,14 @@ class SemsigAlgorithm(QgsProcessingAlgorithm):
         feedback.pushCommandInfo(shlex.join(["semsig", *arguments]))
         watcher = Watcher(progress, feedback.pushInfo, feedback.isCanceled)
         return run_command(
-            [_command(), *arguments], environment=clean_environment(os.environ), watcher=watcher
+            [_command(), *arguments], clean_environment(os.environ), watcher, written=written
         )
 
-    def tell(self, arguments: list[str], feedback: QgsProcessingFeedback) -> None:
-        """Run the command and show what it prints."""
-        feedback.pushConsoleInfo(log_text(self.call(arguments, feedback)))
+    def tell(
+        self, arguments: list[str], feedback: QgsProcessingFeedback, written: str | None = None
+    ) -> None:
+        """Run the command, which may write a file, and show what it prints."""
+        feedback.pushConsoleInfo(log_text(self.call(arguments, feedback, written)))
 
     def file(self, parameters: dict[str, Any], name: str, context: QgsProcessingContext) -> str:
         """Return the path of a file to read, or nothing."""
@@ -172,6 +193,13 @@ class SemsigAlgorithm(QgsProcessingAlgorithm):
     def file_out(self, parameters: dict[str, Any], name: str, context: QgsProcessingContext) -> str:
         """Return the path of a file to write, or nothing."""
         return str(self.parameterAsFileOutput(parameters, name, context))
+
+    def sink_file(
+        self, parameters: dict[str, Any], name: str, context: QgsProcessingContext
+    ) -> str:
+        """Return the path of a layer that QGIS itself writes, or nothing if it is in no file."""
+        path = self.file_out(parameters, name, context)
+        return "" if NO_FILE.match(path) else path
 
     def text(self, parameters: dict[str, Any], name: str, context: QgsProcessingContext) -> str:
         """Return what was chosen or typed, or nothing."""
@@ -190,7 +218,8 @@ class SemsigAlgorithm(QgsProcessingAlgorithm):
         """Return a file with the polygons of a layer, or nothing."""
         if self.parameterAsVectorLayer(parameters, name, context) is None:
             return ""
-        formats = ["gpkg", "shp", "geojson"]
+        # Not GeoPackages: of those the command could not tell which layer is meant.
+        formats = ["shp", "geojson"]
         return str(
             self.parameterAsCompatibleSourceLayerPath(
                 parameters, name, context, formats, "gpkg", feedback
@@ -219,7 +248,7 @@ def show_layers(context: QgsProcessingContext, path: str, titles: dict[str, str]
     str
         The first of the layers, as QGIS names it.
     """
-    sources = {f"{path}|layername={layer}": title for layer, title in titles.items()}
+    sources = {_source(path, layer): title for layer, title in titles.items()}
     listed = context.layersToLoadOnCompletion()
     wished = listed.pop(path, None)
     if wished is not None:
@@ -229,6 +258,14 @@ def show_layers(context: QgsProcessingContext, path: str, titles: dict[str, str]
             listed[source] = details
         context.setLayersToLoadOnCompletion(listed)
     return next(iter(sources))
+
+
+def _source(path: str, layer: str) -> str:
+    """Return how QGIS names a layer of a GeoPackage."""
+    # It loads layers in the order of these texts, each above the one before: points belong above
+    # lines, and capitals, which it does not mind, come first.
+    word = "LAYERNAME" if layer.endswith("_lines") else "layername"
+    return f"{path}|{word}={layer}"
 
 
 class _Styler(QgsProcessingLayerPostProcessorInterface):
@@ -245,8 +282,10 @@ class _Styler(QgsProcessingLayerPostProcessorInterface):
         _feedback: QgsProcessingFeedback,
     ) -> None:
         """Give the layer its style; Processing itself does not even load the default one."""
+        # It may be in the project already, with the file open that was there before.
+        layer.dataProvider().reloadData()
         if self.name:
-            layer.loadNamedStyle(str(HERE / "styles" / f"{self.name}.qml"))
+            _load_style(layer, self.name)
         else:
             layer.loadDefaultStyle()
         layer.triggerRepaint()
@@ -277,6 +316,26 @@ def style_layer(context: QgsProcessingContext, source: str, style: str) -> None:
     """
     if context.willLoadLayerOnCompletion(source):
         context.layerToLoadOnCompletionDetails(source).setPostProcessor(_styler(style))
+
+
+def keep_style(source: str, style: str) -> None:
+    """Write a style of ours into the GeoPackage that a layer is in, if it is in one.
+
+    Parameters
+    ----------
+    source : str
+        The layer.
+    style : str
+        Name of the style's file, without its ending.
+    """
+    layer = QgsVectorLayer(source, style, "ogr")
+    if layer.storageType() == "GPKG":  # a temporary layer is in no file
+        _load_style(layer, style)
+        layer.saveStyleToDatabase(style, "", True, "")  # noqa: FBT003 - as QGIS calls it
+
+
+def _load_style(layer: QgsVectorLayer, style: str) -> None:
+    layer.loadNamedStyle(str(HERE / "styles" / f"{style}.qml"))
 
 
 def described(
@@ -339,18 +398,19 @@ def choice(
 
 
 def number(
-    name: str, title: str, default: float, bounds: tuple[float, float], text: str
+    name: str, title: str, default: float | None, bounds: tuple[float, float], text: str
 ) -> QgsProcessingParameterNumber:
-    """Return the parameter for a number."""
+    """Return the parameter for a number; one without a default may be left out."""
     parameter = QgsProcessingParameterNumber(
         name,
         title,
         type=QgsProcessingParameterNumber.Type.Double,
         defaultValue=default,
+        optional=default is None,
         minValue=bounds[0],
         maxValue=bounds[1],
     )
-    parameter.setMetadata({"widget_wrapper": {"decimals": 1}})
+    parameter.setMetadata({"widget_wrapper": {"decimals": 1 if bounds[1] > 1 else 2}})
     return described(parameter, text)
 
 

@@ -7,11 +7,12 @@ import math
 import re
 from typing import Any
 
-from .command import CommandError
+from .command import SETTINGS, CommandError
 
 __all__ = [
     "CANDIDATE_FIELDS",
     "PLACE_FIELDS",
+    "answer_lines",
     "candidate_rows",
     "log_text",
     "parse_answer",
@@ -101,10 +102,65 @@ def parse_answer(printed: str) -> dict[str, Any]:
     except (KeyError, TypeError, ValueError) as error:
         message = (
             "The semsig command gave an answer that this plugin does not understand; install a "
-            "semsig_gis and a plugin of the same version."
+            "semsig_gis and a plugin of the same version, or choose another command in "
+            f"{SETTINGS}."
         )
         raise CommandError(message) from error
     return answer
+
+
+def answer_lines(answer: dict[str, Any]) -> list[str]:
+    """Return what there is to say of an answer beside its layers.
+
+    Parameters
+    ----------
+    answer : dict
+        See `parse_answer`.
+
+    Returns
+    -------
+    list of str
+        Sentences: how sure the place is, or which candidates tie; and what must be searched.
+
+    Examples
+    --------
+    >>> best = {"rank_low": 1, "rank_high": 4}
+    >>> answer_lines({"candidates": [best], "tied_beyond": 3})
+    ['The best 4 cells share the ranks 1 to 4.', '3 further cells tie with the last candidate.']
+    """
+    place, searched = answer.get("place"), answer.get("searched")
+    lines = _tie_lines(answer) if place is None else [_verdict(answer["answered"], place)]
+    return lines if searched is None else [*lines, _search_line(searched)]
+
+
+def _verdict(answered: bool, place: dict[str, Any]) -> str:  # noqa: FBT001
+    verdict = "The place is" if answered else "Cannot tell: the best place is"
+    return (
+        f"{verdict} within {place['within_m']:g} m of the ellipse's middle with a chance of "
+        f"{place['chance']:.1%}."
+    )
+
+
+def _tie_lines(answer: dict[str, Any]) -> list[str]:
+    tied, beyond = answer["candidates"][0]["rank_high"], answer["tied_beyond"]
+    lines = [
+        "The best cell ties with no other."
+        if tied == 1
+        else f"The best {tied:,} cells share the ranks 1 to {tied:,}."
+    ]
+    if beyond:
+        further = "1 further cell ties" if beyond == 1 else f"{beyond:,} further cells tie"
+        lines.append(f"{further} with the last candidate.")
+    return lines
+
+
+def _search_line(searched: dict[str, Any]) -> str:
+    regions = searched["regions"]
+    chance = f", with {searched['chance']:.1%} of the chance" if "chance" in searched else ""
+    return (
+        f"To search: {regions:,} region{'' if regions == 1 else 's'}, {searched['km2']:.4g} km2, "
+        f"{searched['percent']:.3g} % of the city{chance}."
+    )
 
 
 def candidate_rows(answer: dict[str, Any]) -> list[tuple[float, float, list[Any]]]:

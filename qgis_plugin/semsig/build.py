@@ -43,7 +43,13 @@ ready to be searched; keep it there.
         any_vector = "Vector files (*.parquet *.gpkg *.shp *.geojson *.zip)"
         for parameter in (
             file_to_read("OBJECTS", "Street objects", "The file that “Load street objects” wrote."),
-            number("STEP", "Side of a cell (m)", 10.0, (1.0, 1000.0), "The paper has 10 m."),
+            number(
+                "STEP",
+                "Side of a cell (m)",
+                10.0,
+                (1.0, 1000.0),
+                "The paper of Weng, Gouet-Brunet and Soheilian has 10 m.",
+            ),
             number(
                 "RADIUS",
                 "Visibility range (m)",
@@ -78,10 +84,15 @@ ready to be searched; keep it there.
                     "Angle levels",
                     16,
                     (2, 180),
-                    "In how many equal sectors bearings are compared as sequences.",
+                    "In how many equal sectors the methods of the paper compare bearings. More of "
+                    "them tell cells apart better, and forgive less where bearings are off.",
                 )
             ),
-            file_to_write("OUTPUT", "Signature database", "The database to write."),
+            file_to_write(
+                "OUTPUT",
+                "Signature database",
+                "The database to write. A temporary file is lost when QGIS is closed.",
+            ),
             layers_to_write(
                 "CELLS",
                 "Cells",
@@ -114,6 +125,7 @@ ready to be searched; keep it there.
                 area=self.polygons(parameters, "AREA", context, feedback),
             ),
             feedback,
+            written,
         )
         shown = export_layers(
             self,

@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping, Sequence
 
 __all__ = [
+    "SETTINGS",
     "Cancelled",
     "CommandError",
     "Watcher",
@@ -49,6 +50,8 @@ FOREIGN = (
 )
 # Where installers put commands; a program that was started from a desktop menu has a short PATH.
 PLACES = (
+    "~/semsig/bin",  # where docs/qgis.md has it
+    "~/semsig/Scripts",
     "~/.local/bin",
     "/usr/local/bin",
     "/opt/*/bin",
@@ -59,7 +62,12 @@ PLACES = (
     "~/mini*3/bin",
     "~/anaconda3/bin",
 )
+SETTINGS = "Settings > Options > Processing > Providers > Semantic signatures"
+"""Where in QGIS the command is chosen."""
+
 PROGRESS = re.compile(r"semsig progress (\d+)% (.*)")
+# How its sentences begin.
+SENTENCE = "semsig: "
 # How often a cancel is looked for, and how long the command may take to clean up.
 BLINK_S = 0.1
 PATIENCE_S = 20.0
@@ -127,12 +135,12 @@ def find_command(
     CommandError
         If it is not there.
     """
-    where = "Settings > Options > Processing > Providers > Semantic signatures"
     if chosen:
         found = shutil.which(os.path.expanduser(chosen))  # noqa: PTH111 - a Path adds nothing
         if found is None:
             message = (
-                f"{chosen} is not a program that can be run; choose the semsig command in {where}."
+                f"{chosen} is not a program that can be run; choose the semsig command in "
+                f"{SETTINGS}."
             )
             raise CommandError(message)
         return found
@@ -142,7 +150,7 @@ def find_command(
     if found is None:
         message = (
             "The semsig command is not on this computer, or not where it is looked for; install "
-            f"semsig_gis with pip, or choose the command in {where}."
+            f"semsig_gis with pip, or choose the command in {SETTINGS}."
         )
         raise CommandError(message)
     return found
@@ -155,7 +163,13 @@ def _folders(place: str) -> Iterator[Path]:
     return root.glob(str(path.relative_to(root)))
 
 
-def run_command(command: Sequence[str], environment: Mapping[str, str], watcher: Watcher) -> str:
+def run_command(
+    command: Sequence[str],
+    environment: Mapping[str, str],
+    watcher: Watcher,
+    *,
+    written: str | None = None,
+) -> str:
     """Run the command and return its results, which it prints on standard output.
 
     Parameters
@@ -166,6 +180,8 @@ def run_command(command: Sequence[str], environment: Mapping[str, str], watcher:
         See `clean_environment`.
     watcher : Watcher
         Who hears of it.
+    written : str, optional
+        A file that the command writes.
 
     Returns
     -------
@@ -175,10 +191,12 @@ def run_command(command: Sequence[str], environment: Mapping[str, str], watcher:
     Raises
     ------
     CommandError
-        If the command cannot be run or fails; the message is what it says last.
+        If the command cannot be run or fails, where the message is what it says last; or if it
+        is not `semsig`, since it fails without a word of that or leaves the file as it was.
     Cancelled
         If the watcher wished so. The command has ended and cleaned up.
     """
+    before = _state(written)
     try:
         process = _start(command, environment)
     except OSError as error:
@@ -194,12 +212,7 @@ def run_command(command: Sequence[str], environment: Mapping[str, str], watcher:
         for reader in readers:
             reader.start()
         try:
-            last = ""
-            for remark in _listen(said, watcher):
-                # The last one is held back: it says why the command fails, if it does.
-                if last:
-                    watcher.remark(last)
-                last = remark
+            last, known = _hand_out(said, watcher)
             code = process.wait()
         except BaseException:  # whoever ends the watching, ends the command
             _stop(process)
@@ -208,10 +221,21 @@ def run_command(command: Sequence[str], environment: Mapping[str, str], watcher:
             for reader in readers:
                 reader.join(PATIENCE_S)
     if code != 0:
-        raise CommandError(_reason(last, code))
+        raise CommandError(_reason(command[0], last, code, known=known))
     if last:
-        watcher.remark(last)
+        watcher.remark(last.removeprefix(SENTENCE))
+    if written is not None and _state(written) == before:
+        raise CommandError(_foreign(command[0], f"it did not write {written}"))
     return "".join(results)
+
+
+def _state(path: str | None) -> tuple[int, int] | None:
+    """Return what differs once a file is written anew."""
+    try:
+        found = os.stat(path or "")  # noqa: PTH116 - a Path adds nothing
+    except OSError:
+        return None
+    return found.st_ino, found.st_mtime_ns
 
 
 def _start(command: Sequence[str], environment: Mapping[str, str]) -> subprocess.Popen[str]:
@@ -241,8 +265,23 @@ def _collect(process: subprocess.Popen[str], results: list[str]) -> None:
     results.extend(process.stdout or ())
 
 
+def _hand_out(said: queue.SimpleQueue[str | None], watcher: Watcher) -> tuple[str, bool]:
+    """Tell what is said, and return the last remark and whether it was `semsig` that spoke."""
+    last, known = "", False
+    for line in _listen(said, watcher):
+        # The last remark is held back: it says why the command fails, if it does.
+        if last:
+            watcher.remark(last.removeprefix(SENTENCE))
+        told = PROGRESS.fullmatch(line)
+        if told is not None:
+            watcher.progress(int(told[1]), told[2])
+        last = "" if told else line
+        known = known or told is not None or line.startswith(SENTENCE)
+    return last, known
+
+
 def _listen(said: queue.SimpleQueue[str | None], watcher: Watcher) -> Iterator[str]:
-    """Tell of progress, and yield the remarks, until the command has no more to say."""
+    """Yield the lines until the command has no more to say."""
     while not watcher.cancelled():
         try:
             line = said.get(timeout=BLINK_S)
@@ -250,11 +289,8 @@ def _listen(said: queue.SimpleQueue[str | None], watcher: Watcher) -> Iterator[s
             continue
         if line is None:
             return
-        told = PROGRESS.fullmatch(line)
-        if told is not None:
-            watcher.progress(int(told[1]), told[2])
-        elif line:
-            yield line.removeprefix("semsig: ")
+        if line:
+            yield line
     raise Cancelled
 
 
@@ -271,9 +307,18 @@ def _stop(process: subprocess.Popen[str]) -> None:
         process.wait()
 
 
-def _reason(last: str, code: int) -> str:
+def _reason(program: str, last: str, code: int, *, known: bool) -> str:
     """Return why the command failed: its last words, which are a sentence where it is the input."""
-    if code == 2 and last:  # noqa: PLR2004 - unusable input
-        return last
-    why = f": {last}" if last else " and did not say why."
-    return f"The semsig command failed with exit code {code}{why}"
+    if code == 2 and last.startswith(SENTENCE):  # noqa: PLR2004 - unusable input
+        return last.removeprefix(SENTENCE)
+    if known:
+        why = f": {last.removeprefix(SENTENCE)}" if last else " and did not say why."
+        return f"The semsig command failed with exit code {code}{why}"
+    return _foreign(program, f"exit code {code}: {last}" if last else f"exit code {code}")
+
+
+def _foreign(program: str, why: str) -> str:
+    return (
+        f"{program} is not the semsig command, or not one that fits this plugin ({why}); choose "
+        f"the semsig command in {SETTINGS}."
+    )

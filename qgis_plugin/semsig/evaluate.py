@@ -22,7 +22,14 @@ from .algorithm import (
     map_to_write,
     whole_number,
 )
-from .arguments import DISTORTIONS, LIKELIHOOD, METHODS, NOISES, command_line
+from .arguments import (
+    DISTORTIONS,
+    METHOD_HELP,
+    METHODS,
+    NOISES,
+    command_line,
+    require_likelihood,
+)
 from .export import export_layers
 
 if TYPE_CHECKING:
@@ -57,7 +64,9 @@ map page for the eye.
         folder = QgsProcessingParameterFolderDestination("OUTPUT", "Folder for the results")
         for parameter in (
             database(),
-            whole_number("QUERIES", "Queries", 500, (1, 1_000_000), "How many are asked."),
+            whole_number(
+                "QUERIES", "Number of queries", 500, (1, 1_000_000), "How many are asked."
+            ),
             choice(
                 "DISTORTION",
                 "Distortion",
@@ -72,7 +81,7 @@ map page for the eye.
                     "compass:10,view:90 (a compass that is off by 10°, a view of 90°).",
                 )
             ),
-            choice("METHOD", "Method", METHODS, "How cells are compared with a query."),
+            choice("METHOD", "Method", METHODS, METHOD_HELP),
             choice(
                 "NOISE",
                 "Detector",
@@ -81,9 +90,17 @@ map page for the eye.
                 "generic where that is not known.",
             ),
             whole_number(
-                "TOP", "Candidates", 1, (1, 100_000), "How many best candidates count as answers."
+                "TOP",
+                "Best candidates that count",
+                1,
+                (1, 100_000),
+                "A query is right if one of so many is.",
             ),
-            advanced(whole_number("SEED", "Seed", 0, (0, 2**31 - 1), "Of all chances.")),
+            advanced(
+                whole_number(
+                    "SEED", "Seed", 0, (0, 2**31 - 1), "Another number draws other queries."
+                )
+            ),
             described(folder, "The queries, their errors and a summary, for other programs."),
             layers_to_write(
                 "LAYERS",
@@ -110,9 +127,12 @@ map page for the eye.
         """Run `semsig evaluate`, then `semsig map` where a page is wished for."""
         source = self.file(parameters, "DATABASE", context)
         folder = self.file_out(parameters, "OUTPUT", context)
+        results = Path(folder, "evaluation.json")
         page = self.file_out(parameters, "MAP", context)
         method = self.text(parameters, "METHOD", context)
-        noise = self.text(parameters, "NOISE", context) if method == LIKELIHOOD else ""
+        noise = self.text(parameters, "NOISE", context)
+        if noise != NOISES[0]:
+            require_likelihood(method, "Detector")
         distortions = [
             self.text(parameters, "DISTORTION", context),
             self.text(parameters, "MORE", context),
@@ -130,14 +150,15 @@ map page for the eye.
                 seed=self.parameterAsInt(parameters, "SEED", context),
             ),
             feedback,
+            str(results),
         )
-        summary = json.loads(Path(folder, "evaluation.json").read_text(encoding="utf-8"))
+        summary = json.loads(results.read_text(encoding="utf-8"))
         within = summary["results"]["p_error_within_m"]["50"]
         shown = export_layers(
             self, (parameters, "LAYERS", context, feedback), LAYERS, source, evaluation=folder
         )
         found = {"OUTPUT": folder, "WITHIN_50_M": within, **shown}
         if page:
-            self.tell(command_line("map", source, evaluation=folder, out=page), feedback)
+            self.tell(command_line("map", source, evaluation=folder, out=page), feedback, page)
             found["MAP"] = page
         return found

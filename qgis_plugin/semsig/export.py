@@ -108,6 +108,6 @@ def export_layers(
     if not path:
         return {}
     algorithm.tell(
-        command_line("export", database, out=path, layer=list(titles), **options), feedback
+        command_line("export", database, out=path, layer=list(titles), **options), feedback, path
     )
     return {name: show_layers(context, path, titles)}

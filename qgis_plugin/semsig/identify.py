@@ -50,8 +50,18 @@ A large city takes minutes. What is known already is not computed again.
                 "How much of what is seen will be wrong: light, medium, strong, or generic where "
                 "that is not known.",
             ),
-            number("RADIUS", "Near (m)", 50.0, (1.0, 10_000.0), "What counts as found."),
-            advanced(whole_number("SEED", "Seed", 0, (0, 2**31 - 1), "Of the simulated queries.")),
+            number(
+                "RADIUS",
+                "Found within (m)",
+                50.0,
+                (1.0, 10_000.0),
+                "A query counts as found if its best place is as near as this to the true one.",
+            ),
+            advanced(
+                whole_number(
+                    "SEED", "Seed", 0, (0, 2**31 - 1), "Another number simulates other queries."
+                )
+            ),
             layers_to_write("CELLS", "Cells", "The cells by their chance, in a GeoPackage."),
             map_to_write("A page for the browser, on which cells can be clicked."),
         ):
@@ -78,6 +88,6 @@ A large city takes minutes. What is known already is not computed again.
         shown = export_layers(self, (parameters, "CELLS", context, feedback), CELLS, source)
         page = self.file_out(parameters, "MAP", context)
         if page:
-            self.tell(command_line("map", source, identifiability=True, out=page), feedback)
+            self.tell(command_line("map", source, identifiability=True, out=page), feedback, page)
             shown["MAP"] = page
         return shown

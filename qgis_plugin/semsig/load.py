@@ -97,7 +97,12 @@ The log tells what became of every row: how many are objects, how many were left
             crs = QgsProcessingParameterCrs(name, title, optional=True)
             self.addParameter(advanced(described(crs, text)))
         self.addParameter(
-            file_to_write("OUTPUT", "Street objects", "The table of street objects to write.")
+            file_to_write(
+                "OUTPUT",
+                "Street objects",
+                "The table of street objects to write. A temporary file is lost when QGIS is "
+                "closed.",
+            )
         )
         self.addParameter(
             file_to_write(
@@ -156,6 +161,7 @@ The log tells what became of every row: how many are objects, how many were left
                 streets=written["STREETS"],
             ),
             feedback,
+            written["OUTPUT"],
         )
         # Not every catalogue has buildings and streets.
         return {name: path for name, path in written.items() if path and Path(path).is_file()}

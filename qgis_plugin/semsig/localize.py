@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from qgis.core import (
@@ -25,6 +26,7 @@ from .algorithm import (
     choice,
     database,
     described,
+    keep_style,
     layers_to_write,
     map_to_write,
     number,
@@ -32,8 +34,15 @@ from .algorithm import (
     style_layer,
     whole_number,
 )
-from .answers import CANDIDATE_FIELDS, PLACE_FIELDS, candidate_rows, parse_answer, place_row
-from .arguments import LIKELIHOOD, METHODS, NOISES, command_line
+from .answers import (
+    CANDIDATE_FIELDS,
+    PLACE_FIELDS,
+    answer_lines,
+    candidate_rows,
+    parse_answer,
+    place_row,
+)
+from .arguments import METHOD_HELP, METHODS, NOISES, command_line, require_likelihood
 
 if TYPE_CHECKING:
     from qgis.core import (
@@ -86,7 +95,7 @@ they rank cells by a distance, and cells that look the same share a rank.
                 "Where each is seen, in degrees clockwise from north, with commas between them, "
                 "such as 10,80,200,310.",
             ),
-            choice("METHOD", "Method", METHODS, "How cells are compared with the query."),
+            choice("METHOD", "Method", METHODS, METHOD_HELP),
             choice(
                 "NOISE",
                 "Detector",
@@ -125,6 +134,24 @@ they rank cells by a distance, and cells that look the same share a rank.
                 "What of the city must be searched for the query, in a GeoPackage.",
                 optional=True,
             ),
+            advanced(
+                number(
+                    "SHARE",
+                    "Chance that the regions hold",
+                    None,
+                    (0.01, 1.0),
+                    "With likelihood: they are as large as needed for that, 0.9 by default.",
+                )
+            ),
+            advanced(
+                number(
+                    "WITHIN",
+                    "Around the regions (m)",
+                    0.0,
+                    (0.0, 100_000.0),
+                    "So far around their cells is searched too.",
+                )
+            ),
             map_to_write("A page for the browser with the chances and the candidates."),
         ):
             self.addParameter(parameter)
@@ -142,15 +169,8 @@ they rank cells by a distance, and cells that look the same share a rank.
         heading = self.text(parameters, "HEADING", context)
         if heading == "uncertain":
             heading = str(self.parameterAsDouble(parameters, "HEADING_SIGMA", context))
-        chances = (
-            {
-                "noise": self.text(parameters, "NOISE", context),
-                "heading": heading,
-                "area": self.polygons(parameters, "AREA", context, feedback),
-            }
-            if method == LIKELIHOOD
-            else {}
-        )
+        if self.sink_file(parameters, "PLACE", context):
+            require_likelihood(method, "Place")
         printed = self.call(
             command_line(
                 "localize",
@@ -158,11 +178,16 @@ they rank cells by a distance, and cells that look the same share a rank.
                 types=self.text(parameters, "TYPES", context),
                 bearings=self.text(parameters, "BEARINGS", context),
                 method=method,
-                **chances,
+                # The command refuses what its other methods do not have.
+                noise=self.text(parameters, "NOISE", context),
+                heading=heading,
+                area=self.polygons(parameters, "AREA", context, feedback),
                 require=self.text(parameters, "REQUIRE", context),
                 top=self.parameterAsInt(parameters, "TOP", context),
                 map=page,
                 out=regions,
+                share=self.parameterAsDouble(parameters, "SHARE", context) or None,
+                within=self.parameterAsDouble(parameters, "WITHIN", context),
                 json=True,
             ),
             feedback,
@@ -182,7 +207,6 @@ they rank cells by a distance, and cells that look the same share a rank.
             kind = QgsWkbTypes.Type.Polygon
             sink = self._layer(parameters, "PLACE", context, (PLACE_FIELDS, kind, crs), rows)
             found.update(sink)
-            feedback.pushInfo(_said(values))
         rows = [
             (QgsGeometry.fromPointXY(QgsPointXY(x, y)), values)
             for x, y, values in candidate_rows(answer)
@@ -191,6 +215,8 @@ they rank cells by a distance, and cells that look the same share a rank.
         found.update(
             self._layer(parameters, "CANDIDATES", context, (CANDIDATE_FIELDS, kind, crs), rows)
         )
+        for line in answer_lines(answer):
+            feedback.pushInfo(line)
         return found
 
     def _layer(
@@ -202,6 +228,9 @@ they rank cells by a distance, and cells that look the same share a rank.
         rows: list[tuple[QgsGeometry, list[Any]]],
     ) -> dict[str, Any]:
         """Write a layer, where it is wished for, and return it by the name of its parameter."""
+        path = self.sink_file(parameters, name, context)
+        if path:  # QGIS makes no folders
+            Path(path).parent.mkdir(parents=True, exist_ok=True)
         fields, kind, crs = shape
         sink, source = self.parameterAsSink(parameters, name, context, _fields(fields), kind, crs)
         if sink is None:
@@ -212,6 +241,8 @@ they rank cells by a distance, and cells that look the same share a rank.
             feature.setAttributes(values)
             if not sink.addFeature(feature, QgsFeatureSink.Flag.FastInsert):
                 raise QgsProcessingException(self.writeFeatureError(sink, parameters, name))
+        del sink  # closes the file
+        keep_style(source, name.lower())
         style_layer(context, source, name.lower())
         return {name: source}
 
@@ -220,10 +251,3 @@ def _fields(types: dict[str, str]) -> QgsFields:
     """Return fields by the words that all versions of QGIS know; Qt's own names differ."""
     described_so = "&".join(f"field={name}:{kind}" for name, kind in types.items())
     return QgsVectorLayer(f"None?{described_so}", "", "memory").fields()
-
-
-def _said(place: list[Any]) -> str:
-    """Return the verdict in a sentence."""
-    answered, chance, within = place[:3]
-    verdict = "The place is" if answered == "yes" else "Cannot tell: the best place is"
-    return f"{verdict} within {within:g} m of the ellipse's middle with a chance of {chance:.1%}."
