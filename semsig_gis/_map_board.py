@@ -253,7 +253,7 @@ semsig.streetObjects = (key, packed, about) => {
   semsig.held[key] = layers;
 };
 semsig.classLayer = (key, number) => semsig.held[key][number];
-// Streets and buildings, below all else.
+// Streets and buildings, on the images of cells and below all else.
 semsig.ground = (packed, about) => {
   const chunk = 64;
   const kinds = {};
@@ -321,13 +321,12 @@ semsig.ground = (packed, about) => {
       if (kinds.streets) draw(ctx, kinds.streets, frame, min, max, false);
       if (kinds.buildings) draw(ctx, kinds.buildings, frame, min, max, true);
     });
-    board.canvas.style.zIndex = 0;
-    map.getContainer().classList.add("semsig-ground");
+    board.canvas.style.zIndex = 2;
+    board.canvas.classList.add("semsig-ground");
   };
   layer.onRemove = (map) => {
     board.remove();
     board = null;
-    map.getContainer().classList.remove("semsig-ground");
   };
   return layer;
 };

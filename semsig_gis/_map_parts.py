@@ -5,7 +5,7 @@ from __future__ import annotations
 import base64
 import itertools
 from html import escape
-from typing import TYPE_CHECKING, Any, cast
+from typing import TYPE_CHECKING, Any, Literal, cast
 
 import folium
 import numpy as np
@@ -184,7 +184,8 @@ def finished_map(
     cells of a database, by x and y the places in its coordinate system.
     """
     children = layers_of(chosen)
-    area, names = (None, licenses) if source is None else (_area(source), source.licenses)
+    area = None if source is None else _area(source)
+    names = (*(() if source is None else source.licenses), *licenses)
     for name, child in list(children.items()):
         if isinstance(child, Surroundings):
             names = child.names + names
@@ -281,7 +282,7 @@ def add_city(chosen: folium.Map, database: SignatureDatabase, *, show: bool = Tr
     shown = {child.url for child in layers_of(chosen).values() if isinstance(child, ImageOverlay)}
     if _data_url(picture[0]) not in shown:
         # In the pane of tiles, below everything else.
-        add_image(chosen, *picture, name="Objects seen from a cell", flips=True, show=show)
+        add_image(chosen, *picture, name="Objects seen from a cell", dark="flip", show=show)
 
 
 def add_image(
@@ -291,17 +292,21 @@ def add_image(
     *,
     name: str,
     opacity: float = 1.0,
-    flips: bool = False,
+    dark: Literal["flip", "lift"],
     show: bool = True,
 ) -> None:
-    """Add a PNG below everything that is drawn; its lightness flips in the dark, if need be."""
+    """Add a PNG below everything that is drawn, and say what becomes of it in the dark.
+
+    Shades that begin near the colour of paper flip their lightness; ramps from dark to light are
+    lifted, so that their dark end is seen.
+    """
     ImageOverlay(
         _data_url(image),
         bounds,
         name=free_name(chosen, name),
         pane="tilePane",
         opacity=opacity,
-        class_name="semsig-flip" if flips else "",
+        class_name=f"semsig-{dark}",
         show=show,
     ).add_to(chosen)
 

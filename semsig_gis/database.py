@@ -33,6 +33,7 @@ __all__ = [
     "SignatureDatabase",
     "join_databases",
     "require_same",
+    "require_same_place",
     "rows_of_result",
 ]
 
@@ -364,6 +365,42 @@ def require_same(
                 "build both in the same way."
             )
             raise DatabaseError(msg)
+
+
+def require_same_place(database: SignatureDatabase, xy: NDArray[np.float64], what: str) -> None:
+    """Raise where everything of some kind lies elsewhere than the cells.
+
+    Parameters
+    ----------
+    database : SignatureDatabase
+        The cells, at least one.
+    xy : ndarray of float64, shape (n, 2)
+        Places in the CRS of the database; none are never elsewhere.
+    what : str
+        What lies there, for the sentence that refuses it.
+
+    Raises
+    ------
+    InputError
+        If not one of them is within the box of the cells and a visibility range around it.
+
+    Examples
+    --------
+    >>> from semsig_gis.building import build_database
+    >>> from semsig_gis.sources.synthetic import CitySpec, synthetic_city
+    >>> from semsig_gis.catalog import paper_taxonomy
+    >>> from semsig_gis.objects import build_objects
+    >>> layers = synthetic_city(CitySpec(size=300.0))
+    >>> objects, _ = build_objects(layers, taxonomy=paper_taxonomy(), crs="EPSG:32631")
+    >>> require_same_place(build_database(objects), objects.xy, "street objects")
+    """
+    low, high = (
+        database.xy.min(axis=0) - database.reach,
+        database.xy.max(axis=0) + database.reach,
+    )
+    if len(xy) and not ((low <= xy) & (xy <= high)).all(axis=1).any():
+        msg = f"none of the {len(xy):,} {what} is where the cells are; give those of the same city."
+        raise InputError(msg)
 
 
 def rows_of_result(

@@ -10,6 +10,8 @@ import geopandas as gpd
 import numpy as np
 from pyproj import Transformer
 
+from semsig_gis.grid import cell_ids
+
 if TYPE_CHECKING:
     import pandas as pd
     from numpy.typing import NDArray
@@ -76,6 +78,12 @@ class Location:
         """Area of the cells of the region in square kilometres."""
         return len(self.region) * self.posterior.database.grid.step**2 / 1e6
 
+    @property
+    def cell_id(self) -> int:
+        """Id of the grid cell in which the estimated place is; a database may lack it."""
+        estimate = np.array([[self.estimate.x, self.estimate.y]])
+        return int(cell_ids(*self.posterior.database.grid.cells_at(estimate))[0])
+
     def to_geodataframe(self) -> gpd.GeoDataFrame:
         """Return the candidates with their viewpoints as points in the CRS of the database.
 
@@ -95,7 +103,7 @@ class Location:
         -------
         dict
             ``query``, ``noise``, ``cells``, ``answered``, ``place`` (what
-            `PlaceEstimate.to_dict` gives, ``cell_id``, ``lon``, ``lat``, ``chance`` and
+            `PlaceEstimate.to_dict` gives, its ``cell_id``, ``lon``, ``lat``, ``chance`` and
             ``within_m``), ``threshold`` (None where nothing is answered), ``region`` (``share``,
             ``cells``, ``km2``), ``entropy_bits``, ``crs``, ``licenses``, and ``candidates``, a
             list with the columns of `candidates`, ``lon``, ``lat`` (degrees, WGS 84) and, of the
@@ -118,7 +126,7 @@ class Location:
             "cells": len(database),
             "answered": self.answer.given,
             "place": {
-                "cell_id": int(database.cell_ids[self.answer.cell]),
+                "cell_id": self.cell_id,
                 **self.estimate.to_dict(),
                 "lon": round(place[0], 7),
                 "lat": round(place[1], 7),

@@ -83,7 +83,7 @@ def ambiguity_map(
     for name, size in sizes.items():
         levels = np.digitize(size, list(GROUP_COLOURS)).astype(np.uint8)
         image = level_image(database, levels, list(GROUP_COLOURS.values()))
-        add_image(chosen, *image, name=name, show=name == "Same types")
+        add_image(chosen, *image, name=name, dark="lift", show=name == "Same types")
     facts = [group_facts(database)]
     if identifiability is not None:
         facts.append(lookalike_facts(identifiability))

@@ -20,7 +20,7 @@ from semsig_gis._map_parts import (
     to_latlon,
 )
 from semsig_gis.changes import compare_objects, joined_taxonomy
-from semsig_gis.database import join_databases
+from semsig_gis.database import join_databases, require_same_place
 from semsig_gis.drift import compare_cells
 from semsig_gis.errors import CrsError
 from semsig_gis.map_image import level_image
@@ -90,10 +90,10 @@ def drift_map(
     Returns
     -------
     folium.Map
-        The map, with these layers: the cells that are the same, have changed, appeared or
-        vanished as an image; a layer without signs of its own that tells of a cell by a click;
-        and, where the objects are given, those that were removed, added, moved, or are of another
-        class, with popups.
+        The map, with these layers: the cells that are the same, and those that have changed,
+        appeared or vanished, as images; a layer without signs of its own that tells of a cell by a
+        click; and, where the objects are given, those that were removed, added, moved, or are of
+        another class, with popups.
 
     Raises
     ------
@@ -102,8 +102,8 @@ def drift_map(
     CrsError
         If the objects are in another CRS than the databases.
     InputError
-        If they use a class code for different classes, `tiles` is not known to folium, or both
-        `tiles` and `map_` are given.
+        If they are of different places or use a class code for different classes, `tiles` is not
+        known to folium, or both `tiles` and `map_` are given.
 
     Examples
     --------
@@ -123,10 +123,17 @@ def drift_map(
     # All cells of both dates.
     city = join_databases([new, old.select(cells.vanished)])
     view = city_view(city)
+    if len(old) and len(new):
+        require_same_place(old, new.xy, "cells of the newer database")
     kinds = _kinds(city, old, new, cells)
     chosen = prepared_map(map_, tiles, title="What has changed")
-    image = level_image(city, kinds, list(DRIFT_COLOURS.values()))
-    add_image(chosen, *image, name="Cells")
+    colours, same = list(DRIFT_COLOURS.values()), kinds == 1
+    if same.any():
+        image = level_image(city.select(same), kinds[same], colours)
+        add_image(chosen, *image, name="Cells that are the same", dark="flip")
+    if not same.all():
+        image = level_image(city.select(~same), kinds[~same], colours)
+        add_image(chosen, *image, name="Cells that differ", dark="lift")
     differing = old.select(np.sort(np.concatenate([cells.changed[:, 0], cells.vanished])))
     facts = CellFacts(
         name="change",

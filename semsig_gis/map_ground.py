@@ -45,7 +45,7 @@ def ground_map(
     box : tuple of float, optional
         ``xmin, ymin, xmax, ymax`` in that CRS: only what meets it. Everything by default.
     map_ : folium.Map, optional
-        Map to add the layer to, below all else; a new one by default.
+        Map to add the layer to, on the images of cells and below all else; a new one by default.
 
     Returns
     -------

@@ -86,7 +86,7 @@ CELL_CHANCES: Mapping[float, str] = MappingProxyType(
 )
 """Colour of a cell by the least chance that the place is in it, or near it."""
 
-CHANCES: Mapping[float, str] = MappingProxyType({0.5: "#54278f", 0.9: "#9e9ac8", 0.99: "#dadaeb"})
+CHANCES: Mapping[float, str] = MappingProxyType({0.5: "#00441b", 0.9: "#41ab5d", 0.99: "#c7e9c0"})
 """Colour of the fewest cells that hold a share of the chance."""
 
 VERDICTS: Mapping[str, str] = MappingProxyType(
@@ -109,7 +109,7 @@ GROUP_COLOURS: Mapping[int, str] = MappingProxyType(
 SAME_TYPES, SAME_LEVELS = "#ffffff", "#e69f00"
 
 DRIFT_COLOURS: Mapping[str, str] = MappingProxyType(
-    {"same": "#b3b3ad", "changed": "#f0bf5c", "appeared": "#5aa5d6", "vanished": "#b5698f"}
+    {"same": "#b3b3ad", "changed": "#f0bf5c", "appeared": "#5aa5d6", "vanished": "#8a3f66"}
 )
 """Colour of a cell by what became of it."""
 
@@ -121,7 +121,13 @@ OBJECT_COLOURS: Mapping[str, str] = MappingProxyType(
 FLIPPING = "square semsig-flip"
 """A sign whose lightness flips in the dark, as what it explains does."""
 
+LIFTING = "square semsig-lift"
+"""A sign that is brighter in the dark, as what it explains is."""
+
 _THRESHOLDS = (10, 25, 50, 100)
+_EXPLAINED_BEST = (
+    "<p>The best place is where most of the chance is around it; ranks are of single cells.</p>"
+)
 _HELPERS = 6  # classes that the legend names
 
 
@@ -238,6 +244,7 @@ def location_legend(location: Location) -> str:
         f"<p>{_sign(colour)}<b>{told}</b>: within {location.rule.radius:g} m with a chance of "
         f"{location.answer.mass:.1%}; if there, ±&nbsp;{estimate.sigma:.1f}&nbsp;m each way "
         "(ellipse: 90 %)</p>"
+        f"{'' if location.answer.given else _EXPLAINED_BEST}"
         f"<p>Chance of a cell, or around it, in percent<br>{chances}</p>"
         f"<p>Regions, the fewest cells that hold<br>{shares}</p>"
         f"<p>{_sign('#ffffff')}Candidates by rank</p>"
@@ -273,7 +280,7 @@ def identifiability_legend(told: Identifiability) -> str:
         "<summary>Where a query can be placed</summary>"
         f"<p>{facts['cells']:,} cells, {escape(facts['noise'])} noise</p>"
         f"<p>Chance that the answer to a query is {within}; {facts['chance_found']:.1%} for the "
-        f"mean cell{_ramp(FOUND_RAMP, '0 %', '100 %')}</p>"
+        f"mean cell{_ramp(FOUND_RAMP, '0 %', '100 %', sign='ramp semsig-lift')}</p>"
         f"<p>{bands}</p>"
         f"<p>What each class adds to the chance {within}</p><table>{classes}</table>"
         "<p>Click a cell to see what it is taken for.</p>"
@@ -379,7 +386,7 @@ def ambiguity_legend(sizes: Mapping[str, NDArray[np.int64]], *, licenses: Sequen
         for size in sizes.values()
     ]
     rows = "".join(
-        f"<tr><td>{_sign(colour, 'square')}{label}</td>"
+        f"<tr><td>{_sign(colour, LIFTING)}{label}</td>"
         + "".join(f"<td>{share:.1%}</td>" for share in line)
         + "</tr>"
         for colour, label, *line in zip(GROUP_COLOURS.values(), labels, *shares, strict=True)
@@ -429,7 +436,7 @@ def drift_legend(
     }
     total = sum(len(rows) for rows, _ in kinds.values())
     lines = "".join(
-        f"<tr><td>{_sign(DRIFT_COLOURS[kind], 'square')}{title}</td>"
+        f"<tr><td>{_sign(DRIFT_COLOURS[kind], FLIPPING if kind == 'same' else LIFTING)}{title}</td>"
         f"<td>{len(rows):,}</td><td>{len(rows) / total:.1%}</td></tr>"
         for kind, (rows, title) in kinds.items()
     )

@@ -134,7 +134,7 @@ def _add_chances(chosen: folium.Map, location: Location) -> None:
         ("Chance of a cell", _chances(found, found.chances), near),
         ("Regions of 50, 90 and 99 %", _regions(found), False),
     ):
-        add_image(chosen, *image, name=name, opacity=0.85, flips=True, show=show)
+        add_image(chosen, *image, name=name, opacity=0.85, dark="flip", show=show)
 
 
 def _chances(found: Posterior, chances: NDArray[np.float64]) -> tuple[bytes, list[list[float]]]:
@@ -207,7 +207,7 @@ class _Drawn:
                 f"{shorter:.1f} m across"
             ),
             _north(place.heading, place.heading_sigma),
-            str(self.database.cell_ids[location.answer.cell]),
+            str(location.cell_id),
         ]
         name = "The answer" if given else "Cannot tell: the best place"
         outline = {"color": colour, "weight": 3, "opacity": 0.9}
@@ -266,7 +266,7 @@ class _Drawn:
                     "color": "#808080" if verdict == "missed" else colour,
                     "weight": 1 if verdict == "missed" else 2,
                     "opacity": 0.9,
-                    "dashArray": None if verdict in {"matched", "misnamed"} else "3 5",
+                    "dashArray": {"matched": None, "misnamed": "9 4"}.get(verdict, "3 5"),
                 },
                 rays[verdict],
             ]

@@ -101,7 +101,8 @@ def objects_map(
     corners = np.stack([objects.xy.min(axis=0), objects.xy.max(axis=0)])
     view = to_latlon(corners, objects.crs) if map_ is None else None
     Legend(objects_legend(objects), view).add_to(chosen)
-    return finished_map(chosen, objects if database is None else database)
+    source = objects if database is None else database
+    return finished_map(chosen, source, licenses=objects.licenses)
 
 
 def _drawn(objects: StreetObjects) -> tuple[dict[str, list[str]], dict[str, Any]]:

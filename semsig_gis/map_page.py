@@ -40,9 +40,10 @@ STYLE = """\
 .semsig-dark .semsig-flip, .semsig-dark .semsig-heat, .semsig-dark i.heat,
 .semsig-dark img.leaflet-tile {
   filter: invert(1) hue-rotate(180deg) brightness(1.15); }
-/* The streets and buildings below the cells are seen through them. */
-.semsig-ground .leaflet-tile-pane .leaflet-image-layer { mix-blend-mode: multiply; }
-.semsig-ground.semsig-dark .leaflet-tile-pane .leaflet-image-layer { mix-blend-mode: screen; }
+.semsig-dark .semsig-lift { filter: brightness(1.7); }
+/* Streets and buildings are seen on the cells, whose colours they change but little. */
+.semsig-ground { mix-blend-mode: multiply; }
+.semsig-dark .semsig-ground { mix-blend-mode: screen; }
 .semsig-legend, .semsig-search input, .semsig-search ul, .semsig-search p {
   font: 13px/1.4 system-ui, sans-serif; color: var(--ink); background: var(--panel);
   border-radius: 5px; box-shadow: 0 1px 5px rgba(0, 0, 0, 0.4); box-sizing: border-box; }

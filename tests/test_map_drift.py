@@ -60,7 +60,7 @@ TURNED = dataclasses.replace(AFTER, table=AFTER.table.to_crs("EPSG:32631"))
 def test_cells_before_and_now(browser: Chrome, tmp_path: Path) -> None:
     opened(browser, drift_map(OLD, NEW), tmp_path)
     assert browser.title == "What has changed"
-    assert len(browser.find_elements(By.CSS_SELECTOR, "img.leaflet-image-layer")) == 1
+    assert len(browser.find_elements(By.CSS_SELECTOR, "img.leaflet-image-layer")) == 2
     asked(browser, "map.setZoom(19, {animate: false})")
     assert min(map(len, (CELLS.same, CELLS.changed, CELLS.appeared, CELLS.vanished))) > 0
     same, changed = CELLS.same[0].tolist(), CELLS.changed[0].tolist()
@@ -158,7 +158,8 @@ def test_nothing_has_changed_or_everything() -> None:
     drawn = drift_map(OLD, OLD, objects_before=BEFORE, objects_after=BEFORE, map_=own)
     assert drawn is own
     names = [getattr(child, "layer_name", "") for child in own._children.values()]
-    assert {"Cells", "Cells, by a click"} <= set(names)
+    assert {"Cells that are the same", "Cells, by a click"} <= set(names)
+    assert "Cells that differ" not in names
     assert not any("Objects" in name for name in names)
 
 
@@ -169,6 +170,7 @@ def test_nothing_has_changed_or_everything() -> None:
         (OLD, dataclasses.replace(NEW, taxonomy=OTHER), None, InputError, "'other'"),
         (OLD, NEW, TURNED, CrsError, "EPSG:32631"),
         (OLD.select(slice(0)), NEW.select(slice(0)), None, InputError, "no cells"),
+        (OLD, dataclasses.replace(NEW, rows=NEW.rows + 10_000), None, InputError, "same city"),
     ],
 )
 def test_what_does_not_belong_together(

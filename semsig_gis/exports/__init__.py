@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from semsig_gis.database import require_same_place
 from semsig_gis.errors import EmptyResultError, InputError, UnknownNameError, nearest_name
 from semsig_gis.exports import csv_text, geopackage, geoparquet
 from semsig_gis.exports._layers import answer_layers, cells_layer, evaluation_layers, objects_layer
@@ -193,6 +194,8 @@ def _require_one_city(
             "give the objects that the database was built from."
         )
         raise InputError(msg)
+    if objects is not None:
+        require_same_place(database, objects.xy, "street objects")
     if evaluation is not None:
         evaluation.rows_in(database)
 

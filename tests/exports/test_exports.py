@@ -140,6 +140,11 @@ def test_what_is_of_another_city_or_of_none_is_refused(suffix: str, tmp_path: Pa
         with pytest.raises(InputError) as caught:
             export_database(database, tmp_path / f"a{suffix}", layers=layers, objects=moved)
         assert_sentence(caught.value, "zone 32N", "zone 31N")
+        table = objects.table.set_geometry(objects.table.translate(9_000.0))
+        far = StreetObjects(table, objects.taxonomy, ())
+        with pytest.raises(InputError) as caught:
+            export_database(database, tmp_path / f"a{suffix}", layers=layers, objects=far)
+        assert_sentence(caught.value, "none of the", "same city")
         nothing = StreetObjects(objects.table[:0], objects.taxonomy, objects.licenses)
         with pytest.raises(EmptyResultError) as caught_empty:
             export_database(database, tmp_path / f"a{suffix}", layers=layers, objects=nothing)
