@@ -12,7 +12,7 @@ from pyproj import Transformer
 from sentences import sentence
 from worlds import CORNER, random_town, surroundings
 
-from semsig_gis.objects import save_objects
+from semsig_gis.objects import StreetObjects, save_objects
 from semsig_gis.store import ObjectStore, save_with_store
 from semsig_gis.surroundings import save_surroundings
 
@@ -107,3 +107,13 @@ def test_what_cannot_be_drawn_leaves_the_map_as_it_was(city: Path, run: Run) -> 
     ):
         sentence(run("map", city, *options, "--out", page), *words)
     assert page.read_text() == "before"
+
+
+def test_objects_of_another_city_are_refused(city: Path, run: Run) -> None:
+    page, far = city.with_name("map.html"), city.with_name("far.parquet")
+    table = WORLD.street_objects.table
+    moved = table.set_geometry(table.translate(50_000.0)).to_crs("EPSG:32631")
+    save_objects(StreetObjects(moved, WORLD.street_objects.taxonomy, ()), far)
+    told = run("map", city, "--ambiguity", "--objects", far, "--out", page)
+    sentence(told, "street objects", "same city")
+    assert not page.exists()

@@ -52,6 +52,8 @@ def map_(
     out: Annotated[Path, typer.Option(help="Map to write (.html).")],
 ) -> None:
     """Draw an evaluation, where queries can be placed, cells that look alike, changes, objects."""
+    import numpy as np
+
     from semsig_gis.database import require_same_place
     from semsig_gis.database_file import open_database
     from semsig_gis.evaluation import Evaluation
@@ -79,8 +81,9 @@ def map_(
         raise InputError(msg)
     seen = None if objects is None else open_objects(objects)
     newer = None if drift is None else open_database(drift)
-    if seen is not None and seen.crs == opened.crs:
-        require_same_place(opened, seen.xy, "street objects")
+    if seen is not None:
+        places = seen.table.geometry.to_crs(opened.crs)
+        require_same_place(opened, np.stack([places.x, places.y], axis=1), "street objects")
     with progress("drawing the map"):
         drawn: Any = None  # a map of folium, which the command line does not know
         if ambiguity:
