@@ -40,7 +40,7 @@ STYLE = """\
 .semsig-dark .semsig-flip, .semsig-dark .semsig-heat, .semsig-dark i.heat,
 .semsig-dark img.leaflet-tile {
   filter: invert(1) hue-rotate(180deg) brightness(1.15); }
-.semsig-dark .semsig-lift { filter: brightness(1.7); }
+.semsig-dark .semsig-lift { filter: brightness(1.4); }
 /* Streets and buildings are seen on the cells, whose colours they change but little. */
 .semsig-ground { mix-blend-mode: multiply; }
 .semsig-dark .semsig-ground { mix-blend-mode: screen; }
