@@ -439,6 +439,7 @@ def test_queries_that_do_not_fit(database: Path, run: Run) -> None:
     sentence(run("localize", database, "--types", "D", "--top", 0))
     sentence(run("evaluate", database, "--queries", 10**6), "queries")
     sentence(run("evaluate", database, "--distortion", "mild"), "'mild'")
+    sentence(run("evaluate", database, "--noise", "light"), "--noise", "likelihood", "'edit+edit'")
 
 
 def test_a_database_cut_in_half(database: Path, city: Path, run: Run) -> None:

@@ -77,6 +77,9 @@ def evaluate(
             "leave it out."
         )
         raise InputError(msg)
+    if noise != "generic" and method != LIKELIHOOD:
+        msg = f"--noise is for --method likelihood, not for {method!r}; leave it out."
+        raise InputError(msg)
     import dataclasses
 
     from semsig_gis.database_file import open_database
