@@ -87,7 +87,7 @@ def ambiguity_map(
     facts = [group_facts(database)]
     if identifiability is not None:
         facts.append(lookalike_facts(identifiability))
-    CellLayer(free_name(chosen, "Cells, by a click"), database, facts).add_to(chosen)
+    CellLayer(free_name(chosen, "Tell of a cell when clicked"), database, facts).add_to(chosen)
     Legend(
         ambiguity_legend(sizes, licenses=database.licenses), view if map_ is None else None
     ).add_to(chosen)

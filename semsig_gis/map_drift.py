@@ -145,7 +145,7 @@ def drift_map(
         },
         settings={"kinds": list(DRIFT_COLOURS)},
     )
-    CellLayer(free_name(chosen, "Cells, by a click"), city, [facts]).add_to(chosen)
+    CellLayer(free_name(chosen, "Tell of a cell when clicked"), city, [facts]).add_to(chosen)
     objects = None
     if objects_before is not None and objects_after is not None:
         for some in (objects_before, objects_after):

@@ -77,6 +77,6 @@ def identifiability_map(
     image = level_image(database, levels, FOUND_RAMP)
     add_image(chosen, *image, name="Chance to be found", dark="lift")
     facts = (group_facts(database), lookalike_facts(told))
-    CellLayer(free_name(chosen, "Cells, by a click"), database, facts).add_to(chosen)
+    CellLayer(free_name(chosen, "Tell of a cell when clicked"), database, facts).add_to(chosen)
     Legend(identifiability_legend(told), view if map_ is None else None).add_to(chosen)
     return finished_map(chosen, database)

@@ -117,7 +117,7 @@ def test_a_sign_is_a_jump_away_and_layers_are_switched(browser: Chrome, tmp_path
     assert len(browser.find_elements(By.CSS_SELECTOR, IMAGES)) == 2
     switch(browser, "Same types")
     assert len(browser.find_elements(By.CSS_SELECTOR, IMAGES)) == 1
-    switch(browser, "Cells, by a click")
+    switch(browser, "Tell of a cell when clicked")
     time.sleep(0.5)
     assert asked(browser, "return circles('#ffffff').length") == 0
     asked(browser, "map.fire('click', {latlng: map.getCenter()});")
@@ -157,7 +157,9 @@ def test_maps_of_ones_own_and_what_does_not_fit() -> None:
     own = folium.Map([43.0, 3.0], zoom_start=12, tiles=None)
     assert ambiguity_map(CITY, map_=own) is own
     names = [getattr(child, "layer_name", "") for child in own._children.values()]
-    assert {"Same types", "Same types and angle levels", "Cells, by a click"} <= set(names)
+    assert {"Same types", "Same types and angle levels", "Tell of a cell when clicked"} <= set(
+        names
+    )
     with pytest.raises(InputError) as caught:
         ambiguity_map(CITY.select(slice(0)))
     assert_sentence(caught.value, "no cells")
