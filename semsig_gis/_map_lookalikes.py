@@ -29,12 +29,13 @@ semsig.told.lookalikes = (city, cell) => {
     return value < 1 ? "below 1 %" : value > 99 ? "above 99 %" : Math.round(value) + " %";
   };
   const bits = data.bits[cell] / grid.bits;
+  const like = Number((2 ** bits).toPrecision(2));
   const rows = [
     ["Found within " + grid.radius + " m", percent(data.found[cell])],
     ["Chance given", percent(data.itself[cell]) + " to this cell, " + percent(data.near[cell])
       + " to all within " + grid.radius + " m"],
-    ["Looks like", "about " + Number((2 ** bits).toPrecision(2)).toLocaleString("en")
-      + " cells (" + bits.toFixed(1) + " bits are left)"],
+    ["Looks like", "about " + like.toLocaleString("en") + (like === 1 ? " cell (" : " cells (")
+      + bits.toFixed(1) + " bits are left)"],
   ];
   const marks = [];
   for (let at = cell * grid.places; at < (cell + 1) * grid.places; at += 1) {

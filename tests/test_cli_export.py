@@ -15,6 +15,7 @@ from cells_told import told_of
 from sentences import sentence
 from small_city import small_city, small_evaluation
 
+from semsig_gis.cli._answers import print_answer
 from semsig_gis.database_file import open_database, save_database
 from semsig_gis.exports.geotiff import cell_errors
 from semsig_gis.identifiability_file import save_identifiability
@@ -114,6 +115,14 @@ def test_what_is_required_may_be_drawn_and_searched(city: Path, run: Run) -> Non
     candidates = gpd.read_file(folder / "a.gpkg", layer="candidates")
     assert told["searched"]["cells"] == len(candidates) == 2 + told["tied_beyond"]
     assert len(set(candidates["distance"])) == 1
+
+
+@pytest.mark.parametrize(("tied", "said"), [(1, "1 further cell ties"), (1200, "1,200 further")])
+def test_how_many_cells_tie_is_said(
+    tied: int, said: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    print_answer({"used": "types", "cells": 5000, "candidates": [], "tied_beyond": tied})
+    assert f"\n{said}" in capsys.readouterr().out
 
 
 def test_a_slip_is_told_before_the_index_is_built(city: Path, run: Run) -> None:

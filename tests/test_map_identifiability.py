@@ -57,6 +57,8 @@ def test_a_click_on_any_cell_tells_of_it(browser: Chrome, tmp_path: Path) -> Non
         assert said["Chance given"].startswith(whole_percent(TOLD.itself[cell]))
         named = [name for name in said if name.startswith("Taken for")]
         assert len(named) == int((TOLD.lookalike_chances[cell] >= 0.01).sum())
+    said = click(browser, CITY, int(TOLD.bits.argmin()))
+    assert said["Looks like"] == "about 1 cell (0.0 bits are left)"
     assert_quiet(browser)
 
 
@@ -75,7 +77,7 @@ def test_a_lookalike_is_a_jump_away(browser: Chrome, tmp_path: Path) -> None:
     assert popup(browser)["Cell"] == cell_id(TOLD, other)
     shown = asked(browser, "return map.getBounds().contains(map._popup.getLatLng())")
     assert shown
-    switch(browser, "Cells, by a click")
+    switch(browser, "Tell of a cell when clicked")
     time.sleep(0.5)
     assert browser.find_elements(By.CSS_SELECTOR, ".semsig-number") == []
     script = "map.fire('click', {latlng: map.getCenter()});"
@@ -108,7 +110,9 @@ def test_maps_of_ones_own() -> None:
     assert identifiability_map(TOLD, map_=own) is own
     assert identifiability_map(TOLD, map_=own) is own
     names: list[Any] = [getattr(child, "layer_name", "") for child in own._children.values()]
-    assert {"Chance to be found", "Chance to be found, 2", "Cells, by a click, 2"} <= set(names)
+    assert {"Chance to be found", "Chance to be found, 2", "Tell of a cell when clicked, 2"} <= set(
+        names
+    )
     with pytest.raises(InputError) as caught:
         identifiability_map(TOLD, map_=own, tiles="OpenStreetMap")
     assert_sentence(caught.value, "OpenStreetMap")

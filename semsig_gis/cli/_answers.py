@@ -38,7 +38,9 @@ def print_answer(result: dict[str, Any]) -> None:
         _print_explanations(candidates)
         _print_place(result)
     elif result["tied_beyond"]:
-        typer.echo(f"{result['tied_beyond']:,} further cells tie with the last one.")
+        tied = result["tied_beyond"]
+        more = "1 further cell ties" if tied == 1 else f"{tied:,} further cells tie"
+        typer.echo(f"{more} with the last one.")
 
 
 def _print_place(result: dict[str, Any]) -> None:
