@@ -176,7 +176,7 @@ semsig.streetObjects = (key, packed, about) => {
     ];
     const mark = L.circleMarker(place, {pane: "shadowPane", interactive: false, fill: false,
       radius: 13, color: "#d55e00", weight: 3}).addTo(map);
-    const popup = L.popup({maxWidth: 340, minWidth: 200, maxHeight: 400}).setLatLng(place);
+    const popup = L.popup({maxWidth: 340, minWidth: 200}).setLatLng(place);
     popup.setContent(semsig.details(title, fields, values, {}));
     popup.on("remove", () => mark.remove());
     popup.openOn(map);
@@ -221,7 +221,8 @@ semsig.streetObjects = (key, packed, about) => {
   semsig.finders.push((words, limit) => {
     if (data === null) return [];
     const titles = semsig.matches(classes.map(({title}) => semsig.plain(title)), words, limit);
-    const byTitle = titles.map((number) => ({
+    const byTitle = titles.map(({rank, at: number}) => ({
+      rank,
       name: classes[number].title,
       hint: "all " + (classes[number].end - classes[number].start).toLocaleString("en"),
       show: (map) => {
@@ -239,7 +240,8 @@ semsig.streetObjects = (key, packed, about) => {
         if (end - start === 1) tell(map, start);
       },
     }));
-    const byId = semsig.matches(data.names, words, limit).map((one) => ({
+    const byId = semsig.matches(data.names, words, limit).map(({rank, at: one}) => ({
+      rank,
       name: data.ids[one],
       hint: classes[classOf(one)].title + ", " + sources[data.source[one]],
       show: (map) => {

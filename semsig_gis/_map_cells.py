@@ -171,7 +171,7 @@ semsig.cells = (packed, grid, titles, told) => {
       rows: [], jumps: [], marks: [], dots: [], ...semsig.told[name](city, cell)}));
     const sign = (other, options) => {
       const marker = L.circleMarker(city.middle(other), {
-        pane: "markerPane", color: "#222", weight: 1, fillOpacity: 0.95,
+        pane: "markerPane", color: semsig.outline(map), weight: 1, fillOpacity: 0.95,
         bubblingMouseEvents: false, ...options,
       });
       marker.on("click", () => show(city, map, other));
@@ -194,7 +194,7 @@ semsig.cells = (packed, grid, titles, told) => {
       title, rows.map((one) => one[0]), rows.map((one) => one[1]), titles);
     buttons(city, map, cell, box, parts.flatMap((part) => part.jumps));
     const narrow = Math.min(340, map.getSize().x - 70);
-    const popup = L.popup({maxWidth: narrow, minWidth: 220, maxHeight: 400});
+    const popup = L.popup({maxWidth: narrow, minWidth: 220});
     popup.setLatLng(middle).setContent(box);
     popup.on("remove", () => group.removeLayer(drawn));
     group.addLayer(drawn);

@@ -73,7 +73,7 @@ class Furniture(MacroElement):
 
 
 class Legend(Furniture):
-    """A box with the meaning of the signs, folded on narrow screens, and what to show beside it."""
+    """A box with the meaning of the signs, folded on small screens, and what to show beside it."""
 
     _template = Template(
         """
@@ -132,19 +132,26 @@ class Script(Furniture):
 
 
 class Surroundings(Furniture):
-    """What stands around a map: search, light and dark, and who is to be named for the data."""
+    """What stands around a map: search, light and dark, and who is to be named for the data.
+
+    It comes last, when all boxes are there, and shows what the map is to show between them.
+    """
 
     _template = Template(
         """
         {% macro script(this, kwargs) %}
-        semsig.furnish({{ this._parent.get_name() }}, {{ this.area }}, {{ this.credits_ }});
+        semsig.furnish({{ this._parent.get_name() }}, {{ this.layers.get_name() }},
+          {{ this.area }}, {{ this.credits_ }});
         {% endmacro %}
         """
     )
 
-    def __init__(self, area: dict[str, Any] | None, names: tuple[str, ...]) -> None:
+    def __init__(
+        self, layers: folium.LayerControl, area: dict[str, Any] | None, names: tuple[str, ...]
+    ) -> None:
         super().__init__()  # type: ignore[no-untyped-call]
         self._name = "SemsigSurroundings"
+        self.layers = layers
         self.names = names
         self.found = area
         self.area, self.credits_ = script_json(area), script_json(names)
@@ -178,7 +185,7 @@ def finished_map(
     *,
     licenses: tuple[str, ...] = (),
 ) -> folium.Map:
-    """Put around a map what every map has, and the layer control last, where it knows all layers.
+    """Put around a map what every map has, last, where the layer control knows all layers.
 
     The source of what was drawn tells whom to name, and what a search can find: by number the
     cells of a database, by x and y the places in its coordinate system.
@@ -193,9 +200,9 @@ def finished_map(
                 area = child.found or area
         if isinstance(child, folium.LayerControl | Surroundings):
             del children[name]
-    Surroundings(area, tuple(dict.fromkeys(names))).add_to(chosen)
-    narrow = cast("bool", JsCode("window.innerWidth <= 700"))
-    folium.LayerControl(collapsed=narrow).add_to(chosen)
+    layers = folium.LayerControl(collapsed=cast("bool", JsCode("semsig.small.matches")))
+    layers.add_to(chosen)
+    Surroundings(layers, area, tuple(dict.fromkeys(names))).add_to(chosen)
     return chosen
 
 
@@ -232,8 +239,9 @@ def _area(source: SignatureDatabase | StreetObjects) -> dict[str, Any]:
 
 def layer_text(text: str) -> str:
     """Return text for the name of a layer, which the layer control reads as HTML."""
-    # A brace could begin what folium renders once more (see `semsig_gis.map_page`).
-    return escape(text).replace("{", "&#123;")
+    # A brace could begin what folium renders once more (see `semsig_gis.map_page`), and a sign of
+    # direction turns text round as far as the element goes.
+    return f"<bdi>{escape(text)}</bdi>".replace("{", "&#123;")
 
 
 def layers_of(map_: folium.Map) -> dict[str, Element]:

@@ -10,7 +10,7 @@ semsig.text = (parent, tag, text) => {
   L.DomUtil.create(tag, "", parent).textContent = text;
 };
 // A signature as it is seen from above: north up, every symbol at its bearing.
-semsig.wheel = (label, types, bearings) => {
+semsig.wheel = (size, label, types, bearings) => {
   const figure = L.DomUtil.create("figure", "");
   const drawing = L.SVG.create("svg");
   const draw = (name, values, text) => {
@@ -29,7 +29,6 @@ semsig.wheel = (label, types, bearings) => {
   draw("path", {d: "M0,-67L4,-56H-4Z", class: "north"});
   draw("circle", {r: 1.5, class: "north"});
   // Symbols that would lie on one another go nearer to the middle.
-  const size = bearings.length > 16 ? 8 : 11;
   const circles = [];
   for (let radius = 53 - size * 0.8; radius > size; radius -= size) {
     circles.push({radius, taken: []});
@@ -55,28 +54,30 @@ semsig.wheel = (label, types, bearings) => {
 semsig.details = (name, fields, values, titles) => {
   const box = L.DomUtil.create("div", "semsig-details");
   semsig.text(box, "b", name);
-  const signatures = fields.map((label, at) => [label, values[at]]).filter(
-    ([, value]) => Array.isArray(value) && value[1] !== null && value[1].length);
-  if (signatures.length) {
-    const wheels = L.DomUtil.create("div", "semsig-wheels", box);
-    for (const [label, value] of signatures) wheels.append(semsig.wheel(label, ...value));
-  }
-  const table = L.DomUtil.create("table", "", box);
+  let table = L.DomUtil.create("table", "", box);
   const row = (label) => {
     const line = L.DomUtil.create("tr", "", table);
     semsig.text(line, "th", label);
     return L.DomUtil.create("td", "", line);
   };
+  const fact = (label, value) => {
+    L.DomUtil.create("span", "semsig-fact", row(label)).textContent = value;
+  };
+  const told = fields.map((label, at) => [label, values[at]]).filter((one) => one[1] !== null);
+  for (const [label, value] of told) if (!Array.isArray(value)) fact(label, value);
+  // Signatures come last, as they are long.
+  const signatures = told.filter((one) => Array.isArray(one[1]));
+  const seen = signatures.filter(([, [, bearings]]) => bearings !== null && bearings.length);
+  if (seen.length) {
+    // The letters have 9 pixels and more: there is room for three wheels, or for two of many.
+    const large = seen.length === 1 || seen.some(([, [, bearings]]) => bearings.length > 24);
+    const wheels = L.DomUtil.create("div", "semsig-wheels " + (large ? "large" : "small"), box);
+    wheels.append(...seen.map(([label, value]) => semsig.wheel(large ? 7.5 : 11, label, ...value)));
+  }
+  table = L.DomUtil.create("table", "", box);
   const symbols = new Set();
-  fields.forEach((label, number) => {
-    const value = values[number];
-    if (value === null) return;
+  for (const [label, [types, bearings]] of signatures) {
     const cell = row(label);
-    if (!Array.isArray(value)) {
-      cell.textContent = value;
-      return;
-    }
-    const [types, bearings] = value;
     const places = (bearings || []).map((degrees) => degrees + "\u00b0");
     if (types !== null) {
       semsig.text(cell, "code", types);
@@ -84,11 +85,11 @@ semsig.details = (name, fields, values, titles) => {
     }
     const pairs = places.map((place, at) => (types ? types[at] + "\u00a0" + place : place));
     semsig.text(cell, "div", pairs.join(" "));
-  });
+  }
   if (symbols.size) {
     const known = [...symbols].sort().map(
       (symbol) => symbol + " " + (titles[symbol] || "any class"));
-    row("Classes").textContent = known.join(", ");
+    fact("Classes", known.join(", "));
   }
   return box;
 };

@@ -7,18 +7,19 @@ __all__ = ["SCRIPT"]
 SCRIPT = r"""
 semsig.finders = [];  // of each layer with named things: what is called so, with how to show it
 semsig.plain = (text) => String(text).toLowerCase().replace(/(\d),(?=\d{3})/g, "$1").trim();
-// The places in a list of those that hold the words, whole words first.
+// Which of the names hold the words, best first: one of their lines is the words (rank 0), has
+// them as whole words (1) or within others (2).
 semsig.matches = (names, words, limit) => {
-  const whole = [];
-  const part = [];
-  const ends = (sign) => sign === undefined || !/[\p{L}\p{N}]/u.test(sign);
-  for (let at = 0; at < names.length && whole.length < limit; at += 1) {
-    const place = names[at].indexOf(words);
-    if (place < 0) continue;
-    const apart = ends(names[at][place - 1]) && ends(names[at][place + words.length]);
-    if (apart) whole.push(at); else if (part.length < limit) part.push(at);
-  }
-  return whole.concat(part).slice(0, limit);
+  const quoted = words.replace(/[\\^$.*+?()[\]{}|]/g, "\\$&");
+  const line = new RegExp(`^${quoted}$`, "mu");
+  const whole = new RegExp(`(?<![\\p{L}\\p{N}])${quoted}(?![\\p{L}\\p{N}])`, "u");
+  const found = [[], [], []];
+  names.forEach((name, at) => {
+    if (!name.includes(words)) return;
+    const rank = line.test(name) ? 0 : whole.test(name) ? 1 : 2;
+    if (found[rank].length < limit) found[rank].push({rank, at});
+  });
+  return found.flat().slice(0, limit);
 };
 semsig.reveal = (map, layer, place) => {
   let outermost = layer;
@@ -26,7 +27,6 @@ semsig.reveal = (map, layer, place) => {
   map.addLayer(outermost);
   map.setView(place, Math.max(map.getZoom(), 18), {animate: false});
 };
-semsig.degrees = (place) => ["Degrees", place.map((part) => part.toFixed(6)).join(", ")];
 // Latitude and longitude of a place in the coordinate system of the data.
 semsig.latlng = ({middle, half, terms}, x, y) => {
   const [u, v] = [(x - middle[0]) / half, (y - middle[1]) / half];
@@ -34,6 +34,26 @@ semsig.latlng = ({middle, half, terms}, x, y) => {
     const power = u ** i * v ** j;
     return [latitude + north * power, longitude + east * power];
   }, [0, 0]);
+};
+// The way back, by Newton's steps.
+semsig.xy = (area, place) => {
+  const reach = area.half / 1000;
+  let [x, y] = area.middle;
+  for (let step = 0; step < 8; step += 1) {
+    const [here, east, north] = [[0, 0], [reach, 0], [0, reach]].map(
+      ([right, up]) => semsig.latlng(area, x + right, y + up));
+    const [a, b, c, d] = [east[0] - here[0], north[0] - here[0], east[1] - here[1],
+      north[1] - here[1]];
+    const [u, v] = [place[0] - here[0], place[1] - here[1]];
+    x += reach * (d * u - b * v) / (a * d - b * c);
+    y += reach * (a * v - c * u) / (a * d - b * c);
+  }
+  return [x, y];
+};
+semsig.whereabouts = (area, place, xy) => {
+  const facts = [["Latitude, longitude", place.map((part) => part.toFixed(6)).join(", ")]];
+  if (area) facts.push(["x, y in " + area.crs, xy.map((part) => part.toFixed(2)).join(", ")]);
+  return facts;
 };
 semsig.point = (map, name, place, facts, corners) => {
   const look = {pane: "shadowPane", interactive: false, color: "#d55e00", weight: 3, fill: false};
@@ -45,48 +65,59 @@ semsig.point = (map, name, place, facts, corners) => {
   mark.addTo(map);
   popup.openOn(map);
 };
-semsig.cellsCalled = (text, area) => {
-  if (!area || !area.grid || !/^-?\d{1,19}$/.test(text)) return [];
-  const {step, origin, columns, rows} = area.grid;
+semsig.within = ({columns, rows}, cell) =>
+  [columns, rows].every(([low, high], at) => low <= cell[at] && cell[at] <= high);
+// The number of the cell around a place, where the map knows cells there.
+semsig.cellAround = (area, xy) => {
+  if (!area || !area.grid) return [];
+  const {step, origin} = area.grid;
+  const cell = xy.map((part, at) => Math.floor((part - origin[at]) / step));
+  const number = BigInt(cell[0]) * 100000000n + BigInt(cell[1]);
+  return semsig.within(area.grid, cell) ? [["Cell", String(number)]] : [];
+};
+semsig.cellsCalled = (typed, area) => {
+  if (!area || !area.grid || !/^-?(\d{1,19}|\d{1,3}(,\d{3}){1,6})$/.test(typed)) return [];
+  const {step, origin} = area.grid;
   const [span, half] = [100000000n, 50000000n];
-  const row = (((BigInt(text) + half) % span) + span) % span - half;
-  const cell = [(BigInt(text) - row) / span, row].map(Number);
-  const within = [columns, rows].every(([low, high], at) => low <= cell[at] && cell[at] <= high);
-  if (!within) return [];
+  const number = BigInt(typed.replaceAll(",", ""));
+  const row = (((number + half) % span) + span) % span - half;
+  const cell = [(number - row) / span, row].map(Number);
+  if (!semsig.within(area.grid, cell)) return [];
   const at = ([across, along]) => [
     origin[0] + step * (cell[0] + across), origin[1] + step * (cell[1] + along)];
   const [middle, ...corners] = [[0.5, 0.5], [0, 0], [1, 0], [1, 1], [0, 1]].map(at);
   const latlngs = corners.map((corner) => semsig.latlng(area, ...corner));
+  const name = "Cell " + number;
   const show = (map) => {
     const place = semsig.latlng(area, ...middle);
-    const facts = [["Middle", middle.join(", ") + " in " + area.crs], semsig.degrees(place)];
-    semsig.point(map, "Cell " + text, place, facts, latlngs);
+    semsig.point(map, name, place, semsig.whereabouts(area, place, middle), latlngs);
     // A layer that knows the cell tells of it instead.
     map.fire("click", {latlng: L.latLng(place), semsigSearch: true});
   };
-  return [{name: "Cell " + text, hint: "", show}];
+  return [{rank: 0, name, hint: "", show}];
 };
 semsig.placesAt = (text, area) => {
-  const pair = /^(-?\d+(?:\.\d+)?)\u00b0?[\s,;]+(-?\d+(?:\.\d+)?)\u00b0?$/.exec(text);
+  const part = (letters) => `(-?\\d+(?:[.,]\\d+)?)\\s*\u00b0?\\s*([${letters}]?)`;
+  const pair = new RegExp(`^[(\\s]*${part("NS")}[\\s,;]+${part("EW")}[)\\s]*$`, "i").exec(text);
   if (!pair) return [];
-  const [first, second] = pair.slice(1).map(Number);
+  const [first, second] = [[pair[1], pair[2]], [pair[3], pair[4]]].map(
+    ([number, letter]) => Number(number.replace(",", ".")) * (/[SW]/i.test(letter) ? -1 : 1));
+  const name = first + ", " + second;
   const found = [];
+  const offer = (hint, place, xy) => {
+    const facts = [...semsig.whereabouts(area, place, xy), ...semsig.cellAround(area, xy)];
+    found.push({rank: 0, name, hint, show: (map) => semsig.point(map, name, place, facts)});
+  };
   const bounds = area && L.latLngBounds([[0, 1], [2, 1], [0, 3], [2, 3]].map(
     ([x, y]) => semsig.latlng(area, area.box[x], area.box[y]))).pad(0.1);
   const degrees = Math.abs(first) <= 90 && Math.abs(second) <= 180;
   if (degrees && (!bounds || bounds.contains([first, second]))) {
-    const name = first + ", " + second;
-    const hint = "latitude, longitude";
-    const show = (map) => semsig.point(map, name, [first, second], [["Is", hint]]);
-    found.push({name, hint, show});
+    const place = [first, second];
+    offer("latitude, longitude", place, area && semsig.xy(area, place));
   }
   const [west, south, east, north] = area ? area.box : [0, 0, 0, 0];
   if (area && west <= first && first <= east && south <= second && second <= north) {
-    const name = first + ", " + second;
-    const hint = "x, y in " + area.crs;
-    const place = semsig.latlng(area, first, second);
-    const show = (map) => semsig.point(map, name, place, [["Is", hint], semsig.degrees(place)]);
-    found.push({name, hint, show});
+    offer("x, y in " + area.crs, semsig.latlng(area, first, second), [first, second]);
   }
   return found;
 };
@@ -134,6 +165,7 @@ semsig.search = (map, area) => {
     tell("");
     input.value = one.name;
     input.blur();
+    map.getContainer().focus({preventScroll: true});  // so that Escape closes what is shown
     one.show(map);
   };
   const look = () => {
@@ -144,7 +176,7 @@ semsig.search = (map, area) => {
     if (words) {
       found = [...semsig.cellsCalled(text, area), ...semsig.placesAt(text, area)];
       for (const finder of semsig.finders) found.push(...finder(words, most));
-      found = found.slice(0, most);
+      found = found.sort((one, other) => one.rank - other.rank).slice(0, most);
     }
     list.replaceChildren(...found.map((one, at) => {
       const item = L.DomUtil.create("li", "");
@@ -193,9 +225,18 @@ semsig.colours = (map) => {
     button.href = "#";
     button.textContent = "\u25d0";
     button.setAttribute("role", "button");
-    let chosen = null;
+    // What is chosen is kept for the next time, where a page may keep something.
+    const kept = (choice) => {
+      try {
+        if (choice) localStorage.setItem("semsig-colours", choice);
+        return localStorage.getItem("semsig-colours");
+      } catch {
+        return choice;
+      }
+    };
+    let chosen = kept();
     const show = () => {
-      const is = chosen === null ? dark.matches : chosen;
+      const is = chosen ? chosen === "dark" : dark.matches;
       map.getContainer().classList.toggle("semsig-dark", is);
       button.title = is ? "Light colours" : "Dark colours";
       button.setAttribute("aria-label", button.title);
@@ -203,7 +244,7 @@ semsig.colours = (map) => {
     };
     L.DomEvent.on(button, "click", (event) => {
       L.DomEvent.stop(event);
-      chosen = !semsig.isDark(map);
+      chosen = kept(semsig.isDark(map) ? "light" : "dark");
       show();
     });
     L.DomEvent.on(button, "keydown", (event) => {
@@ -218,15 +259,66 @@ semsig.colours = (map) => {
   control.addTo(map);
 };
 semsig.isDark = (map) => map.getContainer().classList.contains("semsig-dark");
-semsig.furnish = (map, area, credits) => {
+// On light and on dark, what sets a sign off from what is below it.
+semsig.outline = (map) => (semsig.isDark(map) ? "#e9e9e6" : "#222");
+// Where boxes would cover half the map, they are folded.
+semsig.small = window.matchMedia("(max-width: 800px), (max-height: 499px)");
+// What the boxes at the left and right cover, as far as so many pixels remain beside them.
+semsig.margins = (map, least) => {
+  if (semsig.small.matches) return [10, 10];
+  let room = map.getSize().x - 20;
+  return [".leaflet-left", ".leaflet-top.leaflet-right"].map((side) => {
+    const boxes = [...map.getContainer().querySelectorAll(side)];
+    const width = Math.max(...boxes.map((box) => box.offsetWidth));
+    if (room - width < least) return 10;
+    room -= width;
+    return width + 10;
+  });
+};
+// Popups open beside the boxes, as high as the map allows.
+semsig.makeRoom = (map) => {
+  const [left, right] = semsig.margins(map, 360);
+  L.Popup.mergeOptions({
+    autoPanPaddingTopLeft: [left, 10], autoPanPaddingBottomRight: [right, 10],
+    maxHeight: Math.max(240, map.getSize().y - 140),
+  });
+};
+semsig.folding = (map, layers) => {
+  const box = map.getContainer();
+  const fit = () => {
+    box.classList.toggle("semsig-small", semsig.small.matches);
+    semsig.makeRoom(map);
+  };
+  semsig.small.addEventListener("change", ({matches}) => {
+    // Leaflet asks only when the control is made whether it opens by itself.
+    layers.options.collapsed = matches;
+    map.off("click", layers.collapse, layers);
+    layers.remove().addTo(map);
+    if (matches) box.querySelectorAll(".semsig-legend").forEach((one) => { one.open = false; });
+    fit();
+  });
+  map.on("resize", fit);
+  box.addEventListener("toggle", fit, true);  // of a legend
+  fit();
+};
+semsig.furnish = (map, layers, area, credits) => {
   for (const credit of map.attributionControl ? credits : []) {
-    const text = L.DomUtil.create("span", "");
+    // By itself, so that signs of direction in it turn no other text.
+    const text = L.DomUtil.create("bdi", "");
     text.textContent = credit;
-    map.attributionControl.addAttribution(text.innerHTML);
+    map.attributionControl.addAttribution(text.outerHTML);
   }
   const told = (is) => () => map.getContainer().classList.toggle("semsig-told", is);
   map.on("popupopen", told(true)).on("popupclose", told(false));
   semsig.colours(map);
   semsig.search(map, area);
+  semsig.folding(map, layers);
+  if (map.semsigView) {
+    const {view, zoom} = map.semsigView;
+    const [left, right] = semsig.margins(map, 500);
+    map.fitBounds(view, {
+      paddingTopLeft: [left, 10], paddingBottomRight: [right, 10], maxZoom: zoom, animate: false,
+    });
+  }
 };
 """

@@ -59,7 +59,7 @@ SUCCESSFUL, FAILED = "#0072b2", "#e69f00"
 
 # Both ramps change their lightness steadily, so that the hue does not matter.
 ERROR_RAMP = ("#fde0dd", "#fa9fb5", "#dd3497", "#7a0177")
-CANDIDATE_RAMP = ("#440154", "#31688e", "#35b779", "#fde725")
+CANDIDATE_RAMP = ("#31688e", "#35b779", "#fde725")  # of which none is lost in the dark
 
 # Ten steps of viridis, whose lightness rises steadily.
 FOUND_RAMP = (
@@ -159,7 +159,7 @@ def evaluation_legend(evaluation: Evaluation, *, error_limit: str, licenses: Seq
         "<summary>Localization errors</summary>"
         f"<p>{count:,} queries among {evaluation.database['cells']:,} cells<br>"
         f"Method: {escape(str(evaluation.method))}, {best}<br>"
-        f"Distortion: {escape(distortions) or 'none'}</p>"
+        f"Distortion: {_alone(distortions or 'none')}</p>"
         f"<table>{shares}</table>"
         f"<p>{_sign(SUCCESSFUL)}{successes:,} successful: within {SUCCESS_METRES} m "
         f"with probability {SUCCESS_PROBABILITY:g} or more<br>"
@@ -185,7 +185,8 @@ def localization_legend(localization: Localization) -> str:
     """
     candidates = localization.candidates
     more = localization.tied_beyond
-    beyond = f"<br>{more:,} more cells are as good as the last one" if more else ""
+    said = "1 more cell is" if more == 1 else f"{more:,} more cells are"
+    beyond = f"<br>{said} as good as the last one" if more else ""
     distances = candidates["distance"]
     return (
         "<summary>Candidate places</summary>"
@@ -240,7 +241,7 @@ def location_legend(location: Location) -> str:
     return (
         "<summary>Where it was seen</summary>"
         f"<p>{_asked(location.query, database.taxonomy)}"
-        f"Method: likelihood, {escape(location.noise)} noise, {len(database):,} cells</p>"
+        f"Method: likelihood, {_alone(location.noise)} noise, {len(database):,} cells</p>"
         f"<p>{_sign(colour)}<b>{told}</b>: within {location.rule.radius:g} m with a chance of "
         f"{location.answer.mass:.1%}; if there, ±&nbsp;{estimate.sigma:.1f}&nbsp;m each way "
         "(ellipse: 90 %)</p>"
@@ -272,13 +273,13 @@ def identifiability_legend(told: Identifiability) -> str:
         for band in reversed(facts["bands"])
     )
     classes = "".join(
-        f"<tr><td class='title'>{escape(item['title'])}</td>"
+        f"<tr><td class='title'>{_alone(item['title'])}</td>"
         f"<td>{100 * item['chance_near']:+.1f} %</td></tr>"
         for item in facts["classes"][:_HELPERS]
     )
     return (
         "<summary>Where a query can be placed</summary>"
-        f"<p>{facts['cells']:,} cells, {escape(facts['noise'])} noise</p>"
+        f"<p>{facts['cells']:,} cells, {_alone(facts['noise'])} noise</p>"
         f"<p>Chance that the answer to a query is {within}; {facts['chance_found']:.1%} for the "
         f"mean cell{_ramp(FOUND_RAMP, '0 %', '100 %', sign='ramp semsig-lift')}</p>"
         f"<p>{bands}</p>"
@@ -304,7 +305,7 @@ def objects_legend(objects: StreetObjects) -> str:
     signs, counts = class_signs(objects.taxonomy), objects.class_counts
     rows = "".join(
         f"<tr><td>{sign_svg(signs[code])}</td>"
-        f'<td class="title">{escape(signs[code].title)}</td>'
+        f"<td class='title'>{_alone(signs[code].title)}</td>"
         f'<td class="count">{count:,}</td></tr>'
         for code, count in counts.items()
     )
@@ -314,6 +315,11 @@ def objects_legend(objects: StreetObjects) -> str:
         f"from nearer, and a click tells what is known of one.</p><table>{rows}</table>"
         f"{_sources(objects.licenses)}"
     )
+
+
+def _alone(text: str) -> str:
+    """Return text from data, in which signs of direction turn no other text."""
+    return f"<bdi>{escape(text)}</bdi>"
 
 
 def _cells(number: int) -> str:
@@ -356,7 +362,7 @@ def _shades() -> str:
 
 def _sources(licenses: Iterable[str]) -> str:
     """Return who is to be named for the data, and under which licence."""
-    lines = [f"Data: {escape(line)}<br>" for line in licenses]
+    lines = [f"Data: {_alone(line)}<br>" for line in licenses]
     return f"<p><small>{''.join(lines)}Made with semsig_gis {escape(__version__)}</small></p>"
 
 
@@ -466,8 +472,8 @@ def _drifted(objects: ObjectChanges, taxonomy: Taxonomy) -> str:
     }
     most = sorted((item for item in changes if changes[item]), key=lambda one: -changes[one])
     rows = "".join(
-        f"<tr><td>{escape(taxonomy.by_name(item.class_name).title)}</td><td>{item.added:,}</td>"
-        f"<td>{item.removed:,}</td><td>{item.moved:,}</td></tr>"
+        f"<tr><td class='title'>{_alone(taxonomy.by_name(item.class_name).title)}</td>"
+        f"<td>{item.added:,}</td><td>{item.removed:,}</td><td>{item.moved:,}</td></tr>"
         for item in most[:_HELPERS]
     )
     head = "".join(f"<td><small>{name}</small></td>" for name in ("added", "removed", "moved"))

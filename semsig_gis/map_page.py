@@ -47,9 +47,10 @@ STYLE = """\
 .semsig-legend, .semsig-search input, .semsig-search ul, .semsig-search p {
   font: 13px/1.4 system-ui, sans-serif; color: var(--ink); background: var(--panel);
   border-radius: 5px; box-shadow: 0 1px 5px rgba(0, 0, 0, 0.4); box-sizing: border-box; }
+/* Below search, light and dark, and zoom; above another legend, folded, and the scale. */
 .semsig-legend {
   padding: 7px 10px; width: 290px; max-width: calc(100vw - 20px);
-  max-height: calc(100vh - 190px); overflow: auto; overflow-wrap: anywhere; }
+  max-height: calc(100dvh - 260px); overflow: auto; overflow-wrap: anywhere; }
 .semsig-legend summary { font-weight: 600; font-size: 14px; cursor: pointer; }
 .semsig-legend:not([open]) { width: auto; }
 .semsig-legend p { margin: 6px 0; }
@@ -63,6 +64,8 @@ STYLE = """\
 .semsig-legend table, .semsig-details table { border-collapse: collapse; }
 .semsig-legend td { padding: 0 12px 0 0; vertical-align: top; overflow-wrap: break-word; }
 .semsig-legend td.title { overflow-wrap: anywhere; }
+.semsig-legend td.title bdi, .semsig-details b {
+  display: -webkit-box; -webkit-box-orient: vertical; -webkit-line-clamp: 4; overflow: hidden; }
 .semsig-legend td:last-child { padding: 0; }
 .semsig-legend td.count { text-align: right; }
 .semsig-legend td.count, .semsig-legend td:has(i) { white-space: nowrap; }
@@ -74,8 +77,13 @@ STYLE = """\
   text-align: left; font-weight: 400; color: var(--faint); white-space: nowrap; }
 .semsig-details th, .semsig-details td { vertical-align: top; padding: 2px 6px 2px 0; }
 .semsig-details code { font-size: 14px; font-weight: 600; }
+.semsig-fact {
+  display: inline-block; vertical-align: top; max-height: 14em; overflow: auto; }
 .semsig-wheels { display: flex; flex-wrap: wrap; justify-content: space-around; margin: 4px 0; }
-.semsig-wheels figure { flex: 1 1 90px; max-width: 130px; margin: 0; text-align: center; }
+.semsig-wheels figure { margin: 0; text-align: center; }
+.semsig-wheels.small figure { flex: 1 1 96px; max-width: 130px; }
+.semsig-wheels.large figure { flex: 1 1 140px; max-width: 160px; }
+.semsig-wheels.large figure:only-child { max-width: 200px; }
 .semsig-wheels figcaption { color: var(--faint); font-size: 12px; line-height: 1.2; }
 .semsig-wheels svg { display: block; width: 100%; }
 .semsig-wheels .ring { fill: none; stroke: var(--faint); stroke-width: 0.7; }
@@ -86,6 +94,7 @@ STYLE = """\
 .leaflet-container .semsig-search { width: 230px; z-index: 810; }
 .leaflet-container .leaflet-top { z-index: 1001; }
 .semsig-search input { width: 100%; height: 34px; padding: 0 9px; border: 0; font-size: 14px; }
+.semsig-search input::placeholder { color: var(--faint); opacity: 1; }
 .semsig-search ul {
   position: absolute; z-index: 1; top: 100%; width: 100%; list-style: none; margin: 4px 0 0;
   padding: 4px; max-height: 50vh; overflow: auto; }
@@ -103,15 +112,17 @@ STYLE = """\
 .semsig-close .leaflet-image-layer { image-rendering: pixelated; }
 .leaflet-control-layers { font: 13px/1.5 system-ui, sans-serif; overflow-wrap: anywhere; }
 .leaflet-control-layers-expanded { max-width: min(320px, calc(100vw - 20px)); }
-@media (max-width: 700px) {
-  .leaflet-container .semsig-search { width: calc(100vw - 80px); max-width: 300px; }
-  .semsig-search input { height: 40px; font-size: 16px; }
-  /* A popup takes the whole width, and goes by a tap beside it. */
-  .semsig-told .leaflet-top { visibility: hidden; } }
+.leaflet-control-layers label { max-height: 6em; overflow: hidden; }
+.semsig-small .semsig-search { width: calc(100vw - 80px); max-width: 300px; }
+.semsig-small .semsig-search input { height: 40px; font-size: 16px; }
+/* A popup takes the whole width, and goes by a tap beside it. */
+.semsig-small.semsig-told :is(.leaflet-top, .semsig-legend) { visibility: hidden; }
 """
 
 SCRIPT = """\
 const semsig = {
+  // Fields that say what a thing is called; the search knows it by them, too.
+  naming: new Set(["Class", "Class before", "Seen as", "Street object", "Identifier"]),
   points(fields, titles, records) {
     const group = L.featureGroup();
     const markers = [];
@@ -121,7 +132,7 @@ const semsig = {
         fillColor: colour, fillOpacity: 0.95,
       });
       marker.bindPopup(() => semsig.details(name, fields, values, titles),
-        {maxWidth: 340, minWidth: 220, maxHeight: 400});
+        {maxWidth: 340, minWidth: 220});
       if (label) {
         const text = L.DomUtil.create("b", "");
         text.textContent = label;
@@ -142,12 +153,22 @@ const semsig = {
       marker.addTo(group);
       markers.push(marker);
     }
+    const outline = () => group.setStyle({color: semsig.outline(group._map)});
+    group.on("add", () => {
+      group._map.on("semsig-colours", outline);
+      outline();
+    });
+    group.on("remove", () => group._map.off("semsig-colours", outline));
+    const named = [...fields.keys()].filter((at) => semsig.naming.has(fields[at]));
+    const hint = (values) => [...new Set(named.map((at) => values[at]))].filter(Boolean).join(", ");
     let names = null;
     semsig.finders.push((words, limit) => {
-      names = names || records.map((record) => semsig.plain(record[4]));
-      return semsig.matches(names, words, limit).map((at) => ({
+      names = names || records.map((record) => semsig.plain(
+        [record[4], ...named.map((at) => record[5][at])].join("\\n")));
+      return semsig.matches(names, words, limit).map(({rank, at}) => ({
+        rank,
         name: records[at][4],
-        hint: "",
+        hint: hint(records[at][5]),
         show: (map) => {
           semsig.reveal(map, group, markers[at].getLatLng());
           markers[at].openPopup();
@@ -172,7 +193,8 @@ const semsig = {
   },
   legend(map, text, view, zoom) {
     const box = L.DomUtil.create("details", "semsig-legend");
-    box.open = window.innerWidth > 700 && !document.querySelector(".semsig-legend[open]");
+    box.open = !semsig.small.matches && !document.querySelector(".semsig-legend[open]");
+    box.setAttribute("name", "semsig-legend");  // one is open at a time
     box.innerHTML = text;
     L.DomEvent.disableClickPropagation(box);
     L.DomEvent.disableScrollPropagation(box);
@@ -182,13 +204,8 @@ const semsig = {
     // Cells have edges from near, and melt into each other from afar.
     const close = () => map.getContainer().classList.toggle("semsig-close", map.getZoom() > 16);
     map.on("zoomend", close);
-    if (view !== null) {
-      const left = box.open ? box.offsetWidth + 20 : 10;
-      map.fitBounds(view, {
-        paddingTopLeft: [left, 10], paddingBottomRight: [10, 10], maxZoom: zoom, animate: false,
-      });
-    }
     close();
+    if (view !== null) map.semsigView = {view, zoom};
   },
 };
 """

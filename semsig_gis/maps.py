@@ -307,7 +307,7 @@ def _query_records(
                 SUCCESSFUL if successful[number] else FAILED,
                 radius,
                 [found[number].tolist(), *following[number]] if located else None,
-                f"Query {number + 1:,} of {total:,}: {outcome}",
+                f"Query {number + 1:,}: {outcome}",
                 details,
             ]
         )

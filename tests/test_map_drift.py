@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 import shapely
 from cell_clicks import click
-from map_pages import HOSTILE, asked, assert_quiet, hostile_database, opened, switch
+from map_pages import HOSTILE, asked, assert_quiet, hostile_database, opened, searched, switch
 from selenium.webdriver.common.by import By
 from sentences import assert_sentence
 from worlds import CODES, TAXONOMY, random_town
@@ -111,6 +111,14 @@ def test_objects_that_have_changed(browser: Chrome, tmp_path: Path) -> None:
     assert counts == {"removed": 3, "added": 1, "moved": 1, "of another class": 1}
     legend = browser.find_element(By.CSS_SELECTOR, ".semsig-legend").text
     assert "3 removed" in legend
+    # By kind, by class and by identifier, the best match first.
+    (moved,) = changes.moved[:, 1]
+    title = TAXONOMY.by_code(int(AFTER.codes[moved])).title
+    called = f"Object moved\n{title}, {AFTER.table['source_id'].iloc[moved]}"
+    assert searched(browser, "moved")[0] == called
+    assert called in searched(browser, title.upper())
+    assert searched(browser, "new")[0].startswith("Object added\n")
+    asked(browser, "map.closePopup()")
     last = "return [...document.querySelectorAll('.semsig-details')].pop().innerText"
     for kind, count in counts.items():
         colour = OBJECT_COLOURS[kind]
@@ -158,7 +166,7 @@ def test_nothing_has_changed_or_everything() -> None:
     drawn = drift_map(OLD, OLD, objects_before=BEFORE, objects_after=BEFORE, map_=own)
     assert drawn is own
     names = [getattr(child, "layer_name", "") for child in own._children.values()]
-    assert {"Cells that are the same", "Cells, by a click"} <= set(names)
+    assert {"Cells that are the same", "Tell of a cell when clicked"} <= set(names)
     assert "Cells that differ" not in names
     assert not any("Objects" in name for name in names)
 

@@ -54,7 +54,8 @@ class Text(HTMLParser):
 
     def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:  # noqa: ARG002
         self.tags.add(tag)
-        self.shown += "\n" if tag in {"p", "br", "tr"} else " "
+        if tag != "bdi":
+            self.shown += "\n" if tag in {"p", "br", "tr"} else " "
 
     def handle_data(self, data: str) -> None:
         self.shown += data
@@ -120,6 +121,8 @@ def test_what_a_localization_says(
     assert ("more cells are as good" in text) == (localization.tied_beyond > 0)
     assert f"{localization.candidates['distance'].max():.3f}" in text
     assert "Data: Town (CC0): trees, lamps" in text
+    tied = dataclasses.replace(localization, tied_beyond=1)
+    assert "1 more cell is as good as the last one" in Text(localization_legend(tied)).shown
 
 
 def test_text_from_data_stays_text(evaluation: Evaluation, database: SignatureDatabase) -> None:
@@ -222,3 +225,18 @@ def test_what_drift_says() -> None:
     for said in ("2 added", "1 removed", "5 moved", "0 of another class", "Public bench 2 1 5"):
         assert said in text
     assert "Bus stop" not in text
+
+
+def test_signs_of_direction_turn_no_other_text(
+    evaluation: Evaluation, database: SignatureDatabase
+) -> None:
+    turned = "\u202eno ecnecil"
+    for legend in (
+        evaluation_legend(evaluation, error_limit="1 m", licenses=[turned]),
+        localization_legend(
+            dataclasses.replace(
+                localize(database, database.signature(0), top=2), licenses=(turned,)
+            )
+        ),
+    ):
+        assert f"<bdi>{turned}</bdi>" in legend

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import dataclasses
+import html
+import re
 from typing import TYPE_CHECKING
 
 import folium
@@ -155,14 +157,27 @@ def test_the_search_finds_names_cells_and_places(browser: Chrome, tmp_path: Path
     x, y = CITY.xy[middle].tolist()
     latitude, longitude = to_latlon(CITY.xy[middle : middle + 1], CITY.crs)[0].tolist()
     centre = "const place = map.getCenter(); return [place.lat, place.lng];"
+    cell = str(CITY.cell_ids[middle])
+    degrees = "latitude, longitude"
     for text, said in (
-        (str(CITY.cell_ids[middle]), f"Cell {CITY.cell_ids[middle]}"),
-        (f"{latitude}, {longitude}", "latitude, longitude"),
+        (cell, f"Cell {cell}"),
+        (f"{CITY.cell_ids[middle]:,}", f"Cell {cell}"),
+        (f"{latitude}, {longitude}", degrees),
+        (f"({latitude}, {longitude})", degrees),
+        (f"{latitude}N, {longitude}e", degrees),
+        (f"{latitude}° {longitude}°", degrees),
+        (f"{latitude} {longitude}".replace(".", ","), degrees),
         (f"{x} {y}", "x, y in EPSG:2154"),
     ):
         asked(browser, "map.setZoom(14, {animate: false})")
-        assert len(searched(browser, text, Keys.ENTER)) == 1
-        assert said in popup_text(browser)
+        (offer,) = searched(browser, text, Keys.ENTER)
+        assert said in offer
+        popup = popup_text(browser)
+        assert re.findall(r"Cell\D*(\d+)", popup) == [cell]
+        for label, place in (("Latitude, longitude", (latitude, longitude)),
+                             ("x, y in EPSG:2154", (x, y))):  # fmt: skip
+            (numbers,) = re.findall(rf"{label}\t(.*), (.*)", popup)
+            assert [float(one) for one in numbers] == pytest.approx(place, abs=0.1, rel=1e-7)
         # Popups near the edge move the map a little.
         asked(browser, "map.setView(map._popup.getLatLng(), 19, {animate: false})")
         assert asked(browser, centre) == pytest.approx([latitude, longitude], abs=2e-6)
@@ -212,9 +227,23 @@ def test_light_and_dark(browser: Chrome, tmp_path: Path) -> None:
         assert not asked(browser, "return semsig.isDark(map)")
         assert browser.execute_script(panel) == "rgb(34, 34, 34)"
         assert drawn(browser, SIGNS[CODE].colour, BOARD) > 0
+        assert_quiet(browser)
+        browser.refresh()
+        assert not asked(browser, "return semsig.isDark(map)")  # what was chosen is kept
+        browser.execute_script("localStorage.clear()")
+        # A page that may keep nothing.
+        page = (tmp_path / "map.html").read_text(encoding="utf-8")
+        frame = f'<iframe sandbox="allow-scripts" srcdoc="{html.escape(page)}"></iframe>'
+        (tmp_path / "frame.html").write_text(frame, encoding="utf-8")
+        browser.get((tmp_path / "frame.html").as_uri())
+        browser.switch_to.frame(0)
+        assert len(browser.find_elements(By.CSS_SELECTOR, ".semsig-dark")) == 1
+        browser.find_element(By.CSS_SELECTOR, ".semsig-colours").send_keys(Keys.ENTER)
+        assert browser.find_elements(By.CSS_SELECTOR, ".semsig-dark") == []
+        browser.switch_to.default_content()
+        assert browser.get_log("browser") == []
     finally:
         browser.execute_cdp_cmd("Emulation.setEmulatedMedia", {"features": []})
-    assert_quiet(browser)
 
 
 @pytest.mark.usefixtures("carried")
@@ -230,7 +259,8 @@ def test_a_narrow_screen(browser: Chrome, tmp_path: Path) -> None:
         popup = browser.find_element(By.CSS_SELECTOR, ".leaflet-popup-content-wrapper")
         assert popup.rect["x"] >= 0
         assert popup.rect["x"] + popup.rect["width"] <= 390
-        assert not browser.find_element(By.CSS_SELECTOR, ".semsig-search").is_displayed()
+        for hidden in (".semsig-search", ".semsig-legend"):
+            assert not browser.find_element(By.CSS_SELECTOR, hidden).is_displayed()
         asked(browser, "map.closePopup()")
         assert browser.find_element(By.CSS_SELECTOR, ".semsig-search").is_displayed()
     finally:
@@ -255,9 +285,20 @@ def test_hostile_data_is_shown_and_never_run(browser: Chrome, tmp_path: Path) ->
         (".leaflet-control-attribution", 2),
     ):
         assert browser.execute_script(text, selector).count(harm) == times
+    # No sign of direction reaches what stands beside, and no name fills the page.
+    for alone in (".leaflet-control-attribution bdi", ".leaflet-control-layers-overlays bdi"):
+        assert browser.execute_script(text, alone).endswith(harm)
+    highest = """
+    const parts = [...document.querySelectorAll(arguments[0])];
+    return Math.max(...parts.map((one) => one.getBoundingClientRect().height));
+    """
+    assert browser.execute_script(highest, ".leaflet-control-layers-overlays label") <= 90
+    assert browser.execute_script(highest, ".semsig-legend tr") <= 90
     click(browser, place_of(NUMBER))
     popup_text(browser)
     assert browser.execute_script(text, ".semsig-details").count(harm) == 5
+    assert browser.execute_script(highest, ".semsig-details > b") <= 90
+    assert browser.execute_script(highest, ".semsig-details tr") <= 200
     asked(browser, "map.closePopup()")
     offered = searched(browser, "alert")
     assert len(offered) == 8

@@ -28,6 +28,7 @@ from pyproj import CRS, Transformer
 from selenium.webdriver.common.actions.action_builder import ActionBuilder
 from selenium.webdriver.common.by import By
 from selenium.webdriver.common.keys import Keys
+from selenium.webdriver.support.ui import WebDriverWait
 from sentences import assert_sentence
 
 from semsig_gis import _map_parts, map_assets
@@ -163,11 +164,16 @@ def test_a_click_shows_the_signature_and_the_place_found(
     const point = map.latLngToContainerPoint(marker.getLatLng());
     return [point.x, point.y];
     """
-    x, y = asked(browser, centre, f"Query {QUERIES} of", SUCCESSFUL, FAILED)
+    x, y = asked(browser, centre, f"Query {QUERIES}:", SUCCESSFUL, FAILED)
     assert browser.find_elements(By.CSS_SELECTOR, ".semsig-details") == []
     mouse = ActionBuilder(browser)
     mouse.pointer_action.move_to_location(round(x), round(y)).click()
     mouse.perform()
+    outline = "return circles(arguments[0])[0].options.color"
+    assert asked(browser, outline, SUCCESSFUL) == "#222"
+    browser.find_element(By.CSS_SELECTOR, ".semsig-colours").click()
+    assert asked(browser, outline, SUCCESSFUL) == "#e9e9e6"  # light on dark
+    browser.execute_script("localStorage.clear()")
     # Not `text`, which is empty while the popup fades in.
     box = browser.find_element(By.CSS_SELECTOR, ".semsig-details")
     popup = str(box.get_property("innerText")).replace("\u00a0", " ")
@@ -268,21 +274,106 @@ def test_hostile_data_is_shown_word_for_word_and_never_run(
 
 
 @pytest.mark.usefixtures("carried")
-def test_a_narrow_screen_is_not_covered(
-    browser: Chrome, evaluation: Evaluation, database: SignatureDatabase, tmp_path: Path
+@pytest.mark.parametrize("screen", [(390, 800), (844, 390), (720, 600)])
+def test_a_small_screen_is_not_covered(
+    browser: Chrome,
+    evaluation: Evaluation,
+    database: SignatureDatabase,
+    tmp_path: Path,
+    screen: tuple[int, int],
 ) -> None:
-    size = {"width": 400, "height": 800, "deviceScaleFactor": 1, "mobile": True}
+    width, height = screen
+    size = {"width": width, "height": height, "deviceScaleFactor": 1, "mobile": True}
     browser.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", size)
     try:
-        opened(browser, evaluation_map(evaluation, database), tmp_path)
-        legend = browser.find_element(By.CSS_SELECTOR, ".semsig-legend")
-        assert legend.size["height"] < 60
+        map_ = evaluation_map(evaluation, database)
+        localization_map(localize(database, database.signature(0), top=3), database, map_=map_)
+        opened(browser, map_, tmp_path)
+        legends = browser.find_elements(By.CSS_SELECTOR, ".semsig-legend")
+        assert max(legend.size["height"] for legend in legends) < 60
         assert browser.find_elements(By.CSS_SELECTOR, ".leaflet-control-layers-expanded") == []
-        browser.find_element(By.CSS_SELECTOR, ".semsig-legend summary").click()
-        assert legend.size["height"] > 200
-        assert legend.size["width"] <= 380
+        top = browser.find_element(By.CSS_SELECTOR, ".leaflet-top.leaflet-left").rect
+        for legend in legends:
+            legend.find_element(By.TAG_NAME, "summary").click()
+            assert legend.size["height"] > 100
+            assert legend.size["width"] <= width - 20
+            # One is open at a time, and both are below the buttons.
+            assert len(browser.find_elements(By.CSS_SELECTOR, ".semsig-legend[open]")) == 1
+            assert min(one.rect["y"] for one in legends) >= top["y"] + top["height"]
     finally:
         browser.execute_cdp_cmd("Emulation.clearDeviceMetricsOverride", {})
+
+
+@pytest.mark.usefixtures("carried")
+def test_boxes_fold_when_the_window_becomes_small(
+    browser: Chrome, evaluation: Evaluation, database: SignatureDatabase, tmp_path: Path
+) -> None:
+    opened(browser, evaluation_map(evaluation, database), tmp_path)
+    boxes = ".semsig-legend[open], .leaflet-control-layers-expanded"
+    assert len(browser.find_elements(By.CSS_SELECTOR, boxes)) == 2
+    size = {"width": 500, "height": 900, "deviceScaleFactor": 1, "mobile": False}
+    browser.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", size)
+    try:
+        wait = WebDriverWait(browser, 10.0)
+        wait.until(lambda one: one.find_elements(By.CSS_SELECTOR, boxes) == [])
+    finally:
+        browser.execute_cdp_cmd("Emulation.clearDeviceMetricsOverride", {})
+    wait.until(lambda one: len(one.find_elements(By.CSS_SELECTOR, boxes)) == 1)
+    switch(browser, "Failed")  # the layers are there again
+    assert asked(browser, "return circles(arguments[0]).length", FAILED) == 0
+    assert_quiet(browser)
+
+
+@pytest.mark.usefixtures("carried")
+def test_nothing_lies_below_the_boxes(
+    browser: Chrome, evaluation: Evaluation, database: SignatureDatabase, tmp_path: Path
+) -> None:
+    opened(browser, evaluation_map(evaluation, database), tmp_path)
+    legend = browser.find_element(By.CSS_SELECTOR, ".semsig-legend").rect
+    layers = browser.find_element(By.CSS_SELECTOR, ".leaflet-control-layers").rect
+    left, right = legend["x"] + legend["width"], layers["x"]
+    places = """
+    return [...circles(arguments[0]), ...circles(arguments[1])].map(
+      (one) => map.latLngToContainerPoint(one.getLatLng()).x);
+    """
+    across = asked(browser, places, SUCCESSFUL, FAILED)
+    assert left <= min(across) <= max(across) <= right
+    opening = """
+    const pan = map.panBy;
+    map.panBy = (offset) => pan.call(map, offset, {animate: false});
+    const [marker] = circles(arguments[0]);
+    map.setView(marker.getLatLng(), 18, {animate: false});
+    pan.call(map, [arguments[1] * map.getSize().x / 2, 0], {animate: false});
+    marker.openPopup();
+    """
+    for side in (-0.95, 0.95):
+        asked(browser, opening, FAILED, side)
+        box = browser.find_element(By.CSS_SELECTOR, ".leaflet-popup-content-wrapper").rect
+        assert left <= box["x"]
+        assert box["x"] + box["width"] <= right
+        said = browser.find_element(By.CSS_SELECTOR, ".semsig-details").get_property("innerText")
+        assert [line.split("\t")[0] for line in str(said).splitlines()[1:4]] == [
+            "Expected error", "P(error ≤ 50 m)", "True rank"
+        ]  # fmt: skip
+        asked(browser, "map.closePopup()")
+    assert_quiet(browser)
+
+
+@pytest.mark.usefixtures("carried")
+def test_the_search_offers_the_best_match_first(
+    browser: Chrome, evaluation: Evaluation, database: SignatureDatabase, tmp_path: Path
+) -> None:
+    opened(browser, evaluation_map(evaluation, database), tmp_path)
+    for number in (1, 2, 5, 12, QUERIES):  # of both layers
+        for text in (f"Query {number}", f"query {number}:", str(number)):
+            assert searched(browser, text)[0].startswith(f"Query {number}: ")
+    assert searched(browser, "query")[0].startswith("Query")
+    assert searched(browser, f"of {QUERIES}") == []
+    searched(browser, "Query 3", Keys.ENTER)
+    assert popup_text(browser).startswith("Query 3: ")
+    browser.switch_to.active_element.send_keys(Keys.ESCAPE)
+    assert asked(browser, "return map._popup.isOpen()") is False
+    assert_quiet(browser)
 
 
 @pytest.mark.usefixtures("carried")
@@ -310,18 +401,23 @@ def test_a_popup_draws_signatures_as_wheels(
     browser: Chrome, evaluation: Evaluation, database: SignatureDatabase, tmp_path: Path
 ) -> None:
     opened(browser, evaluation_map(evaluation, database), tmp_path)
-    query = int(np.argmax(evaluation.queries["query_length"]))
-    name = f"Query {query + 1:,} of {QUERIES}"
-    assert searched(browser, name, Keys.ENTER)[0].startswith(name)
-    assert popup_text(browser).startswith(name)
+    lengths = evaluation.queries["query_length"]
+    letters = """
+    return [...document.querySelectorAll(".semsig-wheels text")].map((one) =>
+      one.getAttribute("font-size") * one.ownerSVGElement.getBoundingClientRect().width / 116);
+    """
+    for query in (int(lengths.argmin()), int(lengths.argmax())):
+        name = f"Query {query + 1:,}: "
+        assert searched(browser, name, Keys.ENTER)[0].startswith(name)
+        assert popup_text(browser).startswith(name)
+        assert min(browser.execute_script(letters)) >= 9.0
     wheels = browser.find_elements(By.CSS_SELECTOR, ".semsig-wheels figure")
     row = evaluation.queries.iloc[query]
     seen = (
         ("True cell sees", row["types"], database.signature(int(row["cell"])).bearings),
         ("Query", row["query_types"], [float(one) for one in row["query_bearings"].split(",")]),
     )
-    tops = {wheel.rect["y"] for wheel in wheels}
-    assert len(tops) == 1  # side by side
+    assert wheels[0].rect["y"] == wheels[1].rect["y"]  # side by side
     for wheel, (label, types, bearings) in zip(wheels, seen, strict=False):
         assert bearings is not None
         assert wheel.find_element(By.TAG_NAME, "figcaption").get_property("innerText") == label
