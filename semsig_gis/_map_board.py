@@ -222,7 +222,7 @@ semsig.streetObjects = (key, packed, about) => {
     if (data === null) return [];
     const titles = semsig.matches(classes.map(({title}) => semsig.plain(title)), words, limit);
     const byTitle = titles.map(({rank, at: number}) => ({
-      rank,
+      rank: rank - 0.5,  // before what is of this class
       name: classes[number].title,
       hint: "all " + (classes[number].end - classes[number].start).toLocaleString("en"),
       show: (map) => {

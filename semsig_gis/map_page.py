@@ -163,8 +163,9 @@ const semsig = {
     const hint = (values) => [...new Set(named.map((at) => values[at]))].filter(Boolean).join(", ");
     let names = null;
     semsig.finders.push((words, limit) => {
-      names = names || records.map((record) => semsig.plain(
-        [record[4], ...named.map((at) => record[5][at])].join("\\n")));
+      // What has a number is called by it alone, too.
+      names = names || records.map(([, , , , name, values]) => semsig.plain(
+        [name, /\\d[\\d,]*/.exec(name), ...named.map((at) => values[at])].join("\\n")));
       return semsig.matches(names, words, limit).map(({rank, at}) => ({
         rank,
         name: records[at][4],

@@ -21,6 +21,7 @@ from semsig_gis.drift import compare_cells
 from semsig_gis.errors import CrsError, DatabaseError, InputError
 from semsig_gis.map_drift import drift_map
 from semsig_gis.map_legend import OBJECT_COLOURS
+from semsig_gis.map_objects import objects_map
 from semsig_gis.signatures import SignatureSpec
 from semsig_gis.taxonomy import Taxonomy
 
@@ -130,6 +131,17 @@ def test_objects_that_have_changed(browser: Chrome, tmp_path: Path) -> None:
         assert ("Class before" in said) == (kind in {"moved", "of another class"})
         switch(browser, f"Objects {kind}")
         assert asked(browser, "return circles(arguments[0]).length", colour) == 0
+    assert_quiet(browser)
+
+
+@pytest.mark.usefixtures("carried")
+def test_a_class_is_found_before_its_objects(browser: Chrome, tmp_path: Path) -> None:
+    map_ = drift_map(OLD, NEW, objects_before=BEFORE, objects_after=AFTER)
+    opened(browser, objects_map(AFTER, map_=map_), tmp_path)
+    title = TAXONOMY.by_code(int(BEFORE.codes[0])).title
+    offered = searched(browser, title)
+    assert offered[0].startswith(f"{title}\nall ")
+    assert offered[1].startswith("Object removed\n")
     assert_quiet(browser)
 
 

@@ -367,6 +367,9 @@ def test_the_search_offers_the_best_match_first(
     for number in (1, 2, 5, 12, QUERIES):  # of both layers
         for text in (f"Query {number}", f"query {number}:", str(number)):
             assert searched(browser, text)[0].startswith(f"Query {number}: ")
+    # By its number it is as well called as what is called so on another map.
+    exact = "return semsig.finders.flatMap((one) => one('12', 9)).map((one) => one.rank)"
+    assert asked(browser, exact).count(0) == 1
     assert searched(browser, "query")[0].startswith("Query")
     assert searched(browser, f"of {QUERIES}") == []
     searched(browser, "Query 3", Keys.ENTER)
