@@ -188,7 +188,10 @@ semsig.cells = (packed, grid, titles, told) => {
       const label = {permanent: true, direction: "center", className: "semsig-number"};
       sign(other, {radius: 9, fillColor: "#fff"}).bindTooltip(text, label);
     });
-    const rows = [...parts.flatMap((part) => part.rows), ["Cell", city.id(cell)]];
+    // The page has the level of a bearing, whose middle is told.
+    const half = "\u00b1" + Math.round(180 / grid.levels) + "\u00b0, middles of levels";
+    const rows = [
+      ...parts.flatMap((part) => part.rows), ["Cell", city.id(cell)], ["Bearings", half]];
     const title = parts.map((part) => part.title).filter(Boolean).pop();
     const box = semsig.details(
       title, rows.map((one) => one[0]), rows.map((one) => one[1]), titles);

@@ -8,7 +8,7 @@ SCRIPT = """\
 // Not one point laid over the other, which would show where most queries were drawn, and change
 // with every zoom.
 semsig.heat = (packed, {colours, ...about}) => {
-  const step = 4;  // pixels of the screen to one of the field
+  const step = 6;  // pixels of the screen to one of the field
   const radius = 28 / step;
   const parts = colours.map((colour) => [1, 3, 5].map((at) => parseInt(colour.substr(at, 2), 16)));
   const shades = Array.from({length: 256}, (_, value) => {
