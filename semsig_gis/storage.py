@@ -406,7 +406,10 @@ def read_geoparquet(
         msg = f"{file} cannot be read ({_reason(error)}); ask its owner for access."
         raise DatabaseError(msg) from error
     except (pa.ArrowException, OSError, ValueError) as error:
-        msg = f"{file} is damaged or is not a Parquet file; give a {kind} file, or make it again."
+        msg = (
+            f"{file} is damaged or is not a Parquet file; give another, or make the {kind} file "
+            "again."
+        )
         raise DatabaseError(msg) from error
     try:
         specs = json.loads(metadata[SPEC_KEY])
