@@ -192,12 +192,15 @@ def _chromium(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Chrome]:
 
 @pytest.fixture
 def browser(_chromium: Chrome) -> Chrome:
-    """Return a headless Chromium that reaches no network, on an empty page, with empty logs.
+    """Return a headless Chromium that reaches no network and remembers nothing, with empty logs.
 
     ``browser.get_log("browser")`` gives the console messages since then and
     ``browser.get_log("performance")`` what was requested.
     """
     _chromium.get("about:blank")
+    # All pages from files share what they keep, such as the choice of light or dark.
+    kept = {"origin": "file://", "storageTypes": "local_storage"}
+    _chromium.execute_cdp_cmd("Storage.clearDataForOrigin", kept)
     for log in ("browser", "performance"):
         _chromium.get_log(log)
     return _chromium
