@@ -47,6 +47,21 @@ semsig.board = (map, pane, paint) => {
   board.on("remove", () => map.off("semsig-colours", redraw));
   return {redraw, remove: () => board.remove(), canvas: board._container};
 };
+// A layer that is such a canvas.
+semsig.boardLayer = (pane, name, paint) => {
+  const layer = new L.Layer();
+  let board = null;
+  layer.onAdd = (map) => {
+    board = semsig.board(map, pane, paint(map));
+    board.canvas.classList.add(name);
+  };
+  layer.onRemove = () => {
+    board.remove();
+    board = null;
+  };
+  layer.redraw = () => { if (board) board.redraw(); };
+  return layer;
+};
 // Boxes around so many points at a time, to leave out what is not in view.
 semsig.blocks = (x, y, starts) => {
   const boxes = new Int32Array(4 * (starts.length - 1));
@@ -259,8 +274,7 @@ semsig.classLayer = (key, number) => semsig.held[key][number];
 semsig.ground = (packed, about) => {
   const chunk = 64;
   const kinds = {};
-  const layer = new L.Layer();
-  let board = null;
+  let layer = null;
   for (const [kind, arrays] of Object.entries(packed)) {
     semsig.arrays(arrays).then((data) => {
       const firsts = new Int32Array(data.rings.length + 1);  // point of each shape
@@ -273,7 +287,7 @@ semsig.ground = (packed, about) => {
       data.shapes = semsig.blocks(data.x, data.y, firsts);
       data.boxes = semsig.blocks(data.x, data.y, starts);
       kinds[kind] = data;
-      if (board) board.redraw();
+      layer.redraw();
     });
   }
   const draw = (ctx, data, frame, min, max, closed) => {
@@ -312,24 +326,17 @@ semsig.ground = (packed, about) => {
       if (closed) ctx.fill(); else ctx.stroke();
     }
   };
-  layer.onAdd = (map) => {
-    board = semsig.board(map, "tilePane", (ctx, min, max) => {
-      const frame = semsig.frame(map, about);
-      const dark = semsig.isDark(map);
-      ctx.lineWidth = Math.max(0.7, about.width * frame.scale / about.quantum);
-      ctx.lineCap = ctx.lineJoin = "round";
-      ctx.strokeStyle = dark ? "#3b4047" : "#cfd3d8";
-      ctx.fillStyle = dark ? "#272b30" : "#e4ded3";
-      if (kinds.streets) draw(ctx, kinds.streets, frame, min, max, false);
-      if (kinds.buildings) draw(ctx, kinds.buildings, frame, min, max, true);
-    });
-    board.canvas.style.zIndex = 2;
-    board.canvas.classList.add("semsig-ground");
+  const paint = (map) => (ctx, min, max) => {
+    const frame = semsig.frame(map, about);
+    const dark = semsig.isDark(map);
+    ctx.lineWidth = Math.max(0.7, about.width * frame.scale / about.quantum);
+    ctx.lineCap = ctx.lineJoin = "round";
+    ctx.strokeStyle = dark ? "#3b4047" : "#cfd3d8";
+    ctx.fillStyle = dark ? "#272b30" : "#e4ded3";
+    if (kinds.streets) draw(ctx, kinds.streets, frame, min, max, false);
+    if (kinds.buildings) draw(ctx, kinds.buildings, frame, min, max, true);
   };
-  layer.onRemove = (map) => {
-    board.remove();
-    board = null;
-  };
+  layer = semsig.boardLayer("tilePane", "semsig-ground", paint);
   return layer;
 };
 """

@@ -10,19 +10,8 @@ SCRIPT = """\
 semsig.heat = (packed, {colours, ...about}) => {
   const step = 6;  // pixels of the screen to one of the field
   const radius = 28 / step;
-  const parts = colours.map((colour) => [1, 3, 5].map((at) => parseInt(colour.substr(at, 2), 16)));
-  const shades = Array.from({length: 256}, (_, value) => {
-    const place = value / 255 * (parts.length - 1);
-    const first = Math.min(Math.floor(place), parts.length - 2);
-    return parts[first].map((one, at) => one + (place - first) * (parts[first + 1][at] - one));
-  });
-  const layer = new L.Layer();
+  const shades = colours.map((colour) => [1, 3, 5].map((at) => parseInt(colour.substr(at, 2), 16)));
   let data = null;
-  let board = null;
-  semsig.arrays(packed).then((arrays) => {
-    data = arrays;
-    if (board) board.redraw();
-  });
   const paint = (map) => (ctx, min, max) => {
     const [width, height] = [max.x - min.x, max.y - min.y].map((size) => Math.ceil(size / step));
     if (data === null || !width || !height) return;
@@ -55,14 +44,11 @@ semsig.heat = (packed, {colours, ...about}) => {
     field.getContext("2d").putImageData(image, 0, 0);
     ctx.drawImage(field, min.x, min.y, width * step, height * step);
   };
-  layer.onAdd = (map) => {
-    board = semsig.board(map, "overlayPane", paint(map));
-    board.canvas.classList.add("semsig-heat");
-  };
-  layer.onRemove = () => {
-    board.remove();
-    board = null;
-  };
+  const layer = semsig.boardLayer("overlayPane", "semsig-heat", paint);
+  semsig.arrays(packed).then((arrays) => {
+    data = arrays;
+    layer.redraw();
+  });
   return layer;
 };
 """

@@ -400,4 +400,4 @@ def _heat(
         "y": packed(np.ascontiguousarray(places[:, 1])),
         "error": packed(np.rint(255.0 * errors).astype(np.uint8)),
     }
-    return arrays, {**about, "colours": ERROR_RAMP}
+    return arrays, {**about, "colours": _ramp(np.linspace(0.0, 1.0, 256), ERROR_RAMP)}

@@ -79,10 +79,13 @@ class Layer:
     facts: Mapping[str, Any]  # plain values for JSON
     styles: tuple[Style, ...]  # the first is the default
 
-    def blocks(self) -> Iterator[pa.Table]:
+    def blocks(self, progress: Callable[[int, int], None] | None = None) -> Iterator[pa.Table]:
         """Read the layer block by block; one without rows is a block without rows."""
         for low in range(0, max(self.rows, 1), ROWS_A_BLOCK):
-            yield self.read(slice(low, min(low + ROWS_A_BLOCK, self.rows)))
+            high = min(low + ROWS_A_BLOCK, self.rows)
+            yield self.read(slice(low, high))
+            if progress is not None:
+                progress(high, self.rows)
 
 
 def cells_layer(

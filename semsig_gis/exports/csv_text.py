@@ -106,15 +106,11 @@ def write_layer(
     CRS of the layer.
     """
     with whole_file(path) as partial, partial.open("wb") as file:
-        done = 0
         writer = None
-        for block in layer.blocks():
+        for block in layer.blocks(progress):
             table = _plain(block, layer.geometry)
             writer = writer or csv.CSVWriter(file, table.schema)
             writer.write_table(table)
-            done += len(block)
-            if progress is not None:
-                progress(done, layer.rows)
         if writer is not None:
             writer.close()
 

@@ -63,12 +63,8 @@ def write_layer(
     }
 
     def blocks() -> Iterator[pa.Table]:
-        done = 0
-        for block in layer.blocks():
+        for block in layer.blocks(progress):
             shapes = shapely.from_wkb(block[GEOMETRY].to_numpy(zero_copy_only=False))
             yield block.append_column(BBOX, bounds_column(shapely.bounds(shapes)))
-            done += len(block)
-            if progress is not None:
-                progress(done, layer.rows)
 
     write_geoparquet_blocks(blocks(), path, geo=geo, specs=specs)
