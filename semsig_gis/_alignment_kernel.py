@@ -41,30 +41,15 @@ def align(  # noqa: C901, PLR0912, PLR0915, PLR0917 - one pass over the cells; a
 ) -> None:
     """Sum over the one-to-one associations of a query with each of some cells.
 
-    Parameters
-    ----------
-    cells : ndarray of int64, shape (c,)
-        Which cells.
-    offsets, codes, bearing_units, distance_units : ndarray
-        The database.
-    row_of : ndarray of int64, shape (256,)
-        Row of each class code in the tables below.
-    unit : float
-        Degrees in a unit of bearing.
-    kinds : ndarray of int64, shape (q,)
-        Class row of each object of the query.
-    seen : ndarray of float64, shape (q,)
-        Its bearing in degrees.
-    turns : ndarray of float64, shape (c, r)
-        Degrees to turn the query by, for each cell.
-    odds : ndarray of float64, shape (m, longest + 1, k)
-        Chance of detection over chance of a miss, by model, length and class.
-    naming : ndarray of float64, shape (m, longest + 1, k, k + 1)
-        Chance of each name over the density of such clutter.
-    sigma : ndarray of float64, shape (m, k, 256)
-        Deviation of a bearing in degrees, by model, class and distance.
-    found : ndarray of float64, shape (m, c, r)
-        Filled with the logarithms of the sums, where no association at all counts as one.
+    Fills `found`, shape (models, cells, turns), with logarithms; the empty association counts as
+    one. The query has class rows `kinds` and bearings `seen` in degrees, and is turned by `turns`
+    degrees, shape (cells, turns). `unit` is the degrees in a unit of bearing, and `row_of`, shape
+    (256,), the row of each class code in the tables.
+
+    Tables are by model, signature length (0 to longest) and class: `odds` of detection over a miss,
+    and `naming`, with a fourth axis of k + 1 names, the chance of each name over the density of
+    such clutter. `sigma`, shape (models, k, 256), is the deviation of a bearing in degrees by
+    distance.
     """
     models, longest = odds.shape[0], odds.shape[1] - 1
     size = len(kinds)

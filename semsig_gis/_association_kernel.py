@@ -32,24 +32,12 @@ def associate(  # noqa: C901, PLR0917 - a kernel takes no keywords
     chance: NDArray[np.float64],
     total: NDArray[np.float64],
 ) -> None:
-    """Sum over the one-to-one associations of problems that have nothing to do with each other.
+    """Sum over the one-to-one associations of independent problems.
 
-    Parameters
-    ----------
-    starts : ndarray of int64, shape (s + 1,)
-        Where the pairs of each problem begin.
-    left, right : ndarray of int64, shape (e,)
-        The object and the detection of each pair; no problem shares one with another.
-    weight : ndarray of float64, shape (e,)
-        How much likelier the two are one thing than a miss and clutter, 0 or more.
-    at_left : ndarray of float64, shape (objects,)
-        Room to work in.
-    at_right : ndarray of float64, shape (detections,)
-        Room to work in.
-    chance : ndarray of float64, shape (e,)
-        Filled with the chance that the two are one thing.
-    total : ndarray of float64, shape (s,)
-        Filled with the logarithm of the sum, where no association at all counts as one.
+    The pairs of problem i are ``starts[i]:starts[i + 1]``, each an object `left` and a detection
+    `right` with a weight of 0 or more; no two problems share one. `at_left` and `at_right` are
+    working memory. Fills `chance`, that a pair is one thing, and `total`, the logarithm of the sum
+    of each problem, in which the empty association counts as one.
     """
     back = np.ones(len(weight))
     forth = np.empty(len(weight))

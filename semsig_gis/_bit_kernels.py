@@ -35,22 +35,10 @@ def pack(  # noqa: PLR0917
     per_position: int,
     planes: NDArray[np.uint64],
 ) -> None:
-    """Set the bits of all sequences.
+    """Set the bits of all sequences in `planes`, which holds zeros of shape (p, stripe).
 
-    Parameters
-    ----------
-    values : ndarray of uint8, shape (m,)
-        All sequences, one after the other.
-    offsets : ndarray of int64, shape (d + 1,)
-        Where each begins.
-    digits : ndarray of int64, shape (256, 2)
-        The two planes of each value.
-    bounds : ndarray of int64, shape (blocks + 1,)
-        The first plane of each block.
-    per_position : int
-        Planes of a position.
-    planes : ndarray of uint64, shape (p, stripe)
-        Zeros, to be set.
+    `values` and `offsets` are the sequences in CSR form, `digits`, shape (256, 2), gives the two
+    planes of each value, and `bounds`, shape (blocks + 1,), the first plane of each block.
     """
     stripe = planes.shape[1]
     for index in range(len(offsets) - 1):
@@ -79,28 +67,12 @@ def scan(  # noqa: PLR0917
     low: int,
     high: int,
 ) -> None:
-    """Measure queries against some blocks.
+    """Fill `result`, shape (queries, d), with distances to the sequences of some blocks.
 
-    Parameters
-    ----------
-    planes : ndarray of uint64, shape (p, stripe)
-        Bits of the sequences.
-    bounds : ndarray of int64, shape (blocks + 1,)
-        The first plane of each block.
-    per_position : int
-        Planes of a position.
-    lengths : ndarray of int64, shape (d,)
-        Lengths of the sequences of these blocks.
-    wanted : ndarray of int64, shape (entries, 2)
-        The two planes of each value of the queries, one query after the other.
-    ends : ndarray of int64, shape (queries + 1,)
-        Where each query begins in `wanted`.
-    normalized : bool
-        True to divide by the longer length.
-    result : ndarray of float32, shape (queries, d)
-        To be filled.
-    low, high : int
-        The first block, and the block after the last.
+    They run from `low` to before `high`. `lengths` are those of the d sequences of the blocks that
+    `bounds` lists; `wanted`, shape (entries, 2), holds the two planes of each value of the queries,
+    one query after the other, and query i begins at ``ends[i]``. `normalized` divides by the longer
+    length.
     """
     stripe = planes.shape[1]
     longest = 0

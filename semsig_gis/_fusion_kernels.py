@@ -18,18 +18,9 @@ __all__ = ["count_steps", "fuse", "put_behind"]
 def count_steps(
     first: NDArray[np.float32], counts: NDArray[np.int64], step: float, found: NDArray[np.int64]
 ) -> None:
-    """Count the cells at each score.
+    """Add to ``found[i]`` the number of cells whose score is i steps.
 
-    Parameters
-    ----------
-    first : ndarray of float32, shape (d,)
-        Scores of distinct sequences, whole steps.
-    counts : ndarray of int64, shape (d,)
-        How many cells each sequence has.
-    step : float
-        The step.
-    found : ndarray of int64
-        Zeros, to be added to; place i is of the score i steps.
+    `first` holds the scores, whole steps, of d distinct sequences and `counts` their cells.
     """
     for place in range(len(first)):
         found[int(np.rint(first[place] / step))] += counts[place]
@@ -44,22 +35,10 @@ def fuse(  # noqa: PLR0917
     step: float,
     scores: NDArray[np.float32],
 ) -> None:
-    """Add up two distances of every cell.
+    """Fill `scores`, shape (n,), with the sum of the type and angle distances of every cell.
 
-    Parameters
-    ----------
-    left : ndarray of float64, shape (d,)
-        What each type sequence adds, in steps.
-    types : ndarray of int64, shape (n,)
-        Type sequence of each cell.
-    right : ndarray of float32, shape (e,)
-        What each angle sequence adds, in steps.
-    angles : ndarray of int64, shape (n,)
-        Angle sequence of each cell.
-    step : float
-        The step.
-    scores : ndarray of float32, shape (n,)
-        To be filled.
+    `left` and `right` hold what each distinct sequence adds, in steps; `types` and `angles`, shape
+    (n,), say which sequences a cell has.
     """
     for cell in range(len(types)):
         scores[cell] = np.rint(left[types[cell]] + right[angles[cell]]) * step
@@ -74,22 +53,10 @@ def put_behind(  # noqa: PLR0917
     least: np.float32,
     scores: NDArray[np.float32],
 ) -> None:
-    """Rank the cells that the first stage does not keep behind those that it keeps.
+    """Fill `scores` with `fused`, and rank the cells that the first stage drops behind the rest.
 
-    Parameters
-    ----------
-    first : ndarray of float32, shape (n,)
-        Scores of the first stage.
-    cut : float32
-        The worst of them that is kept.
-    fused : ndarray of float32, shape (n,)
-        Scores of the second stage.
-    worst : float32
-        The worst of them of a cell that is kept.
-    least : float32
-        The best score of a cell that is not.
-    scores : ndarray of float32, shape (n,)
-        To be filled.
+    `cut` is the worst score of the first stage that is kept, `worst` the worst fused score of a
+    kept cell, and `least` the best score that a dropped cell may have. Arrays have shape (n,).
     """
     for cell in range(len(first)):
         behind = max(worst + (first[cell] - cut), least)

@@ -19,16 +19,6 @@ def add_quotients(
     quotients: NDArray[np.float64],
     total: NDArray[np.float64],
 ) -> None:
-    """Add what one value adds to the sum of every sequence.
-
-    Parameters
-    ----------
-    counts : ndarray of uint16 or uint32, shape (d,)
-        How often each sequence has the value.
-    quotients : ndarray of float64
-        What each such number adds.
-    total : ndarray of float64, shape (d,)
-        To be added to.
-    """
+    """Add ``quotients[counts]`` to `total`, without an array for the quotients in between."""
     for row in range(len(counts)):
         total[row] += quotients[counts[row]]

@@ -30,18 +30,7 @@ LINES_A_TASK = 64
 
 
 def index_shape(database: SignatureDatabase) -> tuple[int, int, int]:
-    """Return the shape of the columns: classes that are seen and one more, bearings, cells.
-
-    Parameters
-    ----------
-    database : SignatureDatabase
-        The cells.
-
-    Returns
-    -------
-    tuple of int
-        Shape of `LikelihoodIndex.columns`.
-    """
+    """Return the shape of the columns: classes seen and one for unknown, bearing steps, cells."""
     return len(database.present_codes) + 1, BINS, len(database)
 
 
@@ -53,47 +42,12 @@ def write_columns(
     progress: Callable[[int, int], None] | None = None,
     threads: int = 1,
 ) -> float:
-    """Work out the columns of a database for a noise model.
+    """Fill `columns`, shape `index_shape`, for a noise model, and return the size of their steps.
 
-    Parameters
-    ----------
-    database : SignatureDatabase
-        The cells.
-    table : NoiseTable
-        The noise model.
-    columns : ndarray of uint8, shape `index_shape`
-        What to write, such as a mapped file.
-    progress : callable, optional
-        Called with the number of cells done and in all.
-    threads : int, default 1
-        How many blocks of cells are worked out at once.
-
-    Returns
-    -------
-    float
-        Size of a step of the columns.
-
-    Notes
-    -----
-    A column holds, for a class t and a step of bearings,
-    ``log(1 + sum_i o_i C(i, t) N / lambda(t))``: what a detection there adds, less
-    ``log(lambda(t))``, which is the same for all cells. N is the mean density over the step.
-
-    Examples
-    --------
-    >>> from semsig_gis.catalog import paper_taxonomy
-    >>> from semsig_gis.building import build_database
-    >>> from semsig_gis.noise import named_noise
-    >>> from semsig_gis.noise_table import database_tables
-    >>> from semsig_gis.objects import build_objects
-    >>> from semsig_gis.sources.synthetic import CitySpec, synthetic_city
-    >>> layers = synthetic_city(CitySpec(size=200.0))
-    >>> objects, _ = build_objects(layers, taxonomy=paper_taxonomy(), crs="EPSG:32631")
-    >>> database = build_database(objects)
-    >>> columns = np.zeros(index_shape(database), np.uint8)
-    >>> (table,), _ = database_tables(database, named_noise("light"))
-    >>> write_columns(database, table, columns) < 0.1, int(columns.max()) > 100
-    (True, True)
+    A column holds, for a class t and a step of bearings, ``log(1 + sum_i o_i C(i, t) N /
+    lambda(t))``: what a detection there adds, less ``log(lambda(t))``, which is the same for all
+    cells. N is the mean density over the step. `columns` may be a mapped file; `progress` is called
+    with the number of cells done and in all.
     """
     from semsig_gis._likelihood_kernels import LINE, fill_columns  # noqa: PLC0415
 

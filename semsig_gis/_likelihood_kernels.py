@@ -51,24 +51,12 @@ def fill_columns(  # noqa: C901, PLR0912, PLR0917 - a kernel takes no keywords
 ) -> None:
     """Write the columns of some cells: the log of what each symbol adds, in whole steps.
 
-    Parameters
-    ----------
-    lines : ndarray of int64, shape (2,)
-        First and one past the last line of `LINE` cells to write.
-    offsets, rows, bearing_units : ndarray
-        The database: class rows instead of class codes.
-    spread_of : ndarray of uint8, shape (m,)
-        For each entry, which row of `spread` its bearing noise is.
-    spread : ndarray of float32, shape (levels, units, bins)
-        Density a degree of a bearing in each bin, for an object at a unit of bin 0.
-    odds : ndarray of float32, shape (longest + 1, k)
-        Chance of detection over chance of a miss, by length and class.
-    naming : ndarray of float32, shape (longest + 1, k, symbols)
-        Chance that an object of a class is given a name, over the density of such clutter.
-    logs : ndarray of uint8
-        Steps of the logarithm, by the leading bits of a float32 from 1.
-    columns : ndarray of uint8, shape (symbols, bins, n)
-        What to write.
+    Fills the cells of ``lines[0]`` to ``lines[1] - 1``, each `LINE` cells, in `columns`, shape
+    (symbols, bins, n). `rows` are the class rows of the entries of the database and `spread_of`
+    their rows of `spread`, shape (levels, units, bins): the density per degree in each bin for an
+    object at a unit of bin 0. `odds` are of detection over a miss by length and class; `naming`,
+    with a third axis of symbols, is the chance of a name over the density of such clutter; `logs`
+    is the logarithm in steps, by the leading bits of a float32 from 1.
     """
     cells = len(offsets) - 1
     kinds = odds.shape[1]
@@ -157,22 +145,11 @@ def scan(  # noqa: PLR0917
     step: float,
     scores: NDArray[np.float32],
 ) -> None:
-    """Add up one column for each object of a query.
+    """Fill `scores`, shape (n,), with the sums of one column for each object of a query.
 
-    Parameters
-    ----------
-    columns : ndarray of uint8, shape (s, n)
-        One row a symbol.
-    symbols : ndarray of int64, shape (q,)
-        The objects of the query, at most 257.
-    constants : ndarray of float32, shape (n,)
-        What each cell adds whatever the query.
-    base : float
-        What the query adds whatever the cell.
-    step : float
-        Size of a step of the columns.
-    scores : ndarray of float32, shape (n,)
-        Filled with the sums.
+    `symbols` are the rows of `columns`, shape (s, n), to add: at most 257, or 16 bits overflow.
+    `constants` are what each cell adds to any query, `base` what the query adds in any cell, and
+    `step` is the size of a step of the columns.
     """
     cells = len(constants)
     sums = np.empty(_BLOCK, np.uint16)
@@ -197,30 +174,11 @@ def scan_turned(  # noqa: PLR0917
     scores: NDArray[np.float32],
     best: NDArray[np.int16],
 ) -> None:
-    """Add up columns for a query turned in several ways, and sum over the ways.
+    """Add up columns for a query turned in several ways, and sum over the turns.
 
-    Parameters
-    ----------
-    columns : ndarray of uint8, shape (s, n)
-        One row a symbol.
-    symbols : ndarray of int64, shape (r, q)
-        The objects of the query, for each turn; at most 257.
-    turns : ndarray of int64, shape (r,)
-        Number that stands for each turn.
-    priors : ndarray of float32, shape (r,)
-        Chance of each turn.
-    decay : ndarray of float32, shape (d,)
-        ``exp(-step * i)``; beyond its end nothing counts.
-    constants : ndarray of float32, shape (n,)
-        What each cell adds whatever the query.
-    base : float
-        What the query adds whatever the cell.
-    step : float
-        Size of a step of the columns.
-    scores : ndarray of float32, shape (n,)
-        Filled with the logarithms of the sums.
-    best : ndarray of int16, shape (n,)
-        Filled with the turn that is likeliest for each cell.
+    As `scan`, with `symbols` of shape (turns, objects), the chance of each turn in `priors`, and
+    ``exp(-step * i)`` in `decay`, beyond whose end nothing counts. Fills `scores` with the
+    logarithms of the sums and `best` with the number in `turns` of the likeliest turn of each cell.
     """
     cells = len(constants)
     sums = np.empty(_BLOCK, np.uint16)
@@ -257,19 +215,9 @@ def scan_turned(  # noqa: PLR0917
 
 @compiled
 def promising_cells(scores: NDArray[np.float32], count: int) -> NDArray[np.int64]:
-    """Return the cells of the highest scores and a few more, without sorting them.
+    """Return the cells of the `count` highest scores and a few more, ascending, without sorting.
 
-    Parameters
-    ----------
-    scores : ndarray of float32, shape (n,)
-        Higher is better; not NaN.
-    count : int
-        How many are wanted at least, 1 to n.
-
-    Returns
-    -------
-    ndarray of int64
-        Row numbers, ascending; every cell that is left out is worse than `count` that are in.
+    Every cell left out is worse than `count` that are in. Scores must not be NaN.
     """
     top = scores[0]
     for score in scores:
@@ -306,22 +254,10 @@ def count_types(  # noqa: C901, PLR0917
 ) -> None:
     """Compare how many objects of each class a query and each sequence of types have.
 
-    Parameters
-    ----------
-    offsets, codes : ndarray
-        Sequences of class codes.
-    row_of : ndarray of int64, shape (256,)
-        Row of each class code in the tables below.
-    wanted : ndarray of int64, shape (k + 1,)
-        Objects of each class in the query; those of unknown class last.
-    detected : ndarray of float64, shape (longest + 1, k)
-        Chance of detection, by length and class.
-    named : ndarray of float64, shape (longest + 1, k, k)
-        Chance of each name.
-    clutter : ndarray of float64, shape (k,)
-        False objects a signature.
-    scores : ndarray of float32, shape (d,)
-        Filled with the log-likelihoods.
+    Fills `scores`, shape (d,), with log-likelihoods. `wanted`, shape (k + 1,), counts the objects
+    of the query by class, those of unknown class last. By length and class, `detected` is the
+    chance of detection and `named`, shape (longest + 1, k, k), that of each name; `clutter` is in
+    false objects per signature, and `row_of` the row of each class code.
     """
     kinds = len(clutter)
     most = 0

@@ -134,37 +134,17 @@ def compare_cells(  # noqa: C901, PLR0915, PLR0917 - a kernel takes no keywords
 ) -> None:
     """Compare cells with all others, by the likelihood of their own signature there.
 
-    Parameters
-    ----------
-    cells : ndarray of int64, shape (c,)
-        The cells to compare.
-    offsets : ndarray of int64, shape (n + 1,)
-        Where the entries of each cell begin.
-    symbols : ndarray of int64, shape (m,)
-        Column of each entry.
-    flat : ndarray of uint8, shape (s, n)
-        The columns of the index.
-    constants : ndarray of float32, shape (n,)
-        What each cell adds whatever the signature.
-    step : float
-        Size of a step of the columns.
-    temperature : float
-        Power of the ratios of likelihoods.
-    ids : ndarray of int64, shape (n,)
-        Number of each cell, rising.
-    places : ndarray of int64, shape (n, 2)
-        Column and row of each cell.
-    circle : ndarray of int64, shape (a, 2)
-        What is near a cell, column by column: the first and the last number, less its own.
-    limit : int
-        Squared radius of the circle in cells.
-    near, far : ndarray of float64, shape (c,)
-        Filled with the sums of the powers of the ratios inside and outside the circle.
-    like : ndarray of int64, shape (c, k)
-        Filled with the likest cells of so many places outside the circle whose own circles do
-        not overlap; -1 where there are no more.
-    share : ndarray of float64, shape (c, k)
-        Filled with the sums in their circles, without what is also in the cell's own.
+    `cells` (c,) are row numbers. The entries of a cell begin at its item of `offsets` (n + 1,) in
+    `symbols` (m,), which are rows of `flat` (s, n), the columns of the index in steps of `step`.
+    `constants` (n,) is what each cell adds whatever the signature. Ratios of likelihoods are taken
+    to the power `temperature`. `ids` (n,) are the rising numbers of the cells, `places` (n, 2)
+    their columns and rows, `circle` (a, 2) that of `cell_circle`, and `limit` its squared radius in
+    cells.
+
+    It fills `near` and `far` (c,) with the sums of these powers inside and outside the circle;
+    `like` (c, k) with the likest cells outside it whose own circles do not overlap, -1 where there
+    are no more; and `share` (c, k) with the sums in their circles, without what is also in the
+    cell's own.
     """
     count = len(constants)
     scores = np.empty(count, np.float32)
@@ -252,29 +232,12 @@ def compare_without(  # noqa: PLR0917 - a kernel takes no keywords
     sampled: NDArray[np.uint8],
     far: NDArray[np.float64],
 ) -> None:
-    """Compare cells with some others, with all classes and without each of them.
+    """Compare cells with a sample of others, with all classes and without each of them.
 
-    Parameters
-    ----------
-    cells : ndarray of int64, shape (c,)
-        The cells to compare.
-    offsets, symbols : ndarray
-        As for `compare_cells`.
-    kinds : ndarray of int64, shape (m,)
-        Class row of each entry.
-    flat : ndarray of uint8, shape (s, n)
-        The columns of the index.
-    constants : ndarray of float32, shape (k + 1, n)
-        What each cell adds whatever the signature: with all classes, and without each.
-    step, temperature, ids, circle
-        As for `compare_cells`.
-    sample : ndarray of int64, shape (d,)
-        The cells to compare with, rising.
-    sampled : ndarray of uint8, shape (s, d)
-        Their part of the columns.
-    far : ndarray of float64, shape (c, k + 1)
-        Filled with the sums of the powers of the ratios outside the circle: with all classes, and
-        without each.
+    As `compare_cells`, but `kinds` (m,) has the class row of each entry, and `constants` (k + 1, n)
+    is for all classes first, then without each. `sample` (d,) are the rising row numbers of the
+    others, `sampled` (s, d) their part of `flat`. It fills `far` (c, k + 1) with the sums of the
+    powers outside the circle.
     """
     count = len(sample)
     factor = np.float32(temperature * _OCTAVES_A_NAT)

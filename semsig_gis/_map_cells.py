@@ -240,21 +240,13 @@ STYLE = """\
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class CellFacts:
-    """A part of what a click on a cell tells.
+    """A part of what a click on a cell tells, with numbers and a JavaScript function of its own.
 
-    Parameters
-    ----------
-    name : str
-        Of the function ``semsig.told.NAME(city, cell)`` that tells it.
-    script : str
-        JavaScript that defines this function. It returns what there is of ``title``; ``rows``:
-        label and value each, as `semsig.details` shows them; ``jumps``: a label and buttons, each
-        with a text, a cell and a hint; ``marks``: cells to number and to join by lines;
-        ``dots``: cells and colours.
-    arrays : mapping of str to list
-        Numbers of the cells (see `semsig_gis._map_packing`).
-    settings : mapping of str to object
-        What else it needs, in ``city.grid``.
+    ``script`` defines the function ``semsig.told.NAME(city, cell)``, where NAME is ``name``. It
+    returns what there is of ``title``; ``rows``: label and value each, as `semsig.details` shows
+    them; ``jumps``: a label and buttons, each with a text, a cell and a hint; ``marks``: cells to
+    number and to join by lines; ``dots``: cells and colours. ``arrays`` are packed numbers of the
+    cells (see `semsig_gis._map_packing`); ``settings`` reach the function in ``city.grid``.
     """
 
     name: str

@@ -185,10 +185,10 @@ def finished_map(
     *,
     licenses: tuple[str, ...] = (),
 ) -> folium.Map:
-    """Put around a map what every map has, last, where the layer control knows all layers.
+    """Add what every map has, last, where the layer control knows all layers.
 
-    The source of what was drawn tells whom to name, and what a search can find: by number the
-    cells of a database, by x and y the places in its coordinate system.
+    The source of what was drawn names whom to credit and what a search finds: cells by number,
+    places by x and y in its CRS.
     """
     children = layers_of(chosen)
     area = None if source is None else _area(source)

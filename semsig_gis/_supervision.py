@@ -24,11 +24,7 @@ def supervised() -> bool:
 
 
 def progress_line(label: str, percent: int) -> str:
-    """Return what a supervisor reads of the progress.
-
-    >>> progress_line("building", 40)
-    'semsig progress 40% building'
-    """
+    """Return what a supervisor reads of the progress: ``semsig progress 40% building``."""
     return f"semsig progress {percent}% {label}"
 
 

@@ -124,18 +124,9 @@ class AnswerRule:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Answer:
-    """A place, and whether it is given as the answer.
+    """A cell (row number) with its viewpoint in metres, and whether it is given as the answer.
 
-    Parameters
-    ----------
-    cell : int
-        Row number of the cell in the database.
-    x, y : float
-        Its viewpoint in metres.
-    mass : float
-        Chance that the place is near it.
-    given : bool
-        False for "cannot tell".
+    `mass` is the chance that the place is near it; `given` is False for "cannot tell".
     """
 
     cell: int

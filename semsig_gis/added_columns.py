@@ -41,46 +41,10 @@ def add_columns(
 ) -> None:
     """Put columns into a database, in the place of those that were put there under this name.
 
-    Parameters
-    ----------
-    path : str or Path
-        File of the database, which is replaced whole, or folder of its parts, which is replaced
-        as a whole.
-    columns : pyarrow.Table
-        A row a cell.
-    cell_ids : ndarray of int64, shape (n,)
-        The cells of the rows, ascending: all that the database has.
-    name : str
-        What the columns are, taken together.
-    facts : dict
-        What is to be known of them, as plain values for JSON.
-
-    Raises
-    ------
-    DatabaseError
-        If the database is damaged, or has other cells.
-    InputError
-        If it cannot be written; it is unchanged then.
-
-    Examples
-    --------
-    >>> import tempfile
-    >>> from semsig_gis.building import build_database
-    >>> from semsig_gis.catalog import paper_taxonomy
-    >>> from semsig_gis.database_file import open_database, save_database
-    >>> from semsig_gis.objects import build_objects
-    >>> from semsig_gis.sources.synthetic import CitySpec, synthetic_city
-    >>> layers = synthetic_city(CitySpec(size=200.0))
-    >>> objects, _ = build_objects(layers, taxonomy=paper_taxonomy(), crs="EPSG:32631")
-    >>> database = build_database(objects)
-    >>> even = pa.table({"even": database.lengths % 2 == 0})
-    >>> with tempfile.TemporaryDirectory() as folder:
-    ...     path = f"{folder}/city.parquet"
-    ...     save_database(database, path)
-    ...     add_columns(path, even, cell_ids=database.cell_ids, name="parity", facts={"a": 1})
-    ...     table, facts = read_added(path, name="parity")
-    ...     len(open_database(path)) == len(table), facts
-    (True, {'a': 1})
+    `columns` has a row for each of `cell_ids`, which ascend and are all cells of the database.
+    `facts` describe the columns, as plain values for JSON. The file, or the folder of parts, is
+    replaced as a whole. Raise DatabaseError if the database is damaged or has other cells, and
+    InputError if it cannot be written; it is unchanged then.
     """
     added = {name: {"columns": columns.column_names, "facts": facts}}
     if not os.path.isdir(path):  # noqa: PTH112 - it answers where Path.is_dir raises
@@ -99,26 +63,9 @@ def add_columns(
 def read_added(
     path: str | Path, *, name: str
 ) -> tuple[pa.Table, dict[str, Any]] | tuple[None, None]:
-    """Return columns that were put into a database.
+    """Return ``cell_id``, ascending, with the columns of a name and their facts, or None twice.
 
-    Parameters
-    ----------
-    path : str or Path
-        File of the database, or folder of its parts.
-    name : str
-        What they were called.
-
-    Returns
-    -------
-    table : pyarrow.Table or None
-        ``cell_id``, ascending, and the columns; None where there are none of this name.
-    facts : dict or None
-        What is to be known of them.
-
-    Raises
-    ------
-    DatabaseError
-        If the database is missing or damaged, or they are not in all of its parts.
+    Raise DatabaseError if the database is missing or damaged, or its parts do not agree on them.
     """
     tables: list[pa.Table] = []
     found: list[dict[str, Any] | None] = []
@@ -138,23 +85,7 @@ def read_added(
 
 
 def has_added(path: str | Path) -> bool:
-    """Return whether columns were put into a database.
-
-    Parameters
-    ----------
-    path : str or Path
-        File of the database, or folder of its parts.
-
-    Returns
-    -------
-    bool
-        Whether it has any.
-
-    Raises
-    ------
-    DatabaseError
-        If the database is missing or damaged.
-    """
+    """Return whether columns were put into a database file, or a folder of its parts."""
     _, specs, _ = read_geoparquet(_files(path)[0], kind=KIND, columns=[])
     return bool(specs.get(ADDED))
 
@@ -162,20 +93,7 @@ def has_added(path: str | Path) -> bool:
 def built_digest(path: str | Path) -> str:
     """Return the SHA-256 digest that a database file had before columns were put into it.
 
-    Parameters
-    ----------
-    path : str or Path
-        File of the database.
-
-    Returns
-    -------
-    str
-        Hexadecimal digits; that of the file as it is where nothing was put into it.
-
-    Raises
-    ------
-    OSError
-        If the file cannot be read.
+    Without such columns it is the digest of the file as it is, even if that is damaged.
     """
     try:
         _, specs, _ = read_geoparquet(path, kind=KIND, columns=[])

@@ -1,15 +1,14 @@
 """Re-rank the best cells by a likelihood in which no object explains two detections.
 
 The index adds up over the detections one by one, so that one lamp may explain three. Here the
-likelihood sums over all one-to-one associations of detections with objects, each detection being
+likelihood sums over all one-to-one associations A of detections with objects, each detection being
 an object of the cell or clutter, each object detected once or missed:
 
     L = prod_i (1 - p_i) * prod_j lambda(t_j)
         * sum_A prod_(i,j in A) o_i C(i, t_j) N(a_j - theta_i) / lambda(t_j)
 
-The sum over A is a permanent in disguise. Belief propagation gives it closely, whatever the order
-of the objects: bearing noise swaps neighbours, so that an alignment that keeps the order loses
-one query in twenty. Of a mixture of noise models, the weighted sum of the likelihoods counts.
+Belief propagation approximates the sum closely, whatever the order of the objects. An alignment
+that keeps the order loses one query in twenty, as bearing noise swaps neighbours.
 """
 
 from __future__ import annotations
@@ -53,51 +52,13 @@ def align_cells(
 ) -> NDArray[np.float64]:
     """Return the log-likelihood of a query in some cells, summed over one-to-one associations.
 
-    Parameters
-    ----------
-    database : SignatureDatabase
-        The cells.
-    query : Signature
-        At least one object, with bearings; types may be unknown, all or those of code 0.
-    noise : NoiseSpec or NoiseMixture
-        The noise model; a mixture is summed over.
-    cells : ndarray of int, shape (c,)
-        Row numbers in the database.
-    turns : ndarray of float64, shape (c, r), optional
-        Degrees to turn the bearings of the query by, for each cell; none by default.
+    The query needs bearings; its types may be unknown. A mixture of noise models counts as the
+    weighted sum of their likelihoods. The shape is (c,), or (c, r) if `turns`, the degrees to turn
+    the query by for each cell, are given; the scale is that of `semsig_gis.likelihood`.
 
-    Returns
-    -------
-    ndarray of float64, shape (c,), or (c, r) where turns were given
-        Natural logarithms, on the scale of `semsig_gis.likelihood`.
-
-    Raises
-    ------
-    InputError
-        If the query is empty, has no bearings, or has a class that no cell sees.
-
-    Notes
-    -----
     The sum over the associations is the Bethe approximation that belief propagation settles on
     (Williams and Lau, "Approximate evaluation of marginal association probabilities with belief
-    propagation", 2014): exact where the possible pairs form no loop, else a little too small.
-
-    Examples
-    --------
-    >>> from semsig_gis.catalog import paper_taxonomy
-    >>> from semsig_gis.building import build_database
-    >>> from semsig_gis.noise import named_noise
-    >>> from semsig_gis.objects import build_objects
-    >>> from semsig_gis.sources.synthetic import CitySpec, synthetic_city
-    >>> layers = synthetic_city(CitySpec(size=300.0))
-    >>> objects, _ = build_objects(layers, taxonomy=paper_taxonomy(), crs="EPSG:32631")
-    >>> database = build_database(objects)
-    >>> longest = int(database.lengths.argmax())
-    >>> found = align_cells(
-    ...     database, database.signature(longest), named_noise("generic"), np.arange(len(database))
-    ... )
-    >>> int(found.argmax()) == longest
-    True
+    propagation", 2014): exact if the possible pairs form no loop, otherwise a little too small.
     """
     tables, weights = database_tables(database, noise)
     ways = np.zeros((len(cells), 1)) if turns is None else np.asarray(turns, dtype=np.float64)
@@ -116,50 +77,11 @@ def rerank(
 ) -> CellScores:
     """Replace the scores of the best cells by their one-to-one likelihoods.
 
-    Parameters
-    ----------
-    index : LikelihoodIndex
-        What the scores came from; its noise model, a mixture as such, is taken.
-    query : Signature
-        The query; where it has no bearings the scores are returned as they are.
-    scores : CellScores
-        The scores of all cells.
-    north_sigma : float, default 0
-        Standard deviation in degrees of the north of the query, as for the scores.
-    log_prior : ndarray of float64, shape (n,), optional
-        What else is known of the place (see `semsig_gis.priors`); it helps to choose the cells
-        that are re-ranked and is not part of the result.
-    count : int, default 1000
-        How many of the best cells are re-ranked; after the first hundred, only those that may
-        still matter.
-
-    Returns
-    -------
-    CellScores
-        Scores of all cells. Those that were not re-ranked are moved by as much as the likelihood
-        of the worse half of the others moved, so that the masses of both fit each other.
-
-    Raises
-    ------
-    InputError
-        If `count` is below 1.
-
-    Examples
-    --------
-    >>> from semsig_gis.catalog import paper_taxonomy
-    >>> from semsig_gis.building import build_database
-    >>> from semsig_gis.likelihood import build_index
-    >>> from semsig_gis.noise import named_noise
-    >>> from semsig_gis.objects import build_objects
-    >>> from semsig_gis.sources.synthetic import CitySpec, synthetic_city
-    >>> layers = synthetic_city(CitySpec(size=300.0))
-    >>> objects, _ = build_objects(layers, taxonomy=paper_taxonomy(), crs="EPSG:32631")
-    >>> database = build_database(objects)
-    >>> longest = int(database.lengths.argmax())
-    >>> query = database.signature(longest)
-    >>> index = build_index(database, named_noise("generic"))
-    >>> int(rerank(index, query, index.scores(query)).loglik.argmax()) == longest
-    True
+    Up to `count` cells are re-ranked; after the first hundred, only those that may still matter.
+    The others are moved by as much as the likelihood of the worse half of these moved, so that the
+    masses of both fit each other. `log_prior` helps to choose the cells and is not part of the
+    result. `north_sigma` is in degrees, as for the scores. Without bearings the scores are returned
+    as they are.
     """
     if count < 1:
         msg = f"{count} cells were to be re-ranked; give a whole number from 1."

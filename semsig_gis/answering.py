@@ -35,23 +35,12 @@ __all__ = ["Answerer", "RankedAnswer"]
 class RankedAnswer:
     """What a method answers to one query.
 
-    Parameters
-    ----------
-    scores : ndarray of float32, shape (n,)
-        Score of every cell, lower is better: distances; or, of the likelihood method, negative
-        log-likelihoods, with the cells of its answer before all others.
-    best_score : float
-        The distance or negative log-likelihood of the answer.
-    place : tuple of float or None
-        Where in its cell the answer lies, in metres, where that was looked for.
-    heading : float or None
-        Degrees to add to the bearings of the query, where that was looked for.
-    chance : float
-        By the method's own account, that the answer is within 50 m; NaN where it tells none.
-    posterior : Posterior or None
-        The chances of the cells, where the method tells them.
-    seconds : float
-        How long it took.
+    `scores` (n,) has one value a cell, lower is better: distances; or, of the likelihood method,
+    negative log-likelihoods, with the cells of its answer before all others. `best_score` is the
+    distance or negative log-likelihood of the answer. `place` (metres) and `heading` (degrees to
+    add to the bearings of the query) are None where they were not looked for. `chance` is the
+    method's own probability that the answer is within 50 m, NaN where it tells none; `seconds` is
+    how long the answer took.
     """
 
     scores: NDArray[np.float32]
@@ -67,35 +56,10 @@ class RankedAnswer:
 class Answerer:
     """A method with all that it needs to answer.
 
-    Parameters
-    ----------
-    database : SignatureDatabase
-        What is searched.
-    method : Method or LikelihoodMethod
-        How.
-    index : LikelihoodIndex, optional
-        The index of this database for the noise of a likelihood method; spread over a cell,
-        unless the method is for queries on the grid.
-    store : ObjectStore, optional
-        The street objects of this database, for places that are refined.
-
-    Raises
-    ------
-    InputError
-        If the index or the objects are missing, or the index is that of another database.
-
-    Examples
-    --------
-    >>> from semsig_gis.building import build_database
-    >>> from semsig_gis.catalog import paper_taxonomy
-    >>> from semsig_gis.objects import build_objects
-    >>> from semsig_gis.sources.synthetic import CitySpec, synthetic_city
-    >>> layers = synthetic_city(CitySpec(size=300.0))
-    >>> objects, _ = build_objects(layers, taxonomy=paper_taxonomy(), crs="EPSG:32631")
-    >>> database = build_database(objects)
-    >>> answerer = Answerer(database=database, method=Method())
-    >>> [float(one.best_score) for one in answerer.answers([database.signature(7)])]
-    [0.0]
+    A likelihood method needs the `index` of this very database for the noise of the method, spread
+    over a cell unless the method is for queries on the grid; and, where it refines places, the
+    `store` of its street objects. Raises InputError if one of these is missing or the index is that
+    of another database.
     """
 
     database: SignatureDatabase
@@ -119,20 +83,10 @@ class Answerer:
     def answers(
         self, queries: Sequence[Signature], *, memo: DistanceMemo | None = None
     ) -> Iterator[RankedAnswer]:
-        """Yield the answers to some queries.
+        """Yield one answer for each query, in order; each query has at least one object.
 
-        Parameters
-        ----------
-        queries : sequence of Signature
-            Each with at least one object.
-        memo : DistanceMemo, optional
-            Distances of these queries that other methods have needed. How long it took to measure
-            them counts for each method.
-
-        Yields
-        ------
-        RankedAnswer
-            One for each, in their order.
+        `memo` keeps distances of these queries that other methods have needed; the time it took to
+        measure them counts for each method.
         """
         if not queries:
             return

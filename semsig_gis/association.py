@@ -27,16 +27,9 @@ LAPS = 360.0 * np.arange(-3, 4)
 class Pairs:
     """The pairs of an object and a detection that may be one thing, for several problems.
 
-    Parameters
-    ----------
-    starts : ndarray of int64, shape (s + 1,)
-        Where the pairs of each problem begin.
-    objects, detections : ndarray of int64, shape (e,)
-        Rows of the two, counted through over all problems.
-    away : ndarray of float64, shape (e,)
-        Bearing of the detection less that of the object, in [-180, 180).
-    counts : tuple of int
-        How many objects and detections there are in all.
+    The pairs of problem i are ``starts[i]:starts[i + 1]``. `objects` and `detections` are row
+    numbers that run on over all problems, and `counts` says how many of each there are. `away` is
+    the bearing of the detection less that of the object, in degrees in [-180, 180).
     """
 
     starts: NDArray[np.int64]
@@ -48,15 +41,7 @@ class Pairs:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Associations:
-    """The sums over the associations.
-
-    Parameters
-    ----------
-    chances : ndarray of float64, shape (e,)
-        For each pair, the chance that the two are one thing.
-    log_sums : ndarray of float64, shape (s,)
-        For each problem, the logarithm of the sum of the weights of all associations.
-    """
+    """The chance that each pair is one thing, and the log of the sum of weights of each problem."""
 
     chances: NDArray[np.float64]
     log_sums: NDArray[np.float64]
@@ -70,33 +55,10 @@ def near_pairs(
     *,
     reach: float = 180.0,
 ) -> Pairs:
-    """Return every pair of an object and a detection in about the same direction.
+    """Return the pairs of each problem whose bearings differ by at most `reach` degrees.
 
-    Parameters
-    ----------
-    object_starts : ndarray of int64, shape (s + 1,)
-        Where the objects of each problem begin.
-    object_bearings : ndarray of float64, shape (objects,)
-        Degrees.
-    detection_starts : ndarray of int64, shape (s + 1,)
-        Where the detections of each problem begin.
-    detection_bearings : ndarray of float64, shape (detections,)
-        Degrees.
-    reach : float, default 180
-        Largest difference of bearings, in degrees.
-
-    Returns
-    -------
-    Pairs
-        The pairs, ordered by problem and object.
-
-    Examples
-    --------
-    >>> pairs = near_pairs(
-    ...     np.array([0, 2]), np.array([10.0, 90.0]), np.array([0, 1]), np.array([350.0]), reach=30
-    ... )
-    >>> pairs.objects.tolist(), pairs.detections.tolist(), pairs.away.tolist()
-    ([0], [0], [-20.0])
+    Problem i has the objects ``object_starts[i]:object_starts[i + 1]``, and detections likewise.
+    Pairs are ordered by problem and object.
     """
     here, there = np.diff(object_starts), np.diff(detection_starts)
     problem = np.repeat(np.arange(len(here)), here * there)
@@ -126,27 +88,12 @@ def pair_weights(
     lengths: NDArray[np.int64],
     names: NDArray[np.int64],
 ) -> NDArray[np.float64]:
-    """Return how much likelier each pair is one thing than a miss and clutter.
+    """Return how much likelier each pair is one thing than a miss and clutter, shape (e,).
 
-    Parameters
-    ----------
-    table : NoiseTable
-        The noise model.
-    pairs : Pairs
-        The pairs.
-    kinds : ndarray of int64, shape (objects,)
-        Row of the class of each object in the table.
-    distances : ndarray of float64, shape (objects,)
-        Its distance in metres.
-    lengths : ndarray of int64, shape (objects,)
-        How many objects are seen together with it, itself among them.
-    names : ndarray of int64, shape (detections,)
-        Row of the class of each detection; one more than the last class where it is not known.
-
-    Returns
-    -------
-    ndarray of float64, shape (e,)
-        ``p / (1 - p) * C * N / lambda``.
+    The weight is ``p / (1 - p) * C * N / lambda``, in the notation of `semsig_gis.likelihood`. By
+    object, `kinds` is the row of its class in the table, `distances` its distance in metres and
+    `lengths` how many objects are seen together with it, itself included. `names` is the class row
+    of each detection, k if it is unknown.
     """
     kind = kinds[pairs.objects]
     length = np.minimum(lengths[pairs.objects], len(table.missed) - 1)
@@ -162,31 +109,10 @@ def pair_weights(
 
 
 def associate_pairs(pairs: Pairs, weights: NDArray[np.float64]) -> Associations:
-    """Sum over the one-to-one associations of each problem.
+    """Sum over the one-to-one associations of each problem, given the weights of the pairs.
 
-    Parameters
-    ----------
-    pairs : Pairs
-        The pairs that may be one thing.
-    weights : ndarray of float64, shape (e,)
-        Weight of each, 0 or more.
-
-    Returns
-    -------
-    Associations
-        Chances and sums.
-
-    Notes
-    -----
-    Belief propagation (Williams and Lau, "Approximate evaluation of marginal association
-    probabilities with belief propagation", 2014): exact where the pairs form no loop.
-
-    Examples
-    --------
-    >>> both = np.array([0, 1]), np.array([0.0]), np.array([0, 1]), np.array([0.0])
-    >>> found = associate_pairs(near_pairs(*both), np.array([3.0]))
-    >>> found.chances.tolist(), np.exp(found.log_sums).round(6).tolist()
-    ([0.75], [4.0])
+    Weights are 0 or more. Belief propagation (Williams and Lau, "Approximate evaluation of marginal
+    association probabilities with belief propagation", 2014): exact if the pairs form no loop.
     """
     from semsig_gis._association_kernel import associate  # noqa: PLC0415 - numba loads slowly
 

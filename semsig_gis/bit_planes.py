@@ -34,38 +34,21 @@ _VALUES = 256
 class BitPlanes:
     """Sequences of small integers, turned so that the same position of many lies together.
 
-    Parameters
-    ----------
-    planes : ndarray of uint64, shape (p, 64)
-        For every block and position, from the block's longest sequence back to front: which
-        sequences reach that far; then, for each first and each second digit of a value, which
-        sequences have it there. Sequences end together, at the last position.
-    bounds : ndarray of int64, shape (blocks + 1,)
-        Block ``b`` owns the rows ``bounds[b]:bounds[b + 1]`` of `planes`.
-    digits : ndarray of int64, shape (256, 2)
-        For every value, the two planes of a position that are both set where it stands; never
-        both for a value that no sequence has.
-    lengths : ndarray of int64, shape (d,)
-        Length of each sequence.
+    For every block and position, from the longest sequence back to front, `planes`, shape (p, 64),
+    tells which sequences reach that far and then, for each first and each second digit of a value,
+    which have it there. All sequences end at the last position. Block ``b`` owns the rows
+    ``bounds[b]:bounds[b + 1]``. `digits`, shape (256, 2), gives the two planes that are both set
+    where a value stands; never both for a value that no sequence has.
 
-    Notes
-    -----
-    Two digits, of about the square root of the number of values each, need fewer planes than
-    one plane a value: 8 bits an object for eleven classes, 9 for sixteen levels, 33 at most.
+    Two digits, of about the square root of the number of values each, need fewer planes than one
+    plane a value: 8 bits an object for eleven classes, 9 for sixteen levels, 33 at most.
 
-    Hyyrö (2004) gives the steps with bits along one sequence; here they lie across sequences.
-    With the steps ``v`` down the left side of an entry and ``h`` along its top, and ``e`` set
-    where the two values are equal, the diagonal step is 0 where ``d = e | (v < 0) | (h < 0)``.
-    Then the right side is +1 where ``(h < 0) | ~(d | (h > 0))`` and -1 where ``(h > 0) & d``, and
-    the bottom is the same of ``v``. A sequence that does not reach a position has steps of 0 along
-    its top, which leaves its column of steps as it was.
-
-    Examples
-    --------
-    >>> planes = BitPlanes.build(np.array([9, 4, 4, 2, 1], np.uint8), np.array([0, 1, 5]))
-    >>> query = np.array([4, 2, 1], np.uint8)
-    >>> planes.edit_distances([query], normalized=False).tolist()  #
-    [[3.0, 1.0]]
+    Hyyrö (2004) gives the steps with bits along one sequence; here they lie across sequences. With
+    the steps ``v`` down the left side of an entry and ``h`` along its top, and ``e`` set where the
+    two values are equal, the diagonal step is 0 where ``d = e | (v < 0) | (h < 0)``. Then the right
+    side is +1 where ``(h < 0) | ~(d | (h > 0))`` and -1 where ``(h > 0) & d``, and the bottom is
+    the same of ``v``. A sequence that does not reach a position has steps of 0 along its top, which
+    leaves its column of steps as it was.
     """
 
     planes: NDArray[np.uint64]
@@ -75,20 +58,10 @@ class BitPlanes:
 
     @classmethod
     def build(cls, values: NDArray[np.uint8], offsets: NDArray[np.int64]) -> BitPlanes:
-        """Turn sequences given as flat values and offsets.
+        """Turn sequences given as flat values and offsets, shape (d + 1,).
 
-        Parameters
-        ----------
-        values : ndarray of uint8, shape (m,)
-            All sequences, one after the other.
-        offsets : ndarray of int64, shape (d + 1,)
-            Sequence ``i`` is ``values[offsets[i]:offsets[i + 1]]``. Any order gives the same
-            distances; sequences in the order of their lengths waste no memory and no time.
-
-        Returns
-        -------
-        BitPlanes
-            The planes.
+        Any order gives the same distances, but sequences ordered by length waste no memory and no
+        time.
         """
         present = np.flatnonzero(np.bincount(values, minlength=_VALUES))
         # At least two, so that two digits of one kind make the value that no sequence has.
@@ -116,25 +89,10 @@ class BitPlanes:
         blocks: tuple[int, int] | None = None,
         threads: int = 1,
     ) -> NDArray[np.float32]:
-        """Measure the fewest changes that turn each query into each sequence.
+        """Measure the fewest changes that turn each query into each sequence, shape (queries, d).
 
-        Parameters
-        ----------
-        queries : sequence of ndarray of uint8
-            The queries, of any length.
-        normalized : bool
-            True to divide by the longer of the two lengths.
-        wildcard : int, optional
-            A value that, in a query, equals every value.
-        blocks : (int, int), optional
-            First block and the block after the last; all by default.
-        threads : int
-            How many threads share the blocks.
-
-        Returns
-        -------
-        ndarray of float32, shape (queries, d)
-            Distances to the sequences, or to those of the blocks.
+        `normalized` divides by the longer of the two lengths, and a `wildcard` in a query equals
+        every value. `blocks` is the first block and the one after the last, if not all are wanted.
         """
         low, high = (0, len(self.bounds) - 1) if blocks is None else blocks
         lengths = self.lengths[low * BLOCK : high * BLOCK]

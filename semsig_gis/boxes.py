@@ -45,24 +45,9 @@ GROUP_ROWS = 8192
 
 
 def hilbert_order(geometries: NDArray[np.object_] | gpd.array.GeometryArray) -> NDArray[np.int64]:
-    """Return an order in which neighbours in the plane mostly are neighbours in the file.
+    """Return the permutation along a Hilbert curve, so that neighbours mostly are rows nearby.
 
-    Parameters
-    ----------
-    geometries : array of shapely geometries, shape (n,)
-        None is missing or empty.
-
-    Returns
-    -------
-    ndarray of int64, shape (n,)
-        Permutation along a Hilbert curve; equals keep their order.
-
-    Examples
-    --------
-    >>> import shapely
-    >>> places = np.array([[0, 0], [9, 9], [0, 1], [9, 8]])
-    >>> hilbert_order(shapely.points(places)).tolist()
-    [0, 2, 1, 3]
+    No geometry is missing or empty; equals keep their order.
     """
     if len(geometries) == 0:
         return np.empty(0, np.int64)
@@ -73,20 +58,8 @@ def hilbert_order(geometries: NDArray[np.object_] | gpd.array.GeometryArray) -> 
 def bounds_column(bounds: ArrayLike) -> pa.StructArray:
     """Return the column by which readers choose the rows within a box.
 
-    Parameters
-    ----------
-    bounds : array_like of float, shape (n, 4)
-        ``xmin, ymin, xmax, ymax`` of every row.
-
-    Returns
-    -------
-    pyarrow.StructArray
-        The bounds as float32, rounded outwards: half the bytes, and no row is missed.
-
-    Examples
-    --------
-    >>> bounds_column([[0.1, 0.2, 0.1, 0.2]])[0]["xmin"].as_py() < 0.1
-    True
+    ``xmin, ymin, xmax, ymax`` of every row, shape (n, 4), become float32, rounded outwards: half
+    the bytes, and no row is missed.
     """
     exact = np.asarray(bounds, dtype=np.float64).reshape(-1, len(SIDES))
     rounded = exact.astype(np.float32)
@@ -97,19 +70,9 @@ def bounds_column(bounds: ArrayLike) -> pa.StructArray:
 
 
 def groups_meeting(file: pq.ParquetFile, box: Sequence[float]) -> list[int]:
-    """Return the row groups of a file that may have a row that meets a box.
+    """Return the numbers of the row groups that may meet the box ``xmin, ymin, xmax, ymax``.
 
-    Parameters
-    ----------
-    file : pyarrow.parquet.ParquetFile
-        A file; without a column of bounds, all of it may.
-    box : sequence of float
-        ``xmin, ymin, xmax, ymax``.
-
-    Returns
-    -------
-    list of int
-        Numbers of row groups.
+    Without a column of bounds, all of them may.
     """
     return [
         group
@@ -141,25 +104,9 @@ def _may_meet(sides: dict[str, Any], box: Sequence[float]) -> bool:
 
 
 def rows_meeting(table: pa.Table, box: Sequence[float]) -> pa.Table:
-    """Return the rows of a table that meet a box.
+    """Return the rows of a table that meet the box ``xmin, ymin, xmax, ymax``.
 
-    Parameters
-    ----------
-    table : pyarrow.Table
-        A table; without a column of bounds, all of its rows may meet it.
-    box : sequence of float
-        ``xmin, ymin, xmax, ymax``.
-
-    Returns
-    -------
-    pyarrow.Table
-        Those rows, and perhaps some that miss the box by less than a metre.
-
-    Examples
-    --------
-    >>> table = pa.table({"bbox": bounds_column([[0, 0, 1, 1], [5, 5, 6, 6]]), "name": ["a", "b"]})
-    >>> rows_meeting(table, (1, 1, 4, 4))["name"].to_pylist()
-    ['a']
+    Some may miss the box by less than a metre. Without a column of bounds, all rows are returned.
     """
     if BBOX not in table.column_names or table.schema.field(BBOX).type != BOUNDS:
         return table
@@ -174,18 +121,9 @@ def _sides(column: pa.ChunkedArray) -> list[NDArray[np.float32]]:
 
 
 def each_bounds(path: str | Path) -> Iterator[Bounds]:
-    """Yield the bounds of the rows of a file, group by group, without reading anything else.
+    """Yield ``xmin, ymin, xmax, ymax`` of a Parquet file's rows, shape (n, 4), group by group.
 
-    Parameters
-    ----------
-    path : str or Path
-        A Parquet file.
-
-    Yields
-    ------
-    ndarray of float64, shape (n, 4)
-        ``xmin, ymin, xmax, ymax`` of some rows; nothing at all is yielded where the file has no
-        column of bounds.
+    Nothing else is read; nothing is yielded where the file has no column of bounds.
     """
     with pq.ParquetFile(path) as file:
         if BBOX not in file.schema_arrow.names or file.schema_arrow.field(BBOX).type != BOUNDS:

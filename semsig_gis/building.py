@@ -137,47 +137,14 @@ def build_cells(
 ) -> SignatureDatabase:
     """Compute the signatures of some cells; what they see must be among the objects.
 
-    Parameters
-    ----------
-    objects : StreetObjects
-        All objects that one of the cells may see; others do no harm.
-    columns, rows : ndarray of int64, shape (n,)
-        Distinct cells, ordered by column and row.
-    grid : GridSpec
-        Where they lie.
-    spec : SignatureSpec
-        Visibility range and angle levels.
-    viewpoints : ViewpointSpec, optional
-        Which of the cells are looked from; all by default.
-    footprints : GeoDataFrame, optional
-        Buildings (polygons) in any CRS; what they hide is not seen.
-    streets : GeoDataFrame, optional
-        Centre lines in any CRS; a column ``half_width`` holds metres where it is there.
-    progress : callable, optional
-        Called with the number of cells done and in all.
+    The cells are distinct and ordered by column and row; the result has those that are viewpoints
+    and see something, possibly none. Further objects do no harm. `footprints` hide what is behind
+    them; `streets` are centre lines, with half their width in metres in a column ``half_width``
+    where it is there; both may be in any CRS. `progress` is called with the number of cells done
+    and in all.
 
-    Returns
-    -------
-    SignatureDatabase
-        The cells that are viewpoints and see something; there may be none.
-
-    Raises
-    ------
-    InputError
-        If footprints, streets or viewpoints cannot be used, or those that are needed are missing.
-    CrsError
-        If footprints or streets have no CRS.
-
-    Examples
-    --------
-    >>> from semsig_gis.sources.synthetic import CitySpec, synthetic_city
-    >>> from semsig_gis.catalog import paper_taxonomy
-    >>> from semsig_gis.objects import build_objects
-    >>> layers = synthetic_city(CitySpec(size=300.0))
-    >>> objects, _ = build_objects(layers, taxonomy=paper_taxonomy(), crs="EPSG:32631")
-    >>> cell = GridSpec().cells_at(objects.xy[:1])
-    >>> len(build_cells(objects, *cell, grid=GridSpec(), spec=SignatureSpec()))
-    1
+    Raise InputError if footprints, streets or viewpoints cannot be used or needed ones are missing,
+    and CrsError if footprints or streets have no CRS.
     """
     viewpoints = viewpoints or ViewpointSpec()
     buildings = None if footprints is None else Footprints(_moved(footprints, objects.crs))

@@ -151,19 +151,7 @@ def paper_taxonomy() -> Taxonomy:
 
 
 def catalog_names() -> tuple[str, ...]:
-    """Return the names of the catalogues there are.
-
-    Returns
-    -------
-    tuple of str
-        Names that `load_catalog` takes, sorted: the built-in catalogues, and those that other
-        packages bring by the entry-point group ``semsig_gis.catalogs``.
-
-    Examples
-    --------
-    >>> "montpellier" in catalog_names()
-    True
-    """
+    """Return the names that `load_catalog` takes, sorted, with those that other packages bring."""
     return tuple(sorted(_sources()))
 
 
@@ -294,18 +282,7 @@ def _known() -> str:
 
 
 def data_folder() -> Traversable:
-    """Return the folder of shipped catalogues: in the wheel, or at the top of a checkout.
-
-    Returns
-    -------
-    Traversable
-        The folder ``data_sources``.
-
-    Examples
-    --------
-    >>> (data_folder() / "taxonomy.toml").is_file()
-    True
-    """
+    """Return the folder ``data_sources``: in the wheel, or at the top of a checkout."""
     shipped = importlib.resources.files("semsig_gis") / "data_sources"
     if shipped.is_dir():
         return shipped

@@ -31,26 +31,9 @@ LICENSE_MARK = ": "
 class ClassChange:
     """What changed in one class; ``after = before + added - removed + gained - lost``.
 
-    Parameters
-    ----------
-    class_name : str
-        The class.
-    before, after : int
-        Objects.
-    added, removed : int
-        Objects that are nowhere in the other table.
-    moved : int
-        Objects that stand at another place.
-    moved_m : float or None
-        By how many metres, in the median; None where none moved.
-    gained, lost : int
-        Objects that were of another class before, and that are of another class now.
-
-    Examples
-    --------
-    >>> ClassChange(class_name="bench", before=3, after=4, added=2, removed=1, moved=0,
-    ...             moved_m=None, gained=0, lost=0).after
-    4
+    The counts are of objects. `added` and `removed` are nowhere in the other table; `gained` were
+    of another class before and `lost` are of another class now. `moved_m` is the median distance in
+    metres, None where none moved.
     """
 
     class_name: str
@@ -68,28 +51,10 @@ class ClassChange:
 class ObjectChanges:
     """Which rows of two tables of street objects are the same object.
 
-    Parameters
-    ----------
-    same : ndarray of int64, shape (s, 2)
-        Rows of the old and of the new table: same class, same place.
-    moved : ndarray of int64, shape (m, 2)
-        Same source, id and class, other place.
-    changed : ndarray of int64, shape (c, 2)
-        Same source and id, other class, at the same place or not.
-    removed : ndarray of int64, shape (r,)
-        Other rows of the old table.
-    added : ndarray of int64, shape (a,)
-        Other rows of the new table.
-    classes : tuple of ClassChange
-        The numbers by class, for classes that are in one of the tables.
-
-    Examples
-    --------
-    >>> nothing = np.empty((0, 2), np.int64)
-    >>> changes = ObjectChanges(same=nothing, moved=nothing, changed=nothing,
-    ...                         removed=np.array([4]), added=np.array([7]), classes=())
-    >>> changes.gone.tolist(), changes.come.tolist()
-    ([4], [7])
+    `same` (same class and place), `moved` (same source, id and class, other place) and `changed`
+    (same source and id, other class, at the same place or not) have shape (n, 2): rows of the old
+    and of the new table. `removed` and `added`, shape (n,), are the other rows of the old and of
+    the new table; `classes` has the classes that are in one of the tables.
     """
 
     same: NDArray[np.int64]
@@ -113,33 +78,11 @@ class ObjectChanges:
 def compare_objects(old: StreetObjects, new: StreetObjects) -> ObjectChanges:
     """Tell what was added, removed, moved, or is of another class now.
 
-    Parameters
-    ----------
-    old, new : StreetObjects
-        The objects of one city at two times, in the same CRS and with the same class codes.
-
-    Returns
-    -------
-    ObjectChanges
-        The changes.
-
-    Notes
-    -----
-    An object of the same class at exactly the same place is the same object, whatever its id:
-    portals that number their rows anew at each export would otherwise have moved everything. What
-    is left is matched by source and id, where an id is given and stands once in either table: so
-    an object has moved, or changed its class. The rest was removed and added.
-
-    Examples
-    --------
-    >>> from semsig_gis.sources.synthetic import CitySpec, synthetic_city
-    >>> from semsig_gis.catalog import paper_taxonomy
-    >>> from semsig_gis.objects import build_objects
-    >>> layers = synthetic_city(CitySpec(size=300.0))
-    >>> objects, _ = build_objects(layers, taxonomy=paper_taxonomy(), crs="EPSG:32631")
-    >>> fewer = StreetObjects(objects.table[5:], objects.taxonomy, objects.licenses)
-    >>> len(compare_objects(objects, fewer).removed)
-    5
+    Both tables are in the same CRS and use the same class codes. An object of the same class at
+    exactly the same place is the same object, whatever its id: portals that number their rows anew
+    at each export would otherwise have moved everything. What is left is matched by source and id,
+    where an id is given and stands once in either table: so an object has moved, or changed its
+    class. The rest was removed and added.
     """
     tables = _keys(old), _keys(new)
     same = _twins(*tables)
@@ -247,47 +190,12 @@ def replace_layers(
 ) -> tuple[StreetObjects, tuple[str, ...], tuple[str, ...]]:
     """Replace the layers of a city that were loaded anew; the others stay.
 
-    Parameters
-    ----------
-    old : StreetObjects
-        All objects of the city.
-    new : StreetObjects
-        All objects of some of its layers, or of further ones.
-
-    Returns
-    -------
-    objects : StreetObjects
-        The objects of the other layers, then the new ones, with the licences of both.
-    kept : tuple of str
-        The layers that stay.
-    notes : tuple of str
-        What a user should know about layers that were not loaded together.
-
-    Raises
-    ------
-    CrsError
-        If the two are in different CRS.
-    InputError
-        If they use one class code or symbol for different classes, or a class is seen from
-        another distance.
-
-    Notes
-    -----
-    A layer was loaded anew if one of the new objects comes from it, or if a line of the new
-    licences names it: so a layer that was read and has no object any more leaves none behind.
-
-    Examples
-    --------
-    >>> from semsig_gis.sources.synthetic import CitySpec, synthetic_city
-    >>> from semsig_gis.catalog import paper_taxonomy
-    >>> from semsig_gis.objects import build_objects
-    >>> layers = synthetic_city(CitySpec(size=300.0))
-    >>> classes = paper_taxonomy()
-    >>> city, _ = build_objects(layers, taxonomy=classes, crs="EPSG:32631")
-    >>> first, _ = build_objects(layers[:1], taxonomy=classes, crs="EPSG:32631")
-    >>> both, kept, _ = replace_layers(city, first)
-    >>> len(both) == len(city), layers[0].spec.name in kept
-    (True, False)
+    Return the objects of the other layers followed by the new ones, with the licences of both; the
+    names of the layers that stay; and notes for the user about layers that were not loaded
+    together. A layer was loaded anew if one of the new objects comes from it, or if a line of the
+    new licences names it: so a layer that was read and has no object any more leaves none behind. A
+    different CRS is a CrsError, and classes that do not fit are an InputError (see
+    `joined_taxonomy`).
     """
     if new.crs != old.crs:
         msg = (
@@ -312,29 +220,10 @@ def replace_layers(
 
 
 def joined_taxonomy(old: Taxonomy, new: Taxonomy) -> Taxonomy:
-    """Return classes that two dates of one city both fit.
+    """Return all classes of two dates of one city, with the titles of the new ones.
 
-    Parameters
-    ----------
-    old, new : Taxonomy
-        The classes before and after.
-
-    Returns
-    -------
-    Taxonomy
-        All classes of both, with the titles of the new ones.
-
-    Raises
-    ------
-    InputError
-        If they use one class code or symbol for different classes, or a class is seen from
-        another distance.
-
-    Examples
-    --------
-    >>> from semsig_gis.catalog import paper_taxonomy
-    >>> joined_taxonomy(paper_taxonomy(), paper_taxonomy()) == paper_taxonomy()
-    True
+    Raise InputError if they use one class code or symbol for different classes, or if a class is
+    seen from another distance.
     """
     theirs = {item.code: item for item in new.classes}
     for item in old.classes:

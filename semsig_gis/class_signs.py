@@ -44,24 +44,7 @@ DARK = 0.04045
 
 @dataclass(frozen=True, slots=True)
 class ClassSign:
-    """What an object of a class looks like: a shape with a letter on it.
-
-    Parameters
-    ----------
-    symbol : str
-        The letter or digit.
-    title : str
-        What it stands for.
-    shape : str
-        One of `SHAPES`.
-    colour : str
-        Of the shape, ``#rrggbb``.
-
-    Examples
-    --------
-    >>> ClassSign("D", "Street light", "diamond", "#e69f00").ink
-    '#000000'
-    """
+    """What an object of a class looks like: its symbol on one of `SHAPES`, coloured ``#rrggbb``."""
 
     symbol: str
     title: str

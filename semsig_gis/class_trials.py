@@ -83,46 +83,12 @@ def try_without_classes(
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Ask simulated queries once more for each class, as if it had not been published.
 
-    Parameters
-    ----------
-    index : LikelihoodIndex
-        The cells and the noise model.
-    cells : ndarray of int, shape (m,)
-        Row numbers of the true cells.
-    radius : float, default 50
-        Metres that count as near.
-    seed : int, default 0
-        Seed of the detections; the same queries as those of `semsig_gis.trials.try_cells`.
-    threads : int, default 1
-        How many queries are worked on at once.
-    progress : callable, optional
-        Called with the number of queries done and in all.
-
-    Returns
-    -------
-    near, bits : ndarray of float64, shape (m, k)
-        Chance given to the cells near the true one, and entropy that is left, without each of the
-        classes that occur, in the order of ``index.table.codes``.
-
-    Notes
-    -----
-    The detector and the street stay the same. The database has no objects of the class, and what
-    the detector calls by its name is of no use. A cell that sees nothing else cannot be found:
-    no chance, and all bits are left.
-
-    Examples
-    --------
-    >>> from semsig_gis.catalog import paper_taxonomy
-    >>> from semsig_gis.building import build_database
-    >>> from semsig_gis.noise import named_noise
-    >>> from semsig_gis.objects import build_objects
-    >>> from semsig_gis.sources.synthetic import CitySpec, synthetic_city
-    >>> layers = synthetic_city(CitySpec(size=300.0))
-    >>> objects, _ = build_objects(layers, taxonomy=paper_taxonomy(), crs="EPSG:32631")
-    >>> index = build_index(build_database(objects), named_noise("light"))
-    >>> near, bits = try_without_classes(index, np.arange(5))
-    >>> near.shape == bits.shape == (5, len(index.table.codes))
-    True
+    `cells` (m,) are row numbers of the true cells, and the queries those of
+    `semsig_gis.trials.try_cells` with the same seed. The results (m, k) are the chance given to the
+    cells within `radius` metres of the true one, and the entropy in bits that is left, without each
+    class, in the order of ``index.table.codes``. Detector and street stay the same: the database
+    has no objects of the class, and detections of its name are dropped. A cell that sees nothing
+    else cannot be found: no chance, and all bits are left.
     """
     codes = index.table.codes.tolist()
     queries = list(draw_trials(index, cells, seed=seed))

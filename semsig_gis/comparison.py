@@ -121,22 +121,10 @@ def compare_evaluations(
 def common_cases(
     first: Mapping[str, Evaluation], second: Mapping[str, Evaluation]
 ) -> dict[str, tuple[Evaluation, Evaluation]]:
-    """Return the evaluations of two results that belong together.
+    """Return the evaluations of two results that have the same name.
 
-    Parameters
-    ----------
-    first, second : mapping of str to Evaluation
-        See `semsig_gis.experiment_folder.open_results`.
-
-    Returns
-    -------
-    dict of str to tuple of Evaluation
-        Those of one name; or, of two single evaluations, these, whatever they are called.
-
-    Raises
-    ------
-    InputError
-        If there are none.
+    Of two single evaluations, return these, whatever they are called. Results are those of
+    `semsig_gis.experiment_folder.open_results`. Raises InputError if no name is common.
     """
     if len(first) == len(second) == 1:
         (name, one), (other_name, other) = *first.items(), *second.items()

@@ -20,27 +20,11 @@ _R = TypeVar("_R")
 
 
 def compiled(function: Callable[_P, _R]) -> Callable[_P, _R]:
-    """Return a function that runs as machine code, and without the interpreter lock.
+    """Compile loops over numbers and arrays to machine code that runs without the interpreter lock.
 
-    Parameters
-    ----------
-    function : callable
-        Loops over numbers and arrays that numba can compile. It takes no keywords.
-
-    Returns
-    -------
-    callable
-        The same function, compiled at its first call. The code is kept for later processes,
-        beside the module or else in the user's cache folder; where neither can be written, it
-        lives as long as the process.
-
-    Examples
-    --------
-    >>> @compiled
-    ... def double(number: int) -> int:
-    ...     return 2 * number
-    >>> double(21)
-    42
+    The function takes no keywords and is compiled at its first call. The code is kept for later
+    processes, beside the module or else in the user's cache folder; where neither can be written,
+    it lives as long as the process.
     """
     try:
         return numba.njit(cache=True, nogil=True, error_model="numpy")(function)

@@ -33,26 +33,9 @@ RADIUS_LIMIT_M = 100.0
 class ConflatedPair:
     """What was merged of one class between two sources.
 
-    Parameters
-    ----------
-    class_name : str
-        The class.
-    radius : float
-        Metres within which its objects are the same.
-    kept : str
-        Source whose positions are kept.
-    merged : str
-        Source whose objects were merged into them.
-    count : int
-        Objects merged.
-    median_m, largest_m : float
-        Distances in metres between the merged positions and the kept ones.
-
-    Examples
-    --------
-    >>> ConflatedPair(class_name="bench", radius=5.0, kept="city", merged="osm", count=3,
-    ...               median_m=1.5, largest_m=4.0).count
-    3
+    `count` objects of the source `merged` lay within `radius` metres of objects of the source
+    `kept`, whose positions stay; `median_m` and `largest_m` are the distances between the two in
+    metres.
     """
 
     class_name: str
@@ -66,18 +49,9 @@ class ConflatedPair:
 
 @dataclass(frozen=True, slots=True)
 class ConflationReport:
-    """What was merged.
+    """What was merged, for every class and pair of sources with something in common.
 
-    Parameters
-    ----------
-    pairs : tuple of ConflatedPair
-        One entry for every class and pair of sources with something in common; the classes in the
-        order in which their radii were given, the sources in that of the objects.
-
-    Examples
-    --------
-    >>> ConflationReport(()).count
-    0
+    Classes stand in the order in which their radii were given, sources in that of the objects.
     """
 
     pairs: tuple[ConflatedPair, ...]
@@ -88,13 +62,7 @@ class ConflationReport:
         return sum(pair.count for pair in self.pairs)
 
     def to_list(self) -> list[dict[str, Any]]:
-        """Return the entries as plain mappings, ready for JSON.
-
-        Returns
-        -------
-        list of dict
-            One mapping for every class and pair of sources.
-        """
+        """Return the entries as plain mappings, ready for JSON."""
         return [asdict(pair) for pair in self.pairs]
 
 

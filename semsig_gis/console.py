@@ -23,32 +23,14 @@ LARGEST_COUNT = 10**9
 
 
 def remark(text: str) -> None:
-    """Say something on standard error.
-
-    Parameters
-    ----------
-    text : str
-        One sentence.
-    """
+    """Say one sentence on standard error, after the name of the command."""
     typer.echo(f"semsig: {text}", err=True)
 
 
 def print_json(value: Any, *, indent: int | None = 2) -> None:  # noqa: ANN401 - any JSON
-    """Print a value as JSON on standard output.
+    """Print plain values without NaN or infinity as JSON on standard output.
 
-    Parameters
-    ----------
-    value : object
-        Plain values without NaN or infinity.
-    indent : int or None, default 2
-        Blanks to indent by; None for a single line.
-
-    Examples
-    --------
-    >>> print_json({"cells": 2})
-    {
-      "cells": 2
-    }
+    ``indent=None`` gives a single line.
     """
     typer.echo(json.dumps(value, indent=indent, ensure_ascii=False, allow_nan=False))
 
@@ -56,14 +38,7 @@ def print_json(value: Any, *, indent: int | None = 2) -> None:  # noqa: ANN401 -
 def print_rows(title: str, header: Iterable[str], rows: Iterable[Iterable[object]]) -> None:
     """Print a table on standard output; text from data is shown as it is, never as markup.
 
-    Parameters
-    ----------
-    title : str
-        Line above the table.
-    header : iterable of str
-        Names of the columns.
-    rows : iterable of iterable
-        Cells; whole numbers get thousands separators.
+    Whole numbers get thousands separators.
     """
     from rich.console import Console
     from rich.table import Table
@@ -94,19 +69,8 @@ def progress(
 ) -> Iterator[Callable[[int, int], None]]:
     """Show a bar on standard error once the work in the block takes a while.
 
-    A program that supervises this one gets lines instead (see `semsig_gis._supervision`).
-
-    Parameters
-    ----------
-    label : str
-        What is being done.
-    unit : {"steps", "bytes"}, default "steps"
-        What is counted; bytes are shown as such, with their speed.
-
-    Yields
-    ------
-    callable
-        To be called with how much is done and how much there is in all.
+    The block gets a function, to be called with how much is done and how much there is in all. A
+    program that supervises this one gets lines instead (see `semsig_gis._supervision`).
     """
     if supervised():
         yield _progress_lines(label)

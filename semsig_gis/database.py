@@ -276,34 +276,9 @@ class SignatureDatabase:
 def join_databases(parts: Sequence[SignatureDatabase]) -> SignatureDatabase:
     """Join databases of different cells that were made in the same way.
 
-    Parameters
-    ----------
-    parts : sequence of SignatureDatabase
-        At least one; no cell is in two of them.
-
-    Returns
-    -------
-    SignatureDatabase
-        All cells, ordered by column and row; licences that stand in several parts once.
-
-    Raises
-    ------
-    DatabaseError
-        If there is no part, the parts differ in how they were made, or they share a cell.
-
-    Examples
-    --------
-    >>> from semsig_gis.building import build_database
-    >>> from semsig_gis.sources.synthetic import CitySpec, synthetic_city
-    >>> from semsig_gis.catalog import paper_taxonomy
-    >>> from semsig_gis.objects import build_objects
-    >>> layers = synthetic_city(CitySpec(size=300.0))
-    >>> objects, _ = build_objects(layers, taxonomy=paper_taxonomy(), crs="EPSG:32631")
-    >>> database = build_database(objects)
-    >>> half = len(database) // 2
-    >>> both = join_databases([database.select(slice(half, None)), database.select(slice(half))])
-    >>> bool((both.cell_ids == database.cell_ids).all())
-    True
+    The cells are ordered by column and row, and licences that stand in several parts appear once.
+    Raise DatabaseError if there is no part, the parts differ in how they were made, or they share a
+    cell.
     """
     if not parts:
         msg = "there is no database to join; give at least one."
@@ -332,30 +307,9 @@ def join_databases(parts: Sequence[SignatureDatabase]) -> SignatureDatabase:
 def require_same(
     first: SignatureDatabase, other: SignatureDatabase, what: Mapping[str, str] = _MADE
 ) -> None:
-    """Raise where two databases were not made in the same way.
+    """Raise DatabaseError where two databases were not made in the same way.
 
-    Parameters
-    ----------
-    first, other : SignatureDatabase
-        The databases.
-    what : mapping of str to str, optional
-        Attributes to compare, and what they are called; all but the classes by default.
-
-    Raises
-    ------
-    DatabaseError
-        If they differ in one of them.
-
-    Examples
-    --------
-    >>> from semsig_gis.building import build_database
-    >>> from semsig_gis.sources.synthetic import CitySpec, synthetic_city
-    >>> from semsig_gis.catalog import paper_taxonomy
-    >>> from semsig_gis.objects import build_objects
-    >>> layers = synthetic_city(CitySpec(size=300.0))
-    >>> objects, _ = build_objects(layers, taxonomy=paper_taxonomy(), crs="EPSG:32631")
-    >>> database = build_database(objects)
-    >>> require_same(database, database.select(slice(3)))
+    `what` maps the attributes to compare to what they are called; by default all but the classes.
     """
     for name, title in what.items():
         ours, theirs = getattr(first, name), getattr(other, name)
@@ -368,31 +322,10 @@ def require_same(
 
 
 def require_same_place(database: SignatureDatabase, xy: NDArray[np.float64], what: str) -> None:
-    """Raise where everything of some kind lies elsewhere than the cells.
+    """Raise InputError if all places, in the CRS of the database, lie elsewhere than the cells.
 
-    Parameters
-    ----------
-    database : SignatureDatabase
-        The cells, at least one.
-    xy : ndarray of float64, shape (n, 2)
-        Places in the CRS of the database; none are never elsewhere.
-    what : str
-        What lies there, for the sentence that refuses it.
-
-    Raises
-    ------
-    InputError
-        If not one of them is within the box of the cells and a visibility range around it.
-
-    Examples
-    --------
-    >>> from semsig_gis.building import build_database
-    >>> from semsig_gis.sources.synthetic import CitySpec, synthetic_city
-    >>> from semsig_gis.catalog import paper_taxonomy
-    >>> from semsig_gis.objects import build_objects
-    >>> layers = synthetic_city(CitySpec(size=300.0))
-    >>> objects, _ = build_objects(layers, taxonomy=paper_taxonomy(), crs="EPSG:32631")
-    >>> require_same_place(build_database(objects), objects.xy, "street objects")
+    Elsewhere is outside of the box of the cells widened by the longest visibility range; an empty
+    array of places is accepted. `what` names the places in the message.
     """
     low, high = (
         database.xy.min(axis=0) - database.reach,
@@ -408,40 +341,8 @@ def rows_of_result(
 ) -> NDArray[np.int64]:
     """Return the rows of the cells that a result names, and refuse one of another database.
 
-    Parameters
-    ----------
-    database : SignatureDatabase
-        The database that was searched.
-    ids : array_like of int64, shape (k,)
-        Ids of the cells.
-    types : iterable of str
-        What the result says is seen from each of them.
-    what : str
-        What kind of result it is, for the sentence that refuses it.
-
-    Returns
-    -------
-    ndarray of int64, shape (k,)
-        Row numbers.
-
-    Raises
-    ------
-    InputError
-        If the database lacks one of these cells, or sees other types from it.
-
-    Examples
-    --------
-    >>> from semsig_gis.building import build_database
-    >>> from semsig_gis.sources.synthetic import CitySpec, synthetic_city
-    >>> from semsig_gis.catalog import paper_taxonomy
-    >>> from semsig_gis.matching import localize
-    >>> from semsig_gis.objects import build_objects
-    >>> layers = synthetic_city(CitySpec(size=300.0))
-    >>> objects, _ = build_objects(layers, taxonomy=paper_taxonomy(), crs="EPSG:32631")
-    >>> database = build_database(objects)
-    >>> found = localize(database, database.signature(5), top=1).candidates
-    >>> rows_of_result(database, found["cell_id"], found["types"], what="localization").tolist()
-    [5]
+    Raise InputError if the database lacks one of the cell ids, or if the types seen from a cell are
+    not those of the result. `what` names the kind of result in the message.
     """
     wanted = np.asarray(ids, np.int64)
     rows = np.searchsorted(database.cell_ids, wanted)

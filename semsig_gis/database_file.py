@@ -86,18 +86,7 @@ def save_database(database: SignatureDatabase, path: str | Path) -> None:
 
 
 def database_specs(database: SignatureDatabase) -> dict[str, Any]:
-    """Return all but the cells of a database.
-
-    Parameters
-    ----------
-    database : SignatureDatabase
-        A database.
-
-    Returns
-    -------
-    dict
-        Plain values for JSON.
-    """
+    """Return all but the cells of a database, as plain values for JSON."""
     return {
         "kind": KIND,
         "format": FORMAT,
@@ -145,28 +134,10 @@ def open_database(path: str | Path) -> SignatureDatabase:
 def database_of(
     table: pa.Table, specs: dict[str, Any], crs: CRS, *, path: str | Path
 ) -> SignatureDatabase:
-    """Return the database that columns and specs hold.
+    """Return the database that columns and the values of `database_specs` hold.
 
-    Parameters
-    ----------
-    table : pyarrow.Table
-        ``cell_id``, ``types``, ``bearings`` and ``distances`` (see `save_database`).
-    specs : dict
-        What `database_specs` gave.
-    crs : pyproj.CRS
-        Coordinate reference system of the grid.
-    path : str or Path
-        The file that they were read from, to be named in errors.
-
-    Returns
-    -------
-    SignatureDatabase
-        The database.
-
-    Raises
-    ------
-    DatabaseError
-        If they are damaged, or from another version.
+    The columns are ``cell_id``, ``types``, ``bearings`` and ``distances`` (see `save_database`).
+    Raise DatabaseError, which names `path`, if they are damaged or from another version.
     """
     if specs.get("format") != FORMAT:
         msg = (

@@ -29,35 +29,9 @@ def database_tables(
 ) -> tuple[Table, ...]:
     """Return the paper's Tables 1, 2a and 2b for a database, and a table of its classes.
 
-    Parameters
-    ----------
-    database : SignatureDatabase
-        The database.
-    file_bytes : int, optional
-        Size of its file in bytes, where it has one.
-    object_counts : mapping of int to int, optional
-        How many objects of each class code it was made of, where they are at hand.
-
-    Returns
-    -------
-    tuple of Table
-        Occurrences by class, basic properties, sizes of the signature groups, each with the
-        paper's figures beside ours; and range, density and entropy by class.
-
-    Examples
-    --------
-    >>> from semsig_gis.catalog import paper_taxonomy
-    >>> from semsig_gis.building import build_database
-    >>> from semsig_gis.objects import build_objects
-    >>> from semsig_gis.sources.synthetic import CitySpec, synthetic_city
-    >>> layers = synthetic_city(CitySpec(size=300.0))
-    >>> objects, _ = build_objects(layers, taxonomy=paper_taxonomy(), crs="EPSG:32631")
-    >>> for table in database_tables(build_database(objects)):
-    ...     print(table.title)
-    Occurrences by class
-    Database
-    Sizes of the signature groups, in cells
-    Classes that occur
+    They are: occurrences by class, basic properties and sizes of the signature groups, each with
+    the paper's figures beside ours; then range, density and entropy by class. ``object_counts`` is
+    by class code.
     """
     facts = database_summary(database, file_bytes=file_bytes, object_counts=object_counts)
     return (
@@ -74,33 +48,7 @@ def database_markdown(
     file_bytes: int | None = None,
     object_counts: Mapping[int, int] | None = None,
 ) -> str:
-    """Return the tables of a database and its sources as Markdown.
-
-    Parameters
-    ----------
-    database : SignatureDatabase
-        The database.
-    file_bytes : int, optional
-        Size of its file in bytes, where it has one.
-    object_counts : mapping of int to int, optional
-        How many objects of each class code it was made of, where they are at hand.
-
-    Returns
-    -------
-    str
-        A document of sections, ending in a newline.
-
-    Examples
-    --------
-    >>> from semsig_gis.catalog import paper_taxonomy
-    >>> from semsig_gis.building import build_database
-    >>> from semsig_gis.objects import build_objects
-    >>> from semsig_gis.sources.synthetic import CitySpec, synthetic_city
-    >>> layers = synthetic_city(CitySpec(size=300.0))
-    >>> objects, _ = build_objects(layers, taxonomy=paper_taxonomy(), crs="EPSG:32631")
-    >>> database_markdown(build_database(objects)).splitlines()[0]
-    '## Signature database'
-    """
+    """Return the tables of a database (see `database_tables`) and its sources as Markdown."""
     tables = database_tables(database, file_bytes=file_bytes, object_counts=object_counts)
     sections = [table.markdown() for table in tables]
     if database.licenses:

@@ -29,44 +29,12 @@ __all__ = ["Detector"]
 class Detector:
     """A detector that fails as a noise model says.
 
-    Parameters
-    ----------
-    noise : NoiseSpec or NoiseMixture
-        How it misses, misnames and makes up objects, by class if wanted, and how far bearings
-        are off; of a mixture, one model is drawn for each query.
-    half : float, default infinity
-        Distance in metres at which only half of the objects are left that it would detect close
-        by; above 0.
-
-    Raises
-    ------
-    InputError
-        If the distance is not above 0.
-
-    Notes
-    -----
-    An object at distance d is detected with chance ``p * 2 ** -((d / half) ** 2)``, where p is
-    that of the model. False objects come as a Poisson number a class. An uncertain place of the
-    model (``position_sigma``) is a step aside of the observer, which turns the bearings of near
-    objects most. The chances are those of `semsig_gis.noise_table`, with which the likelihood
-    method computes: none is quite nought or one.
-
-    Examples
-    --------
-    >>> from semsig_gis.catalog import paper_taxonomy
-    >>> from semsig_gis.noise import NoiseSpec
-    >>> from semsig_gis.sight import CitySights, Sight
-    >>> city = CitySights(
-    ...     taxonomy=paper_taxonomy(), codes=np.array([1, 3], np.uint8),
-    ...     frequencies=np.array([5, 9]), reach=30.0,
-    ... )
-    >>> lamps = Sight(
-    ...     codes=np.full(1000, 3, np.uint8), bearings=np.full(1000, 90.0),
-    ...     distances=np.full(1000, 20.0),
-    ... )
-    >>> careless = Detector(noise=NoiseSpec(detection=0.8, misnamed=0.0, clutter=0.0), half=20.0)
-    >>> 350 < len(careless.ready(city)(lamps, np.random.default_rng(0))) < 450
-    True
+    An object at distance d metres is detected with chance ``p * 2 ** -((d / half) ** 2)``, where p
+    is that of the model: at `half` metres (above 0) only half of the objects are left. False
+    objects come as a Poisson number a class. An uncertain place of the model (``position_sigma``)
+    is a step aside of the observer, which turns the bearings of near objects most. Of a mixture,
+    one model is drawn for each query. The chances are those of `semsig_gis.noise_table`, with which
+    the likelihood method computes: none is quite 0 or 1.
     """
 
     noise: Noise
@@ -81,22 +49,9 @@ class Detector:
             raise InputError(msg)
 
     def ready(self, city: CitySights) -> Spoiling:
-        """Return what is done to a query.
+        """Return the function that distorts a query.
 
-        Parameters
-        ----------
-        city : CitySights
-            The classes that it may name.
-
-        Returns
-        -------
-        callable
-            From what is seen and a generator to what seems to be seen.
-
-        Raises
-        ------
-        InputError
-            If the noise model names a class that the city does not have.
+        Raises InputError if the noise model names a class that the city does not have.
         """
         tables, weights = noise_tables(
             self.noise, taxonomy=city.taxonomy, codes=city.codes, longest=LONGEST_TABLE

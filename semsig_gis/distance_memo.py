@@ -16,18 +16,10 @@ __all__ = ["DistanceMemo"]
 
 @dataclass(eq=False, slots=True)
 class DistanceMemo:
-    """Distances that have been measured, and how long that took.
+    """Distances between one batch of queries and one database, and how long each took to measure.
 
-    Most of the methods of an experiment differ in how they join the same distances. A memo holds
-    those of one batch of queries to one database; make another for the next batch.
-
-    Examples
-    --------
-    >>> import numpy as np
-    >>> memo = DistanceMemo()
-    >>> first = memo.get("edit", lambda: np.float32([1.0]))
-    >>> memo.get("edit", lambda: np.float32([2.0])) is first, memo.spared > 0
-    (True, True)
+    Most methods of an experiment differ only in how they join the same distances. Make another memo
+    for the next batch.
     """
 
     _known: dict[Hashable, tuple[NDArray[Any], float]] = field(default_factory=dict)
@@ -39,19 +31,9 @@ class DistanceMemo:
         return self._spared
 
     def get(self, key: Hashable, measure: Callable[[], NDArray[Any]]) -> NDArray[Any]:
-        """Return distances, measured now unless they are known.
+        """Return the distances under a key, calling `measure` only if they are not known yet.
 
-        Parameters
-        ----------
-        key : hashable
-            All that they depend on.
-        measure : callable
-            Gives them.
-
-        Returns
-        -------
-        ndarray
-            The distances, not to be written to.
+        The key must name all that they depend on. Do not write to the result.
         """
         if key in self._known:
             found, seconds = self._known[key]

@@ -59,42 +59,14 @@ WORDS = {"true": True, "false": False}
 def parse_chain(
     text: str | Iterable[str], *, noises: Mapping[str, Noise] = NOISES
 ) -> tuple[QueryDistortion, ...]:
-    """Read distortions from text.
+    """Read distortions from text such as ``medium, compass:10, view:90``.
 
-    Parameters
-    ----------
-    text : str or iterable of str
-        One after the other, with commas between them or one by one: each a name of
-        `NAMED_DISTORTIONS`; then, for all but the paper's levels, ``:VALUE`` for its first
-        setting; then any number of ``:SETTING=VALUE``. Lists are written ``bench/bus_stop``,
-        switches as ``true`` and ``false``.
-    noises : mapping of str to Noise, optional
-        What detectors may be called.
-
-    Returns
-    -------
-    tuple
-        The distortions in their order.
-
-    Raises
-    ------
-    UnknownNameError
-        If there is no distortion, setting or noise model of a name; the nearest is offered.
-    InputError
-        If a value cannot be used.
-
-    Examples
-    --------
-    >>> parse_chain("compass:5, missing:bench/bus_stop, view:60")[1].classes
-    ('bench', 'bus_stop')
-    >>> parse_chain("medium:resort=false")[0].occurrences
-    7
-    >>> parse_chain("medium, veiw:60")
-    Traceback (most recent call last):
-    ...
-    semsig_gis.errors.UnknownNameError: 'veiw' is no distortion; the nearest is 'view';
-    give none, light, medium, strong, errors, compass, missing, known, view, behind, obstacles,
-    blocked or detector.
+    A text holds them with commas between them, an iterable one each. Each is a name of
+    `NAMED_DISTORTIONS`; then, for all but the paper's levels, ``:VALUE`` for its first setting;
+    then any number of ``:SETTING=VALUE``. Lists are written ``bench/bus_stop``, switches ``true``
+    and ``false``; a detector names one of `noises`. Blank text gives none. Raises UnknownNameError
+    for an unknown distortion, setting or noise model and for a setting given twice, and InputError
+    for a value of the wrong kind or out of range.
     """
     parts = text.split(",") if isinstance(text, str) else list(text)
     if isinstance(text, str) and not text.strip():
@@ -103,24 +75,10 @@ def parse_chain(
 
 
 def chain_text(distortions: Sequence[QueryDistortion]) -> str:
-    """Write distortions as text.
+    """Write distortions as the shortest text that `parse_chain` reads.
 
-    Parameters
-    ----------
-    distortions : sequence
-        The distortions in their order.
-
-    Returns
-    -------
-    str
-        What `parse_chain` reads; noise models by their names.
-
-    Examples
-    --------
-    >>> chain_text([Detector(noise=named_noise("light"), half=20.0)])
-    'detector:light:half=20'
-    >>> chain_text([Distortion(), Distortion(occurrences=2), MissingClasses(classes=("bench",))])
-    'medium, errors:2, missing:bench'
+    Noise models are written by name alone, so `parse_chain` must be given those that the package
+    does not have.
     """
     return ", ".join(
         # Of the names that may serve, the one that needs the fewest words.
@@ -132,46 +90,13 @@ def chain_text(distortions: Sequence[QueryDistortion]) -> str:
 def ready_chain(
     distortions: Sequence[QueryDistortion], city: CitySights
 ) -> Callable[[Sight, int, int], Sight]:
-    """Return what is done to a query, one distortion after the other.
+    """Return the function that applies distortions to a query.
 
-    Parameters
-    ----------
-    distortions : sequence
-        The distortions in their order.
-    city : CitySights
-        What there is to see.
-
-    Returns
-    -------
-    callable
-        From what is seen, a seed and the number of the query to what seems to be seen.
-
-    Raises
-    ------
-    SemsigError
-        If a distortion does not fit the city.
-
-    Notes
-    -----
-    Each distortion of each query has chances of its own, which depend on the seed, on the number
-    of the query and on the kind of distortion. So a query meets the same compass whatever else
-    happens to it, and experiments that differ in one distortion differ in nothing else.
-
-    Examples
-    --------
-    >>> from semsig_gis.catalog import paper_taxonomy
-    >>> from semsig_gis.sight import CitySights, Sight
-    >>> city = CitySights(
-    ...     taxonomy=paper_taxonomy(), codes=np.array([3], np.uint8),
-    ...     frequencies=np.array([9]), reach=30.0,
-    ... )
-    >>> lamp = Sight(
-    ...     codes=np.array([3], np.uint8), bearings=np.array([90.0]), distances=np.array([9.0])
-    ... )
-    >>> one = ready_chain(parse_chain("compass:10"), city)(lamp, 0, 7)
-    >>> two = ready_chain(parse_chain("light, compass:10"), city)(lamp, 0, 7)
-    >>> one.heading == two.heading
-    True
+    It takes what is seen, a seed and the number of the query. Each distortion of each query has
+    random numbers of its own, which depend on the seed, the number of the query, the kind of
+    distortion and how many of that kind come before. So a query meets the same compass whatever
+    else happens to it, and experiments that differ in one distortion differ in nothing else. Raises
+    SemsigError if a distortion does not fit the city.
     """
     repeats: Counter[str] = Counter()
     steps = []

@@ -23,27 +23,10 @@ __all__ = ["CellChanges", "UpdateReport", "compare_cells"]
 class UpdateReport:
     """How far a city has drifted.
 
-    Parameters
-    ----------
-    classes : tuple of ClassChange
-        What changed in the objects, by class.
-    replaced, kept : tuple of str
-        The layers that were loaded anew, and those that were not.
-    cells_before, cells : int
-        Cells of the database before and after.
-    recomputed : int
-        Cells within range of a change, whether they see it or not.
-    changed, appeared, vanished : int
-        Cells whose signature is another one, that see something for the first time, and that see
-        nothing any more.
-    notes : tuple of str
-        What a user should know.
-
-    Examples
-    --------
-    >>> UpdateReport(classes=(), replaced=(), kept=(), cells_before=10, cells=9, recomputed=5,
-    ...              changed=2, appeared=0, vanished=1).share
-    0.3
+    `replaced` layers were loaded anew, `kept` ones were not. The other numbers count cells:
+    `recomputed` ones lie within range of a change, whether they see it or not; `changed` ones have
+    another signature; `appeared` ones see something for the first time, and `vanished` ones nothing
+    any more.
     """
 
     classes: tuple[ClassChange, ...]
@@ -64,23 +47,13 @@ class UpdateReport:
         return drifted / (self.cells_before + self.appeared)
 
     def to_dict(self) -> dict[str, Any]:
-        """Return the report as plain values, ready for JSON.
-
-        Returns
-        -------
-        dict
-            The fields of the report and ``share``.
-        """
+        """Return the fields and ``share`` as plain values, ready for JSON."""
         return {**asdict(self), "share": self.share}
 
     def tables(self) -> tuple[PlainTable, ...]:
-        """Return the report as tables to print.
+        """Return the report as tables to print, in the form of `semsig_gis.tables.Table`.
 
-        Returns
-        -------
-        tuple of (str, tuple of str, tuple of tuple of str, str)
-            Title, headings, rows of text and a note, which is what `semsig_gis.tables.Table`
-            takes: objects by class, cells.
+        They show objects by class, and cells.
         """
         names = [name for name in ClassChange.__slots__ if name not in {"class_name", "moved_m"}]
         numbers = [[getattr(item, name) for name in names] for item in self.classes]
@@ -120,24 +93,9 @@ def _metres(number: float | None) -> str:
 class CellChanges:
     """Which cells of two databases of one city see what they saw.
 
-    Parameters
-    ----------
-    same : ndarray of int64, shape (s, 2)
-        Rows of the cells in the old and in the new database whose signatures are equal.
-    changed : ndarray of int64, shape (c, 2)
-        The same of those whose signatures differ, in classes, bearings or distances.
-    vanished : ndarray of int64, shape (v,)
-        Other rows of the old database: cells that see nothing any more.
-    appeared : ndarray of int64, shape (a,)
-        Other rows of the new database: cells that saw nothing before.
-
-    Examples
-    --------
-    >>> nothing = np.empty((0, 2), np.int64)
-    >>> changes = CellChanges(same=nothing, changed=np.array([[2, 3]]),
-    ...                       vanished=np.array([0, 1]), appeared=np.array([0, 1, 2]))
-    >>> len(changes.changed)
-    1
+    `same` and `changed`, shape (n, 2), are rows in the old and in the new database of cells whose
+    signatures are equal, or differ in classes, bearings or distances. `vanished` and `appeared`,
+    shape (n,), are the other rows of the old and of the new database.
     """
 
     same: NDArray[np.int64]
@@ -147,35 +105,10 @@ class CellChanges:
 
 
 def compare_cells(before: SignatureDatabase, after: SignatureDatabase) -> CellChanges:
-    """Compare the cells of two databases of one city.
+    """Compare the cells of two databases of one city, those of each kind in their order.
 
-    Parameters
-    ----------
-    before, after : SignatureDatabase
-        Databases of one grid, made in the same way.
-
-    Returns
-    -------
-    CellChanges
-        The cells, those of each kind in their order.
-
-    Raises
-    ------
-    DatabaseError
-        If the databases were not made in the same way.
-
-    Examples
-    --------
-    >>> from semsig_gis.building import build_database
-    >>> from semsig_gis.sources.synthetic import CitySpec, synthetic_city
-    >>> from semsig_gis.catalog import paper_taxonomy
-    >>> from semsig_gis.objects import build_objects
-    >>> layers = synthetic_city(CitySpec(size=300.0))
-    >>> objects, _ = build_objects(layers, taxonomy=paper_taxonomy(), crs="EPSG:32631")
-    >>> database = build_database(objects)
-    >>> changes = compare_cells(database, database.select(slice(3)))
-    >>> len(changes.same), len(changes.vanished) == len(database) - 3
-    (3, True)
+    Raise DatabaseError if the databases were not made in the same way, or differ in their longest
+    visibility range.
     """
     require_same(before, after)
     require_same(before, after, {"reach": "longest visibility range"})

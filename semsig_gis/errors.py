@@ -54,27 +54,7 @@ class DatabaseError(SemsigError, RuntimeError):
 
 
 def nearest_name(name: str, known: Iterable[str]) -> str:
-    """Return the part of a sentence that offers the known name nearest to a misspelt one.
-
-    Parameters
-    ----------
-    name : str
-        The name that was not found.
-    known : iterable of str
-        The names there are.
-
-    Returns
-    -------
-    str
-        ``"; the nearest is 'x'"``, or an empty string when nothing is near.
-
-    Examples
-    --------
-    >>> nearest_name("licence", ["license", "layers"])
-    "; the nearest is 'license'"
-    >>> nearest_name("q", ["license", "layers"])
-    ''
-    """
+    """Return ``"; the nearest is 'x'"`` for a misspelt name, or nothing where no name is near."""
     lowered = {candidate.lower(): candidate for candidate in known}
     close = difflib.get_close_matches(name.lower(), lowered, n=1, cutoff=0.5)
     return f"; the nearest is {lowered[close[0]]!r}" if close else ""

@@ -169,37 +169,9 @@ def score_queries(
 ) -> dict[int, list[dict[str, Any]]]:
     """Let a method answer queries of known places, and score the answers.
 
-    Parameters
-    ----------
-    answerer : Answerer
-        The method.
-    queries : sequence of Query
-        The queries and the truth about them.
-    tops : sequence of int, default (1,)
-        How many best candidates count.
-    memo : DistanceMemo, optional
-        Distances of these queries that other methods have needed.
-    progress : callable, optional
-        Called with the number of queries done and the number of queries.
-
-    Returns
-    -------
-    dict of int to list of dict
-        For each of `tops` what came of each query, for `scored_tables`.
-
-    Examples
-    --------
-    >>> from semsig_gis.catalog import paper_taxonomy
-    >>> from semsig_gis.building import build_database
-    >>> from semsig_gis.objects import build_objects
-    >>> from semsig_gis.sources.synthetic import CitySpec, synthetic_city
-    >>> layers = synthetic_city(CitySpec(size=300.0))
-    >>> objects, _ = build_objects(layers, taxonomy=paper_taxonomy(), crs="EPSG:32631")
-    >>> database = build_database(objects)
-    >>> drawn = draw_queries(database, QuerySpec(number=3))
-    >>> scored = score_queries(Answerer(database=database, method=DEFAULT_METHOD), drawn)
-    >>> [round(one["p5000"], 6) for one in scored[1]]
-    [1.0, 1.0, 1.0]
+    The result has, for each of `tops` (how many best candidates count), one row of outcomes a
+    query, for `scored_tables`. `memo` keeps distances of these queries that other methods have
+    needed; `progress` is called with the number of queries done and in all.
     """
     database = answerer.database
     asked = [one.asked.signature for one in queries if len(one.asked)]
@@ -226,36 +198,10 @@ def scored_tables(
     queries: Sequence[Query],
     outcomes: Mapping[int, Sequence[Mapping[str, Any]]],
 ) -> dict[int, pd.DataFrame]:
-    """Put together what was asked and what came of it.
+    """Return for each number of best candidates a table of what was asked and found.
 
-    Parameters
-    ----------
-    database : SignatureDatabase
-        What was searched.
-    queries : sequence of Query
-        The queries and the truth about them.
-    outcomes : mapping of int to sequence of mapping
-        For some numbers of best candidates what `score_queries` gives of these queries.
-
-    Returns
-    -------
-    dict of int to DataFrame
-        For each number one row a query: the columns of `Evaluation.queries` without ``geometry``,
-        but with ``x``, ``y`` and ``seconds``, which is NaN where nothing was asked.
-
-    Examples
-    --------
-    >>> from semsig_gis.catalog import paper_taxonomy
-    >>> from semsig_gis.building import build_database
-    >>> from semsig_gis.objects import build_objects
-    >>> from semsig_gis.sources.synthetic import CitySpec, synthetic_city
-    >>> layers = synthetic_city(CitySpec(size=300.0))
-    >>> objects, _ = build_objects(layers, taxonomy=paper_taxonomy(), crs="EPSG:32631")
-    >>> database = build_database(objects)
-    >>> drawn = draw_queries(database, QuerySpec(number=3))
-    >>> outcomes = score_queries(Answerer(database=database, method=DEFAULT_METHOD), drawn)
-    >>> scored_tables(database, drawn, outcomes)[1]["number"].tolist()
-    [0, 1, 2]
+    Each has one row a query: the columns of `Evaluation.queries` without ``geometry``, but with
+    ``x``, ``y`` and ``seconds``, which is NaN where nothing was asked.
     """
     about = _query_table(database, queries)
     scored = {}
@@ -276,29 +222,10 @@ def make_evaluation(
     city: str | None = None,
     file_bytes: int | None = None,
 ) -> Evaluation:
-    """Return what an evaluation found, from all its scored queries.
+    """Return the evaluation of all queries that `scored_tables` gave.
 
-    Parameters
-    ----------
-    database : SignatureDatabase
-        What was searched.
-    method : Method or LikelihoodMethod
-        What answered.
-    spec : QuerySpec
-        Which queries were asked.
-    scored : DataFrame
-        All of them, as `scored_tables` gives them.
-    top : int
-        How many best candidates counted.
-    city : str, optional
-        The city that was looked at, if not the one that was searched.
-    file_bytes : int, optional
-        Size of the files of the database.
-
-    Returns
-    -------
-    Evaluation
-        The queries, the settings and the mean time a query.
+    `top` is how many best candidates counted; `city` the city that was looked at, if not the one
+    that was searched; `file_bytes` the size of the files of the database.
     """
     points = gpd.points_from_xy(scored["x"], scored["y"], crs=database.crs)
     seconds = scored["seconds"].to_numpy(dtype=np.float64)
@@ -316,22 +243,7 @@ def make_evaluation(
 
 
 def check_count(what: str, count: int, cells: int) -> None:
-    """Refuse a number of queries or candidates that the database does not have.
-
-    Parameters
-    ----------
-    what : str
-        What is counted.
-    count : int
-        How many.
-    cells : int
-        How many cells there are.
-
-    Raises
-    ------
-    InputError
-        If the number is not between 1 and that of the cells.
-    """
+    """Raise InputError unless a number of queries or candidates is from 1 to that of the cells."""
     if not 1 <= count <= cells:
         msg = (
             f"{count} {what} were asked for; give a number from 1 to {cells}, the number of cells."
@@ -340,13 +252,7 @@ def check_count(what: str, count: int, cells: int) -> None:
 
 
 def versions() -> dict[str, str]:
-    """Return the versions that decide the figures and their speed.
-
-    Returns
-    -------
-    dict of str to str
-        Versions by name.
-    """
+    """Return the versions of the software that decides the figures and their speed."""
     parts = {name: metadata.version(name) for name in ("numpy", "pandas", "rapidfuzz")}
     return {"semsig_gis": __version__, "python": platform.python_version(), **parts}
 

@@ -50,31 +50,13 @@ BINS = 10
 
 
 def query_figures(queries: pd.DataFrame, *, cells: int) -> pd.DataFrame:
-    """Return what each query adds to each figure.
+    """Return what each query adds to each figure: chances in [0, 1], one row a query.
 
-    Parameters
-    ----------
-    queries : DataFrame
-        Columns as in `Evaluation.queries`.
-    cells : int
-        How many cells were ranked.
-
-    Returns
-    -------
-    DataFrame
-        Chances, one row a query: ``p5``, ``p10``, ``p25``, ``p50``, ``p100`` (error at most so
-        many metres), ``recall1``, ``recall10`` (true cell in the top per cent), ``near1``,
-        ``near5``, ``near10``, ``near20`` (one of the best N places within 25 m) and, where a
-        method states chances, ``coverage`` (answered), ``precision`` (answered and right; NaN
-        where not answered) and ``in_region``.
-
-    Examples
-    --------
-    >>> table = pd.DataFrame({"rank_low": [1], "rank_high": [2], "chance": [np.nan]})
-    >>> for name in ("p5", "p10", "p25", "p50", "p100", "near1", "near5", "near10", "near20"):
-    ...     table[name] = 0.5
-    >>> query_figures(table, cells=100)["recall1"].tolist()
-    [0.5]
+    Columns are ``p5``, ``p10``, ``p25``, ``p50``, ``p100`` (error at most so many metres),
+    ``recall1``, ``recall10`` (true cell in the top 1 or 10 % of so many `cells`), ``near1``,
+    ``near5``, ``near10``, ``near20`` (one of the best N places within 25 m) and, where a method
+    states chances, ``coverage`` (answered), ``precision`` (answered and right; NaN where not
+    answered) and ``in_region``.
     """
     names = [*(f"p{metres}" for metres in WITHIN), *(f"near{count}" for count in NEAR_PLACES)]
     figures = {name: queries[name].to_numpy(dtype=np.float64) for name in names}
@@ -92,28 +74,11 @@ def query_figures(queries: pd.DataFrame, *, cells: int) -> pd.DataFrame:
 
 
 def figure_means(figures: pd.DataFrame) -> pd.DataFrame:
-    """Return the mean of each figure, with an interval.
+    """Return the mean of each figure of `query_figures`, with an interval.
 
-    Parameters
-    ----------
-    figures : DataFrame
-        See `query_figures`.
-
-    Returns
-    -------
-    DataFrame
-        By figure: ``value``, ``low`` and ``high`` (95 %), and ``n``, how many queries have a say.
-        NaN where none has.
-
-    Notes
-    -----
-    Wilson's interval. Where ties make a query count with a chance, it is a little too wide: such
-    a count varies less than one of nought or one.
-
-    Examples
-    --------
-    >>> figure_means(pd.DataFrame({"p50": [1.0, 1.0, 0.5, np.nan]})).loc["p50", "n"]
-    np.int64(3)
+    Columns are ``value``, ``low`` and ``high`` (Wilson's 95 % interval) and ``n``, the number of
+    values that are not NaN; the others are NaN where there are none. Where ties make a query count
+    with a chance, the interval is a little too wide: such values vary less than those of 0 or 1.
     """
     means = _means(figures.to_numpy(dtype=np.float64))
     names = pd.Index(figures.columns, name="figure")
@@ -134,30 +99,10 @@ def _means(values: NDArray[np.float64]) -> list[tuple[float, float, float, int]]
 def grouped_means(
     figures: pd.DataFrame, labels: Sequence[str], *, by: str, order: Iterable[str]
 ) -> pd.DataFrame:
-    """Return the means of all figures group by group.
+    """Return the means of all figures, one row a group, in the order wanted.
 
-    Parameters
-    ----------
-    figures : DataFrame
-        See `query_figures`.
-    labels : sequence of str
-        Group of each query.
-    by : str
-        What they are grouped by.
-    order : iterable of str
-        The groups in the order wanted; groups without queries are told, too.
-
-    Returns
-    -------
-    DataFrame
-        One row a group: the column of the name `by`, ``n``, all figures, and ``p50_low`` and
-        ``p50_high`` (95 %).
-
-    Examples
-    --------
-    >>> table = pd.DataFrame({"p50": [1.0, 0.0, 1.0]})
-    >>> grouped_means(table, ["a", "a", "b"], by="part", order=["a", "b"])["p50"].tolist()
-    [0.5, 1.0]
+    `labels` has the group of each query. Columns are the one named `by`, ``n``, all figures, and
+    ``p50_low`` and ``p50_high`` (95 %). Groups without queries have a row, too.
     """
     groups, values = np.asarray(labels), figures.to_numpy(dtype=np.float64)
     rows = []
@@ -172,77 +117,26 @@ def grouped_means(
 
 
 def length_labels(queries: pd.DataFrame) -> list[str]:
-    """Return the range of each query by how many objects are really seen.
+    """Return for each query the one of `LENGTHS` in which its ``length`` is.
 
-    Parameters
-    ----------
-    queries : DataFrame
-        With ``length``.
-
-    Returns
-    -------
-    list of str
-        One of `LENGTHS` each; ``"0"`` where nothing is seen.
-
-    Examples
-    --------
-    >>> length_labels(pd.DataFrame({"length": [1, 19, 400]}))
-    ['1-4', '10-19', '20+']
+    It is ``"0"`` where nothing is seen.
     """
     return _ranges(queries["length"].to_numpy(), LENGTHS)
 
 
 def ambiguity_labels(queries: pd.DataFrame) -> list[str]:
-    """Return the range of each query by how many cells have the types of the true one.
+    """Return for each query the one of `AMBIGUITIES` in which its ``type_group`` is.
 
-    Parameters
-    ----------
-    queries : DataFrame
-        With ``type_group``.
-
-    Returns
-    -------
-    list of str
-        One of `AMBIGUITIES` each; ``"0"`` where the true cell is not in the database.
-
-    Examples
-    --------
-    >>> ambiguity_labels(pd.DataFrame({"type_group": [1, 9, 29958, 0]}))
-    ['1', '2-9', '1000+', '0']
+    It is ``"0"`` where the true cell is not in the database.
     """
     return _ranges(queries["type_group"].to_numpy(), AMBIGUITIES)
 
 
 def district_labels(queries: gpd.GeoDataFrame, districts: gpd.GeoDataFrame, name: str) -> list[str]:
-    """Return the district that each query was seen in.
+    """Return the district in which each query was seen.
 
-    Parameters
-    ----------
-    queries : GeoDataFrame
-        With the true places.
-    districts : GeoDataFrame
-        Polygons in any CRS.
-    name : str
-        Their column that names them.
-
-    Returns
-    -------
-    list of str
-        Names; ``"elsewhere"`` in none of them, and the first of several.
-
-    Raises
-    ------
-    InputError
-        If there is no such column.
-
-    Examples
-    --------
-    >>> import geopandas as gpd
-    >>> import shapely
-    >>> here = gpd.GeoDataFrame(geometry=[shapely.Point(1, 1), shapely.Point(9, 9)], crs=2154)
-    >>> parts = gpd.GeoDataFrame({"part": ["old"]}, geometry=[shapely.box(0, 0, 2, 2)], crs=2154)
-    >>> district_labels(here, parts, "part")
-    ['old', 'elsewhere']
+    Districts are polygons in any CRS with their names in the column `name`. The label is that of
+    the first of several, and ``"elsewhere"`` in none. Raises InputError if there is no such column.
     """
     if name not in districts:
         columns = ", ".join(str(one) for one in districts if one != "geometry")
@@ -258,30 +152,12 @@ def district_labels(queries: gpd.GeoDataFrame, districts: gpd.GeoDataFrame, name
 
 
 def percentile(values: NDArray[np.float64], percent: float) -> tuple[float, float, float]:
-    """Return a percentile with an interval.
+    """Return a percentile and the low and high end of its interval of about 95 %.
 
-    Parameters
-    ----------
-    values : ndarray of float64
-        Errors, some perhaps infinite; NaN is left out.
-    percent : float
-        Above 0 and below 100.
-
-    Returns
-    -------
-    value, low, high : float
-        The percentile, and the order statistics between which the true one is with a confidence
-        of about 95 %; NaN where there are no values.
-
-    Notes
-    -----
-    Between two neighbours the percentile is interpolated. The interval supposes nothing of the
-    distribution: how many values are below the true percentile is binomial.
-
-    Examples
-    --------
-    >>> percentile(np.arange(101.0), 90)
-    (90.0, 83.0, 97.0)
+    NaN is left out; all three are NaN where nothing is left. Values may be infinite. Between
+    neighbours the percentile is interpolated, infinite if the upper one is. The ends are order
+    statistics and suppose nothing of the distribution: how many values are below the true
+    percentile is binomial.
     """
     ordered = np.sort(values[~np.isnan(values)])
     if not ordered.size:
@@ -298,23 +174,8 @@ def percentile(values: NDArray[np.float64], percent: float) -> tuple[float, floa
 def coverage_curve(queries: pd.DataFrame) -> pd.DataFrame:
     """Return how many queries are answered, and how many answers are right, rule by rule.
 
-    Parameters
-    ----------
-    queries : DataFrame
-        With ``chance`` and ``right``.
-
-    Returns
-    -------
-    DataFrame
-        One row a rule: ``threshold`` (least chance that is answered), ``answered`` (queries),
-        ``coverage``, ``precision``, and ``low`` and ``high`` of the precision (95 %).
-
-    Examples
-    --------
-    >>> table = pd.DataFrame({"chance": [0.99, 0.6, np.nan], "right": [1.0, 0.5, np.nan]})
-    >>> curve = coverage_curve(table).set_index("threshold")
-    >>> curve.loc[0.5, "precision"], round(float(curve.loc[0.9, "coverage"]), 4)
-    (np.float64(0.75), 0.3333)
+    One row a rule: ``threshold`` (least chance that is answered), ``answered`` (queries),
+    ``coverage``, ``precision``, and ``low`` and ``high`` of the precision (95 %).
     """
     chance = queries["chance"].to_numpy(dtype=np.float64)
     right = queries["right"].to_numpy(dtype=np.float64)
@@ -338,25 +199,10 @@ def coverage_curve(queries: pd.DataFrame) -> pd.DataFrame:
 
 
 def calibration_bins(queries: pd.DataFrame) -> pd.DataFrame:
-    """Return how often stated chances come true, bin by bin.
+    """Return how often stated chances come true, one row for each tenth.
 
-    Parameters
-    ----------
-    queries : DataFrame
-        With ``chance`` and ``right``.
-
-    Returns
-    -------
-    DataFrame
-        One row for each tenth: ``from`` and ``to`` (chances stated), ``n``, ``stated`` (their
-        mean), ``true`` (share that was right), and ``low`` and ``high`` of that (95 %). NaN where
-        no chance was in the bin.
-
-    Examples
-    --------
-    >>> table = pd.DataFrame({"chance": [0.95, 1.0, 0.2], "right": [1.0, 0.0, 0.0]})
-    >>> calibration_bins(table)["true"].iloc[-1]
-    np.float64(0.5)
+    Columns are ``from`` and ``to`` (chances stated), ``n``, ``stated`` (their mean), ``true``
+    (share that was right), and ``low`` and ``high`` of that (95 %); NaN in an empty bin.
     """
     chance = queries["chance"].to_numpy(dtype=np.float64)
     right = queries["right"].to_numpy(dtype=np.float64)
@@ -377,23 +223,7 @@ def calibration_bins(queries: pd.DataFrame) -> pd.DataFrame:
 
 
 def plain_records(table: pd.DataFrame) -> list[dict[str, Any]]:
-    """Return the rows of a table as plain values for JSON.
-
-    Parameters
-    ----------
-    table : DataFrame
-        Of texts and numbers.
-
-    Returns
-    -------
-    list of dict
-        One a row; None for what is infinite or not a number.
-
-    Examples
-    --------
-    >>> plain_records(pd.DataFrame({"n": [2], "p50": [math.nan]}))
-    [{'n': 2, 'p50': None}]
-    """
+    """Return the rows of a table as values for JSON; None for infinite numbers and NaN."""
     return [
         {
             str(name): None if isinstance(value, float) and not math.isfinite(value) else value

@@ -84,31 +84,7 @@ def evaluation_tables(evaluation: Evaluation) -> tuple[Table, ...]:
 
 
 def evaluation_markdown(evaluation: Evaluation) -> str:
-    """Return the tables of an evaluation as Markdown.
-
-    Parameters
-    ----------
-    evaluation : Evaluation
-        What to show.
-
-    Returns
-    -------
-    str
-        A document of sections, ending in a newline.
-
-    Examples
-    --------
-    >>> from semsig_gis.catalog import paper_taxonomy
-    >>> from semsig_gis.building import build_database
-    >>> from semsig_gis.objects import build_objects
-    >>> from semsig_gis.sources.synthetic import CitySpec, synthetic_city
-    >>> layers = synthetic_city(CitySpec(size=300.0))
-    >>> objects, _ = build_objects(layers, taxonomy=paper_taxonomy(), crs="EPSG:32631")
-    >>> from semsig_gis.evaluation import evaluate
-    >>> evaluation = evaluate(build_database(objects), queries=5)
-    >>> evaluation_markdown(evaluation).splitlines()[0]
-    '## Evaluation'
-    """
+    """Return the tables of an evaluation as Markdown."""
     sections = [table.markdown() for table in evaluation_tables(evaluation)]
     return "\n".join(["## Evaluation\n", *sections])
 

@@ -26,16 +26,8 @@ __all__ = ["machine", "settings_from_dict", "settings_to_dict", "used_noises"]
 def machine() -> dict[str, Any]:
     """Return what decides how long things take here.
 
-    Returns
-    -------
-    dict
-        ``system``, ``processor``, ``processors`` (how many may be used) and ``memory_gb`` (None
-        where the system does not tell).
-
-    Examples
-    --------
-    >>> machine()["processors"] >= 1
-    True
+    Keys are ``system``, ``processor``, ``processors`` (how many there are) and ``memory_gb`` (None
+    where the system does not tell).
     """
     pages = "SC_PHYS_PAGES" in getattr(os, "sysconf_names", ())
     memory = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES") / 1e9 if pages else None
@@ -50,30 +42,10 @@ def machine() -> dict[str, Any]:
 def used_noises(
     methods: Iterable[Method | LikelihoodMethod], distortions: Iterable[QueryDistortion]
 ) -> dict[str, Noise]:
-    """Return the noise models of methods and distortions by the names that stand for them.
+    """Return the noise models of likelihood methods and detectors by name.
 
-    Parameters
-    ----------
-    methods : iterable
-        Methods, of which those by likelihood have a noise model.
-    distortions : iterable
-        Distortions, of which detectors have one.
-
-    Returns
-    -------
-    dict of str to Noise
-        By name.
-
-    Raises
-    ------
-    InputError
-        If two models have one name, or a name has a sign that means something else in texts.
-
-    Examples
-    --------
-    >>> from semsig_gis.noise import named_noise
-    >>> list(used_noises([LikelihoodMethod(noise=named_noise("light"))], []))
-    ['light']
+    Raises InputError if two models have one name, or a name has one of the signs ``, : / =`` that
+    texts of methods and distortions use.
     """
     found: dict[str, Noise] = {}
     models = [one.noise for one in methods if isinstance(one, LikelihoodMethod)]
@@ -89,25 +61,10 @@ def used_noises(
 
 
 def settings_to_dict(method: Method | LikelihoodMethod, asked: QuerySpec) -> dict[str, Any]:
-    """Return a method and what it was asked as plain values, ready for JSON.
+    """Return a method and what it was asked as plain values for JSON.
 
-    Parameters
-    ----------
-    method : Method or LikelihoodMethod
-        The method.
-    asked : QuerySpec
-        Which queries.
-
-    Returns
-    -------
-    dict
-        ``method``, ``asked`` and ``noises``: all noise models, so that nothing else is needed to
-        read the texts.
-
-    Raises
-    ------
-    InputError
-        If two noise models have one name (see `used_noises`).
+    Keys are ``method``, ``asked`` and ``noises``: all noise models in full, so that nothing else is
+    needed to read the texts. Raises InputError as `used_noises` does.
     """
     noises = used_noises([method], asked.distortions)
     return {
@@ -125,28 +82,8 @@ def settings_to_dict(method: Method | LikelihoodMethod, asked: QuerySpec) -> dic
 def settings_from_dict(values: Mapping[str, Any]) -> tuple[Method | LikelihoodMethod, QuerySpec]:
     """Read a method and what it was asked, the inverse of `settings_to_dict`.
 
-    Parameters
-    ----------
-    values : mapping
-        With ``method``, ``asked`` and ``noises``.
-
-    Returns
-    -------
-    method : Method or LikelihoodMethod
-        The method.
-    asked : QuerySpec
-        Which queries.
-
-    Raises
-    ------
-    AttributeError, LookupError, TypeError, ValueError
-        If the values are something else.
-
-    Examples
-    --------
-    >>> from semsig_gis.method import DEFAULT_METHOD
-    >>> settings_from_dict(settings_to_dict(DEFAULT_METHOD, QuerySpec(number=7)))[1].number
-    7
+    Other values raise AttributeError, LookupError, TypeError or ValueError, which the caller turns
+    into an error that names the file.
     """
     noises = {name: noise_from_dict(one) for name, one in values["noises"].items()}
     asked = dict(values["asked"])

@@ -44,15 +44,7 @@ KEYS = {
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Districts:
-    """Polygons by which figures are told.
-
-    Parameters
-    ----------
-    file : str
-        Any vector file.
-    name : str
-        The field that names them.
-    """
+    """Polygons of any vector `file` by which figures are told; the field `name` names them."""
 
     file: str
     name: str
@@ -60,19 +52,9 @@ class Districts:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Case:
-    """One evaluation of an experiment.
+    """One evaluation of an experiment: the names of a distortion and of a method in it.
 
-    Parameters
-    ----------
-    distortion, method : str
-        Their names in the experiment.
-    top : int
-        How many best candidates count.
-
-    Examples
-    --------
-    >>> Case(distortion="phone", method="paper", top=1).name
-    'phone/paper-top1'
+    `top` is how many best candidates count.
     """
 
     distortion: str
@@ -242,30 +224,13 @@ def parse_experiment(
 ) -> ExperimentSpec:
     """Read an experiment from TOML.
 
-    Parameters
-    ----------
-    text : str
-        ``database``; the table ``methods`` with texts such as ``"edit+edit:5%"`` or
-        ``"likelihood:generic:refined"``; the table ``distortions`` with texts such as
-        ``"medium, view:90"`` or lists of them; and, if wanted, ``queries``, ``seeds``,
-        ``seen_from``, ``city``, ``top``, the table ``districts`` (``file``, ``name``), and the
-        table ``noises`` with noise models, each a table or the name of a file.
-    where : str, default "the experiment"
-        What to call it in messages.
-    folder : str or Path, default "."
-        Where files of noise models are looked for.
-
-    Returns
-    -------
-    ExperimentSpec
-        The experiment.
-
-    Raises
-    ------
-    InputError
-        If it is not TOML, or a key or value is unusable.
-    UnknownNameError
-        If a method, a distortion or a noise model is not known.
+    It has ``database``; the table ``methods`` with texts such as ``"edit+edit:5%"`` or
+    ``"likelihood:generic:refined"``; the table ``distortions`` with texts (or lists of them) such
+    as ``"medium, view:90"``; and, if wanted, ``queries``, ``seeds``, ``seen_from``, ``city``,
+    ``top``, the table ``districts`` (``file``, ``name``) and the table ``noises``, where each is a
+    table or the name of a file in `folder`. `where` is what messages call the text. Raises
+    UnknownNameError for an unknown method, distortion or noise model, and InputError if it is not
+    TOML or a key or value cannot be used.
     """
     try:
         values = _checked(tomllib.loads(text), KEYS, where, ["database", "methods", "distortions"])

@@ -40,29 +40,11 @@ HALF_WRITTEN = ".semsig-"
 
 
 def finished_run(out: str | Path, identity: Mapping[str, Any]) -> bool:
-    """Tell whether the results of an experiment are there.
+    """Tell whether the results of an experiment are there; False if there is no such folder.
 
-    Parameters
-    ----------
-    out : str or Path
-        Folder of the results.
-    identity : mapping
-        What the experiment is, as plain values: ``experiment``, ``inputs``, ``versions``.
-
-    Returns
-    -------
-    bool
-        False if there is no such folder.
-
-    Raises
-    ------
-    InputError
-        If it holds the results of another experiment, or something else.
-
-    Examples
-    --------
-    >>> finished_run("nowhere", {"experiment": {}})
-    False
+    ``identity`` is what the experiment is, as plain values: ``experiment``, ``inputs``,
+    ``versions``. Raises `InputError` if the folder holds the results of another experiment, or
+    something else.
     """
     target = Path(os.path.realpath(out))
     if not target.exists():
@@ -73,26 +55,10 @@ def finished_run(out: str | Path, identity: Mapping[str, Any]) -> bool:
 
 
 def begin_run(out: str | Path, spec: ExperimentSpec, identity: Mapping[str, Any]) -> Path:
-    """Begin a run, or take up an unfinished one.
+    """Begin a run, or take up an unfinished one, and return the folder to work in.
 
-    Parameters
-    ----------
-    out : str or Path
-        Folder of the results.
-    spec : ExperimentSpec
-        The experiment.
-    identity : mapping
-        What it is (see `finished_run`).
-
-    Returns
-    -------
-    Path
-        The folder to work in.
-
-    Raises
-    ------
-    InputError
-        If it holds an unfinished run of another experiment, or something else.
+    Raises `InputError` if that holds an unfinished run of another ``identity`` (see
+    `finished_run`), or something else.
     """
     target = Path(os.path.realpath(out))
     partial = target.with_name(f"{target.name}.partial")
@@ -117,19 +83,7 @@ def write_results(
     *,
     districts: gpd.GeoDataFrame | None = None,
 ) -> None:
-    """Write all results of a run.
-
-    Parameters
-    ----------
-    partial : Path
-        Folder to work in.
-    spec : ExperimentSpec
-        The experiment.
-    results : mapping of str to Evaluation
-        Its evaluations by the names of their cases.
-    districts : GeoDataFrame, optional
-        The polygons that the experiment names.
-    """
+    """Write all results of a run, given by the names of their cases, into the folder to work in."""
     for name, evaluation in results.items():
         evaluation.save(partial / name)
         if districts is not None and spec.districts is not None:
@@ -140,18 +94,7 @@ def write_results(
 
 
 def finish_run(partial: Path) -> None:
-    """Put the results of a run in their place.
-
-    Parameters
-    ----------
-    partial : Path
-        Folder to work in.
-
-    Raises
-    ------
-    InputError
-        If the folder cannot be renamed.
-    """
+    """Put the results of a run in their place, by renaming the folder to work in."""
     target = partial.with_name(partial.name.removesuffix(".partial"))
     try:
         partial.rename(target)

@@ -31,20 +31,12 @@ SHOWN = {
 
 
 def experiment_figures(results: Mapping[str, Evaluation]) -> pd.DataFrame:
-    """Return all figures of all cases.
+    """Return all figures of the evaluations, given by the names of their cases.
 
-    Parameters
-    ----------
-    results : mapping of str to Evaluation
-        The evaluations by the names of their cases.
-
-    Returns
-    -------
-    DataFrame
-        One row a case and figure: ``case``, ``figure``, ``value``, ``low`` and ``high`` (95 %) and
-        ``n``, how many queries have a say. The figures are shares (see
-        `semsig_gis.evaluation_figures.query_figures`), ``error_median`` and ``error_p90`` in
-        metres, and ``heading_error_median`` in degrees where a heading was looked for.
+    One row a case and figure: ``case``, ``figure``, ``value``, ``low`` and ``high`` (95 %) and
+    ``n``, how many queries have a say. The figures are shares (see
+    `semsig_gis.evaluation_figures.query_figures`), ``error_median`` and ``error_p90`` in metres,
+    and ``heading_error_median`` in degrees where a heading was looked for.
     """
     parts = []
     for name, evaluation in results.items():
@@ -68,21 +60,10 @@ def experiment_figures(results: Mapping[str, Evaluation]) -> pd.DataFrame:
 def experiment_tables(
     spec: ExperimentSpec, results: Mapping[str, Evaluation], *, times: bool = True
 ) -> tuple[Table, ...]:
-    """Return the settings and the main figures of an experiment.
+    """Return the settings of an experiment, then for each distortion a table of its main figures.
 
-    Parameters
-    ----------
-    spec : ExperimentSpec
-        The experiment.
-    results : mapping of str to Evaluation
-        Its evaluations by the names of their cases.
-    times : bool, default True
-        Whether the seconds of a query are told, which differ from run to run.
-
-    Returns
-    -------
-    tuple of Table
-        Settings; then for each distortion a table with a row a method and number of candidates.
+    A row is a method and number of candidates. ``times`` tells whether to show the seconds of a
+    query, which differ from run to run.
     """
     first = next(iter(results.values()))
     megabytes = first.database["mb_per_km2"]
@@ -120,46 +101,13 @@ def experiment_tables(
 
 
 def experiment_markdown(spec: ExperimentSpec, results: Mapping[str, Evaluation]) -> str:
-    """Return the tables of an experiment as Markdown, the same whenever it is repeated.
-
-    Parameters
-    ----------
-    spec : ExperimentSpec
-        The experiment.
-    results : mapping of str to Evaluation
-        Its evaluations by the names of their cases.
-
-    Returns
-    -------
-    str
-        A document of sections, ending in a newline.
-    """
+    """Return the tables of an experiment as Markdown, the same whenever it is repeated."""
     sections = [table.markdown() for table in experiment_tables(spec, results, times=False)]
     return "\n".join(["## Experiment\n", *sections])
 
 
 def comparison_table(found: pd.DataFrame, title: str) -> Table:
-    """Return a comparison of two evaluations for people.
-
-    Parameters
-    ----------
-    found : DataFrame
-        See `semsig_gis.comparison.compare_evaluations`.
-    title : str
-        What is compared.
-
-    Returns
-    -------
-    Table
-        One row a figure.
-
-    Examples
-    --------
-    >>> row = {"figure": "p50", "first": 0.5, "second": 0.75, "difference": 0.25, "low": 0.1,
-    ...        "high": 0.4}
-    >>> comparison_table(pd.DataFrame([row]), "a and b").rows
-    (('p50', '0.5000', '0.7500', '+0.2500', '+0.1000 to +0.4000', 'more'),)
-    """
+    """Return a comparison (see `semsig_gis.comparison.compare_evaluations`), one row a figure."""
     rows = []
     for row in found.to_dict("records"):
         low, high = row["low"], row["high"]

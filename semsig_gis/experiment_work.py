@@ -55,12 +55,8 @@ STAGES = 2
 class Part(NamedTuple):
     """Some queries of an experiment, to be answered by all its methods.
 
-    Parameters
-    ----------
-    distortion : str
-        What happens to them, by its name in the experiment.
-    number : int
-        Which hundred of them, from 0.
+    ``distortion`` is its name in the experiment, and ``number`` tells which hundred of its queries,
+    from 0.
     """
 
     distortion: str
@@ -69,16 +65,9 @@ class Part(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class ExperimentWork:
-    """An experiment with the files that it names.
+    """An experiment with the files that it names, which are looked for in ``folder``.
 
-    Parameters
-    ----------
-    spec : ExperimentSpec
-        The experiment.
-    folder : Path
-        Where the files are looked for.
-    note : callable, optional
-        Called with a sentence where an index is built or a file was put right.
+    ``note`` is called with a sentence where an index is built or a file was put right.
     """
 
     spec: ExperimentSpec
@@ -89,17 +78,9 @@ class ExperimentWork:
     _answerers: dict[str, Answerer] = field(default_factory=dict)
 
     def digests(self) -> dict[str, str]:
-        """Return what stands for the content of the files that are looked at.
+        """Return a digest of the content of each file that is looked at, by name.
 
-        Returns
-        -------
-        dict of str to str
-            By name.
-
-        Raises
-        ------
-        SemsigError
-            If a file is missing.
+        Raises `SemsigError` if a file is missing.
         """
         found = {}
         for name in dict.fromkeys([self.spec.database, self.spec.city or self.spec.database]):
@@ -132,12 +113,9 @@ class ExperimentWork:
         return list(dict.fromkeys(some))
 
     def prepare(self) -> None:
-        """Refuse what does not fit the database, and build the indexes that methods need.
+        """Build the indexes that methods need.
 
-        Raises
-        ------
-        SemsigError
-            If a file cannot be read, or something does not fit the database.
+        Raises `SemsigError` if a file cannot be read, or something does not fit the database.
         """
         for top in self.spec.top:
             check_count("candidates", top, len(self.database))
@@ -178,30 +156,14 @@ class ExperimentWork:
         return tuple(Part(name, number) for name in self.spec.distortions for number in numbers)
 
     def queries_in(self, part: Part) -> int:
-        """Return how many queries are in a part.
-
-        Parameters
-        ----------
-        part : Part
-            The part.
-
-        Returns
-        -------
-        int
-            Up to a hundred.
-        """
+        """Return how many queries are in a part: a hundred, or fewer in the last one."""
         before = part.number * QUERIES_A_PART
         return min(QUERIES_A_PART, self._queries_of_each - before)
 
     def answer(self, place: Path, part: Part) -> None:
         """Let every method answer the queries of a part, unless it has done so before.
 
-        Parameters
-        ----------
-        place : Path
-            Folder of the files with the answers.
-        part : Part
-            Which queries.
+        ``place`` is the folder of the files with the answers.
         """
         count = self.queries_in(part) * len(self.spec.top)
         files = {name: _part_file(place, part, name) for name in self.spec.methods}
@@ -248,18 +210,7 @@ class ExperimentWork:
         return max(1, min(QUERIES_A_PART, MEMO_BYTES // max(of_each, 1)))
 
     def evaluations(self, place: Path) -> dict[str, Evaluation]:
-        """Return all evaluations, when all queries are answered.
-
-        Parameters
-        ----------
-        place : Path
-            Folder of the files with the answers.
-
-        Returns
-        -------
-        dict of str to Evaluation
-            By the names of their cases.
-        """
+        """Return all evaluations by the names of their cases, once all queries are answered."""
         size = sum(file.stat().st_size for file in _files(self.folder / self.spec.database))
         found = {}
         for distortion, method in product(self.spec.distortions, self.spec.methods):

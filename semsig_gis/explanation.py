@@ -41,35 +41,15 @@ LEAST_CHANCE = 0.01  # of two things being one, to be set beside each other
 class Explanation:
     """What a query and a place have in common, and what not.
 
-    Parameters
-    ----------
-    table : GeoDataFrame
-        One row for each object of the query, then one for each street object that none of them
-        is likely to be; `geometry` is the street object, where there is one.
+    `table` has one row for each object of the query, then one for each street object that none of
+    them is likely to be, with the street object as geometry. `verdict` is ``"matched"`` (more
+    likely an object than not), ``"misnamed"`` (the same, but of another class), ``"false"`` or
+    ``"missed"``; `chance` is that it holds. `query` is the number of the object in the query,
+    `object` the row in the table of objects, `distance` is in metres, and `bearing_error` in
+    degrees clockwise from object to detection. What does not apply is missing.
 
-        - ``verdict``: ``"matched"`` (more likely an object than not), ``"misnamed"`` (the same,
-          of another class), ``"false"`` or ``"missed"``;
-        - ``chance``: that the verdict holds: that the two are one thing, that the detection is
-          no object at all, that the object was not detected;
-        - ``query``: number of the object in the query; ``query_class``, ``query_bearing``
-          (degrees, turned by `heading`);
-        - ``object``: row in the table of objects, ``source``, ``source_id``, ``object_class``,
-          ``object_bearing``, ``distance`` in metres;
-        - ``bearing_error``: degrees clockwise from the object to the detection.
-
-        What does not apply is missing.
-    xy : tuple of float
-        The place in metres.
-    heading : float
-        Degrees that were added to the bearings of the query.
-    loglik : float
-        Log-likelihood of the query at the place.
-
-    Examples
-    --------
-    >>> empty = gpd.GeoDataFrame({"verdict": ["false"]}, geometry=[None], crs="EPSG:2154")
-    >>> Explanation(table=empty, xy=(0.0, 0.0), heading=0.0, loglik=-3.0).counts
-    {'matched': 0, 'misnamed': 0, 'missed': 0, 'false': 1}
+    `xy` is the place in metres, `heading` the degrees that were added to the bearings of the query,
+    and `loglik` the log-likelihood of the query at the place.
     """
 
     table: gpd.GeoDataFrame
@@ -86,13 +66,7 @@ class Explanation:
         }
 
     def to_dict(self) -> dict[str, Any]:
-        """Return everything as plain values, ready for JSON.
-
-        Returns
-        -------
-        dict
-            The place and ``rows``, where what does not apply is None.
-        """
+        """Return plain values for JSON; what does not apply in a row is None."""
         plain = pd.DataFrame(self.table.drop(columns="geometry"))
         rows = plain.astype(object).where(plain.notna(), None).to_dict("records")
         return {
@@ -118,57 +92,14 @@ def explain(
 ) -> Explanation:
     """Say which objects of a query are which street objects, if it was seen from a place.
 
-    Parameters
-    ----------
-    query : Signature
-        At least one object, with bearings; types may be unknown, all or some.
-    xy : tuple of float
-        The place in metres, such as the viewpoint of a candidate or a refined place.
-    noise : NoiseSpec or NoiseMixture
-        The noise model.
-    objects : StreetObjects
-        The objects of the city.
-    index : ObjectIndex or StoredIndex
-        R-tree over them.
-    radius : float, default 30
-        Visibility range in metres of classes that have none of their own.
-    heading : float, default 0
-        Degrees to add to the bearings of the query.
-    footprints : Footprints, optional
-        Buildings; what they hide is not seen.
+    The query needs bearings; its types may be unknown. `xy` and `radius`, the visibility range of
+    classes that have none of their own, are in metres; `heading` is in degrees to add to the
+    bearings. What `footprints` hide is not seen.
 
-    Returns
-    -------
-    Explanation
-        The verdicts.
-
-    Raises
-    ------
-    InputError
-        If the query is empty, has no bearings, or has a class that the city does not have.
-
-    Notes
-    -----
     Chances are those of all one-to-one associations together (see `semsig_gis.association`), each
-    model of a mixture counting as much as the query speaks for it here. An object of the query
-    is set beside the street object that it most likely is.
-
-    Examples
-    --------
-    >>> from semsig_gis.catalog import paper_taxonomy
-    >>> from semsig_gis.noise import NoiseSpec
-    >>> from semsig_gis.objects import build_objects
-    >>> from semsig_gis.signatures import Signature
-    >>> from semsig_gis.sources.synthetic import CitySpec, synthetic_city
-    >>> from semsig_gis.spatial_index import ObjectIndex
-    >>> layers = synthetic_city(CitySpec(size=300.0))
-    >>> objects, _ = build_objects(layers, taxonomy=paper_taxonomy(), crs="EPSG:32631")
-    >>> place = tuple((objects.xy[0] - [3.0, 4.0]).tolist())
-    >>> tree = ObjectIndex(objects.xy)
-    >>> query = Signature(objects.codes[:1], np.array([38.0]))
-    >>> why = explain(query, place, NoiseSpec(), objects=objects, index=tree, radius=6.0)
-    >>> why.table["verdict"].iloc[0], float(why.table["bearing_error"].iloc[0].round(2))
-    ('matched', 1.13)
+    model of a mixture counting as much as the query speaks for it here. An object of the query is
+    paired with the street object that it most likely is. An empty query and a class that the city
+    does not have raise `InputError`.
     """
     place = np.array([xy], dtype=np.float64)
     view = views_at(objects, place, index=index, radius=radius, footprints=footprints)
@@ -186,43 +117,8 @@ def explain_cell(
 ) -> Explanation:
     """Say which objects of a query are which objects of a cell, by the database alone.
 
-    Parameters
-    ----------
-    query : Signature
-        At least one object, with bearings; types may be unknown, all or some.
-    cell : int
-        Row number in the database.
-    noise : NoiseSpec or NoiseMixture
-        The noise model.
-    database : SignatureDatabase
-        The cells. They do not know which objects they see: columns ``object``, ``source`` and
-        ``source_id`` are missing, and where an object stands is told to some decimetres.
-    heading : float, default 0
-        Degrees to add to the bearings of the query.
-
-    Returns
-    -------
-    Explanation
-        The verdicts.
-
-    Raises
-    ------
-    InputError
-        If the query is empty, has no bearings, or has a class that no cell sees.
-
-    Examples
-    --------
-    >>> from semsig_gis.catalog import paper_taxonomy
-    >>> from semsig_gis.building import build_database
-    >>> from semsig_gis.noise import NoiseSpec
-    >>> from semsig_gis.objects import build_objects
-    >>> from semsig_gis.sources.synthetic import CitySpec, synthetic_city
-    >>> layers = synthetic_city(CitySpec(size=300.0))
-    >>> objects, _ = build_objects(layers, taxonomy=paper_taxonomy(), crs="EPSG:32631")
-    >>> database = build_database(objects)
-    >>> why = explain_cell(database.signature(7), 7, NoiseSpec(), database=database)
-    >>> why.counts["matched"] == int(database.lengths[7])
-    True
+    As `explain`, but a database does not know which objects a cell sees: the columns ``object``,
+    ``source`` and ``source_id`` are missing, and places of objects are good to some decimetres.
     """
     view = views_in(database, np.array([cell]))
     city = _City(database.taxonomy, database.present_codes, database.crs)

@@ -106,44 +106,15 @@ class GridSpec:
 
 
 def cell_ids(columns: ArrayLike, rows: ArrayLike) -> NDArray[np.int64]:
-    """Return the number of each cell, which stays the same when the area grows.
+    """Return ``column * 10**8 + row``, a cell's number that stays the same when the area grows.
 
-    Parameters
-    ----------
-    columns, rows : array_like of int, shape (n,)
-        Cells; rows within 50 million of 0.
-
-    Returns
-    -------
-    ndarray of int64, shape (n,)
-        ``column * 10**8 + row``, readable in any table.
-
-    Examples
-    --------
-    >>> cell_ids([76520], [627500]).tolist()
-    [7652000627500]
+    Rows must be within 50 million of 0.
     """
     return np.asarray(columns, np.int64) * ROW_SPAN + np.asarray(rows, np.int64)
 
 
 def split_ids(ids: ArrayLike) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Return the columns and rows of cell numbers, the inverse of `cell_ids`.
-
-    Parameters
-    ----------
-    ids : array_like of int, shape (n,)
-        Cell numbers.
-
-    Returns
-    -------
-    columns, rows : ndarray of int64, shape (n,)
-        The cells.
-
-    Examples
-    --------
-    >>> split_ids([7652000627500])
-    (array([76520]), array([627500]))
-    """
+    """Return the columns and rows of cell numbers, the inverse of `cell_ids`."""
     numbers = np.asarray(ids, np.int64)
     columns = (numbers + ROW_SPAN // 2) // ROW_SPAN
     return columns, numbers - columns * ROW_SPAN
@@ -152,33 +123,11 @@ def split_ids(ids: ArrayLike) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
 def cells_near(
     xy: NDArray[np.float64], *, grid: GridSpec, radius: float
 ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Return every cell whose centre may lie within a radius of some point.
+    """Return the columns and rows of every cell whose centre may be within `radius` of a point.
 
-    Parameters
-    ----------
-    xy : ndarray of float64, shape (n, 2)
-        Points in metres.
-    grid : GridSpec
-        The grid.
-    radius : float
-        Metres.
-
-    Returns
-    -------
-    columns, rows : ndarray of int64
-        Distinct cells ordered by column, then row. The square around a point is taken, so some
-        cells see nothing in the end.
-
-    Raises
-    ------
-    InputError
-        If the step is so small that there would be too many cells, or they cannot be numbered.
-
-    Examples
-    --------
-    >>> columns, rows = cells_near(np.array([[5.0, 5.0]]), grid=GridSpec(), radius=12.0)
-    >>> sorted(zip(columns.tolist(), rows.tolist()))[:3]
-    [(-2, -2), (-2, -1), (-2, 0)]
+    Points, shape (n, 2), and radius are in metres. Cells are distinct, ordered by column, then row.
+    The square around a point is taken, so that some cells see nothing in the end. Raises InputError
+    if the step is so small that there would be too many cells, or they cannot be numbered.
     """
     if radius > (MAX_REACH - 1) * grid.step:
         msg = (

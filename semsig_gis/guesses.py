@@ -31,20 +31,8 @@ LAT_LON = re.compile(r"\s*-?\d{1,2}\.\d+\s*,\s*-?\d{1,3}\.\d+\s*")
 class Column:
     """A field and its values in a sample.
 
-    Parameters
-    ----------
-    name : str
-        Name of the field.
-    counts : Counter
-        Rows of every value, in the order of their first row; without those that are blank.
-    missing : int
-        Rows without a value.
-
-    Examples
-    --------
-    >>> kind = Column("Type", Counter({"tree": 3, "lamp": 1}), 0)
-    >>> kind.meant_for("filter"), kind.unique, kind.few
-    (True, False, True)
+    `counts` has the rows of every value that is not blank, in the order of their first row;
+    `missing` is the number of rows without a value.
     """
 
     name: str
@@ -68,33 +56,14 @@ class Column:
         )
 
     def meant_for(self, purpose: str) -> bool:
-        """Tell whether the name is one that fields of a purpose have.
+        """Tell whether the name is typical of fields for a purpose.
 
-        Parameters
-        ----------
-        purpose : {"filter", "identifier", "row_number", "x", "y"}
-            The purpose.
-
-        Returns
-        -------
-        bool
-            Whether it is.
+        The purposes are ``"filter"``, ``"identifier"``, ``"row_number"``, ``"x"`` and ``"y"``.
         """
         return any(found.name == purpose for found in keywords("fields").find(self.name))
 
     def within(self, limit: float) -> bool:
-        """Tell whether all values are numbers of no more than a size.
-
-        Parameters
-        ----------
-        limit : float
-            The size, such as 90 for latitudes.
-
-        Returns
-        -------
-        bool
-            Whether they are.
-        """
+        """Tell whether all values are numbers from ``-limit`` to ``limit``."""
         return all(_number(value) and abs(float(value)) <= limit for value in self.counts)
 
 
@@ -118,18 +87,7 @@ def _number(value: object) -> bool:
 
 
 def columns_of(sample: Sample) -> tuple[Column, ...]:
-    """Return the fields of a sample that hold plain values.
-
-    Parameters
-    ----------
-    sample : Sample
-        Layer with its first rows.
-
-    Returns
-    -------
-    tuple of Column
-        The fields in their order, without those of lists, mappings or bytes.
-    """
+    """Return the fields of a sample in their order, without those of lists, mappings or bytes."""
     columns = []
     for name, _ in sample.info.fields:
         values = [row.get(name) for row in sample.rows]
@@ -141,25 +99,10 @@ def columns_of(sample: Sample) -> tuple[Column, ...]:
 
 @dataclass(frozen=True, slots=True)
 class ClassGuess:
-    """What a layer seems to hold.
+    """What a layer seems to hold: a class, or a role if `is_role`; empty if nothing points to one.
 
-    Parameters
-    ----------
-    name : str
-        Class or role; empty if nothing points to one.
-    is_role : bool
-        Whether it is a role.
-    reason : str
-        What it was seen by, for people.
-    others : tuple of str
-        Further classes that the name could mean.
-    sure : bool
-        Whether the name says it and means nothing else.
-
-    Examples
-    --------
-    >>> ClassGuess("bench", reason='from the name: "bancs"', sure=True).others
-    ()
+    `reason` tells people what it was seen by, `others` are further classes that the name could
+    mean, and `sure` says that the name means this and nothing else.
     """
 
     name: str = ""
@@ -174,26 +117,9 @@ def guess_class(
 ) -> ClassGuess:
     """Guess the class of a layer, or its role where it holds no objects.
 
-    Parameters
-    ----------
-    names : str
-        Names of the file and of the layer.
-    columns : sequence of Column
-        Its fields.
-    geometry : {"point", "line", "polygon"} or None
-        Its geometry, where it is of one kind.
-    rows : int
-        Rows of the sample.
-
-    Returns
-    -------
-    ClassGuess
-        By the name; else by values that most rows have; else by a field that only one class has.
-
-    Examples
-    --------
-    >>> guess_class("Bancs publics", (), geometry="point", rows=0).name
-    'bench'
+    `names` holds those of the file and of the layer; `geometry` is ``"point"``, ``"line"`` or
+    ``"polygon"``, or None where it is of several kinds; `rows` is the size of the sample. The name
+    decides; else values that most rows have; else a field that only one class has.
     """
     classes = keywords("classes").find(names)
     for role in keywords("roles").find(names):
@@ -231,23 +157,8 @@ def _by_content(columns: Sequence[Column], rows: int) -> Iterator[ClassGuess]:
 def guess_class_by(columns: Sequence[Column], class_name: str) -> tuple[str, dict[str, str]] | None:
     """Return the field whose values name other classes than that of the layer, and which.
 
-    Parameters
-    ----------
-    columns : sequence of Column
-        The fields.
-    class_name : str
-        Class of the layer.
-
-    Returns
-    -------
-    tuple of (str, dict) or None
-        Name of the field, and class by value; None if there is no such field.
-
-    Examples
-    --------
-    >>> kind = Column("kind", Counter({"Taxi": 5, "Other": 9}), 0)
-    >>> guess_class_by([kind], "reserved_bay")
-    ('kind', {'Taxi': 'taxi_station'})
+    The mapping leads from value to class. Of several such fields, the one with most of these values
+    is chosen, and the first of equals.
     """
     best: tuple[str, dict[str, str]] | None = None
     for column in columns:
@@ -266,20 +177,7 @@ def guess_class_by(columns: Sequence[Column], class_name: str) -> tuple[str, dic
 
 
 def guess_position(sample: Sample, columns: Sequence[Column]) -> tuple[str, ...]:
-    """Return the field of a table that holds ``lat, lon``, or those of x and y.
-
-    Parameters
-    ----------
-    sample : Sample
-        A table.
-    columns : sequence of Column
-        Its fields of plain values.
-
-    Returns
-    -------
-    tuple of str
-        One name, or two, or none.
-    """
+    """Return the field of a table that holds ``lat, lon``, or those of x and y, or nothing."""
     for name, _ in sample.info.fields:
         values = [row[name] for row in sample.rows if row.get(name) not in {None, ""}]
         if values and all(isinstance(value, str) and LAT_LON.fullmatch(value) for value in values):

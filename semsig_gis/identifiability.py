@@ -31,14 +31,8 @@ BANDS = (0.0, 0.1, 0.5, 0.9)
 class ClassGain:
     """What a city gains by publishing a class of objects.
 
-    Parameters
-    ----------
-    code : int
-        Code of the class.
-    near : float
-        What the mean cell's chance of the place within the radius gains.
-    bits : float
-        What the mean query tells of the cell beyond what the other classes tell.
+    `near` is what the mean cell's chance of the place within the radius gains; `bits` what the mean
+    query tells of the cell beyond what the other classes tell.
     """
 
     code: int

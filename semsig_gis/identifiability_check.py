@@ -32,20 +32,10 @@ BINS = 10
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ChanceBin:
-    """Queries from cells of which about the same chance is told.
+    """Queries from cells with a chance from `low` to `high`.
 
-    Parameters
-    ----------
-    low, high : float
-        The chances of a tenth.
-    queries : int
-        How many queries are from such cells.
-    stated : float
-        Mean of their chances.
-    true : float
-        Share of them that was found.
-    true_low, true_high : float
-        Wilson's interval of that share, 95 %.
+    `stated` is the mean of their chances, `true` the share of the queries that was found, with
+    Wilson's 95 % interval from `true_low` to `true_high`.
     """
 
     low: float

@@ -65,18 +65,7 @@ def save_identifiability(told: Identifiability, path: str | Path) -> None:
 
 
 def identifiability_facts(told: Identifiability) -> dict[str, Any]:
-    """Return what is to be known of the columns of `Identifiability.table` to read them again.
-
-    Parameters
-    ----------
-    told : Identifiability
-        What is known of the cells.
-
-    Returns
-    -------
-    dict
-        Plain values for JSON.
-    """
+    """Return what is needed beside `Identifiability.table` to read it again, as values for JSON."""
     return {
         "format": FORMAT,
         "belongs_to": index_fingerprint(told.database, told.noise),
@@ -143,28 +132,10 @@ def open_identifiability(database: SignatureDatabase, path: str | Path) -> Ident
 def identifiability_of(
     database: SignatureDatabase, table: pa.Table, facts: dict[str, Any], path: str | Path
 ) -> Identifiability:
-    """Return what columns and the facts beside them tell.
+    """Return what columns of `Identifiability.table` and `identifiability_facts` tell.
 
-    Parameters
-    ----------
-    database : SignatureDatabase
-        The cells.
-    table : pyarrow.Table
-        The columns of `Identifiability.table`, a row a cell.
-    facts : dict
-        What `identifiability_facts` gave.
-    path : str or Path
-        The file that they were read from, to be named in errors.
-
-    Returns
-    -------
-    Identifiability
-        What is known of the cells.
-
-    Raises
-    ------
-    DatabaseError
-        If they are damaged, or belong to other signatures.
+    `path`, which they were read from, is named in errors. Raises DatabaseError if they are damaged,
+    or belong to other signatures or another version of the format.
     """
     try:
         noise = noise_from_dict(facts["noise"])

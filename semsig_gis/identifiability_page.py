@@ -26,41 +26,9 @@ def identifiability_page(
     name: str,
     object_counts: Mapping[int, int] | None = None,
 ) -> Report:
-    """Put together what is known of a city's cells, and whether it comes true.
+    """Put together what is known of a city's cells, and whether fresh queries bear it out.
 
-    Parameters
-    ----------
-    told : Identifiability
-        What is known of its cells.
-    check : IdentifiabilityCheck
-        What fresh queries say to that.
-    name : str
-        What the database is called.
-    object_counts : mapping of int to int, optional
-        How many objects of each class code there are, where they are at hand.
-
-    Returns
-    -------
-    Report
-        For `semsig_gis.report_files.write_report`.
-
-    Examples
-    --------
-    >>> from semsig_gis.catalog import paper_taxonomy
-    >>> from semsig_gis.building import build_database
-    >>> from semsig_gis.identifiability_check import check_identifiability
-    >>> from semsig_gis.identifying import identify
-    >>> from semsig_gis.likelihood import build_index
-    >>> from semsig_gis.noise import named_noise
-    >>> from semsig_gis.objects import build_objects
-    >>> from semsig_gis.sources.synthetic import CitySpec, synthetic_city
-    >>> layers = synthetic_city(CitySpec(size=200.0))
-    >>> objects, _ = build_objects(layers, taxonomy=paper_taxonomy(), crs="EPSG:32631")
-    >>> index = build_index(build_database(objects), named_noise("light"))
-    >>> told = identify(index, trials=20, class_trials=5)
-    >>> page = identifiability_page(told, check_identifiability(told, index, queries=9), name="A")
-    >>> [section.name for section in page.sections]
-    ['cells', 'classes', 'calibration', 'ranks']
+    ``name`` is what the database is called; ``object_counts`` is by class code.
     """
     facts = told.summary(object_counts=object_counts)
     return Report(

@@ -26,36 +26,9 @@ __all__ = ["check_tables", "identifiability_tables"]
 def identifiability_tables(
     told: Identifiability, *, object_counts: Mapping[int, int] | None = None
 ) -> tuple[Table, ...]:
-    """Return what there is to say of a city as tables.
+    """Return the mean cell with the bands of cells, and what each class adds, as tables.
 
-    Parameters
-    ----------
-    told : Identifiability
-        What is known of its cells.
-    object_counts : mapping of int to int, optional
-        How many objects of each class code there are, where they are at hand.
-
-    Returns
-    -------
-    tuple of Table
-        The mean cell and the bands of cells; what each class adds.
-
-    Examples
-    --------
-    >>> from semsig_gis.catalog import paper_taxonomy
-    >>> from semsig_gis.building import build_database
-    >>> from semsig_gis.identifying import identify
-    >>> from semsig_gis.likelihood import build_index
-    >>> from semsig_gis.noise import named_noise
-    >>> from semsig_gis.objects import build_objects
-    >>> from semsig_gis.sources.synthetic import CitySpec, synthetic_city
-    >>> layers = synthetic_city(CitySpec(size=200.0))
-    >>> objects, _ = build_objects(layers, taxonomy=paper_taxonomy(), crs="EPSG:32631")
-    >>> index = build_index(build_database(objects), named_noise("light"))
-    >>> for table in identifiability_tables(identify(index, trials=20, class_trials=5)):
-    ...     print(table.title)
-    Identifiability, light noise
-    What each class adds
+    ``object_counts`` is by class code; without it the columns about objects are left out.
     """
     facts = told.summary(object_counts=object_counts)
     within = f"within {facts['radius_m']:g} m"
@@ -110,31 +83,7 @@ def identifiability_tables(
 
 
 def check_tables(check: IdentifiabilityCheck) -> tuple[Table, ...]:
-    """Return what came of a check as tables.
-
-    Parameters
-    ----------
-    check : IdentifiabilityCheck
-        What was told beside what came of queries.
-
-    Returns
-    -------
-    tuple of Table
-        The calibration; the rank correlations.
-
-    Examples
-    --------
-    >>> from semsig_gis.identifiability_check import ChanceBin, IdentifiabilityCheck
-    >>> tenth = ChanceBin(
-    ...     low=0.9, high=1.0, queries=50, stated=0.95, true=0.96, true_low=0.86, true_high=0.99
-    ... )
-    >>> check = IdentifiabilityCheck(
-    ...     queries=50, seed=1, found=0.96, correlations={"found": 0.5}, attainable=0.6,
-    ...     bins=(tenth,),
-    ... )
-    >>> check_tables(check)[0].rows[0]
-    ('0.9 to 1', '50', '95.0 %', '96.0 %', '86.0 % to 99.0 %')
-    """
+    """Return the calibration and the rank correlations of a check as tables."""
     calibration = Table(
         title="Do the chances come true?",
         columns=("Chance to be found", "Queries", "Stated", "Found", "Interval (95 %)"),

@@ -48,26 +48,9 @@ def wilson_interval(share: float, trials: float, *, percent: float = 95.0) -> tu
 
 
 def poisson_interval(rate: float, trials: float, *, percent: float = 95.0) -> tuple[float, float]:
-    """Return the score interval for a Poisson rate.
+    """Return the score interval for a Poisson rate, in events a trial.
 
-    Parameters
-    ----------
-    rate : float
-        Events a trial, 0 or more.
-    trials : float
-        Number of trials, 0 or more, not necessarily whole.
-    percent : float, default 95
-        How often the interval shall hold the true rate.
-
-    Returns
-    -------
-    low, high : float
-        The interval; up to infinity where there was no trial.
-
-    Examples
-    --------
-    >>> [round(end, 3) for end in poisson_interval(2.0, 100)]
-    [1.741, 2.297]
+    The number of trials need not be whole; without any, the interval goes up to infinity.
     """
     z = _deviations(percent)
     if trials <= 0:
@@ -78,57 +61,19 @@ def poisson_interval(rate: float, trials: float, *, percent: float = 95.0) -> tu
 
 
 def log_interval(value: float, deviation: float, *, percent: float = 95.0) -> tuple[float, float]:
-    """Return an interval that is even in the logarithm.
+    """Return an interval around a value above 0 that is even in the logarithm.
 
-    Parameters
-    ----------
-    value : float
-        Above 0.
-    deviation : float
-        Standard deviation of its logarithm.
-    percent : float, default 95
-        How often the interval shall hold the true value.
-
-    Returns
-    -------
-    low, high : float
-        The interval.
-
-    Examples
-    --------
-    >>> [round(end, 3) for end in log_interval(5.0, 0.1)]
-    [4.11, 6.083]
+    `deviation` is the standard deviation of the natural logarithm.
     """
     factor = math.exp(min(_deviations(percent) * deviation, 700.0))
     return value / factor, value * factor
 
 
 def quantile_ranks(size: int, share: float, *, percent: float = 95.0) -> tuple[int, int]:
-    """Return between which values of an ordered sample a quantile lies.
+    """Return the ranks, from 1, of the ordered values between which a quantile lies.
 
-    Parameters
-    ----------
-    size : int
-        How many values there are, at least 1.
-    share : float
-        Share of all values that are below the quantile, above 0 and below 1.
-    percent : float, default 95
-        How often the interval shall hold the true quantile.
-
-    Returns
-    -------
-    low, high : int
-        Ranks from 1; the least and the largest where the sample is too small to say more.
-
-    Notes
-    -----
-    Whatever the distribution, the number of values below the quantile is binomial; here it is
-    taken as normal.
-
-    Examples
-    --------
-    >>> quantile_ranks(100, 0.5)
-    (40, 61)
+    They are the least and the largest where the sample is too small to say more. Whatever the
+    distribution, the number of values below the quantile is binomial; here it is taken as normal.
     """
     half = _deviations(percent) * math.sqrt(size * share * (1.0 - share))
     low = math.floor(size * share - half)
@@ -137,27 +82,7 @@ def quantile_ranks(size: int, share: float, *, percent: float = 95.0) -> tuple[i
 
 
 def binomial_tail(hits: int, trials: int, chance: float) -> float:
-    """Return the chance of so many hits or fewer.
-
-    Parameters
-    ----------
-    hits : int
-        0 to `trials`.
-    trials : int
-        Number of trials.
-    chance : float
-        Chance of a hit in each, above 0 and below 1.
-
-    Returns
-    -------
-    float
-        Distribution function of the binomial distribution.
-
-    Examples
-    --------
-    >>> round(binomial_tail(1, 3, 0.5), 6)
-    0.5
-    """
+    """Return the chance of so many hits or fewer; that of one hit is above 0 and below 1."""
     parts = (
         math.exp(
             math.lgamma(trials + 1)

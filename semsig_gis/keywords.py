@@ -30,21 +30,9 @@ WHOLE_WORD_LETTERS = 3
 
 @dataclass(frozen=True, slots=True)
 class Found:
-    """A keyword that was found.
+    """A class or role whose keyword was found, and the words of the text in which it was.
 
-    Parameters
-    ----------
-    name : str
-        Class or role that it stands for.
-    words : str
-        The words of the text in which it was found.
-    letters : int
-        Letters of the keyword: the more, the surer.
-
-    Examples
-    --------
-    >>> Found("bench", "bancs", 4).name
-    'bench'
+    `letters` is the length of the keyword: the longer, the surer.
     """
 
     name: str
@@ -55,22 +43,7 @@ class Found:
 def words_of(text: str) -> tuple[str, ...]:
     """Return the words of a name without capitals, accents and articles.
 
-    Parameters
-    ----------
-    text : str
-        Name of a file, layer or field, or a value.
-
-    Returns
-    -------
-    tuple of str
-        The words.
-
-    Examples
-    --------
-    >>> words_of("Les_ArbresAlignés (2011)")
-    ('arbres', 'alignes', '2011')
-    >>> words_of("Arrêts de bus"), words_of("WCPublic")
-    (('arrets', 'bus'), ('wc', 'public'))
+    Words also end where a capital follows (``WCPublic``) and between letters and digits.
     """
     letters = unicodedata.normalize("NFKD", text)
     plain = "".join(letter for letter in letters if not unicodedata.combining(letter))
@@ -83,48 +56,20 @@ def words_of(text: str) -> tuple[str, ...]:
 class Keywords:
     """Keywords of classes, roles or kinds of field.
 
-    Parameters
-    ----------
-    phrases : tuple of (str, tuple of str)
-        Name, and the words that stand for it one after the other.
-
-    Examples
-    --------
-    >>> Keywords.of([("bus_stop", "bus stop"), ("bus_stop", "Haltestelle")]).find("BusStops_2024")
-    (Found(name='bus_stop', words='bus stops', letters=7),)
+    Each phrase is a name and the words that stand for it, one after the other.
     """
 
     phrases: tuple[tuple[str, tuple[str, ...]], ...]
 
     @classmethod
     def of(cls, pairs: Iterable[tuple[str, str]]) -> Keywords:
-        """Return keywords from pairs of a name and a phrase.
-
-        Parameters
-        ----------
-        pairs : iterable of (str, str)
-            Name and phrase.
-
-        Returns
-        -------
-        Keywords
-            The keywords, each once.
-        """
+        """Return the keywords of pairs of a name and a phrase, each once."""
         return cls(tuple(dict.fromkeys((name, words_of(phrase)) for name, phrase in pairs)))
 
     def find(self, text: str) -> tuple[Found, ...]:
-        """Find the keywords in a text.
+        """Find the keywords in a text, the longest first and each name once.
 
-        Parameters
-        ----------
-        text : str
-            Name of a file, layer or field, or a value.
-
-        Returns
-        -------
-        tuple of Found
-            What was found, the longest keyword first and each name once; words that are part of
-            those of a longer keyword do not count.
+        Words that are part of those of a longer keyword do not count.
         """
         words = words_of(text)
         found: list[tuple[int, int, Found]] = []
@@ -165,21 +110,9 @@ def _begins(word: str, keyword: str) -> bool:
 def keywords(kind: str) -> Keywords:
     """Return the shipped keywords of a kind.
 
-    Parameters
-    ----------
-    kind : {"classes", "class_fields", "roles", "fields"}
-        What they tell: the class of a layer or value by what it is called, the class of a layer
-        by a field of it, the role of a layer that holds no objects, or what a field is for.
-
-    Returns
-    -------
-    Keywords
-        The keywords.
-
-    Examples
-    --------
-    >>> [found.name for found in keywords("classes").find("Straßenbäume")]
-    ['alignment_tree']
+    The kinds are ``"classes"`` (what a class is called), ``"class_fields"`` (fields that tell the
+    class of a layer), ``"roles"`` (what layers without objects are called) and ``"fields"`` (what a
+    field is for).
     """
     text = (data_folder() / "keywords.toml").read_text(encoding="utf-8")
     content = tomllib.loads(text)

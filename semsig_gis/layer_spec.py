@@ -33,18 +33,7 @@ MAX_WIDTH_M = 200.0
 class ClassBy:
     """A field whose value decides the class of a row.
 
-    Parameters
-    ----------
-    field : str
-        Name of the field.
-    classes : tuple of (value, str)
-        Value of the field and the class name it stands for; a row with another value keeps the
-        class of its layer.
-
-    Examples
-    --------
-    >>> ClassBy("kind", (("Taxi", "taxi_station"),)).field
-    'kind'
+    A row with a value that is not among `classes` keeps the class of its layer.
     """
 
     field: str
@@ -55,19 +44,7 @@ class ClassBy:
 class WidthBy:
     """A field that says of which class a street is, and how wide the streets of a class are.
 
-    Parameters
-    ----------
-    field : str
-        Name of the field.
-    widths : tuple of (value, float)
-        Value of the field, and the width of such a street in metres.
-    default : float, optional
-        Width of streets of other values; None where nobody knows.
-
-    Examples
-    --------
-    >>> WidthBy("highway", (("primary", 24.0), ("residential", 12.0))).default is None
-    True
+    Widths are in metres; `default` is for other values, None where nobody knows.
     """
 
     field: str

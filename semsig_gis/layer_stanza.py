@@ -76,38 +76,10 @@ PLAIN_KEYS = (
 def layer_of(
     item: object, where: str, *, taxonomy: Taxonomy, shared: Mapping[str, Any]
 ) -> LayerSpec:
-    """Return what a ``[[layers]]`` table says.
+    """Return the checked layer of a ``[[layers]]`` table; CatalogError says what is wrong in it.
 
-    Parameters
-    ----------
-    item : object
-        The table.
-    where : str
-        Catalogue, for messages.
-    taxonomy : Taxonomy
-        The classes that there are.
-    shared : mapping
-        What holds for layers that do not say otherwise: ``files``, ``reader``, ``license``,
-        ``attribution``.
-
-    Returns
-    -------
-    LayerSpec
-        The layer, checked.
-
-    Raises
-    ------
-    CatalogError
-        If a key means nothing, one that is needed is missing, or a value makes no sense.
-
-    Examples
-    --------
-    >>> from semsig_gis.taxonomy import ObjectClass, Taxonomy
-    >>> known = Taxonomy((ObjectClass(10, "L", "bench", "Bench"),))
-    >>> shared = {"files": (), "reader": "vector_file", "license": "CC0", "attribution": "Town"}
-    >>> item = {"name": "benches", "class": "bench", "files": ["benches.shp"]}
-    >>> layer_of(item, "town.toml", taxonomy=known, shared=shared).license
-    'CC0'
+    `shared` holds for layers that do not say otherwise: ``files``, ``reader``, ``license`` and
+    ``attribution``.
     """
     if not isinstance(item, dict):
         msg = f"{where} has the layer {item!r}; write a [[layers]] table."
@@ -179,27 +151,7 @@ def _tags(item: object, where: str) -> tuple[tuple[str, tuple[str, ...]], ...]:
 
 
 def require_class(name: str, taxonomy: Taxonomy, where: str) -> None:
-    """Refuse a class that does not exist.
-
-    Parameters
-    ----------
-    name : str
-        Name of a class.
-    taxonomy : Taxonomy
-        The classes that there are.
-    where : str
-        Catalogue and table, for messages.
-
-    Raises
-    ------
-    CatalogError
-        With the nearest name.
-
-    Examples
-    --------
-    >>> from semsig_gis.taxonomy import ObjectClass, Taxonomy
-    >>> require_class("bench", Taxonomy((ObjectClass(10, "L", "bench", "Bench"),)), "town.toml")
-    """
+    """Refuse a class that does not exist, with a CatalogError that offers the nearest name."""
     try:
         taxonomy.by_name(name)
     except UnknownNameError as error:

@@ -52,35 +52,15 @@ SETTLED = 1e-4  # largest change of a log-odds or logarithm
 class NoiseEstimate:
     """A noise model that was learnt, and how well it is known.
 
-    Parameters
-    ----------
-    spec : NoiseSpec
-        The model, ready to be saved and used.
-    rates : DataFrame
-        One row for each quantity (``detection``, ``misnamed``, ``clutter`` in false objects a
-        signature, ``bearing_sigma`` in degrees) and each class, and ``"all"`` together:
-        ``value`` as in the model; ``own``, what the samples of the class alone say, and its
-        intervals ``low_90``, ``high_90``, ``low_95``, ``high_95``; ``samples``, how many (objects,
-        detected objects, signatures, detected objects) it rests on.
-    confusion : DataFrame
-        Expected number of detected objects by true class (rows) and given class (columns).
-    samples, objects, detections : int
-        What it was learnt from.
-    skipped : int
-        Samples that were left out, as nothing is in sight of their place.
-    rounds : int
-        Rounds until it settled.
-    log_likelihood : float
-        Of all detections under the model.
+    `rates` has one row for each quantity (``detection``, ``misnamed``, ``clutter`` in false objects
+    per signature, ``bearing_sigma`` in degrees) and each class, and ``"all"`` together: ``value``
+    as in the model; ``own``, what the samples of the class alone say, with its intervals
+    ``low_90``, ``high_90``, ``low_95``, ``high_95``; and ``samples``, how many objects, detected
+    objects, signatures or detected objects it rests on.
 
-    Examples
-    --------
-    >>> table = pd.DataFrame({"quantity": ["clutter"], "class": ["all"], "value": [1.0]})
-    >>> NoiseEstimate(
-    ...     spec=NoiseSpec(), rates=table, confusion=pd.DataFrame(), samples=1, objects=2,
-    ...     detections=3, skipped=0, rounds=4, log_likelihood=-5.0,
-    ... ).to_dict()["rates"]
-    [{'quantity': 'clutter', 'class': 'all', 'value': 1.0}]
+    `confusion` holds the expected number of detected objects by true class (rows) and given class
+    (columns). `skipped` samples were left out, as nothing is in sight of their place. `rounds` says
+    how many it took to settle, and `log_likelihood` is of all detections under the model.
     """
 
     spec: NoiseSpec
@@ -94,13 +74,7 @@ class NoiseEstimate:
     log_likelihood: float
 
     def to_dict(self) -> dict[str, Any]:
-        """Return everything as plain values, ready for JSON.
-
-        Returns
-        -------
-        dict
-            The fields; ``confusion`` by true class and given class.
-        """
+        """Return plain values for JSON; ``confusion`` is by true class, then given class."""
         return {
             "spec": self.spec.to_dict(),
             "rates": self.rates.to_dict("records"),

@@ -57,15 +57,10 @@ LEAST_MASS = 1e-6  # below which a turn adds nothing to the sum
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class CellScores:
-    """The log-likelihood of a query in every cell.
+    """The log-likelihood (natural logarithm) of a query in every cell, and the likeliest headings.
 
-    Parameters
-    ----------
-    loglik : ndarray of float32 or float64, shape (n,)
-        Natural logarithm of the likelihood; higher is better.
-    heading : ndarray of float32, shape (n,), or None
-        Degrees, clockwise, in [-180, 180), to add to the bearings of the query where it was seen
-        from each cell; None where north was known or the query has no bearings.
+    `heading` is in degrees clockwise, in [-180, 180), to add to the bearings of the query; None if
+    north was known or the query has no bearings.
     """
 
     loglik: NDArray[np.floating]
@@ -324,28 +319,7 @@ def index_of_columns(
     step: float,
     fingerprint: str,
 ) -> LikelihoodIndex:
-    """Return the index whose columns are there already.
-
-    Parameters
-    ----------
-    database : SignatureDatabase
-        The cells.
-    noise : NoiseSpec or NoiseMixture
-        The noise model.
-    columns : ndarray of uint8, shape `index_shape`
-        The columns.
-    constants : ndarray of float32, shape (n,)
-        What each cell adds to any query.
-    step : float
-        Size of a step of the columns.
-    fingerprint : str
-        `index_fingerprint` of the database and the noise model.
-
-    Returns
-    -------
-    LikelihoodIndex
-        The index.
-    """
+    """Return the index whose columns and constants are there already, such as those of a file."""
     tables, weights = database_tables(database, noise)
     return LikelihoodIndex(
         database=database,
@@ -360,20 +334,7 @@ def index_of_columns(
 
 
 def index_fingerprint(database: SignatureDatabase, noise: Noise) -> str:
-    """Return a text that changes with the database, the noise model and the kind of index.
-
-    Parameters
-    ----------
-    database : SignatureDatabase
-        The cells.
-    noise : NoiseSpec or NoiseMixture
-        The noise model.
-
-    Returns
-    -------
-    str
-        32 hexadecimal digits.
-    """
+    """Return 32 hexadecimal digits that change with the database, the noise model and `VERSION`."""
     said = json.dumps([VERSION, noise.to_dict(), database.taxonomy.to_list(), database.reach])
     digest = hashlib.blake2b(said.encode(), digest_size=16)
     for array in (

@@ -36,25 +36,9 @@ HEADER_PAGES = 4
 
 
 def index_path(database_path: str | Path, noise: Noise) -> Path:
-    """Return where the index of a database file is kept.
+    """Return the path of an index, next to its database; each noise model has its own.
 
-    Parameters
-    ----------
-    database_path : str or Path
-        The database file.
-    noise : NoiseSpec or NoiseMixture
-        The noise model; each has an index of its own.
-
-    Returns
-    -------
-    Path
-        A name beside the database that begins with its name.
-
-    Examples
-    --------
-    >>> from semsig_gis.noise import named_noise
-    >>> index_path("maps/city.parquet", named_noise("generic")).as_posix()
-    'maps/city.parquet.generic-8d47.likelihood'
+    For ``city.parquet`` and generic noise that is ``city.parquet.generic-8d47.likelihood``.
     """
     said = json.dumps(noise.to_dict(), sort_keys=True)
     plain = "".join(letter if letter.isalnum() else "_" for letter in noise.name)
@@ -146,25 +130,9 @@ def save_index(
     progress: Callable[[int, int], None] | None = None,
     threads: int = 1,
 ) -> None:
-    """Build an index straight into its file.
+    """Build an index straight into its file, which appears whole, by rename.
 
-    Parameters
-    ----------
-    database : SignatureDatabase
-        The cells.
-    noise : NoiseSpec or NoiseMixture
-        The noise model.
-    path : str or Path
-        File to write; it appears whole, by rename.
-    progress : callable, optional
-        Called with the number of cells done and in all.
-    threads : int, default 1
-        How many blocks of cells are worked out at once.
-
-    Raises
-    ------
-    InputError
-        If the file is a database, which the index would replace, or it cannot be written.
+    Raises `InputError` if the file is a database, which the index would replace, or not writable.
     """
     _keep_database(path, noise)
     shape = index_shape(database)
@@ -196,28 +164,10 @@ def open_index(
     *,
     fingerprint: str | None = None,
 ) -> LikelihoodIndex:
-    """Open a file that `save_index` wrote.
+    """Map a file that `save_index` wrote; its columns are read when a query needs them.
 
-    Parameters
-    ----------
-    database : SignatureDatabase
-        The cells it was built from.
-    noise : NoiseSpec or NoiseMixture
-        The noise model it was built for.
-    path : str or Path
-        File to map.
-    fingerprint : str, optional
-        That of the database and the noise model, where it is known already.
-
-    Returns
-    -------
-    LikelihoodIndex
-        The index; its columns are read when a query needs them.
-
-    Raises
-    ------
-    DatabaseError
-        If the file is missing or damaged, or belongs to another database, noise model or version.
+    Raises `DatabaseError` if the file is missing or damaged, or belongs to another database, noise
+    model or version. Give the fingerprint of the database and the noise model if it is known.
     """
     wanted = fingerprint or index_fingerprint(database, noise)
     shape = index_shape(database)

@@ -21,23 +21,7 @@ __all__ = ["CompassBias", "FieldOfView", "MissingClasses"]
 class CompassBias:
     """A compass that is off by the same angle for all objects of a query.
 
-    Parameters
-    ----------
-    sigma : float, default 10.0
-        Standard deviation of that angle in degrees; 0 or more.
-
-    Raises
-    ------
-    InputError
-        If it is out of range.
-
-    Examples
-    --------
-    >>> CompassBias(sigma=-1.0)
-    Traceback (most recent call last):
-    ...
-    semsig_gis.errors.InputError: a compass that is off by -1.0 degrees was given; give a standard
-    deviation, 0 or more.
+    The angle is normal, with a standard deviation of `sigma` degrees, 0 or more.
     """
 
     sigma: float = 10.0
@@ -51,18 +35,7 @@ class CompassBias:
             raise InputError(msg)
 
     def ready(self, city: CitySights) -> Spoiling:  # noqa: ARG002 - all distortions take it
-        """Return what is done to a query.
-
-        Parameters
-        ----------
-        city : CitySights
-            What there is to see in the city.
-
-        Returns
-        -------
-        callable
-            From what is seen and a generator to what seems to be seen.
-        """
+        """Return the function that distorts a query."""
         return lambda sight, rng: sight.turned(float(rng.normal(0.0, self.sigma)))
 
 
@@ -70,49 +43,16 @@ class CompassBias:
 class MissingClasses:
     """A detector that does not know some classes of the city.
 
-    Parameters
-    ----------
-    classes : tuple of str, default ()
-        Their names.
-    others : bool, default False
-        Whether the classes are those that it knows, and all others are missing.
-
-    Examples
-    --------
-    >>> from semsig_gis.catalog import paper_taxonomy
-    >>> from semsig_gis.sight import CitySights
-    >>> city = CitySights(
-    ...     taxonomy=paper_taxonomy(), codes=np.array([3], np.uint8),
-    ...     frequencies=np.array([9]), reach=30.0,
-    ... )
-    >>> MissingClasses(classes=("benc",)).ready(city)
-    Traceback (most recent call last):
-    ...
-    semsig_gis.errors.UnknownNameError: class 'benc' is unknown; the nearest is 'bench';
-    the classes are alignment_tree, water_fountain, street_light, indicator, traffic_light,
-    bike_station, automatic_wc, car_station, taxi_station, bench, bus_stop.
+    With `others`, the named classes are the ones it knows, and all others are missing.
     """
 
     classes: tuple[str, ...] = ()
     others: bool = False
 
     def ready(self, city: CitySights) -> Spoiling:
-        """Return what is done to a query.
+        """Return the function that distorts a query.
 
-        Parameters
-        ----------
-        city : CitySights
-            Its taxonomy has the classes.
-
-        Returns
-        -------
-        callable
-            From what is seen and a generator to what seems to be seen.
-
-        Raises
-        ------
-        UnknownNameError
-            If the city has no class of a name.
+        Raises UnknownNameError if the taxonomy of the city has no class of a name.
         """
         named = [city.taxonomy.by_name(name).code for name in self.classes]
 
@@ -124,29 +64,10 @@ class MissingClasses:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FieldOfView:
-    """A camera that looks in one direction, any with equal chance, not all round.
+    """A camera that looks in one direction, drawn at random, and sees part of the turn.
 
-    Parameters
-    ----------
-    degrees : float, default 90.0
-        How much of the turn it sees, above 0 and at most 360.
-
-    Raises
-    ------
-    InputError
-        If it is out of range.
-
-    Notes
-    -----
-    The bearings are still counted from north; nothing tells which part of the turn was looked at.
-
-    Examples
-    --------
-    >>> FieldOfView(degrees=400.0)
-    Traceback (most recent call last):
-    ...
-    semsig_gis.errors.InputError: a view of 400.0 degrees was given; give degrees above 0, at most
-    360.
+    It sees `degrees`, above 0 and at most 360. Bearings are still counted from north; nothing tells
+    which part of the turn was looked at.
     """
 
     degrees: float = 90.0
@@ -159,18 +80,7 @@ class FieldOfView:
             raise InputError(msg)
 
     def ready(self, city: CitySights) -> Spoiling:  # noqa: ARG002 - all distortions take it
-        """Return what is done to a query.
-
-        Parameters
-        ----------
-        city : CitySights
-            What there is to see in the city.
-
-        Returns
-        -------
-        callable
-            From what is seen and a generator to what seems to be seen.
-        """
+        """Return the function that distorts a query."""
 
         def spoil(sight: Sight, rng: np.random.Generator) -> Sight:
             aside = angular_distance(sight.bearings, rng.uniform(0.0, FULL_TURN))

@@ -158,32 +158,9 @@ def read_files(
 
 
 def metric_crs_of(layers: Iterable[RawLayer]) -> tuple[CRS, tuple[str, ...]]:
-    """Return the UTM zone in which layers lie.
+    """Return the UTM zone of the middle of all features, and a note if they span more than one.
 
-    Parameters
-    ----------
-    layers : iterable of RawLayer
-        Layers, each with a CRS.
-
-    Returns
-    -------
-    crs : pyproj.CRS
-        The zone of the middle of all features.
-    notes : tuple of str
-        A remark where the features lie in more than one zone.
-
-    Raises
-    ------
-    EmptyResultError
-        If no layer has a feature with a position.
-    CrsError
-        If a layer has no CRS.
-
-    Examples
-    --------
-    >>> from semsig_gis.sources.synthetic import CitySpec, synthetic_city
-    >>> metric_crs_of(synthetic_city(CitySpec(size=300.0)))[0].name
-    'WGS 84 / UTM zone 31N'
+    Raise CrsError if a layer has no CRS, and EmptyResultError if no feature has a position.
     """
     boxes = []
     for layer in layers:

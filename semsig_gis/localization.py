@@ -104,26 +104,10 @@ class Localization:
 
 
 class Shortlist:
-    """The best cells of a search, gathered from one part of a database after the other.
+    """The best `top` cells of a search, gathered from one part of a database after the other.
 
-    Parameters
-    ----------
-    top : int
-        How many cells to list, at least 1.
-
-    Attributes
-    ----------
-    listed : DataFrame
-        The best cells so far, best first, equal distances in the order of columns and rows.
-    present : set of int
-        Class codes that some cell sees.
-    cells : int
-        How many cells were looked at.
-
-    Examples
-    --------
-    >>> Shortlist(10).cells
-    0
+    `listed` holds them best first, equal distances in the order of columns and rows; `present` the
+    class codes that some cell sees; `cells` how many cells were looked at.
     """
 
     def __init__(self, top: int) -> None:
@@ -135,15 +119,7 @@ class Shortlist:
         self._sizes: Counter[float] = Counter()
 
     def add(self, database: SignatureDatabase, scores: NDArray[np.float32]) -> None:
-        """Take the best cells of a part.
-
-        Parameters
-        ----------
-        database : SignatureDatabase
-            The part.
-        scores : ndarray of float32, shape (n,)
-            Distance of each of its cells, lower is better.
-        """
+        """Take the best cells of a part, given the distances of all its cells."""
         better, level = top_candidates(scores, min(self._top, len(scores)))
         better = better[np.argsort(scores[better], kind="stable")]
         cells = np.concatenate([better, level])
@@ -170,15 +146,7 @@ class Shortlist:
         self.cells += len(database)
 
     def ranked(self) -> tuple[pd.DataFrame, int]:
-        """Return the listed cells with their ranks.
-
-        Returns
-        -------
-        candidates : DataFrame
-            See `Localization`.
-        tied_beyond : int
-            How many cells are as good as the last one but are not listed.
-        """
+        """Return the candidates and the number of ties beyond them, as in `Localization`."""
         values = np.array(sorted(self._sizes))
         sizes = np.array([self._sizes[value] for value in values.tolist()])
         place = np.searchsorted(values, self.listed["distance"].to_numpy())

@@ -37,21 +37,14 @@ SAMPLE = 16_384
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Lookalikes:
-    """How like other cells are to some cells.
+    """How like other cells are to each of c cells.
 
-    Parameters
-    ----------
-    near : ndarray of float64, shape (c,)
-        Sum, over the cells in the circle around each cell, of the likelihood of its signature
-        there over that in the cell itself, to the power of the temperature. The cell itself
-        counts 1.
-    far : ndarray of float64, shape (c,)
-        The same of all other cells.
-    cells : ndarray of int64, shape (c, k)
-        The likest cells outside the circle, one a place, their circles apart from each other;
-        by falling sum. -1 where there are no more.
-    sums : ndarray of float64, shape (c, k)
-        The sum over the circle of each, but for cells near the first one.
+    `near` (c,) is the sum, over the cells in the circle around each cell, of the likelihood of its
+    signature there over that in the cell itself, to the power of the temperature; the cell itself
+    counts 1. `far` (c,) is the same for all other cells. `cells` (c, k) are row numbers of the
+    likest cells outside the circle whose own circles do not overlap, by falling sum, -1 where there
+    are no more; `sums` (c, k) is the sum over the circle of each, without what is also in the
+    circle of the compared cell.
     """
 
     near: NDArray[np.float64]
@@ -61,24 +54,10 @@ class Lookalikes:
 
 
 def cell_circle(radius: float, step: float) -> NDArray[np.int64]:
-    """Return which cells are near a cell, as differences of cell numbers.
+    """Return which cells are within a radius (metres) of a cell, shape (a, 2).
 
-    Parameters
-    ----------
-    radius : float
-        Metres between viewpoints.
-    step : float
-        Side of a cell in metres.
-
-    Returns
-    -------
-    ndarray of int64, shape (a, 2)
-        Of each column of cells, the first and the last number less that of the cell.
-
-    Examples
-    --------
-    >>> cell_circle(10.0, 10.0).tolist()
-    [[-100000000, -100000000], [-1, 1], [100000000, 100000000]]
+    For each column of cells, the first and the last cell number less that of the cell. `step` is
+    the side of a cell in metres.
     """
     reach = radius / step + 1e-9
     across = np.arange(-math.floor(reach), math.floor(reach) + 1)
@@ -87,17 +66,9 @@ def cell_circle(radius: float, step: float) -> NDArray[np.int64]:
 
 
 def city_extent(database: SignatureDatabase) -> float:
-    """Return a distance within which all cells are from each other.
+    """Return a distance in metres within which all cells are from each other.
 
-    Parameters
-    ----------
-    database : SignatureDatabase
-        The cells.
-
-    Returns
-    -------
-    float
-        Metres: a larger radius finds nothing more, but takes longer.
+    A larger radius finds nothing more, but takes longer.
     """
     sides = np.ptp(database.columns), np.ptp(database.rows)
     return database.grid.step * math.ceil(math.hypot(*sides))
@@ -115,54 +86,12 @@ def find_lookalikes(
 ) -> Lookalikes:
     """Compare cells with all others.
 
-    Parameters
-    ----------
-    index : LikelihoodIndex
-        The cells and the noise model.
-    temperature : float
-        Power of the ratios of likelihoods, above 0: 1 for a query that is just the signature of
-        the cell, less for one that is spoiled.
-    radius : float, default 50
-        Metres that count as near, 0 or more.
-    cells : ndarray of int, shape (c,), optional
-        Row numbers of the cells to compare; all by default.
-    places : int, default 3
-        How many places to name for each cell.
-    threads : int, default 1
-        How many cells are worked on at once.
-    progress : callable, optional
-        Called with the number of cells done and in all.
-
-    Returns
-    -------
-    Lookalikes
-        Sums and places.
-
-    Raises
-    ------
-    InputError
-        If the temperature or the radius is out of range.
-
-    Notes
-    -----
-    Each cell is a query of the index, so that the time grows with the square of the number of
-    cells. A ratio beyond 2 to the power of 100, or below its inverse, counts as that.
-
-    Examples
-    --------
-    >>> from semsig_gis.catalog import paper_taxonomy
-    >>> from semsig_gis.building import build_database
-    >>> from semsig_gis.likelihood import build_index
-    >>> from semsig_gis.noise import named_noise
-    >>> from semsig_gis.objects import build_objects
-    >>> from semsig_gis.sources.synthetic import CitySpec, synthetic_city
-    >>> layers = synthetic_city(CitySpec(size=300.0))
-    >>> objects, _ = build_objects(layers, taxonomy=paper_taxonomy(), crs="EPSG:32631")
-    >>> database = build_database(objects)
-    >>> index = build_index(database, named_noise("light"))
-    >>> found = find_lookalikes(index, temperature=0.4)
-    >>> bool((found.near >= 1.0).all()), found.cells.shape == (len(database), 3)
-    (True, True)
+    `cells` are row numbers, all by default; `places` is how many lookalikes to name for each.
+    `temperature` (above 0) is the power of the ratios of likelihoods: 1 for a query that is just
+    the signature of the cell, less for one that is spoiled. `radius` is what counts as near, in
+    metres. The time grows with the square of the number of cells. A ratio beyond 2 to the power of
+    100, or below its inverse, counts as that. Raises InputError if the temperature or the radius is
+    out of range.
     """
     from semsig_gis._lookalike_kernels import compare_cells  # noqa: PLC0415 - numba loads slowly
 
@@ -222,54 +151,11 @@ def compare_without_classes(
 ) -> NDArray[np.float64]:
     """Compare cells with a sample of the others as if a class were not published.
 
-    Parameters
-    ----------
-    index : LikelihoodIndex
-        The cells and the noise model.
-    temperature : float
-        Power of the ratios of likelihoods, above 0.
-    radius : float, default 50
-        Metres that count as near, 0 or more.
-    cells : ndarray of int, shape (c,), optional
-        Row numbers of the cells to compare; all by default.
-    seed : int, default 0
-        Seed of the sample.
-    threads : int, default 1
-        How many cells are worked on at once.
-    progress : callable, optional
-        Called with the number of cells done and in all.
-
-    Returns
-    -------
-    ndarray of float64, shape (c, k)
-        By how much the logarithm of `Lookalikes.far` would rise without each of the classes that
-        occur, in the order of ``index.table.codes``.
-
-    Raises
-    ------
-    InputError
-        If the temperature or the radius is out of range.
-
-    Notes
-    -----
-    The objects of the class and the detections that bear its name are left out; that some of the
-    objects are detected under another name is neglected.
-
-    Examples
-    --------
-    >>> from semsig_gis.catalog import paper_taxonomy
-    >>> from semsig_gis.building import build_database
-    >>> from semsig_gis.likelihood import build_index
-    >>> from semsig_gis.noise import named_noise
-    >>> from semsig_gis.objects import build_objects
-    >>> from semsig_gis.sources.synthetic import CitySpec, synthetic_city
-    >>> layers = synthetic_city(CitySpec(size=300.0))
-    >>> objects, _ = build_objects(layers, taxonomy=paper_taxonomy(), crs="EPSG:32631")
-    >>> database = build_database(objects)
-    >>> index = build_index(database, named_noise("light"))
-    >>> rise = compare_without_classes(index, temperature=0.4)
-    >>> rise.shape == (len(database), len(database.present_codes)), bool(rise.mean() > 0)
-    (True, True)
+    Parameters are as in `find_lookalikes`; `seed` draws the sample of `SAMPLE` cells. The result
+    (c, k) is by how much the natural logarithm of `Lookalikes.far` would rise without each class
+    that occurs, in the order of ``index.table.codes``. The objects of the class and the detections
+    that bear its name are left out; that some of the objects are detected under another name is
+    neglected.
     """
     from semsig_gis._lookalike_kernels import compare_without  # noqa: PLC0415
 

@@ -21,25 +21,10 @@ CHUNK = 1 << 20
 
 @dataclass(frozen=True, slots=True, order=True)
 class Part:
-    """One part file.
+    """One part file, which holds the cells of one tile.
 
-    Parameters
-    ----------
-    tile : tuple of (int, int)
-        Column and row of the tile, a square of so many cells from column 0 and row 0.
-    cells : int
-        Cells in the file.
-    entries : int
-        What they see in all: the sum of the lengths of their signatures.
-    bytes : int
-        Size of the file.
-    sha256 : str
-        Digest of its content.
-
-    Examples
-    --------
-    >>> Part((12, -3), 1, 1, 1, "").file
-    'tile_12_-3.parquet'
+    `tile` is its column and row, counted in tiles from grid column 0 and row 0. `entries` is the
+    sum of the lengths of all signatures; `bytes` and `sha256` are the size and digest of the file.
     """
 
     tile: tuple[int, int]
@@ -56,19 +41,9 @@ class Part:
 
 @dataclass(frozen=True, slots=True)
 class Manifest:
-    """A signature database in parts.
+    """A signature database in parts, ordered by tile.
 
-    Parameters
-    ----------
-    recipe : dict
-        How it was built, as plain JSON values: the specs and the digests of the inputs.
-    parts : tuple of Part
-        The parts, ordered by tile.
-
-    Examples
-    --------
-    >>> Manifest({}, (Part((0, 0), 2, 9, 1, ""), Part((0, 1), 3, 6, 1, ""))).cells
-    5
+    `recipe` says how it was built, as plain JSON values: the specs and the digests of the inputs.
     """
 
     recipe: dict[str, Any]
@@ -90,13 +65,7 @@ class Manifest:
         return sum(part.bytes for part in self.parts)
 
     def write(self, folder: Path) -> None:
-        """Write the manifest into the folder of the parts; it appears whole, by rename.
-
-        Parameters
-        ----------
-        folder : Path
-            The folder.
-        """
+        """Write the manifest into the folder of the parts; it appears whole, by rename."""
         content = {
             "kind": KIND,
             "recipe": self.recipe,
@@ -107,51 +76,14 @@ class Manifest:
 
 
 def part_name(tile: tuple[int, int]) -> str:
-    """Return the name of the part file of a tile.
-
-    Parameters
-    ----------
-    tile : tuple of (int, int)
-        Column and row of the tile.
-
-    Returns
-    -------
-    str
-        The name.
-
-    Examples
-    --------
-    >>> part_name((12, -3))
-    'tile_12_-3.parquet'
-    """
+    """Return the name of the part file of a tile, such as ``tile_12_-3.parquet``."""
     return f"tile_{tile[0]}_{tile[1]}.parquet"
 
 
 def read_manifest(folder: str | Path) -> Manifest:
     """Read what a database in parts consists of.
 
-    Parameters
-    ----------
-    folder : str or Path
-        Folder of the database.
-
-    Returns
-    -------
-    Manifest
-        The manifest.
-
-    Raises
-    ------
-    DatabaseError
-        If the folder has no manifest, or it is damaged.
-
-    Examples
-    --------
-    >>> read_manifest("nowhere")
-    Traceback (most recent call last):
-    ...
-    semsig_gis.errors.DatabaseError: nowhere is not a signature database in parts (it has no \
-_manifest.json); give a folder that `semsig build --tile` wrote.
+    Raise DatabaseError if the folder has no manifest, or it is damaged.
     """
     path = Path(folder) / MANIFEST
     try:
@@ -184,22 +116,9 @@ _manifest.json); give a folder that `semsig build --tile` wrote.
 
 
 def part_files(folder: str | Path) -> tuple[Path, ...]:
-    """Return the part files of a database, after checking that it is whole.
+    """Return the part files of a database, ordered by tile, after checking that it is whole.
 
-    Parameters
-    ----------
-    folder : str or Path
-        Folder of the database.
-
-    Returns
-    -------
-    tuple of Path
-        The files, ordered by tile.
-
-    Raises
-    ------
-    DatabaseError
-        If a part is missing or damaged, or a Parquet file is there that is no part.
+    Raise DatabaseError if a part is missing or damaged, or a Parquet file is there that is no part.
     """
     manifest = read_manifest(folder)
     folder = Path(folder)
@@ -222,18 +141,7 @@ def part_files(folder: str | Path) -> tuple[Path, ...]:
 
 
 def digest(*paths: Path) -> str:
-    """Return the SHA-256 digest of the content of some files, one after the other.
-
-    Parameters
-    ----------
-    *paths : Path
-        The files.
-
-    Returns
-    -------
-    str
-        Hexadecimal digits.
-    """
+    """Return the SHA-256 digest, in hexadecimal, of the content of files one after the other."""
     total = hashlib.sha256()
     for path in paths:
         with path.open("rb") as file:

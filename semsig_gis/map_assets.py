@@ -55,16 +55,8 @@ _SOURCE_MAP = re.compile(r"\n?//# sourceMappingURL=\S*\s*$")
 class Asset:
     """One third-party file that the package carries.
 
-    Attributes
-    ----------
-    name : str
-        File name in the package, for example ``"leaflet.js"``.
-    package, version, license : str
-        Where it comes from; the licence as an SPDX identifier.
-    sha256 : str
-        Sum of the file, in hexadecimal.
-    stands_for : tuple of str
-        File names, at the end of an address in a page, that this file replaces.
+    ``license`` is an SPDX identifier, ``sha256`` is in hexadecimal, and ``stands_for`` holds the
+    file names, at the end of an address in a page, that this file replaces.
     """
 
     name: str
@@ -77,18 +69,7 @@ class Asset:
 
 @functools.cache
 def assets() -> Mapping[str, Asset]:
-    """Return the files of the manifest, brought or not, by name.
-
-    Returns
-    -------
-    mapping of str to Asset
-        In the order of the manifest.
-
-    Examples
-    --------
-    >>> assets()["leaflet.js"].license
-    'BSD-2-Clause'
-    """
+    """Return the files of the manifest by name, in its order, whether brought or not."""
     manifest = tomllib.loads(_folder().joinpath("manifest.toml").read_text(encoding="utf-8"))
     return {
         file["target"]: Asset(
@@ -107,48 +88,17 @@ def assets() -> Mapping[str, Asset]:
 def available() -> bool:
     """Tell whether every file is there, unchanged, so that a map can be self-contained.
 
-    Returns
-    -------
-    bool
-        False when the package was built without ``npm``.
-
-    Examples
-    --------
-    >>> isinstance(available(), bool)
-    True
+    False when the package was built without ``npm``.
     """
     return all(_content(asset) is not None for asset in assets().values())
 
 
 def asset_text(name: str) -> str:
-    """Return a script or style sheet as it may stand inside a page.
+    """Return a script or style sheet as it may stand inside a page, without the element around it.
 
-    Images of a style sheet become data URIs, the address of the source map is dropped, and
-    nothing in the text can close the element that it is put into.
-
-    Parameters
-    ----------
-    name : str
-        A file that replaces a link: one with `Asset.stands_for`.
-
-    Returns
-    -------
-    str
-        JavaScript or CSS, without the surrounding element.
-
-    Raises
-    ------
-    UnknownNameError
-        If there is no such script or style sheet.
-    InputError
-        If the package was built without the file.
-
-    Examples
-    --------
-    >>> asset_text("leaf.css")
-    Traceback (most recent call last):
-    ...
-    semsig_gis.errors.UnknownNameError: 'leaf.css' is not a map file; the nearest is 'leaflet.css'.
+    Images of a style sheet become data URIs, the address of the source map is dropped, and nothing
+    in the text can close the element that it is put into. Raises `InputError` if the package was
+    built without the file.
     """
     known = {asset.name: asset for asset in assets().values() if asset.stands_for}
     if name not in known:
@@ -166,23 +116,9 @@ def asset_text(name: str) -> str:
 
 
 def external_files(page: str) -> tuple[str, ...]:
-    """Return the addresses of the scripts and style sheets that the head of a page loads.
+    """Return the addresses of the scripts and style sheets that the head of a page loads, in order.
 
-    Parameters
-    ----------
-    page : str
-        A whole HTML page.
-
-    Returns
-    -------
-    tuple of str
-        In the order of the page; empty for a self-contained page. Map tiles, which a script
-        asks for later, are not among them.
-
-    Examples
-    --------
-    >>> external_files('<head><script src="https://example.org/a.js"></script></head>')
-    ('https://example.org/a.js',)
+    Map tiles, which a script asks for later, are not among them.
     """
     head, _, _ = page.partition("</head>")
     return tuple(match["script"] or match["link"] for match in _REFERENCE.finditer(head))
@@ -192,28 +128,9 @@ def inline_assets(page: str) -> str:
     """Return a page of folium's with every external script and style sheet put into it.
 
     Those that our maps do not use (Bootstrap, Font Awesome, awesome-markers) are dropped. The
-    result asks for nothing but the tiles of a tile layer, if the map has one.
-
-    Parameters
-    ----------
-    page : str
-        ``map_.get_root().render()``.
-
-    Returns
-    -------
-    str
-        The page; about 250 kB longer.
-
-    Raises
-    ------
-    InputError
-        If the package was built without the files, or the page needs one that is not among
-        them (a plugin, `folium.Icon`, a colour map drawn by branca).
-
-    Examples
-    --------
-    >>> inline_assets('<head><link rel="stylesheet" href="https://a.org/all.min.css"/></head>')
-    '<head></head>'
+    result is about 250 kB longer and asks for nothing but the tiles of a tile layer, if the map has
+    one. Raises `InputError` if the package was built without the files, or the page needs one that
+    is not among them (a plugin, `folium.Icon`, a colour map drawn by branca).
     """
     replacements = {
         file: asset.name for asset in assets().values() for file in asset.stands_for

@@ -21,15 +21,7 @@ _RIGID = re.compile(r",\s*maximum-scale=1\.0,\s*user-scalable=no")
 
 @dataclass(frozen=True, slots=True)
 class MapFrame:
-    """A map as a notebook shows it.
-
-    Parameters
-    ----------
-    page : str
-        The HTML page of the map.
-    height : int
-        Of the frame in which it is shown, in pixels.
-    """
+    """A map as a notebook shows it: its HTML page, in a frame ``height`` pixels high."""
 
     page: str
     height: int
@@ -45,29 +37,9 @@ class MapFrame:
 def page_of_map(map_: folium.Map, *, self_contained: bool | None = None) -> str:
     """Return a map as one HTML page.
 
-    Parameters
-    ----------
-    map_ : folium.Map
-        The map.
-    self_contained : bool, optional
-        True to put Leaflet and all else into the page, False to link them; by default they are
-        put into it where the package carries them and the map needs no others.
-
-    Returns
-    -------
-    str
-        The page.
-
-    Raises
-    ------
-    InputError
-        If a self-contained page was asked for and is not to be had.
-
-    Examples
-    --------
-    >>> import folium
-    >>> page_of_map(folium.Map(tiles=None), self_contained=False).splitlines()[:2]
-    ['<!DOCTYPE html>', '<html lang="en">']
+    By default Leaflet and all else are put into the page where the package carries them and the map
+    needs no others; ``self_contained=False`` links them, and True raises `InputError` where they
+    cannot be put into it.
     """
     page = map_.get_root().render().replace("<html>", '<html lang="en">', 1)
     page = _RIGID.sub("", page, count=1)

@@ -30,20 +30,11 @@ _LATTICE = 64
 class PlaceLattices:
     """The places of a city on a web map, and back, at the crossings of two lattices.
 
-    To project a lattice and interpolate in it is far faster than to project every place, needs no
-    projection where the map is shown, and is exact to a centimetre in a city.
-
-    Parameters
-    ----------
-    metres : ndarray of float64, shape (65, 65, 2)
-        x and y, in the CRS of the database, at the crossings of a lattice over `mercator_box`:
-        rows from south to north, columns from west to east.
-    mercator_box : list of float
-        West, south, east and north in Web Mercator.
-    degrees : ndarray of float64, shape (65, 65, 2)
-        Latitude and longitude at the crossings of a lattice over `metric_box`.
-    metric_box : list of float
-        West, south, east and north in the CRS of the database.
+    To interpolate in a lattice is far faster than to project every place, needs no projection where
+    the map is shown, and is exact to a centimetre in a city. ``metres`` (65, 65, 2) holds x and y
+    in the CRS of the database over ``mercator_box`` (Web Mercator), rows from south to north and
+    columns from west to east; ``degrees`` (65, 65, 2) holds latitude and longitude over
+    ``metric_box``. Boxes are west, south, east, north.
     """
 
     metres: NDArray[np.float64]
@@ -53,30 +44,7 @@ class PlaceLattices:
 
 
 def place_lattices(database: SignatureDatabase) -> PlaceLattices:
-    """Return where the cells of a database are on a web map.
-
-    Parameters
-    ----------
-    database : SignatureDatabase
-        The cells.
-
-    Returns
-    -------
-    PlaceLattices
-        Lattices over all cells.
-
-    Examples
-    --------
-    >>> from semsig_gis.catalog import paper_taxonomy
-    >>> from semsig_gis.building import build_database
-    >>> from semsig_gis.objects import build_objects
-    >>> from semsig_gis.sources.synthetic import CitySpec, synthetic_city
-    >>> layers = synthetic_city(CitySpec(size=300.0))
-    >>> objects, _ = build_objects(layers, taxonomy=paper_taxonomy(), crs="EPSG:32631")
-    >>> found = place_lattices(build_database(objects))
-    >>> found.degrees[0, 0].round(1).tolist(), len(found.metric_box)
-    ([48.8, 3.0], 4)
-    """
+    """Return lattices over all cells of a database, to find them on a web map."""
     step, origin = database.grid.step, np.array(database.grid.origin)
     low = origin + step * np.array([database.columns.min(), database.rows.min()])
     high = origin + step * np.array([database.columns.max() + 1.0, database.rows.max() + 1.0])
@@ -95,38 +63,13 @@ def place_lattices(database: SignatureDatabase) -> PlaceLattices:
 def city_image(
     database: SignatureDatabase, shades: Mapping[int, str]
 ) -> tuple[bytes, list[list[float]]]:
-    r"""Draw how many objects are seen from every cell.
+    """Draw how many objects are seen from every cell, as a PNG with its corners.
 
-    Parameters
-    ----------
-    database : SignatureDatabase
-        The cells.
-    shades : mapping of int to str
-        Smallest number of objects, rising from 1, and colour (``#rrggbb``).
-
-    Returns
-    -------
-    image : bytes
-        A PNG, transparent where nothing is seen. Its rows and columns are even steps of Web
-        Mercator, as the map's are, so it needs no warping.
-    bounds : list of [latitude, longitude]
-        South-western and north-eastern corner in degrees, WGS 84.
-
-    Notes
-    -----
-    A city wider than 2048 cells is drawn in blocks of cells, each with its mean.
-
-    Examples
-    --------
-    >>> from semsig_gis.catalog import paper_taxonomy
-    >>> from semsig_gis.building import build_database
-    >>> from semsig_gis.objects import build_objects
-    >>> from semsig_gis.sources.synthetic import CitySpec, synthetic_city
-    >>> layers = synthetic_city(CitySpec(size=300.0))
-    >>> objects, _ = build_objects(layers, taxonomy=paper_taxonomy(), crs="EPSG:32631")
-    >>> image, bounds = city_image(build_database(objects), {1: "#cccccc", 10: "#999999"})
-    >>> image[:4]
-    b'\x89PNG'
+    ``shades`` gives a colour (``#rrggbb``) to each smallest number of objects, rising from 1. The
+    PNG is transparent where nothing is seen; its rows and columns are even steps of Web Mercator,
+    as the map's are, so it needs no warping. The corners are south-west and north-east, latitude
+    and longitude in degrees (WGS 84). A city wider than 2048 cells is drawn in blocks of cells,
+    each with its mean.
     """
 
     def mean_shades(members: NDArray[np.int64]) -> NDArray[np.uint8]:
@@ -139,36 +82,10 @@ def city_image(
 def level_image(
     database: SignatureDatabase, levels: NDArray[np.uint8], colours: Sequence[str]
 ) -> tuple[bytes, list[list[float]]]:
-    r"""Draw a level of every cell.
+    """Draw a level of every cell, as a PNG with its corners (see `city_image`).
 
-    Parameters
-    ----------
-    database : SignatureDatabase
-        The cells.
-    levels : ndarray of uint8, shape (n,)
-        Level of each cell from 1, or 0 for nothing.
-    colours : sequence of str
-        Colour (``#rrggbb``) of each level.
-
-    Returns
-    -------
-    image : bytes
-        A PNG (see `city_image`). Of several cells in a block the highest level is shown.
-    bounds : list of [latitude, longitude]
-        South-western and north-eastern corner in degrees, WGS 84.
-
-    Examples
-    --------
-    >>> from semsig_gis.catalog import paper_taxonomy
-    >>> from semsig_gis.building import build_database
-    >>> from semsig_gis.objects import build_objects
-    >>> from semsig_gis.sources.synthetic import CitySpec, synthetic_city
-    >>> layers = synthetic_city(CitySpec(size=300.0))
-    >>> objects, _ = build_objects(layers, taxonomy=paper_taxonomy(), crs="EPSG:32631")
-    >>> database = build_database(objects)
-    >>> image, bounds = level_image(database, np.ones(len(database), np.uint8), ["#cccccc"])
-    >>> image[:4]
-    b'\x89PNG'
+    Levels count from 1 into ``colours`` (``#rrggbb``); 0 is nothing. Of several cells in a block
+    the highest level is shown.
     """
 
     def highest(members: NDArray[np.int64]) -> NDArray[np.uint8]:

@@ -132,21 +132,9 @@ _HELPERS = 6  # classes that the legend names
 
 
 def evaluation_legend(evaluation: Evaluation, *, error_limit: str, licenses: Sequence[str]) -> str:
-    """Return the legend of a map of errors.
+    """Return the legend of a map of errors, as HTML for a ``details`` element with data escaped.
 
-    Parameters
-    ----------
-    evaluation : Evaluation
-        What the map shows.
-    error_limit : str
-        The error at the end of the colour ramp, with its unit.
-    licenses : sequence of str
-        One line a source, ``layer: attribution (licence)``.
-
-    Returns
-    -------
-    str
-        HTML in which all text from data is escaped, for a ``details`` element.
+    ``error_limit`` is the error at the end of the colour ramp, with its unit.
     """
     count, distortions = len(evaluation.queries), chain_text(evaluation.asked.distortions)
     successes = int(evaluation.successful.sum())
@@ -171,18 +159,7 @@ def evaluation_legend(evaluation: Evaluation, *, error_limit: str, licenses: Seq
 
 
 def localization_legend(localization: Localization) -> str:
-    """Return the legend of a map of candidates.
-
-    Parameters
-    ----------
-    localization : Localization
-        What the map shows.
-
-    Returns
-    -------
-    str
-        HTML in which all text from data is escaped, for a ``details`` element.
-    """
+    """Return the legend of a map of candidates, as HTML with data escaped."""
     candidates = localization.candidates
     more = localization.tied_beyond
     said = "1 more cell is" if more == 1 else f"{more:,} more cells are"
@@ -200,18 +177,7 @@ def localization_legend(localization: Localization) -> str:
 
 
 def location_legend(location: Location) -> str:
-    """Return the legend of a map of chances.
-
-    Parameters
-    ----------
-    location : Location
-        What the map shows.
-
-    Returns
-    -------
-    str
-        HTML in which all text from data is escaped, for a ``details`` element.
-    """
+    """Return the legend of a map of chances, as HTML with data escaped."""
     database, estimate = location.posterior.database, location.estimate
     colour = SUCCESSFUL if location.answer.given else FAILED
     told = "The answer" if location.answer.given else "Cannot tell; the best place"
@@ -254,18 +220,7 @@ def location_legend(location: Location) -> str:
 
 
 def identifiability_legend(told: Identifiability) -> str:
-    """Return the legend of a map of where a query can be placed.
-
-    Parameters
-    ----------
-    told : Identifiability
-        What the map shows.
-
-    Returns
-    -------
-    str
-        HTML in which all text from data is escaped, for a ``details`` element.
-    """
+    """Return the legend of a map of where a query can be placed, as HTML with data escaped."""
     facts = told.summary()
     within = f"within {facts['radius_m']:g} m"
     bands = "<br>".join(
@@ -290,18 +245,7 @@ def identifiability_legend(told: Identifiability) -> str:
 
 
 def objects_legend(objects: StreetObjects) -> str:
-    """Return the legend of a map of street objects.
-
-    Parameters
-    ----------
-    objects : StreetObjects
-        What the map shows.
-
-    Returns
-    -------
-    str
-        HTML in which all text from data is escaped, for a ``details`` element.
-    """
+    """Return the legend of a map of street objects, as HTML with data escaped."""
     signs, counts = class_signs(objects.taxonomy), objects.class_counts
     rows = "".join(
         f"<tr><td>{sign_svg(signs[code])}</td>"
@@ -367,19 +311,9 @@ def _sources(licenses: Iterable[str]) -> str:
 
 
 def ambiguity_legend(sizes: Mapping[str, NDArray[np.int64]], *, licenses: Sequence[str]) -> str:
-    """Return the legend of a map of how many cells look the same.
+    """Return the legend of a map of how many cells look the same, as HTML with data escaped.
 
-    Parameters
-    ----------
-    sizes : mapping of str to ndarray of int64, shape (n,)
-        For every cell, how many look the same, by what is compared.
-    licenses : sequence of str
-        One line a source, ``layer: attribution (licence)``.
-
-    Returns
-    -------
-    str
-        HTML in which all text from data is escaped, for a ``details`` element.
+    ``sizes`` has for every cell how many look the same, by what is compared.
     """
     starts = list(GROUP_COLOURS)
     labels = [
@@ -416,23 +350,9 @@ def drift_legend(
     taxonomy: Taxonomy,
     licenses: Sequence[str],
 ) -> str:
-    """Return the legend of a map of what has changed between two dates.
+    """Return the legend of a map of changes between two dates, as HTML with data escaped.
 
-    Parameters
-    ----------
-    cells : CellChanges
-        What became of the cells.
-    objects : ObjectChanges or None
-        What became of the street objects, where they are at hand.
-    taxonomy : Taxonomy
-        Their classes.
-    licenses : sequence of str
-        One line a source, ``layer: attribution (licence)``.
-
-    Returns
-    -------
-    str
-        HTML in which all text from data is escaped, for a ``details`` element.
+    ``objects`` is None where the street objects are not at hand.
     """
     kinds = {
         "same": (cells.same, "see what they saw"),

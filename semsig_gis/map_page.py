@@ -213,22 +213,10 @@ const semsig = {
 
 
 def script_json(value: object) -> str:
-    r"""Return a value as JSON that may stand in the script of a folium page.
+    """Return a value as JSON that may stand in the script of a folium page.
 
-    Parameters
-    ----------
-    value : object
-        Anything that JSON can hold; numbers are finite.
-
-    Returns
-    -------
-    str
-        JSON in ASCII that no HTML parser takes for markup and no Jinja rendering changes.
-
-    Examples
-    --------
-    >>> script_json({"title": "{{7*7}}</script>"})
-    '{"title":"\\u007b{7*7}}\\u003c/script\\u003e"}'
+    It is ASCII that no HTML parser takes for markup and no Jinja rendering changes. Numbers must be
+    finite.
     """
     text = json.dumps(value, separators=(",", ":"), allow_nan=False)
     # Only a brace of text can be followed by one of these: JSON's own is by a quote or a "}".

@@ -353,8 +353,8 @@ def _two_stage(
 ) -> NDArray[np.float32]:
     """Re-rank the cells that are best by type; the others follow in their order.
 
-    The second stage gives the distances to the distinct angle sequences that it is asked for. The
-    gate is that of all cells, where these are a part of them.
+    `second_stage` gives the distances to the distinct angle sequences that it is asked for. The
+    gate is that of all cells, if these are only a part of them.
     """
     first = _on_steps(by_types)
     cut = _cut(method, first, types) if gate is None else gate.cut

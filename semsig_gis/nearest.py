@@ -26,17 +26,9 @@ __all__ = ["Nearest", "nearest"]
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Nearest:
-    """What a search found.
+    """The rows of a table nearest to a query, and how many rows were not measured (`skipped`).
 
-    Parameters
-    ----------
-    rows : ndarray of int64, shape (k,)
-        Rows of the table, nearest first and equal ones in their order: as many as were asked for,
-        and every other that ties with the last.
-    distances : ndarray of float32, shape (k,)
-        Their distances.
-    skipped : int
-        How many rows of the table were not measured.
+    `rows` are nearest first, equal ones in table order, with every row that ties with the last.
     """
 
     rows: NDArray[np.int64]
@@ -53,41 +45,11 @@ def nearest(
     normalized: bool = True,
     wildcard: int | None = None,
 ) -> Nearest:
-    """Find the rows of a table that are nearest to a query by edit distance with weights of 1.
+    """Find the `top` rows of a table nearest to a query by edit distance with weights of 1.
 
-    Parameters
-    ----------
-    query : ndarray of uint8
-        Class codes or angle levels.
-    table : SequenceTable
-        The sequences to search.
-    top : int
-        How many rows are wanted, at least 1.
-    among : ndarray of bool, shape (d,), optional
-        True for the distinct sequences that may be found (see `semsig_gis.patterns`); all by
-        default.
-    normalized : bool
-        True to divide distances by the longer length.
-    wildcard : int, optional
-        A value that equals every value where the query has it.
-
-    Returns
-    -------
-    Nearest
-        The nearest rows with all ties, just as a search of everything gives them.
-
-    Raises
-    ------
-    InputError
-        If the query is not an array of bytes, or `top` is below 1.
-
-    Examples
-    --------
-    >>> from semsig_gis.sequences import SequenceTable
-    >>> table = SequenceTable.from_csr(np.array([3, 1, 3, 3, 1], np.uint8), np.array([0, 1, 3, 5]))
-    >>> found = nearest(np.array([3, 1], np.uint8), table, 1)
-    >>> found.rows.tolist(), found.distances.tolist()
-    ([2], [0.0])
+    The result is that of a full search, with all ties. `among`, shape (d,), is True for the
+    distinct sequences that may be found (see `semsig_gis.patterns`). `normalized` divides by the
+    longer length; a `wildcard` in the query equals every value.
     """
     if top < 1:
         msg = f"the nearest {top} sequences were asked for; give a whole number from 1."

@@ -192,28 +192,8 @@ Noise = NoiseSpec | NoiseMixture
 def noise_from_dict(values: Mapping[str, Any]) -> Noise:
     """Read a noise model from plain values, the inverse of ``to_dict``.
 
-    Parameters
-    ----------
-    values : mapping
-        The fields of `NoiseSpec`, each optional; or ``specs``, ``weights`` and ``name`` of a
-        mixture.
-
-    Returns
-    -------
-    NoiseSpec or NoiseMixture
-        The model.
-
-    Raises
-    ------
-    InputError
-        If a field is unknown or its value cannot be used.
-
-    Examples
-    --------
-    >>> noise_from_dict({"detection": 0.8}) == NoiseSpec(detection=0.8)
-    True
-    >>> noise_from_dict(named_noise("generic").to_dict()) == named_noise("generic")
-    True
+    Values are the fields of `NoiseSpec`, each optional, or ``specs``, ``weights`` and ``name`` of a
+    mixture, which must not hold another mixture.
     """
     if not isinstance(values, Mapping):
         msg = f"a noise model is {values!r}; give a table of its fields."

@@ -19,31 +19,7 @@ __all__ = ["open_noise", "save_noise"]
 
 
 def open_noise(path: str | Path) -> Noise:
-    """Read a noise model from a file.
-
-    Parameters
-    ----------
-    path : str or Path
-        A JSON file, or a TOML file with the suffix ``.toml``.
-
-    Returns
-    -------
-    NoiseSpec or NoiseMixture
-        The model.
-
-    Raises
-    ------
-    InputError
-        If the file cannot be read or does not hold a noise model.
-
-    Examples
-    --------
-    >>> open_noise("nowhere.toml")
-    Traceback (most recent call last):
-    ...
-    semsig_gis.errors.InputError: noise file nowhere.toml cannot be read (No such file or
-    directory); give a JSON or TOML file.
-    """
+    """Read a noise model from a JSON file, or a TOML file with the suffix ``.toml``."""
     file = Path(path)
     try:
         text = file.read_text(encoding="utf-8")
@@ -56,24 +32,7 @@ def open_noise(path: str | Path) -> Noise:
 
 
 def save_noise(noise: Noise, path: str | Path) -> None:
-    """Write a noise model to a file.
-
-    Parameters
-    ----------
-    noise : NoiseSpec or NoiseMixture
-        The model.
-    path : str or Path
-        File to write, TOML with the suffix ``.toml`` and JSON else; it appears whole, by rename.
-
-    Examples
-    --------
-    >>> import tempfile
-    >>> from semsig_gis.noise import NoiseSpec
-    >>> with tempfile.TemporaryDirectory() as folder:
-    ...     save_noise(NoiseSpec(clutter=2.0), f"{folder}/noise.json")
-    ...     open_noise(f"{folder}/noise.json").clutter
-    2.0
-    """
+    """Write a noise model as TOML (suffix ``.toml``) or JSON; the file appears whole, by rename."""
     values = noise.to_dict()
     if Path(path).suffix.lower() == ".toml":
         text = toml_text(values)

@@ -46,24 +46,11 @@ LEAST_SIGMA, MOST_SIGMA = 0.05, 60.0
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Evidence:
-    """What was there and what was detected, over all samples.
+    """What was there and what was detected, over all samples (signatures).
 
-    Parameters
-    ----------
-    names : list of str
-        The k classes that occur.
-    codes : ndarray of uint8, shape (k,)
-        Their codes.
-    samples : int
-        Number of signatures.
-    kinds, owners : ndarray of int64, shape (objects,)
-        Class (its number among the k) and sample of each object.
-    distances : ndarray of float64, shape (objects,)
-        Metres.
-    given, givers : ndarray of int64, shape (detections,)
-        Class and sample of each detection.
-    pairs : Pairs
-        Objects and detections that may be one thing.
+    `names` and `codes` list the k classes that occur. Each object has a class (`kinds`, its number
+    among the k), a sample (`owners`) and a distance in metres; each detection a class (`given`) and
+    a sample (`givers`). `pairs` are objects and detections that may be one thing.
     """
 
     names: list[str]
@@ -84,20 +71,11 @@ class Evidence:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Counts:
-    """What is to be expected, given the detections and a model.
+    """The expected counts, given the detections and a model.
 
-    Parameters
-    ----------
-    chances : ndarray of float64, shape (pairs,)
-        That an object and a detection are one thing.
-    squares : ndarray of float64, shape (pairs,)
-        Square of the bearing noise if they are, in square degrees.
-    false : ndarray of float64, shape (detections,)
-        That a detection is clutter.
-    named : ndarray of float64, shape (k, k)
-        Detected objects, by true and given class.
-    log_likelihood : float
-        Of all detections.
+    By pair, `chances` that it is one thing and `squares` of the bearing noise if it is, in square
+    degrees; `false`, the chance that each detection is clutter; `named`, shape (k, k), detected
+    objects by true and given class; `log_likelihood` of all detections.
     """
 
     chances: NDArray[np.float64]
@@ -108,26 +86,9 @@ class Counts:
 
 
 def gather_evidence(views: Views, detected: Sequence[Signature], *, taxonomy: Taxonomy) -> Evidence:
-    """Put what was there and what was detected side by side.
+    """Join what there was to see in each sample with what was detected, with types and bearings.
 
-    Parameters
-    ----------
-    views : Views
-        What there was to see in each sample.
-    detected : sequence of Signature
-        What was detected, with types and bearings.
-    taxonomy : Taxonomy
-        The classes.
-
-    Returns
-    -------
-    Evidence
-        All as arrays.
-
-    Raises
-    ------
-    InputError
-        If there was nothing to see at all, or nothing was detected.
+    Raises `InputError` if there was nothing to see at all, or nothing was detected.
     """
     codes = np.concatenate([np.asarray(one.codes, dtype=np.uint8) for one in detected])
     seen = np.concatenate([np.asarray(one.bearings, dtype=np.float64) for one in detected])
@@ -153,20 +114,7 @@ def gather_evidence(views: Views, detected: Sequence[Signature], *, taxonomy: Ta
 
 
 def starting_model(evidence: Evidence, *, position_sigma: float) -> NoiseTable:
-    """Return a model to begin with.
-
-    Parameters
-    ----------
-    evidence : Evidence
-        What it shall be fitted to.
-    position_sigma : float
-        Known deviation of the places in metres.
-
-    Returns
-    -------
-    NoiseTable
-        A usual detector.
-    """
+    """Return a usual detector as the first model, with the known deviation of places in metres."""
     count = len(evidence.codes)
     return NoiseTable(
         codes=evidence.codes,
@@ -180,19 +128,9 @@ def starting_model(evidence: Evidence, *, position_sigma: float) -> NoiseTable:
 
 
 def expected_counts(evidence: Evidence, model: NoiseTable) -> Counts:
-    """Return what is to be expected under a model: the E step.
+    """Return the expected counts under a model: the E step.
 
-    Parameters
-    ----------
-    evidence : Evidence
-        What was there and what was detected.
-    model : NoiseTable
-        The model, the same for signatures of all lengths.
-
-    Returns
-    -------
-    Counts
-        Expected counts.
+    The model must be the same for signatures of all lengths.
     """
     pairs, size = evidence.pairs, len(evidence.codes)
     weights = pair_weights(
@@ -228,22 +166,7 @@ def expected_counts(evidence: Evidence, model: NoiseTable) -> Counts:
 
 
 def next_model(evidence: Evidence, counts: Counts, model: NoiseTable) -> NoiseTable:
-    """Return the model that counts speak for, classes drawn to the whole: the M step.
-
-    Parameters
-    ----------
-    evidence : Evidence
-        What was there and what was detected.
-    counts : Counts
-        What is to be expected of it.
-    model : NoiseTable
-        The model before.
-
-    Returns
-    -------
-    NoiseTable
-        The model after.
-    """
+    """Return the model that the counts speak for, classes drawn to the whole: the M step."""
     size = len(evidence.codes)
     detected = counts.named.sum(axis=1)
     wrong = counts.named * (1.0 - np.eye(size))
@@ -265,40 +188,15 @@ def next_model(evidence: Evidence, counts: Counts, model: NoiseTable) -> NoiseTa
 
 
 def drawn_rates(hits: NDArray[np.float64], trials: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the rate of each class, drawn to the rate of all.
-
-    Parameters
-    ----------
-    hits, trials : ndarray of float64, shape (k,)
-        Counts by class.
-
-    Returns
-    -------
-    ndarray of float64, shape (k,)
-        The overall rate counts for `PRIOR_SAMPLES` trials of each class.
-
-    Examples
-    --------
-    >>> drawn_rates(np.array([90.0, 0.0]), np.array([100.0, 0.0])).round(3).tolist()
-    [0.9, 0.9]
-    """
+    """Return the rate of each class; the overall rate counts for `PRIOR_SAMPLES` trials of each."""
     overall = hits.sum() / max(trials.sum(), 1e-9)
     return np.asarray((hits + PRIOR_SAMPLES * overall) / (trials + PRIOR_SAMPLES))
 
 
 def model_change(old: NoiseTable, new: NoiseTable) -> float:
-    """Return how far two models are apart.
+    """Return the largest difference between two models of the same classes.
 
-    Parameters
-    ----------
-    old, new : NoiseTable
-        Two models of the same classes.
-
-    Returns
-    -------
-    float
-        Largest difference of a log-odds of detection, or a logarithm of a chance, a rate or a
-        deviation.
+    Differences are of log-odds of detection, and of logarithms of chances, rates and deviations.
     """
     moves = [
         np.log(new.odds) - np.log(old.odds),

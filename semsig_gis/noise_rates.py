@@ -25,31 +25,14 @@ LEAST_INFORMATION = 0.05
 
 
 def estimated_rates(evidence: Evidence, counts: Counts, model: NoiseTable) -> pd.DataFrame:
-    """Return the rates of a model by class and of all classes, with their intervals.
+    """Return the rates by class and overall with their intervals, as in `NoiseEstimate.rates`.
 
-    Parameters
-    ----------
-    evidence : Evidence
-        What the model was fitted to.
-    counts : Counts
-        What is to be expected of it under the model.
-    model : NoiseTable
-        The model.
-
-    Returns
-    -------
-    DataFrame
-        See `semsig_gis.learning.NoiseEstimate`.
-
-    Notes
-    -----
-    Intervals are Wilson's for chances, their like for Poisson rates, and even in the logarithm for
-    deviations. They are as wide as the samples deserve of which the association is not certain:
-    the number of samples in them follows from the information matrix, the sum over the samples of
-    the outer products of the scores (derivatives of the log-likelihood of one sample, by Fisher's
-    identity the expected scores given the detections). Where many objects stand close together,
-    the chances of the associations are approximate, and the clutter comes out some percent too
-    large.
+    Intervals are Wilson's for chances, the equivalent for Poisson rates, and symmetric in the
+    logarithm for deviations. They allow for uncertain association: the effective number of samples
+    follows from the information matrix, the sum over the samples of the outer products of the
+    scores (derivatives of the log-likelihood of one sample, by Fisher's identity the expected
+    scores given the detections). Where many objects stand close together, the chances of the
+    associations are approximate, and the clutter comes out some per cent too large.
     """
     size = len(evidence.codes)
     detected = counts.named.sum(axis=1)

@@ -38,22 +38,11 @@ LONGEST_TABLE = 400  # lengths that have chances of their own; longer signatures
 class NoiseTable:
     """One noise model for k classes, and signatures of every length up to a longest.
 
-    Parameters
-    ----------
-    codes : ndarray of uint8, shape (k,)
-        Class codes, in the order of the other arrays.
-    missed : ndarray of float64, shape (longest + 1, k)
-        Chance that an object of a class, in a signature of a length, is missed.
-    misnamed : ndarray of float64, shape (longest + 1, k)
-        Chance that it is given another class, once detected.
-    others : ndarray of float64, shape (k, k)
-        Which other class a misnamed object is given: rows sum to one, the diagonal is nought.
-    clutter : ndarray of float64, shape (k,)
-        False objects a signature, by class.
-    sigma : ndarray of float64, shape (k,)
-        Standard deviation of a bearing in degrees.
-    position_sigma : float
-        Standard deviation of the observer's place in metres.
+    By length and class, shape (longest + 1, k), `missed` is the chance that an object is missed and
+    `misnamed` that it is given another class, once detected. `others`, shape (k, k), says which:
+    rows sum to one, the diagonal is zero. `clutter` is in false objects per signature by class,
+    `sigma` the standard deviation of a bearing in degrees by class, and `position_sigma` that of
+    the observer's place in metres.
     """
 
     codes: NDArray[np.uint8]
@@ -97,17 +86,9 @@ class NoiseTable:
         return rows
 
     def sigmas(self, reach: float) -> NDArray[np.float64]:
-        """Return the deviation of a bearing by class and distance.
+        """Return the deviation of a bearing by class and distance unit, shape (k, 256).
 
-        Parameters
-        ----------
-        reach : float
-            Distance in metres that 255 units are.
-
-        Returns
-        -------
-        ndarray of float64, shape (k, 256)
-            Degrees, at most 180; by class and distance unit.
+        In degrees, at most 180; `reach` is the distance in metres of 255 units.
         """
         distances = np.maximum(np.arange(256), 0.5) * (reach / 255.0)
         turned = np.degrees(self.position_sigma / distances)
@@ -116,19 +97,9 @@ class NoiseTable:
     def nothing_seen(
         self, database: SignatureDatabase, cells: NDArray[np.int64] | None = None
     ) -> NDArray[np.float64]:
-        """Return the log-likelihood that nothing at all is detected in cells.
+        """Return the log-likelihood that nothing is detected in some or all cells of a database.
 
-        Parameters
-        ----------
-        database : SignatureDatabase
-            The cells; their classes are those of the table.
-        cells : ndarray of int, shape (c,), optional
-            Row numbers in the database; all by default.
-
-        Returns
-        -------
-        ndarray of float64, shape (c,)
-            ``sum_i log(missed_i) - sum_t clutter_t``.
+        It is ``sum_i log(missed_i) - sum_t clutter_t``. The classes must be those of the table.
         """
         lengths, codes = database.lengths, database.codes
         if cells is not None:
@@ -141,22 +112,9 @@ class NoiseTable:
         return np.asarray(sums - self.clutter.sum())
 
     def query_rows(self, query: Signature) -> NDArray[np.int64]:
-        """Return the row of the class of each object of a query.
+        """Return the class row of each object of a query, k if the class is unknown.
 
-        Parameters
-        ----------
-        query : Signature
-            Its types may be unknown, all or some.
-
-        Returns
-        -------
-        ndarray of int64, shape (q,)
-            Rows of the tables; k where the class is not known.
-
-        Raises
-        ------
-        InputError
-            If the query has no objects, or a class that the tables do not have.
+        Raises `InputError` if the query is empty or has a class that the tables do not have.
         """
         if len(query) == 0:
             msg = "the query has no objects; give at least one type or bearing."
@@ -177,42 +135,11 @@ class NoiseTable:
 def noise_tables(
     noise: Noise, *, taxonomy: Taxonomy, codes: NDArray[np.uint8], longest: int
 ) -> tuple[tuple[NoiseTable, ...], NDArray[np.float64]]:
-    """Return the tables of a noise model.
+    """Return one table for each model of a mixture, or for the only model, and the chance of each.
 
-    Parameters
-    ----------
-    noise : NoiseSpec or NoiseMixture
-        The model.
-    taxonomy : Taxonomy
-        The classes that its names may mean.
-    codes : ndarray of uint8, shape (k,)
-        The classes that count; what the model says of others is left out.
-    longest : int
-        Length of the longest signature.
-
-    Returns
-    -------
-    tables : tuple of NoiseTable
-        One for each model of a mixture.
-    weights : ndarray of float64
-        Chance of each.
-
-    Raises
-    ------
-    InputError
-        If the model names a class that the taxonomy does not have, or gives a class no chance at
-        all of being named as one that counts.
-
-    Examples
-    --------
-    >>> from semsig_gis.catalog import paper_taxonomy
-    >>> from semsig_gis.noise import named_noise
-    >>> codes = np.array([1, 3], np.uint8)
-    >>> tables, weights = noise_tables(
-    ...     named_noise("generic"), taxonomy=paper_taxonomy(), codes=codes, longest=20
-    ... )
-    >>> len(tables), round(float(tables[1].missed[14, 0]), 3)
-    (3, 0.159)
+    Only classes in `codes` count; what the model says of others is left out. Raises `InputError` if
+    it names a class that the taxonomy does not have, or gives a class no chance at all of being
+    named as one that counts.
     """
     specs, weights = (
         (noise.specs, noise.weights) if isinstance(noise, NoiseMixture) else ((noise,), (1.0,))
@@ -225,27 +152,7 @@ def noise_tables(
 def database_tables(
     database: SignatureDatabase, noise: Noise
 ) -> tuple[tuple[NoiseTable, ...], NDArray[np.float64]]:
-    """Return the tables of a noise model for the classes and lengths of a database.
-
-    Parameters
-    ----------
-    database : SignatureDatabase
-        The cells.
-    noise : NoiseSpec or NoiseMixture
-        The model.
-
-    Returns
-    -------
-    tables : tuple of NoiseTable
-        One for each model of a mixture.
-    weights : ndarray of float64
-        Chance of each.
-
-    Raises
-    ------
-    InputError
-        If the model does not fit the classes.
-    """
+    """Return `noise_tables` for the classes and lengths of a database."""
     return noise_tables(
         noise,
         taxonomy=database.taxonomy,
@@ -255,30 +162,9 @@ def database_tables(
 
 
 def mean_table(tables: tuple[NoiseTable, ...], weights: NDArray[np.float64]) -> NoiseTable:
-    """Return one model in the middle of several.
+    """Return the weighted mean of models: of chances, and of squares for deviations.
 
-    Parameters
-    ----------
-    tables : tuple of NoiseTable
-        Models for the same classes and lengths.
-    weights : ndarray of float64
-        Chance of each; they sum to one.
-
-    Returns
-    -------
-    NoiseTable
-        Weighted means of the chances, and of the squares of the deviations.
-
-    Examples
-    --------
-    >>> from semsig_gis.catalog import paper_taxonomy
-    >>> from semsig_gis.noise import named_noise
-    >>> codes = np.array([1, 3], np.uint8)
-    >>> given = noise_tables(
-    ...     named_noise("generic"), taxonomy=paper_taxonomy(), codes=codes, longest=20
-    ... )
-    >>> mean_table(*given).clutter.round(3).tolist()
-    [1.167, 1.167]
+    The models are for the same classes and lengths; weights sum to one.
     """
     names = np.stack([table.misnamed.mean(axis=0)[:, None] * table.others for table in tables])
     named = np.tensordot(weights, names, axes=1)

@@ -120,34 +120,11 @@ class StreetObjects:
 class LayerReport:
     """What became of the rows of one layer; the numbers add up to `read`.
 
-    Parameters
-    ----------
-    name : str
-        Name of the layer.
-    read : int
-        Rows in the source.
-    unreadable : int
-        Rows that could not be read.
-    filtered : int
-        Rows left out by the catalogue's filter.
-    missing : int
-        Rows without a geometry, or with an empty one.
-    duplicates : int
-        Rows with the id of an earlier one, where the catalogue says that ids are unique.
-    misplaced : int
-        Rows whose position has no finite coordinates in the metric CRS, or is off the Earth.
-    collapsed : int
-        Rows at the same place as an earlier object of the same class.
-    kept : int
-        Objects that remain.
-    notes : tuple of str
-        Warnings, and the first messages about unreadable rows.
-
-    Examples
-    --------
-    >>> LayerReport(name="trees", read=2, unreadable=0, filtered=0, missing=1, misplaced=0,
-    ...             collapsed=0, kept=1).kept
-    1
+    Rows are dropped as `unreadable`, `filtered` (by the catalogue's filter), `missing` (no
+    geometry, or an empty one), `duplicates` (the id of an earlier row, where the catalogue says
+    that ids are unique), `misplaced` (no finite coordinates in the metric CRS, or off the Earth) or
+    `collapsed` (at the same place as an earlier object of the class). `notes` are warnings and the
+    first messages about unreadable rows.
     """
 
     name: str
@@ -164,29 +141,12 @@ class LayerReport:
 
 @dataclass(frozen=True, slots=True)
 class LoadReport:
-    """What became of every layer.
-
-    Parameters
-    ----------
-    layers : tuple of LayerReport
-        One report a layer, in the order they were given.
-
-    Examples
-    --------
-    >>> LoadReport(()).to_list()
-    []
-    """
+    """What became of every layer, in the order they were given."""
 
     layers: tuple[LayerReport, ...]
 
     def to_list(self) -> list[dict[str, Any]]:
-        """Return the reports as plain mappings, ready for JSON.
-
-        Returns
-        -------
-        list of dict
-            One mapping a layer.
-        """
+        """Return the reports as plain mappings, ready for JSON."""
         return [asdict(layer) for layer in self.layers]
 
 
@@ -367,22 +327,7 @@ def _first_at_place(
 def license_lines(layers: Iterable[RawLayer]) -> tuple[str, ...]:
     """Return whom to name for layers.
 
-    Parameters
-    ----------
-    layers : iterable of RawLayer
-        The layers.
-
-    Returns
-    -------
-    tuple of str
-        A line for every publisher and licence, with the names of the layers that they cover.
-
-    Examples
-    --------
-    >>> from semsig_gis.sources.synthetic import CitySpec, synthetic_city
-    >>> for line in license_lines(synthetic_city(CitySpec(size=300.0))[:1]):
-    ...     print(line)
-    synthetic city of semsig_gis, seed 0: no real place (CC0-1.0): synthetic_alignment_tree
+    There is a line for every publisher and licence, with the names of the layers that they cover.
     """
     layers_of: dict[str, list[str]] = {}
     for layer in layers:
@@ -450,18 +395,7 @@ def save_objects(objects: StreetObjects, path: str | Path, *, keep_order: bool =
 
 
 def objects_specs(objects: StreetObjects) -> dict[str, Any]:
-    """Return what is to be known of street objects besides their table.
-
-    Parameters
-    ----------
-    objects : StreetObjects
-        The objects.
-
-    Returns
-    -------
-    dict
-        Plain values for JSON.
-    """
+    """Return all but the table of street objects, as plain values for JSON."""
     return {
         "kind": KIND,
         "version": __version__,
@@ -511,30 +445,12 @@ def objects_of(
     path: str | Path,
     box: Sequence[float] | None = None,
 ) -> StreetObjects:
-    """Return the street objects that columns and specs hold.
+    """Return the street objects that columns and the values of `objects_specs` hold.
 
-    Parameters
-    ----------
-    arrow : pyarrow.Table
-        The columns of `StreetObjects.table`, ``geometry`` as WKB.
-    specs : dict
-        What `objects_specs` gave.
-    crs : pyproj.CRS
-        Coordinate reference system of the geometry.
-    path : str or Path
-        The file that they were read from, to be named in errors.
-    box : sequence of float, optional
-        ``xmin, ymin, xmax, ymax`` in metres: only objects in it or on its edge.
-
-    Returns
-    -------
-    StreetObjects
-        The objects; there is at least one, but in a box there may be none.
-
-    Raises
-    ------
-    DatabaseError
-        If they are damaged.
+    The columns are those of `StreetObjects.table`, ``geometry`` as WKB. With a box ``xmin, ymin,
+    xmax, ymax`` in metres, only objects in it or on its edge are returned, possibly none. Raise
+    DatabaseError, which names `path`, if they are damaged; without a box, a table without objects
+    is damaged.
     """
     try:
         taxonomy = Taxonomy.from_list(specs["taxonomy"])

@@ -25,36 +25,8 @@ NEAREST_M = 0.01  # that anything stands, so that its width is an angle
 class HiddenBehind:
     """Objects that nearer objects hide.
 
-    Parameters
-    ----------
-    width : float, default 0.5
-        How wide each object is, in metres; 0 or more.
-
-    Raises
-    ------
-    InputError
-        If it is out of range.
-
-    Notes
-    -----
-    An object is hidden when a nearer one covers its bearing: of width w at distance d, that one
-    covers ``atan(w / 2 d)`` to either side.
-
-    Examples
-    --------
-    >>> from semsig_gis.catalog import paper_taxonomy
-    >>> from semsig_gis.sight import CitySights, Sight
-    >>> city = CitySights(
-    ...     taxonomy=paper_taxonomy(), codes=np.array([3], np.uint8),
-    ...     frequencies=np.array([9]), reach=30.0,
-    ... )
-    >>> row = Sight(
-    ...     codes=np.full(3, 3, np.uint8), bearings=np.array([10.0, 11.0, 30.0]),
-    ...     distances=np.array([4.0, 20.0, 20.0]),
-    ... )
-    >>> spoil = HiddenBehind(width=0.5).ready(city)
-    >>> spoil(row, np.random.default_rng(0)).bearings.tolist()
-    [10.0, 30.0]
+    An object is hidden when a nearer one covers its bearing: one of `width` w metres (0 or more) at
+    distance d covers ``atan(w / 2 d)`` to either side.
     """
 
     width: float = 0.5
@@ -63,18 +35,7 @@ class HiddenBehind:
         _check_amount("width of the objects", self.width)
 
     def ready(self, city: CitySights) -> Spoiling:  # noqa: ARG002 - all distortions take it
-        """Return what is done to a query.
-
-        Parameters
-        ----------
-        city : CitySights
-            What there is to see in the city.
-
-        Returns
-        -------
-        callable
-            From what is seen and a generator to what seems to be seen.
-        """
+        """Return the function that distorts a query."""
 
         def spoil(sight: Sight, rng: np.random.Generator) -> Sight:  # noqa: ARG001
             away = np.full(len(sight), self.width)
@@ -87,25 +48,8 @@ class HiddenBehind:
 class Obstacles:
     """Things at the kerb, on no map, that hide what is behind them.
 
-    Parameters
-    ----------
-    count : float, default 2.0
-        How many there are around a place on average, 0 or more; the number is a Poisson one, and
-        they stand anywhere in sight.
-    width : float, default 4.0
-        How wide each is, in metres, 0 or more.
-
-    Raises
-    ------
-    InputError
-        If a number is out of range.
-
-    Examples
-    --------
-    >>> Obstacles(count=-2.0)
-    Traceback (most recent call last):
-    ...
-    semsig_gis.errors.InputError: number of obstacles is -2.0; give a number, 0 or more.
+    Their number around a place is a Poisson one with mean `count`; each is `width` metres wide and
+    stands anywhere within the range of the city. Both are 0 or more.
     """
 
     count: float = 2.0
@@ -116,18 +60,7 @@ class Obstacles:
         _check_amount("width of the obstacles", self.width)
 
     def ready(self, city: CitySights) -> Spoiling:
-        """Return what is done to a query.
-
-        Parameters
-        ----------
-        city : CitySights
-            Its range is how far obstacles may be away.
-
-        Returns
-        -------
-        callable
-            From what is seen and a generator to what seems to be seen.
-        """
+        """Return the function that distorts a query."""
 
         def spoil(sight: Sight, rng: np.random.Generator) -> Sight:
             count = int(rng.poisson(self.count))
@@ -143,25 +76,8 @@ class Obstacles:
 class BlockedSectors:
     """Sectors of the view in which nothing is seen, near or far.
 
-    Parameters
-    ----------
-    count : int, default 1
-        How many there are, 0 or more, each anywhere in the turn; they may overlap.
-    degrees : float, default 30.0
-        How wide each is, 0 to 360.
-
-    Raises
-    ------
-    InputError
-        If a number is out of range.
-
-    Examples
-    --------
-    >>> BlockedSectors(degrees=400.0)
-    Traceback (most recent call last):
-    ...
-    semsig_gis.errors.InputError: 1 sectors of 400.0 degrees were given; give a whole number from
-    0 up and degrees from 0 to 360.
+    There are `count` of them (0 or more), each of `degrees` (0 to 360) anywhere in the turn; they
+    may overlap.
     """
 
     count: int = 1
@@ -176,18 +92,7 @@ class BlockedSectors:
             raise InputError(msg)
 
     def ready(self, city: CitySights) -> Spoiling:  # noqa: ARG002 - all distortions take it
-        """Return what is done to a query.
-
-        Parameters
-        ----------
-        city : CitySights
-            What there is to see in the city.
-
-        Returns
-        -------
-        callable
-            From what is seen and a generator to what seems to be seen.
-        """
+        """Return the function that distorts a query."""
 
         def spoil(sight: Sight, rng: np.random.Generator) -> Sight:
             middles = rng.uniform(0.0, FULL_TURN, self.count)

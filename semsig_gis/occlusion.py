@@ -154,36 +154,15 @@ def hidden(
 ) -> NDArray[np.bool_]:
     """Tell which objects a building hides from the viewpoint they are looked at from.
 
-    Parameters
-    ----------
-    viewpoints : ndarray of float64, shape (p, 2)
-        Where each pair is looked from, in metres.
-    objects : ndarray of float64, shape (p, 2)
-        What each pair looks at, in metres.
-    footprints : Footprints
-        The buildings, in the same CRS.
+    Row by row, `viewpoints` and `objects` are the two ends of a sight line, shape (p, 2) in metres
+    in the CRS of the footprints.
 
-    Returns
-    -------
-    ndarray of bool, shape (p,)
-        Whether the straight line between the two is blocked.
-
-    Notes
-    -----
     The rule: an object is hidden when the sight line comes deeper into the buildings than the
     tolerance. So an object on a facade, or in it no deeper than the tolerance, is seen from its
-    side of the building at any slant and hidden from the other sides; a line that cuts a corner
-    by less than the tolerance is free, and a wall thinner than twice the tolerance hides
-    nothing. A footprint that has the viewpoint in it deeper than the tolerance (an arcade, a
-    passage, a roof on posts) does not hide; all other footprints do, its neighbours too.
-
-    Examples
-    --------
-    >>> house = Footprints([shapely.box(0, 0, 10, 10)], tolerance=0.5)
-    >>> street = np.array([[5.0, -8.0]])
-    >>> lamps = np.array([[2.0, 0.3], [5.0, 12.0]])  # in the facade, and behind the house
-    >>> hidden(street.repeat(2, axis=0), lamps, footprints=house).tolist()
-    [False, True]
+    side of the building at any slant and hidden from the other sides; a line that cuts a corner by
+    less than the tolerance is free, and a wall thinner than twice the tolerance hides nothing. A
+    footprint that has the viewpoint in it deeper than the tolerance (an arcade, a passage, a roof
+    on posts) does not hide; all other footprints do, its neighbours too.
     """
     starts = np.asarray(viewpoints, dtype=np.float64).reshape(-1, 2)
     ends = np.asarray(objects, dtype=np.float64).reshape(-1, 2)
@@ -283,31 +262,10 @@ def _joined(first: NDArray[np.int64], second: NDArray[np.int64], size: int) -> N
 def buildings_near(
     polygons: NDArray[np.object_], places: NDArray[np.float64], *, distance: float
 ) -> NDArray[np.int64]:
-    """Return the buildings around some places, with all that they are joined to.
+    """Return the rows of the buildings around some places, with all that they are joined to.
 
-    Parameters
-    ----------
-    polygons : ndarray of shapely.Geometry, shape (n,)
-        Footprints in a metric CRS.
-    places : ndarray of float64, shape (p, 2)
-        Places in metres.
-    distance : float
-        Metres around each of them.
-
-    Returns
-    -------
-    ndarray of int64
-        Row numbers, rising.
-
-    Notes
-    -----
-    A block of houses is one shape to occlusion, which comes out the same only from all of them.
-
-    Examples
-    --------
-    >>> row = np.array([shapely.box(x, 0, x + 8, 8) for x in (0, 8, 50)])
-    >>> buildings_near(row, np.array([[-5.0, 0.0]]), distance=6.0).tolist()
-    [0, 1]
+    The rows ascend; `distance` is in metres. Joined buildings are needed because occlusion treats a
+    block of houses as one shape, which comes out the same only from all of them.
     """
     tree = shapely.STRtree(polygons)
     chosen = np.zeros(len(polygons), bool)

@@ -113,34 +113,11 @@ def paper_experiments(
     queries: int = QUERIES,
     seed: int = 0,
 ) -> dict[str, ExperimentSpec]:
-    """Return all experiments of the paper.
+    """Return all experiments of the paper by name: ``"none"``, ``"medium"``, ``"levels"``, ...
 
-    Parameters
-    ----------
-    database : str
-        File of the database.
-    ranges : mapping of float to str
-        Files of the databases of the same city with other visibility ranges.
-    scales : mapping of int to str
-        Files of the databases of the same city with other numbers of angle levels.
-    queries : int, default 10000
-        How many queries each experiment asks.
-    seed : int, default 0
-        Seed of all chances.
-
-    Returns
-    -------
-    dict of str to ExperimentSpec
-        By name: ``"none"``, ``"medium"``, ``"levels"``, ``"readings"``, ``"ours"``,
-        ``"range-20"``, ..., ``"levels-8"``, ...
-
-    Examples
-    --------
-    >>> specs = paper_experiments("city.parquet", ranges={20.0: "r20.parquet"}, scales={})
-    >>> list(specs)
-    ['none', 'medium', 'levels', 'readings', 'ours', 'range-20']
-    >>> [case.name for case in specs["range-20"].cases]
-    ['medium/types-edit-top1', 'medium/stages-5-top1']
+    ``ranges`` and ``scales`` are the files of databases of the same city by their visibility range
+    in metres and by their number of angle levels; each adds an experiment, such as ``"range-20"``
+    or ``"levels-8"``.
     """
     stages = {name: f"edit+edit:{k}%" for k, name in PERCENTS.items() if name not in FUSIONS}
     weights = {name: f"edit+edit:alpha={w}" for w, name in WEIGHTS.items() if name not in FUSIONS}

@@ -33,46 +33,20 @@ _AMOUNT = re.compile(r"(\d*)\s*(\S)")
 class Requirement:
     """How many objects of some classes a cell must see.
 
-    Parameters
-    ----------
-    limits : tuple of (int, int, float)
-        Class code, or `WILDCARD` for all objects together; the fewest and the most.
-
-    Examples
-    --------
-    A bus stop, two trees or more, no street light, at most ten objects in all:
-
-    >>> from semsig_gis.catalog import paper_taxonomy
-    >>> Requirement.parse("M,2B,D=0,?<=10", paper_taxonomy()).limits
-    ((11, 1, inf), (1, 2, inf), (3, 0, 0), (0, 0, 10))
+    Each limit is a class code, or `WILDCARD` for all objects together, with the fewest and the
+    most.
     """
 
     limits: tuple[tuple[int, int, float], ...]
 
     @classmethod
     def parse(cls, text: str, taxonomy: Taxonomy) -> Self:
-        """Read a requirement from text.
+        """Read a requirement from text, such as ``M,2B,D=0,?<=10``.
 
-        Parameters
-        ----------
-        text : str
-            Parts between commas: ``M`` for at least one bus stop, ``2B`` for at least two trees,
-            or ``B>=2``, ``B<=5``, ``B=3``. The symbol ``?`` counts all objects. A symbol may
-            stand in several parts.
-        taxonomy : Taxonomy
-            The classes of the symbols.
-
-        Returns
-        -------
-        Requirement
-            What the text says.
-
-        Raises
-        ------
-        InputError
-            If a part does not have that form, or two parts exclude each other.
-        UnknownNameError
-            If a symbol is not in the taxonomy.
+        Parts stand between commas: ``M`` for at least one bus stop, ``2B`` for at least two trees,
+        or ``B>=2``, ``B<=5``, ``B=3``. The symbol ``?`` counts all objects. A symbol may stand in
+        several parts. Raise InputError if a part does not have that form or two parts exclude each
+        other, and UnknownNameError if a symbol is not in the taxonomy.
         """
         limits: dict[int, tuple[int, float]] = {}
         for part in map(str.strip, text.split(",")):
@@ -93,24 +67,9 @@ class Requirement:
 class PatternIndex:
     """Cells grouped by how often they see each class.
 
-    Parameters
-    ----------
-    sequences : SequenceTable
-        The distinct type sequences of the cells.
-    groups : SequenceTable
-        The same with the objects of each in the order of their codes: a distinct sequence is a
-        group, and the rows are the distinct type sequences.
-
-    Examples
-    --------
-    >>> import numpy as np
-    >>> from semsig_gis.catalog import paper_taxonomy
-    >>> types = np.array([1, 11, 1, 11, 1, 1, 3], np.uint8)
-    >>> index = PatternIndex.build(SequenceTable.from_csr(types, np.array([0, 3, 6, 7])))
-    >>> len(index), index.cells.tolist()
-    (2, [1, 2])
-    >>> index.meeting(Requirement.parse("M,2B", paper_taxonomy())).tolist()
-    [True, True, False]
+    `sequences` has the distinct type sequences of the cells. `groups` has the same sequences as
+    rows, each with its objects in the order of their codes, so that its distinct sequences are the
+    groups.
     """
 
     sequences: SequenceTable
@@ -118,18 +77,7 @@ class PatternIndex:
 
     @classmethod
     def build(cls, sequences: SequenceTable) -> Self:
-        """Group the cells of a table of type sequences.
-
-        Parameters
-        ----------
-        sequences : SequenceTable
-            Such as `SignatureDatabase.type_sequences`.
-
-        Returns
-        -------
-        PatternIndex
-            The groups.
-        """
+        """Group the cells of a table such as `SignatureDatabase.type_sequences`."""
         counts = sequences.histogram
         values = np.tile(np.arange(counts.shape[1], dtype=np.uint8), len(sequences))
         ordered = np.repeat(values, counts.ravel())
@@ -149,15 +97,7 @@ class PatternIndex:
     def sequences_meeting(self, requirement: Requirement) -> NDArray[np.bool_]:
         """Tell which distinct type sequences meet a requirement.
 
-        Parameters
-        ----------
-        requirement : Requirement
-            What a cell must see.
-
-        Returns
-        -------
-        ndarray of bool, shape (d,)
-            True for those that do, as `semsig_gis.nearest.nearest` takes them.
+        The result, shape (d,), is what `semsig_gis.nearest.nearest` takes.
         """
         counts = self.groups.histogram
         met = np.ones(len(self), np.bool_)
@@ -172,18 +112,7 @@ class PatternIndex:
         return np.asarray(met[self.groups.inverse])
 
     def meeting(self, requirement: Requirement) -> NDArray[np.bool_]:
-        """Tell which cells meet a requirement.
-
-        Parameters
-        ----------
-        requirement : Requirement
-            What a cell must see.
-
-        Returns
-        -------
-        ndarray of bool, shape (n,)
-            True for those that do.
-        """
+        """Tell which cells meet a requirement, shape (n,)."""
         return np.asarray(self.sequences_meeting(requirement)[self.sequences.inverse])
 
 

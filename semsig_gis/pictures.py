@@ -72,15 +72,7 @@ SETTINGS = {
 
 @dataclass(frozen=True, slots=True)
 class Picture:
-    """A picture in two formats.
-
-    Parameters
-    ----------
-    svg, png : bytes
-        The content of the files.
-    description : str
-        What is to be seen, for those who cannot.
-    """
+    """A picture in two formats; ``description`` tells what is seen to those who cannot see it."""
 
     svg: bytes
     png: bytes
@@ -93,24 +85,7 @@ class Picture:
 
 @contextlib.contextmanager
 def blank_figure(width: float, height: float) -> Iterator[Figure]:
-    """Give a figure to draw on with settings of our own, until the block ends.
-
-    Parameters
-    ----------
-    width, height : float
-        Size in inches.
-
-    Yields
-    ------
-    Figure
-        White and empty.
-
-    Examples
-    --------
-    >>> with blank_figure(3, 2) as figure:
-    ...     figure.axes
-    []
-    """
+    """Give an empty white figure (inches) with settings of our own, until the block ends."""
     # The backend stays as it is: it is the one of whoever draws on a screen.
     settings: dict[Any, Any] = {**mpl.rcParamsDefault, **SETTINGS}
     del settings["backend"]
@@ -123,24 +98,8 @@ def blank_figure(width: float, height: float) -> Iterator[Figure]:
 def saved(figure: Figure, *, title: str, description: str) -> Picture:
     """Return a figure as files; call it in the block of `blank_figure`.
 
-    Parameters
-    ----------
-    figure : Figure
-        What was drawn.
-    title, description : str
-        What a screen reader says.
-
-    Returns
-    -------
-    Picture
-        Without dates and names of programs.
-
-    Examples
-    --------
-    >>> with blank_figure(3, 2) as figure:
-    ...     picture = saved(figure, title="A < B", description="nothing")
-    >>> b"<title>A &lt; B</title>" in picture.svg
-    True
+    The files hold no dates and no names of programs. Title and description are what a screen reader
+    says.
     """
     svg, png = io.BytesIO(), io.BytesIO()
     nothing = dict.fromkeys(("Creator", "Date", "Format", "Type"))
@@ -155,24 +114,9 @@ def saved(figure: Figure, *, title: str, description: str) -> Picture:
 
 
 def label(text: str, length: int) -> str:
-    """Return text from data that fits into a picture.
+    """Return text from data on one line, cut where it does not fit into a picture.
 
-    Parameters
-    ----------
-    text : str
-        Anything.
-    length : int
-        The most letters; a Chinese one, say, counts as two.
-
-    Returns
-    -------
-    str
-        One line, cut where it is too long.
-
-    Examples
-    --------
-    >>> label("alignment trees of plane and lime", 18)
-    'alignment trees o…'
+    ``length`` is the most letters; a Chinese one, say, counts as two.
     """
     plain = one_line(text)
     ends = list(itertools.accumulate(map(_letter_width, plain)))
@@ -197,25 +141,8 @@ def draw_legend(
 ) -> None:
     """Draw a legend in columns of one width.
 
-    Parameters
-    ----------
-    figure : Figure
-        Where to draw.
-    keys : sequence of (Line2D or Patch, str)
-        Signs and what they mean.
-    place : tuple of float
-        Left, top and width as shares of the figure's.
-    columns : int
-        How many columns.
-    size : float
-        Size of the letters in points.
-    sign_width : float
-        Width of a sign in letters.
-
-    Examples
-    --------
-    >>> with blank_figure(3, 2) as figure:
-    ...     draw_legend(figure, [], place=(0, 0, 1), columns=2, size=9, sign_width=1)
+    ``place`` is left, top and width as shares of the figure's; ``size`` is in points,
+    ``sign_width`` in letters.
     """
     left, top, width = place
     rows = math.ceil(len(keys) / columns)

@@ -27,26 +27,11 @@ TURN = 2.0  # degrees between the headings that are tried
 
 @dataclass(frozen=True, eq=False, slots=True, kw_only=True)
 class PlaceEstimate:
-    """A place and a heading, each with its uncertainty.
+    """A mean place in metres and a heading, each with its uncertainty.
 
-    Parameters
-    ----------
-    x, y : float
-        The mean place in metres.
-    heading : float or None
-        Degrees to add to the bearings of the query, in [-180, 180); None where they are known.
-    covariance : ndarray of float64, shape (3, 3)
-        Of x, y (metres) and heading (degrees).
-    refined : bool
-        Whether the place is from between the viewpoints, not from whole cells alone.
-
-    Examples
-    --------
-    >>> found = PlaceEstimate(
-    ...     x=0.0, y=0.0, heading=None, covariance=np.diag([4.0, 1.0, 0.0]), refined=True
-    ... )
-    >>> [round(part, 2) for part in found.ellipse(0.9)]
-    [4.29, 2.15, 90.0]
+    `heading` is in degrees to add to the bearings of the query, in [-180, 180), or None if they are
+    known. `covariance`, shape (3, 3), is of x, y (metres) and heading (degrees). `refined` tells
+    whether the place comes from between the viewpoints rather than from whole cells.
     """
 
     x: float
@@ -68,17 +53,8 @@ class PlaceEstimate:
     def ellipse(self, share: float = 0.9) -> tuple[float, float, float]:
         """Return the ellipse that holds a share of a normal distribution of this covariance.
 
-        Parameters
-        ----------
-        share : float, default 0.9
-            Above 0, below 1.
-
-        Returns
-        -------
-        longer, shorter : float
-            Half axes in metres.
-        bearing : float
-            Degrees clockwise from grid north of the longer one, in [0, 180).
+        It is the longer and the shorter half axis in metres, and the bearing of the longer one in
+        degrees clockwise from grid north, in [0, 180).
         """
         values, vectors = np.linalg.eigh(self.covariance[:2, :2])
         scale = math.sqrt(-2.0 * math.log(1.0 - share))
@@ -87,13 +63,7 @@ class PlaceEstimate:
         return longer, shorter, bearing
 
     def to_dict(self) -> dict[str, Any]:
-        """Return the estimate as plain values, ready for JSON.
-
-        Returns
-        -------
-        dict
-            The fields; the covariance with two rows where the heading is known.
-        """
+        """Return plain values for JSON; the covariance has two rows if the heading is known."""
         size = 2 if self.heading is None else 3
         longer, shorter, bearing = self.ellipse(0.9)
         return {
@@ -117,50 +87,12 @@ def cell_estimate(
     radius: float,
     north_sigma: float = 0.0,
 ) -> PlaceEstimate:
-    """Return the mean place around a cell, from the chances of the cells.
+    """Return the mean place within `radius` metres of a cell, from the chances of the cells.
 
-    Parameters
-    ----------
-    query : Signature
-        What was seen.
-    noise : NoiseSpec or NoiseMixture
-        The noise model.
-    found : Posterior
-        The chances.
-    cell : int
-        Row number of the cell around which the place lies.
-    radius : float
-        Metres around it over which is averaged.
-    north_sigma : float, default 0
-        Standard deviation in degrees of the north of the query: 0 where it is known, infinite
-        where it is not known at all.
-
-    Returns
-    -------
-    PlaceEstimate
-        The mean. The covariance has ``step ** 2 / 12`` each way for the place in a cell.
-
-    Notes
-    -----
-    Of a place in two streets at once the mean is between them; it is the place that is least far
-    off in the mean square. The chances of the headings are worked out in steps of two degrees
-    round the whole turn, cell by cell.
-
-    Examples
-    --------
-    >>> from semsig_gis.catalog import paper_taxonomy
-    >>> from semsig_gis.building import build_database
-    >>> from semsig_gis.noise import NoiseSpec
-    >>> from semsig_gis.objects import build_objects
-    >>> from semsig_gis.posterior import posterior
-    >>> from semsig_gis.sources.synthetic import CitySpec, synthetic_city
-    >>> layers = synthetic_city(CitySpec(size=300.0))
-    >>> objects, _ = build_objects(layers, taxonomy=paper_taxonomy(), crs="EPSG:32631")
-    >>> database = build_database(objects)
-    >>> sure = posterior(database, np.where(np.arange(len(database)) == 7, 0.0, -99.0))
-    >>> place = cell_estimate(database.signature(7), NoiseSpec(), sure, 7, radius=50.0)
-    >>> [place.x, place.y] == database.xy[7].tolist(), round(place.sigma, 3)
-    (True, 2.887)
+    For a place in two streets at once the mean lies between them, as it has the least mean squared
+    error. The covariance has ``step ** 2 / 12`` each way for the place in a cell. `north_sigma` is
+    the standard deviation in degrees of the query's north: 0 if known, infinite if not known at
+    all. Headings are tried every two degrees all round, cell by cell.
     """
     database = found.database
     away = database.xy - database.xy[cell]
@@ -185,33 +117,10 @@ def cell_estimate(
 def refined_estimate(
     found: Refinement, xy: tuple[float, float], *, radius: float, turned: bool
 ) -> PlaceEstimate | None:
-    """Return the best place around another one, from the chances of the parts of cells.
+    """Return the best place within `radius` metres of another, from the chances of parts of cells.
 
-    Parameters
-    ----------
-    found : Refinement
-        The chances.
-    xy : tuple of float
-        The viewpoint of the answer in metres.
-    radius : float
-        Metres around it in which the best place is looked for.
-    turned : bool
-        Whether the heading was looked for, too.
-
-    Returns
-    -------
-    PlaceEstimate or None
-        The mean over what is near the best part; None where no part is in the circle.
-
-    Examples
-    --------
-    >>> parts = Refinement(
-    ...     places=np.array([[0.0, 0.0], [2.0, 0.0], [90.0, 0.0]]), sizes=np.full(3, 2.0),
-    ...     loglik=np.zeros(3), headings=np.zeros(3), heading_sigmas=np.zeros(3),
-    ...     chances=np.array([0.2, 0.2, 0.6]), near=25.0,
-    ... )
-    >>> refined_estimate(parts, (5.0, 0.0), radius=50.0, turned=False).x
-    1.0
+    It is the mean over what is near the best part, or None if no part is in the circle. `turned`
+    tells whether the heading was looked for, too.
     """
     away = found.places - np.asarray(xy)
     inside = np.hypot(away[:, 0], away[:, 1]) <= radius

@@ -31,36 +31,12 @@ def place_loglik(
     turns: NDArray[np.float64],
     reach: float,
 ) -> NDArray[np.float64]:
-    """Return the log-likelihood of a query by place and turn.
+    """Return the log-likelihood of a query by place and turn, shape (v, r).
 
-    Parameters
-    ----------
-    query : Signature
-        At least one object, with bearings; types may be unknown, all or some.
-    views : Views
-        What is seen from the places.
-    tables : sequence of NoiseTable
-        The noise model, or each model of a mixture.
-    weights : ndarray of float64
-        Chance of each.
-    turns : ndarray of float64, shape (v, r)
-        Degrees to turn the bearings of the query by, for each place.
-    reach : float
-        The largest visibility range of any class, in metres.
-
-    Returns
-    -------
-    ndarray of float64, shape (v, r)
-        Natural logarithms, on the scale of `semsig_gis.likelihood`.
-
-    Raises
-    ------
-    InputError
-        If the query is empty, has no bearings, or has a class that the tables do not have.
-
-    Notes
-    -----
-    The same sum as in `semsig_gis.alignment`, there for the cells of a database.
+    The query needs bearings; its types may be unknown. `weights` are the chances of the tables,
+    `turns` the degrees to turn the query by at each place, and `reach` the largest visibility range
+    of any class in metres. The sum is that of `semsig_gis.alignment`, on the scale of
+    `semsig_gis.likelihood`.
     """
     from semsig_gis._alignment_kernel import align  # noqa: PLC0415 - numba loads slowly
 

@@ -1,15 +1,7 @@
 """Catalogues and readers that other installed packages bring, found by entry points.
 
-A package announces them in its ``pyproject.toml``::
-
-    [project.entry-points."semsig_gis.catalogs"]
-    lyon = "my_package:LYON"                # path of a TOML file, or a function that returns one
-
-    [project.entry-points."semsig_gis.readers"]
-    my_format = "my_package.reader:read_layers"     # a `semsig_gis.sources.Reader`
-
-Importing them runs code of that package, which happens only when one of the functions below is
-called.
+``data_sources/README.md`` shows how a package announces them. Its code is imported only when a
+function below is called.
 """
 
 from __future__ import annotations
@@ -35,63 +27,19 @@ READERS = "semsig_gis.readers"
 
 
 def installed_catalogs(*, taken: Collection[str] = ()) -> Mapping[str, Path]:
-    """Return the catalogues of other packages.
+    """Return the names and TOML files of other packages' catalogues, sorted by name, not read.
 
-    Parameters
-    ----------
-    taken : collection of str
-        Names that are no longer free, such as those of the built-in catalogues.
-
-    Returns
-    -------
-    mapping of str to Path
-        Names and TOML files, sorted by name. What is in the files is not looked at.
-
-    Raises
-    ------
-    CatalogError
-        If two packages bring a catalogue of one name, or its name is taken.
-
-    Warns
-    -----
-    UserWarning
-        For an entry that fails to load or is not the path of a TOML file; it is left out.
-
-    Examples
-    --------
-    >>> all(path.suffix == ".toml" for path in installed_catalogs().values())
-    True
+    `taken` are names that are no longer free. Raises CatalogError if a name is taken or stands
+    twice. An entry that fails to load or is not the path of a TOML file is left out with a warning.
     """
     return _installed(CATALOGS, _toml_path, taken, CatalogError)
 
 
 def installed_readers(*, taken: Collection[str] = ()) -> Mapping[str, Callable[..., Any]]:
-    """Return the readers of other packages.
+    """Return the names and functions of other packages' readers, sorted by name.
 
-    Parameters
-    ----------
-    taken : collection of str
-        Names that are no longer free, such as those of the built-in readers.
-
-    Returns
-    -------
-    mapping of str to callable
-        Names and functions that are called as `semsig_gis.sources.Reader` says, sorted by name.
-
-    Raises
-    ------
-    SourceError
-        If two packages bring a reader of one name, or its name is taken.
-
-    Warns
-    -----
-    UserWarning
-        For an entry that fails to load or is not a function; it is left out.
-
-    Examples
-    --------
-    >>> all(callable(read) for read in installed_readers().values())
-    True
+    `taken` are names that are no longer free. Raises SourceError if a name is taken or stands
+    twice. An entry that fails to load or is not a function is left out with a warning.
     """
     return _installed(READERS, _function, taken, SourceError)
 

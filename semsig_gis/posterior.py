@@ -159,42 +159,10 @@ def posterior(
     *,
     log_prior: NDArray[np.float64] | None = None,
 ) -> Posterior:
-    """Return the chance of every cell.
+    """Return chances that are proportional to likelihood times prior, both as logarithms by cell.
 
-    Parameters
-    ----------
-    database : SignatureDatabase
-        The cells.
-    loglik : array_like of float, shape (n,)
-        Log-likelihood of the query in each cell, up to a constant.
-    log_prior : ndarray of float64, shape (n,), optional
-        What was known before (see `semsig_gis.priors`), up to a constant; every cell as likely
-        as every other by default.
-
-    Returns
-    -------
-    Posterior
-        Chances that are proportional to likelihood times prior.
-
-    Raises
-    ------
-    InputError
-        If there is not one number a cell, one is NaN or plus infinity, or no cell is possible.
-
-    Examples
-    --------
-    >>> from semsig_gis.catalog import paper_taxonomy
-    >>> from semsig_gis.building import build_database
-    >>> from semsig_gis.objects import build_objects
-    >>> from semsig_gis.sources.synthetic import CitySpec, synthetic_city
-    >>> layers = synthetic_city(CitySpec(size=300.0))
-    >>> objects, _ = build_objects(layers, taxonomy=paper_taxonomy(), crs="EPSG:32631")
-    >>> database = build_database(objects)
-    >>> loglik = np.full(len(database), -50.0)
-    >>> loglik[[5, 6]] = -10.0, -10.0 + np.log(4.0)
-    >>> found = posterior(database, loglik)
-    >>> found.chances[[5, 6]].round(6).tolist(), found.credible_cells(0.75).tolist()
-    ([0.2, 0.8], [6])
+    Both are up to a constant; without `log_prior` (see `semsig_gis.priors`) all cells are alike.
+    Raises `InputError` if a number is NaN or plus infinity, or no cell is possible.
     """
     parts = [loglik] if log_prior is None else [loglik, log_prior]
     total = np.zeros(len(database))

@@ -40,29 +40,11 @@ EDGE_POINTS = 21
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ClassQuality:
-    """The objects of one class.
+    """The objects of one class, after collapsing and conflation, and their density.
 
-    Parameters
-    ----------
-    class_name : str
-        The class.
-    objects : int
-        Objects, after collapsing and conflation.
-    rows : int
-        Rows of the sources that they stand for.
-    per_km2_hull : float or None
-        Objects per square kilometre of the convex hull; None where it has no area.
-    per_km2_occupied : float
-        Objects per square kilometre of the occupied squares.
-    nearest_m : float or None
-        Median distance in metres from an object to the nearest other one of its class; None for
-        a single object.
-
-    Examples
-    --------
-    >>> ClassQuality(class_name="bench", objects=1, rows=1, per_km2_hull=None,
-    ...              per_km2_occupied=100.0, nearest_m=None).objects
-    1
+    `rows` counts the rows of the sources that they stand for. `per_km2_hull` is None where the
+    convex hull has no area. `nearest_m` is the median distance in metres from an object to the
+    nearest other one of its class, None for a single object.
     """
 
     class_name: str
@@ -77,26 +59,8 @@ class ClassQuality:
 class SourceQuality:
     """What became of the rows of one layer; all that is dropped and `objects` add up to `read`.
 
-    Parameters
-    ----------
-    name : str
-        The layer.
-    read : int
-        Rows in the source.
-    unreadable, filtered, missing, duplicates, misplaced, collapsed : int
-        Rows dropped, by reason; see `semsig_gis.objects.LayerReport`.
-    conflated : int
-        Objects merged into those of an earlier source.
-    objects : int
-        Objects that remain.
-    notes : tuple of str
-        Warnings, and the first messages about unreadable rows.
-
-    Examples
-    --------
-    >>> SourceQuality(name="trees", read=3, unreadable=0, filtered=1, missing=0, duplicates=0,
-    ...               misplaced=0, collapsed=0, conflated=1, objects=1).read
-    3
+    For the reasons see `semsig_gis.objects.LayerReport`; `conflated` objects were merged into those
+    of an earlier source. `notes` are warnings and the first messages about unreadable rows.
     """
 
     name: str
@@ -116,39 +80,10 @@ class SourceQuality:
 class QualityReport:
     """The quality report of a load.
 
-    Parameters
-    ----------
-    classes : tuple of ClassQuality
-        The classes that have objects, in the order of the taxonomy.
-    absent : tuple of str
-        Classes of the taxonomy without any object.
-    sources : tuple of SourceQuality
-        The layers, in the order they were loaded.
-    conflated : tuple of ConflatedPair
-        What was merged, by class and pair of sources.
-    crs : str
-        Metric coordinate reference system: its code, or its name where it has none.
-    extent : tuple of float
-        West, south, east and north in metres.
-    extent_degrees : tuple of float
-        West, south, east and north in degrees of WGS 84.
-    hull_km2 : float
-        Area of the convex hull of all objects.
-    occupied_km2 : float
-        Area of the squares of 100 m that hold an object.
-    licenses : tuple of str
-        One line for every publisher and licence.
-
-    Examples
-    --------
-    >>> from semsig_gis.sources.synthetic import CitySpec, synthetic_city
-    >>> from semsig_gis.catalog import paper_taxonomy
-    >>> from semsig_gis.objects import build_objects
-    >>> layers = synthetic_city(CitySpec(size=300.0))
-    >>> city = build_objects(layers, taxonomy=paper_taxonomy(), crs="EPSG:32631")
-    >>> report = quality_report(*city)
-    >>> report.crs, report.objects == len(city[0])
-    ('EPSG:32631', True)
+    `classes` are those with objects in the order of the taxonomy, `absent` those without; `sources`
+    stand in the order they were loaded. `crs` is a code, or a name where there is none. Extents are
+    west, south, east and north, in metres and in degrees of WGS 84. `hull_km2` is the area of the
+    convex hull of all objects, `occupied_km2` that of the squares of 100 m that hold one.
     """
 
     classes: tuple[ClassQuality, ...]
@@ -168,24 +103,14 @@ class QualityReport:
         return sum(item.objects for item in self.classes)
 
     def to_dict(self) -> dict[str, Any]:
-        """Return the report as plain values, ready for JSON.
-
-        Returns
-        -------
-        dict
-            The fields of the report and ``objects``, their number.
-        """
+        """Return the fields and ``objects``, their number, as plain values for JSON."""
         return {"objects": self.objects, **asdict(self)}
 
     def tables(self) -> tuple[PlainTable, ...]:
-        """Return the report as tables to print.
+        """Return the report as tables to print, in the form of `semsig_gis.tables.Table`.
 
-        Returns
-        -------
-        tuple of (str, tuple of str, tuple of tuple of str, str)
-            Title, headings, rows of text and a note, which is what `semsig_gis.tables.Table`
-            takes. Objects by class, rows by layer, what was conflated (where something was), the
-            place, and the licences.
+        They show objects by class, rows by layer, what was conflated (where something was), the
+        place, and the licences.
         """
         tables: list[PlainTable] = [
             (

@@ -96,20 +96,10 @@ class QuerySpec:
 class Query:
     """A query and the truth about it.
 
-    Parameters
-    ----------
-    seed, number : int
-        Its seed, and its number from 0.
-    xy : tuple of float
-        Where it was seen from, metres in the CRS of the database.
-    cell : int
-        Row number in the database of the cell of that place; -1 where the database has none.
-    length : int
-        How many objects are seen from there.
-    asked : Sight
-        What is asked, and by how much its north is off.
-    pick : float
-        Chance in [0, 1) to choose one of equal answers by.
+    It was seen from `xy`, metres in the CRS of the database, in the cell of row number `cell` there
+    (-1 where the database has no such cell), where `length` objects are seen. `number` counts from
+    0 for each seed. `asked` is what is asked after all distortions, and by how much its north is
+    off; `pick`, in [0, 1), chooses one of equally good answers.
     """
 
     seed: int

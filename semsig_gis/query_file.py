@@ -27,131 +27,42 @@ TOWARDS = ("distance", "bearing")
 
 
 def read_queries(path: str | Path, *, taxonomy: Taxonomy) -> Queries:
-    """Read the queries of a file.
+    """Read the queries of a CSV file, or of a file of JSON lines.
 
-    Parameters
-    ----------
-    path : str or Path
-        A CSV file with columns ``types`` and ``bearings`` (numbers with blanks, commas or
-        semicolons between them), one of which may be missing or empty, and ``id`` if wanted; or
-        JSON lines with the same names, where bearings may be a list.
-    taxonomy : Taxonomy
-        Classes that the symbols belong to.
-
-    Returns
-    -------
-    list of tuple of (str or int, Signature)
-        Name of each query (its ``id``, or the number of its line) and the query.
-
-    Raises
-    ------
-    InputError
-        If the file cannot be read or a line of it is no query.
-
-    Examples
-    --------
-    >>> from semsig_gis.catalog import paper_taxonomy
-    >>> read_queries("nowhere.csv", taxonomy=paper_taxonomy())
-    Traceback (most recent call last):
-    ...
-    semsig_gis.errors.InputError: query file nowhere.csv cannot be read (No such file or
-    directory); give a CSV or JSON lines file.
+    The columns are ``types`` and ``bearings`` (degrees with blanks, commas or semicolons between
+    them; in JSON perhaps a list), one of which may be missing or empty, and ``id`` if wanted. Each
+    query comes with its ``id``, or else the number of its line. Raises InputError if the file
+    cannot be read or a line of it is no query.
     """
     return _named(read_rows(path, lambda row: _query(row, taxonomy), what="query"))
 
 
 def parse_queries(text: str, source: str, *, taxonomy: Taxonomy) -> Queries:
-    r"""Read queries from text.
+    """Read queries from JSON lines, with the names of `read_queries`.
 
-    Parameters
-    ----------
-    text : str
-        JSON lines.
-    source : str
-        What to call the text in messages.
-    taxonomy : Taxonomy
-        Classes that the symbols belong to.
-
-    Returns
-    -------
-    list of tuple of (str or int, Signature)
-        Name of each query and the query.
-
-    Raises
-    ------
-    InputError
-        If there is no line, or one is no query; with its number.
-
-    Examples
-    --------
-    >>> from semsig_gis.catalog import paper_taxonomy
-    >>> lines = '{"id": "a", "types": "DB", "bearings": [10, 80]}\n{"types": "?B"}\n'
-    >>> [(name, len(query)) for name, query in
-    ...     parse_queries(lines, "example", taxonomy=paper_taxonomy())]
-    [('a', 2), (2, 2)]
+    `source` is what messages call the text. Raises InputError if there is no line, or, with its
+    number, if one is no query.
     """
     return _named(parse_rows(text, source, lambda row: _query(row, taxonomy), what="query"))
 
 
 def read_route(path: str | Path, *, taxonomy: Taxonomy) -> Route:
-    """Read the views of a route.
+    """Read the views of a route from a file of queries (see `read_queries`).
 
-    Parameters
-    ----------
-    path : str or Path
-        A file of queries (see `read_queries`), in which each line but the first also tells the way
-        from the line before: ``dx`` and ``dy`` (metres to grid east and north), or ``distance``
-        (metres) and ``bearing`` (degrees clockwise from grid north), and ``sigma`` (standard
-        deviation of each coordinate in metres, 0 if missing). A line may have seen nothing.
-    taxonomy : Taxonomy
-        Classes that the symbols belong to.
-
-    Returns
-    -------
-    queries : list of tuple of (str or int, Signature)
-        Name of each view and what was seen.
-    legs : list of Leg
-        The ways between them, one fewer.
-
-    Raises
-    ------
-    InputError
-        If the file cannot be read, or a line of it is no view of a route.
+    Each line but the first also tells the way from the line before: ``dx`` and ``dy`` (metres to
+    grid east and north), or ``distance`` (metres) and ``bearing`` (degrees clockwise from grid
+    north), and ``sigma`` (standard deviation of each coordinate in metres, 0 if missing). A line
+    may have seen nothing. There is one leg fewer than views. Raises InputError if the file cannot
+    be read or a line of it is no view of a route.
     """
     return _route(read_rows(path, lambda row: _view(row, taxonomy), what="view"), str(path))
 
 
 def parse_route(text: str, source: str, *, taxonomy: Taxonomy) -> Route:
-    r"""Read the views of a route from text.
+    """Read the views of a route from JSON lines, with the names of `read_route`.
 
-    Parameters
-    ----------
-    text : str
-        JSON lines.
-    source : str
-        What to call the text in messages.
-    taxonomy : Taxonomy
-        Classes that the symbols belong to.
-
-    Returns
-    -------
-    queries : list of tuple of (str or int, Signature)
-        Name of each view and what was seen.
-    legs : list of Leg
-        The ways between them, one fewer.
-
-    Raises
-    ------
-    InputError
-        If there is no line, or one is no view of a route; with its number.
-
-    Examples
-    --------
-    >>> from semsig_gis.catalog import paper_taxonomy
-    >>> lines = '{"types": "DB"}\n{"types": "", "distance": 20, "bearing": 90, "sigma": 2}\n'
-    >>> queries, legs = parse_route(lines, "example", taxonomy=paper_taxonomy())
-    >>> [len(query) for _, query in queries], legs[0].dx, legs[0].sigma
-    ([2, 0], 20.0, 2.0)
+    `source` is what messages call the text. Raises InputError if there is no line, or, with its
+    number, if one is no view of a route.
     """
     return _route(parse_rows(text, source, lambda row: _view(row, taxonomy), what="view"), source)
 

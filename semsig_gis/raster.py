@@ -43,51 +43,13 @@ def raster_at_cells(
     crs: CRS,
     band: int | None = None,
 ) -> NDArray[np.float64]:
-    """Return the mean of a raster over each of some cells.
+    """Return the mean of a raster over each of some cells, by the area of the pixels in it.
 
-    Parameters
-    ----------
-    path : str or Path
-        Any raster that GDAL reads, in any coordinate reference system.
-    grid : GridSpec
-        The grid.
-    columns, rows : array_like of int, shape (n,)
-        Cells, at least one.
-    crs : pyproj.CRS
-        Coordinate reference system of the grid.
-    band : int, optional
-        Which band to read, from 1; needed only where there are several.
-
-    Returns
-    -------
-    ndarray of float64, shape (n,)
-        Means over the pixels in each cell, by area; NaN where the raster has no data. A cell that
-        touches the edge from outside may get the value there.
-
-    Raises
-    ------
-    SourceError
-        If the file cannot be read as a raster.
-    CrsError
-        If the raster does not say its coordinate reference system, or it does not fit the grid's.
-    InputError
-        If the raster does not have that band, or has several and none was named.
-
-    Examples
-    --------
-    >>> import tempfile
-    >>> from pyproj import CRS
-    >>> from semsig_gis.grid import GridSpec
-    >>> options = {"count": 1, "dtype": "uint8", "crs": "EPSG:2154"}
-    >>> with tempfile.TemporaryDirectory() as folder:
-    ...     path = f"{folder}/counts.tif"
-    ...     shape = {"width": 2, "height": 1, "transform": Affine(20, 0, 0, 0, -20, 20)}
-    ...     with rasterio.open(path, "w", **options, **shape) as file:
-    ...         file.write(np.array([[7, 9]], np.uint8), 1)
-    ...     raster_at_cells(
-    ...         path, grid=GridSpec(), columns=[0, 3, 9], rows=[0, 1, 0], crs=CRS("EPSG:2154")
-    ...     ).tolist()
-    [7.0, 9.0, nan]
+    The raster may be in any format that GDAL reads and in any CRS; `crs` is that of the grid. NaN
+    stands where the raster has no data; a cell that touches its edge from outside may get the value
+    there. `band` counts from 1 and is needed only where there are several. SourceError if the file
+    is not a raster, CrsError if its CRS is missing or does not fit the grid's, InputError for the
+    band.
     """
     across, up = np.asarray(columns, dtype=np.int64), np.asarray(rows, dtype=np.int64)
     left, top = int(across.min()), int(up.max())
@@ -155,35 +117,11 @@ def write_cells(
     unit: str = "",
     notes: Mapping[str, str],
 ) -> None:
-    """Write one number a cell as a Cloud-Optimised GeoTIFF.
+    """Write one number a cell as a Cloud-Optimised GeoTIFF; NaN where there is none.
 
-    Parameters
-    ----------
-    path : str or Path
-        File to write; it appears whole, by rename.
-    values : ndarray of float64, shape (n,)
-        Numbers; NaN where there is none.
-    grid : GridSpec
-        The grid.
-    columns, rows : ndarray of int32, shape (n,)
-        Cells, at least one, ordered by column.
-    crs : pyproj.CRS
-        Coordinate reference system of the grid.
-    name : str
-        What the numbers are.
-    unit : str, optional
-        Their unit.
-    notes : mapping of str to str
-        What else is to be known of them.
-
-    Raises
-    ------
-    InputError
-        If the cells span too wide an area, or the file cannot be written.
-
-    Notes
-    -----
-    The raster is written in strips, so that memory stays flat.
+    Cells, at least one, are ordered by column. The raster is written in strips, so that memory
+    stays flat, and appears whole, by rename. InputError if the cells span too wide an area, or the
+    file cannot be written.
     """
     left, top = int(columns[0]), int(rows.max())
     width, height = int(columns[-1]) - left + 1, top - int(rows.min()) + 1

@@ -45,32 +45,10 @@ ROUNDING = 1e-6  # square metres
 class Refinement:
     """The chances of places on and off the grid.
 
-    Parameters
-    ----------
-    places : ndarray of float64, shape (p, 2)
-        Middle of each square part of a cell, in metres.
-    sizes : ndarray of float64, shape (p,)
-        Length of its sides in metres.
-    loglik : ndarray of float64, shape (p,)
-        Log-likelihood of the query there, the mean over the part.
-    headings : ndarray of float64, shape (p,)
-        Degrees to add to the bearings of the query, the mean in each part; 0 where north is known.
-    heading_sigmas : ndarray of float64, shape (p,)
-        Their standard deviations.
-    chances : ndarray of float64, shape (p,)
-        Chances of the parts; they sum to one.
-    near : float
-        Metres around the best place over which it is averaged.
-
-    Examples
-    --------
-    >>> found = Refinement(
-    ...     places=np.array([[0.0, 0.0], [2.0, 0.0], [90.0, 0.0]]), sizes=np.full(3, 2.0),
-    ...     loglik=np.zeros(3), headings=np.zeros(3), heading_sigmas=np.zeros(3),
-    ...     chances=np.array([0.3, 0.3, 0.4]), near=25.0,
-    ... )
-    >>> found.xy, round(found.mass, 6)
-    ((1.0, 0.0), 0.6)
+    By square part of a cell: `places`, shape (p, 2), its middle in metres; `sizes`, the length of
+    its sides; `loglik`, the mean over the part; `headings`, the mean degrees to add to the bearings
+    of the query (0 if north is known), with `heading_sigmas`; and `chances`, which sum to one. The
+    best place is averaged over `near` metres around it.
     """
 
     places: NDArray[np.float64]
@@ -136,23 +114,7 @@ BEST = 300
 def cell_noise(noise: Noise, step: float) -> Noise:
     """Return a noise model for queries from anywhere in a cell, not from its middle alone.
 
-    Parameters
-    ----------
-    noise : NoiseSpec or NoiseMixture
-        The model for a place that is known.
-    step : float
-        Side of a cell in metres.
-
-    Returns
-    -------
-    NoiseSpec or NoiseMixture
-        The model with ``step / 12 ** 0.5`` metres more of uncertainty of the place, each way.
-
-    Examples
-    --------
-    >>> from semsig_gis.noise import NoiseSpec
-    >>> round(cell_noise(NoiseSpec(), 10.0).position_sigma, 2)
-    2.89
+    It adds ``step / 12 ** 0.5`` metres of uncertainty of the place, each way, in quadrature.
     """
     if isinstance(noise, NoiseMixture):
         specs = tuple(cell_noise(spec, step) for spec in noise.specs)
@@ -162,30 +124,9 @@ def cell_noise(noise: Noise, step: float) -> Noise:
 
 
 def place_noise(noise: Noise, step: float) -> Noise:
-    """Return the noise model for a place that is known, the inverse of `cell_noise`.
+    """Return the noise model for a known place, the inverse of `cell_noise`.
 
-    Parameters
-    ----------
-    noise : NoiseSpec or NoiseMixture
-        The model for queries from anywhere in a cell.
-    step : float
-        Side of a cell in metres.
-
-    Returns
-    -------
-    NoiseSpec or NoiseMixture
-        The model without the uncertainty of the place in a cell.
-
-    Raises
-    ------
-    InputError
-        If the model has less of it than that.
-
-    Examples
-    --------
-    >>> from semsig_gis.noise import NoiseSpec
-    >>> place_noise(cell_noise(NoiseSpec(), 10.0), 10.0).position_sigma
-    0.0
+    Raises `InputError` if the model has too little uncertainty of the place to take away.
     """
     if isinstance(noise, NoiseMixture):
         specs = tuple(place_noise(spec, step) for spec in noise.specs)
@@ -217,52 +158,17 @@ def refine(
 ) -> Refinement:
     """Look for the place of a query within some cells.
 
-    Parameters
-    ----------
-    query : Signature
-        At least one object, with bearings; types may be unknown.
-    cells : ndarray of float64, shape (c, 2)
-        Middles of the likeliest cells in metres, likeliest first: of a ranking with the noise
-        model that `cell_noise` gives. Some hundred do.
-    noise : NoiseSpec or NoiseMixture
-        The noise model for a place that is known.
-    objects : StreetObjects
-        The objects of the city.
-    index : ObjectIndex or StoredIndex
-        R-tree over them.
-    step : float, default 10
-        Side of a cell in metres.
-    radius : float, default 30
-        Visibility range in metres of classes that have none of their own.
-    near : float, default 25
-        Metres around the best place that count as near.
-    north_sigma : float, default 0
-        Standard deviation in degrees of the north of the query: 0 where it is known, infinite
-        where it is not known at all.
-    headings : ndarray, shape (c,), optional
-        Likeliest degrees to add to the bearings in each cell (see `CellScores.heading`); needed
-        where north is not known.
-    log_prior : ndarray of float64, shape (c,), optional
-        What else is known of the cells, up to a constant.
-    footprints : Footprints, optional
-        Buildings; what they hide is not seen.
+    The query needs bearings; its types may be unknown. `cells`, shape (c, 2), are the middles in
+    metres of the likeliest cells, likeliest first, of a ranking with the noise that `cell_noise`
+    gives; some hundred will do. `noise` itself is for a known place. `step`, `near` (see
+    `Refinement`) and `radius`, the visibility range of classes that have none of their own, are in
+    metres. `north_sigma` is the standard deviation in degrees of the query's north, infinite if it
+    is not known at all; then `headings`, the likeliest one in each cell, are needed. `log_prior` is
+    what else is known of the cells, and what `footprints` hide is not seen.
 
-    Returns
-    -------
-    Refinement
-        Chances of places.
-
-    Raises
-    ------
-    InputError
-        If the query has no bearings or a class that the city does not have, there is no cell, or
-        headings are missing.
-
-    Notes
-    -----
-    The likelihood is that of `semsig_gis.alignment`. A part of side s counts with an uncertainty
-    of the place of ``s / 12 ** 0.5`` each way, the deviation of places anywhere in it, so that
-    its likelihood stands for the mean over the part; chances are likelihood times area.
+    The likelihood is that of `semsig_gis.alignment`. A part of side s counts with an uncertainty of
+    the place of ``s / 12 ** 0.5`` each way, the deviation of places anywhere in it, so that its
+    likelihood stands for the mean over the part; chances are likelihood times area.
     """
     _check(cells, north_sigma, headings)
     codes = np.unique(objects.codes)

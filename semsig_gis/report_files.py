@@ -44,42 +44,16 @@ POINT_COLUMNS = ("source", "label", "x", "y", "low", "high")
 
 
 def write_report(report: Report, folder: str | Path) -> None:
-    """Write a report.
+    """Write a report into a folder, which is made if need be; files of the same names are replaced.
 
-    Parameters
-    ----------
-    report : Report
-        The report.
-    folder : str or Path
-        Where to; made if it is not there. Files of the same names are replaced, all else is left.
-
-    Raises
-    ------
-    InputError
-        If a name in the report cannot be that of a file or stands twice, or the folder cannot be
-        written to.
-
-    Notes
-    -----
     ``report.html`` is one page that asks the network for nothing, ``report.md`` is the same as
     Markdown. ``figures`` holds each plot and scene as SVG and PNG, and the points of each plot as
     CSV. ``numbers.csv`` holds every number of the tables, and ``report.json`` all there is, with
     null for what is infinite or not a number. A text in a CSV file that a spreadsheet would run as
     a formula begins with an apostrophe.
 
-    Examples
-    --------
-    >>> import tempfile
-    >>> from semsig_gis.catalog import paper_taxonomy
-    >>> from semsig_gis.report_parts import Number, Report, Section
-    >>> number = Number(row="R = 30 m", column="P(error <= 50 m)", ours=0.37, paper=0.3733)
-    >>> section = Section(name="range", title="Visibility range", numbers=(number,))
-    >>> report = Report(title="Figures", sections=(section,), taxonomy=paper_taxonomy())
-    >>> with tempfile.TemporaryDirectory() as folder:
-    ...     write_report(report, folder)
-    ...     print((Path(folder) / "numbers.csv").read_text(), end="")
-    section,row,column,unit,ours,low,high,paper,difference
-    range,R = 30 m,P(error <= 50 m),,0.37,,,0.3733,-0.0033
+    Raises `InputError` if a name in the report cannot be that of a file or stands twice, or the
+    folder cannot be written to.
     """
     _require_names([section.name for section in report.sections])
     _require_names([part.name for section in report.sections for part in section.drawn])

@@ -27,28 +27,7 @@ FIRST_MARKS = re.compile(r"^(\d*)([-+=>#.)])")
 
 
 def html_page(report: Report, pictures: Mapping[str, Picture]) -> str:
-    """Return a report as a page of HTML.
-
-    Parameters
-    ----------
-    report : Report
-        The report.
-    pictures : mapping of str to Picture
-        Its plots and scenes by their names.
-
-    Returns
-    -------
-    str
-        One page with the pictures in it, which may ask the network for nothing.
-
-    Examples
-    --------
-    >>> from semsig_gis.catalog import paper_taxonomy
-    >>> from semsig_gis.report_parts import Report
-    >>> report = Report(title="A < B", sections=(), taxonomy=paper_taxonomy())
-    >>> "<title>A &lt; B</title>" in html_page(report, {})
-    True
-    """
+    """Return a report as one page of HTML with its pictures in it, which loads nothing."""
     environment = Environment(
         loader=PackageLoader("semsig_gis"),
         autoescape=True,
@@ -71,39 +50,7 @@ def html_page(report: Report, pictures: Mapping[str, Picture]) -> str:
 
 
 def markdown_page(report: Report, pictures: Mapping[str, Picture]) -> str:
-    """Return a report as Markdown.
-
-    Parameters
-    ----------
-    report : Report
-        The report.
-    pictures : mapping of str to Picture
-        Its plots and scenes by their names, which are shown from the folder ``figures``.
-
-    Returns
-    -------
-    str
-        A document, ending in a newline.
-
-    Examples
-    --------
-    >>> from semsig_gis.catalog import paper_taxonomy
-    >>> from semsig_gis.report_parts import Number, Report, Section
-    >>> section = Section(
-    ...     name="range",
-    ...     title="Range",
-    ...     numbers=(Number(row="30 m", column="P", ours=0.37, paper=0.3733),),
-    ... )
-    >>> report = Report(title="Paris", sections=(section,), taxonomy=paper_taxonomy())
-    >>> print(markdown_page(report, {}), end="")
-    # Paris
-    <BLANKLINE>
-    ## Range
-    <BLANKLINE>
-    |  | P: ours | P: paper | P: difference |
-    | --- | ---: | ---: | ---: |
-    | 30 m | 0.3700 | 0.3733 | -0.0033 |
-    """
+    """Return a report as Markdown, with its pictures shown from the folder ``figures``."""
     blocks = [f"# {_inline(report.title)}", *map(_paragraph, report.text)]
     if report.settings:
         rows = [(_inline(name), _inline(value)) for name, value in report.settings]

@@ -17,25 +17,9 @@ __all__ = ["Curve", "Number", "Plot", "Report", "Scene", "SceneObject", "Section
 class Number:
     """A number of ours, beside the paper's where it prints one.
 
-    Parameters
-    ----------
-    row, column : str
-        What it tells.
-    ours : float or None
-        Our figure; None where it could not be worked out.
-    low, high : float or None
-        Ends of its interval of 95 %, where it has one.
-    paper : float or None
-        The paper's figure, where it prints one.
-    unit : str, default ""
-        Unit of all of them; ``""`` for a share or a pure number.
-    decimals : int, default 4
-        With how many it is shown.
-
-    Examples
-    --------
-    >>> Number(row="R = 30 m", column="P(error <= 50 m)", ours=0.37, paper=0.3733).difference
-    -0.0033
+    ``ours`` is None where it could not be worked out; ``low`` and ``high`` are the ends of its
+    interval of 95 %, where it has one. The unit is of all of them, ``""`` for a share or a pure
+    number.
     """
 
     row: str
@@ -110,15 +94,7 @@ class Plot:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SceneObject:
-    """A street object of a scene.
-
-    Parameters
-    ----------
-    code : int
-        Code of its class.
-    east, north : float
-        Metres from the viewpoint.
-    """
+    """A street object of a scene: the code of its class, and metres from the viewpoint."""
 
     code: int
     east: float
@@ -129,26 +105,11 @@ class SceneObject:
 class Scene:
     """A viewpoint with the street objects around it.
 
-    Parameters
-    ----------
-    name : str
-        Letters, digits and ``-``: what its files are called.
-    title : str
-        What it is an example of.
-    lon, lat : float
-        The viewpoint in degrees (WGS 84).
-    radius : float
-        Visibility range in metres.
-    types : str
-        Symbols of its signature, clockwise from north.
-    objects : tuple of SceneObject
-        The objects of the signature.
-    others : tuple of SceneObject
-        Objects around that are not seen from there.
-    answer : tuple of float or None
-        Metres east and north to the place that was answered, if near enough to be drawn.
-    error_m : float, optional
-        By how much the answer was off, in metres; None where nothing was asked.
+    ``name`` (letters, digits and ``-``) is what its files are called. ``lon`` and ``lat`` are in
+    degrees (WGS 84), ``radius`` is the visibility range in metres, and ``types`` holds the symbols
+    of the signature, clockwise from north. ``others`` are objects around that are not seen from
+    there. ``answer`` is metres east and north to the place that was answered, if near enough to be
+    drawn; ``error_m`` is None where nothing was asked.
     """
 
     name: str
@@ -165,22 +126,9 @@ class Scene:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Section:
-    """A part of a report.
+    """A part of a report; ``name`` consists of letters, digits and ``-``.
 
-    Parameters
-    ----------
-    name : str
-        Letters, digits and ``-``.
-    title : str
-        Its heading.
-    text : tuple of str
-        Paragraphs.
-    numbers : tuple of Number
-        Its table: rows and columns as they come first.
-    plots : tuple of Plot
-        Its plots.
-    scenes : tuple of Scene
-        Its examples.
+    Its table has the rows and columns of ``numbers`` in the order in which they first come.
     """
 
     name: str
@@ -198,22 +146,10 @@ class Section:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Report:
-    """A report.
+    """A report, which `semsig_gis.report_files.write_report` writes.
 
-    Parameters
-    ----------
-    title : str
-        Its title.
-    text : tuple of str
-        Paragraphs that come first.
-    settings : tuple of (str, str)
-        What was run on what, as names and values.
-    sections : tuple of Section
-        Its parts.
-    taxonomy : Taxonomy
-        The classes of the street objects in the scenes.
-    facts : mapping
-        Specs, versions and machine as plain values for JSON.
+    ``settings`` tells what was run on what, as names and values; ``taxonomy`` has the classes of
+    the objects in the scenes; ``facts`` holds specs, versions and machine as plain values for JSON.
     """
 
     title: str

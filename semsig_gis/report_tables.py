@@ -29,16 +29,9 @@ OUTSIDE = "Bold: the paper's figure is outside our interval of 95 %."
 
 @dataclass(frozen=True, slots=True)
 class NumberCell:
-    """A cell.
+    """A cell: the figure as it is shown, and its interval where that has no column of its own.
 
-    Parameters
-    ----------
-    text : str
-        The figure, as it is shown.
-    interval : str, default ""
-        Its interval, where that has no column of its own.
-    strong : bool, default False
-        Whether the paper's figure is outside our interval.
+    It is strong where the paper's figure is outside our interval.
     """
 
     text: str
@@ -50,12 +43,7 @@ class NumberCell:
 class NumberGroup:
     """Columns that belong together.
 
-    Parameters
-    ----------
-    name : str
-        What they tell.
-    columns : tuple of str
-        Some of ``ours``, ``95 %``, ``paper`` and ``difference`` (or ``diff.``).
+    They are some of ``ours``, ``95 %``, ``paper`` and ``difference`` (or ``diff.``).
     """
 
     name: str
@@ -64,16 +52,9 @@ class NumberGroup:
 
 @dataclass(frozen=True, slots=True)
 class NumberRow:
-    """A row.
+    """A row with one cell for each column of each group.
 
-    Parameters
-    ----------
-    labels : tuple of str
-        What it tells.
-    cells : tuple of NumberCell
-        One for each column of each group.
-    span : int, default 1
-        How many rows from here on share the first label; 0 where the row above has it.
+    ``span`` is how many rows from here on share the first label; 0 where the row above has it.
     """
 
     labels: tuple[str, ...]
@@ -83,17 +64,7 @@ class NumberRow:
 
 @dataclass(frozen=True, slots=True)
 class NumberTable:
-    """A table of numbers, laid out.
-
-    Parameters
-    ----------
-    groups : tuple of NumberGroup
-        The columns.
-    rows : tuple of NumberRow
-        The rows.
-    note : str, default ""
-        What a reader must know to read it rightly.
-    """
+    """A table of numbers, laid out, with a note that a reader needs to read it rightly."""
 
     groups: tuple[NumberGroup, ...]
     rows: tuple[NumberRow, ...]
@@ -130,27 +101,10 @@ class NumberTable:
 
 
 def number_table(numbers: Sequence[Number]) -> NumberTable:
-    """Lay numbers out.
+    """Lay out at least one number, rows and columns in the order in which they first come.
 
-    Parameters
-    ----------
-    numbers : sequence of Number
-        At least one.
-
-    Returns
-    -------
-    NumberTable
-        Rows and columns in the order in which they first come. Where the columns side by side
-        would be too wide for a sheet of paper, each number has a row of its own.
-
-    Examples
-    --------
-    >>> from semsig_gis.report_parts import Number
-    >>> table = number_table([Number(row="R = 30 m", column="P", ours=0.37, paper=0.3733)])
-    >>> table.headings
-    ('P: ours', 'P: paper', 'P: difference')
-    >>> [cell.text for cell in table.rows[0].cells]
-    ['0.3700', '0.3733', '-0.0033']
+    Where the columns side by side would be too wide for a sheet of paper, each number has a row of
+    its own.
     """
     units = _units(numbers)
     names = {number.column: one_line(number.column) for number in numbers}

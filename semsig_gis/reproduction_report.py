@@ -61,18 +61,10 @@ SOME_SEEN = f"{P50} of queries that see {MIDDLING[0]} to {MIDDLING[1]} objects"
 
 
 def reproduction_report(found: Reproduction) -> Report:
-    """Put together what the experiments of the paper found.
+    """Put together what the experiments of the paper found, in the order of the paper.
 
-    Parameters
-    ----------
-    found : Reproduction
-        What they found.
-
-    Returns
-    -------
-    Report
-        In the order of the paper: its tables and plots, each with its figures where it prints
-        them; then what it leaves open, and the likelihood method.
+    Its tables and plots come first, each with its figures where it prints them; then what it leaves
+    open, and the likelihood method.
     """
     settings = found.settings
     first = next(iter(found.experiments["none"].values()))

@@ -28,51 +28,12 @@ def time_queries(
     seed: int = 0,
     progress: Callable[[int, int], None] | None = None,
 ) -> dict[str, float]:
-    """Measure how long methods take to compare one query with all cells.
+    """Return the mean seconds that each method takes to compare one query with all cells.
 
-    Parameters
-    ----------
-    database : SignatureDatabase
-        What is searched.
-    methods : mapping of str to Method
-        Methods by name.
-    length : int, default 14
-        How many objects a query has; cells of the nearest length are taken, if none has just this.
-    repetitions : int, default 100
-        How many queries to ask one by one.
-    seed : int, default 0
-        Seed of the choice of the cells that are asked for.
-    progress : callable, optional
-        Called with the number of methods done and in all.
-
-    Returns
-    -------
-    dict of str to float
-        Mean seconds of a query by the name of the method; what is worked out once for a database
-        does not count.
-
-    Raises
-    ------
-    InputError
-        If there are fewer than one repetitions.
-
-    Notes
-    -----
-    Paper, table of retrieval times: the mean of 100 repetitions with a query of mean length. The
-    queries are asked one at a time, on one thread.
-
-    Examples
-    --------
-    >>> from semsig_gis.building import build_database
-    >>> from semsig_gis.catalog import paper_taxonomy
-    >>> from semsig_gis.method import Method
-    >>> from semsig_gis.objects import build_objects
-    >>> from semsig_gis.sources.synthetic import CitySpec, synthetic_city
-    >>> layers = synthetic_city(CitySpec(size=300.0))
-    >>> objects, _ = build_objects(layers, taxonomy=paper_taxonomy(), crs="EPSG:32631")
-    >>> times = time_queries(build_database(objects), {"paper": Method()}, repetitions=3)
-    >>> 0 < times["paper"] < 1
-    True
+    Paper, table of retrieval times: the mean of 100 repetitions with a query of mean length, asked
+    one at a time, on one thread. The queries are cells with ``length`` objects, or of the nearest
+    length; what is worked out once for a database does not count. ``progress`` is called with the
+    methods done and in all.
     """
     if repetitions < 1:
         msg = f"{repetitions} repetitions were asked for; give a whole number from 1."

@@ -98,49 +98,12 @@ def route_posteriors(
 ) -> tuple[Posterior, ...]:
     """Return where each view of a route was taken, given all of them.
 
-    Parameters
-    ----------
-    database : SignatureDatabase
-        The cells.
-    logliks : sequence of array_like of float, shape (n,)
-        For each view, its log-likelihood in every cell, up to a constant.
-    legs : sequence of Leg
-        The ways between them, one fewer.
-    log_prior : ndarray of float64, shape (n,), optional
-        What was known of the place of the first view, up to a constant.
+    Each view has its log-likelihood in every cell, and there is one leg fewer; `log_prior` is for
+    the first view. All places of a route are cells of the database.
 
-    Returns
-    -------
-    tuple of Posterior
-        One for each view.
-
-    Raises
-    ------
-    InputError
-        If the numbers of views and legs do not fit, or a likelihood is not usable.
-
-    Notes
-    -----
     The forward-backward recursion of a hidden Markov model over the cells: with likelihoods l and
     transitions T, ``a_k = l_k * (T_k' a_(k-1))`` and ``b_k = T_(k+1) (l_(k+1) * b_(k+1))``; the
-    chances are proportional to ``a_k * b_k``. All places of a route are cells of the database.
-
-    Examples
-    --------
-    >>> from semsig_gis.catalog import paper_taxonomy
-    >>> from semsig_gis.building import build_database
-    >>> from semsig_gis.objects import build_objects
-    >>> from semsig_gis.sources.synthetic import CitySpec, synthetic_city
-    >>> layers = synthetic_city(CitySpec(size=300.0))
-    >>> objects, _ = build_objects(layers, taxonomy=paper_taxonomy(), crs="EPSG:32631")
-    >>> database = build_database(objects)
-    >>> first = np.where(np.isin(np.arange(len(database)), [0, 200]), 0.0, -30.0)
-    >>> second = np.zeros(len(database))
-    >>> step = database.xy[200] - database.xy[0]
-    >>> second[200] = 10.0
-    >>> start, end = route_posteriors(database, [first, second], [Leg(dx=step[0], dy=step[1])])
-    >>> int(start.chances.argmax()), int(end.chances.argmax())
-    (0, 200)
+    chances are proportional to ``a_k * b_k``.
     """
     if not logliks or len(legs) != len(logliks) - 1:
         msg = (
@@ -172,26 +135,10 @@ def route_posteriors(
 def moved_chances(
     database: SignatureDatabase, chances: NDArray[np.float64], leg: Leg
 ) -> NDArray[np.float64]:
-    """Return the chances of the cells after a leg.
+    """Return the chances of the cells after a leg; what leaves the cells of the database is lost.
 
-    Parameters
-    ----------
-    database : SignatureDatabase
-        The cells.
-    chances : ndarray of float64, shape (n,)
-        Chances of the cells before it.
-    leg : Leg
-        The way.
-
-    Returns
-    -------
-    ndarray of float64, shape (n,)
-        Chances; what leaves the cells of the database is lost.
-
-    Notes
-    -----
-    Somebody anywhere in a cell who moves on by less than a cell comes to lie in it or in the next
-    one, each according to the length of the way; the blur is the normal distribution on top.
+    From anywhere in a cell, a way shorter than a cell leads to the same cell or the next one, each
+    in proportion to the length of the way; the normal distribution of the leg blurs this further.
     """
     aside, aside_share = _axis_shares(leg.dx / database.grid.step, leg.sigma / database.grid.step)
     up, up_share = _axis_shares(leg.dy / database.grid.step, leg.sigma / database.grid.step)

@@ -26,26 +26,11 @@ _T = TypeVar("_T")
 
 
 def read_rows(path: str | Path, read: Callable[[Row], _T], *, what: str) -> list[tuple[int, _T]]:
-    """Read the rows of a file.
+    """Return the line number of each row of a file, and what `read` made of the row.
 
-    Parameters
-    ----------
-    path : str or Path
-        A CSV file (suffix ``.csv``), or JSON lines.
-    read : callable
-        Makes something of the values of a row, or raises an error that says what is wrong.
-    what : str
-        What a row is, for messages: ``"query"``, ``"sample"``.
-
-    Returns
-    -------
-    list of tuple of (int, object)
-        Number of each line, and what was made of it.
-
-    Raises
-    ------
-    InputError
-        If the file cannot be read, has no rows, or a row cannot be used; with its number.
+    The file is CSV (suffix ``.csv``) or JSON lines. `read` raises an error that says what is wrong
+    with a row; `what` names a row in messages, such as ``"query"``. InputError if the file cannot
+    be read, has no rows, or a row cannot be used.
     """
     file = Path(path)
     try:
@@ -60,35 +45,9 @@ def read_rows(path: str | Path, read: Callable[[Row], _T], *, what: str) -> list
 def parse_rows(
     text: str, source: str, read: Callable[[Row], _T], *, what: str, table: bool = False
 ) -> list[tuple[int, _T]]:
-    r"""Read rows from text.
+    """Return what `read_rows` does, from text: CSV if `table`, else JSON lines.
 
-    Parameters
-    ----------
-    text : str
-        JSON lines, or CSV.
-    source : str
-        What to call the text in messages.
-    read : callable
-        Makes something of the values of a row, or raises an error that says what is wrong.
-    what : str
-        What a row is, for messages.
-    table : bool, default False
-        True for CSV.
-
-    Returns
-    -------
-    list of tuple of (int, object)
-        Number of each line, and what was made of it.
-
-    Raises
-    ------
-    InputError
-        If there are no rows, or one cannot be used; with its number.
-
-    Examples
-    --------
-    >>> parse_rows('{"a": 1}\n\n{"a": 2}\n', "example", lambda row: row["a"], what="thing")
-    [(1, 1), (3, 2)]
+    `source` names the text in messages.
     """
     found = []
     for line, values in _csv(text, source) if table else _json_lines(text):
@@ -111,32 +70,11 @@ def parse_rows(
 
 
 def row_signature(row: Row, taxonomy: Taxonomy) -> Signature | None:
-    """Return the signature of a row, or None where nothing was seen.
+    """Return the signature of a row, clockwise from north, or None where nothing was seen.
 
-    Parameters
-    ----------
-    row : dict
-        ``types`` (symbols such as ``DDB``) and ``bearings`` (degrees; a list, or text with blanks,
-        commas or semicolons between them), each of which may be missing or empty.
-    taxonomy : Taxonomy
-        Classes that the symbols belong to.
-
-    Returns
-    -------
-    Signature or None
-        The signature, sorted clockwise from north where there are bearings.
-
-    Raises
-    ------
-    InputError
-        If the parts cannot be used or do not fit each other.
-
-    Examples
-    --------
-    >>> from semsig_gis.catalog import paper_taxonomy
-    >>> seen = row_signature({"types": "DB", "bearings": "200 -10"}, paper_taxonomy())
-    >>> seen.codes.tolist(), seen.bearings.tolist()
-    ([3, 1], [200.0, 350.0])
+    The row has ``types`` (symbols such as ``DDB``) and ``bearings`` (degrees; a list, or text with
+    blanks, commas or semicolons between them), each of which may be missing or empty. InputError if
+    they cannot be used or do not fit each other.
     """
     types, bearings = given(row, "types"), given(row, "bearings")
     if isinstance(bearings, str):
@@ -150,25 +88,7 @@ def row_signature(row: Row, taxonomy: Taxonomy) -> Signature | None:
 
 
 def given(row: Row, name: str) -> Any:  # noqa: ANN401 - any value of JSON
-    """Return a value of a row, None where it is missing or empty.
-
-    Parameters
-    ----------
-    row : dict
-        The row.
-    name : str
-        Name of the value.
-
-    Returns
-    -------
-    object
-        The value.
-
-    Examples
-    --------
-    >>> given({"id": ""}, "id") is None, given({"id": 0}, "id")
-    (True, 0)
-    """
+    """Return a value of a row, None where it is missing or empty; 0 is a value."""
     value = row.get(name)
     return None if isinstance(value, str) and not value.strip() else value
 

@@ -23,27 +23,10 @@ __all__ = ["Sample", "read_samples"]
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Sample:
-    """What was detected at a known place.
+    """What was detected, perhaps nothing, at a known place.
 
-    Parameters
-    ----------
-    signature : Signature
-        Types and bearings of the detections; there may be none.
-    xy : tuple of float, optional
-        The place in metres, in the CRS of the city.
-    cell_id : int, optional
-        The cell instead (see `semsig_gis.grid.cell_ids`).
-
-    Raises
-    ------
-    InputError
-        If neither or both are given, or the types or the bearings are missing.
-
-    Examples
-    --------
-    >>> seen = Signature(np.array([3], np.uint8), np.array([90.0]))
-    >>> Sample(signature=seen, xy=(500_000.0, 5_400_000.0)).cell_id is None
-    True
+    The place is either `xy`, in metres in the CRS of the city, or `cell_id` (see
+    `semsig_gis.grid.cell_ids`). The signature must have types, all known, and bearings.
     """
 
     signature: Signature

@@ -71,39 +71,10 @@ def cell_scene(database: SignatureDatabase, cell: int, *, title: str = "") -> Sc
 def example_scenes(
     evaluation: Evaluation, database: SignatureDatabase, *, successful: bool, count: int = 4
 ) -> tuple[Scene, ...]:
-    """Return examples of queries that were answered well, or not.
+    """Return the first queries that were answered well (see `Evaluation.successful`), or not.
 
-    Parameters
-    ----------
-    evaluation : Evaluation
-        Queries seen from cells of the database.
-    database : SignatureDatabase
-        The database.
-    successful : bool
-        Whether to return queries that were answered well (see `Evaluation.successful`).
-    count : int, default 4
-        How many at most: the first ones.
-
-    Returns
-    -------
-    tuple of Scene
-        The examples. The objects that are not seen from a cell are those that the cells around it
-        see.
-
-    Examples
-    --------
-    >>> from semsig_gis.building import build_database
-    >>> from semsig_gis.catalog import paper_taxonomy
-    >>> from semsig_gis.evaluation import evaluate
-    >>> from semsig_gis.objects import build_objects
-    >>> from semsig_gis.sources.synthetic import CitySpec, synthetic_city
-    >>> layers = synthetic_city(CitySpec(size=300.0))
-    >>> objects, _ = build_objects(layers, taxonomy=paper_taxonomy(), crs="EPSG:32631")
-    >>> database = build_database(objects)
-    >>> found = evaluate(database, queries=20, distortion="none")
-    >>> scene, *_ = example_scenes(found, database, successful=True)
-    >>> len(scene.objects) == len(scene.types)
-    True
+    The queries must be seen from cells of the database. The objects that are not seen from a cell
+    are those that the cells around it see.
     """
     queries = evaluation.queries
     chosen = queries[(evaluation.successful == successful) & (queries["cell"] >= 0)].head(count)

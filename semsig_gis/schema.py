@@ -36,34 +36,11 @@ LICENSES = "licenses"
 
 
 def require_metric_crs(crs: CRS | str | int | None) -> CRS:
-    """Return a coordinate system if true distances in metres can be taken in it.
+    """Return a coordinate system, without its height, if distances in metres can be taken in it.
 
-    Parameters
-    ----------
-    crs : pyproj.CRS, str, int or None
-        Anything that pyproj understands, such as ``"EPSG:2154"``.
-
-    Returns
-    -------
-    pyproj.CRS
-        The projected coordinate system in metres, without a height.
-
-    Raises
-    ------
-    CrsError
-        If it is missing, unknown, in degrees or feet, a Mercator or cylindrical projection,
-        where lengths grow with the latitude (1.5 times at Paris), or if its axes do not point
-        east and north, from which bearings are counted.
-
-    Examples
-    --------
-    >>> require_metric_crs("EPSG:2154").name
-    'RGF93 v1 / Lambert-93'
-    >>> require_metric_crs("EPSG:4326")
-    Traceback (most recent call last):
-    ...
-    semsig_gis.errors.CrsError: WGS 84 is in degrees; give a projected CRS in metres, such as \
-'EPSG:2154' for France or the UTM zone of the city.
+    Raises CrsError if it is missing, unknown, in degrees or feet, a Mercator or cylindrical
+    projection, where lengths grow with the latitude (1.5 times at Paris), or if its axes do not
+    point east and north, from which bearings are counted.
     """
     advice = (
         "give a projected CRS in metres, such as 'EPSG:2154' for France or the UTM zone of the city"

@@ -47,29 +47,10 @@ FEW = 4  # times as many blocks: then it pays to look at some of them alone
 
 
 def best_cells(scores: NDArray[np.float32], count: int) -> NDArray[np.intp]:
-    """Return the best cells, and all that tie with the last of them.
+    """Return the rows of the `count` best cells and of all that tie with the last, ascending.
 
-    Parameters
-    ----------
-    scores : ndarray of float32, shape (n,)
-        Distance of every cell to the query, lower is better.
-    count : int
-        How many best cells are wanted, 1 to n.
-
-    Returns
-    -------
-    ndarray of int, shape (b,)
-        Row numbers, ascending; b >= `count`.
-
-    Notes
-    -----
-    The best of each block of cells are looked at first. As many cells as are wanted are at most
-    as bad as the last of the best blocks, so that few others need to be ordered.
-
-    Examples
-    --------
-    >>> best_cells(np.float32([3, 1, 2, 2, 2]), 2).tolist()
-    [1, 2, 3, 4]
+    Lower scores are better. The best of each block of cells are looked at first: at least `count`
+    cells are no worse than the last of the best blocks, so few others need to be ordered.
     """
     blocks = len(scores) // BLOCK
     if blocks < count:
@@ -91,27 +72,9 @@ def best_cells(scores: NDArray[np.float32], count: int) -> NDArray[np.intp]:
 def top_candidates(
     scores: NDArray[np.float32], top: int
 ) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
-    """Return the cells that are surely among the best, and those that tie for what is left.
+    """Return the cells that are surely among the `top` best, and those that tie for what is left.
 
-    Parameters
-    ----------
-    scores : ndarray of float32, shape (n,)
-        Distance of every cell to the query, lower is better.
-    top : int
-        How many best cells are wanted, 1 to n.
-
-    Returns
-    -------
-    better : ndarray of int, shape (b,)
-        Cells before the cut, b < `top`, in array order.
-    tied : ndarray of int, shape (g,)
-        Cells with the score at the cut, g >= `top` - b, in array order.
-
-    Examples
-    --------
-    >>> better, tied = top_candidates(np.float32([3, 1, 2, 2, 2]), 2)
-    >>> better.tolist(), tied.tolist()
-    ([1], [2, 3, 4])
+    Lower scores are better. Both are row numbers in array order; fewer than `top` cells are sure.
     """
     cut = scores.min() if top == 1 else np.partition(scores, top - 1)[top - 1]
     return np.flatnonzero(scores < cut), np.flatnonzero(scores == cut)
@@ -120,39 +83,14 @@ def top_candidates(
 def expected_best(
     better: ArrayLike, tied: ArrayLike, *, slots: int, thresholds: Sequence[float] = THRESHOLDS
 ) -> tuple[float, NDArray[np.float64]]:
-    """Return what to expect of the smallest error when a cut falls among tied candidates.
+    """Return the expected smallest error, and the chance that it is within each threshold.
 
-    Parameters
-    ----------
-    better : array_like of float, shape (b,)
-        Errors in metres of the candidates that are in for sure.
-    tied : array_like of float, shape (g,)
-        Errors of the tied candidates, of which `slots` are drawn without replacement.
-    slots : int
-        How many are drawn, 1 to g.
-    thresholds : sequence of float, optional
-        Errors to give the probability of, in metres.
+    All `better` candidates count, and `slots` (1 to g) of the g `tied` ones, drawn without
+    replacement. Errors and thresholds are in metres.
 
-    Returns
-    -------
-    expected : float
-        Expected smallest error among the candidates that are in.
-    within : ndarray of float64, shape (len(thresholds),)
-        Probability that the smallest error is at most each threshold.
-
-    Notes
-    -----
-    With h of the g tied errors at most x, all draws are beyond x with probability
-    C(g - h, slots) / C(g, slots). As h grows by one, that is multiplied by
-    (g - h - slots) / (g - h), which gives the whole distribution of the smallest draw.
-
-    Examples
-    --------
-    One of four is drawn; two of them are within 50 m.
-
-    >>> expected, within = expected_best([], [0, 40, 60, 100], slots=1, thresholds=[10, 50])
-    >>> expected, within.tolist()
-    (50.0, [0.25, 0.5])
+    With h of the g tied errors at most x, all draws are beyond x with probability C(g - h, slots) /
+    C(g, slots). As h grows by one, that is multiplied by (g - h - slots) / (g - h), which gives the
+    whole distribution of the smallest draw.
     """
     nearest = _nearest(better)
     errors = np.asarray(tied, dtype=np.float64)
@@ -183,30 +121,9 @@ def _count_within(errors: NDArray[np.float64], limits: NDArray[np.float64]) -> N
 
 
 def chance_within(better: ArrayLike, tied: ArrayLike, *, slots: int, metres: float) -> float:
-    """Return the chance that the smallest error is small when a cut falls among tied candidates.
+    """Return the chance that the smallest error is at most `metres` when candidates tie at the cut.
 
-    Parameters
-    ----------
-    better : array_like of float, shape (b,)
-        Errors in metres of the candidates that are in for sure.
-    tied : array_like of float, shape (g,)
-        Errors of the tied candidates, of which `slots` are drawn without replacement.
-    slots : int
-        How many are drawn, 1 to g.
-    metres : float
-        What is small.
-
-    Returns
-    -------
-    float
-        The probability that `expected_best` gives for this threshold, sooner for few draws.
-
-    Examples
-    --------
-    Two of four are drawn; two of them are within 50 m.
-
-    >>> round(chance_within([], [0, 40, 60, 100], slots=2, metres=50), 6)
-    0.833333
+    The value of `expected_best` for one threshold; faster if `slots` is small.
     """
     if _nearest(better) <= metres:
         return 1.0
@@ -224,25 +141,7 @@ def _nearest(errors: ArrayLike) -> float:
 
 
 def rank_range(scores: NDArray[np.float32], cell: int) -> tuple[int, int]:
-    """Return the first and the last rank that a cell can have among those it ties with.
-
-    Parameters
-    ----------
-    scores : ndarray of float32, shape (n,)
-        Distance of every cell to the query, lower is better.
-    cell : int
-        Which cell.
-
-    Returns
-    -------
-    low, high : int
-        Ranks from 1 to n.
-
-    Examples
-    --------
-    >>> rank_range(np.float32([3, 1, 2, 2, 2]), 3)
-    (2, 4)
-    """
+    """Return the first and the last rank, from 1, that a cell can have among those it ties with."""
     own = scores[cell]
     return int(np.count_nonzero(scores < own)) + 1, int(np.count_nonzero(scores <= own))
 
@@ -250,33 +149,10 @@ def rank_range(scores: NDArray[np.float32], cell: int) -> tuple[int, int]:
 def expected_recall(
     rank_low: ArrayLike, rank_high: ArrayLike, *, cells: int, percent: float
 ) -> NDArray[np.float64]:
-    """Return the chance that each true cell ranks in the top so many per cent of the cells.
+    """Return the chance that each true cell ranks in the top `percent` of the cells, shape (q,).
 
-    Parameters
-    ----------
-    rank_low, rank_high : array_like of int, shape (q,)
-        First and last rank that ties allow, from 1.
-    cells : int
-        How many cells were ranked.
-    percent : float
-        Share of them that is kept, above 0 and at most 100; the number is rounded down.
-
-    Returns
-    -------
-    ndarray of float64, shape (q,)
-        Chances in [0, 1]: a rank is uniform between its bounds.
-
-    Raises
-    ------
-    InputError
-        If the percentage is out of range.
-
-    Examples
-    --------
-    The top 10 % of 30 cells are three; the second true cell ranks 2nd to 5th.
-
-    >>> expected_recall([1, 2, 4], [1, 5, 9], cells=30, percent=10).tolist()
-    [1.0, 0.5, 0.0]
+    A rank is uniform between its bounds, which count from 1. `percent` is above 0 and at most 100,
+    and the number of cells that it stands for is rounded down.
     """
     if not 0 < percent <= 100:  # noqa: PLR2004
         msg = f"A recall at {percent} % was asked for; give a percentage above 0, at most 100."

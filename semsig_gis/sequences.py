@@ -32,35 +32,12 @@ _UINT16_MAX = 65_535
 
 @dataclass(frozen=True, eq=False)
 class SequenceTable:
-    """The distinct sequences of a list of sequences, short ones first.
+    """The distinct sequences of a list of n sequences, short ones first; made by `from_csr`.
 
-    Sequences of one length stand in order of first appearance.
-
-    Parameters
-    ----------
-    values : ndarray of uint8, shape (m,)
-        The distinct sequences, one after the other.
-    offsets : ndarray of int64, shape (d + 1,)
-        Distinct sequence ``i`` is ``values[offsets[i]:offsets[i + 1]]``; it may be empty.
-    inverse : ndarray of int64, shape (n,)
-        For each row of the list, which distinct sequence it holds.
-    counts : ndarray of int64, shape (d,)
-        How many rows hold each distinct sequence: the sizes of the signature groups.
-
-    Notes
-    -----
-    All arrays are read-only. Build a table with `SequenceTable.from_csr`.
-
-    Examples
-    --------
-    >>> import numpy as np
-    >>> table = SequenceTable.from_csr(
-    ...     np.array([3, 3, 1, 3, 3], np.uint8), np.array([0, 2, 3, 5])
-    ... )
-    >>> len(table), table.inverse.tolist(), table.counts.tolist()
-    (2, [1, 0, 1], [1, 2])
-    >>> table[0].tolist(), table[1].tolist()
-    ([1], [3, 3])
+    Sequences of one length stand in order of first appearance. Of the d distinct sequences, number
+    ``i`` is ``values[offsets[i]:offsets[i + 1]]``, which may be empty. `inverse`, shape (n,), tells
+    which one each row of the list holds; `counts`, shape (d,), how many rows hold each one (the
+    sizes of the signature groups). All arrays are read-only.
     """
 
     values: NDArray[np.uint8]
@@ -72,22 +49,8 @@ class SequenceTable:
     def from_csr(cls, values: NDArray[np.uint8], offsets: NDArray[np.int64]) -> SequenceTable:
         """Find the distinct sequences of a list given as flat values and offsets.
 
-        Parameters
-        ----------
-        values : ndarray of uint8, shape (m,)
-            All sequences, one after the other.
-        offsets : ndarray of int64, shape (n + 1,)
-            Row ``i`` is ``values[offsets[i]:offsets[i + 1]]``.
-
-        Returns
-        -------
-        SequenceTable
-            Copies: later changes of the input do not reach the table.
-
-        Raises
-        ------
-        InputError
-            If the values are not bytes, or the offsets do not divide them.
+        Row ``i`` is ``values[offsets[i]:offsets[i + 1]]``; the arrays are copied. Raise InputError
+        if the values are not bytes, or the offsets do not divide them.
         """
         flat, ends = _checked_csr(values, offsets)
         rows = pa.LargeBinaryArray.from_buffers(
@@ -127,22 +90,8 @@ class SequenceTable:
     def rows(self, wanted: NDArray[np.int64]) -> NDArray[np.int64]:
         """Return the rows that hold some of the distinct sequences.
 
-        Parameters
-        ----------
-        wanted : ndarray of int64
-            Distinct sequences.
-
-        Returns
-        -------
-        ndarray of int64
-            The rows of the first of them in their order, then those of the second, and so on.
-
-        Examples
-        --------
-        >>> import numpy as np
-        >>> table = SequenceTable.from_csr(np.array([3, 1, 3], np.uint8), np.arange(4))
-        >>> table.rows(np.array([1, 0])).tolist()
-        [1, 0, 2]
+        Those of the first wanted sequence come first, in their order, then those of the second, and
+        so on.
         """
         counts = self.counts[wanted]
         ends = np.cumsum(counts)
@@ -174,10 +123,9 @@ class SequenceTable:
 
     @cached_property
     def histogram(self) -> NDArray[np.uint16 | np.uint32]:
-        """How often each value occurs in each distinct sequence, shape (d, k).
+        """How often each value occurs in each distinct sequence, shape (d, largest value + 1).
 
-        ``k`` is one more than the largest value. A column is contiguous in memory, because the
-        measures read it value by value.
+        A column is contiguous in memory, because the measures read it value by value.
         """
         size = int(self.values.max()) + 1 if len(self.values) else 0
         longest = int(self.lengths.max()) if len(self) else 0
@@ -211,26 +159,10 @@ class SequenceTable:
     def overlap(
         self, query: NDArray[np.uint8], *, only: NDArray[np.int64] | None = None
     ) -> tuple[NDArray[np.int16], NDArray[np.int16]]:
-        """Count the values that a query and each distinct sequence share, whatever their order.
+        """Count the different values that a query and each distinct sequence share, in any order.
 
-        Parameters
-        ----------
-        query : ndarray of uint8
-            One sequence.
-        only : ndarray of int64, optional
-            The distinct sequences to look at; all by default.
-
-        Returns
-        -------
-        both, either : ndarray of int16, shape (d,) or the shape of `only`
-            How many different values are in both sequences, and in at least one of them.
-
-        Examples
-        --------
-        >>> import numpy as np
-        >>> table = SequenceTable.from_csr(np.array([3, 3, 1], np.uint8), np.array([0, 3]))
-        >>> table.overlap(np.array([3, 7], np.uint8))
-        (array([1], dtype=int16), array([3], dtype=int16))
+        Return how many are in both and how many in at least one of them, for the distinct sequences
+        `only`, or for all.
         """
         sets = self.value_sets if only is None else self.value_sets[only]
         values = np.unique(query)
@@ -247,29 +179,7 @@ class SequenceTable:
 
 
 def checked_sequence(values: NDArray[np.uint8]) -> NDArray[np.uint8]:
-    """Return a sequence as it is, or say why it is none.
-
-    Parameters
-    ----------
-    values : ndarray of uint8
-        Class codes or angle levels.
-
-    Returns
-    -------
-    ndarray of uint8
-        The same array.
-
-    Raises
-    ------
-    InputError
-        If it is not a one-dimensional array of unsigned bytes.
-
-    Examples
-    --------
-    >>> import numpy as np
-    >>> checked_sequence(np.array([1, 2], np.uint8)).tolist()
-    [1, 2]
-    """
+    """Return a sequence as it is, or raise InputError if it is not a flat uint8 array."""
     array = np.asarray(values)
     if array.dtype != np.uint8 or array.ndim != 1:
         msg = (

@@ -24,18 +24,11 @@ LARGEST = 30.0  # logits beyond it are as good as certain
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class ShareFit:
-    """A curve that `fit_shares` found.
+    """A curve that `fit_shares` found, over f features and with p terms.
 
-    Parameters
-    ----------
-    low, high : ndarray of float64, shape (f,)
-        Range of each feature in the examples; beyond it the curve stays what it is at its ends.
-    middle, spread : ndarray of float64, shape (f,)
-        Mean and standard deviation of each feature in the examples.
-    powers : ndarray of int64, shape (p, f)
-        Powers of the features in each term.
-    weights : ndarray of float64, shape (p,)
-        Weight of each term.
+    `low` and `high` are the range of each feature in the examples, beyond which the curve stays
+    what it is at its ends; `middle` and `spread` are mean and standard deviation of each. `powers`,
+    shape (p, f), are the powers of the features in each term.
     """
 
     low: NDArray[np.float64]
@@ -46,54 +39,19 @@ class ShareFit:
     weights: NDArray[np.float64]
 
     def predict(self, features: ArrayLike) -> NDArray[np.float64]:
-        """Return the shares to expect.
-
-        Parameters
-        ----------
-        features : array_like of float, shape (n, f)
-            A row a case.
-
-        Returns
-        -------
-        ndarray of float64, shape (n,)
-            From 0 to 1.
-        """
+        """Return the shares to expect, from 0 to 1, of cases, shape (n, f)."""
         inside = np.clip(np.asarray(features, dtype=np.float64), self.low, self.high)
         terms = _terms((inside - self.middle) / self.spread, self.powers)
         return _logistic(terms @ self.weights)
 
 
 def fit_shares(features: ArrayLike, shares: ArrayLike) -> ShareFit:
-    """Fit a curve to examples.
+    """Fit a curve to examples: features of shape (m, f), and m shares from 0 to 1, or 0 and 1.
 
-    Parameters
-    ----------
-    features : array_like of float, shape (m, f)
-        A row an example; finite.
-    shares : array_like of float, shape (m,)
-        What came of each, from 0 to 1: shares, or 0 and 1.
-
-    Returns
-    -------
-    ShareFit
-        The curve. Over the examples, its mean is that of the shares.
-
-    Raises
-    ------
-    InputError
-        If there is no example, or a number is not finite or out of its range.
-
-    Notes
-    -----
     Logistic regression on the products of the features up to the third degree, by Newton's method
-    on the log-likelihood less a small penalty on all weights but the constant.
-
-    Examples
-    --------
-    >>> heights = np.linspace(-3.0, 3.0, 200)[:, None]
-    >>> curve = fit_shares(heights, heights[:, 0] > 0)
-    >>> (curve.predict([[-2.0], [2.0]]) > 0.5).tolist()
-    [False, True]
+    on the log-likelihood less a small penalty on all weights but the constant. So the mean of the
+    curve over the examples is that of the shares. InputError if there is no example, or a number is
+    not finite or out of its range.
     """
     given = np.asarray(features, dtype=np.float64)
     wanted = np.asarray(shares, dtype=np.float64)

@@ -146,26 +146,8 @@ class Sight:
 class CitySights:
     """What there is to see in a city: what false objects are made of.
 
-    Parameters
-    ----------
-    taxonomy : Taxonomy
-        The classes.
-    codes : ndarray of uint8, shape (k,)
-        Those that are seen somewhere, ascending.
-    frequencies : ndarray, shape (k,)
-        How often each is seen.
-    reach : float
-        From how far the farthest is seen, in metres.
-
-    Examples
-    --------
-    >>> from semsig_gis.catalog import paper_taxonomy
-    >>> lamps = CitySights(
-    ...     taxonomy=paper_taxonomy(), codes=np.array([3], np.uint8),
-    ...     frequencies=np.array([9]), reach=30.0,
-    ... )
-    >>> bool(lamps.false_distances(2, np.random.default_rng(0)).max() <= 30.0)
-    True
+    `codes` (k,) are the classes of `taxonomy` that are seen somewhere, ascending; `frequencies`
+    (k,) how often each is seen; `reach` the range of sight in metres.
     """
 
     taxonomy: Taxonomy
@@ -175,18 +157,7 @@ class CitySights:
 
     @classmethod
     def of(cls, database: SignatureDatabase) -> CitySights:
-        """Return what is seen in the cells of a database.
-
-        Parameters
-        ----------
-        database : SignatureDatabase
-            The cells.
-
-        Returns
-        -------
-        CitySights
-            Its classes with their occurrences, and its range.
-        """
+        """Return what is seen in the cells of a database."""
         codes = database.present_codes
         return cls(
             taxonomy=database.taxonomy,
@@ -196,18 +167,8 @@ class CitySights:
         )
 
     def false_distances(self, count: int, rng: np.random.Generator) -> NDArray[np.float64]:
-        """Return how far away things seem to be that could be anywhere in sight.
+        """Draw the distances of false objects, in metres, shape (count,).
 
-        Parameters
-        ----------
-        count : int
-            How many.
-        rng : numpy.random.Generator
-            Source of the chances.
-
-        Returns
-        -------
-        ndarray of float64, shape (count,)
-            Metres, of places all over the circle alike.
+        They are spread evenly over the circle within reach, so that more of them are far.
         """
         return self.reach * np.sqrt(rng.random(count))

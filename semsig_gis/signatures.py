@@ -66,24 +66,9 @@ class SignatureSpec:
 
 
 def quantize(bearings: ArrayLike, levels: int) -> NDArray[np.uint8]:
-    """Return the angle level of bearings: ``floor(bearing / (360 / levels))``.
+    """Return the angle level of bearings in [0, 360): ``floor(bearing / (360 / levels))``.
 
-    Parameters
-    ----------
-    bearings : array_like
-        Degrees in [0, 360).
-    levels : int
-        Number Q of levels, 1 to 255 (the paper takes 16).
-
-    Returns
-    -------
-    ndarray of uint8
-        Level in [0, levels).
-
-    Examples
-    --------
-    >>> quantize([0.0, 22.4, 22.5, 359.9], 16).tolist()
-    [0, 0, 1, 15]
+    There are 1 to 255 levels; the paper takes Q = 16.
     """
     scaled = np.floor(np.asarray(bearings, dtype=np.float64) * levels / FULL_TURN)
     return np.minimum(scaled, levels - 1).astype(np.uint8)
@@ -92,25 +77,9 @@ def quantize(bearings: ArrayLike, levels: int) -> NDArray[np.uint8]:
 def clockwise_order(sightings: Sightings, codes: NDArray[np.uint8]) -> NDArray[np.int64]:
     """Return the order in which a clockwise sweep from north meets the objects.
 
-    Parameters
-    ----------
-    sightings : Sightings
-        Pairs of viewpoint and object, p of them.
-    codes : ndarray of uint8, shape (n,)
-        Class code of every object.
-
-    Returns
-    -------
-    ndarray of int64, shape (p,)
-        Permutation that sorts by viewpoint, then bearing; on the same bearing the nearer object
-        comes first, then the lower class code.
-
-    Examples
-    --------
-    >>> from semsig_gis.visibility import Sightings
-    >>> seen = Sightings(np.zeros(2, int), np.array([0, 1]), np.array([90.0, 10.0]), np.ones(2))
-    >>> clockwise_order(seen, np.array([3, 3], np.uint8)).tolist()
-    [1, 0]
+    The permutation sorts p sightings by viewpoint, then bearing; on the same bearing the nearer
+    object comes first, then the lower class code. `codes` holds the class of every object, not
+    sighting.
     """
     viewpoint, bearing = sightings.viewpoint, sightings.bearing
     # One number for each pair, the viewpoint in front and the pair itself behind; plain numbers

@@ -24,29 +24,11 @@ ROUNDING_M = 1e-6
 
 
 class ObjectIndex:
-    """An R-tree over points.
+    """An R-tree over points in metres, shape (n, 2).
 
-    Parameters
-    ----------
-    xy : ndarray of float64, shape (n, 2)
-        Positions in metres, finite.
-
-    Raises
-    ------
-    InputError
-        If there is no point, or one is not finite.
-
-    Notes
-    -----
-    The tree is packed from the arrays in one go and asked for many boxes at once. It belongs to
-    the process and thread that made it: an R-tree of this library pickles to an empty one.
-
-    Examples
-    --------
-    >>> tree = ObjectIndex(np.array([[0.0, 0.0], [3.0, 4.0], [50.0, 0.0]]))
-    >>> viewpoints, objects = tree.pairs_within(np.array([[0.0, 0.0]]), radius=5.0)
-    >>> sorted(objects.tolist())
-    [0, 1]
+    InputError if there is no point, or one is not finite. The tree is packed in one go and asked
+    for many boxes at once. It belongs to the process and thread that made it: an R-tree of this
+    library pickles to an empty one.
     """
 
     def __init__(self, xy: NDArray[np.float64]) -> None:
@@ -59,19 +41,9 @@ class ObjectIndex:
     def pairs_within(
         self, viewpoints: NDArray[np.float64], *, radius: float
     ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-        """Return every pair of viewpoint and point within a radius.
+        """Return the rows of viewpoint and point of every pair within a radius, by viewpoint.
 
-        Parameters
-        ----------
-        viewpoints : ndarray of float64, shape (v, 2)
-            Places to look from, in metres.
-        radius : float
-            Metres; a point at exactly this distance counts.
-
-        Returns
-        -------
-        viewpoint, point : ndarray of int64, shape (p,)
-            Row numbers, ordered by viewpoint.
+        Viewpoints, shape (v, 2), and radius are in metres; a point at exactly the radius counts.
         """
         return tree_pairs(self._tree, self._xy, viewpoints, radius=radius)
 
@@ -79,24 +51,8 @@ class ObjectIndex:
 class PackedIndex:
     """An R-tree over points that is packed once and asked by very many viewpoints.
 
-    Parameters
-    ----------
-    xy : ndarray of float64, shape (n, 2)
-        Positions in metres, finite.
-    points : ndarray of shapely.Point, shape (n,), optional
-        The same positions, so that they need not be made again.
-
-    Raises
-    ------
-    InputError
-        If there is no point, or one is not finite.
-
-    Examples
-    --------
-    >>> tree = PackedIndex(np.array([[0.0, 0.0], [3.0, 4.0], [50.0, 0.0]]))
-    >>> viewpoints, objects = tree.pairs_within(np.array([[0.0, 0.0]]), radius=5.0)
-    >>> sorted(objects.tolist())
-    [0, 1]
+    Positions are in metres, shape (n, 2); `points` are the same as shapely points, where they are
+    made already. InputError if there is none, or one is not finite.
     """
 
     def __init__(self, xy: NDArray[np.float64], points: NDArray[np.object_] | None = None) -> None:
@@ -108,19 +64,9 @@ class PackedIndex:
     def pairs_within(
         self, viewpoints: NDArray[np.float64], *, radius: float
     ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-        """Return every pair of viewpoint and point within a radius.
+        """Return the rows of viewpoint and point of every pair within a radius, by viewpoint.
 
-        Parameters
-        ----------
-        viewpoints : ndarray of float64, shape (v, 2)
-            Places to look from, in metres.
-        radius : float
-            Metres; a point at exactly this distance counts.
-
-        Returns
-        -------
-        viewpoint, point : ndarray of int64, shape (p,)
-            Row numbers, ordered by viewpoint.
+        Viewpoints, shape (v, 2), and radius are in metres; a point at exactly the radius counts.
         """
         places = np.ascontiguousarray(viewpoints, dtype=np.float64)
         viewpoint, point = self._tree.query(
@@ -131,51 +77,16 @@ class PackedIndex:
     def pairs_in(
         self, low: NDArray[np.float64], high: NDArray[np.float64]
     ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-        """Return every pair of a box and a point in it.
+        """Return the rows of box and point of every point in a box, ordered by box.
 
-        Parameters
-        ----------
-        low, high : ndarray of float64, shape (b, 2)
-            Lower left and upper right corners in metres; a point on an edge counts.
-
-        Returns
-        -------
-        box, point : ndarray of int64, shape (p,)
-            Row numbers, ordered by box.
-
-        Examples
-        --------
-        >>> tree = PackedIndex(np.array([[0.0, 0.0], [3.0, 4.0], [50.0, 0.0]]))
-        >>> tree.pairs_in(np.array([[2.0, 3.0]]), np.array([[3.0, 5.0]]))
-        (array([0]), array([1]))
+        Lower left and upper right corners have shape (b, 2); a point on an edge counts.
         """
         box, point = self._tree.query(shapely.box(*low.T, *high.T))
         return box, point
 
 
 def checked_points(xy: ArrayLike) -> NDArray[np.float64]:
-    """Return a copy of the points of an R-tree, or say why there can be none.
-
-    Parameters
-    ----------
-    xy : array_like, shape (n, 2)
-        Positions in metres.
-
-    Returns
-    -------
-    ndarray of float64, shape (n, 2)
-        The same, in rows that follow each other.
-
-    Raises
-    ------
-    InputError
-        If there is no point, or one is not finite.
-
-    Examples
-    --------
-    >>> checked_points([(0, 1)]).tolist()
-    [[0.0, 1.0]]
-    """
+    """Return a C-ordered copy of points, shape (n, 2); refuse none, or one that is not finite."""
     points = np.array(xy, dtype=np.float64, order="C")  # a copy, as the tree has one too
     if len(points) == 0 or not np.isfinite(points).all():
         msg = "an R-tree needs at least one point, and finite coordinates."
@@ -191,32 +102,10 @@ def tree_pairs(
     radius: float,
     rows: NDArray[np.int64] | None = None,
 ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Return every pair of viewpoint and point within a radius, as a tree finds them.
+    """Return the rows of viewpoint and point of every pair within a radius, ordered by viewpoint.
 
-    Parameters
-    ----------
-    tree : rtree.index.Index
-        Over the points, by number.
-    xy : ndarray of float64, shape (n, 2)
-        Positions of the points in metres.
-    viewpoints : array_like, shape (v, 2)
-        Places to look from, in metres.
-    radius : float
-        Metres; a point at exactly this distance counts.
-    rows : ndarray of int64, optional
-        Row in `xy` of each number of the tree; the number itself by default.
-
-    Returns
-    -------
-    viewpoint, point : ndarray of int64, shape (p,)
-        Row numbers, ordered by viewpoint.
-
-    Examples
-    --------
-    >>> xy = np.array([[0.0, 0.0], [50.0, 0.0]])
-    >>> tree = rtree_index.Index((np.arange(2), xy, xy))
-    >>> tree_pairs(tree, xy, [(3.0, 4.0)], radius=5.0)
-    (array([0]), array([0]))
+    All is in metres; a point at exactly the radius counts. `rows` gives the row in `xy` of each
+    number of the tree, by default the number itself.
     """
     places = np.ascontiguousarray(viewpoints, dtype=np.float64)
     reach = _a_touch_more(radius)

@@ -52,30 +52,8 @@ WKB_POINT = np.dtype([("order", "u1"), ("type", "<u4"), ("x", "<f8"), ("y", "<f8
 def whole_file(path: str | Path) -> Iterator[Path]:
     """Give a temporary path that replaces `path` if, and only if, the block succeeds.
 
-    Parameters
-    ----------
-    path : str or Path
-        The file to write. Its folder is made if it does not exist.
-
-    Yields
-    ------
-    Path
-        A path in the same folder, with the same suffix, to write to.
-
-    Raises
-    ------
-    InputError
-        If the folder cannot be made or written to, or `path` is something other than a file.
-
-    Examples
-    --------
-    >>> import tempfile
-    >>> with tempfile.TemporaryDirectory() as folder:
-    ...     target = Path(folder) / "a.txt"
-    ...     with whole_file(target) as partial:
-    ...         _ = partial.write_text("done")
-    ...     target.read_text()
-    'done'
+    The path ends in the same name, in a folder of its own beside the file; missing folders are
+    made. InputError if there is no writing there, or `path` is a folder, a device or a pipe.
     """
     # A link stays, and the file that it names is replaced.
     target = Path(os.path.realpath(path))
@@ -112,30 +90,7 @@ def whole_file(path: str | Path) -> Iterator[Path]:
 def whole_folder(path: str | Path) -> Iterator[Path]:
     """Give an empty folder that replaces `path` if, and only if, the block succeeds.
 
-    Parameters
-    ----------
-    path : str or Path
-        The folder to write; one that is there is replaced with all that is in it.
-
-    Yields
-    ------
-    Path
-        A folder of the same name to write to.
-
-    Raises
-    ------
-    InputError
-        If it cannot be written.
-
-    Examples
-    --------
-    >>> import tempfile
-    >>> with tempfile.TemporaryDirectory() as folder:
-    ...     target = Path(folder) / "a"
-    ...     with whole_folder(target) as partial:
-    ...         _ = (partial / "b.txt").write_text("done")
-    ...     (target / "b.txt").read_text()
-    'done'
+    A folder that is there is replaced with all that is in it. InputError if it cannot be written.
     """
     target = Path(os.path.realpath(path))
     with _box(target) as box:
@@ -146,20 +101,7 @@ def whole_folder(path: str | Path) -> Iterator[Path]:
 
 
 def move_folder(new: Path, place: Path) -> None:
-    """Rename a folder to its place; what is there is replaced, or stays if that fails.
-
-    Parameters
-    ----------
-    new : Path
-        The folder.
-    place : Path
-        Where it belongs, beside it.
-
-    Raises
-    ------
-    InputError
-        If it cannot be renamed.
-    """
+    """Rename a folder to its place beside it; what is there is replaced, or stays if that fails."""
     with _box(place) as box:
         _put(new, place, aside=box / "old")
 
@@ -202,26 +144,9 @@ def _reason(error: OSError) -> str:
 def geo_metadata(
     crs: CRS, *, geometry_types: Sequence[str], bounds: Sequence[float]
 ) -> dict[str, Any]:
-    """Return the ``geo`` metadata of a GeoParquet 1.1 file with WKB geometry.
+    """Return the ``geo`` metadata of a GeoParquet 1.1 file with WKB in the column ``geometry``.
 
-    Parameters
-    ----------
-    crs : pyproj.CRS
-        Coordinate reference system of the column ``geometry``.
-    geometry_types : sequence of str
-        Names such as ``"Point"``.
-    bounds : sequence of float
-        ``xmin, ymin, xmax, ymax`` in `crs`.
-
-    Returns
-    -------
-    dict
-        The metadata, ready for JSON.
-
-    Examples
-    --------
-    >>> geo_metadata(CRS(2154), geometry_types=["Point"], bounds=[0, 0, 1, 1])["version"]
-    '1.1.0'
+    Bounds are ``xmin, ymin, xmax, ymax`` in `crs`; geometry types are such as ``"Point"``.
     """
     column = {
         "encoding": "WKB",
@@ -233,23 +158,7 @@ def geo_metadata(
 
 
 def points_to_wkb(xy: NDArray[np.float64]) -> pa.Array:
-    """Return points as an Arrow column of well-known binary, for very many at once.
-
-    Parameters
-    ----------
-    xy : ndarray of float64, shape (n, 2)
-        Coordinates.
-
-    Returns
-    -------
-    pyarrow.Array
-        Binary, 21 bytes a point.
-
-    Examples
-    --------
-    >>> points_to_wkb(np.array([[1.0, 2.0]]))[0].as_py().hex()
-    '0101000000000000000000f03f0000000000000040'
-    """
+    """Return points, shape (n, 2), as an Arrow column of well-known binary, 21 bytes a point."""
     points = np.ones(len(xy), WKB_POINT)
     points["x"], points["y"] = xy.T
     fixed = pa.binary(WKB_POINT.itemsize)
@@ -267,29 +176,9 @@ def write_geoparquet(
 ) -> None:
     """Write an Arrow table as one whole GeoParquet file with specs in its metadata.
 
-    Parameters
-    ----------
-    table : pyarrow.Table
-        Columns to write; ``geometry`` holds WKB.
-    path : str or Path
-        File to write; it appears whole, by rename.
-    geo : dict
-        See `geo_metadata`.
-    specs : dict
-        What made the table, as plain JSON values; stored under the key ``semsig``.
-    group_rows : int, optional
-        How many rows are read together, in a file that is read by box.
-
-    Examples
-    --------
-    >>> import shapely, tempfile
-    >>> table = pa.table({"geometry": [shapely.to_wkb(shapely.Point(1, 2))]})
-    >>> geo = geo_metadata(CRS(2154), geometry_types=["Point"], bounds=[1, 2, 1, 2])
-    >>> with tempfile.TemporaryDirectory() as folder:
-    ...     file = Path(folder) / "a.parquet"
-    ...     write_geoparquet(table, file, geo=geo, specs={"kind": "example"})
-    ...     read_geoparquet(file, kind="example")[1]
-    {'kind': 'example'}
+    The column ``geometry`` holds WKB, which `geo` describes (see `geo_metadata`). Specs are plain
+    JSON values, stored under the key ``semsig``. `group_rows` is how many rows are read together,
+    in a file that is read by box.
     """
     with whole_file(path) as partial:
         pq.write_table(
@@ -303,19 +192,7 @@ def write_geoparquet(
 def write_geoparquet_blocks(
     blocks: Iterable[pa.Table], path: str | Path, *, geo: dict[str, Any], specs: dict[str, Any]
 ) -> None:
-    """Write Arrow tables one after the other as one whole GeoParquet file.
-
-    Parameters
-    ----------
-    blocks : iterable of pyarrow.Table
-        At least one; all have the same columns.
-    path : str or Path
-        File to write; it appears whole, by rename.
-    geo : dict
-        See `geo_metadata`.
-    specs : dict
-        As of `write_geoparquet`.
-    """
+    """Write Arrow tables of the same columns, at least one, as `write_geoparquet` writes one."""
     blocks = iter(blocks)
     with whole_file(path) as partial:
         block = next(blocks)
@@ -359,40 +236,10 @@ def read_geoparquet(
     columns: list[str] | None = None,
     box: Sequence[float] | None = None,
 ) -> tuple[pa.Table, dict[str, Any], CRS]:
-    """Read a file that `write_geoparquet` wrote.
+    """Return the table, the specs and the CRS of a file that `write_geoparquet` wrote.
 
-    Parameters
-    ----------
-    path : str or Path
-        File to read.
-    kind : str
-        What the file must hold: the value of ``specs["kind"]``.
-    columns : list of str, optional
-        Columns to read; all by default.
-    box : sequence of float, optional
-        ``xmin, ymin, xmax, ymax``: rows that do not meet it may be left out (see
-        `semsig_gis.boxes`).
-
-    Returns
-    -------
-    table : pyarrow.Table
-        The columns.
-    specs : dict
-        The specs that were stored.
-    crs : pyproj.CRS
-        Coordinate reference system of the geometry.
-
-    Raises
-    ------
-    DatabaseError
-        If the file is missing, damaged, or of another kind.
-
-    Examples
-    --------
-    >>> read_geoparquet("nowhere.parquet", kind="signature database")
-    Traceback (most recent call last):
-    ...
-    semsig_gis.errors.DatabaseError: nowhere.parquet does not exist; give a signature database file.
+    DatabaseError if it is missing, damaged, or not of that kind (``specs["kind"]``). Rows that do
+    not meet the box ``xmin, ymin, xmax, ymax`` may be left out (see `semsig_gis.boxes`).
     """
     file = Path(path)
     if not os.path.isfile(file):  # noqa: PTH113 - it answers where Path.is_file raises

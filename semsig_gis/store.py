@@ -159,27 +159,9 @@ def _surroundings(table: gpd.GeoDataFrame, objects: StreetObjects) -> gpd.GeoDat
 
 
 def store_path(database: str | Path) -> Path:
-    """Return where the object store of a database lies.
+    """Return the folder beside a database file where its object store lies.
 
-    Parameters
-    ----------
-    database : str or Path
-        File of the database.
-
-    Returns
-    -------
-    Path
-        A folder beside it.
-
-    Raises
-    ------
-    InputError
-        If the database would be called as a store is.
-
-    Examples
-    --------
-    >>> store_path("city.parquet").name
-    'city.objects'
+    Links are followed. Raise InputError if the name of the database has the ending of a store.
     """
     # A link to a database has the store of the database.
     file = Path(os.path.realpath(database))

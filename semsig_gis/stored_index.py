@@ -43,33 +43,16 @@ FEW_EDITS = 1000
 
 
 class StoredIndex:
-    """An R-tree over points that is kept in files.
+    """An R-tree over points that is kept in files; make one with `pack` or `open`.
 
-    Make one with `pack` or `open`.
+    `folder` holds the tree and is removed with this object. `numbers` says under which number each
+    point of `xy` (metres, shape (n, 2)) stands in the tree; a point keeps its number when others
+    come and go.
 
-    Parameters
-    ----------
-    folder : Path
-        A folder of its own that holds the tree; it is removed with this object.
-    xy : ndarray of float64, shape (n, 2)
-        Positions in metres.
-    numbers : ndarray of int64, shape (n,)
-        Under which number each point stands in the tree. A point keeps its number when others
-        come and go.
-
-    Notes
-    -----
-    The library writes to the files of a tree even when it only reads from it, and two programs
-    that do so at once destroy it. So the tree is worked on in a copy in the temporary folder of
-    the system, and `save` alone puts it elsewhere. It belongs to the process and the thread that
-    opened it, and cannot be pickled: the library would make an empty tree of it without an error.
-
-    Examples
-    --------
-    >>> tree = StoredIndex.pack(np.array([[0.0, 0.0], [3.0, 4.0], [50.0, 0.0]]))
-    >>> viewpoints, objects = tree.pairs_within(np.array([[0.0, 0.0]]), radius=5.0)
-    >>> sorted(objects.tolist())
-    [0, 1]
+    The library writes to the files of a tree even when it only reads from it, and two programs that
+    do so at once destroy it. So the tree is worked on in a copy in the temporary folder of the
+    system, and `save` alone puts it elsewhere. It belongs to the process and thread that opened it,
+    and cannot be pickled: the library would make an empty tree of it without an error.
     """
 
     def __init__(self, folder: Path, xy: NDArray[np.float64], numbers: NDArray[np.int64]) -> None:
@@ -96,22 +79,9 @@ class StoredIndex:
 
     @classmethod
     def pack(cls, xy: ArrayLike) -> StoredIndex:
-        """Make a tree of points in one go.
+        """Make a tree of finite points in metres, shape (n, 2), in one go.
 
-        Parameters
-        ----------
-        xy : array_like of float, shape (n, 2)
-            Positions in metres, finite.
-
-        Returns
-        -------
-        StoredIndex
-            The tree.
-
-        Raises
-        ------
-        InputError
-            If there is no point, or one is not finite, or the temporary folder is full.
+        InputError if there is no point, or one is not finite, or the temporary folder is full.
         """
         points = checked_points(xy)
         numbers = np.arange(len(points))
@@ -122,26 +92,11 @@ class StoredIndex:
 
     @classmethod
     def open(cls, folder: str | Path, xy: ArrayLike) -> StoredIndex:
-        """Open a tree that `save` wrote.
+        """Open a tree that `save` wrote, over the points in the order in which they were saved.
 
-        Parameters
-        ----------
-        folder : str or Path
-            Where it lies; nothing in it is changed.
-        xy : array_like of float, shape (n, 2)
-            The points, in the order in which they were saved. Whoever keeps the files sees to it
-            that they are whole: the library takes a damaged tree for a small one.
-
-        Returns
-        -------
-        StoredIndex
-            The tree.
-
-        Raises
-        ------
-        InputError
-            If the points are not as many as were saved, or the files are damaged or cannot be
-            copied.
+        Whoever keeps the files sees to it that they are whole: the library takes a damaged tree for
+        a small one. InputError if the number of points differs, or the files cannot be read or
+        copied.
         """
         points = checked_points(xy)
         try:
@@ -157,39 +112,16 @@ class StoredIndex:
             return cls(own, points, numbers)
 
     def save(self, folder: str | Path) -> None:
-        """Write the files of the tree, which are `INDEX_FILES`.
-
-        Parameters
-        ----------
-        folder : str or Path
-            A folder that exists.
-        """
+        """Write the files of the tree, which are `INDEX_FILES`, to a folder that exists."""
         # Whole since it was opened: edits are made in a copy, and asking writes when it is closed.
         _copy(self._folder, Path(folder))
         np.save(Path(folder, NUMBERS_FILE), self._numbers)
 
     def edited(self, xy: ArrayLike, kept: NDArray[np.int64]) -> StoredIndex:
-        """Return a tree of other points, some of which are in this one.
+        """Return a new tree of other points, some of which are in this one, which stays.
 
-        Parameters
-        ----------
-        xy : array_like of float, shape (m, 2)
-            All points of the new tree, in metres, finite.
-        kept : ndarray of int64, shape (m,)
-            For each of them the row of the same point in this tree, or -1 where it is new. No row
-            stands twice.
-
-        Returns
-        -------
-        StoredIndex
-            The new tree; this one stays.
-
-        Examples
-        --------
-        >>> tree = StoredIndex.pack(np.array([[0.0, 0.0], [3.0, 4.0], [50.0, 0.0]]))
-        >>> moved = tree.edited([[50.0, 0.0], [4.0, 3.0]], np.array([2, -1]))
-        >>> moved.pairs_within(np.array([[0.0, 0.0]]), radius=5.0)[1].tolist()
-        [1]
+        `xy` holds all points of the new tree, shape (m, 2). `kept`, shape (m,), holds for each the
+        row of the same point in this tree, or -1 where it is new; no row stands twice.
         """
         points = checked_points(xy)
         gone = np.ones(len(self), bool)
@@ -217,19 +149,9 @@ class StoredIndex:
     def pairs_within(
         self, viewpoints: NDArray[np.float64], *, radius: float
     ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-        """Return every pair of viewpoint and point within a radius.
+        """Return the rows of viewpoint and point of every pair within a radius, by viewpoint.
 
-        Parameters
-        ----------
-        viewpoints : ndarray of float64, shape (v, 2)
-            Places to look from, in metres.
-        radius : float
-            Metres; a point at exactly this distance counts.
-
-        Returns
-        -------
-        viewpoint, point : ndarray of int64, shape (p,)
-            Row numbers, ordered by viewpoint.
+        Viewpoints, shape (v, 2), and radius are in metres; a point at exactly the radius counts.
         """
         return tree_pairs(self._tree, self._xy, viewpoints, radius=radius, rows=self._rows)
 

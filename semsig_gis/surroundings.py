@@ -121,61 +121,19 @@ def read_surroundings(
 
 
 def licenses_of(*tables: gpd.GeoDataFrame | None) -> tuple[str, ...]:
-    """Return whom to name for buildings and streets.
+    """Return whom to name for buildings and streets, a line for every publisher and licence.
 
-    Parameters
-    ----------
-    *tables : GeoDataFrame or None
-        Tables that `read_surroundings` or `semsig_gis.loading.assemble` returned.
-
-    Returns
-    -------
-    tuple of str
-        A line for every publisher and licence.
-
-    Examples
-    --------
-    >>> houses = gpd.GeoDataFrame(geometry=[shapely.box(0, 0, 5, 5)], crs="EPSG:2154")
-    >>> houses.attrs["licenses"] = ["City (CC0-1.0): buildings"]
-    >>> licenses_of(houses, None)
-    ('City (CC0-1.0): buildings',)
+    The tables are those of `read_surroundings` or `semsig_gis.loading.assemble`.
     """
     lines = [table.attrs.get(LICENSES, ()) for table in tables if table is not None]
     return tuple(dict.fromkeys(itertools.chain.from_iterable(lines)))
 
 
 def read_area(path: str | Path, *, crs: CRS | str) -> shapely.Polygon | shapely.MultiPolygon:
-    """Read an area: what all polygons of a file enclose together.
+    """Read what all polygons of a vector or ``.parquet`` file enclose together, moved to a CRS.
 
-    Parameters
-    ----------
-    path : str or Path
-        A vector or ``.parquet`` file.
-    crs : pyproj.CRS or str
-        CRS to move it to.
-
-    Returns
-    -------
-    shapely.Polygon or shapely.MultiPolygon
-        The area.
-
-    Raises
-    ------
-    SourceError
-        If the file is missing, damaged, or of another kind.
-    CrsError
-        If nobody knows its CRS.
-    InputError
-        If it holds no polygon, or something else too.
-
-    Examples
-    --------
-    >>> import tempfile
-    >>> town = gpd.GeoDataFrame(geometry=[shapely.box(0, 0, 5, 5)], crs="EPSG:2154")
-    >>> with tempfile.TemporaryDirectory() as folder:
-    ...     town.to_parquet(f"{folder}/town.parquet")
-    ...     read_area(f"{folder}/town.parquet", crs="EPSG:2154").area
-    25.0
+    Raise SourceError if the file is missing, damaged, or of another kind, CrsError if its CRS is
+    not known, and InputError if it holds no polygon, or something else too.
     """
     area = join_areas(_read(Path(path), "area", "polygon", crs).geometry.to_numpy())
     if area is None:

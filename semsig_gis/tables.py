@@ -66,66 +66,21 @@ class Table:
 
 
 def percent(share: float) -> str:
-    """Return a share as text.
-
-    Parameters
-    ----------
-    share : float
-        From 0 to 1.
-
-    Returns
-    -------
-    str
-        Percent with one decimal.
-
-    Examples
-    --------
-    >>> percent(0.418)
-    '41.8 %'
-    """
+    """Return a share from 0 to 1 as percent with one decimal: ``41.8 %``."""
     return f"{100 * share:.1f} %"
 
 
 def escaped(text: str) -> str:
-    """Return text from data so that it cannot break a Markdown table or become HTML.
-
-    Parameters
-    ----------
-    text : str
-        Anything.
-
-    Returns
-    -------
-    str
-        The text on one line.
-
-    Examples
-    --------
-    >>> escaped("trees  of <b>")
-    'trees of &lt;b>'
-    """
+    """Return text on one line that cannot break a Markdown table or become HTML."""
     plain = " ".join(text.split())
     return plain.replace("&", "&amp;").replace("<", "&lt;").replace("|", "\\|")
 
 
 def one_line(text: str) -> str:
-    r"""Return text from data on one line, without characters that hide or turn other text.
+    """Return text from data on one line, without characters that hide or turn other text.
 
-    Parameters
-    ----------
-    text : str
-        Anything.
-
-    Returns
-    -------
-    str
-        The text with single spaces, without control characters and marks of direction; halves of
-        characters, which no file can hold, become U+FFFD.
-
-    Examples
-    --------
-    >>> one_line(" plane\n trees\u202e ")
-    'plane trees'
+    Those are control characters and marks of direction. Halves of characters, which no file can
+    hold, become U+FFFD.
     """
     plain = " ".join(text.split())
     # What is left out may have stood between two spaces.

@@ -53,33 +53,11 @@ def plan_tiles(
 ) -> TilePlan:
     """Check the inputs of a run, begin it or take it up again, and return the plan of its tiles.
 
-    Parameters
-    ----------
-    objects : str or Path
-        Street objects that `semsig_gis.objects.save_objects` wrote.
-    out : str or Path
-        Where the database shall be.
-    tile : TileSpec
-        Size of a tile.
-    grid : GridSpec
-        The cells.
-    spec : SignatureSpec
-        Visibility range and angle levels.
-    viewpoints : ViewpointSpec
-        Which cells are looked from.
-    buildings, streets : str or Path, optional
-        Files that `semsig_gis.surroundings.read_surroundings` reads; streets are needed by the
-        viewpoints ``"streets"`` and left aside by others.
-
-    Returns
-    -------
-    TilePlan
-        The plan. Inputs that cannot be read by box have been copied into the folder of the run.
-
-    Raises
-    ------
-    SemsigError
-        If an input is missing or cannot be used, or `out` cannot be written.
+    `objects` is a file of `semsig_gis.objects.save_objects`; `buildings` and `streets` are files
+    that `semsig_gis.surroundings.read_surroundings` reads. Streets are needed by the viewpoints
+    ``"streets"`` and left aside by others. Inputs that cannot be read by box are copied into the
+    folder of the run. Raise SemsigError if an input is missing or cannot be used, or `out` cannot
+    be written.
     """
     places = {"objects": objects, "buildings": buildings, "streets": streets}
     if viewpoints.mode != "streets":

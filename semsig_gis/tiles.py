@@ -92,27 +92,10 @@ class TileSpec:
 class TilePlan:
     """All that is needed to build any tile: paths and specs, so that it travels lightly.
 
-    Parameters
-    ----------
-    folder : Path
-        Where part files are written.
-    objects : Path
-        Street objects that `semsig_gis.objects.save_objects` wrote.
-    buildings, streets : Path, optional
-        Surroundings that `semsig_gis.surroundings.save_surroundings` wrote, in the CRS of the
-        objects.
-    grid : GridSpec
-        The cells.
-    spec : SignatureSpec
-        Visibility range and angle levels.
-    viewpoints : ViewpointSpec
-        Which cells are looked from.
-    side : int
-        Side of a tile in cells.
-    reach : float
-        The largest visibility range of any class, in metres.
-    street_reach : float
-        How far the widest street reaches from its centre line, in metres.
+    Part files are written to `folder`. `objects` is a file of `semsig_gis.objects.save_objects`,
+    `buildings` and `streets` are files of `semsig_gis.surroundings.save_surroundings` in the same
+    CRS. `side` is that of a tile in cells; `reach` is the largest visibility range of any class,
+    and `street_reach` how far the widest street reaches from its centre line, both in metres.
     """
 
     folder: Path
@@ -127,20 +110,7 @@ class TilePlan:
     street_reach: float = 0.0
 
     def box(self, tile: Tile, margin: float) -> Box:
-        """Return the square of a tile, widened.
-
-        Parameters
-        ----------
-        tile : tuple of (int, int)
-            Column and row of the tile.
-        margin : float
-            Metres on each side.
-
-        Returns
-        -------
-        tuple of float
-            ``xmin, ymin, xmax, ymax`` in metres.
-        """
+        """Return ``xmin, ymin, xmax, ymax`` of a tile, widened by `margin` metres on each side."""
         side = self.side * self.grid.step
         west, south = (
             start + place * side for start, place in zip(self.grid.origin, tile, strict=True)
@@ -149,28 +119,11 @@ class TilePlan:
 
 
 def touched_tiles(path: str | Path, *, grid: GridSpec, side: int, reach: float) -> list[Tile]:
-    """Return the tiles that may have a cell from which some object is seen.
+    """Return the tiles that may have a cell from which some object is seen, fullest first.
 
-    Parameters
-    ----------
-    path : str or Path
-        Street objects that `semsig_gis.objects.save_objects` wrote; only their bounds are read.
-    grid : GridSpec
-        The cells.
-    side : int
-        Side of a tile in cells.
-    reach : float
-        The largest visibility range of any class, in metres.
-
-    Returns
-    -------
-    list of tuple of (int, int)
-        Column and row of each tile, those with most objects first.
-
-    Raises
-    ------
-    InputError
-        If tiles are so small that an object would touch very many, or there are too many.
+    Only the bounds in the file of objects are read. `side` is that of a tile in cells, `reach` the
+    largest visibility range of any class in metres. Raise InputError if tiles are so small that an
+    object would touch very many, or if there are too many.
     """
     metres = side * grid.step
     if reach > MOST_REACHED * metres:
@@ -204,27 +157,8 @@ def touched_tiles(path: str | Path, *, grid: GridSpec, side: int, reach: float) 
 
 
 def build_tile(plan: TilePlan, tile: Tile) -> Part | None:
-    """Build the part of one tile and save it.
+    """Build and save the part of one tile; return None where none of its cells sees anything.
 
-    Parameters
-    ----------
-    plan : TilePlan
-        What to build from, and how.
-    tile : tuple of (int, int)
-        Column and row of the tile.
-
-    Returns
-    -------
-    Part or None
-        What was saved; None where no cell of the tile sees anything.
-
-    Raises
-    ------
-    SemsigError
-        If an input cannot be read or used, or the part cannot be written.
-
-    Notes
-    -----
     What decides about a cell lies within the largest range of it: objects, and buildings together
     with their neighbours; a street lies within its own width. So only that is read, and the cells
     are the same as when everything is.

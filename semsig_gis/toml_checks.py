@@ -22,30 +22,7 @@ TYPE_NAMES: dict[type, str] = {
 
 
 def parse_toml(text: str, where: str) -> dict[str, Any]:
-    """Parse TOML.
-
-    Parameters
-    ----------
-    text : str
-        Content of a file.
-    where : str
-        Name of the file, for messages.
-
-    Returns
-    -------
-    dict
-        The values.
-
-    Raises
-    ------
-    CatalogError
-        If the text is not TOML.
-
-    Examples
-    --------
-    >>> parse_toml("rows = [1, 10]", "town.toml")
-    {'rows': [1, 10]}
-    """
+    """Parse TOML; CatalogError names the file, `where`, if the text is something else."""
     try:
         return tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
@@ -61,25 +38,8 @@ def check_keys(
 ) -> None:
     """Refuse a table with an unknown key, a value of another type, or a key too few.
 
-    Parameters
-    ----------
-    table : mapping
-        What the file says.
-    allowed : mapping of str to type
-        Keys and the types of their values; ``object`` for a value that is checked elsewhere.
-    where : str
-        File and table, for messages.
-    needed : iterable of str
-        Keys that must be there.
-
-    Raises
-    ------
-    CatalogError
-        With the key, and the nearest known one.
-
-    Examples
-    --------
-    >>> check_keys({"title": "Town"}, {"title": str}, "town.toml", ["title"])
+    `allowed` gives the type of each key's value, ``object`` for one that is checked elsewhere. The
+    CatalogError offers the nearest known key.
     """
     for key, value in table.items():
         if key not in allowed:
@@ -102,33 +62,9 @@ def check_keys(
 
 
 def one_of(value: str, key: str, choices: tuple[str, ...], where: str) -> Any:  # noqa: ANN401
-    """Return a value that must be one of some.
+    """Return a value that is one of `choices`; otherwise CatalogError offers the nearest.
 
-    Parameters
-    ----------
-    value : str
-        What the file says.
-    key : str
-        Its key.
-    choices : tuple of str
-        What may be said.
-    where : str
-        File and table, for messages.
-
-    Returns
-    -------
-    str
-        The value; its type is left open so that it may be a `Literal`.
-
-    Raises
-    ------
-    CatalogError
-        If it is none of them; the nearest is offered.
-
-    Examples
-    --------
-    >>> one_of("line", "geometry", ("line", "point"), "town.toml")
-    'line'
+    The type is left open, so that it may be a `Literal`.
     """
     if value not in choices:
         known = ", ".join(repr(choice) for choice in choices)
@@ -138,32 +74,7 @@ def one_of(value: str, key: str, choices: tuple[str, ...], where: str) -> Any:  
 
 
 def texts(items: object, key: str, where: str) -> tuple[str, ...]:
-    """Return a list of texts, none of them empty.
-
-    Parameters
-    ----------
-    items : object
-        What the file says.
-    key : str
-        Its key.
-    where : str
-        File and table, for messages.
-
-    Returns
-    -------
-    tuple of str
-        The texts.
-
-    Raises
-    ------
-    CatalogError
-        If it is something else.
-
-    Examples
-    --------
-    >>> texts(["trees*.geojson"], "files", "town.toml")
-    ('trees*.geojson',)
-    """
+    """Return a list of texts, none of them empty; CatalogError for anything else."""
     if not isinstance(items, list) or not all(isinstance(item, str) and item for item in items):
         msg = f"{where} has {key} = {items!r}; write a list of texts."
         raise CatalogError(msg)
@@ -171,34 +82,7 @@ def texts(items: object, key: str, where: str) -> tuple[str, ...]:
 
 
 def metres(value: object, key: str, where: str, *, most: float) -> float:
-    """Return a length.
-
-    Parameters
-    ----------
-    value : object
-        What the file says.
-    key : str
-        Its key.
-    where : str
-        File and table, for messages.
-    most : float
-        The largest length that makes sense.
-
-    Returns
-    -------
-    float
-        Metres, above 0 and up to `most`.
-
-    Raises
-    ------
-    CatalogError
-        If it is something else.
-
-    Examples
-    --------
-    >>> metres(50, "bus_stop", "town.toml, ranges", most=6000)
-    50.0
-    """
+    """Return a length in metres, above 0 and up to `most`; CatalogError for anything else."""
     # bool is an int to Python, never to a catalogue; NaN is not above 0
     if isinstance(value, bool) or not isinstance(value, int | float) or not 0 < value <= most:
         msg = f"{where} has {key} = {value!r}; write metres above 0 and up to {most:g}."

@@ -13,24 +13,8 @@ __all__ = ["toml_text"]
 def toml_text(values: Mapping[str, Any]) -> str:
     """Write values as TOML: numbers, texts and lists first, then a section for each table.
 
-    Parameters
-    ----------
-    values : mapping
-        Plain values; no None, no NaN and no infinity.
-
-    Returns
-    -------
-    str
-        What a TOML parser reads back as the same values, but for tables that are empty; lines end
-        in a newline.
-
-    Examples
-    --------
-    >>> print(toml_text({"size": 2, "parts": {"old town": [1.5]}}), end="")
-    size = 2
-    <BLANKLINE>
-    [parts]
-    "old town" = [1.5]
+    There is no None, NaN or infinity among them. A parser reads back the same values, but for
+    tables that are empty.
     """
     return _section(values).lstrip("\n")
 

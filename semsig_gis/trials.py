@@ -32,23 +32,13 @@ HOPELESS = 20.0  # nats below the likeliest cell, at which a cell is left out of
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Trials:
-    """What came of simulated queries, one a row.
+    """What came of simulated queries, arrays of one item a query.
 
-    Parameters
-    ----------
-    cells : ndarray of int64, shape (m,)
-        Row number of the true cell.
-    itself : ndarray of float64, shape (m,)
-        Chance that the answer gave to the true cell.
-    near : ndarray of float64, shape (m,)
-        Chance that it gave to the cells near the true one, itself among them.
-    found : ndarray of bool, shape (m,)
-        Whether the best place is near the true cell.
-    bits : ndarray of float64, shape (m,)
-        Entropy of the chances of the cells: what is left to be known.
-    lean : ndarray of float64, shape (m,)
-        Mean, by these chances, of the logarithm of the likelihood of the true cell's own
-        signature in a cell over that in the true one; NaN where nothing was detected.
+    `cells` has row numbers of the true cells. The answer gave the chance `itself` to the true cell
+    and `near` to all cells near it, itself among them; `found` tells whether the best place is
+    near, `bits` the entropy of the chances of all cells. `lean` is the mean, by these chances, of
+    the logarithm of the likelihood of the true cell's own signature in a cell over that in the true
+    one; NaN where nothing was detected.
     """
 
     cells: NDArray[np.int64]
@@ -60,26 +50,9 @@ class Trials:
 
 
 def trial_cells(cells: int, count: int, *, seed: int = 0) -> NDArray[np.int64]:
-    """Return the cells of so many trials: all equally often, the rest drawn.
+    """Return row numbers of the cells of `count` trials: all equally often, the rest drawn.
 
-    Parameters
-    ----------
-    cells : int
-        How many cells there are.
-    count : int
-        How many trials are wanted.
-    seed : int, default 0
-        Seed of the draw.
-
-    Returns
-    -------
-    ndarray of int64, shape (count,)
-        Row numbers; more of them keep the first ones.
-
-    Examples
-    --------
-    >>> np.bincount(trial_cells(3, 7)).tolist() in ([2, 2, 3], [2, 3, 2], [3, 2, 2])
-    True
+    A larger count keeps the first ones.
     """
     rng = np.random.default_rng([seed, 0])
     rounds = [rng.permutation(cells) for _ in range(-(-count // cells))]
@@ -89,37 +62,10 @@ def trial_cells(cells: int, count: int, *, seed: int = 0) -> NDArray[np.int64]:
 def draw_trials(
     index: LikelihoodIndex, cells: NDArray[np.int64], *, seed: int = 0
 ) -> Iterator[Signature]:
-    """Draw what a detector tells of cells, if it fails as the noise model says.
+    """Yield what a detector tells of cells, if it fails as the noise model of the index says.
 
-    Parameters
-    ----------
-    index : LikelihoodIndex
-        The cells and the noise model.
-    cells : ndarray of int, shape (m,)
-        Row numbers of the cells; one may come several times.
-    seed : int, default 0
-        Seed of the detections. Query number i is the same whatever the number of queries.
-
-    Yields
-    ------
-    Signature
-        The detections in each cell, clockwise; perhaps none.
-
-    Examples
-    --------
-    >>> from semsig_gis.catalog import paper_taxonomy
-    >>> from semsig_gis.building import build_database
-    >>> from semsig_gis.likelihood import build_index
-    >>> from semsig_gis.noise import NoiseSpec
-    >>> from semsig_gis.objects import build_objects
-    >>> from semsig_gis.sources.synthetic import CitySpec, synthetic_city
-    >>> layers = synthetic_city(CitySpec(size=200.0))
-    >>> objects, _ = build_objects(layers, taxonomy=paper_taxonomy(), crs="EPSG:32631")
-    >>> careful = NoiseSpec(detection=1.0, misnamed=0.0, clutter=0.0, bearing_sigma=0.01)
-    >>> index = build_index(build_database(objects), careful)
-    >>> (seen,) = draw_trials(index, np.array([0]))
-    >>> index.database.taxonomy.decode(seen.codes) == index.database.types(0)
-    True
+    `cells` are row numbers and may repeat. Detections are clockwise, perhaps none. Query number i
+    is the same whatever the number of queries.
     """
     detector = Detector(noise=index.noise)
     spoil = ready_chain((detector,), CitySights.of(index.database))
@@ -136,43 +82,10 @@ def try_cells(
     threads: int = 1,
     progress: Callable[[int, int], None] | None = None,
 ) -> Trials:
-    """Ask one simulated query from each of some cells.
+    """Ask one simulated query from each of some cells, given by row number.
 
-    Parameters
-    ----------
-    index : LikelihoodIndex
-        The cells and the noise model, of the detector and of the answer alike.
-    cells : ndarray of int, shape (m,)
-        Row numbers of the true cells.
-    radius : float, default 50
-        Metres that count as near.
-    seed : int, default 0
-        Seed of the detections.
-    threads : int, default 1
-        How many queries are worked on at once.
-    progress : callable, optional
-        Called with the number of queries done and in all.
-
-    Returns
-    -------
-    Trials
-        The outcomes.
-
-    Examples
-    --------
-    >>> from semsig_gis.catalog import paper_taxonomy
-    >>> from semsig_gis.building import build_database
-    >>> from semsig_gis.likelihood import build_index
-    >>> from semsig_gis.noise import named_noise
-    >>> from semsig_gis.objects import build_objects
-    >>> from semsig_gis.sources.synthetic import CitySpec, synthetic_city
-    >>> layers = synthetic_city(CitySpec(size=300.0))
-    >>> objects, _ = build_objects(layers, taxonomy=paper_taxonomy(), crs="EPSG:32631")
-    >>> database = build_database(objects)
-    >>> index = build_index(database, named_noise("light"))
-    >>> trials = try_cells(index, trial_cells(len(database), 50))
-    >>> bool(trials.found.mean() > 0.5), bool((trials.itself <= trials.near).all())
-    (True, True)
+    The noise model of the index is that of the detector and of the answer alike; `radius` is what
+    counts as near, in metres.
     """
     queries = draw_trials(index, cells, seed=seed)
     return try_queries(index, cells, queries, radius=radius, threads=threads, progress=progress)
@@ -187,27 +100,10 @@ def try_queries(
     threads: int = 1,
     progress: Callable[[int, int], None] | None = None,
 ) -> Trials:
-    """Ask queries of which the true cells are known.
+    """Ask queries of which the true cells are known, one a row number of `cells`.
 
-    Parameters
-    ----------
-    index : LikelihoodIndex
-        The cells and the noise model.
-    cells : ndarray of int, shape (m,)
-        Row numbers of the true cells.
-    queries : iterable of Signature
-        A query from each.
-    radius : float, default 50
-        Metres that count as near.
-    threads : int, default 1
-        How many queries are worked on at once.
-    progress : callable, optional
-        Called with the number of queries done and in all.
-
-    Returns
-    -------
-    Trials
-        The outcomes. A query without objects is not answered: chances of 0.
+    `radius` is what counts as near, in metres. A query without objects is not answered: its chances
+    are 0.
     """
     places = _without_signatures(index.database)
     radius = min(radius, city_extent(places))

@@ -41,32 +41,11 @@ HALF_WRITTEN = ".semsig-"
 
 
 def start(out: str | Path, recipe: dict[str, Any]) -> Path:
-    """Begin a run, or take up an unfinished one.
+    """Begin a run, or take up an unfinished one, and return its folder: `out` with ``.partial``.
 
-    Parameters
-    ----------
-    out : str or Path
-        Where the database shall be.
-    recipe : dict
-        How it is built, as plain JSON values.
-
-    Returns
-    -------
-    Path
-        The folder to work in: the name of `out` and ``.partial``.
-
-    Raises
-    ------
-    InputError
-        If `out` holds something that may not be replaced, the folder cannot be written to, or it
-        holds an unfinished run by another recipe, which is never thrown away unasked.
-
-    Examples
-    --------
-    >>> import tempfile
-    >>> with tempfile.TemporaryDirectory() as folder:
-    ...     start(f"{folder}/city", {"step": 10}).name
-    'city.partial'
+    `recipe` says how the database is built, as plain JSON values. Raise InputError if `out` holds
+    something that may not be replaced, the folder cannot be written to, or it holds tiles of an
+    unfinished run by another recipe, which are never thrown away unasked.
     """
     target = Path(os.path.realpath(out))
     _require_replaceable(target)
@@ -102,18 +81,7 @@ def start(out: str | Path, recipe: dict[str, Any]) -> Path:
 
 
 def abandon(folder: Path) -> bool:
-    """Remove the folder of a run that has not done a single tile.
-
-    Parameters
-    ----------
-    folder : Path
-        Folder of the run.
-
-    Returns
-    -------
-    bool
-        Whether it was removed.
-    """
+    """Remove the folder of a run that has not done a single tile, and tell whether it was."""
     if any(folder.glob("tile_*")):
         return False
     shutil.rmtree(folder, ignore_errors=True)
@@ -152,54 +120,21 @@ def _difference(found: Any, wanted: dict[str, Any]) -> str:  # noqa: ANN401 - wh
 
 
 def describe(tile: tuple[int, int], database: SignatureDatabase, path: Path) -> Part:
-    """Return what the manifest says of a part.
-
-    Parameters
-    ----------
-    tile : tuple of (int, int)
-        Column and row of the tile.
-    database : SignatureDatabase
-        The part.
-    path : Path
-        The file that it was saved to.
-
-    Returns
-    -------
-    Part
-        The entry.
-    """
+    """Return the manifest's entry for a part that was saved to a path."""
     return Part(tile, len(database), len(database.codes), path.stat().st_size, digest(path))
 
 
 def mark_empty(folder: Path, tile: tuple[int, int]) -> None:
-    """Note that a tile is done and that none of its cells sees anything.
-
-    Parameters
-    ----------
-    folder : Path
-        Folder of the run.
-    tile : tuple of (int, int)
-        Column and row of the tile.
-    """
+    """Note that a tile is done and that none of its cells sees anything."""
     (folder / part_name(tile)).with_suffix(EMPTY).touch()
 
 
 def finished_tiles(
     folder: Path, tiles: Iterable[tuple[int, int]]
 ) -> dict[tuple[int, int], Part | None]:
-    """Return the tiles that are done; a file that is damaged is thrown away and is not.
+    """Return the parts of the tiles that are done, None where no cell sees anything.
 
-    Parameters
-    ----------
-    folder : Path
-        Folder of the run.
-    tiles : iterable of tuple of (int, int)
-        Columns and rows of all tiles.
-
-    Returns
-    -------
-    dict
-        The part of each tile that is done, None where no cell sees anything.
+    A damaged file is deleted, and its tile is not done.
     """
     done: dict[tuple[int, int], Part | None] = {}
     for tile in tiles:
@@ -217,22 +152,8 @@ def finished_tiles(
 def publish(folder: Path, parts: Sequence[Part]) -> Manifest:
     """Put a database whose tiles are all done in its place; one that was there is replaced.
 
-    Parameters
-    ----------
-    folder : Path
-        Folder of the run.
-    parts : sequence of Part
-        The parts, ordered by tile.
-
-    Returns
-    -------
-    Manifest
-        What the database consists of.
-
-    Raises
-    ------
-    InputError
-        If the folder cannot be renamed.
+    The parts are ordered by tile. Raise InputError if the folder cannot be renamed; the parts then
+    stay in it.
     """
     target = folder.with_name(folder.name.removesuffix(".partial"))
     before = target.with_name(f"{HALF_WRITTEN}{target.name}")

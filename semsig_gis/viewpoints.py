@@ -131,42 +131,13 @@ def choose_viewpoints(
     streets: NDArray[np.object_] | Sequence[shapely.Geometry | None] | None = None,
     widths: ArrayLike | None = None,
 ) -> NDArray[np.bool_]:
-    """Tell which cells are viewpoints.
+    """Tell which cells are viewpoints, by their centres.
 
-    Parameters
-    ----------
-    columns, rows : ndarray of int64, shape (n,)
-        Cells.
-    grid : GridSpec
-        Where they lie.
-    spec : ViewpointSpec
-        The choice.
-    footprints : Footprints, optional
-        Buildings; needed for ``"outdoor"``.
-    streets : array_like of shapely.LineString or shapely.MultiLineString, shape (s,), optional
-        Centre lines in metres; needed for ``"streets"``. Missing and empty ones are left out.
-    widths : array_like of float, shape (s,), optional
-        Half the width of each street in metres; not finite where ``spec.width`` holds.
-
-    Returns
-    -------
-    ndarray of bool, shape (n,)
-        Whether the centre of a cell is a viewpoint; a centre on the outline of a building is
-        not, one on the edge of a street or of the area is.
-
-    Raises
-    ------
-    InputError
-        If the buildings or streets that the mode needs are missing, or the streets are not lines.
-
-    Examples
-    --------
-    >>> from semsig_gis.grid import GridSpec
-    >>> street = [shapely.LineString([(0, 5), (100, 5)])]
-    >>> spec = ViewpointSpec(mode="streets")
-    >>> cells = np.zeros(3, int), np.arange(3)
-    >>> choose_viewpoints(*cells, grid=GridSpec(), spec=spec, streets=street).tolist()
-    [True, False, False]
+    A centre on the outline of a building is none; one on the edge of a street or of the area is.
+    The footprints are needed for ``"outdoor"``, and the centre lines in metres for ``"streets"``;
+    missing and empty lines are left out. `widths` holds half the width of each street in metres,
+    not finite where ``spec.width`` holds. Raise InputError if what the mode needs is missing, or
+    the streets are not lines.
     """
     places = grid.viewpoints(columns, rows)
     chosen = np.ones(len(places), bool)

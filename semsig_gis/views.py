@@ -30,18 +30,9 @@ HALF_UNIT = 180.0 / BEARING_UNITS
 class Views:
     """What is seen from v places, each clockwise from north.
 
-    Parameters
-    ----------
-    offsets : ndarray of int64, shape (v + 1,)
-        Where the entries of each place begin.
-    objects : ndarray of int64, shape (m,)
-        Row of each object in the table of objects; -1 where it is not known.
-    codes : ndarray of uint8, shape (m,)
-        Its class code.
-    bearings : ndarray of float64, shape (m,)
-        Degrees clockwise from grid north.
-    distances : ndarray of float64, shape (m,)
-        Metres.
+    The entries of place ``i`` are ``offsets[i]`` to ``offsets[i + 1]``. `objects` are rows in the
+    table of objects, -1 where not known; `codes` their classes; `bearings` are in degrees clockwise
+    from grid north, `distances` in metres.
     """
 
     offsets: NDArray[np.int64]
@@ -67,38 +58,10 @@ def views_at(
     radius: float,
     footprints: Footprints | None = None,
 ) -> Views:
-    """Return what is seen from places anywhere.
+    """Return what is seen from places anywhere, in metres in the CRS of the objects, not rounded.
 
-    Parameters
-    ----------
-    objects : StreetObjects
-        The objects of the city.
-    places : ndarray of float64, shape (v, 2)
-        Where to look from, metres in the CRS of the objects.
-    index : ObjectIndex or StoredIndex
-        R-tree over ``objects.xy``.
-    radius : float
-        Visibility range in metres of classes that have none of their own.
-    footprints : Footprints, optional
-        Buildings; what they hide is not seen.
-
-    Returns
-    -------
-    Views
-        The objects, not rounded.
-
-    Examples
-    --------
-    >>> from semsig_gis.catalog import paper_taxonomy
-    >>> from semsig_gis.objects import build_objects
-    >>> from semsig_gis.sources.synthetic import CitySpec, synthetic_city
-    >>> from semsig_gis.spatial_index import ObjectIndex
-    >>> layers = synthetic_city(CitySpec(size=300.0))
-    >>> objects, _ = build_objects(layers, taxonomy=paper_taxonomy(), crs="EPSG:32631")
-    >>> tree = ObjectIndex(objects.xy)
-    >>> seen = views_at(objects, objects.xy[:1] + 0.25, index=tree, radius=0.5)
-    >>> seen.distances.round(3).tolist(), seen.bearings.round(3).tolist()
-    ([0.354], [225.0])
+    `index` is an R-tree over ``objects.xy``; `radius` is the visibility range in metres of classes
+    that have none of their own; what `footprints` hide is not seen.
     """
     ranges = objects.taxonomy.ranges(radius)
     places = np.ascontiguousarray(places, dtype=np.float64)
@@ -120,19 +83,9 @@ def views_at(
 
 
 def views_in(database: SignatureDatabase, cells: NDArray[np.int64]) -> Views:
-    """Return what a database says is seen from some of its cells.
+    """Return what a database says is seen from some of its cells; one may stand there twice.
 
-    Parameters
-    ----------
-    database : SignatureDatabase
-        The cells.
-    cells : ndarray of int64, shape (v,)
-        Row numbers in the database; one may stand there twice.
-
-    Returns
-    -------
-    Views
-        Bearings in the middle of their units; the rows of the objects are not known.
+    Bearings are in the middle of their units, and the rows of the objects are not known.
     """
     lengths = database.lengths[cells]
     offsets = np.concatenate([[0], np.cumsum(lengths)])

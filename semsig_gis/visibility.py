@@ -32,22 +32,10 @@ ROUNDING_CELLS = 1e-3
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Sightings:
-    """Pairs of a viewpoint and an object that is seen from it.
+    """Pairs of a viewpoint and an object that is seen from it, both as row numbers.
 
-    Parameters
-    ----------
-    viewpoint, object : ndarray of int64, shape (p,)
-        Row numbers.
-    bearing : ndarray of float64, shape (p,)
-        Degrees clockwise from grid north, [0, 360), to nine decimals.
-    distance : ndarray of float64, shape (p,)
-        Metres.
-
-    Examples
-    --------
-    >>> nothing = np.empty(0, np.int64)
-    >>> len(Sightings(nothing, nothing, nothing.astype(float), nothing.astype(float)).bearing)
-    0
+    `bearing` is in degrees clockwise from grid north, [0, 360), to nine decimals, `distance` in
+    metres.
     """
 
     viewpoint: NDArray[np.int64]
@@ -56,18 +44,7 @@ class Sightings:
     distance: NDArray[np.float64]
 
     def only(self, kept: NDArray[np.bool_] | NDArray[np.int64]) -> Sightings:
-        """Return some of the pairs, or all of them in another order.
-
-        Parameters
-        ----------
-        kept : ndarray of bool, shape (p,), or of int64
-            Whether to keep each pair, or the numbers of those to keep.
-
-        Returns
-        -------
-        Sightings
-            Those pairs.
-        """
+        """Return some of the pairs, by mask or number, or all of them in another order."""
         return Sightings(
             self.viewpoint[kept], self.object[kept], self.bearing[kept], self.distance[kept]
         )
@@ -82,44 +59,16 @@ def visible_objects(
     index: PackedIndex,
     ranges: NDArray[np.float64],
 ) -> Iterator[tuple[slice, Sightings]]:
-    """Yield what is seen from the cells of a grid, block by block.
+    """Yield what is seen from the centres of grid cells, block by block.
 
-    Parameters
-    ----------
-    columns, rows : ndarray of int64, shape (n,)
-        Distinct cells, ordered by column and row; they are looked from at their centres.
-    objects : ndarray of float64, shape (m, 2)
-        Positions of the objects, in metres.
-    grid : GridSpec
-        Where the cells lie.
-    index : PackedIndex
-        R-tree over `objects`.
-    ranges : ndarray of float64, shape (m,)
-        From how far each object is seen: its visibility range R in metres.
+    The cells are distinct and ordered by column and row. `index` is an R-tree over `objects`,
+    positions in metres; `ranges` tells from how far each object is seen: its visibility range R in
+    metres. Each block is a slice of the cells and the pairs within range (paper, section on
+    semantic signatures), viewpoints counted from the first cell of the block, in any order.
 
-    Yields
-    ------
-    cells : slice
-        Rows of the next cells in `columns` and `rows`.
-    Sightings
-        The pairs within range (paper, section on semantic signatures) of a viewpoint, counted
-        from the first of these cells, and an object, in any order.
-
-    Notes
-    -----
-    The R-tree is asked which objects are near each tile of cells. Around such an object, the
-    cells of one column that see it follow each other, so that two searches in the list of cells
-    find them all. The distance of every pair is then measured.
-
-    Examples
-    --------
-    >>> from semsig_gis.grid import GridSpec
-    >>> from semsig_gis.spatial_index import PackedIndex
-    >>> places = np.array([[5.0, 15.0], [5.0, 104.0]])
-    >>> cell, tree, reach = np.array([0]), PackedIndex(places), np.array([30.0, 30.0])
-    >>> blocks = visible_objects(cell, cell, places, grid=GridSpec(), index=tree, ranges=reach)
-    >>> [(seen.bearing.tolist(), seen.distance.tolist()) for _, seen in blocks]
-    [([0.0], [10.0])]
+    The R-tree is asked which objects are near each tile of cells. Around such an object, the cells
+    of one column that see it follow each other, so that two searches in the list of cells find them
+    all. The distance of every pair is then measured.
     """
     cells = len(columns)
     starts = range(0, cells, CELLS_A_BLOCK)
@@ -205,32 +154,10 @@ def seen_from(
     index: ObjectIndex | StoredIndex,
     ranges: NDArray[np.float64],
 ) -> Sightings:
-    """Return what is seen from places anywhere.
+    """Return the pairs within range of a place anywhere and an object.
 
-    Parameters
-    ----------
-    places : ndarray of float64, shape (v, 2)
-        Where to look from, in metres.
-    objects : ndarray of float64, shape (m, 2)
-        Positions of the objects, in metres.
-    index : ObjectIndex or StoredIndex
-        R-tree over `objects`.
-    ranges : ndarray of float64, shape (m,)
-        From how far each object is seen, in metres.
-
-    Returns
-    -------
-    Sightings
-        The pairs within range of a place and an object.
-
-    Examples
-    --------
-    >>> from semsig_gis.spatial_index import ObjectIndex
-    >>> lamps = np.array([[0.0, 10.0], [0.0, 99.0]])
-    >>> reach = np.array([30.0, 30.0])
-    >>> here = np.array([[0.0, 0.0]])
-    >>> seen_from(here, lamps, index=ObjectIndex(lamps), ranges=reach).distance.tolist()
-    [10.0]
+    `index` is an R-tree over `objects`. Positions and `ranges`, from how far each object is seen,
+    are in metres.
     """
     pairs = index.pairs_within(places, radius=float(ranges.max()))
     return _within(*pairs, places, objects, ranges=ranges)

@@ -33,17 +33,7 @@ PATIENCE_S = 10
 
 @dataclass(frozen=True, slots=True)
 class Outcome(Generic[_Task, _Value]):
-    """What became of a task.
-
-    Parameters
-    ----------
-    task : object
-        The task.
-    value : object
-        What it gave; None where it failed.
-    reason : str, optional
-        Why it failed, without a full stop.
-    """
+    """What a task gave, or why it failed, without a full stop; then its value is None."""
 
     task: _Task
     value: _Value | None = None
@@ -51,28 +41,7 @@ class Outcome(Generic[_Task, _Value]):
 
 
 def check_workers(workers: int, scheduler: str | None) -> None:
-    """Refuse a number of workers and a scheduler that do not go together.
-
-    Parameters
-    ----------
-    workers : int
-        How many processes of this machine are to work; 0 for none but this one.
-    scheduler : str or None
-        Address of a dask scheduler.
-
-    Raises
-    ------
-    InputError
-        If the number is negative, the address is empty, or both are given.
-
-    Examples
-    --------
-    >>> check_workers(-1, None)
-    Traceback (most recent call last):
-    ...
-    semsig_gis.errors.InputError: -1 workers and the scheduler None were given; give a number of
-    workers from 0 up, or the address of a scheduler.
-    """
+    """Refuse a negative number of workers, an empty scheduler address, or both at once."""
     if workers < 0 or (workers and scheduler is not None) or scheduler == "":
         msg = (
             f"{workers} workers and the scheduler {scheduler!r} were given; give a number of "
@@ -89,43 +58,16 @@ def run_tasks(
     scheduler: str | None = None,
     files: Sequence[Path] = (),
 ) -> Generator[Outcome[_Task, _Value]]:
-    """Do tasks, and yield the outcome of each when it is done or has failed.
+    """Do tasks, and yield the outcome of each when it is done or has failed three times.
 
-    Parameters
-    ----------
-    work : callable
-        Does a task; with workers, a function that they can import, perhaps with first arguments
-        bound by `functools.partial`.
-    tasks : sequence
-        What to do, each task once; all hashable or none.
-    workers : int, default 0
-        How many processes of this machine work; 0 does the tasks here, in their order, without
-        dask.
-    scheduler : str, optional
-        Address of a dask scheduler, such as ``tcp://10.0.0.5:8786``; then `workers` stays 0.
-    files : sequence of Path, optional
-        Files that the workers must see under the same paths.
+    `workers` is the number of processes of this machine, 0 to work here, in the order of the tasks
+    and without dask; `scheduler` is the address of a dask scheduler instead, such as
+    ``tcp://10.0.0.5:8786``. Workers import `work` (a `functools.partial` will do), so a script that
+    gives them needs the guard ``if __name__ == "__main__":``, and they must see `files` under the
+    same paths. Tasks are distinct, and all hashable or none.
 
-    Yields
-    ------
-    Outcome
-        One for each task, as they end. A task that fails is tried three times.
-
-    Raises
-    ------
-    InputError
-        If the numbers do not go together, the scheduler cannot be reached, or its workers have
-        another version of the package or other files.
-
-    Notes
-    -----
-    A script that gives `workers` needs the guard ``if __name__ == "__main__":``, because the
-    workers import it.
-
-    Examples
-    --------
-    >>> [outcome.value for outcome in run_tasks(len, ["a", "bcd"])]
-    [1, 3]
+    InputError if `workers` and `scheduler` do not go together, the scheduler cannot be reached, or
+    its workers have another version of the package or other files.
     """
     check_workers(workers, scheduler)
     if not tasks:

@@ -35,47 +35,19 @@ _MARK = re.compile(f"(?:^|(?<={_END}))'")
 
 
 def formula_safe(text: str) -> str:
-    r"""Return text that no spreadsheet takes for a formula.
+    """Return text that no spreadsheet takes for a formula, by apostrophes before risky parts.
 
-    Parameters
-    ----------
-    text : str
-        Anything.
-
-    Returns
-    -------
-    str
-        The text with an apostrophe before each part that may be taken for a formula, and before
-        each apostrophe at such a place; `as_written` takes them away.
-
-    Examples
-    --------
-    >>> formula_safe("=cmd|'/C calc'!A0")
-    "'=cmd|''/C calc'!A0"
-    >>> formula_safe("Lime tree")
-    'Lime tree'
+    An apostrophe that stands at such a place already gets another one, so that `as_written` can
+    undo it.
     """
     return _RISK.sub("'", text)
 
 
 def as_written(text: str) -> str:
-    r"""Return the text that `formula_safe` made safe.
+    """Return the text that `formula_safe` made safe.
 
-    Parameters
-    ----------
-    text : str
-        What stands in a file.
-
-    Returns
-    -------
-    str
-        The text without the apostrophes at its beginning and after ``;``, ``,``, ``|``, ``"``,
-        tabs and line ends.
-
-    Examples
-    --------
-    >>> as_written(formula_safe("=1;'2"))
-    "=1;'2"
+    It loses the apostrophes at its beginning and after ``;``, ``,``, ``|``, ``"``, tabs and line
+    ends.
     """
     return _MARK.sub("", text)
 
@@ -83,27 +55,11 @@ def as_written(text: str) -> str:
 def write_layer(
     layer: Layer, path: str | Path, *, progress: Callable[[int, int], None] | None = None
 ) -> None:
-    """Write a layer as one CSV file.
+    """Write a layer as one CSV file, which appears whole, by rename.
 
-    Parameters
-    ----------
-    layer : Layer
-        What to write.
-    path : str or Path
-        File to write; it appears whole, by rename.
-    progress : callable, optional
-        Called with the number of rows written and in all.
-
-    Raises
-    ------
-    InputError
-        If it cannot be written.
-
-    Notes
-    -----
     UTF-8 with commas; texts stand in quotes and are `formula_safe`, what is missing is empty.
-    Numbers have all their digits. A point is ``x`` and ``y``, another geometry ``WKT``, in the
-    CRS of the layer.
+    Numbers have all their digits. A point is ``x`` and ``y``, another geometry ``WKT``, in the CRS
+    of the layer. ``progress`` is called with the rows written and in all.
     """
     with whole_file(path) as partial, partial.open("wb") as file:
         writer = None

@@ -54,27 +54,13 @@ def write_layers(
     *,
     progress: Callable[[int, int], None] | None = None,
 ) -> None:
-    """Write layers as one GeoPackage 1.2.
+    """Write at least one layer as one GeoPackage 1.2, which appears whole, by rename.
 
-    Parameters
-    ----------
-    layers : sequence of Layer
-        At least one.
-    path : str or Path
-        File to write, ending in ``.gpkg``; it appears whole, by rename.
-    progress : callable, optional
-        Called with the number of rows written and in all.
-
-    Raises
-    ------
-    InputError
-        If the file does not end in ``.gpkg``, is open in another program or cannot be written.
-
-    Notes
-    -----
     The table ``layer_styles`` holds the styles with which QGIS draws the layers. The metadata of
     each layer holds the specs, the classes and the licences as JSON; its description holds the
-    licences as text. The rows are written in blocks, so that memory stays flat.
+    licences as text. The rows are written in blocks, so that memory stays flat; ``progress`` is
+    called with the rows written and in all. Raises `InputError` if the file is open in another
+    program.
     """
     target = Path(path)
     if target.suffix.lower() != ".gpkg":

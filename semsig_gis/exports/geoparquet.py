@@ -26,28 +26,13 @@ __all__ = ["write_layer"]
 def write_layer(
     layer: Layer, path: str | Path, *, progress: Callable[[int, int], None] | None = None
 ) -> None:
-    """Write a layer as one GeoParquet 1.1 file.
+    """Write a layer as one GeoParquet 1.1 file, which appears whole, by rename.
 
-    Parameters
-    ----------
-    layer : Layer
-        What to write.
-    path : str or Path
-        File to write; it appears whole, by rename.
-    progress : callable, optional
-        Called with the number of rows written and in all.
-
-    Raises
-    ------
-    InputError
-        If it cannot be written.
-
-    Notes
-    -----
-    The column ``bbox`` holds the bounds of every row as float32, rounded outwards, and the
-    metadata names it as the covering of ``geometry``. The metadata key ``semsig`` holds the
-    specs, the classes and the licences as JSON. The rows are in groups of
-    `semsig_gis.boxes.GROUP_ROWS` and in the order of the database, column by column.
+    The column ``bbox`` holds the bounds of every row as float32, rounded outwards, and the metadata
+    names it as the covering of ``geometry``. The metadata key ``semsig`` holds the specs, the
+    classes and the licences as JSON. The rows are in groups of `semsig_gis.boxes.GROUP_ROWS` and in
+    the order of the database, column by column. ``progress`` is called with the rows written and in
+    all.
     """
     geo = geo_metadata(
         layer.crs, geometry_types=[GEOMETRY_TYPES[layer.geometry]], bounds=layer.bounds

@@ -87,25 +87,10 @@ def export_geotiff(
 
 
 def cell_errors(evaluation: Evaluation, database: SignatureDatabase) -> NDArray[np.float64]:
-    """Return the mean error of the queries from each cell.
+    """Return the mean expected error in metres of the queries from each cell (float64, n).
 
-    Parameters
-    ----------
-    evaluation : Evaluation
-        The queries.
-    database : SignatureDatabase
-        The cells.
-
-    Returns
-    -------
-    ndarray of float64, shape (n,)
-        Mean expected error in metres; NaN where no query is from, and queries of which the
-        distortion left nothing do not count.
-
-    Raises
-    ------
-    InputError
-        If another database was searched.
+    NaN where no query is from; queries of which the distortion left nothing do not count. Raises
+    `InputError` if another database was searched.
     """
     errors = evaluation.queries["error_m"].to_numpy(np.float64)
     rows = evaluation.rows_in(database)

@@ -43,17 +43,7 @@ class Distances(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class Metric:
-    """A measure by name.
-
-    Parameters
-    ----------
-    name : str
-        The name that methods use.
-    title : str
-        What tables and maps call it.
-    distances : callable
-        The function of the measure's module.
-    """
+    """A measure under the `name` that methods use and the `title` that tables and maps show."""
 
     name: str
     title: str
@@ -74,33 +64,10 @@ METRICS: Mapping[str, Metric] = MappingProxyType(
 
 
 def metric(name: str, *, weights: EditWeights | None = None, wildcard: int | None = None) -> Metric:
-    """Return a measure by its name.
+    """Return the measure of a name in `METRICS`, with the edit weights bound to it.
 
-    Parameters
-    ----------
-    name : str
-        One of the keys of `METRICS`.
-    weights : EditWeights, optional
-        Costs for the edit distance; the other measures have none and ignore them.
-    wildcard : int, optional
-        A value of the query that stands for any other, which the edit distance alone knows.
-
-    Returns
-    -------
-    Metric
-        The measure, with the weights bound to it.
-
-    Raises
-    ------
-    UnknownNameError
-        If there is no measure of that name.
-    InputError
-        If a wildcard is given to a measure that knows none.
-
-    Examples
-    --------
-    >>> metric("jaccard").title
-    'Jaccard distance'
+    Measures other than the edit distance ignore weights and refuse a wildcard (a value of the query
+    that stands for any other) with an `InputError`.
     """
     if name not in METRICS:
         msg = (

@@ -38,26 +38,10 @@ _asked: WeakSet[SequenceTable] = WeakSet()
 
 @dataclass(frozen=True, slots=True)
 class EditWeights:
-    """Costs of the three operations that turn a query into a cell's sequence.
+    """Costs, each 1 to 100, of the operations that turn a query into a cell's sequence.
 
-    Parameters
-    ----------
-    insert : int
-        Cost of an object of the cell that the query missed, 1 to 100.
-    delete : int
-        Cost of an object of the query that the cell does not have, a false detection, 1 to 100.
-    substitute : int
-        Cost of an object of the query that has another value in the cell, 1 to 100.
-
-    Raises
-    ------
-    InputError
-        If a weight is not a whole number from 1 to 100.
-
-    Examples
-    --------
-    >>> EditWeights(insert=2)
-    EditWeights(insert=2, delete=1, substitute=1)
+    An object is inserted that the query missed, deleted if it is a false detection, and substituted
+    if it has another value in the cell.
     """
 
     insert: int = 1
@@ -92,54 +76,15 @@ def distances(
 ) -> NDArray[np.float32]:
     """Measure the cheapest way to turn each query into each distinct sequence.
 
-    Parameters
-    ----------
-    queries : sequence of ndarray of uint8
-        Class codes or angle levels of each query.
-    table : SequenceTable
-        The distinct sequences to compare with.
-    normalized : bool
-        True to divide the cost by the largest that two sequences of these lengths can have;
-        False for the cost itself.
-    weights : EditWeights, optional
-        Costs of the operations, from the query to the cell's sequence; 1 each by default.
-    only : ndarray of int64, optional
-        The distinct sequences to measure; all by default.
-    wildcard : int, optional
-        A value that equals every value where a query has it, for an object of unknown class.
-    threads : int
-        How many threads share the sequences; a single query is over too soon to gain by it.
+    Levenshtein's distance with weights (paper, section "Signature comparison"). `normalized`
+    divides by the largest cost that two sequences of these lengths can have, so that the distance
+    is 1 if just one of them is empty. That cost is the cheaper of two ways that always work: delete
+    everything and insert everything; or substitute along the shorter length, then insert or delete
+    the rest. With weights of 1 it is the longer length.
 
-    Returns
-    -------
-    ndarray of float32, shape (queries, d) or (queries, len(only))
-        Distances, 0 for equal sequences. Normalised: on [0, 1], and 1 when just one of the two
-        is empty.
-
-    Raises
-    ------
-    InputError
-        If a query is not an array of bytes, or a wildcard comes with weights other than 1.
-
-    Notes
-    -----
-    Levenshtein's distance with weights (paper, section "Signature comparison"). The largest cost
-    is the longer length when all weights are 1. In general it is the cheaper of two ways that
-    always work: delete everything and insert everything; or substitute along the shorter length,
-    then insert or delete the rest.
-
-    Examples
-    --------
-    A query that missed one object of the second cell:
-
-    >>> import numpy as np
-    >>> from semsig_gis.sequences import SequenceTable
-    >>> table = SequenceTable.from_csr(np.array([9, 4, 4, 2, 1], np.uint8), np.array([0, 1, 5]))
-    >>> query = np.array([4, 2, 1], np.uint8)
-    >>> distances([query], table).tolist()
-    [[1.0, 0.25]]
-    >>> distances([query], table, normalized=False, weights=EditWeights(insert=3)).tolist()
-    [[3.0, 3.0]]
+    A `wildcard` in a query, for an object of unknown class, equals every value; it needs weights of
+    1. Threads share the sequences, which does not pay for a single query. The shape is (queries,
+    d), or (queries, len(only)) if only some sequences are measured.
     """
     sequences = [checked_sequence(query) for query in queries]
     costs = weights or EditWeights()

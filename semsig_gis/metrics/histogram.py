@@ -27,45 +27,12 @@ def distances(
 ) -> NDArray[np.float32]:
     """Measure how much the counts of values of queries and of distinct sequences differ.
 
-    Parameters
-    ----------
-    queries : sequence of ndarray of uint8
-        Class codes or angle levels of each query.
-    table : SequenceTable
-        The distinct sequences to compare with.
-    normalized : bool
-        True for a distance on [0, 1]; False for minus the sum of the paper, which is lower the
-        more alike two sequences are and has no lower bound.
-    only : ndarray of int64, optional
-        The distinct sequences to measure; all by default.
+    The paper (section "Signature comparison") sums over the values ``c`` present in either
+    sequence: ``S = sum of min(x_c, y_c) / max(x_c, y_c)``. Normalised, the distance is ``1 - S /
+    (number of such values)``: 0 for equal counts, also for two empty sequences, and 1 if no value
+    is shared. Otherwise it is ``-S``, which has no lower bound.
 
-    Returns
-    -------
-    ndarray of float32, shape (queries, d) or (queries, len(only))
-        Distances, lower for more alike sequences. Normalised: 0 for equal counts, also for two
-        empty sequences; 1 when no value is shared.
-
-    Raises
-    ------
-    InputError
-        If a query is not an array of bytes.
-
-    Notes
-    -----
-    The paper's sum (section "Signature comparison") runs over the values ``c`` present in either
-    sequence: ``S = sum of min(x_c, y_c) / max(x_c, y_c)``, a similarity. Raw: ``-S``.
-    Normalised: ``1 - S / (number of such values)``.
-
-    Examples
-    --------
-    >>> import numpy as np
-    >>> from semsig_gis.sequences import SequenceTable
-    >>> table = SequenceTable.from_csr(np.array([3, 1, 1, 2], np.uint8), np.array([0, 1, 4]))
-    >>> query = np.array([2, 1], np.uint8)
-    >>> distances([query], table).tolist()
-    [[1.0, 0.25]]
-    >>> distances([query], table, normalized=False).tolist()
-    [[0.0, -1.5]]
+    The shape is (queries, d), or (queries, len(only)) if only some sequences are measured.
     """
     from semsig_gis._histogram_kernel import add_quotients  # noqa: PLC0415 - loads a compiler
 

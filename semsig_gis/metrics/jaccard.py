@@ -27,39 +27,11 @@ def distances(
 ) -> NDArray[np.float32]:
     """Measure how much the sets of values of queries and of distinct sequences differ.
 
-    Parameters
-    ----------
-    queries : sequence of ndarray of uint8
-        Class codes or angle levels of each query.
-    table : SequenceTable
-        The distinct sequences to compare with.
-    normalized : bool
-        Without effect, since the measure lies on [0, 1] by itself; every measure takes it.
-    only : ndarray of int64, optional
-        The distinct sequences to measure; all by default.
+    The distance is ``1 - |X & Y| / |X | Y|``, 0 for two empty sequences. The paper (section
+    "Signature comparison") calls the quotient itself a distance, although it grows with likeness.
+    `normalized` has no effect, as the measure lies on [0, 1] anyway.
 
-    Returns
-    -------
-    ndarray of float32, shape (queries, d) or (queries, len(only))
-        Distances on [0, 1]; 0 for equal sets, also for two empty ones.
-
-    Raises
-    ------
-    InputError
-        If a query is not an array of bytes.
-
-    Notes
-    -----
-    ``1 - |X & Y| / |X | Y|``. The paper (section "Signature comparison") names the
-    quotient a distance; it grows with likeness, so the distance is one minus it.
-
-    Examples
-    --------
-    >>> import numpy as np
-    >>> from semsig_gis.sequences import SequenceTable
-    >>> table = SequenceTable.from_csr(np.array([3, 1, 1, 2], np.uint8), np.array([0, 1, 4]))
-    >>> distances([np.array([2, 1], np.uint8), np.array([2], np.uint8)], table).tolist()
-    [[1.0, 0.0], [1.0, 0.5]]
+    The shape is (queries, d), or (queries, len(only)) if only some sequences are measured.
     """
     del normalized
     rows = len(table) if only is None else len(only)

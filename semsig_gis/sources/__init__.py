@@ -98,50 +98,15 @@ class Reader(Protocol):
         filters: bool = True,
         crs: str | None = None,
     ) -> tuple[RawLayer, ...]:
-        """Read layers.
+        """Return one layer for each of `specs`, in their order.
 
-        Parameters
-        ----------
-        path : Path
-            The file.
-        specs : sequence of LayerSpec
-            The layers to look for.
-        filters : bool
-            Whether the filters of the layers apply.
-        crs : str, optional
-            CRS of a file that states none.
-
-        Returns
-        -------
-        tuple of RawLayer
-            One layer for each of `specs`, in their order.
+        `filters` says whether the filters of the layers apply; `crs` is for a file that states
+        none.
         """
 
 
 def reader(name: str) -> Reader:
-    """Return the reader that a catalogue names.
-
-    Parameters
-    ----------
-    name : str
-        A built-in reader, or one that another package brings by the entry-point group
-        ``semsig_gis.readers``.
-
-    Returns
-    -------
-    Reader
-        The function that reads layers.
-
-    Raises
-    ------
-    UnknownNameError
-        If there is no reader of that name; the nearest is offered.
-
-    Examples
-    --------
-    >>> reader("vector_file").__module__
-    'semsig_gis.sources.vector_file'
-    """
+    """Return a built-in reader, or one of the entry-point group ``semsig_gis.readers``, by name."""
     if name in READERS:
         read: Reader = importlib.import_module(f"{__name__}.{name}").read_layers
         return read

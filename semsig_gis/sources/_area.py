@@ -29,20 +29,7 @@ POLYGONAL = {"Polygon", "MultiPolygon"}
 
 @dataclass(frozen=True, eq=False)
 class Area:
-    """An area of the Earth.
-
-    Parameters
-    ----------
-    polygon : shapely.Polygon or shapely.MultiPolygon
-        Its outline in EPSG:4326, longitude first.
-    name : str
-        Its name to show to people.
-
-    Examples
-    --------
-    >>> Area(shapely.box(2.3, 48.8, 2.4, 48.9), "a part of Paris").bounds
-    (2.3, 48.8, 2.4, 48.9)
-    """
+    """An area of the Earth: its outline in EPSG:4326, longitude first, and a name to show."""
 
     polygon: shapely.Polygon | shapely.MultiPolygon
     name: str
@@ -55,32 +42,10 @@ class Area:
 
 
 def parse_area(text: str) -> Area:
-    """Return the area that a user wrote.
+    """Return the area of ``"west,south,east,north"`` in degrees, or of a vector file's polygons.
 
-    Parameters
-    ----------
-    text : str
-        ``"west,south,east,north"`` in degrees, or the path of a vector file, all polygons of which
-        together are the area.
-
-    Returns
-    -------
-    Area
-        The area.
-
-    Raises
-    ------
-    InputError
-        If it is neither, or is no area.
-    SourceError
-        If the file cannot be read.
-    CrsError
-        If the file does not say its CRS.
-
-    Examples
-    --------
-    >>> parse_area("2.3,48.8,2.4,48.9").bounds
-    (2.3, 48.8, 2.4, 48.9)
+    InputError if the text is neither or is no area, SourceError if the file cannot be read, and
+    CrsError if it does not say its CRS.
     """
     if NUMBERS.fullmatch(text):
         return _box(text)
@@ -94,57 +59,17 @@ def parse_area(text: str) -> Area:
 
 
 def names_place(text: str) -> bool:
-    """Tell whether a text is the name of a place rather than what `parse_area` takes.
-
-    Parameters
-    ----------
-    text : str
-        What a user wrote.
-
-    Returns
-    -------
-    bool
-        Whether it is neither numbers nor a file, be it one that does not exist.
-
-    Examples
-    --------
-    >>> names_place("Helsinki"), names_place("helsinki.geojson"), names_place("1,2,3,4")
-    (True, False, False)
-    """
+    """Tell whether a text names a place: it is neither numbers nor a file, even a missing one."""
     path = Path(text)
     is_file = path.suffix.lower() in FILE_SUFFIXES or path.is_file()
     return not is_file and not NUMBERS.fullmatch(text)
 
 
 def clip_layer(layer: RawLayer, area: Area) -> RawLayer:
-    """Leave out the rows of a layer that are outside an area.
+    """Leave out the rows of a layer, in any CRS, that are outside an area; they count as filtered.
 
-    Parameters
-    ----------
-    layer : RawLayer
-        The layer, in any CRS.
-    area : Area
-        The area.
-
-    Returns
-    -------
-    RawLayer
-        The rows whose centroid is in the area; of buildings and streets, those that touch it.
-        The others count as filtered. A row without a position stays, to be counted as such.
-
-    Examples
-    --------
-    >>> import geopandas as gpd
-    >>> from semsig_gis.sources import RawLayer
-    >>> table = gpd.GeoDataFrame(
-    ...     {"class_name": ["bench"] * 2, "source_id": ["1", "2"]},
-    ...     geometry=gpd.points_from_xy([2.35, 3.0], [48.85, 48.85]),
-    ...     crs="EPSG:4326",
-    ... )
-    >>> layer = RawLayer(spec=LayerSpec(name="b", class_name="bench"), table=table, read=2)
-    >>> clipped = clip_layer(layer, parse_area("2.3,48.8,2.4,48.9"))
-    >>> clipped.table.source_id.tolist(), clipped.filtered
-    (['1'], 1)
+    Objects stay where their centroid is in the area, buildings and streets where they touch it. A
+    row without a position stays, to be counted as such.
     """
     geometry = layer.table.geometry.to_crs(WGS84).to_numpy()
     nowhere = shapely.is_missing(geometry) | shapely.is_empty(geometry)

@@ -29,20 +29,7 @@ LEAST_HOUSES = 5  # around a block, so that each takes less than half a turn
 
 
 def open_ground(network: Network, rng: np.random.Generator) -> tuple[Ints, Ints]:
-    """Choose the faces that are not built on.
-
-    Parameters
-    ----------
-    network : Network
-        The streets.
-    rng : numpy.random.Generator
-        Source of chance.
-
-    Returns
-    -------
-    parks, squares : ndarray of int64
-        Faces.
-    """
+    """Choose the faces, by number, that are not built on: parks, then squares."""
     by_area = np.argsort(shapely.area(network.faces))
     small, large = np.array_split(by_area, 2)
     parks, squares = (
@@ -53,20 +40,9 @@ def open_ground(network: Network, rng: np.random.Generator) -> tuple[Ints, Ints]
 
 
 def cut_back(faces: Objects, network: Network) -> Objects:
-    """Take the streets off faces.
+    """Return what of each face is farther from every centre line than its street's half-width.
 
-    Parameters
-    ----------
-    faces : ndarray of shapely.Polygon, shape (f,)
-        Faces of the network.
-    network : Network
-        The streets.
-
-    Returns
-    -------
-    ndarray of shapely.Polygon or shapely.MultiPolygon, shape (f,)
-        What of each is farther from every centre line than the half-width of its street; it may
-        be empty.
+    It may be several parts, or empty.
     """
     # An arc of chords lies inside the circle: a little wider, it holds the whole of it.
     radius = network.half_width / math.cos(math.pi / (4 * ARC_CHORDS))
@@ -83,22 +59,7 @@ def cut_back(faces: Objects, network: Network) -> Objects:
 
 
 def build_houses(network: Network, built: Objects, rng: np.random.Generator) -> Objects:
-    """Build houses around the edge of every block.
-
-    Parameters
-    ----------
-    network : Network
-        The streets.
-    built : ndarray of shapely.Polygon
-        Faces that are built on.
-    rng : numpy.random.Generator
-        Source of chance.
-
-    Returns
-    -------
-    ndarray of shapely.Polygon
-        Footprints: a ring of houses around a courtyard, where there is room for one.
-    """
+    """Build a ring of houses around every block, with a courtyard where there is room for one."""
     blocks = shapely.get_parts(cut_back(built, network))
     blocks = blocks[shapely.area(blocks) >= LEAST_BLOCK_M2]
     rings = shapely.difference(blocks, shapely.buffer(blocks, -HOUSE_DEPTH_M, join_style="mitre"))

@@ -79,14 +79,10 @@ SECOND_ROW_M = 3.0
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Furniture:
-    """The objects of one class.
+    """The objects of one class: metres from the middle of the city, shape (k, 2), and identifiers.
 
-    Parameters
-    ----------
-    xy : ndarray of float64, shape (k, 2)
-        Metres from the middle of the city.
-    ids : ndarray of str, shape (k,)
-        Edge, side and number along it such as ``"57R4"``, or ground and number such as ``"p3-41"``.
+    An identifier is edge, side and number along it such as ``"57R4"``, or ground and number such as
+    ``"p3-41"``.
     """
 
     xy: Floats
@@ -101,23 +97,9 @@ def furnish(
     squares: NDArray[np.object_],
     rng: np.random.Generator,
 ) -> Furniture:
-    """Place the objects of a class.
+    """Place the objects of one of the paper's eleven classes.
 
-    Parameters
-    ----------
-    class_name : str
-        One of the paper's eleven classes.
-    network : Network
-        The streets.
-    parks, squares : ndarray of shapely.Polygon
-        Open ground, which has trees and lights of its own.
-    rng : numpy.random.Generator
-        Source of chance.
-
-    Returns
-    -------
-    Furniture
-        Positions and identifiers.
+    Parks and squares are polygons of open ground, which have trees and lights of their own.
     """
     if class_name == "alignment_tree":
         return _joined(*_trees(network, rng), _on_ground(parks, PARK_TREE_SPACING_M, rng))

@@ -38,24 +38,12 @@ PAVEMENT = 0.3
 class Network:
     """Edges of the street network, one entry an edge between two junctions, and the faces.
 
-    Parameters
-    ----------
-    start, along : ndarray of float64, shape (n, 2)
-        First junction in metres from the middle of the city, and the unit vector to the second.
-    length : ndarray of float64, shape (n,)
-        Metres.
-    junction : ndarray of int64, shape (n, 2)
-        Numbers of the junctions at either end.
-    street : ndarray of int64, shape (n,)
-        The street or avenue that the edge belongs to; the avenues come first.
-    avenue : ndarray of bool, shape (n,)
-        Whether it is an avenue.
-    half_width : ndarray of float64, shape (n,)
-        Metres from the centre line to the houses.
-    clear : ndarray of float64, shape (n, 2)
-        Metres to leave free at either end for what crosses there.
-    faces : ndarray of shapely.Polygon, shape (f,)
-        What the centre lines enclose.
+    `start` is the first junction, in metres from the middle of the city, and `along` the unit
+    vector to the second, both of shape (n, 2); `length` is in metres. `junction`, shape (n, 2), has
+    the numbers of both ends. `street` is the street or avenue of the edge; avenues come first.
+    `half_width` is metres from the centre line to the houses, and `clear`, shape (n, 2), metres to
+    leave free at either end for what crosses there. `faces` are the polygons that the centre lines
+    enclose.
     """
 
     start: Floats
@@ -72,19 +60,9 @@ class Network:
         return len(self.length)
 
     def drawn(self, limits: tuple[float, float], rng: np.random.Generator) -> Floats:
-        """Draw a number for every avenue and street, so that each kind fills the range evenly.
+        """Draw a number for each avenue and street, and return that of every edge, shape (n,).
 
-        Parameters
-        ----------
-        limits : tuple of float
-            Least and greatest.
-        rng : numpy.random.Generator
-            Source of chance.
-
-        Returns
-        -------
-        ndarray of float64, shape (n,)
-            The number of the street of each edge.
+        Avenues fill the range between the limits evenly, and so do streets.
         """
         avenues = int(self.street[self.avenue].max(initial=-1)) + 1
         streets = int(self.street.max(initial=-1)) + 1 - avenues
@@ -103,21 +81,9 @@ class Network:
         return np.asarray(shapely.linestrings(ends))
 
     def place(self, edge: Ints, t: Floats, offset: Floats) -> Floats:
-        """Return positions on edges.
+        """Return positions on edges, shape (k, 2), in metres from the middle of the city.
 
-        Parameters
-        ----------
-        edge : ndarray of int64, shape (k,)
-            Edges.
-        t : ndarray of float64, shape (k,)
-            Metres along them.
-        offset : ndarray of float64, shape (k,)
-            Metres to the right of their centre lines, to the left where negative.
-
-        Returns
-        -------
-        ndarray of float64, shape (k, 2)
-            Metres from the middle of the city.
+        `t` is metres along an edge, `offset` metres to the right of its centre line.
         """
         along = self.along[edge]
         right = np.stack([along[:, 1], -along[:, 0]], axis=1)
@@ -126,20 +92,7 @@ class Network:
 
 
 def lay_streets(size: float, rng: np.random.Generator) -> Network:
-    """Lay the streets of a city.
-
-    Parameters
-    ----------
-    size : float
-        Side of the square city in metres.
-    rng : numpy.random.Generator
-        Source of chance.
-
-    Returns
-    -------
-    Network
-        The edges in and near the square, and the faces in and near it.
-    """
+    """Lay the streets in and near a square city with sides of `size` metres."""
     turn = rng.uniform(0.0, math.pi / 2)
     reach = size / 2 + MARGIN * QUARTER_M
     middles = _scattered_lattice(reach, BLOCK_M, turn, rng)

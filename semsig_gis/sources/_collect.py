@@ -49,16 +49,9 @@ class Row(NamedTuple):
 
 @dataclass(slots=True)
 class Rows:
-    """What a reader has seen so far of a layer.
+    """What a reader has seen so far of a layer: how many rows, and those that are wanted.
 
-    Parameters
-    ----------
-    read, filtered : int
-        Rows seen, and rows that the filter leaves out.
-    kept : list of Row
-        Rows that are wanted.
-    errors : dict of int to str
-        What was wrong with the others, by number of the row.
+    `filtered` counts rows that the filter leaves out; `errors` says what is wrong with others.
     """
 
     read: int = 0
@@ -83,25 +76,8 @@ def raw_layer(
 ) -> RawLayer:
     """Build the geometries of a layer and check them against its CRS and its specification.
 
-    Parameters
-    ----------
-    rows : Rows
-        What was read; rows with impossible coordinates are refused in place.
-    spec : LayerSpec
-        What the catalogue expects.
-    crs : pyproj.CRS
-        CRS of the coordinates.
-    by_file : bool
-        Whether the file itself states that CRS.
-    where : str
-        Layer and file, for messages.
-    notes : tuple of str
-        Notes so far.
-
-    Raises
-    ------
-    CrsError
-        If the CRS is in degrees and most coordinates cannot be.
+    Rows with impossible coordinates are refused in place. `by_file` says whether the file itself
+    states the CRS. CrsError if that is in degrees and most coordinates cannot be.
     """
     geometry = _geometries(rows)
     geometry = _on_globe(rows, geometry, crs, where=where, by_file=by_file)

@@ -21,13 +21,7 @@ LATITUDE_LIMIT = 90.0 + 1e-6
 
 
 def parse_crs(text: str) -> CRS:
-    """Return the CRS that a person wrote.
-
-    Raises
-    ------
-    CrsError
-        If pyproj does not know it.
-    """
+    """Return the CRS that a person wrote; CrsError if pyproj does not know it."""
     try:
         return CRS.from_user_input(text)
     except CRSError as error:
@@ -39,8 +33,8 @@ def parse_crs(text: str) -> CRS:
 def usable_crs(wkt: str) -> CRS | None:
     """Return the CRS that a file states, or None where it does not tie coordinates to the Earth.
 
-    A definition that equals an EPSG one, such as the WKT that Esri's software writes, becomes
-    that one, so that coordinates already in it are not touched by a transformation.
+    A definition that equals an EPSG one, such as Esri's WKT, becomes that one, so that coordinates
+    already in it are not transformed.
     """
     if not wkt.strip():
         return None
@@ -70,30 +64,11 @@ def crs_label(crs: CRS) -> str:
 def settle_crs(
     own: CRS | None, *, implicit: bool, expected: str | None, given: str | None, where: str
 ) -> tuple[CRS, tuple[str, ...]]:
-    """Decide which CRS holds for a layer.
+    """Return the CRS of a layer: the file's own statement, else the user's, catalogue's or default.
 
-    Parameters
-    ----------
-    own : pyproj.CRS or None
-        What the file states.
-    implicit : bool
-        Whether that is only the default of the format (GeoJSON without a ``crs`` member).
-    expected, given : str or None
-        What the catalogue and the user say.
-    where : str
-        Layer and file, for messages.
-
-    Returns
-    -------
-    crs : pyproj.CRS
-        The file's own statement, else the user's, else the catalogue's, else the default.
-    notes : tuple of str
-        A warning where the file contradicts what was expected.
-
-    Raises
-    ------
-    CrsError
-        If nobody states one.
+    `implicit` says that `own` is only the default of the format (GeoJSON without a ``crs`` member);
+    `expected` is the catalogue's word and `given` the user's. A note comes with it where the file
+    contradicts what was expected. CrsError if nobody states one.
     """
     stated = given or expected
     if own is not None and not implicit:

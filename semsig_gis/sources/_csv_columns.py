@@ -23,15 +23,7 @@ KNOWN_NAMES = ((("lon", "longitude"), ("lat", "latitude")), (("x",), ("y",)))
 
 @dataclass(frozen=True, slots=True)
 class CsvColumns:
-    """Separator and coordinate columns of a CSV file.
-
-    Parameters
-    ----------
-    separator : str
-        One character.
-    x, y : str or None
-        Columns of the easting or longitude and of the northing or latitude.
-    """
+    """Separator, one character, and coordinate columns: x is easting or longitude."""
 
     separator: str
     x: str | None
@@ -45,10 +37,7 @@ class CsvColumns:
     def position(self, row: Mapping[str, Any]) -> tuple[float, float] | None:
         """Return the coordinates of a row, or None where both are blank.
 
-        Raises
-        ------
-        BadFeatureError
-            If they are not two numbers.
+        BadFeatureError if they are not two numbers.
         """
         texts = {name: (row[name] or "").strip() for name in (self.x, self.y) if name}
         if not any(texts.values()):
@@ -72,21 +61,8 @@ class CsvColumns:
 def csv_columns(header: str, spec: LayerSpec | None, *, where: str) -> CsvColumns:
     """Find the separator and the coordinate columns from the first line of a file.
 
-    Parameters
-    ----------
-    header : str
-        The line.
-    spec : LayerSpec or None
-        Specification that may name the columns; None only looks.
-    where : str
-        Layer and file, for messages.
-
-    Raises
-    ------
-    CatalogError
-        If `spec` names only one column, or one that does not exist.
-    SourceError
-        If `spec` names none and none is recognised.
+    CatalogError if `spec` names only one column, or one that does not exist; SourceError if it
+    names none and none is recognised. Without `spec`, there may be none.
     """
     layouts = {sep: next(csv.reader([header], delimiter=sep), []) for sep in SEPARATORS}
     widest = max(layouts, key=lambda separator: len(layouts[separator]))

@@ -34,13 +34,7 @@ for _name in LOGGERS:
 
 @contextlib.contextmanager
 def listening() -> Iterator[list[logging.LogRecord]]:
-    """Collect the messages of the block in the list that is given.
-
-    Yields
-    ------
-    list of logging.LogRecord
-        The messages so far.
-    """
+    """Collect the messages of the block in the list that is given."""
     heard: list[logging.LogRecord] = []
     token = _heard.set(heard)
     try:

@@ -87,58 +87,22 @@ def fetch(
     before: Callable[[], None] | None = None,
     progress: Progress | None = None,
 ) -> Fetched:
-    """Fetch a file into the cache, or find it there.
+    """Fetch a file into the cache, or find it there; with `data`, post a form.
 
-    Parameters
-    ----------
-    url : str
-        Address, http or https.
-    params : mapping, optional
-        Query of the address.
-    data : mapping, optional
-        Form to post; without it the request is a GET.
-    cache : Cache
-        Where files are kept.
-    spec : HttpSpec
-        How requests are made.
-    accept : tuple of str
-        Content types that may come, such as ``"application/json"``; all by default.
-    suffix : str, optional
-        Suffix of the file in the cache, such as ``".geojson"``; else by the content type.
-    identity : str
-        What the cache knows the request by where it is not the address, for services that mirror
-        one another.
-    check : callable, optional
-        Takes the path of what was sent, and raises SourceError if it is not what is wanted; then
-        it is not kept.
-    before : callable, optional
-        Called before each request that is sent, such as to wait for one's turn.
-    progress : callable, optional
-        Takes the bytes that have arrived and the bytes there are, 0 where nobody knows.
+    `accept` are the content types that may come, all by default. `suffix` is that of the file in
+    the cache, else by the content type. `identity` is what the cache knows the request by instead
+    of the address, for services that mirror one another. `check` takes the path of what was sent
+    and raises SourceError if it is not to be kept; `before` is called before each request that is
+    sent; `progress` takes the bytes that have arrived and those there are, 0 where nobody knows.
 
-    Returns
-    -------
-    Fetched
-        The file.
-
-    Raises
-    ------
-    InputError
-        If the address is not one, or the cache cannot be written to.
-    HttpError
-        If the server refuses, cannot be reached, or fails until the attempts are used up.
-    TooLargeError
-        If it sends more than ``spec.max_bytes``.
-    NotCachedError
-        If ``spec.offline`` and there is no sound copy in the cache.
-    SourceError
-        If what it sends is not what is wanted, or it sends us to another host.
-
-    Notes
-    -----
     A cached copy is confirmed by a conditional request where the server gave an ETag or a date;
     where it gave neither, the copy is taken as it is for ``spec.fresh_s``. A connection that is cut
     goes on where it was cut (RFC 9110, If-Range), also in a later run, if the server can do that.
+
+    InputError for the address or the cache folder; HttpError if the server refuses or fails until
+    the attempts are used up; TooLargeError above ``spec.max_bytes``; NotCachedError if offline
+    without a sound copy; SourceError if something else is sent, or a redirect leads to another
+    host.
     """
     require_address(url)
     request = Request(url, _pairs(params), _pairs(data))
@@ -164,25 +128,7 @@ def fetch(
 
 
 def read_text(url: str, *, spec: HttpSpec = DEFAULT_HTTP) -> str:
-    """Ask once for a short text that is not worth keeping, such as the state of a service.
-
-    Parameters
-    ----------
-    url : str
-        Address, http or https.
-    spec : HttpSpec
-        How requests are made.
-
-    Returns
-    -------
-    str
-        The text, up to 64 KiB of it.
-
-    Raises
-    ------
-    HttpError
-        If it does not come.
-    """
+    """Ask once for a short text that is not worth keeping, and return up to 64 KiB of it."""
     require_address(url)
     request = Request(url)
     try:

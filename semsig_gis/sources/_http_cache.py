@@ -35,24 +35,10 @@ KEPT_S = 86_400.0  # how long a superseded body stays after its last use
 
 @dataclass(frozen=True, slots=True)
 class Fetched:
-    """A file that was fetched, now or earlier.
+    """A file that was fetched, now or earlier (`from_cache`): where it lies and came from.
 
-    Parameters
-    ----------
-    path : Path
-        The file in the cache.
-    sha256 : str
-        Its checksum.
-    fetched_at : str
-        When it was sent, in UTC by ISO 8601.
-    url : str
-        Where it came from, redirects followed.
-    from_cache : bool
-        Whether it was not sent now.
-    bytes : int
-        Its size.
-    content_type : str
-        What the server calls it, such as ``"application/json"``.
+    `fetched_at` is in UTC by ISO 8601; `url` is the address after redirects; `content_type` is the
+    server's word, such as ``"application/json"``.
     """
 
     path: Path
@@ -66,16 +52,10 @@ class Fetched:
 
 @dataclass(frozen=True, slots=True)
 class Edition:
-    """What a server says of the file that it sends.
+    """What a server says of the file that it sends; empty where it says nothing.
 
-    Parameters
-    ----------
-    etag, last_modified : str
-        What it recognises this edition by; empty where it gives none.
-    encoding : str
-        How it is packed for sending, such as ``"gzip"``.
-    content_type : str
-        What it is, in lower case and without parameters.
+    `encoding` is how the file is packed for sending, such as ``"gzip"``; `content_type` is in lower
+    case and without parameters.
     """
 
     etag: str = ""
@@ -116,13 +96,7 @@ class Copy:
 
 @dataclass(frozen=True, slots=True)
 class Cache:
-    """A folder of fetched files.
-
-    Parameters
-    ----------
-    folder : Path
-        The folder; it is made when something is put in it.
-    """
+    """A folder of fetched files, made when something is put in it."""
 
     folder: Path
 
@@ -134,10 +108,7 @@ class Cache:
     def locked(self, key: str) -> Iterator[Entry]:
         """Give the entry of a request while no other process works on it.
 
-        Raises
-        ------
-        InputError
-            If the folder cannot be written to.
+        InputError if the folder cannot be written to.
         """
         try:
             Path(self.folder).mkdir(parents=True, exist_ok=True)
@@ -155,15 +126,7 @@ class Cache:
 
 @dataclass(frozen=True, slots=True)
 class Entry:
-    """What the cache holds for one request.
-
-    Parameters
-    ----------
-    folder : Path
-        Folder of the cache.
-    key : str
-        Key of the request.
-    """
+    """What the cache in a folder holds for the request of one key."""
 
     folder: Path
     key: str
@@ -212,23 +175,9 @@ class Entry:
     def store(
         self, body: Path, fetched: Fetched, edition: Edition, request: Mapping[str, object]
     ) -> Fetched:
-        """Make a checked body the entry, and forget what was under way.
+        """Make a checked body, at `scratch`, the entry; forget what was under way; return its file.
 
-        Parameters
-        ----------
-        body : Path
-            The body, at `scratch`.
-        fetched : Fetched
-            What it is; the path is decided here.
-        edition : Edition
-            What the server knows it by.
-        request : mapping
-            What was asked, for people who look into the cache.
-
-        Returns
-        -------
-        Fetched
-            `fetched` with its path.
+        The path of `fetched` is decided here. `request` is kept for people who look into the cache.
         """
         final = self.folder / f"{self.key}-{fetched.sha256[:16]}{body.suffix}"
         body.replace(final)

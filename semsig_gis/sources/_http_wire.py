@@ -30,35 +30,14 @@ BLOCK = 2**16
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class HttpSpec:
-    """How requests are made.
+    """How requests are made: times in seconds, sizes in bytes.
 
-    Parameters
-    ----------
-    timeout : tuple of (float, float)
-        Seconds to wait for a connection, and for the next bytes.
-    slowest : float
-        Bytes a second below which, over the second of the time-outs, a server counts as stalled.
-    attempts : int
-        How often a request is sent before it is given up, at least 1.
-    backoff_s : float
-        Pause after the first failure in seconds; it doubles with each further one.
-    longest_wait_s : float
-        Most seconds to wait because a server says so; one that asks for more is not waited for.
-    max_bytes : int
-        Most bytes to take, as sent and as unpacked.
-    fresh_s : float
-        Seconds for which a cached copy is used as it is where the server has no way to confirm it.
-    offline : bool
-        Whether everything comes from the cache.
-    user_agent : str
-        How we introduce ourselves.
-    sleep : callable
-        Waits for so many seconds.
-
-    Examples
-    --------
-    >>> HttpSpec(attempts=2).attempts
-    2
+    `timeout` is for the connection, and for the next bytes; a server that sends less than `slowest`
+    bytes a second over the latter counts as stalled. `attempts` counts the first one too. The pause
+    after a failure, `backoff_s`, doubles each time; a server that asks for more than
+    `longest_wait_s` is not waited for. `max_bytes` holds as sent and as unpacked. `fresh_s` is how
+    long a cached copy is used where the server has no way to confirm it. `offline` takes everything
+    from the cache.
     """
 
     timeout: tuple[float, float] = (10.0, 60.0)
@@ -100,15 +79,7 @@ class PassingError(Exception):
 
 @dataclass(frozen=True, slots=True)
 class Request:
-    """What is asked for: a GET, or a POST where there is a form.
-
-    Parameters
-    ----------
-    url : str
-        Address, http or https.
-    params, data : tuple of (str, str)
-        Query of the address, and form to post.
-    """
+    """What is asked for: an address with its query, by GET, or by POST where there is a form."""
 
     url: str
     params: tuple[tuple[str, str], ...] = ()
@@ -135,14 +106,8 @@ def answer_to(
 ) -> Iterator[requests.Response]:
     """Send a request and give the response, of which no body is read yet.
 
-    Raises
-    ------
-    PassingError
-        If the server cannot be reached now.
-    HttpError
-        If it never can.
-    SourceError
-        If it redirects to another host; redirects within the host are followed.
+    Redirects within the host are followed; SourceError for one to another host. PassingError if the
+    server cannot be reached now, HttpError if it never can.
     """
     url = request.url
     params: tuple[tuple[str, str], ...] | None = request.params
@@ -204,12 +169,7 @@ def _failure(error: Exception, url: str) -> Exception:
 def require_success(response: requests.Response, spec: HttpSpec) -> None:
     """Refuse an answer that is not the file, or a part of it.
 
-    Raises
-    ------
-    PassingError
-        If it may be another one later.
-    HttpError
-        If it is final.
+    PassingError if it may be another one later, HttpError if it is final.
     """
     status = response.status_code
     if status in {requests.codes.ok, requests.codes.partial}:
@@ -243,10 +203,7 @@ def _detail(response: requests.Response, spec: HttpSpec) -> str:
 def blocks_of(response: requests.Response, spec: HttpSpec) -> Iterator[bytes]:
     """Yield the body as it is sent.
 
-    Raises
-    ------
-    PassingError
-        If the server closes the connection too early, stops, or gets too slow.
+    PassingError if the server closes the connection too early, stops, or gets too slow.
     """
     since, got = time.monotonic(), 0
     try:
@@ -280,13 +237,7 @@ def _retry_after(response: requests.Response) -> float | None:
 
 
 def require_address(url: str) -> None:
-    """Refuse what is not an http address.
-
-    Raises
-    ------
-    InputError
-        Also where it holds a password, which would end up in the cache.
-    """
+    """Refuse an address that is not http, or holds a password, which would end up in the cache."""
     try:
         parts = urlsplit(url)
         usable = parts.scheme in {"http", "https"} and parts.hostname and parts.password is None

@@ -24,16 +24,9 @@ SIDE_SUFFIXES = frozenset({".csv", ".json"})
 
 @dataclass(frozen=True, slots=True)
 class Member:
-    """One layer of a file, or of a file in an archive.
+    """One layer of a file, or of a file in an archive, by its name there (`inner`).
 
-    Parameters
-    ----------
-    file : Path
-        The file.
-    inner : str or None
-        Name in the archive that the file is.
-    layer : str or None
-        Name of the layer, once it is known.
+    `layer` is None until its name is known.
     """
 
     file: Path
@@ -78,10 +71,7 @@ def unreadable(what: object, error: BaseException) -> SourceError:
 def members(path: Path) -> tuple[Member, ...]:
     """Return the parts of a file that hold layers: itself, or the vector files in an archive.
 
-    Raises
-    ------
-    SourceError
-        If it does not exist, is of another kind, or is a damaged or useless archive.
+    SourceError if it is missing, of another kind, or a damaged or useless archive.
     """
     suffix = path.suffix.lower()
     if not path.is_file():

@@ -20,39 +20,9 @@ if TYPE_CHECKING:
 
 
 def find_place(name: str, *, endpoint: str, cache: Cache, spec: HttpSpec = DEFAULT_HTTP) -> Area:
-    """Return the area of a place by its name.
+    """Return the first place of that name that has an outline, from a Nominatim server.
 
-    Parameters
-    ----------
-    name : str
-        Name of the place, such as ``"Neukölln, Berlin"``.
-    endpoint : str
-        Address of a Nominatim server, such as ``"https://nominatim.openstreetmap.org"``.
-    cache : Cache
-        Where answers are kept.
-    spec : HttpSpec
-        How requests are made.
-
-    Returns
-    -------
-    Area
-        The first of the places found that has an outline.
-
-    Raises
-    ------
-    InputError
-        If there is no such place, or it is known as a point or a line only.
-    SourceError
-        If the server does not answer.
-
-    Examples
-    --------
-    >>> from pathlib import Path
-    >>> from semsig_gis.sources._http import Cache
-    >>> find_place(" ", endpoint="https://nominatim.openstreetmap.org", cache=Cache(Path()))
-    Traceback (most recent call last):
-    ...
-    semsig_gis.errors.InputError: the name of the place is empty; write one such as 'Helsinki'.
+    InputError if there is no such place, or it is known as a point or a line only.
     """
     name = " ".join(name.split())
     if not name:

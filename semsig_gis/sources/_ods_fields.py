@@ -23,8 +23,8 @@ def fold(name: str) -> str:
 def find_field(name: str, spec: LayerSpec, fields: Sequence[str]) -> str | None:
     """Return the field that a catalogue means, or None where there is none.
 
-    A field of exactly that name goes first, then one of its aliases, then one that differs in
-    capitals, accents, spaces and signs only.
+    A field of exactly that name goes first, then an alias, then one that differs in capitals,
+    accents, spaces and signs only.
     """
     names = (name, *dict(spec.aliases).get(name, ()))
     folded = {fold(field): field for field in reversed(fields) if fold(field)}

@@ -27,24 +27,11 @@ POINT = "geo_point_2d"
 
 
 class Positions:
-    """Finds the position of the records of a table.
+    """Finds the position of the records of a table; SourceError if it has no field for one.
 
     The shape goes first, because it says which coordinate is which and may be more than a point;
-    then the point, which is ``lat, lon``, and then two fields with a coordinate each.
-
-    Parameters
-    ----------
-    spec : LayerSpec
-        Specification that may name the fields: aliases of `SHAPE` and `POINT`, x_field, y_field.
-    table : Table
-        The table.
-    where : str
-        Layer and file, for messages.
-
-    Raises
-    ------
-    SourceError
-        If the table has no such field.
+    then the point, which is ``lat, lon``, and then two fields with a coordinate each. The layer may
+    name them: aliases of `SHAPE` and `POINT`, ``x_field``, ``y_field``.
     """
 
     def __init__(self, spec: LayerSpec, table: Table, *, where: str) -> None:
@@ -67,10 +54,7 @@ class Positions:
     def of(self, record: Record) -> Position:
         """Return the position of a record, or None where it has none.
 
-        Raises
-        ------
-        BadFeatureError
-            If it cannot be understood.
+        BadFeatureError if it cannot be understood.
         """
         values = record.values
         if self._shape is not None:

@@ -41,20 +41,10 @@ Records = Iterator[Record | str]
 class Table:
     """A file that has been opened.
 
-    Parameters
-    ----------
-    fields : tuple of str
-        Names of the fields.
-    records : callable
-        Takes the names of the fields that are wanted and returns an iterator over the rows.
-    has_geometry : bool
-        Whether rows may have a geometry that is not a field.
-    crs : pyproj.CRS or None
-        What the file states, which those of a portal never do.
-    empty : bool
-        Whether there are no rows, and so nothing to know the fields by.
-    rest : int
-        Rows that the portal has beyond these, where the file is a page of a longer answer.
+    `records` takes the fields that are wanted and returns an iterator over the rows, which may have
+    a geometry that is not a field (`has_geometry`). `crs` is what the file states, which those of a
+    portal never do. `empty`: no rows, and so nothing to know the fields by. `rest`: rows that the
+    portal has beyond these, where the file is a page of a longer answer.
     """
 
     fields: tuple[str, ...]
@@ -66,13 +56,7 @@ class Table:
 
 
 def open_table(path: Path) -> Table:
-    """Open a file by what is in it, whatever its name.
-
-    Raises
-    ------
-    SourceError
-        If it is missing, damaged, or of another kind.
-    """
+    """Open a file by what is in it, whatever its name; SourceError if it cannot be used."""
     if not path.is_file():
         what = "is a folder" if path.is_dir() else "does not exist"
         msg = f"{path} {what}; give a file that a portal exports."

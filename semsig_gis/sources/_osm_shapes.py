@@ -22,32 +22,11 @@ RING_NODES = 4  # of the smallest, a triangle: the first node comes again at its
 
 
 def way_shape(xy: NDArray[np.float64], role: Role) -> Position:
-    """Return what a way stands for.
+    """Return what a way stands for: a centroid for objects, a polygon for buildings, or a line.
 
-    Parameters
-    ----------
-    xy : array of float, shape (n, 2)
-        Longitude and latitude of its nodes, in order.
-    role : {"objects", "buildings", "streets"}
-        Role of the layer.
-
-    Returns
-    -------
-    tuple of float or shapely.Geometry
-        The centroid of a street object, the polygon of a building, or the line of a street. A
-        closed way is taken for the outline of an area, but for a street.
-
-    Raises
-    ------
-    BadFeatureError
-        If it has less than two nodes, or is the outline of a building that is not closed or
-        encloses nothing.
-
-    Examples
-    --------
-    >>> import numpy as np
-    >>> way_shape(np.array([(2.0, 48.0), (2.2, 48.0)]), "objects")
-    (2.1, 48.0)
+    Nodes are longitude and latitude, shape (n, 2). A closed way is taken for the outline of an
+    area, but for a street. BadFeatureError for less than two nodes, and for the outline of a
+    building that is not closed or encloses nothing.
     """
     if len(xy) < 2:  # noqa: PLR2004
         msg = "has less than two nodes"
@@ -68,32 +47,10 @@ def way_shape(xy: NDArray[np.float64], role: Role) -> Position:
 def relation_shape(
     outer: Iterable[NDArray[np.float64]], inner: Iterable[NDArray[np.float64]], role: Role
 ) -> Position:
-    """Return what a multipolygon stands for.
+    """Return what a multipolygon stands for: a centroid for objects, or the area of a building.
 
-    Parameters
-    ----------
-    outer, inner : iterable of array of float, shape (n, 2)
-        Nodes of the ways that bound it on the outside, and those that bound its holes, in any
-        order and direction.
-    role : {"objects", "buildings"}
-        Role of the layer.
-
-    Returns
-    -------
-    tuple of float or shapely.Geometry
-        The centroid of a street object, or the polygon or multipolygon of a building.
-
-    Raises
-    ------
-    BadFeatureError
-        If the ways do not join to rings, or enclose nothing.
-
-    Examples
-    --------
-    >>> import numpy as np
-    >>> half = np.array([(0.0, 0.0), (1.0, 0.0), (1.0, 1.0)])
-    >>> relation_shape([half, np.array([(1.0, 1.0), (0.0, 0.0)])], [], "buildings").area
-    0.5
+    The ways that bound it on the outside, and those of its holes, come in any order and direction.
+    BadFeatureError if they do not join to rings, or enclose nothing.
     """
     area: BaseGeometry = shapely.Polygon()
     for ring in (*_rings(outer), *_rings(inner)):

@@ -14,36 +14,11 @@ if TYPE_CHECKING:
 
 
 def matches(tags: Mapping[str, str], spec: LayerSpec) -> bool:
-    """Tell whether an element has the tags of the layer.
+    """Tell whether an element has the tags of the layer; without ``tags``, none has.
 
     One of the layer's alternatives must hold, in all its keys. Values compare exactly, so that
     ``amenity=toilets;bench`` is neither. Every value is every one but "no", by which mappers say
     that there is none.
-
-    Parameters
-    ----------
-    tags : mapping of str to str
-        Tags of the element.
-    spec : LayerSpec
-        The layer; without ``tags`` it means no element at all.
-
-    Returns
-    -------
-    bool
-        Whether the tags are the layer's.
-
-    Examples
-    --------
-    >>> from semsig_gis.layer_spec import LayerSpec
-    >>> taps = LayerSpec(
-    ...     name="taps",
-    ...     class_name="water_fountain",
-    ...     tags=((("amenity", ("drinking_water",)),), (("man_made", ("water_tap",)),)),
-    ... )
-    >>> matches({"amenity": "drinking_water", "name": "Fontaine"}, taps)
-    True
-    >>> matches({"amenity": "public_bookcase"}, taps)
-    False
     """
     return any(
         all(_accepts(accepted, tags.get(key)) for key, accepted in alternative)
@@ -54,28 +29,9 @@ def matches(tags: Mapping[str, str], spec: LayerSpec) -> bool:
 def counts(kind: ElementKind, tags: Mapping[str, str], spec: LayerSpec) -> bool:
     """Tell whether an element that has the tags of the layer is of a shape that it wants.
 
-    Parameters
-    ----------
-    kind : {"node", "way", "relation"}
-        Kind of the element.
-    tags : mapping of str to str
-        Its tags.
-    spec : LayerSpec
-        The layer.
-
-    Returns
-    -------
-    bool
-        False for a kind that is not among the layer's ``elements``, for a relation that is no
-        multipolygon (it groups elements that are mapped themselves), and for the outline of a
-        square where centre lines of streets are wanted.
-
-    Examples
-    --------
-    >>> from semsig_gis.layer_spec import LayerSpec
-    >>> stops = LayerSpec(name="stops", class_name="bus_stop", elements=("node",))
-    >>> counts("node", {"highway": "bus_stop"}, stops), counts("way", {}, stops)
-    (True, False)
+    It is not if its kind is not among the layer's ``elements``, if it is a relation but no
+    multipolygon (it groups elements that are mapped themselves), or the outline of a square where
+    centre lines of streets are wanted.
     """
     if kind not in spec.elements:
         return False
@@ -87,23 +43,7 @@ def counts(kind: ElementKind, tags: Mapping[str, str], spec: LayerSpec) -> bool:
 class TagIndex:
     """The layers of a catalogue by tag, to find those of an element without trying each.
 
-    Parameters
-    ----------
-    specs : sequence of LayerSpec
-        The layers.
-
-    Raises
-    ------
-    CatalogError
-        If a layer says no tags.
-
-    Examples
-    --------
-    >>> from semsig_gis.layer_spec import LayerSpec
-    >>> trees = LayerSpec(name="t", class_name="alignment_tree", tags=((("natural", ("tree",)),),))
-    >>> index = TagIndex([trees])
-    >>> index.keys, index.layers({"natural": "tree"}), index.layers({"natural": "tree_row"})
-    (('natural',), [0], [])
+    CatalogError if a layer says no tags.
     """
 
     def __init__(self, specs: Sequence[LayerSpec]) -> None:
@@ -125,18 +65,7 @@ class TagIndex:
         return tuple(sorted({key for key, _ in self._by_tag}))
 
     def layers(self, tags: Mapping[str, str]) -> list[int]:
-        """Return the positions of the layers whose tags an element has, in order.
-
-        Parameters
-        ----------
-        tags : mapping of str to str
-            Tags of the element.
-
-        Returns
-        -------
-        list of int
-            Positions in the layers that the index was made of.
-        """
+        """Return the positions of the layers whose tags an element has, in order."""
         candidates: set[int] = set()
         for key, value in tags.items():
             for looked_up in (value, ANY_VALUE):

@@ -32,15 +32,7 @@ EXHAUSTED = ("timed out", "out of memory")
 
 @dataclass(frozen=True, slots=True)
 class Document:
-    """One answer of a server.
-
-    Parameters
-    ----------
-    elements : list of dict
-        The elements.
-    remark : str
-        What the server says of its answer; empty as a rule.
-    """
+    """The elements of one answer, and what the server remarks on it: as a rule, nothing."""
 
     elements: list[dict[str, Any]]
     remark: str = ""
@@ -57,25 +49,7 @@ class Document:
 
 
 def load_document(path: Path, *, where: str) -> Document:
-    """Read an answer.
-
-    Parameters
-    ----------
-    path : Path
-        The file.
-    where : str
-        Who sent it, or where it is, for messages.
-
-    Returns
-    -------
-    Document
-        The answer, complete or not.
-
-    Raises
-    ------
-    SourceError
-        If it is not an answer of an Overpass server.
-    """
+    """Read an answer, complete or not; SourceError if it is not one of an Overpass server."""
     try:
         content = json.loads(path.read_bytes())
         elements = [element for element in content["elements"] if _is_element(element)]
@@ -107,45 +81,11 @@ def read_layers(
     filters: bool = True,
     crs: str | None = None,
 ) -> tuple[RawLayer, ...]:
-    """Read layers of what an Overpass server sent.
+    """Read layers of a file of Overpass JSON, or of the tiles of an area, one for each of `specs`.
 
-    Parameters
-    ----------
-    path : str, Path, or sequence of Path
-        A file of Overpass JSON, or the tiles of an area.
-    specs : sequence of LayerSpec
-        The layers to look for, by their ``tags`` and ``elements``; fields in ``where``,
-        ``class_by``, ``width_by`` and ``width_field`` are keys of tags.
-    filters : bool, default True
-        Whether ``where`` holds.
-    crs : str, optional
-        Ignored but for a note: such files are in EPSG:4326.
-
-    Returns
-    -------
-    tuple of RawLayer
-        One for each of `specs`, in their order, as of `semsig_gis.sources.osm_file.read_layers`.
-        An element that is in several tiles counts once.
-
-    Raises
-    ------
-    SourceError
-        If a file is missing, is not Overpass JSON, or is incomplete by its own remark.
-    CatalogError
-        If a layer says no tags.
-
-    Examples
-    --------
-    >>> import tempfile
-    >>> from semsig_gis.layer_spec import LayerSpec
-    >>> spec = LayerSpec(name="t", class_name="alignment_tree", tags=((("natural", ("tree",)),),))
-    >>> tree = {"type": "node", "id": 7, "lat": 48.8, "lon": 2.3, "tags": {"natural": "tree"}}
-    >>> with tempfile.TemporaryDirectory() as folder:
-    ...     file = Path(folder, "tile.json")
-    ...     _ = file.write_text(json.dumps({"elements": [tree]}))
-    ...     (layer,) = read_layers([file, file], [spec])
-    >>> layer.table.source_id.tolist(), layer.table.geometry.to_wkt().tolist()
-    (['node/7'], ['POINT (2.3 48.8)'])
+    Layers, `crs` and what is returned are as of `semsig_gis.sources.osm_file.read_layers`. An
+    element that is in several tiles counts once. SourceError if a file is missing, is not Overpass
+    JSON, or is incomplete by its own remark; CatalogError if a layer says no tags.
     """
     paths = [Path(path)] if isinstance(path, str | Path) else list(path)
     where = str(paths[0]) if len(paths) == 1 else f"{len(paths)} tiles"
@@ -218,8 +158,8 @@ class _Layer:
 class _Places:
     """The positions of the elements of a document, however it says them.
 
-    A way has its nodes' positions (``out geom``), or only its centre (``out center``), or names
-    nodes that are elements of their own (``out; >; out skel``).
+    A way has its nodes' positions (``out geom``), only its centre (``out center``), or names nodes
+    that are elements of their own (``out; >; out skel``).
     """
 
     def __init__(self, document: Document) -> None:
@@ -231,10 +171,7 @@ class _Places:
     def position(self, element: dict[str, Any], spec: LayerSpec) -> Position:
         """Return what an element stands for.
 
-        Raises
-        ------
-        BadFeatureError
-            If its position is not there, or not in full.
+        BadFeatureError if its position is not there, or not in full.
         """
         if element["type"] == "node":
             return _point(element)

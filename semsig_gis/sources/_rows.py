@@ -36,9 +36,9 @@ def as_text(value: object) -> str:
 def matches(value: object, wanted: Value) -> bool:
     """Tell whether a field value is the one a catalogue names.
 
-    Text compares as text and numbers as numbers, so that the number 3 is found in the text field
-    of a CSV file and the key "3" of a TOML table in a numeric field. A text between slashes, such
-    as ``"/Taxi.*/"``, is a regular expression, which the whole value must match.
+    Text compares as text and numbers as numbers, so that 3 is found in the text field of a CSV file
+    and the key "3" of a TOML table in a numeric field. A text between slashes, such as
+    ``"/Taxi.*/"``, is a regular expression, which the whole value must match.
     """
     if value is None:
         return False
@@ -63,21 +63,8 @@ def _pattern(wanted: str) -> re.Pattern[str] | None:
 class RowRules:
     """The filter, classes, widths and identifier of one layer, checked against its fields.
 
-    Parameters
-    ----------
-    spec : LayerSpec
-        What the catalogue says.
-    fields : sequence of str
-        Names of the fields that the file has.
-    filters : bool
-        Whether the specification's ``where`` holds.
-    where : str
-        Layer and file, for messages.
-
-    Raises
-    ------
-    CatalogError
-        If a field that the specification names does not exist, or a pattern is wrong.
+    `filters` says whether the layer's ``where`` holds. CatalogError if a field that the layer names
+    does not exist, or a pattern is wrong.
     """
 
     def __init__(
@@ -156,13 +143,7 @@ def _require_patterns(values: Iterable[Value], *, where: str) -> None:
 
 
 def require_field(field: str, fields: Sequence[str], *, where: str, key: str) -> None:
-    """Refuse a field that a file does not have.
-
-    Raises
-    ------
-    CatalogError
-        With the fields there are, and the nearest.
-    """
+    """Refuse a field that a file does not have; CatalogError lists the fields and the nearest."""
     if field not in fields:
         msg = (
             f"{where} has no field {field!r}, which the catalogue names in {key}"

@@ -36,20 +36,10 @@ POINT_TYPE = "Point"
 
 @dataclass(frozen=True, slots=True)
 class Sample:
-    """One layer and its first rows.
+    """One layer, the name of its reader, and the fields of its first rows.
 
-    Parameters
-    ----------
-    reader : str
-        Reader of `semsig_gis.sources` that reads the file.
-    info : LayerInfo
-        What the layer is; the CRS of a table is that of portals.
-    rows : tuple of mapping
-        The fields of the first rows.
-    placed : bool
-        Whether the reader finds the positions by itself.
-    coordinates : tuple of str
-        The two fields in which it finds them, where they are two.
+    The CRS of a table is that of portals. `placed` says whether the reader finds the positions by
+    itself; `coordinates` are the two fields in which it finds them, where they are two.
     """
 
     reader: str
@@ -60,13 +50,7 @@ class Sample:
 
 
 def samples(path: Path, *, limit: int) -> tuple[Sample, ...]:
-    """Return the layers of a file that may hold positions.
-
-    Raises
-    ------
-    SourceError
-        If the file is missing, damaged, or not one to describe.
-    """
+    """Return the layers of a file that may hold positions; SourceError for one not to describe."""
     suffix = path.suffix.lower()
     if suffix in OSM_SUFFIXES:
         msg = f"{path} is OpenStreetMap data; load it with the built-in catalogue 'openstreetmap'."

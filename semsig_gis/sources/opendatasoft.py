@@ -80,53 +80,17 @@ def read_layers(
     filters: bool = True,
     crs: str | None = None,
 ) -> tuple[RawLayer, ...]:
-    r"""Read layers from a file that a portal exports, as it is.
+    """Read layers, in one pass, from a file that a portal exports, as it is.
 
-    Parameters
-    ----------
-    path : str or Path
-        JSON of version 1, 2.0 or 2.1 of the API, GeoJSON, CSV or Parquet, told apart by what is in
-        the file; or a GeoPackage, shapefile, FlatGeobuf or archive that was made of such a file.
-    specs : sequence of LayerSpec
-        Layers to look for, in one pass over the file.
-    filters : bool, default True
-        Whether the ``where`` of the layers holds.
-    crs : str, optional
-        CRS of the coordinates, where the file states none; it goes before the specification's.
+    JSON of version 1, 2.0 or 2.1 of the API, GeoJSON, CSV and Parquet are told apart by what is in
+    the file; a GeoPackage, shapefile, FlatGeobuf or archive that was made of such a file will do
+    too. Fields are found by name, by alias, or by a name that differs in capitals, accents, spaces
+    and signs only. A shape (``geo_shape``) goes before a point (``geo_point_2d``, latitude first),
+    and that before ``x_field`` and ``y_field``. What portals publish is in WGS 84.
 
-    Returns
-    -------
-    tuple of RawLayer
-        One layer for each of `specs`, in their order.
-
-    Raises
-    ------
-    SourceError
-        If the file is missing, damaged, of another kind, or has no positions.
-    CatalogError
-        If the file does not have a field that a layer names.
-    CrsError
-        If the coordinates are in degrees and most of them cannot be.
-
-    Notes
-    -----
-    Fields are found by name, by alias, or by a name that differs in capitals, accents, spaces and
-    signs only. A shape (``geo_shape``) goes before a point (``geo_point_2d``, latitude first),
-    and that before two fields with a coordinate each (``x_field``, ``y_field``). What portals
-    publish is in WGS 84.
-
-    Examples
-    --------
-    >>> import tempfile
-    >>> from semsig_gis.layer_spec import LayerSpec
-    >>> spec = LayerSpec(name="trees", class_name="alignment_tree", id_field="IDBASE")
-    >>> with tempfile.TemporaryDirectory() as folder:
-    ...     path = Path(folder, "trees.csv")
-    ...     _ = path.write_text("idBase;geo_point_2d\n123704.0;48.839, 2.407\n7;nowhere\n")
-    ...     layer, = read_layers(path, [spec])
-    >>> layer.table["source_id"][0], layer.table.geometry[0].wkt, layer.errors
-    ('123704', 'POINT (2.407 48.839)',
-     ("row 2: its point 'nowhere' is not a latitude and a longitude",))
+    `filters` says whether the ``where`` of the layers holds; `crs` is for a file that states none.
+    SourceError if the file cannot be used or has no positions, CatalogError if it lacks a field
+    that a layer names, CrsError if it is in degrees and most coordinates cannot be.
     """
     path = Path(path)
     if path.suffix.lower() in VECTOR_SUFFIXES:
@@ -226,55 +190,16 @@ def fetch_layers(
     format: Literal["geojson", "csv", "parquet"] = "geojson",  # noqa: A002 - the API's own word
     progress: Callable[[LayerSpec, int, int], None] | None = None,
 ) -> list[tuple[LayerSpec, Fetched]]:
-    """Fetch the datasets of layers from a portal into the cache.
+    """Fetch the datasets of layers from a portal into the cache, as files for `read_layers`.
 
-    Parameters
-    ----------
-    specs : sequence of LayerSpec
-        Layers; those without a dataset are left out, because the portal does not have them.
-    portal : str
-        Address of the portal, such as ``"https://opendata.paris.fr"``.
-    area : Area, optional
-        What is asked for: the rows in it, and for an outline of very many corners those of a
-        somewhat larger one. By default all rows.
-    cache : Cache
-        Where files are kept; what is there and has not changed is not sent again.
-    spec : HttpSpec
-        How requests are made; offline, everything comes from the cache.
-    format : {"geojson", "csv", "parquet"}, default "geojson"
-        Kind of file to ask for.
-    progress : callable, optional
-        Takes a layer, the bytes of it that have arrived, and the bytes there are, 0 where nobody
-        knows.
+    Layers without a dataset are left out, because the portal does not have them. For each dataset
+    its description is asked for, then one export (Explore API v2.1), whose ``where`` is the layer's
+    ``server_where`` and the area; for an outline of very many corners, a somewhat larger one. Where
+    a layer selects fields, those that its other keys name are selected too. `progress` takes a
+    layer, the bytes of it that have arrived, and those there are, 0 where nobody knows.
 
-    Returns
-    -------
-    list of (LayerSpec, Fetched)
-        Layers and their files, which `read_layers` takes.
-
-    Raises
-    ------
-    InputError
-        If the address or the format is wrong.
-    CatalogError
-        If the portal does not have the dataset of a layer, or the dataset lacks a field that the
-        layer selects.
-    SourceError
-        If the portal refuses, fails, or sends something else.
-
-    Notes
-    -----
-    For each dataset its description is asked for, then one export (Explore API v2.1), whose
-    ``where`` is the layer's ``server_where`` and the area. Where a layer selects fields, those
-    that its other keys name are selected too.
-
-    Examples
-    --------
-    >>> import tempfile
-    >>> from semsig_gis.sources._http import Cache
-    >>> with tempfile.TemporaryDirectory() as folder:
-    ...     fetch_layers([], portal="https://opendata.paris.fr", cache=Cache(Path(folder)))
-    []
+    InputError for a wrong address or format, CatalogError if the portal lacks the dataset or a
+    selected field, SourceError if it refuses, fails, or sends something else.
     """
     if format not in EXPORTS:
         msg = f"format {format!r} is unknown; give one of {', '.join(EXPORTS)}."

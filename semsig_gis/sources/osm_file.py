@@ -70,56 +70,19 @@ def read_layers(
     filters: bool = True,
     crs: str | None = None,
 ) -> tuple[RawLayer, ...]:
-    """Read layers of an OpenStreetMap file.
+    """Read layers of a ``.osm``, ``.osm.pbf`` or ``.osm.bz2`` file, one for each of `specs`.
 
-    The file is streamed, so that memory grows with what is kept and not with the file. Where a
-    layer has ways, the places of all nodes are kept meanwhile in an unnamed temporary file, of
-    16 bytes a node.
+    The file is streamed, so that memory grows with what is kept. Where a layer has ways, the places
+    of all nodes are kept meanwhile in an unnamed temporary file, of 16 bytes a node. A layer is
+    found by its ``tags`` and ``elements``; fields in ``where``, ``class_by``, ``width_by`` and
+    ``width_field`` are keys of tags.
 
-    Parameters
-    ----------
-    path : str or Path
-        A ``.osm``, ``.osm.pbf`` or ``.osm.bz2`` file.
-    specs : sequence of LayerSpec
-        The layers to look for, by their ``tags`` and ``elements``; fields in ``where``,
-        ``class_by``, ``width_by`` and ``width_field`` are keys of tags.
-    filters : bool, default True
-        Whether ``where`` holds.
-    crs : str, optional
-        Ignored but for a note: such files are in EPSG:4326.
-
-    Returns
-    -------
-    tuple of RawLayer
-        One for each of `specs`, in their order. Row identifiers are such as ``"node/123"`` and
-        ``"way/456"``. Street objects are points, the centroid where they are mapped as a way or
-        an area; buildings are polygons and streets lines. ``read`` is the number of elements with
-        the layer's tags, ``filtered`` of those that are mapped in another way than the layer
-        wants, and errors are incomplete (clipped) or broken elements. Of an element nothing but
-        its identifier, class, geometry and width is kept.
-
-    Raises
-    ------
-    SourceError
-        If the file is missing, of another kind, or damaged.
-    CatalogError
-        If a layer says no tags, or an ``id_field``.
-
-    Examples
-    --------
-    >>> import tempfile
-    >>> from pathlib import Path
-    >>> from semsig_gis.layer_spec import LayerSpec
-    >>> spec = LayerSpec(name="t", class_name="alignment_tree", tags=((("natural", ("tree",)),),))
-    >>> with tempfile.TemporaryDirectory() as folder:
-    ...     file = Path(folder, "city.osm")
-    ...     _ = file.write_text(
-    ...         '<osm version="0.6"><node id="7" lat="48.8" lon="2.3">'
-    ...         '<tag k="natural" v="tree"/></node></osm>'
-    ...     )
-    ...     (layer,) = read_layers(file, [spec])
-    >>> layer.table.source_id.tolist(), layer.table.geometry.to_wkt().tolist()
-    (['node/7'], ['POINT (2.3 48.8)'])
+    Identifiers are such as ``"node/123"``. Street objects are points, the centroid of a way or an
+    area; buildings are polygons and streets lines. ``read`` counts the elements with the layer's
+    tags, ``filtered`` those that are mapped in another way than it wants, and errors are incomplete
+    (clipped) or broken elements. `crs` is ignored but for a note: such files are in EPSG:4326.
+    SourceError if the file cannot be used, CatalogError if a layer says no tags, or an
+    ``id_field``.
     """
     path = Path(path)
     file = _file(path)
@@ -247,8 +210,8 @@ def _multipolygon(layer: _Layer, row: Row, relation: Relation) -> _Outline:
 def _lines(file: osmium.io.File, numbers: set[int]) -> dict[int, NDArray[np.float64]]:
     """Return longitude and latitude of the nodes of ways; NaN for nodes that the file lacks.
 
-    An index in memory of the nodes of the ways alone would be smaller, yet pyosmium's filters by
-    number take more than a gigabyte for the numbers that nodes have today.
+    An index of these nodes alone would be smaller, yet pyosmium's filters by number take more than
+    a gigabyte for the numbers that nodes have today.
     """
     places = osmium.NodeLocationsForWays(osmium.index.create_map(PLACES))
     places.ignore_errors()

@@ -52,43 +52,11 @@ SPECIAL = re.compile(r"[.^$*+?()\[\]{}|\\]")
 def overpass_query(
     specs: Sequence[LayerSpec], bounds: tuple[float, float, float, float], *, timeout: int = QUERY_S
 ) -> str:
-    r"""Return the question for the elements of layers, in the language of Overpass servers.
+    """Return the Overpass QL for the elements of layers, by their ``tags`` and ``elements``.
 
-    Parameters
-    ----------
-    specs : sequence of LayerSpec
-        The layers, by ``tags`` and ``elements``.
-    bounds : tuple of float
-        West, south, east and north in degrees.
-    timeout : int
-        Seconds that the server may take.
-
-    Returns
-    -------
-    str
-        Overpass QL. Values are exact; ways and multipolygons come with all their positions, and
-        nothing comes with the names of mappers.
-
-    Raises
-    ------
-    CatalogError
-        If a layer says no tags.
-
-    Examples
-    --------
-    >>> from semsig_gis.layer_spec import LayerSpec
-    >>> trees = LayerSpec(
-    ...     name="trees",
-    ...     class_name="alignment_tree",
-    ...     tags=((("natural", ("tree",)),),),
-    ...     elements=("node",),
-    ... )
-    >>> print(overpass_query([trees], (2.3, 48.8, 2.4, 48.9)))
-    [out:json][timeout:90][bbox:48.8000000,2.3000000,48.9000000,2.4000000];
-    (
-    node["natural"="tree"];
-    );
-    out body geom;
+    Bounds are west, south, east and north in degrees; the server may take `timeout` seconds. Values
+    are exact; ways and multipolygons come with all their positions, and nothing comes with the
+    names of mappers. CatalogError if a layer says no tags.
     """
     west, south, east, north = bounds
     # a dict keeps the order, and an element asked for by two layers is asked for once
@@ -152,56 +120,17 @@ def fetch_layers(
     tile_deg: float = 0.1,
     progress: Callable[[int, int], None] | None = None,
 ) -> list[Path]:
-    """Fetch the elements of layers in an area.
+    """Fetch the elements of layers in an area, and a little more, as files for `read_layers`.
 
-    Parameters
-    ----------
-    specs : sequence of LayerSpec
-        The layers.
-    area : Area
-        The area. What is fetched covers it and a little more, see
-        `semsig_gis.sources._area.clip_layer`.
-    endpoints : sequence of str
-        Addresses of Overpass servers, such as ``"https://overpass-api.de/api"``, best first. One
-        that fails is asked last from then on.
-    cache : Cache
-        Where answers are kept.
-    spec : HttpSpec
-        How requests are made.
-    tile_deg : float
-        Longest side of a tile in degrees. One that is too much for the servers is split into four.
-    progress : callable, optional
-        Takes the number of tiles that are done and of those there are; the latter may grow.
+    There is a file for each tile of at most `tile_deg` degrees; one that is too much for the
+    servers is split into four. Endpoints are such as ``"https://overpass-api.de/api"``, best first;
+    one that fails is asked last from then on. Before each query that is sent, the server is asked
+    for its free slots, and waited for. The answers of all servers count as the same in the cache,
+    so that a run that was interrupted goes on where it stopped. `progress` takes the number of
+    tiles that are done and of those there are, which may grow.
 
-    Returns
-    -------
-    list of Path
-        Files for `read_layers`, one a tile.
-
-    Raises
-    ------
-    InputError
-        If there is no server to ask, or `tile_deg` is not above 0.
-    CatalogError
-        If a layer says no tags.
-    SourceError
-        If no server gives a tile.
-
-    Notes
-    -----
-    Before each query that is sent, the server is asked for its free slots, and waited for. The
-    answers of all servers count as the same in the cache, so that a run that was interrupted goes
-    on where it stopped.
-
-    Examples
-    --------
-    >>> from pathlib import Path
-    >>> from semsig_gis.sources._area import parse_area
-    >>> from semsig_gis.sources._http import Cache
-    >>> fetch_layers([], area=parse_area("1,2,3,4"), endpoints=[], cache=Cache(Path()))
-    Traceback (most recent call last):
-    ...
-    semsig_gis.errors.InputError: there is no Overpass server to ask; name one in endpoints.
+    InputError if there is no server to ask or `tile_deg` is not above 0, CatalogError if a layer
+    says no tags, SourceError if no server gives a tile.
     """
     if not endpoints:
         msg = "there is no Overpass server to ask; name one in endpoints."
@@ -251,17 +180,7 @@ class _Servers:
     def answer(self, query: str, *, last: bool) -> Path | None:
         """Return the file of the answer, or None where a smaller question may have one.
 
-        Parameters
-        ----------
-        query : str
-            The question.
-        last : bool
-            Whether it cannot be made smaller.
-
-        Raises
-        ------
-        SourceError
-            If there is neither an answer nor a smaller question.
+        `last` says that the question cannot be made smaller. SourceError if there is neither.
         """
         failures: list[SourceError] = []
         for address in tuple(self._addresses):
@@ -327,24 +246,9 @@ class _Servers:
 
 
 def waiting_time(status: str) -> float:
-    r"""Return how long an Overpass server lets us wait for a slot.
+    """Return the seconds until a slot is free, by an Overpass server's page ``/api/status``.
 
-    Parameters
-    ----------
-    status : str
-        What its page ``/api/status`` says.
-
-    Returns
-    -------
-    float
-        Seconds; 0 if a slot is free, or there is no limit, or nothing is said.
-
-    Examples
-    --------
-    >>> waiting_time("Rate limit: 2\nSlot available after: 2026-01-01T00:00:09Z, in 9 seconds.\n")
-    9.0
-    >>> waiting_time("Rate limit: 2\n1 slots available now.\n")
-    0.0
+    0 if one is free, there is no limit, or nothing is said.
     """
     free = re.search(r"^(\d+) slots? available now", status, re.MULTILINE)
     if free and int(free[1]):

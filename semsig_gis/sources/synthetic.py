@@ -1,12 +1,7 @@
 """A synthetic city, for demonstrations, tests and benchmarks that need no data: no real place.
 
-Streets are the edges of a Voronoi diagram, some of them avenues: wide, lit on both sides, many
-lined with trees, signalled at their corners. Every street has a width and a rhythm of its own.
-Houses stand around courtyards between the streets; some blocks are parks or squares instead.
-
-How much there is of everything is calibrated: of `PARIS_LIKE`, a signature database (30 m, cells
-of 10 m, viewpoints ``"streets"``) has about the figures that the paper prints for Paris. Cities
-of other sizes are cut from the same cloth. Nothing is where it is in Paris.
+It is calibrated: of `PARIS_LIKE`, a signature database (30 m, cells of 10 m, viewpoints
+``"streets"``) has about the figures that the paper prints for Paris.
 """
 
 from __future__ import annotations

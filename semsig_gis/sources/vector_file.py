@@ -51,27 +51,11 @@ WGS84_NAMES = re.compile(r"4326|CRS84|WGS ?84", re.IGNORECASE)
 
 @dataclass(frozen=True, slots=True)
 class LayerInfo:
-    """What one layer of a file is.
+    """What one layer of a file is: its name, kind, CRS, number of features and fields with types.
 
-    Parameters
-    ----------
-    name : str
-        Name of the layer.
-    geometry : str
-        Its geometry type as GDAL calls it; ``"Point"`` for a CSV file with coordinate columns,
-        ``"None"`` for a table without geometry.
-    crs : str or None
-        Code or name of its coordinate reference system; None where the file does not say, or says
-        too little to transform coordinates.
-    rows : int
-        Number of features.
-    fields : tuple of (str, str)
-        Names and types of its fields.
-
-    Examples
-    --------
-    >>> LayerInfo("trees", "Point", "EPSG:2154", 23972, (("HAUTEUR_M", "int32"),)).rows
-    23972
+    `geometry` is the type as GDAL calls it; ``"Point"`` for a CSV file with coordinate columns,
+    ``"None"`` for a table without geometry. `crs` is a code or name, None where the file does not
+    say, or says too little to transform coordinates.
     """
 
     name: str
@@ -82,33 +66,10 @@ class LayerInfo:
 
 
 def list_layers(path: str | Path) -> tuple[LayerInfo, ...]:
-    r"""List the layers of a vector file.
+    """List the layers of a vector file, in its order; SourceError if it cannot be used.
 
-    Parameters
-    ----------
-    path : str or Path
-        A ``.shp``, ``.geojson``, ``.json``, ``.gpkg``, ``.fgb`` or ``.csv`` file, or a ``.zip``
-        with such files in it.
-
-    Returns
-    -------
-    tuple of LayerInfo
-        One entry a layer, in the file's order.
-
-    Raises
-    ------
-    SourceError
-        If the file is missing, damaged, or of another kind.
-
-    Examples
-    --------
-    >>> import tempfile
-    >>> with tempfile.TemporaryDirectory() as folder:
-    ...     path = Path(folder, "benches.csv")
-    ...     _ = path.write_text("id;lon;lat\n7;3.88;43.61\n")
-    ...     layer, = list_layers(path)
-    >>> layer.name, layer.geometry, layer.crs, layer.rows, layer.fields[0]
-    ('benches', 'Point', None, 1, ('id', 'str'))
+    It is a ``.shp``, ``.geojson``, ``.json``, ``.gpkg``, ``.fgb`` or ``.csv`` file, or a ``.zip``
+    with such files in it.
     """
     with listening():
         return tuple(_describe(member) for member in _layers(Path(path)))
@@ -198,29 +159,7 @@ def read_layers(
     filters: bool = True,
     crs: str | None = None,
 ) -> tuple[RawLayer, ...]:
-    """Read several layers of one file.
-
-    Parameters
-    ----------
-    path : str or Path
-        The file.
-    specs : iterable of LayerSpec
-        The layers to look for.
-    filters : bool, default True
-        Whether the filters of the layers apply.
-    crs : str, optional
-        CRS of a file that states none.
-
-    Returns
-    -------
-    tuple of RawLayer
-        One layer for each of `specs`, in their order; see `read_layer` for what it raises.
-
-    Examples
-    --------
-    >>> read_layers("nowhere.shp", [])
-    ()
-    """
+    """Read several layers of one file, as `read_layer` reads one."""
     return tuple(read_layer(path, spec, filters=filters, crs=crs) for spec in specs)
 
 
