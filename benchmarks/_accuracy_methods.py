@@ -11,13 +11,13 @@ from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
 
-from semsig_gis.alignment import rerank
-from semsig_gis.matching import score_cells
-from semsig_gis.posterior import posterior
-from semsig_gis.refinement import KEPT, refine
-from semsig_gis.route import route_posteriors
-from semsig_gis.scoring import expected_best, rank_range, top_candidates
-from semsig_gis.spatial_index import ObjectIndex
+from semsig_gis.core.rtree import ObjectIndex
+from semsig_gis.likelihood.posterior import posterior
+from semsig_gis.likelihood.refine import KEPT, refine
+from semsig_gis.likelihood.rerank import rerank
+from semsig_gis.likelihood.route import route_posteriors
+from semsig_gis.matching.scores import score_cells
+from semsig_gis.matching.ties import expected_best, rank_range, top_candidates
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -25,10 +25,10 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from benchmarks._accuracy_queries import City, Query, Walk
-    from semsig_gis.likelihood import LikelihoodIndex
-    from semsig_gis.method import Method
-    from semsig_gis.noise import Noise
-    from semsig_gis.posterior import Posterior
+    from semsig_gis.likelihood.index import LikelihoodIndex
+    from semsig_gis.likelihood.noise.model import Noise
+    from semsig_gis.likelihood.posterior import Posterior
+    from semsig_gis.matching.method import Method
 
 __all__ = [
     "NEAR",

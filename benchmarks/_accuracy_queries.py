@@ -10,21 +10,21 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from semsig_gis.distortion import distort, named_distortion
-from semsig_gis.geometry import wrap_degrees
-from semsig_gis.grid import cell_ids
-from semsig_gis.route import Leg
-from semsig_gis.signatures import Signature
-from semsig_gis.views import views_at
+from semsig_gis.core.geometry import wrap_degrees
+from semsig_gis.core.grid import cell_ids
+from semsig_gis.core.signature import Signature
+from semsig_gis.database.visibility import views_at
+from semsig_gis.likelihood.route import Leg
+from semsig_gis.queries.paper_errors import distort, named_distortion
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
     from numpy.typing import NDArray
 
-    from semsig_gis.database import SignatureDatabase
-    from semsig_gis.objects import StreetObjects
-    from semsig_gis.spatial_index import ObjectIndex
+    from semsig_gis.core.rtree import ObjectIndex
+    from semsig_gis.database.database import SignatureDatabase
+    from semsig_gis.objects.table import StreetObjects
 
 __all__ = ["City", "Query", "Walk", "off_grid", "on_grid", "turned", "walks"]
 

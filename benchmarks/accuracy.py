@@ -27,30 +27,30 @@ from benchmarks._accuracy_methods import (
 )
 from benchmarks._accuracy_queries import City, off_grid, on_grid, turned, walks
 from benchmarks._accuracy_rows import Bar, Row
-from semsig_gis.abstention import calibrate
-from semsig_gis.building import build_database
-from semsig_gis.catalog import load_catalog, paper_taxonomy
-from semsig_gis.likelihood import build_index
-from semsig_gis.loading import choose_layers, read_files
-from semsig_gis.matching import Method
-from semsig_gis.noise import named_noise
-from semsig_gis.objects import build_objects
-from semsig_gis.refinement import cell_noise
-from semsig_gis.sources.synthetic import (
+from semsig_gis.core.rtree import ObjectIndex
+from semsig_gis.database.build import build_database
+from semsig_gis.database.viewpoints import ViewpointSpec
+from semsig_gis.likelihood.answer_rule import calibrate
+from semsig_gis.likelihood.index import build_index
+from semsig_gis.likelihood.noise.model import named_noise
+from semsig_gis.likelihood.refine import cell_noise
+from semsig_gis.matching.method import Method
+from semsig_gis.objects.clean import build_objects
+from semsig_gis.objects.load import choose_layers, read_files
+from semsig_gis.sources.catalog import load_catalog, paper_taxonomy
+from semsig_gis.sources.synthetic.city import (
     PARIS_LIKE,
     CitySpec,
     synthetic_city,
     synthetic_surroundings,
 )
-from semsig_gis.spatial_index import ObjectIndex
-from semsig_gis.viewpoints import ViewpointSpec
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
     from benchmarks._accuracy_methods import Outcome
     from benchmarks._accuracy_queries import Query
-    from semsig_gis.likelihood import LikelihoodIndex
+    from semsig_gis.likelihood.index import LikelihoodIndex
 
 __all__ = ["main"]
 

@@ -11,23 +11,23 @@ import pyarrow.parquet as pq
 from scipy.spatial import cKDTree
 
 from benchmarks.comparison import Comparison, compare
-from semsig_gis.building import build_database
-from semsig_gis.catalog import paper_taxonomy
-from semsig_gis.database_file import open_database, save_database
-from semsig_gis.objects import build_objects
-from semsig_gis.sources.synthetic import (
+from semsig_gis.database.build import build_database
+from semsig_gis.database.file import open_database, save_database
+from semsig_gis.database.viewpoints import ViewpointSpec
+from semsig_gis.objects.clean import build_objects
+from semsig_gis.sources.catalog import paper_taxonomy
+from semsig_gis.sources.synthetic.city import (
     PARIS_LIKE,
     CitySpec,
     synthetic_city,
     synthetic_surroundings,
 )
-from semsig_gis.viewpoints import ViewpointSpec
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from semsig_gis.database import SignatureDatabase
-    from semsig_gis.objects import StreetObjects
+    from semsig_gis.database.database import SignatureDatabase
+    from semsig_gis.objects.table import StreetObjects
 
 __all__ = ["comparisons"]
 

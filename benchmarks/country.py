@@ -14,20 +14,19 @@ from distributed import Client, LocalCluster
 
 from benchmarks.comparison import Comparison
 from benchmarks.memory import own_peak
-from semsig_gis.catalog import paper_taxonomy
-from semsig_gis.distributed import build_tiles
-from semsig_gis.grid import GridSpec
-from semsig_gis.objects import build_objects, save_objects
-from semsig_gis.signatures import SignatureSpec
-from semsig_gis.sources.synthetic import CitySpec, synthetic_city
-from semsig_gis.tile_inputs import plan_tiles
-from semsig_gis.tiles import TileSpec, build_tile
-from semsig_gis.viewpoints import ViewpointSpec
+from semsig_gis.core.grid import GridSpec
+from semsig_gis.core.signature import SignatureSpec
+from semsig_gis.database.tiles import TileSpec, build_tile, build_tiles, plan_tiles
+from semsig_gis.database.viewpoints import ViewpointSpec
+from semsig_gis.objects.clean import build_objects
+from semsig_gis.objects.table import save_objects
+from semsig_gis.sources.catalog import paper_taxonomy
+from semsig_gis.sources.synthetic.city import CitySpec, synthetic_city
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from semsig_gis.manifest import Manifest
+    from semsig_gis.database.parts import Manifest
     from semsig_gis.sources import RawLayer
 
 __all__ = ["comparisons"]

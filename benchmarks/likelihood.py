@@ -14,18 +14,18 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from benchmarks.comparison import Comparison, compare
-from semsig_gis.alignment import rerank
-from semsig_gis.database_file import save_database
-from semsig_gis.likelihood import build_index
-from semsig_gis.likelihood_file import index_path, open_index, save_index
-from semsig_gis.locating import locate
-from semsig_gis.noise import named_noise
+from semsig_gis.database.file import save_database
+from semsig_gis.likelihood.index import build_index
+from semsig_gis.likelihood.index_file import index_path, open_index, save_index
+from semsig_gis.likelihood.locate import locate
+from semsig_gis.likelihood.noise.model import named_noise
+from semsig_gis.likelihood.rerank import rerank
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
 
-    from semsig_gis.database import SignatureDatabase
-    from semsig_gis.signatures import Signature
+    from semsig_gis.core.signature import Signature
+    from semsig_gis.database.database import SignatureDatabase
 
     _Peer = Callable[[int], object]
 

@@ -11,22 +11,24 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from benchmarks.comparison import Comparison
-from semsig_gis import map_assets
-from semsig_gis.building import build_database
-from semsig_gis.catalog import paper_taxonomy
-from semsig_gis.evaluation import evaluate
-from semsig_gis.map_ambiguity import ambiguity_map
-from semsig_gis.map_drift import drift_map
-from semsig_gis.maps import evaluation_map, save_map
-from semsig_gis.method import Method
-from semsig_gis.objects import StreetObjects, build_objects
-from semsig_gis.sources.synthetic import (
+from semsig_gis.database.build import build_database
+from semsig_gis.database.viewpoints import ViewpointSpec
+from semsig_gis.evaluation.evaluate import evaluate
+from semsig_gis.maps import page as map_assets
+from semsig_gis.maps.cells import ambiguity_map
+from semsig_gis.maps.drift import drift_map
+from semsig_gis.maps.evaluation import evaluation_map
+from semsig_gis.maps.page import save_map
+from semsig_gis.matching.method import Method
+from semsig_gis.objects.clean import build_objects
+from semsig_gis.objects.table import StreetObjects
+from semsig_gis.sources.catalog import paper_taxonomy
+from semsig_gis.sources.synthetic.city import (
     PARIS_LIKE,
     CitySpec,
     synthetic_city,
     synthetic_surroundings,
 )
-from semsig_gis.viewpoints import ViewpointSpec
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence

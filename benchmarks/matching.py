@@ -15,13 +15,14 @@ from rapidfuzz.process import cdist
 
 from benchmarks.comparison import compare
 from benchmarks.likelihood import growth_of_likelihood, likelihood_rows
-from semsig_gis.catalog import paper_taxonomy
-from semsig_gis.database import BEARING_UNITS, SignatureDatabase
-from semsig_gis.grid import GridSpec
-from semsig_gis.matching import Method, score_cells
-from semsig_gis.nearest import nearest
-from semsig_gis.paper_figures import PARIS_QUERY_MS
-from semsig_gis.signatures import SignatureSpec
+from semsig_gis.core.grid import GridSpec
+from semsig_gis.core.signature import SignatureSpec
+from semsig_gis.database.database import BEARING_UNITS, SignatureDatabase
+from semsig_gis.matching.method import Method
+from semsig_gis.matching.nearest import nearest
+from semsig_gis.matching.scores import score_cells
+from semsig_gis.reports.paper_figures import PARIS_QUERY_MS
+from semsig_gis.sources.catalog import paper_taxonomy
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -29,7 +30,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from benchmarks.comparison import Comparison
-    from semsig_gis.signatures import Signature
+    from semsig_gis.core.signature import Signature
 
 __all__ = ["comparisons", "random_database"]
 

@@ -8,11 +8,11 @@ import numpy as np
 import shapely
 
 from benchmarks.comparison import Comparison, compare
-from semsig_gis.catalog import paper_taxonomy
-from semsig_gis.grid import GridSpec, cells_near
-from semsig_gis.objects import build_objects
-from semsig_gis.occlusion import GAP_M, TOLERANCE_M, Footprints, hidden
-from semsig_gis.sources.synthetic import CitySpec, synthetic_city, synthetic_surroundings
+from semsig_gis.core.grid import GridSpec, cells_near
+from semsig_gis.database.occlusion import GAP_M, TOLERANCE_M, Footprints, hidden
+from semsig_gis.objects.clean import build_objects
+from semsig_gis.sources.catalog import paper_taxonomy
+from semsig_gis.sources.synthetic.city import CitySpec, synthetic_city, synthetic_surroundings
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

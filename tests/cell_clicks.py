@@ -12,7 +12,7 @@ from selenium.webdriver.common.by import By
 if TYPE_CHECKING:
     from selenium.webdriver import Chrome
 
-    from semsig_gis.database import SignatureDatabase
+    from semsig_gis.database.database import SignatureDatabase
 
 POPUP = "return [...document.querySelectorAll('.semsig-details')].pop()?.innerText"
 

@@ -6,11 +6,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from semsig_gis.identifiability import BANDS, ClassGain, Identifiability
-from semsig_gis.noise import named_noise
+from semsig_gis.evaluation.identify.result import BANDS, ClassGain, Identifiability
+from semsig_gis.likelihood.noise.model import named_noise
 
 if TYPE_CHECKING:
-    from semsig_gis.database import SignatureDatabase
+    from semsig_gis.database.database import SignatureDatabase
 
 PLACES = 3
 

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from distributed import LocalCluster
     from selenium.webdriver import Chrome
 
-    from semsig_gis.reproduction import Reproduction
+    from semsig_gis.experiments.paper.reproduce import Reproduction
 
     Run = Callable[..., tuple[int, str, str]]
 
@@ -151,7 +151,7 @@ def run(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> 
 @pytest.fixture
 def carried() -> None:
     """Need the map files that a package built with npm carries."""
-    from semsig_gis import map_assets
+    from semsig_gis.maps import page as map_assets
 
     if not map_assets.available():
         unavailable("browser", "the package was built without npm, so it carries no map files")
@@ -230,7 +230,7 @@ def reproduced(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Return a folder in which the experiments of the paper were run on a small town."""
     from reproductions import QUERIES, save_town
 
-    from semsig_gis.reproduction import reproduce
+    from semsig_gis.experiments.paper.reproduce import reproduce
 
     place = tmp_path_factory.mktemp("reproduced")
     reproduce(place / "out", database=save_town(place), queries=QUERIES)
@@ -242,7 +242,7 @@ def reproduction(reproduced: Path) -> Reproduction:
     """Return what was found there."""
     from reproductions import QUERIES
 
-    from semsig_gis.reproduction import reproduce
+    from semsig_gis.experiments.paper.reproduce import reproduce
 
     database = reproduced.parent / "city.parquet"
     return reproduce(reproduced, database=database, queries=QUERIES)

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any
 
 from selenium.webdriver.common.by import By
 
-from semsig_gis.maps import save_map
-from semsig_gis.taxonomy import ObjectClass, Taxonomy
+from semsig_gis.core.taxonomy import ObjectClass, Taxonomy
+from semsig_gis.maps.page import save_map
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     import folium
     from selenium.webdriver import Chrome
 
-    from semsig_gis.database import SignatureDatabase
+    from semsig_gis.database.database import SignatureDatabase
 
 HOSTILE = (
     "<script>alert(1)</script><img src=x onerror=alert(1)>\"'`${alert(1)}`\\</script>"

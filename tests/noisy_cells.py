@@ -8,14 +8,14 @@ import numpy as np
 from hypothesis import strategies as st
 from pyproj import CRS
 
-from semsig_gis.catalog import paper_taxonomy
-from semsig_gis.database import BEARING_UNITS, SignatureDatabase
-from semsig_gis.grid import GridSpec
-from semsig_gis.noise import NoiseMixture, NoiseSpec, named_noise
-from semsig_gis.signatures import Signature, SignatureSpec
+from semsig_gis.core.grid import GridSpec
+from semsig_gis.core.signature import Signature, SignatureSpec
+from semsig_gis.database.database import BEARING_UNITS, SignatureDatabase
+from semsig_gis.likelihood.noise.model import NoiseMixture, NoiseSpec, named_noise
+from semsig_gis.sources.catalog import paper_taxonomy
 
 if TYPE_CHECKING:
-    from semsig_gis.noise import Noise
+    from semsig_gis.likelihood.noise.model import Noise
 
 TAXONOMY = paper_taxonomy()
 

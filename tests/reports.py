@@ -2,17 +2,24 @@
 
 from __future__ import annotations
 
+import xml.etree.ElementTree as ET
 from typing import Any
 
 from map_pages import HOSTILE
 
-from semsig_gis.catalog import paper_taxonomy
-from semsig_gis.report_parts import Curve, Number, Plot, Report, Scene, SceneObject, Section
-from semsig_gis.taxonomy import ObjectClass, Taxonomy
+from semsig_gis.core.taxonomy import ObjectClass, Taxonomy
+from semsig_gis.reports.parts import Curve, Number, Plot, Report, Scene, SceneObject, Section
+from semsig_gis.sources.catalog import paper_taxonomy
 
 FORMULA = '=cmd|"/C calc"!A0'
 HARM = f"{FORMULA} $\\frac{{}}$ _x_ ![a](http://example.org/a.png)\0\r\n# | {HOSTILE}"
 LONG = f"{HARM} {'long ' * 2000}{'M' * 10_000}"
+
+
+def texts(svg: bytes) -> list[str]:
+    """Return the texts of a drawing."""
+    namespace = "{http://www.w3.org/2000/svg}"
+    return [found.text or "" for found in ET.fromstring(svg).iter(f"{namespace}text")]  # noqa: S314
 
 
 def plot(name: str = "errors", *, curves: int = 2, points: int = 30, **options: Any) -> Plot:  # noqa: ANN401

@@ -8,8 +8,8 @@ import numpy as np
 from hypothesis import strategies as st
 from scipy.stats import binom
 
-from semsig_gis.catalog import paper_taxonomy
-from semsig_gis.sight import CitySights, Sight
+from semsig_gis.queries.sight import CitySights, Sight
+from semsig_gis.sources.catalog import paper_taxonomy
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

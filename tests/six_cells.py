@@ -7,16 +7,16 @@ from typing import TYPE_CHECKING
 import numpy as np
 from pyproj import CRS
 
-from semsig_gis.catalog import paper_taxonomy
-from semsig_gis.database import SignatureDatabase
-from semsig_gis.grid import GridSpec
-from semsig_gis.signatures import SignatureSpec
-from semsig_gis.taxonomy import ObjectClass
+from semsig_gis.core.grid import GridSpec
+from semsig_gis.core.signature import SignatureSpec
+from semsig_gis.core.taxonomy import ObjectClass
+from semsig_gis.database.database import SignatureDatabase
+from semsig_gis.sources.catalog import paper_taxonomy
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from semsig_gis.tables import Table
+    from semsig_gis.reports.tables import Table
 
 # Six cells: by type three DD, one DB, two B; by angle (levels) four alike, two alike.
 CELLS = [

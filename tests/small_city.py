@@ -5,21 +5,22 @@ from __future__ import annotations
 import functools
 from typing import TYPE_CHECKING
 
-from semsig_gis.building import build_database
-from semsig_gis.catalog import paper_taxonomy
-from semsig_gis.evaluation import evaluate
-from semsig_gis.likelihood import build_index
-from semsig_gis.locating import locate
-from semsig_gis.matching import localize
-from semsig_gis.noise import named_noise
-from semsig_gis.objects import StreetObjects, build_objects
-from semsig_gis.sources.synthetic import CitySpec, synthetic_city
+from semsig_gis.database.build import build_database
+from semsig_gis.evaluation.evaluate import evaluate
+from semsig_gis.likelihood.index import build_index
+from semsig_gis.likelihood.locate import locate
+from semsig_gis.likelihood.noise.model import named_noise
+from semsig_gis.matching.search import localize
+from semsig_gis.objects.clean import build_objects
+from semsig_gis.objects.table import StreetObjects
+from semsig_gis.sources.catalog import paper_taxonomy
+from semsig_gis.sources.synthetic.city import CitySpec, synthetic_city
 
 if TYPE_CHECKING:
-    from semsig_gis.database import SignatureDatabase
-    from semsig_gis.evaluation_result import Evaluation
-    from semsig_gis.localization import Localization
-    from semsig_gis.location import Location
+    from semsig_gis.database.database import SignatureDatabase
+    from semsig_gis.evaluation.result import Evaluation
+    from semsig_gis.likelihood.result import Location
+    from semsig_gis.matching.result import Localization
 
 
 @functools.cache

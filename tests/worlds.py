@@ -15,16 +15,16 @@ import shapely
 from hypothesis import strategies as st
 from sentences import assert_sentence
 
-from semsig_gis.building import build_database
-from semsig_gis.catalog import load_catalog
-from semsig_gis.database import BEARING_UNITS, DISTANCE_UNITS
-from semsig_gis.errors import EmptyResultError
-from semsig_gis.grid import GridSpec
-from semsig_gis.objects import StreetObjects
-from semsig_gis.signatures import SignatureSpec
+from semsig_gis.core.errors import EmptyResultError
+from semsig_gis.core.grid import GridSpec
+from semsig_gis.core.signature import SignatureSpec
+from semsig_gis.database.build import build_database
+from semsig_gis.database.database import BEARING_UNITS, DISTANCE_UNITS
+from semsig_gis.objects.table import StreetObjects
+from semsig_gis.sources.catalog import load_catalog
 
 if TYPE_CHECKING:
-    from semsig_gis.database import SignatureDatabase
+    from semsig_gis.database.database import SignatureDatabase
 
 TAXONOMY = load_catalog("montpellier").taxonomy
 CORNER = np.array([765_200.0, 6_275_000.0])

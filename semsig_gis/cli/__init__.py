@@ -14,29 +14,27 @@ from typing import Annotated
 import typer
 
 from semsig_gis import __version__
-from semsig_gis._supervision import stop_with_supervisor, supervised
+from semsig_gis.cli.console import stop_with_supervisor, supervised
 
 # The order of these imports is that of the help.
 # isort: off
-from semsig_gis.cli import _demo  # noqa: F401
-from semsig_gis.cli import _sources  # noqa: F401
-from semsig_gis.cli import _load  # noqa: F401
-from semsig_gis.cli import _synthesize  # noqa: F401
-from semsig_gis.cli import _build  # noqa: F401
-from semsig_gis.cli import _localize  # noqa: F401
-from semsig_gis.cli import _learn  # noqa: F401
-from semsig_gis.cli import _evaluate  # noqa: F401
-from semsig_gis.cli import _reproduce  # noqa: F401
-from semsig_gis.cli import _identify  # noqa: F401
-from semsig_gis.cli import _map  # noqa: F401
-from semsig_gis.cli import _export  # noqa: F401
+from semsig_gis.cli import demo as _demo  # noqa: F401
+from semsig_gis.cli import load as _sources  # noqa: F401
+from semsig_gis.cli import load as _load  # noqa: F401
+from semsig_gis.cli import demo as _synthesize  # noqa: F401
+from semsig_gis.cli import build as _build  # noqa: F401
+from semsig_gis.cli import localize as _localize  # noqa: F401
+from semsig_gis.cli import learn as _learn  # noqa: F401
+from semsig_gis.cli import evaluate as _evaluate  # noqa: F401
+from semsig_gis.cli import reproduce as _reproduce  # noqa: F401
+from semsig_gis.cli import identify as _identify  # noqa: F401
+from semsig_gis.cli import maps as _map  # noqa: F401
+from semsig_gis.cli import export as _export  # noqa: F401
 
 # isort: on
-from semsig_gis.cli._app import app
-from semsig_gis.console import remark
-from semsig_gis.errors import SemsigError
-
-__all__ = ["app", "main"]
+from semsig_gis.cli.app import app
+from semsig_gis.cli.console import remark
+from semsig_gis.core.errors import SemsigError
 
 
 def main() -> None:

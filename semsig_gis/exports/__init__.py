@@ -1,8 +1,8 @@
 """Hand results on to other programs: pick a format by the suffix of the file.
 
-``.gpkg`` (`semsig_gis.exports.geopackage`) holds many layers, with styles for QGIS; ``.parquet``
-(`semsig_gis.exports.geoparquet`) and ``.csv`` (`semsig_gis.exports.csv_text`) hold one; ``.tif``
-(`semsig_gis.exports.geotiff`) holds one number a cell.
+``.gpkg`` (`exports.geopackage`) holds many layers, with styles for QGIS; ``.parquet``
+(`exports.geoparquet`) and ``.csv`` (`exports.csv`) hold one; ``.tif``
+(`exports.geotiff`) holds one number a cell.
 """
 
 from __future__ import annotations
@@ -13,28 +13,27 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from semsig_gis.database import require_same_place
-from semsig_gis.errors import EmptyResultError, InputError, UnknownNameError, nearest_name
-from semsig_gis.exports import csv_text, geopackage, geoparquet
-from semsig_gis.exports._layers import answer_layers, cells_layer, evaluation_layers, objects_layer
+from semsig_gis.core.errors import EmptyResultError, InputError, UnknownNameError, nearest_name
+from semsig_gis.database.database import require_same_place
+from semsig_gis.exports import csv as csv_text
+from semsig_gis.exports import geopackage, geoparquet
 from semsig_gis.exports.geotiff import cell_errors, export_geotiff
-from semsig_gis.location import REGION_SHARE, Location
-from semsig_gis.regions import search_regions
+from semsig_gis.exports.layers import answer_layers, cells_layer, evaluation_layers, objects_layer
+from semsig_gis.exports.regions import search_regions
+from semsig_gis.likelihood.result import REGION_SHARE, Location
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
 
-    from semsig_gis.database import SignatureDatabase
-    from semsig_gis.evaluation_result import Evaluation
-    from semsig_gis.exports._layers import CellGeometry, Layer
-    from semsig_gis.identifiability import Identifiability
-    from semsig_gis.localization import Localization
-    from semsig_gis.objects import StreetObjects
-    from semsig_gis.regions import SearchRegions
+    from semsig_gis.database.database import SignatureDatabase
+    from semsig_gis.evaluation.identify.result import Identifiability
+    from semsig_gis.evaluation.result import Evaluation
+    from semsig_gis.exports.layers import CellGeometry, Layer
+    from semsig_gis.exports.regions import SearchRegions
+    from semsig_gis.matching.result import Localization
+    from semsig_gis.objects.table import StreetObjects
 
     Progress = Callable[[int, int], None]
-
-__all__ = ["LAYERS", "RASTERS", "export_answer", "export_database"]
 
 LAYERS = ("cells", "objects", "evaluation", "evaluation_lines")
 """What may be written of a database as layers."""
@@ -109,15 +108,15 @@ def export_database(
     (angle levels) and ``distances`` (metres to 0.01), each of these four clockwise from north and
     the numbers separated by spaces; ``type_group_size`` and ``angle_group_size`` (cells that have
     the same types or the same angle levels, 1 where the cell is alone); and, where given, the
-    columns of `semsig_gis.identifiability.Identifiability.table`. Nothing is lost by rounding:
-    `semsig_gis.geopackage_reading.read_geopackage` gives the database back.
+    columns of `evaluation.identify.result.Identifiability.table`. Nothing is lost by rounding:
+    `exports.geopackage.read_geopackage` gives the database back.
 
     Layer ``objects``, in the CRS of the objects: ``class_code``, ``symbol``, ``class_name``,
     ``title``, ``source``, ``source_id``, ``merged`` where sources were merged, and ``count``.
 
     Layers ``evaluation``, the queries at their true places, and ``evaluation_lines``, from there
     to the best place where that is another one: the columns of
-    `semsig_gis.evaluation_result.Evaluation.queries` and
+    `evaluation.result.Evaluation.queries` and
     ``outcome``: ``found`` (with a probability of 0.5 or more the best place is within 50 m; there
     may be several that are as good), ``missed`` or ``nothing seen``.
 
@@ -125,10 +124,10 @@ def export_database(
     --------
     >>> import tempfile
     >>> import geopandas as gpd
-    >>> from semsig_gis.building import build_database
-    >>> from semsig_gis.catalog import paper_taxonomy
-    >>> from semsig_gis.objects import build_objects
-    >>> from semsig_gis.sources.synthetic import CitySpec, synthetic_city
+    >>> from semsig_gis.database.build import build_database
+    >>> from semsig_gis.sources.catalog import paper_taxonomy
+    >>> from semsig_gis.objects.clean import build_objects
+    >>> from semsig_gis.sources.synthetic.city import CitySpec, synthetic_city
     >>> layers = synthetic_city(CitySpec(size=300.0))
     >>> objects, _ = build_objects(layers, taxonomy=paper_taxonomy(), crs="EPSG:32631")
     >>> database = build_database(objects)
@@ -257,7 +256,7 @@ def export_answer(
         ``.csv`` the regions, ``.tif`` the chance of every cell, of the likelihood method only; it
         appears whole, by rename.
     share, within : float, optional
-        Which cells the regions hold (see `semsig_gis.regions.search_regions`).
+        Which cells the regions hold (see `exports.regions.search_regions`).
 
     Returns
     -------

@@ -7,10 +7,15 @@ from typing import TYPE_CHECKING
 import shapely
 
 from semsig_gis import __version__
-from semsig_gis.boxes import BBOX, COVERING, bounds_column
-from semsig_gis.exports._layers import GEOMETRY_TYPES
-from semsig_gis.schema import GEOMETRY
-from semsig_gis.storage import geo_metadata, write_geoparquet_blocks
+from semsig_gis.core.crs import GEOMETRY
+from semsig_gis.exports.layers import GEOMETRY_TYPES
+from semsig_gis.storage.geoparquet import (
+    BBOX,
+    COVERING,
+    bounds_column,
+    geo_metadata,
+    write_geoparquet_blocks,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -18,9 +23,7 @@ if TYPE_CHECKING:
 
     import pyarrow as pa
 
-    from semsig_gis.exports._layers import Layer
-
-__all__ = ["write_layer"]
+    from semsig_gis.exports.layers import Layer
 
 
 def write_layer(
@@ -30,7 +33,7 @@ def write_layer(
 
     The column ``bbox`` holds the bounds of every row as float32, rounded outwards, and the metadata
     names it as the covering of ``geometry``. The metadata key ``semsig`` holds the specs, the
-    classes and the licences as JSON. The rows are in groups of `semsig_gis.boxes.GROUP_ROWS` and in
+    classes and the licences as JSON. The rows are in groups of `GROUP_ROWS` and in
     the order of the database, column by column. ``progress`` is called with the rows written and in
     all.
     """

@@ -6,18 +6,16 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from semsig_gis.errors import InputError
-from semsig_gis.raster import write_cells
+from semsig_gis.core.errors import InputError
+from semsig_gis.storage.raster import write_cells
 
 if TYPE_CHECKING:
     from pathlib import Path
 
     from numpy.typing import ArrayLike, NDArray
 
-    from semsig_gis.database import SignatureDatabase
-    from semsig_gis.evaluation_result import Evaluation
-
-__all__ = ["cell_errors", "export_geotiff"]
+    from semsig_gis.database.database import SignatureDatabase
+    from semsig_gis.evaluation.result import Evaluation
 
 
 def export_geotiff(
@@ -53,11 +51,11 @@ def export_geotiff(
     Examples
     --------
     >>> import tempfile
-    >>> from semsig_gis.building import build_database
-    >>> from semsig_gis.catalog import paper_taxonomy
-    >>> from semsig_gis.objects import build_objects
-    >>> from semsig_gis.raster import raster_at_cells
-    >>> from semsig_gis.sources.synthetic import CitySpec, synthetic_city
+    >>> from semsig_gis.database.build import build_database
+    >>> from semsig_gis.sources.catalog import paper_taxonomy
+    >>> from semsig_gis.objects.clean import build_objects
+    >>> from semsig_gis.storage.raster import raster_at_cells
+    >>> from semsig_gis.sources.synthetic.city import CitySpec, synthetic_city
     >>> layers = synthetic_city(CitySpec(size=300.0))
     >>> objects, _ = build_objects(layers, taxonomy=paper_taxonomy(), crs="EPSG:32631")
     >>> database = build_database(objects)

@@ -8,20 +8,23 @@ from fnmatch import fnmatchcase
 from pathlib import Path
 from typing import TYPE_CHECKING, Protocol
 
-from semsig_gis.errors import SourceError, UnknownNameError, nearest_name
-from semsig_gis.plugins import installed_readers
+from semsig_gis.core.errors import SourceError, UnknownNameError, nearest_name
+from semsig_gis.core.plugins import installed_readers
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
 
     from geopandas import GeoDataFrame
 
-    from semsig_gis.layer_spec import LayerSpec
-
-__all__ = ["FILE_SUFFIXES", "READERS", "RawLayer", "Reader", "find_files", "reader"]
+    from semsig_gis.sources.layers import LayerSpec
 
 # The module of this package that reads what a catalogue's `reader` names.
-READERS = ("opendatasoft", "osm_file", "overpass", "vector_file")
+READERS = {
+    "opendatasoft": "opendatasoft.reader",
+    "osm_file": "osm.file",
+    "overpass": "osm.overpass_json",
+    "vector_file": "vector.reader",
+}
 
 # Files with another suffix (.dbf, .prj, a README) accompany data and are not opened on their own.
 FILE_SUFFIXES = frozenset(
@@ -71,7 +74,7 @@ class RawLayer:
 
     Examples
     --------
-    >>> from semsig_gis.sources.synthetic import CitySpec, synthetic_city
+    >>> from semsig_gis.sources.synthetic.city import CitySpec, synthetic_city
     >>> layer = synthetic_city(CitySpec(size=300.0))[0]
     >>> layer.spec.class_name, layer.read == len(layer.table)
     ('alignment_tree', True)
@@ -108,7 +111,7 @@ class Reader(Protocol):
 def reader(name: str) -> Reader:
     """Return a built-in reader, or one of the entry-point group ``semsig_gis.readers``, by name."""
     if name in READERS:
-        read: Reader = importlib.import_module(f"{__name__}.{name}").read_layers
+        read: Reader = importlib.import_module(f"{__name__}.{READERS[name]}").read_layers
         return read
     others = installed_readers()
     if name in others:
@@ -151,7 +154,7 @@ def find_files(
     Examples
     --------
     >>> import tempfile
-    >>> from semsig_gis.layer_spec import LayerSpec
+    >>> from semsig_gis.sources.layers import LayerSpec
     >>> trees = LayerSpec(name="trees", class_name="alignment_tree", files=("*trees*.geojson",))
     >>> lights = LayerSpec(name="lights", class_name="street_light", files=("lights.*",))
     >>> with tempfile.TemporaryDirectory() as folder:

@@ -17,10 +17,10 @@ from hypothesis import strategies as st
 from sentences import assert_sentence
 from small_city import small_city, small_evaluation
 
-from semsig_gis.errors import InputError
+from semsig_gis.core.errors import InputError
 from semsig_gis.exports import export_database
-from semsig_gis.exports.csv_text import as_written, formula_safe
-from semsig_gis.objects import StreetObjects
+from semsig_gis.exports.csv import as_written, formula_safe
+from semsig_gis.objects.table import StreetObjects
 
 if TYPE_CHECKING:
     from pathlib import Path

@@ -13,9 +13,9 @@ from cells_told import told_of
 from sentences import assert_sentence
 from small_city import small_city, small_evaluation, small_localization, small_location
 
-from semsig_gis.errors import EmptyResultError, InputError, SemsigError, UnknownNameError
+from semsig_gis.core.errors import EmptyResultError, InputError, SemsigError, UnknownNameError
 from semsig_gis.exports import LAYERS, RASTERS, export_answer, export_database
-from semsig_gis.objects import StreetObjects
+from semsig_gis.objects.table import StreetObjects
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-    from semsig_gis.evaluation_result import Evaluation
+    from semsig_gis.evaluation.result import Evaluation
 
 
 def everything() -> dict[str, Any]:

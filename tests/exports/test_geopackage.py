@@ -25,30 +25,32 @@ import pytest
 import rasterio
 import shapely
 from cells_told import told_of
-from conftest import unavailable
 from full_disk import largest_file
 from map_pages import HOSTILE
 from sentences import assert_sentence
 from small_city import small_city, small_evaluation, small_localization, small_location
 
-from semsig_gis.building import build_database
-from semsig_gis.catalog import paper_taxonomy
-from semsig_gis.class_signs import class_signs
-from semsig_gis.errors import InputError, UnknownNameError
-from semsig_gis.exports import _layers, export_answer, export_database
-from semsig_gis.exports._styles import CLASS_MARKERS, by_class
-from semsig_gis.grid import GridSpec
-from semsig_gis.objects import StreetObjects, build_objects
-from semsig_gis.signatures import SignatureSpec, quantize
-from semsig_gis.sources.synthetic import CitySpec, synthetic_city
-from semsig_gis.taxonomy import ObjectClass, Taxonomy
+from conftest import unavailable
+from semsig_gis.core.errors import InputError, UnknownNameError
+from semsig_gis.core.grid import GridSpec
+from semsig_gis.core.signature import SignatureSpec, quantize
+from semsig_gis.core.signs import class_signs
+from semsig_gis.core.taxonomy import ObjectClass, Taxonomy
+from semsig_gis.database.build import build_database
+from semsig_gis.exports import export_answer, export_database
+from semsig_gis.exports import layers as _layers
+from semsig_gis.exports.styles import CLASS_MARKERS, by_class
+from semsig_gis.objects.clean import build_objects
+from semsig_gis.objects.table import StreetObjects
+from semsig_gis.sources.catalog import paper_taxonomy
+from semsig_gis.sources.synthetic.city import CitySpec, synthetic_city
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from semsig_gis.database import SignatureDatabase
-    from semsig_gis.localization import Localization
-    from semsig_gis.location import Location
+    from semsig_gis.database.database import SignatureDatabase
+    from semsig_gis.likelihood.result import Location
+    from semsig_gis.matching.result import Localization
 
     Draw = Callable[..., list[dict[str, Any]]]
 

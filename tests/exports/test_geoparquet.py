@@ -13,9 +13,10 @@ from cells_told import told_of
 from sentences import assert_sentence
 from small_city import small_city, small_evaluation
 
-from semsig_gis.database_file import open_database
-from semsig_gis.errors import DatabaseError
-from semsig_gis.exports import _layers, export_database
+from semsig_gis.core.errors import DatabaseError
+from semsig_gis.database.file import open_database
+from semsig_gis.exports import export_database
+from semsig_gis.exports import layers as _layers
 
 if TYPE_CHECKING:
     from pathlib import Path

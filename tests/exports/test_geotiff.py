@@ -13,16 +13,16 @@ from rio_cogeo.cogeo import cog_validate
 from sentences import assert_sentence
 from small_city import small_city, small_evaluation, small_location
 
-from semsig_gis import raster
-from semsig_gis.errors import InputError
+from semsig_gis.core.errors import InputError
+from semsig_gis.core.grid import GridSpec
 from semsig_gis.exports import export_answer, export_database
 from semsig_gis.exports.geotiff import cell_errors, export_geotiff
-from semsig_gis.grid import GridSpec
+from semsig_gis.storage import raster
 
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from semsig_gis.database import SignatureDatabase
+    from semsig_gis.database.database import SignatureDatabase
 
 
 def is_cloud_optimised(file: Path) -> bool:

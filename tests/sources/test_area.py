@@ -13,10 +13,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 from sentences import assert_sentence
 
-from semsig_gis.errors import InputError, SemsigError
-from semsig_gis.layer_spec import LayerSpec
+from semsig_gis.core.errors import InputError, SemsigError
 from semsig_gis.sources import RawLayer
-from semsig_gis.sources._area import clip_layer, join_areas, names_place, parse_area
+from semsig_gis.sources.area import clip_layer, join_areas, names_place, parse_area
+from semsig_gis.sources.layers import LayerSpec
 
 if TYPE_CHECKING:
     from pathlib import Path

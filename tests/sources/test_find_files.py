@@ -6,11 +6,11 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from semsig_gis.catalog import load_catalog
-from semsig_gis.errors import SourceError
-from semsig_gis.layer_spec import LayerSpec
+from semsig_gis.core.errors import SourceError
 from semsig_gis.sources import FILE_SUFFIXES, find_files
-from semsig_gis.sources._member import DRIVERS
+from semsig_gis.sources.catalog import load_catalog
+from semsig_gis.sources.layers import LayerSpec
+from semsig_gis.sources.vector.archive import DRIVERS
 
 if TYPE_CHECKING:
     from pathlib import Path

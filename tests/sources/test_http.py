@@ -17,17 +17,11 @@ from sentences import assert_sentence
 from servers import Answer, Server, published, zipped
 
 from semsig_gis import __version__
-from semsig_gis.errors import InputError, SourceError
-from semsig_gis.sources import _http_cache
-from semsig_gis.sources._http import (
-    Cache,
-    HttpError,
-    HttpSpec,
-    NotCachedError,
-    TooLargeError,
-    fetch,
-    read_text,
-)
+from semsig_gis.core.errors import InputError, SourceError
+from semsig_gis.sources.http import cache as _http_cache
+from semsig_gis.sources.http.cache import Cache
+from semsig_gis.sources.http.fetch import NotCachedError, TooLargeError, fetch, read_text
+from semsig_gis.sources.http.wire import HttpError, HttpSpec
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -35,7 +29,7 @@ if TYPE_CHECKING:
 
     from servers import Seen
 
-    from semsig_gis.sources._http import Fetched
+    from semsig_gis.sources.http.cache import Fetched
 
 CONTENT = json.dumps({"trees": list(range(5_000))}).encode()
 JSON = ("application/json",)
@@ -409,7 +403,7 @@ def test_a_redirect_to_nowhere_is_refused(
 def test_the_only_way_to_another_scheme_is_the_safer_one(
     source: str, target: str, *, allowed: bool
 ) -> None:
-    from semsig_gis.sources._http_wire import _require_same_host
+    from semsig_gis.sources.http.wire import _require_same_host
 
     if allowed:
         _require_same_host(source, target)
@@ -513,7 +507,7 @@ def test_an_address_that_leads_nowhere_is_said(cache: Cache) -> None:
 def test_a_certificate_that_is_not_trusted_is_not_tried_again() -> None:
     from requests.exceptions import SSLError
 
-    from semsig_gis.sources._http_wire import _failure
+    from semsig_gis.sources.http.wire import _failure
 
     error = _failure(SSLError("certificate verify failed"), "https://a.example/x")
     assert isinstance(error, HttpError)

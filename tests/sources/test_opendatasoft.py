@@ -21,12 +21,13 @@ from hypothesis import strategies as st
 from sentences import assert_sentence
 from servers import Answer, Server, published
 
-from semsig_gis.errors import CatalogError, CrsError, InputError, SourceError
-from semsig_gis.layer_spec import ClassBy, LayerSpec
-from semsig_gis.sources._area import Area
-from semsig_gis.sources._http import Cache, HttpSpec
-from semsig_gis.sources._ods_fields import find_field, fold
-from semsig_gis.sources.opendatasoft import _outline, fetch_layers, read_layers
+from semsig_gis.core.errors import CatalogError, CrsError, InputError, SourceError
+from semsig_gis.sources.area import Area
+from semsig_gis.sources.http.cache import Cache
+from semsig_gis.sources.http.wire import HttpSpec
+from semsig_gis.sources.layers import ClassBy, LayerSpec
+from semsig_gis.sources.opendatasoft.fields import find_field, fold
+from semsig_gis.sources.opendatasoft.reader import _outline, fetch_layers, read_layers
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator

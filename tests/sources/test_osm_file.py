@@ -17,9 +17,9 @@ from osm_xml import node, relation, way, write_osm
 from osmium.osm.mutable import Node
 from sentences import assert_sentence
 
-from semsig_gis.errors import CatalogError, SourceError
-from semsig_gis.layer_spec import ClassBy, LayerSpec
-from semsig_gis.sources.osm_file import read_layers
+from semsig_gis.core.errors import CatalogError, SourceError
+from semsig_gis.sources.layers import ClassBy, LayerSpec
+from semsig_gis.sources.osm.file import read_layers
 
 if TYPE_CHECKING:
     from semsig_gis.sources import RawLayer
@@ -379,8 +379,8 @@ def test_a_specification_that_does_not_fit_is_refused(
 MEASURE = """
 import sys
 from pathlib import Path
-from semsig_gis.layer_spec import LayerSpec
-from semsig_gis.sources.osm_file import read_layers
+from semsig_gis.sources.layers import LayerSpec
+from semsig_gis.sources.osm.file import read_layers
 tags = ((("natural", ("tree",)),),)
 (layer,) = read_layers(sys.argv[1], [LayerSpec(name="t", class_name="bench", tags=tags)])
 # Not getrusage, which includes the process that started this one.

@@ -11,8 +11,8 @@ import shapely
 from hypothesis import given
 from hypothesis import strategies as st
 
-from semsig_gis.sources._osm_shapes import relation_shape, way_shape
-from semsig_gis.sources._rows import BadFeatureError
+from semsig_gis.sources.osm.shapes import relation_shape, way_shape
+from semsig_gis.sources.raw_layer import BadFeatureError
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

@@ -7,9 +7,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from sentences import assert_sentence
 
-from semsig_gis.errors import CatalogError
-from semsig_gis.layer_spec import LayerSpec
-from semsig_gis.sources._osm_tags import TagIndex, counts, matches
+from semsig_gis.core.errors import CatalogError
+from semsig_gis.sources.layers import LayerSpec
+from semsig_gis.sources.osm.tags import TagIndex, counts, matches
 
 KEYS = st.sampled_from("abc")
 VALUES = st.sampled_from(["x", "y", "no", "*"])

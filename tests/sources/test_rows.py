@@ -15,10 +15,10 @@ from hypothesis import strategies as st
 from osm_xml import node, way, write_osm
 from sentences import assert_sentence
 
-from semsig_gis.errors import CatalogError
-from semsig_gis.layer_spec import LayerSpec, WidthBy
+from semsig_gis.core.errors import CatalogError
 from semsig_gis.sources import reader
-from semsig_gis.sources._rows import BETWEEN_SLASHES, RowRules, as_text, matches
+from semsig_gis.sources.layers import LayerSpec, WidthBy
+from semsig_gis.sources.raw_layer import BETWEEN_SLASHES, RowRules, as_text, matches
 
 if TYPE_CHECKING:
     from pathlib import Path

@@ -13,25 +13,26 @@ import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from semsig_gis.building import build_database
-from semsig_gis.catalog import paper_taxonomy
-from semsig_gis.errors import InputError
-from semsig_gis.objects import build_objects
-from semsig_gis.occlusion import Footprints
-from semsig_gis.sources import _city_streets, synthetic
-from semsig_gis.sources.synthetic import (
+from semsig_gis.core.errors import InputError
+from semsig_gis.database.build import build_database
+from semsig_gis.database.occlusion import Footprints
+from semsig_gis.database.viewpoints import ViewpointSpec
+from semsig_gis.objects.clean import build_objects
+from semsig_gis.sources.catalog import paper_taxonomy
+from semsig_gis.sources.synthetic import city as synthetic
+from semsig_gis.sources.synthetic import streets as _city_streets
+from semsig_gis.sources.synthetic.city import (
     PARIS_LIKE,
     CitySpec,
     synthetic_city,
     synthetic_surroundings,
 )
-from semsig_gis.viewpoints import ViewpointSpec
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from semsig_gis.sources import RawLayer
-    from semsig_gis.sources._city_streets import Network
+    from semsig_gis.sources.synthetic.streets import Network
 
 # How often the paper's 312,134 signatures of Paris hold each class.
 CELLS = 312_134

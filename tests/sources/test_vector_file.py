@@ -21,12 +21,12 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from pyproj import CRS
 
-from semsig_gis.errors import CatalogError, CrsError, SourceError, UnknownNameError
-from semsig_gis.layer_spec import ClassBy, LayerSpec
-from semsig_gis.sources import vector_file
-from semsig_gis.sources._member import DRIVERS
-from semsig_gis.sources._rows import RowRules
-from semsig_gis.sources.vector_file import list_layers, read_layer
+from semsig_gis.core.errors import CatalogError, CrsError, SourceError, UnknownNameError
+from semsig_gis.sources.layers import ClassBy, LayerSpec
+from semsig_gis.sources.raw_layer import RowRules
+from semsig_gis.sources.vector import reader as vector_file
+from semsig_gis.sources.vector.archive import DRIVERS
+from semsig_gis.sources.vector.reader import list_layers, read_layer
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable

@@ -1,0 +1,35 @@
+"""What the examples in docstrings begin from: a small made-up town, built once."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import pytest
+
+if TYPE_CHECKING:
+    from semsig_gis import SignatureDatabase, StreetObjects
+
+
+@pytest.fixture(scope="session")
+def demo_objects() -> StreetObjects:
+    """Return the street objects of a town of 300 m by 300 m, in EPSG:32631."""
+    from semsig_gis import CitySpec, build_objects, paper_taxonomy, synthetic_city
+
+    layers = synthetic_city(CitySpec(size=300.0))
+    return build_objects(layers, taxonomy=paper_taxonomy(), crs="EPSG:32631")[0]
+
+
+@pytest.fixture(scope="session")
+def demo_database(demo_objects: StreetObjects) -> SignatureDatabase:
+    """Return the signatures of its cells."""
+    from semsig_gis import build_database
+
+    return build_database(demo_objects)
+
+
+@pytest.fixture(autouse=True)
+def _examples(request: pytest.FixtureRequest, doctest_namespace: dict[str, Any]) -> None:
+    """Give `demo_objects` and `demo_database` to the examples of docstrings."""
+    if isinstance(request.node, pytest.DoctestItem):
+        for name in ("demo_objects", "demo_database"):
+            doctest_namespace[name] = request.getfixturevalue(name)

@@ -1,0 +1,229 @@
+"""`semsig build` and `semsig info`: street objects become a signature database."""
+
+from __future__ import annotations
+
+import enum
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from semsig_gis.cli.app import (
+    AsJson,
+    Database,
+    app,
+    keep_inputs,
+    known_identifiability,
+    numbers,
+    object_counts,
+    print_report,
+    print_table,
+    require_suffix,
+)
+from semsig_gis.cli.console import print_json, progress, remark
+from semsig_gis.core.errors import InputError
+
+if TYPE_CHECKING:
+    from semsig_gis.database.database import SignatureDatabase
+
+
+class Viewpoints(enum.StrEnum):
+    """Which cells `semsig build` looks from."""
+
+    all = "all"
+    outdoor = "outdoor"
+    streets = "streets"
+
+
+@app.command()
+def build(
+    objects: Annotated[Path, typer.Argument(help="Street objects that `semsig load` wrote.")],
+    *,
+    out: Annotated[
+        Path, typer.Option(help="Signature database to write: a file, or with tiles a folder.")
+    ],
+    step: Annotated[float, typer.Option(help="Side of a cell in metres.")] = 10.0,
+    radius: Annotated[
+        float,
+        typer.Option(
+            help="Visibility range in metres, of all classes to which the catalogue gives none "
+            "of their own."
+        ),
+    ] = 30.0,
+    levels: Annotated[int, typer.Option(help="Number of angle levels.")] = 16,
+    origin: Annotated[
+        str, typer.Option(help="Corner of a cell as X,Y in metres, in the CRS of the objects.")
+    ] = "0,0",
+    buildings: Annotated[
+        Path | None, typer.Option(help="Building footprints: what they hide is not seen.")
+    ] = None,
+    streets: Annotated[Path | None, typer.Option(help="Centre lines of streets.")] = None,
+    viewpoints: Annotated[
+        Viewpoints,
+        typer.Option(help="Every cell, those outside --buildings, or those along --streets."),
+    ] = Viewpoints.all,
+    street_width: Annotated[
+        float, typer.Option(help="Width in metres of streets of which --streets says none.")
+    ] = 16.0,
+    area: Annotated[Path | None, typer.Option(help="Polygons that the cells must lie in.")] = None,
+    tile: Annotated[
+        float | None,
+        typer.Option(help="Build in tiles of so many metres; 2000 where workers are given."),
+    ] = None,
+    workers: Annotated[
+        int, typer.Option(help="Build tiles in so many processes of this machine.")
+    ] = 0,
+    scheduler: Annotated[
+        str | None, typer.Option(help="Build tiles on a dask cluster: tcp://HOST:PORT.")
+    ] = None,
+    as_json: AsJson = False,
+) -> None:
+    """Compute the signature of every cell that sees an object."""
+    from semsig_gis.core.grid import GridSpec
+    from semsig_gis.core.signature import SignatureSpec
+    from semsig_gis.database.viewpoints import ViewpointSpec
+    from semsig_gis.objects.surroundings import read_area
+    from semsig_gis.objects.table import open_objects
+    from semsig_gis.storage.geoparquet import NOWHERE
+
+    if streets is not None and viewpoints is not Viewpoints.streets:
+        msg = "--streets was given, which only --viewpoints streets uses; give both or none."
+        raise InputError(msg)
+    keep_inputs(out, read=(objects, buildings, streets, area))
+    corner = numbers(origin, "--origin")
+    specs: dict[str, Any] = {
+        "grid": GridSpec(step, tuple(corner)),  # type: ignore[arg-type] # it checks the length
+        "spec": SignatureSpec(radius, levels),
+        "viewpoints": ViewpointSpec(
+            mode=viewpoints.value,
+            width=street_width / 2,
+            area=None
+            if area is None
+            else read_area(area, crs=open_objects(objects, box=NOWHERE).crs),
+        ),
+    }
+    if tile is None and not workers and scheduler is None:
+        require_suffix(".parquet", out)
+        cells, entries = _build_whole(objects, out, buildings, streets, specs)
+    else:
+        from semsig_gis.database.tiles import TileSpec, build_tiles
+
+        with progress("building tiles") as advance:
+            manifest = build_tiles(
+                objects,
+                out,
+                tile=None if tile is None else TileSpec(tile),
+                buildings=buildings,
+                streets=streets,
+                workers=workers,
+                scheduler=scheduler,
+                progress=advance,
+                tell=remark,
+                **specs,
+            )
+        cells, entries = manifest.cells, sum(part.entries for part in manifest.parts)
+    if as_json:
+        print_json(_info(out))
+        return
+    typer.echo(
+        f"{cells:,} cells of mean length {entries / cells:.3f}, {_bytes(out) / 1e6:.1f} MB: {out}"
+    )
+
+
+def _build_whole(
+    objects: Path, out: Path, buildings: Path | None, streets: Path | None, specs: dict[str, Any]
+) -> tuple[int, int]:
+    """Build a database in one piece, and the object store beside it; return cells and entries."""
+    from semsig_gis.database.build import build_database
+    from semsig_gis.database.store import ObjectStore, save_with_store
+    from semsig_gis.objects.surroundings import read_surroundings
+    from semsig_gis.objects.table import open_objects
+
+    opened = open_objects(objects)
+    crs = opened.crs
+    houses = None if buildings is None else read_surroundings(buildings, role="buildings", crs=crs)
+    lines = None if streets is None else read_surroundings(streets, role="streets", crs=crs)
+    if houses is not None and (invalid := int((~houses.is_valid).sum())):
+        remark(f"{invalid} building footprints in {buildings} are invalid polygons; repaired here")
+    with progress("building") as advance:
+        database = build_database(
+            opened, footprints=houses, streets=lines, progress=advance, **specs
+        )
+    save_with_store(database, ObjectStore.of(opened, footprints=houses, streets=lines), out)
+    return len(database), len(database.codes)
+
+
+@app.command()
+def update(
+    database: Database,
+    *,
+    objects: Annotated[
+        Path, typer.Option(help="Street objects loaded anew; each layer in it is replaced whole.")
+    ],
+    out: Annotated[
+        Path | None, typer.Option(help="Database to write; the one that was given by default.")
+    ] = None,
+    as_json: AsJson = False,
+) -> None:
+    """Apply changed street objects to a database, and tell how far the city has drifted."""
+    from semsig_gis.database.file import has_added
+    from semsig_gis.database.update import update_file
+    from semsig_gis.objects.table import open_objects
+
+    keep_inputs(out, read=(objects,))
+    had_columns = has_added(database)
+    with progress("updating") as advance:
+        report = update_file(database, open_objects(objects), out=out, progress=advance)
+    if had_columns:
+        remark("the new database lacks the columns of semsig identify; run semsig identify again")
+    for note in report.notes:
+        remark(note)
+    print_report(report, as_json=as_json)
+
+
+@app.command()
+def info(database: Database, *, as_json: AsJson = False) -> None:
+    """Print the paper's tables of properties for a database."""
+    if as_json:
+        print_json(_info(database))
+        return
+    from semsig_gis.reports.database import database_tables
+    from semsig_gis.reports.identifiability import identifiability_tables
+
+    opened, facts = _opened(database)
+    for table in database_tables(opened, **facts):
+        print_table(table)
+    told = known_identifiability(database, opened)
+    if told is not None:
+        for table in identifiability_tables(told, object_counts=facts.get("object_counts")):
+            print_table(table)
+    for line in opened.licenses:
+        typer.echo(line)
+
+
+def _info(path: Path) -> dict[str, Any]:
+    from semsig_gis.database.properties import database_summary
+
+    opened, facts = _opened(path)
+    told = known_identifiability(path, opened)
+    more = {}
+    if told is not None:
+        counts = facts.get("object_counts")
+        more["identifiability"] = told.summary(object_counts=counts)
+    return database_summary(opened, **facts) | more
+
+
+def _opened(path: Path) -> tuple[SignatureDatabase, dict[str, Any]]:
+    """Open a database; return also what its files tell of it."""
+    from semsig_gis.database.file import open_database
+
+    opened = open_database(path)
+    facts: dict[str, Any] = {"file_bytes": _bytes(path)}
+    counts = object_counts(path)
+    return opened, facts if counts is None else facts | {"object_counts": counts}
+
+
+def _bytes(path: Path) -> int:
+    """Return the size of a file, or of the files of a folder."""
+    files = path.iterdir() if path.is_dir() else [path]
+    return sum(file.stat().st_size for file in files)

@@ -1,0 +1,164 @@
+"""Printing for the command line: tables, JSON, remarks and progress."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import os
+import signal
+import sys
+import threading
+from typing import TYPE_CHECKING, Any, Literal
+
+import typer
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterable, Iterator
+
+
+VARIABLE = "SEMSIG_SUPERVISED"
+
+
+def supervised() -> bool:
+    """Tell whether another program watches this one."""
+    return bool(os.environ.get(VARIABLE))
+
+
+def progress_line(label: str, percent: int) -> str:
+    """Return what a supervisor reads of the progress: ``semsig progress 40% building``."""
+    return f"semsig progress {percent}% {label}"
+
+
+def stop_with_supervisor() -> None:
+    """From now on, be interrupted when the standard input ends."""
+    # A program that was itself started in the background hands on that interrupts be ignored.
+    signal.signal(signal.SIGINT, signal.default_int_handler)
+    # A copy, with nothing in the place of the original: on Windows, a library that asks for the
+    # kind of the standard input while it is loaded would wait for the read to end.
+    watched, nothing = os.dup(0), os.open(os.devnull, os.O_RDONLY)
+    os.dup2(nothing, 0)
+    os.close(nothing)
+    threading.Thread(target=_interrupt_at_end_of, args=(watched,), daemon=True).start()
+
+
+def _interrupt_at_end_of(watched: int) -> None:
+    # Not a file object, whose lock would be held when the interpreter ends.
+    while os.read(watched, 1):
+        pass
+    if sys.platform == "win32":
+        signal.raise_signal(signal.SIGINT)
+    else:
+        signal.pthread_kill(threading.main_thread().ident or 0, signal.SIGINT)
+
+
+# A bar appears for work that takes longer than this.
+PATIENCE_S = 2.0
+
+
+# Whole numbers from here on are identifiers, which read better without separators.
+LARGEST_COUNT = 10**9
+
+
+def remark(text: str) -> None:
+    """Say one sentence on standard error, after the name of the command."""
+    typer.echo(f"semsig: {text}", err=True)
+
+
+def print_json(value: Any, *, indent: int | None = 2) -> None:  # noqa: ANN401 - any JSON
+    """Print plain values without NaN or infinity as JSON on standard output.
+
+    ``indent=None`` gives a single line.
+    """
+    typer.echo(json.dumps(value, indent=indent, ensure_ascii=False, allow_nan=False))
+
+
+def print_rows(title: str, header: Iterable[str], rows: Iterable[Iterable[object]]) -> None:
+    """Print a table on standard output; text from data is shown as it is, never as markup.
+
+    Whole numbers get thousands separators.
+    """
+    from rich.console import Console
+    from rich.table import Table
+    from rich.text import Text
+
+    table = Table(title=Text(title), title_justify="left")
+    for name in header:
+        table.add_column(Text(name), overflow="fold")
+    for row in rows:
+        table.add_row(*(Text(_cell_text(cell)) for cell in row))
+    console = Console()
+    if not console.is_terminal:
+        # A file or a pipe has no width to fold to.
+        wide = Console(width=10_000)
+        console = Console(width=max(wide.measure(table).maximum, wide.measure(title).maximum))
+    console.print(table)
+
+
+def _cell_text(cell: object) -> str:
+    if isinstance(cell, int) and abs(cell) < LARGEST_COUNT:
+        return f"{cell:,}"
+    return str(cell)
+
+
+@contextlib.contextmanager
+def progress(
+    label: str, *, unit: Literal["steps", "bytes"] = "steps"
+) -> Iterator[Callable[[int, int], None]]:
+    """Show a bar on standard error once the work in the block takes a while.
+
+    The block gets a function, to be called with how much is done and how much there is in all. A
+    program that supervises this one gets lines instead (see `cli.console`).
+    """
+    if supervised():
+        yield _progress_lines(label)
+        return
+    from rich.console import Console
+    from rich.progress import (
+        BarColumn,
+        DownloadColumn,
+        MofNCompleteColumn,
+        Progress,
+        TextColumn,
+        TimeRemainingColumn,
+        TransferSpeedColumn,
+    )
+
+    screen = Console(stderr=True)
+    bar = Progress(
+        TextColumn("{task.description}"),
+        BarColumn(),
+        *(
+            (DownloadColumn(), TransferSpeedColumn())
+            if unit == "bytes"
+            else (MofNCompleteColumn(), TimeRemainingColumn())
+        ),
+        console=screen,
+        transient=True,
+        disable=not screen.is_terminal,
+    )
+    task = bar.add_task(label, total=None)
+    patience = threading.Timer(PATIENCE_S, bar.start)
+    patience.daemon = True
+    patience.start()
+    try:
+        yield lambda done, total: bar.update(task, completed=done, total=total or None)
+    finally:
+        patience.cancel()
+        # Stopping a bar that never showed, or shows nowhere, would print an empty line.
+        if bar.live.is_started:
+            bar.stop()
+
+
+def _progress_lines(label: str) -> Callable[[int, int], None]:
+    """Return what prints a line for every percent of the work."""
+    told = -1
+
+    def advance(done: int, total: int) -> None:
+        nonlocal told
+        percent = done * 100 // total if total else 0
+        if percent != told:
+            told = percent
+            typer.echo(progress_line(label, percent), err=True)
+
+    advance(0, 1)
+    return advance

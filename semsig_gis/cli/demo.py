@@ -1,0 +1,96 @@
+"""`semsig demo`: the whole road on a made-up city."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from semsig_gis.cli.app import app, print_evaluation, tell_if_online
+from semsig_gis.cli.console import progress, remark
+
+DEMO_QUERIES = 200
+
+
+@app.command()
+def demo(
+    *,
+    out: Annotated[Path, typer.Option(help="Folder to write to.")] = Path("demo"),
+    queries: Annotated[int, typer.Option(help="Number of queries.")] = DEMO_QUERIES,
+    seed: Annotated[int, typer.Option(help="Seed of the city and of the queries.")] = 0,
+) -> None:
+    """Run the whole road on the embedded synthetic city, without a network."""
+    from semsig_gis.database.build import build_database
+    from semsig_gis.database.file import save_database
+    from semsig_gis.evaluation.evaluate import evaluate as run
+    from semsig_gis.exports import export_database
+    from semsig_gis.maps.evaluation import evaluation_map
+    from semsig_gis.maps.objects import objects_map
+    from semsig_gis.maps.page import save_map
+    from semsig_gis.objects.clean import build_objects
+    from semsig_gis.objects.table import save_objects
+    from semsig_gis.sources.catalog import paper_taxonomy
+    from semsig_gis.sources.synthetic.city import CitySpec, synthetic_city
+
+    layers = synthetic_city(CitySpec(seed=seed))
+    objects, _ = build_objects(layers, taxonomy=paper_taxonomy(), crs=layers[0].table.crs)
+    save_objects(objects, out / "objects.parquet")
+    remark(f"a synthetic city with {len(objects):,} street objects")
+    with progress("building") as advance:
+        database = build_database(objects, progress=advance)
+    save_database(database, out / "city.parquet")
+    remark(f"its signature database: {len(database):,} cells")
+    with progress("evaluating") as advance:
+        evaluation = run(database, queries=queries, seed=seed, progress=advance)
+    evaluation.save(out / "evaluation")
+    with progress("drawing the map"):
+        drawn = objects_map(objects, map_=evaluation_map(evaluation, database))
+        offline = save_map(drawn, out / "map.html")
+    with progress("writing the GeoPackage") as advance:
+        export_database(
+            database,
+            out / "city.gpkg",
+            objects=objects,
+            evaluation=evaluation,
+            progress=advance,
+        )
+    print_evaluation(evaluation)
+    typer.echo(f"map:        {out / 'map.html'}  (open it in a browser)")
+    typer.echo(f"GeoPackage: {out / 'city.gpkg'}  (open it in QGIS)")
+    typer.echo(f"database:   {out / 'city.parquet'}")
+    tell_if_online(offline)
+
+
+@app.command()
+def synthesize(
+    *,
+    out: Annotated[Path, typer.Option(help="Folder to write to.")],
+    size: Annotated[
+        float | None,
+        typer.Option(help="Side of the square city in metres; as many cells as Paris by default."),
+    ] = None,
+    seed: Annotated[int, typer.Option(help="Seed of the random numbers.")] = 0,
+) -> None:
+    """Make up a city: street objects, buildings and streets of no real place."""
+    from semsig_gis.objects.clean import build_objects
+    from semsig_gis.objects.surroundings import save_surroundings
+    from semsig_gis.objects.table import save_objects
+    from semsig_gis.sources.catalog import paper_taxonomy
+    from semsig_gis.sources.synthetic.city import (
+        PARIS_LIKE,
+        CitySpec,
+        synthetic_city,
+        synthetic_surroundings,
+    )
+
+    spec = CitySpec(size=PARIS_LIKE.size if size is None else size, seed=seed)
+    with progress("making up a city"):
+        layers = synthetic_city(spec)
+        surroundings = synthetic_surroundings(spec)
+    objects, _ = build_objects(layers, taxonomy=paper_taxonomy(), crs=layers[0].table.crs)
+    save_objects(objects, out / "objects.parquet")
+    for layer in surroundings:
+        save_surroundings(layer.table, out / f"{layer.spec.role}.parquet")
+    for name in ("objects", *(layer.spec.role for layer in surroundings)):
+        typer.echo(out / f"{name}.parquet")

@@ -1,0 +1,110 @@
+"""`semsig export` and `import`: results for other programs, and back."""
+
+from __future__ import annotations
+
+import enum
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from semsig_gis.cli.app import Database, app, keep_inputs, known_identifiability, require_suffix
+from semsig_gis.cli.console import progress, remark
+from semsig_gis.core.errors import InputError
+
+
+class CellGeometry(enum.StrEnum):
+    """How `semsig export` draws a cell."""
+
+    polygon = "polygon"
+    point = "point"
+
+
+@app.command()
+def export(
+    database: Database,
+    *,
+    out: Annotated[
+        Path,
+        typer.Option(
+            help="File to write: a GeoPackage of all layers, for QGIS (.gpkg), one layer as "
+            "GeoParquet (.parquet) or CSV (.csv), or one number a cell as a Cloud-Optimised "
+            "GeoTIFF (.tif)."
+        ),
+    ],
+    objects: Annotated[Path | None, typer.Option(help="Street objects to add as a layer.")] = None,
+    evaluation: Annotated[
+        Path | None,
+        typer.Option(help="Folder that `semsig evaluate --out` wrote, to add its queries."),
+    ] = None,
+    layer: Annotated[
+        list[str] | None,
+        typer.Option(
+            help="What the file holds: cells, objects, evaluation or evaluation_lines, by default "
+            "the first, in a GeoPackage all that there are (give the option once for each); in a "
+            "GeoTIFF ambiguity (the default), identifiability or error."
+        ),
+    ] = None,
+    geometry: Annotated[
+        CellGeometry | None,
+        typer.Option(
+            help="How a cell is drawn; by default as a polygon, in CSV as a point.",
+            show_default=False,
+        ),
+    ] = None,
+) -> None:
+    """Write the cells, and what else there is of the city, for QGIS and other programs."""
+    from semsig_gis.database.file import open_database
+    from semsig_gis.evaluation.result import Evaluation
+    from semsig_gis.exports import export_database
+    from semsig_gis.objects.table import open_objects
+
+    keep_inputs(out, read=(database, objects))
+    opened = open_database(database)
+    seen = None if objects is None else open_objects(objects)
+    results = None if evaluation is None else Evaluation.load(evaluation)
+    with progress(f"writing {out.name}") as advance:
+        export_database(
+            opened,
+            out,
+            layers=layer or (),
+            objects=seen,
+            evaluation=results,
+            identifiability=known_identifiability(database, opened),
+            geometry=None if geometry is None else geometry.value,
+            progress=advance,
+        )
+    typer.echo(f"exported: {out}")
+
+
+@app.command(name="import")
+def import_(
+    geopackage: Annotated[Path, typer.Argument(help="GeoPackage that `semsig export` wrote.")],
+    *,
+    out: Annotated[Path, typer.Option(help="Signature database to write (.parquet).")],
+    objects: Annotated[
+        Path | None, typer.Option(help="Street objects to write, where they were exported too.")
+    ] = None,
+) -> None:
+    """Turn an exported GeoPackage into the database that it was, without loss."""
+    from semsig_gis.database.file import save_database
+    from semsig_gis.evaluation.identify.result import save_identifiability
+    from semsig_gis.exports.geopackage import read_geopackage
+    from semsig_gis.objects.table import save_objects
+
+    keep_inputs(out, objects, read=(geopackage,))
+    require_suffix(".parquet", out, objects)
+    found = read_geopackage(geopackage)
+    if objects is not None and found.objects is None:
+        msg = f"{geopackage} holds no street objects; leave out --objects."
+        raise InputError(msg)
+    for note in found.notes:
+        remark(note)
+    if objects is not None and found.objects is not None:
+        save_objects(found.objects, objects, keep_order=True)
+    save_database(found.database, out)
+    if found.identifiability is not None:
+        save_identifiability(found.identifiability, out)
+    typer.echo(f"database: {out}  ({len(found.database):,} cells)")
+    if objects is not None:
+        typer.echo(f"objects:  {objects}")

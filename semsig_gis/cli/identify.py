@@ -1,0 +1,120 @@
+"""`semsig identify`: where in a city a query can be placed, before there is one."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from semsig_gis.cli.app import (
+    AsJson,
+    Database,
+    app,
+    known_identifiability,
+    object_counts,
+    print_table,
+)
+from semsig_gis.cli.console import print_json, progress, remark
+from semsig_gis.cli.options import NoiseName, OnGrid, prepared_index, read_noise
+from semsig_gis.core.errors import InputError
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from semsig_gis.evaluation.identify.check import IdentifiabilityCheck
+    from semsig_gis.evaluation.identify.result import Identifiability
+
+
+@app.command()
+def identify(
+    database: Database,
+    *,
+    noise: NoiseName = "generic",
+    on_grid: OnGrid = False,
+    radius: Annotated[float, typer.Option(help="Metres that count as near.")] = 50.0,
+    seed: Annotated[int, typer.Option(help="Seed of the simulated queries.")] = 0,
+    threads: Annotated[
+        int | None, typer.Option(help="How many threads to use; all processors by default.")
+    ] = None,
+    check: Annotated[
+        int | None,
+        typer.Option(help="Ask so many fresh queries, and tell whether the chances come true."),
+    ] = None,
+    out: Annotated[
+        Path | None, typer.Option(help="Folder for a report of the check, with a plot.")
+    ] = None,
+    as_json: AsJson = False,
+) -> None:
+    """Tell of every cell how well a query from it will be placed, and what it is taken for.
+
+    The database gets columns that say so; `semsig info`, `map` and `export` show them.
+    """
+    from semsig_gis.database.file import open_database
+    from semsig_gis.evaluation.identify.check import check_identifiability
+    from semsig_gis.evaluation.identify.identify import identify as identified
+    from semsig_gis.evaluation.identify.result import save_identifiability
+    from semsig_gis.likelihood.refine import cell_noise
+    from semsig_gis.reports.identifiability import check_tables, identifiability_tables
+
+    _require_numbers(check, threads, out)
+    model = read_noise(noise)
+    opened = open_database(database)
+    if not on_grid:
+        model = cell_noise(model, opened.grid.step)
+    told = known_identifiability(database, opened)
+    known = told is not None and (told.noise, told.radius, told.seed) == (model, radius, seed)
+    workers = (os.cpu_count() or 1) if threads is None else threads
+    if not known or check is not None:
+        index = prepared_index(database, opened, model)
+    if told is None or not known:
+        with progress("comparing cells") as advance:
+            told = identified(index, radius=radius, seed=seed, threads=workers, progress=advance)
+        save_identifiability(told, database)
+    else:
+        remark("The database has these columns already; they are kept.")
+    checked = None
+    if check is not None:
+        with progress("checking") as advance:
+            checked = check_identifiability(
+                told, index, queries=check, threads=workers, progress=advance
+            )
+    counts = object_counts(database)
+    if out is not None and checked is not None:
+        _write_page(told, checked, database, counts, out)
+    if as_json:
+        more = {} if checked is None else {"check": checked.to_dict()}
+        print_json(told.summary(object_counts=counts) | more)
+        return
+    tables = identifiability_tables(told, object_counts=counts)
+    for part in tables if checked is None else (*tables, *check_tables(checked)):
+        print_table(part)
+    typer.echo(f"columns: {database}")
+    if out is not None:
+        typer.echo(f"report: {out / 'report.html'}")
+
+
+def _write_page(
+    told: Identifiability,
+    checked: IdentifiabilityCheck,
+    database: Path,
+    counts: Mapping[int, int] | None,
+    out: Path,
+) -> None:
+    from semsig_gis.reports.identifiability import identifiability_page
+    from semsig_gis.reports.page import write_report
+
+    page = identifiability_page(told, checked, name=database.name, object_counts=counts)
+    write_report(page, out)
+
+
+def _require_numbers(check: int | None, threads: int | None, out: Path | None) -> None:
+    """Refuse options that cannot be used."""
+    for option, number in (("--check", check), ("--threads", threads)):
+        if number is not None and number < 1:
+            msg = f"{option} was given as {number}; give a whole number from 1."
+            raise InputError(msg)
+    if out is not None and check is None:
+        msg = "--out was given without --check, of which it is the report; give both or none."
+        raise InputError(msg)

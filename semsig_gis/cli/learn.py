@@ -1,0 +1,198 @@
+"""`semsig learn` and `semsig calibrate`: what detections of known places teach."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from semsig_gis.cli.app import AsJson, Database, app, keep_inputs
+from semsig_gis.cli.console import print_json, print_rows, progress
+from semsig_gis.cli.options import (
+    Heading,
+    NoiseName,
+    Objects,
+    OnGrid,
+    Refine,
+    locator,
+    object_store,
+)
+
+if TYPE_CHECKING:
+    from collections.abc import Hashable, Sequence
+
+    from numpy.typing import NDArray
+
+    from semsig_gis.database.database import SignatureDatabase
+    from semsig_gis.likelihood.noise.learn import NoiseEstimate, Sample
+
+Samples = Annotated[
+    Path,
+    typer.Option(
+        help="Detections of known places: a CSV or JSON lines file with types, bearings, and x "
+        "and y (metres) or cell_id (its middle)."
+    ),
+]
+
+
+@app.command()
+def learn(
+    database: Database,
+    *,
+    samples: Samples,
+    out: Annotated[Path, typer.Option(help="Noise model to write (.toml or .json), for --noise.")],
+    objects: Objects = None,
+    as_json: AsJson = False,
+) -> None:
+    """Learn how a detector fails: what it misses, misnames and makes up, and how far off it is."""
+    from dataclasses import replace
+
+    from semsig_gis.database.file import open_database
+    from semsig_gis.likelihood.noise.learn import read_samples
+    from semsig_gis.likelihood.noise.model import save_noise
+
+    keep_inputs(out, read=(database, samples, objects))
+    opened = open_database(database)
+    with progress("learning"):
+        found = _learnt(database, opened, read_samples(samples, taxonomy=opened.taxonomy), objects)
+    # How far the places were known is no matter of the detector.
+    found = replace(found, spec=replace(found.spec, position_sigma=0.0, name=out.stem))
+    save_noise(found.spec, out)
+    if as_json:
+        print_json(found.to_dict())
+        return
+    _print_estimate(found)
+    typer.echo(f"noise model: {out}")
+
+
+def _learnt(
+    path: Path, opened: SignatureDatabase, samples: Sequence[Sample], objects: Path | None
+) -> NoiseEstimate:
+    import numpy as np
+
+    from semsig_gis.likelihood.noise.learn import Sample, learn_noise
+
+    places = _places(opened, samples)
+    store = object_store(path, opened, objects, needed=False)
+    if store is None:
+        columns, rows = opened.grid.cells_at(places)
+        away = places - opened.grid.viewpoints(columns, rows)
+        sigma = math.sqrt(float(np.mean(away**2)))
+        return learn_noise(samples, opened, position_sigma=sigma)
+    return learn_noise(
+        [
+            Sample(signature=sample.signature, xy=(x, y))
+            for sample, (x, y) in zip(samples, places.tolist(), strict=True)
+        ],
+        store.objects,
+        radius=opened.spec.radius,
+        footprints=store.buildings_around(places, distance=opened.reach),
+    )
+
+
+def _places(opened: SignatureDatabase, samples: Sequence[Sample]) -> NDArray[Any]:
+    """Return the true places in metres, shape (samples, 2)."""
+    import numpy as np
+
+    from semsig_gis.core.grid import split_ids
+
+    return np.array(
+        [
+            opened.grid.viewpoints(*split_ids([sample.cell_id]))[0]
+            if sample.cell_id is not None
+            else sample.xy
+            for sample in samples
+        ]
+    )
+
+
+def _print_estimate(found: NoiseEstimate) -> None:
+    skipped = f"; {found.skipped} samples lie where nothing is in sight" if found.skipped else ""
+    print_rows(
+        f"Learnt from {found.detections:,} detections at {found.samples:,} places that see "
+        f"{found.objects:,} objects{skipped}",
+        ("quantity", "class", "value", "its own samples say", "95% interval", "samples"),
+        map(_rate, found.rates.to_dict("records")),
+    )
+
+
+def _rate(row: dict[Hashable, Any]) -> list[str]:
+    """Return a rate as a row of a table; a class without samples has nothing of its own."""
+    high = min(row["high_95"], 180.0)  # no error of a bearing is larger
+    own = (
+        [f"{row['own']:.3f}", f"{row['low_95']:.3f} to {high:.3f}"] if row["samples"] else ["", ""]
+    )
+    return [row["quantity"], row["class"], f"{row['value']:.3f}", *own, f"{row['samples']:.0f}"]
+
+
+@app.command()
+def calibrate(
+    database: Database,
+    *,
+    samples: Samples,
+    out: Annotated[Path, typer.Option(help="Rule to write (.json), for --rule.")],
+    precision: Annotated[
+        float, typer.Option(help="Share of the answers that shall be right.")
+    ] = 0.98,
+    noise: NoiseName = "generic",
+    heading: Heading = "known",
+    on_grid: OnGrid = False,
+    refine: Refine = None,
+    objects: Objects = None,
+    as_json: AsJson = False,
+) -> None:
+    """Choose from which chance on `semsig localize` answers, so that answers can be trusted."""
+    from dataclasses import asdict
+
+    import numpy as np
+
+    from semsig_gis.database.file import open_database
+    from semsig_gis.likelihood import answer_rule as abstention
+    from semsig_gis.likelihood.noise.learn import read_samples
+
+    keep_inputs(out, read=(database, samples, noise, objects))
+    opened = open_database(database)
+    known = read_samples(samples, taxonomy=opened.taxonomy)
+    ready = locator(
+        database,
+        opened,
+        noise=noise,
+        heading=heading,
+        on_grid=on_grid,
+        objects=objects,
+        refine=refine,
+        top=1,
+    )
+    radius = ready.options["rule"].radius
+    masses, errors = np.zeros(len(known)), np.full(len(known), np.inf)
+    with progress("answering") as advance:
+        for number, (sample, place) in enumerate(
+            zip(known, _places(ready.database, known), strict=True)
+        ):
+            if len(sample.signature):  # what saw nothing cannot be told
+                found = ready.locate(sample.signature)
+                masses[number] = found.answer.mass
+                errors[number] = math.dist((found.estimate.x, found.estimate.y), place)
+            advance(number + 1, len(known))
+    rule = abstention.calibrate(masses, errors <= radius, precision=precision, radius=radius)
+    abstention.save_rule(rule, out)
+    if as_json:
+        threshold = rule.threshold if math.isfinite(rule.threshold) else None
+        print_json({**asdict(rule), "threshold": threshold, "coverage": rule.coverage})
+        return
+    if rule.answered:
+        typer.echo(
+            f"Answers from a chance of {rule.threshold:.4f} that the place is within {radius:g} m: "
+            f"{rule.answered:,} of {rule.queries:,} samples ({rule.coverage:.1%}), of which "
+            f"{rule.wrong:,} wrong; {precision:.0%} right with a confidence of "
+            f"{rule.confidence:.0%}."
+        )
+    else:
+        typer.echo(
+            f"No chance is proven to be right {precision:.0%} of the time by these "
+            f"{rule.queries:,} samples, so nothing is answered; give more samples, or a lower "
+            "--precision."
+        )
+    typer.echo(f"rule: {out}")

@@ -1,0 +1,267 @@
+"""`semsig load` and `semsig fetch`: open data become street objects."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Literal
+
+import typer
+
+from semsig_gis.cli.app import AsJson, app, keep_inputs, print_report, require_suffix
+from semsig_gis.cli.console import print_json, print_rows, progress, remark
+from semsig_gis.core.errors import InputError
+
+if TYPE_CHECKING:
+    from semsig_gis.objects.load import Loaded
+    from semsig_gis.sources.layers import LayerSpec
+
+
+Catalogs = Annotated[
+    list[str],
+    typer.Option(help="Catalogue, by name or .toml file; several are merged, best source first."),
+]
+
+
+Objects = Annotated[Path, typer.Option(help="Street objects to write (.parquet).")]
+
+
+Layers = Annotated[
+    list[str] | None,
+    typer.Option(help="Only this layer, optional ones too; may be given several times."),
+]
+
+
+MetricCrs = Annotated[
+    str | None,
+    typer.Option(help="CRS in metres to work in; the catalogue's or the UTM zone by default."),
+]
+
+
+Filters = Annotated[
+    bool, typer.Option("--filter/--no-filter", help="Apply the catalogue's filters.")
+]
+
+
+Collapse = Annotated[bool, typer.Option(help="Collapse objects of a class at the same place.")]
+
+
+Merge = Annotated[
+    bool, typer.Option(help="Merge objects of different layers within the catalogue's radii.")
+]
+
+
+Buildings = Annotated[
+    Path | None, typer.Option(help="Building footprints to write too (.parquet).")
+]
+
+
+Streets = Annotated[
+    Path | None, typer.Option(help="Centre lines of streets to write too (.parquet).")
+]
+
+
+@app.command()
+def load(
+    files: Annotated[list[Path], typer.Argument(help="Files, or a folder that holds them.")],
+    *,
+    catalog: Catalogs,
+    out: Objects,
+    layer: Layers = None,
+    crs: Annotated[
+        str | None, typer.Option(help="CRS of files that state none, such as EPSG:2154.")
+    ] = None,
+    metric_crs: MetricCrs = None,
+    filters: Filters = True,
+    collapse: Collapse = True,
+    merge: Merge = True,
+    buildings: Buildings = None,
+    streets: Streets = None,
+    as_json: AsJson = False,
+) -> None:
+    """Read local files into one table of street objects."""
+    from semsig_gis.objects.load import assemble, choose_layers, read_files
+    from semsig_gis.sources.catalog import combine_catalogs, load_catalog
+
+    keep_inputs(out, buildings, streets, read=[*files, *catalog])
+    require_suffix(".parquet", out, buildings, streets)
+    chosen = combine_catalogs([load_catalog(name) for name in catalog])
+    specs = choose_layers(chosen, layer or (), surroundings=bool(buildings or streets))
+    with progress("reading") as advance:
+        layers, absent = read_files(specs, files, filters=filters, crs=crs, progress=advance)
+    for spec in absent:
+        remark(f"layer {spec.name!r} has no file here ({', '.join(spec.files)}); it is left out")
+    loaded = assemble(layers, chosen, metric_crs=metric_crs, collapse=collapse, merge=merge)
+    _save_loaded(loaded, out, buildings, streets, as_json=as_json)
+
+
+@app.command()
+def fetch(
+    catalog: Annotated[str, typer.Argument(help="Catalogue with a service, by name or .toml.")],
+    *,
+    area: Annotated[
+        str,
+        typer.Option(help="WEST,SOUTH,EAST,NORTH in degrees, a polygon file, or a place name."),
+    ],
+    out: Objects,
+    layer: Layers = None,
+    cache: Annotated[
+        Path | None, typer.Option(help="Folder of the cache; semsig's own by default.")
+    ] = None,
+    offline: Annotated[
+        bool, typer.Option("--offline", help="Take everything from the cache.")
+    ] = False,
+    metric_crs: MetricCrs = None,
+    filters: Filters = True,
+    collapse: Collapse = True,
+    merge: Merge = True,
+    buildings: Buildings = None,
+    streets: Streets = None,
+    as_json: AsJson = False,
+) -> None:
+    """Download an area from the service of a catalogue into one table of street objects."""
+    from semsig_gis.objects.load import assemble, choose_layers, fetch_layers, find_area, open_cache
+    from semsig_gis.sources.catalog import load_catalog
+
+    keep_inputs(out, buildings, streets, read=(catalog, area))
+    require_suffix(".parquet", out, buildings, streets)
+    chosen = load_catalog(catalog)
+    specs = choose_layers(chosen, layer or (), surroundings=bool(buildings or streets))
+    kept, http = open_cache(cache, offline=offline)
+    unit: Literal["steps", "bytes"] = "steps" if chosen.reader == "osm_file" else "bytes"
+    with progress("fetching", unit=unit) as advance:
+        place = find_area(area, chosen, cache=kept, http=http)
+        layers = fetch_layers(
+            specs,
+            chosen,
+            area=place,
+            cache=kept,
+            http=http,
+            filters=filters,
+            progress=advance,
+            tell=remark,
+        )
+    loaded = assemble(layers, chosen, metric_crs=metric_crs, collapse=collapse, merge=merge)
+    _save_loaded(loaded, out, buildings, streets, as_json=as_json)
+
+
+def _save_loaded(
+    loaded: Loaded, out: Path, buildings: Path | None, streets: Path | None, *, as_json: bool
+) -> None:
+    from semsig_gis.objects.quality import quality_report
+    from semsig_gis.objects.surroundings import save_surroundings
+    from semsig_gis.objects.table import save_objects
+
+    report = quality_report(loaded.objects, loaded.report, loaded.conflation)
+    save_objects(loaded.objects, out)
+    for what, table, path in (
+        ("buildings", loaded.buildings, buildings),
+        ("streets", loaded.streets, streets),
+    ):
+        if path is not None and table is None:
+            remark(f"there are no {what} in what was loaded, so {path} is not written")
+        elif path is not None:
+            save_surroundings(table, path)
+    for note in loaded.notes:
+        remark(note)
+    print_report(report, as_json=as_json)
+    if not as_json:
+        typer.echo(f"street objects: {out}")
+
+
+@app.command()
+def sources(
+    name: Annotated[
+        str | None, typer.Argument(help="A catalogue, by name or .toml file; or `suggest`.")
+    ] = None,
+    file: Annotated[
+        Path | None, typer.Argument(help="With `suggest`: a file to draft a catalogue for.")
+    ] = None,
+    *,
+    as_json: AsJson = False,
+) -> None:
+    """List the catalogues and readers, or the layers of one; `suggest FILE` drafts a new one."""
+    import dataclasses
+
+    from semsig_gis.core.plugins import installed_readers
+    from semsig_gis.sources import READERS
+    from semsig_gis.sources.catalog import catalog_names, load_catalog
+
+    if name == "suggest":
+        from semsig_gis.objects.draft import suggest_catalog
+
+        if file is None:
+            msg = "`semsig sources suggest` needs a file; give the path of a vector file."
+            raise InputError(msg)
+        typer.echo(suggest_catalog(file), nl=False)
+        return
+    if file is not None:
+        msg = f"{file} was given after {name!r}; only `semsig sources suggest` takes a file."
+        raise InputError(msg)
+    if name is None:
+        catalogs = [load_catalog(known) for known in catalog_names()]
+        readers = sorted({*READERS, *installed_readers(taken=READERS)})
+        listed = [
+            {"name": c.name, "title": c.title, "layers": len(c.layers), "reader": c.reader}
+            for c in catalogs
+        ]
+        if as_json:
+            print_json({"catalogs": listed, "readers": readers})
+            return
+        print_rows(
+            "Catalogues",
+            ("name", "title", "layers", "reader", "licence"),
+            ([*row.values(), c.license] for row, c in zip(listed, catalogs, strict=True)),
+        )
+        typer.echo(f"readers: {', '.join(readers)}")
+        return
+    catalog = load_catalog(name)
+    if as_json:
+        print_json(dataclasses.asdict(catalog))
+        return
+    print_rows(
+        f"{catalog.title} ({catalog.url})",
+        ("layer", "class", "from", "filter", "licence", "note"),
+        (
+            [
+                f"{spec.name} (optional)" if spec.optional else spec.name,
+                _class_text(spec),
+                _origin_text(spec),
+                _filter_text(spec),
+                spec.license,
+                spec.note,
+            ]
+            for spec in catalog.layers
+        ),
+    )
+    used = {spec.class_name for spec in catalog.layers}
+    used |= {
+        value for spec in catalog.layers if spec.class_by for _, value in spec.class_by.classes
+    }
+    print_rows(
+        "Classes",
+        ("symbol", "code", "class", "title"),
+        ([c.symbol, c.code, c.name, c.title] for c in catalog.taxonomy.classes if c.name in used),
+    )
+
+
+def _class_text(spec: LayerSpec) -> str:
+    if spec.class_by is None:
+        return spec.class_name or spec.role
+    others = dict.fromkeys(name for _, name in spec.class_by.classes)
+    return f"{spec.class_name} ({', '.join(others)} by {spec.class_by.field})"
+
+
+def _origin_text(spec: LayerSpec) -> str:
+    """Say what a layer is made from: tags, a dataset of a portal, or files."""
+    if spec.tags:
+        return " or ".join(
+            " and ".join(f"{key}={'/'.join(values)}" for key, values in tags) for tags in spec.tags
+        )
+    files = ", ".join(spec.files)
+    return files if spec.dataset is None else f"{spec.dataset} ({files})"
+
+
+def _filter_text(spec: LayerSpec) -> str:
+    return " and ".join(
+        f"{field} = {' or '.join(map(str, accepted))}" for field, accepted in spec.where
+    )

@@ -1,0 +1,175 @@
+"""Streets and buildings below the maps of the commands."""
+
+from __future__ import annotations
+
+import contextlib
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from semsig_gis.cli.app import (
+    Database,
+    app,
+    keep_inputs,
+    known_identifiability,
+    require_suffix,
+    stored_objects,
+    tell_if_online,
+)
+from semsig_gis.cli.console import progress, remark
+from semsig_gis.core.errors import DatabaseError, EmptyResultError, InputError
+
+if TYPE_CHECKING:
+    import folium
+
+    from semsig_gis.database.database import SignatureDatabase
+    from semsig_gis.objects.table import StreetObjects
+
+
+AROUND_M = 100.0
+
+
+Buildings = Annotated[
+    Path | None,
+    typer.Option(
+        help="Footprints to draw below the map; those that the database was built with by default."
+    ),
+]
+
+
+Streets = Annotated[
+    Path | None,
+    typer.Option(
+        help="Centre lines to draw below the map; those that the database was built with by "
+        "default."
+    ),
+]
+
+
+def draw_ground(
+    drawn: folium.Map,
+    path: Path,
+    opened: SignatureDatabase,
+    *,
+    buildings: Path | None = None,
+    streets: Path | None = None,
+) -> None:
+    """Add streets and buildings to a map: those of files, else of the store of the database."""
+    from semsig_gis.database.store import open_store
+    from semsig_gis.maps.objects import ground_map
+    from semsig_gis.objects.surroundings import read_surroundings
+
+    houses = lines = None
+    if buildings is not None:
+        houses = read_surroundings(buildings, role="buildings", crs=opened.crs)
+    if streets is not None:
+        lines = read_surroundings(streets, role="streets", crs=opened.crs)
+    if houses is None or lines is None:
+        with contextlib.suppress(DatabaseError):  # a map may do without
+            store = open_store(path)
+            houses = store.footprints if houses is None else houses
+            lines = store.streets if lines is None else lines
+    if houses is None and lines is None:
+        return
+    low, high = opened.xy.min(axis=0) - AROUND_M, opened.xy.max(axis=0) + AROUND_M
+    try:
+        ground_map(
+            buildings=houses,
+            streets=lines,
+            box=(*low.tolist(), *high.tolist()),
+            map_=drawn,
+        )
+    except EmptyResultError:
+        if buildings is not None or streets is not None:
+            raise
+
+
+@app.command(name="map")
+def map_(
+    database: Database,
+    *,
+    evaluation: Annotated[
+        Path | None, typer.Option(help="Folder that `semsig evaluate --out` wrote.")
+    ] = None,
+    identifiability: Annotated[
+        bool,
+        typer.Option(
+            "--identifiability", help="Draw where a query can be placed (after `semsig identify`)."
+        ),
+    ] = False,
+    ambiguity: Annotated[
+        bool, typer.Option("--ambiguity", help="Draw how many cells look the same.")
+    ] = False,
+    drift: Annotated[
+        Path | None,
+        typer.Option(help="Draw what has changed up to this newer database of the city."),
+    ] = None,
+    objects: Annotated[
+        Path | None, typer.Option(help="Draw the street objects that `semsig load` wrote.")
+    ] = None,
+    buildings: Buildings = None,
+    streets: Streets = None,
+    out: Annotated[Path, typer.Option(help="Map to write (.html).")],
+) -> None:
+    """Draw an evaluation, where queries can be placed, cells that look alike, changes, objects."""
+    import numpy as np
+
+    from semsig_gis.database.database import require_same_place
+    from semsig_gis.database.file import open_database
+    from semsig_gis.evaluation.result import Evaluation
+    from semsig_gis.maps.cells import ambiguity_map, identifiability_map
+    from semsig_gis.maps.drift import drift_map
+    from semsig_gis.maps.evaluation import evaluation_map
+    from semsig_gis.maps.objects import objects_map
+    from semsig_gis.maps.page import save_map
+    from semsig_gis.objects.table import open_objects
+
+    given = sum((evaluation is not None, identifiability, ambiguity, drift is not None))
+    if given > 1 or (given == 0 and objects is None):
+        msg = (
+            "a map shows --evaluation, --identifiability, --ambiguity or --drift, with --objects "
+            "or without, or --objects alone; give one of them."
+        )
+        raise InputError(msg)
+    keep_inputs(out, read=(database, drift, objects, buildings, streets))
+    require_suffix(".html", out)
+    results = None if evaluation is None else Evaluation.load(evaluation)
+    opened = open_database(database)
+    told = known_identifiability(database, opened) if identifiability or ambiguity else None
+    if identifiability and told is None:
+        msg = f"{database} does not tell where a query can be placed; run semsig identify first."
+        raise InputError(msg)
+    seen = None if objects is None else open_objects(objects)
+    newer = None if drift is None else open_database(drift)
+    if seen is not None:
+        places = seen.table.geometry.to_crs(opened.crs)
+        require_same_place(opened, np.stack([places.x, places.y], axis=1), "street objects")
+    with progress("drawing the map"):
+        drawn: Any = None  # a map of folium, which the command line does not know
+        if ambiguity:
+            drawn = ambiguity_map(opened, identifiability=told)
+        elif told is not None:
+            drawn = identifiability_map(told)
+        elif results is not None:
+            drawn = evaluation_map(results, opened)
+        elif drift is not None and newer is not None:
+            before, after = _objects_of_both(database, drift)
+            drawn = drift_map(opened, newer, objects_before=before, objects_after=after)
+        if seen is not None:
+            drawn = objects_map(seen, database=opened if drawn is None else None, map_=drawn)
+        draw_ground(drawn, database, opened, buildings=buildings, streets=streets)
+        offline = save_map(drawn, out)
+    typer.echo(f"map: {out}")
+    tell_if_online(offline)
+
+
+def _objects_of_both(
+    before: Path, after: Path
+) -> tuple[StreetObjects | None, StreetObjects | None]:
+    """Return the street objects of two databases; tell where those of one are not at hand."""
+    old, new = stored_objects(before), stored_objects(after)
+    if old is None or new is None:
+        remark("the street objects of both are not at hand, so only cells are drawn")
+        return None, None
+    return old, new

@@ -1,0 +1,240 @@
+"""What the commands by likelihood share: their options, and what they make of them."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from semsig_gis.cli.app import numbers
+from semsig_gis.cli.console import progress, remark
+from semsig_gis.core.errors import CrsError, DatabaseError, InputError
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.typing import NDArray
+
+    from semsig_gis.core.signature import Signature
+    from semsig_gis.database.database import SignatureDatabase
+    from semsig_gis.database.store import ObjectStore
+    from semsig_gis.likelihood.index import LikelihoodIndex
+    from semsig_gis.likelihood.noise.model import Noise
+    from semsig_gis.likelihood.result import Location
+    from semsig_gis.likelihood.route import Leg
+
+EXPLAINED = 3
+"""How many candidates are explained."""
+
+NoiseName = Annotated[
+    str,
+    typer.Option(
+        "--noise",
+        help="With likelihood, how the detector fails: light, medium, strong, generic (which of "
+        "them is not known), or a file such as `semsig learn` writes.",
+    ),
+]
+Heading = Annotated[
+    str,
+    typer.Option(
+        "--heading",
+        help="With likelihood: known, unknown, or by how many degrees the north of the query may "
+        "be off (standard deviation).",
+    ),
+]
+OnGrid = Annotated[
+    bool,
+    typer.Option(
+        "--on-grid",
+        help="With likelihood: the query is from the very middle of a cell, as in the paper's "
+        "experiment, not from anywhere in it.",
+    ),
+]
+Refine = Annotated[
+    bool | None,
+    typer.Option(
+        "--refine/--no-refine",
+        help="With likelihood: look for the place between the middles of the cells, too; by "
+        "default where the street objects are there and the query has bearings.",
+        show_default=False,
+    ),
+]
+Objects = Annotated[
+    Path | None,
+    typer.Option(
+        "--objects",
+        help="With likelihood, the street objects: a file that `semsig load` wrote, or an object "
+        "store; that beside the database by default.",
+    ),
+]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Locator:
+    """A database and a noise model, ready to be asked."""
+
+    index: LikelihoodIndex
+    options: dict[str, Any]
+    lenient: bool
+    """Whether what has no bearings is answered without being refined."""
+
+    @property
+    def database(self) -> SignatureDatabase:
+        """The cells that are searched."""
+        return self.index.database
+
+    def locate(self, query: Signature) -> Location:
+        """Answer one query."""
+        from semsig_gis.likelihood.locate import locate
+
+        return locate(self.index, query, **self._options_for([query]))
+
+    def route(self, queries: Sequence[Signature], legs: Sequence[Leg]) -> tuple[Location, ...]:
+        """Answer the queries of a route, each with what the others tell."""
+        from semsig_gis.likelihood.locate import locate_route
+
+        return locate_route(self.index, queries, legs, **self._options_for(queries))
+
+    def _options_for(self, queries: Sequence[Signature]) -> dict[str, Any]:
+        blind = any(len(query) and query.bearings is None for query in queries)
+        return self.options | ({"refined": False} if self.lenient and blind else {})
+
+
+def locator(
+    path: Path,
+    opened: SignatureDatabase,
+    *,
+    noise: str,
+    heading: str,
+    on_grid: bool,
+    objects: Path | None,
+    refine: bool | None,
+    explain: bool = False,
+    rule: Path | None = None,
+    top: int = 10,
+    known: dict[str, Any] | None = None,
+) -> Locator:
+    """Return what answers the queries of a command."""
+    from semsig_gis.likelihood.answer_rule import open_rule
+    from semsig_gis.likelihood.locate import DEFAULT_RULE
+    from semsig_gis.likelihood.refine import cell_noise
+
+    if on_grid and refine:
+        msg = "--on-grid and --refine were given; a place on the grid is not to be refined, so "
+        msg += "leave out one of them."
+        raise InputError(msg)
+    wanted = not on_grid if refine is None else refine
+    if objects is not None and not (wanted or explain):
+        given = "--on-grid" if on_grid else "--no-refine"
+        msg = f"--objects and {given} were given, so that nothing looks at them; leave out one."
+        raise InputError(msg)
+    options: dict[str, Any] = {
+        "north_sigma": north_sigma(heading),
+        "rule": DEFAULT_RULE if rule is None else open_rule(rule),
+        "top": top,
+        "refined": False,
+        "explained": EXPLAINED if explain else 0,
+    }
+    model = read_noise(noise)
+    if not on_grid:
+        model = cell_noise(model, opened.grid.step)
+    if known is not None:
+        options["log_prior"] = _prior(opened, **known)
+    if wanted or explain:
+        store = object_store(path, opened, objects, needed=bool(refine))
+        options |= {"store": store, "refined": wanted and store is not None}
+    index = prepared_index(path, opened, model)
+    return Locator(index=index, options=options, lenient=refine is None)
+
+
+def prepared_index(path: Path, opened: SignatureDatabase, model: Noise) -> LikelihoodIndex:
+    """Return the likelihood index beside a database; it is built where it is not there."""
+    from semsig_gis.likelihood.index_file import index_path, ready_index
+
+    with progress("preparing the likelihood index") as advance:
+        return ready_index(opened, model, index_path(path, model), note=remark, progress=advance)
+
+
+def read_noise(noise: str) -> Noise:
+    """Return a noise model by its name or file."""
+    from semsig_gis.likelihood.noise.model import NOISES, named_noise, open_noise
+
+    return open_noise(noise) if noise not in NOISES and Path(noise).suffix else named_noise(noise)
+
+
+def object_store(
+    path: Path, opened: SignatureDatabase, objects: Path | None, *, needed: bool
+) -> ObjectStore | None:
+    """Return the street objects of a database; None where there are none, unless needed."""
+    from semsig_gis.database.store import ObjectStore, open_store
+    from semsig_gis.objects.table import open_objects
+
+    if objects is not None and not objects.is_dir():
+        store = ObjectStore.of(open_objects(objects))
+        if store.objects.crs != opened.crs:
+            msg = (
+                f"{objects} is in {store.objects.crs.to_string()} and the database in "
+                f"{opened.crs.to_string()}; give the objects that it was built from."
+            )
+            raise CrsError(msg)
+        return store
+    try:
+        store = open_store(path, objects)
+    except DatabaseError as error:
+        if needed or objects is not None:
+            raise
+        remark(f"the street objects are not at hand, so the cells must do: {error}")
+        return None
+    for note in store.notes:
+        remark(note)
+    return store
+
+
+def north_sigma(heading: str) -> float:
+    """Return the deviation of north that an option says."""
+    if heading in {"known", "unknown"}:
+        return 0.0 if heading == "known" else math.inf
+    try:
+        sigma = float(heading)
+    except ValueError:
+        sigma = -1.0
+    if not sigma >= 0:
+        msg = f"--heading was given as {heading!r}; give known, unknown, or degrees from 0 up."
+        raise InputError(msg)
+    return sigma
+
+
+def _prior(
+    opened: SignatureDatabase,
+    *,
+    near: str | None,
+    area: Path | None,
+    popularity: Path | None,
+    require: str | None,
+) -> NDArray[Any] | None:
+    """Return the log-prior that the options ask for."""
+    import numpy as np
+
+    from semsig_gis.database.requirement import PatternIndex, Requirement
+    from semsig_gis.likelihood.priors import area_prior, position_prior, raster_prior, weight_prior
+    from semsig_gis.objects.surroundings import read_area
+
+    parts = []
+    if near is not None:
+        place = numbers(near, "--near")
+        if len(place) != 3:  # noqa: PLR2004 - x, y and sigma
+            msg = f"--near was given as {near!r}; give X,Y,SIGMA in metres."
+            raise InputError(msg)
+        parts.append(position_prior(opened, (place[0], place[1]), sigma=place[2]))
+    if area is not None:
+        parts.append(area_prior(opened, read_area(area, crs=opened.crs)))
+    if popularity is not None:
+        parts.append(raster_prior(opened, popularity))
+    if require is not None:
+        wanted = Requirement.parse(require, opened.taxonomy)
+        met = PatternIndex.build(opened.type_sequences).meeting(wanted)
+        parts.append(weight_prior(opened, met.astype(np.float64)))
+    return None if not parts else np.sum(parts, axis=0)

@@ -1,0 +1,1 @@
+"""Words that every step shares: errors, geometry, grid, taxonomy, signatures, R-trees."""

@@ -1,0 +1,48 @@
+"""The errors that the package raises on purpose, all children of `SemsigError`."""
+
+from __future__ import annotations
+
+import difflib
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+
+
+class SemsigError(Exception):
+    """Root of the package's errors: the message is one plain sentence for the user."""
+
+
+class InputError(SemsigError, ValueError):
+    """A value that the caller gave cannot be used."""
+
+
+class UnknownNameError(SemsigError, LookupError):
+    """A name (class, symbol, layer, method...) is not in the list it was looked up in."""
+
+
+class CatalogError(SemsigError, ValueError):
+    """A catalogue or taxonomy file is wrong, or does not fit the data it describes."""
+
+
+class SourceError(SemsigError, RuntimeError):
+    """A file of source data cannot be read."""
+
+
+class CrsError(SemsigError, ValueError):
+    """A coordinate reference system is missing or cannot be used."""
+
+
+class EmptyResultError(SemsigError, ValueError):
+    """A step would have produced nothing."""
+
+
+class DatabaseError(SemsigError, RuntimeError):
+    """A file that the package wrote is damaged or does not fit the request."""
+
+
+def nearest_name(name: str, known: Iterable[str]) -> str:
+    """Return ``"; the nearest is 'x'"`` for a misspelt name, or nothing where no name is near."""
+    lowered = {candidate.lower(): candidate for candidate in known}
+    close = difflib.get_close_matches(name.lower(), lowered, n=1, cutoff=0.5)
+    return f"; the nearest is {lowered[close[0]]!r}" if close else ""

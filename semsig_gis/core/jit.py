@@ -1,0 +1,30 @@
+"""How number loops become machine code; the home of numba.
+
+Importing this module takes a third of a second. Modules of kernels import it; whoever calls a
+kernel imports its module when the first one is needed.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, ParamSpec, TypeVar
+
+import numba
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+_P = ParamSpec("_P")
+_R = TypeVar("_R")
+
+
+def compiled(function: Callable[_P, _R]) -> Callable[_P, _R]:
+    """Compile loops over numbers and arrays to machine code that runs without the interpreter lock.
+
+    The function takes no keywords and is compiled at its first call. The code is kept for later
+    processes, beside the module or else in the user's cache folder; where neither can be written,
+    it lives as long as the process.
+    """
+    try:
+        return numba.njit(cache=True, nogil=True, error_model="numpy")(function)
+    except RuntimeError:  # no folder for the code can be written
+        return numba.njit(nogil=True, error_model="numpy")(function)

@@ -1,0 +1,238 @@
+"""Semantic signatures: the clockwise sequence of object types and bearings at one viewpoint."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from semsig_gis.core.errors import InputError
+from semsig_gis.core.geometry import FULL_TURN, wrap_degrees
+from semsig_gis.core.taxonomy import MAX_RANGE_M
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.typing import ArrayLike, NDArray
+
+    from semsig_gis.core.taxonomy import Taxonomy
+
+
+MAX_LEVELS = 255
+
+
+@dataclass(frozen=True, slots=True)
+class SignatureSpec:
+    """How a signature is made.
+
+    Parameters
+    ----------
+    radius : float, default 30
+        Visibility range R in metres, above 0 and at most 6000.
+    levels : int, default 16
+        Number Q of angle levels, 1 to 255.
+
+    Raises
+    ------
+    InputError
+        If a value is out of its range.
+
+    Examples
+    --------
+    >>> SignatureSpec().levels
+    16
+    """
+
+    radius: float = 30.0
+    levels: int = 16
+
+    def __post_init__(self) -> None:  # noqa: D105
+        if not (math.isfinite(self.radius) and 0 < self.radius <= MAX_RANGE_M):
+            msg = (
+                f"visibility range is {self.radius} m; "
+                f"give a number of metres above 0 and up to {MAX_RANGE_M:.0f}."
+            )
+            raise InputError(msg)
+        if self.levels not in range(1, MAX_LEVELS + 1):
+            msg = f"{self.levels} angle levels were asked for; give a whole number from 1 to 255."
+            raise InputError(msg)
+
+
+def quantize(bearings: ArrayLike, levels: int) -> NDArray[np.uint8]:
+    """Return the angle level of bearings in [0, 360): ``floor(bearing / (360 / levels))``.
+
+    There are 1 to 255 levels; the paper takes Q = 16.
+    """
+    scaled = np.floor(np.asarray(bearings, dtype=np.float64) * levels / FULL_TURN)
+    return np.minimum(scaled, levels - 1).astype(np.uint8)
+
+
+@dataclass(frozen=True, eq=False)
+class Signature:
+    """One signature: of a cell, or a query.
+
+    Parameters
+    ----------
+    codes : ndarray of uint8, shape (n,), or None
+        Class codes, clockwise from north; None where the types are unknown.
+    bearings : ndarray of float64, shape (n,), or None
+        Degrees clockwise from north in [0, 360); None where the bearings are unknown.
+
+    Raises
+    ------
+    InputError
+        If neither part is given, the parts differ in length, or a bearing is out of range.
+
+    Examples
+    --------
+    >>> len(Signature(np.array([3, 3], np.uint8), None))
+    2
+    """
+
+    codes: NDArray[np.uint8] | None
+    bearings: NDArray[np.float64] | None
+
+    def __post_init__(self) -> None:  # noqa: D105
+        if self.codes is None and self.bearings is None:
+            msg = "a signature needs types, bearings or both; give at least one of them."
+            raise InputError(msg)
+        if self.codes is not None:
+            object.__setattr__(self, "codes", np.asarray(self.codes, dtype=np.uint8))
+        if self.bearings is not None:
+            bearings = np.asarray(self.bearings, dtype=np.float64)
+            # Others would get a wrong angle level without an error.
+            wrong = bearings[~((bearings >= 0.0) & (bearings < FULL_TURN))]
+            if len(wrong):
+                msg = f"bearing {wrong[0]:g} is not in [0, 360); wrap bearings onto one turn first."
+                raise InputError(msg)
+            object.__setattr__(self, "bearings", bearings)
+        parts = [part for part in (self.codes, self.bearings) if part is not None]
+        if any(part.ndim != 1 for part in parts):
+            msg = (
+                "a signature is one row of types and one of bearings; give lists of one dimension."
+            )
+            raise InputError(msg)
+        if (
+            self.codes is not None
+            and self.bearings is not None
+            and len(self.codes) != len(self.bearings)
+        ):
+            msg = (
+                f"{len(self.codes)} types and {len(self.bearings)} bearings were given; "
+                "give one bearing for each type, or leave one of the two out."
+            )
+            raise InputError(msg)
+
+    def __len__(self) -> int:  # noqa: D105
+        part = self.codes if self.codes is not None else self.bearings
+        return 0 if part is None else len(part)
+
+    def to_dict(self, taxonomy: Taxonomy) -> dict[str, Any]:
+        """Return the signature as plain values that JSON can hold.
+
+        Parameters
+        ----------
+        taxonomy : Taxonomy
+            Classes of the codes.
+
+        Returns
+        -------
+        dict
+            ``types`` (symbols) and ``bearings`` (degrees), None where unknown, and ``length``.
+
+        Examples
+        --------
+        >>> from semsig_gis.sources.catalog import paper_taxonomy
+        >>> Signature(np.array([3, 1], np.uint8), None).to_dict(paper_taxonomy())
+        {'types': 'DB', 'bearings': None, 'length': 2}
+        """
+        return {
+            "types": None if self.codes is None else taxonomy.decode(self.codes),
+            "bearings": None if self.bearings is None else self.bearings.tolist(),
+            "length": len(self),
+        }
+
+    def levels(self, levels: int) -> NDArray[np.uint8]:
+        """Return the angle levels.
+
+        Parameters
+        ----------
+        levels : int
+            Number Q of levels.
+
+        Returns
+        -------
+        ndarray of uint8, shape (n,)
+            Level of each bearing.
+
+        Raises
+        ------
+        InputError
+            If the bearings are unknown.
+        """
+        if self.bearings is None:
+            msg = "the query has no bearings; give them, or use a method on types."
+            raise InputError(msg)
+        return quantize(self.bearings, levels)
+
+    @classmethod
+    def parse(
+        cls,
+        types: str | None,
+        bearings: Sequence[float] | NDArray[np.float64] | None = None,
+        *,
+        taxonomy: Taxonomy,
+    ) -> Signature:
+        """Make a query from what a person or a detector says.
+
+        Parameters
+        ----------
+        types : str or None
+            Symbols such as ``"DDBL"``, clockwise from north where no bearings are given.
+        bearings : sequence of float, optional
+            Degrees clockwise from north, -360 to 360, in any order, one for each type.
+        taxonomy : Taxonomy
+            Classes that the symbols belong to.
+
+        Returns
+        -------
+        Signature
+            The query, sorted clockwise from north.
+
+        Raises
+        ------
+        UnknownNameError
+            If a symbol belongs to no class.
+        InputError
+            If nothing is given, the lengths differ, or a bearing is not a number or out of range.
+
+        Examples
+        --------
+        >>> from semsig_gis.sources.catalog import paper_taxonomy
+        >>> query = Signature.parse("DB", [200, -10], taxonomy=paper_taxonomy())
+        >>> query.codes.tolist(), query.bearings.tolist()
+        ([3, 1], [200.0, 350.0])
+        """
+        codes = None if types is None else taxonomy.encode(types)
+        if types == "" or (bearings is not None and len(bearings) == 0):
+            msg = "a query without objects was given; give one symbol or bearing an object."
+            raise InputError(msg)
+        if bearings is None:
+            return cls(codes, None)
+        try:
+            angles = np.asarray(bearings, dtype=np.float64)
+        except (TypeError, ValueError) as error:
+            msg = f"bearings {bearings!r} are not all numbers; give degrees clockwise from north."
+            raise InputError(msg) from error
+        wrong = angles[~(np.abs(angles) <= FULL_TURN)]  # NaN too
+        if len(wrong):
+            msg = (
+                f"bearing {wrong[0]:g} is not usable; give degrees clockwise from north, 0 to 360."
+            )
+            raise InputError(msg)
+        turned = wrap_degrees(angles)
+        query = cls(codes, turned)
+        order = np.argsort(turned, kind="stable")
+        return cls(None if query.codes is None else query.codes[order], turned[order])

@@ -1,0 +1,355 @@
+"""The kinds of street object: stable code, one-character symbol and name."""
+
+from __future__ import annotations
+
+import functools
+import re
+from dataclasses import asdict, dataclass, replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from semsig_gis.core.errors import CatalogError, UnknownNameError, nearest_name
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Mapping
+
+    from numpy.typing import ArrayLike, NDArray
+
+MAX_CODE = 255
+WILDCARD = 0
+"""The code of an object whose class is not known; no class has it."""
+MAX_RANGE_M = 6000.0
+
+
+@dataclass(frozen=True, slots=True)
+class ObjectClass:
+    """One kind of street object.
+
+    Parameters
+    ----------
+    code : int
+        Stable number, 1 to 255.
+    symbol : str
+        One ASCII letter or digit, which stands for the class in a type sequence.
+    name : str
+        Lower-case identifier such as ``street_light``.
+    title : str
+        Name to show to people.
+    range_m : float, optional
+        From how far an object of the class is seen, in metres; None for the range that holds for
+        all.
+
+    Raises
+    ------
+    CatalogError
+        If the code, the symbol or the name is not of that form, or the range is not above 0.
+
+    Examples
+    --------
+    >>> ObjectClass(3, "D", "street_light", "Street light").symbol
+    'D'
+    """
+
+    code: int
+    symbol: str
+    name: str
+    title: str
+    range_m: float | None = None
+
+    def __post_init__(self) -> None:  # noqa: D105
+        # The type exactly: True is an int to Python, never a code.
+        if type(self.code) is not int or not 1 <= self.code <= MAX_CODE:
+            msg = f"class {self.name!r} has code {self.code!r}; codes are whole numbers 1 to 255."
+            raise CatalogError(msg)
+        if type(self.symbol) is not str or not re.fullmatch(r"[A-Za-z0-9]", self.symbol):
+            msg = (
+                f"class {self.name!r} has symbol {self.symbol!r}; "
+                "a symbol is one ASCII letter or digit."
+            )
+            raise CatalogError(msg)
+        if type(self.name) is not str or not re.fullmatch(r"[a-z][a-z0-9_]*", self.name):
+            msg = (
+                f"class name {self.name!r} is not usable; "
+                "write lower-case letters, digits and underscores."
+            )
+            raise CatalogError(msg)
+        if self.range_m is not None and not 0 < self.range_m <= MAX_RANGE_M:  # false for NaN too
+            msg = (
+                f"class {self.name!r} is seen from {self.range_m!r} m; give a number of metres "
+                f"above 0 and up to {MAX_RANGE_M:.0f}."
+            )
+            raise CatalogError(msg)
+
+
+@dataclass(frozen=True)
+class Taxonomy:
+    """An immutable list of object classes without double codes, symbols or names.
+
+    Parameters
+    ----------
+    classes : tuple of ObjectClass
+        The classes, in any order.
+
+    Raises
+    ------
+    CatalogError
+        If a code, symbol or name stands twice.
+
+    Examples
+    --------
+    >>> lights = Taxonomy((ObjectClass(3, "D", "street_light", "Street light"),))
+    >>> lights.encode("DD").tolist()
+    [3, 3]
+    >>> lights.decode([3, 3])
+    'DD'
+    """
+
+    classes: tuple[ObjectClass, ...]
+
+    def __post_init__(self) -> None:  # noqa: D105
+        for attribute in ("code", "symbol", "name"):
+            seen: dict[object, str] = {}
+            for item in self.classes:
+                value = getattr(item, attribute)
+                if value in seen:
+                    msg = (
+                        f"{attribute} {value!r} is given to both {seen[value]!r} and "
+                        f"{item.name!r}; give each class a {attribute} of its own."
+                    )
+                    raise CatalogError(msg)
+                seen[value] = item.name
+
+    @classmethod
+    def from_list(cls, items: Iterable[Mapping[str, Any]]) -> Taxonomy:
+        """Make a taxonomy from plain mappings, the inverse of `to_list`.
+
+        Parameters
+        ----------
+        items : iterable of mapping
+            Each with ``code``, ``symbol``, ``name`` and ``title``, and ``range_m`` where the
+            class has a range of its own.
+
+        Returns
+        -------
+        Taxonomy
+            The classes, checked.
+        """
+        return cls(tuple(ObjectClass(**item) for item in items))
+
+    def to_list(self) -> list[dict[str, Any]]:
+        """Return the classes as plain mappings, ready for JSON.
+
+        Returns
+        -------
+        list of dict
+            One mapping a class.
+        """
+        return [
+            {key: value for key, value in asdict(item).items() if value is not None}
+            for item in self.classes
+        ]
+
+    def extended(self, classes: Iterable[ObjectClass]) -> Taxonomy:
+        """Return a taxonomy with further classes.
+
+        Parameters
+        ----------
+        classes : iterable of ObjectClass
+            Classes with codes, symbols and names that are still free.
+
+        Returns
+        -------
+        Taxonomy
+            This taxonomy's classes, then the new ones.
+
+        Raises
+        ------
+        CatalogError
+            If a code, symbol or name is taken.
+        """
+        return Taxonomy((*self.classes, *classes))
+
+    def with_ranges(self, ranges: Mapping[str, float]) -> Taxonomy:
+        """Return a taxonomy in which some classes are seen from another distance.
+
+        Parameters
+        ----------
+        ranges : mapping of str to float
+            Names of classes, and from how far each is seen in metres.
+
+        Returns
+        -------
+        Taxonomy
+            The same classes; those that are not named keep the range they have, if any.
+
+        Raises
+        ------
+        UnknownNameError
+            If there is no class of a name; the nearest is offered.
+        CatalogError
+            If a range is not above 0, or is too large.
+
+        Examples
+        --------
+        >>> stops = Taxonomy((ObjectClass(11, "M", "bus_stop", "Bus stop"),))
+        >>> stops.with_ranges({"bus_stop": 50.0}).ranges(30.0)[11]
+        np.float64(50.0)
+        """
+        for name in ranges:
+            self.by_name(name)
+        return Taxonomy(
+            tuple(
+                replace(item, range_m=float(ranges[item.name])) if item.name in ranges else item
+                for item in self.classes
+            )
+        )
+
+    def by_name(self, name: str) -> ObjectClass:
+        """Return the class of that name.
+
+        Parameters
+        ----------
+        name : str
+            Identifier of the class.
+
+        Returns
+        -------
+        ObjectClass
+            The class.
+
+        Raises
+        ------
+        UnknownNameError
+            If there is none; the nearest name is offered.
+        """
+        for item in self.classes:
+            if item.name == name:
+                return item
+        known = [item.name for item in self.classes]
+        msg = (
+            f"class {name!r} is unknown{nearest_name(name, known)}; "
+            f"the classes are {', '.join(known)}."
+        )
+        raise UnknownNameError(msg)
+
+    def by_code(self, code: int) -> ObjectClass:
+        """Return the class of that code.
+
+        Parameters
+        ----------
+        code : int
+            Code of the class.
+
+        Returns
+        -------
+        ObjectClass
+            The class.
+
+        Raises
+        ------
+        UnknownNameError
+            If there is none.
+        """
+        for item in self.classes:
+            if item.code == code:
+                return item
+        msg = f"class code {code} is unknown; the codes are {[c.code for c in self.classes]}."
+        raise UnknownNameError(msg)
+
+    def by_symbol(self, symbol: str) -> ObjectClass:
+        """Return the class of that symbol.
+
+        Parameters
+        ----------
+        symbol : str
+            One character.
+
+        Returns
+        -------
+        ObjectClass
+            The class.
+
+        Raises
+        ------
+        UnknownNameError
+            If there is none.
+        """
+        for item in self.classes:
+            if item.symbol == symbol:
+                return item
+        raise self._unknown_symbol(symbol)
+
+    def encode(self, symbols: str) -> NDArray[np.uint8]:
+        """Turn symbols into class codes.
+
+        Parameters
+        ----------
+        symbols : str
+            A type sequence such as ``"DDBL"``, of n characters; ``?`` is an object of unknown
+            class.
+
+        Returns
+        -------
+        ndarray of uint8, shape (n,)
+            One code a symbol; `WILDCARD` for ``?``.
+
+        Raises
+        ------
+        UnknownNameError
+            If a symbol belongs to no class.
+        """
+        codes = {item.symbol: item.code for item in self.classes}
+        codes["?"] = WILDCARD
+        unknown = next((symbol for symbol in symbols if symbol not in codes), None)
+        if unknown is not None:
+            raise self._unknown_symbol(unknown)
+        return np.fromiter((codes[symbol] for symbol in symbols), np.uint8, count=len(symbols))
+
+    def _unknown_symbol(self, symbol: str) -> UnknownNameError:
+        near = nearest_name(symbol, [item.symbol for item in self.classes])
+        legend = ", ".join(f"{item.symbol} {item.title.lower()}" for item in self.classes)
+        return UnknownNameError(f"symbol {symbol!r} is unknown{near}; the symbols are {legend}.")
+
+    def decode(self, codes: ArrayLike) -> str:
+        """Turn class codes into symbols, the inverse of `encode`.
+
+        Parameters
+        ----------
+        codes : array_like of int, shape (n,)
+            Codes of classes in this taxonomy.
+
+        Returns
+        -------
+        str
+            One symbol a code.
+        """
+        return self.symbol_bytes[np.asarray(codes, dtype=np.uint8)].tobytes().decode("ascii")
+
+    @functools.cached_property
+    def symbol_bytes(self) -> NDArray[np.uint8]:
+        """ASCII value of the symbol of every code, shape (256,); ``?`` where there is no class."""
+        table = np.full(MAX_CODE + 1, ord("?"), dtype=np.uint8)
+        for item in self.classes:
+            table[item.code] = ord(item.symbol)
+        table.setflags(write=False)
+        return table
+
+    def ranges(self, radius: float) -> NDArray[np.float64]:
+        """Return from how far each class is seen.
+
+        Parameters
+        ----------
+        radius : float
+            Visibility range in metres of classes without one of their own.
+
+        Returns
+        -------
+        ndarray of float64, shape (256,)
+            Metres by class code; `radius` where there is no class.
+        """
+        table = np.full(MAX_CODE + 1, float(radius))
+        for item in self.classes:
+            if item.range_m is not None:
+                table[item.code] = item.range_m
+        return table

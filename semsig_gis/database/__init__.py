@@ -1,0 +1,1 @@
+"""What each cell sees: build, tile, save, open, update."""

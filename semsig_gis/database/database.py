@@ -1,0 +1,361 @@
+"""The signature database: the signature of every cell as flat arrays."""
+
+from __future__ import annotations
+
+import functools
+import operator
+from dataclasses import dataclass, replace
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Any, TypeVar
+
+import numpy as np
+from pyproj import CRS
+
+from semsig_gis import __version__
+from semsig_gis.core.errors import DatabaseError, InputError
+from semsig_gis.core.grid import cell_ids
+from semsig_gis.core.signature import Signature, quantize
+from semsig_gis.database.sequences import SequenceTable
+from semsig_gis.database.viewpoints import ViewpointSpec
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Mapping, Sequence
+
+    from numpy.typing import ArrayLike, NDArray
+
+    from semsig_gis.core.grid import GridSpec
+    from semsig_gis.core.signature import SignatureSpec
+    from semsig_gis.core.taxonomy import Taxonomy
+
+_Array = TypeVar("_Array", bound="NDArray[Any]")
+
+# Divisible by 8, 16, 24, 32 and 72, so that the usual angle levels come out exactly. A unit is a
+# hundredth of the noise of a good detector.
+BEARING_UNITS = 7200
+# In the range that is seen furthest; a unit is 12 cm where that is 30 m.
+DISTANCE_UNITS = 255
+LONGEST_VALUE = 80
+
+_MADE: Mapping[str, str] = MappingProxyType(
+    {
+        "crs": "coordinate reference system",
+        "grid": "grid",
+        "spec": "range or angle levels",
+        "viewpoints": "viewpoints",
+        "occlusion": "occlusion",
+    }
+)
+
+
+@dataclass(frozen=True, eq=False)
+class SignatureDatabase:
+    """The signatures of all cells of a city that see at least one object.
+
+    Cell i owns the entries ``offsets[i]:offsets[i + 1]`` of the flat arrays, clockwise from north.
+
+    Parameters
+    ----------
+    columns, rows : ndarray of int32, shape (n,)
+        Cells, ordered by column and row.
+    offsets : ndarray of int64, shape (n + 1,)
+        Where each cell's entries begin.
+    codes : ndarray of uint8, shape (m,)
+        Class code of each object seen.
+    bearing_units : ndarray of uint16, shape (m,)
+        Bearing in 1/20 degree, rounded down.
+    distance_units : ndarray of uint8, shape (m,)
+        Distance in 1/255 of `reach`, rounded.
+    grid : GridSpec
+        The cells.
+    spec : SignatureSpec
+        How the signatures were made.
+    taxonomy : Taxonomy
+        Classes of the codes.
+    crs : pyproj.CRS
+        Metric coordinate reference system.
+    licenses : tuple of str
+        Attribution and licence of each source.
+    version : str
+        Version of the package that built it.
+    viewpoints : ViewpointSpec
+        Which cells were looked from.
+    occlusion : float or None
+        Tolerance in metres with which buildings hide objects (see `database.occlusion`); None
+        where no building did.
+
+    Examples
+    --------
+    >>> from semsig_gis.sources.synthetic.city import CitySpec, synthetic_city
+    >>> from semsig_gis.sources.catalog import paper_taxonomy
+    >>> from semsig_gis.objects.clean import build_objects
+    >>> layers = synthetic_city(CitySpec(size=300.0))
+    >>> objects, _ = build_objects(layers, taxonomy=paper_taxonomy(), crs="EPSG:32631")
+    >>> from semsig_gis.database.build import build_database
+    >>> database = build_database(objects)
+    >>> len(database.types(0)) == int(database.lengths[0])
+    True
+    """
+
+    columns: NDArray[np.int32]
+    rows: NDArray[np.int32]
+    offsets: NDArray[np.int64]
+    codes: NDArray[np.uint8]
+    bearing_units: NDArray[np.uint16]
+    distance_units: NDArray[np.uint8]
+    grid: GridSpec
+    spec: SignatureSpec
+    taxonomy: Taxonomy
+    crs: CRS
+    licenses: tuple[str, ...] = ()
+    version: str = __version__
+    viewpoints: ViewpointSpec = ViewpointSpec()  # noqa: RUF009 - it is frozen
+    occlusion: float | None = None
+
+    def __post_init__(self) -> None:  # noqa: D105
+        for name in ("columns", "rows", "offsets", "codes", "bearing_units", "distance_units"):
+            getattr(self, name).setflags(write=False)
+
+    def __len__(self) -> int:  # noqa: D105
+        return len(self.columns)
+
+    @property
+    def cell_ids(self) -> NDArray[np.int64]:
+        """Number of every cell, ``column * 10**8 + row``, shape (n,)."""
+        return cell_ids(self.columns, self.rows)
+
+    @functools.cached_property
+    def xy(self) -> NDArray[np.float64]:
+        """Viewpoint of every cell in metres, shape (n, 2)."""
+        return _frozen(self.grid.viewpoints(self.columns, self.rows))
+
+    @functools.cached_property
+    def lengths(self) -> NDArray[np.int64]:
+        """Number of objects that every cell sees, shape (n,)."""
+        return _frozen(np.diff(self.offsets))
+
+    @property
+    def bearings(self) -> NDArray[np.float64]:
+        """Bearing of every entry in degrees, to 1/20 degree, shape (m,)."""
+        return self.bearing_units * np.float64(360.0 / BEARING_UNITS)
+
+    @property
+    def reach(self) -> float:
+        """The largest visibility range of any class, in metres."""
+        return float(self.taxonomy.ranges(self.spec.radius).max())
+
+    @property
+    def distances(self) -> NDArray[np.float64]:
+        """Distance of every entry in metres, to 1/255 of `reach`, shape (m,)."""
+        return self.distance_units * np.float64(self.reach / DISTANCE_UNITS)
+
+    @functools.cached_property
+    def levels(self) -> NDArray[np.uint8]:
+        """Angle level of every entry, shape (m,)."""
+        if BEARING_UNITS % self.spec.levels == 0:
+            levels = self.bearing_units // (BEARING_UNITS // self.spec.levels)
+            return _frozen(levels.astype(np.uint8))
+        return _frozen(quantize(self.bearings, self.spec.levels))
+
+    @functools.cached_property
+    def occurrences(self) -> NDArray[np.int64]:
+        """How often each class code occurs over all signatures, shape (256,)."""
+        return _frozen(np.bincount(self.codes, minlength=256))
+
+    @functools.cached_property
+    def present_codes(self) -> NDArray[np.uint8]:
+        """Class codes that occur, ascending."""
+        return _frozen(np.flatnonzero(self.occurrences).astype(np.uint8))
+
+    @functools.cached_property
+    def type_sequences(self) -> SequenceTable:
+        """The distinct type sequences, and which of them every cell has."""
+        return SequenceTable.from_csr(self.codes, self.offsets)
+
+    @functools.cached_property
+    def angle_sequences(self) -> SequenceTable:
+        """The distinct angle-level sequences, and which of them every cell has."""
+        return SequenceTable.from_csr(self.levels, self.offsets)
+
+    @functools.cached_property
+    def type_group_sizes(self) -> NDArray[np.int64]:
+        """For every cell, how many cells have its type sequence, shape (n,)."""
+        return _frozen(self.type_sequences.counts[self.type_sequences.inverse])
+
+    @functools.cached_property
+    def angle_group_sizes(self) -> NDArray[np.int64]:
+        """For every cell, how many cells have its angle-level sequence, shape (n,)."""
+        return _frozen(self.angle_sequences.counts[self.angle_sequences.inverse])
+
+    def cells_at(self, xy: ArrayLike) -> NDArray[np.int64]:
+        """Return the cells in which places lie.
+
+        Parameters
+        ----------
+        xy : array_like, shape (p, 2)
+            Places in metres.
+
+        Returns
+        -------
+        ndarray of int64, shape (p,)
+            Row numbers in the database; -1 where it has no cell there.
+        """
+        ids = cell_ids(*self.grid.cells_at(xy))
+        rows = np.minimum(np.searchsorted(self.cell_ids, ids), len(self) - 1)
+        return np.where(self.cell_ids[rows] == ids, rows, -1)
+
+    def signature(self, cell: int) -> Signature:
+        """Return the signature of one cell.
+
+        Parameters
+        ----------
+        cell : int
+            Row number in the database, 0 to n - 1.
+
+        Returns
+        -------
+        Signature
+            Its class codes and bearings.
+        """
+        part = slice(self.offsets[cell], self.offsets[cell + 1])
+        bearings = self.bearing_units[part] * np.float64(360.0 / BEARING_UNITS)
+        return Signature(self.codes[part], bearings)
+
+    def select(self, cells: slice | NDArray[np.int64] | NDArray[np.bool_]) -> SignatureDatabase:
+        """Return a database of some of the cells.
+
+        Parameters
+        ----------
+        cells : slice or ndarray
+            Row numbers in the database, or True for each cell to keep; their order is kept.
+
+        Returns
+        -------
+        SignatureDatabase
+            Those cells.
+        """
+        chosen = np.arange(len(self))[cells]
+        lengths = self.lengths[chosen]
+        offsets = np.concatenate([[0], np.cumsum(lengths)])
+        entries = np.repeat(self.offsets[chosen] - offsets[:-1], lengths) + np.arange(offsets[-1])
+        return replace(
+            self,
+            columns=self.columns[chosen],
+            rows=self.rows[chosen],
+            offsets=offsets,
+            codes=self.codes[entries],
+            bearing_units=self.bearing_units[entries],
+            distance_units=self.distance_units[entries],
+        )
+
+    def types(self, cell: int) -> str:
+        """Return the type sequence of one cell.
+
+        Parameters
+        ----------
+        cell : int
+            Row number in the database, 0 to n - 1.
+
+        Returns
+        -------
+        str
+            One symbol an object.
+        """
+        return self.taxonomy.decode(self.codes[self.offsets[cell] : self.offsets[cell + 1]])
+
+
+def join_databases(parts: Sequence[SignatureDatabase]) -> SignatureDatabase:
+    """Join databases of different cells that were made in the same way.
+
+    The cells are ordered by column and row, and licences that stand in several parts appear once.
+    Raise DatabaseError if there is no part, the parts differ in how they were made, or they share a
+    cell.
+    """
+    if not parts:
+        msg = "there is no database to join; give at least one."
+        raise DatabaseError(msg)
+    first = parts[0]
+    for part in parts[1:]:
+        require_same(first, part, {**_MADE, "taxonomy": "classes"})
+    ids = np.concatenate([part.cell_ids for part in parts])
+    order = np.argsort(ids, kind="stable")
+    if (np.diff(ids[order]) == 0).any():
+        msg = "two of the databases hold the same cell; join databases of different cells."
+        raise DatabaseError(msg)
+    joined = replace(
+        first,
+        columns=np.concatenate([part.columns for part in parts]),
+        rows=np.concatenate([part.rows for part in parts]),
+        offsets=np.concatenate([[0], np.cumsum(np.concatenate([part.lengths for part in parts]))]),
+        codes=np.concatenate([part.codes for part in parts]),
+        bearing_units=np.concatenate([part.bearing_units for part in parts]),
+        distance_units=np.concatenate([part.distance_units for part in parts]),
+        licenses=tuple(dict.fromkeys(line for part in parts for line in part.licenses)),
+    )
+    return joined if (np.diff(order) == 1).all() else joined.select(order)
+
+
+def require_same(
+    first: SignatureDatabase, other: SignatureDatabase, what: Mapping[str, str] = _MADE
+) -> None:
+    """Raise DatabaseError where two databases were not made in the same way.
+
+    `what` maps the attributes to compare to what they are called; by default all but the classes.
+    """
+    for name, title in what.items():
+        ours, theirs = getattr(first, name), getattr(other, name)
+        if ours != theirs:
+            msg = (
+                f"the databases differ in their {title} ({_brief(ours)} and {_brief(theirs)}); "
+                "build both in the same way."
+            )
+            raise DatabaseError(msg)
+
+
+def require_same_place(database: SignatureDatabase, xy: NDArray[np.float64], what: str) -> None:
+    """Raise InputError if all places, in the CRS of the database, lie elsewhere than the cells.
+
+    Elsewhere is outside of the box of the cells widened by the longest visibility range; an empty
+    array of places is accepted. `what` names the places in the message.
+    """
+    low, high = (
+        database.xy.min(axis=0) - database.reach,
+        database.xy.max(axis=0) + database.reach,
+    )
+    if len(xy) and not ((low <= xy) & (xy <= high)).all(axis=1).any():
+        msg = f"none of the {len(xy):,} {what} is where the cells are; give those of the same city."
+        raise InputError(msg)
+
+
+def rows_of_result(
+    database: SignatureDatabase, ids: ArrayLike, types: Iterable[str], *, what: str
+) -> NDArray[np.int64]:
+    """Return the rows of the cells that a result names, and refuse one of another database.
+
+    Raise InputError if the database lacks one of the cell ids, or if the types seen from a cell are
+    not those of the result. `what` names the kind of result in the message.
+    """
+    wanted = np.asarray(ids, np.int64)
+    rows = np.searchsorted(database.cell_ids, wanted)
+    same = (
+        rows.max(initial=-1) < len(database)
+        and np.array_equal(database.cell_ids[rows], wanted)
+        and all(map(operator.eq, types, map(database.types, rows.tolist())))
+    )
+    if not same:
+        msg = (
+            f"This {what} was not made with this database; give the database that it was made "
+            f"with, or make the {what} again."
+        )
+        raise InputError(msg)
+    return rows
+
+
+def _brief(value: object) -> str:
+    text = value.to_string() if isinstance(value, CRS) else str(value)
+    return text if len(text) <= LONGEST_VALUE else f"{text[: LONGEST_VALUE - 3]}..."
+
+
+def _frozen(array: _Array) -> _Array:
+    """Return an array that cannot be written to."""
+    array.setflags(write=False)
+    return array

@@ -1,0 +1,175 @@
+"""Properties of a database as plain values: the numbers of the paper's Tables 1 and 2, and more."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pandas as pd
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from numpy.typing import NDArray
+
+    from semsig_gis.core.taxonomy import ObjectClass
+    from semsig_gis.database.database import SignatureDatabase
+
+
+def database_summary(
+    database: SignatureDatabase,
+    *,
+    file_bytes: int | None = None,
+    object_counts: Mapping[int, int] | None = None,
+) -> dict[str, Any]:
+    """Return the properties of a database as plain values for JSON.
+
+    Parameters
+    ----------
+    database : SignatureDatabase
+        The database.
+    file_bytes : int, optional
+        Size of its file in bytes, where it has one.
+    object_counts : mapping of int to int, optional
+        How many objects of each class code it was made of, where they are at hand; a code that
+        is not there has none.
+
+    Returns
+    -------
+    dict
+        ``signatures``, ``mean_length``, ``covered_km2``, ``radius_m``, ``step_m``, ``levels``,
+        ``crs``, ``file_mb`` and ``mb_per_km2`` (millions of bytes or None), ``version``,
+        ``licenses``; ``viewpoints``: ``mode``, ``half_width_m`` (of streets, else None) and
+        ``area_km2`` (of the area that they were chosen from, or None); ``occlusion_m``: the
+        tolerance, or None where no building hides anything; ``occurrences``: one dict a class
+        (``code``, ``symbol``, ``name``, ``title``, ``range_m``, ``number``, ``share``,
+        ``objects``: its count or None, ``objects_per_km2``, ``entropy_bits``);
+        ``density_from``: ``"objects"`` or ``"occurrences"``; ``cell_bits``; ``groups``: for
+        ``type``, ``angle`` and ``both`` the statistics of the group sizes as
+        `pandas.Series.describe` gives them (``std`` is the sample's, None for a single group),
+        ``alone``, the share of the cells that share their signature with no other, and
+        ``entropy_bits``; ``largest_type_group``: ``types`` and ``cells``.
+
+    Notes
+    -----
+    Paper, Tables 1 and 2. An occurrence is an object in a signature: an object counts once in
+    every cell that sees it. The covered area is the number n of cells times that of a cell, and
+    MB a km2 are of it.
+
+    Objects a km2 of a class: with `object_counts`, their number by the covered area. Without,
+    occurrences / (n pi R^2), where R is the range of the class: what the mean cell sees by the
+    area that it looks at. Where every cell is a viewpoint and nothing is hidden both estimate the
+    same; occlusion makes the second too small.
+
+    Entropy of a class, in bits: -sum over k of p_k log2 p_k, where p_k is the share of the cells
+    that see exactly k objects of it. It is what counting these objects, without a mistake, tells
+    of the cell that one is in; log2 n (``cell_bits``) would tell the cell. Entropy of groups: the
+    same of the shares of the cells in each group, which is what the whole sequence tells.
+
+    Examples
+    --------
+    >>> from semsig_gis.sources.catalog import paper_taxonomy
+    >>> from semsig_gis.database.build import build_database
+    >>> from semsig_gis.objects.clean import build_objects
+    >>> from semsig_gis.sources.synthetic.city import CitySpec, synthetic_city
+    >>> layers = synthetic_city(CitySpec(size=300.0))
+    >>> objects, _ = build_objects(layers, taxonomy=paper_taxonomy(), crs="EPSG:32631")
+    >>> facts = database_summary(build_database(objects))
+    >>> facts["groups"]["type"]["count"] <= facts["signatures"]
+    True
+    """
+    total = int(database.occurrences.sum())
+    covered = len(database) * database.grid.step**2 / 1e6
+    area = database.viewpoints.area
+    mode = database.viewpoints.mode
+    types, angles = database.type_sequences, database.angle_sequences
+    pairs = types.inverse.astype(np.int64) * len(angles) + angles.inverse
+    both = np.unique(pairs, return_counts=True)[1]
+    largest = int(np.argmax(types.counts))
+    codes = types.values[types.offsets[largest] : types.offsets[largest + 1]]
+    return {
+        "signatures": len(database),
+        "mean_length": float(database.lengths.mean()),
+        "covered_km2": covered,
+        "radius_m": float(database.spec.radius),
+        "step_m": float(database.grid.step),
+        "levels": int(database.spec.levels),
+        "crs": database.crs.to_string(),
+        "file_mb": None if file_bytes is None else file_bytes / 1e6,
+        "mb_per_km2": None if file_bytes is None else file_bytes / 1e6 / covered,
+        "version": database.version,
+        "licenses": list(database.licenses),
+        "viewpoints": {
+            "mode": mode,
+            "half_width_m": float(database.viewpoints.width) if mode == "streets" else None,
+            "area_km2": None if area is None else area.area / 1e6,
+        },
+        "occlusion_m": database.occlusion,
+        "occurrences": [
+            _class_facts(database, item, total=total, object_counts=object_counts)
+            for item in sorted(database.taxonomy.classes, key=lambda item: item.code)
+        ],
+        "density_from": "occurrences" if object_counts is None else "objects",
+        "cell_bits": float(np.log2(len(database))),
+        "groups": {
+            "type": _group_statistics(types.counts),
+            "angle": _group_statistics(angles.counts),
+            "both": _group_statistics(both),
+        },
+        "largest_type_group": {
+            "types": database.taxonomy.decode(codes),
+            "cells": int(types.counts[largest]),
+        },
+    }
+
+
+def _class_facts(
+    database: SignatureDatabase,
+    item: ObjectClass,
+    *,
+    total: int,
+    object_counts: Mapping[int, int] | None,
+) -> dict[str, Any]:
+    """Return what there is to say of one class."""
+    cells = len(database)
+    number = int(database.occurrences[item.code])
+    seen_from = item.range_m or float(database.spec.radius)
+    if object_counts is None:
+        objects, density = None, number / (cells * np.pi * seen_from**2)
+    else:
+        objects = int(object_counts.get(item.code, 0))
+        density = objects / (cells * database.grid.step**2)
+    # No cell of a database is empty, so that every offset begins a cell of its own.
+    seen = np.add.reduceat(database.codes == item.code, database.offsets[:-1], dtype=np.int64)
+    return {
+        "code": item.code,
+        "symbol": item.symbol,
+        "name": item.name,
+        "title": item.title,
+        "range_m": seen_from,
+        "number": number,
+        "share": number / total,
+        "objects": objects,
+        "objects_per_km2": 1e6 * density,
+        "entropy_bits": _entropy(np.bincount(seen)),
+    }
+
+
+def _entropy(sizes: NDArray[np.int64]) -> float:
+    """Return the Shannon entropy of a partition into parts of such sizes, in bits."""
+    shares = sizes[sizes > 0] / sizes.sum()
+    return max(0.0, -float((shares * np.log2(shares)).sum()))
+
+
+def _group_statistics(sizes: NDArray[np.int64]) -> dict[str, float | int | None]:
+    """Return the statistics of group sizes and the share of cells alone in their group."""
+    described = pd.Series(sizes).describe()
+    statistics: dict[str, float | int | None] = {
+        name: int(described[name]) for name in ("count", "min", "max")
+    }
+    for name in ("mean", "std", "25%", "50%", "75%"):
+        value = float(described[name])
+        statistics[name] = None if np.isnan(value) else value
+    statistics["alone"] = int(np.count_nonzero(sizes == 1)) / int(sizes.sum())
+    statistics["entropy_bits"] = _entropy(sizes)
+    return statistics

@@ -1,0 +1,130 @@
+"""What a place must show: cells grouped by the objects they see, whatever their order.
+
+A person often knows a few things for sure, "a bus stop and two trees, and no taxi rank". Cells
+that see the same classes equally often form a group, so such a demand is checked once a group.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Self
+
+import numpy as np
+
+from semsig_gis.core.errors import InputError
+from semsig_gis.core.taxonomy import WILDCARD
+from semsig_gis.database.sequences import SequenceTable
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from semsig_gis.core.taxonomy import Taxonomy
+
+_ANY = "?"
+_COMPARISON = re.compile(r"(\S)\s*(>=|<=|=)\s*(\d+)")
+_AMOUNT = re.compile(r"(\d*)\s*(\S)")
+
+
+@dataclass(frozen=True, slots=True)
+class Requirement:
+    """How many objects of some classes a cell must see.
+
+    Each limit is a class code, or `WILDCARD` for all objects together, with the fewest and the
+    most.
+    """
+
+    limits: tuple[tuple[int, int, float], ...]
+
+    @classmethod
+    def parse(cls, text: str, taxonomy: Taxonomy) -> Self:
+        """Read a requirement from text, such as ``M,2B,D=0,?<=10``.
+
+        Parts stand between commas: ``M`` for at least one bus stop, ``2B`` for at least two trees,
+        or ``B>=2``, ``B<=5``, ``B=3``. The symbol ``?`` counts all objects. A symbol may stand in
+        several parts. Raise InputError if a part does not have that form or two parts exclude each
+        other, and UnknownNameError if a symbol is not in the taxonomy.
+        """
+        limits: dict[int, tuple[int, float]] = {}
+        for part in map(str.strip, text.split(",")):
+            symbol, least, most = _read(part, text)
+            code = WILDCARD if symbol == _ANY else taxonomy.by_symbol(symbol).code
+            low, high = limits.get(code, (0, math.inf))
+            limits[code] = low, high = max(low, least), min(high, most)
+            if low > high:
+                msg = (
+                    f"requirement {text!r} wants at least {low} and at most {high} of "
+                    f"{symbol!r}; give numbers that a cell can meet."
+                )
+                raise InputError(msg)
+        return cls(tuple((code, low, high) for code, (low, high) in limits.items()))
+
+
+@dataclass(frozen=True, eq=False)
+class PatternIndex:
+    """Cells grouped by how often they see each class.
+
+    `sequences` has the distinct type sequences of the cells. `groups` has the same sequences as
+    rows, each with its objects in the order of their codes, so that its distinct sequences are the
+    groups.
+    """
+
+    sequences: SequenceTable
+    groups: SequenceTable
+
+    @classmethod
+    def build(cls, sequences: SequenceTable) -> Self:
+        """Group the cells of a table such as `SignatureDatabase.type_sequences`."""
+        counts = sequences.histogram
+        values = np.tile(np.arange(counts.shape[1], dtype=np.uint8), len(sequences))
+        ordered = np.repeat(values, counts.ravel())
+        return cls(sequences, SequenceTable.from_csr(ordered, sequences.offsets))
+
+    def __len__(self) -> int:
+        """Return the number of groups."""
+        return len(self.groups)
+
+    @property
+    def cells(self) -> NDArray[np.int64]:
+        """How many cells each group has, shape (g,)."""
+        sizes = np.zeros(len(self), np.int64)
+        np.add.at(sizes, self.groups.inverse, self.sequences.counts)
+        return sizes
+
+    def sequences_meeting(self, requirement: Requirement) -> NDArray[np.bool_]:
+        """Tell which distinct type sequences meet a requirement.
+
+        The result, shape (d,), is what `matching.nearest.nearest` takes.
+        """
+        counts = self.groups.histogram
+        met = np.ones(len(self), np.bool_)
+        for code, least, most in requirement.limits:
+            if code == WILDCARD:
+                seen = self.groups.lengths
+            elif code < counts.shape[1]:
+                seen = counts[:, code].astype(np.int64)
+            else:
+                seen = np.zeros(len(self), np.int64)
+            met &= (seen >= least) & (seen <= most)
+        return np.asarray(met[self.groups.inverse])
+
+    def meeting(self, requirement: Requirement) -> NDArray[np.bool_]:
+        """Tell which cells meet a requirement, shape (n,)."""
+        return np.asarray(self.sequences_meeting(requirement)[self.sequences.inverse])
+
+
+def _read(part: str, text: str) -> tuple[str, int, float]:
+    """Return the symbol, the fewest and the most of one part of a requirement."""
+    if found := _COMPARISON.fullmatch(part):
+        symbol, sign, digits = found.groups()
+        number = int(digits)
+        return symbol, 0 if sign == "<=" else number, math.inf if sign == ">=" else number
+    if found := _AMOUNT.fullmatch(part):
+        digits, symbol = found.groups()
+        return symbol, int(digits or 1), math.inf
+    msg = (
+        f"{part!r} in requirement {text!r} cannot be read; give parts such as 'M', '2B', 'B>=2', "
+        "'B<=5' or 'B=3' with commas between them, '?' for all objects."
+    )
+    raise InputError(msg)

@@ -1,0 +1,365 @@
+"""The object store: the street objects of a database and their R-tree, kept beside it.
+
+A signature database does not say which objects its cells see, where these stand exactly, or what
+they are called in their source. The store does: ``city.objects`` beside ``city.parquet``. An
+update needs it, and so does whatever looks at objects from a place off the grid.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import geopandas as gpd
+import pyarrow as pa
+
+from semsig_gis import __version__
+from semsig_gis.core.crs import HALF_WIDTH, LICENSES
+from semsig_gis.core.errors import CrsError, DatabaseError, InputError
+from semsig_gis.core.rtree import INDEX_FILES, StoredIndex
+from semsig_gis.database.file import built_digest, save_database
+from semsig_gis.database.occlusion import Footprints, buildings_near
+from semsig_gis.database.parts import digest
+from semsig_gis.objects.surroundings import licenses_of
+from semsig_gis.objects.table import open_objects, save_objects
+from semsig_gis.storage.whole import move_folder, whole_file, whole_folder
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+    from semsig_gis.database.database import SignatureDatabase
+    from semsig_gis.objects.table import StreetObjects
+
+KIND = "object store"
+# Raised whenever a store of before would be read wrongly.
+FORMAT = 1
+SUFFIX = ".objects"
+MANIFEST = "manifest.json"
+OBJECTS = "objects.parquet"
+FOOTPRINTS = "footprints.parquet"
+STREETS = "streets.parquet"
+# What a new store is called until its database is in place.
+NEXT = ".next"
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class ObjectStore:
+    """What a signature database was built from.
+
+    Parameters
+    ----------
+    objects : StreetObjects
+        The objects.
+    index : StoredIndex
+        R-tree over them, in the same order.
+    footprints : GeoDataFrame, optional
+        The buildings, in the CRS of the objects, where the database was built with buildings.
+    streets : GeoDataFrame, optional
+        The centre lines, in the CRS of the objects, where it was built with streets.
+    notes : tuple of str
+        What was wrong with the files and has been put right.
+
+    Examples
+    --------
+    >>> from semsig_gis.sources.synthetic.city import CitySpec, synthetic_city
+    >>> from semsig_gis.sources.catalog import paper_taxonomy
+    >>> from semsig_gis.objects.clean import build_objects
+    >>> layers = synthetic_city(CitySpec(size=300.0))
+    >>> objects, _ = build_objects(layers, taxonomy=paper_taxonomy(), crs="EPSG:32631")
+    >>> store = ObjectStore(objects=objects, index=StoredIndex.pack(objects.xy))
+    >>> _, near = store.index.pairs_within(objects.xy[:1], radius=0.0)
+    >>> near.tolist()
+    [0]
+    """
+
+    objects: StreetObjects
+    index: StoredIndex
+    footprints: gpd.GeoDataFrame | None = None
+    streets: gpd.GeoDataFrame | None = None
+    notes: tuple[str, ...] = ()
+
+    @classmethod
+    def of(
+        cls,
+        objects: StreetObjects,
+        *,
+        footprints: gpd.GeoDataFrame | None = None,
+        streets: gpd.GeoDataFrame | None = None,
+    ) -> ObjectStore:
+        """Make the store of a database that was built from these.
+
+        Parameters
+        ----------
+        objects : StreetObjects
+            The objects.
+        footprints : GeoDataFrame, optional
+            The buildings, in any CRS.
+        streets : GeoDataFrame, optional
+            The centre lines, in any CRS, with a column ``half_width`` or without.
+
+        Returns
+        -------
+        ObjectStore
+            The store, with a new R-tree.
+
+        Raises
+        ------
+        CrsError
+            If the buildings or streets have no CRS.
+        """
+        return cls(
+            objects=objects,
+            index=StoredIndex.pack(objects.xy),
+            footprints=None if footprints is None else _surroundings(footprints, objects),
+            streets=None if streets is None else _surroundings(streets, objects),
+        )
+
+    def buildings_around(
+        self, places: NDArray[np.float64], *, distance: float
+    ) -> Footprints | None:
+        """Return the buildings around some places, ready to be looked at.
+
+        Parameters
+        ----------
+        places : ndarray of float64, shape (p, 2)
+            Places in metres.
+        distance : float
+            Metres around each of them.
+
+        Returns
+        -------
+        Footprints or None
+            The buildings with all that they are joined to; None where there are none.
+        """
+        if self.footprints is None:
+            return None
+        polygons = self.footprints.geometry.to_numpy()
+        near = buildings_near(polygons, places, distance=distance)
+        return Footprints(polygons[near]) if len(near) else None
+
+
+def _surroundings(table: gpd.GeoDataFrame, objects: StreetObjects) -> gpd.GeoDataFrame:
+    """Return what the building of a database takes of a table, in the CRS of the objects."""
+    if table.crs is None:
+        msg = "buildings or streets have no coordinate reference system; state their crs."
+        raise CrsError(msg)
+    geometry = table.geometry
+    kept = table[~(geometry.isna() | geometry.is_empty)]
+    columns = {HALF_WIDTH: kept[HALF_WIDTH].to_numpy(float)} if HALF_WIDTH in kept else {}
+    taken = gpd.GeoDataFrame(columns, geometry=kept.geometry.to_numpy(), crs=table.crs)
+    taken.attrs[LICENSES] = list(licenses_of(table))
+    return taken.to_crs(objects.crs)
+
+
+def store_path(database: str | Path) -> Path:
+    """Return the folder beside a database file where its object store lies.
+
+    Links are followed. Raise InputError if the name of the database has the ending of a store.
+    """
+    # A link to a database has the store of the database.
+    file = Path(os.path.realpath(database))
+    if file.suffix == SUFFIX:
+        msg = f"{database} is a name for an object store; give a database another ending."
+        raise InputError(msg)
+    return file.with_suffix(SUFFIX)
+
+
+def save_with_store(database: SignatureDatabase, store: ObjectStore, path: str | Path) -> None:
+    """Save a database and the store that belongs to it.
+
+    Parameters
+    ----------
+    database : SignatureDatabase
+        What to save.
+    store : ObjectStore
+        What it was built from.
+    path : str or Path
+        File of the database; the store is put beside it (see `store_path`).
+
+    Raises
+    ------
+    InputError
+        If the files cannot be written; those that were there are unchanged then.
+
+    Notes
+    -----
+    The new store is written whole under another name, then the database is renamed into its
+    place, and at last the store into its own. The store names the digest of its database, so
+    whoever opens the two sees how far an interrupted run came: `open_store` takes the new store
+    as soon as the new database is there, and the old one until then. Any number of programs may
+    read meanwhile; of two that write at once, the later one wins.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> from semsig_gis.database.build import build_database
+    >>> from semsig_gis.sources.synthetic.city import CitySpec, synthetic_city
+    >>> from semsig_gis.sources.catalog import paper_taxonomy
+    >>> from semsig_gis.objects.clean import build_objects
+    >>> layers = synthetic_city(CitySpec(size=300.0))
+    >>> objects, _ = build_objects(layers, taxonomy=paper_taxonomy(), crs="EPSG:32631")
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     file = Path(folder, "city.parquet")
+    ...     save_with_store(build_database(objects), ObjectStore.of(objects), file)
+    ...     len(open_store(file).objects) == len(objects)
+    True
+    """
+    final = store_path(path)
+    _settle(Path(path))  # what waits there may be needed until the new database is in place
+    with whole_file(path) as partial:
+        try:
+            save_database(database, partial)
+        except InputError as error:  # which knows nothing of the place that was asked for
+            raise InputError(str(error).replace(str(partial), str(path))) from error
+        _write(store, _waiting(final), fingerprint=digest(partial))
+    _settle(Path(path))
+
+
+def open_store(database: str | Path, folder: str | Path | None = None) -> ObjectStore:
+    """Open the object store of a database.
+
+    Parameters
+    ----------
+    database : str or Path
+        File of the database.
+    folder : str or Path, optional
+        The store, where it does not lie beside the database.
+
+    Returns
+    -------
+    ObjectStore
+        The store; its notes say so where the R-tree had to be made again.
+
+    Raises
+    ------
+    DatabaseError
+        If there is no database or no store, the store is damaged, or belongs to another database.
+
+    Notes
+    -----
+    What an interrupted `save_with_store` left half done is finished, if the folder can be written
+    to. The files of a store are not changed by reading.
+
+    Examples
+    --------
+    >>> open_store("nowhere.parquet")
+    Traceback (most recent call last):
+    ...
+    semsig_gis.core.errors.DatabaseError: nowhere.parquet does not exist;
+    give a signature database file.
+    """
+    if not os.path.isfile(database):  # noqa: PTH113 - it answers where Path.is_file raises
+        what = "does not exist"
+        if os.path.isdir(database):  # noqa: PTH112
+            what = "is a folder, and only a database in one file has an object store"
+        msg = f"{database} {what}; give a signature database file."
+        raise DatabaseError(msg)
+    return _read(_settle(Path(database)) if folder is None else Path(folder), Path(database))
+
+
+def _belongs(folder: Path, fingerprint: str) -> bool:
+    try:
+        return bool(_manifest(folder)["database"] == fingerprint)
+    except DatabaseError:
+        return False
+
+
+def _manifest(folder: Path) -> dict[str, Any]:
+    path = folder / MANIFEST
+    try:
+        manifest = json.loads(path.read_bytes())
+        if manifest["kind"] != KIND or not isinstance(manifest["files"], dict):
+            raise ValueError(manifest["kind"])  # noqa: TRY301
+        known: bool = manifest["format"] == FORMAT
+        version, _ = manifest["version"], manifest["database"]
+    except (OSError, ValueError, KeyError, TypeError) as error:
+        msg = f"{path} is missing or damaged; build the database again."
+        raise DatabaseError(msg) from error
+    if not known:
+        msg = f"{folder} is of another version of semsig ({version}); build the database again."
+        raise DatabaseError(msg)
+    return dict(manifest)
+
+
+def _read(folder: Path, database: Path) -> ObjectStore:
+    if not os.path.isdir(folder):  # noqa: PTH112 - it answers where Path.is_dir raises
+        msg = f"{database} has no object store ({folder.name} beside it); build the database again."
+        raise DatabaseError(msg)
+    manifest = _manifest(folder)
+    if manifest["database"] != built_digest(database):
+        msg = f"{folder} belongs to another database than {database}; build the database again."
+        raise DatabaseError(msg)
+    files = manifest["files"]
+    damaged = [name for name, wanted in files.items() if not _is_whole(folder / name, wanted)]
+    lost = [name for name in damaged if name not in INDEX_FILES]
+    if lost or OBJECTS not in files:
+        msg = f"{folder / min(lost, default=OBJECTS)} is damaged; build the database again."
+        raise DatabaseError(msg)
+    objects = open_objects(folder / OBJECTS)
+    notes: tuple[str, ...] = ()
+    if damaged or not set(INDEX_FILES) <= set(files):
+        index = StoredIndex.pack(objects.xy)
+        notes = (f"the R-tree in {folder} is damaged; it was made again from the objects",)
+    else:
+        index = StoredIndex.open(folder, objects.xy)
+    return ObjectStore(
+        objects=objects,
+        index=index,
+        footprints=_table(folder / FOOTPRINTS) if FOOTPRINTS in files else None,
+        streets=_table(folder / STREETS) if STREETS in files else None,
+        notes=notes,
+    )
+
+
+def _table(path: Path) -> gpd.GeoDataFrame:
+    try:
+        return gpd.read_parquet(path)
+    except (pa.ArrowException, ValueError, OSError) as error:
+        msg = f"{path} is damaged ({error}); build the database again."
+        raise DatabaseError(msg) from error
+
+
+def _write(store: ObjectStore, folder: Path, *, fingerprint: str) -> None:
+    """Write a whole store of that name, in the place of another."""
+    with whole_folder(folder) as partial:
+        save_objects(store.objects, partial / OBJECTS, keep_order=True)  # as in the R-tree
+        store.index.save(partial)
+        for name, table in ((FOOTPRINTS, store.footprints), (STREETS, store.streets)):
+            if table is not None:
+                table.to_parquet(partial / name, compression="zstd")
+        manifest = {
+            "kind": KIND,
+            "format": FORMAT,
+            "version": __version__,
+            "database": fingerprint,
+            "objects": len(store.objects),
+            "files": {file.name: digest(file) for file in sorted(partial.iterdir())},
+        }
+        (partial / MANIFEST).write_text(json.dumps(manifest, indent=2) + "\n", encoding="utf-8")
+
+
+def _settle(database: Path) -> Path:
+    """Finish what an interrupted run left half done; return where the store is to be read."""
+    final = store_path(database)
+    waiting = _waiting(final)
+    if waiting.exists() and database.exists() and _belongs(waiting, built_digest(database)):
+        try:
+            move_folder(waiting, final)
+        except InputError:  # nothing may be written here, or another program was quicker
+            return waiting if waiting.exists() else final
+    return final
+
+
+def _waiting(final: Path) -> Path:
+    return final.with_name(final.name + NEXT)
+
+
+def _is_whole(path: Path, wanted: str) -> bool:
+    try:
+        return digest(path) == wanted
+    except OSError:
+        return False

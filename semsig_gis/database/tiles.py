@@ -1,0 +1,521 @@
+"""Tiles: building a signature database square by square, each from what lies near it alone."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import math
+import shutil
+from collections import Counter
+from dataclasses import asdict, dataclass, replace
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+import shapely
+from pyproj import CRS
+from pyproj.exceptions import CRSError
+
+from semsig_gis import __version__
+from semsig_gis.core.crs import HALF_WIDTH
+from semsig_gis.core.errors import DatabaseError, EmptyResultError, InputError, SourceError
+from semsig_gis.core.grid import GridSpec, cell_ids, cells_near, split_ids
+from semsig_gis.core.parallel import check_workers, run_tasks
+from semsig_gis.core.signature import SignatureSpec
+from semsig_gis.database.build import build_cells
+from semsig_gis.database.file import save_database
+from semsig_gis.database.occlusion import TOLERANCE_M
+from semsig_gis.database.parts import digest, part_name
+from semsig_gis.database.tile_run import (
+    INPUTS,
+    abandon,
+    describe,
+    finished_tiles,
+    mark_empty,
+    publish,
+    start,
+)
+from semsig_gis.database.viewpoints import ViewpointSpec, choose_viewpoints
+from semsig_gis.objects.surroundings import licenses_of, read_surroundings, save_surroundings
+from semsig_gis.objects.table import open_objects, save_objects
+from semsig_gis.storage.geoparquet import NOWHERE, each_bounds
+
+if TYPE_CHECKING:
+    import geopandas as gpd
+
+    from semsig_gis.database.database import SignatureDatabase
+    from semsig_gis.database.parts import Part
+    from semsig_gis.objects.table import StreetObjects
+
+    Tile = tuple[int, int]
+    Box = tuple[float, float, float, float]
+    Role = Literal["buildings", "streets"]
+    from collections.abc import Callable
+
+    from semsig_gis.database.parts import Manifest
+
+
+# Beyond the range: for rounding, and for walls as near as occlusion.GAP_M and TOLERANCE_M look.
+MARGIN_M = 2.0
+
+
+# Tiles that one object may touch in a row, and tiles in all.
+MOST_REACHED = 16
+
+
+MOST_TILES = 1_000_000
+
+
+@dataclass(frozen=True, slots=True)
+class TileSpec:
+    """How a database is cut into tiles.
+
+    Parameters
+    ----------
+    side : float, default 2000
+        Side of a tile in metres; it is rounded to whole cells, at least one.
+
+    Raises
+    ------
+    InputError
+        If the side is not a number of metres above 0.
+
+    Examples
+    --------
+    >>> TileSpec(side=104.0).cells(GridSpec(step=10.0))
+    10
+    """
+
+    side: float = 2000.0
+
+    def __post_init__(self) -> None:  # noqa: D105
+        if not (math.isfinite(self.side) and self.side > 0):
+            msg = f"the side of a tile is {self.side} m; give a number of metres above 0."
+            raise InputError(msg)
+
+    def cells(self, grid: GridSpec) -> int:
+        """Return the side in cells.
+
+        Parameters
+        ----------
+        grid : GridSpec
+            The cells.
+
+        Returns
+        -------
+        int
+            At least 1.
+        """
+        return max(1, round(self.side / grid.step))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class TilePlan:
+    """All that is needed to build any tile: paths and specs, so that it travels lightly.
+
+    Part files are written to `folder`. `objects` is a file of `objects.table.save_objects`,
+    `buildings` and `streets` are files of `objects.surroundings.save_surroundings` in the same
+    CRS. `side` is that of a tile in cells; `reach` is the largest visibility range of any class,
+    and `street_reach` how far the widest street reaches from its centre line, both in metres.
+    """
+
+    folder: Path
+    objects: Path
+    buildings: Path | None = None
+    streets: Path | None = None
+    grid: GridSpec = GridSpec()  # noqa: RUF009 - it is frozen
+    spec: SignatureSpec = SignatureSpec()  # noqa: RUF009
+    viewpoints: ViewpointSpec = ViewpointSpec()  # noqa: RUF009
+    side: int
+    reach: float
+    street_reach: float = 0.0
+
+    def box(self, tile: Tile, margin: float) -> Box:
+        """Return ``xmin, ymin, xmax, ymax`` of a tile, widened by `margin` metres on each side."""
+        side = self.side * self.grid.step
+        west, south = (
+            start + place * side for start, place in zip(self.grid.origin, tile, strict=True)
+        )
+        return west - margin, south - margin, west + side + margin, south + side + margin
+
+
+def touched_tiles(path: str | Path, *, grid: GridSpec, side: int, reach: float) -> list[Tile]:
+    """Return the tiles that may have a cell from which some object is seen, fullest first.
+
+    Only the bounds in the file of objects are read. `side` is that of a tile in cells, `reach` the
+    largest visibility range of any class in metres. Raise InputError if tiles are so small that an
+    object would touch very many, or if there are too many.
+    """
+    metres = side * grid.step
+    if reach > MOST_REACHED * metres:
+        msg = (
+            f"a tile of {metres:g} m is too small for a visibility range of {reach:g} m; make it "
+            f"at least {reach / MOST_REACHED:g} m."
+        )
+        raise InputError(msg)
+    objects: Counter[int] = Counter()
+    for bounds in each_bounds(path):
+        widened = bounds + np.array([-reach, -reach, reach, reach])
+        places = np.floor((widened - np.tile(grid.origin, 2)) / metres).astype(np.int64)
+        ranges, count = np.unique(places, axis=0, return_counts=True)
+        width, height = (ranges[:, 2:] - ranges[:, :2] + 1).T
+        which = np.repeat(np.arange(len(ranges)), width * height)
+        inside = np.arange(len(which)) - np.repeat(
+            np.cumsum(width * height) - width * height, width * height
+        )
+        ids = cell_ids(
+            ranges[which, 0] + inside // height[which], ranges[which, 1] + inside % height[which]
+        )
+        distinct, row = np.unique(ids, return_inverse=True)
+        total = np.bincount(row, weights=count[which]).astype(np.int64)
+        objects.update(dict(zip(distinct.tolist(), total.tolist(), strict=True)))
+        if len(objects) > MOST_TILES:
+            msg = f"tiles of {metres:g} m would be more than {MOST_TILES:,}; make them larger."
+            raise InputError(msg)
+    ordered = sorted(objects, key=lambda number: (-objects[number], number))
+    columns, rows = split_ids(np.array(ordered, np.int64))
+    return list(zip(columns.tolist(), rows.tolist(), strict=True))
+
+
+def build_tile(plan: TilePlan, tile: Tile) -> Part | None:
+    """Build and save the part of one tile; return None where none of its cells sees anything.
+
+    What decides about a cell lies within the largest range of it: objects, and buildings together
+    with their neighbours; a street lies within its own width. So only that is read, and the cells
+    are the same as when everything is.
+    """
+    if not plan.folder.is_dir():
+        msg = f"{plan.folder} is not there any more; run the same command again."
+        raise InputError(msg)
+    objects = open_objects(plan.objects, box=plan.box(tile, plan.reach + MARGIN_M))
+    database = _seen_from(plan, tile, objects) if len(objects) else None
+    if database is None or len(database) == 0:
+        mark_empty(plan.folder, tile)
+        return None
+    path = plan.folder / part_name(tile)
+    save_database(database, path)
+    return describe(tile, database, path)
+
+
+def _seen_from(plan: TilePlan, tile: Tile, objects: StreetObjects) -> SignatureDatabase | None:
+    """Return the cells of a tile; None where it has surely none."""
+    columns, rows = cells_near(objects.xy, grid=plan.grid, radius=plan.reach)
+    inside = (columns // plan.side == tile[0]) & (rows // plan.side == tile[1])
+    streets = None
+    viewpoints = plan.viewpoints
+    if plan.streets is not None:
+        box = plan.box(tile, plan.street_reach + MARGIN_M)
+        streets = read_surroundings(plan.streets, role="streets", crs=objects.crs, box=box)
+        if streets.empty:
+            return None
+    footprints = None
+    if plan.buildings is not None:
+        footprints = _footprints(plan.buildings, plan.box(tile, plan.reach + MARGIN_M), objects.crs)
+        if footprints.empty and viewpoints.mode == "outdoor":
+            viewpoints = replace(viewpoints, mode="all")
+    database = build_cells(
+        objects,
+        columns[inside],
+        rows[inside],
+        grid=plan.grid,
+        spec=plan.spec,
+        viewpoints=viewpoints,
+        footprints=None if footprints is None or footprints.empty else footprints,
+        streets=streets,
+    )
+    # A tile without buildings was made in the same way as the others.
+    return replace(
+        database,
+        viewpoints=plan.viewpoints,
+        occlusion=None if footprints is None else TOLERANCE_M,
+        licenses=(*objects.licenses, *licenses_of(footprints, streets)),
+    )
+
+
+def _footprints(path: Path, box: Box, crs: CRS) -> gpd.GeoDataFrame:
+    """Return the footprints that meet a box, and all neighbours of those that do."""
+    near = read_surroundings(path, role="buildings", crs=crs, box=box)
+    if len(near):
+        low, high = near.total_bounds[:2], near.total_bounds[2:]
+        around = (*(np.minimum(low, box[:2]) - MARGIN_M), *(np.maximum(high, box[2:]) + MARGIN_M))
+        near = read_surroundings(path, role="buildings", crs=crs, box=around)
+    # Flat ones are left out there too, but a tile may have no others.
+    flat = shapely.area(near.geometry.to_numpy()) == 0
+    flat[flat] = shapely.area(shapely.make_valid(near.geometry.to_numpy()[flat])) == 0
+    return near[~flat]
+
+
+NEEDED = {"outdoor": "buildings", "streets": "streets"}
+
+
+def plan_tiles(
+    objects: str | Path,
+    out: str | Path,
+    *,
+    tile: TileSpec,
+    grid: GridSpec,
+    spec: SignatureSpec,
+    viewpoints: ViewpointSpec,
+    buildings: str | Path | None = None,
+    streets: str | Path | None = None,
+) -> TilePlan:
+    """Check the inputs of a run, begin it or take it up again, and return the plan of its tiles.
+
+    `objects` is a file of `objects.table.save_objects`; `buildings` and `streets` are files
+    that `objects.surroundings.read_surroundings` reads. Streets are needed by the viewpoints
+    ``"streets"`` and left aside by others. Inputs that cannot be read by box are copied into the
+    folder of the run. Raise SemsigError if an input is missing or cannot be used, or `out` cannot
+    be written.
+    """
+    places = {"objects": objects, "buildings": buildings, "streets": streets}
+    if viewpoints.mode != "streets":
+        del places["streets"]
+    paths = {name: Path(path).absolute() for name, path in places.items() if path is not None}
+    nothing = open_objects(paths["objects"], box=NOWHERE)
+    reach = float(nothing.taxonomy.ranges(spec.radius).max())
+    cells_near(np.array([grid.origin]), grid=grid, radius=reach)  # refuses a step that is too small
+    if viewpoints.mode != "all" and NEEDED[viewpoints.mode] not in paths:
+        no_cells = np.empty(0, np.int64)
+        choose_viewpoints(no_cells, no_cells, grid=grid, spec=viewpoints)  # says what is missing
+    recipe: dict[str, Any] = {
+        "version": __version__,
+        "grid": asdict(grid),
+        "signature": asdict(spec),
+        "viewpoints": viewpoints.to_dict(),
+        "occlusion": TOLERANCE_M if "buildings" in paths else None,
+        "tile": {"cells": tile.cells(grid)},
+        "inputs": {name: _fingerprint(path) for name, path in paths.items()},
+    }
+    folder = start(out, recipe)
+    try:
+        lines = _by_box(paths, "streets", nothing.crs, folder)
+        return TilePlan(
+            folder=folder,
+            objects=_objects_by_box(paths["objects"], folder),
+            buildings=_by_box(paths, "buildings", nothing.crs, folder),
+            streets=lines,
+            grid=grid,
+            spec=spec,
+            viewpoints=viewpoints,
+            side=tile.cells(grid),
+            reach=reach,
+            street_reach=0.0 if lines is None else max(viewpoints.width, _widest(lines)),
+        )
+    except BaseException:
+        abandon(folder)
+        raise
+
+
+def _fingerprint(path: Path) -> str:
+    """Return the digest of a file, with its companions, or of a folder."""
+    if path.is_dir():
+        files = sorted(one for one in path.rglob("*") if one.is_file())
+    elif path.suffix.lower() == ".shp":
+        files = sorted(path.parent.glob(f"{path.stem}.*"))
+    else:
+        files = [path]
+    try:
+        return digest(*files)
+    except OSError as error:
+        msg = f"{path} does not exist or cannot be read; give another file."
+        raise SourceError(msg) from error
+
+
+def _objects_by_box(path: Path, folder: Path) -> Path:
+    """Return a file of street objects that can be read by box; those of before have no bounds."""
+    if next(each_bounds(path), None) is not None:
+        return path
+    copy = folder / INPUTS / "objects.parquet"
+    if not copy.exists():
+        save_objects(open_objects(path), copy)
+    return copy
+
+
+def _by_box(paths: dict[str, Path], role: Role, crs: CRS, folder: Path) -> Path | None:
+    """Return a file of surroundings that can be read by box in a CRS."""
+    path = paths.get(role)
+    if path is None or _covered(path, crs):
+        return path
+    copy = folder / INPUTS / f"{role}.parquet"
+    if not copy.exists():
+        save_surroundings(read_surroundings(path, role=role, crs=crs), copy)
+    return copy
+
+
+def _covered(path: Path, crs: CRS) -> bool:
+    """Tell whether a file is GeoParquet in this CRS with a column of bounds."""
+    try:
+        geo = json.loads(pq.read_metadata(path).metadata[b"geo"])
+        column = geo["columns"][geo["primary_column"]]
+        return "covering" in column and CRS.from_user_input(column["crs"]) == crs
+    except (pa.ArrowException, OSError, LookupError, TypeError, ValueError, CRSError):
+        return False
+
+
+def _widest(streets: Path) -> float:
+    """Return the largest half-width of any street in metres, 0 where the file tells none."""
+    if HALF_WIDTH not in pq.read_schema(streets).names:
+        return 0.0
+    widths = pq.read_table(streets, columns=[HALF_WIDTH])[HALF_WIDTH].to_numpy()
+    finite = widths[np.isfinite(widths.astype(np.float64))]
+    return float(finite.max(initial=0.0))
+
+
+# When so many have failed, the rest would too.
+MOST_FAILED = 10
+
+
+def build_tiles(
+    objects: str | Path,
+    out: str | Path,
+    *,
+    tile: TileSpec | None = None,
+    grid: GridSpec | None = None,
+    spec: SignatureSpec | None = None,
+    viewpoints: ViewpointSpec | None = None,
+    buildings: str | Path | None = None,
+    streets: str | Path | None = None,
+    workers: int = 0,
+    scheduler: str | None = None,
+    progress: Callable[[int, int], None] | None = None,
+    tell: Callable[[str], None] | None = None,
+) -> Manifest:
+    """Build a signature database in tiles: a folder that is opened like a single file.
+
+    Parameters
+    ----------
+    objects : str or Path
+        Street objects that `objects.table.save_objects` wrote.
+    out : str or Path
+        Folder to write. It appears whole, by rename; a database that is there is replaced.
+    tile : TileSpec, optional
+        Size of a tile; 2000 m by default.
+    grid : GridSpec, optional
+        The cells; 10 m by default.
+    spec : SignatureSpec, optional
+        Visibility range and angle levels; 30 m and 16 by default.
+    viewpoints : ViewpointSpec, optional
+        Which cells are looked from; all by default.
+    buildings, streets : str or Path, optional
+        Files that `objects.surroundings.read_surroundings` reads. Those that cannot be read by
+        box are copied into such a file first.
+    workers : int, default 0
+        How many processes of this machine build tiles; 0 builds them here, without dask.
+    scheduler : str, optional
+        Address of a dask scheduler, such as ``tcp://10.0.0.5:8786``, whose workers see the same
+        files under the same paths; then `workers` stays 0.
+    progress : callable, optional
+        Called with the number of tiles done and in all.
+    tell : callable, optional
+        Called with a remark for the user, as about a run that is taken up again.
+
+    Returns
+    -------
+    Manifest
+        What the database consists of.
+
+    Raises
+    ------
+    InputError
+        If an option cannot be used, the scheduler cannot be reached, or `out` holds something
+        else or an unfinished run with other inputs or specs.
+    DatabaseError
+        If the street objects cannot be read, or a tile cannot be built; the other tiles are kept
+        for the next run.
+    EmptyResultError
+        If no cell sees an object.
+
+    Notes
+    -----
+    The files are the same byte for byte whatever the number of workers. An interrupted run leaves
+    its tiles in ``OUT.partial``, and the same command goes on from there, if the specs are the same
+    and the input files have the same content (by SHA-256). A script that gives `workers` needs the
+    guard ``if __name__ == "__main__":``, because the workers import it.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> from semsig_gis.sources.catalog import paper_taxonomy
+    >>> from semsig_gis.database.file import open_database
+    >>> from semsig_gis.objects.clean import build_objects
+    >>> from semsig_gis.objects.table import save_objects
+    >>> from semsig_gis.sources.synthetic.city import CitySpec, synthetic_city
+    >>> layers = synthetic_city(CitySpec(size=300.0))
+    >>> town, _ = build_objects(layers, taxonomy=paper_taxonomy(), crs="EPSG:32631")
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     save_objects(town, f"{folder}/objects.parquet")
+    ...     parts = build_tiles(f"{folder}/objects.parquet", f"{folder}/town")
+    ...     len(open_database(f"{folder}/town")) == parts.cells
+    True
+    """
+    check_workers(workers, scheduler)
+    plan = plan_tiles(
+        objects,
+        out,
+        tile=tile or TileSpec(),
+        grid=grid or GridSpec(),
+        spec=spec or SignatureSpec(),
+        viewpoints=viewpoints or ViewpointSpec(),
+        buildings=buildings,
+        streets=streets,
+    )
+    try:
+        parts = _run(plan, workers, scheduler, progress, tell)
+    finally:
+        abandon(plan.folder)
+    if not parts:
+        shutil.rmtree(plan.folder, ignore_errors=True)
+        msg = (
+            f"no cell sees an object of {objects}; make the step ({plan.grid.step:g} m) smaller or "
+            f"the visibility range ({plan.spec.radius:g} m) larger, or look at the area, the "
+            "streets and the buildings."
+        )
+        raise EmptyResultError(msg)
+    return publish(plan.folder, parts)
+
+
+def _run(
+    plan: TilePlan,
+    workers: int,
+    scheduler: str | None,
+    progress: Callable[[int, int], None] | None,
+    tell: Callable[[str], None] | None,
+) -> list[Part]:
+    """Build the tiles that are not done yet, and return the parts of all."""
+    tiles = touched_tiles(plan.objects, grid=plan.grid, side=plan.side, reach=plan.reach)
+    done = finished_tiles(plan.folder, tiles)
+    if done and tell is not None:
+        tell(f"an unfinished run has left {len(done):,} of {len(tiles):,} tiles; it goes on")
+    todo = [one for one in tiles if one not in done]
+    failed: dict[Tile, str] = {}
+    paths = [plan.folder, plan.objects, plan.buildings, plan.streets]
+    running = run_tasks(
+        partial(build_tile, plan),
+        todo,
+        workers=workers,
+        scheduler=scheduler,
+        files=[path for path in paths if path is not None],
+    )
+    with contextlib.closing(running) as outcomes:
+        for outcome in outcomes:
+            if outcome.reason is None:
+                done[outcome.task] = outcome.value
+            else:
+                failed[outcome.task] = outcome.reason
+            if len(failed) == MOST_FAILED:
+                break
+            if progress is not None:
+                progress(len(done), len(tiles))
+    if failed:
+        first = min(failed)
+        others = f" and {len(failed) - 1} more" if len(failed) > 1 else ""
+        msg = (
+            f"{part_name(first)}{others} could not be built ({failed[first]}); the {len(done):,} "
+            f"tiles that are done are kept in {plan.folder}, so mend that and run the same command "
+            "again."
+        )
+        raise DatabaseError(msg)
+    return sorted(part for part in done.values() if part is not None)

@@ -1,0 +1,411 @@
+"""Updating a signature database: only the cells that see a changed object are computed again."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass, replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import shapely
+
+from semsig_gis import __version__
+from semsig_gis.core.crs import HALF_WIDTH, SOURCE
+from semsig_gis.core.errors import DatabaseError, EmptyResultError, InputError
+from semsig_gis.core.grid import cell_ids, cells_near
+from semsig_gis.core.rtree import PackedIndex
+from semsig_gis.database.build import build_cells
+from semsig_gis.database.database import join_databases, require_same
+from semsig_gis.database.file import open_database
+from semsig_gis.database.occlusion import TOUCHING_M, buildings_near
+from semsig_gis.database.store import open_store, save_with_store
+from semsig_gis.objects.changes import ClassChange, compare_objects, replace_layers
+from semsig_gis.objects.surroundings import licenses_of
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+    from pathlib import Path
+
+    import geopandas as gpd
+    from numpy.typing import NDArray
+
+    from semsig_gis.database.database import SignatureDatabase
+    from semsig_gis.database.store import ObjectStore
+    from semsig_gis.objects.changes import ObjectChanges
+    from semsig_gis.objects.quality import PlainTable
+    from semsig_gis.objects.table import StreetObjects
+
+    _Cells = tuple[NDArray[np.int64], NDArray[np.int64]]  # columns and rows
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class UpdateReport:
+    """How far a city has drifted.
+
+    `replaced` layers were loaded anew, `kept` ones were not. The other numbers count cells:
+    `recomputed` ones lie within range of a change, whether they see it or not; `changed` ones have
+    another signature; `appeared` ones see something for the first time, and `vanished` ones nothing
+    any more.
+    """
+
+    classes: tuple[ClassChange, ...]
+    replaced: tuple[str, ...]
+    kept: tuple[str, ...]
+    cells_before: int
+    cells: int
+    recomputed: int
+    changed: int
+    appeared: int
+    vanished: int
+    notes: tuple[str, ...] = ()
+
+    @property
+    def share(self) -> float:
+        """Share of all cells, before or after, that are not what they were."""
+        drifted = self.changed + self.appeared + self.vanished
+        return drifted / (self.cells_before + self.appeared)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the fields and ``share`` as plain values, ready for JSON."""
+        return {**asdict(self), "share": self.share}
+
+    def tables(self) -> tuple[PlainTable, ...]:
+        """Return the report as tables to print, in the form of `reports.tables.Table`.
+
+        They show objects by class, and cells.
+        """
+        names = [name for name in ClassChange.__slots__ if name not in {"class_name", "moved_m"}]
+        numbers = [[getattr(item, name) for name in names] for item in self.classes]
+        totals = np.array(numbers, np.int64).reshape(-1, len(names)).sum(axis=0).tolist()
+        rows = [
+            (item.class_name, *(f"{number:,}" for number in row), _metres(item.moved_m))
+            for item, row in zip(self.classes, numbers, strict=True)
+        ]
+        rows.append(("all", *(f"{number:,}" for number in totals), ""))
+        cells = (
+            ("before", self.cells_before),
+            ("after", self.cells),
+            ("computed again", self.recomputed),
+            ("changed", self.changed),
+            ("appeared", self.appeared),
+            ("vanished", self.vanished),
+        )
+        layers = f"Layers replaced: {', '.join(self.replaced)}."
+        if self.kept:
+            layers += f" Layers that stay as they were: {', '.join(self.kept)}."
+        return (
+            ("Objects by class", ("class", *names, "moved by, m"), tuple(rows), layers),
+            (
+                "Cells",
+                ("what", "cells"),
+                tuple((name, f"{number:,}") for name, number in cells),
+                f"The city has drifted by {self.share:.2%} of its cells.",
+            ),
+        )
+
+
+def _metres(number: float | None) -> str:
+    return "" if number is None else f"{number:,.2f}"
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class CellChanges:
+    """Which cells of two databases of one city see what they saw.
+
+    `same` and `changed`, shape (n, 2), are rows in the old and in the new database of cells whose
+    signatures are equal, or differ in classes, bearings or distances. `vanished` and `appeared`,
+    shape (n,), are the other rows of the old and of the new database.
+    """
+
+    same: NDArray[np.int64]
+    changed: NDArray[np.int64]
+    vanished: NDArray[np.int64]
+    appeared: NDArray[np.int64]
+
+
+def compare_cells(before: SignatureDatabase, after: SignatureDatabase) -> CellChanges:
+    """Compare the cells of two databases of one city, those of each kind in their order.
+
+    Raise DatabaseError if the databases were not made in the same way, or differ in their longest
+    visibility range.
+    """
+    require_same(before, after)
+    require_same(before, after, {"reach": "longest visibility range"})
+    _, first, second = np.intersect1d(
+        before.cell_ids, after.cell_ids, assume_unique=True, return_indices=True
+    )
+    differs = before.lengths[first] != after.lengths[second]
+    alike = np.flatnonzero(~differs)
+    one, other = before.select(first[alike]), after.select(second[alike])
+    entry_differs = np.zeros(len(one.codes), bool)
+    for name in ("codes", "bearing_units", "distance_units"):
+        entry_differs |= getattr(one, name) != getattr(other, name)
+    differs[np.repeat(alike, one.lengths)[entry_differs]] = True
+    common = np.stack([first, second], axis=1)
+    return CellChanges(
+        same=common[~differs],
+        changed=common[differs],
+        vanished=np.setdiff1d(np.arange(len(before)), first, assume_unique=True),
+        appeared=np.setdiff1d(np.arange(len(after)), second, assume_unique=True),
+    )
+
+
+def update_file(
+    path: str | Path,
+    objects: StreetObjects,
+    *,
+    out: str | Path | None = None,
+    progress: Callable[[int, int], None] | None = None,
+) -> UpdateReport:
+    """Update the file of a database, and the object store beside it.
+
+    Parameters
+    ----------
+    path : str or Path
+        File of the database.
+    objects : StreetObjects
+        The layers that were loaded anew, whole (see `objects.changes.replace_layers`).
+    out : str or Path, optional
+        Another file to write to; `path` itself by default.
+    progress : callable, optional
+        Called with the number of cells done and in all.
+
+    Returns
+    -------
+    UpdateReport
+        What changed.
+
+    Raises
+    ------
+    DatabaseError
+        If the database or its store is missing or damaged.
+    InputError
+        If the new objects do not fit the database, or the files cannot be written; nothing has
+        changed then.
+    CrsError
+        If the new objects are in another CRS.
+    EmptyResultError
+        If no cell would see an object any more.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> from semsig_gis.database.build import build_database
+    >>> from semsig_gis.sources.synthetic.city import CitySpec, synthetic_city
+    >>> from semsig_gis.sources.catalog import paper_taxonomy
+    >>> from semsig_gis.objects.table import StreetObjects
+    >>> from semsig_gis.objects.clean import build_objects
+    >>> from semsig_gis.database.store import ObjectStore
+    >>> layers = synthetic_city(CitySpec(size=300.0))
+    >>> objects, _ = build_objects(layers, taxonomy=paper_taxonomy(), crs="EPSG:32631")
+    >>> fewer = StreetObjects(objects.table[1:], objects.taxonomy, objects.licenses)
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     file = f"{folder}/city.parquet"
+    ...     save_with_store(build_database(objects), ObjectStore.of(objects), file)
+    ...     report = update_file(file, fewer)
+    >>> sum(item.removed for item in report.classes), 0 < report.share < 0.5
+    (1, True)
+    """
+    database, store = open_database(path), open_store(path)
+    database, store, report = update_database(database, store, objects, progress=progress)
+    save_with_store(database, store, path if out is None else out)
+    return report
+
+
+def update_database(
+    database: SignatureDatabase,
+    store: ObjectStore,
+    objects: StreetObjects,
+    *,
+    progress: Callable[[int, int], None] | None = None,
+) -> tuple[SignatureDatabase, ObjectStore, UpdateReport]:
+    """Replace layers of a database, and compute again what the changes are seen from.
+
+    Parameters
+    ----------
+    database : SignatureDatabase
+        The database.
+    store : ObjectStore
+        What it was built from.
+    objects : StreetObjects
+        The layers that were loaded anew, whole; layers that none of these objects comes from stay
+        as they are (see `objects.changes.replace_layers`).
+    progress : callable, optional
+        Called with the number of cells done and in all.
+
+    Returns
+    -------
+    database : SignatureDatabase
+        What `database.build.build_database` would make of the new store.
+    store : ObjectStore
+        All objects as they are now.
+    report : UpdateReport
+        What changed.
+
+    Raises
+    ------
+    InputError
+        If the new objects use a class code for something else, or one of their classes is seen
+        from further away than all classes before.
+    CrsError
+        If the new objects are in another CRS.
+    DatabaseError
+        If the store lacks the buildings or streets that the database was built with.
+    EmptyResultError
+        If no cell would see an object any more.
+
+    Examples
+    --------
+    >>> from semsig_gis.database.build import build_database
+    >>> from semsig_gis.sources.synthetic.city import CitySpec, synthetic_city
+    >>> from semsig_gis.sources.catalog import paper_taxonomy
+    >>> from semsig_gis.objects.clean import build_objects
+    >>> from semsig_gis.database.store import ObjectStore
+    >>> layers = synthetic_city(CitySpec(size=300.0))
+    >>> objects, _ = build_objects(layers, taxonomy=paper_taxonomy(), crs="EPSG:32631")
+    >>> database, store = build_database(objects), ObjectStore.of(objects)
+    >>> _, _, report = update_database(database, store, objects)
+    >>> report.recomputed
+    0
+    """
+    _require_surroundings(database, store)
+    merged, kept, notes = replace_layers(store.objects, objects)
+    along = store.streets if database.viewpoints.mode == "streets" else None
+    licenses = (*merged.licenses, *licenses_of(store.footprints, along))
+    new = replace(database, taxonomy=merged.taxonomy, licenses=licenses, version=__version__)
+    _require_reach(database, new)
+    changes = compare_objects(store.objects, merged)
+    cells = _cells_in_range(new, store.objects, merged, changes)
+    old_row = np.full(len(merged), -1)
+    old_row[changes.same[:, 1]] = changes.same[:, 0]
+    index = store.index.edited(merged.xy, old_row)
+    after = replace(store, objects=merged, index=index, notes=())
+    stale = np.isin(database.cell_ids, cell_ids(*cells))
+    places = _places(store.objects, merged, changes)
+    fresh = _recomputed(new, after, places, cells, progress=progress)
+    updated = join_databases([new.select(~stale), fresh])
+    if len(updated) == 0:
+        msg = f"no cell would see any of the {len(merged):,} objects; look at the new objects."
+        raise EmptyResultError(msg)
+    seen_before, seen_now = database.select(stale), fresh
+    layers = {*store.objects.table[SOURCE].unique(), *merged.table[SOURCE].unique()}
+    drifted = compare_cells(seen_before, seen_now)
+    report = UpdateReport(
+        classes=changes.classes,
+        replaced=tuple(sorted(layers - set(kept))),
+        kept=kept,
+        cells_before=len(database),
+        cells=len(updated),
+        recomputed=len(cells[0]),
+        changed=len(drifted.changed),
+        appeared=len(drifted.appeared),
+        vanished=len(drifted.vanished),
+        notes=(*store.notes, *notes),
+    )
+    return updated, after, report
+
+
+def _require_surroundings(database: SignatureDatabase, store: ObjectStore) -> None:
+    lacking = []
+    if store.footprints is None and database.occlusion is not None:
+        lacking.append("buildings")
+    if store.streets is None and database.viewpoints.mode == "streets":
+        lacking.append("streets")
+    if lacking:
+        msg = (
+            f"the object store lacks the {' and '.join(lacking)} that the database was built with; "
+            "build the database again."
+        )
+        raise DatabaseError(msg)
+
+
+def _require_reach(old: SignatureDatabase, new: SignatureDatabase) -> None:
+    """Raise where the unit in which all distances are stored would be another one."""
+    if new.reach > old.reach:
+        furthest = max(new.taxonomy.classes, key=lambda item: item.range_m or 0.0)
+        msg = (
+            f"class {furthest.name!r} is seen from {new.reach:g} m, further than any class of the "
+            f"database ({old.reach:g} m), which concerns every cell; build the database again."
+        )
+        raise InputError(msg)
+
+
+def _places(old: StreetObjects, new: StreetObjects, changes: ObjectChanges) -> NDArray[np.float64]:
+    """Return every place where an object is gone or has come, shape (c, 2)."""
+    return np.concatenate([old.xy[changes.gone], new.xy[changes.come]])
+
+
+def _cells_in_range(
+    database: SignatureDatabase, old: StreetObjects, new: StreetObjects, changes: ObjectChanges
+) -> _Cells:
+    """Return the cells that an object which is gone or has come may be seen from."""
+    places = _places(old, new, changes)
+    nothing = np.empty(0, np.int64)
+    if len(places) == 0:
+        return nothing, nothing
+    codes = np.concatenate([old.codes[changes.gone], new.codes[changes.come]])
+    ranges = database.taxonomy.ranges(database.spec.radius)[codes]
+    reach = float(ranges.max())
+    columns, rows = cells_near(places, grid=database.grid, radius=reach)
+    viewpoints = database.grid.viewpoints(columns, rows)
+    cell, place = PackedIndex(places).pairs_within(viewpoints, radius=reach)
+    if (ranges < reach).any():
+        delta = places[place] - viewpoints[cell]
+        cell = cell[np.hypot(delta[:, 0], delta[:, 1]) <= ranges[place]]
+    near = np.unique(cell)
+    return columns[near], rows[near]
+
+
+def _recomputed(
+    database: SignatureDatabase,
+    store: ObjectStore,
+    places: NDArray[np.float64],
+    cells: _Cells,
+    *,
+    progress: Callable[[int, int], None] | None,
+) -> SignatureDatabase:
+    """Return some cells around some places as they are now."""
+    if len(places) == 0:
+        return database.select(slice(0))
+    # A viewpoint is at most the reach from a place, and all it looks at as far from it again.
+    around = 2.0 * database.reach + TOUCHING_M
+    near = np.unique(store.index.pairs_within(places, radius=around)[1])
+    if len(near) == 0:
+        return database.select(slice(0))
+    objects = replace(store.objects, table=store.objects.table.iloc[near])
+    footprints, streets, viewpoints = store.footprints, store.streets, database.viewpoints
+    if footprints is not None:
+        polygons = footprints.geometry.to_numpy()
+        footprints = footprints.iloc[buildings_near(polygons, places, distance=around)]
+        if len(footprints) == 0:
+            footprints = None  # so that none of the cells is in a building either
+            if viewpoints.mode == "outdoor":
+                viewpoints = replace(viewpoints, mode="all")
+    if viewpoints.mode == "streets" and streets is not None:
+        streets = _streets_near(streets, database.grid.viewpoints(*cells), viewpoints.width)
+        if len(streets) == 0:
+            return database.select(slice(0))
+    fresh = build_cells(
+        objects,
+        *cells,
+        grid=database.grid,
+        spec=database.spec,
+        viewpoints=viewpoints,
+        footprints=footprints,
+        streets=streets,
+        progress=progress,
+    )
+    if footprints is None:
+        fresh = replace(fresh, occlusion=database.occlusion)
+    return replace(fresh, viewpoints=database.viewpoints)
+
+
+def _streets_near(
+    streets: gpd.GeoDataFrame, viewpoints: NDArray[np.float64], width: float
+) -> gpd.GeoDataFrame:
+    """Return the streets that some viewpoints may be in."""
+    widest = max(width, np.nan_to_num(streets.get(HALF_WIDTH, np.array([width]))).max())
+    tree = shapely.STRtree(streets.geometry.to_numpy())
+    found = tree.query(
+        shapely.points(viewpoints), predicate="dwithin", distance=widest + TOUCHING_M
+    )[1]
+    return streets.iloc[np.unique(found)]

@@ -1,0 +1,1 @@
+"""Queries of known places -> error, recall, calibration."""

@@ -1,0 +1,190 @@
+"""Compare two evaluations that asked queries from the same places."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pandas as pd
+
+from semsig_gis.core.errors import InputError
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from numpy.typing import NDArray
+
+    from semsig_gis.evaluation.result import Evaluation
+
+RESAMPLES = 2000
+AT_ONCE = 50
+PERCENTILES = {"error_median": ("error_m", 50), "error_p90": ("error_m", 90)}
+HEADINGS = {"heading_error_median": ("heading_error", 50)}
+INTERVAL = (2.5, 97.5)
+
+
+def compare_evaluations(
+    first: Evaluation, second: Evaluation, *, resamples: int = RESAMPLES, seed: int = 0
+) -> pd.DataFrame:
+    """Return by how much the figures of two evaluations differ.
+
+    Parameters
+    ----------
+    first, second : Evaluation
+        Evaluations with queries from the same places, number by number. The methods may differ,
+        the databases, or what happened to the queries.
+    resamples : int, default 2000
+        How often the queries are drawn again.
+    seed : int, default 0
+        Seed of these draws.
+
+    Returns
+    -------
+    DataFrame
+        One row a figure that both have: ``figure``, ``first``, ``second``, ``difference`` (the
+        second less the first), ``low`` and ``high`` (its 95 % interval). Figures are those of
+        `reports.experiment.experiment_figures`; NaN where one of them is infinite.
+
+    Raises
+    ------
+    InputError
+        If the queries are not from the same places.
+
+    Notes
+    -----
+    The bootstrap by percentiles, in pairs: whole queries are drawn with replacement, with both of
+    their answers, so that what is hard for both methods does not blur the difference.
+
+    Examples
+    --------
+    >>> from semsig_gis.database.build import build_database
+    >>> from semsig_gis.sources.catalog import paper_taxonomy
+    >>> from semsig_gis.evaluation.evaluate import evaluate
+    >>> from semsig_gis.matching.method import Method
+    >>> from semsig_gis.objects.clean import build_objects
+    >>> from semsig_gis.sources.synthetic.city import CitySpec, synthetic_city
+    >>> layers = synthetic_city(CitySpec(size=300.0))
+    >>> objects, _ = build_objects(layers, taxonomy=paper_taxonomy(), crs="EPSG:32631")
+    >>> database = build_database(objects)
+    >>> one = evaluate(database, queries=50, method=Method.parse("types:jaccard"))
+    >>> other = evaluate(database, queries=50, method=Method.parse("edit+edit"))
+    >>> found = compare_evaluations(one, other).set_index("figure")
+    >>> bool(found["low"]["p50"] <= found["difference"]["p50"] <= found["high"]["p50"])
+    True
+    """
+    _require_pairs(first, second)
+    shares = [one.figures for one in (first, second)]
+    names = [name for name in shares[0] if name in shares[1]]
+    percentiles = {**PERCENTILES, **(HEADINGS if _turned(first) and _turned(second) else {})}
+    values = [figures[names].to_numpy(dtype=np.float64) for figures in shares]
+    errors = {
+        name: [one.queries[column].to_numpy(dtype=np.float64) for one in (first, second)]
+        for name, (column, _) in percentiles.items()
+    }
+
+    def figures_of(rows: NDArray[np.int64]) -> NDArray[np.float64]:
+        # Of both, for samples of the queries: shape (2, samples, figures).
+        told = np.stack([_means(one, rows) for one in values])
+        lengths = [
+            np.stack([_percentiles(one[rows], percentiles[name][1]) for one in pair])
+            for name, pair in errors.items()
+        ]
+        return np.concatenate([told, np.stack(lengths, axis=-1)], axis=-1)
+
+    count = len(first.queries)
+    rng = np.random.default_rng(seed)
+    drawn = [
+        figures_of(rng.integers(0, count, (min(AT_ONCE, resamples - start), count)))
+        for start in range(0, resamples, AT_ONCE)
+    ]
+    one, other = figures_of(np.arange(count)[None])[:, 0]
+    samples = np.concatenate(drawn, axis=1)
+    with np.errstate(invalid="ignore"):  # of two infinite errors there is no difference
+        differences = samples[1] - samples[0]
+        difference = other - one
+    bounds = [_bounds(column) for column in differences.T]
+    return pd.DataFrame(
+        {
+            "figure": [*names, *percentiles],
+            "first": one,
+            "second": other,
+            "difference": difference,
+            "low": [low for low, _ in bounds],
+            "high": [high for _, high in bounds],
+        }
+    )
+
+
+def common_cases(
+    first: Mapping[str, Evaluation], second: Mapping[str, Evaluation]
+) -> dict[str, tuple[Evaluation, Evaluation]]:
+    """Return the evaluations of two results that have the same name.
+
+    Of two single evaluations, return these, whatever they are called. Results are those of
+    `experiments.folder.open_results`. Raises InputError if no name is common.
+    """
+    if len(first) == len(second) == 1:
+        (name, one), (other_name, other) = *first.items(), *second.items()
+        return {name or other_name: (one, other)}
+    common = {name: (first[name], second[name]) for name in first if name in second}
+    if not common:
+        msg = (
+            f"the first results have {_listed(first)} and the second {_listed(second)}, none in "
+            "common; give two that have, or the folders of two evaluations."
+        )
+        raise InputError(msg)
+    return common
+
+
+def _listed(results: Mapping[str, Evaluation]) -> str:
+    return ", ".join(name or "a single evaluation" for name in results)
+
+
+def _require_pairs(first: Evaluation, second: Evaluation) -> None:
+    """Refuse evaluations whose queries are not from the same places, number by number."""
+    keys = ["seed", "number"]
+    tables = [one.queries.reset_index(drop=True) for one in (first, second)]
+    same = tables[0][keys].equals(tables[1][keys]) and first.queries.crs == second.queries.crs
+    if same:
+        places = [np.column_stack([one.geometry.x, one.geometry.y]) for one in tables]
+        same = np.array_equal(places[0], places[1])
+    if not same:
+        msg = (
+            f"the two evaluations asked other queries ({len(tables[0])} and {len(tables[1])}); "
+            "compare evaluations with the same places, seeds and number of queries."
+        )
+        raise InputError(msg)
+
+
+def _turned(evaluation: Evaluation) -> bool:
+    return bool(evaluation.queries["heading_error"].notna().any())
+
+
+def _means(values: NDArray[np.float64], rows: NDArray[np.int64]) -> NDArray[np.float64]:
+    """Return the mean of each column over samples of the rows, of what is told."""
+    weights = np.stack([np.bincount(row, minlength=len(values)) for row in rows]).astype(np.float64)
+    told = ~np.isnan(values)
+    with np.errstate(invalid="ignore"):  # nothing is told of a figure in a sample
+        return np.asarray((weights @ np.where(told, values, 0.0)) / (weights @ told))
+
+
+def _percentiles(samples: NDArray[np.float64], percent: float) -> NDArray[np.float64]:
+    """Return a percentile of each row, of what is told."""
+    ordered = np.sort(samples, axis=1)  # NaN comes last
+    told = (~np.isnan(ordered)).sum(axis=1)
+    place = percent / 100.0 * np.maximum(told - 1, 0)
+    rows = np.arange(len(ordered))
+    below, above = (ordered[rows, end(place).astype(np.int64)] for end in (np.floor, np.ceil))
+    part: NDArray[np.float64] = place - np.floor(place)
+    with np.errstate(invalid="ignore"):
+        between = below + part * (above - below)
+    return np.asarray(np.where((part == 0.0) | (below == above), below, between))
+
+
+def _bounds(values: NDArray[np.float64]) -> tuple[float, float]:
+    """Return the interval of resampled differences; NaN where some have none."""
+    if np.isnan(values).any() or np.isinf(values).any():
+        return math.nan, math.nan
+    low, high = np.percentile(values, INTERVAL).tolist()
+    return low, high

@@ -1,0 +1,423 @@
+"""Measure localization: draw queries of known places, let a method answer, score errors and ranks.
+
+Equal scores are common (a street with three lamps looks like thousands of others), so every
+figure is an expectation over all orders of the tied cells, worked out exactly, never the luck of
+an array order.
+"""
+
+from __future__ import annotations
+
+import math
+import platform
+from importlib import metadata
+from typing import TYPE_CHECKING, Any
+
+import geopandas as gpd
+import numpy as np
+import pandas as pd
+
+from semsig_gis import __version__
+from semsig_gis.core.errors import InputError
+from semsig_gis.core.geometry import angular_distance
+from semsig_gis.core.grid import cell_ids
+from semsig_gis.evaluation.answer import Answerer
+from semsig_gis.evaluation.result import (
+    QUERY_COLUMNS,
+    SUCCESS_METRES,
+    Evaluation,
+)
+from semsig_gis.likelihood.method import LikelihoodMethod
+from semsig_gis.likelihood.result import REGION_SHARE
+from semsig_gis.matching.method import DEFAULT_METHOD, Method
+from semsig_gis.matching.ties import (
+    NEAR_METRES,
+    NEAR_PLACES,
+    THRESHOLDS,
+    best_cells,
+    chance_within,
+    expected_best,
+    rank_range,
+    top_candidates,
+)
+from semsig_gis.queries.chain import QueryDistortion, parse_chain
+from semsig_gis.queries.draw import QuerySpec, draw_queries
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping, Sequence
+
+    from numpy.typing import NDArray
+
+    from semsig_gis.database.database import SignatureDatabase
+    from semsig_gis.evaluation.answer import RankedAnswer
+    from semsig_gis.likelihood.index import LikelihoodIndex
+    from semsig_gis.likelihood.posterior import Posterior
+    from semsig_gis.matching.memo import DistanceMemo
+    from semsig_gis.queries.draw import Query
+
+NEXT_CELLS = 4  # that are named after the best candidate
+
+# What is told of an answer, in this order.
+OUTCOME_COLUMNS = (
+    *("distance", "rank_low", "rank_high", "chance", "in_region", "heading_error", "seconds"),
+    *("best_cell_id", "best_x", "best_y", "tied", "next_cell_ids"),
+    *(f"near{count}" for count in NEAR_PLACES),
+    *("right", "error_m"),
+    *(f"p{threshold}" for threshold in THRESHOLDS),
+)
+
+
+def evaluate(
+    database: SignatureDatabase,
+    *,
+    queries: int = 500,
+    method: Method | LikelihoodIndex = DEFAULT_METHOD,
+    distortion: str | QueryDistortion | Sequence[QueryDistortion] = "medium",
+    top: int = 1,
+    seed: int = 0,
+    progress: Callable[[int, int], None] | None = None,
+) -> Evaluation:
+    """Query a database with distorted signatures of its own cells and score the answers.
+
+    Parameters
+    ----------
+    database : SignatureDatabase
+        What to search.
+    queries : int, default 500
+        How many cells to draw as queries, without replacement; 1 to the number of cells.
+    method : Method or LikelihoodIndex, optional
+        What ranks the cells: measures of distance, or the index of this database for the
+        likelihood method; metric fusion of two edit distances unless given.
+    distortion : str, distortion or sequence of distortions, default "medium"
+        What happens to the signatures: one of the paper's levels, or any of
+        `queries.chain`, as text or as values.
+    top : int, default 1
+        How many best candidates count (t); 1 to the number of cells.
+    seed : int, default 0
+        Seed of the sample and of all chances; 0 or more. Query number i is the same whatever
+        the number of queries.
+    progress : callable, optional
+        Called with the number of queries done and the number of queries.
+
+    Returns
+    -------
+    Evaluation
+        One row a query, the settings and the mean time a query.
+
+    Raises
+    ------
+    InputError
+        If a number is out of range, or the index is that of another database.
+    UnknownNameError
+        If there is no distortion of that name.
+
+    Notes
+    -----
+    Paper, section 4.2: the error is the distance from the true viewpoint to the nearest of the
+    best t candidates; the recall looks at the rank of the true cell among all cells. False
+    objects have the classes that occur in the database.
+
+    The likelihood method, as `likelihood.locate` has it, answers with the place around which
+    most of the chance lies. That comes first; then follow the other cells, likeliest first. So
+    the best t candidates are the answer and the t - 1 likeliest other cells.
+
+    Queries from anywhere, and several methods on the same queries, are for
+    `evaluation.spec`.
+
+    Examples
+    --------
+    >>> from semsig_gis.sources.catalog import paper_taxonomy
+    >>> from semsig_gis.database.build import build_database
+    >>> from semsig_gis.objects.clean import build_objects
+    >>> from semsig_gis.sources.synthetic.city import CitySpec, synthetic_city
+    >>> layers = synthetic_city(CitySpec(size=300.0))
+    >>> objects, _ = build_objects(layers, taxonomy=paper_taxonomy(), crs="EPSG:32631")
+    >>> evaluation = evaluate(build_database(objects), queries=20, distortion="none")
+    >>> len(evaluation.queries), evaluation.recall(100)
+    (20, 1.0)
+    """
+    check_count("queries", queries, len(database))
+    check_count("candidates", top, len(database))
+    spec = QuerySpec(number=queries, seeds=(seed,), distortions=_chain(distortion))
+    if isinstance(method, Method):
+        answerer = Answerer(database=database, method=method)
+    else:
+        by_likelihood = LikelihoodMethod(noise=method.noise, on_grid=True)
+        answerer = Answerer(database=database, method=by_likelihood, index=method)
+    drawn = draw_queries(database, spec)
+    outcomes = score_queries(answerer, drawn, tops=(top,), progress=progress)
+    scored = scored_tables(database, drawn, outcomes)[top]
+    return make_evaluation(database, answerer.method, spec, scored, top=top)
+
+
+def score_queries(
+    answerer: Answerer,
+    queries: Sequence[Query],
+    *,
+    tops: Sequence[int] = (1,),
+    memo: DistanceMemo | None = None,
+    progress: Callable[[int, int], None] | None = None,
+) -> dict[int, list[dict[str, Any]]]:
+    """Let a method answer queries of known places, and score the answers.
+
+    The result has, for each of `tops` (how many best candidates count), one row of outcomes a
+    query, for `scored_tables`. `memo` keeps distances of these queries that other methods have
+    needed; `progress` is called with the number of queries done and in all.
+    """
+    database = answerer.database
+    asked = [one.asked.signature for one in queries if len(one.asked)]
+    answers = answerer.answers(asked, memo=memo)
+    outcomes: dict[int, list[dict[str, Any]]] = {top: [] for top in tops}
+    for done, query in enumerate(queries, start=1):
+        if len(query.asked):
+            answer = next(answers)
+            pool = _Pool(database, query, answer, max(*tops, *NEAR_PLACES))
+            shared = _told(database, query, answer, pool)
+            shared |= _near(pool, judged=answer.posterior is not None)
+            for top in tops:
+                outcomes[top].append(shared | _outcome(pool, top))
+        else:
+            for top in tops:
+                outcomes[top].append(_unlocalized(len(database)))
+        if progress is not None:
+            progress(done, len(queries))
+    return outcomes
+
+
+def scored_tables(
+    database: SignatureDatabase,
+    queries: Sequence[Query],
+    outcomes: Mapping[int, Sequence[Mapping[str, Any]]],
+) -> dict[int, pd.DataFrame]:
+    """Return for each number of best candidates a table of what was asked and found.
+
+    Each has one row a query: the columns of `Evaluation.queries` without ``geometry``, but with
+    ``x``, ``y`` and ``seconds``, which is NaN where nothing was asked.
+    """
+    about = _query_table(database, queries)
+    scored = {}
+    for top, rows in outcomes.items():
+        told = pd.DataFrame(list(rows), columns=OUTCOME_COLUMNS)
+        told["best_cell_id"] = told["best_cell_id"].astype("Int64")
+        scored[top] = pd.concat([about, told], axis=1)
+    return scored
+
+
+def make_evaluation(
+    database: SignatureDatabase,
+    method: Method | LikelihoodMethod,
+    spec: QuerySpec,
+    scored: pd.DataFrame,
+    *,
+    top: int,
+    city: str | None = None,
+    file_bytes: int | None = None,
+) -> Evaluation:
+    """Return the evaluation of all queries that `scored_tables` gave.
+
+    `top` is how many best candidates counted; `city` the city that was looked at, if not the one
+    that was searched; `file_bytes` the size of the files of the database.
+    """
+    points = gpd.points_from_xy(scored["x"], scored["y"], crs=database.crs)
+    seconds = scored["seconds"].to_numpy(dtype=np.float64)
+    timed = seconds[~np.isnan(seconds)]
+    return Evaluation(
+        queries=gpd.GeoDataFrame(scored[list(QUERY_COLUMNS)], geometry=points),
+        method=method,
+        asked=spec,
+        city=city,
+        top=top,
+        seconds_per_query=float(timed.mean()) if timed.size else 0.0,
+        database=_database_summary(database, file_bytes),
+        versions=versions(),
+    )
+
+
+def check_count(what: str, count: int, cells: int) -> None:
+    """Raise InputError unless a number of queries or candidates is from 1 to that of the cells."""
+    if not 1 <= count <= cells:
+        msg = (
+            f"{count} {what} were asked for; give a number from 1 to {cells}, the number of cells."
+        )
+        raise InputError(msg)
+
+
+def versions() -> dict[str, str]:
+    """Return the versions of the software that decides the figures and their speed."""
+    parts = {name: metadata.version(name) for name in ("numpy", "pandas", "rapidfuzz")}
+    return {"semsig_gis": __version__, "python": platform.python_version(), **parts}
+
+
+def _chain(
+    distortion: str | QueryDistortion | Sequence[QueryDistortion],
+) -> tuple[QueryDistortion, ...]:
+    if isinstance(distortion, str):
+        return parse_chain(distortion)
+    return (distortion,) if isinstance(distortion, QueryDistortion) else tuple(distortion)
+
+
+def _told(
+    database: SignatureDatabase, query: Query, answer: RankedAnswer, pool: _Pool
+) -> dict[str, Any]:
+    """Return the columns that do not depend on how many candidates count."""
+    scores = answer.scores
+    low, high = rank_range(scores, query.cell) if query.cell >= 0 else (len(scores),) * 2
+    found = answer.posterior
+    off = math.nan
+    if answer.heading is not None:
+        off = float(angular_distance(answer.heading, query.asked.heading))
+    return {
+        "distance": answer.best_score,
+        "rank_low": low,
+        "rank_high": high,
+        "chance": answer.chance,
+        "in_region": math.nan if found is None else _in_region(found, query.cell),
+        "heading_error": off,
+        "seconds": answer.seconds,
+        **_shown(database, query, answer, pool),
+    }
+
+
+def _shown(
+    database: SignatureDatabase, query: Query, answer: RankedAnswer, pool: _Pool
+) -> dict[str, Any]:
+    """Return the best candidate, or one of equals."""
+    best = pool.cells[pool.scores == pool.scores.min()]
+    shown = best[int(query.pick * len(best))]
+    after = pool.cells[pool.best(NEXT_CELLS + 1)]
+    after = after[after != shown][:NEXT_CELLS]
+    x, y = database.xy[shown].tolist() if answer.place is None else answer.place
+    return {
+        "best_cell_id": int(cell_ids(database.columns[shown], database.rows[shown])),
+        "best_x": x,
+        "best_y": y,
+        "tied": len(best),
+        "next_cell_ids": ",".join(
+            map(str, cell_ids(database.columns[after], database.rows[after]).tolist())
+        ),
+    }
+
+
+class _Pool:
+    """The best cells of an answer with all that tie with the last of them, and their errors."""
+
+    def __init__(
+        self, database: SignatureDatabase, query: Query, answer: RankedAnswer, count: int
+    ) -> None:
+        self.cells = best_cells(answer.scores, min(count, len(database)))
+        places = database.xy.take(self.cells, axis=0)
+        self.scores = answer.scores[self.cells]
+        if answer.place is not None:
+            places[self.scores.argmin()] = answer.place
+        places -= query.xy
+        # So that a cell 50 m away is not a rounding beyond 50 m.
+        self.errors = np.round(np.sqrt((places**2).sum(axis=1)), 6)
+        self.better = self.tied = np.empty(0)
+
+    def best(self, count: int) -> NDArray[np.intp]:
+        """Return the places here of so many best, equals in the order of the cells."""
+        count = min(count, len(self.scores))
+        better, tied = top_candidates(self.scores, count)
+        better = better[np.argsort(self.scores[better], kind="stable")]
+        return np.concatenate([better, tied[: count - len(better)]])
+
+    def cut(self, count: int) -> dict[str, Any]:
+        """Return the errors of those that are surely among so many best, and of the tied."""
+        count = min(count, len(self.scores))
+        slots = count - len(self.better)
+        if not 0 < slots <= len(self.tied):  # else the cut is among the same cells as before
+            better, tied = top_candidates(self.scores, count)
+            self.better, self.tied = self.errors[better], self.errors[tied]
+            slots = count - len(better)
+        return {"better": self.better, "tied": self.tied, "slots": slots}
+
+
+def _outcome(pool: _Pool, top: int) -> dict[str, Any]:
+    """Return the columns that depend on how many candidates count."""
+    expected, within = expected_best(**pool.cut(top))
+    chances = {f"p{t}": float(p) for t, p in zip(THRESHOLDS, within, strict=True)}
+    return {"error_m": expected, **chances}
+
+
+def _near(pool: _Pool, *, judged: bool) -> dict[str, float]:
+    """Return the chances that one of the best places is near, and that the answer is right."""
+    near = {
+        f"near{count}": chance_within(**pool.cut(count), metres=NEAR_METRES)
+        for count in NEAR_PLACES
+    }
+    right = chance_within(**pool.cut(1), metres=SUCCESS_METRES) if judged else math.nan
+    return {**near, "right": right}
+
+
+def _unlocalized(cells: int) -> dict[str, Any]:
+    """Return the same columns for a query that had nothing to compare."""
+    untold = ("chance", "right", "in_region", "heading_error", "seconds", "best_x", "best_y")
+    return {
+        "best_cell_id": None,
+        "next_cell_ids": "",
+        "distance": math.inf,
+        "tied": 0,
+        "error_m": math.inf,
+        **{f"p{t}": 0.0 for t in THRESHOLDS},
+        **{f"near{count}": 0.0 for count in NEAR_PLACES},
+        "rank_low": cells,
+        "rank_high": cells,
+        **dict.fromkeys(untold, math.nan),
+    }
+
+
+def _in_region(found: Posterior, cell: int) -> float:
+    """Return the probability that a cell is in the region, whose last cell is one of equals."""
+    if cell < 0:
+        return 0.0
+    region = found.credible_cells(REGION_SHARE)
+    least, own = found.chances[region[-1]], found.chances[cell]
+    if own != least:
+        return float(own > least)
+    return float((found.chances[region] == least).sum() / (found.chances == least).sum())
+
+
+def _query_table(database: SignatureDatabase, queries: Sequence[Query]) -> pd.DataFrame:
+    """Return what was asked, and the truth, one row a query."""
+    cells = np.array([one.cell for one in queries], np.int64)
+    known = cells >= 0
+    places = np.array([one.xy for one in queries], np.float64).reshape(-1, 2)
+    return pd.DataFrame(
+        {
+            "seed": np.array([one.seed for one in queries], np.int64),
+            "number": np.array([one.number for one in queries], np.int64),
+            "cell": cells,
+            "cell_id": cell_ids(*database.grid.cells_at(places)),
+            "types": [database.types(cell) if cell >= 0 else "" for cell in cells.tolist()],
+            "length": np.array([one.length for one in queries], np.int64),
+            "type_group": np.where(known, database.type_group_sizes[cells], 0),
+            "angle_group": np.where(known, database.angle_group_sizes[cells], 0),
+            "query_types": [database.taxonomy.decode(one.asked.codes) for one in queries],
+            "query_bearings": [_bearing_text(one.asked.bearings) for one in queries],
+            "query_length": np.array([len(one.asked) for one in queries], np.int64),
+            "heading": np.array([one.asked.heading for one in queries], np.float64),
+            "x": places[:, 0],
+            "y": places[:, 1],
+        }
+    )
+
+
+def _bearing_text(bearings: NDArray[np.float64]) -> str:
+    """Return bearings as the command line takes them, to a tenth of a degree."""
+    tenths = np.floor(bearings * 10.0) / 10.0  # down, so that none becomes 360
+    return ",".join(f"{value:.1f}" for value in tenths)
+
+
+def _database_summary(database: SignatureDatabase, file_bytes: int | None) -> dict[str, Any]:
+    """Return what identifies a database, as plain values."""
+    covered = len(database) * database.grid.step**2 / 1e6
+    return {
+        "cells": len(database),
+        "mean_length": float(database.lengths.mean()),
+        "step_m": float(database.grid.step),
+        "origin": [float(value) for value in database.grid.origin],
+        "radius_m": float(database.spec.radius),
+        "levels": int(database.spec.levels),
+        "crs": database.crs.to_string(),
+        "version": database.version,
+        "mb_per_km2": None if file_bytes is None else file_bytes / 1e6 / covered,
+    }

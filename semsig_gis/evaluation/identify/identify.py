@@ -1,0 +1,307 @@
+"""How well a query from each cell will be placed, found out before there is one.
+
+A sample of cells is asked one simulated query each, with all that localization does. What comes of
+these *trials* depends, nearly alone, on how like the other cells of the city are to the cell and on
+how many objects it sees. Both are cheap to know for every cell, so that a curve through the trials
+gives the chances of all of them.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from semsig_gis.core.errors import InputError
+from semsig_gis.core.statistics import fit_shares
+from semsig_gis.evaluation.identify.lookalikes import (
+    LEAST_SUM,
+    compare_without_classes,
+    find_lookalikes,
+)
+from semsig_gis.evaluation.identify.result import ClassGain, Identifiability
+from semsig_gis.evaluation.identify.trials import trial_cells, try_cells, try_without_classes
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from numpy.typing import NDArray
+
+    from semsig_gis.database.database import SignatureDatabase
+    from semsig_gis.evaluation.identify.lookalikes import Lookalikes
+    from semsig_gis.evaluation.identify.trials import Trials
+    from semsig_gis.likelihood.index import LikelihoodIndex
+
+TRIALS = 3000
+CLASS_TRIALS = 400
+"""Trials without each class."""
+PLACES = 3
+"""Places that are named for each cell."""
+TEMPERATURES = (0.15, 0.2, 0.25, 0.3, 0.35, 0.4, 0.5, 0.6, 0.8, 1.0)
+TEMPERATURE_TRIALS = 300
+DECIMALS = 3
+"""Of all numbers: more than they are sure to, and short in a file."""
+
+# Seconds that a trial, and a pair of cells, takes: only for telling how far the work is.
+TRIAL_S, PAIR_S, SAMPLED_S = 1.5e-2, 2.7e-9, 2.5e-4
+
+
+def identify(
+    index: LikelihoodIndex,
+    *,
+    radius: float = 50.0,
+    trials: int = TRIALS,
+    class_trials: int = CLASS_TRIALS,
+    seed: int = 0,
+    threads: int = 1,
+    progress: Callable[[int, int], None] | None = None,
+) -> Identifiability:
+    """Find out how well a query from each cell will be placed.
+
+    Parameters
+    ----------
+    index : LikelihoodIndex
+        The cells, and how the detector fails; the answers know that, too.
+    radius : float, default 50
+        Metres that count as near, 0 or more.
+    trials : int, default 3000
+        How many simulated queries to ask, 1 or more.
+    class_trials : int, default 400
+        How many of them to ask again without each class, 1 or more.
+    seed : int, default 0
+        Seed of all chances, 0 or more.
+    threads : int, default 1
+        How many threads share the work; the result does not depend on it.
+    progress : callable, optional
+        Called with how much is done and how much there is in all.
+
+    Returns
+    -------
+    Identifiability
+        Chances, lookalikes and gains of all cells.
+
+    Raises
+    ------
+    InputError
+        If a number is out of range.
+
+    Notes
+    -----
+    Queries are seen from the middles of the cells; a noise model with a position_sigma has them
+    elsewhere. Let l_d(c) be the log-likelihood of the signature of cell c, as a query, in cell d,
+    and F(c) the logarithm of the sum over the cells d beyond the radius of
+    ``exp(T (l_d(c) - l_c(c)))``, with the temperature T at which ``exp(T l_d(c))``, made to sum to
+    one, is nearest to the chances that the answers to the trials gave (least cross-entropy). What
+    came of the trials is fitted as a share that depends on F and on the logarithm of the number
+    of objects (`core.statistics`). The rest of the chance is divided by the same powers.
+
+    For the gains, trials are asked again without each class, and the fit takes the logarithm of
+    the number of objects that are left as a third feature.
+
+    The time grows with the square of the number of cells.
+
+    Examples
+    --------
+    >>> from semsig_gis.sources.catalog import paper_taxonomy
+    >>> from semsig_gis.database.build import build_database
+    >>> from semsig_gis.likelihood.index import build_index
+    >>> from semsig_gis.likelihood.noise.model import named_noise
+    >>> from semsig_gis.objects.clean import build_objects
+    >>> from semsig_gis.sources.synthetic.city import CitySpec, synthetic_city
+    >>> layers = synthetic_city(CitySpec(size=300.0))
+    >>> objects, _ = build_objects(layers, taxonomy=paper_taxonomy(), crs="EPSG:32631")
+    >>> database = build_database(objects)
+    >>> index = build_index(database, named_noise("medium"))
+    >>> told = identify(index, trials=100, class_trials=20)
+    >>> rich, poor = database.lengths >= 15, database.lengths <= 3
+    >>> bool(told.found[rich].mean() > told.found[poor].mean())
+    True
+    """
+    for what, count, least in (
+        ("number of trials", trials, 1),
+        ("number of trials without a class", class_trials, 1),
+        ("number of threads", threads, 1),
+        ("seed", seed, 0),
+    ):
+        if count < least:
+            msg = f"the {what} was given as {count}; give a whole number from {least}."
+            raise InputError(msg)
+    if not 0 <= radius < math.inf:
+        msg = f"a radius of {radius} m was given; give metres, 0 or more."
+        raise InputError(msg)
+    database = index.database
+    cells, kinds = len(database), len(index.table.codes)
+    some = min(class_trials, trials)
+    stages = _Stages(
+        progress,
+        trials * TRIAL_S,
+        cells**2 * PAIR_S,
+        cells * SAMPLED_S,
+        some * kinds * TRIAL_S,
+    )
+    asked = trial_cells(cells, trials, seed=seed)
+    common: dict[str, Any] = {"radius": radius, "threads": threads}
+    tried = try_cells(index, asked, seed=seed, progress=stages.stage(0), **common)
+    common["temperature"] = _temperature(index, tried, **common)
+    like = find_lookalikes(index, places=PLACES, progress=stages.stage(1), **common)
+    shares = _expected(tried, like, database.lengths)
+    gains, classes = _gains(index, asked[:some], tried, like, seed=seed, stages=stages, **common)
+    rest = (1.0 - shares["near"]) / np.maximum(like.far, LEAST_SUM)
+    return Identifiability(
+        database=database,
+        noise=index.noise,
+        radius=radius,
+        itself=shares["itself"].round(DECIMALS),
+        near=shares["near"].round(DECIMALS),
+        found=shares["found"].round(DECIMALS),
+        bits=shares["bits"].round(DECIMALS),
+        lookalikes=like.cells,
+        lookalike_chances=(rest[:, None] * like.sums).round(DECIMALS),
+        gains=gains.round(DECIMALS) + 0.0,  # no -0.0
+        classes=classes,
+        trials=trials,
+        seed=seed,
+    )
+
+
+class _Stages:
+    """Tells how far work of several stages is, in seconds that they are thought to take."""
+
+    def __init__(self, progress: Callable[[int, int], None] | None, *seconds: float) -> None:
+        self.progress = progress
+        self.ends = np.cumsum([0.0, *seconds])
+
+    def stage(self, number: int) -> Callable[[int, int], None] | None:
+        """Return what a stage is to call with its own progress."""
+        if self.progress is None:
+            return None
+        tell, total = self.progress, self.ends[-1]
+        low, high = self.ends[number : number + 2]
+
+        def told(done: int, whole: int) -> None:
+            tell(round(1000.0 * (low + (high - low) * done / whole)), round(1000.0 * total))
+
+        return told
+
+
+def _temperature(index: LikelihoodIndex, tried: Trials, *, radius: float, threads: int) -> float:
+    """Return the power that brings the likelihoods of signatures nearest to the answers."""
+    some = np.flatnonzero(np.isfinite(tried.lean))[:TEMPERATURE_TRIALS]
+    if not len(some):
+        return 1.0
+    fits = []
+    for power in TEMPERATURES:
+        like = find_lookalikes(
+            index,
+            temperature=power,
+            radius=radius,
+            cells=tried.cells[some],
+            places=1,
+            threads=threads,
+        )
+        fits.append(float(np.mean(power * tried.lean[some] - np.log(like.near + like.far))))
+    return TEMPERATURES[int(np.argmax(fits))]
+
+
+def _log(sums: NDArray[np.float64]) -> NDArray[np.float64]:
+    return np.log(np.maximum(sums, LEAST_SUM))
+
+
+def _expected(
+    tried: Trials, like: Lookalikes, lengths: NDArray[np.int64]
+) -> dict[str, NDArray[np.float64]]:
+    """Return what to expect of every cell, by what came of the trials."""
+    objects = np.log(lengths)
+    beyond = np.stack([_log(like.far), objects], axis=1)
+    others = np.stack([_log(like.far + np.maximum(like.near - 1.0, 0.0)), objects], axis=1)
+    most = max(float(np.log2(len(lengths))), LEAST_SUM)
+    shares = {
+        name: fit_shares(features[tried.cells], values).predict(features)
+        for name, features, values in (
+            ("itself", others, tried.itself),
+            ("near", beyond, tried.near),
+            ("found", beyond, tried.found),
+            ("bits", others, np.clip(tried.bits / most, 0.0, 1.0)),
+        )
+    }
+    return {
+        **shares,
+        "itself": np.minimum(shares["itself"], shares["near"]),
+        "bits": most * shares["bits"],
+    }
+
+
+def _gains(
+    index: LikelihoodIndex,
+    asked: NDArray[np.int64],
+    tried: Trials,
+    like: Lookalikes,
+    *,
+    radius: float,
+    temperature: float,
+    seed: int,
+    threads: int,
+    stages: _Stages,
+) -> tuple[NDArray[np.float64], tuple[ClassGain, ...]]:
+    """Return what each class adds, by cell and for the city."""
+    database = index.database
+    common: dict[str, Any] = {"radius": radius, "seed": seed, "threads": threads}
+    rise = compare_without_classes(
+        index, temperature=temperature, progress=stages.stage(2), **common
+    )
+    near, bits = try_without_classes(index, asked, progress=stages.stage(3), **common)
+    some = slice(len(asked))
+    seen = _seen(database, index.table.codes)
+    left = database.lengths[:, None] - seen
+    features = _features(like, database.lengths, rise, left)
+    whole = _features(like, database.lengths, np.zeros((len(left), 1)), database.lengths[:, None])
+    # What is left of cells that see nothing else needs no fit.
+    told = left[asked] > 0
+    examples = np.concatenate([whole[asked][:, 0], features[asked][told]])
+    most = max(float(np.log2(len(database))), LEAST_SUM)
+    found = []
+    for all_, without, blank in (
+        (tried.near[some], near, 0.0),
+        (np.clip(tried.bits[some] / most, 0, 1), np.clip(bits / most, 0, 1), 1.0),
+    ):
+        fit = fit_shares(examples, np.concatenate([all_, without[told]]))
+        before = fit.predict(whole[:, 0])
+        gains = np.empty(left.shape)
+        for number in range(left.shape[1]):
+            after = np.where(left[:, number] > 0, fit.predict(features[:, number]), blank)
+            gains[:, number] = before - after
+        found.append(gains)
+    classes = tuple(
+        ClassGain(code=code, near=float(gain), bits=-float(told_bits))
+        for code, gain, told_bits in zip(
+            index.table.codes.tolist(),
+            found[0].mean(axis=0),
+            most * found[1].mean(axis=0),
+            strict=True,
+        )
+    )
+    return found[0], classes
+
+
+def _features(
+    like: Lookalikes,
+    lengths: NDArray[np.int64],
+    rise: NDArray[np.float64],
+    left: NDArray[np.int64],
+) -> NDArray[np.float64]:
+    """Return what decides over a cell without each class, shape (n, c, 3)."""
+    parts = (
+        _log(like.far)[:, None] + rise,
+        np.broadcast_to(np.log(lengths)[:, None], rise.shape),
+        np.log(np.maximum(left, 1)),
+    )
+    return np.stack(parts, axis=2)
+
+
+def _seen(database: SignatureDatabase, codes: NDArray[np.uint8]) -> NDArray[np.int64]:
+    """Return how many objects of each class every cell sees, shape (n, c)."""
+    starts = database.offsets[:-1]
+    return np.stack(
+        [np.add.reduceat(database.codes == code, starts, dtype=np.int64) for code in codes], axis=1
+    )

@@ -1,0 +1,232 @@
+"""Which cells look like which: every cell compared with all others.
+
+The likelihood index tells how well a query fits every cell. Here the signature of each cell is
+the query, so that the ratio of two likelihoods tells how far another cell is from looking the
+same to a detector. A real query is spoiled, which brings the ratios nearer to one: they are raised
+to a power, the *temperature*, before they are added up.
+"""
+
+from __future__ import annotations
+
+import math
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from semsig_gis.core.errors import InputError
+from semsig_gis.core.grid import cell_ids
+from semsig_gis.likelihood.index import BIN_UNITS, BINS
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from numpy.typing import NDArray
+
+    from semsig_gis.database.database import SignatureDatabase
+    from semsig_gis.likelihood.index import LikelihoodIndex
+
+CELLS_A_TASK = 256
+LEAST_SUM = 1e-30  # of ratios, so that it has a logarithm
+SAMPLE = 16_384
+"""Cells with which each cell is compared where classes are left out."""
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Lookalikes:
+    """How like other cells are to each of c cells.
+
+    `near` (c,) is the sum, over the cells in the circle around each cell, of the likelihood of its
+    signature there over that in the cell itself, to the power of the temperature; the cell itself
+    counts 1. `far` (c,) is the same for all other cells. `cells` (c, k) are row numbers of the
+    likest cells outside the circle whose own circles do not overlap, by falling sum, -1 where there
+    are no more; `sums` (c, k) is the sum over the circle of each, without what is also in the
+    circle of the compared cell.
+    """
+
+    near: NDArray[np.float64]
+    far: NDArray[np.float64]
+    cells: NDArray[np.int64]
+    sums: NDArray[np.float64]
+
+
+def cell_circle(radius: float, step: float) -> NDArray[np.int64]:
+    """Return which cells are within a radius (metres) of a cell, shape (a, 2).
+
+    For each column of cells, the first and the last cell number less that of the cell. `step` is
+    the side of a cell in metres.
+    """
+    reach = radius / step + 1e-9
+    across = np.arange(-math.floor(reach), math.floor(reach) + 1)
+    up = np.floor(np.sqrt(reach**2 - across**2)).astype(np.int64)
+    return np.stack([cell_ids(across, -up), cell_ids(across, up)], axis=1)
+
+
+def city_extent(database: SignatureDatabase) -> float:
+    """Return a distance in metres within which all cells are from each other.
+
+    A larger radius finds nothing more, but takes longer.
+    """
+    sides = np.ptp(database.columns), np.ptp(database.rows)
+    return database.grid.step * math.ceil(math.hypot(*sides))
+
+
+def find_lookalikes(
+    index: LikelihoodIndex,
+    *,
+    temperature: float,
+    radius: float = 50.0,
+    cells: NDArray[np.int64] | None = None,
+    places: int = 3,
+    threads: int = 1,
+    progress: Callable[[int, int], None] | None = None,
+) -> Lookalikes:
+    """Compare cells with all others.
+
+    `cells` are row numbers, all by default; `places` is how many lookalikes to name for each.
+    `temperature` (above 0) is the power of the ratios of likelihoods: 1 for a query that is just
+    the signature of the cell, less for one that is spoiled. `radius` is what counts as near, in
+    metres. The time grows with the square of the number of cells. A ratio beyond 2 to the power of
+    100, or below its inverse, counts as that. Raises InputError if the temperature or the radius is
+    out of range.
+    """
+    from semsig_gis.evaluation.identify.kernels import compare_cells  # noqa: PLC0415 - numba loads slowly
+
+    database = index.database
+    _check(temperature, radius)
+    asked = _asked(index, cells)
+    step = database.grid.step
+    radius = min(radius, city_extent(database))
+    where = np.stack([database.columns, database.rows], axis=1).astype(np.int64)
+    symbols, _ = _symbols(index)
+    ids, flat = database.cell_ids, index.columns.reshape(-1, len(database))
+    circle = cell_circle(radius, step)
+    found = Lookalikes(
+        near=np.empty(len(asked)),
+        far=np.empty(len(asked)),
+        cells=np.empty((len(asked), places), np.int64),
+        sums=np.zeros((len(asked), places)),
+    )
+
+    def compare(part: slice) -> None:
+        compare_cells(
+            asked[part],
+            database.offsets,
+            symbols,
+            flat,
+            index.constants,
+            index.step,
+            temperature,
+            ids,
+            where,
+            circle,
+            math.floor((radius / step + 1e-9) ** 2),
+            found.near[part],
+            found.far[part],
+            found.cells[part],
+            found.sums[part],
+        )
+
+    _in_parts(compare, len(asked), threads, progress)
+    order = np.argsort(-found.sums, axis=1, kind="stable")
+    return replace(
+        found,
+        cells=np.take_along_axis(found.cells, order, axis=1),
+        sums=np.take_along_axis(found.sums, order, axis=1),
+    )
+
+
+def compare_without_classes(
+    index: LikelihoodIndex,
+    *,
+    temperature: float,
+    radius: float = 50.0,
+    cells: NDArray[np.int64] | None = None,
+    seed: int = 0,
+    threads: int = 1,
+    progress: Callable[[int, int], None] | None = None,
+) -> NDArray[np.float64]:
+    """Compare cells with a sample of the others as if a class were not published.
+
+    Parameters are as in `find_lookalikes`; `seed` draws the sample of `SAMPLE` cells. The result
+    (c, k) is by how much the natural logarithm of `Lookalikes.far` would rise without each class
+    that occurs, in the order of ``index.table.codes``. The objects of the class and the detections
+    that bear its name are left out; that some of the objects are detected under another name is
+    neglected.
+    """
+    from semsig_gis.evaluation.identify.kernels import compare_without  # noqa: PLC0415
+
+    database = index.database
+    _check(temperature, radius)
+    asked = _asked(index, cells)
+    symbols, kinds = _symbols(index)
+    count, classes = len(database), len(index.table.codes)
+    rng = np.random.default_rng([seed, 1])
+    sample = np.sort(rng.permutation(count)[:SAMPLE])
+    flat = index.columns.reshape(-1, count)
+    owner = np.repeat(np.arange(count), database.lengths)
+    lengths = np.minimum(database.lengths, len(index.table.missed) - 1)[owner]
+    missed = np.log(index.table.missed)[lengths, kinds]
+    by_class = np.bincount(kinds * count + owner, missed, classes * count).reshape(classes, count)
+    constants = index.constants - np.concatenate([np.zeros((1, count)), by_class])
+    constants = constants.astype(np.float32)
+    sampled = np.ascontiguousarray(flat[:, sample])
+    ids = database.cell_ids
+    circle = cell_circle(min(radius, city_extent(database)), database.grid.step)
+    far = np.empty((len(asked), classes + 1))
+
+    def compare(part: slice) -> None:
+        compare_without(
+            asked[part],
+            database.offsets,
+            symbols,
+            kinds,
+            flat,
+            constants,
+            index.step,
+            temperature,
+            ids,
+            circle,
+            sample,
+            sampled,
+            far[part],
+        )
+
+    _in_parts(compare, len(asked), threads, progress)
+    logs = np.log(np.maximum(far, LEAST_SUM))
+    return logs[:, 1:] - logs[:, :1]
+
+
+def _check(temperature: float, radius: float) -> None:
+    """Refuse numbers out of range."""
+    if not 0 < temperature < math.inf:
+        msg = f"a temperature of {temperature} was given; give a power above 0."
+        raise InputError(msg)
+    if not 0 <= radius < math.inf:
+        msg = f"a radius of {radius} m was given; give metres, 0 or more."
+        raise InputError(msg)
+
+
+def _asked(index: LikelihoodIndex, cells: NDArray[np.int64] | None) -> NDArray[np.int64]:
+    return np.arange(len(index.database)) if cells is None else np.asarray(cells, dtype=np.int64)
+
+
+def _symbols(index: LikelihoodIndex) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Return the column of the index and the class row of every entry of the database."""
+    kinds = index.table.row_of[index.database.codes]
+    return kinds * BINS + index.database.bearing_units // BIN_UNITS, kinds
+
+
+def _in_parts(
+    work: Callable[[slice], None],
+    count: int,
+    threads: int,
+    progress: Callable[[int, int], None] | None,
+) -> None:
+    """Do work in parts, several at once."""
+    parts = [slice(low, min(low + CELLS_A_TASK, count)) for low in range(0, count, CELLS_A_TASK)]
+    with ThreadPoolExecutor(threads) as pool:
+        for part, _ in zip(parts, pool.map(work, parts), strict=True):
+            if progress is not None:
+                progress(part.stop, count)

@@ -1,0 +1,360 @@
+"""What is known of every cell before any query: how well one from it will be placed.
+
+`evaluation.identify.identify` finds it out.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pyarrow as pa
+
+from semsig_gis.core.errors import DatabaseError, InputError, SemsigError
+from semsig_gis.database.file import add_columns, read_added
+from semsig_gis.likelihood.index import index_fingerprint
+from semsig_gis.likelihood.noise.model import noise_from_dict
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+    from pathlib import Path
+    from typing import Any
+
+    from numpy.typing import NDArray
+
+    from semsig_gis.database.database import SignatureDatabase
+    from semsig_gis.likelihood.noise.model import Noise
+
+
+BANDS = (0.0, 0.1, 0.5, 0.9)
+"""Lower ends of the chances to be found by which cells are counted."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ClassGain:
+    """What a city gains by publishing a class of objects.
+
+    `near` is what the mean cell's chance of the place within the radius gains; `bits` what the mean
+    query tells of the cell beyond what the other classes tell.
+    """
+
+    code: int
+    near: float
+    bits: float
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Identifiability:
+    """How well a query from each cell of a database will be placed.
+
+    Parameters
+    ----------
+    database : SignatureDatabase
+        The cells.
+    noise : NoiseSpec or NoiseMixture
+        How the detector fails.
+    radius : float
+        Metres that count as near.
+    itself : ndarray of float64, shape (n,)
+        Expected chance that the answer to a query from the cell gives to the cell itself.
+    near : ndarray of float64, shape (n,)
+        Expected chance that it gives to the cells within the radius.
+    found : ndarray of float64, shape (n,)
+        Chance that the best place of the answer is within the radius.
+    bits : ndarray of float64, shape (n,)
+        Expected entropy of the chances of all cells: what is left to be known.
+    lookalikes : ndarray of int64, shape (n, k)
+        Row numbers of the cells in whose surroundings, farther away than the radius, the answer
+        puts most of the rest; -1 where there are no more.
+    lookalike_chances : ndarray of float64, shape (n, k)
+        Expected chance that it gives to the surroundings of each.
+    gains : ndarray of float64, shape (n, c)
+        What `near` gains by each class that occurs, in the order of `classes`.
+    classes : tuple of ClassGain
+        The same for the city as a whole.
+    trials : int
+        Number of simulated queries.
+    seed : int
+        Seed of all chances.
+    """
+
+    database: SignatureDatabase
+    noise: Noise
+    radius: float
+    itself: NDArray[np.float64]
+    near: NDArray[np.float64]
+    found: NDArray[np.float64]
+    bits: NDArray[np.float64]
+    lookalikes: NDArray[np.int64]
+    lookalike_chances: NDArray[np.float64]
+    gains: NDArray[np.float64]
+    classes: tuple[ClassGain, ...]
+    trials: int
+    seed: int
+
+    def require_cells_of(self, database: SignatureDatabase) -> None:
+        """Raise where another database has other cells.
+
+        Parameters
+        ----------
+        database : SignatureDatabase
+            The database.
+
+        Raises
+        ------
+        InputError
+            If its cells are others.
+        """
+        if not np.array_equal(self.database.cell_ids, database.cell_ids):
+            msg = "the identifiability is that of other cells; give that of this database."
+            raise InputError(msg)
+
+    def table(self, rows: slice = slice(None)) -> pa.Table:
+        """Return what is known of the cells as columns.
+
+        Parameters
+        ----------
+        rows : slice, optional
+            Which cells; all by default.
+
+        Returns
+        -------
+        pyarrow.Table
+            ``chance_itself``, ``chance_near``, ``chance_found``, ``bits_left``; for each place
+            from 1 ``lookalike_1`` (cell id, null where there is none) and ``lookalike_1_chance``;
+            for each class that occurs ``gain_NAME``.
+        """
+        names = {item.code: item.name for item in self.database.taxonomy.classes}
+        columns = {
+            "chance_itself": pa.array(self.itself[rows]),
+            "chance_near": pa.array(self.near[rows]),
+            "chance_found": pa.array(self.found[rows]),
+            "bits_left": pa.array(self.bits[rows]),
+        }
+        ids = self.database.cell_ids
+        for place in range(self.lookalikes.shape[1]):
+            cells = self.lookalikes[rows, place]
+            name = f"lookalike_{place + 1}"
+            columns[name] = pa.array(ids[cells], mask=cells < 0)
+            columns[f"{name}_chance"] = pa.array(self.lookalike_chances[rows, place])
+        for number, item in enumerate(self.classes):
+            columns[f"gain_{names[item.code]}"] = pa.array(self.gains[rows, number])
+        return pa.table(columns)
+
+    def summary(self, *, object_counts: Mapping[int, int] | None = None) -> dict[str, Any]:
+        """Return what there is to say of the city as plain values for JSON.
+
+        Parameters
+        ----------
+        object_counts : mapping of int to int, optional
+            How many objects of each class code there are, where they are at hand.
+
+        Returns
+        -------
+        dict
+            ``cells``, ``noise``, ``radius_m``, ``trials``, ``seed``; ``chance_itself``,
+            ``chance_near``, ``chance_found`` and ``bits_left`` of the mean cell; ``cell_bits``;
+            ``bands``: one dict a band of the chance to be found (``from``, ``to``, ``cells``,
+            ``share``); ``classes``: one dict a class (``code``, ``symbol``, ``name``, ``title``,
+            ``chance_near``, ``bits``, ``objects`` and ``chance_near_per_1000``, the last two None
+            where the objects are not at hand), the most useful first.
+        """
+        kinds = {item.code: item for item in self.database.taxonomy.classes}
+        cells = len(self.database)
+        counts = np.bincount(np.digitize(self.found, BANDS) - 1, minlength=len(BANDS)).tolist()
+        classes = []
+        for gain in sorted(self.classes, key=lambda one: -one.near):
+            objects = None if object_counts is None else int(object_counts.get(gain.code, 0))
+            classes.append(
+                {
+                    "code": gain.code,
+                    "symbol": kinds[gain.code].symbol,
+                    "name": kinds[gain.code].name,
+                    "title": kinds[gain.code].title,
+                    "chance_near": gain.near,
+                    "bits": gain.bits,
+                    "objects": objects,
+                    "chance_near_per_1000": 1000.0 * gain.near / objects if objects else None,
+                }
+            )
+        return {
+            "cells": cells,
+            "noise": self.noise.name,
+            "radius_m": self.radius,
+            "trials": self.trials,
+            "seed": self.seed,
+            "chance_itself": float(self.itself.mean()),
+            "chance_near": float(self.near.mean()),
+            "chance_found": float(self.found.mean()),
+            "bits_left": float(self.bits.mean()),
+            "cell_bits": float(np.log2(cells)),
+            "bands": [
+                {"from": low, "to": high, "cells": count, "share": count / cells}
+                for low, high, count in zip(BANDS, (*BANDS[1:], 1.0), counts, strict=True)
+            ],
+            "classes": classes,
+        }
+
+
+NAME = "identifiability"
+
+
+# Raised whenever the same cells and noise give other numbers, or they are told otherwise.
+FORMAT = 1
+
+
+def save_identifiability(told: Identifiability, path: str | Path) -> None:
+    """Put what is known of the cells into the files of their database.
+
+    Parameters
+    ----------
+    told : Identifiability
+        What to save.
+    path : str or Path
+        File of the database, or folder of its parts; it is replaced whole.
+
+    Raises
+    ------
+    DatabaseError
+        If it is damaged, or is not the database of `told`.
+    InputError
+        If it cannot be written; it is unchanged then.
+
+    Notes
+    -----
+    The columns are those of `Identifiability.table`. Whoever builds or updates the database gets
+    one without them.
+    """
+    add_columns(
+        path,
+        told.table(),
+        cell_ids=told.database.cell_ids,
+        name=NAME,
+        facts=identifiability_facts(told),
+    )
+
+
+def identifiability_facts(told: Identifiability) -> dict[str, Any]:
+    """Return what is needed beside `Identifiability.table` to read it again, as values for JSON."""
+    return {
+        "format": FORMAT,
+        "belongs_to": index_fingerprint(told.database, told.noise),
+        "noise": told.noise.to_dict(),
+        "radius": told.radius,
+        "trials": told.trials,
+        "seed": told.seed,
+        "classes": [
+            {"code": item.code, "near": item.near, "bits": item.bits} for item in told.classes
+        ],
+    }
+
+
+def open_identifiability(database: SignatureDatabase, path: str | Path) -> Identifiability | None:
+    """Read what `save_identifiability` put into the files of a database.
+
+    Parameters
+    ----------
+    database : SignatureDatabase
+        The database, opened.
+    path : str or Path
+        Its file, or the folder of its parts.
+
+    Returns
+    -------
+    Identifiability or None
+        What is known of the cells; None where nothing was found out yet.
+
+    Raises
+    ------
+    DatabaseError
+        If the files are damaged, or what they tell belongs to other signatures.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> from semsig_gis.sources.catalog import paper_taxonomy
+    >>> from semsig_gis.database.build import build_database
+    >>> from semsig_gis.database.file import save_database
+    >>> from semsig_gis.evaluation.identify.identify import identify
+    >>> from semsig_gis.likelihood.index import build_index
+    >>> from semsig_gis.likelihood.noise.model import named_noise
+    >>> from semsig_gis.objects.clean import build_objects
+    >>> from semsig_gis.sources.synthetic.city import CitySpec, synthetic_city
+    >>> layers = synthetic_city(CitySpec(size=200.0))
+    >>> objects, _ = build_objects(layers, taxonomy=paper_taxonomy(), crs="EPSG:32631")
+    >>> database = build_database(objects)
+    >>> told = identify(build_index(database, named_noise("light")), trials=20, class_trials=5)
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     path = f"{folder}/city.parquet"
+    ...     save_database(database, path)
+    ...     before = open_identifiability(database, path)
+    ...     save_identifiability(told, path)
+    ...     after = open_identifiability(database, path)
+    >>> before is None, bool((after.found == told.found).all())
+    (True, True)
+    """
+    table, facts = read_added(path, name=NAME)
+    if table is None or facts is None:
+        return None
+    return identifiability_of(database, table, facts, path)
+
+
+def identifiability_of(
+    database: SignatureDatabase, table: pa.Table, facts: dict[str, Any], path: str | Path
+) -> Identifiability:
+    """Return what columns of `Identifiability.table` and `identifiability_facts` tell.
+
+    `path`, which they were read from, is named in errors. Raises DatabaseError if they are damaged,
+    or belong to other signatures or another version of the format.
+    """
+    try:
+        noise = noise_from_dict(facts["noise"])
+        fits = facts["format"] == FORMAT and (
+            facts["belongs_to"] == index_fingerprint(database, noise)
+        )
+        told = _told(database, noise, table, facts) if fits else None
+    except (KeyError, TypeError, ValueError, SemsigError) as error:
+        msg = f"the identifiability in {path} is damaged ({error}); run semsig identify again."
+        raise DatabaseError(msg) from error
+    if told is None:
+        msg = (
+            f"the identifiability in {path} is that of other signatures, or of another version of "
+            "semsig; run semsig identify again."
+        )
+        raise DatabaseError(msg)
+    return told
+
+
+def _told(
+    database: SignatureDatabase, noise: Noise, table: pa.Table, facts: dict[str, Any]
+) -> Identifiability:
+    """Return what a table and the facts beside it tell."""
+    classes = tuple(ClassGain(**item) for item in facts["classes"])
+    names = {item.code: item.name for item in database.taxonomy.classes}
+    ids = database.cell_ids
+    places = [name for name in table.column_names if name.endswith("_chance")]
+
+    def stacked(columns: list[str]) -> np.ndarray:
+        return np.stack([table[name].to_numpy() for name in columns], axis=1)
+
+    def rows(name: str) -> np.ndarray:
+        cells = table[name]
+        found = np.searchsorted(ids, cells.fill_null(ids[0]).to_numpy())
+        return np.where(cells.is_valid().to_numpy(), found, -1)
+
+    return Identifiability(
+        database=database,
+        noise=noise,
+        radius=float(facts["radius"]),
+        itself=table["chance_itself"].to_numpy(),
+        near=table["chance_near"].to_numpy(),
+        found=table["chance_found"].to_numpy(),
+        bits=table["bits_left"].to_numpy(),
+        lookalikes=np.stack([rows(name.removesuffix("_chance")) for name in places], axis=1),
+        lookalike_chances=stacked(places),
+        gains=stacked([f"gain_{names[item.code]}" for item in classes]),
+        classes=classes,
+        trials=int(facts["trials"]),
+        seed=int(facts["seed"]),
+    )

@@ -1,0 +1,285 @@
+"""Trials: queries drawn from a noise model at known cells, and what localization makes of them."""
+
+from __future__ import annotations
+
+import math
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from semsig_gis.core.signature import Signature
+from semsig_gis.evaluation.identify.lookalikes import city_extent
+from semsig_gis.likelihood.index import build_index
+from semsig_gis.likelihood.noise.model import NoiseMixture
+from semsig_gis.likelihood.posterior import posterior
+from semsig_gis.likelihood.rerank import rerank
+from semsig_gis.queries.chain import ready_chain
+from semsig_gis.queries.distortions import Detector
+from semsig_gis.queries.sight import CitySights, Sight
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterable, Iterator
+
+    from numpy.typing import NDArray
+
+    from semsig_gis.database.database import SignatureDatabase
+    from semsig_gis.likelihood.index import LikelihoodIndex
+    from semsig_gis.likelihood.noise.model import Noise, NoiseSpec
+
+
+HOPELESS = 20.0  # nats below the likeliest cell, at which a cell is left out of the sums
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Trials:
+    """What came of simulated queries, arrays of one item a query.
+
+    `cells` has row numbers of the true cells. The answer gave the chance `itself` to the true cell
+    and `near` to all cells near it, itself among them; `found` tells whether the best place is
+    near, `bits` the entropy of the chances of all cells. `lean` is the mean, by these chances, of
+    the logarithm of the likelihood of the true cell's own signature in a cell over that in the true
+    one; NaN where nothing was detected.
+    """
+
+    cells: NDArray[np.int64]
+    itself: NDArray[np.float64]
+    near: NDArray[np.float64]
+    found: NDArray[np.bool_]
+    bits: NDArray[np.float64]
+    lean: NDArray[np.float64]
+
+
+def trial_cells(cells: int, count: int, *, seed: int = 0) -> NDArray[np.int64]:
+    """Return row numbers of the cells of `count` trials: all equally often, the rest drawn.
+
+    A larger count keeps the first ones.
+    """
+    rng = np.random.default_rng([seed, 0])
+    rounds = [rng.permutation(cells) for _ in range(-(-count // cells))]
+    return np.concatenate([np.zeros(0, np.int64), *rounds])[:count]
+
+
+def draw_trials(
+    index: LikelihoodIndex, cells: NDArray[np.int64], *, seed: int = 0
+) -> Iterator[Signature]:
+    """Yield what a detector tells of cells, if it fails as the noise model of the index says.
+
+    `cells` are row numbers and may repeat. Detections are clockwise, perhaps none. Query number i
+    is the same whatever the number of queries.
+    """
+    detector = Detector(noise=index.noise)
+    spoil = ready_chain((detector,), CitySights.of(index.database))
+    for number, cell in enumerate(cells.tolist()):
+        yield spoil(Sight.of_cell(index.database, cell), seed, number).signature
+
+
+def try_cells(
+    index: LikelihoodIndex,
+    cells: NDArray[np.int64],
+    *,
+    radius: float = 50.0,
+    seed: int = 0,
+    threads: int = 1,
+    progress: Callable[[int, int], None] | None = None,
+) -> Trials:
+    """Ask one simulated query from each of some cells, given by row number.
+
+    The noise model of the index is that of the detector and of the answer alike; `radius` is what
+    counts as near, in metres.
+    """
+    queries = draw_trials(index, cells, seed=seed)
+    return try_queries(index, cells, queries, radius=radius, threads=threads, progress=progress)
+
+
+def try_queries(
+    index: LikelihoodIndex,
+    cells: NDArray[np.int64],
+    queries: Iterable[Signature],
+    *,
+    radius: float = 50.0,
+    threads: int = 1,
+    progress: Callable[[int, int], None] | None = None,
+) -> Trials:
+    """Ask queries of which the true cells are known, one a row number of `cells`.
+
+    `radius` is what counts as near, in metres. A query without objects is not answered: its chances
+    are 0.
+    """
+    places = _without_signatures(index.database)
+    radius = min(radius, city_extent(places))
+
+    def ask(cell: int, query: Signature) -> tuple[float, ...]:
+        return _outcome(index, places, cell, query, radius)
+
+    rows: list[tuple[float, ...]] = []
+    with ThreadPoolExecutor(threads) as pool:
+        for row in pool.map(ask, cells.tolist(), queries):
+            rows.append(row)
+            if progress is not None:
+                progress(len(rows), len(cells))
+    itself, near, found, bits, lean = np.array(rows, dtype=np.float64).reshape(-1, 5).T
+    return Trials(
+        cells=np.asarray(cells),
+        itself=itself,
+        near=near,
+        found=found.astype(np.bool_),
+        bits=bits,
+        lean=lean,
+    )
+
+
+def _without_signatures(database: SignatureDatabase) -> SignatureDatabase:
+    """Return the cells alone, some of which are selected far faster."""
+    nothing = slice(0)
+    return replace(
+        database,
+        offsets=np.zeros_like(database.offsets),
+        codes=database.codes[nothing],
+        bearing_units=database.bearing_units[nothing],
+        distance_units=database.distance_units[nothing],
+    )
+
+
+def _outcome(
+    index: LikelihoodIndex,
+    places: SignatureDatabase,
+    cell: int,
+    query: Signature,
+    radius: float,
+) -> tuple[float, ...]:
+    """Return what comes of one query, in the order of `Trials`."""
+    if not len(query):
+        return 0.0, 0.0, 0.0, float(np.log2(len(places))), np.nan
+    loglik = rerank(index, query, index.scores(query)).loglik
+    kept = loglik > loglik.max() - HOPELESS
+    kept[cell] = True
+    cells = np.flatnonzero(kept)
+    found = posterior(places.select(cells), loglik[cells])
+    true = int(np.searchsorted(cells, cell))
+    best, _ = found.best_place(radius)
+    near = float(found.mass_within(radius, np.array([true]))[0])
+    apart = places.grid.step * math.hypot(
+        int(places.columns[cells[best]]) - int(places.columns[cell]),
+        int(places.rows[cells[best]]) - int(places.rows[cell]),
+    )
+    own = index.scores(index.database.signature(cell)).loglik
+    return (
+        min(float(found.chances[true]), near),
+        near,
+        float(apart <= radius + 1e-6),
+        found.entropy,
+        float(found.chances @ own[cells] - own[cell]),
+    )
+
+
+def leave_class_out(
+    database: SignatureDatabase, code: int
+) -> tuple[SignatureDatabase, NDArray[np.int64]]:
+    """Return a database without the objects of a class.
+
+    Parameters
+    ----------
+    database : SignatureDatabase
+        The cells.
+    code : int
+        Code of the class.
+
+    Returns
+    -------
+    database : SignatureDatabase
+        The cells that see other objects, too, and these objects; perhaps none.
+    rows : ndarray of int64, shape (n,)
+        For each cell of the given database, its row in the new one; -1 where it is not there.
+
+    Examples
+    --------
+    >>> from semsig_gis.sources.catalog import paper_taxonomy
+    >>> from semsig_gis.database.build import build_database
+    >>> from semsig_gis.objects.clean import build_objects
+    >>> from semsig_gis.sources.synthetic.city import CitySpec, synthetic_city
+    >>> layers = synthetic_city(CitySpec(size=300.0))
+    >>> objects, _ = build_objects(layers, taxonomy=paper_taxonomy(), crs="EPSG:32631")
+    >>> database = build_database(objects)
+    >>> without, rows = leave_class_out(database, 3)
+    >>> bool((without.codes == 3).any()), len(without) == int((rows >= 0).sum())
+    (False, True)
+    """
+    kept = database.codes != code
+    lengths = np.add.reduceat(kept, database.offsets[:-1], dtype=np.int64)
+    some = lengths > 0
+    rows = np.where(some, np.cumsum(some) - 1, -1)
+    left = replace(
+        database,
+        columns=database.columns[some],
+        rows=database.rows[some],
+        offsets=np.concatenate([[0], np.cumsum(lengths[some])]),
+        codes=database.codes[kept],
+        bearing_units=database.bearing_units[kept],
+        distance_units=database.distance_units[kept],
+    )
+    return left, rows
+
+
+def try_without_classes(
+    index: LikelihoodIndex,
+    cells: NDArray[np.int64],
+    *,
+    radius: float = 50.0,
+    seed: int = 0,
+    threads: int = 1,
+    progress: Callable[[int, int], None] | None = None,
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Ask simulated queries once more for each class, as if it had not been published.
+
+    `cells` (m,) are row numbers of the true cells, and the queries those of
+    `try_cells` with the same seed. The results (m, k) are the chance given to the
+    cells within `radius` metres of the true one, and the entropy in bits that is left, without each
+    class, in the order of ``index.table.codes``. Detector and street stay the same: the database
+    has no objects of the class, and detections of its name are dropped. A cell that sees nothing
+    else cannot be found: no chance, and all bits are left.
+    """
+    codes = index.table.codes.tolist()
+    queries = list(draw_trials(index, cells, seed=seed))
+    near = np.zeros((len(cells), len(codes)))
+    bits = np.full((len(cells), len(codes)), np.log2(len(index.database)))
+    names = {item.code: item.name for item in index.database.taxonomy.classes}
+    for number, code in enumerate(codes):
+        without, rows = leave_class_out(index.database, code)
+        asked = np.flatnonzero(rows[cells] >= 0)
+        if len(asked):
+            noise = _without_class(index.noise, names[code], len(codes))
+            trials = try_queries(
+                build_index(without, noise, threads=threads),
+                rows[cells[asked]],
+                [_without_code(queries[one], code) for one in asked.tolist()],
+                radius=radius,
+                threads=threads,
+            )
+            near[asked, number], bits[asked, number] = trials.near, trials.bits
+        if progress is not None:
+            progress((number + 1) * len(cells), len(codes) * len(cells))
+    return near, bits
+
+
+def _without_code(query: Signature, code: int) -> Signature:
+    """Return the detections of a query that do not bear the name of a class."""
+    if query.codes is None or query.bearings is None:
+        return query
+    kept = query.codes != code
+    return Signature(query.codes[kept], query.bearings[kept])
+
+
+def _without_class(noise: Noise, name: str, classes: int) -> Noise:
+    """Return a noise model of so many classes for all of them but one."""
+
+    def without(spec: NoiseSpec) -> NoiseSpec:
+        confusion = {own: row for own, row in spec.confusion.items() if own != name}
+        # Equal shares of the false objects are taken of the classes that are left.
+        clutter = spec.clutter if spec.clutter_shares else spec.clutter * (1.0 - 1.0 / classes)
+        return replace(spec, confusion=confusion, clutter=clutter)
+
+    if isinstance(noise, NoiseMixture):
+        return replace(noise, specs=tuple(without(spec) for spec in noise.specs))
+    return without(noise)

@@ -1,0 +1,335 @@
+"""Experiments as values: what is searched, which queries are asked, and which methods answer."""
+
+from __future__ import annotations
+
+import re
+import tomllib
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from semsig_gis.core.errors import CatalogError, InputError
+from semsig_gis.evaluation.methods import parse_method
+from semsig_gis.evaluation.result import used_noises
+from semsig_gis.likelihood.noise.model import NOISES, noise_from_dict, open_noise
+from semsig_gis.queries.chain import chain_text, parse_chain
+from semsig_gis.queries.draw import QuerySpec
+from semsig_gis.storage.toml import check_keys, toml_text
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Mapping
+
+    from semsig_gis.likelihood.method import LikelihoodMethod
+    from semsig_gis.likelihood.noise.model import Noise
+    from semsig_gis.matching.method import Method
+    from semsig_gis.queries.chain import QueryDistortion
+    from semsig_gis.queries.draw import SeenFrom
+
+KEYS = {
+    "database": str,
+    "queries": int,
+    "seeds": list,
+    "seen_from": str,
+    "city": str,
+    "top": list,
+    "methods": dict,
+    "distortions": dict,
+    "noises": dict,
+    "districts": dict,
+}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Districts:
+    """Polygons of any vector `file` by which figures are told; the field `name` names them."""
+
+    file: str
+    name: str
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Case:
+    """One evaluation of an experiment: the names of a distortion and of a method in it.
+
+    `top` is how many best candidates count.
+    """
+
+    distortion: str
+    method: str
+    top: int
+
+    @property
+    def name(self) -> str:
+        """What stands for it, also as a folder."""
+        return f"{self.distortion}/{self.method}-top{self.top}"
+
+
+@dataclass(frozen=True, kw_only=True)
+class ExperimentSpec:
+    """An experiment: every method answers the same queries, after each of some distortions.
+
+    Parameters
+    ----------
+    database : str
+        File of the database that is searched.
+    methods : mapping of str to Method or LikelihoodMethod
+        The methods by name.
+    distortions : mapping of str to tuple
+        What happens to the queries, each a chain of distortions, by name.
+    queries : int, default 500
+        How many of each seed.
+    seeds : tuple of int, default (0,)
+        Seeds of all chances.
+    seen_from : {"cells", "anywhere"}, default "cells"
+        Where queries are seen from (see `queries.draw`).
+    city : str, optional
+        File of the database of the city that is looked at, if it is another one than that which
+        is searched: the same city at another date, say.
+    top : tuple of int, default (1,)
+        Numbers of best candidates that count (t).
+    districts : Districts, optional
+        Polygons by which the figures are told, too.
+
+    Raises
+    ------
+    InputError
+        If there is no method or no distortion, a name cannot be that of a folder, a number is out
+        of range, or two noise models have one name.
+    UnknownNameError
+        If `seen_from` is neither.
+
+    Examples
+    --------
+    >>> spec = parse_experiment('''
+    ... database = "city.parquet"
+    ... [methods]
+    ... paper = "edit+edit:5%"
+    ... [distortions]
+    ... phone = ["medium", "compass:10", "view:90"]
+    ... ''')
+    >>> [case.name for case in spec.cases]
+    ['phone/paper-top1']
+    """
+
+    database: str
+    methods: Mapping[str, Method | LikelihoodMethod]
+    distortions: Mapping[str, tuple[QueryDistortion, ...]]
+    queries: int = 500
+    seeds: tuple[int, ...] = (0,)
+    seen_from: SeenFrom = "cells"
+    city: str | None = None
+    top: tuple[int, ...] = (1,)
+    districts: Districts | None = None
+
+    def __post_init__(self) -> None:  # noqa: D105
+        for what, named in (("methods", self.methods), ("distortions", self.distortions)):
+            if not named:
+                msg = f"the experiment has no {what}; name at least one."
+                raise InputError(msg)
+            for name in named:
+                if not re.fullmatch("[A-Za-z0-9_-]+", name):
+                    msg = (
+                        f"{name!r} cannot be a name in {what}; use letters, digits, _ and - alone."
+                    )
+                    raise InputError(msg)
+        if not self.top or len(set(self.top)) < len(self.top) or min(self.top) < 1:
+            msg = f"top is {list(self.top)}; give different whole numbers from 1."
+            raise InputError(msg)
+        for name in self.distortions:
+            self.asked(name)
+        self.noises  # noqa: B018 - looks at their names
+
+    @property
+    def noises(self) -> dict[str, Noise]:
+        """The noise models of all methods and detectors, by name."""
+        chains = [one for chain in self.distortions.values() for one in chain]
+        return used_noises(self.methods.values(), chains)
+
+    @property
+    def cases(self) -> tuple[Case, ...]:
+        """All evaluations: each distortion, each method, each number of candidates."""
+        return tuple(
+            Case(distortion=distortion, method=method, top=top)
+            for distortion in self.distortions
+            for method in self.methods
+            for top in self.top
+        )
+
+    def asked(self, distortion: str) -> QuerySpec:
+        """Return the queries of one of the distortions.
+
+        Parameters
+        ----------
+        distortion : str
+            Its name.
+
+        Returns
+        -------
+        QuerySpec
+            Which queries are asked.
+        """
+        return QuerySpec(
+            number=self.queries,
+            seeds=self.seeds,
+            seen_from=self.seen_from,
+            distortions=self.distortions[distortion],
+        )
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the experiment as plain values.
+
+        Returns
+        -------
+        dict
+            What `parse_experiment` reads as TOML; noise models that this package does not have by
+            name are written out.
+        """
+        noises = {
+            name: noise.to_dict()
+            for name, noise in self.noises.items()
+            if NOISES.get(name) != noise
+        }
+        return {
+            "database": self.database,
+            "queries": self.queries,
+            "seeds": list(self.seeds),
+            "seen_from": self.seen_from,
+            **({} if self.city is None else {"city": self.city}),
+            "top": list(self.top),
+            "methods": {name: str(method) for name, method in self.methods.items()},
+            "distortions": {
+                name: [chain_text([one]) for one in chain]
+                for name, chain in self.distortions.items()
+            },
+            **({} if self.districts is None else {"districts": asdict(self.districts)}),
+            **({"noises": noises} if noises else {}),
+        }
+
+    def to_toml(self) -> str:
+        """Return the experiment as TOML.
+
+        Returns
+        -------
+        str
+            What `parse_experiment` reads.
+        """
+        return toml_text(self.to_dict())
+
+
+def parse_experiment(
+    text: str, *, where: str = "the experiment", folder: str | Path = "."
+) -> ExperimentSpec:
+    """Read an experiment from TOML.
+
+    It has ``database``; the table ``methods`` with texts such as ``"edit+edit:5%"`` or
+    ``"likelihood:generic:refined"``; the table ``distortions`` with texts (or lists of them) such
+    as ``"medium, view:90"``; and, if wanted, ``queries``, ``seeds``, ``seen_from``, ``city``,
+    ``top``, the table ``districts`` (``file``, ``name``) and the table ``noises``, where each is a
+    table or the name of a file in `folder`. `where` is what messages call the text. Raises
+    UnknownNameError for an unknown method, distortion or noise model, and InputError if it is not
+    TOML or a key or value cannot be used.
+    """
+    try:
+        values = _checked(tomllib.loads(text), KEYS, where, ["database", "methods", "distortions"])
+    except tomllib.TOMLDecodeError as error:
+        msg = f"{where} is not valid TOML: {error}."
+        raise InputError(msg) from error
+    given = {
+        name: _noise(name, one, where, Path(folder))
+        for name, one in values.pop("noises", {}).items()
+    }
+    noises = {**NOISES, **given}
+    for name in ("seeds", "top"):
+        if name in values:
+            values[name] = _whole_numbers(values[name], name, where)
+    methods = values.pop("methods")
+    _checked(methods, dict.fromkeys(methods, str), f"{where}, methods")
+    distortions = {
+        name: parse_chain(_chain(chain, name, where), noises=noises)
+        for name, chain in values.pop("distortions").items()
+    }
+    districts = values.pop("districts", None)
+    if districts is not None:
+        keys = {"file": str, "name": str}
+        districts = Districts(**_checked(districts, keys, f"{where}, districts", keys))
+    return ExperimentSpec(
+        methods={name: parse_method(text, noises=noises) for name, text in methods.items()},
+        distortions=distortions,
+        districts=districts,
+        **values,
+    )
+
+
+def open_experiment_spec(path: str | Path) -> ExperimentSpec:
+    """Read an experiment from a TOML file.
+
+    Parameters
+    ----------
+    path : str or Path
+        The file; files that it names are looked for beside it.
+
+    Returns
+    -------
+    ExperimentSpec
+        The experiment.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be read, or does not hold an experiment.
+
+    Examples
+    --------
+    >>> open_experiment_spec("nowhere.toml")
+    Traceback (most recent call last):
+    ...
+    semsig_gis.core.errors.InputError: experiment nowhere.toml cannot be read (No such file or
+    directory); give a TOML file.
+    """
+    file = Path(path)
+    try:
+        text = file.read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError) as error:
+        reason = error.strerror if isinstance(error, OSError) else "it is not text"
+        msg = f"experiment {file} cannot be read ({reason}); give a TOML file."
+        raise InputError(msg) from error
+    return parse_experiment(text, where=str(file), folder=file.parent)
+
+
+def _checked(
+    values: dict[str, Any], keys: Mapping[str, type], where: str, needed: Iterable[str] = ()
+) -> dict[str, Any]:
+    """Return values with known keys of the right types."""
+    try:
+        check_keys(values, keys, where, needed)
+    except CatalogError as error:
+        raise InputError(str(error)) from error
+    return values
+
+
+def _noise(name: str, given: object, where: str, folder: Path) -> Noise:
+    """Return a noise model that is written out, or that of a file, under its name."""
+    if isinstance(given, str):
+        values = open_noise(folder / given).to_dict()
+    elif isinstance(given, dict):
+        values = given
+    else:
+        msg = f"{where} has {name} = {given!r} in noises; write a table or the name of a file."
+        raise InputError(msg)
+    return noise_from_dict({**values, "name": name})
+
+
+def _chain(chain: object, name: str, where: str) -> str:
+    texts: list[Any] = chain if isinstance(chain, list) else [chain]
+    if not all(isinstance(text, str) for text in texts):
+        msg = f"{where} has {name} = {chain!r} in distortions; write a text or a list of texts."
+        raise InputError(msg)
+    return ", ".join(texts)
+
+
+def _whole_numbers(items: list[object], key: str, where: str) -> tuple[int, ...]:
+    # bool is an int to Python, never to a person
+    if not all(type(item) is int for item in items):
+        msg = f"{where} has {key} = {items!r}; write a list of whole numbers."
+        raise InputError(msg)
+    return tuple(item for item in items if isinstance(item, int))

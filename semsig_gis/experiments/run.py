@@ -1,0 +1,555 @@
+"""The work of an experiment: the files that it names, its queries, and what its methods answer.
+
+Queries are answered a hundred at a time. Each method's answers to a hundred are a file of their
+own, so that little is lost when a run is interrupted, and many processes can share the work.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import math
+from dataclasses import dataclass, field
+from functools import cached_property, lru_cache, partial
+from itertools import product
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import geopandas as gpd
+import pandas as pd
+import pyarrow as pa
+import pyarrow.parquet as pq
+
+from semsig_gis.core.errors import DatabaseError, SourceError
+from semsig_gis.core.parallel import check_workers, run_tasks
+from semsig_gis.database.file import built_digest, open_database
+from semsig_gis.database.parts import digest, part_files
+from semsig_gis.database.store import open_store, store_path
+from semsig_gis.evaluation.answer import Answerer
+from semsig_gis.evaluation.evaluate import (
+    check_count,
+    make_evaluation,
+    score_queries,
+    scored_tables,
+    versions,
+)
+from semsig_gis.evaluation.figures import district_labels
+from semsig_gis.evaluation.spec import Case, parse_experiment
+from semsig_gis.experiments.folder import (
+    PARTS,
+    begin_run,
+    finish_run,
+    finished_run,
+    open_results,
+    write_results,
+)
+from semsig_gis.likelihood.index_file import index_path, ready_index
+from semsig_gis.likelihood.method import LikelihoodMethod
+from semsig_gis.likelihood.refine import cell_noise
+from semsig_gis.matching.memo import DistanceMemo
+from semsig_gis.matching.method import Method
+from semsig_gis.queries.draw import draw_queries
+from semsig_gis.storage.whole import whole_file
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator, Mapping, Sequence
+
+    from semsig_gis.database.database import SignatureDatabase
+    from semsig_gis.database.store import ObjectStore
+    from semsig_gis.evaluation.result import Evaluation
+    from semsig_gis.evaluation.spec import ExperimentSpec
+    from semsig_gis.likelihood.index import LikelihoodIndex
+    from semsig_gis.queries.draw import Query
+
+
+QUERIES_A_PART = 100
+
+
+MEMO_BYTES = 256 << 20  # distances that the methods of an experiment share
+
+
+MEASURES = 3  # each of types and of angles
+
+
+STAGES = 2
+
+
+class Part(NamedTuple):
+    """Some queries of an experiment, to be answered by all its methods.
+
+    ``distortion`` is its name in the experiment, and ``number`` tells which hundred of its queries,
+    from 0.
+    """
+
+    distortion: str
+    number: int
+
+
+@dataclass(frozen=True, eq=False)
+class ExperimentWork:
+    """An experiment with the files that it names, which are looked for in ``folder``.
+
+    ``note`` is called with a sentence where an index is built or a file was put right.
+    """
+
+    spec: ExperimentSpec
+    folder: Path
+    note: Callable[[str], None] | None = None
+    _stored: dict[str, ObjectStore] = field(default_factory=dict)
+    _indexes: dict[Path, LikelihoodIndex] = field(default_factory=dict)
+    _answerers: dict[str, Answerer] = field(default_factory=dict)
+
+    def digests(self) -> dict[str, str]:
+        """Return a digest of the content of each file that is looked at, by name.
+
+        Raises `SemsigError` if a file is missing.
+        """
+        found = {}
+        for name in dict.fromkeys([self.spec.database, self.spec.city or self.spec.database]):
+            files = _files(self.folder / name)
+            # Columns that were put into a database later change nothing here.
+            found[name] = built_digest(*files) if len(files) == 1 else digest(*files)
+        for name in self._stores():
+            store = store_path(self.folder / name)
+            if store.is_dir():
+                key = f"{name.removesuffix('.parquet')}{store.suffix}"
+                found[key] = digest(*sorted(store.glob("*.parquet")))
+        if self.spec.districts is not None:
+            file = self.folder / self.spec.districts.file
+            if not file.is_file():
+                msg = f"districts {file} do not exist; give a file of polygons."
+                raise SourceError(msg)
+            found[self.spec.districts.file] = digest(file)
+        return found
+
+    def _stores(self) -> list[str]:
+        """Return the databases of which the street objects are looked at."""
+        some = []
+        if self.spec.seen_from == "anywhere":
+            some.append(self.spec.city or self.spec.database)
+        if any(
+            isinstance(method, LikelihoodMethod) and method.refined
+            for method in self.spec.methods.values()
+        ):
+            some.append(self.spec.database)
+        return list(dict.fromkeys(some))
+
+    def prepare(self) -> None:
+        """Build the indexes that methods need.
+
+        Raises `SemsigError` if a file cannot be read, or something does not fit the database.
+        """
+        for top in self.spec.top:
+            check_count("candidates", top, len(self.database))
+        if self.districts is not None and self.spec.districts is not None:
+            nowhere = gpd.GeoDataFrame(geometry=[], crs=self.database.crs)
+            district_labels(nowhere, self.districts, self.spec.districts.name)
+        for distortion in self.spec.distortions:
+            self._queries(distortion, slice(1))
+        for name in self.spec.methods:
+            self._answerer(name)
+
+    @cached_property
+    def database(self) -> SignatureDatabase:
+        """What is searched."""
+        return open_database(self.folder / self.spec.database)
+
+    @cached_property
+    def city(self) -> SignatureDatabase | None:
+        """What is looked at, if it is something else."""
+        return None if self.spec.city is None else open_database(self.folder / self.spec.city)
+
+    @cached_property
+    def districts(self) -> gpd.GeoDataFrame | None:
+        """The polygons by which figures are told, if any."""
+        if self.spec.districts is None:
+            return None
+        file = self.folder / self.spec.districts.file
+        try:
+            return gpd.read_file(file)
+        except Exception as error:  # whatever the many readers raise
+            msg = f"districts {file} cannot be read ({error}); give a file of polygons."
+            raise SourceError(msg) from error
+
+    @property
+    def parts(self) -> tuple[Part, ...]:
+        """All parts of the work."""
+        numbers = range(math.ceil(self._queries_of_each / QUERIES_A_PART))
+        return tuple(Part(name, number) for name in self.spec.distortions for number in numbers)
+
+    def queries_in(self, part: Part) -> int:
+        """Return how many queries are in a part: a hundred, or fewer in the last one."""
+        before = part.number * QUERIES_A_PART
+        return min(QUERIES_A_PART, self._queries_of_each - before)
+
+    def answer(self, place: Path, part: Part) -> None:
+        """Let every method answer the queries of a part, unless it has done so before.
+
+        ``place`` is the folder of the files with the answers.
+        """
+        count = self.queries_in(part) * len(self.spec.top)
+        files = {name: _part_file(place, part, name) for name in self.spec.methods}
+        left = {name: file for name, file in files.items() if not _is_whole(file, rows=count)}
+        if not left:
+            return
+        start = part.number * QUERIES_A_PART
+        queries = self._queries(part.distortion, slice(start, start + QUERIES_A_PART))
+        by_distance = [name for name in left if isinstance(self.spec.methods[name], Method)]
+        for names in (by_distance, *([name] for name in left if name not in by_distance)):
+            for name, scored in self._scored(names, queries):
+                with whole_file(left[name]) as half:
+                    scored.to_parquet(half)
+
+    def _scored(
+        self, names: Sequence[str], queries: Sequence[Query]
+    ) -> Iterator[tuple[str, pd.DataFrame]]:
+        """Yield the scored answers of some methods that share what they measure."""
+        found: dict[str, dict[int, list[dict[str, Any]]]] = {
+            name: {top: [] for top in self.spec.top} for name in names
+        }
+        step = self._batch if len(names) > 1 else len(queries)
+        for start in range(0, len(queries), step):
+            memo = DistanceMemo() if len(names) > 1 else None
+            for name in names:
+                outcomes = score_queries(
+                    self._answerer(name),
+                    queries[start : start + step],
+                    tops=self.spec.top,
+                    memo=memo,
+                )
+                for top, rows in outcomes.items():
+                    found[name][top] += rows
+        for name, outcomes in found.items():
+            scored = scored_tables(self.database, queries, outcomes)
+            tables = [table.assign(top=top) for top, table in scored.items()]
+            yield name, pd.concat(tables, ignore_index=True)
+
+    @property
+    def _batch(self) -> int:
+        """For how many queries the distances are kept that methods share."""
+        distinct = len(self.database.type_sequences) + len(self.database.angle_sequences)
+        of_each = 4 * (MEASURES * distinct + STAGES * len(self.database))
+        return max(1, min(QUERIES_A_PART, MEMO_BYTES // max(of_each, 1)))
+
+    def evaluations(self, place: Path) -> dict[str, Evaluation]:
+        """Return all evaluations by the names of their cases, once all queries are answered."""
+        size = sum(file.stat().st_size for file in _files(self.folder / self.spec.database))
+        found = {}
+        for distortion, method in product(self.spec.distortions, self.spec.methods):
+            scored = self._answers(place, distortion, method)
+            for top in self.spec.top:
+                case = Case(distortion=distortion, method=method, top=top)
+                found[case.name] = make_evaluation(
+                    self.database,
+                    self.spec.methods[method],
+                    self.spec.asked(distortion),
+                    scored[scored["top"] == top].reset_index(drop=True),
+                    top=top,
+                    city=self.spec.city,
+                    file_bytes=size,
+                )
+        return found
+
+    def _answers(self, place: Path, distortion: str, method: str) -> pd.DataFrame:
+        """Return all answers of a method."""
+        files = [
+            _part_file(place, part, method) for part in self.parts if part.distortion == distortion
+        ]
+        found: pd.DataFrame = pa.concat_tables(
+            map(pq.read_table, files), promote_options="default"
+        ).to_pandas()
+        return found
+
+    @property
+    def _queries_of_each(self) -> int:
+        """How many queries each distortion has."""
+        return self.spec.queries * len(self.spec.seeds)
+
+    def _queries(self, distortion: str, part: slice) -> list[Query]:
+        """Return some of the queries after a distortion."""
+        looked_at = self.spec.city or self.spec.database
+        return draw_queries(
+            self.database,
+            self.spec.asked(distortion),
+            store=self._store(looked_at) if self.spec.seen_from == "anywhere" else None,
+            city=self.city,
+            part=part,
+        )
+
+    def _answerer(self, name: str) -> Answerer:
+        """Return a method with all that it needs."""
+        if name not in self._answerers:
+            method = self.spec.methods[name]
+            more: dict[str, Any] = {}
+            if isinstance(method, LikelihoodMethod):
+                more["index"] = self._index(method)
+                more["store"] = self._store(self.spec.database) if method.refined else None
+            self._answerers[name] = Answerer(database=self.database, method=method, **more)
+        return self._answerers[name]
+
+    def _store(self, name: str) -> ObjectStore:
+        if name not in self._stored:
+            self._stored[name] = open_store(self.folder / name)
+            for sentence in self._stored[name].notes:
+                self._say(sentence)
+        return self._stored[name]
+
+    def _index(self, method: LikelihoodMethod) -> LikelihoodIndex:
+        step = self.database.grid.step
+        noise = method.noise if method.on_grid else cell_noise(method.noise, step)
+        path = index_path(self.folder / self.spec.database, noise)
+        if path not in self._indexes:
+            self._indexes[path] = ready_index(self.database, noise, path, note=self.note)
+        return self._indexes[path]
+
+    def _say(self, sentence: str) -> None:
+        if self.note is not None:
+            self.note(sentence)
+
+
+def _files(database: Path) -> tuple[Path, ...]:
+    """Return the files of a database."""
+    if database.is_dir():
+        return part_files(database)
+    if not database.is_file():
+        msg = f"{database} does not exist; give a signature database file."
+        raise DatabaseError(msg)
+    return (database,)
+
+
+def _part_file(place: Path, part: Part, method: str) -> Path:
+    return place / f"{part.distortion}.{method}.{part.number:05d}.parquet"
+
+
+def _is_whole(file: Path, *, rows: int) -> bool:
+    """Tell whether a part is there and can be read."""
+    if not file.is_file():
+        return False
+    try:
+        return bool(pq.read_table(file).num_rows == rows)
+    except (OSError, ValueError, pa.ArrowException):
+        return False
+
+
+# When so many parts have failed, the rest would too.
+MOST_FAILED = 10
+
+
+def run_experiment(
+    spec: ExperimentSpec,
+    out: str | Path,
+    *,
+    folder: str | Path = ".",
+    workers: int = 0,
+    scheduler: str | None = None,
+    note: Callable[[str], None] | None = None,
+    progress: Callable[[int, int], None] | None = None,
+) -> dict[str, Evaluation]:
+    """Run an experiment, or what is left of it.
+
+    Parameters
+    ----------
+    spec : ExperimentSpec
+        The experiment.
+    out : str or Path
+        Folder for the results; it appears whole, by rename. If it holds the results of the same
+        experiment, these are returned.
+    folder : str or Path, default "."
+        Where the files that the experiment names are looked for.
+    workers : int, default 0
+        How many processes of this machine answer; 0 answers here, without dask.
+    scheduler : str, optional
+        Address of a dask scheduler, such as ``tcp://10.0.0.5:8786``, whose workers see the same
+        files under the same paths; then `workers` stays 0.
+    note : callable, optional
+        Called with a sentence where an index is built.
+    progress : callable, optional
+        Called with the number of answers done and in all.
+
+    Returns
+    -------
+    dict of str to Evaluation
+        The evaluations by the names of their cases.
+
+    Raises
+    ------
+    InputError
+        If `out` or its unfinished run belongs to another experiment or to none, or the experiment
+        asks for more than the database has, or the workers cannot be reached.
+    SemsigError
+        If a file cannot be read, or something does not fit the database.
+
+    Notes
+    -----
+    The folder gets ``experiment.toml``, ``inputs.json`` (digests of the files, and versions),
+    ``figures.csv`` and ``report.md`` for people, and for each case a folder with what
+    `Evaluation.save` writes. A script that gives `workers` needs the guard
+    ``if __name__ == "__main__":``, because the workers import it.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> from semsig_gis.database.build import build_database
+    >>> from semsig_gis.sources.catalog import paper_taxonomy
+    >>> from semsig_gis.database.file import save_database
+    >>> from semsig_gis.evaluation.spec import parse_experiment
+    >>> from semsig_gis.objects.clean import build_objects
+    >>> from semsig_gis.sources.synthetic.city import CitySpec, synthetic_city
+    >>> layers = synthetic_city(CitySpec(size=300.0))
+    >>> objects, _ = build_objects(layers, taxonomy=paper_taxonomy(), crs="EPSG:32631")
+    >>> spec = parse_experiment('''
+    ... database = "city.parquet"
+    ... queries = 10
+    ... methods.paper = "edit+edit:5%"
+    ... distortions.phone = "medium, view:90"
+    ... ''')
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     save_database(build_database(objects), f"{folder}/city.parquet")
+    ...     found = run_experiment(spec, f"{folder}/results", folder=folder)
+    >>> list(found), len(found["phone/paper-top1"].queries)
+    (['phone/paper-top1'], 10)
+    """
+    (found,) = run_experiments(
+        {Path(out): spec},
+        folder=folder,
+        workers=workers,
+        scheduler=scheduler,
+        note=note,
+        progress=progress,
+    ).values()
+    return found
+
+
+def run_experiments(
+    specs: Mapping[Path, ExperimentSpec],
+    *,
+    folder: str | Path = ".",
+    workers: int = 0,
+    scheduler: str | None = None,
+    note: Callable[[str], None] | None = None,
+    progress: Callable[[int, int], None] | None = None,
+) -> dict[Path, dict[str, Evaluation]]:
+    """Run several experiments at once, or what is left of them.
+
+    Parameters
+    ----------
+    specs : mapping of Path to ExperimentSpec
+        The experiments by the folders for their results.
+    folder : str or Path, default "."
+        Where the files that the experiments name are looked for.
+    workers : int, default 0
+        How many processes of this machine answer; 0 answers here, without dask.
+    scheduler : str, optional
+        Address of a dask scheduler; then `workers` stays 0.
+    note : callable, optional
+        Called with a sentence where an index is built.
+    progress : callable, optional
+        Called with the number of answers done and in all, of all experiments.
+
+    Returns
+    -------
+    dict of Path to dict
+        What `run_experiment` gives, by folder.
+
+    Raises
+    ------
+    InputError, SemsigError
+        As in `run_experiment`. Nothing is answered if one of the experiments is refused.
+    """
+    check_workers(workers, scheduler)
+    running: dict[Path, _Running] = {}
+    for out, spec in specs.items():
+        work = ExperimentWork(spec, Path(folder), note)
+        identity = {"experiment": spec.to_dict(), "inputs": work.digests(), "versions": versions()}
+        if not finished_run(out, identity):
+            running[out] = _Running(work, begin_run(out, spec, identity))
+    for work, _ in running.values():
+        work.prepare()
+    _answer(running, workers=workers, scheduler=scheduler, progress=progress)
+    found = {}
+    for out in specs:
+        if out in running:
+            work, partial_ = running[out]
+            found[out] = work.evaluations(partial_ / PARTS)
+            write_results(partial_, work.spec, found[out], districts=work.districts)
+            finish_run(partial_)
+        else:
+            found[out] = open_results(out)
+    return found
+
+
+class _Running(NamedTuple):
+    """An experiment that is not finished, and the folder where its parts are put."""
+
+    work: ExperimentWork
+    partial: Path
+
+
+class _Task(NamedTuple):
+    """A part of one of the experiments."""
+
+    out: Path
+    part: Part
+
+
+def _answer(
+    running: Mapping[Path, _Running],
+    *,
+    workers: int,
+    scheduler: str | None,
+    progress: Callable[[int, int], None] | None,
+) -> None:
+    """Answer all parts of all experiments."""
+    sizes = {
+        _Task(out, part): work.queries_in(part) * len(work.spec.methods)
+        for out, (work, _) in running.items()
+        for part in work.parts
+    }
+    if workers or scheduler is not None:
+        given = {
+            out: (work.spec.to_toml(), work.folder.resolve(), place.resolve() / PARTS)
+            for out, (work, place) in running.items()
+        }
+        answer = partial(_answer_apart, given)
+    else:
+        answer = partial(_answer_here, running)
+    outcomes = run_tasks(
+        answer,
+        list(sizes),
+        workers=workers,
+        scheduler=scheduler,
+        files=[work.folder.resolve() / work.spec.database for work, _ in running.values()],
+    )
+    done, total, failed = 0, sum(sizes.values()), []
+    with contextlib.closing(outcomes):
+        for outcome in outcomes:
+            if outcome.reason is not None:
+                failed.append(outcome)
+                if len(failed) == MOST_FAILED:
+                    break
+                continue
+            done += sizes[outcome.task]
+            if progress is not None:
+                progress(done, total)
+    if failed:
+        out, reason = failed[0].task.out, failed[0].reason
+        msg = (
+            f"{len(failed)} of the {len(sizes)} parts of the work failed ({reason}); what is done "
+            f"is kept in {running[out].partial}, so mend that and run the same command again."
+        )
+        raise DatabaseError(msg)
+
+
+def _answer_here(running: Mapping[Path, _Running], task: _Task) -> None:
+    work, place = running[task.out]
+    work.answer(place / PARTS, task.part)
+
+
+def _answer_apart(given: Mapping[Path, tuple[str, Path, Path]], task: _Task) -> None:
+    spec, folder, place = given[task.out]
+    _opened(spec, folder).answer(place, task.part)
+
+
+@lru_cache(maxsize=2)
+def _opened(spec: str, folder: Path) -> ExperimentWork:
+    """Return an experiment with its files, which a worker opens once."""
+    return ExperimentWork(parse_experiment(spec), folder)

@@ -1,0 +1,340 @@
+"""What is handed on, as layers that are read in blocks: every format writes the same ones."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Literal, get_args
+
+import numpy as np
+import pandas as pd
+import pyarrow as pa
+import pyarrow.compute as pc
+import shapely
+
+from semsig_gis.core.crs import CLASS_CODE, CLASS_NAME, COUNT, GEOMETRY, MERGED, SOURCE, SOURCE_ID
+from semsig_gis.core.errors import UnknownNameError, nearest_name
+from semsig_gis.database.database import BEARING_UNITS, DISTANCE_UNITS
+from semsig_gis.database.file import database_specs
+from semsig_gis.evaluation.identify.result import identifiability_facts
+from semsig_gis.evaluation.result import SUCCESS_METRES, SUCCESS_PROBABILITY
+from semsig_gis.exports.styles import (
+    AMBIGUITY,
+    IDENTIFIABILITY,
+    OUTCOMES,
+    by_amount,
+    by_class,
+    by_outcome,
+    by_rank,
+)
+from semsig_gis.likelihood.result import Location
+from semsig_gis.objects.table import objects_specs
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator, Mapping
+
+    import geopandas as gpd
+    from numpy.typing import NDArray
+    from pyproj import CRS
+
+    from semsig_gis.database.database import SignatureDatabase
+    from semsig_gis.evaluation.identify.result import Identifiability
+    from semsig_gis.evaluation.result import Evaluation
+    from semsig_gis.exports.regions import SearchRegions
+    from semsig_gis.exports.styles import Style
+    from semsig_gis.matching.result import Localization
+    from semsig_gis.objects.table import StreetObjects
+
+CellGeometry = Literal["polygon", "point"]
+
+ROWS_A_BLOCK = 1 << 16
+GEOMETRY_TYPES = {"polygon": "Polygon", "line": "LineString", "point": "Point"}
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Layer:
+    """A table with geometry, of which some rows at a time are in memory."""
+
+    name: str
+    title: str
+    description: str
+    geometry: str  # polygon, line or point
+    crs: CRS
+    rows: int
+    bounds: tuple[float, float, float, float]
+    read: Callable[[slice], pa.Table]  # the geometry, as WKB, is the last column
+    licenses: tuple[str, ...]
+    facts: Mapping[str, Any]  # plain values for JSON
+    styles: tuple[Style, ...]  # the first is the default
+
+    def blocks(self, progress: Callable[[int, int], None] | None = None) -> Iterator[pa.Table]:
+        """Read the layer block by block; one without rows is a block without rows."""
+        for low in range(0, max(self.rows, 1), ROWS_A_BLOCK):
+            high = min(low + ROWS_A_BLOCK, self.rows)
+            yield self.read(slice(low, high))
+            if progress is not None:
+                progress(high, self.rows)
+
+
+def cells_layer(
+    database: SignatureDatabase,
+    *,
+    identifiability: Identifiability | None = None,
+    geometry: CellGeometry = "polygon",
+) -> Layer:
+    """Return the cells, as squares or as points."""
+    if geometry not in get_args(CellGeometry):
+        names = " or ".join(repr(name) for name in get_args(CellGeometry))
+        hint = nearest_name(str(geometry), get_args(CellGeometry))
+        msg = f"{geometry!r} is no geometry of a cell; give {names}{hint}."
+        raise UnknownNameError(msg)
+    if identifiability is not None:
+        identifiability.require_cells_of(database)
+    symbols = pa.array([chr(symbol) for symbol in database.taxonomy.symbol_bytes])
+    degrees = pa.array([f"{unit * 360 / BEARING_UNITS:.2f}" for unit in range(BEARING_UNITS)])
+    whole_numbers = pa.array([str(level) for level in range(1 << 8)])
+    decimals = distance_decimals(database.reach)
+    metres = pa.array(
+        [
+            f"{unit * database.reach / DISTANCE_UNITS:.{decimals}f}"
+            for unit in range(DISTANCE_UNITS + 1)
+        ]
+    )
+    type_groups, angle_groups = database.type_group_sizes, database.angle_group_sizes
+
+    def read(rows: slice) -> pa.Table:
+        places = database.xy[rows]
+        offsets = database.offsets[rows.start : rows.stop + 1]
+        squares = geometry == "polygon"
+        shapes = _squares(database, rows) if squares else shapely.points(places)
+        more = {}
+        if identifiability is not None:
+            told = identifiability.table(rows)
+            more = dict(zip(told.column_names, told.columns, strict=True))
+        return pa.table(
+            {
+                "cell_id": database.cell_ids[rows],
+                "x": np.ascontiguousarray(places[:, 0]),
+                "y": np.ascontiguousarray(places[:, 1]),
+                "length": database.lengths[rows].astype(np.int32),
+                "types": _joined(database.codes, offsets, texts=symbols, separator=""),
+                "bearings": _joined(database.bearing_units, offsets, texts=degrees),
+                "levels": _joined(database.levels, offsets, texts=whole_numbers),
+                "distances": _joined(database.distance_units, offsets, texts=metres),
+                "type_group_size": type_groups[rows],
+                "angle_group_size": angle_groups[rows],
+                **more,
+                GEOMETRY: shapely.to_wkb(shapes),
+            }
+        )
+
+    step = database.grid.step
+    drawn: dict[str, Any] = {"geometry": geometry, "size": step}
+    styles = [by_amount("Ambiguity", "type_group_size", AMBIGUITY, **drawn)]
+    if identifiability is not None:
+        chances = by_amount("Identifiability", "chance_found", IDENTIFIABILITY, **drawn)
+        styles.insert(0, chances)
+    corners = [(part.min(), part.max()) for part in (database.columns, database.rows)]
+    (west, south), (east, north) = database.grid.viewpoints(*corners).tolist()
+    margin = step / 2 if geometry == "polygon" else 0.0
+    return Layer(
+        name="cells",
+        title="Signature cells",
+        description=(
+            f"Cells of {step:g} m with the street objects that are seen within "
+            f"{database.spec.radius:g} m of their centre, clockwise from north."
+        ),
+        geometry=geometry,
+        crs=database.crs,
+        rows=len(database),
+        bounds=(west - margin, south - margin, east + margin, north + margin),
+        read=read,
+        licenses=database.licenses,
+        facts={
+            **database_specs(database),
+            "crs": database.crs.to_json_dict(),
+            "identifiability": (
+                None if identifiability is None else identifiability_facts(identifiability)
+            ),
+        },
+        styles=tuple(styles),
+    )
+
+
+def distance_decimals(reach: float) -> int:
+    """Return how many decimals tell every unit of a distance from the next."""
+    return max(2, math.ceil(-math.log10(reach / DISTANCE_UNITS)))
+
+
+def objects_layer(objects: StreetObjects) -> Layer:
+    """Return the street objects."""
+    classes = {item.code: item for item in objects.taxonomy.classes}
+    texts = [SOURCE, SOURCE_ID, *([MERGED] if MERGED in objects.table.columns else [])]
+
+    def read(rows: slice) -> pa.Table:
+        table = objects.table.iloc[rows]
+        kinds = [classes[code] for code in objects.codes[rows].tolist()]
+        return pa.table(
+            {
+                CLASS_CODE: objects.codes[rows],
+                "symbol": [item.symbol for item in kinds],
+                CLASS_NAME: [item.name for item in kinds],
+                "title": [item.title for item in kinds],
+                **{name: pa.array(table[name].tolist(), pa.string()) for name in texts},
+                COUNT: table[COUNT].to_numpy(np.int32),
+                GEOMETRY: shapely.to_wkb(table.geometry.array),
+            }
+        )
+
+    return Layer(
+        name="objects",
+        title="Street objects",
+        description=f"The {len(objects)} street objects.",
+        geometry="point",
+        crs=objects.crs,
+        rows=len(objects),
+        bounds=(*objects.xy.min(axis=0).tolist(), *objects.xy.max(axis=0).tolist()),
+        read=read,
+        licenses=objects.licenses,
+        facts={**objects_specs(objects), "crs": objects.crs.to_json_dict()},
+        styles=(by_class(objects.taxonomy, objects.class_counts),),
+    )
+
+
+def evaluation_layers(evaluation: Evaluation, licenses: tuple[str, ...]) -> list[Layer]:
+    """Return the queries at their true places, and lines from there to the best places."""
+    queries = evaluation.queries
+    found, missed, empty = OUTCOMES
+    nothing = (queries["query_length"] == 0).to_numpy()
+    told = queries.assign(
+        outcome=np.select([nothing, evaluation.successful], [empty, found], missed)
+    )
+    placed = told[told["best_x"].notna().to_numpy()]
+    truth = shapely.get_coordinates(placed.geometry.array)
+    best = placed[["best_x", "best_y"]].to_numpy(np.float64)
+    lines = placed[["seed", "number", "cell_id", "best_cell_id", "outcome", "error_m"]].assign(
+        off_m=np.hypot(*(best - truth).T)
+    )
+    lines = lines.set_geometry(
+        shapely.linestrings(np.stack([truth, best], axis=1)), crs=queries.crs
+    )
+    lines = lines[lines["off_m"] > 0]  # a line has a length
+    summary = evaluation.summary()
+    facts = {name: summary[name] for name in ("settings", "database", "versions")}
+    return [
+        _table_layer(
+            told,
+            name="evaluation",
+            title="Queries",
+            description=(
+                f"{len(told)} queries at their true places; found: the best place is within "
+                f"{SUCCESS_METRES} m with a probability of {SUCCESS_PROBABILITY:g} or more."
+            ),
+            geometry="point",
+            licenses=licenses,
+            facts=facts,
+            style=by_outcome(geometry="point"),
+        ),
+        _table_layer(
+            lines,
+            name="evaluation_lines",
+            title="From the true to the best place",
+            description="Each query's true place, joined to the best place that was found for it.",
+            geometry="line",
+            licenses=licenses,
+            facts=facts,
+            style=by_outcome(geometry="line"),
+        ),
+    ]
+
+
+def answer_layers(answer: Location | Localization, regions: SearchRegions) -> list[Layer]:
+    """Return the regions that must be searched, and the candidates of a query."""
+    told = answer.to_dict()
+    facts = {name: told[name] for name in told if name not in {"candidates", "crs", "licenses"}}
+    facts["searched"] = regions.to_dict()
+    rank = "rank" if isinstance(answer, Location) else "rank_low"
+    licenses = tuple(told["licenses"])
+    return [
+        _table_layer(
+            regions.table,
+            name="regions",
+            title="Regions to search",
+            description="Where the query may have been seen from, the best first.",
+            geometry="polygon",
+            licenses=licenses,
+            facts=facts,
+            style=by_rank("rank", geometry="polygon"),
+        ),
+        _table_layer(
+            answer.to_geodataframe(),
+            name="candidates",
+            title="Candidates",
+            description="The best cells for the query.",
+            geometry="point",
+            licenses=licenses,
+            facts=facts,
+            style=by_rank(rank, geometry="point"),
+        ),
+    ]
+
+
+def _table_layer(
+    frame: gpd.GeoDataFrame,
+    *,
+    name: str,
+    title: str,
+    description: str,
+    geometry: str,
+    licenses: tuple[str, ...],
+    facts: Mapping[str, Any],
+    style: Style,
+) -> Layer:
+    """Return a layer of a table that is in memory; what is not finite is missing in it."""
+    shapes = frame.geometry
+    columns = {}
+    for column in frame.columns.drop(shapes.name):
+        values = frame[column]
+        if pd.api.types.is_float_dtype(values.dtype):
+            numbers = values.to_numpy(np.float64)
+            columns[column] = pa.array(numbers, mask=~np.isfinite(numbers))
+        else:
+            texts = pd.api.types.is_string_dtype(values.dtype)
+            columns[column] = pa.Array.from_pandas(values, type=pa.string() if texts else None)
+    table = pa.table({**columns, GEOMETRY: pa.array(shapely.to_wkb(shapes.array), pa.binary())})
+    return Layer(
+        name=name,
+        title=title,
+        description=description,
+        geometry=geometry,
+        crs=shapes.crs,
+        rows=len(table),
+        bounds=tuple(shapes.total_bounds.tolist()),
+        read=lambda rows: table.slice(rows.start, rows.stop - rows.start),
+        licenses=licenses,
+        facts=facts,
+        styles=(style,),
+    )
+
+
+def _squares(database: SignatureDatabase, rows: slice) -> NDArray[np.object_]:
+    """Return the squares of some cells; neighbours share their corners to the last bit."""
+    step = database.grid.step
+    (left, right), (bottom, top) = (
+        (start + numbers[rows] * step, start + (numbers[rows] + 1) * step)
+        for start, numbers in zip(
+            database.grid.origin, (database.columns, database.rows), strict=True
+        )
+    )
+    return np.asarray(shapely.box(left, bottom, right, top))
+
+
+def _joined(
+    values: NDArray[Any], offsets: NDArray[np.int64], *, texts: pa.Array, separator: str = " "
+) -> pa.Array:
+    """Return the values of each cell as one text; `texts` holds every possible value as text."""
+    entries = pa.array(values[offsets[0] : offsets[-1]])
+    # From 0, and small enough for Arrow's 32-bit lists: a block has few cells.
+    starts = pa.array((offsets - offsets[0]).astype(np.int32))
+    lists = pa.ListArray.from_arrays(starts, texts.take(entries))
+    return pc.binary_join(lists, separator)

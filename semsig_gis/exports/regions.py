@@ -1,0 +1,184 @@
+"""What of a city must be searched after a query: polygons for whoever looks closer.
+
+A pipeline that estimates poses compares pictures, which costs time for every square metre. It
+takes the regions by rank until it has found the place.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import geopandas as gpd
+import numpy as np
+import shapely
+
+from semsig_gis.core.errors import InputError
+from semsig_gis.database.database import rows_of_result
+from semsig_gis.likelihood.posterior import Posterior
+from semsig_gis.likelihood.result import REGION_SHARE, Location
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from semsig_gis.database.database import SignatureDatabase
+    from semsig_gis.matching.result import Localization
+
+
+@dataclass(frozen=True, eq=False)
+class SearchRegions:
+    """The regions of a city in which a query may have been seen.
+
+    Parameters
+    ----------
+    table : GeoDataFrame
+        One row a region, best first, in the CRS of the database: ``rank`` (from 1), ``chance``
+        (of the place being in it; of the likelihood method only), ``cells``, ``km2``,
+        ``best_cell_id``, ``best_x`` and ``best_y`` (its best cell, and the viewpoint of that);
+        ``searched_chance``, ``searched_km2`` and ``searched_percent`` (of the city) with all
+        regions before it; ``geometry`` (polygon of whole cells that share sides).
+    """
+
+    table: gpd.GeoDataFrame
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return what is to be searched in all as plain values for JSON.
+
+        Returns
+        -------
+        dict
+            ``regions``, ``cells``, ``km2``, ``percent`` (of the area of all cells) and, of the
+            likelihood method, ``chance``.
+        """
+        last = self.table.iloc[-1]
+        told = {
+            "regions": len(self.table),
+            "cells": int(self.table["cells"].sum()),
+            "km2": float(last["searched_km2"]),
+            "percent": float(last["searched_percent"]),
+        }
+        if "chance" in self.table.columns:
+            told["chance"] = float(last["searched_chance"])
+        return told
+
+
+def search_regions(
+    answer: Location | Localization,
+    database: SignatureDatabase,
+    *,
+    share: float = REGION_SHARE,
+    within: float = 0.0,
+) -> SearchRegions:
+    """Return the regions in which a query may have been seen.
+
+    Parameters
+    ----------
+    answer : Location or Localization
+        The answer to the query. Of the likelihood method, the regions hold the fewest cells that
+        have a share of the chance; of other methods, the candidates.
+    database : SignatureDatabase
+        The database that was searched.
+    share : float, default 0.9
+        Of the chance, above 0 and at most 1.
+    within : float, default 0
+        Cells whose viewpoint is at most so many metres from one of those belong to the regions
+        too, for places between the viewpoints and for what is not known of the city.
+
+    Returns
+    -------
+    SearchRegions
+        Merged polygons, by falling chance or by their best candidate.
+
+    Raises
+    ------
+    InputError
+        If the share or the distance is out of range, or the answer is from another database.
+
+    Examples
+    --------
+    >>> from semsig_gis.database.build import build_database
+    >>> from semsig_gis.sources.catalog import paper_taxonomy
+    >>> from semsig_gis.matching.search import localize
+    >>> from semsig_gis.objects.clean import build_objects
+    >>> from semsig_gis.sources.synthetic.city import CitySpec, synthetic_city
+    >>> layers = synthetic_city(CitySpec(size=300.0))
+    >>> objects, _ = build_objects(layers, taxonomy=paper_taxonomy(), crs="EPSG:32631")
+    >>> database = build_database(objects)
+    >>> answer = localize(database, database.signature(0), top=5)
+    >>> search_regions(answer, database).to_dict()["cells"]
+    5
+    """
+    if not 0 < share <= 1:
+        msg = f"regions of a share of {share} were asked for; give a number above 0, at most 1."
+        raise InputError(msg)
+    if not (math.isfinite(within) and within >= 0):
+        msg = f"regions within {within} m were asked for; give metres, 0 or more."
+        raise InputError(msg)
+    chances: NDArray[np.float64] | None = None
+    if isinstance(answer, Location):
+        chances = answer.posterior.chances
+        cells = answer.posterior.credible_cells(share)
+        if not np.array_equal(answer.posterior.database.cell_ids, database.cell_ids):
+            msg = "the answer was found in another database; give the database that was searched."
+            raise InputError(msg)
+    else:
+        found = answer.candidates
+        cells = rows_of_result(database, found["cell_id"], found["types"], what="localization")
+    if within > 0:
+        cells = np.concatenate([cells, _around(database, cells, within)])
+    shapes = shapely.get_parts(shapely.union_all(_runs(database, np.sort(cells))))
+    points = np.asarray(shapely.points(database.xy[cells]))
+    shape, inside = shapely.STRtree(points).query(shapes, predicate="contains")
+    # In the order of the cells, so that the first of each region is its best.
+    region = shape[np.argsort(inside)]
+    first = np.unique(region, return_index=True)[1]
+    counts = np.bincount(region)
+    held = None if chances is None else np.bincount(region, chances[cells])
+    order = np.argsort(first if held is None else -held, kind="stable")
+    best = cells[first[order]]
+    km2 = counts[order] * database.grid.step**2 / 1e6
+    columns: dict[str, Any] = {"rank": np.arange(1, len(order) + 1)}
+    if held is not None:
+        columns["chance"] = held[order]
+    columns |= {
+        "cells": counts[order],
+        "km2": km2,
+        "best_cell_id": database.cell_ids[best],
+        "best_x": database.xy[best, 0],
+        "best_y": database.xy[best, 1],
+    }
+    if held is not None:
+        columns["searched_chance"] = np.minimum(np.cumsum(held[order]), 1.0)
+    columns["searched_km2"] = np.cumsum(km2)
+    columns["searched_percent"] = 100.0 * np.cumsum(counts[order]) / len(database)
+    return SearchRegions(gpd.GeoDataFrame(columns, geometry=shapes[order], crs=database.crs))
+
+
+def _runs(database: SignatureDatabase, cells: NDArray[np.int64]) -> NDArray[np.object_]:
+    """Return cells as rectangles, one for all that follow each other in a column.
+
+    There are far fewer of these than of cells to be merged.
+    """
+    step, (west, south) = database.grid.step, database.grid.origin
+    breaks = np.diff(database.cell_ids[cells]) != 1
+    first, last = cells[np.append(True, breaks)], cells[np.append(breaks, True)]
+    columns, bottom, top = database.columns[first], database.rows[first], database.rows[last]
+    return np.asarray(
+        shapely.box(
+            west + columns * step,
+            south + bottom * step,
+            west + (columns + 1) * step,
+            south + (top + 1) * step,
+        )
+    )
+
+
+def _around(
+    database: SignatureDatabase, cells: NDArray[np.int64], within: float
+) -> NDArray[np.int64]:
+    """Return the other cells that are near to some."""
+    chosen = np.zeros(len(database))
+    chosen[cells] = 1.0
+    near = Posterior(database=database, chances=chosen).mass_within(within) > 0
+    return np.flatnonzero(near & (chosen == 0))

@@ -1,0 +1,1 @@
+"""Rank cells by likelihood: index, re-rank, refine, explain, learn."""

@@ -1,0 +1,130 @@
+"""The likelihood method with its settings."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+from semsig_gis.core.errors import InputError, UnknownNameError, nearest_name
+from semsig_gis.core.text import plain_number
+from semsig_gis.likelihood.noise.model import NOISES
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from semsig_gis.likelihood.noise.model import Noise
+
+
+LIKELIHOOD = "likelihood"  # what the text of a likelihood method begins with
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LikelihoodMethod:
+    """The likelihood method with all its steps (see `likelihood.locate`).
+
+    Parameters
+    ----------
+    noise : NoiseSpec or NoiseMixture
+        How detectors fail, at a place that is known.
+    refined : bool, default False
+        Whether the place is looked for between the viewpoints, too, with the street objects.
+    on_grid : bool, default False
+        Whether queries are from the very viewpoints, as in the paper, not from anywhere in a cell.
+    north_sigma : float, default 0
+        Standard deviation in degrees of the north of a query; infinite where it is not known.
+
+    Raises
+    ------
+    InputError
+        If the deviation is negative, or a place on the grid is to be refined.
+
+    Examples
+    --------
+    >>> from semsig_gis.likelihood.noise.model import named_noise
+    >>> str(LikelihoodMethod(noise=named_noise("medium"), refined=True))
+    'likelihood:medium:refined'
+    >>> LikelihoodMethod.parse("likelihood:generic:heading=10").north_sigma
+    10.0
+    """
+
+    noise: Noise
+    refined: bool = False
+    on_grid: bool = False
+    north_sigma: float = 0.0
+
+    def __post_init__(self) -> None:  # noqa: D105
+        if not self.north_sigma >= 0:
+            msg = f"the deviation of north is {self.north_sigma} degrees; give 0 or more."
+            raise InputError(msg)
+        if self.refined and self.on_grid:
+            msg = "a place on the grid is not to be refined; leave out refined or on_grid."
+            raise InputError(msg)
+
+    @classmethod
+    def parse(cls, text: str, *, noises: Mapping[str, Noise] = NOISES) -> LikelihoodMethod:
+        """Read a method from the text that `str` writes.
+
+        Parameters
+        ----------
+        text : str
+            ``likelihood``, or ``likelihood:NOISE``, then any of ``:refined``, ``:on_grid`` and
+            ``:heading=DEGREES`` or ``:heading=unknown``. Without a noise model, it is generic.
+        noises : mapping of str to Noise, optional
+            The noise models by name.
+
+        Returns
+        -------
+        LikelihoodMethod
+            The method.
+
+        Raises
+        ------
+        UnknownNameError
+            If there is no noise model of that name.
+        InputError
+            If the text does not have that form.
+        """
+        _, *options = text.strip().split(":")
+        said = options.pop(0) if options else "generic"
+        if said not in noises:
+            known = ", ".join(noises)
+            hint = nearest_name(said, noises)
+            msg = f"method {text!r} has a noise model that is not known{hint}; give one of {known}."
+            raise UnknownNameError(msg)
+        values: dict[str, Any] = {}
+        for option in options:
+            key, _, value = option.partition("=")
+            if option in {"refined", "on_grid"}:
+                values[option] = True
+            elif key == "heading" and value:
+                values["north_sigma"] = _north_sigma(value, text)
+            else:
+                raise InputError(_misread_likelihood(text))
+        return cls(noise=noises[said], **values)
+
+    def __str__(self) -> str:
+        """Return the text that `parse` reads."""
+        parts = [LIKELIHOOD, self.noise.name]
+        parts += [name for name in ("refined", "on_grid") if getattr(self, name)]
+        if self.north_sigma:
+            known = math.isfinite(self.north_sigma)
+            parts.append(f"heading={plain_number(self.north_sigma) if known else 'unknown'}")
+        return ":".join(parts)
+
+
+def _north_sigma(value: str, text: str) -> float:
+    """Return the deviation of north that a method says."""
+    if value == "unknown":
+        return math.inf
+    try:
+        return float(value)
+    except ValueError as error:
+        raise InputError(_misread_likelihood(text)) from error
+
+
+def _misread_likelihood(text: str) -> str:
+    return (
+        f"method {text!r} cannot be read; give 'likelihood:NOISE' and, if wanted, ':refined', "
+        "':on_grid', ':heading=10' (degrees) or ':heading=unknown'."
+    )

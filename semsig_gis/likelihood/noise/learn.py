@@ -1,0 +1,317 @@
+"""Detections whose true place is known, read from a file: what noise models are learnt from."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pandas as pd
+
+from semsig_gis.core.errors import InputError
+from semsig_gis.core.grid import cell_ids
+from semsig_gis.core.rtree import ObjectIndex
+from semsig_gis.core.signature import Signature
+from semsig_gis.core.taxonomy import WILDCARD
+from semsig_gis.database.database import SignatureDatabase
+from semsig_gis.database.visibility import views_at, views_in
+from semsig_gis.likelihood.noise.fit import (
+    ALL,
+    estimated_rates,
+    expected_counts,
+    gather_evidence,
+    model_change,
+    next_model,
+    starting_model,
+)
+from semsig_gis.likelihood.noise.model import NoiseSpec
+from semsig_gis.storage.signature_rows import given, read_rows, row_signature
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+    from pathlib import Path
+
+    from numpy.typing import NDArray
+    from pyproj import CRS
+
+    from semsig_gis.core.taxonomy import Taxonomy
+    from semsig_gis.database.occlusion import Footprints
+    from semsig_gis.database.visibility import Views
+    from semsig_gis.likelihood.noise.fit import Evidence
+    from semsig_gis.likelihood.noise.table import NoiseTable
+    from semsig_gis.objects.table import StreetObjects
+    from semsig_gis.storage.signature_rows import Row
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Sample:
+    """What was detected, perhaps nothing, at a known place.
+
+    The place is either `xy`, in metres in the CRS of the city, or `cell_id` (see
+    `core.grid.cell_ids`). The signature must have types, all known, and bearings.
+    """
+
+    signature: Signature
+    xy: tuple[float, float] | None = None
+    cell_id: int | None = None
+
+    def __post_init__(self) -> None:  # noqa: D105
+        if (self.xy is None) == (self.cell_id is None):
+            msg = "a sample needs its true place; give either its x and y or its cell_id."
+            raise InputError(msg)
+        if self.xy is not None and not np.isfinite(self.xy).all():
+            msg = f"the place of a sample is {self.xy}; give two finite coordinates in metres."
+            raise InputError(msg)
+        if self.signature.codes is None or self.signature.bearings is None:
+            msg = "a sample needs the types and the bearings of its detections; give both."
+            raise InputError(msg)
+        if (self.signature.codes == WILDCARD).any():
+            msg = "a sample has a detection of unknown class; give its class, or leave it out."
+            raise InputError(msg)
+
+
+def read_samples(path: str | Path, *, taxonomy: Taxonomy) -> list[Sample]:
+    r"""Read detections with their true places.
+
+    Parameters
+    ----------
+    path : str or Path
+        A CSV file with the columns ``types`` (symbols such as ``DDB``), ``bearings`` (degrees,
+        with blanks, commas or semicolons between them) and either ``x`` and ``y`` or
+        ``cell_id``; or JSON lines with the same names (suffix ``.jsonl``, ``.ndjson`` or
+        ``.json``), where bearings may be a list. Other columns are left alone; a row without
+        detections is a sample too.
+    taxonomy : Taxonomy
+        Classes that the symbols belong to.
+
+    Returns
+    -------
+    list of Sample
+        One a row.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be read, has no rows, or a row cannot be used; with its number.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> from pathlib import Path
+    >>> from semsig_gis.sources.catalog import paper_taxonomy
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     path = Path(folder, "seen.csv")
+    ...     _ = path.write_text("x,y,types,bearings\n500000,5400000,DB,200 -10\n")
+    ...     sample = read_samples(path, taxonomy=paper_taxonomy())[0]
+    >>> sample.xy, sample.signature.bearings.tolist()
+    ((500000.0, 5400000.0), [200.0, 350.0])
+    """
+    rows = read_rows(path, lambda row: _sample(row, taxonomy), what="sample")
+    return [sample for _, sample in rows]
+
+
+def _sample(row: Row, taxonomy: Taxonomy) -> Sample:
+    for name in ("types", "bearings"):
+        if row.get(name) is None:
+            msg = f"it has no {name}"
+            raise InputError(msg)
+    signature = row_signature(row, taxonomy)
+    if signature is None:
+        signature = Signature(np.empty(0, np.uint8), np.empty(0))
+    x, y, cell = (given(row, name) for name in ("x", "y", "cell_id"))
+    if x is not None and y is not None:
+        return Sample(signature=signature, xy=(float(x), float(y)))
+    return Sample(signature=signature, cell_id=None if cell is None else int(cell))
+
+
+MOST_ROUNDS = 500
+
+
+SETTLED = 1e-4  # largest change of a log-odds or logarithm
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class NoiseEstimate:
+    """A noise model that was learnt, and how well it is known.
+
+    `rates` has one row for each quantity (``detection``, ``misnamed``, ``clutter`` in false objects
+    per signature, ``bearing_sigma`` in degrees) and each class, and ``"all"`` together: ``value``
+    as in the model; ``own``, what the samples of the class alone say, with its intervals
+    ``low_90``, ``high_90``, ``low_95``, ``high_95``; and ``samples``, how many objects, detected
+    objects, signatures or detected objects it rests on.
+
+    `confusion` holds the expected number of detected objects by true class (rows) and given class
+    (columns). `skipped` samples were left out, as nothing is in sight of their place. `rounds` says
+    how many it took to settle, and `log_likelihood` is of all detections under the model.
+    """
+
+    spec: NoiseSpec
+    rates: pd.DataFrame
+    confusion: pd.DataFrame
+    samples: int
+    objects: int
+    detections: int
+    skipped: int
+    rounds: int
+    log_likelihood: float
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return plain values for JSON; ``confusion`` is by true class, then given class."""
+        return {
+            "spec": self.spec.to_dict(),
+            "rates": self.rates.to_dict("records"),
+            "confusion": self.confusion.to_dict("index"),
+            "samples": self.samples,
+            "objects": self.objects,
+            "detections": self.detections,
+            "skipped": self.skipped,
+            "rounds": self.rounds,
+            "log_likelihood": self.log_likelihood,
+        }
+
+
+def learn_noise(
+    samples: Sequence[Sample],
+    city: SignatureDatabase | StreetObjects,
+    *,
+    radius: float = 30.0,
+    position_sigma: float = 0.0,
+    footprints: Footprints | None = None,
+    name: str = "learned",
+) -> NoiseEstimate:
+    """Estimate a noise model from detections whose true place is known.
+
+    Parameters
+    ----------
+    samples : sequence of Sample
+        The detections; some hundred signatures serve well.
+    city : SignatureDatabase or StreetObjects
+        What there is to see. With a database a sample is looked up by its cell, and seen from
+        the middle of it; with street objects it is seen from where it was.
+    radius : float, default 30
+        Visibility range in metres, with street objects; a database has its own.
+    position_sigma : float, default 0
+        Known standard deviation in metres, each way, of the true places given (with a database,
+        of the place in its cell: ``step / 12 ** 0.5`` for places anywhere in it). What it turns
+        the bearings by is not counted as bearing noise.
+    footprints : Footprints, optional
+        Buildings, with street objects; what they hide is not seen.
+    name : str, default "learned"
+        Name of the model.
+
+    Returns
+    -------
+    NoiseEstimate
+        The model with intervals.
+
+    Raises
+    ------
+    InputError
+        If there are no samples, none can be used, or there is nothing to see or no detection.
+
+    Notes
+    -----
+    A class with n samples and the rate r of its own is given
+    ``(n * r + 8 * overall) / (n + 8)``, that is, the overall rate counts for eight samples; the
+    squares of deviations likewise, and a row of the confusion is filled up with eight samples
+    that are misnamed as often as all are, each other class alike. See
+    `likelihood.noise.fit` for the intervals.
+    """
+    if not (math.isfinite(position_sigma) and position_sigma >= 0):
+        msg = f"the deviation of the places is {position_sigma} m; give metres, 0 or more."
+        raise InputError(msg)
+    views, used = _true_views(samples, city, radius, footprints)
+    detected = [samples[row].signature for row in used]
+    evidence = gather_evidence(views, detected, taxonomy=city.taxonomy)
+    model = starting_model(evidence, position_sigma=position_sigma)
+    rounds, change = 0, math.inf
+    while change >= SETTLED and rounds < MOST_ROUNDS:
+        old, model = model, next_model(evidence, expected_counts(evidence, model), model)
+        change = model_change(old, model)
+        rounds += 1
+    counts = expected_counts(evidence, model)
+    rates = estimated_rates(evidence, counts, model)
+    return NoiseEstimate(
+        spec=_spec(evidence, rates, model, name),
+        rates=rates,
+        confusion=pd.DataFrame(counts.named, index=evidence.names, columns=evidence.names),
+        samples=len(used),
+        objects=len(evidence.kinds),
+        detections=len(evidence.given),
+        skipped=len(samples) - len(used),
+        rounds=rounds,
+        log_likelihood=counts.log_likelihood,
+    )
+
+
+def _true_views(
+    samples: Sequence[Sample],
+    city: SignatureDatabase | StreetObjects,
+    radius: float,
+    footprints: Footprints | None,
+) -> tuple[Views, list[int]]:
+    """Return what there was to see in the samples that can be used, and which these are."""
+    if not samples:
+        msg = "there are no samples to learn from; give detections with their true places."
+        raise InputError(msg)
+    if not isinstance(city, SignatureDatabase):
+        places = [sample.xy for sample in samples if sample.xy is not None]
+        if len(places) < len(samples):
+            msg = "a sample gives its cell alone; give x and y, or a database instead of objects."
+            raise InputError(msg)
+        index = ObjectIndex(city.xy)
+        xy = np.array(places)
+        views = views_at(city, xy, index=index, radius=radius, footprints=footprints)
+        found = np.flatnonzero(views.lengths)
+        if len(found) < len(places):  # as a cell that sees nothing is not in a database
+            _require_some(len(found), len(places), city.crs)
+            views = views_at(city, xy[found], index=index, radius=radius, footprints=footprints)
+        return views, found.tolist()
+    wanted = np.array(
+        [
+            sample.cell_id
+            if sample.cell_id is not None
+            else int(cell_ids(*city.grid.cells_at(np.array([sample.xy])))[0])
+            for sample in samples
+        ]
+    )
+    ids = city.cell_ids
+    cells = np.minimum(np.searchsorted(ids, wanted), len(ids) - 1)
+    found = np.flatnonzero(ids[cells] == wanted)
+    _require_some(len(found), len(samples), city.crs)
+    return views_in(city, cells[found]), found.tolist()
+
+
+def _require_some(found: int, samples: int, crs: CRS) -> None:
+    if found == 0:
+        msg = (
+            f"none of the {samples} samples lies where an object of the city is in sight; give "
+            f"places in its coordinate reference system ({crs.to_string()}), or its cell ids."
+        )
+        raise InputError(msg)
+
+
+def _spec(evidence: Evidence, rates: pd.DataFrame, model: NoiseTable, name: str) -> NoiseSpec:
+    """Return the model as a specification."""
+    overall = rates[rates["class"] == ALL].set_index("quantity")["value"].to_dict()
+
+    def by_class(values: NDArray[np.float64]) -> dict[str, float]:
+        return dict(zip(evidence.names, values.tolist(), strict=True))
+
+    named = model.named[0]
+    clutter = float(model.clutter.sum())
+    return NoiseSpec(
+        detection=overall["detection"],
+        detection_by_class=by_class(1.0 - model.missed[0]),
+        misnamed=overall["misnamed"],
+        confusion={
+            kind: by_class(row / row.sum()) for kind, row in zip(evidence.names, named, strict=True)
+        },
+        clutter=clutter,
+        clutter_shares=by_class(model.clutter / clutter),
+        bearing_sigma=overall["bearing_sigma"],
+        bearing_sigma_by_class=by_class(model.sigma),
+        position_sigma=model.position_sigma,
+        name=name,
+    )

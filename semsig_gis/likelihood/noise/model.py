@@ -1,0 +1,363 @@
+"""Noise models: how a detector fails, as the likelihood method takes it.
+
+A detector misses objects, gives some another class, invents some, and is a few degrees out.
+`NoiseSpec` says how often; `NoiseMixture` says that it is one of several models, unknown which.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import tomllib
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, field, fields
+from pathlib import Path
+from types import MappingProxyType
+from typing import Any
+
+from semsig_gis.core.errors import InputError, UnknownNameError, nearest_name
+from semsig_gis.storage.toml import toml_text
+from semsig_gis.storage.whole import whole_file
+
+HALF_TURN = 180.0
+
+
+SUM_TOLERANCE = 1e-6
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class NoiseSpec:
+    """How a detector fails.
+
+    Parameters
+    ----------
+    detection : float, default 0.9
+        Chance that an object in range is detected, 0 to 1.
+    detection_by_class : mapping of str to float, optional
+        The same for single classes, by the name of the class.
+    misnamed : float, default 0.05
+        Share of the detected objects that are given another class, each other class with equal
+        chance; 0 to 1.
+    misnamed_by_class : mapping of str to float, optional
+        The same for single classes.
+    confusion : mapping of str to mapping of str to float, optional
+        For some or all classes the chance of each class that a detected object is given, the
+        right one among them; each row sums to one. It goes before `misnamed`.
+    clutter : float, default 1.0
+        Expected number of false objects in a signature, 0 or more, all round alike.
+    clutter_shares : mapping of str to float, optional
+        Share of each class in the false objects; sums to one. Equal shares by default.
+    bearing_sigma : float, default 5.0
+        Standard deviation of a bearing in degrees, above 0 and up to 180.
+    bearing_sigma_by_class : mapping of str to float, optional
+        The same for single classes.
+    position_sigma : float, default 0.0
+        Standard deviation in metres of where in its cell the observer stands, each way; it turns
+        the bearings of near objects more than those of far ones.
+    missed_each : float, default 0.0
+        Expected number of further objects that are missed in every signature, few or many.
+    misnamed_each : float, default 0.0
+        Expected number of further objects that are misnamed in every signature.
+    name : str, default "custom"
+        Name to print.
+
+    Raises
+    ------
+    InputError
+        If a number is out of its range or a row of shares does not sum to one.
+
+    Notes
+    -----
+    The two numbers `missed_each` and `misnamed_each` describe the source's distortion (section
+    4.2), which spoils a number of objects however long the signature is: an object among L
+    survives m draws with chance ``(1 - 1/L) ** m``.
+
+    Examples
+    --------
+    >>> NoiseSpec(detection=0.8, detection_by_class={"bench": 0.6}).bearing_sigma
+    5.0
+    >>> NoiseSpec(detection=1.2)
+    Traceback (most recent call last):
+    ...
+    semsig_gis.core.errors.InputError: detection of the noise is 1.2; give a chance from 0 to 1.
+    """
+
+    detection: float = 0.9
+    detection_by_class: Mapping[str, float] = field(default_factory=dict)
+    misnamed: float = 0.05
+    misnamed_by_class: Mapping[str, float] = field(default_factory=dict)
+    confusion: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
+    clutter: float = 1.0
+    clutter_shares: Mapping[str, float] = field(default_factory=dict)
+    bearing_sigma: float = 5.0
+    bearing_sigma_by_class: Mapping[str, float] = field(default_factory=dict)
+    position_sigma: float = 0.0
+    missed_each: float = 0.0
+    misnamed_each: float = 0.0
+    name: str = "custom"
+
+    def __post_init__(self) -> None:  # noqa: D105
+        if not isinstance(self.name, str):
+            msg = f"name of the noise is {self.name!r}; give a text."
+            raise InputError(msg)
+        for label, check in _CHECKS.items():
+            check(label, getattr(self, label))
+        for label in _BY_CLASS:
+            for name, value in _table(label, getattr(self, label)).items():
+                _CHECKS[label.removesuffix("_by_class")](f"{label} {name!r}", value)
+        for name, row in _table("confusion", self.confusion).items():
+            _check_shares(f"confusion row {name!r}", _table(f"confusion row {name!r}", row))
+        if _table("clutter_shares", self.clutter_shares):
+            _check_shares("clutter_shares", self.clutter_shares)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the model as plain values, ready for JSON.
+
+        Returns
+        -------
+        dict
+            What `noise_from_dict` reads.
+        """
+        values: dict[str, Any] = _plain(asdict(self))
+        return values
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class NoiseMixture:
+    """Noise of which only is known that it follows one of several models.
+
+    Parameters
+    ----------
+    specs : tuple of NoiseSpec
+        The models; at least one.
+    weights : tuple of float
+        Chance of each, above 0; they sum to one.
+    name : str, default "custom"
+        Name to print.
+
+    Raises
+    ------
+    InputError
+        If there is no model, or the weights do not fit.
+
+    Notes
+    -----
+    The likelihood is the weighted sum of the likelihoods, for every cell by itself: the level is
+    as unknown as the place.
+
+    Examples
+    --------
+    >>> [spec.name for spec in named_noise("generic").specs]
+    ['light', 'medium', 'strong']
+    """
+
+    specs: tuple[NoiseSpec, ...]
+    weights: tuple[float, ...]
+    name: str = "custom"
+
+    def __post_init__(self) -> None:  # noqa: D105
+        if not self.specs or len(self.specs) != len(self.weights):
+            msg = (
+                f"{len(self.specs)} noise models and {len(self.weights)} weights were given; "
+                "give at least one model and one weight for each."
+            )
+            raise InputError(msg)
+        named = {f"{number}": weight for number, weight in enumerate(self.weights, start=1)}
+        _check_shares("weights of the mixture", named)
+        if not all(weight > 0 for weight in self.weights):
+            msg = f"weights of the mixture are {self.weights}; leave models of no weight out."
+            raise InputError(msg)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the mixture as plain values, ready for JSON.
+
+        Returns
+        -------
+        dict
+            What `noise_from_dict` reads.
+        """
+        return {
+            "name": self.name,
+            "weights": list(self.weights),
+            "specs": [spec.to_dict() for spec in self.specs],
+        }
+
+
+Noise = NoiseSpec | NoiseMixture
+"""Any noise model."""
+
+
+def noise_from_dict(values: Mapping[str, Any]) -> Noise:
+    """Read a noise model from plain values, the inverse of ``to_dict``.
+
+    Values are the fields of `NoiseSpec`, each optional, or ``specs``, ``weights`` and ``name`` of a
+    mixture, which must not hold another mixture.
+    """
+    if not isinstance(values, Mapping):
+        msg = f"a noise model is {values!r}; give a table of its fields."
+        raise InputError(msg)
+    kind = NoiseMixture if "specs" in values else NoiseSpec
+    known = [item.name for item in fields(kind)]
+    for name in values:
+        if name not in known:
+            hint = nearest_name(str(name), known)
+            msg = f"a noise model has no field {name!r}{hint}; its fields are {', '.join(known)}."
+            raise InputError(msg)
+    if kind is NoiseSpec:
+        return NoiseSpec(**values)
+    try:
+        specs = tuple(noise_from_dict(one) for one in values["specs"])
+        weights = tuple(float(one) for one in values["weights"])
+    except (KeyError, TypeError, ValueError) as error:
+        if isinstance(error, InputError):
+            raise
+        msg = f"a mixture of noise models is not usable ({error}); give lists specs and weights."
+        raise InputError(msg) from error
+    if not all(isinstance(one, NoiseSpec) for one in specs):
+        msg = "a mixture of noise models holds another mixture; give plain models."
+        raise InputError(msg)
+    plain = tuple(one for one in specs if isinstance(one, NoiseSpec))
+    return NoiseMixture(specs=plain, weights=weights, name=values.get("name", "custom"))
+
+
+def named_noise(name: str) -> Noise:
+    """Return a noise model by name.
+
+    Parameters
+    ----------
+    name : {"light", "medium", "strong", "generic"}
+        A level of the source's distortion, or ``"generic"`` where the level is not known.
+
+    Returns
+    -------
+    NoiseSpec or NoiseMixture
+        The model.
+
+    Raises
+    ------
+    UnknownNameError
+        If there is no such model.
+
+    Examples
+    --------
+    >>> named_noise("medium").clutter
+    2.3333333333333335
+    """
+    if name not in NOISES:
+        *most, last = NOISES
+        hint = nearest_name(name, NOISES)
+        msg = f"{name!r} is no noise model; give {', '.join(most)} or {last}{hint}."
+        raise UnknownNameError(msg)
+    return NOISES[name]
+
+
+def _check_chance(label: str, value: object) -> None:
+    if not _is_number(value) or not 0 <= value <= 1:  # type: ignore[operator]
+        msg = f"{label} of the noise is {value!r}; give a chance from 0 to 1."
+        raise InputError(msg)
+
+
+def _check_amount(label: str, value: object) -> None:
+    if not _is_number(value) or not value >= 0:  # type: ignore[operator]
+        msg = f"{label} of the noise is {value!r}; give a number, 0 or more."
+        raise InputError(msg)
+
+
+def _check_degrees(label: str, value: object) -> None:
+    if not _is_number(value) or not 0 < value <= HALF_TURN:  # type: ignore[operator]
+        msg = f"{label} of the noise is {value!r}; give degrees above 0 and up to 180."
+        raise InputError(msg)
+
+
+_CHECKS = MappingProxyType(
+    {
+        "detection": _check_chance,
+        "misnamed": _check_chance,
+        "clutter": _check_amount,
+        "bearing_sigma": _check_degrees,
+        "position_sigma": _check_amount,
+        "missed_each": _check_amount,
+        "misnamed_each": _check_amount,
+    }
+)
+
+
+_BY_CLASS = ("detection_by_class", "misnamed_by_class", "bearing_sigma_by_class")
+
+
+def _check_shares(label: str, shares: Mapping[str, float]) -> None:
+    """Refuse shares that are not chances or do not sum to one."""
+    for name, value in shares.items():
+        _check_chance(f"{label}, {name!r},", value)
+    total = math.fsum(shares.values())
+    if abs(total - 1.0) > SUM_TOLERANCE:
+        msg = f"{label} of the noise sums to {total:.6g}; give shares that sum to 1."
+        raise InputError(msg)
+
+
+def _table(label: str, value: object) -> Mapping[str, Any]:
+    """Return a mapping by class, or say that it is none."""
+    if not isinstance(value, Mapping) or not all(isinstance(name, str) for name in value):
+        msg = f"{label} of the noise is {value!r}; give a table by the names of the classes."
+        raise InputError(msg)
+    return value
+
+
+def _is_number(value: object) -> bool:
+    return isinstance(value, (int, float)) and not isinstance(value, bool) and math.isfinite(value)
+
+
+def _plain(value: Any) -> Any:  # noqa: ANN401
+    """Return mappings of any kind as dictionaries."""
+    if isinstance(value, Mapping):
+        return {name: _plain(one) for name, one in value.items()}
+    return value
+
+
+def _level(name: str, occurrences: int) -> NoiseSpec:
+    """Return the model of one of the source's levels: each occurrence is one of three kinds."""
+    each = occurrences / 3
+    return NoiseSpec(
+        detection=1.0,
+        misnamed=0.0,
+        clutter=each,
+        missed_each=each,
+        misnamed_each=each,
+        name=name,
+    )
+
+
+_LEVELS = (_level("light", 1), _level("medium", 7), _level("strong", 13))
+
+
+NOISES: Mapping[str, Noise] = MappingProxyType(
+    {
+        **{spec.name: spec for spec in _LEVELS},
+        "generic": NoiseMixture(specs=_LEVELS, weights=(1 / 3, 1 / 3, 1 / 3), name="generic"),
+    }
+)
+"""The noise models that have a name."""
+
+
+def open_noise(path: str | Path) -> Noise:
+    """Read a noise model from a JSON file, or a TOML file with the suffix ``.toml``."""
+    file = Path(path)
+    try:
+        text = file.read_text(encoding="utf-8")
+        values = tomllib.loads(text) if file.suffix.lower() == ".toml" else json.loads(text)
+    except (OSError, ValueError) as error:
+        reason = error.strerror if isinstance(error, OSError) else error
+        msg = f"noise file {file} cannot be read ({reason}); give a JSON or TOML file."
+        raise InputError(msg) from error
+    return noise_from_dict(values)
+
+
+def save_noise(noise: Noise, path: str | Path) -> None:
+    """Write a noise model as TOML (suffix ``.toml``) or JSON; the file appears whole, by rename."""
+    values = noise.to_dict()
+    if Path(path).suffix.lower() == ".toml":
+        text = toml_text(values)
+    else:
+        text = json.dumps(values, indent=2, allow_nan=False, ensure_ascii=False) + "\n"
+    with whole_file(path) as partial:
+        partial.write_text(text, encoding="utf-8")

@@ -1,0 +1,256 @@
+"""A noise model as tables of numbers, for the classes and lengths of one database."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from semsig_gis.core.errors import InputError, nearest_name
+from semsig_gis.core.taxonomy import WILDCARD
+from semsig_gis.likelihood.noise.model import NoiseMixture
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from numpy.typing import NDArray
+
+    from semsig_gis.core.signature import Signature
+    from semsig_gis.core.taxonomy import Taxonomy
+    from semsig_gis.database.database import SignatureDatabase
+    from semsig_gis.likelihood.noise.model import Noise, NoiseSpec
+
+# No chance is quite nought or one: a model that excludes something is wrong one day, and then
+# excludes the true place.
+LEAST_CHANCE = 1e-3
+MOST_CHANCE = 0.95
+LEAST_CLUTTER = 1e-3
+FULL_TURN = 360.0
+WIDEST_SIGMA = 180.0
+LONGEST_TABLE = 400  # lengths that have chances of their own; longer signatures take the last
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class NoiseTable:
+    """One noise model for k classes, and signatures of every length up to a longest.
+
+    By length and class, shape (longest + 1, k), `missed` is the chance that an object is missed and
+    `misnamed` that it is given another class, once detected. `others`, shape (k, k), says which:
+    rows sum to one, the diagonal is zero. `clutter` is in false objects per signature by class,
+    `sigma` the standard deviation of a bearing in degrees by class, and `position_sigma` that of
+    the observer's place in metres.
+    """
+
+    codes: NDArray[np.uint8]
+    missed: NDArray[np.float64]
+    misnamed: NDArray[np.float64]
+    others: NDArray[np.float64]
+    clutter: NDArray[np.float64]
+    sigma: NDArray[np.float64]
+    position_sigma: float
+
+    @cached_property
+    def density(self) -> NDArray[np.float64]:
+        """False objects a degree by class, and of any class, shape (k + 1,)."""
+        return np.append(self.clutter, self.clutter.sum()) / FULL_TURN
+
+    @cached_property
+    def odds(self) -> NDArray[np.float64]:
+        """Chance of detection over the chance of a miss, shape (longest + 1, k)."""
+        return (1.0 - self.missed) / self.missed
+
+    @cached_property
+    def named(self) -> NDArray[np.float64]:
+        """Chance of each name, by length, class and name, shape (longest + 1, k, k)."""
+        names = self.misnamed[:, :, None] * self.others
+        kinds = np.arange(len(self.codes))
+        names[:, kinds, kinds] = 1.0 - self.misnamed
+        return np.asarray(names)
+
+    @cached_property
+    def naming(self) -> NDArray[np.float64]:
+        """`named`, and one for a class that is not known, over `density`, (..., k, k + 1)."""
+        anything = np.ones((*self.missed.shape, 1))
+        return np.asarray(np.concatenate([self.named, anything], axis=2) / self.density)
+
+    @cached_property
+    def row_of(self) -> NDArray[np.int64]:
+        """Row of each class code, shape (256,); k for `WILDCARD`, -1 for other codes."""
+        rows = np.full(256, -1)
+        rows[self.codes] = np.arange(len(self.codes))
+        rows[WILDCARD] = len(self.codes)
+        return rows
+
+    def sigmas(self, reach: float) -> NDArray[np.float64]:
+        """Return the deviation of a bearing by class and distance unit, shape (k, 256).
+
+        In degrees, at most 180; `reach` is the distance in metres of 255 units.
+        """
+        distances = np.maximum(np.arange(256), 0.5) * (reach / 255.0)
+        turned = np.degrees(self.position_sigma / distances)
+        return np.asarray(np.minimum(np.hypot(self.sigma[:, None], turned), WIDEST_SIGMA))
+
+    def nothing_seen(
+        self, database: SignatureDatabase, cells: NDArray[np.int64] | None = None
+    ) -> NDArray[np.float64]:
+        """Return the log-likelihood that nothing is detected in some or all cells of a database.
+
+        It is ``sum_i log(missed_i) - sum_t clutter_t``. The classes must be those of the table.
+        """
+        lengths, codes = database.lengths, database.codes
+        if cells is not None:
+            lengths = lengths[cells]
+            starts = database.offsets[cells] - np.cumsum(lengths) + lengths
+            codes = codes[np.repeat(starts, lengths) + np.arange(lengths.sum())]
+        rows = np.minimum(lengths, len(self.missed) - 1)
+        each = np.log(self.missed)[np.repeat(rows, lengths), self.row_of[codes]]
+        sums = np.bincount(np.repeat(np.arange(len(lengths)), lengths), each, len(lengths))
+        return np.asarray(sums - self.clutter.sum())
+
+    def query_rows(self, query: Signature) -> NDArray[np.int64]:
+        """Return the class row of each object of a query, k if the class is unknown.
+
+        Raises `InputError` if the query is empty or has a class that the tables do not have.
+        """
+        if len(query) == 0:
+            msg = "the query has no objects; give at least one type or bearing."
+            raise InputError(msg)
+        if query.codes is None:
+            return np.full(len(query), len(self.codes))
+        rows = self.row_of[query.codes]
+        if (rows < 0).any():
+            msg = (
+                f"the query has an object of class code {int(query.codes[rows < 0][0])}, which no "
+                "cell of the database sees; leave it out, or give its class as not known "
+                f"(code {WILDCARD})."
+            )
+            raise InputError(msg)
+        return rows
+
+
+def noise_tables(
+    noise: Noise, *, taxonomy: Taxonomy, codes: NDArray[np.uint8], longest: int
+) -> tuple[tuple[NoiseTable, ...], NDArray[np.float64]]:
+    """Return one table for each model of a mixture, or for the only model, and the chance of each.
+
+    Only classes in `codes` count; what the model says of others is left out. Raises `InputError` if
+    it names a class that the taxonomy does not have, or gives a class no chance at all of being
+    named as one that counts.
+    """
+    specs, weights = (
+        (noise.specs, noise.weights) if isinstance(noise, NoiseMixture) else ((noise,), (1.0,))
+    )
+    names = {item.name: item.code for item in taxonomy.classes}
+    tables = tuple(_table(spec, names, codes, longest) for spec in specs)
+    return tables, np.asarray(weights, dtype=np.float64)
+
+
+def database_tables(
+    database: SignatureDatabase, noise: Noise
+) -> tuple[tuple[NoiseTable, ...], NDArray[np.float64]]:
+    """Return `noise_tables` for the classes and lengths of a database."""
+    return noise_tables(
+        noise,
+        taxonomy=database.taxonomy,
+        codes=database.present_codes,
+        longest=min(int(database.lengths.max()), LONGEST_TABLE),
+    )
+
+
+def mean_table(tables: tuple[NoiseTable, ...], weights: NDArray[np.float64]) -> NoiseTable:
+    """Return the weighted mean of models: of chances, and of squares for deviations.
+
+    The models are for the same classes and lengths; weights sum to one.
+    """
+    names = np.stack([table.misnamed.mean(axis=0)[:, None] * table.others for table in tables])
+    named = np.tensordot(weights, names, axes=1)
+    totals = named.sum(axis=1, keepdims=True)
+    plain = np.tensordot(weights, np.stack([table.others for table in tables]), axes=1)
+    position = sum(
+        weight * table.position_sigma**2 for weight, table in zip(weights, tables, strict=True)
+    )
+
+    def mean(name: str, power: int = 1) -> NDArray[np.float64]:
+        stacked = np.stack([getattr(table, name) for table in tables]) ** power
+        return np.asarray(np.tensordot(weights, stacked, axes=1) ** (1 / power))
+
+    return NoiseTable(
+        codes=tables[0].codes,
+        missed=mean("missed"),
+        misnamed=mean("misnamed"),
+        others=np.divide(named, totals, out=plain, where=totals > 0),
+        clutter=mean("clutter"),
+        sigma=mean("sigma", 2),
+        position_sigma=float(position) ** 0.5,
+    )
+
+
+def _table(
+    spec: NoiseSpec, names: Mapping[str, int], codes: NDArray[np.uint8], longest: int
+) -> NoiseTable:
+    """Return the table of one model."""
+    rows = {code: row for row, code in enumerate(codes.tolist())}
+    count = len(codes)
+
+    def by_class(overall: float, special: Mapping[str, float]) -> NDArray[np.float64]:
+        values = np.full(count, float(overall))
+        for name, value in special.items():
+            code = _code(names, name)
+            if code in rows:
+                values[rows[code]] = value
+        return values
+
+    misnamed = by_class(spec.misnamed, spec.misnamed_by_class)
+    others = np.full((count, count), 1.0 / max(count - 1, 1))
+    np.fill_diagonal(others, 0.0)
+    for name, shares in spec.confusion.items():
+        row = _confusion_row(name, {_code(names, other): shares[other] for other in shares}, codes)
+        if _code(names, name) in rows:
+            kind = rows[names[name]]
+            misnamed[kind] = 1.0 - row[kind]
+            row[kind] = 0.0
+            if row.sum() > 0:
+                others[kind] = row / row.sum()
+    clutter = np.full(count, spec.clutter / count)
+    if spec.clutter_shares:
+        clutter = spec.clutter * by_class(0.0, spec.clutter_shares)
+    # A draw among L objects leaves each of them alone with chance 1 - 1/L.
+    spared = 1.0 - 1.0 / np.maximum(np.arange(longest + 1), 1)
+    kept = np.outer(spared**spec.missed_each, by_class(spec.detection, spec.detection_by_class))
+    right = np.outer(spared**spec.misnamed_each, 1.0 - misnamed)
+    return NoiseTable(
+        codes=codes,
+        missed=np.clip(1.0 - kept, LEAST_CHANCE, MOST_CHANCE),
+        misnamed=np.clip(1.0 - right, LEAST_CHANCE, MOST_CHANCE) if count > 1 else 0.0 * right,
+        others=others,
+        clutter=np.maximum(clutter, LEAST_CLUTTER / count),
+        sigma=by_class(spec.bearing_sigma, spec.bearing_sigma_by_class),
+        position_sigma=spec.position_sigma,
+    )
+
+
+def _confusion_row(
+    name: str, shares: Mapping[int, float], codes: NDArray[np.uint8]
+) -> NDArray[np.float64]:
+    """Return the chance of each class that counts, whatever the others had."""
+    row = np.array([shares.get(code, 0.0) for code in codes.tolist()])
+    if row.sum() <= 0:
+        msg = (
+            f"confusion row {name!r} of the noise gives no chance to any class that is seen; "
+            "give some chance to the class itself."
+        )
+        raise InputError(msg)
+    return np.asarray(row / row.sum())
+
+
+def _code(names: Mapping[str, int], name: str) -> int:
+    """Return the code of a class that a noise model names."""
+    if name not in names:
+        msg = (
+            f"the noise model names a class {name!r} that the database does not know"
+            f"{nearest_name(name, names)}; its classes are {', '.join(names)}."
+        )
+        raise InputError(msg)
+    return names[name]

@@ -1,0 +1,311 @@
+"""The likelihood of a query at places anywhere, summed over one-to-one associations."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from semsig_gis.core.errors import InputError
+from semsig_gis.database.database import BEARING_UNITS, DISTANCE_UNITS
+from semsig_gis.database.visibility import views_at
+from semsig_gis.likelihood.noise.model import NoiseMixture
+from semsig_gis.likelihood.noise.table import LONGEST_TABLE, noise_tables
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.typing import NDArray
+
+    from semsig_gis.core.rtree import ObjectIndex, StoredIndex
+    from semsig_gis.core.signature import Signature
+    from semsig_gis.database.occlusion import Footprints
+    from semsig_gis.database.visibility import Views
+    from semsig_gis.likelihood.noise.model import Noise
+    from semsig_gis.likelihood.noise.table import NoiseTable
+    from semsig_gis.objects.table import StreetObjects
+
+
+def place_loglik(
+    query: Signature,
+    views: Views,
+    tables: Sequence[NoiseTable],
+    weights: NDArray[np.float64],
+    *,
+    turns: NDArray[np.float64],
+    reach: float,
+) -> NDArray[np.float64]:
+    """Return the log-likelihood of a query by place and turn, shape (v, r).
+
+    The query needs bearings; its types may be unknown. `weights` are the chances of the tables,
+    `turns` the degrees to turn the query by at each place, and `reach` the largest visibility range
+    of any class in metres. The sum is that of `likelihood.rerank`, on the scale of
+    `likelihood.index`.
+    """
+    from semsig_gis.likelihood.kernels import align  # noqa: PLC0415 - numba loads slowly
+
+    if query.bearings is None:
+        msg = "the query has no bearings, which its place rests on; give them."
+        raise InputError(msg)
+    kinds = tables[0].query_rows(query)
+    units = np.minimum(views.bearings * (BEARING_UNITS / 360.0), BEARING_UNITS - 1)
+    far = np.rint(views.distances * (DISTANCE_UNITS / reach))
+    found = np.empty((len(tables), *turns.shape))
+    align(
+        np.arange(len(views)),
+        views.offsets,
+        views.codes,
+        units.astype(np.uint16),
+        far.astype(np.uint8),
+        tables[0].row_of,
+        360.0 / BEARING_UNITS,
+        kinds,
+        query.bearings,
+        turns,
+        np.stack([table.odds for table in tables]),
+        np.stack([table.naming for table in tables]),
+        np.stack([table.sigmas(reach) for table in tables]),
+        found,
+    )
+    owners = np.repeat(np.arange(len(views)), views.lengths)
+    for one, (table, weight) in enumerate(zip(tables, weights.tolist(), strict=True)):
+        rows = np.minimum(views.lengths, len(table.missed) - 1)[owners]
+        missed = np.log(table.missed)[rows, table.row_of[views.codes]]
+        found[one] += np.bincount(owners, missed, len(views))[:, None] - table.clutter.sum()
+        found[one] += float(np.log(table.density[kinds]).sum()) + math.log(weight)
+    return np.asarray(np.logaddexp.reduce(found, axis=0))
+
+
+KEPT = (1000, 400, 200, 100)
+"""How many parts are divided, level by level: cells, their quarters, and so on."""
+
+
+LEAST_CHANCE = 1e-6  # of a part, against the likeliest, to be divided
+
+
+TURNS = (7.5, 6.0, 4.5, 3.0)  # degrees to each side that are tried, level by level
+
+
+TURNS_A_SIDE = 3
+
+
+ROUNDING = 1e-6  # square metres
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Refinement:
+    """The chances of places on and off the grid.
+
+    By square part of a cell: `places`, shape (p, 2), its middle in metres; `sizes`, the length of
+    its sides; `loglik`, the mean over the part; `headings`, the mean degrees to add to the bearings
+    of the query (0 if north is known), with `heading_sigmas`; and `chances`, which sum to one. The
+    best place is averaged over `near` metres around it.
+    """
+
+    places: NDArray[np.float64]
+    sizes: NDArray[np.float64]
+    loglik: NDArray[np.float64]
+    headings: NDArray[np.float64]
+    heading_sigmas: NDArray[np.float64]
+    chances: NDArray[np.float64]
+    near: float
+
+    @property
+    def best(self) -> int:
+        """The part around which most of the chance lies."""
+        return self._around()[0]
+
+    @property
+    def mass(self) -> float:
+        """Chance that the place is within `near` of the best one."""
+        _, inside = self._around()
+        return float(self.chances[inside].sum())
+
+    @property
+    def xy(self) -> tuple[float, float]:
+        """The mean place around the best one, in metres."""
+        _, inside = self._around()
+        x, y = np.average(self.places[inside], axis=0, weights=self.chances[inside]).tolist()
+        return x, y
+
+    @property
+    def heading(self) -> float:
+        """Degrees to add to the bearings of the query there, in [-180, 180)."""
+        _, inside = self._around()
+        angles = np.radians(self.headings[inside])
+        mean = np.exp(1j * angles) @ self.chances[inside]
+        return (math.degrees(float(np.angle(mean))) + 180.0) % 360.0 - 180.0
+
+    @property
+    def covariance(self) -> NDArray[np.float64]:
+        """Of x, y (metres) and heading (degrees) around the best place, shape (3, 3)."""
+        _, inside = self._around()
+        weights = self.chances[inside] / self.chances[inside].sum()
+        turned = (self.headings[inside] - self.heading + 180.0) % 360.0 - 180.0
+        away = np.column_stack([self.places[inside] - self.xy, turned])
+        covariance = (weights[:, None] * away).T @ away
+        # The place may be anywhere in a part.
+        covariance[[0, 1], [0, 1]] += weights @ self.sizes[inside] ** 2 / 12.0
+        covariance[2, 2] += weights @ self.heading_sigmas[inside] ** 2
+        return np.asarray(covariance)
+
+    def _around(self) -> tuple[int, NDArray[np.bool_]]:
+        """Return the best part, and which parts are near it."""
+        order = np.argsort(-self.chances, kind="stable")[:BEST]
+        away = self.places[order, None] - self.places[None]
+        inside = np.hypot(away[..., 0], away[..., 1]) <= self.near
+        best = int(np.round(inside @ self.chances, 9).argmax())
+        return int(order[best]), inside[best]
+
+
+BEST = 300
+"""Likeliest parts among which the best place is looked for."""
+
+
+def cell_noise(noise: Noise, step: float) -> Noise:
+    """Return a noise model for queries from anywhere in a cell, not from its middle alone.
+
+    It adds ``step / 12 ** 0.5`` metres of uncertainty of the place, each way, in quadrature.
+    """
+    if isinstance(noise, NoiseMixture):
+        specs = tuple(cell_noise(spec, step) for spec in noise.specs)
+        return replace(noise, specs=specs)  # type: ignore[arg-type]
+    sigma = math.hypot(noise.position_sigma, step / math.sqrt(12.0))
+    return replace(noise, position_sigma=sigma)
+
+
+def place_noise(noise: Noise, step: float) -> Noise:
+    """Return the noise model for a known place, the inverse of `cell_noise`.
+
+    Raises `InputError` if the model has too little uncertainty of the place to take away.
+    """
+    if isinstance(noise, NoiseMixture):
+        specs = tuple(place_noise(spec, step) for spec in noise.specs)
+        return replace(noise, specs=specs)  # type: ignore[arg-type]
+    known = noise.position_sigma**2 - step**2 / 12.0
+    if known < -ROUNDING:
+        msg = (
+            f"noise model {noise.name!r} is for queries from the middles of cells; build the index "
+            f"for cell_noise(noise, {step:g}), which is for queries from anywhere in them."
+        )
+        raise InputError(msg)
+    return replace(noise, position_sigma=0.0 if known < ROUNDING else math.sqrt(known))
+
+
+def refine(
+    query: Signature,
+    cells: NDArray[np.float64],
+    noise: Noise,
+    *,
+    objects: StreetObjects,
+    index: ObjectIndex | StoredIndex,
+    step: float = 10.0,
+    radius: float = 30.0,
+    near: float = 25.0,
+    north_sigma: float = 0.0,
+    headings: NDArray[np.floating] | None = None,
+    log_prior: NDArray[np.float64] | None = None,
+    footprints: Footprints | None = None,
+) -> Refinement:
+    """Look for the place of a query within some cells.
+
+    The query needs bearings; its types may be unknown. `cells`, shape (c, 2), are the middles in
+    metres of the likeliest cells, likeliest first, of a ranking with the noise that `cell_noise`
+    gives; some hundred will do. `noise` itself is for a known place. `step`, `near` (see
+    `Refinement`) and `radius`, the visibility range of classes that have none of their own, are in
+    metres. `north_sigma` is the standard deviation in degrees of the query's north, infinite if it
+    is not known at all; then `headings`, the likeliest one in each cell, are needed. `log_prior` is
+    what else is known of the cells, and what `footprints` hide is not seen.
+
+    The likelihood is that of `likelihood.rerank`. A part of side s counts with an uncertainty of
+    the place of ``s / 12 ** 0.5`` each way, the deviation of places anywhere in it, so that its
+    likelihood stands for the mean over the part; chances are likelihood times area.
+    """
+    _check(cells, north_sigma, headings)
+    codes = np.unique(objects.codes)
+    tables, weights = noise_tables(
+        noise, taxonomy=objects.taxonomy, codes=codes, longest=LONGEST_TABLE
+    )
+    size = float(step)
+    parts = np.asarray(cells[: KEPT[0]], dtype=np.float64)
+    prior = np.zeros(len(parts)) if log_prior is None else np.asarray(log_prior)[: KEPT[0]]
+    turned = np.zeros(len(parts)) if headings is None else np.asarray(headings)[: KEPT[0]]
+    done: list[tuple[NDArray[np.float64], ...]] = []
+    for level, turn in enumerate(TURNS):
+        parts, prior, turned = _quarters(parts, size), np.repeat(prior, 4), np.repeat(turned, 4)
+        size /= 2.0
+        views = views_at(objects, parts, index=index, radius=radius, footprints=footprints)
+        spread = [_with_place(table, size) for table in tables]
+        reach = float(objects.taxonomy.ranges(radius).max())
+        steps = np.linspace(-turn, turn, 2 * TURNS_A_SIDE + 1) if north_sigma > 0 else np.zeros(1)
+        turns = turned[:, None] + steps
+        found = place_loglik(query, views, spread, weights, turns=turns, reach=reach)
+        if north_sigma > 0:
+            found += _log_chance(turns, steps[1] - steps[0], north_sigma)
+        loglik = np.logaddexp.reduce(found, axis=1)
+        shares = np.exp(found - loglik[:, None])
+        turned = (shares * turns).sum(axis=1)
+        sigmas = np.sqrt((shares * (turns - turned[:, None]) ** 2).sum(axis=1))
+        total = loglik + prior
+        divided = np.zeros(len(parts), np.bool_)
+        if level + 1 < len(TURNS):
+            best = np.argsort(-total, kind="stable")[: KEPT[level + 1]]
+            divided[best] = total[best] > total[best[0]] + math.log(LEAST_CHANCE)
+        kept = ~divided
+        sizes = np.full(len(parts), size)
+        done.append(
+            (parts[kept], sizes[kept], loglik[kept], prior[kept], turned[kept], sigmas[kept])
+        )
+        parts, prior, turned = parts[divided], prior[divided], turned[divided]
+    places, sizes, loglik, prior, turned, sigmas = (
+        np.concatenate(column) for column in zip(*done, strict=True)
+    )
+    weight = loglik + prior + 2.0 * np.log(sizes)
+    chances = np.exp(weight - weight.max())
+    return Refinement(
+        places=places,
+        sizes=sizes,
+        loglik=loglik,
+        headings=(turned + 180.0) % 360.0 - 180.0,
+        heading_sigmas=sigmas,
+        chances=chances / chances.sum(),
+        near=near,
+    )
+
+
+def _check(
+    cells: NDArray[np.float64],
+    north_sigma: float,
+    headings: NDArray[np.floating] | None,
+) -> None:
+    if not north_sigma >= 0:
+        msg = f"the deviation of north is {north_sigma} degrees; give 0 or more, or infinity."
+        raise InputError(msg)
+    if len(cells) == 0 or (headings is None and north_sigma > 0):
+        msg = (
+            f"{len(cells)} cells and {'no' if headings is None else 'some'} headings were given; "
+            "give at least one cell, and headings where north is not known."
+        )
+        raise InputError(msg)
+
+
+def _quarters(parts: NDArray[np.float64], size: float) -> NDArray[np.float64]:
+    """Return the middles of the four quarters of squares."""
+    corners = np.array([[-1.0, -1.0], [-1.0, 1.0], [1.0, -1.0], [1.0, 1.0]]) * (size / 4.0)
+    return np.asarray((parts[:, None] + corners).reshape(-1, 2))
+
+
+def _with_place(table: NoiseTable, size: float) -> NoiseTable:
+    """Return a noise model for places anywhere in a square."""
+    return replace(table, position_sigma=math.hypot(table.position_sigma, size / math.sqrt(12.0)))
+
+
+def _log_chance(turns: NDArray[np.float64], step: float, north_sigma: float) -> NDArray[np.float64]:
+    """Return the logarithm of the chance of a turn, one step wide."""
+    if math.isinf(north_sigma):
+        return np.full(turns.shape, math.log(step / 360.0))
+    away = (turns + 180.0) % 360.0 - 180.0
+    scale = math.log(step / (north_sigma * math.sqrt(2.0 * math.pi)))
+    return np.asarray(scale - 0.5 * (away / north_sigma) ** 2)

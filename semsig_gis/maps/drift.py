@@ -1,0 +1,239 @@
+"""A map of what has changed in a city between two dates."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pandas as pd
+
+from semsig_gis.core.colours import DRIFT_COLOURS, OBJECT_COLOURS
+from semsig_gis.core.crs import SOURCE, SOURCE_ID
+from semsig_gis.core.errors import CrsError
+from semsig_gis.database.database import join_databases, require_same_place
+from semsig_gis.database.update import compare_cells
+from semsig_gis.maps.cell_layer import CellFacts, CellLayer, city_view, packed_signatures
+from semsig_gis.maps.image import level_image
+from semsig_gis.maps.legend import drift_legend
+from semsig_gis.maps.packing import packed
+from semsig_gis.maps.parts import (
+    Drawing,
+    Legend,
+    add_image,
+    finished_map,
+    free_name,
+    prepared_map,
+    to_latlon,
+)
+from semsig_gis.objects.changes import compare_objects, joined_taxonomy
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    import folium
+    from numpy.typing import NDArray
+
+    from semsig_gis.database.database import SignatureDatabase
+    from semsig_gis.database.update import CellChanges
+    from semsig_gis.objects.changes import ObjectChanges
+    from semsig_gis.objects.table import StreetObjects
+
+OBJECT_FIELDS = ("Class", "Class before", "Moved by", "Source", "Identifier")
+SAID = ["title", "was", "by", SOURCE, SOURCE_ID]
+PLACE = ["latitude", "longitude"]
+SCRIPT = """\
+semsig.told.change = (city, cell) => {
+  const kind = city.grid.kinds[city.data.kind[cell] - 1];
+  const [before, after] = ["before", "now"].map((part) => city.signature(part, cell));
+  const title = {same: "A cell that sees what it saw", changed: "A cell that sees something else",
+    appeared: "A new cell: it saw nothing", vanished: "A cell that sees nothing any more"}[kind];
+  if (kind === "same") return {title, rows: [["It sees", after]]};
+  const count = {};
+  for (const symbol of after[0]) count[symbol] = (count[symbol] || 0) + 1;
+  for (const symbol of before[0]) count[symbol] = (count[symbol] || 0) - 1;
+  const differences = Object.entries(count).filter((one) => one[1] !== 0).map(
+    ([symbol, more]) => (more > 0 ? "+" : "\\u2212") + Math.abs(more) + "\\u00a0" + symbol);
+  const shown = (signature) => (signature[0] ? signature : "nothing");
+  return {title, rows: [
+    ["Before", shown(before)],
+    ["Now", shown(after)],
+    ["Difference", differences.join(", ") || "of bearings or distances alone"],
+  ]};
+};
+"""
+
+
+def drift_map(
+    before: SignatureDatabase,
+    after: SignatureDatabase,
+    *,
+    objects_before: StreetObjects | None = None,
+    objects_after: StreetObjects | None = None,
+    map_: folium.Map | None = None,
+    tiles: str | None = None,
+) -> folium.Map:
+    """Show what has changed in a city: the cells that see something else, and why.
+
+    Parameters
+    ----------
+    before, after : SignatureDatabase
+        Databases of one city at two dates, made in the same way.
+    objects_before, objects_after : StreetObjects, optional
+        The street objects that they were built from, in the same CRS; give both or none.
+    map_ : folium.Map, optional
+        Map to add the layers to; a new one by default.
+    tiles : str, optional
+        Online background of a new map, by a name that folium knows; none by default.
+
+    Returns
+    -------
+    folium.Map
+        The map, with these layers: the cells that are the same, and those that have changed,
+        appeared or vanished, as images; a layer without signs of its own that tells of a cell by a
+        click; and, where the objects are given, those that were removed, added, moved, or are of
+        another class, with popups.
+
+    Raises
+    ------
+    DatabaseError
+        If the databases were not made in the same way.
+    CrsError
+        If the objects are in another CRS than the databases.
+    InputError
+        If they are of different places or use a class code for different classes, `tiles` is not
+        known to folium, or both `tiles` and `map_` are given.
+
+    Examples
+    --------
+    >>> from semsig_gis.sources.catalog import paper_taxonomy
+    >>> from semsig_gis.database.build import build_database
+    >>> from semsig_gis.objects.table import StreetObjects
+    >>> from semsig_gis.objects.clean import build_objects
+    >>> from semsig_gis.sources.synthetic.city import CitySpec, synthetic_city
+    >>> layers = synthetic_city(CitySpec(size=200.0))
+    >>> objects, _ = build_objects(layers, taxonomy=paper_taxonomy(), crs="EPSG:32631")
+    >>> fewer = StreetObjects(objects.table[5:], objects.taxonomy, objects.licenses)
+    >>> drift_map(build_database(objects), build_database(fewer)).options["maxZoom"]
+    20
+    """
+    cells = compare_cells(before, after)
+    taxonomy = joined_taxonomy(before.taxonomy, after.taxonomy)
+    old, new = (replace(one, taxonomy=taxonomy) for one in (before, after))
+    # All cells of both dates.
+    city = join_databases([new, old.select(cells.vanished)])
+    view = city_view(city)
+    if len(old) and len(new):
+        require_same_place(old, new.xy, "cells of the newer database")
+    kinds = _kinds(city, old, new, cells)
+    chosen = prepared_map(map_, tiles, title="What has changed")
+    colours, same = list(DRIFT_COLOURS.values()), kinds == 1
+    if same.any():
+        image = level_image(city.select(same), kinds[same], colours)
+        add_image(chosen, *image, name="Cells that are the same", dark="flip")
+    if not same.all():
+        image = level_image(city.select(~same), kinds[~same], colours)
+        add_image(chosen, *image, name="Cells that differ", dark="lift")
+    differing = old.select(np.sort(np.concatenate([cells.changed[:, 0], cells.vanished])))
+    facts = CellFacts(
+        name="change",
+        script=SCRIPT,
+        arrays={
+            "kind": packed(kinds),
+            **_signatures("before", differing, city),
+            **_signatures("now", new, city),
+        },
+        settings={"kinds": list(DRIFT_COLOURS)},
+    )
+    CellLayer(free_name(chosen, "Tell of a cell when clicked"), city, [facts]).add_to(chosen)
+    objects = None
+    if objects_before is not None and objects_after is not None:
+        for some in (objects_before, objects_after):
+            _require_crs(some, city)
+        objects = compare_objects(objects_before, objects_after)
+        for name, drawn in _object_drawings(objects_before, objects_after, objects):
+            Drawing(free_name(chosen, name), "drawings", drawn).add_to(chosen)
+    legend = drift_legend(cells, objects, taxonomy=taxonomy, licenses=city.licenses)
+    Legend(legend, view if map_ is None else None).add_to(chosen)
+    return finished_map(chosen, city)
+
+
+def _kinds(
+    city: SignatureDatabase, old: SignatureDatabase, new: SignatureDatabase, cells: CellChanges
+) -> NDArray[np.uint8]:
+    """Return of each cell of the city the number of its colour, from 1."""
+    ids = {
+        "same": new.cell_ids[cells.same[:, 1]],
+        "changed": new.cell_ids[cells.changed[:, 1]],
+        "appeared": new.cell_ids[cells.appeared],
+        "vanished": old.cell_ids[cells.vanished],
+    }
+    kinds = np.empty(len(city), np.uint8)
+    for number, kind in enumerate(DRIFT_COLOURS, start=1):
+        kinds[np.searchsorted(city.cell_ids, ids[kind])] = number
+    return kinds
+
+
+def _signatures(
+    name: str, database: SignatureDatabase, city: SignatureDatabase
+) -> dict[str, list[Any]]:
+    """Return the signatures of those cells of the city that the database has."""
+    lengths = np.zeros(len(city), np.int32)
+    lengths[np.searchsorted(city.cell_ids, database.cell_ids)] = database.lengths
+    return packed_signatures(name, database, np.cumsum(lengths))
+
+
+def _require_crs(objects: StreetObjects, city: SignatureDatabase) -> None:
+    if objects.crs != city.crs:
+        msg = (
+            f"the objects are in {objects.crs.to_string()} and the database is in "
+            f"{city.crs.to_string()}; give the objects that it was built from."
+        )
+        raise CrsError(msg)
+
+
+def _object_drawings(
+    old: StreetObjects, new: StreetObjects, changes: ObjectChanges
+) -> Iterator[tuple[str, list[list[Any]]]]:
+    """Yield name and drawings of a layer of each kind of change that there is."""
+    kinds = (
+        ("removed", _facts(old, changes.removed), None),
+        ("added", _facts(new, changes.added), None),
+        ("moved", *_pair(old, new, changes.moved)),
+        ("of another class", *_pair(old, new, changes.changed)),
+    )
+    for what, facts, before in kinds:
+        if facts.empty:
+            continue
+        drawn: list[list[Any]] = []
+        if before is not None:
+            moves = np.hypot(facts["x"] - before["x"], facts["y"] - before["y"])
+            facts["by"] = [f"{metres:.1f} m" for metres in moves]
+            facts["was"] = before["title"]
+            lines = np.stack([before[PLACE], facts[PLACE]], axis=1).tolist()
+            drawn = [["lines", [[{"color": "#808080", "weight": 2, "opacity": 0.9}, lines]]]]
+        places, said = (facts[some].to_numpy().tolist() for some in (PLACE, SAID))
+        records = [
+            [place, OBJECT_COLOURS[what], 5, None, f"Object {what}", details]
+            for place, details in zip(places, said, strict=True)
+        ]
+        drawn.append(["points", OBJECT_FIELDS, {}, records])
+        yield f"Objects {what} ({len(facts):,})", drawn
+
+
+def _pair(
+    old: StreetObjects, new: StreetObjects, rows: NDArray[np.int64]
+) -> tuple[pd.DataFrame, pd.DataFrame]:
+    """Return what there is to say of objects now and before."""
+    return _facts(new, rows[:, 1]), _facts(old, rows[:, 0])
+
+
+def _facts(objects: StreetObjects, rows: NDArray[np.int64]) -> pd.DataFrame:
+    """Return what there is to say of some objects."""
+    titles = {item.code: item.title for item in objects.taxonomy.classes}
+    facts = pd.DataFrame(objects.table[[SOURCE, SOURCE_ID]]).iloc[rows].reset_index(drop=True)
+    facts[["was", "by"]] = None
+    facts["title"] = [titles[code] for code in objects.codes[rows].tolist()]
+    facts[["x", "y"]] = objects.xy[rows]
+    facts[PLACE] = to_latlon(objects.xy[rows], objects.crs)
+    return facts

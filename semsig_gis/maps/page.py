@@ -1,0 +1,311 @@
+"""Leaflet and its companions, put into a page so that a map opens without any request.
+
+folium's pages load eleven files from content networks and are blank where there is none. The
+few of them that our maps use are brought when the package is built (``hatch_build.py``, which
+needs ``npm``) into the folder ``assets``; here they replace the links of a finished page. Where
+they were not brought, `available` is false and a map keeps its links.
+"""
+
+from __future__ import annotations
+
+import base64
+import functools
+import hashlib
+import html
+import json
+import re
+import tomllib
+from dataclasses import dataclass
+from importlib import resources
+from pathlib import PurePosixPath
+from typing import TYPE_CHECKING
+from urllib.parse import urlsplit
+
+import folium
+from folium.raster_layers import WmsTileLayer
+
+from semsig_gis.core.errors import InputError, UnknownNameError, nearest_name
+from semsig_gis.maps.parts import layers_of
+from semsig_gis.storage.whole import whole_file
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+    from importlib.resources.abc import Traversable
+    from pathlib import Path
+
+
+# Files that every folium page links and that our maps do without: they only serve
+# `folium.Icon`, Font Awesome and Bootstrap widgets.
+UNUSED = frozenset(
+    {
+        "bootstrap.bundle.min.js",
+        "bootstrap.min.css",
+        "bootstrap-glyphicons.css",
+        "all.min.css",
+        "leaflet.awesome-markers.js",
+        "leaflet.awesome-markers.css",
+        "leaflet.awesome.rotate.min.css",
+    }
+)
+
+
+_REFERENCE = re.compile(
+    r"""<script\b[^>]*\bsrc\s*=\s*["'](?P<script>[^"']*)["'][^>]*>\s*</script\s*>"""
+    r"""|<link\b[^>]*\bhref\s*=\s*["'](?P<link>[^"']*)["'][^>]*>""",
+    re.IGNORECASE,
+)
+
+
+_CSS_IMAGE = re.compile(r"url\(images/(?P<name>[\w-]+\.png)\)")
+
+
+_SOURCE_MAP = re.compile(r"\n?//# sourceMappingURL=\S*\s*$")
+
+
+@dataclass(frozen=True, slots=True)
+class Asset:
+    """One third-party file that the package carries.
+
+    ``license`` is an SPDX identifier, ``sha256`` is in hexadecimal, and ``stands_for`` holds the
+    file names, at the end of an address in a page, that this file replaces.
+    """
+
+    name: str
+    package: str
+    version: str
+    license: str
+    sha256: str
+    stands_for: tuple[str, ...]
+
+
+@functools.cache
+def assets() -> Mapping[str, Asset]:
+    """Return the files of the manifest by name, in its order, whether brought or not."""
+    manifest = tomllib.loads(_folder().joinpath("manifest.toml").read_text(encoding="utf-8"))
+    return {
+        file["target"]: Asset(
+            name=file["target"],
+            package=package["name"],
+            version=package["version"],
+            license=package["license"],
+            sha256=file["sha256"],
+            stands_for=tuple(file.get("stands_for", ())),
+        )
+        for package in manifest["package"]
+        for file in package["file"]
+    }
+
+
+def available() -> bool:
+    """Tell whether every file is there, unchanged, so that a map can be self-contained.
+
+    False when the package was built without ``npm``.
+    """
+    return all(_content(asset) is not None for asset in assets().values())
+
+
+def asset_text(name: str) -> str:
+    """Return a script or style sheet as it may stand inside a page, without the element around it.
+
+    Images of a style sheet become data URIs, the address of the source map is dropped, and nothing
+    in the text can close the element that it is put into. Raises `InputError` if the package was
+    built without the file.
+    """
+    known = {asset.name: asset for asset in assets().values() if asset.stands_for}
+    if name not in known:
+        msg = f"{name!r} is not a map file{nearest_name(name, known)}."
+        raise UnknownNameError(msg)
+    text = _required(known[name]).decode("utf-8")
+    if name.endswith(".css"):
+        text = _CSS_IMAGE.sub(lambda match: f"url({_data_uri(match['name'])})", text)
+        return re.sub(r"</(style)", r"<\\/\1", text, flags=re.IGNORECASE)
+    text = _SOURCE_MAP.sub("", text)
+    if name == "leaflet.js":
+        text += _default_icon()
+    # Inside <script>, "</script" closes it and "<!--" changes how the rest is read.
+    return re.sub(r"</(script)", r"<\\/\1", text, flags=re.IGNORECASE).replace("<!--", r"<\!--")
+
+
+def external_files(page: str) -> tuple[str, ...]:
+    """Return the addresses of the scripts and style sheets that the head of a page loads, in order.
+
+    Map tiles, which a script asks for later, are not among them.
+    """
+    head, _, _ = page.partition("</head>")
+    return tuple(match["script"] or match["link"] for match in _REFERENCE.finditer(head))
+
+
+def inline_assets(page: str) -> str:
+    """Return a page of folium's with every external script and style sheet put into it.
+
+    Those that our maps do not use (Bootstrap, Font Awesome, awesome-markers) are dropped. The
+    result is about 250 kB longer and asks for nothing but the tiles of a tile layer, if the map has
+    one. Raises `InputError` if the package was built without the files, or the page needs one that
+    is not among them (a plugin, `folium.Icon`, a colour map drawn by branca).
+    """
+    replacements = {
+        file: asset.name for asset in assets().values() for file in asset.stands_for
+    } | dict.fromkeys(UNUSED)
+    if "L.AwesomeMarkers." in page:
+        msg = "A self-contained map cannot show folium.Icon markers; use CircleMarker or DivIcon."
+        raise InputError(msg)
+
+    def replace(match: re.Match[str]) -> str:
+        address = match["script"] or match["link"]
+        file = PurePosixPath(urlsplit(address).path).name
+        if file not in replacements:
+            msg = (
+                f"A self-contained map cannot use {address}; the files it may use are "
+                f"{', '.join(sorted(replacements.keys() - UNUSED))}."
+            )
+            raise InputError(msg)
+        name = replacements[file]
+        if name is None:
+            return ""
+        element = "script" if match["script"] else "style"
+        return f"<{element}>\n{asset_text(name)}\n</{element}>"
+
+    head, end, rest = page.partition("</head>")
+    return _REFERENCE.sub(replace, head) + end + rest
+
+
+def _folder() -> Traversable:
+    return resources.files("semsig_gis") / "assets"
+
+
+def _content(asset: Asset) -> bytes | None:
+    """Return the file if it is there and is the one that the manifest names."""
+    path = _folder() / asset.name
+    if not path.is_file():
+        return None
+    content = path.read_bytes()
+    return content if hashlib.sha256(content).hexdigest() == asset.sha256 else None
+
+
+def _required(asset: Asset) -> bytes:
+    content = _content(asset)
+    if content is None:
+        msg = (
+            f"This installation does not carry {asset.name} of {asset.package} {asset.version}; "
+            "make a map that links it, or install semsig_gis again where npm is available."
+        )
+        raise InputError(msg)
+    return content
+
+
+def _data_uri(name: str) -> str:
+    return f"data:image/png;base64,{base64.b64encode(_required(assets()[name])).decode('ascii')}"
+
+
+def _default_icon() -> str:
+    """Return JavaScript that gives Leaflet its default marker, which it looks for beside itself."""
+    images = {
+        "iconUrl": _data_uri("marker-icon.png"),
+        "iconRetinaUrl": _data_uri("marker-icon-2x.png"),
+        "shadowUrl": _data_uri("marker-shadow.png"),
+    }
+    return f"\nL.Icon.Default.imagePath='';L.Icon.Default.mergeOptions({json.dumps(images)});"
+
+
+# folium forbids to enlarge a page with two fingers, which is how small text is read on a phone.
+_RIGID = re.compile(r",\s*maximum-scale=1\.0,\s*user-scalable=no")
+
+
+@dataclass(frozen=True, slots=True)
+class MapFrame:
+    """A map as a notebook shows it: its HTML page, in a frame ``height`` pixels high."""
+
+    page: str
+    height: int
+
+    def _repr_html_(self) -> str:
+        """Show the page in a frame of its own, where its scripts harm nothing else."""
+        return (
+            f'<iframe srcdoc="{html.escape(self.page)}" title="map" allowfullscreen '
+            f'style="width: 100%; height: {self.height}px; border: none"></iframe>'
+        )
+
+
+def page_of_map(map_: folium.Map, *, self_contained: bool | None = None) -> str:
+    """Return a map as one HTML page.
+
+    By default Leaflet and all else are put into the page where the package carries them and the map
+    needs no others; ``self_contained=False`` links them, and True raises `InputError` where they
+    cannot be put into it.
+    """
+    page = map_.get_root().render().replace("<html>", '<html lang="en">', 1)
+    page = _RIGID.sub("", page, count=1)
+    if self_contained or (self_contained is None and available()):
+        try:
+            return inline_assets(page)
+        except InputError:
+            if self_contained:
+                raise
+    return page
+
+
+def show_map(map_: folium.Map, *, height: int = 520) -> MapFrame:
+    """Show a map in a notebook, as the last thing of a cell.
+
+    What folium shows by itself loads Leaflet from the web, and stays blank without it.
+
+    Parameters
+    ----------
+    map_ : folium.Map
+        The map.
+    height : int, default 520
+        How high it is shown, in pixels.
+
+    Returns
+    -------
+    MapFrame
+        What a notebook shows. Its page makes no request, but for the tiles of a map that has some;
+        where the package was built without the map files, or the map needs others, it links them.
+
+    Examples
+    --------
+    >>> import folium
+    >>> show_map(folium.Map(tiles=None), height=300).height
+    300
+    """
+    return MapFrame(page_of_map(map_), height)
+
+
+def save_map(map_: folium.Map, path: str | Path, *, self_contained: bool | None = None) -> bool:
+    """Write a map as one HTML page.
+
+    Parameters
+    ----------
+    map_ : folium.Map
+        The map.
+    path : str or Path
+        File to write; it appears whole, by rename.
+    self_contained : bool, optional
+        True to put Leaflet and all else into the page, False to link them; by default they are
+        put into it where the package carries them and the map needs no others.
+
+    Returns
+    -------
+    bool
+        Whether the page makes no request at all: it holds all scripts and has no online tiles.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be written, or a self-contained page was asked for and is not to be
+        had.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     save_map(folium.Map(tiles=None), f"{folder}/map.html", self_contained=False)
+    False
+    """
+    page = page_of_map(map_, self_contained=self_contained)
+    with whole_file(path) as partial:
+        partial.write_text(page, encoding="utf-8")
+    tiled = any(
+        isinstance(child, folium.TileLayer | WmsTileLayer) for child in layers_of(map_).values()
+    )
+    return not external_files(page) and not tiled

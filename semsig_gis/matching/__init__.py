@@ -1,0 +1,1 @@
+"""Rank cells by distance."""

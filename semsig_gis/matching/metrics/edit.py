@@ -1,0 +1,252 @@
+"""Weighted edit distance (Levenshtein) between sequences; the home of RapidFuzz.
+
+Unit weights have a kernel of their own, `matching.metrics.edit`, about fifty times as fast a value
+as RapidFuzz on one query. Both give the same distances.
+"""
+
+from __future__ import annotations
+
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, fields
+from functools import partial
+from typing import TYPE_CHECKING
+from weakref import WeakKeyDictionary, WeakSet
+
+import numpy as np
+from rapidfuzz.distance import Levenshtein
+from rapidfuzz.process import cdist
+
+from semsig_gis.core.errors import InputError
+from semsig_gis.database.sequences import checked_sequence
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+    from types import ModuleType
+
+    from numpy.typing import NDArray
+
+    from semsig_gis.database.sequences import SequenceTable
+
+
+STRIPE = 64  # words in a plane: enough work for a loop, little enough for the nearest cache
+
+
+BLOCK = 64 * STRIPE
+"""Sequences in a block."""
+
+
+_VALUES = 256
+
+
+@dataclass(frozen=True, eq=False)
+class BitPlanes:
+    """Sequences of small integers, turned so that the same position of many lies together.
+
+    For every block and position, from the longest sequence back to front, `planes`, shape (p, 64),
+    tells which sequences reach that far and then, for each first and each second digit of a value,
+    which have it there. All sequences end at the last position. Block ``b`` owns the rows
+    ``bounds[b]:bounds[b + 1]``. `digits`, shape (256, 2), gives the two planes that are both set
+    where a value stands; never both for a value that no sequence has.
+
+    Two digits, of about the square root of the number of values each, need fewer planes than one
+    plane a value: 8 bits an object for eleven classes, 9 for sixteen levels, 33 at most.
+
+    Hyyrö (2004) gives the steps with bits along one sequence; here they lie across sequences. With
+    the steps ``v`` down the left side of an entry and ``h`` along its top, and ``e`` set where the
+    two values are equal, the diagonal step is 0 where ``d = e | (v < 0) | (h < 0)``. Then the right
+    side is +1 where ``(h < 0) | ~(d | (h > 0))`` and -1 where ``(h > 0) & d``, and the bottom is
+    the same of ``v``. A sequence that does not reach a position has steps of 0 along its top, which
+    leaves its column of steps as it was.
+    """
+
+    planes: NDArray[np.uint64]
+    bounds: NDArray[np.int64]
+    digits: NDArray[np.int64]
+    lengths: NDArray[np.int64]
+
+    @classmethod
+    def build(cls, values: NDArray[np.uint8], offsets: NDArray[np.int64]) -> BitPlanes:
+        """Turn sequences given as flat values and offsets, shape (d + 1,).
+
+        Any order gives the same distances, but sequences ordered by length waste no memory and no
+        time.
+        """
+        present = np.flatnonzero(np.bincount(values, minlength=_VALUES))
+        # At least two, so that two digits of one kind make the value that no sequence has.
+        first = max(2, int(np.ceil(np.sqrt(len(present)))))
+        second = max(1, -(-len(present) // first))
+        digits = np.tile(np.array([1, 2]), (_VALUES, 1))
+        digits[present, 0] = 1 + np.arange(len(present)) % first
+        digits[present, 1] = 1 + first + np.arange(len(present)) // first
+        lengths = np.diff(offsets)
+        starts = np.arange(0, len(lengths), BLOCK)
+        longest = np.maximum.reduceat(lengths, starts) if len(lengths) else lengths
+        bounds = np.concatenate([[0], np.cumsum(longest * (1 + first + second))])
+        planes = np.zeros((bounds[-1], STRIPE), np.uint64)
+        _kernels().pack(values, offsets, digits, bounds, 1 + first + second, planes)
+        for array in (planes, bounds, digits):
+            array.setflags(write=False)
+        return cls(planes, bounds, digits, lengths)
+
+    def edit_distances(
+        self,
+        queries: Sequence[NDArray[np.uint8]],
+        *,
+        normalized: bool = True,
+        wildcard: int | None = None,
+        blocks: tuple[int, int] | None = None,
+        threads: int = 1,
+    ) -> NDArray[np.float32]:
+        """Measure the fewest changes that turn each query into each sequence, shape (queries, d).
+
+        `normalized` divides by the longer of the two lengths, and a `wildcard` in a query equals
+        every value. `blocks` is the first block and the one after the last, if not all are wanted.
+        """
+        low, high = (0, len(self.bounds) - 1) if blocks is None else blocks
+        lengths = self.lengths[low * BLOCK : high * BLOCK]
+        bounds = self.bounds[low : high + 1]
+        digits = self.digits
+        if wildcard is not None:
+            digits = digits.copy()
+            digits[wildcard] = 0
+        ends = np.cumsum([0, *map(len, queries)])
+        wanted = digits[np.concatenate([*queries, np.empty(0, np.uint8)])]
+        result = np.empty((len(queries), len(lengths)), np.float32)
+        per_position = int(self.digits.max()) + 1
+        scan = partial(
+            _kernels().scan,
+            self.planes,
+            bounds,
+            per_position,
+            lengths,
+            wanted,
+            ends,
+            normalized,
+            result,
+        )
+        cuts = np.linspace(0, high - low, max(1, threads) + 1).astype(np.int64).tolist()
+        if threads > 1:
+            with ThreadPoolExecutor(threads) as pool:
+                list(pool.map(scan, cuts[:-1], cuts[1:]))
+        else:
+            scan(*cuts)
+        return result
+
+
+def _kernels() -> ModuleType:
+    """Load the compiled loops, which takes about half a second, when they are first needed."""
+    from semsig_gis.matching import kernels as _bit_kernels  # noqa: PLC0415
+
+    return _bit_kernels
+
+
+_LARGEST_WEIGHT = 100  # costs of any real signature stay exact in float32
+
+
+# Loading the compiled kernel takes as long as RapidFuzz takes for this many values (0.7 s).
+_LOADING = 100_000_000
+
+
+# A table with as many values, asked again, is likely to be asked often.
+_LARGE = 50_000
+
+
+_FEWER = 50  # times: RapidFuzz on so many fewer sequences is as fast as the kernel on all
+
+
+_planes: WeakKeyDictionary[SequenceTable, BitPlanes] = WeakKeyDictionary()
+_asked: WeakSet[SequenceTable] = WeakSet()
+
+
+@dataclass(frozen=True, slots=True)
+class EditWeights:
+    """Costs, each 1 to 100, of the operations that turn a query into a cell's sequence.
+
+    An object is inserted that the query missed, deleted if it is a false detection, and substituted
+    if it has another value in the cell.
+    """
+
+    insert: int = 1
+    delete: int = 1
+    substitute: int = 1
+
+    def __post_init__(self) -> None:  # noqa: D105
+        for field in fields(self):
+            weight = getattr(self, field.name)
+            whole = isinstance(weight, int) and not isinstance(weight, bool)
+            if not whole or not 1 <= weight <= _LARGEST_WEIGHT:
+                msg = (
+                    f"edit weight {field.name!r} is {weight!r}; "
+                    f"give a whole number from 1 to {_LARGEST_WEIGHT}."
+                )
+                raise InputError(msg)
+
+    def as_tuple(self) -> tuple[int, int, int]:
+        """Return the weights as (insert, delete, substitute)."""
+        return self.insert, self.delete, self.substitute
+
+
+def distances(
+    queries: Sequence[NDArray[np.uint8]],
+    table: SequenceTable,
+    *,
+    normalized: bool = True,
+    weights: EditWeights | None = None,
+    only: NDArray[np.int64] | None = None,
+    wildcard: int | None = None,
+    threads: int = 1,
+) -> NDArray[np.float32]:
+    """Measure the cheapest way to turn each query into each distinct sequence.
+
+    Levenshtein's distance with weights (paper, section "Signature comparison"). `normalized`
+    divides by the largest cost that two sequences of these lengths can have, so that the distance
+    is 1 if just one of them is empty. That cost is the cheaper of two ways that always work: delete
+    everything and insert everything; or substitute along the shorter length, then insert or delete
+    the rest. With weights of 1 it is the longer length.
+
+    A `wildcard` in a query, for an object of unknown class, equals every value; it needs weights of
+    1. Threads share the sequences, which does not pay for a single query. The shape is (queries,
+    d), or (queries, len(only)) if only some sequences are measured.
+    """
+    sequences = [checked_sequence(query) for query in queries]
+    costs = weights or EditWeights()
+    if wildcard is not None and costs != EditWeights():
+        msg = (
+            f"a wildcard was given with edit weights {'/'.join(map(str, costs.as_tuple()))}; "
+            "wildcards are compared with weights of 1 only."
+        )
+        raise InputError(msg)
+    few = only is not None and len(only) * _FEWER < len(table)
+    if wildcard is not None or (
+        costs == EditWeights() and not few and _pays(len(sequences), table)
+    ):
+        everything = bit_planes(table).edit_distances(
+            sequences, normalized=normalized, wildcard=wildcard, threads=threads
+        )
+        return everything if only is None else everything[:, only]
+    choices = table.strings if only is None else list(map(table.strings.__getitem__, only.tolist()))
+    result: NDArray[np.float32] = cdist(
+        [sequence.tobytes().decode("latin-1") for sequence in sequences],
+        choices,
+        scorer=Levenshtein.normalized_distance if normalized else Levenshtein.distance,
+        scorer_kwargs={"weights": costs.as_tuple()},
+        dtype=np.float32,
+        workers=threads,
+    )
+    return result
+
+
+def bit_planes(table: SequenceTable) -> BitPlanes:
+    """Return the sequences in the form that edit distances are measured fastest in, made once."""
+    planes = _planes.get(table)
+    if planes is None:
+        planes = _planes[table] = BitPlanes.build(table.values, table.offsets)
+    return planes
+
+
+def _pays(queries: int, table: SequenceTable) -> bool:
+    """Tell whether to load the kernel; one query of a short-lived process is not worth it."""
+    again = table in _asked
+    _asked.add(table)
+    values = len(table.values)
+    return queries * values >= _LOADING or (again and values >= _LARGE)

@@ -1,0 +1,1 @@
+"""Raw layers become one clean table of street objects."""

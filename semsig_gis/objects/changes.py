@@ -1,0 +1,294 @@
+"""What changed in the street objects of a city: two tables of them, compared and joined."""
+
+from __future__ import annotations
+
+from collections import Counter
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pandas as pd
+
+from semsig_gis.core.crs import CLASS_CODE, MERGED, SOURCE, SOURCE_ID
+from semsig_gis.core.errors import CatalogError, CrsError, InputError
+from semsig_gis.objects.table import StreetObjects
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+
+    from numpy.typing import NDArray
+
+    from semsig_gis.core.taxonomy import ObjectClass, Taxonomy
+
+NAME = [SOURCE, SOURCE_ID]
+LOOKS = [CLASS_CODE, "x", "y"]
+LICENSE_MARK = ": "
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ClassChange:
+    """What changed in one class; ``after = before + added - removed + gained - lost``.
+
+    The counts are of objects. `added` and `removed` are nowhere in the other table; `gained` were
+    of another class before and `lost` are of another class now. `moved_m` is the median distance in
+    metres, None where none moved.
+    """
+
+    class_name: str
+    before: int
+    after: int
+    added: int
+    removed: int
+    moved: int
+    moved_m: float | None
+    gained: int
+    lost: int
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class ObjectChanges:
+    """Which rows of two tables of street objects are the same object.
+
+    `same` (same class and place), `moved` (same source, id and class, other place) and `changed`
+    (same source and id, other class, at the same place or not) have shape (n, 2): rows of the old
+    and of the new table. `removed` and `added`, shape (n,), are the other rows of the old and of
+    the new table; `classes` has the classes that are in one of the tables.
+    """
+
+    same: NDArray[np.int64]
+    moved: NDArray[np.int64]
+    changed: NDArray[np.int64]
+    removed: NDArray[np.int64]
+    added: NDArray[np.int64]
+    classes: tuple[ClassChange, ...]
+
+    @property
+    def gone(self) -> NDArray[np.int64]:
+        """Rows of the old table at whose place no such object stands any more, shape (g,)."""
+        return np.concatenate([self.removed, self.moved[:, 0], self.changed[:, 0]])
+
+    @property
+    def come(self) -> NDArray[np.int64]:
+        """Rows of the new table at whose place no such object stood before, shape (n,)."""
+        return np.concatenate([self.added, self.moved[:, 1], self.changed[:, 1]])
+
+
+def compare_objects(old: StreetObjects, new: StreetObjects) -> ObjectChanges:
+    """Tell what was added, removed, moved, or is of another class now.
+
+    Both tables are in the same CRS and use the same class codes. An object of the same class at
+    exactly the same place is the same object, whatever its id: portals that number their rows anew
+    at each export would otherwise have moved everything. What is left is matched by source and id,
+    where an id is given and stands once in either table: so an object has moved, or changed its
+    class. The rest was removed and added.
+    """
+    tables = _keys(old), _keys(new)
+    same = _twins(*tables)
+    left = [_without(table, same[:, side]) for side, table in enumerate(tables)]
+    known = [_with_own_id(*pair) for pair in zip(left, tables, strict=True)]
+    linked = _pairs(*known)
+    equal = old.codes[linked[:, 0]] == new.codes[linked[:, 1]]
+    moved, changed = linked[equal], linked[~equal]
+    removed, added = (
+        _without(table, linked[:, side]).index.to_numpy() for side, table in enumerate(left)
+    )
+    changes = ObjectChanges(
+        same=same, moved=moved, changed=changed, removed=removed, added=added, classes=()
+    )
+    return replace(changes, classes=tuple(_by_class(old, new, changes)))
+
+
+def _keys(objects: StreetObjects) -> pd.DataFrame:
+    """Return what objects are told apart by, numbered by row."""
+    keys = pd.DataFrame(objects.table[NAME]).reset_index(drop=True)
+    keys[CLASS_CODE] = objects.codes
+    keys[["x", "y"]] = objects.xy
+    return keys
+
+
+def _twins(old: pd.DataFrame, new: pd.DataFrame) -> NDArray[np.int64]:
+    """Return pairs of rows of one class at one place; of several there, those of one id first."""
+    alone = _lone_twins(old, new)
+    rest = [_without(table, alone[:, side]) for side, table in enumerate((old, new))]
+    crowds = pd.concat([table.loc[table.duplicated(LOOKS), "x"] for table in rest])
+    named = _pairs(*(table[table["x"].isin(crowds)] for table in rest))
+    others = _pairs(*(_without(t, named[:, side])[LOOKS] for side, t in enumerate(rest)))
+    return np.concatenate([alone, named, others])
+
+
+def _lone_twins(old: pd.DataFrame, new: pd.DataFrame) -> NDArray[np.int64]:
+    """Return those pairs that nothing else has the x coordinate of: nearly all, and quickly."""
+    found = []
+    for table in (old, new):
+        x, row, count = np.unique(table["x"], return_index=True, return_counts=True)
+        found.append((x[count == 1], row[count == 1]))
+    (x, row), (other_x, other_row) = found
+    _, one, other = np.intersect1d(x, other_x, assume_unique=True, return_indices=True)
+    pairs: NDArray[np.int64] = np.stack([row[one], other_row[other]], axis=1)
+    looks = [table[LOOKS].to_numpy(float)[pairs[:, side]] for side, table in enumerate((old, new))]
+    equal: NDArray[np.bool_] = (looks[0] == looks[1]).all(axis=1)
+    return pairs[equal]
+
+
+def _with_own_id(rows: pd.DataFrame, table: pd.DataFrame) -> pd.DataFrame:
+    """Return source and id of the rows whose id no other row of the table has."""
+    alike = table.loc[table[SOURCE_ID].isin(rows[SOURCE_ID]) & table[SOURCE_ID].ne(""), NAME]
+    single = alike[~alike.duplicated(keep=False)]
+    return single[single.index.isin(rows.index)]
+
+
+def _without(table: pd.DataFrame, rows: NDArray[np.int64]) -> pd.DataFrame:
+    return table[~table.index.isin(rows)]
+
+
+def _pairs(old: pd.DataFrame, new: pd.DataFrame) -> NDArray[np.int64]:
+    """Return the index labels of equal rows, each row once, first with first."""
+    both = pd.concat([old, new], ignore_index=True)
+    group = both.groupby(list(both.columns), sort=False).ngroup()
+    first, second = (
+        part.to_numpy(np.int64) * (len(both) + 1) + part.groupby(part).cumcount().to_numpy()
+        for part in (group[: len(old)], group[len(old) :])
+    )
+    _, row, other = np.intersect1d(first, second, assume_unique=True, return_indices=True)
+    return np.stack([old.index.to_numpy()[row], new.index.to_numpy()[other]], axis=1)
+
+
+def _by_class(
+    old: StreetObjects, new: StreetObjects, changes: ObjectChanges
+) -> Iterable[ClassChange]:
+    """Yield the numbers of every class that one of the tables has."""
+
+    def count(codes: NDArray[np.uint8]) -> NDArray[np.int64]:
+        return np.bincount(codes, minlength=256)
+
+    before, after = count(old.codes), count(new.codes)
+    added, removed = count(new.codes[changes.added]), count(old.codes[changes.removed])
+    moved_codes = new.codes[changes.moved[:, 1]]
+    metres = np.hypot(*(new.xy[changes.moved[:, 1]] - old.xy[changes.moved[:, 0]]).T)
+    lost, gained = count(old.codes[changes.changed[:, 0]]), count(new.codes[changes.changed[:, 1]])
+    for item in new.taxonomy.classes:
+        code = item.code
+        if before[code] or after[code]:
+            far = metres[moved_codes == code]
+            yield ClassChange(
+                class_name=item.name,
+                before=int(before[code]),
+                after=int(after[code]),
+                added=int(added[code]),
+                removed=int(removed[code]),
+                moved=len(far),
+                moved_m=float(np.median(far)) if len(far) else None,
+                gained=int(gained[code]),
+                lost=int(lost[code]),
+            )
+
+
+def replace_layers(
+    old: StreetObjects, new: StreetObjects
+) -> tuple[StreetObjects, tuple[str, ...], tuple[str, ...]]:
+    """Replace the layers of a city that were loaded anew; the others stay.
+
+    Return the objects of the other layers followed by the new ones, with the licences of both; the
+    names of the layers that stay; and notes for the user about layers that were not loaded
+    together. A layer was loaded anew if one of the new objects comes from it, or if a line of the
+    new licences names it: so a layer that was read and has no object any more leaves none behind. A
+    different CRS is a CrsError, and classes that do not fit are an InputError (see
+    `joined_taxonomy`).
+    """
+    if new.crs != old.crs:
+        msg = (
+            f"the new objects are in {_crs_name(new)} and those of the database in "
+            f"{_crs_name(old)}; load the new ones with --metric-crs {_crs_name(old)}."
+        )
+        raise CrsError(msg)
+    taxonomy = joined_taxonomy(old.taxonomy, new.taxonomy)
+    renewed = set(new.table[SOURCE].unique()).union(*(_layers_of(line) for line in new.licenses))
+    stays = ~old.table[SOURCE].isin(renewed).to_numpy()
+    if not stays.any():
+        return StreetObjects(new.table, taxonomy, new.licenses), (), ()
+    remaining = old.table[stays]
+    table = pd.concat([remaining, new.table], ignore_index=True)
+    if MERGED in table:
+        table[MERGED] = table[MERGED].fillna("")
+    objects = StreetObjects(
+        table.astype({CLASS_CODE: np.uint8}), taxonomy, _joined_licenses(old, new, renewed)
+    )
+    kept = tuple(sorted(remaining[SOURCE].unique()))
+    return objects, kept, tuple(_doubts(objects, len(remaining), renewed))
+
+
+def joined_taxonomy(old: Taxonomy, new: Taxonomy) -> Taxonomy:
+    """Return all classes of two dates of one city, with the titles of the new ones.
+
+    Raise InputError if they use one class code or symbol for different classes, or if a class is
+    seen from another distance.
+    """
+    theirs = {item.code: item for item in new.classes}
+    for item in old.classes:
+        other = theirs.get(item.code)
+        if other is not None and replace(other, title=item.title) != item:
+            msg = (
+                f"class code {item.code} means {_brief(item)} before and {_brief(other)} after; "
+                "load both with the same catalogue, or build the database again."
+            )
+            raise InputError(msg)
+    codes = {item.code for item in old.classes}
+    if codes <= set(theirs):
+        return new
+    try:
+        return old.extended(item for item in new.classes if item.code not in codes)
+    except CatalogError as error:
+        msg = (
+            f"the new classes do not fit those of before ({str(error)[:-1]}); load both with the "
+            "same catalogue, or build the database again."
+        )
+        raise InputError(msg) from error
+
+
+def _crs_name(objects: StreetObjects) -> str:
+    return objects.crs.to_string()
+
+
+def _layers_of(license_line: str) -> set[str]:
+    """Return the layers that a line of `StreetObjects.licenses` is about."""
+    return set(license_line.rpartition(LICENSE_MARK)[2].split(", "))
+
+
+def _joined_licenses(old: StreetObjects, new: StreetObjects, renewed: set[str]) -> tuple[str, ...]:
+    """Return the licences of the layers that stay and of the new ones, a publisher a line."""
+    layers_of: dict[str, list[str]] = {}
+    for line in old.licenses:
+        terms, _, names = line.rpartition(LICENSE_MARK)
+        stay = [name for name in names.split(", ") if name not in renewed]
+        if stay:
+            layers_of.setdefault(terms, []).extend(stay)
+    for line in new.licenses:
+        terms, _, names = line.rpartition(LICENSE_MARK)
+        layers_of.setdefault(terms, []).extend(names.split(", "))
+    return tuple(f"{terms}{LICENSE_MARK}{', '.join(names)}" for terms, names in layers_of.items())
+
+
+def _brief(item: ObjectClass) -> str:
+    reach = "" if item.range_m is None else f", seen from {item.range_m:g} m"
+    return f"{item.name!r} (symbol {item.symbol}{reach})"
+
+
+def _doubts(objects: StreetObjects, kept: int, renewed: set[str]) -> Iterable[str]:
+    """Yield what may be twice, because the layers that stay were not loaded with the new ones."""
+    table = objects.table
+    if MERGED in table:
+        merged: Counter[str] = Counter()
+        for text in table[MERGED][:kept]:
+            merged.update({part.partition(":")[0] for part in text.split("; ")} & renewed)
+        for name, number in sorted(merged.items()):
+            yield (
+                f"{number:,} objects of layers that stay were merged with objects of {name!r}, "
+                "which may stand beside them now; load layers that are merged together"
+            )
+    keys = _keys(objects)[LOOKS]
+    twice = keys[kept:].merge(keys[:kept].drop_duplicates(), on=LOOKS)
+    if len(twice):
+        yield (
+            f"{len(twice):,} new objects stand exactly where an object of a layer that stays does; "
+            "load layers that overlap together"
+        )

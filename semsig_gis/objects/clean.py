@@ -1,0 +1,247 @@
+"""Raw layers become one clean table of street objects, and what became of each row."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass
+from typing import TYPE_CHECKING, Any
+
+import geopandas as gpd
+import numpy as np
+import pandas as pd
+import shapely
+
+from semsig_gis.core.crs import (
+    CLASS_CODE,
+    CLASS_NAME,
+    COUNT,
+    SOURCE,
+    SOURCE_ID,
+    require_metric_crs,
+)
+from semsig_gis.core.errors import CrsError, EmptyResultError
+from semsig_gis.objects.table import StreetObjects, license_lines
+
+if TYPE_CHECKING:
+    from collections.abc import Collection, Iterable
+
+    from numpy.typing import NDArray
+    from pyproj import CRS
+
+    from semsig_gis.core.taxonomy import Taxonomy
+    from semsig_gis.sources import RawLayer
+
+
+# Two objects of a class within the same centimetre are one object listed twice.
+SAME_PLACE_M = 0.01
+
+
+# Larger than any projected coordinate; files write -1.8e308 and the like for "no value".
+BEYOND_EARTH_M = 1e8
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LayerReport:
+    """What became of the rows of one layer; the numbers add up to `read`.
+
+    Rows are dropped as `unreadable`, `filtered` (by the catalogue's filter), `missing` (no
+    geometry, or an empty one), `duplicates` (the id of an earlier row, where the catalogue says
+    that ids are unique), `misplaced` (no finite coordinates in the metric CRS, or off the Earth) or
+    `collapsed` (at the same place as an earlier object of the class). `notes` are warnings and the
+    first messages about unreadable rows.
+    """
+
+    name: str
+    read: int
+    unreadable: int
+    filtered: int
+    missing: int
+    misplaced: int
+    collapsed: int
+    kept: int
+    duplicates: int = 0
+    notes: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class LoadReport:
+    """What became of every layer, in the order they were given."""
+
+    layers: tuple[LayerReport, ...]
+
+    def to_list(self) -> list[dict[str, Any]]:
+        """Return the reports as plain mappings, ready for JSON."""
+        return [asdict(layer) for layer in self.layers]
+
+
+def build_objects(
+    layers: Iterable[RawLayer],
+    *,
+    taxonomy: Taxonomy,
+    crs: CRS | str,
+    collapse: bool = True,
+    apart: Collection[str] = (),
+) -> tuple[StreetObjects, LoadReport]:
+    """Turn raw layers into one table of street objects.
+
+    A geometry that is not a point is represented by its centroid (paper, section on semantic
+    signatures). Rows without a usable position are dropped and counted.
+
+    Parameters
+    ----------
+    layers : iterable of RawLayer
+        What the readers of `sources` return; each has a coordinate reference system.
+    taxonomy : Taxonomy
+        Classes that the layers name.
+    crs : pyproj.CRS or str
+        Metric coordinate reference system to work in.
+    collapse : bool, default True
+        Whether objects of one class at the same place (within the same centimetre) become one,
+        with their number in ``count``.
+    apart : collection of str
+        Classes that are collapsed within each layer only, because they will be conflated (see
+        `objects.conflate`), which keeps account of where objects came from.
+
+    Returns
+    -------
+    objects : StreetObjects
+        The objects, in the order of the layers.
+    report : LoadReport
+        What became of every row.
+
+    Raises
+    ------
+    CrsError
+        If `crs` is not metric, or a layer has no coordinate reference system.
+    UnknownNameError
+        If a layer names a class that `taxonomy` does not have.
+    EmptyResultError
+        If no object remains.
+
+    Examples
+    --------
+    >>> from semsig_gis.sources.synthetic.city import CitySpec, synthetic_city
+    >>> from semsig_gis.sources.catalog import paper_taxonomy
+    >>> layers = synthetic_city(CitySpec(size=300.0))
+    >>> _, report = build_objects(layers, taxonomy=paper_taxonomy(), crs="EPSG:32631")
+    >>> all(layer.kept == layer.read for layer in report.layers)
+    True
+    """
+    system = require_metric_crs(crs)
+    layers = tuple(layers)
+    parts = [_positions(layer, taxonomy, system) for layer in layers]
+    columns = [SOURCE, SOURCE_ID, CLASS_CODE, "x", "y"]
+    everything = (
+        pd.concat([part for part, _, _ in parts], ignore_index=True)
+        if parts
+        else pd.DataFrame(columns=columns)
+    )
+    if everything.empty:
+        msg = (
+            f"no object remains of {sum(layer.read for layer in layers)} rows in {len(layers)} "
+            "layers; look at the filters, the geometries and the coordinate systems."
+        )
+        raise EmptyResultError(msg)
+    # By number, because two layers may bear one name.
+    owner = np.repeat(np.arange(len(parts)), [len(part) for part, _, _ in parts])
+    again = _same_id(everything, np.array([layer.spec.unique_id for layer in layers])[owner])
+    repeated = np.bincount(owner[again], minlength=len(parts)).tolist()
+    everything, owner = everything[~again].reset_index(drop=True), owner[~again]
+    if collapse:
+        codes = [taxonomy.by_name(name).code for name in apart]
+        first, counts = _first_at_place(
+            everything, np.where(everything[CLASS_CODE].isin(codes), owner, -1)
+        )
+    else:
+        first, counts = np.arange(len(everything)), np.ones(len(everything), np.int64)
+    kept = everything.iloc[first].reset_index(drop=True)
+    table = gpd.GeoDataFrame(
+        {
+            CLASS_CODE: kept[CLASS_CODE].to_numpy(np.uint8),
+            SOURCE: kept[SOURCE].to_numpy(str).astype(object),
+            SOURCE_ID: kept[SOURCE_ID].to_numpy(str).astype(object),
+            COUNT: counts.astype(np.int32),
+        },
+        geometry=shapely.points(kept["x"].to_numpy(), kept["y"].to_numpy()),
+        crs=system,
+    )
+    remaining = np.bincount(owner[first], minlength=len(parts)).tolist()
+    reports = tuple(
+        LayerReport(
+            name=layer.spec.name,
+            read=layer.read,
+            unreadable=layer.error_count,
+            filtered=layer.filtered,
+            missing=missing,
+            duplicates=layer.duplicates + twice,
+            misplaced=misplaced,
+            collapsed=len(part) - twice - kept_here,
+            kept=kept_here,
+            notes=(*layer.notes, *layer.errors),
+        )
+        for layer, (part, missing, misplaced), twice, kept_here in zip(
+            layers, parts, repeated, remaining, strict=True
+        )
+    )
+    return StreetObjects(table, taxonomy, license_lines(layers)), LoadReport(reports)
+
+
+def _positions(layer: RawLayer, taxonomy: Taxonomy, crs: CRS) -> tuple[pd.DataFrame, int, int]:
+    """Return the usable rows of a layer, and how many are missing and misplaced."""
+    table = layer.table
+    if table.crs is None:
+        msg = (
+            f"layer {layer.spec.name!r} has no coordinate reference system; "
+            "state its crs in the catalogue."
+        )
+        raise CrsError(msg)
+    geometry = table.geometry
+    usable = ~(geometry.isna() | geometry.is_empty).to_numpy(bool)
+    points = geometry[usable]
+    if not (points.geom_type == "Point").all():
+        # In the layer's own plane: a street object is small, so the CRS makes no difference.
+        with np.errstate(invalid="ignore", over="ignore"):  # such rows are dropped below
+            centroids = shapely.centroid(points.array)
+        points = gpd.GeoSeries(centroids, index=points.index, crs=table.crs)
+    moved = points if points.crs == crs else points.to_crs(crs)
+    # A broken geometry may have an empty centroid, which has no coordinates at all.
+    xy = np.full((len(moved), 2), np.nan)
+    coordinates, row = shapely.get_coordinates(moved.array, return_index=True)
+    xy[row] = coordinates
+    placed = (np.abs(xy) < BEYOND_EARTH_M).all(axis=1)  # false for NaN too
+    codes = {name: taxonomy.by_name(name).code for name in table[CLASS_NAME].unique()}
+    rows = table[usable][placed]
+    part = pd.DataFrame(
+        {
+            SOURCE: layer.spec.name,
+            SOURCE_ID: rows[SOURCE_ID].to_numpy(),
+            CLASS_CODE: rows[CLASS_NAME].map(codes).to_numpy(),
+            "x": xy[placed, 0],
+            "y": xy[placed, 1],
+        }
+    )
+    return part, int((~usable).sum()), int((~placed).sum())
+
+
+def _same_id(everything: pd.DataFrame, unique: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Tell the rows whose id an earlier row of the layer has, as in a second file of it."""
+    told = unique & (everything[SOURCE_ID] != "").to_numpy(bool)
+    again: NDArray[np.bool_] = everything.duplicated([SOURCE, SOURCE_ID]).to_numpy(bool)
+    return told & again
+
+
+def _first_at_place(
+    everything: pd.DataFrame, group: NDArray[np.int64]
+) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Return the first row of every group, class and place, in order, and how many share it."""
+    keys = np.stack(
+        [
+            group,
+            everything[CLASS_CODE].to_numpy(np.int64),
+            np.rint(everything["x"].to_numpy() / SAME_PLACE_M).astype(np.int64),
+            np.rint(everything["y"].to_numpy() / SAME_PLACE_M).astype(np.int64),
+        ],
+        axis=1,
+    )
+    _, first, counts = np.unique(keys, axis=0, return_index=True, return_counts=True)
+    order = np.argsort(first)
+    return first[order], counts[order]

@@ -1,0 +1,253 @@
+"""One object in two sources is one object: merge by class within a radius, and say what was done.
+
+Objects of one source are never merged with each other; `objects.clean.build_objects` has
+dealt with rows that stand twice in a source.
+"""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass, replace
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+import pandas as pd
+
+from semsig_gis.core.crs import COUNT, GEOMETRY, MERGED, SOURCE, SOURCE_ID
+from semsig_gis.core.errors import InputError
+from semsig_gis.core.rtree import ObjectIndex
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Mapping, Sequence
+
+    from numpy.typing import NDArray
+
+    from semsig_gis.objects.table import StreetObjects
+
+# A catalogue accepts the same: beyond that, two objects of a class are two objects.
+RADIUS_LIMIT_M = 100.0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ConflatedPair:
+    """What was merged of one class between two sources.
+
+    `count` objects of the source `merged` lay within `radius` metres of objects of the source
+    `kept`, whose positions stay; `median_m` and `largest_m` are the distances between the two in
+    metres.
+    """
+
+    class_name: str
+    radius: float
+    kept: str
+    merged: str
+    count: int
+    median_m: float
+    largest_m: float
+
+
+@dataclass(frozen=True, slots=True)
+class ConflationReport:
+    """What was merged, for every class and pair of sources with something in common.
+
+    Classes stand in the order in which their radii were given, sources in that of the objects.
+    """
+
+    pairs: tuple[ConflatedPair, ...]
+
+    @property
+    def count(self) -> int:
+        """Number of objects that were merged into others."""
+        return sum(pair.count for pair in self.pairs)
+
+    def to_list(self) -> list[dict[str, Any]]:
+        """Return the entries as plain mappings, ready for JSON."""
+        return [asdict(pair) for pair in self.pairs]
+
+
+def conflate(
+    objects: StreetObjects, radii: Mapping[str, float]
+) -> tuple[StreetObjects, ConflationReport]:
+    """Merge objects that stand in several sources.
+
+    Parameters
+    ----------
+    objects : StreetObjects
+        The objects; the column ``source`` tells the sources apart, and one whose rows begin
+        earlier is trusted more.
+    radii : mapping of str to float
+        Classes, and the metres within which two objects of different sources are the same; a
+        distance of exactly so much counts. Other classes are left as they are.
+
+    Returns
+    -------
+    objects : StreetObjects
+        The remaining objects in their order. An object that others were merged into keeps its
+        source and position, its ``count`` is the sum of theirs, and its column ``merged`` lists
+        them as ``"source:id; source:id"``; for all others that is empty. The licences of all
+        sources still hold.
+    report : ConflationReport
+        How many were merged, a class and pair of sources.
+
+    Raises
+    ------
+    UnknownNameError
+        If a class is not in the taxonomy.
+    InputError
+        If a radius is not above 0 and below 100 metres, or the objects were conflated before.
+
+    Notes
+    -----
+    Source after source is compared with what remains of those before it. Of all pairs of a
+    remaining and a new object within the radius, the nearest is merged first, and each object of
+    either side takes part once. Thus no two objects of one source are ever merged, and whatever
+    is merged lies within the radius of the position that is kept. Pairs of equal distance go by
+    source, position and identifier, so that the order of the rows in a source does not matter.
+
+    Examples
+    --------
+    >>> import geopandas as gpd
+    >>> from semsig_gis.sources.catalog import paper_taxonomy
+    >>> from semsig_gis.sources.layers import LayerSpec
+    >>> from semsig_gis.objects.clean import build_objects
+    >>> from semsig_gis.sources import RawLayer
+    >>> layers = [
+    ...     RawLayer(
+    ...         spec=LayerSpec(name=name, class_name="bench"),
+    ...         table=gpd.GeoDataFrame(
+    ...             {"class_name": ["bench"] * len(x), "source_id": [str(i) for i in x]},
+    ...             geometry=gpd.points_from_xy(x, [0] * len(x)), crs="EPSG:2154",
+    ...         ),
+    ...         read=len(x),
+    ...     )
+    ...     for name, x in (("city", [0, 4]), ("osm", [3, 50]))
+    ... ]
+    >>> benches, _ = build_objects(layers, taxonomy=paper_taxonomy(), crs="EPSG:2154")
+    >>> merged, report = conflate(benches, {"bench": 5.0})
+    >>> merged.table[["source", "source_id", "count", "merged"]].to_numpy().tolist()
+    [['city', '0', 1, ''], ['city', '4', 2, 'osm:3'], ['osm', '50', 1, '']]
+    >>> report.count
+    1
+    """
+    table = objects.table
+    if MERGED in table.columns:
+        msg = "the objects are conflated already; conflate all sources at once, before saving."
+        raise InputError(msg)
+    codes = {name: objects.taxonomy.by_name(name).code for name in radii}
+    for name, radius in radii.items():
+        if not 0 < radius < RADIUS_LIMIT_M:
+            msg = f"class {name!r} has the radius {radius!r}; give metres above 0 and below 100."
+            raise InputError(msg)
+    view = _view(objects)
+    matches = [
+        _Match(name, kept, merged, metres)
+        for name, radius in radii.items()
+        for kept, merged, metres in _matches(
+            view, np.flatnonzero(objects.codes == codes[name]), radius
+        )
+    ]
+    return _merged(objects, view, matches), _report(view, matches, radii)
+
+
+class _View(NamedTuple):
+    """What decides about merging, an entry an object."""
+
+    xy: NDArray[np.float64]
+    source: NDArray[np.int64]  # number of the source, the first one 0
+    names: list[str]  # of the sources
+    rank: NDArray[np.int64]  # place in an order that does not depend on that of the rows
+
+
+class _Match(NamedTuple):
+    class_name: str
+    kept: int  # row
+    merged: int  # row
+    metres: float
+
+
+def _view(objects: StreetObjects) -> _View:
+    table = objects.table
+    names = list(dict.fromkeys(table[SOURCE]))
+    number = {name: place for place, name in enumerate(names)}
+    source = table[SOURCE].map(number).to_numpy(np.int64)
+    x, y = objects.xy.T
+    keys = pd.DataFrame(
+        {"source": source, "x": x, "y": y, "id": table[SOURCE_ID], "count": table[COUNT]}
+    )
+    rank = np.empty(len(keys), np.int64)
+    rank[keys.sort_values(list(keys.columns)).index] = np.arange(len(keys))
+    return _View(objects.xy, source, names, rank)
+
+
+def _matches(
+    view: _View, members: NDArray[np.int64], radius: float
+) -> Iterator[tuple[int, int, float]]:
+    """Yield row kept, row merged and metres between them, for the objects of one class."""
+    remaining = members[:0]
+    for number in np.unique(view.source[members]):
+        new = members[view.source[members] == number]
+        pairs = _nearest_first(view, remaining, new, radius) if len(remaining) else []
+        yield from pairs
+        merged = [row for _, row, _ in pairs]
+        remaining = np.concatenate([remaining, np.setdiff1d(new, merged)])
+
+
+def _nearest_first(
+    view: _View, old: NDArray[np.int64], new: NDArray[np.int64], radius: float
+) -> list[tuple[int, int, float]]:
+    """Pair old and new objects one to one, the nearest first."""
+    found, seen = ObjectIndex(view.xy[old]).pairs_within(view.xy[new], radius=radius)
+    new_row, old_row = new[found], old[seen]
+    delta = view.xy[old_row] - view.xy[new_row]
+    metres = np.hypot(delta[:, 0], delta[:, 1])
+    order = np.lexsort((view.rank[new_row], view.rank[old_row], metres))
+    taken: set[int] = set()
+    pairs = []
+    for left, right, distance in zip(
+        old_row[order].tolist(), new_row[order].tolist(), metres[order].tolist(), strict=True
+    ):
+        if left not in taken and right not in taken:
+            taken.update((left, right))
+            pairs.append((left, right, distance))
+    return pairs
+
+
+def _merged(objects: StreetObjects, view: _View, matches: Sequence[_Match]) -> StreetObjects:
+    """Return the objects that remain, with what was merged into them."""
+    table = objects.table
+    source, source_id = table[SOURCE].tolist(), table[SOURCE_ID].tolist()
+    counts = table[COUNT].to_numpy(np.int64).copy()
+    entries: dict[int, list[str]] = {}
+    for match in sorted(matches, key=lambda match: view.rank[match.merged]):  # by source
+        counts[match.kept] += counts[match.merged]
+        entry = f"{source[match.merged]}:{source_id[match.merged]}"
+        entries.setdefault(match.kept, []).append(entry)
+    result = table.drop(columns=GEOMETRY)
+    result[COUNT] = counts.astype(np.int32)
+    result[MERGED] = ["; ".join(entries.get(row, [])) for row in range(len(table))]
+    result = result.set_geometry(table.geometry)
+    gone = [match.merged for match in matches]
+    return replace(objects, table=result.drop(index=gone).reset_index(drop=True))
+
+
+def _report(view: _View, matches: Sequence[_Match], radii: Mapping[str, float]) -> ConflationReport:
+    found: dict[tuple[str, int, int], list[float]] = {}
+    for match in matches:
+        sources = int(view.source[match.kept]), int(view.source[match.merged])
+        found.setdefault((match.class_name, *sources), []).append(match.metres)
+    order = list(radii)
+    return ConflationReport(
+        tuple(
+            ConflatedPair(
+                class_name=name,
+                radius=float(radii[name]),
+                kept=view.names[kept],
+                merged=view.names[merged],
+                count=len(metres),
+                median_m=float(np.median(metres)),
+                largest_m=max(metres),
+            )
+            for (name, kept, merged), metres in sorted(
+                found.items(), key=lambda item: (order.index(item[0][0]), item[0][1:])
+            )
+        )
+    )

@@ -1,0 +1,672 @@
+"""Words of several languages that tell which class a layer or a value is about."""
+
+from __future__ import annotations
+
+import functools
+import glob
+import itertools
+import json
+import re
+import tomllib
+import unicodedata
+from collections import Counter
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from pyproj import CRS
+from pyproj.exceptions import CRSError
+
+from semsig_gis.core.crs import require_metric_crs
+from semsig_gis.core.errors import CrsError, SourceError
+from semsig_gis.core.taxonomy import MAX_CODE, ObjectClass
+from semsig_gis.sources.catalog import catalog_names, data_folder, load_catalog, paper_taxonomy
+from semsig_gis.sources.vector.reader import NO_GEOMETRY
+from semsig_gis.sources.vector.sample import VECTOR, samples
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Iterator, Sequence
+
+    from semsig_gis.sources.vector.sample import Sample
+
+
+# Boundaries in ArbresAlign and in WCPublic.
+HUMPS = re.compile(r"(?<=[a-z])(?=[A-Z])|(?<=[A-Z])(?=[A-Z][a-z])")
+
+
+ARTICLES = frozenset(
+    {"a", "al", "alla", "and", "au", "aux", "d", "da", "das", "de", "dei", "del", "della", "dem",
+     "den", "der", "des", "di", "die", "do", "dos", "du", "e", "el", "en", "et", "for", "fur",
+     "het", "i", "il", "in", "l", "la", "las", "le", "les", "lo", "los", "mit", "o", "of", "on",
+     "per", "pour", "the", "to", "und", "van", "von"}
+)  # fmt: skip
+
+
+# Shorter words are the beginnings of too many others.
+WHOLE_WORD_LETTERS = 3
+
+
+@dataclass(frozen=True, slots=True)
+class Found:
+    """A class or role whose keyword was found, and the words of the text in which it was.
+
+    `letters` is the length of the keyword: the longer, the surer.
+    """
+
+    name: str
+    words: str
+    letters: int
+
+
+def words_of(text: str) -> tuple[str, ...]:
+    """Return the words of a name without capitals, accents and articles.
+
+    Words also end where a capital follows (``WCPublic``) and between letters and digits.
+    """
+    letters = unicodedata.normalize("NFKD", text)
+    plain = "".join(letter for letter in letters if not unicodedata.combining(letter))
+    parts = re.findall(r"[^\W\d_]+|\d+", HUMPS.sub(" ", plain))
+    folded = (part.casefold() for part in parts)
+    return tuple(word for word in folded if word not in ARTICLES)
+
+
+@dataclass(frozen=True, slots=True)
+class Keywords:
+    """Keywords of classes, roles or kinds of field.
+
+    Each phrase is a name and the words that stand for it, one after the other.
+    """
+
+    phrases: tuple[tuple[str, tuple[str, ...]], ...]
+
+    @classmethod
+    def of(cls, pairs: Iterable[tuple[str, str]]) -> Keywords:
+        """Return the keywords of pairs of a name and a phrase, each once."""
+        return cls(tuple(dict.fromkeys((name, words_of(phrase)) for name, phrase in pairs)))
+
+    def find(self, text: str) -> tuple[Found, ...]:
+        """Find the keywords in a text, the longest first and each name once.
+
+        Words that are part of those of a longer keyword do not count.
+        """
+        words = words_of(text)
+        found: list[tuple[int, int, Found]] = []
+        for name, phrase in self.phrases:
+            for start in range(len(words)):
+                end = _end(words, start, phrase)
+                if end is not None:
+                    what = Found(name, " ".join(words[start:end]), sum(map(len, phrase)))
+                    found.append((start, end, what))
+        # Python's sort keeps the order of the file among keywords of the same length.
+        found.sort(key=lambda item: (-item[2].letters, item[0]))
+        best: dict[str, Found] = {}
+        for start, end, what in found:
+            if not any(
+                first <= start and end <= last and other.letters > what.letters
+                for first, last, other in found
+            ):
+                best.setdefault(what.name, what)
+        return tuple(best.values())
+
+
+def _end(words: tuple[str, ...], start: int, phrase: tuple[str, ...]) -> int | None:
+    """Return where a phrase ends that begins at a word, or None if it is not there."""
+    if len(phrase) > 1 and words[start].startswith("".join(phrase)):
+        return start + 1  # written as one word
+    end = start + len(phrase)
+    pairs = zip(words[start:end], phrase, strict=False)
+    return end if end <= len(words) and all(_begins(*pair) for pair in pairs) else None
+
+
+def _begins(word: str, keyword: str) -> bool:
+    if len(keyword) <= WHOLE_WORD_LETTERS:
+        return word in {keyword, f"{keyword}s"}
+    return word.startswith(keyword)
+
+
+@functools.cache
+def keywords(kind: str) -> Keywords:
+    """Return the shipped keywords of a kind.
+
+    The kinds are ``"classes"`` (what a class is called), ``"class_fields"`` (fields that tell the
+    class of a layer), ``"roles"`` (what layers without objects are called) and ``"fields"`` (what a
+    field is for).
+    """
+    text = (data_folder() / "keywords.toml").read_text(encoding="utf-8")
+    content = tomllib.loads(text)
+    if kind == "fields":
+        groups = content["fields"].items()
+        return Keywords.of((name, word) for name, words in groups for word in words)
+    table = content["classes" if kind == "class_fields" else kind]
+    return Keywords.of(
+        (name, word)
+        for name, lists in table.items()
+        for key, words in lists.items()
+        if (key == "fields") == (kind == "class_fields")
+        for word in words
+    )
+
+
+# A field with no more values is one to filter by, unless most of them are seen only once.
+FEW_VALUES = 12
+
+
+LONGEST_VALUE = 60
+
+
+LEAST_SHARE = 0.1
+
+
+DATE = re.compile(r"\d{4}-\d\d-\d\d|\d\d[-/.]\d\d[-/.]\d{4}")
+
+
+# A class must be named by the values of at least this share of the rows.
+MOST_ROWS = 0.5
+
+
+ROLE_GEOMETRY = {"buildings": "polygon", "streets": "line"}
+
+
+LAT_LON = re.compile(r"\s*-?\d{1,2}\.\d+\s*,\s*-?\d{1,3}\.\d+\s*")
+
+
+@dataclass(frozen=True, slots=True)
+class Column:
+    """A field and its values in a sample.
+
+    `counts` has the rows of every value that is not blank, in the order of their first row;
+    `missing` is the number of rows without a value.
+    """
+
+    name: str
+    counts: Counter[Any]
+    missing: int
+
+    @property
+    def unique(self) -> bool:
+        """Whether every row has a value of its own."""
+        return not self.missing and max(self.counts.values(), default=2) == 1
+
+    @property
+    def few(self) -> bool:
+        """Whether the values are few, name something, and most rows or many have one."""
+        rows = self.counts.total()
+        return (
+            2 <= len(self.counts) <= FEW_VALUES  # noqa: PLR2004 - one value tells nothing apart
+            and 2 * len(self.counts) <= rows
+            and rows >= LEAST_SHARE * (rows + self.missing)
+            and all(_names_something(value) for value in self.counts)
+        )
+
+    def meant_for(self, purpose: str) -> bool:
+        """Tell whether the name is typical of fields for a purpose.
+
+        The purposes are ``"filter"``, ``"identifier"``, ``"row_number"``, ``"x"`` and ``"y"``.
+        """
+        return any(found.name == purpose for found in keywords("fields").find(self.name))
+
+    def within(self, limit: float) -> bool:
+        """Tell whether all values are numbers from ``-limit`` to ``limit``."""
+        return all(_number(value) and abs(float(value)) <= limit for value in self.counts)
+
+
+def _names_something(value: object) -> bool:
+    if isinstance(value, bool):
+        return True
+    return (
+        isinstance(value, str)
+        and len(value) <= LONGEST_VALUE
+        and not _number(value)
+        and not DATE.search(value)
+    )
+
+
+def _number(value: object) -> bool:
+    try:
+        float(value)  # type: ignore[arg-type] # what cannot be one raises
+    except (TypeError, ValueError):
+        return False
+    return True
+
+
+def columns_of(sample: Sample) -> tuple[Column, ...]:
+    """Return the fields of a sample in their order, without those of lists, mappings or bytes."""
+    columns = []
+    for name, _ in sample.info.fields:
+        values = [row.get(name) for row in sample.rows]
+        there = [value for value in values if value is not None and value != ""]
+        if all(isinstance(value, str | int | float) for value in there):
+            columns.append(Column(name, Counter(there), len(values) - len(there)))
+    return tuple(columns)
+
+
+@dataclass(frozen=True, slots=True)
+class ClassGuess:
+    """What a layer seems to hold: a class, or a role if `is_role`; empty if nothing points to one.
+
+    `reason` tells people what it was seen by, `others` are further classes that the name could
+    mean, and `sure` says that the name means this and nothing else.
+    """
+
+    name: str = ""
+    is_role: bool = False
+    reason: str = ""
+    others: tuple[str, ...] = ()
+    sure: bool = False
+
+
+def guess_class(
+    names: str, columns: Sequence[Column], *, geometry: str | None, rows: int
+) -> ClassGuess:
+    """Guess the class of a layer, or its role where it holds no objects.
+
+    `names` holds those of the file and of the layer; `geometry` is ``"point"``, ``"line"`` or
+    ``"polygon"``, or None where it is of several kinds; `rows` is the size of the sample. The name
+    decides; else values that most rows have; else a field that only one class has.
+    """
+    classes = keywords("classes").find(names)
+    for role in keywords("roles").find(names):
+        longer = any(found.letters > role.letters for found in classes)
+        if ROLE_GEOMETRY[role.name] == geometry and not longer:
+            return ClassGuess(
+                role.name, is_role=True, reason=f'from the name: "{role.words}"', sure=True
+            )
+    if classes:
+        first, *others = classes
+        reason = f'from the name: "{first.words}"'
+        also = tuple(found.name for found in others)
+        return ClassGuess(first.name, reason=reason, others=also, sure=not also)
+    if geometry not in {"point", None}:
+        return ClassGuess()
+    return next(_by_content(columns, rows), ClassGuess())
+
+
+def _by_content(columns: Sequence[Column], rows: int) -> Iterator[ClassGuess]:
+    for column in columns:
+        seen: Counter[str] = Counter()
+        example: dict[str, str] = {}
+        for value, number in column.counts.items() if len(column.counts) <= FEW_VALUES else ():
+            for found in keywords("classes").find(str(value))[:1]:
+                seen[found.name] += number
+                example.setdefault(found.name, str(value))
+        for name, number in seen.most_common(1):
+            if number >= MOST_ROWS * rows:
+                yield ClassGuess(name, reason=f"from {column.name} = {example[name]}")
+    for column in columns:
+        for found in keywords("class_fields").find(column.name):
+            yield ClassGuess(found.name, reason=f"from the field {column.name}")
+
+
+def guess_class_by(columns: Sequence[Column], class_name: str) -> tuple[str, dict[str, str]] | None:
+    """Return the field whose values name other classes than that of the layer, and which.
+
+    The mapping leads from value to class. Of several such fields, the one with most of these values
+    is chosen, and the first of equals.
+    """
+    best: tuple[str, dict[str, str]] | None = None
+    for column in columns:
+        if not column.few:
+            continue
+        classes = {
+            value: found.name
+            for value in column.counts
+            if isinstance(value, str)
+            for found in keywords("classes").find(value)[:1]
+            if found.name != class_name
+        }
+        if classes and (best is None or len(classes) > len(best[1])):
+            best = column.name, classes
+    return best
+
+
+def guess_position(sample: Sample, columns: Sequence[Column]) -> tuple[str, ...]:
+    """Return the field of a table that holds ``lat, lon``, or those of x and y, or nothing."""
+    for name, _ in sample.info.fields:
+        values = [row[name] for row in sample.rows if row.get(name) not in {None, ""}]
+        if values and all(isinstance(value, str) and LAT_LON.fullmatch(value) for value in values):
+            return (name,)
+    numbers = [column for column in columns if column.counts and column.within(float("inf"))]
+    x, y = (
+        [column.name for column in numbers if column.meant_for(purpose)] for purpose in ("x", "y")
+    )
+    return (x[0], y[0]) if x and y else ()
+
+
+# Marks what a person must fill in; as a class, it does not load.
+EDIT = "EDIT"
+
+
+SAMPLE_ROWS = 100_000
+
+
+FILTERS_SHOWN = 8
+
+
+# A field that has more rows a value than this does not identify anything.
+FEW_PER_ID = 10
+
+
+GEOMETRIES = {"Point": "point", "LineString": "line", "LinearRing": "line", "Polygon": "polygon"}
+
+
+FIRST_OWN_CODE = 12
+
+
+SYMBOLS = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789"
+
+
+@dataclass(frozen=True, slots=True)
+class _Draft:
+    """What is known and guessed of one layer."""
+
+    file: Path
+    sample: Sample
+    columns: tuple[Column, ...]
+    geometry: str | None
+    guess: ClassGuess
+    class_by: tuple[str, dict[str, str]] | None
+    position: tuple[str, ...]
+
+
+def suggest_catalog(path: str | Path) -> str:
+    r"""Draft a catalogue for a file from its names, its fields and its values.
+
+    Parameters
+    ----------
+    path : str or Path
+        A vector file, an archive with such files, or a table of a portal (JSON, CSV, Parquet).
+
+    Returns
+    -------
+    str
+        TOML text. What only a person can know is marked ``EDIT`` in a comment; where not even
+        the class could be guessed, ``EDIT`` stands for it, which `load_catalog` refuses. Filters,
+        classes by the value of a field and the like are offered in comments.
+
+    Raises
+    ------
+    SourceError
+        If the file is missing, damaged, of another kind, or holds no positions.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     path = Path(folder, "town_benches.csv")
+    ...     _ = path.write_text("id;lon;lat;wood\n7;3.88;43.61;yes\n8;3.89;43.61;no\n")
+    ...     draft = suggest_catalog(path)
+    >>> print(draft[draft.index("[[layers]]"):], end="")
+    [[layers]]
+    name = "town_benches"
+    class = "bench"  # from the name: "benches"
+    files = ["town_benches.csv"]
+    id_field = "id"  # a value of its own in every row
+    geometry = "point"
+    x_field = "lon"
+    y_field = "lat"
+    crs = "EPSG:4326"  # EDIT: the file does not say; its coordinates could be degrees
+    rows = [1, 4]  # now 2; a load tells when they are fewer or more
+    # Fields: id, lon, lat, wood
+    """
+    path = Path(path)
+    found = samples(path, limit=SAMPLE_ROWS)
+    layers = [item for item in found if item.info.geometry != NO_GEOMETRY]
+    if not layers:
+        msg = f"{path} holds no layer with positions; give a file that does."
+        raise SourceError(msg)
+    drafts = [_draft(path, item) for item in layers]
+    lines = [
+        f"# Draft of a catalogue for {_text(path.name)}, from its names, fields and values.",
+        f"# Check every line; what only a person can know is marked {EDIT}.",
+        "",
+        f"name = {_text(_snake(path.stem))}",
+        f"title = {_text(path.stem)}",
+        f'license = "unknown"  # {EDIT}: what the publisher allows',
+        f'attribution = ""  # {EDIT}: the line that the publisher asks for',
+        *_metric_crs(layers),
+    ]
+    if layers[0].reader != VECTOR:
+        lines.append(f"reader = {_text(layers[0].reader)}")
+    lines += _classes(drafts)
+    for name, draft in zip(_unique(_snake(item.info.name) for item in layers), drafts, strict=True):
+        lines += ["", *_stanza(name, draft, several=len(layers) > 1)]
+    if len(layers) < len(found):
+        tables = ", ".join(_text(item.info.name) for item in found if item not in layers)
+        lines += ["", f"# Left out, because they have no geometry: {tables}"]
+    return "\n".join(lines) + "\n"
+
+
+def _draft(path: Path, sample: Sample) -> _Draft:
+    columns = columns_of(sample)
+    geometry = GEOMETRIES.get(sample.info.geometry.removeprefix("3D ").removeprefix("Multi"))
+    position = sample.coordinates if sample.placed else guess_position(sample, columns)
+    if not sample.placed and not position:
+        fields = ", ".join(column.name for column in columns)
+        msg = (
+            f"{path} has no field that looks like a position, only {fields}; "
+            "give a file with coordinates."
+        )
+        raise SourceError(msg)
+    names = f"{path.stem} / {sample.info.name}"
+    guess = guess_class(names, columns, geometry=geometry, rows=len(sample.rows))
+    kinds = [column for column in columns if column.meant_for("filter") or not guess.sure]
+    class_by = None if guess.is_role else guess_class_by(kinds, guess.name)
+    return _Draft(path, sample, columns, geometry, guess, class_by, position)
+
+
+# --- The top of the catalogue -----------------------------------------------------------------
+
+
+def _metric_crs(layers: Sequence[Sample]) -> list[str]:
+    """Take the CRS of the layers, where it is one in which distances can be taken."""
+    systems = {item.info.crs for item in layers}
+    for crs in systems if len(systems) == 1 else ():
+        try:
+            require_metric_crs(crs)
+        except CrsError:
+            break
+        return [f"metric_crs = {_text(str(crs))}"]
+    return ["# Without metric_crs, distances are taken in the UTM zone of the data."]
+
+
+def _classes(drafts: Sequence[_Draft]) -> Iterator[str]:
+    """Yield stanzas for classes that the paper does not have."""
+    taxonomies = [load_catalog(name).taxonomy for name in catalog_names()]
+    shipped = {item.name: item for taxonomy in taxonomies for item in taxonomy.classes}
+    taken = list(shipped.values())
+    paper = {item.name for item in paper_taxonomy().classes}
+    sure = [draft.guess.name for draft in drafts if draft.guess.name and not draft.guess.is_role]
+    maybe = [name for draft in drafts if draft.class_by for name in draft.class_by[1].values()]
+    for name in dict.fromkeys([*sure, *maybe]):
+        if name in paper:
+            continue
+        item = shipped.get(name) or _new_class(name, taken)
+        taken.append(item)
+        comment = "" if name in sure else "# "
+        yield ""
+        if comment:
+            yield "# For class_by below:"
+        yield f"{comment}[[classes]]"
+        yield f"{comment}code = {item.code}"
+        yield f"{comment}symbol = {_text(item.symbol)}"
+        yield f"{comment}name = {_text(item.name)}"
+        yield f"{comment}title = {_text(item.title)}"
+
+
+def _new_class(name: str, taken: Sequence[ObjectClass]) -> ObjectClass:
+    """Return a class with a code and a symbol that no shipped class has."""
+    codes = {item.code for item in taken}
+    symbols = {item.symbol for item in taken}
+    code = next(code for code in range(FIRST_OWN_CODE, MAX_CODE) if code not in codes)
+    wanted = name.upper() + name + SYMBOLS
+    symbol = next(letter for letter in wanted if letter in SYMBOLS and letter not in symbols)
+    return ObjectClass(code, symbol, name, name.replace("_", " ").capitalize())
+
+
+# --- A layer ----------------------------------------------------------------------------------
+
+
+def _stanza(name: str, draft: _Draft, *, several: bool) -> Iterator[str]:
+    info = draft.sample.info
+    yield "[[layers]]"
+    yield f"name = {_text(name)}"
+    yield from _class(draft.guess)
+    yield f"files = [{_text(glob.escape(draft.file.name))}]"
+    if several:
+        yield f"layer = {_text(info.name)}"
+    yield from _identifier(draft)
+    if draft.geometry:
+        yield f"geometry = {_text(draft.geometry)}"
+    else:
+        yield f"# geometry is of several kinds ({info.geometry}); centroids are taken."
+    yield from _place(draft)
+    least, most = (info.rows + 1) // 2, info.rows * 2
+    yield f"rows = [{least}, {most}]  # now {info.rows:,}; a load tells when they are fewer or more"
+    yield from _filters(draft)
+    yield f"# Fields: {', '.join(_plain(field) for field, _ in info.fields) or 'none'}"
+
+
+def _class(guess: ClassGuess) -> Iterator[str]:
+    key = "role" if guess.is_role else "class"
+    if not guess.name:
+        yield (
+            f'class = "{EDIT}"  # {EDIT}: nothing tells what this is; write a class (or role = '
+            '"buildings" or "streets" instead), or remove the layer'
+        )
+    elif guess.sure:
+        yield f"{key} = {_text(guess.name)}  # {_plain(guess.reason)}"
+    else:
+        others = f"; or is it {' or '.join(guess.others)}?" if guess.others else "; is it so?"
+        yield f"{key} = {_text(guess.name)}  # {EDIT}: {_plain(guess.reason)}{others}"
+
+
+def _identifier(draft: _Draft) -> Iterator[str]:
+    """Yield the field that tells rows apart, or those that may."""
+    rows = len(draft.sample.rows)
+    some = "every row" if rows == draft.sample.info.rows else f"each of the first {rows:,} rows"
+    named = [column for column in draft.columns if column.meant_for("identifier")]
+    numbers = [column for column in draft.columns if column.meant_for("row_number")]
+    for column in [*named, *numbers]:
+        if column.unique:
+            warning = "" if column in named else "; a program gave them, and may give others anew"
+            yield f"id_field = {_text(column.name)}  # a value of its own in {some}{warning}"
+            return
+    yield (
+        f"# No field that is named like an identifier has a value of its own in {some}; rows are "
+        "told by their number."
+    )
+    best = max(named, key=lambda column: len(column.counts), default=None)
+    if best is not None and best.counts and len(best.counts) * FEW_PER_ID >= rows:
+        yield f"# id_field = {_text(best.name)}  # {len(best.counts):,} values in {rows:,} rows"
+        yield "# unique_id = true  # if rows of the same id are the same object"
+        return
+    others = (column for column in draft.columns if column.unique and not _measured(column))
+    other = next((column for column in others if column.name not in draft.position), None)
+    if other is not None:
+        yield f"# id_field = {_text(other.name)}  # has one, if it is meant to identify a row"
+
+
+def _measured(column: Column) -> bool:
+    """Tell whether the values are numbers with decimals, which are different by chance."""
+    return any(str(value).count(".") == 1 for value in column.counts)
+
+
+def _place(draft: _Draft) -> Iterator[str]:
+    """Yield where positions are found, and in which CRS."""
+    info, sample = draft.sample.info, draft.sample
+    if len(draft.position) == 1:
+        (field,) = draft.position
+        yield f"aliases = {{ geo_point_2d = [{_text(field)}] }}  # latitude, longitude"
+    degrees = True
+    if len(draft.position) == 2:  # noqa: PLR2004 - x and y
+        x, y = draft.position
+        yield f"x_field = {_text(x)}"
+        yield f"y_field = {_text(y)}"
+        limits = {x: 180.0, y: 90.0}
+        degrees = all(
+            column.within(limits[column.name]) for column in draft.columns if column.name in limits
+        )
+    if info.crs is not None and sample.reader == VECTOR:
+        yield from _known_crs(info.crs)
+    elif draft.position and degrees and sample.reader == VECTOR:
+        yield (
+            f'crs = "EPSG:4326"  # {EDIT}: the file does not say; its coordinates could be degrees'
+        )
+    elif not degrees or sample.reader == VECTOR:
+        yield (
+            f"# {EDIT}: the file does not say its coordinate system; write its code, such as "
+            'crs = "EPSG:2154"'
+        )
+
+
+def _known_crs(crs: str) -> Iterator[str]:
+    try:
+        CRS.from_user_input(crs)
+    except CRSError:
+        yield f"# The file states its own coordinate system, {_text(crs)}, which has no code."
+    else:
+        yield f"crs = {_text(crs)}"
+
+
+def _filters(draft: _Draft) -> Iterator[str]:
+    """Yield, in comments, the fields of few values, and the classes that one of them tells."""
+    if draft.class_by is not None:
+        field, classes = draft.class_by
+        values = ", ".join(f"{_key(value)} = {_text(name)}" for value, name in classes.items())
+        yield f"# If {_plain(field)} tells the class of a row:"
+        yield f"# class_by = {{ field = {_text(field)}, values = {{ {values} }} }}"
+    few = [column for column in draft.columns if column.few and not _pattern(column)]
+    few.sort(key=lambda column: not column.meant_for("filter"))  # the others keep their order
+    if few:
+        rows = len(draft.sample.rows)
+        seen = "" if rows == draft.sample.info.rows else f" (seen in the first {rows:,} rows)"
+        yield f"# To keep some rows only, take one of these without the values not wanted{seen}:"
+    for column in few[:FILTERS_SHOWN]:
+        values = ", ".join(_value(value) for value, _ in column.counts.most_common())
+        numbers = ", ".join(f"{number:,}" for _, number in column.counts.most_common())
+        missing = f"; without: {column.missing:,}" if column.missing else ""
+        yield f"# where = {{ {_key(column.name)} = [{values}] }}  # rows: {numbers}{missing}"
+    if len(few) > FILTERS_SHOWN:
+        names = ", ".join(_plain(column.name) for column in few[FILTERS_SHOWN:])
+        yield f"# More fields of few values: {names}"
+
+
+def _pattern(column: Column) -> bool:
+    """Tell whether a catalogue would take a value for a pattern."""
+    return any(str(value).startswith("/") for value in column.counts)
+
+
+# --- TOML -------------------------------------------------------------------------------------
+
+
+def _text(text: str) -> str:
+    """Return a TOML string: JSON's, but for the one control character that JSON lets pass."""
+    clean = text.encode("utf-8", "replace").decode("utf-8")  # a file name may be anything
+    return json.dumps(clean, ensure_ascii=False).replace("\x7f", "\\u007f")
+
+
+def _plain(text: str) -> str:
+    """Return text that fits into a comment."""
+    return _text(text)[1:-1].replace('\\"', '"')
+
+
+def _value(value: object) -> str:
+    return str(value).lower() if isinstance(value, bool) else _text(str(value))
+
+
+def _key(name: str) -> str:
+    return name if re.fullmatch(r"[A-Za-z0-9_-]+", name) else _text(name)
+
+
+def _snake(text: str) -> str:
+    return "_".join(words_of(text)) or "layer"
+
+
+def _unique(names: Iterable[str]) -> Iterator[str]:
+    """Yield the names, with a number where one comes again."""
+    seen: set[str] = set()
+    for name in names:
+        free = (f"{name}_{number}" if number > 1 else name for number in itertools.count(1))
+        chosen = next(candidate for candidate in free if candidate not in seen)
+        seen.add(chosen)
+        yield chosen

@@ -1,0 +1,291 @@
+"""What a load of street objects is worth: how many, how dense, what was left out and why.
+
+A density needs an area, and nothing in the data says which. Two are given, and both are named
+wherever they are used: the convex hull of all objects, which takes in whatever lies between them
+(a river, a park, the sea), and the squares of 100 m on the metric grid that hold an object of any
+class, which leave out empty ground but grow with every object. The truth mostly lies between.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from dataclasses import asdict, dataclass
+from typing import TYPE_CHECKING, Any, TypeAlias
+
+import numpy as np
+import shapely
+from pyproj import Transformer
+
+from semsig_gis.core.crs import COUNT
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Iterator, Sequence
+
+    from numpy.typing import NDArray
+
+    from semsig_gis.core.taxonomy import ObjectClass
+    from semsig_gis.objects.clean import LayerReport, LoadReport
+    from semsig_gis.objects.conflate import ConflatedPair, ConflationReport
+    from semsig_gis.objects.table import StreetObjects
+
+# Title, headings, rows of text, and what a reader must know.
+PlainTable: TypeAlias = tuple[str, tuple[str, ...], tuple[tuple[str, ...], ...], str]
+
+SQUARE_M = 100.0
+M2_PER_KM2 = 1e6
+# Points of an edge of the extent whose degrees are looked at: in degrees an edge is a curve.
+EDGE_POINTS = 21
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ClassQuality:
+    """The objects of one class, after collapsing and conflation, and their density.
+
+    `rows` counts the rows of the sources that they stand for. `per_km2_hull` is None where the
+    convex hull has no area. `nearest_m` is the median distance in metres from an object to the
+    nearest other one of its class, None for a single object.
+    """
+
+    class_name: str
+    objects: int
+    rows: int
+    per_km2_hull: float | None
+    per_km2_occupied: float
+    nearest_m: float | None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SourceQuality:
+    """What became of the rows of one layer; all that is dropped and `objects` add up to `read`.
+
+    For the reasons see `objects.table.LayerReport`; `conflated` objects were merged into those
+    of an earlier source. `notes` are warnings and the first messages about unreadable rows.
+    """
+
+    name: str
+    read: int
+    unreadable: int
+    filtered: int
+    missing: int
+    duplicates: int
+    misplaced: int
+    collapsed: int
+    conflated: int
+    objects: int
+    notes: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class QualityReport:
+    """The quality report of a load.
+
+    `classes` are those with objects in the order of the taxonomy, `absent` those without; `sources`
+    stand in the order they were loaded. `crs` is a code, or a name where there is none. Extents are
+    west, south, east and north, in metres and in degrees of WGS 84. `hull_km2` is the area of the
+    convex hull of all objects, `occupied_km2` that of the squares of 100 m that hold one.
+    """
+
+    classes: tuple[ClassQuality, ...]
+    absent: tuple[str, ...]
+    sources: tuple[SourceQuality, ...]
+    conflated: tuple[ConflatedPair, ...]
+    crs: str
+    extent: tuple[float, float, float, float]
+    extent_degrees: tuple[float, float, float, float]
+    hull_km2: float
+    occupied_km2: float
+    licenses: tuple[str, ...]
+
+    @property
+    def objects(self) -> int:
+        """Number of objects of all classes."""
+        return sum(item.objects for item in self.classes)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the fields and ``objects``, their number, as plain values for JSON."""
+        return {"objects": self.objects, **asdict(self)}
+
+    def tables(self) -> tuple[PlainTable, ...]:
+        """Return the report as tables to print, in the form of `reports.tables.Table`.
+
+        They show objects by class, rows by layer, what was conflated (where something was), the
+        place, and the licences.
+        """
+        tables: list[PlainTable] = [
+            (
+                "Objects by class",
+                ("class", "objects", "rows", "per km² of hull", "per km² occupied", "nearest, m"),
+                tuple(
+                    (
+                        item.class_name,
+                        f"{item.objects:,}",
+                        f"{item.rows:,}",
+                        _text(item.per_km2_hull),
+                        _text(item.per_km2_occupied),
+                        _text(item.nearest_m),
+                    )
+                    for item in self.classes
+                ),
+                f"The convex hull of all objects is {self.hull_km2:,.2f} km², ground without "
+                f"objects included; the squares of {SQUARE_M:.0f} m that hold an object are "
+                f"{self.occupied_km2:,.2f} km². Nearest: the median distance to the nearest other "
+                "object of the class."
+                + (f" No objects of: {', '.join(self.absent)}." if self.absent else ""),
+            ),
+            ("Rows by layer", _SOURCE_COLUMNS, tuple(map(_source_row, self.sources)), ""),
+        ]
+        if self.conflated:
+            rows = tuple(
+                (
+                    item.class_name,
+                    item.merged,
+                    item.kept,
+                    f"{item.count:,}",
+                    _text(item.radius),
+                    _text(item.median_m),
+                    _text(item.largest_m),
+                )
+                for item in self.conflated
+            )
+            tables.append(("Conflated", _CONFLATED_COLUMNS, rows, ""))
+        place = (
+            ("coordinate system", self.crs),
+            ("west, south, east, north, m", ", ".join(f"{edge:.0f}" for edge in self.extent)),
+            (
+                "west, south, east, north, degrees",
+                ", ".join(f"{edge:.5f}" for edge in self.extent_degrees),
+            ),
+        )
+        tables.append(("Place", ("what", "value"), place, ""))
+        tables.append(("Licences", ("licence",), tuple((line,) for line in self.licenses), ""))
+        return tuple(tables)
+
+
+_SOURCE_COLUMNS = (
+    "layer",
+    "read",
+    "unreadable",
+    "filtered",
+    "missing",
+    "duplicates",
+    "misplaced",
+    "collapsed",
+    "conflated",
+    "objects",
+    "notes",
+)
+_CONFLATED_COLUMNS = ("class", "from", "into", "objects", "radius, m", "median, m", "largest, m")
+
+
+def _source_row(item: SourceQuality) -> tuple[str, ...]:
+    *numbers, notes = (getattr(item, column) for column in _SOURCE_COLUMNS[1:])
+    return (item.name, *(f"{number:,}" for number in numbers), "; ".join(notes))
+
+
+def _text(number: float | None) -> str:
+    return "" if number is None else f"{number:,.1f}"
+
+
+def quality_report(
+    objects: StreetObjects, load: LoadReport, conflation: ConflationReport | None = None
+) -> QualityReport:
+    """Report on the quality of a load.
+
+    Parameters
+    ----------
+    objects : StreetObjects
+        What was loaded, after conflation if there was one.
+    load : LoadReport
+        What `objects.clean.build_objects` says of the layers.
+    conflation : ConflationReport, optional
+        What `objects.conflate.conflate` says, if it was used.
+
+    Returns
+    -------
+    QualityReport
+        The report.
+
+    Examples
+    --------
+    >>> from semsig_gis.sources.synthetic.city import CitySpec, synthetic_city
+    >>> from semsig_gis.sources.catalog import paper_taxonomy
+    >>> from semsig_gis.objects.clean import build_objects
+    >>> layers = synthetic_city(CitySpec(size=300.0))
+    >>> objects, load = build_objects(layers, taxonomy=paper_taxonomy(), crs="EPSG:32631")
+    >>> quality_report(objects, load).classes[0].class_name
+    'alignment_tree'
+    """
+    xy = objects.xy
+    hull_km2 = float(shapely.area(shapely.convex_hull(shapely.multipoints(xy)))) / M2_PER_KM2
+    squares = np.unique(np.floor(xy / SQUARE_M), axis=0)
+    occupied_km2 = len(squares) * SQUARE_M**2 / M2_PER_KM2
+    west, south = xy.min(axis=0).tolist()
+    east, north = xy.max(axis=0).tolist()
+    pairs = conflation.pairs if conflation is not None else ()
+    present = set(np.unique(objects.codes).tolist())
+    return QualityReport(
+        classes=tuple(
+            _class_quality(objects, item, hull_km2=hull_km2, occupied_km2=occupied_km2)
+            for item in objects.taxonomy.classes
+            if item.code in present
+        ),
+        absent=tuple(item.name for item in objects.taxonomy.classes if item.code not in present),
+        sources=tuple(_sources(load.layers, pairs)),
+        conflated=pairs,
+        crs=f"EPSG:{code}" if (code := objects.crs.to_epsg()) else objects.crs.name,
+        extent=(west, south, east, north),
+        extent_degrees=Transformer.from_crs(
+            objects.crs, "EPSG:4326", always_xy=True
+        ).transform_bounds(west, south, east, north, densify_pts=EDGE_POINTS),
+        hull_km2=hull_km2,
+        occupied_km2=occupied_km2,
+        licenses=objects.licenses,
+    )
+
+
+def _class_quality(
+    objects: StreetObjects, item: ObjectClass, *, hull_km2: float, occupied_km2: float
+) -> ClassQuality:
+    members = objects.codes == item.code
+    number = int(members.sum())
+    return ClassQuality(
+        class_name=item.name,
+        objects=number,
+        rows=int(objects.table[COUNT].to_numpy(np.int64)[members].sum()),
+        per_km2_hull=number / hull_km2 if hull_km2 > 0 else None,
+        per_km2_occupied=number / occupied_km2,
+        nearest_m=_nearest(objects.xy[members]),
+    )
+
+
+def _nearest(xy: NDArray[np.float64]) -> float | None:
+    """Return the median distance to the nearest other point."""
+    if len(xy) == 1:
+        return None
+    places, counts = np.unique(xy, axis=0, return_counts=True)
+    alone = counts == 1
+    # Points that share their place are at no distance; the tree passes over equal points.
+    distances = np.zeros(len(xy))
+    if alone.any():
+        points = np.asarray(shapely.points(places))
+        _, found = shapely.STRtree(points).query_nearest(
+            points[alone], exclusive=True, all_matches=False, return_distance=True
+        )
+        distances[: len(found)] = found
+    return float(np.median(distances))
+
+
+def _sources(
+    layers: Sequence[LayerReport], pairs: Iterable[ConflatedPair]
+) -> Iterator[SourceQuality]:
+    """Yield what became of the rows of every layer."""
+    merged: Counter[str] = Counter()
+    for pair in pairs:
+        merged[pair.merged] += pair.count
+    for layer in layers:
+        # Layers of one name are one source to conflation: the first has given what it can.
+        conflated = min(layer.kept, merged[layer.name])
+        merged[layer.name] -= conflated
+        facts = asdict(layer)
+        objects = facts.pop("kept") - conflated
+        yield SourceQuality(**facts, conflated=conflated, objects=objects)

@@ -1,0 +1,189 @@
+"""Files of what surrounds street objects: building footprints, street centre lines, an area."""
+
+from __future__ import annotations
+
+import itertools
+from pathlib import Path
+from typing import TYPE_CHECKING, Literal
+
+import geopandas as gpd
+import pyarrow as pa
+import shapely
+
+from semsig_gis.core.crs import LICENSES
+from semsig_gis.core.errors import InputError, SourceError
+from semsig_gis.objects.table import license_lines
+from semsig_gis.sources.area import join_areas
+from semsig_gis.sources.catalog import load_catalog
+from semsig_gis.sources.layers import LayerSpec
+from semsig_gis.sources.osm import file as osm_file
+from semsig_gis.sources.vector import reader as vector_file
+from semsig_gis.storage.geoparquet import GROUP_ROWS, hilbert_order
+from semsig_gis.storage.whole import whole_file
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from pyproj import CRS
+
+    from semsig_gis.sources.layers import GeometryKind
+
+OSM_SUFFIXES = (".osm", ".osm.pbf", ".osm.bz2")
+DIMENSIONS: dict[GeometryKind, int] = {"line": 1, "polygon": 2}
+
+
+def save_surroundings(table: gpd.GeoDataFrame, path: str | Path) -> None:
+    """Save buildings or streets as one GeoParquet file that can be read by box.
+
+    Parameters
+    ----------
+    table : GeoDataFrame
+        Features, each with a geometry; all columns are kept.
+    path : str or Path
+        File to write; it appears whole, by rename.
+
+    Notes
+    -----
+    The file holds the features in a spatial order, with their bounds in the column ``bbox``, and
+    the `attrs` of the table.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> houses = gpd.GeoDataFrame(
+    ...     geometry=[shapely.box(0, 0, 5, 5), shapely.box(90, 0, 95, 5)], crs="EPSG:2154"
+    ... )
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     file = f"{folder}/houses.parquet"
+    ...     save_surroundings(houses, file)
+    ...     len(read_surroundings(file, role="buildings", crs="EPSG:2154", box=(0, 0, 9, 9)))
+    1
+    """
+    ordered = table.iloc[hilbert_order(table.geometry.array)]
+    with whole_file(path) as partial:
+        ordered.to_parquet(
+            partial,
+            index=False,
+            compression="zstd",
+            schema_version="1.1.0",
+            write_covering_bbox=True,
+            row_group_size=GROUP_ROWS,
+        )
+
+
+def read_surroundings(
+    path: str | Path,
+    *,
+    role: Literal["buildings", "streets"],
+    crs: CRS | str,
+    box: Sequence[float] | None = None,
+) -> gpd.GeoDataFrame:
+    """Read the buildings or the streets of a city.
+
+    Parameters
+    ----------
+    path : str or Path
+        Any vector file that `sources.vector.reader` reads, an OpenStreetMap file, or a
+        ``.parquet`` file such as ``semsig load --buildings`` writes.
+    role : {"buildings", "streets"}
+        What the file holds: polygons or lines.
+    crs : pyproj.CRS or str
+        CRS to move it to.
+    box : sequence of float, optional
+        ``xmin, ymin, xmax, ymax`` in the CRS of the file, which `save_surroundings` wrote: only
+        features whose bounds meet it.
+
+    Returns
+    -------
+    GeoDataFrame
+        One row a feature that has a geometry; in a box there may be none. Of a ``.parquet`` file
+        all columns are kept. Whom to name for it, where that is known, is in ``attrs["licenses"]``
+        (see `licenses_of`).
+
+    Raises
+    ------
+    SourceError
+        If the file is missing, damaged, or of another kind.
+    CrsError
+        If nobody knows its CRS.
+    InputError
+        If it holds no polygon or line at all, or something else too.
+
+    Examples
+    --------
+    >>> read_surroundings("nowhere.parquet", role="buildings", crs="EPSG:2154")
+    Traceback (most recent call last):
+    ...
+    semsig_gis.core.errors.SourceError: nowhere.parquet does not exist; give a file of polygons.
+    """
+    return _read(Path(path), role, "polygon" if role == "buildings" else "line", crs, box)
+
+
+def licenses_of(*tables: gpd.GeoDataFrame | None) -> tuple[str, ...]:
+    """Return whom to name for buildings and streets, a line for every publisher and licence.
+
+    The tables are those of `read_surroundings` or `objects.load.assemble`.
+    """
+    lines = [table.attrs.get(LICENSES, ()) for table in tables if table is not None]
+    return tuple(dict.fromkeys(itertools.chain.from_iterable(lines)))
+
+
+def read_area(path: str | Path, *, crs: CRS | str) -> shapely.Polygon | shapely.MultiPolygon:
+    """Read what all polygons of a vector or ``.parquet`` file enclose together, moved to a CRS.
+
+    Raise SourceError if the file is missing, damaged, or of another kind, CrsError if its CRS is
+    not known, and InputError if it holds no polygon, or something else too.
+    """
+    area = join_areas(_read(Path(path), "area", "polygon", crs).geometry.to_numpy())
+    if area is None:
+        msg = f"{path} encloses no area; give a file of polygons."
+        raise InputError(msg)
+    return area
+
+
+def _read(
+    path: Path,
+    role: str,
+    kind: GeometryKind,
+    crs: CRS | str,
+    box: Sequence[float] | None = None,
+) -> gpd.GeoDataFrame:
+    if path.suffix.lower() == ".parquet":
+        table = _read_parquet(path, kind, box)
+    elif path.name.lower().endswith(OSM_SUFFIXES) and role != "area":
+        spec = load_catalog("openstreetmap").layer(role)
+        (layer,) = osm_file.read_layers(path, [spec])
+        table = layer.table
+        table.attrs[LICENSES] = list(license_lines([layer]))
+    else:
+        layer = vector_file.read_layer(path, LayerSpec(name=role, class_name="", geometry=kind))
+        if layer.error_count:
+            msg = (
+                f"{path} has {layer.error_count} features that cannot be read "
+                f"({layer.errors[0]}); correct the file."
+            )
+            raise SourceError(msg)
+        table = layer.table
+    if table.crs is None:
+        msg = f"{path} states no coordinate reference system; write it with one."
+        raise SourceError(msg)
+    geometry = table.geometry
+    table = table[~(geometry.isna() | geometry.is_empty)].reset_index(drop=True)
+    dimensions = shapely.get_dimensions(table.geometry.to_numpy())
+    others = table.geometry[dimensions != DIMENSIONS[kind]]
+    if (len(table) == 0 and box is None) or len(others):
+        found = f"holds a {others.iloc[0].geom_type}" if len(others) else f"holds no {kind}"
+        msg = f"{path} {found}; give a file of {kind}s."
+        raise InputError(msg)
+    return table.to_crs(crs)
+
+
+def _read_parquet(path: Path, kind: GeometryKind, box: Sequence[float] | None) -> gpd.GeoDataFrame:
+    if not path.is_file():
+        msg = f"{path} does not exist; give a file of {kind}s."
+        raise SourceError(msg)
+    try:
+        return gpd.read_parquet(path, bbox=None if box is None else tuple(box))
+    except (pa.ArrowException, ValueError, OSError) as error:
+        msg = f"{path} is damaged or is not GeoParquet; give a file of {kind}s."
+        raise SourceError(msg) from error

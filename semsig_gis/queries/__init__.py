@@ -1,0 +1,1 @@
+"""Queries of known places and from files, and what spoils them."""

@@ -1,0 +1,296 @@
+"""Queries of known places: seen from the cells or from anywhere, in this city or a later one.
+
+What is seen from a place is spoiled by distortions; what is left is asked. All chances come from a
+seed and the number of a query, so that query 17 is the same whatever else is asked, and however
+many.
+"""
+
+from __future__ import annotations
+
+import zlib
+from dataclasses import dataclass, replace
+from itertools import pairwise
+from typing import TYPE_CHECKING, Literal, get_args
+
+import numpy as np
+
+from semsig_gis.core.errors import CrsError, InputError, UnknownNameError, nearest_name
+from semsig_gis.database.visibility import views_at
+from semsig_gis.queries.chain import ready_chain
+from semsig_gis.queries.paper_errors import DISTORTIONS
+from semsig_gis.queries.sight import CitySights, Sight
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from numpy.typing import NDArray
+
+    from semsig_gis.database.database import SignatureDatabase
+    from semsig_gis.database.occlusion import Footprints
+    from semsig_gis.database.store import ObjectStore
+    from semsig_gis.database.visibility import Views
+    from semsig_gis.queries.chain import QueryDistortion
+
+SeenFrom = Literal["cells", "anywhere"]
+
+TRIES = 20
+"""How many places in a cell are tried for one outside the buildings."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class QuerySpec:
+    """Which queries are asked.
+
+    Parameters
+    ----------
+    number : int, default 500
+        How many of each seed; at least 1.
+    seeds : tuple of int, default (0,)
+        Seeds of all chances; different ones, each 0 or more.
+    seen_from : {"cells", "anywhere"}, default "cells"
+        The viewpoints of cells, as in the paper, or places anywhere in cells, outside of
+        buildings.
+    distortions : tuple, default the paper's medium level
+        What happens to a query, in this order (see `queries.chain`).
+
+    Raises
+    ------
+    InputError
+        If a number is out of range.
+    UnknownNameError
+        If there is no such place to see from.
+
+    Examples
+    --------
+    >>> QuerySpec(seen_from="cell")
+    Traceback (most recent call last):
+    ...
+    semsig_gis.core.errors.UnknownNameError: queries are seen from 'cell';
+    the nearest is 'cells'; give
+    cells or anywhere.
+    """
+
+    number: int = 500
+    seeds: tuple[int, ...] = (0,)
+    seen_from: SeenFrom = "cells"
+    distortions: tuple[QueryDistortion, ...] = (DISTORTIONS["medium"],)
+
+    def __post_init__(self) -> None:  # noqa: D105
+        if self.number < 1:
+            msg = f"{self.number} queries were asked for; give a whole number from 1."
+            raise InputError(msg)
+        if not self.seeds or len(set(self.seeds)) < len(self.seeds):
+            msg = f"the seeds are {list(self.seeds)}; give at least one, and none twice."
+            raise InputError(msg)
+        if min(self.seeds) < 0:
+            msg = f"A seed of {min(self.seeds)} was given; give a whole number, 0 or more."
+            raise InputError(msg)
+        if self.seen_from not in get_args(SeenFrom):
+            hint = nearest_name(self.seen_from, get_args(SeenFrom))
+            msg = f"queries are seen from {self.seen_from!r}{hint}; give cells or anywhere."
+            raise UnknownNameError(msg)
+
+
+@dataclass(frozen=True, eq=False, slots=True, kw_only=True)
+class Query:
+    """A query and the truth about it.
+
+    It was seen from `xy`, metres in the CRS of the database, in the cell of row number `cell` there
+    (-1 where the database has no such cell), where `length` objects are seen. `number` counts from
+    0 for each seed. `asked` is what is asked after all distortions, and by how much its north is
+    off; `pick`, in [0, 1), chooses one of equally good answers.
+    """
+
+    seed: int
+    number: int
+    xy: tuple[float, float]
+    cell: int
+    length: int
+    asked: Sight
+    pick: float
+
+
+def draw_queries(
+    database: SignatureDatabase,
+    spec: QuerySpec,
+    *,
+    store: ObjectStore | None = None,
+    city: SignatureDatabase | None = None,
+    part: slice = slice(None),
+) -> list[Query]:
+    """Draw queries of known places.
+
+    Parameters
+    ----------
+    database : SignatureDatabase
+        What is to be searched.
+    spec : QuerySpec
+        Which queries.
+    store : ObjectStore, optional
+        The street objects, and buildings if any, of the city that is looked at; needed for places
+        anywhere.
+    city : SignatureDatabase, optional
+        The city that is looked at, if it is not the one that the database tells of: the same city
+        at another date, say, in the same coordinate reference system. Places are in its cells.
+    part : slice, optional
+        Which of the queries to draw, those of the first seed first; all by default.
+
+    Returns
+    -------
+    list of Query
+        For each seed so many queries. A detector knows the classes that the database has
+        somewhere; objects of others are not asked.
+
+    Raises
+    ------
+    InputError
+        If there are more queries than cells or places, or the street objects are missing.
+    CrsError
+        If the two cities have different coordinate reference systems.
+
+    Examples
+    --------
+    >>> from semsig_gis.database.build import build_database
+    >>> from semsig_gis.sources.catalog import paper_taxonomy
+    >>> from semsig_gis.objects.clean import build_objects
+    >>> from semsig_gis.sources.synthetic.city import CitySpec, synthetic_city
+    >>> from semsig_gis.database.store import ObjectStore
+    >>> layers = synthetic_city(CitySpec(size=300.0))
+    >>> objects, _ = build_objects(layers, taxonomy=paper_taxonomy(), crs="EPSG:32631")
+    >>> database = build_database(objects)
+    >>> spec = QuerySpec(number=3, seen_from="anywhere", distortions=())
+    >>> drawn = draw_queries(database, spec, store=ObjectStore.of(objects))
+    >>> [query.length == len(query.asked) for query in drawn]
+    [True, True, True]
+    """
+    looked_at = database if city is None else city
+    if looked_at.crs != database.crs:
+        msg = (
+            f"queries are seen in {looked_at.crs.to_string()} and searched for in "
+            f"{database.crs.to_string()}; build both databases in one reference system."
+        )
+        raise CrsError(msg)
+    if spec.number > len(looked_at):
+        msg = (
+            f"{spec.number} queries were asked for; give a number from 1 to {len(looked_at)}, "
+            "the number of cells."
+        )
+        raise InputError(msg)
+    if spec.seen_from == "anywhere" and store is None:
+        msg = (
+            "queries from anywhere need the street objects of the city; build its database with "
+            "them, or let queries be seen from cells."
+        )
+        raise InputError(msg)
+    spoil = ready_chain(spec.distortions, CitySights.of(database))
+    known = _known_codes(looked_at, database)
+    queries = []
+    for seed, numbers in _numbers(spec, part):
+        places, sights = _seen(looked_at, spec, seed, numbers, store)
+        cells = database.cells_at(places)
+        for number, place, cell, sight in zip(numbers, places, cells, sights, strict=True):
+            codes = known[sight.codes]
+            true = replace(sight, codes=codes).only(codes > 0)
+            queries.append(
+                Query(
+                    seed=seed,
+                    number=number,
+                    xy=(float(place[0]), float(place[1])),
+                    cell=int(cell),
+                    length=len(sight),
+                    asked=spoil(true, seed, number),
+                    pick=float(_random(seed, "pick", number).random()),
+                )
+            )
+    return queries
+
+
+def _numbers(spec: QuerySpec, part: slice) -> Iterator[tuple[int, range]]:
+    """Yield the numbers of the queries of each seed that are in a part."""
+    start, stop, _ = part.indices(spec.number * len(spec.seeds))
+    for place, seed in enumerate(spec.seeds):
+        first = place * spec.number
+        low, high = max(start - first, 0), min(stop - first, spec.number)
+        if low < high:
+            yield seed, range(low, high)
+
+
+def _seen(
+    city: SignatureDatabase,
+    spec: QuerySpec,
+    seed: int,
+    numbers: range,
+    store: ObjectStore | None,
+) -> tuple[NDArray[np.float64], Iterator[Sight]]:
+    """Return places, and what is seen from each."""
+    # The first cells of one permutation: more queries keep the first ones.
+    cells = np.random.default_rng(np.random.SeedSequence(seed)).permutation(len(city))
+    if spec.seen_from == "cells" or store is None:
+        chosen = cells[numbers.start : numbers.stop]
+        return city.xy[chosen], (Sight.of_cell(city, cell) for cell in chosen.tolist())
+    places = _places(city, cells, spec.number, seed, store)[numbers.start : numbers.stop]
+    views = views_at(
+        store.objects,
+        places,
+        index=store.index,
+        radius=city.spec.radius,
+        footprints=store.buildings_around(places, distance=city.reach),
+    )
+    return places, _sights(views)
+
+
+def _places(
+    city: SignatureDatabase, cells: NDArray[np.int64], number: int, seed: int, store: ObjectStore
+) -> NDArray[np.float64]:
+    """Return a place outside the buildings in each of the first cells that have one."""
+    step = city.grid.step
+    found: list[NDArray[np.float64]] = []
+    for start in range(0, len(cells), number):
+        block = cells[start : start + number]
+        aside = np.stack(
+            [
+                _random(seed, "place", start + row).uniform(-0.5, 0.5, (TRIES, 2))
+                for row in range(len(block))
+            ]
+        )
+        tried = city.xy[block][:, None] + step * aside
+        buildings = store.buildings_around(city.xy[block], distance=step)
+        free = _outside(tried.reshape(-1, 2), buildings).reshape(tried.shape[:2])
+        stands = free.any(axis=1)
+        found.append(tried[stands, free.argmax(axis=1)[stands]])
+        if sum(map(len, found)) >= number:
+            return np.concatenate(found)[:number]
+    msg = (
+        f"{number} queries were asked for, but only {sum(map(len, found))} of the {len(cells)} "
+        "cells have a place outside the buildings; give a smaller number."
+    )
+    raise InputError(msg)
+
+
+def _outside(places: NDArray[np.float64], buildings: Footprints | None) -> NDArray[np.bool_]:
+    return np.ones(len(places), np.bool_) if buildings is None else ~buildings.cover(places)
+
+
+def _sights(views: Views) -> Iterator[Sight]:
+    """Yield what is seen from each place."""
+    for low, high in pairwise(views.offsets.tolist()):
+        part = slice(low, high)
+        yield Sight(
+            codes=views.codes[part], bearings=views.bearings[part], distances=views.distances[part]
+        )
+
+
+def _known_codes(city: SignatureDatabase, database: SignatureDatabase) -> NDArray[np.uint8]:
+    """Return the code that each class of a city has in a database, 0 where it has none."""
+    codes = {item.name: item.code for item in database.taxonomy.classes}
+    present = set(database.present_codes.tolist())
+    known = np.zeros(256, np.uint8)
+    for item in city.taxonomy.classes:
+        code = codes.get(item.name, 0)
+        known[item.code] = code if code in present else 0
+    return known
+
+
+def _random(seed: int, stream: str, number: int) -> np.random.Generator:
+    key = (number, zlib.crc32(stream.encode()))
+    return np.random.default_rng(np.random.SeedSequence(seed, spawn_key=key))

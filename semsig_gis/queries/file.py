@@ -1,0 +1,119 @@
+"""Files of queries: one signature a row, from detectors or people, each by itself or a route."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from semsig_gis.core.errors import InputError
+from semsig_gis.core.signature import Signature
+from semsig_gis.likelihood.route import Leg
+from semsig_gis.storage.signature_rows import given, parse_rows, read_rows, row_signature
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from semsig_gis.core.taxonomy import Taxonomy
+    from semsig_gis.storage.signature_rows import Row
+
+Queries = list[tuple[str | int, Signature]]
+Route = tuple[Queries, list[Leg]]
+
+PLAIN_LEG = ("dx", "dy")
+TOWARDS = ("distance", "bearing")
+
+
+def read_queries(path: str | Path, *, taxonomy: Taxonomy) -> Queries:
+    """Read the queries of a CSV file, or of a file of JSON lines.
+
+    The columns are ``types`` and ``bearings`` (degrees with blanks, commas or semicolons between
+    them; in JSON perhaps a list), one of which may be missing or empty, and ``id`` if wanted. Each
+    query comes with its ``id``, or else the number of its line. Raises InputError if the file
+    cannot be read or a line of it is no query.
+    """
+    return _named(read_rows(path, lambda row: _query(row, taxonomy), what="query"))
+
+
+def parse_queries(text: str, source: str, *, taxonomy: Taxonomy) -> Queries:
+    """Read queries from JSON lines, with the names of `read_queries`.
+
+    `source` is what messages call the text. Raises InputError if there is no line, or, with its
+    number, if one is no query.
+    """
+    return _named(parse_rows(text, source, lambda row: _query(row, taxonomy), what="query"))
+
+
+def read_route(path: str | Path, *, taxonomy: Taxonomy) -> Route:
+    """Read the views of a route from a file of queries (see `read_queries`).
+
+    Each line but the first also tells the way from the line before: ``dx`` and ``dy`` (metres to
+    grid east and north), or ``distance`` (metres) and ``bearing`` (degrees clockwise from grid
+    north), and ``sigma`` (standard deviation of each coordinate in metres, 0 if missing). A line
+    may have seen nothing. There is one leg fewer than views. Raises InputError if the file cannot
+    be read or a line of it is no view of a route.
+    """
+    return _route(read_rows(path, lambda row: _view(row, taxonomy), what="view"), str(path))
+
+
+def parse_route(text: str, source: str, *, taxonomy: Taxonomy) -> Route:
+    """Read the views of a route from JSON lines, with the names of `read_route`.
+
+    `source` is what messages call the text. Raises InputError if there is no line, or, with its
+    number, if one is no view of a route.
+    """
+    return _route(parse_rows(text, source, lambda row: _view(row, taxonomy), what="view"), source)
+
+
+def _query(row: Row, taxonomy: Taxonomy) -> tuple[object, Signature]:
+    signature = row_signature(row, taxonomy)
+    if signature is None:
+        msg = "it needs types, bearings or both"
+        raise InputError(msg)
+    return given(row, "id"), signature
+
+
+def _view(row: Row, taxonomy: Taxonomy) -> tuple[object, Signature, Leg | None]:
+    signature = row_signature(row, taxonomy)
+    nothing = Signature(np.empty(0, np.uint8), np.empty(0))
+    return given(row, "id"), nothing if signature is None else signature, _leg(row)
+
+
+def _leg(row: Row) -> Leg | None:
+    told = {
+        name: float(given(row, name))
+        for name in (*PLAIN_LEG, *TOWARDS, "sigma")
+        if given(row, name) is not None
+    }
+    if not told:
+        return None
+    sigma = told.pop("sigma", 0.0)
+    if set(told) == set(PLAIN_LEG):
+        return Leg(dx=told["dx"], dy=told["dy"], sigma=sigma)
+    if set(told) == set(TOWARDS):
+        return Leg.towards(told["bearing"], told["distance"], sigma=sigma)
+    msg = "the way to it needs dx and dy, or distance and bearing"
+    raise InputError(msg)
+
+
+def _route(rows: list[tuple[int, tuple[object, Signature, Leg | None]]], source: str) -> Route:
+    legs = []
+    for number, (line, (_, _, leg)) in enumerate(rows):
+        if (leg is None) != (number == 0):
+            does = "does not tell the way from the line before" if number else "tells a way"
+            msg = (
+                f"line {line} of {source} {does}; give dx and dy, or distance and bearing, on "
+                "every line of a route but the first."
+            )
+            raise InputError(msg)
+        if leg is not None:
+            legs.append(leg)
+    return _named([(line, (name, query)) for line, (name, query, _) in rows]), legs
+
+
+def _named(rows: list[tuple[int, tuple[object, Signature]]]) -> Queries:
+    """Return queries by their name, or the number of their line."""
+    return [
+        (name if isinstance(name, (str, int)) else line if name is None else str(name), query)
+        for line, (name, query) in rows
+    ]

@@ -1,0 +1,200 @@
+"""Tables of the properties of a database, with the paper's figures of Paris beside them."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from semsig_gis.core.text import escaped
+from semsig_gis.database.properties import database_summary
+from semsig_gis.reports.paper_figures import PARIS, PARIS_GROUPS, PARIS_OCCURRENCES
+from semsig_gis.reports.tables import Table, percent
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from semsig_gis.database.database import SignatureDatabase
+
+GROUP_LABELS = {
+    "alone": "cells alone in their group",
+    "entropy_bits": "entropy, in bits",
+}
+
+
+def database_tables(
+    database: SignatureDatabase,
+    *,
+    file_bytes: int | None = None,
+    object_counts: Mapping[int, int] | None = None,
+) -> tuple[Table, ...]:
+    """Return the paper's Tables 1, 2a and 2b for a database, and a table of its classes.
+
+    They are: occurrences by class, basic properties and sizes of the signature groups, each with
+    the paper's figures beside ours; then range, density and entropy by class. ``object_counts`` is
+    by class code.
+    """
+    facts = database_summary(database, file_bytes=file_bytes, object_counts=object_counts)
+    return (
+        _occurrence_table(facts),
+        _property_table(facts),
+        _group_table(facts),
+        _class_table(facts),
+    )
+
+
+def database_markdown(
+    database: SignatureDatabase,
+    *,
+    file_bytes: int | None = None,
+    object_counts: Mapping[int, int] | None = None,
+) -> str:
+    """Return the tables of a database (see `database_tables`) and its sources as Markdown."""
+    tables = database_tables(database, file_bytes=file_bytes, object_counts=object_counts)
+    sections = [table.markdown() for table in tables]
+    if database.licenses:
+        lines = "\n".join(f"- {escaped(line)}" for line in database.licenses)
+        sections.append(f"### Sources\n\n{lines}\n")
+    return "\n".join(["## Signature database\n", *sections])
+
+
+def _occurrence_table(facts: Mapping[str, Any]) -> Table:
+    total = sum(PARIS_OCCURRENCES.values())
+    rows = []
+    for item in facts["occurrences"]:
+        paris = PARIS_OCCURRENCES.get(item["name"])
+        rows.append(
+            (
+                f"{item['title']} ({item['symbol']})",
+                f"{item['number']:,}",
+                percent(item["share"]),
+                "" if paris is None else f"{paris:,}",
+                "" if paris is None else percent(paris / total),
+            )
+        )
+    return Table(
+        title="Occurrences by class",
+        columns=("Class (symbol)", "Number", "Share", PARIS, "Share"),
+        rows=tuple(rows),
+        note="An object counts once in every signature that holds it.",
+    )
+
+
+def _property_table(facts: Mapping[str, Any]) -> Table:
+    size, dense = facts["file_mb"], facts["mb_per_km2"]
+    largest = facts["largest_type_group"]
+    own = sum(
+        item["range_m"] != facts["radius_m"] for item in facts["occurrences"] if item["number"]
+    )
+    others = f" ({own} classes have their own)" if own else ""
+    hidden = facts["occlusion_m"]
+    rows = (
+        ("Visibility range", f"{facts['radius_m']:g} m{others}", "30 m"),
+        (
+            "Occlusion",
+            "none" if hidden is None else f"by buildings, more than {hidden:g} m deep",
+            "",
+        ),
+        ("Viewpoints", _viewpoint_text(facts["viewpoints"]), ""),
+        ("Grid step", f"{facts['step_m']:g} m", "10 m"),
+        ("Angle levels", str(facts["levels"]), "16"),
+        ("Signatures", f"{facts['signatures']:,}", "312,134"),
+        ("Mean length", f"{facts['mean_length']:.3f} objects", "14 objects"),
+        ("Covered area", f"{facts['covered_km2']:.1f} km²", "79 km²"),
+        ("File", "" if size is None else f"{size:.1f} MB", "38.7 MB"),
+        ("File a km²", "" if dense is None else f"{dense:.2f} MB", "1.24 MB"),
+        (
+            "Largest group by type",
+            f"{_shortened(largest['types'])}, {largest['cells']:,} cells",
+            "DDD, 29,958 cells",
+        ),
+    )
+    return Table(
+        title="Database",
+        columns=("Property", "Ours", PARIS),
+        rows=rows,
+        note=(
+            "Our covered area is cells times the area of a cell; by that count "
+            "the paper's signatures cover 31.2 km², not 79."
+        ),
+    )
+
+
+def _viewpoint_text(viewpoints: Mapping[str, Any]) -> str:
+    """Say which cells are looked from."""
+    text: str = {
+        "all": "all cells",
+        "outdoor": "cells outside buildings",
+        "streets": "cells along streets",
+    }[viewpoints["mode"]]
+    if viewpoints["half_width_m"] is not None:
+        text += f" ({viewpoints['half_width_m']:g} m from the centre line, or by class)"
+    if viewpoints["area_km2"] is not None:
+        text += f", in an area of {viewpoints['area_km2']:.1f} km²"
+    return text
+
+
+def _group_table(facts: Mapping[str, Any]) -> Table:
+    groups = facts["groups"]
+    kinds = ("type", "angle", "both")
+    rows = []
+    for name, paris in PARIS_GROUPS.items():
+        label = GROUP_LABELS.get(name, name)
+        rows.append((label, *(_statistic(name, groups[kind][name]) for kind in kinds), *paris))
+    return Table(
+        title="Sizes of the signature groups, in cells",
+        columns=("", "By type", "By angle", "By both", f"{PARIS}, by type", "by angle"),
+        rows=tuple(rows),
+        note=(
+            "The paper counts distinct patterns over its 10,000 queries, not over all cells. "
+            f"{facts['cell_bits']:.2f} bits would tell every cell."
+        ),
+    )
+
+
+def _class_table(facts: Mapping[str, Any]) -> Table:
+    counted = facts["density_from"] == "objects"
+    rows = tuple(
+        (
+            f"{item['title']} ({item['symbol']})",
+            f"{item['range_m']:g}",
+            *([f"{item['objects']:,}"] if counted else []),
+            f"{item['objects_per_km2']:,.1f}",
+            f"{item['entropy_bits']:.3f}",
+        )
+        for item in facts["occurrences"]
+        if item["number"] or item["objects"]
+    )
+    density = "Objects a km² of the covered area."
+    if not counted:
+        missed = "" if facts["occlusion_m"] is None else ", without what buildings hide"
+        density = (
+            "Objects a km² are estimated: what the mean cell sees by the area within range of it"
+            f"{missed}."
+        )
+    return Table(
+        title="Classes that occur",
+        columns=(
+            "Class (symbol)",
+            "Range, m",
+            *(["Objects"] if counted else []),
+            "Objects a km²",
+            "Entropy, bits",
+        ),
+        rows=rows,
+        note=f"{density} Entropy: what the number of objects of the class tells of the cell.",
+    )
+
+
+def _statistic(name: str, value: float | None) -> str:
+    """Return one statistic of group sizes as text."""
+    if value is None:
+        return ""
+    if name == "alone":
+        return percent(value)
+    if name == "entropy_bits":
+        return f"{value:.2f}"
+    return f"{value:,.1f}" if name in {"mean", "std"} else f"{value:,g}"
+
+
+def _shortened(symbols: str, limit: int = 20) -> str:
+    """Return a type sequence that fits a table."""
+    return symbols if len(symbols) <= limit else f"{symbols[:limit]}… ({len(symbols)} objects)"

@@ -1,0 +1,255 @@
+"""A report as a page of HTML or Markdown, in which text from data is only ever text."""
+
+from __future__ import annotations
+
+import base64
+import csv
+import io
+import json
+import math
+import re
+from collections.abc import Mapping
+from dataclasses import asdict
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from jinja2 import Environment, PackageLoader, StrictUndefined
+
+from semsig_gis import __version__
+from semsig_gis.core.errors import InputError
+from semsig_gis.core.text import escaped, one_line
+from semsig_gis.reports.plots import draw_plot
+from semsig_gis.reports.scenes import draw_scene
+from semsig_gis.reports.tables import number_table
+from semsig_gis.storage.whole import whole_file
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Iterator, Sequence
+
+    from semsig_gis.reports.parts import Number, Plot, Report, Section
+    from semsig_gis.reports.plots import Picture
+    from semsig_gis.reports.tables import NumberCell, NumberTable
+
+
+# What has a meaning to Markdown anywhere, besides what `escaped` knows, and at the beginning.
+MARKS = re.compile(r"([\\`*_\[\]{}~$])")
+
+
+FIRST_MARKS = re.compile(r"^(\d*)([-+=>#.)])")
+
+
+def html_page(report: Report, pictures: Mapping[str, Picture]) -> str:
+    """Return a report as one page of HTML with its pictures in it, which loads nothing."""
+    environment = Environment(
+        loader=PackageLoader("semsig_gis"),
+        autoescape=True,
+        finalize=_finalized,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+        keep_trailing_newline=True,
+    )
+    return environment.get_template("report.html").render(
+        report=report,
+        tables=_tables(report),
+        images={
+            name: base64.b64encode(picture.svg).decode("ascii")
+            for name, picture in pictures.items()
+        },
+        alts={name: picture.description for name, picture in pictures.items()},
+        version=__version__,
+    )
+
+
+def markdown_page(report: Report, pictures: Mapping[str, Picture]) -> str:
+    """Return a report as Markdown, with its pictures shown from the folder ``figures``."""
+    blocks = [f"# {_inline(report.title)}", *map(_paragraph, report.text)]
+    if report.settings:
+        rows = [(_inline(name), _inline(value)) for name, value in report.settings]
+        blocks.append(_table(("Setting", "Value"), rows, texts=2))
+    tables = _tables(report)
+    for section in report.sections:
+        blocks += [f"## {_inline(section.title)}", *map(_paragraph, section.text)]
+        if section.name in tables:
+            blocks += _number_blocks(tables[section.name])
+        blocks += _picture_blocks(section, pictures)
+    return "\n\n".join(blocks) + "\n"
+
+
+def _finalized(value: Any) -> Any:  # noqa: ANN401 - whatever a template shows
+    return one_line(value) if type(value) is str else value
+
+
+def _tables(report: Report) -> dict[str, NumberTable]:
+    return {
+        section.name: number_table(section.numbers)
+        for section in report.sections
+        if section.numbers
+    }
+
+
+def _inline(text: str) -> str:
+    """Return text that Markdown shows as it is."""
+    return escaped(MARKS.sub(r"\\\1", one_line(text)))
+
+
+def _paragraph(text: str) -> str:
+    return FIRST_MARKS.sub(r"\1\\\2", _inline(text))
+
+
+def _number_blocks(table: NumberTable) -> Iterator[str]:
+    rows = [(*map(_inline, row.labels), *map(_markdown_cell, row.cells)) for row in table.rows]
+    headings = [*[""] * table.labels, *map(_inline, table.headings)]
+    yield _table(headings, rows, texts=table.labels)
+    if table.note:
+        yield _paragraph(table.note)
+
+
+def _markdown_cell(cell: NumberCell) -> str:
+    text = f"**{_inline(cell.text)}**" if cell.strong else _inline(cell.text)
+    return f"{text} ({_inline(cell.interval)})" if cell.interval else text
+
+
+def _table(headings: Sequence[str], rows: Sequence[Sequence[str]], *, texts: int) -> str:
+    rules = ["---"] * texts + ["---:"] * (len(headings) - texts)
+    return "\n".join(f"| {' | '.join(line)} |" for line in (headings, rules, *rows))
+
+
+def _picture_blocks(section: Section, pictures: Mapping[str, Picture]) -> Iterator[str]:
+    for part in section.drawn:
+        yield f"![{_inline(pictures[part.name].description)}](figures/{part.name}.svg)"
+
+
+FIGURES = "figures"
+
+
+NUMBER_COLUMNS = (
+    "section",
+    "row",
+    "column",
+    "unit",
+    "ours",
+    "low",
+    "high",
+    "paper",
+    "difference",
+)
+
+
+POINT_COLUMNS = ("source", "label", "x", "y", "low", "high")
+
+
+def write_report(report: Report, folder: str | Path) -> None:
+    """Write a report into a folder, which is made if need be; files of the same names are replaced.
+
+    ``report.html`` is one page that asks the network for nothing, ``report.md`` is the same as
+    Markdown. ``figures`` holds each plot and scene as SVG and PNG, and the points of each plot as
+    CSV. ``numbers.csv`` holds every number of the tables, and ``report.json`` all there is, with
+    null for what is infinite or not a number. A text in a CSV file that a spreadsheet would run as
+    a formula begins with an apostrophe.
+
+    Raises `InputError` if a name in the report cannot be that of a file or stands twice, or the
+    folder cannot be written to.
+    """
+    _require_names([section.name for section in report.sections])
+    _require_names([part.name for section in report.sections for part in section.drawn])
+    place = Path(folder)
+    pictures: dict[str, Picture] = {}
+    for section in report.sections:
+        for plot in section.plots:
+            pictures[plot.name] = draw_plot(plot)
+            _write(place / FIGURES / f"{plot.name}.csv", _csv(POINT_COLUMNS, _points(plot)))
+        for scene in section.scenes:
+            pictures[scene.name] = draw_scene(scene, report.taxonomy)
+    for name, picture in pictures.items():
+        _write(place / FIGURES / f"{name}.svg", picture.svg)
+        _write(place / FIGURES / f"{name}.png", picture.png)
+    _write(place / "numbers.csv", _csv(NUMBER_COLUMNS, _numbers(report)))
+    _write(place / "report.json", _json(report))
+    _write(place / "report.md", markdown_page(report, pictures))
+    _write(place / "report.html", html_page(report, pictures))
+
+
+def _require_names(names: Sequence[str]) -> None:
+    """Refuse what cannot be the name of a file, on any system."""
+    seen = set()
+    for name in names:
+        if not re.fullmatch(r"[A-Za-z0-9-]+", name):
+            msg = f"{name!r} cannot be a name in a report; write letters, digits and hyphens."
+            raise InputError(msg)
+        if name.lower() in seen:
+            msg = f"{name!r} is in the report twice; give each part a name of its own."
+            raise InputError(msg)
+        seen.add(name.lower())
+
+
+def _write(path: Path, content: str | bytes) -> None:
+    with whole_file(path) as half:
+        half.write_bytes(content.encode("utf-8") if isinstance(content, str) else content)
+
+
+# --- CSV ----------------------------------------------------------------------------------------
+
+
+def _csv(columns: Iterable[str], rows: Iterable[Sequence[str | float | None]]) -> str:
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(columns)
+    for row in rows:
+        writer.writerow([_defused(cell) if isinstance(cell, str) else cell for cell in row])
+    return text.getvalue()
+
+
+def _defused(text: str) -> str:
+    """Return text that no spreadsheet takes for a formula."""
+    plain = one_line(text)
+    return f"'{plain}" if plain.startswith(("=", "+", "-", "@")) else plain
+
+
+def _numbers(report: Report) -> Iterator[tuple[str | float | None, ...]]:
+    for section in report.sections:
+        for number in section.numbers:
+            values = (number.ours, number.low, number.high, number.paper, number.difference)
+            yield (section.name, number.row, number.column, number.unit, *values)
+
+
+def _points(plot: Plot) -> Iterator[tuple[str | float | None, ...]]:
+    for curve in plot.curves:
+        nothing = (None,) * len(curve.x)
+        ends = (curve.low or nothing, curve.high or nothing)
+        for x, y, low, high in zip(curve.x, curve.y, *ends, strict=True):
+            yield ("ours", curve.label, x, y, low, high)
+    for x, y, label in plot.paper:
+        yield ("paper", label, x, y, None, None)
+
+
+# --- JSON ---------------------------------------------------------------------------------------
+
+
+def _json(report: Report) -> str:
+    content = {
+        "title": report.title,
+        "text": report.text,
+        "settings": [{"name": name, "value": value} for name, value in report.settings],
+        "sections": [
+            {**asdict(section), "numbers": [_number(number) for number in section.numbers]}
+            for section in report.sections
+        ],
+        "classes": report.taxonomy.to_list(),
+        "facts": report.facts,
+        "version": __version__,
+    }
+    return json.dumps(_finite(content), indent=1, allow_nan=False) + "\n"
+
+
+def _number(number: Number) -> dict[str, Any]:
+    return {**asdict(number), "difference": number.difference}
+
+
+def _finite(value: Any) -> Any:  # noqa: ANN401 - whatever JSON holds
+    """Return a value without what JSON has no word for."""
+    if isinstance(value, Mapping):
+        return {name: _finite(one) for name, one in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [_finite(one) for one in value]
+    return None if isinstance(value, float) and not math.isfinite(value) else value

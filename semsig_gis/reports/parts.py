@@ -1,0 +1,158 @@
+"""What a report is made of: numbers beside the paper's, curves, scenes, in sections."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from semsig_gis.core.taxonomy import Taxonomy
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Number:
+    """A number of ours, beside the paper's where it prints one.
+
+    ``ours`` is None where it could not be worked out; ``low`` and ``high`` are the ends of its
+    interval of 95 %, where it has one. The unit is of all of them, ``""`` for a share or a pure
+    number.
+    """
+
+    row: str
+    column: str
+    ours: float | None
+    low: float | None = None
+    high: float | None = None
+    paper: float | None = None
+    unit: str = ""
+    decimals: int = 4
+
+    @property
+    def difference(self) -> float | None:
+        """Ours less the paper's, rounded as it is shown."""
+        if self.ours is None or self.paper is None:
+            return None
+        return round(self.ours - self.paper, self.decimals)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Curve:
+    """A line of a plot.
+
+    Parameters
+    ----------
+    label : str
+        What the legend says.
+    x, y : tuple of float
+        Points, x ascending.
+    low, high : tuple of float
+        Ends of the intervals of 95 % of each y; empty where there are none.
+    """
+
+    label: str
+    x: tuple[float, ...]
+    y: tuple[float, ...]
+    low: tuple[float, ...] = ()
+    high: tuple[float, ...] = ()
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Plot:
+    """A plot of curves, with points that the paper tells.
+
+    Parameters
+    ----------
+    name : str
+        Letters, digits and ``-``: what its files are called.
+    title : str
+        What it shows.
+    x_label, y_label : str
+        What the axes show, with units.
+    curves : tuple of Curve
+        The lines.
+    paper : tuple of (float, float, str)
+        Points x, y that the paper's text tells, each with what it is of.
+    y_range : tuple of float
+        Ends of the y axis.
+    diagonal : bool, default False
+        Whether the line y = x is drawn, on which chances come true.
+    """
+
+    name: str
+    title: str
+    x_label: str
+    y_label: str
+    curves: tuple[Curve, ...]
+    paper: tuple[tuple[float, float, str], ...] = ()
+    y_range: tuple[float, float] = (0.0, 1.0)
+    diagonal: bool = False
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SceneObject:
+    """A street object of a scene: the code of its class, and metres from the viewpoint."""
+
+    code: int
+    east: float
+    north: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Scene:
+    """A viewpoint with the street objects around it.
+
+    ``name`` (letters, digits and ``-``) is what its files are called. ``lon`` and ``lat`` are in
+    degrees (WGS 84), ``radius`` is the visibility range in metres, and ``types`` holds the symbols
+    of the signature, clockwise from north. ``others`` are objects around that are not seen from
+    there. ``answer`` is metres east and north to the place that was answered, if near enough to be
+    drawn; ``error_m`` is None where nothing was asked.
+    """
+
+    name: str
+    title: str
+    lon: float
+    lat: float
+    radius: float
+    types: str
+    objects: tuple[SceneObject, ...]
+    others: tuple[SceneObject, ...] = ()
+    answer: tuple[float, float] | None = None
+    error_m: float | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Section:
+    """A part of a report; ``name`` consists of letters, digits and ``-``.
+
+    Its table has the rows and columns of ``numbers`` in the order in which they first come.
+    """
+
+    name: str
+    title: str
+    text: tuple[str, ...] = ()
+    numbers: tuple[Number, ...] = ()
+    plots: tuple[Plot, ...] = ()
+    scenes: tuple[Scene, ...] = ()
+
+    @property
+    def drawn(self) -> tuple[Plot | Scene, ...]:
+        """Everything of which there is a picture."""
+        return (*self.plots, *self.scenes)
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Report:
+    """A report, which `reports.page.write_report` writes.
+
+    ``settings`` tells what was run on what, as names and values; ``taxonomy`` has the classes of
+    the objects in the scenes; ``facts`` holds specs, versions and machine as plain values for JSON.
+    """
+
+    title: str
+    text: tuple[str, ...] = ()
+    settings: tuple[tuple[str, str], ...] = ()
+    sections: tuple[Section, ...]
+    taxonomy: Taxonomy
+    facts: Mapping[str, Any] = field(default_factory=dict)

@@ -1,0 +1,413 @@
+"""Curves as pictures that also read in black and white."""
+
+from __future__ import annotations
+
+import bisect
+import contextlib
+import io
+import itertools
+import math
+import textwrap
+import unicodedata
+import warnings
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+from xml.sax.saxutils import escape
+
+import matplotlib as mpl
+import numpy as np
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
+
+from semsig_gis.core.text import one_line
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Iterator, Sequence
+
+    from matplotlib.axes import Axes
+
+    from semsig_gis.reports.parts import Curve, Plot
+
+
+COLOURS = (
+    "#0072b2",
+    "#d55e00",
+    "#009e73",
+    "#cc79a7",
+    "#e69f00",
+    "#56b4e9",
+    "#333333",
+    "#882255",
+    "#999933",
+)
+"""Colours that colour-blind people tell apart: those of Okabe and Ito, and two of Tol."""
+
+
+INK, WHITE = "#222222", "#ffffff"
+
+
+DOTS_PER_INCH = 200
+
+
+# Text stays text in an SVG: a reader can search it, copy it and read it in any script.
+SETTINGS = {
+    "svg.fonttype": "none",
+    "svg.hashsalt": "semsig_gis",
+    "text.parse_math": False,
+    "font.size": 9.5,
+    "text.color": INK,
+    "axes.labelcolor": INK,
+    "axes.edgecolor": "#777777",
+    "xtick.color": "#555555",
+    "ytick.color": "#555555",
+    "xtick.labelcolor": INK,
+    "ytick.labelcolor": INK,
+    "grid.color": "#dddddd",
+    "grid.linewidth": 0.7,
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Picture:
+    """A picture in two formats; ``description`` tells what is seen to those who cannot see it."""
+
+    svg: bytes
+    png: bytes
+    description: str
+
+    def _repr_svg_(self) -> str:
+        """Show the picture in a notebook."""
+        return self.svg.decode("utf-8")
+
+
+@contextlib.contextmanager
+def blank_figure(width: float, height: float) -> Iterator[Figure]:
+    """Give an empty white figure (inches) with settings of our own, until the block ends."""
+    # The backend stays as it is: it is the one of whoever draws on a screen.
+    settings: dict[Any, Any] = {**mpl.rcParamsDefault, **SETTINGS}
+    del settings["backend"]
+    with mpl.rc_context(settings), warnings.catch_warnings():
+        # A PNG shows boxes for what its font does not have; a browser has fonts of its own.
+        warnings.filterwarnings("ignore", message=r"Glyph \d+")
+        yield Figure(figsize=(width, height), facecolor=WHITE)
+
+
+def saved(figure: Figure, *, title: str, description: str) -> Picture:
+    """Return a figure as files; call it in the block of `blank_figure`.
+
+    The files hold no dates and no names of programs. Title and description are what a screen reader
+    says.
+    """
+    svg, png = io.BytesIO(), io.BytesIO()
+    nothing = dict.fromkeys(("Creator", "Date", "Format", "Type"))
+    figure.savefig(svg, format="svg", metadata=nothing)
+    figure.savefig(png, format="png", dpi=DOTS_PER_INCH, metadata={"Software": None})
+    # Without the document type, which names an address on the web.
+    _, opened, rest = svg.getvalue().decode("utf-8").partition("<svg ")
+    head, _, body = rest.partition(">")
+    told = f"<title>{escape(one_line(title))}</title>\n<desc>{escape(one_line(description))}</desc>"
+    text = f'<?xml version="1.0" encoding="utf-8"?>\n{opened}role="img" {head}>\n{told}{body}'
+    return Picture(text.encode("utf-8"), png.getvalue(), one_line(description))
+
+
+def label(text: str, length: int) -> str:
+    """Return text from data on one line, cut where it does not fit into a picture.
+
+    ``length`` is the most letters; a Chinese one, say, counts as two.
+    """
+    plain = one_line(text)
+    ends = list(itertools.accumulate(map(_letter_width, plain)))
+    if not ends or ends[-1] <= length:
+        return plain
+    return plain[: bisect.bisect_right(ends, length - 1)].rstrip() + "…"
+
+
+def _letter_width(letter: str) -> int:
+    """Return 2 for a letter as wide as the Chinese, else 1."""
+    return 2 if unicodedata.east_asian_width(letter) in "WF" else 1
+
+
+def draw_legend(
+    figure: Figure,
+    keys: Sequence[tuple[Line2D | Patch, str]],
+    *,
+    place: tuple[float, float, float],
+    columns: int,
+    size: float,
+    sign_width: float,
+) -> None:
+    """Draw a legend in columns of one width.
+
+    ``place`` is left, top and width as shares of the figure's; ``size`` is in points,
+    ``sign_width`` in letters.
+    """
+    left, top, width = place
+    rows = math.ceil(len(keys) / columns)
+    for column in range(columns):
+        part = keys[column * rows : (column + 1) * rows]
+        if part:
+            figure.legend(
+                [sign for sign, _ in part],
+                # matplotlib leaves out what begins with an underscore.
+                [f" {text}" if text.startswith("_") else text for _, text in part],
+                loc="upper left",
+                bbox_to_anchor=(left + column * width / columns, top),
+                frameon=False,
+                borderaxespad=0,
+                borderpad=0,
+                handlelength=sign_width,
+                handletextpad=0.6,
+                fontsize=size,
+                labelspacing=0.45,
+            )
+
+
+# So many colours, dashes and markers that no two curves of a plot look alike.
+DASHES = ("-", (0, (5, 1.6)), (0, (6, 1.6, 1.2, 1.6)), (0, (1.4, 1.2)))
+
+
+# Each with the size at which it looks as large as the others.
+MARKERS = (("o", 5.2), ("s", 5.0), ("^", 6.4), ("D", 4.8), ("v", 6.4), ("P", 7.0), ("X", 7.0))
+
+
+BAND_SHADE, MANY_BANDS = 0.16, 4
+
+
+FEW_POINTS = 12
+
+
+FEW_TICKS = 6
+
+
+MARKERS_APART = 0.14  # share of the diagonal
+
+
+# Inches.
+WIDTH = 6.2
+
+
+LEFT, RIGHT = 0.72, 0.2
+
+
+AXES_HEIGHT = 3.3
+
+
+TITLE_LINE, LEGEND_LINE = 0.22, 0.2
+
+
+BELOW_AXES = 0.52
+
+
+TITLE_LETTERS = 70
+
+
+# How many columns a legend has by the letters of its longest label.
+COLUMNS = ((9, 4), (16, 3), (30, 2))
+
+
+LONGEST_LABEL = 64
+
+
+def draw_plot(plot: Plot) -> Picture:
+    """Draw a plot.
+
+    Parameters
+    ----------
+    plot : Plot
+        Its curves; those of many points have a band for their intervals, those of few have bars.
+
+    Returns
+    -------
+    Picture
+        The same bytes for the same plot.
+
+    Notes
+    -----
+    The legend stands below, where it hides nothing. The points that the paper tells are black
+    diamonds, numbered where there are several.
+
+    Examples
+    --------
+    >>> from semsig_gis.reports.parts import Curve, Plot
+    >>> half = Curve(label="edit", x=(0.0, 50.0), y=(0.5, 1.0))
+    >>> plot = Plot(name="a", title="Errors", x_label="m", y_label="share", curves=(half,))
+    >>> draw_plot(plot).description
+    'Errors. Share by m. Edit: 0.5 at 0, 1 at 50.'
+    """
+    titles = textwrap.wrap(label(plot.title, 2 * TITLE_LETTERS), TITLE_LETTERS)
+    curves, others = _keys(plot), _other_keys(plot)
+    heights = [LEGEND_LINE * _rows([text for _, text in keys]) for keys in (curves, others)]
+    below = BELOW_AXES + sum(heights) + 0.08
+    above = TITLE_LINE * len(titles) + 0.16
+    height = above + AXES_HEIGHT + below
+    with blank_figure(WIDTH, height) as figure:
+        axes = figure.add_axes(
+            (
+                LEFT / WIDTH,
+                below / height,
+                (WIDTH - LEFT - RIGHT) / WIDTH,
+                AXES_HEIGHT / height,
+            )
+        )
+        _draw_frame(axes, plot)
+        for number, curve in enumerate(plot.curves):
+            _draw_curve(axes, curve, number, len(plot.curves))
+        _draw_paper(axes, plot.paper)
+        figure.text(
+            0.1 / WIDTH,
+            1 - 0.08 / height,
+            "\n".join(titles),
+            va="top",
+            weight="bold",
+            size=10.5,
+            linespacing=1.25,
+        )
+        _legend(figure, curves, top=(sum(heights) + 0.04) / height)
+        _legend(figure, others, top=(heights[1] + 0.04) / height)
+        return saved(figure, title=plot.title, description=_described(plot))
+
+
+def _draw_frame(axes: Axes, plot: Plot) -> None:
+    known = sorted({x for x in _all_x(plot) if math.isfinite(x)}) or [0.0, 1.0]
+    left, right = known[0], known[-1]
+    margin = 0.015 * (right - left) or 0.5
+    axes.set_xlim(left - margin, right + margin)
+    low, high = plot.y_range
+    margin = 0.02 * (high - low) or 0.5
+    axes.set_ylim(low - margin, high + margin)
+    axes.set_xlabel(label(plot.x_label, 70))
+    axes.set_ylabel(label(plot.y_label, 40))
+    axes.grid(visible=True)
+    axes.set_axisbelow(True)
+    axes.spines[["top", "right"]].set_visible(False)
+    if len(known) <= FEW_TICKS:
+        axes.set_xticks(known, [f"{x:g}" for x in known])
+    if plot.diagonal:
+        axes.axline((0, 0), slope=1, color="#888888", linewidth=1, dashes=(4, 3), zorder=1.5)
+
+
+def _all_x(plot: Plot) -> Iterable[float]:
+    yield from itertools.chain.from_iterable(curve.x for curve in plot.curves)
+    yield from (x for x, _, _ in plot.paper)
+
+
+def _draw_curve(axes: Axes, curve: Curve, number: int, curves: int) -> None:
+    look = _look(number)
+    x, y = np.asarray(curve.x, np.float64), np.asarray(curve.y, np.float64)
+    few = int((np.isfinite(x) & np.isfinite(y)).sum()) <= FEW_POINTS
+    if curve.low:
+        low, high = np.asarray(curve.low, np.float64), np.asarray(curve.high, np.float64)
+        if few:
+            axes.vlines(x, low, high, colors=look["color"], linewidth=1.2)
+            for ends in (low, high):
+                axes.plot(x, ends, linestyle="", marker="_", color=look["color"], markersize=6)
+        else:
+            shade = BAND_SHADE if curves <= MANY_BANDS else 0.6 * BAND_SHADE
+            axes.fill_between(x, low, high, color=look["color"], alpha=shade, linewidth=0)
+    # Each curve has its markers elsewhere, so that curves on one another are seen.
+    every = None if few else (MARKERS_APART * number / curves, MARKERS_APART)
+    axes.plot(x, y, markevery=every, zorder=3, **look)
+
+
+def _look(number: int) -> dict[str, Any]:
+    marker, size = MARKERS[number % len(MARKERS)]
+    return {
+        "color": COLOURS[number % len(COLOURS)],
+        "linestyle": DASHES[number % len(DASHES)],
+        "marker": marker,
+        "linewidth": 1.6,
+        "markersize": size,
+        "markeredgecolor": WHITE,
+        "markeredgewidth": 0.6,
+    }
+
+
+def _draw_paper(axes: Axes, points: Sequence[tuple[float, float, str]]) -> None:
+    left, right = axes.get_xlim()
+    for number, (x, y, _) in enumerate(points, 1):
+        axes.plot([x], [y], clip_on=False, zorder=5, **_PAPER_LOOK)
+        if len(points) > 1:
+            side = -1 if x > left + 0.9 * (right - left) else 1
+            axes.annotate(
+                str(number),
+                (x, y),
+                xytext=(7 * side, -4),
+                textcoords="offset points",
+                ha="left" if side > 0 else "right",
+                va="center",
+                weight="bold",
+                size=9,
+                zorder=6,
+                bbox={"facecolor": WHITE, "alpha": 0.8, "edgecolor": "none", "pad": 0.6},
+            )
+
+
+_PAPER_LOOK: dict[str, Any] = {
+    "color": INK,
+    "linestyle": "",
+    "marker": "D",
+    "markersize": 7.5,
+    "markerfacecolor": "none",  # ours is often below
+    "markeredgewidth": 1.7,
+}
+
+
+Keys = list[tuple[Line2D | Patch, str]]
+
+
+def _keys(plot: Plot) -> Keys:
+    return [
+        (Line2D([], [], **_look(number)), label(curve.label, LONGEST_LABEL))
+        for number, curve in enumerate(plot.curves)
+    ]
+
+
+def _other_keys(plot: Plot) -> Keys:
+    """Return what the legend says below the curves."""
+    keys: Keys = []
+    if any(curve.low for curve in plot.curves):
+        keys.append((Patch(color="#999999", alpha=0.4, linewidth=0), "interval of 95 %"))
+    if plot.diagonal:
+        dashes = (0, (4, 3))
+        keys.append((Line2D([], [], color="#888888", linewidth=1, linestyle=dashes), "y = x"))
+    several = len(plot.paper) > 1
+    for number, (_, _, text) in enumerate(plot.paper, 1):
+        sign = Line2D([], [], **_PAPER_LOOK)
+        source = f"paper {number}" if several else "paper"
+        keys.append((sign, label(f"{source}: {text}", LONGEST_LABEL)))
+    return keys
+
+
+def _columns(texts: Sequence[str]) -> int:
+    longest = max(map(len, texts), default=0)
+    return next((columns for letters, columns in COLUMNS if longest <= letters), 1)
+
+
+def _rows(texts: Sequence[str]) -> int:
+    return math.ceil(len(texts) / _columns(texts))
+
+
+def _legend(figure: Figure, keys: Keys, *, top: float) -> None:
+    draw_legend(
+        figure,
+        keys,
+        place=(LEFT / WIDTH, top, (WIDTH - LEFT) / WIDTH),
+        columns=_columns([text for _, text in keys]),
+        size=9,
+        sign_width=3.2,
+    )
+
+
+def _described(plot: Plot) -> str:
+    lines = [f"{plot.title}.", f"{_capital(plot.y_label)} by {plot.x_label}."]
+    for curve in plot.curves:
+        ends = dict.fromkeys([(curve.x[at], curve.y[at]) for at in (0, -1) if curve.x])
+        points = ", ".join(f"{y:.4g} at {x:.4g}" for x, y in ends)
+        lines.append(f"{_capital(curve.label)}: {points or 'no points'}.")
+    lines += [f"The paper, {text}: {y:.4g} at {x:.4g}." for x, y, text in plot.paper]
+    return " ".join(lines)
+
+
+def _capital(text: str) -> str:
+    return text[:1].upper() + text[1:]

@@ -1,0 +1,471 @@
+"""Places with what is seen there: cells, and examples of queries that were found or not."""
+
+from __future__ import annotations
+
+import math
+import textwrap
+from collections import Counter
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+from matplotlib.collections import LineCollection
+from matplotlib.lines import Line2D
+from matplotlib.patches import Circle
+from matplotlib.path import Path
+from pyproj import Transformer
+
+from semsig_gis.core.grid import cell_ids
+from semsig_gis.core.signs import ClassSign, class_signs
+from semsig_gis.core.text import one_line
+from semsig_gis.queries.sight import Sight
+from semsig_gis.reports.parts import Scene, SceneObject
+from semsig_gis.reports.plots import INK, WHITE, blank_figure, draw_legend, label, saved
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+    from semsig_gis.core.taxonomy import Taxonomy
+    from semsig_gis.database.database import SignatureDatabase
+    from semsig_gis.evaluation.result import Evaluation
+    from semsig_gis.reports.plots import Picture
+
+
+SAME_M = 1.0
+"""How far apart, in metres, two cells may see one object: bearings and distances are rounded."""
+
+
+def cell_scene(database: SignatureDatabase, cell: int, *, title: str = "") -> Scene:
+    """Return what is seen from a cell.
+
+    Parameters
+    ----------
+    database : SignatureDatabase
+        The database.
+    cell : int
+        Row number in the database.
+    title : str, optional
+        What to call it; the cell's number by default.
+
+    Returns
+    -------
+    Scene
+        The objects of its signature, and those around that only other cells see.
+
+    Examples
+    --------
+    >>> from semsig_gis.database.build import build_database
+    >>> from semsig_gis.sources.catalog import paper_taxonomy
+    >>> from semsig_gis.objects.clean import build_objects
+    >>> from semsig_gis.sources.synthetic.city import CitySpec, synthetic_city
+    >>> layers = synthetic_city(CitySpec(size=300.0))
+    >>> objects, _ = build_objects(layers, taxonomy=paper_taxonomy(), crs="EPSG:32631")
+    >>> database = build_database(objects)
+    >>> cell_scene(database, 0, title="A corner").types == database.types(0)
+    True
+    """
+    x, y = database.xy[cell].tolist()
+    lon, lat = Transformer.from_crs(database.crs, 4326, always_xy=True).transform(x, y)
+    number = int(database.cell_ids[cell])
+    own = _seen_from(database, cell)
+    return Scene(
+        name=f"cell-{number}",
+        title=title or f"Cell {number}",
+        lon=lon,
+        lat=lat,
+        radius=database.spec.radius,
+        types=database.types(cell),
+        objects=_drawn(own),
+        others=_drawn(_seen_around(database, cell, own)),
+    )
+
+
+def example_scenes(
+    evaluation: Evaluation, database: SignatureDatabase, *, successful: bool, count: int = 4
+) -> tuple[Scene, ...]:
+    """Return the first queries that were answered well (see `Evaluation.successful`), or not.
+
+    The queries must be seen from cells of the database. The objects that are not seen from a cell
+    are those that the cells around it see.
+    """
+    queries = evaluation.queries
+    chosen = queries[(evaluation.successful == successful) & (queries["cell"] >= 0)].head(count)
+    kind = "found" if successful else "lost"
+    scenes = []
+    for place, row in enumerate(chosen.to_dict("records"), start=1):
+        cell = int(row["cell"])
+        x, y = database.xy[cell].tolist()
+        aside = (float(row["best_x"]) - x, float(row["best_y"]) - y)
+        title = f"{'Found' if successful else 'Not found'}: query {int(row['number']):,}"
+        scenes.append(
+            replace(
+                cell_scene(database, cell, title=title),
+                name=f"{kind}-{place}",
+                answer=aside if math.isfinite(aside[0]) else None,
+                error_m=float(row["error_m"]),
+            )
+        )
+    return tuple(scenes)
+
+
+class _Seen(NamedTuple):
+    """A class code, and metres east and north."""
+
+    code: int
+    east: float
+    north: float
+
+
+def _drawn(seen: list[_Seen]) -> tuple[SceneObject, ...]:
+    return tuple(SceneObject(code=one.code, east=one.east, north=one.north) for one in seen)
+
+
+def _seen_from(database: SignatureDatabase, cell: int) -> list[_Seen]:
+    """Return what is seen from a cell, clockwise from north."""
+    sight = Sight.of_cell(database, cell)
+    turned = np.radians(sight.bearings)
+    east, north = sight.distances * np.sin(turned), sight.distances * np.cos(turned)
+    seen = zip(sight.codes.tolist(), east.tolist(), north.tolist(), strict=True)
+    return [_Seen(*one) for one in seen]
+
+
+def _seen_around(database: SignatureDatabase, cell: int, own: list[_Seen]) -> list[_Seen]:
+    """Return what the cells around see, but not the cell itself, each thing once."""
+    grid = database.grid
+    reach = int(np.ceil(database.spec.radius / grid.step))
+    steps = np.arange(-reach, reach + 1)
+    columns, rows = (
+        one.ravel()
+        for one in np.meshgrid(database.columns[cell] + steps, database.rows[cell] + steps)
+    )
+    wanted = cell_ids(columns, rows)
+    there = np.flatnonzero(np.isin(database.cell_ids, wanted))
+    found: list[_Seen] = []
+    for other in there.tolist():
+        dx, dy = (database.xy[other] - database.xy[cell]).tolist()
+        for one in _seen_from(database, other):
+            moved = _Seen(one.code, one.east + dx, one.north + dy)
+            if not any(_same(moved, known) for known in (*own, *found)):
+                found.append(moved)
+    return found
+
+
+def _same(one: _Seen, other: _Seen) -> bool:
+    apart = math.hypot(one.east - other.east, one.north - other.north)
+    return one.code == other.code and apart <= SAME_M
+
+
+# A cross with wider arms than matplotlib's own, so that a letter has room on it.
+CROSS = Path(
+    [
+        *((-6, 11), (6, 11), (6, 6), (11, 6), (11, -6), (6, -6)),
+        *((6, -11), (-6, -11), (-6, -6), (-11, -6), (-11, 6), (-6, 6)),
+        (-6, 11),
+    ],
+    closed=True,
+)
+
+
+# The marker of each shape, and its size where that of a circle is 1.
+MARKERS = {
+    "circle": ("o", 1.0),
+    "square": ("s", 0.9),
+    "diamond": ("D", 0.88),
+    "triangle": ("^", 1.2),
+    "hexagon": ("h", 1.15),
+    "triangle_down": ("v", 1.2),
+    "cross": (CROSS, 1.1),
+}
+
+
+UNKNOWN = ClassSign("?", "unknown class", "circle", "#777777")
+
+
+ANSWER = "#cc0000"
+
+
+# In visibility ranges: what is drawn around the viewpoint, and at most.
+AROUND, FARTHEST = 1.25, 2.5
+
+
+# Inches.
+WIDTH, MAP, MARGIN = 4.4, 4.2, 0.1
+
+
+LINE = 0.19
+
+
+TITLE_LETTERS = 46
+
+
+TYPE_LETTERS, TYPE_LINES = 42, 3
+
+
+CLASS_LETTERS = 21
+
+
+MANY_OBJECTS = 40
+
+
+def draw_scene(scene: Scene, taxonomy: Taxonomy) -> Picture:
+    """Draw a scene, north up.
+
+    Parameters
+    ----------
+    scene : Scene
+        A viewpoint and what is around.
+    taxonomy : Taxonomy
+        The classes of its objects; a class looks the same in all scenes.
+
+    Returns
+    -------
+    Picture
+        The same bytes for the same scene.
+
+    Notes
+    -----
+    The answer is a cross; an arrow at the edge points to one that is farther away.
+
+    Examples
+    --------
+    >>> from semsig_gis.sources.catalog import paper_taxonomy
+    >>> from semsig_gis.reports.parts import Scene, SceneObject
+    >>> lamp = SceneObject(code=3, east=10.0, north=0.0)
+    >>> scene = Scene(name="a", title="A lamp", lon=2.3, lat=48.8, radius=30.0, types="D",
+    ...               objects=(lamp,), error_m=12.0)
+    >>> draw_scene(scene, paper_taxonomy()).description
+    'A lamp. Signature D, seen from 2.300000, 48.800000: street light (1). Error 12.0 m.'
+    """
+    signs = class_signs(taxonomy)
+    titles = textwrap.wrap(label(scene.title, 2 * TITLE_LETTERS), TITLE_LETTERS)
+    told = _told(scene)
+    keys = _keys(scene, signs)
+    above = LINE * len(titles) + 0.14
+    below = LINE * (len(told) + math.ceil(len(keys) / 2)) + 0.3
+    height = above + MAP + below
+    with blank_figure(WIDTH, height) as figure:
+        axes = figure.add_axes((MARGIN / WIDTH, below / height, MAP / WIDTH, MAP / height))
+        _draw_map(axes, scene, signs)
+        figure.text(
+            MARGIN / WIDTH,
+            1 - 0.07 / height,
+            "\n".join(titles),
+            va="top",
+            weight="bold",
+            size=10,
+        )
+        figure.text(
+            MARGIN / WIDTH,
+            (below - 0.1) / height,
+            "\n".join(told),
+            va="top",
+            size=9,
+            linespacing=1.3,
+        )
+        draw_legend(
+            figure,
+            keys,
+            place=(MARGIN / WIDTH, (below - 0.2 - LINE * len(told)) / height, 1.0),
+            columns=2,
+            size=8.5,
+            sign_width=1,
+        )
+        return saved(figure, title=scene.title, description=_described(scene, signs))
+
+
+def _draw_map(axes: Axes, scene: Scene, signs: dict[int, ClassSign]) -> None:
+    away = math.hypot(*scene.answer) if scene.answer else 0.0
+    drawn = away if away < FARTHEST * scene.radius else 0.0
+    farthest = max((math.hypot(item.east, item.north) for item in scene.objects), default=0.0)
+    reach = max(AROUND * scene.radius, 1.08 * farthest, 1.12 * drawn)
+    axes.set(xlim=(-reach, reach), ylim=(-reach, reach), xticks=[], yticks=[], aspect="equal")
+    axes.set_facecolor("#fafaf8")
+    axes.add_patch(
+        Circle((0, 0), scene.radius, facecolor=WHITE, edgecolor="#999999", linestyle="--")
+    )
+    lines = [[(0.0, 0.0), (item.east, item.north)] for item in scene.objects]
+    axes.add_collection(LineCollection(lines, colors="#999999", linewidths=0.5, zorder=2))
+    for item in scene.others:
+        axes.plot(
+            [item.east],
+            [item.north],
+            **_shape(signs.get(item.code, UNKNOWN), 5),
+            alpha=0.25,
+            markeredgewidth=0,
+            zorder=1.5,
+        )
+    size = 8 if len(scene.objects) > MANY_OBJECTS else 10
+    # The nearest last, so that they lie on top.
+    for item in sorted(scene.objects, key=lambda one: -math.hypot(one.east, one.north)):
+        _draw_object(axes, item, signs.get(item.code, UNKNOWN), size)
+    axes.plot(
+        [0],
+        [0],
+        marker="o",
+        markersize=7,
+        color=INK,
+        markeredgecolor=WHITE,
+        markeredgewidth=1.5,
+        zorder=6,
+    )
+    if scene.answer:
+        _draw_answer(axes, scene.answer, away, reach)
+    _draw_north(axes)
+    _draw_scale(axes, reach)
+
+
+def _shape(sign: ClassSign, size: float) -> dict[str, Any]:
+    marker, share = MARKERS[sign.shape]
+    return {"marker": marker, "markersize": share * size, "color": sign.colour}
+
+
+def _draw_object(axes: Axes, item: SceneObject, sign: ClassSign, size: float) -> None:
+    axes.plot(
+        [item.east],
+        [item.north],
+        **_shape(sign, size),
+        markeredgecolor=WHITE,
+        markeredgewidth=0.7,
+        zorder=4,
+    )
+    axes.annotate(
+        sign.symbol,
+        (item.east, item.north),
+        xytext=(0, -sign.drop * size / 2),
+        textcoords="offset points",
+        size=0.62 * size,
+        color=sign.ink,
+        weight="bold",
+        ha="center",
+        va="center_baseline",
+        zorder=4,
+        clip_on=True,
+    )
+
+
+def _draw_answer(axes: Axes, answer: tuple[float, float], away: float, reach: float) -> None:
+    east, north = answer
+    if max(abs(east), abs(north)) < reach:
+        axes.plot([0, east], [0, north], color=ANSWER, linewidth=1, linestyle=":", zorder=3)
+        axes.plot([east], [north], **_ANSWER_LOOK, zorder=7)
+        return
+    share = 0.96 * reach / max(abs(east), abs(north))
+    tip = (share * east, share * north)
+    axes.annotate(
+        "",
+        tip,
+        xytext=(0.84 * tip[0], 0.84 * tip[1]),
+        arrowprops={"arrowstyle": "-|>", "color": ANSWER, "linewidth": 1.6},
+        zorder=7,
+    )
+    axes.text(
+        0.78 * tip[0],
+        0.78 * tip[1],
+        f"{away:,.0f} m",
+        color=ANSWER,
+        size=8.5,
+        ha="center",
+        va="center",
+        zorder=7,
+        bbox={"facecolor": WHITE, "alpha": 0.85, "edgecolor": "none", "pad": 1},
+    )
+
+
+_ANSWER_LOOK: dict[str, Any] = {
+    "color": ANSWER,
+    "linestyle": "",
+    "marker": "X",
+    "markersize": 9.5,
+    "markeredgecolor": WHITE,
+    "markeredgewidth": 1,
+}
+
+
+def _draw_north(axes: Axes) -> None:
+    axes.annotate(
+        "N",
+        (0.955, 0.985),
+        xytext=(0.955, 0.885),
+        xycoords="axes fraction",
+        textcoords="axes fraction",
+        ha="center",
+        va="center",
+        weight="bold",
+        size=9,
+        arrowprops={"arrowstyle": "-|>", "color": INK, "linewidth": 1.2, "shrinkB": 0},
+        bbox={"facecolor": WHITE, "alpha": 0.85, "edgecolor": "none", "pad": 1},
+        zorder=8,
+    )
+
+
+def _draw_scale(axes: Axes, reach: float) -> None:
+    metres = _round_length(0.5 * reach)
+    start = 0.03
+    end = start + metres / (2 * reach)
+    axes.plot(
+        [start, start, end, end],
+        [0.045, 0.03, 0.03, 0.045],
+        transform=axes.transAxes,
+        color=INK,
+        linewidth=1.4,
+        solid_capstyle="butt",
+        zorder=8,
+    )
+    axes.text(
+        (start + end) / 2,
+        0.045,
+        f"{metres:g} m",
+        transform=axes.transAxes,
+        ha="center",
+        va="bottom",
+        size=8.5,
+        bbox={"facecolor": WHITE, "alpha": 0.85, "edgecolor": "none", "pad": 1},
+        zorder=8,
+    )
+
+
+def _round_length(longest: float) -> float:
+    """Return the largest of 1, 2, 5, 10, 20, 50... that is not longer."""
+    power = 10 ** math.floor(math.log10(longest))  # half an ulp below it, log10 rounds up
+    return next(float(power * step) for step in (5, 2, 1, 0.5) if power * step <= longest)
+
+
+def _told(scene: Scene) -> list[str]:
+    """Return the lines below the map."""
+    types = label(scene.types, TYPE_LETTERS * TYPE_LINES)
+    signature = textwrap.wrap(types, TYPE_LETTERS) or ["sees nothing"]
+    place = f"{scene.lon:.6f}°, {scene.lat:.6f}°"
+    return [*signature, " · ".join(part for part in (place, _error(scene)) if part)]
+
+
+def _error(scene: Scene) -> str:
+    if scene.error_m is None:
+        return ""
+    return f"error {scene.error_m:,.1f} m" if math.isfinite(scene.error_m) else "not localized"
+
+
+def _keys(scene: Scene, signs: dict[int, ClassSign]) -> list[tuple[Line2D, str]]:
+    seen = Counter(item.code for item in scene.objects)
+    keys = []
+    for code in sorted({*seen, *(item.code for item in scene.others)}):
+        sign = signs.get(code, UNKNOWN)
+        # An empty count is of a class that is only around.
+        count = f" ({seen[code]})" if seen[code] else ""
+        key = Line2D([], [], linestyle="", markeredgewidth=0, **_shape(sign, 8))
+        key.set_alpha(None if seen[code] else 0.25)
+        keys.append((key, f"{sign.symbol} {label(sign.title, CLASS_LETTERS)}{count}"))
+    if scene.answer:
+        keys.append((Line2D([], [], **_ANSWER_LOOK), "answer"))
+    return keys
+
+
+def _described(scene: Scene, signs: dict[int, ClassSign]) -> str:
+    seen = Counter(item.code for item in scene.objects)
+    counts = ", ".join(
+        f"{one_line(signs.get(code, UNKNOWN).title).lower()} ({number})"
+        for code, number in sorted(seen.items())
+    )
+    types = f"Signature {scene.types}, seen" if scene.types else "Nothing is seen"
+    place = f"from {scene.lon:.6f}, {scene.lat:.6f}"
+    told = (scene.title, f"{types} {place}{f': {counts}' if counts else ''}", _error(scene))
+    return " ".join(f"{part[:1].upper()}{part[1:]}." for part in told if part)

@@ -1,0 +1,128 @@
+"""The area that a user wants: a bounding box, or the polygons of a file."""
+
+from __future__ import annotations
+
+import dataclasses
+import re
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import shapely
+
+from semsig_gis.core.errors import InputError
+from semsig_gis.sources import FILE_SUFFIXES
+from semsig_gis.sources.crs import LATITUDE_LIMIT, LONGITUDE_LIMIT, WGS84
+from semsig_gis.sources.layers import LayerSpec
+from semsig_gis.sources.vector import reader as vector_file
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+    from semsig_gis.sources import RawLayer
+
+NUMBERS = re.compile(r"[\s\d.,;eE+-]*\d[\s\d.,;eE+-]*")
+POLYGONAL = {"Polygon", "MultiPolygon"}
+
+
+@dataclass(frozen=True, eq=False)
+class Area:
+    """An area of the Earth: its outline in EPSG:4326, longitude first, and a name to show."""
+
+    polygon: shapely.Polygon | shapely.MultiPolygon
+    name: str
+
+    @property
+    def bounds(self) -> tuple[float, float, float, float]:
+        """West, south, east and north in degrees."""
+        west, south, east, north = self.polygon.bounds
+        return west, south, east, north
+
+
+def parse_area(text: str) -> Area:
+    """Return the area of ``"west,south,east,north"`` in degrees, or of a vector file's polygons.
+
+    InputError if the text is neither or is no area, SourceError if the file cannot be read, and
+    CrsError if it does not say its CRS.
+    """
+    if NUMBERS.fullmatch(text):
+        return _box(text)
+    if names_place(text):
+        msg = (
+            f"area {text!r} is neither a bounding box nor a file; write west,south,east,north in "
+            "degrees, or the path of a file with polygons."
+        )
+        raise InputError(msg)
+    return _outline(Path(text))
+
+
+def names_place(text: str) -> bool:
+    """Tell whether a text names a place: it is neither numbers nor a file, even a missing one."""
+    path = Path(text)
+    is_file = path.suffix.lower() in FILE_SUFFIXES or path.is_file()
+    return not is_file and not NUMBERS.fullmatch(text)
+
+
+def clip_layer(layer: RawLayer, area: Area) -> RawLayer:
+    """Leave out the rows of a layer, in any CRS, that are outside an area; they count as filtered.
+
+    Objects stay where their centroid is in the area, buildings and streets where they touch it. A
+    row without a position stays, to be counted as such.
+    """
+    geometry = layer.table.geometry.to_crs(WGS84).to_numpy()
+    nowhere = shapely.is_missing(geometry) | shapely.is_empty(geometry)
+    shapely.prepare(area.polygon)
+    if layer.spec.role == "objects":
+        inside = shapely.covers(area.polygon, shapely.centroid(geometry))
+    else:
+        inside = shapely.intersects(area.polygon, geometry)
+    kept = layer.table[nowhere | inside].reset_index(drop=True)
+    dropped = len(layer.table) - len(kept)
+    return dataclasses.replace(layer, table=kept, filtered=layer.filtered + dropped)
+
+
+def _box(text: str) -> Area:
+    try:
+        west, south, east, north = (float(number) for number in text.split(","))
+    except ValueError as error:
+        msg = f"bounding box {text!r} is not four numbers; write west,south,east,north in degrees."
+        raise InputError(msg) from error
+    if not (-LONGITUDE_LIMIT <= west < east <= LONGITUDE_LIMIT) or not (
+        -LATITUDE_LIMIT <= south < north <= LATITUDE_LIMIT
+    ):
+        msg = (
+            f"bounding box {text!r} is no area; write west,south,east,north in degrees, with west "
+            "below east within -180 to 180 and south below north within -90 to 90."
+        )
+        raise InputError(msg)
+    return Area(shapely.box(west, south, east, north), text)
+
+
+def _outline(path: Path) -> Area:
+    wanted = LayerSpec(name="area", class_name="", geometry="polygon")
+    layer = vector_file.read_layer(path, wanted)
+    if layer.error_count:
+        msg = f"{path} has polygons that cannot be read ({layer.errors[0]}); correct the file."
+        raise InputError(msg)
+    geometry = layer.table.geometry.dropna()
+    others = set(geometry.geom_type) - POLYGONAL
+    if others or geometry.empty:
+        found = f"holds {', '.join(sorted(others))}" if others else "holds nothing"
+        msg = f"{path} {found}; give a file of polygons."
+        raise InputError(msg)
+    polygon = join_areas(geometry.to_crs(WGS84).to_numpy())
+    if polygon is None:
+        msg = f"{path} encloses no area; give a file of polygons."
+        raise InputError(msg)
+    return Area(polygon, path.stem)
+
+
+def join_areas(
+    geometry: NDArray[np.object_],
+) -> shapely.Polygon | shapely.MultiPolygon | None:
+    """Return the union of what geometries enclose, in valid form; None where that is nothing."""
+    parts = shapely.get_parts(shapely.make_valid(geometry))
+    polygons = shapely.get_parts(parts[shapely.get_dimensions(parts) == 2])  # noqa: PLR2004
+    joined = shapely.union_all(polygons)
+    return joined if isinstance(joined, shapely.Polygon | shapely.MultiPolygon) else None

@@ -1,0 +1,369 @@
+"""Catalogues: TOML files that say which layers of which source hold which class of object."""
+
+from __future__ import annotations
+
+import dataclasses
+import importlib.resources
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from semsig_gis.core.crs import require_metric_crs
+from semsig_gis.core.errors import (
+    CatalogError,
+    CrsError,
+    InputError,
+    UnknownNameError,
+    nearest_name,
+)
+from semsig_gis.core.plugins import installed_catalogs
+from semsig_gis.core.taxonomy import MAX_RANGE_M, ObjectClass, Taxonomy
+from semsig_gis.sources.layers import layer_of, require_class
+from semsig_gis.storage.toml import check_keys, metres, parse_toml, texts
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+    from importlib.resources.abc import Traversable
+
+    from semsig_gis.sources.layers import LayerSpec
+
+# Shipped beside the catalogues: the paper's classes, and words by which drafts are made.
+NO_CATALOGS = frozenset({"keywords", "taxonomy"})
+# What a catalogue may say, and of which type; every other key is a mistake that gets named.
+CATALOG_KEYS = {
+    "name": str,
+    "title": str,
+    "url": str,
+    "license": str,
+    "attribution": str,
+    "metric_crs": str,
+    "reader": str,
+    "endpoints": list,
+    "geocoder": str,
+    "files": list,
+    "conflate": dict,
+    "ranges": dict,
+    "classes": list,
+    "layers": list,
+}
+CLASS_KEYS = {"code": int, "symbol": str, "name": str, "title": str}
+MAX_MERGING_M = 100.0
+
+
+@dataclass(frozen=True, kw_only=True)
+class Catalog:
+    """A source of open data: its classes, its layers and its licence.
+
+    Parameters
+    ----------
+    name : str
+        Short name.
+    title : str
+        Name to show to people.
+    metric_crs : str, optional
+        Coordinate reference system in metres in which distances are taken; where it is left
+        out, the UTM zone of the data.
+    taxonomy : Taxonomy
+        The paper's classes and the catalogue's own.
+    layers : tuple of LayerSpec
+        The layers.
+    url : str
+        Where the data is published.
+    reader : str
+        Reader of `sources` for its files.
+    endpoints : tuple of str
+        Base addresses of the services that send the data, best first.
+    geocoder : str, optional
+        Base address of the Nominatim service that knows places by name.
+    conflate : tuple of (str, float)
+        Classes whose objects from different layers are the same thing within so many metres.
+    license, attribution : str
+        What holds for every layer that does not say otherwise.
+
+    Examples
+    --------
+    >>> load_catalog("montpellier").layer("trees").class_name
+    'alignment_tree'
+    """
+
+    name: str
+    title: str
+    taxonomy: Taxonomy
+    layers: tuple[LayerSpec, ...]
+    metric_crs: str | None = None
+    url: str = ""
+    reader: str = "vector_file"
+    endpoints: tuple[str, ...] = ()
+    geocoder: str | None = None
+    conflate: tuple[tuple[str, float], ...] = ()
+    license: str = "unknown"
+    attribution: str = ""
+
+    def layer(self, name: str) -> LayerSpec:
+        """Return the layer of that name.
+
+        Parameters
+        ----------
+        name : str
+            Name of a layer.
+
+        Returns
+        -------
+        LayerSpec
+            The layer.
+
+        Raises
+        ------
+        UnknownNameError
+            If there is none; the nearest name is offered.
+        """
+        for spec in self.layers:
+            if spec.name == name:
+                return spec
+        known = [spec.name for spec in self.layers]
+        msg = (
+            f"catalogue {self.name!r} has no layer {name!r}{nearest_name(name, known)}; "
+            f"its layers are {', '.join(known)}."
+        )
+        raise UnknownNameError(msg)
+
+
+def paper_taxonomy() -> Taxonomy:
+    """Return the eleven classes of the paper, with its identifiers as codes and its symbols.
+
+    Returns
+    -------
+    Taxonomy
+        Codes 1 to 11 (paper, table of semantic objects).
+
+    Examples
+    --------
+    >>> "".join(item.symbol for item in paper_taxonomy().classes)
+    'BCDEGHIJKLM'
+    """
+    source = data_folder() / "taxonomy.toml"
+    content = parse_toml(source.read_text(encoding="utf-8"), "taxonomy.toml")
+    check_keys(content, {"classes": list}, "taxonomy.toml")
+    return Taxonomy(_classes(content["classes"], "taxonomy.toml"))
+
+
+def catalog_names() -> tuple[str, ...]:
+    """Return the names that `load_catalog` takes, sorted, with those that other packages bring."""
+    return tuple(sorted(_sources()))
+
+
+def _sources() -> dict[str, Path | Traversable]:
+    """Return the file of every catalogue by name."""
+    shipped: dict[str, Path | Traversable] = {
+        Path(item.name).stem: item
+        for item in data_folder().iterdir()
+        if item.name.endswith(".toml") and Path(item.name).stem not in NO_CATALOGS
+    }
+    return {**shipped, **installed_catalogs(taken=shipped)}
+
+
+def load_catalog(name: str | Path) -> Catalog:
+    """Read and check a catalogue.
+
+    Parameters
+    ----------
+    name : str or Path
+        Name of a built-in or installed catalogue, or path of a TOML file (it ends in ``.toml``).
+
+    Returns
+    -------
+    Catalog
+        The catalogue; its taxonomy is the paper's classes followed by its own.
+
+    Raises
+    ------
+    UnknownNameError
+        If there is no catalogue of that name.
+    CatalogError
+        If the file is missing, is not TOML, has a key that means nothing, lacks one that is
+        needed, or names a class or CRS that does not exist.
+
+    Examples
+    --------
+    >>> load_catalog("montpellier").metric_crs
+    'EPSG:2154'
+    """
+    text = str(name)
+    source: Path | Traversable
+    if text.endswith(".toml"):
+        source = Path(text)
+        if not source.is_file():
+            msg = f"catalogue {text} does not exist; give a TOML file or one of {_known()}."
+            raise CatalogError(msg)
+    else:
+        sources = _sources()
+        if text not in sources:
+            msg = (
+                f"catalogue {text!r} is unknown{nearest_name(text, sources)}; "
+                f"give one of {_known()}, or the path of a .toml file."
+            )
+            raise UnknownNameError(msg)
+        source = sources[text]
+    try:
+        content = source.read_text(encoding="utf-8-sig")  # some editors write a BOM
+    except UnicodeDecodeError as error:
+        msg = f"catalogue {text} is not UTF-8 text ({error}); save it as UTF-8."
+        raise CatalogError(msg) from error
+    except OSError as error:
+        msg = f"catalogue {text} cannot be read ({error.strerror}); give a file that you can read."
+        raise CatalogError(msg) from error
+    return _catalog(parse_toml(content, text), text)
+
+
+def combine_catalogs(catalogs: Sequence[Catalog]) -> Catalog:
+    """Make one catalogue of several, so that their layers can be loaded and merged together.
+
+    Parameters
+    ----------
+    catalogs : sequence of Catalog
+        At least one; the first is trusted most when objects are merged.
+
+    Returns
+    -------
+    Catalog
+        With several, each layer's name begins with its catalogue's. The first of them that says
+        a metric CRS, how far a class is seen, or within how many metres it is merged, decides
+        that.
+
+    Raises
+    ------
+    InputError
+        If there is no catalogue, or one stands twice.
+    CatalogError
+        If two catalogues mean different classes by one name, code or symbol.
+
+    Examples
+    --------
+    >>> both = combine_catalogs([load_catalog("montpellier"), load_catalog("openstreetmap")])
+    >>> both.layers[0].name
+    'montpellier/trees'
+    """
+    names = [catalog.name for catalog in catalogs]
+    if not names or len(set(names)) < len(names):
+        msg = f"the catalogues given are {names}; give one or more, each once."
+        raise InputError(msg)
+    if len(catalogs) == 1:
+        return catalogs[0]
+    classes = [item for catalog in catalogs for item in catalog.taxonomy.classes]
+    ranges = {item.name: item.range_m for item in reversed(classes) if item.range_m is not None}
+    # Catalogues that differ in how far a class is seen mean the same class.
+    kinds = dict.fromkeys(dataclasses.replace(item, range_m=None) for item in classes)
+    try:
+        taxonomy = Taxonomy(tuple(kinds)).with_ranges(ranges)
+    except CatalogError as error:
+        msg = f"catalogues {' and '.join(names)} do not go together: {error}"
+        raise CatalogError(msg) from error
+    return Catalog(
+        name="+".join(names),
+        title=" and ".join(catalog.title for catalog in catalogs),
+        taxonomy=taxonomy,
+        layers=tuple(
+            dataclasses.replace(spec, name=f"{catalog.name}/{spec.name}")
+            for catalog in catalogs
+            for spec in catalog.layers
+        ),
+        metric_crs=next((item.metric_crs for item in catalogs if item.metric_crs), None),
+        conflate=tuple(
+            {name: radius for item in reversed(catalogs) for name, radius in item.conflate}.items()
+        ),
+    )
+
+
+def _known() -> str:
+    return ", ".join(repr(name) for name in catalog_names())
+
+
+def data_folder() -> Traversable:
+    """Return the folder ``data_sources``: in the wheel, or at the top of a checkout."""
+    shipped = importlib.resources.files("semsig_gis") / "data_sources"
+    if shipped.is_dir():
+        return shipped
+    return Path(__file__).resolve().parents[2] / "data_sources"
+
+
+def _catalog(content: dict[str, Any], where: str) -> Catalog:
+    where = f"catalogue {where}"
+    check_keys(content, CATALOG_KEYS, where, ("name", "title", "layers"))
+    own = _classes(content.get("classes", []), where)
+    try:
+        taxonomy = paper_taxonomy().extended(own)
+        if "metric_crs" in content:
+            require_metric_crs(content["metric_crs"])
+    except (CatalogError, CrsError) as error:
+        msg = f"{where}: {error}"
+        raise CatalogError(msg) from error
+    taxonomy = taxonomy.with_ranges(_ranges(content.get("ranges", {}), taxonomy, where))
+    shared = {
+        "license": content.get("license", "unknown"),
+        "attribution": content.get("attribution", ""),
+        "files": texts(content.get("files", []), "files", where),
+        "reader": content.get("reader", "vector_file"),
+    }
+    layers = tuple(
+        layer_of(item, where, taxonomy=taxonomy, shared=shared) for item in content["layers"]
+    )
+    names = [spec.name for spec in layers]
+    double = next((name for name in names if names.count(name) > 1), None)
+    if double is not None or not names:
+        what = f"two layers named {double!r}; rename one" if names else "no layer; add [[layers]]"
+        msg = f"{where} has {what}."
+        raise CatalogError(msg)
+    return Catalog(
+        name=content["name"],
+        title=content["title"],
+        metric_crs=content.get("metric_crs"),
+        taxonomy=taxonomy,
+        layers=layers,
+        url=content.get("url", ""),
+        reader=content.get("reader", "vector_file"),
+        endpoints=texts(content.get("endpoints", []), "endpoints", where),
+        geocoder=content.get("geocoder"),
+        conflate=tuple(
+            _metres_by_class(
+                content.get("conflate", {}), taxonomy, f"{where}, conflate", most=MAX_MERGING_M
+            ).items()
+        ),
+        license=shared["license"],
+        attribution=shared["attribution"],
+    )
+
+
+def _classes(items: list[Any], where: str) -> tuple[ObjectClass, ...]:
+    classes = []
+    for number, item in enumerate(items, start=1):
+        place = f"{where}, class {number}"
+        if not isinstance(item, dict):
+            msg = f"{place} is {item!r}; write a [[classes]] table."
+            raise CatalogError(msg)
+        check_keys(item, {**CLASS_KEYS, "range_m": object}, place, CLASS_KEYS)
+        if "range_m" in item:
+            item["range_m"] = metres(item["range_m"], "range_m", place, most=MAX_RANGE_M)
+        try:
+            classes.append(ObjectClass(**item))
+        except CatalogError as error:
+            msg = f"{place}: {error}"
+            raise CatalogError(msg) from error
+    return tuple(classes)
+
+
+def _ranges(item: dict[str, Any], taxonomy: Taxonomy, where: str) -> dict[str, float]:
+    """Return the ranges that a catalogue gives to classes outside their own tables."""
+    found = _metres_by_class(item, taxonomy, f"{where}, ranges", most=MAX_RANGE_M)
+    double = next((name for name in found if taxonomy.by_name(name).range_m is not None), None)
+    if double is not None:
+        msg = f"{where} has a range_m of {double!r} and one in ranges; remove one of them."
+        raise CatalogError(msg)
+    return found
+
+
+def _metres_by_class(
+    item: dict[str, Any], taxonomy: Taxonomy, where: str, *, most: float
+) -> dict[str, float]:
+    for name in item:
+        require_class(name, taxonomy, where)
+    return {name: metres(value, name, where, most=most) for name, value in item.items()}

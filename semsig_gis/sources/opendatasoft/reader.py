@@ -1,0 +1,331 @@
+"""Opendatasoft portals, such as Open Data Paris: their files, and their Explore API v2.1."""
+
+from __future__ import annotations
+
+import dataclasses
+import functools
+import json
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple
+from urllib.parse import quote
+
+import shapely
+
+from semsig_gis.core.errors import CatalogError, InputError, SourceError
+from semsig_gis.sources.crs import WGS84, settle_crs
+from semsig_gis.sources.http.fetch import fetch
+from semsig_gis.sources.http.wire import HttpError, HttpSpec
+from semsig_gis.sources.layers import LayerSpec
+from semsig_gis.sources.opendatasoft.fields import POINT, Positions, find_field, settle_fields
+from semsig_gis.sources.opendatasoft.table import open_table
+from semsig_gis.sources.raw_layer import (
+    BadFeatureError,
+    Row,
+    RowRules,
+    Rows,
+    raw_layer,
+    require_field,
+)
+from semsig_gis.sources.vector import reader as vector_file
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping, Sequence
+
+    from shapely.geometry.base import BaseGeometry
+
+    from semsig_gis.sources import RawLayer
+    from semsig_gis.sources.area import Area
+    from semsig_gis.sources.http.cache import Cache, Fetched
+    from semsig_gis.sources.opendatasoft.table import Record, Table
+
+# What people make of a portal's data with other programs, and leave beside its own files.
+VECTOR_SUFFIXES = frozenset({".fgb", ".gpkg", ".shp", ".zip"})
+# Longer addresses are refused by some servers.
+LONGEST_OUTLINE = 2_000
+GEO_TYPES = ("geo_point_2d", "geo_shape")
+
+
+class _Export(NamedTuple):
+    suffix: str
+    types: tuple[str, ...]
+    begin: bytes = b""
+    end: bytes = b""
+
+
+EXPORTS = {
+    "geojson": _Export(
+        ".geojson",
+        ("application/geo+json", "application/vnd.geo+json", "application/json"),
+        b"{",
+        b"}",
+    ),
+    "csv": _Export(".csv", ("text/csv", "application/csv")),
+    "parquet": _Export(
+        ".parquet",
+        (
+            "application/parquet",
+            "application/vnd.apache.parquet",
+            "application/x-parquet",
+            "application/octet-stream",
+        ),
+        b"PAR1",
+        b"PAR1",
+    ),
+}
+
+
+# --- Files ------------------------------------------------------------------------------------
+
+
+def read_layers(
+    path: str | Path,
+    specs: Sequence[LayerSpec],
+    *,
+    filters: bool = True,
+    crs: str | None = None,
+) -> tuple[RawLayer, ...]:
+    """Read layers, in one pass, from a file that a portal exports, as it is.
+
+    JSON of version 1, 2.0 or 2.1 of the API, GeoJSON, CSV and Parquet are told apart by what is in
+    the file; a GeoPackage, shapefile, FlatGeobuf or archive that was made of such a file will do
+    too. Fields are found by name, by alias, or by a name that differs in capitals, accents, spaces
+    and signs only. A shape (``geo_shape``) goes before a point (``geo_point_2d``, latitude first),
+    and that before ``x_field`` and ``y_field``. What portals publish is in WGS 84.
+
+    `filters` says whether the ``where`` of the layers holds; `crs` is for a file that states none.
+    SourceError if the file cannot be used or has no positions, CatalogError if it lacks a field
+    that a layer names, CrsError if it is in degrees and most coordinates cannot be.
+    """
+    path = Path(path)
+    if path.suffix.lower() in VECTOR_SUFFIXES:
+        return tuple(_read_vector(path, spec, filters=filters, crs=crs) for spec in specs)
+    table = open_table(path)
+    jobs = [_Job(spec, table, path, filters=filters, crs=crs) for spec in specs]
+    wanted = [field for job in jobs for field in job.fields]
+    for number, record in enumerate(table.records(wanted), start=1):
+        for job in jobs:
+            job.take(number, record)
+    return tuple(job.layer() for job in jobs)
+
+
+def _read_vector(path: Path, spec: LayerSpec, *, filters: bool, crs: str | None) -> RawLayer:
+    layers = {info.name: info for info in vector_file.list_layers(path)}
+    named = [layers[spec.layer]] if spec.layer in layers else list(layers.values())
+    fields = [field for info in named for field, _ in info.fields]
+    layer = vector_file.read_layer(path, settle_fields(spec, fields), filters=filters, crs=crs)
+    return dataclasses.replace(layer, spec=spec)
+
+
+# What holds for a table without rows, which has no fields to look at.
+_NO_FIELDS = LayerSpec(name="", class_name="")
+
+
+class _Job:
+    """One layer that is being read from a table."""
+
+    def __init__(
+        self, spec: LayerSpec, table: Table, path: Path, *, filters: bool, crs: str | None
+    ) -> None:
+        self._spec = spec
+        self._where = f"layer {spec.name!r} ({path})"
+        self._by_file = table.crs is not None
+        self._crs, self._notes = settle_crs(
+            table.crs or WGS84,
+            implicit=table.crs is None,
+            expected=spec.crs,
+            given=crs,
+            where=self._where,
+        )
+        if table.rest:
+            rest = (
+                f"the file is one page of a longer answer, which has {table.rest:,} records more; "
+                "export the whole dataset instead"
+            )
+            self._notes += (rest,)
+        own = _NO_FIELDS if table.empty else settle_fields(spec, table.fields)
+        self._rules = RowRules(own, table.fields, filters=filters, where=self._where)
+        self._positions = Positions(spec, table, where=self._where)
+        self._rows = Rows()
+        self.fields = (*self._rules.fields, *self._positions.fields)
+
+    def take(self, number: int, record: Record | str) -> None:
+        """Take the next row of the table."""
+        self._rows.read = number
+        try:
+            self._keep(number, record)
+        except BadFeatureError as error:
+            self._rows.errors[number] = str(error)
+
+    def _keep(self, number: int, record: Record | str) -> None:
+        if isinstance(record, str):
+            raise BadFeatureError(record)
+        rules = self._rules
+        row = {field: record.values.get(field) for field in rules.fields}  # JSON leaves nulls out
+        if not rules.keeps(row):
+            self._rows.filtered += 1
+            return
+        position = self._positions.of(record)
+        identifier = rules.source_id(row, str(number))
+        half_width = rules.half_width(row)
+        self._rows.kept.append(Row(number, rules.class_name(row), identifier, position, half_width))
+
+    def layer(self) -> RawLayer:
+        """Return what was read."""
+        return raw_layer(
+            self._rows,
+            self._spec,
+            self._crs,
+            by_file=self._by_file,
+            where=self._where,
+            notes=self._notes,
+        )
+
+
+# --- Live -------------------------------------------------------------------------------------
+
+
+def fetch_layers(
+    specs: Sequence[LayerSpec],
+    *,
+    portal: str,
+    area: Area | None = None,
+    cache: Cache,
+    spec: HttpSpec = HttpSpec(),  # noqa: B008 - frozen
+    format: Literal["geojson", "csv", "parquet"] = "geojson",  # noqa: A002 - the API's own word
+    progress: Callable[[LayerSpec, int, int], None] | None = None,
+) -> list[tuple[LayerSpec, Fetched]]:
+    """Fetch the datasets of layers from a portal into the cache, as files for `read_layers`.
+
+    Layers without a dataset are left out, because the portal does not have them. For each dataset
+    its description is asked for, then one export (Explore API v2.1), whose ``where`` is the layer's
+    ``server_where`` and the area; for an outline of very many corners, a somewhat larger one. Where
+    a layer selects fields, those that its other keys name are selected too. `progress` takes a
+    layer, the bytes of it that have arrived, and those there are, 0 where nobody knows.
+
+    InputError for a wrong address or format, CatalogError if the portal lacks the dataset or a
+    selected field, SourceError if it refuses, fails, or sends something else.
+    """
+    if format not in EXPORTS:
+        msg = f"format {format!r} is unknown; give one of {', '.join(EXPORTS)}."
+        raise InputError(msg)
+    fetched = []
+    for layer in specs:
+        if layer.dataset is None:
+            continue
+        found = functools.partial(progress, layer) if progress is not None else None
+        address = _address(portal, layer.dataset)
+        try:
+            types = _field_types(address, layer, portal, cache=cache, spec=spec)
+            file = fetch(
+                f"{address}/exports/{format}",
+                params=_query(layer, types, area, format, where=f"dataset {layer.dataset!r}"),
+                cache=cache,
+                spec=spec,
+                accept=EXPORTS[format].types,
+                suffix=EXPORTS[format].suffix,
+                check=functools.partial(_require_whole, export=EXPORTS[format]),
+                progress=found,
+            )
+        except HttpError as error:
+            msg = f"layer {layer.name!r}: {error}"
+            raise HttpError(msg, error.status) from error
+        fetched.append((layer, file))
+    return fetched
+
+
+def _address(portal: str, dataset: str) -> str:
+    return f"{portal.rstrip('/')}/api/explore/v2.1/catalog/datasets/{quote(dataset, safe='')}"
+
+
+def _field_types(
+    address: str, layer: LayerSpec, portal: str, *, cache: Cache, spec: HttpSpec
+) -> Mapping[str, str]:
+    """Return the fields of a dataset and their types, as its description has them."""
+    try:
+        file = fetch(
+            address, cache=cache, spec=spec, accept=("application/json",), check=_require_described
+        )
+    except HttpError as error:
+        if error.status != 404:  # noqa: PLR2004 - not found
+            raise
+        msg = (
+            f"{portal} has no dataset {layer.dataset!r}, which the catalogue names for layer "
+            f"{layer.name!r}; look for it at {portal.rstrip('/')}/explore and correct `dataset` "
+            "in the catalogue."
+        )
+        raise CatalogError(msg) from error
+    return _described(file.path)
+
+
+def _require_described(path: Path) -> None:
+    _described(path)
+
+
+def _described(path: Path) -> dict[str, str]:
+    try:
+        content: Any = json.loads(path.read_text(encoding="utf-8"))
+        return {field["name"]: field["type"] for field in content["fields"]}
+    except (KeyError, TypeError, ValueError) as error:
+        msg = (
+            "the portal does not describe its dataset as the Explore API v2.1 does; "
+            "check that the address is that of an Opendatasoft portal."
+        )
+        raise SourceError(msg) from error
+
+
+def _query(
+    layer: LayerSpec, types: Mapping[str, str], area: Area | None, kind: str, *, where: str
+) -> dict[str, str | float]:
+    """Return the parameters of an export."""
+    fields = list(types)
+    places = [name for name, kind in types.items() if kind in GEO_TYPES]
+    query: dict[str, str | float] = {"limit": -1}
+    conditions = [layer.server_where] if layer.server_where else []
+    if area is not None:
+        points = [name for name in places if types[name] == POINT] or places
+        if not points:
+            msg = f"{where} of layer {layer.name!r} has no positions to cut an area out of."
+            raise CatalogError(msg)
+        conditions.append(_inside(area, find_field(POINT, layer, points) or points[0]))
+    if conditions:
+        query["where"] = " and ".join(f"({condition})" for condition in conditions)
+    if layer.select:
+        own = settle_fields(layer, fields)
+        for field in own.select:
+            require_field(field, fields, where=where, key="select")
+        rules = RowRules(own, fields, filters=True, where=where)
+        query["select"] = ",".join(dict.fromkeys([*own.select, *rules.fields, *places]))
+    if kind == "csv":
+        query |= {"delimiter": ";", "use_labels": "false"}
+    return query
+
+
+def _inside(area: Area, field: str) -> str:
+    """Return the condition that a position is in an area, in the portal's language (ODSQL)."""
+    west, south, east, north = area.bounds
+    if area.polygon.equals(shapely.box(west, south, east, north)):
+        return f"in_bbox({field}, {south:.7f}, {west:.7f}, {north:.7f}, {east:.7f})"
+    return f"intersects({field}, geom'{_outline(area.polygon)}')"
+
+
+def _outline(polygon: BaseGeometry) -> str:
+    """Return an outline as text, short enough for an address and never smaller than it was."""
+    text: str = shapely.to_wkt(polygon, rounding_precision=7)
+    room = 1e-5  # degrees: about a metre
+    while len(text) > LONGEST_OUTLINE:
+        # What is cut off is never wider than what was added, whose round corners are cut a little.
+        polygon = polygon.buffer(1.1 * room, quad_segs=2).simplify(room)
+        text = shapely.to_wkt(polygon, rounding_precision=7)
+        room *= 2
+    return text
+
+
+def _require_whole(path: Path, *, export: _Export) -> None:
+    """Refuse a file that does not begin and end as its kind does."""
+    with path.open("rb") as stream:
+        begin = stream.read(16).lstrip()
+        stream.seek(max(0, path.stat().st_size - 16))
+        end = stream.read().rstrip()
+    if not (begin.startswith(export.begin) and end.endswith(export.end)):
+        msg = f"what the portal sent is not whole {export.suffix[1:]}; try again later."
+        raise SourceError(msg)

@@ -1,0 +1,232 @@
+"""The records of a file that an Opendatasoft portal exports: JSON of each kind, CSV, Parquet."""
+
+from __future__ import annotations
+
+import csv
+import json
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import pyarrow as pa
+import pyarrow.parquet as pq
+from pyproj import CRS
+from pyproj.exceptions import CRSError
+
+from semsig_gis.core.errors import CrsError, SourceError
+from semsig_gis.sources.crs import WGS84
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping, Sequence
+    from pathlib import Path
+
+SEPARATORS = ";,\t"
+# A shape in a CSV file may be longer than the 128 KiB that Python's reader allows.
+LONGEST_VALUE = 2**24
+BATCH = 10_000
+
+
+class Record(NamedTuple):
+    """One row: its fields, and the geometry that stands beside them, if any."""
+
+    values: Mapping[str, Any]
+    geometry: object = None
+
+
+# A row that cannot be understood is the message that says why.
+Records = Iterator[Record | str]
+
+
+@dataclass(frozen=True)
+class Table:
+    """A file that has been opened.
+
+    `records` takes the fields that are wanted and returns an iterator over the rows, which may have
+    a geometry that is not a field (`has_geometry`). `crs` is what the file states, which those of a
+    portal never do. `empty`: no rows, and so nothing to know the fields by. `rest`: rows that the
+    portal has beyond these, where the file is a page of a longer answer.
+    """
+
+    fields: tuple[str, ...]
+    records: Callable[[Sequence[str]], Records]
+    has_geometry: bool = False
+    crs: CRS | None = None
+    empty: bool = False
+    rest: int = 0
+
+
+def open_table(path: Path) -> Table:
+    """Open a file by what is in it, whatever its name; SourceError if it cannot be used."""
+    if not path.is_file():
+        what = "is a folder" if path.is_dir() else "does not exist"
+        msg = f"{path} {what}; give a file that a portal exports."
+        raise SourceError(msg)
+    with path.open("rb") as stream:
+        begin = stream.read(256).removeprefix(b"\xef\xbb\xbf").lstrip()
+    if begin.startswith(b"PAR1"):
+        return _parquet(path)
+    if begin.startswith((b"{", b"[")):
+        return _json(path)
+    if not begin or b"\0" in begin:
+        what = "is not a text" if begin else "is empty"
+        msg = f"{path} {what}; give a JSON, GeoJSON, CSV or Parquet file that a portal exports."
+        raise SourceError(msg)
+    return _csv(path)
+
+
+# --- JSON -------------------------------------------------------------------------------------
+
+
+def _json(path: Path) -> Table:
+    try:
+        content = json.loads(path.read_text(encoding="utf-8-sig"))
+    except UnicodeDecodeError as error:
+        raise _not_utf8(path) from error
+    except (ValueError, RecursionError) as error:
+        msg = f"{path} is not whole JSON ({error}); get it again."
+        raise SourceError(msg) from error
+    features = isinstance(content, dict) and content.get("type") == "FeatureCollection"
+    items = content
+    if isinstance(content, dict):
+        keys = ("features",) if features else ("results", "records")
+        items = next((content[key] for key in keys if key in content), None)
+    records = [_record(item) for item in items] if isinstance(items, list) else [""]
+    good = [record for record in records if isinstance(record, Record)]
+    if records and not good:
+        msg = (
+            f"{path} has no records; give an export of a portal, which is a list of them or has "
+            "one under features, results or records."
+        )
+        raise SourceError(msg)
+    return Table(
+        fields=tuple(dict.fromkeys(name for record in good for name in record.values)),
+        records=lambda _: iter(records),
+        has_geometry=features or any(record.geometry for record in good),
+        crs=_member_crs(content, path) if features else None,
+        empty=not records,
+        rest=_rest(content, len(records)),
+    )
+
+
+def _rest(content: object, rows: int) -> int:
+    """Return how many rows more a page says that there are, by version 2.1 or 1 of the API."""
+    told = content if isinstance(content, dict) else {}
+    total = told.get("total_count", told.get("nhits"))
+    return max(total - rows, 0) if isinstance(total, int) else 0
+
+
+def _record(item: object) -> Record | str:
+    """Return a feature, a record of version 1 or 2.0, or a plain one of version 2.1."""
+    if not isinstance(item, dict):
+        return f"is {json.dumps(item)[:40]}, not a record"
+    if item.get("type") == "Feature":
+        fields = item.get("properties") or {}
+        good = isinstance(fields, dict)
+        return Record(fields, item.get("geometry")) if good else "has properties without names"
+    inner = item.get("record", item)
+    if isinstance(inner, dict) and isinstance(inner.get("fields"), dict):
+        return Record(inner["fields"], inner.get("geometry"))
+    return Record(item)
+
+
+def _member_crs(content: dict[str, Any], path: Path) -> CRS | None:
+    """Return the CRS that a GeoJSON file of before RFC 7946 states."""
+    if content.get("crs") is None:
+        return None
+    try:
+        name = content["crs"]["properties"]["name"]
+    except (KeyError, TypeError):
+        name = content["crs"]
+    return _stated_crs(name, path)
+
+
+def _stated_crs(definition: object, path: Path) -> CRS:
+    try:
+        system = CRS.from_user_input(definition)
+    except CRSError as error:
+        msg = f"{path} states a CRS that is unknown ({str(definition)[:60]}); correct it."
+        raise CrsError(msg) from error
+    return WGS84 if system.equals(WGS84, ignore_axis_order=True) else system
+
+
+# --- CSV --------------------------------------------------------------------------------------
+
+
+def _csv(path: Path) -> Table:
+    try:
+        with path.open(encoding="utf-8-sig", newline="") as stream:
+            header = stream.readline()
+    except UnicodeDecodeError as error:
+        raise _not_utf8(path) from error
+    layouts = {
+        separator: next(csv.reader([header], delimiter=separator), []) for separator in SEPARATORS
+    }
+    separator = max(layouts, key=lambda separator: len(layouts[separator]))
+    fields = tuple(layouts[separator])
+    return Table(fields, lambda _: _csv_records(path, separator, fields))
+
+
+def _csv_records(path: Path, separator: str, fields: tuple[str, ...]) -> Records:
+    before = csv.field_size_limit(LONGEST_VALUE)
+    try:
+        with path.open(encoding="utf-8-sig", newline="") as stream:
+            stream.readline()
+            # Strict, because a quote that is never closed would swallow all the rows below it.
+            rows = csv.reader(stream, delimiter=separator, strict=True)
+            while True:
+                try:
+                    row = next(rows)
+                except StopIteration:
+                    return
+                except csv.Error as error:
+                    yield f"cannot be read ({error})"
+                    continue
+                if len(row) == len(fields):
+                    yield Record(dict(zip(fields, row, strict=True)))
+                elif row:
+                    yield f"has {len(row)} values, and the header has {len(fields)} names"
+    except UnicodeDecodeError as error:
+        raise _not_utf8(path) from error
+    finally:
+        csv.field_size_limit(before)
+
+
+def _not_utf8(path: Path) -> SourceError:
+    return SourceError(f"{path} is not UTF-8 text; save it as UTF-8.")
+
+
+# --- Parquet ----------------------------------------------------------------------------------
+
+
+def _parquet(path: Path) -> Table:
+    try:
+        with pq.ParquetFile(path) as file:
+            fields = tuple(file.schema_arrow.names)
+            metadata = json.loads((file.schema_arrow.metadata or {}).get(b"geo", b"{}"))
+    except (pa.ArrowException, OSError, ValueError) as error:
+        raise _broken_parquet(path, error) from error
+    # A portal's own exports name no geometry; those that other programs made of them do.
+    primary = metadata.get("primary_column")
+    stated = metadata.get("columns", {}).get(primary, {}).get("crs")
+    return Table(
+        fields,
+        lambda wanted: _parquet_records(path, wanted, primary),
+        has_geometry=primary is not None,
+        crs=None if stated is None else _stated_crs(stated, path),
+    )
+
+
+def _parquet_records(path: Path, wanted: Sequence[str], primary: str | None) -> Records:
+    columns = list(dict.fromkeys([*wanted, primary] if primary else wanted))
+    try:
+        with pq.ParquetFile(path) as file:
+            for batch in file.iter_batches(BATCH, columns=columns):
+                for values in batch.to_pylist():
+                    yield Record(values, values.get(primary))
+    except (pa.ArrowException, OSError) as error:
+        raise _broken_parquet(path, error) from error
+
+
+def _broken_parquet(path: Path, error: Exception) -> SourceError:
+    cause = " ".join(str(error).split()).partition(". ")[0].rstrip(".")
+    return SourceError(f"{path} is not a whole Parquet file ({cause}); get it again.")

@@ -1,0 +1,266 @@
+"""OpenStreetMap live, by area: Overpass servers for its elements, Nominatim for its places."""
+
+from __future__ import annotations
+
+import collections
+import dataclasses
+import itertools
+import math
+import re
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import shapely
+
+from semsig_gis.core.errors import CatalogError, InputError, SourceError
+from semsig_gis.sources.http.fetch import NotCachedError, TooLargeError, fetch, read_text
+from semsig_gis.sources.http.wire import DEFAULT_HTTP, HttpError, host_of
+from semsig_gis.sources.layers import ANY_VALUE
+from semsig_gis.sources.osm.overpass_json import load_document
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator, Sequence
+    from pathlib import Path
+
+    from semsig_gis.sources.area import Area
+    from semsig_gis.sources.http.cache import Cache
+    from semsig_gis.sources.http.wire import HttpSpec
+    from semsig_gis.sources.layers import LayerSpec
+
+JSON = ("application/json",)
+QUERY_S = 90  # a server gives up a query after so many seconds
+ANSWER_S = 30.0  # for what comes before and after it
+STATUS_S = 10.0
+TILE_BYTES = 2**28  # a tile is parsed in memory
+MOST_SPLITS = 4
+TOO_SLOW = 504
+TOO_MANY = 429
+NO_SLOT_MARGIN_S = 1.0
+# What means something in a regular expression (POSIX, extended).
+SPECIAL = re.compile(r"[.^$*+?()\[\]{}|\\]")
+
+
+def overpass_query(
+    specs: Sequence[LayerSpec], bounds: tuple[float, float, float, float], *, timeout: int = QUERY_S
+) -> str:
+    """Return the Overpass QL for the elements of layers, by their ``tags`` and ``elements``.
+
+    Bounds are west, south, east and north in degrees; the server may take `timeout` seconds. Values
+    are exact; ways and multipolygons come with all their positions, and nothing comes with the
+    names of mappers. CatalogError if a layer says no tags.
+    """
+    west, south, east, north = bounds
+    # a dict keeps the order, and an element asked for by two layers is asked for once
+    lines = dict.fromkeys(line for spec in specs for line in _statements(spec))
+    box = f"{south:.7f},{west:.7f},{north:.7f},{east:.7f}"
+    head = f"[out:json][timeout:{timeout}][bbox:{box}];"
+    return "\n".join([head, "(", *lines, ");", "out body geom;"])
+
+
+def _statements(spec: LayerSpec) -> Iterator[str]:
+    if not spec.tags:
+        msg = f'layer {spec.name!r} has no tags; write tags = [{{ key = "value" }}].'
+        raise CatalogError(msg)
+    for alternative in spec.tags:
+        filters = "".join(_filter(key, values) for key, values in alternative)
+        for kind in spec.elements:
+            # of the relations, readers take multipolygons only
+            areas = '["type"="multipolygon"]' if kind == "relation" else ""
+            yield f"{kind}{filters}{areas};"
+
+
+def _filter(key: str, values: tuple[str, ...]) -> str:
+    if ANY_VALUE in values:
+        return f'[{_quoted(key)}][{_quoted(key)}!="no"]'
+    if len(values) == 1:
+        return f"[{_quoted(key)}={_quoted(values[0])}]"
+    pattern = "|".join(SPECIAL.sub(r"\\\g<0>", value) for value in values)
+    return f"[{_quoted(key)}~{_quoted(f'^({pattern})$')}]"
+
+
+def _quoted(text: str) -> str:
+    escaped = text.replace("\\", "\\\\").replace('"', '\\"').replace("\n", "\\n")
+    return f'"{escaped}"'
+
+
+# --- Tiles --------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, slots=True)
+class _Tile:
+    bounds: tuple[float, float, float, float]
+    splits: int = 0
+
+    def parts(self, columns: int, rows: int, *, splits: int) -> Iterator[_Tile]:
+        """Yield a grid of tiles over this one, from the south-west."""
+        west, south, east, north = self.bounds
+        xs = [west + (east - west) * i / columns for i in range(columns + 1)]
+        ys = [south + (north - south) * i / rows for i in range(rows + 1)]
+        for bottom, top in itertools.pairwise(ys):
+            for left, right in itertools.pairwise(xs):
+                yield _Tile((left, bottom, right, top), splits)
+
+
+def fetch_layers(
+    specs: Sequence[LayerSpec],
+    *,
+    area: Area,
+    endpoints: Sequence[str],
+    cache: Cache,
+    spec: HttpSpec = DEFAULT_HTTP,
+    tile_deg: float = 0.1,
+    progress: Callable[[int, int], None] | None = None,
+) -> list[Path]:
+    """Fetch the elements of layers in an area, and a little more, as files for `read_layers`.
+
+    There is a file for each tile of at most `tile_deg` degrees; one that is too much for the
+    servers is split into four. Endpoints are such as ``"https://overpass-api.de/api"``, best first;
+    one that fails is asked last from then on. Before each query that is sent, the server is asked
+    for its free slots, and waited for. The answers of all servers count as the same in the cache,
+    so that a run that was interrupted goes on where it stopped. `progress` takes the number of
+    tiles that are done and of those there are, which may grow.
+
+    InputError if there is no server to ask or `tile_deg` is not above 0, CatalogError if a layer
+    says no tags, SourceError if no server gives a tile.
+    """
+    if not endpoints:
+        msg = "there is no Overpass server to ask; name one in endpoints."
+        raise InputError(msg)
+    if not tile_deg > 0:
+        msg = f"tile_deg is {tile_deg}; give degrees above 0."
+        raise InputError(msg)
+    if not specs:
+        return []
+    servers = _Servers([_base(address) for address in endpoints], cache, spec)
+    shapely.prepare(area.polygon)
+    west, south, east, north = area.bounds
+    columns, rows = (math.ceil(side / tile_deg - 1e-9) for side in (east - west, north - south))
+    grid = _Tile(area.bounds).parts(max(1, columns), max(1, rows), splits=0)
+    waiting = collections.deque(_touching(area, grid))
+    paths: list[Path] = []
+    while waiting:
+        tile = waiting.popleft()
+        path = servers.answer(overpass_query(specs, tile.bounds), last=tile.splits == MOST_SPLITS)
+        if path is None:
+            parts = tile.parts(2, 2, splits=tile.splits + 1)
+            waiting.extendleft(reversed(_touching(area, parts)))
+            continue
+        paths.append(path)
+        if progress is not None:
+            progress(len(paths), len(paths) + len(waiting))
+    return paths
+
+
+def _touching(area: Area, tiles: Iterator[_Tile]) -> list[_Tile]:
+    return [tile for tile in tiles if area.polygon.intersects(shapely.box(*tile.bounds))]
+
+
+class _Servers:
+    """Servers that mirror one another, in the order in which they are asked."""
+
+    def __init__(self, addresses: list[str], cache: Cache, spec: HttpSpec) -> None:
+        connect, read = spec.timeout
+        self._addresses = addresses
+        self._cache = cache
+        self._spec = dataclasses.replace(
+            spec,
+            timeout=(connect, max(read, QUERY_S + ANSWER_S)),
+            max_bytes=min(spec.max_bytes, TILE_BYTES),
+        )
+
+    def answer(self, query: str, *, last: bool) -> Path | None:
+        """Return the file of the answer, or None where a smaller question may have one.
+
+        `last` says that the question cannot be made smaller. SourceError if there is neither.
+        """
+        failures: list[SourceError] = []
+        for address in tuple(self._addresses):
+            try:
+                path = self._ask(address, query)
+            except TooLargeError as error:
+                failures = [error]
+                break
+            except SourceError as error:
+                failures.append(error)
+                if isinstance(error, NotCachedError):
+                    break  # the same for all of them
+                self._addresses.remove(address)
+                self._addresses.append(address)
+                continue
+            document = load_document(path, where=str(path))
+            if not document.exhausted:
+                return path
+            failures = [_too_much(address, document.remark)]
+            break
+        if not last and any(_may_be_size(failure) for failure in failures):
+            return None
+        if len(failures) == 1:
+            raise failures[0]
+        causes = ", and ".join(str(failure).rstrip(".") for failure in failures)
+        msg = f"no Overpass server gave an answer: {causes}."
+        raise SourceError(msg) from failures[0]
+
+    def _ask(self, address: str, query: str) -> Path:
+        def check(path: Path) -> None:
+            document = load_document(path, where=f"the answer of {host_of(address)}")
+            # One that is incomplete by its size is kept: the next run need not learn it again.
+            if document.failed and not document.exhausted:
+                msg = f"{host_of(address)} failed ({document.remark}); try again later."
+                raise HttpError(msg)
+
+        return fetch(
+            f"{address}/interpreter",
+            data={"data": query},
+            cache=self._cache,
+            spec=self._spec,
+            accept=JSON,
+            suffix=".json",
+            identity="overpass",
+            check=check,
+            before=lambda: self._wait_for_slot(address),
+        ).path
+
+    def _wait_for_slot(self, address: str) -> None:
+        spec = self._spec
+        try:
+            status = read_text(
+                f"{address}/status", spec=dataclasses.replace(spec, timeout=(STATUS_S, STATUS_S))
+            )
+        except SourceError:
+            return  # a server without it says by its answer that it is busy
+        wait = waiting_time(status)
+        if wait > spec.longest_wait_s:
+            msg = f"{host_of(address)} has no free slot for {wait:.0f} s; try again after that."
+            raise HttpError(msg, TOO_MANY)
+        if wait:
+            spec.sleep(wait + NO_SLOT_MARGIN_S)
+
+
+def waiting_time(status: str) -> float:
+    """Return the seconds until a slot is free, by an Overpass server's page ``/api/status``.
+
+    0 if one is free, there is no limit, or nothing is said.
+    """
+    free = re.search(r"^(\d+) slots? available now", status, re.MULTILINE)
+    if free and int(free[1]):
+        return 0.0
+    later = re.findall(r"^Slot available after: .*?, in (-?\d+) seconds", status, re.MULTILINE)
+    return max(0.0, min(map(float, later), default=0.0))
+
+
+def _too_much(address: str, remark: str) -> SourceError:
+    return TooLargeError(
+        f"{host_of(address)} cannot answer even for the smallest tile ({remark}); "
+        "ask for fewer layers or try again later."
+    )
+
+
+def _may_be_size(failure: SourceError) -> bool:
+    # Offline, the parts of a tile that was split are there, and the tile may not be.
+    return isinstance(failure, TooLargeError | NotCachedError) or (
+        isinstance(failure, HttpError) and failure.status == TOO_SLOW
+    )
+
+
+def _base(address: str) -> str:
+    return address.rstrip("/").removesuffix("/interpreter")

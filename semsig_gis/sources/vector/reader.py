@@ -1,0 +1,411 @@
+"""What GDAL says while a file is read: kept for the report instead of reaching the log."""
+
+from __future__ import annotations
+
+import contextlib
+import contextvars
+import json
+import logging
+import math
+import re
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import fiona
+import numpy as np
+import shapely
+import shapely.geometry
+
+from semsig_gis.core.errors import SourceError, UnknownNameError, nearest_name
+from semsig_gis.sources.crs import WGS84, crs_label, fits_the_globe, settle_crs, usable_crs
+from semsig_gis.sources.raw_layer import BadFeatureError, Row, RowRules, Rows, raw_layer
+from semsig_gis.sources.vector.archive import Member, members, unreadable
+from semsig_gis.sources.vector.csv import csv_columns
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Iterator
+
+    from pyproj import CRS
+
+    from semsig_gis.sources import RawLayer
+    from semsig_gis.sources.layers import LayerSpec
+    from semsig_gis.sources.raw_layer import Position
+    from semsig_gis.sources.vector.csv import CsvColumns
+
+
+# fiona's loggers; a filter acts on the very logger that emits, not on those below it.
+LOGGERS = ("fiona._env", "fiona._err", "fiona.collection", "fiona.ogrext")
+
+
+_heard: contextvars.ContextVar[list[logging.LogRecord] | None] = contextvars.ContextVar(
+    "_heard", default=None
+)
+
+
+def _hear(record: logging.LogRecord) -> bool:
+    heard = _heard.get()
+    if heard is None:
+        return True
+    heard.append(record)
+    return False
+
+
+# A filter and not a handler: another user of fiona in the process keeps its messages, and two
+# threads that read at once do not hear each other.
+for _name in LOGGERS:
+    logging.getLogger(_name).addFilter(_hear)
+
+
+@contextlib.contextmanager
+def listening() -> Iterator[list[logging.LogRecord]]:
+    """Collect the messages of the block in the list that is given."""
+    heard: list[logging.LogRecord] = []
+    token = _heard.set(heard)
+    try:
+        yield heard
+    finally:
+        _heard.reset(token)
+
+
+def first_error(heard: list[logging.LogRecord]) -> str:
+    """Return the first message that is an error, or an empty string."""
+    for record in heard:
+        if record.levelno >= logging.ERROR:
+            return record.getMessage().rstrip(".")
+    return ""
+
+
+NO_GEOMETRY = "None"
+
+
+HEADER_BYTES = 65_536  # enough for the first line of a CSV file
+
+
+# A reader that fails so often without a good feature between does not move on.
+FAILURES_IN_A_ROW = 1_000
+
+
+WGS84_NAMES = re.compile(r"4326|CRS84|WGS ?84", re.IGNORECASE)
+
+
+@dataclass(frozen=True, slots=True)
+class LayerInfo:
+    """What one layer of a file is: its name, kind, CRS, number of features and fields with types.
+
+    `geometry` is the type as GDAL calls it; ``"Point"`` for a CSV file with coordinate columns,
+    ``"None"`` for a table without geometry. `crs` is a code or name, None where the file does not
+    say, or says too little to transform coordinates.
+    """
+
+    name: str
+    geometry: str
+    crs: str | None
+    rows: int
+    fields: tuple[tuple[str, str], ...]
+
+
+def list_layers(path: str | Path) -> tuple[LayerInfo, ...]:
+    """List the layers of a vector file, in its order; SourceError if it cannot be used.
+
+    It is a ``.shp``, ``.geojson``, ``.json``, ``.gpkg``, ``.fgb`` or ``.csv`` file, or a ``.zip``
+    with such files in it.
+    """
+    with listening():
+        return tuple(_describe(member) for member in _layers(Path(path)))
+
+
+def read_layer(
+    path: str | Path, spec: LayerSpec, *, filters: bool = True, crs: str | None = None
+) -> RawLayer:
+    r"""Read one layer of a vector file.
+
+    Features are streamed. One that cannot be read is counted and reported, and the rest are read.
+
+    Parameters
+    ----------
+    path : str or Path
+        A file that `list_layers` takes.
+    spec : LayerSpec
+        Which layer and rows are wanted, and what they are.
+    filters : bool, default True
+        Whether the specification's ``where`` holds.
+    crs : str, optional
+        CRS of a file that states none; it goes before the specification's.
+
+    Returns
+    -------
+    RawLayer
+        The features in the CRS of the file, and notes where the file is not as expected.
+
+    Raises
+    ------
+    SourceError
+        If the file is missing, damaged or of another kind, or has several layers and `spec` names
+        none.
+    UnknownNameError
+        If the file does not have the layer that `spec` names.
+    CatalogError
+        If the file does not have a field that `spec` names.
+    CrsError
+        If nobody states the CRS, or it is in degrees and most coordinates cannot be.
+
+    Notes
+    -----
+    The file's own CRS holds; what `spec` and `crs` say is for a file without one. A GeoJSON file
+    without a ``crs`` member counts as such: by RFC 7946 it is WGS 84, but that is taken only if
+    nothing else is said and the coordinates fit. A null or empty geometry is passed on; so is a
+    CSV row whose coordinate columns are both blank.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> from semsig_gis.sources.layers import LayerSpec
+    >>> spec = LayerSpec(name="benches", class_name="bench", crs="EPSG:4326")
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     path = Path(folder, "benches.csv")
+    ...     _ = path.write_text("id;lon;lat\n7;3.88;43.61\n8;here;43.61\n")
+    ...     layer = read_layer(path, spec)
+    >>> len(layer.table), layer.read, layer.errors
+    (1, 2, ("row 2: lon 'here' is not a number",))
+    """
+    where = f"layer {spec.name!r} ({path})"
+    with listening() as heard:
+        member = _pick(Path(path), spec.layer)
+        columns = _columns(member, spec, where=where)
+        with _opened(member, columns) as source:
+            if columns is None and source.schema["geometry"] == NO_GEOMETRY:
+                msg = f"{where} has no geometry; give the layer that holds the positions."
+                raise SourceError(msg)
+            rules = RowRules(spec, list(source.schema["properties"]), filters=filters, where=where)
+        with _opened(member, columns, fields=rules.fields) as source:
+            own, implicit = _own_crs(source)
+            system, notes = settle_crs(
+                own, implicit=implicit, expected=spec.crs, given=crs, where=where
+            )
+            rows = _read_rows(source, rules, columns, heard)
+        if member.driver == "GeoJSON":
+            _refuse_broken(rows, member)
+        if any(record.getMessage().startswith("Failed to decode") for record in heard):
+            notes += ("some text is not UTF-8 and was read as missing",)
+    by_file = own is not None and not implicit
+    return raw_layer(rows, spec, system, by_file=by_file, where=where, notes=notes)
+
+
+def read_layers(
+    path: str | Path,
+    specs: Iterable[LayerSpec],
+    *,
+    filters: bool = True,
+    crs: str | None = None,
+) -> tuple[RawLayer, ...]:
+    """Read several layers of one file, as `read_layer` reads one."""
+    return tuple(read_layer(path, spec, filters=filters, crs=crs) for spec in specs)
+
+
+# --- Opening ----------------------------------------------------------------------------------
+
+
+@contextlib.contextmanager
+def _opened(
+    member: Member, columns: CsvColumns | None = None, *, fields: tuple[str, ...] | None = None
+) -> Iterator[fiona.Collection]:
+    """Open a layer; what goes wrong in opening it becomes a `SourceError`."""
+    options: dict[str, Any] = dict(columns.options) if columns else {}
+    if member.driver == "GeoJSON":
+        # Has GDAL keep the members of the file that are not features, `crs` among them.
+        options["NATIVE_DATA"] = "YES"
+    elif fields is not None:  # which GeoJSON's driver cannot select
+        coordinates = (columns.x, columns.y) if columns else ()
+        options["include_fields"] = list(dict.fromkeys([*fields, *filter(None, coordinates)]))
+    try:
+        source = fiona.open(
+            member.address, layer=member.layer, enabled_drivers=[member.driver], **options
+        )
+        source.schema  # noqa: B018 - the names of the fields are decoded here
+    except Exception as error:
+        raise unreadable(member, error) from error
+    with source:
+        yield source
+
+
+def _layers(path: Path) -> tuple[Member, ...]:
+    """Return the layers of a file, or of all the files in an archive."""
+    return tuple(layer for member in members(path) for layer in _layers_in(member))
+
+
+def _layers_in(member: Member) -> Iterator[Member]:
+    # Opened under the allow-list first, because listing would try every driver of GDAL.
+    with _opened(member):
+        pass
+    for name in fiona.listlayers(member.address):
+        yield Member(member.file, member.inner, name)
+
+
+def _pick(path: Path, wanted: str | None) -> Member:
+    """Return the layer that a specification means."""
+    layers = _layers(path)
+    if wanted is None and len(layers) > 1:
+        # A GeoPackage keeps its styles in a table without geometry, which is never meant.
+        drawn = [item for item in layers if _describe(item).geometry != NO_GEOMETRY]
+        layers = tuple(drawn) or layers
+    known = [str(member.layer) for member in layers]
+    chosen = [item for item in layers if wanted is None or item.layer == wanted]
+    if len(chosen) == 1:
+        return chosen[0]
+    if wanted is not None and not chosen:
+        msg = (
+            f"{path} has no layer {wanted!r}{nearest_name(wanted, known)}; "
+            f"its layers are {', '.join(known)}."
+        )
+        raise UnknownNameError(msg)
+    msg = f"{path} holds {len(chosen)} layers ({', '.join(known)}); name the one that is meant."
+    raise SourceError(msg)
+
+
+def _columns(member: Member, spec: LayerSpec | None, *, where: str) -> CsvColumns | None:
+    if member.driver != "CSV":
+        return None
+    # What is not UTF-8 here was refused when the file was first opened.
+    head = member.content(HEADER_BYTES).decode("utf-8-sig", errors="replace")
+    return csv_columns(head.splitlines()[0], spec, where=where)
+
+
+def _describe(member: Member) -> LayerInfo:
+    columns = _columns(member, None, where=str(member))
+    with _opened(member, columns) as source:
+        crs, implicit = _own_crs(source)
+        count = _count(source)
+        if implicit and count and not fits_the_globe(np.reshape(source.bounds, (2, 2))):
+            crs = None
+        return LayerInfo(
+            name=str(member.layer),
+            geometry="Point" if columns and columns.x else source.schema["geometry"],
+            crs=None if crs is None else crs_label(crs),
+            rows=sum(1 for _ in source) if count is None else count,
+            fields=tuple(source.schema["properties"].items()),
+        )
+
+
+def _count(source: fiona.Collection) -> int | None:
+    try:
+        return len(source)
+    except TypeError:  # a FlatGeobuf file that was written as a stream, or is empty
+        return None
+
+
+def _own_crs(source: fiona.Collection) -> tuple[CRS | None, bool]:
+    """Return the CRS of a layer, and whether it is only what GeoJSON means by saying nothing."""
+    if source.driver == "GeoJSON":
+        members = json.loads(source.tags(ns="NATIVE_DATA").get("NATIVE_DATA", "{}"))
+        if "crs" not in members:
+            return WGS84, True
+        if usable_crs(source.crs_wkt) == WGS84 and not WGS84_NAMES.search(str(members["crs"])):
+            return None, False  # GDAL takes what it does not understand for WGS 84
+    return usable_crs(source.crs_wkt), False
+
+
+# --- Reading ----------------------------------------------------------------------------------
+
+
+def _read_rows(
+    source: fiona.Collection,
+    rules: RowRules,
+    columns: CsvColumns | None,
+    heard: list[logging.LogRecord],
+) -> Rows:
+    rows = Rows()
+    expected = _count(source) or 0
+    # GDAL parses GeoJSON whole: what it says then belongs to no row (see `_refuse_broken`).
+    by_row = source.driver != "GeoJSON"
+    damage = ""
+    features = iter(source)
+    failures = 0
+    while failures < FAILURES_IN_A_ROW:
+        said = len(heard)
+        try:
+            feature = next(features, None)
+        except Exception as error:  # noqa: BLE001 - of many kinds, and one must not stop the rest
+            failures += 1
+            rows.read += 1
+            rows.errors[rows.read] = f"cannot be read ({error})"
+            continue
+        failures = 0
+        if by_row and not damage:
+            damage = first_error(heard[said:])
+        if feature is None:
+            break
+        rows.read += 1
+        try:
+            _read_row(rows, feature, rules, columns, damage)
+        except BadFeatureError as error:
+            rows.errors[rows.read] = str(error)
+    if rows.read < expected and (damage or failures):
+        rest = range(rows.read + 1, expected + 1)
+        rows.errors.update(dict.fromkeys(rest, damage or "out of reach behind unreadable rows"))
+        rows.read = expected
+    return rows
+
+
+def _read_row(
+    rows: Rows,
+    feature: fiona.Feature,
+    rules: RowRules,
+    columns: CsvColumns | None,
+    damage: str,
+) -> None:
+    if not rules.keeps(feature.properties):
+        rows.filtered += 1
+        return
+    position: Position
+    if columns is not None:
+        position = columns.position(feature.properties)
+    else:
+        position = _position(feature.geometry)
+    if position is None and damage:
+        # From the first damage on, GDAL gives null for what it cannot read.
+        raise BadFeatureError(damage)
+    class_name = rules.class_name(feature.properties)
+    source_id = rules.source_id(feature.properties, feature.id)
+    half_width = rules.half_width(feature.properties)
+    rows.kept.append(Row(rows.read, class_name, source_id, position, half_width))
+
+
+def _position(geometry: fiona.Geometry | None) -> Position:
+    if geometry is None:
+        return None
+    if geometry.type == "Point":
+        x, y = geometry.coordinates[:2]
+        # A GeoPackage writes an empty point as one of NaN.
+        return shapely.Point() if math.isnan(x) and math.isnan(y) else (x, y)
+    try:
+        with np.errstate(invalid="ignore"):  # NaN is looked for in all geometries at once
+            return shapely.geometry.shape(geometry)
+    except (AttributeError, TypeError, ValueError, shapely.errors.ShapelyError) as error:
+        msg = f"its {geometry.type} is not valid ({error})"
+        raise BadFeatureError(msg) from error
+
+
+def _refuse_broken(rows: Rows, member: Member) -> None:
+    """Tell the null geometries of a GeoJSON file from those that GDAL could make nothing of."""
+    null = [row.number for row in rows.kept if row.position is None]
+    if not null:
+        return
+    document = json.loads(member.content().decode("utf-8-sig", errors="replace"))
+    listed = document.get("features", [document])
+    features = [item for item in listed if isinstance(item, dict) and item.get("type") == "Feature"]
+    if len(features) != rows.read:
+        return  # GDAL counts otherwise, so that rows cannot be told apart
+    broken = [number for number in null if not _is_nothing(features[number - 1].get("geometry"))]
+    rows.refuse(dict.fromkeys(broken, "its geometry is not valid GeoJSON"))
+
+
+def _is_nothing(geometry: object) -> bool:
+    """Tell whether a GeoJSON geometry is null or properly empty."""
+    if not isinstance(geometry, dict):
+        return geometry is None
+    return _is_blank(geometry.get("coordinates", geometry.get("geometries")))
+
+
+def _is_blank(parts: object) -> bool:
+    return isinstance(parts, list) and all(_is_blank(part) for part in parts)

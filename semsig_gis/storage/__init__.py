@@ -1,0 +1,1 @@
+"""Files that appear whole, runs that resume, tables that carry their specs."""

@@ -1,0 +1,186 @@
+"""Read and write rasters at the cells of a grid; the home of rasterio."""
+
+from __future__ import annotations
+
+import warnings
+from typing import TYPE_CHECKING
+
+import numpy as np
+import rasterio
+import rasterio.shutil
+from rasterio._err import CPLE_BaseError
+from rasterio.enums import ColorInterp, Resampling
+from rasterio.errors import CRSError, NotGeoreferencedWarning, RasterioError
+from rasterio.transform import Affine
+from rasterio.vrt import WarpedVRT
+from rasterio.windows import Window
+
+from semsig_gis.core.errors import CrsError, InputError, SourceError
+from semsig_gis.storage.whole import whole_file
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+    from pathlib import Path
+
+    from numpy.typing import ArrayLike, NDArray
+    from pyproj import CRS
+
+    from semsig_gis.core.grid import GridSpec
+
+TILE = 512
+# 330 km by 330 km at a step of 10 m; a file of more is a mistake in the data.
+MOST_PIXELS = 1 << 30
+
+
+def raster_at_cells(
+    path: str | Path,
+    *,
+    grid: GridSpec,
+    columns: ArrayLike,
+    rows: ArrayLike,
+    crs: CRS,
+    band: int | None = None,
+) -> NDArray[np.float64]:
+    """Return the mean of a raster over each of some cells, by the area of the pixels in it.
+
+    The raster may be in any format that GDAL reads and in any CRS; `crs` is that of the grid. NaN
+    stands where the raster has no data; a cell that touches its edge from outside may get the value
+    there. `band` counts from 1 and is needed only where there are several. SourceError if the file
+    is not a raster, CrsError if its CRS is missing or does not fit the grid's, InputError for the
+    band.
+    """
+    across, up = np.asarray(columns, dtype=np.int64), np.asarray(rows, dtype=np.int64)
+    left, top = int(across.min()), int(up.max())
+    west, north = grid.origin[0] + left * grid.step, grid.origin[1] + (top + 1) * grid.step
+    try:
+        with warnings.catch_warnings():
+            # A raster without a place on the ground is told about below.
+            warnings.simplefilter("ignore", NotGeoreferencedWarning)
+            source = rasterio.open(path)
+        with source:
+            if source.crs is None:
+                msg = (
+                    f"{path} does not say its coordinate reference system; give a raster that "
+                    "does, such as a GeoTIFF."
+                )
+                raise CrsError(msg)
+            chosen = _chosen_band(source, str(path), band)
+            with WarpedVRT(
+                source,
+                crs=crs.to_wkt(),
+                transform=Affine(grid.step, 0.0, west, 0.0, -grid.step, north),
+                width=int(across.max()) - left + 1,
+                height=top - int(up.min()) + 1,
+                resampling=Resampling.average,
+                nodata=np.nan,
+                dtype="float64",
+            ) as warped:
+                values: NDArray[np.float64] = warped.read(chosen)
+    except (CRSError, CPLE_BaseError) as error:
+        msg = (
+            f"the coordinate reference system of {path} cannot be turned into that of the cells; "
+            "give a raster in another."
+        )
+        raise CrsError(msg) from error
+    except RasterioError as error:
+        reason = str(error).split(". ")[0].strip().rstrip(".")
+        msg = f"{path} cannot be read as a raster ({reason}); give a file such as a GeoTIFF."
+        raise SourceError(msg) from error
+    return values[top - up, across - left]
+
+
+def _chosen_band(source: rasterio.DatasetReader, path: str, band: int | None) -> int:
+    """Return the band to read."""
+    # What only tells how opaque the others are is none to choose.
+    kinds = enumerate(source.colorinterp, start=1)
+    bands = [number for number, kind in kinds if kind != ColorInterp.alpha]
+    if band is None and len(bands) == 1:
+        return bands[0]
+    if band is None or band not in source.indexes:
+        asked = "none was named" if band is None else f"band {band} was asked for"
+        msg = f"{path} has {len(bands)} bands, but {asked}; name one, or give a raster of one band."
+        raise InputError(msg)
+    return band
+
+
+def write_cells(
+    path: str | Path,
+    values: NDArray[np.float64],
+    *,
+    grid: GridSpec,
+    columns: NDArray[np.int32],
+    rows: NDArray[np.int32],
+    crs: CRS,
+    name: str,
+    unit: str = "",
+    notes: Mapping[str, str],
+) -> None:
+    """Write one number a cell as a Cloud-Optimised GeoTIFF; NaN where there is none.
+
+    Cells, at least one, are ordered by column. The raster is written in strips, so that memory
+    stays flat, and appears whole, by rename. InputError if the cells span too wide an area, or the
+    file cannot be written.
+    """
+    left, top = int(columns[0]), int(rows.max())
+    width, height = int(columns[-1]) - left + 1, top - int(rows.min()) + 1
+    if width * height > MOST_PIXELS:
+        msg = (
+            f"the cells span {width:,} by {height:,} pixels, which is too wide for a raster; "
+            "export the parts of the city that lie far apart each on its own."
+        )
+        raise InputError(msg)
+    west, north = grid.origin[0] + left * grid.step, grid.origin[1] + (top + 1) * grid.step
+    with whole_file(path) as partial:
+        strips = partial.with_name("strips.tif")
+        try:
+            with rasterio.open(
+                strips,
+                "w",
+                driver="GTiff",
+                width=width,
+                height=height,
+                count=1,
+                dtype="float32",
+                nodata=np.nan,
+                crs=crs.to_wkt(),
+                transform=Affine(grid.step, 0.0, west, 0.0, -grid.step, north),
+                tiled=True,
+                blockxsize=TILE,
+                blockysize=TILE,
+                sparse_ok=True,
+            ) as file:
+                file.update_tags(**notes)
+                file.set_band_description(1, name)
+                file.set_band_unit(1, unit)
+                for start in range(0, width, TILE):
+                    low, high = np.searchsorted(columns, [left + start, left + start + TILE])
+                    strip = np.full((height, min(TILE, width - start)), np.nan, np.float32)
+                    across = columns[low:high] - left - start
+                    strip[top - rows[low:high], across] = values[low:high]
+                    file.write(strip, 1, window=Window(start, 0, strip.shape[1], height))
+            rasterio.shutil.copy(
+                strips,
+                partial,
+                driver="COG",
+                blocksize=TILE,
+                compress="DEFLATE",
+                predictor="YES",
+                overview_resampling="AVERAGE",
+            )
+            _check_blocks(partial)
+        except (CPLE_BaseError, RasterioError) as error:
+            # GDAL's own words do not help; they stay with the cause.
+            msg = (
+                f"{path} could not be written whole, so what was there before is unchanged; free "
+                "some space or choose another folder."
+            )
+            raise InputError(msg) from error
+
+
+def _check_blocks(path: Path) -> None:
+    """Read a raster block by block: what a full disk cuts off is not always told of earlier."""
+    with rasterio.open(path) as file:
+        for level in (None, *range(len(file.overviews(1)))):
+            with rasterio.open(path, overview_level=level) as part:
+                for _, window in part.block_windows(1):
+                    part.read(1, window=window)

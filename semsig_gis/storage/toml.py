@@ -1,0 +1,130 @@
+"""Checks on TOML that people write: every key known, every value of its type, else a sentence."""
+
+from __future__ import annotations
+
+import json
+import re
+import tomllib
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+from semsig_gis.core.errors import CatalogError, nearest_name
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+
+
+TYPE_NAMES: dict[type, str] = {
+    str: "a string",
+    int: "a whole number",
+    list: "a list",
+    dict: "a table",
+    bool: "true or false",
+}
+
+
+def parse_toml(text: str, where: str) -> dict[str, Any]:
+    """Parse TOML; CatalogError names the file, `where`, if the text is something else."""
+    try:
+        return tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
+        msg = f"{where} is not valid TOML: {error}."
+        raise CatalogError(msg) from error
+
+
+def check_keys(
+    table: Mapping[str, Any],
+    allowed: Mapping[str, type],
+    where: str,
+    needed: Iterable[str] = (),
+) -> None:
+    """Refuse a table with an unknown key, a value of another type, or a key too few.
+
+    `allowed` gives the type of each key's value, ``object`` for one that is checked elsewhere. The
+    CatalogError offers the nearest known key.
+    """
+    for key, value in table.items():
+        if key not in allowed:
+            msg = (
+                f"{where} has the key {key!r}, which means nothing"
+                f"{nearest_name(key, allowed)}; the keys are {', '.join(allowed)}."
+            )
+            raise CatalogError(msg)
+        kind = allowed[key]
+        if kind is object:
+            continue
+        # bool is an int to Python, never to a catalogue
+        if not isinstance(value, kind) or isinstance(value, bool) != (kind is bool):
+            msg = f"{where} has {key} = {value!r}; write {TYPE_NAMES[kind]}."
+            raise CatalogError(msg)
+    for key in needed:
+        if key not in table:
+            msg = f"{where} lacks the key {key!r}; add it."
+            raise CatalogError(msg)
+
+
+def one_of(value: str, key: str, choices: tuple[str, ...], where: str) -> Any:  # noqa: ANN401
+    """Return a value that is one of `choices`; otherwise CatalogError offers the nearest.
+
+    The type is left open, so that it may be a `Literal`.
+    """
+    if value not in choices:
+        known = ", ".join(repr(choice) for choice in choices)
+        msg = f"{where} has {key} = {value!r}{nearest_name(value, choices)}; write one of {known}."
+        raise CatalogError(msg)
+    return value
+
+
+def texts(items: object, key: str, where: str) -> tuple[str, ...]:
+    """Return a list of texts, none of them empty; CatalogError for anything else."""
+    if not isinstance(items, list) or not all(isinstance(item, str) and item for item in items):
+        msg = f"{where} has {key} = {items!r}; write a list of texts."
+        raise CatalogError(msg)
+    return tuple(items)
+
+
+def metres(value: object, key: str, where: str, *, most: float) -> float:
+    """Return a length in metres, above 0 and up to `most`; CatalogError for anything else."""
+    # bool is an int to Python, never to a catalogue; NaN is not above 0
+    if isinstance(value, bool) or not isinstance(value, int | float) or not 0 < value <= most:
+        msg = f"{where} has {key} = {value!r}; write metres above 0 and up to {most:g}."
+        raise CatalogError(msg)
+    return float(value)
+
+
+def toml_text(values: Mapping[str, Any]) -> str:
+    """Write values as TOML: numbers, texts and lists first, then a section for each table.
+
+    There is no None, NaN or infinity among them. A parser reads back the same values, but for
+    tables that are empty.
+    """
+    return _section(values).lstrip("\n")
+
+
+def _section(values: Mapping[str, Any], *above: str) -> str:
+    tables = {name: part for name, part in values.items() if isinstance(part, Mapping)}
+    lines = [
+        f"{_key(name)} = {_inline(part)}\n" for name, part in values.items() if name not in tables
+    ]
+    for name, part in tables.items():
+        path = (*above, _key(name))
+        own = any(not isinstance(one, Mapping) for one in part.values())
+        lines += [f"\n[{'.'.join(path)}]\n"] if own else []
+        lines.append(_section(part, *path))
+    return "".join(lines)
+
+
+def _inline(value: Any) -> str:  # noqa: ANN401 - any value of JSON
+    if isinstance(value, Mapping):
+        return f"{{ {', '.join(f'{_key(n)} = {_inline(one)}' for n, one in value.items())} }}"
+    if isinstance(value, list):
+        return f"[{', '.join(map(_inline, value))}]"
+    return _text(value) if isinstance(value, str) else json.dumps(value, allow_nan=False)
+
+
+def _key(name: str) -> str:
+    return name if re.fullmatch("[A-Za-z0-9_-]+", name) else _text(name)
+
+
+def _text(text: str) -> str:
+    return json.dumps(text, ensure_ascii=False).replace("\x7f", "\\u007f")

@@ -1,0 +1,108 @@
+"""Files and folders that appear whole or not at all."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import shutil
+import tempfile
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from semsig_gis.core.errors import InputError
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+
+@contextlib.contextmanager
+def whole_file(path: str | Path) -> Iterator[Path]:
+    """Give a temporary path that replaces `path` if, and only if, the block succeeds.
+
+    The path ends in the same name, in a folder of its own beside the file; missing folders are
+    made. InputError if there is no writing there, or `path` is a folder, a device or a pipe.
+    """
+    # A link stays, and the file that it names is replaced.
+    target = Path(os.path.realpath(path))
+    if os.path.isdir(target):  # noqa: PTH112 - it answers where Path.is_dir raises
+        msg = f"{path} is a folder; give the name of a file to write."
+        raise InputError(msg)
+    if os.path.exists(target) and not os.path.isfile(target):  # noqa: PTH110, PTH113
+        msg = f"{path} is a device or a pipe; give the name of a file to write."
+        raise InputError(msg)
+    try:
+        target.parent.mkdir(parents=True, exist_ok=True)
+        folder = tempfile.mkdtemp(prefix=".semsig-", dir=target.parent)
+    except OSError as error:
+        msg = f"{path} cannot be written ({_reason(error)}); choose a folder you can write to."
+        raise InputError(msg) from error
+    # A folder of its own, because some formats write companions beside the file (-journal, -wal).
+    partial = Path(folder) / Path(path).name
+    try:
+        yield partial
+        os.replace(partial, target)  # noqa: PTH105 - the rename is the point
+    except OSError as error:
+        if error.errno is None or error.filename not in {None, str(partial), str(target)}:
+            raise
+        msg = (
+            f"{path} could not be written ({_reason(error)}); what was there before is unchanged, "
+            "so make room or choose another place."
+        )
+        raise InputError(msg) from error
+    finally:
+        shutil.rmtree(folder, ignore_errors=True)
+
+
+@contextlib.contextmanager
+def whole_folder(path: str | Path) -> Iterator[Path]:
+    """Give an empty folder that replaces `path` if, and only if, the block succeeds.
+
+    A folder that is there is replaced with all that is in it. InputError if it cannot be written.
+    """
+    target = Path(os.path.realpath(path))
+    with _box(target) as box:
+        partial = box / target.name
+        partial.mkdir()
+        yield partial
+        _put(partial, target, aside=box / "old")
+
+
+def move_folder(new: Path, place: Path) -> None:
+    """Rename a folder to its place beside it; what is there is replaced, or stays if that fails."""
+    with _box(place) as box:
+        _put(new, place, aside=box / "old")
+
+
+@contextlib.contextmanager
+def _box(target: Path) -> Iterator[Path]:
+    """Give a temporary folder beside a folder that is being written."""
+    try:
+        target.parent.mkdir(parents=True, exist_ok=True)
+        box = Path(tempfile.mkdtemp(prefix=".semsig-", dir=target.parent))
+        try:
+            yield box
+        finally:
+            shutil.rmtree(box, ignore_errors=True)
+    except OSError as error:
+        msg = (
+            f"{target} could not be written ({_reason(error)}); what was there before is "
+            "unchanged, so make room or choose another place."
+        )
+        raise InputError(msg) from error
+
+
+def _put(new: Path, place: Path, *, aside: Path) -> None:
+    """Rename a folder to its place; what is there is put aside, or back if that fails."""
+    with contextlib.suppress(FileNotFoundError):
+        place.rename(aside)
+    try:
+        new.rename(place)
+    except OSError:
+        if aside.exists():
+            aside.rename(place)
+        raise
+
+
+def _reason(error: OSError) -> str:
+    """Return the system's few words about an error, such as "Permission denied"."""
+    return os.strerror(error.errno) if error.errno else str(error)

@@ -1,0 +1,323 @@
+"""The published files of Paris, each as it is, against figures of an independent reader."""
+
+from __future__ import annotations
+
+import csv
+import json
+import sqlite3
+from collections import Counter
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pytest
+import shapely
+
+from semsig_gis.objects.clean import build_objects
+from semsig_gis.sources.catalog import load_catalog, paper_taxonomy
+from semsig_gis.sources.opendatasoft.reader import read_layers
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from semsig_gis.objects.table import StreetObjects
+    from semsig_gis.sources import RawLayer
+
+STOPS = "positions-geographiques-des-stations-du-reseau-ratp.csv"
+# File, layer, rows as published, rows that the filter leaves out, rows that repeat an id, and
+# objects at different places.
+FILES = [
+    ("fontaines-a-boire.json", "fountains", 1_323, 0, 0, 1_323),
+    ("fontaines-a-boire__DashParis.csv", "fountains", 1_188, 0, 0, 1_188),
+    ("sanisettesparis.json", "toilets", 615, 0, 0, 606),
+    ("sanisettesparis__DashParis.csv", "toilets", 644, 0, 0, 633),
+    ("velib-emplacement-des-stations.geojson", "bike_stations", 1_003, 0, 0, 1_003),
+    ("gpdtut_paris_bike_stations.geojson", "bike_stations_2010s", 1_226, 0, 0, 1_226),
+    ("bornes-dappel-taxi.csv", "taxi_ranks", 419, 0, 0, 417),
+    ("Autolib_dataset.csv", "car_stations", 5_000, 0, 3_895, 1_105),
+    ("coord-feurouge_west.json", "traffic_light_positions", 23_564, 0, 0, 4_539),
+    ("signalisation-tricolore_15_16.geojson", "traffic_lights", 1_091, 0, 467, 624),
+    ("signalisation-tricolore_arrond_sample.geojson", "traffic_lights", 1_264, 0, 22, 1_242),
+    ("signalisation-tricolore_repeaters.geojson", "traffic_lights", 232, 0, 73, 159),
+    ("les-arbres_10K_sample.csv", "trees", 9_999, 4_903, 0, 5_096),
+    ("les-arbres_gael.geojson", "trees", 3_542, 3_030, 0, 512),
+    ("les-arbres_julien2019.csv", "trees", 197, 195, 0, 2),
+    ("les-arbres_nizar.csv", "trees", 2_948, 1_410, 0, 1_538),
+    ("gpdtut_paris_trees.gpkg", "trees_extract", 7_856, 2_657, 0, 5_199),
+    (STOPS, "bus_stops", 25_338, 955, 0, 11_589),
+]
+TREES = [name for name, layer, *_ in FILES if layer == "trees"]
+# Boundaries and land use, which hold no street objects.
+OTHERS = {
+    "arrondissements.geojson",
+    "gpdtut_paris_districts.geojson",
+    "gpdtut_paris_land_use.zip",
+    "paris-perimeter.geojson",
+}
+# Around the region of Paris.
+WEST, SOUTH, EAST, NORTH = 1.8, 48.5, 2.9, 49.2
+
+
+@pytest.fixture(scope="module")
+def paris(geodata: Path) -> Path:
+    return geodata / "paris"
+
+
+def read(path: Path, name: str, *, filters: bool = True) -> RawLayer:
+    (layer,) = read_layers(path, [load_catalog("opendata_paris").layer(name)], filters=filters)
+    return layer
+
+
+def build(*layers: RawLayer) -> StreetObjects:
+    catalog = load_catalog("opendata_paris")
+    assert catalog.metric_crs is not None
+    return build_objects(layers, taxonomy=catalog.taxonomy, crs=catalog.metric_crs)[0]
+
+
+def rows_of(path: Path) -> list[dict[str, Any]]:
+    """Read a CSV file with nothing but Python's own reader."""
+    with path.open(encoding="utf-8-sig", newline="") as stream:
+        sample = stream.readline()
+        stream.seek(0)
+        return list(csv.DictReader(stream, delimiter=";" if ";" in sample else ","))
+
+
+def xy_of(layer: RawLayer) -> np.ndarray[tuple[int, int], np.dtype[np.float64]]:
+    xy: np.ndarray[tuple[int, int], np.dtype[np.float64]]
+    xy = shapely.get_coordinates(shapely.centroid(layer.table.geometry.array))
+    return xy
+
+
+def lat_lon(texts: list[str]) -> list[list[float]]:
+    """Return (longitude, latitude) of texts with the latitude first."""
+    return [[float(part) for part in text.split(",")][::-1] for text in texts]
+
+
+def test_all_files_of_the_folder_are_listed(paris: Path) -> None:
+    assert {path.name for path in paris.iterdir()} == {name for name, *_ in FILES} | OTHERS
+
+
+@pytest.mark.parametrize("published", FILES, ids=[file for file, *_ in FILES])
+def test_published_files_load_as_they_are(
+    paris: Path, published: tuple[str, str, int, int, int, int]
+) -> None:
+    file, name, rows, filtered, duplicates, places = published
+    layer = read(paris / file, name)
+    counts = (layer.read, layer.filtered, layer.duplicates, layer.error_count)
+    assert counts == (rows, filtered, duplicates, 0)
+    assert layer.read == len(layer.table) + layer.filtered + layer.duplicates + layer.error_count
+    assert (layer.errors, layer.notes) == ((), ())
+    assert set(layer.table["class_name"]) == {layer.spec.class_name}
+    if layer.table.crs == "EPSG:4326":
+        x, y = xy_of(layer).T
+        assert ((x > WEST) & (x < EAST) & (y > SOUTH) & (y < NORTH)).all()
+    objects = build(layer)
+    assert len(objects) == places
+    assert objects.table["count"].sum() == rows - filtered - duplicates
+
+
+@pytest.mark.parametrize(("file", "name"), [(file, name) for file, name, *_ in FILES])
+def test_filters_can_be_off(paris: Path, file: str, name: str) -> None:
+    layer = read(paris / file, name, filters=False)
+    assert (layer.filtered, layer.error_count) == (0, 0)
+    assert len(layer.table) + layer.duplicates == layer.read
+
+
+# --- Trap by trap -------------------------------------------------------------------------------
+
+
+def test_trees_of_all_files_are_one_list_of_ids(paris: Path) -> None:
+    layers = [read(paris / file, "trees", filters=False) for file in TREES]
+    found: set[str] = set().union(*(layer.table["source_id"] for layer in layers))
+    assert len(found) == 16_328
+    expected = set()
+    for file in TREES:
+        if file.endswith(".csv"):
+            expected |= {str(int(float(row["IDBASE"]))) for row in rows_of(paris / file)}
+        else:
+            content = json.loads((paris / file).read_text())
+            expected |= {str(item["properties"]["idbase"]) for item in content["features"]}
+    assert found == expected
+
+
+@pytest.mark.parametrize(
+    ("name", "filters", "ids"),
+    [
+        ("trees", False, 16_328),
+        ("trees", True, 7_055),
+        ("fountains", True, 1_355),
+        ("traffic_lights", True, 2_010),
+    ],
+)
+def test_objects_in_several_files_are_taken_once(
+    paris: Path, name: str, *, filters: bool, ids: int
+) -> None:
+    files = [file for file, layer, *_ in FILES if layer == name]
+    layers = [read(paris / file, name, filters=filters) for file in files]
+    objects = build(*layers)
+    assert objects.table["count"].sum() == ids
+    assert len({identifier for layer in layers for identifier in layer.table["source_id"]}) == ids
+
+
+def test_trees_of_streets_are_kept_whatever_the_header(paris: Path) -> None:
+    found: set[str] = set()
+    expected = set()
+    for file in TREES:
+        found |= set(read(paris / file, "trees").table["source_id"])
+        if file.endswith(".csv"):
+            rows = rows_of(paris / file)
+            expected |= {row["IDBASE"] for row in rows if row["DOMANIALITE"] == "Alignement"}
+        else:
+            features = json.loads((paris / file).read_text())["features"]
+            values = [item["properties"] for item in features]
+            expected |= {str(v["idbase"]) for v in values if v["domanialite"] == "Alignement"}
+    assert found == {identifier.removesuffix(".0") for identifier in expected}
+    assert len(found) == 7_055
+
+
+def test_the_extract_of_trees_has_no_ids_at_all(paris: Path) -> None:
+    with sqlite3.connect(f"file:{paris / 'gpdtut_paris_trees.gpkg'}?immutable=1", uri=True) as data:
+        columns = [row[1] for row in data.execute("PRAGMA table_info(paris_trees_small)")]
+    assert columns == ["fid", "geom", "species", "location_type"]
+
+
+def test_ids_that_were_written_as_floats_are_whole(paris: Path) -> None:
+    layer = read(paris / "les-arbres_julien2019.csv", "trees", filters=False)
+    assert layer.table["source_id"][0] == "123704"
+    assert layer.table["source_id"].str.fullmatch(r"\d+").all()
+
+
+@pytest.mark.parametrize(
+    ("file", "name", "field", "identifier"),
+    [
+        ("les-arbres_10K_sample.csv", "trees", "geo_point_2d", "IDBASE"),
+        ("les-arbres_julien2019.csv", "trees", "geo_point_2d", "IDBASE"),
+        ("fontaines-a-boire__DashParis.csv", "fountains", "geo_point_2d", "Identifiant"),
+        ("bornes-dappel-taxi.csv", "taxi_ranks", "geopoint", "id"),
+        (STOPS, "bus_stops", "Coordinates", "ID"),
+    ],
+)
+def test_positions_are_those_of_the_point_column(
+    paris: Path, file: str, name: str, field: str, identifier: str
+) -> None:
+    layer = read(paris / file, name, filters=False)
+    rows = rows_of(paris / file)
+    ids = [row[identifier].removesuffix(".0") for row in rows]
+    assert layer.table["source_id"].tolist() == ids
+    # The shape has some decimals more than the point.
+    assert xy_of(layer) == pytest.approx(np.array(lat_lon([row[field] for row in rows])), abs=1e-9)
+
+
+def test_the_last_column_of_the_taxi_file_has_the_other_order(paris: Path) -> None:
+    rows = rows_of(paris / "bornes-dappel-taxi.csv")
+    first = [float(row["geopoint"].split(",")[0]) for row in rows]
+    last = [float(row["geopoint_datagouv"].split(",")[0]) for row in rows]
+    assert min(first) > 48
+    assert max(last) < 3
+    layer = read(paris / "bornes-dappel-taxi.csv", "taxi_ranks")
+    assert xy_of(layer)[:, 0] == pytest.approx(last)
+    twice = layer.table[layer.table["source_id"] == "75117-T-086"]
+    assert twice.geometry.nunique() == 2  # so this id is not unique, and both stay
+
+
+def test_shapes_of_toilets_are_points_in_a_list(paris: Path) -> None:
+    for file in ("sanisettesparis.json", "sanisettesparis__DashParis.csv"):
+        layer = read(paris / file, "toilets")
+        assert set(layer.table.geometry.geom_type) == {"MultiPoint"}
+        assert (layer.table.geometry.count_geometries() == 1).all()
+    rows = rows_of(paris / "sanisettesparis__DashParis.csv")
+    expected = np.array(lat_lon([row["geo_point_2d"] for row in rows]))
+    assert xy_of(layer) == pytest.approx(expected, abs=1e-9)
+
+
+def test_stations_of_autolib_stand_still(paris: Path) -> None:
+    places: dict[str, set[str]] = {}
+    for row in rows_of(paris / "Autolib_dataset.csv"):
+        places.setdefault(row["ID"], set()).add(row["Geo point"])
+    assert max(map(len, places.values())) == 1
+    layer = read(paris / "Autolib_dataset.csv", "car_stations")
+    assert layer.table["source_id"].tolist() == list(places)
+    expected = lat_lon([next(iter(items)) for items in places.values()])
+    assert xy_of(layer).tolist() == expected
+
+
+def test_lamps_of_a_support_are_one_traffic_light(paris: Path) -> None:
+    files = [file for file, name, *_ in FILES if name == "traffic_lights"]
+    for file in files:
+        features = json.loads((paris / file).read_text())["features"]
+        supports = Counter(item["properties"]["cod_ouvrag"] for item in features)
+        places = {tuple(item["geometry"]["coordinates"]) for item in features}
+        layer = read(paris / file, "traffic_lights")
+        assert layer.table["source_id"].tolist() == list(supports)
+        assert len(build(layer)) == len(places) == len(supports)
+
+
+def test_traffic_light_positions_are_the_distinct_ones(paris: Path) -> None:
+    content = json.loads((paris / "coord-feurouge_west.json").read_text())
+    places = {(item["lng"], item["lat"]) for item in content}
+    layer = read(paris / "coord-feurouge_west.json", "traffic_light_positions")
+    assert set(map(tuple, xy_of(layer).tolist())) == places
+    assert len(build(layer)) == len(places) == 4_539
+
+
+def test_stops_in_capitals_are_those_of_buses_and_trams(paris: Path) -> None:
+    file = paris / STOPS
+    layer = read(file, "bus_stops")
+    rows = rows_of(file)
+    stops = [row for row in rows if row["Name"] == row["Name"].upper()]
+    assert layer.table["source_id"].tolist() == [row["ID"] for row in stops]
+    rail = [row for row in rows if row["Name"] != row["Name"].upper()]
+    # What supports the rule: every short number is a station's, whose names are all mixed, and
+    # the addresses of stops are in capitals too.
+    assert len(rail) == 955
+    assert {row["ID"] for row in rows if len(row["ID"]) < 7} <= {row["ID"] for row in rail}
+    assert sum(row["Description"] != row["Description"].upper() for row in stops) <= 1
+    assert sum(row["Description"] == row["Description"].upper() for row in rail) <= 4
+    assert {"Châtelet", "Nation", "La Défense (Grande Arche)"} <= {row["Name"] for row in rail}
+
+
+# --- The catalogue ------------------------------------------------------------------------------
+
+
+def test_the_classes_of_the_paper_have_a_layer_each() -> None:
+    catalog = load_catalog("opendata_paris")
+    classes = {spec.class_name for spec in catalog.layers if spec.role == "objects"}
+    assert classes == {item.name for item in paper_taxonomy().classes}
+    assert catalog.taxonomy.classes == paper_taxonomy().classes
+    assert (catalog.reader, catalog.metric_crs) == ("opendatasoft", "EPSG:2154")
+    assert catalog.endpoints == ("https://opendata.paris.fr",)
+    assert {spec.role for spec in catalog.layers} == {"objects", "buildings"}
+
+
+def test_the_catalogue_says_how_sure_it_is_of_each_layer() -> None:
+    catalog = load_catalog("opendata_paris")
+    assert all(spec.note for spec in catalog.layers)
+    plain = {spec.name for spec in catalog.layers if not spec.optional}
+    assert plain == {
+        "trees",
+        "fountains",
+        "street_lights",
+        "traffic_lights",
+        "bike_stations",
+        "toilets",
+        "taxi_ranks",
+        "car_stations",
+        "bus_stops",
+    }
+    datasets = {spec.name: spec.dataset for spec in catalog.layers if spec.dataset}
+    assert datasets == {
+        "trees": "les-arbres",
+        "fountains": "fontaines-a-boire",
+        "street_lights": "eclairage-public",
+        "traffic_lights": "signalisation-tricolore",
+        "bike_stations": "velib-emplacement-des-stations",
+        "toilets": "sanisettesparis",
+        "taxi_ranks": "bornes-dappel-taxi",
+        "benches": "plan-de-voirie-mobiliers-urbains-jardinieres-bancs-corbeilles-de-rue",
+        "bus_shelters": "plan-de-voirie-mobiliers-urbains-abris-voyageurs-points-darrets-bus",
+        "indicators": (
+            "plan-de-voirie-mobiliers-urbains-kiosques-toilettes-publiques-panneaux-publicita"
+        ),
+        "buildings": "volumesbatisparis",
+    }
+    licences = {spec.license for spec in catalog.layers if spec.name != "bus_stops"}
+    assert licences == {"Open Database License (ODbL)"}

@@ -1,0 +1,412 @@
+"""The commands by likelihood as their user meets them: localize, learn and calibrate."""
+
+from __future__ import annotations
+
+import io
+import json
+import math
+from typing import TYPE_CHECKING, Any
+
+import geopandas as gpd
+import numpy as np
+import pytest
+import rasterio
+import shapely
+from sentences import sentence
+from worlds import CORNER, World, random_town
+
+from semsig_gis.database.file import save_database
+from semsig_gis.database.store import ObjectStore, save_with_store
+from semsig_gis.database.visibility import views_at
+from semsig_gis.likelihood.answer_rule import open_rule
+from semsig_gis.likelihood.noise.model import open_noise
+from semsig_gis.objects.table import save_objects
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from conftest import Run
+
+WORLD = random_town()
+CITY = WORLD.database
+STORE = ObjectStore.of(WORLD.street_objects)
+BY = ("--method", "likelihood")
+
+
+@pytest.fixture
+def city(tmp_path: Path) -> Path:
+    """Return a database with its object store beside it."""
+    save_with_store(CITY, STORE, tmp_path / "city.parquet")
+    return tmp_path / "city.parquet"
+
+
+def seen_from(xy: np.ndarray) -> dict[str, Any]:
+    """Return what a faultless detector tells from a place."""
+    view = views_at(STORE.objects, xy[None], index=STORE.index, radius=30.0)
+    return {"types": CITY.taxonomy.decode(view.codes), "bearings": view.bearings.tolist()}
+
+
+def options(seen: dict[str, Any]) -> tuple[str, ...]:
+    return ("--types", seen["types"], "--bearings", ",".join(map(str, seen["bearings"])))
+
+
+def written(path: Path, rows: list[dict[str, Any]]) -> Path:
+    path.write_text("".join(json.dumps(row) + "\n" for row in rows), encoding="utf-8")
+    return path
+
+
+def walk(count: int) -> tuple[np.ndarray, list[dict[str, Any]]]:
+    """Return places 15 m apart, and what is seen from them with the ways between."""
+    places = CORNER + np.array([[50.0 + 15.0 * step, 90.0] for step in range(count)])
+    rows = [seen_from(place) for place in places]
+    rows[0]["id"] = "start"
+    for row in rows[1:]:
+        row |= {"dx": 15.0, "dy": 0.0, "sigma": 1.0}
+    return places, rows
+
+
+PLACE = CORNER + np.array([103.0, 97.0])
+SEEN = seen_from(PLACE)
+
+
+def test_the_likelihood_answers_or_cannot_tell(city: Path, run: Run) -> None:
+    query = "localize", city, *options(SEEN), *BY
+    code, out, told = run(*query, "--json", "--top", 3)
+    assert code == 0
+    assert "is built" in told
+    answer = json.loads(out)
+    assert answer["noise"] == "generic"
+    assert len(answer["candidates"]) == 3
+    assert answer["answered"]
+    assert math.dist((answer["place"]["x"], answer["place"]["y"]), PLACE) < 10.0
+    assert "explanation" not in answer["candidates"][0]
+    code, out, told = run(*query, "--noise", "medium", "--heading", "unknown", "--top", 2)
+    assert code == 0
+    assert "2 best of" in out
+    assert "give or take" in out
+    assert "The north of the query lies at" in out
+    code, out, told = run("localize", city, "--types", SEEN["types"][:1], *BY)
+    assert (code, "is built" in told) == (0, False)
+    assert "Cannot tell: the best place is" in out
+    assert "of the chance is in" in out
+    x, y = PLACE
+    prior = "--near", f"{x},{y},15", "--require", SEEN["types"][0]
+    assert run(*query, *prior, "--heading", 10)[0] == 0
+    square = shapely.box(x - 6, y - 6, x + 6, y + 6)
+    gpd.GeoDataFrame(geometry=[square], crs=2154).to_file(city.with_name("square.gpkg"))
+    area = "--area", city.with_name("square.gpkg")
+    inside = json.loads(run("localize", city, "--types", SEEN["types"], *BY, *area, "--json")[1])
+    assert inside["answered"]
+    assert sum(row["chance"] for row in inside["candidates"][:4]) == pytest.approx(1.0)
+
+
+def test_a_raster_tells_where_people_are(city: Path, run: Run) -> None:
+    x, y = PLACE
+    people = city.with_name("people.tif")
+    spec = {"width": 3, "height": 3, "count": 1, "dtype": "uint8", "crs": "EPSG:2154"}
+    place = rasterio.Affine(200.0, 0.0, x - 300.0, 0.0, -200.0, y + 300.0)
+    with rasterio.open(people, "w", transform=place, **spec) as file:
+        file.write(np.array([[0, 0, 0], [0, 9, 0], [0, 0, 0]], np.uint8), 1)
+    query = "localize", city, "--types", SEEN["types"][:1], *BY
+    found = json.loads(run(*query, "--popularity", people, "--json", "--top", 500)[1])
+    likely = [row for row in found["candidates"] if row["chance"] > 0]
+    assert likely
+    assert all(abs(row["x"] - x) < 110 and abs(row["y"] - y) < 110 for row in likely)
+    sentence(run(*query, "--popularity", city), "cannot be read as a raster")
+
+
+def test_a_query_from_the_middle_of_a_cell(city: Path, run: Run) -> None:
+    cell = int(CITY.lengths.argmax())
+    query = "localize", city, *options(seen_from(CITY.xy[cell])), *BY, "--json"
+    sure, likely = (
+        json.loads(run(*query, *more)[1])["candidates"][0] for more in (("--on-grid",), ())
+    )
+    assert sure["cell_id"] == likely["cell_id"] == CITY.cell_ids[cell]
+    assert sure["chance"] > likely["chance"]
+
+
+def test_a_place_is_refined_explained_and_drawn(city: Path, run: Run) -> None:
+    page = city.with_name("map.html")
+    query = "localize", city, *options(SEEN), *BY, "--explain"
+    code, out, _ = run(*query, "--map", page)
+    assert code == 0
+    assert "Rank 1, at x" in out
+    assert "matched" in out
+    assert "street_light" in out or "alignment_tree" in out or "world" in out
+    assert "Rank 3, at x" in out
+    assert f"map: {page}" in out
+    assert "leaflet" in page.read_text(encoding="utf-8").lower()
+    answer = json.loads(run(*query, "--json")[1])
+    place = answer["place"]
+    assert place["refined"]
+    assert math.dist((place["x"], place["y"]), PLACE) < 1.0
+    assert place["sigma"] < 2.0
+    why = [row.get("explanation") for row in answer["candidates"]]
+    assert [one is not None for one in why] == [True] * 3 + [False] * 7
+    rows = why[0]["rows"]
+    assert why[0]["counts"]["matched"] == len(SEEN["types"])
+    assert {row["source"] for row in rows} == {"world"}
+    assert all(row["source_id"].isdigit() for row in rows)
+
+
+def test_street_objects_from_elsewhere_or_from_nowhere(city: Path, run: Run) -> None:
+    query = "localize", city, *options(SEEN), *BY
+    moved = city.with_name("elsewhere")
+    city.with_suffix(".objects").rename(moved)
+    sentence(run(*query, "--refine"), "no object store", "build the database again")
+    code, out, told = run(*query, "--explain", "--json")
+    assert code == 0
+    assert "street objects are not at hand" in told
+    rows = json.loads(out)["candidates"][0]["explanation"]["rows"]
+    assert {row["source_id"] for row in rows} == {None}
+    assert json.loads(run(*query, "--objects", moved, "--json")[1])["place"]["refined"]
+    file = city.with_name("objects.parquet")
+    save_objects(WORLD.street_objects, file)
+    assert json.loads(run(*query, "--refine", "--objects", file, "--json")[1])["place"]["refined"]
+    table = WORLD.street_objects.table.to_crs("EPSG:32631")
+    other = type(WORLD.street_objects)(table, WORLD.street_objects.taxonomy, ())
+    save_objects(other, file)
+    sentence(run(*query, "--refine", "--objects", file), "EPSG:32631", "EPSG:2154")
+    sentence(run(*query, "--no-refine", "--objects", file), "--objects and --no-refine")
+    sentence(run(*query, "--on-grid", "--objects", file), "--objects and --on-grid")
+    sentence(run(*query, "--refine", "--objects", city.with_name("none")), "none")
+    sentence(run(*query, "--refine", "--on-grid", "--objects", moved), "--on-grid and --refine")
+
+
+def test_a_route_is_answered_line_by_line(
+    city: Path, run: Run, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    places, rows = walk(4)
+    rows[1] = {"types": "", "bearings": [], "distance": 15.0, "bearing": 90.0, "sigma": 1.0}
+    file = written(city.with_name("route.jsonl"), rows)
+    query = "localize", city, *BY, "--route", "--queries"
+    for more in (("--no-refine",), ("--refine", "--explain"), ("--heading", "unknown")):
+        code, out, _ = run(*query, file, *more)
+        assert code == 0
+        answers = [json.loads(line) for line in out.splitlines()]
+        assert [answer["id"] for answer in answers] == ["start", 2, 3, 4]
+        for answer, place in zip(answers, places, strict=True):
+            assert math.dist((answer["place"]["x"], answer["place"]["y"]), place) < 15.0
+            assert answer["answered"]
+    monkeypatch.setattr("sys.stdin", io.StringIO(file.read_text(encoding="utf-8")))
+    assert len(run(*query, "-")[1].splitlines()) == 4
+
+
+def test_a_route_whose_legs_do_not_fit(city: Path, run: Run) -> None:
+    query = "localize", city, *BY, "--route", "--queries", city.with_name("route.jsonl")
+    _, rows = walk(3)
+    for number, change, words in (
+        (1, {"dx": None, "dy": None, "sigma": None}, ("line 2", "does not tell the way")),
+        (0, {"dx": 1.0, "dy": 2.0}, ("line 1", "tells a way")),
+        (2, {"dy": None}, ("line 3", "dx and dy")),
+        (2, {"bearing": 3.0}, ("line 3", "dx and dy, or distance and bearing")),
+        (2, {"dx": "far"}, ("line 3", "far")),
+        (2, {"dx": math.inf}, ("line 3", "finite")),
+        (2, {"sigma": -1.0}, ("line 3", "-1.0")),
+    ):
+        changed = [row | change if line == number else row for line, row in enumerate(rows)]
+        written(city.with_name("route.jsonl"), changed)
+        sentence(run(*query), "route.jsonl", *words)
+    sentence(run("localize", city, *options(SEEN), *BY, "--route"), "--route", "--queries")
+
+
+def samples(count: int, *, seed: int = 0) -> list[dict[str, Any]]:
+    """Return what a poor detector tells from random places."""
+    rng = np.random.default_rng(seed)
+    rows = []
+    for place in CORNER + rng.uniform(20, 180, (count, 2)):
+        view = views_at(STORE.objects, place[None], index=STORE.index, radius=30.0)
+        kept = rng.random(len(view.codes)) < 0.8
+        angles = (view.bearings[kept] + rng.normal(0, 4.0, int(kept.sum()))) % 360.0
+        seen = {"types": CITY.taxonomy.decode(view.codes[kept]), "bearings": angles.tolist()}
+        rows.append({"x": place[0], "y": place[1], **seen})
+    return rows
+
+
+def test_noise_is_learnt_and_used(city: Path, run: Run) -> None:
+    file, out = written(city.with_name("s.jsonl"), samples(150)), city.with_name("noise.toml")
+    learn = "learn", city, "--samples", file, "--out", out
+    code, printed, _ = run(*learn)
+    assert code == 0
+    assert "Learnt from" in printed
+    assert "bearing_sigma" in printed
+    assert f"noise model: {out}" in printed
+    found = json.loads(run(*learn, "--json")[1])
+    (detection,) = (
+        row for row in found["rates"] if (row["quantity"], row["class"]) == ("detection", "all")
+    )
+    assert detection["low_95"] < 0.8 < detection["high_95"]
+    assert detection["samples"] == found["objects"]
+    noise = open_noise(out)
+    assert noise.name == "noise"
+    assert noise.to_dict()["position_sigma"] == 0.0
+    assert noise.to_dict()["bearing_sigma"] == pytest.approx(4.0, abs=0.5)
+    query = "localize", city, *options(SEEN), *BY, "--refine", "--json", "--noise", out
+    answer = json.loads(run(*query)[1])
+    assert answer["noise"] == "noise"
+    assert math.dist((answer["place"]["x"], answer["place"]["y"]), PLACE) < 1.0
+
+
+def test_noise_is_learnt_without_a_store(city: Path, run: Run) -> None:
+    save_database(CITY, city.with_name("bare.parquet"))
+    out = city.with_name("noise.json")
+    rows = samples(100)
+    for row in rows[:50]:
+        cell = CITY.grid.cells_at([[row.pop("x"), row.pop("y")]])
+        row["cell_id"] = int(cell[0][0]) * 10**8 + int(cell[1][0])
+    for database in (city, city.with_name("bare.parquet")):
+        file = written(city.with_name("s.jsonl"), rows)
+        code, _, told = run("learn", database, "--samples", file, "--out", out)
+        assert code == 0
+        assert ("street objects are not at hand" in told) == (database != city)
+        assert open_noise(out).to_dict()["position_sigma"] == 0.0
+
+
+def test_a_rule_is_calibrated_and_used(city: Path, run: Run) -> None:
+    file = written(
+        city.with_name("s.jsonl"), [*samples(60), samples(1)[0] | {"types": "", "bearings": ""}]
+    )
+    out = city.with_name("rule.json")
+    calibrate = "calibrate", city, "--samples", file, "--out", out, "--precision", 0.9
+    code, printed, _ = run(*calibrate, "--no-refine")
+    assert code == 0
+    assert "Answers from a chance of" in printed
+    rule = open_rule(out)
+    assert rule.queries == 61
+    assert 0 < rule.answered < 61
+    told = json.loads(run(*calibrate, "--json")[1])
+    assert told["coverage"] >= rule.coverage
+    assert told["precision"] == 0.9
+    query = "localize", city, *options(SEEN), *BY, "--json", "--rule", out
+    assert json.loads(run(*query)[1])["threshold"] == open_rule(out).threshold
+    code, printed, _ = run("calibrate", city, "--samples", file, "--out", out, "--no-refine")
+    assert "nothing is answered" in printed
+    answer = json.loads(run(*query)[1])
+    assert (answer["answered"], answer["threshold"]) == (False, None)
+    sentence(run(*calibrate[:-1], 1.5), "precision", "1.5")
+
+
+def test_samples_that_are_none(city: Path, run: Run) -> None:
+    file, out = city.with_name("s.csv"), city.with_name("out.toml")
+    for text, words in (
+        ("", ("no rows", "one sample")),
+        ("x,y,types,bearings\n", ("no rows",)),
+        ("types,bearings\nD,3\n", ("line 2", "true place")),
+        ("x,y,types,bearings\n1,2,D,nan\n", ("line 2", "nan")),
+    ):
+        file.write_text(text, encoding="utf-8")
+        for command in ("learn", "calibrate"):
+            sentence(run(command, city, "--samples", file, "--out", out), "s.csv", *words)
+    file.write_text("x,y,types,bearings\n1,2,D,3\n", encoding="utf-8")
+    sentence(run("learn", city, "--samples", file, "--out", out), "none of the 1", "EPSG:2154")
+    sentence(run("learn", city, "--samples", city.with_name("n.csv"), "--out", out), "n.csv")
+    assert not out.exists()
+
+
+def test_a_damaged_or_stale_index_is_built_again(city: Path, run: Run) -> None:
+    query = "localize", city, *options(SEEN), *BY, "--json"
+    assert "does not exist yet and is built" in run(*query)[2]
+    first = run(*query)
+    assert (first[0], first[2]) == (0, "")
+    (index,) = city.parent.glob("*.likelihood")
+    index.write_bytes(index.read_bytes()[:-500])
+    damaged = run(*query)
+    assert "is built again" in damaged[2]
+    assert "damaged" in damaged[2]
+    assert damaged[1] == first[1]
+    save_with_store(CITY.select(slice(0, 300)), STORE, city)
+    assert "is built again" in run(*query)[2]
+    assert run(*query)[2] == ""
+
+
+def test_a_database_of_one_cell(city: Path, run: Run) -> None:
+    save_with_store(CITY.select(slice(40, 41)), STORE, city)
+    seen = seen_from(CITY.xy[40])
+    for more in (("--no-refine",), ("--explain", "--heading", "unknown")):
+        code, out, _ = run("localize", city, *options(seen), *BY, *more, "--json")
+        assert code == 0
+        answer = json.loads(out)
+        assert answer["answered"]
+        assert answer["candidates"][0]["chance"] == pytest.approx(1.0)
+
+
+def test_a_query_longer_than_any_signature(city: Path, run: Run) -> None:
+    symbols = CITY.taxonomy.decode(CITY.present_codes) * 60
+    angles = ",".join(str(number * 360 / len(symbols)) for number in range(len(symbols)))
+    query = "localize", city, "--types", symbols, "--bearings", angles, "--json"
+    for more in (BY, (*BY, "--no-refine"), ()):
+        code, out, _ = run(*query, *more)
+        assert code == 0
+        assert json.loads(out)["query"]["length"] == len(symbols) > 257
+    sentence(run(*query, *BY, "--heading", "unknown"), "257 objects")
+
+
+def test_bearings_of_360_and_minus_10(city: Path, run: Run) -> None:
+    query = "localize", city, "--types", SEEN["types"][:3], *BY, "--json"
+    plain = run(*query, "--bearings", "0,350,20")
+    assert run(*query, "--bearings", "360,-10,20")[1] == plain[1]
+    assert json.loads(plain[1])["query"]["bearings"] == [0.0, 20.0, 350.0]
+
+
+def test_what_cannot_be_used_is_refused(city: Path, run: Run) -> None:
+    query = "localize", city, *options(SEEN)
+    noise, rule = city.with_name("noise.toml"), city.with_name("rule.json")
+    noise.write_text("[confusion.bench]\nbench = 0.5\n", encoding="utf-8")
+    rule.write_text('{"threshold": "high"}', encoding="utf-8")
+    far = city.with_name("far.gpkg")
+    gpd.GeoDataFrame(geometry=[shapely.box(0, 0, 9, 9)], crs=2154).to_file(far)
+    code = int(CITY.present_codes[-1])
+    others = [
+        cell
+        for cell in range(len(CITY))
+        if code not in CITY.codes[slice(*CITY.offsets[cell : cell + 2])]
+    ]
+    few = city.with_name("few.parquet")
+    save_database(CITY.select(np.array(others)), few)
+    absent = "--types", CITY.taxonomy.by_code(code).symbol
+    one = ("localize", city, *BY)
+    for call, words in (
+        ((*one, "--types", ""), ("without objects",)),
+        ((*one, "--bearings", ""), ("without objects",)),
+        (one, ("types, bearings or both",)),
+        ((*one, "--types", "BB", "--bearings", "nan,2"), ("bearing nan",)),
+        ((*one, "--types", "BB", "--bearings", "400,2"), ("bearing 400",)),
+        ((*one, "--types", "BB", "--bearings", "2"), ("2 types", "1 bearings")),
+        ((*one, "--types", "%"), ("'%'",)),
+        (("localize", few, *BY, *absent), ("no cell of the database sees",)),
+        ((*query, *BY, "--noise", noise), ("'bench'", "sums to 0.5")),
+        ((*query, *BY, "--noise", "lihgt"), ("'lihgt'", "light")),
+        ((*query, *BY, "--noise", city.with_name("n.toml")), ("n.toml", "cannot be read")),
+        ((*query, *BY, "--heading", "north"), ("'north'", "unknown")),
+        ((*query, *BY, "--heading", -3), ("-3", "from 0 up")),
+        ((*query, *BY, "--heading", "nan"), ("'nan'",)),
+        ((*query, *BY, "--near", "1,2"), ("X,Y,SIGMA",)),
+        ((*query, *BY, "--area", far), ("excludes every cell",)),
+        ((*query, *BY, "--require", f"{SEEN['types'][0]}=0,90?"), ("every cell",)),
+        ((*query, *BY, "--require", "%"), ("'%'",)),
+        ((*query, *BY, "--rule", rule), ("rule.json", "high")),
+        ((*query, *BY, "--rule", noise), ("noise.toml", "cannot be used")),
+        ((*query, *BY, "--top", 0), ("0 candidates",)),
+        ((*query, *BY, "--map", city.parent), ("is a folder",)),
+        ((*one, "--types", "BB", "--refine"), ("bearings",)),
+        (
+            (*query, "--heading", "unknown", "--refine"),
+            ("--heading and --refine are", "likelihood"),
+        ),
+        ((*query, "--rule", rule), ("--rule is", "edit+edit")),
+    ):
+        sentence(run(*call), *words)
+
+
+def test_nobody_stands_where_nothing_is_possible(city: Path, run: Run) -> None:
+    apart = World((*WORLD.objects, (CORNER[0] + 900.0, CORNER[1], WORLD.objects[0][2])))
+    save_with_store(apart.database, ObjectStore.of(apart.street_objects), city)
+    corner = shapely.box(*CORNER, *(CORNER + 50.0))
+    area = city.with_name("corner.gpkg")
+    gpd.GeoDataFrame(geometry=[corner], crs=2154).to_file(area)
+    x, y = CORNER[0] + 900.0, CORNER[1]
+    prior = "--area", area, "--near", f"{x},{y},1"
+    code, out, _ = run("localize", city, *options(SEEN), *BY, *prior, "--json")
+    assert code == 0
+    best = json.loads(out)["place"]
+    assert shapely.Point(best["x"], best["y"]).within(corner)

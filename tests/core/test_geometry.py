@@ -1,0 +1,110 @@
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import assume, given
+from hypothesis import strategies as st
+
+from semsig_gis.core.geometry import angular_distance, bearings, wrap_degrees
+
+ANGLES = st.floats(-1e6, 1e6)
+METRES = st.floats(-1e4, 1e4)
+
+
+def apart(a: float, b: float) -> float:
+    """Return the angle between two directions, by the complex plane."""
+    turn = complex(math.cos(math.radians(a - b)), math.sin(math.radians(a - b)))
+    return abs(math.degrees(math.atan2(turn.imag, turn.real)))
+
+
+@given(ANGLES)
+def test_wrapping_lands_on_one_turn_and_stays_there(angle: float) -> None:
+    once = wrap_degrees(angle)
+    assert 0.0 <= once < 360.0
+    assert wrap_degrees(once) == once
+    assert apart(float(once), angle) < 1e-6
+
+
+@given(st.floats(0.0, 360.0, exclude_max=True))
+def test_an_angle_on_one_turn_is_left_alone(angle: float) -> None:
+    assert wrap_degrees(angle) == angle
+
+
+@given(st.integers(-1000, 1000), st.integers(0, 359))
+def test_whole_turns_do_not_matter(turns: int, angle: int) -> None:
+    assert wrap_degrees(angle + 360.0 * turns) == angle
+
+
+def test_a_tiny_negative_angle_does_not_become_a_whole_turn() -> None:
+    assert wrap_degrees([-1e-20, -5e-324, -0.0, 360.0, 720.0]).tolist() == [0.0] * 5
+    assert bearings(-1e-300, 1.0) == 0.0
+    assert bearings(-5e-324, 30.0) == 0.0
+
+
+def test_a_displacement_of_zero_has_bearing_zero() -> None:
+    assert bearings([0.0, -0.0, 0.0, -0.0], [0.0, 0.0, -0.0, -0.0])[0] == 0.0
+    assert bearings([], []).shape == (0,)
+
+
+@pytest.mark.parametrize(
+    ("dx", "dy", "bearing"),
+    [(0, 7, 0), (7, 7, 45), (7, 0, 90), (7, -7, 135), (0, -7, 180), (-7, -7, 225), (-7, 0, 270)],
+)
+def test_bearings_count_clockwise_from_north(dx: float, dy: float, bearing: float) -> None:
+    assert bearings(dx, dy) == bearing
+
+
+@given(st.floats(allow_nan=False), st.floats(allow_nan=False))
+def test_a_bearing_is_the_wrapped_arctangent(dx: float, dy: float) -> None:
+    bearing = bearings(dx, dy)
+    assert bearing == wrap_degrees(np.degrees(np.arctan2(dx, dy)))
+    assert not np.signbit(bearing)
+
+
+@given(METRES, METRES)
+def test_a_bearing_points_along_its_displacement(dx: float, dy: float) -> None:
+    bearing = float(bearings(dx, dy))
+    length = math.hypot(dx, dy)
+    assert 0.0 <= bearing < 360.0
+    assert math.isclose(length * math.sin(math.radians(bearing)), dx, abs_tol=1e-9)
+    assert math.isclose(length * math.cos(math.radians(bearing)), dy, abs_tol=1e-9)
+
+
+@given(METRES, METRES, ANGLES)
+def test_turning_a_displacement_turns_its_bearing(dx: float, dy: float, angle: float) -> None:
+    assume(math.hypot(dx, dy) > 1e-3)
+    cosine, sine = math.cos(math.radians(angle)), math.sin(math.radians(angle))
+    turned = bearings(dx * cosine + dy * sine, dy * cosine - dx * sine)
+    assert apart(float(turned), float(bearings(dx, dy)) + angle) < 1e-6
+
+
+@given(METRES, METRES)
+def test_the_way_back_is_the_opposite_bearing(dx: float, dy: float) -> None:
+    assume(math.hypot(dx, dy) > 1e-3)
+    assert angular_distance(bearings(dx, dy), bearings(-dx, -dy)) == pytest.approx(180.0)
+
+
+@given(ANGLES, ANGLES)
+def test_angular_distance_is_the_smaller_angle(a: float, b: float) -> None:
+    distance = float(angular_distance(a, b))
+    assert 0.0 <= distance <= 180.0
+    assert distance == pytest.approx(apart(a, b), abs=1e-6)
+    assert distance == pytest.approx(float(angular_distance(b, a)), abs=1e-9)
+    assert distance == pytest.approx(180.0 - float(angular_distance(a, b + 180.0)), abs=1e-6)
+    assert angular_distance(a, a) == 0.0
+
+
+@given(ANGLES, ANGLES, ANGLES)
+def test_no_detour_is_shorter(a: float, b: float, c: float) -> None:
+    direct = float(angular_distance(a, c))
+    assert direct <= float(angular_distance(a, b)) + float(angular_distance(b, c)) + 1e-6
+
+
+def test_arrays_keep_their_shape() -> None:
+    grid = np.arange(-6.0, 6.0).reshape(3, 4)
+    assert wrap_degrees(grid).shape == (3, 4)
+    assert bearings(grid, grid).shape == (3, 4)
+    assert angular_distance(grid, 10.0).shape == (3, 4)
+    assert wrap_degrees(np.arange(3, dtype=np.uint8)).dtype == np.float64

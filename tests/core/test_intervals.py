@@ -1,0 +1,78 @@
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from sentences import assert_sentence
+
+from semsig_gis.core.errors import InputError
+from semsig_gis.core.statistics import (
+    binomial_tail,
+    log_interval,
+    poisson_interval,
+    quantile_ranks,
+    wilson_interval,
+)
+
+
+@given(st.integers(1, 60), st.floats(0.01, 0.99), st.data())
+def test_the_tail_is_a_sum_of_binomials(trials: int, chance: float, data: st.DataObject) -> None:
+    hits = data.draw(st.integers(0, trials))
+    slow = sum(
+        math.comb(trials, hit) * chance**hit * (1 - chance) ** (trials - hit)
+        for hit in range(hits + 1)
+    )
+    assert binomial_tail(hits, trials, chance) == pytest.approx(slow, rel=1e-9)
+
+
+@given(size=st.integers(1, 3000), share=st.floats(0.01, 0.99))
+def test_ranks_of_a_quantile_are_ranks(size: int, share: float) -> None:
+    low, high = quantile_ranks(size, share)
+    assert 1 <= low <= high <= size
+
+
+@pytest.mark.parametrize("share", [0.5, 0.9])
+@pytest.mark.parametrize("size", [60, 400])
+def test_ranks_hold_the_quantile_as_often_as_they_say(size: int, share: float) -> None:
+    low, high = quantile_ranks(size, share)
+    # The quantile is between them when so many values are below it.
+    inside = binomial_tail(high - 1, size, share) - binomial_tail(low - 1, size, share)
+    assert 0.945 < inside < 0.99
+
+
+@pytest.mark.parametrize("chance", [0.05, 0.3, 0.9])
+def test_wilson_holds_the_truth_as_often_as_it_says(chance: float) -> None:
+    hits = np.random.default_rng(0).binomial(80, chance, 4000)
+    inside = [low <= chance <= high for low, high in (wilson_interval(h / 80, 80) for h in hits)]
+    assert 0.93 < np.mean(inside) < 0.985
+
+
+@pytest.mark.parametrize("rate", [0.2, 2.0])
+def test_the_poisson_interval_does_too(rate: float) -> None:
+    events = np.random.default_rng(0).poisson(rate * 80, 4000)
+    inside = [low <= rate <= high for low, high in (poisson_interval(e / 80, 80) for e in events)]
+    assert 0.93 < np.mean(inside) < 0.985
+
+
+def test_no_trials_say_nothing() -> None:
+    assert wilson_interval(0.5, 0) == (0.0, 1.0)
+    assert poisson_interval(0.5, 0) == (0.0, math.inf)
+    low, high = log_interval(2.0, math.inf)
+    assert low < 1e-200
+    assert high > 1e200
+
+
+@given(st.floats(0, 1), st.floats(0.1, 1e6), st.floats(50, 99.9))
+def test_the_interval_is_around_the_value(share: float, trials: float, percent: float) -> None:
+    low, high = wilson_interval(share, trials, percent=percent)
+    assert 0 <= low <= share + 1e-12
+    assert share - 1e-12 <= high <= 1
+
+
+def test_percent_is_checked() -> None:
+    with pytest.raises(InputError) as caught:
+        wilson_interval(0.5, 10, percent=100)
+    assert_sentence(caught.value, "100", "between")

@@ -1,0 +1,122 @@
+"""Tests of semsig_gis.core.parallel; what it does with real tiles is in test_distributed.py."""
+
+from __future__ import annotations
+
+import os
+import signal
+from typing import TYPE_CHECKING
+
+import pytest
+from sentences import assert_sentence
+
+from semsig_gis import __version__
+from semsig_gis.core import parallel as workers
+from semsig_gis.core.errors import InputError
+from semsig_gis.core.parallel import Outcome, check_workers, run_tasks
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from distributed import LocalCluster
+
+
+def test_tasks_here_are_done_in_their_order() -> None:
+    assert list(run_tasks(abs, [-3, 2, -1])) == [Outcome(-3, 3), Outcome(2, 2), Outcome(-1, 1)]
+    assert list(run_tasks(abs, [], workers=2)) == []
+
+
+def test_processes_do_the_same() -> None:
+    found = list(run_tasks(abs, [*range(-5, 0)], workers=2))
+    assert sorted(found, key=lambda one: one.task) == [*run_tasks(abs, [*range(-5, 0)])]
+
+
+def test_a_task_is_tried_three_times() -> None:
+    tried: list[int] = []
+
+    def moody(task: int) -> int:
+        tried.append(task)
+        if tried.count(task) < task:
+            msg = f"failure {tried.count(task)}."
+            raise InputError(msg) if task % 2 else OSError(msg)
+        return task
+
+    found = {one.task: one for one in run_tasks(moody, [1, 2, 3, 4, 5])}
+    assert [found[task].value for task in range(1, 6)] == [1, 2, 3, None, None]
+    assert found[4].reason == "OSError: failure 3."
+    assert found[5].reason == "failure 3"
+    assert tried.count(5) == 3
+
+
+def test_a_task_that_kills_its_process_is_named_and_the_others_are_done() -> None:
+    def deadly(task: int) -> int:
+        if task == 2:
+            os.kill(os.getpid(), signal.SIGKILL)
+        return task
+
+    found = {one.task: one for one in run_tasks(deadly, [1, 2, 3, 4], workers=2)}
+    assert {task for task, one in found.items() if one.value == task} == {1, 3, 4}
+    assert found[2].reason == "3 processes died while they worked on it"
+
+
+@pytest.mark.parametrize(("count", "address"), [(-1, None), (2, "tcp://x:1"), (0, "")])
+def test_options_that_do_not_fit_are_refused(count: int, address: str | None) -> None:
+    for use in (
+        check_workers,
+        lambda *given: list(run_tasks(abs, [1], workers=given[0], scheduler=given[1])),
+    ):
+        with pytest.raises(InputError) as caught:
+            use(count, address)
+        assert_sentence(caught.value, "workers", "scheduler", "from 0 up")
+
+
+@pytest.mark.parametrize("address", ["tcp://127.0.0.1:9", "127.0.0.1:9", "carrier://pigeon:1", "x"])
+def test_a_scheduler_that_does_not_answer_is_named(
+    monkeypatch: pytest.MonkeyPatch,
+    address: str,
+    capfd: pytest.CaptureFixture[str],
+) -> None:
+    monkeypatch.setattr(workers, "PATIENCE_S", 0.3)
+    with pytest.raises(InputError) as caught:
+        list(run_tasks(abs, [1], scheduler=address))
+    assert_sentence(caught.value, address, "cannot be reached", "dask scheduler")
+    assert capfd.readouterr() == ("", "")
+
+
+def test_a_scheduler_without_workers_is_named() -> None:
+    from distributed import LocalCluster
+
+    empty = LocalCluster(n_workers=0, host="127.0.0.1", dashboard_address="127.0.0.1:0")
+    with empty, pytest.raises(InputError) as caught:
+        list(run_tasks(abs, [1], scheduler=empty.scheduler_address))
+    assert_sentence(caught.value, "no workers", "dask worker")
+
+
+@pytest.mark.parametrize(
+    ("there", "words"),
+    [
+        ((__version__, None), ("does not see", "share")),
+        (("0.0.0", 0), ("has semsig_gis 0.0.0", f"install {__version__}")),
+        (None, ("cannot run semsig_gis", "No module named 'semsig_gis'", "install it")),
+    ],
+)
+def test_workers_that_see_something_else_are_named(
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    cluster: LocalCluster,
+    there: tuple[object, ...] | None,
+    words: tuple[str, ...],
+) -> None:
+    here = os.getpid()
+
+    def view(paths: list[Path]) -> tuple[object, ...]:
+        if os.getpid() == here:
+            return (__version__, *[0 for _ in paths])
+        if there is None:
+            msg = "No module named 'semsig_gis'"
+            raise ModuleNotFoundError(msg)
+        return there
+
+    monkeypatch.setattr(workers, "_view", view)
+    with pytest.raises(InputError) as caught:
+        list(run_tasks(abs, [1], scheduler=cluster.scheduler_address, files=[tmp_path]))
+    assert_sentence(caught.value, "the worker tcp://127.0.0.1", *words)

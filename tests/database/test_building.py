@@ -1,0 +1,231 @@
+from __future__ import annotations
+
+import dataclasses
+import math
+from typing import TYPE_CHECKING
+
+import geopandas as gpd
+import numpy as np
+import pytest
+import shapely
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from sentences import assert_sentence
+from worlds import (
+    CODES,
+    CORNER,
+    LEVELS,
+    TAXONOMY,
+    World,
+    assert_same,
+    brute_force,
+    check_against_brute_force,
+    lamps,
+    random_town,
+    surroundings,
+    worlds,
+)
+
+from semsig_gis.core.errors import CrsError, EmptyResultError
+from semsig_gis.core.grid import GridSpec
+from semsig_gis.core.signature import SignatureSpec
+from semsig_gis.core.taxonomy import Taxonomy
+from semsig_gis.database import visibility
+from semsig_gis.database.build import build_cells, build_database
+from semsig_gis.database.file import open_database, save_database
+from semsig_gis.database.viewpoints import ViewpointSpec
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+
+@pytest.fixture(scope="module")
+def town() -> World:
+    return random_town()
+
+
+@given(worlds())
+def test_a_database_is_what_a_plain_loop_finds(world: World) -> None:
+    check_against_brute_force(world)
+
+
+@given(st.integers(0, 2**32 - 1), LEVELS)
+@settings(max_examples=25)
+def test_any_coordinates_step_origin_and_range_will_do(seed: int, levels: int) -> None:
+    rng = np.random.default_rng(seed)
+    places = rng.uniform(0, 150, (20, 2)) + rng.uniform(-1e6, 1e7, 2)
+    check_against_brute_force(
+        World(
+            objects=tuple((x, y, int(rng.choice(CODES))) for x, y in places.tolist()),
+            step=float(rng.uniform(4, 30)),
+            origin=(float(rng.uniform(-50, 50)), float(rng.uniform(-1e6, 1e6))),
+            radius=float(rng.uniform(2, 40)),
+            levels=levels,
+        )
+    )
+
+
+@pytest.mark.parametrize("levels", [8, 16, 24, 32])
+def test_objects_on_the_edge_of_a_level_belong_to_the_next(levels: int) -> None:
+    ring = [math.radians(360 * level / levels) for level in range(levels)]
+    objects = tuple((5 + 20 * math.sin(a), 5 + 20 * math.cos(a), 3) for a in ring)
+    database = World(objects, levels=levels).database
+    cell = database.cell_ids.tolist().index(0)
+    part = slice(*database.offsets[cell : cell + 2])
+    assert database.levels[part].tolist() == list(range(levels))
+    assert database.signature(cell).levels(levels).tolist() == list(range(levels))
+
+
+def test_on_one_bearing_the_nearer_comes_first_then_the_lower_code() -> None:
+    # From the centre of cell (0, 0), three objects in one direction that no fraction rounds well.
+    objects = [(5 + 3 * k, 5 + 7 * k, code) for k, code in ((3, 1), (1, 9), (2, 5), (1, 2))]
+    database = World(tuple((float(x), float(y), code) for x, y, code in objects)).database
+    cell = database.cell_ids.tolist().index(0)
+    assert database.types(cell) == TAXONOMY.decode([2, 9, 5, 1])
+    part = slice(*database.offsets[cell : cell + 2])
+    assert len(set(database.bearing_units[part].tolist())) == 1
+
+
+def test_the_range_is_kept_to_the_last_bit() -> None:
+    ring = [(35.0, 5.0), (5.0, -25.0), (23.0, 29.0), (math.nextafter(35.0, 99.0), 5.0)]
+    database = World(tuple((x, y, 3) for x, y in ring)).database
+    cell = database.cell_ids.tolist().index(0)
+    assert database.lengths[cell] == 3
+    part = slice(database.offsets[cell], database.offsets[cell + 1])
+    assert database.distances[part].tolist() == [30.0, 30.0, 30.0]
+
+
+def test_nothing_seen_is_an_error() -> None:
+    world = World(((0.0, 0.0, 3),), step=100.0, radius=10.0)
+    assert brute_force(world) == {}
+    check_against_brute_force(world)
+
+
+@pytest.mark.parametrize("size", [1, 7, 100, 10**6])
+def test_blocks_leave_no_seam(town: World, size: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    whole = town.database
+    calls: list[tuple[int, int]] = []
+    monkeypatch.setattr(visibility, "CELLS_A_BLOCK", size)
+    parts = build_database(
+        town.street_objects, progress=lambda done, total: calls.append((done, total))
+    )
+    assert_same(parts, whole)
+    total = calls[-1][1]
+    assert calls == [(min(done, total), total) for done in range(size, total + size, size)]
+
+
+def test_what_buildings_hide_is_not_seen() -> None:
+    objects, house = lamps(), shapely.box(*(CORNER + 22), *(CORNER + 71))
+    open_air = build_database(objects)
+    hindered = build_database(objects, footprints=surroundings(house))
+    assert hindered.occlusion == 0.5
+    assert open_air.occlusion is None
+    moved = surroundings(house).to_crs("EPSG:2154").geometry[0]
+    expected = {}
+    for cell, viewpoint in zip(open_air.cell_ids, open_air.xy, strict=True):
+        pairs = [
+            (xy, shapely.LineString([viewpoint, xy]))
+            for xy in objects.xy
+            if np.hypot(*(xy - viewpoint)) <= 30
+        ]
+        deep = moved.buffer(-0.5)
+        free = deep.intersects(shapely.Point(viewpoint))
+        expected[cell] = sum(free or not line.intersects(deep) for _, line in pairs)
+    seen = dict(zip(hindered.cell_ids.tolist(), hindered.lengths.tolist(), strict=True))
+    assert seen == {cell: size for cell, size in expected.items() if size}
+    assert hindered.lengths.sum() < open_air.lengths.sum()
+
+
+def test_only_viewpoints_become_cells(tmp_path: Path) -> None:
+    objects, house = lamps(), shapely.box(*(CORNER + 22), *(CORNER + 71))
+    full = build_database(objects)
+    street = shapely.LineString([CORNER, CORNER + np.array([100, 0])])
+    area = shapely.box(*CORNER, *(CORNER + 50))
+    houses, streets = surroundings(house), surroundings(street)
+    outdoor = build_database(objects, viewpoints=ViewpointSpec(mode="outdoor"), footprints=houses)
+    assert not shapely.contains_xy(house.buffer(-0.1), *outdoor.xy.T).any()
+    spec = ViewpointSpec(mode="streets", width=12.0, area=area)
+    along = build_database(objects, viewpoints=spec, streets=streets)
+    near = (shapely.distance(street, shapely.points(full.xy)) <= 12.0) & shapely.intersects_xy(
+        area, *full.xy.T
+    )
+    assert along.cell_ids.tolist() == full.cell_ids[near].tolist()
+    assert along.lengths.tolist() == full.lengths[near].tolist()
+    wide = build_database(
+        objects,
+        viewpoints=spec,
+        streets=surroundings(street, half_width=[25.0]),
+    )
+    assert len(wide) > len(along)
+
+    for database in (outdoor, along, full):
+        save_database(database, tmp_path / "city.parquet")
+        again = open_database(tmp_path / "city.parquet")
+        assert (again.viewpoints, again.occlusion) == (database.viewpoints, database.occlusion)
+
+
+def test_no_viewpoint_and_no_crs_are_told() -> None:
+    far = ViewpointSpec(area=shapely.box(0, 0, 10, 10))
+    with pytest.raises(EmptyResultError) as caught:
+        build_database(lamps(), viewpoints=far)
+    assert_sentence(caught.value, "no cell sees", "area")
+    bare = gpd.GeoDataFrame(geometry=[shapely.box(0, 0, 10, 10)])
+    with pytest.raises(CrsError) as unplaced:
+        build_database(lamps(), footprints=bare)
+    assert_sentence(unplaced.value, "no coordinate reference system")
+
+
+def test_a_city_that_is_hidden_altogether_is_told() -> None:
+    # The lamp stands deep in a building, and so does no viewpoint that would see it.
+    world = World(((0.0, 0.0, CODES[0]),), radius=12.0)
+    house = gpd.GeoDataFrame(geometry=[shapely.box(-2, -2, 2, 2)], crs="EPSG:2154")
+    with pytest.raises(EmptyResultError) as caught:
+        build_database(world.street_objects, spec=SignatureSpec(12.0), footprints=house)
+    assert_sentence(caught.value, "1 objects", "look at", "buildings")
+
+
+def test_some_cells_are_the_same_cells(town: World) -> None:
+    whole = town.database
+    chosen = np.arange(3, len(whole), 11)
+    some = build_cells(
+        town.street_objects,
+        whole.columns[chosen].astype(np.int64),
+        whole.rows[chosen].astype(np.int64),
+        grid=whole.grid,
+        spec=whole.spec,
+    )
+    assert_same(some, whole.select(chosen))
+    nowhere = np.zeros(1, np.int64), np.zeros(1, np.int64)
+    assert len(build_cells(town.street_objects, *nowhere, grid=GridSpec(), spec=whole.spec)) == 0
+
+
+@given(worlds(), st.sampled_from([2.5, 12.5, 40.0]))
+@settings(max_examples=25)
+def test_a_class_is_seen_from_its_own_range(world: World, metres: float) -> None:
+    code = world.objects[0][2]
+    taxonomy = Taxonomy(
+        tuple(
+            dataclasses.replace(item, range_m=metres if item.code == code else None)
+            for item in TAXONOMY.classes
+        )
+    )
+    expected: dict[tuple[int, int], list[tuple[float, float, int]]] = {}
+    for chosen, radius in ((code, metres), (None, world.radius)):
+        for cell, seen in brute_force(dataclasses.replace(world, radius=radius)).items():
+            kept = [one for one in seen if (one[2] == code) == (chosen == code)]
+            expected.setdefault(cell, []).extend(kept)
+    lengths = [len(seen) for _, seen in sorted(expected.items()) if seen]
+    codes = [one[2] for _, seen in sorted(expected.items()) for one in sorted(seen)]
+    objects = dataclasses.replace(world.street_objects, taxonomy=taxonomy)
+    if not lengths:
+        return
+    database = build_database(
+        objects,
+        grid=GridSpec(world.step, world.origin),
+        spec=SignatureSpec(world.radius, world.levels),
+    )
+    assert database.lengths.tolist() == lengths
+    assert database.codes.tolist() == codes
+    assert database.reach == max(metres, world.radius)
+    distances = [one[1] for _, seen in sorted(expected.items()) for one in sorted(seen)]
+    assert np.abs(database.distances - distances).max() <= database.reach / 510 + 1e-9

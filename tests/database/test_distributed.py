@@ -1,0 +1,339 @@
+"""Real processes of dask: one cluster for the module, and some that a test starts and kills."""
+
+from __future__ import annotations
+
+import multiprocessing
+import os
+import signal
+import subprocess
+import sys
+import textwrap
+import time
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pyarrow.parquet as pq
+import pytest
+from sentences import assert_sentence
+from worlds import CODES, CORNER, World, assert_same
+
+from semsig_gis.core.errors import DatabaseError, InputError
+from semsig_gis.database import tiles as distributed
+from semsig_gis.database.file import open_database
+from semsig_gis.database.tiles import TileSpec, build_tile, build_tiles
+from semsig_gis.objects.table import save_objects
+
+if TYPE_CHECKING:
+    from distributed import LocalCluster
+
+    from semsig_gis.database.parts import Part
+    from semsig_gis.database.tiles import TilePlan
+
+SIDE = 200.0
+CHECKOUT = Path(distributed.__file__).parents[2]
+
+
+def some_town() -> World:
+    """Return two places of different size, some tiles apart."""
+    rng = np.random.default_rng(11)
+    places = np.concatenate([rng.uniform(0, 700, (1500, 2)), rng.uniform(1500, 1700, (100, 2))])
+    codes = rng.choice(CODES[:5], len(places)).tolist()
+    return World(
+        tuple((x, y, code) for (x, y), code in zip((places + CORNER).tolist(), codes, strict=True))
+    )
+
+
+TOWN = some_town()
+
+
+def build(folder: Path, name: str = "city", **options: object) -> dict[str, bytes]:
+    """Build the town in tiles and return every file that this has left."""
+    if not (folder / "objects.parquet").exists():
+        save_objects(TOWN.street_objects, folder / "objects.parquet")
+    build_tiles(folder / "objects.parquet", folder / name, tile=TileSpec(SIDE), **options)  # type: ignore[arg-type]
+    return {path.name: path.read_bytes() for path in (folder / name).iterdir()}
+
+
+@pytest.fixture(scope="module")
+def serial(tmp_path_factory: pytest.TempPathFactory) -> dict[str, bytes]:
+    return build(tmp_path_factory.mktemp("serial"))
+
+
+def script(folder: Path, body: str) -> list[str]:
+    """Return the command of a script that builds the town."""
+    path = folder / "script.py"
+    head = f"""
+        import sys
+        sys.path.insert(0, {str(CHECKOUT)!r})
+        from semsig_gis.distributed import build_tiles
+        from semsig_gis.tiles import TileSpec
+        paths = {str(folder / "objects.parquet")!r}, {str(folder / "city")!r}
+        tile = TileSpec({SIDE})
+    """
+    path.write_text(textwrap.dedent(head) + textwrap.dedent(body), encoding="utf-8")
+    return [sys.executable, "-W", "error", str(path)]
+
+
+# --- The same, whoever builds -----------------------------------------------------------------
+
+
+def test_the_parts_are_the_whole(serial: dict[str, bytes], tmp_path: Path) -> None:
+    assert len(serial) > 15
+    (tmp_path / "city").mkdir()
+    for name, content in serial.items():
+        (tmp_path / "city" / name).write_bytes(content)
+    assert_same(open_database(tmp_path / "city"), TOWN.database)
+
+
+@pytest.mark.parametrize("workers", [1, 2])
+def test_workers_write_the_same_files_as_one_process(
+    serial: dict[str, bytes], tmp_path: Path, workers: int, capfd: pytest.CaptureFixture[str]
+) -> None:
+    others = set(multiprocessing.active_children())
+    told: list[tuple[int, int]] = []
+    found = build(tmp_path, workers=workers, progress=lambda *done: told.append(done))
+    assert found == serial
+    assert {path.name for path in tmp_path.iterdir()} == {"city", "objects.parquet"}
+    total = told[-1][1]
+    assert told == [(done, total) for done in range(1, total + 1)]
+    assert capfd.readouterr() == ("", "")
+    assert set(multiprocessing.active_children()) == others
+
+
+def test_a_scheduler_elsewhere_gives_the_same_files(
+    serial: dict[str, bytes], tmp_path: Path, cluster: LocalCluster
+) -> None:
+    assert build(tmp_path, scheduler=cluster.scheduler_address) == serial
+    assert len(cluster.workers) == 2  # it is not ours to end
+
+
+def test_one_process_does_not_load_dask(tmp_path: Path) -> None:
+    save_objects(TOWN.street_objects, tmp_path / "objects.parquet")
+    body = """
+        build_tiles(*paths, tile=tile)
+        print([name for name in ("dask", "distributed", "tornado") if name in sys.modules])
+    """
+    done = subprocess.run(script(tmp_path, body), check=True, capture_output=True, text=True)
+    assert (done.stdout, done.stderr) == ("[]\n", "")
+
+
+# --- Processes that die -----------------------------------------------------------------------
+
+
+def test_a_worker_killed_in_the_middle_does_not_matter(
+    serial: dict[str, bytes], tmp_path: Path, cluster: LocalCluster
+) -> None:
+    killed: list[int] = []
+
+    def kill(done: int, total: int) -> None:
+        if not killed:
+            assert done < total
+            killed.append(cluster.workers[0].pid)
+            os.kill(killed[0], signal.SIGKILL)
+
+    assert build(tmp_path, scheduler=cluster.scheduler_address, progress=kill) == serial
+    for _ in range(100):  # the cluster starts another one
+        if cluster.workers[0].pid not in {None, killed[0]}:
+            break
+        time.sleep(0.1)
+    assert cluster.workers[0].pid != killed[0]
+
+
+@pytest.mark.skipif(os.name != "posix", reason="kills a group of processes")
+def test_a_killed_run_goes_on_where_it_was(serial: dict[str, bytes], tmp_path: Path) -> None:
+    save_objects(TOWN.street_objects, tmp_path / "objects.parquet")
+    body = """
+        def stop(done, total):
+            print(done, flush=True)
+            if done == 3:
+                import os, signal
+                os.kill(os.getpid(), signal.SIGKILL)
+        if __name__ == "__main__":
+            build_tiles(*paths, tile=tile, workers=2, progress=stop)
+    """
+    # What the killed process has no time to remove is removed with the test.
+    (tmp_path / "scratch").mkdir()
+    run = subprocess.run(
+        script(tmp_path, body),
+        check=False,
+        capture_output=True,
+        text=True,
+        env={**os.environ, "TMPDIR": str(tmp_path / "scratch")},
+    )
+    assert run.returncode == -signal.SIGKILL
+    assert run.stdout == "1\n2\n3\n"
+    assert not (tmp_path / "city").exists()
+    time.sleep(0.5)  # for the workers, which end when they are alone
+
+    def finished() -> dict[str, tuple[int, int]]:
+        return {
+            path.name: (path.stat().st_ino, path.stat().st_mtime_ns)
+            for path in sorted(tmp_path.glob("city*/tile_*.parquet"))
+        }
+
+    before = finished()
+    assert 2 <= len(before) < len(serial)  # of three tiles one may have no cell
+    told: list[str] = []
+    assert build(tmp_path, tell=told.append) == serial
+    assert before.items() <= finished().items()
+    assert len(told) == 1
+    assert "unfinished run" in told[0]
+
+
+def test_an_interrupted_run_keeps_its_tiles(
+    serial: dict[str, bytes], tmp_path: Path, cluster: LocalCluster
+) -> None:
+    def interrupt(done: int, _: int) -> None:
+        if done >= 4:
+            raise KeyboardInterrupt
+
+    for options in ({"scheduler": cluster.scheduler_address}, {}):
+        with pytest.raises(KeyboardInterrupt):
+            build(tmp_path, progress=interrupt, **options)
+    seen: list[int] = []
+    assert build(tmp_path, progress=lambda done, _: seen.append(done)) == serial
+    assert seen[0] > 4
+
+
+# --- Tiles that fail --------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("where", ["here", "cluster"])
+def test_a_tile_that_always_fails_is_named_and_the_others_are_kept(
+    serial: dict[str, bytes], tmp_path: Path, cluster: LocalCluster, where: str
+) -> None:
+    path = tmp_path / "objects.parquet"
+    # A class that nobody knows, in the small place of one tile that stands apart.
+    odd = World((*TOWN.objects, (*(CORNER + 3100.0).tolist(), CODES[5])))
+    save_objects(odd.street_objects, path)
+    table = pq.read_table(path)
+    codes = table["class_code"].to_numpy().copy()
+    codes[codes == CODES[5]] = 250
+    table = table.set_column(0, "class_code", [codes])
+    pq.write_table(table, path, row_group_size=100)
+    options = {} if where == "here" else {"scheduler": cluster.scheduler_address}
+    with pytest.raises(DatabaseError) as caught:
+        build(tmp_path, **options)
+    assert_sentence(caught.value, "tile_3841_31390.parquet could not be built", "250", "kept")
+    assert not (tmp_path / "city").exists()
+    kept = {file.name: file.read_bytes() for file in (tmp_path / "city.partial").glob("*.parquet")}
+    assert kept == {name: serial[name] for name in serial if name.startswith("tile")}
+
+
+def test_a_tile_that_kills_its_workers_is_named_and_the_others_are_kept(
+    serial: dict[str, bytes],
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capfd: pytest.CaptureFixture[str],
+) -> None:
+    original = build_tile
+    deadly = (3827, 31376)
+
+    def deadly_build(plan: TilePlan, tile: tuple[int, int]) -> Part | None:
+        if tile == deadly:
+            os.kill(os.getpid(), signal.SIGKILL)
+        return original(plan, tile)
+
+    monkeypatch.setattr(distributed, "build_tile", deadly_build)
+    with pytest.raises(DatabaseError) as caught:
+        build(tmp_path, workers=2)
+    assert_sentence(
+        caught.value, "tile_3827_31376.parquet could not be built (3 processes died", "kept"
+    )
+    assert capfd.readouterr() == ("", "")
+    monkeypatch.undo()
+    seen: list[tuple[int, int]] = []
+    assert build(tmp_path, progress=lambda *done: seen.append(done)) == serial
+    assert len(seen) == 1  # it alone was left
+
+
+def test_a_tile_that_fails_twice_is_built_the_third_time(
+    serial: dict[str, bytes], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    calls: dict[object, int] = {}
+    original = build_tile
+
+    def moody(plan: TilePlan, tile: tuple[int, int]) -> Part | None:
+        calls[tile] = calls.get(tile, 0) + 1
+        if calls[tile] < 3:
+            msg = "the disk hiccups"
+            raise OSError(msg)
+        return original(plan, tile)
+
+    monkeypatch.setattr(distributed, "build_tile", moody)
+    assert build(tmp_path) == serial
+
+
+def test_a_run_in_which_all_fails_ends_soon_and_leaves_nothing(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    tried = set()
+
+    def fail(_: TilePlan, tile: tuple[int, int]) -> Part | None:
+        tried.add(tile)
+        msg = "nothing works"
+        raise ValueError(msg)
+
+    monkeypatch.setattr(distributed, "build_tile", fail)
+    with pytest.raises(DatabaseError) as caught:
+        build(tmp_path)
+    assert_sentence(caught.value, "and 9 more", "ValueError: nothing works", "0 tiles")
+    assert len(tried) == 10
+    assert [path.name for path in tmp_path.iterdir()] == ["objects.parquet"]
+
+
+def full_disk(folder: Path, command: list[str]) -> list[str]:
+    """Return a command that runs another one on a small disk of its own at a folder."""
+    mount = f'mount -t tmpfs -o size=160k none "{folder}" && exec "$@"'
+    return ["unshare", "--user", "--map-root-user", "--mount", "sh", "-c", mount, "sh", *command]
+
+
+def test_a_full_disk_leaves_the_database_that_was_there(tmp_path: Path) -> None:
+    disk = tmp_path / "disk"
+    disk.mkdir()
+    try:
+        subprocess.run(full_disk(disk, ["true"]), check=True, capture_output=True)
+    except (OSError, subprocess.CalledProcessError) as error:
+        pytest.skip(f"no small disk can be made here ({error})")
+    save_objects(World(TOWN.objects[-40:]).street_objects, tmp_path / "small.parquet")
+    save_objects(TOWN.street_objects, tmp_path / "objects.parquet")
+    body = f"""
+        from semsig_gis.building import build_database
+        from semsig_gis.database_file import open_database, save_database
+        from semsig_gis.errors import SemsigError
+        from semsig_gis.objects import open_objects
+        city, file = {str(disk / "city")!r}, {str(disk / "city.parquet")!r}
+        build_tiles({str(tmp_path / "small.parquet")!r}, city, tile=tile)
+        small = open_database(city)
+        save_database(small, file)
+        large = build_database(open_objects(paths[0]))
+        for action in (lambda: save_database(large, file), lambda: build_tiles(paths[0], city)):
+            try:
+                action()
+            except SemsigError as error:
+                print(error)
+        for path in (city, file):
+            print(open_database(path).cell_ids.tolist() == small.cell_ids.tolist())
+    """
+    done = subprocess.run(
+        full_disk(disk, script(tmp_path, body)), check=True, capture_output=True, text=True
+    )
+    one, two, *same = done.stdout.splitlines()
+    for message in (one, two):
+        assert_sentence(InputError(message), "could not be written (No space left on device)")
+    assert "city.parquet" in one
+    assert "tile_382_3137.parquet" in two
+    assert same == ["True", "True"]
+
+
+# --- Options that cannot be used ---------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    "options", [{"workers": -1}, {"workers": 2, "scheduler": "tcp://x:1"}, {"scheduler": ""}]
+)
+def test_options_that_do_not_fit_are_refused(tmp_path: Path, options: dict[str, Any]) -> None:
+    with pytest.raises(InputError) as caught:
+        build(tmp_path, **options)
+    assert_sentence(caught.value, "workers", "scheduler", "from 0 up")

@@ -1,0 +1,89 @@
+from __future__ import annotations
+
+import math
+from collections import Counter
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from semsig_gis.core.errors import InputError, UnknownNameError
+from semsig_gis.core.taxonomy import WILDCARD
+from semsig_gis.database.requirement import PatternIndex, Requirement
+from semsig_gis.database.sequences import SequenceTable
+from semsig_gis.matching.nearest import nearest
+from semsig_gis.sources.catalog import paper_taxonomy
+
+PAPER = paper_taxonomy()
+ROWS = st.lists(st.lists(st.integers(1, 4), max_size=6), max_size=20)
+LIMIT = st.tuples(
+    st.sampled_from([WILDCARD, 1, 2, 3, 11]),
+    st.integers(0, 3),
+    st.integers(3, 5) | st.just(math.inf),
+)
+
+
+def index_of(rows: list[list[int]]) -> PatternIndex:
+    flat = np.array([value for row in rows for value in row], np.uint8)
+    return PatternIndex.build(SequenceTable.from_csr(flat, np.cumsum([0, *map(len, rows)])))
+
+
+@given(ROWS)
+def test_groups_see_the_same_objects(rows: list[list[int]]) -> None:
+    index = index_of(rows)
+    sizes = Counter(tuple(sorted(row)) for row in rows)
+    groups = [tuple(index.groups[group].tolist()) for group in range(len(index))]
+    assert dict(zip(groups, index.cells.tolist(), strict=True)) == sizes
+
+
+@given(ROWS, st.lists(LIMIT, max_size=3))
+def test_requirement_is_checked_as_if_cell_by_cell(
+    rows: list[list[int]], limits: list[tuple[int, int, float]]
+) -> None:
+    expected = []
+    for row in rows:
+        seen = Counter(row) | Counter({WILDCARD: len(row)})
+        expected.append(all(low <= seen[code] <= high for code, low, high in limits))
+    assert index_of(rows).meeting(Requirement(tuple(limits))).tolist() == expected
+
+
+@pytest.mark.parametrize(
+    ("text", "limits"),
+    [
+        ("M", {11: (1, math.inf)}),
+        ("2B", {1: (2, math.inf)}),
+        ("B>=2", {1: (2, math.inf)}),
+        (" B <= 5 ", {1: (0, 5)}),
+        ("B=0", {1: (0, 0)}),
+        ("?=12", {WILDCARD: (12, 12)}),
+        ("2B,B<=5,M", {1: (2, 5), 11: (1, math.inf)}),
+    ],
+)
+def test_parse(text: str, limits: dict[int, tuple[int, float]]) -> None:
+    read = Requirement.parse(text, PAPER).limits
+    assert {code: (low, high) for code, low, high in read} == limits
+
+
+@pytest.mark.parametrize("text", ["", "M,", "M;B", "B>2", "B>=", "B>=-1", "B=x", "MB", "2"])
+def test_text_that_cannot_be_read(text: str) -> None:
+    with pytest.raises((InputError, UnknownNameError), match=r"cannot be read|symbol '2'"):
+        Requirement.parse(text, PAPER)
+
+
+def test_parts_that_exclude_each_other_and_unknown_symbols() -> None:
+    with pytest.raises(InputError, match="at least 3 and at most 2 of 'B'"):
+        Requirement.parse("3B,B<=2", PAPER)
+    with pytest.raises(UnknownNameError, match="'Z'"):
+        Requirement.parse("Z", PAPER)
+    with pytest.raises(UnknownNameError, match="'Z'"):
+        PAPER.encode("M?Z")
+
+
+def test_a_pattern_finds_the_cells_that_it_may_mean() -> None:
+    index = index_of([[11, 1, 1], [11, 3, 1], [11, 1], [3, 3, 3]])
+    pattern = PAPER.encode("M?B")
+    found = nearest(pattern, index.sequences, 1, wildcard=WILDCARD)
+    assert found.rows.tolist() == [0, 1]
+    among = index.sequences_meeting(Requirement.parse("2B", PAPER))
+    assert nearest(pattern, index.sequences, 1, among=among).rows.tolist() == [0]

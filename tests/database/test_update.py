@@ -1,0 +1,408 @@
+from __future__ import annotations
+
+import dataclasses
+import functools
+from typing import TYPE_CHECKING, Any
+
+import geopandas as gpd
+import numpy as np
+import pandas as pd
+import pytest
+import shapely
+from hypothesis import example, given, settings
+from hypothesis import strategies as st
+from sentences import assert_sentence
+from worlds import CODES, CORNER, TAXONOMY, assert_same, random_town, surroundings
+
+from semsig_gis.core.errors import CrsError, DatabaseError, EmptyResultError, InputError
+from semsig_gis.core.rtree import ObjectIndex
+from semsig_gis.core.taxonomy import ObjectClass, Taxonomy
+from semsig_gis.database import store as store_module
+from semsig_gis.database.build import build_database
+from semsig_gis.database.file import open_database
+from semsig_gis.database.store import ObjectStore, open_store, save_with_store, store_path
+from semsig_gis.database.update import update_database, update_file
+from semsig_gis.database.viewpoints import ViewpointSpec
+from semsig_gis.objects.load import assemble, choose_layers, read_files
+from semsig_gis.objects.table import StreetObjects
+from semsig_gis.sources.catalog import load_catalog
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+    from pathlib import Path
+
+    from semsig_gis.database.database import SignatureDatabase
+    from semsig_gis.database.update import UpdateReport
+    from semsig_gis.database.viewpoints import Mode
+    from semsig_gis.objects.load import Loaded
+
+# Two classes that are seen from further than the others, and one from nearer.
+RANGES = {CODES[0]: 45.0, CODES[1]: 12.5}
+CLASSES = Taxonomy(
+    tuple(dataclasses.replace(c, range_m=RANGES.get(c.code)) for c in TAXONOMY.classes)
+)
+SIZE = 300.0
+
+
+def at(x: float, y: float) -> tuple[float, float]:
+    """Return a place in the town."""
+    return CORNER[0] + x, CORNER[1] + y
+
+
+def house(x: float, y: float) -> shapely.Polygon:
+    return shapely.box(*at(x, y), *at(x + 20, y + 12))
+
+
+# Houses in rows that share walls, one of them drawn wrongly, and one that stands alone.
+HOUSES = surroundings(
+    *(house(x, y) for x in (30, 50, 70) for y in (40, 52.05, 200)),
+    shapely.Polygon([at(150, 150), at(180, 170), at(180, 150), at(150, 170)]),
+    house(230, 230),
+)
+STREETS = surroundings(
+    shapely.LineString([at(0, 30), at(SIZE, 30)]),
+    shapely.LineString([at(110, 0), at(120, SIZE)]),
+    half_width=[np.nan, 14.0],
+)
+HOUSES.attrs["licenses"] = ["City (CC0): houses"]
+STREETS.attrs["licenses"] = ["Roads (OGL): lanes"]
+AREA = shapely.Polygon([at(-20, -20), at(400, 0), at(200, 280)])
+
+
+def objects_of(table: pd.DataFrame, taxonomy: Taxonomy = CLASSES) -> StreetObjects:
+    columns = table[["class_code", "source", "source_id", "count"]].reset_index(drop=True)
+    columns = columns.astype({"class_code": np.uint8, "count": np.int32})
+    places = shapely.points(table["x"].to_numpy(float), table["y"].to_numpy(float))
+    layers = ", ".join(sorted(table["source"].unique()))
+    return StreetObjects(
+        gpd.GeoDataFrame(columns, geometry=places, crs="EPSG:2154"),
+        taxonomy,
+        (f"A (CC0): {layers}",),
+    )
+
+
+def random_table(rng: np.random.Generator, size: int) -> pd.DataFrame:
+    places = np.round(rng.uniform(0, SIZE, (size, 2)) * 4) / 4 + CORNER
+    return pd.DataFrame(
+        {
+            "class_code": rng.choice(CODES[:6], size),
+            "source": rng.choice(["trees", "lamps", "signs"], size),
+            "source_id": [str(number) for number in rng.integers(0, 10 * size, size)],
+            "count": 1,
+            "x": places[:, 0],
+            "y": places[:, 1],
+        }
+    )
+
+
+def edited(table: pd.DataFrame, rng: np.random.Generator, edits: int) -> pd.DataFrame:
+    """Return the table after so many additions, moves, removals and changes of class."""
+    for kind in rng.choice(["add", "move", "remove", "class"], edits):
+        row = rng.choice(table.index)
+        if kind == "add":
+            table = pd.concat([table, random_table(rng, 1)], ignore_index=True)
+        elif kind == "move":
+            table.loc[row, ["x", "y"]] += np.round(rng.normal(0, 8, 2), 2)
+        elif kind == "class":
+            table.loc[row, "class_code"] = rng.choice(CODES[:6])
+        elif len(table) > 1:
+            table = table.drop(index=row)
+    return table.sample(frac=1.0, random_state=int(rng.integers(2**31)))
+
+
+def builder(**options: Any) -> Callable[[StreetObjects], SignatureDatabase]:  # noqa: ANN401
+    return lambda objects: build_database(objects, **options)
+
+
+def assert_equal(one: SignatureDatabase, other: SignatureDatabase) -> None:
+    assert_same(one, other)
+    assert one.viewpoints == other.viewpoints
+    assert one.occlusion == other.occlusion
+
+
+def assert_index_fits(store: ObjectStore) -> None:
+    xy = store.objects.xy
+    answers = [
+        np.stack(index.pairs_within(xy, radius=20.0)).T.tolist()
+        for index in (store.index, ObjectIndex(xy))
+    ]
+    assert sorted(answers[0]) == sorted(answers[1])
+
+
+def check_report(report: UpdateReport, before: SignatureDatabase, after: SignatureDatabase) -> None:
+    """Hold the numbers of cells against a plain comparison of the signatures."""
+
+    def signatures(database: SignatureDatabase) -> dict[int, tuple[bytes, ...]]:
+        arrays = (database.codes, database.bearing_units, database.distance_units)
+        cuts = database.offsets[1:-1]
+        parts = zip(*([part.tobytes() for part in np.split(a, cuts)] for a in arrays), strict=True)
+        return dict(zip(database.cell_ids.tolist(), parts, strict=True))
+
+    old, new = signatures(before), signatures(after)
+    assert (report.cells_before, report.cells) == (len(old), len(new))
+    assert report.appeared == len(new.keys() - old.keys())
+    assert report.vanished == len(old.keys() - new.keys())
+    assert report.changed == sum(old[cell] != new[cell] for cell in old.keys() & new.keys())
+    drifted = report.changed + report.appeared + report.vanished
+    assert drifted <= report.recomputed
+    assert report.share == pytest.approx(drifted / len(old.keys() | new.keys()))
+
+
+@given(
+    seed=st.integers(0, 2**32 - 1),
+    size=st.integers(1, 150),
+    edits=st.integers(0, 40),
+    houses=st.booleans(),
+    mode=st.sampled_from(["all", "outdoor", "streets"]),
+    area=st.booleans(),
+)
+@example(seed=1, size=120, edits=30, houses=True, mode="outdoor", area=False)
+@example(seed=2, size=120, edits=30, houses=True, mode="streets", area=True)
+@settings(max_examples=40)
+def test_an_update_is_a_rebuild(
+    *, seed: int, size: int, edits: int, houses: bool, mode: Mode, area: bool
+) -> None:
+    rng = np.random.default_rng(seed)
+    table = random_table(rng, size)
+    given: dict[str, Any] = {
+        "footprints": HOUSES if houses or mode == "outdoor" else None,
+        "streets": STREETS if mode == "streets" else None,
+    }
+    build = builder(viewpoints=ViewpointSpec(mode=mode, area=AREA if area else None), **given)
+    try:
+        before = build(objects_of(table))
+    except EmptyResultError:
+        return
+    store = ObjectStore.of(objects_of(table), **given)
+    new = objects_of(edited(table, rng, edits))
+    try:
+        after, updated, report = update_database(before, store, new)
+    except EmptyResultError:
+        with pytest.raises(EmptyResultError):
+            build(new)
+        return
+    # Layers that lost their last object are not in the new table, and so they stay.
+    assert set(report.kept) == set(table["source"]) - set(new.table["source"])
+    rebuilt = build(updated.objects)
+    assert_equal(after, rebuilt)
+    if not report.kept:
+        assert_equal(after, build(new))
+    assert_index_fits(updated)
+    check_report(report, before, after)
+
+
+def test_two_hundred_edits_of_the_files(tmp_path: Path) -> None:
+    """In twenty rounds, each of which takes up what the one before has written."""
+    rng = np.random.default_rng(11)
+    table = random_table(rng, 250)
+    given: dict[str, Any] = {"footprints": HOUSES, "streets": STREETS}
+    build = builder(viewpoints=ViewpointSpec(mode="streets"), **given)
+    path = tmp_path / "city.parquet"
+    save_with_store(build(objects_of(table)), ObjectStore.of(objects_of(table), **given), path)
+    for _ in range(20):
+        before = open_database(path)
+        table = edited(table, rng, 10)
+        report = update_file(path, objects_of(table))
+        after = open_database(path)
+        assert_equal(after, build(objects_of(table)))
+        check_report(report, before, after)
+        store = open_store(path)
+        assert_index_fits(store)
+        assert len(store.objects) == len(table)
+        assert store.notes == ()
+    assert sorted(file.name for file in tmp_path.iterdir()) == ["city.objects", "city.parquet"]
+
+
+@pytest.mark.parametrize("mode", ["outdoor", "streets"])
+def test_far_from_buildings_and_streets(mode: Mode) -> None:
+    rng = np.random.default_rng(3)
+    town, hamlet = random_table(rng, 80), random_table(rng, 30)
+    hamlet[["x", "y"]] += 2000.0
+    options = {"footprints": HOUSES, "streets": STREETS}
+    build = builder(viewpoints=ViewpointSpec(mode=mode), **options)
+    old = objects_of(pd.concat([town, hamlet]))
+    for new in (objects_of(pd.concat([town, hamlet[9:]])), objects_of(town)):
+        before = build(old)
+        after, store, report = update_database(before, ObjectStore.of(old, **options), new)
+        assert_equal(after, build(new))
+        assert_index_fits(store)
+        assert report.recomputed > 100
+        assert (report.vanished > 0) == (mode == "outdoor")
+
+
+@pytest.fixture
+def city(tmp_path: Path) -> tuple[Path, pd.DataFrame]:
+    table = random_table(np.random.default_rng(5), 120)
+    path = tmp_path / "city.parquet"
+    objects = objects_of(table)
+    save_with_store(build_database(objects), ObjectStore.of(objects), path)
+    return path, table
+
+
+def test_only_what_is_in_range_is_computed(city: tuple[Path, pd.DataFrame]) -> None:
+    path, table = city
+    database = open_database(path)
+    x, y = at(100.25, 120.5)
+    columns, rows = np.meshgrid(np.arange(76520, 76550), np.arange(627500, 627530))
+    centres = database.grid.viewpoints(columns.ravel(), rows.ravel())
+    distances = np.hypot(centres[:, 0] - x, centres[:, 1] - y)
+    for code, reach in ((CODES[0], 45.0), (CODES[1], 12.5), (CODES[2], 30.0)):
+        thing = table[:1].assign(class_code=code, x=x, y=y)
+        more = objects_of(pd.concat([table, thing]))
+        _, _, report = update_database(database, open_store(path), more)
+        near = distances <= reach
+        assert report.recomputed == near.sum()
+        assert report.changed + report.appeared == near.sum()
+        (item,) = (one for one in report.classes if one.added)
+        assert (item.class_name, item.added) == (CLASSES.by_code(code).name, 1)
+
+
+def test_nothing_new_changes_nothing(city: tuple[Path, pd.DataFrame]) -> None:
+    path, table = city
+    content = path.read_bytes()
+    report = update_file(path, objects_of(table.sample(frac=1.0, random_state=1)))
+    assert path.read_bytes() == content
+    assert (report.recomputed, report.share) == (0, 0.0)
+    assert_index_fits(open_store(path))
+
+
+def test_the_update_may_go_to_another_file(city: tuple[Path, pd.DataFrame]) -> None:
+    path, table = city
+    content = path.read_bytes()
+    other = path.with_name("later.parquet")
+    update_file(path, objects_of(table[3:]), out=other)
+    assert path.read_bytes() == content
+    assert_equal(open_database(other), build_database(objects_of(table[3:])))
+    assert (len(open_store(path).objects), len(open_store(other).objects)) == (120, 117)
+
+
+def test_layers_that_were_not_loaded_stay(city: tuple[Path, pd.DataFrame]) -> None:
+    path, table = city
+    trees = table[table["source"] == "trees"][5:]
+    report = update_file(path, objects_of(trees))
+    expected = pd.concat([table[table["source"] != "trees"], trees])
+    rebuilt = build_database(objects_of(expected))
+    updated = open_database(path)
+    assert updated.licenses == ("A (CC0): lamps, signs, trees",)
+    assert_equal(updated, rebuilt)
+    assert (report.replaced, report.kept) == (("trees",), ("lamps", "signs"))
+    assert sum(item.removed for item in report.classes) == 5
+    assert "lamps, signs" in report.tables()[0][3]
+
+
+def test_a_new_class_is_taken_up(city: tuple[Path, pd.DataFrame]) -> None:
+    path, table = city
+    drain = ObjectClass(250, "9", "drain", "Drain", 20.0)
+    extended = CLASSES.extended([drain])
+    more = pd.concat([table, table[:4].assign(class_code=250, source="drains")])
+    new = objects_of(more[more["source"] == "drains"], extended)
+    report = update_file(path, new)
+    assert open_database(path).taxonomy == extended
+    assert_equal(
+        dataclasses.replace(open_database(path), licenses=()),
+        dataclasses.replace(build_database(objects_of(more, extended)), licenses=()),
+    )
+    assert report.classes[-1].class_name == "drain"
+    assert (report.classes[-1].before, report.classes[-1].added) == (0, 4)
+
+
+def test_what_does_not_fit_is_refused(city: tuple[Path, pd.DataFrame]) -> None:
+    path, table = city
+    before = {file: file.read_bytes() for file in (path, *store_path(path).iterdir())}
+    far = CLASSES.extended([ObjectClass(250, "9", "tower", "Tower", 90.0)])
+    with pytest.raises(InputError) as further:
+        update_file(path, objects_of(table, far))
+    assert_sentence(further.value, "'tower'", "90 m", "45 m", "build the database again")
+    with pytest.raises(InputError) as other:
+        update_file(path, objects_of(table, TAXONOMY))
+    assert_sentence(other.value, "seen from 45 m")
+    moved = objects_of(table)
+    moved = dataclasses.replace(moved, table=moved.table.to_crs("EPSG:32631"))
+    with pytest.raises(CrsError) as elsewhere:
+        update_file(path, moved)
+    assert_sentence(elsewhere.value, "EPSG:32631", "EPSG:2154")
+    for file in (path.with_name("none.parquet"), path.parent):
+        with pytest.raises(DatabaseError):
+            update_file(file, objects_of(table))
+    assert {file: file.read_bytes() for file in before} == before
+
+
+def test_a_city_must_not_come_to_nothing() -> None:
+    objects = random_town().street_objects
+    area = ViewpointSpec(area=shapely.box(*CORNER, *(CORNER + 30)))
+    database = build_database(objects, viewpoints=area)
+    away = dataclasses.replace(objects, table=objects.table[(objects.xy > CORNER + 90).all(axis=1)])
+    with pytest.raises(EmptyResultError) as caught:
+        update_database(database, ObjectStore.of(objects), away)
+    assert_sentence(caught.value, "no cell would see")
+
+
+def test_a_store_without_what_the_database_was_built_with_is_told() -> None:
+    objects = objects_of(random_table(np.random.default_rng(5), 60))
+    given: dict[str, Any] = {"footprints": HOUSES, "streets": STREETS}
+    database = build_database(objects, viewpoints=ViewpointSpec(mode="streets"), **given)
+    with pytest.raises(DatabaseError) as caught:
+        update_database(database, ObjectStore.of(objects), objects)
+    assert_sentence(caught.value, "buildings and streets", "build the database again")
+    with pytest.raises(DatabaseError) as streets:
+        update_database(database, ObjectStore.of(objects, footprints=HOUSES), objects)
+    assert_sentence(streets.value, "lacks the streets")
+
+
+def test_a_damaged_r_tree_is_told_and_healed(city: tuple[Path, pd.DataFrame]) -> None:
+    path, table = city
+    (store_path(path) / "rtree.dat").unlink()
+    report = update_file(path, objects_of(table[2:]))
+    assert len(report.notes) == 1
+    assert "R-tree" in report.notes[0]
+    assert_equal(open_database(path), build_database(objects_of(table[2:])))
+    assert update_file(path, objects_of(table[3:])).notes == ()
+
+
+def test_an_update_that_was_interrupted_is_finished_by_the_next(
+    city: tuple[Path, pd.DataFrame], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path, table = city
+    settle, calls = store_module._settle, []
+
+    def interrupted(file: Path) -> Path:
+        calls.append(file)
+        if len(calls) == 3:  # opening, before and after the new database is in place
+            raise KeyboardInterrupt
+        return settle(file)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(store_module, "_settle", interrupted)
+        with pytest.raises(KeyboardInterrupt):
+            update_file(path, objects_of(table[5:]))
+    assert_equal(open_database(path), build_database(objects_of(table[5:])))
+    report = update_file(path, objects_of(table[8:]))
+    assert sum(item.removed for item in report.classes) == 3
+    assert_equal(open_database(path), build_database(objects_of(table[8:])))
+    assert_index_fits(open_store(path))
+
+
+@functools.cache
+def monaco(geodata: Path, year: int) -> Loaded:
+    catalog = load_catalog("openstreetmap")
+    specs = choose_layers(catalog, surroundings=True)
+    layers, _ = read_files(specs, [geodata / "osm" / f"monaco_{year}.osm.pbf"])
+    return assemble(layers, catalog)
+
+
+@pytest.mark.parametrize("mode", ["all", "outdoor", "streets"])
+def test_a_year_in_monaco(geodata: Path, tmp_path: Path, mode: Mode) -> None:
+    before, after = monaco(geodata, 2021), monaco(geodata, 2022)
+    given: dict[str, Any] = {"footprints": before.buildings, "streets": before.streets}
+    given = {} if mode == "all" else given
+    build = builder(viewpoints=ViewpointSpec(mode=mode), **given)
+    path = tmp_path / "monaco.parquet"
+    first = build(before.objects)
+    save_with_store(first, ObjectStore.of(before.objects, **given), path)
+    report = update_file(path, after.objects)
+    assert_equal(open_database(path), build(after.objects))
+    check_report(report, first, open_database(path))
+    assert_index_fits(open_store(path))
+    assert report.kept == report.notes == ()
+    assert sum(item.added for item in report.classes) > 100
+    assert 0.1 < report.share < 0.6

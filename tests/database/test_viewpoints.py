@@ -1,0 +1,113 @@
+from __future__ import annotations
+
+import json
+from typing import Any
+
+import numpy as np
+import pytest
+import shapely
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from sentences import assert_sentence
+
+from semsig_gis.core.errors import InputError
+from semsig_gis.core.grid import GridSpec
+from semsig_gis.database import viewpoints
+from semsig_gis.database.occlusion import Footprints
+from semsig_gis.database.viewpoints import ViewpointSpec, choose_viewpoints
+
+GRID = GridSpec(step=10.0)
+CELLS = tuple(part.ravel() for part in np.meshgrid(np.arange(10), np.arange(10), indexing="ij"))
+CENTRES = [shapely.Point(xy) for xy in GRID.viewpoints(*CELLS)]
+
+
+def choose(spec: ViewpointSpec, **surroundings: Any) -> list[bool]:  # noqa: ANN401
+    chosen: list[bool] = choose_viewpoints(*CELLS, grid=GRID, spec=spec, **surroundings).tolist()
+    return chosen
+
+
+def test_all_cells_are_viewpoints_unless_said_otherwise() -> None:
+    assert all(choose(ViewpointSpec()))
+    assert all(choose(ViewpointSpec(), footprints=Footprints([shapely.box(0, 0, 99, 99)])))
+
+
+def test_outdoor_is_outside_the_footprints() -> None:
+    yard = shapely.Polygon(
+        shapely.box(0, 0, 70, 70).exterior, [shapely.box(21, 21, 49, 49).exterior]
+    )
+    chosen = choose(ViewpointSpec(mode="outdoor"), footprints=Footprints([yard]))
+    assert chosen == [not yard.intersects(centre) for centre in CENTRES]
+    assert sum(chosen) == 100 - 49 + 9
+
+
+def test_an_area_holds_in_every_mode() -> None:
+    area = shapely.Polygon([(0, 0), (100, 0), (0, 100)])
+    assert choose(ViewpointSpec(area=area)) == [area.intersects(centre) for centre in CENTRES]
+    street = shapely.LineString([(0, 5), (100, 5)])
+    chosen = choose(ViewpointSpec(mode="streets", area=shapely.box(0, 0, 30, 30)), streets=[street])
+    assert [index for index, kept in enumerate(chosen) if kept] == [0, 10, 20]
+
+
+@settings(max_examples=30)
+@given(st.integers(0, 2**32 - 1), st.sampled_from([7, 1 << 18]))
+def test_streets_equal_a_plain_loop(seed: int, block: int) -> None:
+    rng = np.random.default_rng(seed)
+    lines = [shapely.LineString(rng.uniform(0, 100, (3, 2))) for _ in range(6)]
+    widths = rng.uniform(1, 20, 6)
+    widths[0] = np.nan
+    reaches = np.where(np.isnan(widths), 8.0, widths)
+    spec = ViewpointSpec(mode="streets")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(viewpoints, "CELLS_A_BLOCK", block)
+        one = choose(spec, streets=[*lines, None, shapely.LineString()])
+        own = choose(spec, streets=lines, widths=widths)
+    assert one == [min(line.distance(centre) for line in lines) <= 8 for centre in CENTRES]
+    assert own == [
+        any(line.distance(centre) <= reach for line, reach in zip(lines, reaches, strict=True))
+        for centre in CENTRES
+    ]
+
+
+def test_what_a_mode_needs_is_asked_for() -> None:
+    with pytest.raises(InputError) as caught:
+        choose(ViewpointSpec(mode="outdoor"))
+    assert_sentence(caught.value, "outdoor", "footprints")
+    with pytest.raises(InputError) as caught:
+        choose(ViewpointSpec(mode="streets"))
+    assert_sentence(caught.value, "streets", "centre lines")
+
+
+def test_streets_that_are_none_are_refused() -> None:
+    spec = ViewpointSpec(mode="streets")
+    with pytest.raises(InputError) as caught:
+        choose(spec, streets=[shapely.Point(0, 0)])
+    assert_sentence(caught.value, "Point", "centre lines")
+    with pytest.raises(InputError) as caught:
+        choose(spec, streets=[None])
+    assert_sentence(caught.value, "no street", "centre lines")
+    with pytest.raises(InputError) as caught:
+        choose(spec, streets=[shapely.LineString([(0, 0), (1, 1)])], widths=[0.0])
+    assert_sentence(caught.value, "half-widths", "above 0")
+
+
+def test_a_wrong_choice_is_refused() -> None:
+    with pytest.raises(InputError) as caught:
+        ViewpointSpec(mode="street")  # type: ignore[arg-type]
+    assert_sentence(caught.value, "'street'", "nearest is 'streets'")
+    for width in (0.0, -1.0, np.nan):
+        with pytest.raises(InputError) as caught:
+            ViewpointSpec(width=width)
+        assert_sentence(caught.value, "half-width", "above 0")
+    for area in (shapely.Point(0, 0), shapely.Polygon()):
+        with pytest.raises(InputError) as caught:
+            ViewpointSpec(area=area)  # type: ignore[arg-type]
+        assert_sentence(caught.value, area.geom_type, "give a polygon")
+
+
+def test_a_choice_survives_json() -> None:
+    area = shapely.Polygon(np.random.default_rng(0).uniform(6e6, 7e6, (3, 2)))
+    for spec in (ViewpointSpec(), ViewpointSpec(mode="streets", width=5.5, area=area)):
+        assert ViewpointSpec.from_dict(json.loads(json.dumps(spec.to_dict()))) == spec
+    with pytest.raises(InputError) as caught:
+        ViewpointSpec.from_dict({"mode": "all", "width": 8.0, "area": "POLYGON (("})
+    assert_sentence(caught.value, "WKT")

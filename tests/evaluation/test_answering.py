@@ -1,0 +1,84 @@
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from noisy_cells import random_database
+from sentences import assert_sentence
+from worlds import random_town
+
+from semsig_gis.core.errors import InputError
+from semsig_gis.database.store import ObjectStore
+from semsig_gis.evaluation.answer import Answerer
+from semsig_gis.evaluation.methods import parse_method
+from semsig_gis.likelihood.index import build_index
+from semsig_gis.likelihood.locate import locate
+from semsig_gis.likelihood.method import LikelihoodMethod
+from semsig_gis.likelihood.noise.model import named_noise
+from semsig_gis.likelihood.refine import cell_noise
+from semsig_gis.matching.method import Method
+from semsig_gis.matching.scores import score_cells
+from semsig_gis.queries.draw import QuerySpec, draw_queries
+
+TOWN = random_town()
+DATABASE = TOWN.database
+STORE = ObjectStore.of(TOWN.street_objects)
+LIGHT = named_noise("light")
+INDEX = build_index(DATABASE, cell_noise(LIGHT, DATABASE.grid.step))
+QUERIES = [
+    query.asked.signature
+    for query in draw_queries(
+        DATABASE, QuerySpec(number=6, seen_from="anywhere", distortions=()), store=STORE
+    )
+    if len(query.asked)
+]
+
+
+def test_a_method_of_distances() -> None:
+    method = Method.parse("edit+edit:5%")
+    answers = list(Answerer(database=DATABASE, method=method).answers(QUERIES))
+    for answer, scores in zip(answers, score_cells(DATABASE, QUERIES, method), strict=True):
+        assert answer.scores.tolist() == scores.tolist()
+        assert answer.best_score == scores.min()
+        assert (answer.posterior, answer.place, answer.heading) == (None, None, None)
+        assert math.isnan(answer.chance)
+        assert answer.seconds > 0
+
+
+@pytest.mark.parametrize("text", ["likelihood:light", "likelihood:light:refined:heading=20"])
+def test_the_likelihood_method_answers_as_it_locates(text: str) -> None:
+    method = parse_method(text)
+    assert isinstance(method, LikelihoodMethod)
+    answerer = Answerer(database=DATABASE, method=method, index=INDEX, store=STORE)
+    for query, answer in zip(QUERIES, answerer.answers(QUERIES), strict=True):
+        found = locate(
+            INDEX, query, north_sigma=method.north_sigma, store=STORE, refined=method.refined
+        )
+        assert answer.scores.argmin() == found.answer.cell
+        others = np.arange(len(DATABASE)) != found.answer.cell
+        assert answer.scores[others] == pytest.approx(-found.loglik[others], rel=1e-6)
+        assert answer.chance == found.answer.mass
+        assert answer.best_score == pytest.approx(-found.loglik[found.answer.cell])
+        if method.refined:
+            assert answer.place == (found.estimate.x, found.estimate.y)
+            assert answer.heading == found.estimate.heading
+        else:
+            assert (answer.place, answer.heading) == (None, None)
+
+
+def test_nothing_is_asked() -> None:
+    assert list(Answerer(database=DATABASE, method=Method()).answers([])) == []
+
+
+def test_what_a_method_lacks_is_told() -> None:
+    refined = LikelihoodMethod(noise=LIGHT, refined=True)
+    with pytest.raises(InputError) as caught:
+        Answerer(database=DATABASE, method=refined)
+    assert_sentence(caught.value, "likelihood:light:refined", "index")
+    with pytest.raises(InputError) as caught:
+        Answerer(database=DATABASE, method=refined, index=INDEX)
+    assert_sentence(caught.value, "street objects")
+    with pytest.raises(InputError) as caught:
+        Answerer(database=random_database(1), method=LikelihoodMethod(noise=LIGHT), index=INDEX)
+    assert_sentence(caught.value, "another database")

@@ -1,0 +1,206 @@
+"""Figures against cases counted by hand, ties among them."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import geopandas as gpd
+import numpy as np
+import pandas as pd
+import pytest
+import shapely
+from hypothesis import given
+from hypothesis import strategies as st
+from sentences import assert_sentence
+
+from semsig_gis.core.errors import InputError
+from semsig_gis.core.statistics import wilson_interval
+from semsig_gis.evaluation.figures import (
+    ambiguity_labels,
+    calibration_bins,
+    coverage_curve,
+    district_labels,
+    figure_means,
+    grouped_means,
+    length_labels,
+    percentile,
+    query_figures,
+)
+from semsig_gis.matching.ties import THRESHOLDS, expected_best
+
+NAN = math.nan
+
+# Five queries of a database of 200 cells. The first is right for sure; the second ties with one
+# cell 30 m off; the third is 60 m off; the fourth is far off; of the fifth nothing is left.
+ERRORS = ([0.0], [0.0, 30.0], [60.0], [900.0], None)
+RANKS = ((1, 1), (1, 2), (3, 4), (150, 150), (200, 200))
+CHANCES = (0.97, 0.5, 0.91, 0.2, NAN)
+
+
+def table() -> pd.DataFrame:
+    rows: list[dict[str, Any]] = []
+    for errors, (low, high), chance in zip(ERRORS, RANKS, CHANCES, strict=True):
+        within = np.zeros(len(THRESHOLDS))
+        expected = math.inf
+        if errors is not None:
+            expected, within = expected_best([], errors, slots=1)
+        row = {f"p{x}": value for x, value in zip(THRESHOLDS, within, strict=True)}
+        near = {f"near{count}": row["p25"] for count in (1, 5, 10, 20)}
+        right = NAN if errors is None else row["p50"]
+        truth = {"chance": chance, "right": right, "in_region": 0.0 if math.isnan(chance) else 1.0}
+        rows.append(
+            {"error_m": expected, **row, **near, "rank_low": low, "rank_high": high, **truth}
+        )
+    return pd.DataFrame(rows)
+
+
+def test_figures_counted_by_hand() -> None:
+    means = figure_means(query_figures(table(), cells=200))
+    expected = {
+        "p5": 1.5 / 5,
+        "p10": 1.5 / 5,
+        "p25": 1.5 / 5,
+        "p50": 2.0 / 5,
+        "p100": 3.0 / 5,
+        "near1": 1.5 / 5,
+        "near20": 1.5 / 5,
+        # 1 % are two cells, 10 % twenty: the second is among them for sure, the third never, soon.
+        "recall1": 2.0 / 5,
+        "recall10": 3.0 / 5,
+        "coverage": 2.0 / 5,
+        "precision": 1.0 / 2,
+        "in_region": 4.0 / 5,
+    }
+    assert {name: means.loc[name, "value"] for name in expected} == pytest.approx(expected)
+    assert means.loc["precision", "n"] == 2
+    assert means.loc["p50", "n"] == 5
+    for name, value in expected.items():
+        low, high = wilson_interval(value, int(means["n"][name]))
+        assert (means["low"][name], means["high"][name]) == pytest.approx((low, high))
+
+
+def test_a_rank_that_ties_counts_by_its_share() -> None:
+    ranks = pd.DataFrame({"rank_low": [1, 2, 3], "rank_high": [4, 5, 3]})
+    filled = ranks.assign(**{str(name): 0.0 for name in table() if name not in ranks})
+    # 1 % of 300 cells are three of them.
+    figures = query_figures(filled, cells=300)
+    assert figures["recall1"].tolist() == pytest.approx([3 / 4, 2 / 4, 1.0])
+
+
+def test_methods_without_chances_have_no_figures_of_them() -> None:
+    plain = table().assign(chance=NAN, right=NAN, in_region=NAN)
+    assert {"coverage", "precision", "in_region"}.isdisjoint(query_figures(plain, cells=200))
+
+
+def test_groups_share_the_queries_out() -> None:
+    figures = query_figures(table(), cells=200)
+    labels = ["a", "b", "a", "b", "a"]
+    found = grouped_means(figures, labels, by="part", order=["b", "a", "c"])
+    assert found["part"].tolist() == ["b", "a", "c"]
+    assert found["n"].tolist() == [2, 3, 0]
+    assert found["p50"].iloc[:2].tolist() == pytest.approx([0.5, 1 / 3])
+    assert found["p50"].isna().tolist() == [False, False, True]
+    low, high = wilson_interval(0.5, 2)
+    assert (found["p50_low"][0], found["p50_high"][0]) == pytest.approx((low, high))
+
+
+def test_ranges() -> None:
+    sizes = [0, 1, 4, 5, 9, 10, 19, 20, 400]
+    expected = ["0", "1-4", "1-4", "5-9", "5-9", "10-19", "10-19", "20+", "20+"]
+    assert length_labels(pd.DataFrame({"length": sizes})) == expected
+    groups = [0, 1, 2, 9, 10, 99, 100, 999, 1000]
+    expected = ["0", "1", "2-9", "2-9", "10-99", "10-99", "100-999", "100-999", "1000+"]
+    assert ambiguity_labels(pd.DataFrame({"type_group": groups})) == expected
+
+
+def test_districts() -> None:
+    places = [shapely.Point(x, 5.0) for x in (1.0, 10.0, 15.0, 25.0)]
+    queries = gpd.GeoDataFrame(geometry=places, crs=2154)
+    boxes = [shapely.box(0, 0, 10, 10), shapely.box(10, 0, 20, 10)]
+    districts = gpd.GeoDataFrame({"name": [7, "new"]}, geometry=boxes, crs=2154)
+    # The second stands on the border: the first district that holds it counts.
+    expected = ["7", "7", "new", "elsewhere"]
+    assert district_labels(queries, districts, "name") == expected
+    far = gpd.GeoDataFrame(geometry=[shapely.Point(765_205, 6_275_005)], crs=2154)
+    block = gpd.GeoSeries([shapely.box(765_200, 6_275_000, 765_210, 6_275_010)], crs=2154)
+    degrees = gpd.GeoDataFrame({"name": ["town"]}, geometry=block.to_crs(4326).to_numpy(), crs=4326)
+    assert district_labels(far, degrees, "name") == ["town"]
+    with pytest.raises(InputError) as caught:
+        district_labels(queries, districts, "nom")
+    assert_sentence(caught.value, "'nom'", "name")
+
+
+@pytest.mark.parametrize(
+    ("values", "percent", "expected"),
+    [
+        ([3.0, 1.0, 2.0], 50, 2.0),
+        ([1.0, 2.0], 50, 1.5),
+        ([1.0, 2.0, NAN], 50, 1.5),
+        ([5.0], 90, 5.0),
+        (list(range(11)), 90, 9.0),
+        ([0.0, 1.0, math.inf, math.inf], 50, math.inf),
+        ([0.0, 1.0, math.inf], 50, 1.0),
+        ([math.inf, math.inf], 90, math.inf),
+    ],
+)
+def test_percentiles_by_hand(values: list[float], percent: float, expected: float) -> None:
+    found, low, high = percentile(np.array(values), percent)
+    assert found == expected
+    assert low <= found <= high
+
+
+def test_a_percentile_of_nothing() -> None:
+    assert all(math.isnan(value) for value in percentile(np.array([NAN]), 50))
+
+
+@given(
+    values=st.lists(st.floats(0, 1e4), min_size=1, max_size=60), percent=st.sampled_from([50, 90])
+)
+def test_percentiles_are_those_of_numpy(values: list[float], percent: float) -> None:
+    found, low, high = percentile(np.array(values), percent)
+    assert found == pytest.approx(np.percentile(values, percent))
+    assert low <= found + 1e-9
+    assert found <= high + 1e-9
+
+
+def test_intervals_of_a_median_hold_it() -> None:
+    rng = np.random.default_rng(5)
+    held = 0
+    for _ in range(1000):
+        _, low, high = percentile(rng.exponential(1.0, 200), 50)
+        held += low <= math.log(2.0) <= high
+    assert 930 <= held <= 985
+
+
+def test_a_coverage_curve_by_hand() -> None:
+    curve = coverage_curve(table()).set_index("threshold")
+    answered = {0.0: 4, 0.2: 4, 0.3: 3, 0.5: 3, 0.6: 2, 0.9: 2, 0.95: 1, 0.98: 0}
+    assert {key: curve["answered"][key] for key in answered} == answered
+    assert curve["coverage"][0.9] == pytest.approx(2 / 5)
+    right = {0.0: 2.0 / 4, 0.3: 2.0 / 3, 0.9: 1.0 / 2, 0.95: 1.0}
+    assert {key: curve["precision"][key] for key in right} == pytest.approx(right)
+    assert math.isnan(curve["precision"][0.98])
+    assert (curve["low"][0.95], curve["high"][0.95]) == wilson_interval(1.0, 1)
+
+
+def test_calibration_by_hand() -> None:
+    bins = calibration_bins(table())
+    assert bins["n"].tolist() == [0, 0, 1, 0, 0, 1, 0, 0, 0, 2]
+    assert bins["stated"].iloc[9] == pytest.approx(0.94)
+    assert bins["true"].iloc[[2, 5, 9]].tolist() == pytest.approx([0.0, 1.0, 0.5])
+    assert bins["true"].isna().sum() == 7
+    assert (bins["low"].iloc[9], bins["high"].iloc[9]) == wilson_interval(0.5, 2)
+    edges = calibration_bins(pd.DataFrame({"chance": [0.0, 0.3, 1.0], "right": [0.0, 0.5, 1.0]}))
+    assert edges["n"].tolist() == [1, 0, 0, 1, 0, 0, 0, 0, 0, 1]
+
+
+@given(seed=st.integers(0, 2**32))
+def test_chances_that_come_true_are_calibrated(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    chance = rng.random(4000)
+    right = (rng.random(4000) < chance).astype(float)
+    bins = calibration_bins(pd.DataFrame({"chance": chance, "right": right}))
+    assert bins["n"].sum() == 4000
+    spread = np.sqrt(bins["stated"] * (1 - bins["stated"]) / bins["n"])
+    assert ((bins["stated"] - bins["true"]).abs() < 6 * spread + 1e-9).all()

@@ -1,0 +1,183 @@
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from noisy_cells import noise_specs
+from sentences import assert_sentence
+
+from semsig_gis.core.errors import SemsigError
+from semsig_gis.evaluation.methods import parse_method
+from semsig_gis.evaluation.spec import (
+    Districts,
+    ExperimentSpec,
+    open_experiment_spec,
+    parse_experiment,
+)
+from semsig_gis.likelihood.method import LikelihoodMethod
+from semsig_gis.likelihood.noise.model import NoiseSpec, save_noise
+from semsig_gis.matching.method import Method
+from semsig_gis.queries.chain import parse_chain
+from semsig_gis.queries.distortions import Detector
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+SMALL = """
+database = "city.parquet"
+[methods]
+paper = "edit+edit:5%"
+[distortions]
+medium = "medium"
+"""
+names = st.text("abcXYZ019_-", min_size=1, max_size=6)
+methods = st.sampled_from(
+    ["edit+edit:5%", "types:jaccard", "likelihood:light:refined", "likelihood:generic:heading=5"]
+).map(parse_method)
+chains = st.sampled_from(["", "medium", "none, compass:5", "detector:strong:half=20, view:60"]).map(
+    parse_chain
+)
+
+
+@st.composite
+def experiments(draw: st.DrawFn) -> ExperimentSpec:
+    spec = ExperimentSpec(
+        database=draw(st.sampled_from(["city.parquet", 'a folder/"city".parquet'])),
+        methods=draw(st.dictionaries(names, methods, min_size=1, max_size=3)),
+        distortions=draw(st.dictionaries(names, chains, min_size=1, max_size=3)),
+        queries=draw(st.integers(1, 9999)),
+        seeds=tuple(draw(st.lists(st.integers(0, 99), min_size=1, max_size=3, unique=True))),
+        seen_from=draw(st.sampled_from(["cells", "anywhere"])),
+        city=draw(st.sampled_from([None, "later.parquet"])),
+        top=tuple(draw(st.lists(st.integers(1, 99), min_size=1, max_size=3, unique=True))),
+        districts=draw(st.sampled_from([None, Districts(file="a.geojson", name="nom")])),
+    )
+    own = replace(draw(noise_specs()), name="own")
+    if draw(st.booleans()):
+        spec = replace(spec, methods={**spec.methods, "own": LikelihoodMethod(noise=own)})
+    if draw(st.booleans()):
+        chain = (Detector(noise=own, half=9.5),)
+        spec = replace(spec, distortions={**spec.distortions, "own": chain})
+    return spec
+
+
+@given(experiments())
+def test_written_and_read_is_the_same(spec: ExperimentSpec) -> None:
+    assert parse_experiment(spec.to_toml()) == spec
+
+
+def test_defaults_and_cases() -> None:
+    spec = parse_experiment(SMALL)
+    assert spec == ExperimentSpec(
+        database="city.parquet",
+        methods={"paper": Method.parse("edit+edit:5%")},
+        distortions={"medium": parse_chain("medium")},
+    )
+    assert (spec.queries, spec.seeds, spec.seen_from, spec.top) == (500, (0,), "cells", (1,))
+    more = replace(
+        spec,
+        methods={"a": Method(), "b": Method(keep=5)},
+        distortions={"x": (), "y": parse_chain("light")},
+        top=(1, 100),
+    )
+    assert [case.name for case in more.cases] == [
+        f"{distortion}/{method}-top{top}"
+        for distortion in "xy"
+        for method in "ab"
+        for top in (1, 100)
+    ]
+    asked = replace(more, queries=7, seeds=(3,)).asked("y")
+    assert (asked.number, asked.seeds, asked.distortions) == (7, (3,), parse_chain("light"))
+
+
+def test_noise_models_come_from_tables_and_files(tmp_path: Path) -> None:
+    save_noise(NoiseSpec(detection=0.7, name="whatever"), tmp_path / "learnt.toml")
+    (tmp_path / "spec.toml").write_text(
+        SMALL.replace("[distortions]", 'generic = "likelihood:learnt"\n[distortions]')
+        + 'mine = ["detector:mine:half=15", "compass:5"]\n'
+        + '[noises]\nlearnt = "learnt.toml"\nmine = { clutter = 3.0, bearing_sigma = 2 }\n',
+        encoding="utf-8",
+    )
+    spec = open_experiment_spec(tmp_path / "spec.toml")
+    method = spec.methods["generic"]
+    assert isinstance(method, LikelihoodMethod)
+    assert method.noise == NoiseSpec(detection=0.7, name="learnt")
+    detector = spec.distortions["mine"][0]
+    assert isinstance(detector, Detector)
+    assert detector.noise == NoiseSpec(clutter=3.0, bearing_sigma=2, name="mine")
+    assert sorted(spec.noises) == ["learnt", "mine"]
+    # Written out, it needs the file no more.
+    assert parse_experiment(spec.to_toml()) == spec
+
+
+def test_noise_models_known_by_name_are_not_written_out() -> None:
+    spec = parse_experiment(SMALL.replace("edit+edit:5%", "likelihood:light"))
+    assert "noises" not in spec.to_dict()
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        (("database", "databse"), ["'databse'", "nearest is 'database'"]),
+        (("[distortions]", "[other]"), ["'other'"]),
+        (('"city.parquet"', "3"), ["database = 3", "a string"]),
+        (('"city.parquet"', '"city.parquet"\nqueries = 0'), ["0 queries"]),
+        (('"city.parquet"', '"city.parquet"\nqueries = "many"'), ["queries = 'many'"]),
+        (('"city.parquet"', '"city.parquet"\nseeds = 4'), ["seeds = 4", "a list"]),
+        (('"city.parquet"', '"city.parquet"\nseeds = [1.5]'), ["seeds = [1.5]", "whole numbers"]),
+        (('"city.parquet"', '"city.parquet"\nseeds = []'), ["seeds are []"]),
+        (('"city.parquet"', '"city.parquet"\ntop = [0]'), ["top is [0]"]),
+        (('"city.parquet"', '"city.parquet"\ntop = [true]'), ["top = [True]"]),
+        (('"city.parquet"', '"city.parquet"\nseen_from = "cell"'), ["nearest is 'cells'"]),
+        (("edit+edit:5%", "edit+edti"), ["'edti'"]),
+        (('"edit+edit:5%"', "5"), ["paper = 5", "methods"]),
+        (("paper", '"pa/per"'), ["'pa/per'", "methods", "letters"]),
+        (('"medium"', '"meduim"'), ["'meduim'", "nearest is 'medium'"]),
+        (('"medium"', "7"), ["medium = 7", "distortions", "a list of texts"]),
+        (('"medium"', '["medium", 7]'), ["distortions"]),
+        (('paper = "edit+edit:5%"', ""), ["no methods"]),
+        (('medium = "medium"', ""), ["no distortions"]),
+        (('medium = "medium"', 'medium = "medium"\n[noises]\nmine = 3'), ["mine = 3", "noises"]),
+        (
+            ('medium = "medium"', 'medium = "medium"\n[noises]\nmine = { detection = 3 }'),
+            ["detection", "from 0 to 1"],
+        ),
+        (
+            ('medium = "medium"', 'medium = "medium"\n[noises]\nmine = "nowhere.toml"'),
+            ["nowhere.toml", "cannot be read"],
+        ),
+        (
+            ('medium = "medium"', 'medium = "medium"\n[districts]\nfile = "a.gpkg"'),
+            ["districts", "'name'"],
+        ),
+        (("[methods]", "[methods"), ["not valid TOML"]),
+    ],
+)
+def test_experiments_that_cannot_be_read(change: tuple[str, str], words: list[str]) -> None:
+    with pytest.raises(SemsigError) as caught:
+        parse_experiment(SMALL.replace(*change))
+    assert_sentence(caught.value, *words)
+
+
+def test_files_that_cannot_be_read(tmp_path: Path) -> None:
+    (tmp_path / "spec.toml").write_bytes(b"\xff\xfe")
+    for name in ("spec.toml", "nowhere.toml"):
+        with pytest.raises(SemsigError) as caught:
+            open_experiment_spec(tmp_path / name)
+        assert_sentence(caught.value, name, "cannot be read")
+
+
+@pytest.mark.parametrize("name", ["generic", "mine"])
+def test_two_noise_models_of_one_name(name: str) -> None:
+    one, other = (NoiseSpec(clutter=value, name=name) for value in (1.0, 2.0))
+    options: dict[str, Any] = {"database": "city.parquet"}
+    with pytest.raises(SemsigError) as caught:
+        ExperimentSpec(
+            methods={"a": LikelihoodMethod(noise=one)},
+            distortions={"b": (Detector(noise=other),)},
+            **options,
+        )
+    assert_sentence(caught.value, name, "a name of its own")

@@ -1,0 +1,410 @@
+"""Experiments from end to end: the files, interrupted runs, folders that are refused."""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
+
+import geopandas as gpd
+import pandas as pd
+import pytest
+import shapely
+from geopandas.testing import assert_geodataframe_equal
+from sentences import assert_sentence
+from worlds import CORNER, World, random_town
+
+from semsig_gis.core.errors import DatabaseError, InputError, SemsigError
+from semsig_gis.database.store import ObjectStore, save_with_store
+from semsig_gis.evaluation.evaluate import evaluate, score_queries
+from semsig_gis.evaluation.spec import Districts, parse_experiment
+from semsig_gis.experiments.folder import open_results
+from semsig_gis.experiments.run import QUERIES_A_PART, run_experiment, run_experiments
+from semsig_gis.matching.method import Method
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+    from pathlib import Path
+
+    from distributed import LocalCluster
+
+    from semsig_gis.evaluation.answer import Answerer
+    from semsig_gis.evaluation.spec import ExperimentSpec
+    from semsig_gis.queries.draw import Query
+
+TOWN = random_town()
+SPEC = parse_experiment("""
+database = "city.parquet"
+queries = 130
+top = [1, 3]
+[methods]
+paper = "edit+edit:5%"
+generic = "likelihood:generic"
+[distortions]
+none = []
+phone = "light, compass:5, view:180"
+""")
+SAME_IN_EVERY_RUN = {"experiment.toml", "inputs.json", "figures.csv", "report.md"}
+
+
+class KilledError(Exception):
+    """The end of a run, somewhere in the middle."""
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return a folder with a town, and the same town after some objects moved."""
+    place = tmp_path_factory.mktemp("towns")
+    save_with_store(TOWN.database, ObjectStore.of(TOWN.street_objects), place / "city.parquet")
+    moved = World(
+        tuple((x + 40.0 * (row % 4 == 0), y, code) for row, (x, y, code) in enumerate(TOWN.objects))
+    )
+    save_with_store(moved.database, ObjectStore.of(moved.street_objects), place / "later.parquet")
+    x, y = CORNER
+    halves = [
+        shapely.box(x - 50, y - 50, x + 100, y + 250),
+        shapely.box(x + 100, y, x + 150, y + 9),
+    ]
+    parts = gpd.GeoDataFrame({"part": ["west", "nook"]}, geometry=halves, crs="EPSG:2154")
+    parts.to_file(place / "parts.gpkg")
+    return place
+
+
+@pytest.fixture(scope="module")
+def results(folder: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return the results of a run that nothing interrupted."""
+    out = tmp_path_factory.mktemp("results") / "all"
+    run_experiment(SPEC, out, folder=folder)
+    return out
+
+
+def contents(folder: Path) -> dict[str, bytes]:
+    """Return all files, but for those that tell times."""
+    return {
+        path.relative_to(folder).as_posix(): path.read_bytes()
+        for path in sorted(folder.rglob("*"))
+        if path.is_file() and path.name != "timing.json"
+    }
+
+
+def test_a_folder_holds_everything(results: Path) -> None:
+    files = contents(results)
+    cases = {case.name for case in SPEC.cases}
+    expected = {
+        f"{case}/{name}" for case in cases for name in ("queries.parquet", "evaluation.json")
+    }
+    assert set(files) == SAME_IN_EVERY_RUN | expected
+    assert parse_experiment(files["experiment.toml"].decode()) == SPEC
+    inputs = json.loads(files["inputs.json"])
+    assert list(inputs["inputs"]) == ["city.parquet"]
+    assert inputs["versions"]["semsig_gis"]
+    figures = pd.read_csv(results / "figures.csv")
+    assert set(figures["case"]) == cases
+    for name, evaluation in open_results(results).items():
+        mine = figures[figures["case"] == name].set_index("figure")
+        assert mine["value"]["p50"] == pytest.approx(evaluation.cdf([50])[0])
+        assert (mine["low"] <= mine["value"]).all()
+        timing = json.loads((results / name / "timing.json").read_text("utf-8"))
+        assert timing["machine"]["processors"] >= 1
+        assert evaluation.database["mb_per_km2"] > 0
+    report = files["report.md"].decode()
+    assert "### phone: light, compass:5, view:180" in report
+    assert "| generic, t = 3 |" in report
+    assert "s a query" not in report
+
+
+def test_all_methods_see_the_same_queries(results: Path) -> None:
+    asked = ["seed", "number", "cell", "query_types", "query_bearings", "heading", "geometry"]
+    found = open_results(results)
+    for distortion in SPEC.distortions:
+        tables = [
+            found[case.name].queries[asked] for case in SPEC.cases if case.distortion == distortion
+        ]
+        for table in tables[1:]:
+            assert_geodataframe_equal(table, tables[0])
+    none, phone = (found[f"{name}/paper-top1"].queries for name in ("none", "phone"))
+    assert none.geometry.equals(phone.geometry)
+    assert none["query_bearings"].tolist() != phone["query_bearings"].tolist()
+
+
+def test_an_experiment_is_what_an_evaluation_is(results: Path) -> None:
+    found = open_results(results)["none/paper-top3"]
+    alone = evaluate(
+        TOWN.database, queries=130, method=Method.parse("edit+edit:5%"), distortion="", top=3
+    )
+    assert_geodataframe_equal(found.queries, alone.queries)
+
+
+@pytest.mark.parametrize("done", [1, QUERIES_A_PART, 131, 400, 520])
+def test_a_run_that_was_interrupted_ends_with_the_same_bytes(
+    done: int, folder: Path, results: Path, tmp_path: Path
+) -> None:
+    def stop(count: int, total: int) -> None:
+        assert total == 520
+        if count >= done:
+            raise KilledError
+
+    out = tmp_path / "out"
+    with pytest.raises(KilledError):
+        run_experiment(SPEC, out, folder=folder, progress=stop)
+    assert not out.exists()
+    run_experiment(SPEC, out, folder=folder)
+    assert contents(out) == contents(results)
+    assert [path.name for path in tmp_path.iterdir()] == ["out"]
+
+
+def test_a_run_that_was_killed_ends_with_the_same_bytes(
+    folder: Path, results: Path, tmp_path: Path
+) -> None:
+    spec = folder / "killed.toml"
+    spec.write_text(SPEC.to_toml(), encoding="utf-8")
+    out = tmp_path / "out"
+    command = [sys.executable, "-m", "semsig_gis.cli", "evaluate", str(spec), "--out", str(out)]
+    with subprocess.Popen(
+        command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, env=os.environ
+    ) as run:
+        parts = tmp_path / "out.partial" / "_parts"
+        end = time.monotonic() + 120
+        while run.poll() is None and time.monotonic() < end:
+            if any(parts.glob("*.parquet")):
+                run.send_signal(signal.SIGKILL)
+                break
+            time.sleep(0.002)
+        run.wait()
+    run_experiment(SPEC, out, folder=folder)
+    assert contents(out) == contents(results)
+
+
+@pytest.mark.parametrize("where", ["processes", "scheduler"])
+def test_workers_write_the_same_files_as_one_process(
+    where: str, folder: Path, results: Path, tmp_path: Path, cluster: LocalCluster
+) -> None:
+    seen: list[int] = []
+    run_experiment(
+        SPEC,
+        tmp_path / "out",
+        folder=folder,
+        workers=2 if where == "processes" else 0,
+        scheduler=cluster.scheduler_address if where == "scheduler" else None,
+        progress=lambda done, _: seen.append(done),
+    )
+    assert contents(tmp_path / "out") == contents(results)
+    assert len(seen) == 4
+    assert seen[-1] == 520
+
+
+def test_several_experiments_at_once_are_as_one_by_one(
+    folder: Path, results: Path, tmp_path: Path
+) -> None:
+    other = replace(SPEC, queries=20, seeds=(3, 4))
+    run_experiment(other, tmp_path / "alone", folder=folder)
+    specs = {tmp_path / "a": SPEC, tmp_path / "b": other}
+    found = run_experiments(specs, folder=folder, workers=2)
+    assert contents(tmp_path / "a") == contents(results)
+    assert contents(tmp_path / "b") == contents(tmp_path / "alone")
+    again = run_experiments(specs, folder=folder)
+    for out, evaluations in found.items():
+        assert list(again[out]) == list(evaluations)
+
+
+def test_parts_that_fail_are_told_and_the_others_are_kept(
+    folder: Path, results: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def fail(answerer: Answerer, queries: Sequence[Query], **options: Any) -> object:  # noqa: ANN401
+        if len(queries) < QUERIES_A_PART:
+            msg = "the disk hiccups"
+            raise OSError(msg)
+        return score_queries(answerer, queries, **options)
+
+    monkeypatch.setattr("semsig_gis.experiments.run.score_queries", fail)
+    with pytest.raises(DatabaseError) as caught:
+        run_experiment(SPEC, tmp_path / "out", folder=folder)
+    assert_sentence(caught.value, "2 of the 4 parts", "disk hiccups", "out.partial", "kept")
+    monkeypatch.undo()
+    parts = tmp_path / "out.partial" / "_parts"
+    kept = {path.name: path.stat().st_mtime_ns for path in parts.iterdir()}
+    assert len(kept) == 4
+    run_experiment(SPEC, tmp_path / "out", folder=folder)
+    assert contents(tmp_path / "out") == contents(results)
+
+
+def test_killed_at_the_very_end(folder: Path, results: Path, tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    shutil.copytree(results, out)
+    (out / "_parts").mkdir()
+    (out / "_parts" / "none.paper.00000.parquet").write_bytes(b"left")
+    run_experiment(SPEC, out, folder=folder)
+    assert contents(out) == contents(results)
+
+
+def test_a_part_that_is_damaged_is_done_again(folder: Path, results: Path, tmp_path: Path) -> None:
+    def stop(count: int, total: int) -> None:
+        if count == total:
+            raise KilledError
+
+    out = tmp_path / "out"
+    with pytest.raises(KilledError):
+        run_experiment(SPEC, out, folder=folder, progress=stop)
+    first, second, *_ = sorted((tmp_path / "out.partial" / "_parts").iterdir())
+    first.write_bytes(first.read_bytes()[:-50])
+    pd.read_parquet(second).iloc[1:].to_parquet(second)
+    half = tmp_path / "out.partial" / "_parts" / ".semsig-left"
+    half.mkdir()
+    run_experiment(SPEC, out, folder=folder)
+    assert contents(out) == contents(results)
+
+
+def test_results_that_are_there_are_not_made_again(
+    folder: Path, results: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def never(*_: object, **__: object) -> None:
+        raise AssertionError
+
+    monkeypatch.setattr("semsig_gis.experiments.run.score_queries", never)
+    before = contents(results)
+    found = run_experiment(SPEC, results, folder=folder)
+    assert list(found) == [case.name for case in SPEC.cases]
+    assert contents(results) == before
+
+
+@pytest.mark.parametrize(
+    ("change", "word"),
+    [
+        ({"queries": 131}, "queries"),
+        ({"seeds": (1,)}, "seeds"),
+        ({"methods": {"paper": Method()}}, "methods"),
+        ({"seen_from": "anywhere"}, "seen_from"),
+        ({"city": "later.parquet"}, "city"),
+    ],
+)
+def test_results_of_another_experiment_are_refused(
+    change: dict[str, object], word: str, folder: Path, results: Path
+) -> None:
+    before = contents(results)
+    with pytest.raises(InputError) as caught:
+        run_experiment(replace(SPEC, **change), results, folder=folder)  # type: ignore[arg-type]
+    assert_sentence(caught.value, "another experiment", word, "another folder")
+    assert contents(results) == before
+
+
+def test_an_unfinished_run_of_another_experiment_is_refused(folder: Path, tmp_path: Path) -> None:
+    def stop(count: int, _: int) -> None:
+        if count > 100:
+            raise KilledError
+
+    out = tmp_path / "out"
+    with pytest.raises(KilledError):
+        run_experiment(SPEC, out, folder=folder, progress=stop)
+    other = replace(SPEC, queries=20)
+    with pytest.raises(InputError) as caught:
+        run_experiment(other, out, folder=folder)
+    assert_sentence(caught.value, "out.partial", "queries")
+    shutil.rmtree(tmp_path / "out.partial" / "_parts")  # nothing is lost
+    run_experiment(other, out, folder=folder)
+    assert len(open_results(out)["none/paper-top1"].queries) == 20
+
+
+def test_other_inputs_and_versions_are_refused(
+    folder: Path, results: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    shutil.copytree(folder, tmp_path / "towns")
+    save_with_store(
+        World(TOWN.objects[:-1]).database,
+        ObjectStore.of(World(TOWN.objects[:-1]).street_objects),
+        tmp_path / "towns" / "city.parquet",
+    )
+    with pytest.raises(InputError) as caught:
+        run_experiment(SPEC, results, folder=tmp_path / "towns")
+    assert_sentence(caught.value, "inputs", "city.parquet")
+    monkeypatch.setattr("semsig_gis.experiments.run.versions", lambda: {"numpy": "99"})
+    with pytest.raises(InputError) as caught:
+        run_experiment(SPEC, results, folder=folder)
+    assert_sentence(caught.value, "versions", "numpy")
+
+
+def test_folders_of_other_things_are_refused(folder: Path, tmp_path: Path) -> None:
+    (tmp_path / "photos").mkdir()
+    (tmp_path / "photos" / "me.jpg").touch()
+    (tmp_path / "new.partial").mkdir()
+    (tmp_path / "new.partial" / "me.jpg").touch()
+    for name, word in (("photos", "photos"), ("new", "'me.jpg'")):
+        with pytest.raises(InputError) as caught:
+            run_experiment(SPEC, tmp_path / name, folder=folder)
+        assert_sentence(caught.value, word, "another folder")
+    assert (tmp_path / "new.partial" / "me.jpg").exists()
+    with pytest.raises(DatabaseError) as no_results:
+        open_results(tmp_path / "photos")
+    assert_sentence(no_results.value, "photos", "semsig evaluate")
+
+
+def refuse(spec: ExperimentSpec, folder: Path, tmp_path: Path, *words: str) -> None:
+    """Check that an experiment is refused, and leaves nothing that is in the way of another."""
+    with pytest.raises(SemsigError) as caught:
+        run_experiment(spec, tmp_path / "out", folder=folder)
+    assert_sentence(caught.value, *words)
+    assert not (tmp_path / "out").exists()
+
+
+def test_experiments_that_do_not_fit(folder: Path, tmp_path: Path) -> None:
+    chain = parse_experiment(SPEC.to_toml().replace("view:180", "missing:bnech")).distortions
+    for spec, words in (
+        (replace(SPEC, queries=10**6), ["1000000 queries", "number of cells"]),
+        (replace(SPEC, top=(10**6,)), ["1000000 candidates"]),
+        (replace(SPEC, database="nowhere.parquet"), ["nowhere.parquet", "does not exist"]),
+        (replace(SPEC, city="nowhere.parquet"), ["nowhere.parquet", "does not exist"]),
+        (replace(SPEC, distortions=chain), ["'bnech'", "nearest is 'bench'"]),
+        (replace(SPEC, districts=Districts(file="none.gpkg", name="part")), ["none.gpkg"]),
+        (replace(SPEC, districts=Districts(file="parts.gpkg", name="nom")), ["'nom'", "part"]),
+        (replace(SPEC, districts=Districts(file="city.parquet", name="nom")), ["cannot be read"]),
+    ):
+        refuse(spec, folder, tmp_path, *words)
+    run_experiment(replace(SPEC, queries=5), tmp_path / "out", folder=folder)
+
+
+def test_the_street_objects_are_needed_for_places_anywhere(folder: Path, tmp_path: Path) -> None:
+    shutil.copyfile(folder / "city.parquet", tmp_path / "city.parquet")
+    refuse(replace(SPEC, seen_from="anywhere"), tmp_path, tmp_path, "city.objects")
+
+
+def test_a_later_city_is_looked_at_from_anywhere(folder: Path, tmp_path: Path) -> None:
+    text = SPEC.to_toml().replace("queries = 130", "queries = 40")
+    text = text.replace('seen_from = "cells"', 'seen_from = "anywhere"\ncity = "later.parquet"')
+    text = text.replace('"likelihood:generic"', '"likelihood:light:refined:heading=10"')
+    spec = parse_experiment(text + '[districts]\nfile = "parts.gpkg"\nname = "part"\n')
+    found = run_experiment(spec, tmp_path / "out", folder=folder)
+    inputs = json.loads((tmp_path / "out" / "inputs.json").read_text("utf-8"))["inputs"]
+    names = ["city.parquet", "later.parquet", "later.objects", "city.objects", "parts.gpkg"]
+    assert list(inputs) == names
+    refined = found["phone/generic-top1"]
+    assert refined.city == "later.parquet"
+    assert refined.queries["heading_error"].notna().any()
+    assert (refined.queries["cell"] == -1).any()
+    lost = refined.queries[refined.queries["cell"] == -1]
+    assert (lost[["rank_low", "rank_high"]] == len(TOWN.database)).all(axis=None)
+    assert (lost["type_group"] == 0).all()
+    districts = pd.read_csv(tmp_path / "out" / "phone" / "generic-top1" / "districts.csv")
+    assert districts["n"].sum() == 40
+    assert districts["district"].tolist()[0] == "west"
+    assert set(districts["district"]) <= {"west", "nook", "elsewhere"}
+    assert set(open_results(tmp_path / "out")) == set(found)
+
+
+def test_progress_counts_every_answer(folder: Path, tmp_path: Path) -> None:
+    seen: list[tuple[int, int]] = []
+    notes: list[str] = []
+    run_experiment(
+        SPEC,
+        tmp_path / "out",
+        folder=folder,
+        note=notes.append,
+        progress=lambda done, total: seen.append((done, total)),
+    )
+    assert [done for done, _ in seen] == [200, 260, 460, 520]
+    assert {total for _, total in seen} == {520}
+    assert all("index" in note for note in notes)

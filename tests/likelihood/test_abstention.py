@@ -1,0 +1,123 @@
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pytest
+from noisy_cells import random_database
+from sentences import assert_sentence
+
+from semsig_gis.core.errors import InputError
+from semsig_gis.likelihood.answer_rule import AnswerRule, calibrate, open_rule, save_rule
+from semsig_gis.likelihood.posterior import posterior
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+
+def queries(seed: int, count: int) -> tuple[np.ndarray, np.ndarray]:
+    """Return chances and outcomes of a model that is too sure of itself."""
+    rng = np.random.default_rng(seed)
+    masses = np.where(rng.random(count) < 0.5, rng.beta(1, 5, count), rng.beta(20, 1, count))
+    return masses, rng.random(count) < masses**1.3
+
+
+def test_the_promise_is_kept() -> None:
+    masses, correct = queries(99, 200_000)
+    broken = 0
+    for seed in range(150):
+        rule = calibrate(*queries(seed, 1500), precision=0.95)
+        answered = masses >= rule.threshold
+        broken += bool(answered.any() and correct[answered].mean() < 0.95)
+    assert broken / 150 <= 0.05 + 0.03
+    assert rule.coverage > 0.2
+
+
+def test_counts_are_those_of_the_threshold() -> None:
+    masses, correct = queries(0, 2000)
+    rule = calibrate(masses, correct, precision=0.9, radius=25.0)
+    answered = masses >= rule.threshold
+    assert rule.queries == 2000
+    assert rule.answered == answered.sum()
+    assert rule.wrong == (~correct[answered]).sum()
+    assert rule.radius == 25.0
+    assert rule.coverage == answered.mean()
+
+
+def test_too_few_queries_prove_nothing() -> None:
+    rule = calibrate(np.ones(100), np.ones(100, bool))
+    assert rule.threshold == math.inf
+    assert rule.answered == 0
+    assert not rule.answers(1.0)
+    assert calibrate(np.ones(217), np.ones(217, bool)).threshold == 1.0
+    assert calibrate([], []).threshold == math.inf
+    assert calibrate(np.ones(500), np.zeros(500, bool)).threshold == math.inf
+
+
+def test_equal_chances_are_answered_together() -> None:
+    correct = np.arange(1000) < 600
+    rule = calibrate(np.full(1000, 0.9), correct)
+    assert rule.threshold == math.inf
+
+
+def test_a_posterior_is_decided_on() -> None:
+    database = random_database(0)
+    loglik = np.full(len(database), -50.0)
+    loglik[7] = 0.0
+    answer = AnswerRule(threshold=0.9).decide(posterior(database, loglik))
+    assert answer.given
+    assert answer.cell == 7
+    assert [answer.x, answer.y] == database.xy[7].tolist()
+    assert answer.mass == pytest.approx(1.0)
+    assert not AnswerRule(threshold=1.1).decide(posterior(database, loglik)).given
+
+
+@pytest.mark.parametrize("threshold", [0.75, math.inf])
+def test_a_rule_is_saved_and_opened(tmp_path: Path, threshold: float) -> None:
+    rule = AnswerRule(threshold=threshold, queries=10, answered=5, wrong=1)
+    save_rule(rule, tmp_path / "rule.json")
+    assert open_rule(tmp_path / "rule.json") == rule
+    assert math.isnan(AnswerRule(threshold=0.5).coverage)
+
+
+@pytest.mark.parametrize(
+    "text", ["", "[]", "{}", '{"threshold": "a"}', '{"threshold": 1, "more": 2}']
+)
+def test_damaged_rules(tmp_path: Path, text: str) -> None:
+    (tmp_path / "rule.json").write_text(text)
+    with pytest.raises(InputError) as caught:
+        open_rule(tmp_path / "rule.json")
+    assert_sentence(caught.value, "rule.json", "save_rule")
+
+
+def test_a_rule_that_is_not_there(tmp_path: Path) -> None:
+    with pytest.raises(InputError) as caught:
+        open_rule(tmp_path / "none.json")
+    assert_sentence(caught.value, "none.json", "No such file")
+
+
+@pytest.mark.parametrize(
+    ("values", "word"),
+    [
+        ({"threshold": math.nan}, "threshold"),
+        ({"threshold": 0.5, "precision": 1.0}, "precision"),
+        ({"threshold": 0.5, "confidence": 0.0}, "confidence"),
+        ({"threshold": 0.5, "radius": math.inf}, "radius"),
+        ({"threshold": 0.5, "wrong": 1}, "1 wrong"),
+    ],
+)
+def test_numbers_out_of_range(values: dict[str, float], word: str) -> None:
+    with pytest.raises(InputError) as caught:
+        AnswerRule(**values)  # type: ignore[arg-type]
+    assert_sentence(caught.value, word)
+
+
+def test_calibration_refuses_what_does_not_fit() -> None:
+    for masses, correct in (([0.5], []), ([math.nan], [True]), ([[0.5]], [[True]])):
+        with pytest.raises(InputError) as caught:
+            calibrate(masses, correct)
+        assert_sentence(caught.value, "one outcome")
+    with pytest.raises(InputError) as caught:
+        calibrate([0.5], [True], precision=2.0)
+    assert_sentence(caught.value, "precision")

@@ -1,0 +1,135 @@
+from __future__ import annotations
+
+import itertools
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from noisy_cells import noise_specs, random_database, random_query
+
+from semsig_gis.database.visibility import views_in
+from semsig_gis.likelihood.association import Pairs, associate_pairs, near_pairs, pair_weights
+from semsig_gis.likelihood.noise.table import database_tables
+from semsig_gis.likelihood.rerank import align_cells
+
+
+def every_association(weights: np.ndarray) -> tuple[float, np.ndarray]:
+    """Sum over all one-to-one associations, one at a time."""
+    objects, detections = weights.shape
+    total, chances = 0.0, np.zeros_like(weights)
+    for choice in itertools.product(range(-1, detections), repeat=objects):
+        taken = [other for other in choice if other >= 0]
+        if len(taken) != len(set(taken)):
+            continue
+        part = math.prod(weights[one, other] for one, other in enumerate(choice) if other >= 0)
+        total += part
+        for one, other in enumerate(choice):
+            if other >= 0:
+                chances[one, other] += part
+    return math.log(total), chances / total
+
+
+def pairs_of(weights: np.ndarray) -> tuple[Pairs, np.ndarray]:
+    one, other = np.nonzero(weights)
+    pairs = Pairs(
+        starts=np.array([0, len(one)]),
+        objects=one,
+        detections=other,
+        away=np.zeros(len(one)),
+        counts=weights.shape,
+    )
+    return pairs, weights[one, other]
+
+
+@given(
+    st.integers(1, 4),
+    st.integers(1, 4),
+    st.lists(st.floats(1e-3, 1e3), min_size=16, max_size=16),
+    st.booleans(),
+)
+def test_belief_propagation_is_exact_without_loops(
+    objects: int,
+    detections: int,
+    values: list[float],
+    star: bool,  # noqa: FBT001
+) -> None:
+    weights = np.zeros((objects, detections))
+    if star:
+        weights[0] = values[:detections]
+        weights[:, 0] = values[4 : 4 + objects]
+    else:
+        for step in range(min(objects, detections)):
+            weights[step, step] = values[step]
+            if step:
+                weights[step, step - 1] = values[step + 4]
+    total, chances = every_association(weights)
+    pairs, flat = pairs_of(weights)
+    found = associate_pairs(pairs, flat)
+    assert found.log_sums[0] == pytest.approx(total, abs=1e-3)
+    assert found.chances == pytest.approx(chances[pairs.objects, pairs.detections], abs=2e-3)
+
+
+@given(st.integers(0, 10_000))
+def test_belief_propagation_is_near_the_sum_over_everything(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    weights = np.exp(rng.normal(0.0, 2.0, (4, 4)))
+    total, chances = every_association(weights)
+    pairs, flat = pairs_of(weights)
+    found = associate_pairs(pairs, flat)
+    assert found.log_sums[0] == pytest.approx(total, abs=0.35)
+    assert found.log_sums[0] <= total + 1e-3  # the Bethe approximation is a lower bound
+    assert np.abs(found.chances.reshape(4, 4) - chances).max() < 0.2
+    assert (found.chances.reshape(4, 4).sum(axis=0) <= 1 + 1e-3).all()
+
+
+def test_problems_do_not_touch_each_other() -> None:
+    rng = np.random.default_rng(1)
+    starts = np.array([0, 3, 3, 8]), np.array([0, 2, 4, 9])
+    bearings = rng.uniform(0, 360, 8), rng.uniform(0, 360, 9)
+    pairs = near_pairs(starts[0], bearings[0], starts[1], bearings[1], reach=120.0)
+    weights = rng.uniform(0, 3, len(pairs.away))
+    together = associate_pairs(pairs, weights)
+    for row in range(3):
+        here = [slice(*part[row : row + 2]) for part in starts]
+        alone = near_pairs(
+            np.array([0, here[0].stop - here[0].start]),
+            bearings[0][here[0]],
+            np.array([0, here[1].stop - here[1].start]),
+            bearings[1][here[1]],
+            reach=120.0,
+        )
+        part = slice(*pairs.starts[row : row + 2])
+        assert pairs.objects[part].tolist() == (alone.objects + here[0].start).tolist()
+        found = associate_pairs(alone, weights[part])
+        assert found.chances == pytest.approx(together.chances[part])
+        assert found.log_sums[0] == pytest.approx(together.log_sums[row])
+    assert together.log_sums[1] == 0.0
+
+
+@given(st.integers(0, 1000), st.integers(1, 12), noise_specs())
+def test_the_sums_are_those_of_the_re_ranking(seed: int, size: int, noise: object) -> None:
+    database = random_database(seed)
+    query = random_query(database, seed, size=size)
+    (table,), _ = database_tables(database, noise)  # type: ignore[arg-type]
+    cells = np.arange(len(database))
+    views = views_in(database, cells)
+    starts = np.arange(len(database) + 1) * size
+    assert query.bearings is not None
+    pairs = near_pairs(views.offsets, views.bearings, starts, np.tile(query.bearings, len(cells)))
+    names = table.query_rows(query)
+    weights = pair_weights(
+        table,
+        pairs,
+        kinds=table.row_of[views.codes],
+        distances=views.distances,
+        lengths=np.repeat(views.lengths, views.lengths),
+        names=np.tile(names, len(cells)),
+    )
+    # The re-ranking cuts the tails.
+    weights[np.abs(pairs.away) > 4.5 * table.sigma[table.row_of[views.codes]][pairs.objects]] = 0.0
+    sums = associate_pairs(pairs, weights).log_sums
+    expected = align_cells(database, query, noise, cells)  # type: ignore[arg-type]
+    constant = table.nothing_seen(database) + np.log(table.density[names]).sum()
+    assert sums + constant == pytest.approx(expected, abs=0.05)

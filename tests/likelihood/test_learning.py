@@ -1,0 +1,211 @@
+from __future__ import annotations
+
+import json
+import math
+import random
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pytest
+from noisy_cells import TAXONOMY, random_database
+from sentences import assert_sentence
+from worlds import CODES, World
+
+from semsig_gis.core.errors import InputError
+from semsig_gis.core.signature import Signature
+from semsig_gis.likelihood.noise.learn import Sample, learn_noise
+from semsig_gis.likelihood.noise.model import open_noise, save_noise
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from semsig_gis.database.database import SignatureDatabase
+    from semsig_gis.likelihood.noise.learn import NoiseEstimate
+
+# What the simulated detector does; the estimator has no part in it.
+DETECTION = {1: 0.9, 2: 0.7, 3: 0.8, 4: 0.6}
+MISNAMED = {1: 0.05, 2: 0.1, 3: 0.02, 4: 0.2}
+SIGMA = {1: 3.0, 2: 6.0, 3: 4.0, 4: 5.0}
+CLUTTER = {1: 0.5, 2: 0.1, 3: 0.3, 4: 0.2}
+
+
+def detector(seed: int, seen: list[tuple[int, float]]) -> Signature:
+    """Detect things as a plain loop over the throws of dice."""
+    dice = random.Random(seed)  # noqa: S311
+    given: list[tuple[float, int]] = []
+    for code, bearing in seen:
+        if dice.random() < DETECTION[code]:
+            name = code
+            if dice.random() < MISNAMED[code]:
+                name = dice.choice([other for other in DETECTION if other != code])
+            given.append(((bearing + dice.gauss(0, SIGMA[code])) % 360, name))
+    for code, rate in CLUTTER.items():
+        alive = dice.random()
+        while alive > math.exp(-rate):  # Knuth's Poisson numbers
+            given.append((dice.uniform(0, 360), code))
+            alive *= dice.random()
+    given.sort()
+    return Signature(
+        np.array([code for _, code in given], np.uint8), np.array([angle for angle, _ in given])
+    )
+
+
+def simulated(database: SignatureDatabase, count: int, *, seed: int = 0) -> list[Sample]:
+    samples = []
+    for number in range(count):
+        cell = number % len(database)
+        part = slice(database.offsets[cell], database.offsets[cell + 1])
+        seen = list(
+            zip(
+                database.codes[part].tolist(),
+                (database.bearings[part] + 0.025).tolist(),
+                strict=True,
+            )
+        )
+        samples.append(
+            Sample(
+                signature=detector(seed * 100_000 + number, seen),
+                cell_id=int(database.cell_ids[cell]),
+            )
+        )
+    return samples
+
+
+def truths(estimate: NoiseEstimate) -> list[tuple[float, float, float]]:
+    """Return the true value of each rate of a class, and its interval."""
+    known = {
+        "detection": DETECTION,
+        "misnamed": MISNAMED,
+        "clutter": CLUTTER,
+        "bearing_sigma": SIGMA,
+    }
+    codes = {item.name: item.code for item in TAXONOMY.classes}
+    rows = estimate.rates[estimate.rates["class"] != "all"]
+    return [
+        (known[row["quantity"]][codes[row["class"]]], row["low_95"], row["high_95"])
+        for row in rows.to_dict("records")
+    ]
+
+
+@pytest.fixture(scope="module")
+def estimate() -> NoiseEstimate:
+    return learn_noise(simulated(random_database(1, cells=200), 500), random_database(1, cells=200))
+
+
+def test_the_true_rates_are_recovered_within_their_intervals(estimate: NoiseEstimate) -> None:
+    rows = truths(estimate)
+    assert len(rows) == 16
+    assert sum(low <= true <= high for true, low, high in rows) >= 14
+    values = estimate.rates["value"].to_numpy()
+    assert (estimate.rates["low_95"] <= estimate.rates["low_90"]).all()
+    assert (estimate.rates["high_95"] >= estimate.rates["high_90"]).all()
+    assert np.isfinite(values).all()
+    spec = estimate.spec
+    assert spec.detection_by_class["alignment_tree"] == pytest.approx(0.9, abs=0.04)
+    assert spec.clutter == pytest.approx(sum(CLUTTER.values()), abs=0.15)
+    assert spec.bearing_sigma_by_class["water_fountain"] == pytest.approx(6.0, abs=0.5)
+
+
+def test_intervals_hold_the_truth_as_often_as_they_say() -> None:
+    database = random_database(2, cells=100, longest=8)
+    inside = []
+    for seed in range(12):
+        found = learn_noise(simulated(database, 250, seed=seed + 1), database)
+        inside += [low <= true <= high for true, low, high in truths(found)]
+    assert 0.88 <= np.mean(inside) <= 0.995
+
+
+def test_more_samples_make_narrower_intervals(estimate: NoiseEstimate) -> None:
+    database = random_database(1, cells=200)
+    few = learn_noise(simulated(database, 100), database)
+    width = few.rates["high_95"] - few.rates["low_95"]
+    assert (width > (estimate.rates["high_95"] - estimate.rates["low_95"])).mean() > 0.9
+    assert few.samples == 100
+    assert few.objects < estimate.objects
+
+
+def test_the_spec_is_saved_and_opened(estimate: NoiseEstimate, tmp_path: Path) -> None:
+    save_noise(estimate.spec, tmp_path / "noise.json")
+    assert open_noise(tmp_path / "noise.json") == estimate.spec
+    assert json.loads(json.dumps(estimate.to_dict()))["samples"] == 500
+    rows = estimate.confusion.to_numpy().sum()
+    assert rows == pytest.approx(estimate.rates["samples"][estimate.rates.index[5]], rel=1e-6)
+
+
+def test_a_class_of_few_samples_is_drawn_to_the_whole(estimate: NoiseEstimate) -> None:
+    database = random_database(1, cells=200)
+    rare = 5
+    codes = database.codes.copy()
+    codes[np.flatnonzero(codes == 1)[:2]] = rare  # which is never detected below
+    changed = replace(database, codes=codes)
+    samples = simulated(database, 200)
+    found = learn_noise(samples, changed)
+    name = TAXONOMY.by_code(rare).name
+    row = found.rates[(found.rates["quantity"] == "detection") & (found.rates["class"] == name)]
+    overall = found.spec.detection
+    assert row["samples"].item() == 2
+    assert abs(row["value"].item() - overall) < abs(row["own"].item() - overall) + 1e-9
+    assert row["value"].item() == pytest.approx(overall, abs=0.2)
+    assert estimate.skipped == 0
+
+
+def test_places_in_cells_turn_bearings() -> None:
+    rng = np.random.default_rng(0)
+    world = World(
+        tuple((x, y, int(rng.choice(CODES[:2]))) for x, y in rng.uniform(0, 300, (90, 2)))
+    )
+    database, objects = world.database, world.street_objects
+    samples = []
+    for _ in range(400):
+        xy = rng.uniform(0, 300, 2)
+        away = objects.xy - xy
+        near = np.flatnonzero(np.hypot(*away.T) <= 30.0)
+        angles = np.degrees(np.arctan2(away[near, 0], away[near, 1])) + rng.normal(0, 2, len(near))
+        seen = Signature(objects.codes[near], np.asarray(angles % 360.0))
+        samples.append(Sample(signature=seen, xy=(float(xy[0]), float(xy[1]))))
+    exact = learn_noise(samples, objects)
+    assert exact.spec.bearing_sigma == pytest.approx(2.0, abs=0.15)
+    assert exact.spec.detection > 0.99
+    lost = Sample(signature=samples[0].signature, xy=(9e6, 9e6))
+    with_lost = learn_noise([lost, *samples], objects)
+    assert (with_lost.skipped, with_lost.spec) == (exact.skipped + 1, exact.spec)
+    naive = learn_noise(samples, database)
+    told = learn_noise(samples, database, position_sigma=10 / math.sqrt(12))
+    assert naive.spec.bearing_sigma > 2 * told.spec.bearing_sigma
+    assert told.spec.position_sigma == pytest.approx(2.89, abs=0.01)
+    assert told.skipped == naive.skipped > 0
+
+
+def test_one_class_alone() -> None:
+    database = random_database(4, classes=1)
+    samples = [
+        Sample(signature=database.signature(cell), cell_id=int(database.cell_ids[cell]))
+        for cell in range(len(database))
+    ]
+    found = learn_noise(samples, database)
+    assert found.spec.detection > 0.98
+    assert found.spec.confusion == {"alignment_tree": {"alignment_tree": 1.0}}
+
+
+def test_what_cannot_be_learnt_from() -> None:
+    database = random_database(0)
+    seen = database.signature(0)
+    elsewhere = Sample(signature=seen, xy=(5e6, 5e6))
+    nothing = Sample(
+        signature=Signature(np.empty(0, np.uint8), np.empty(0)), cell_id=int(database.cell_ids[0])
+    )
+    objects = World(((0.0, 0.0, 1),)).street_objects
+    for samples, city, words in (
+        ([], database, ["no samples"]),
+        ([elsewhere], database, ["none of the 1", "EPSG:2154"]),
+        ([nothing], database, ["0 detections"]),
+        ([nothing], objects, ["x and y"]),
+        ([elsewhere], objects, ["none of the 1"]),
+    ):
+        with pytest.raises(InputError) as caught:
+            learn_noise(samples, city)
+        assert_sentence(caught.value, *words)
+    with pytest.raises(InputError) as caught:
+        learn_noise([nothing], database, position_sigma=math.nan)
+    assert_sentence(caught.value, "nan", "metres")

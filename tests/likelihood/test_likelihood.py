@@ -1,0 +1,353 @@
+from __future__ import annotations
+
+import dataclasses
+import math
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from noisy_cells import mixtures, noise_specs, random_database, random_query
+
+from semsig_gis.core.errors import InputError
+from semsig_gis.core.signature import Signature
+from semsig_gis.likelihood.index import (
+    BIN_DEGREES,
+    BINS,
+    LEAST_PRIOR,
+    build_index,
+    index_fingerprint,
+    write_columns,
+)
+from semsig_gis.likelihood.kernels import promising_cells
+from semsig_gis.likelihood.noise.model import NoiseMixture, NoiseSpec, named_noise
+
+if TYPE_CHECKING:
+    from semsig_gis.database.database import SignatureDatabase
+    from semsig_gis.likelihood.index import LikelihoodIndex
+    from semsig_gis.likelihood.noise.model import Noise
+
+SEEDS = st.integers(0, 10_000)
+
+
+def bin_density(bearing: float, seen: float, sigma: float) -> float:
+    """Return the mean density a degree of a wrapped normal over the bin of a bearing."""
+    low = math.floor(seen / BIN_DEGREES) * BIN_DEGREES - bearing
+    total = 0.0
+    for turn in range(-4, 5):
+        edges = (low + 360 * turn, low + BIN_DEGREES + 360 * turn)
+        below, above = (0.5 * (1 + math.erf(edge / sigma / math.sqrt(2))) for edge in edges)
+        total += above - below
+    return total / BIN_DEGREES
+
+
+def slow_loglik(index: LikelihoodIndex, query: Signature, cell: int, turn: float = 0.0) -> float:
+    """Return the formula of one cell, one number at a time, without steps."""
+    table, database = index.table, index.database
+    assert query.bearings is not None
+    part = slice(database.offsets[cell], database.offsets[cell + 1])
+    length = min(int(database.lengths[cell]), len(table.missed) - 1)
+    kinds = table.row_of[database.codes[part]].tolist()
+    sigmas = table.sigmas(database.reach)[kinds, database.distance_units[part]].tolist()
+    bearings = (database.bearings[part] + 0.025).tolist()  # the middle of a unit
+    total = -float(table.clutter.sum())
+    for kind in kinds:
+        total += math.log(table.missed[length, kind])
+    for name, seen in zip(table.query_rows(query).tolist(), query.bearings.tolist(), strict=True):
+        density = alone = table.density[name]
+        for kind, bearing, sigma in zip(kinds, bearings, sigmas, strict=True):
+            missed = table.missed[length, kind]
+            chance = 1.0 if name == len(table.codes) else table.named[length, kind, name]
+            odds = (1 - missed) / missed * chance
+            density += odds * bin_density(bearing, (seen + turn) % 360.0, sigma)
+        # A byte holds no more than what four objects in one direction add.
+        total += min(math.log(density), math.log(alone) + 255 * index.step)
+    return total
+
+
+def slack(index: LikelihoodIndex, query: Signature) -> float:
+    """Return how far the steps of the columns may be from the formula."""
+    return len(query) * (0.5 * index.step + 2.0**-9) + 1e-3
+
+
+def slow_counts(index: LikelihoodIndex, wanted: list[int], cell: int) -> float:
+    """Return the likelihood of so many objects of each class, by sums over all hits."""
+    table, database = index.table, index.database
+    length = int(database.lengths[cell])
+    own = np.bincount(
+        table.row_of[database.codes[database.offsets[cell] : database.offsets[cell + 1]]],
+        minlength=len(table.codes),
+    ).tolist()
+    share = sum(wanted[:-1]) / sum(wanted)
+    detected = (1 - table.missed[length]).tolist()
+    total = 0.0
+    for name in range(len(own) if share else 0):
+        stray = share * (
+            table.clutter[name]
+            + sum(
+                own[kind] * detected[kind] * table.named[length, kind, name]
+                for kind in range(len(own))
+                if kind != name
+            )
+        )
+        hit = share * detected[name] * table.named[length, name, name]
+        total += math.log(
+            sum(
+                math.comb(own[name], hits)
+                * hit**hits
+                * (1 - hit) ** (own[name] - hits)
+                * stray ** (wanted[name] - hits)
+                * math.exp(-stray)
+                / math.factorial(wanted[name] - hits)
+                for hits in range(min(own[name], wanted[name]) + 1)
+            )
+        )
+    if wanted[-1]:
+        rate = (1 - share) * (
+            table.clutter.sum() + sum(n * p for n, p in zip(own, detected, strict=True))
+        )
+        total += wanted[-1] * math.log(rate) - rate - math.lgamma(wanted[-1] + 1)
+    return total
+
+
+@settings(max_examples=25)
+@given(SEEDS, mixtures(), st.integers(1, 9))
+def test_scores_are_the_formula_to_within_the_steps(seed: int, noise: Noise, size: int) -> None:
+    database = random_database(seed, cells=8)
+    index = build_index(database, noise)
+    query = random_query(database, seed, size=size)
+    scores = index.scores(query)
+    assert scores.heading is None
+    for cell in range(len(database)):
+        expected = slow_loglik(index, query, cell)
+        assert scores.loglik[cell] == pytest.approx(expected, abs=slack(index, query))
+
+
+def test_the_steps_hardly_change_the_order() -> None:
+    database = random_database(5, cells=300)
+    index = build_index(database, named_noise("generic"))
+    query = Signature(*(getattr(database.signature(17), name) for name in ("codes", "bearings")))
+    exact = [slow_loglik(index, query, cell) for cell in range(len(database))]
+    found = index.scores(query).loglik
+    first, second = (np.argsort(np.argsort(values)) for values in (exact, found))
+    assert np.corrcoef(first, second)[0, 1] > 0.995
+    assert int(np.argmax(exact)) == int(found.argmax())
+
+
+@settings(max_examples=6)
+@given(SEEDS, st.floats(0.5, 15.0))
+def test_a_position_that_is_not_known_widens_by_distance(seed: int, metres: float) -> None:
+    database = random_database(seed, cells=8)
+    index = build_index(database, NoiseSpec(position_sigma=metres))
+    query = random_query(database, seed, size=5)
+    found = index.scores(query).loglik
+    # The deviations are kept in 128 levels, up to two per cent apart from the true one.
+    for cell in range(len(database)):
+        assert found[cell] == pytest.approx(
+            slow_loglik(index, query, cell), abs=slack(index, query) + 0.2 * len(query)
+        )
+
+
+@settings(max_examples=10)
+@given(SEEDS, st.sampled_from([4.0, 20.0, math.inf]))
+def test_turns_are_summed_over_with_their_chances(seed: int, sigma: float) -> None:
+    database = random_database(seed, cells=20)
+    index = build_index(database, named_noise("medium"))
+    query = random_query(database, seed, size=6)
+    assert query.bearings is not None
+    turns = np.arange(-36, 36) * BIN_DEGREES
+    chances = np.exp(-0.5 * (turns / sigma) ** 2)
+    chances[chances <= LEAST_PRIOR] = 0.0  # the likeliest has 1
+    chances /= chances.sum()
+    each = np.stack(
+        [
+            index.scores(Signature(query.codes, (query.bearings + turn) % 360.0)).loglik
+            for turn in turns
+        ]
+    ).astype(np.float64)
+    found = index.scores(query, north_sigma=sigma)
+    with np.errstate(divide="ignore"):
+        expected = np.logaddexp.reduce(each + np.log(chances)[:, None], axis=0)
+        best = (each + np.log(chances)[:, None]).max(axis=0)
+    assert found.loglik == pytest.approx(expected, abs=2e-3)
+    assert found.heading is not None
+    reached = each[((found.heading + 180.0) / BIN_DEGREES).astype(int), np.arange(len(database))]
+    chance = chances[((found.heading + 180.0) / BIN_DEGREES).astype(int)]
+    assert reached + np.log(chance) == pytest.approx(best, abs=2e-3)
+
+
+def test_the_turn_of_a_query_is_found() -> None:
+    database = random_database(3, longest=20)
+    cell = int(database.lengths.argmax())
+    true = database.signature(cell)
+    assert true.bearings is not None
+    query = Signature(true.codes, (true.bearings - 65.0) % 360.0)
+    index = build_index(database, named_noise("light"))
+    found = index.scores(query, north_sigma=math.inf)
+    assert int(found.loglik.argmax()) == cell
+    assert found.heading is not None
+    assert found.heading[cell] == 65.0
+
+
+@settings(max_examples=20)
+@given(SEEDS, noise_specs(), st.lists(st.integers(0, 4), min_size=1, max_size=9))
+def test_types_alone_are_compared_by_their_numbers(
+    seed: int, spec: NoiseSpec, codes: list[int]
+) -> None:
+    database = random_database(seed, cells=30)
+    index = build_index(database, spec)
+    query = Signature(np.array(codes, np.uint8), None)
+    wanted = np.bincount(index.table.query_rows(query), minlength=5).tolist()
+    found = index.scores(query).loglik
+    for cell in range(len(database)):
+        assert found[cell] == pytest.approx(slow_counts(index, wanted, cell), rel=1e-4, abs=1e-3)
+
+
+def test_order_and_unknown_classes_do_not_matter() -> None:
+    database = random_database(9)
+    index = build_index(database, named_noise("medium"))
+    query = random_query(database, 9, size=7)
+    assert query.codes is not None
+    assert query.bearings is not None
+    back = Signature(query.codes[::-1], query.bearings[::-1])
+    assert np.array_equal(index.scores(query).loglik, index.scores(back).loglik)
+    blank = Signature(np.zeros(7, np.uint8), query.bearings)
+    alone = Signature(None, query.bearings)
+    assert np.array_equal(index.scores(blank).loglik, index.scores(alone).loglik)
+
+
+def test_a_query_longer_than_sixteen_bits_hold_is_scored() -> None:
+    database = random_database(2, cells=5)
+    index = build_index(database, named_noise("medium"))
+    one = random_query(database, 2, size=1)
+    assert one.codes is not None
+    assert one.bearings is not None
+    many = Signature(np.repeat(one.codes, 600), np.repeat(one.bearings, 600))
+    single, found = index.scores(one).loglik, index.scores(many).loglik
+    constants = index.constants
+    assert found - constants == pytest.approx(600 * (single - constants), rel=1e-4)
+    with pytest.raises(InputError, match="at most 257 objects"):
+        index.scores(many, north_sigma=math.inf)
+
+
+@pytest.mark.parametrize("cells", [1, 63, 64, 65])
+def test_any_number_of_cells_is_worked_out(cells: int) -> None:
+    database = random_database(6, cells=cells)
+    index = build_index(database, named_noise("light"), threads=3)
+    query = random_query(database, 6, size=3)
+    for cell in (0, cells - 1):
+        expected = slow_loglik(index, query, cell)
+        assert index.scores(query).loglik[cell] == pytest.approx(expected, abs=slack(index, query))
+
+
+def test_columns_come_out_the_same_whatever_the_threads_and_the_progress_is_told() -> None:
+    database = random_database(8, cells=390)
+    table = build_index(database, named_noise("medium")).table
+    told: list[tuple[int, int]] = []
+    written = []
+    for threads in (1, 4):
+        columns = np.zeros((5, BINS, 390), np.uint8)
+        write_columns(
+            database,
+            table,
+            columns,
+            threads=threads,
+            progress=lambda done, cells: told.append((done, cells)),
+        )
+        written.append(columns)
+    assert np.array_equal(written[0], written[1])
+    assert told[-1] == (390, 390)
+
+
+def test_an_index_of_a_mixture_holds_its_mean() -> None:
+    database = random_database(8)
+    specs = (NoiseSpec(detection=0.6), NoiseSpec(detection=0.8))
+    both = build_index(database, NoiseMixture(specs=specs, weights=(0.5, 0.5)))
+    mean = build_index(database, NoiseSpec(detection=0.7))
+    assert np.array_equal(both.columns, mean.columns)
+    assert len(both.tables) == 2
+
+
+def test_the_fingerprint_changes_with_what_the_index_depends_on() -> None:
+    database = random_database(8)
+    noise = named_noise("light")
+    prints = {
+        index_fingerprint(database, noise),
+        index_fingerprint(database, named_noise("medium")),
+        index_fingerprint(random_database(9), noise),
+        index_fingerprint(database.select(slice(39)), noise),
+        index_fingerprint(
+            dataclasses.replace(database, distance_units=database.distance_units // 2), noise
+        ),
+    }
+    assert len(prints) == 5
+    assert index_fingerprint(random_database(8), noise) in prints
+
+
+def small() -> SignatureDatabase:
+    return random_database(1, cells=5)
+
+
+@pytest.mark.parametrize(
+    ("query", "north_sigma", "said"),
+    [
+        (Signature(np.empty(0, np.uint8), np.empty(0)), 0.0, "the query has no objects"),
+        (Signature(np.array([11], np.uint8), np.zeros(1)), 0.0, "class code 11, which no cell"),
+        (Signature(np.array([1], np.uint8), np.zeros(1)), -1.0, "north is -1.0 degrees"),
+        (Signature(np.array([1], np.uint8), np.zeros(1)), math.nan, "north is nan degrees"),
+    ],
+)
+def test_queries_that_cannot_be_scored_are_refused(
+    query: Signature, north_sigma: float, said: str
+) -> None:
+    index = build_index(small(), named_noise("medium"))
+    with pytest.raises(InputError) as caught:
+        index.scores(query, north_sigma=north_sigma)
+    assert said in str(caught.value)
+
+
+@given(
+    st.lists(st.one_of(st.floats(-500, 0, width=32), st.just(-math.inf)), min_size=1, max_size=60),
+    st.integers(1, 60),
+)
+def test_promising_cells_hold_the_best(scores: list[float], count: int) -> None:
+    array = np.array(scores, np.float32)
+    wanted = min(count, len(array))
+    found = promising_cells(array, wanted)
+    assert len(found) >= wanted
+    assert (np.diff(found) > 0).all()
+    left = np.delete(array, found)
+    if len(left):
+        assert np.sort(array[found])[::-1][wanted - 1] > left.max()
+
+
+@settings(max_examples=20)
+@given(SEEDS, st.integers(0, 9), st.sampled_from([0.0, 10.0, math.inf]), st.integers(1, 3))
+def test_many_queries_at_once_are_one_after_the_other(
+    seed: int, count: int, north_sigma: float, threads: int
+) -> None:
+    database = random_database(seed, cells=70)
+    index = build_index(database, named_noise("generic"))
+    whole = [random_query(database, seed + place, size=1 + place) for place in range(count)]
+    bearings_alone = [Signature(None, one.bearings) for one in whole[:2]]
+    queries = [*whole, *bearings_alone, *(Signature(one.codes, None) for one in whole[:2])]
+    together = list(index.scores_of(queries, north_sigma=north_sigma, threads=threads))
+    for query, scores in zip(queries, together, strict=True):
+        alone = index.scores(query, north_sigma=north_sigma)
+        assert np.array_equal(scores.loglik, alone.loglik)
+        assert (scores.heading is None) == (alone.heading is None)
+        if scores.heading is not None and alone.heading is not None:
+            assert np.array_equal(scores.heading, alone.heading)
+
+
+def test_many_queries_with_a_bad_one_among_them() -> None:
+    database = random_database(1)
+    index = build_index(database, named_noise("generic"))
+    nothing = Signature(np.empty(0, np.uint8), np.empty(0))
+    answers = index.scores_of([database.signature(0), nothing])
+    assert np.array_equal(next(answers).loglik, index.scores(database.signature(0)).loglik)
+    with pytest.raises(InputError, match="has no objects"):
+        next(answers)
+    with pytest.raises(InputError, match="0 threads were asked for"):
+        list(index.scores_of([], threads=0))

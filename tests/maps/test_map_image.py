@@ -1,0 +1,198 @@
+"""The picture of the cells: every cell is where the map has it."""
+
+from __future__ import annotations
+
+import struct
+import zlib
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pytest
+from pyproj import CRS, Transformer
+
+from semsig_gis.core.grid import GridSpec
+from semsig_gis.core.signature import SignatureSpec
+from semsig_gis.database.database import SignatureDatabase
+from semsig_gis.maps import image as map_image
+from semsig_gis.maps.image import city_image, level_image, place_lattices
+from semsig_gis.sources.catalog import paper_taxonomy
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+SHADES = {1: "#e0e0e0", 5: "#a0a0a0", 10: "#505050"}
+
+
+def a_city(
+    columns: NDArray[np.int64],
+    rows: NDArray[np.int64],
+    *,
+    crs: str = "EPSG:2154",
+    grid: GridSpec | None = None,
+    seed: int = 0,
+) -> SignatureDatabase:
+    """Return a database with random lengths in the given cells."""
+    order = np.lexsort((rows, columns))
+    lengths = np.random.default_rng(seed).integers(1, 15, len(order))
+    total = int(lengths.sum())
+    return SignatureDatabase(
+        columns=columns[order].astype(np.int32),
+        rows=rows[order].astype(np.int32),
+        offsets=np.concatenate([[0], np.cumsum(lengths)]),
+        codes=np.ones(total, np.uint8),
+        bearing_units=np.zeros(total, np.uint16),
+        distance_units=np.zeros(total, np.uint8),
+        grid=grid or GridSpec(10.0, (765_200.0, 6_275_000.0)),
+        spec=SignatureSpec(),
+        taxonomy=paper_taxonomy(),
+        crs=CRS(crs),
+    )
+
+
+def scattered(side: int, share: float, seed: int = 1) -> tuple[NDArray[np.int64], ...]:
+    return np.nonzero(np.random.default_rng(seed).random((side, side)) < share)
+
+
+def decoded(png: bytes) -> tuple[NDArray[np.uint8], bytes]:
+    """Return the palette indices of a PNG without filters, and its palette."""
+    assert png[:8] == b"\x89PNG\r\n\x1a\n"
+    chunks: dict[bytes, bytes] = {}
+    at = 8
+    while at < len(png):
+        (length,) = struct.unpack_from(">I", png, at)
+        kind, body = png[at + 4 : at + 8], png[at + 8 : at + 8 + length]
+        assert struct.unpack_from(">I", png, at + 8 + length) == (zlib.crc32(kind + body),)
+        chunks[kind] = body
+        at += 12 + length
+    width, height, *rest = struct.unpack(">IIBBBBB", chunks[b"IHDR"])
+    assert rest == [8, 3, 0, 0, 0]
+    assert chunks[b"tRNS"] == b"\0"
+    lines = np.frombuffer(zlib.decompress(chunks[b"IDAT"]), np.uint8).reshape(height, width + 1)
+    assert not lines[:, 0].any()
+    return lines[:, 1:], chunks[b"PLTE"]
+
+
+def seen_at(
+    image: bytes, bounds: list[list[float]], xy: NDArray[np.float64], crs: CRS
+) -> NDArray[np.uint8]:
+    """Return the palette indices where a web map puts places."""
+    pixels, _ = decoded(image)
+    to_mercator = Transformer.from_crs(crs, "EPSG:3857", always_xy=True)
+    from_degrees = Transformer.from_crs("EPSG:4326", "EPSG:3857")
+    south_west, north_east = (
+        np.array(from_degrees.transform(latitude, longitude)) for latitude, longitude in bounds
+    )
+    x, y = to_mercator.transform(xy[:, 0], xy[:, 1])
+    height, width = pixels.shape
+    across = (np.asarray(x) - south_west[0]) / (north_east[0] - south_west[0]) * width
+    down = (north_east[1] - np.asarray(y)) / (north_east[1] - south_west[1]) * height
+    found: NDArray[np.uint8] = pixels[down.astype(int), across.astype(int)]
+    return found
+
+
+@pytest.mark.parametrize("side", [7, 600])
+@pytest.mark.parametrize(
+    ("crs", "origin"),
+    [
+        ("EPSG:2154", (765_200.0, 6_275_000.0)),
+        ("EPSG:32631", (-3.5, 5_400_000.0)),  # west of its zone: much turned
+        ("EPSG:32735", (500_000.0, 7_500_000.0)),  # south of the equator
+    ],
+)
+def test_cells_lie_where_the_map_has_them(side: int, crs: str, origin: tuple[float, float]) -> None:
+    database = a_city(*scattered(side, 0.4), crs=crs, grid=GridSpec(10.0, origin))
+    image, bounds = city_image(database, SHADES)
+    # A pixel is at most half a cell wide, so the middle of a cell always has the cell's shade.
+    expected = np.digitize(database.lengths, list(SHADES))
+    assert (seen_at(image, bounds, database.xy, database.crs) == expected).all()
+    free = np.ones((database.columns.max() + 1, database.rows.max() + 1), bool)
+    free[database.columns, database.rows] = False
+    free[: database.columns.min()] = free[:, : database.rows.min()] = False
+    absent = database.grid.viewpoints(*np.nonzero(free))
+    assert not seen_at(image, bounds, absent, database.crs).any()
+
+
+def test_one_cell() -> None:
+    database = a_city(np.array([-5]), np.array([3]))
+    image, bounds = city_image(database, SHADES)
+    assert seen_at(image, bounds, database.xy, database.crs).all()
+    (south, west), (north, east) = bounds
+    assert 0 < north - south < 2e-4
+    assert 0 < east - west < 2e-4
+
+
+def test_palette_and_size() -> None:
+    image, _ = city_image(a_city(*scattered(500, 0.3)), SHADES)
+    pixels, palette = decoded(image)
+    assert palette[3:] == bytes.fromhex("e0e0e0a0a0a0505050")
+    assert 1000 <= min(pixels.shape) <= max(pixels.shape) <= 2048
+    assert set(np.unique(pixels)) == {0, 1, 2, 3}
+
+
+def test_a_wide_city_is_drawn_in_blocks_with_their_means(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(map_image, "_BLOCKS", 50)
+    database = a_city(*scattered(140, 0.5))
+    image, bounds = city_image(database, SHADES)
+    assert max(decoded(image)[0].shape) <= 100
+    block = 3
+    blocks: dict[tuple[int, int], list[int]] = {}
+    for column, row, length in zip(database.columns, database.rows, database.lengths, strict=True):
+        blocks.setdefault((int(column) // block, int(row) // block), []).append(int(length))
+    corners = np.array(list(blocks))
+    middles = np.array(database.grid.origin) + (corners + 0.5) * block * database.grid.step
+    expected = np.digitize([np.mean(lengths) for lengths in blocks.values()], list(SHADES))
+    assert (seen_at(image, bounds, middles, database.crs) == expected).all()
+
+
+def test_levels_are_where_the_cells_are() -> None:
+    city = a_city(*scattered(40, 0.4))
+    levels = np.random.default_rng(3).integers(0, 4, len(city)).astype(np.uint8)
+    image, bounds = level_image(city, levels, ["#111111", "#222222", "#333333"])
+    assert seen_at(image, bounds, city.xy, city.crs).tolist() == levels.tolist()
+    assert decoded(image)[1] == bytes([0, 0, 0, 17, 17, 17, 34, 34, 34, 51, 51, 51])
+
+
+def test_a_block_has_its_highest_level(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(map_image, "_BLOCKS", 8)
+    city = a_city(*scattered(16, 1.0))
+    levels = np.zeros(len(city), np.uint8)
+    levels[[5, 200]] = 2, 1
+    image, _ = level_image(city, levels, ["#111111", "#222222"])
+    assert set(np.unique(decoded(image)[0])) == {0, 1, 2}
+
+
+def between(
+    lattice: NDArray[np.float64], box: list[float], points: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Return values at points by those at the crossings of a lattice, one point at a time."""
+    lines = len(lattice) - 1
+    found = []
+    for point in points:
+        place = (point - np.array(box[:2])) / (np.array(box[2:]) - np.array(box[:2])) * lines
+        column, row = np.minimum(place.astype(int), lines - 1)
+        right, up = place - [column, row]
+        low = lattice[row, column] * (1 - right) + lattice[row, column + 1] * right
+        high = lattice[row + 1, column] * (1 - right) + lattice[row + 1, column + 1] * right
+        found.append(low * (1 - up) + high * up)
+    return np.array(found)
+
+
+@pytest.mark.parametrize(
+    ("crs", "origin"),
+    [
+        ("EPSG:2154", (765_200.0, 6_275_000.0)),
+        ("EPSG:32631", (-3.5, 5_400_000.0)),
+        ("EPSG:32735", (500_000.0, 7_500_000.0)),
+    ],
+)
+def test_lattices_place_cells_to_a_centimetre(crs: str, origin: tuple[float, float]) -> None:
+    database = a_city(*scattered(300, 0.01), crs=crs, grid=GridSpec(10.0, origin))
+    lattices = place_lattices(database)
+    to_degrees = Transformer.from_crs(crs, "EPSG:4326")
+    latlon = np.stack(to_degrees.transform(*database.xy.T), axis=1)
+    found = between(lattices.degrees, lattices.metric_box, database.xy)
+    assert np.abs(found - latlon).max() < 1e-7  # degrees
+    to_mercator = Transformer.from_crs(crs, "EPSG:3857", always_xy=True)
+    web = np.stack(to_mercator.transform(*database.xy.T), axis=1)
+    back = between(lattices.metres, lattices.mercator_box, web)
+    assert np.abs(back - database.xy).max() < 0.01

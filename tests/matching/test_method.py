@@ -1,0 +1,139 @@
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from sentences import assert_sentence
+
+from semsig_gis.core.errors import InputError, UnknownNameError
+from semsig_gis.evaluation.methods import parse_method
+from semsig_gis.likelihood.method import LikelihoodMethod
+from semsig_gis.likelihood.noise.model import NOISES, NoiseSpec
+from semsig_gis.matching.method import Method
+from semsig_gis.matching.metrics import METRICS
+from semsig_gis.matching.metrics.edit import EditWeights
+
+if TYPE_CHECKING:
+    from semsig_gis.core.errors import SemsigError
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "edit+edit",
+        "edit+jaccard:alpha=0.3",
+        "jaccard+histogram:alpha=0.9:raw",
+        "edit+edit:weights=3/1/2",
+        "angles:histogram",
+        "edit+edit:5%",
+        "edit+jaccard:0.25%:alpha=0.125:raw:weights=1/2/100",
+        "types:jaccard",
+    ],
+)
+def test_text_of_a_method_is_read_back(text: str) -> None:
+    assert str(Method.parse(text)) == text
+
+
+@given(
+    st.builds(
+        Method,
+        types=st.sampled_from(list(METRICS)),
+        angles=st.sampled_from(list(METRICS)),
+        alpha=st.floats(0, 1),
+        keep=st.none() | st.floats(0, 100, exclude_min=True),
+        normalized=st.booleans(),
+        weights=st.builds(EditWeights, *[st.integers(1, 100)] * 3),
+    )
+)
+def test_every_method_has_a_text_of_its_own(method: Method) -> None:
+    assert Method.parse(str(method)) == method
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "",
+        "edit",
+        "types",
+        "edit+edit+edit",
+        "edit+edit:5",
+        "edit+edit:five%",
+        "edit+edit:alpha",
+        "edit+edit:alpha=x",
+        "edit+edit:raw:raw",
+        "edit+edit:weights=1/1/1/1",
+        "edit+edit:weights=1/x/1",
+        "edit+edit:beta=1",
+    ],
+)
+def test_text_that_is_no_method(text: str) -> None:
+    with pytest.raises(InputError, match="cannot be read; give two measures as"):
+        Method.parse(text)
+
+
+@pytest.mark.parametrize(
+    ("text", "error", "sentence"),
+    [
+        ("edit+edti", UnknownNameError, "'edti' is unknown; the nearest is 'edit'"),
+        ("types:", UnknownNameError, "measure '' is unknown"),
+        ("edit+edit:alpha=1.5", InputError, "alpha of the types is 1.5; give a number from 0 to 1"),
+        ("edit+edit:alpha=nan", InputError, "alpha of the types is nan"),
+        ("edit+edit:0%", InputError, "above 0 and up to 100"),
+        ("edit+edit:101%", InputError, "above 0 and up to 100"),
+        ("edit+edit:nan%", InputError, "above 0 and up to 100"),
+        ("types:edit:5%", InputError, "it has one measure; give both"),
+        ("edit+edit:weights=0/1/1", InputError, "edit weight 'insert' is 0"),
+    ],
+)
+def test_values_that_no_method_has(text: str, error: type[SemsigError], sentence: str) -> None:
+    with pytest.raises(error, match=sentence):
+        Method.parse(text)
+
+
+def test_a_method_compares_something() -> None:
+    with pytest.raises(InputError, match="neither types nor angles"):
+        Method(types=None, angles=None)
+
+
+MINE = {**NOISES, "mine": NoiseSpec(detection=0.7, name="mine")}
+
+
+@given(
+    noise=st.sampled_from(list(MINE.values())),
+    place=st.sampled_from([{}, {"refined": True}, {"on_grid": True}]),
+    north_sigma=st.one_of(st.floats(0, 180), st.just(math.inf)),
+)
+def test_every_likelihood_method_has_a_text_of_its_own(
+    noise: NoiseSpec, place: dict[str, bool], north_sigma: float
+) -> None:
+    method = LikelihoodMethod(noise=noise, north_sigma=north_sigma, **place)
+    assert parse_method(str(method), noises=MINE) == method
+
+
+def test_either_kind_is_read() -> None:
+    assert parse_method("edit+jaccard:5%") == Method.parse("edit+jaccard:5%")
+    assert parse_method(" likelihood ") == LikelihoodMethod(noise=NOISES["generic"])
+    assert str(parse_method("likelihood:light:heading=unknown:refined")) == (
+        "likelihood:light:refined:heading=unknown"
+    )
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("likelihood:ligth", ["nearest is 'light'"]),
+        ("likelihood:light:refine", ["cannot be read", "':refined'"]),
+        ("likelihood:light:heading", ["cannot be read"]),
+        ("likelihood:light:heading=north", ["cannot be read"]),
+        ("likelihood:light:heading=-4", ["-4.0 degrees", "0 or more"]),
+        ("likelihood:light:on_grid:refined", ["on the grid", "leave out"]),
+        ("liklihood:light", ["cannot be read"]),
+    ],
+)
+def test_likelihood_methods_that_cannot_be_read(text: str, words: list[str]) -> None:
+    with pytest.raises((InputError, UnknownNameError)) as caught:
+        parse_method(text)
+    assert_sentence(caught.value, *words)

@@ -1,0 +1,252 @@
+from __future__ import annotations
+
+import dataclasses
+from collections import Counter
+from typing import TYPE_CHECKING
+
+import geopandas as gpd
+import numpy as np
+import pytest
+import shapely
+from hypothesis import given
+from hypothesis import strategies as st
+from sentences import assert_sentence
+from worlds import CODES, TAXONOMY
+
+from semsig_gis.core.errors import CrsError, InputError
+from semsig_gis.core.taxonomy import ObjectClass, Taxonomy
+from semsig_gis.objects.changes import compare_objects, replace_layers
+from semsig_gis.objects.table import StreetObjects
+
+if TYPE_CHECKING:
+    from semsig_gis.objects.changes import ClassChange
+
+TREE, FOUNTAIN, LAMP = CODES[:3]
+Thing = tuple[float, float, int, str, str]  # x, y, class code, source, id
+
+
+def table(
+    *things: Thing,
+    licenses: tuple[str, ...] = ("City (CC0): trees, lamps",),
+    taxonomy: Taxonomy = TAXONOMY,
+    merged: list[str] | None = None,
+    crs: str = "EPSG:2154",
+) -> StreetObjects:
+    x, y, codes, sources, ids = zip(*things, strict=True) if things else ((),) * 5
+    columns = {
+        "class_code": np.array(codes, np.uint8),
+        "source": np.array(sources, object),
+        "source_id": np.array(ids, object),
+        "count": np.ones(len(things), np.int32),
+    }
+    if merged is not None:
+        columns["merged"] = np.array(merged, object)
+    return StreetObjects(
+        gpd.GeoDataFrame(columns, geometry=shapely.points(x, y), crs=crs), taxonomy, licenses
+    )
+
+
+def by_name(changes: tuple[ClassChange, ...]) -> dict[str, ClassChange]:
+    return {change.class_name: change for change in changes}
+
+
+OLD = table(
+    (0, 0, TREE, "trees", "1"),
+    (5, 0, TREE, "trees", "2"),
+    (9, 0, LAMP, "lamps", "1"),
+    (9, 9, LAMP, "lamps", "2"),
+)
+
+
+def test_added_removed_moved_and_of_another_class() -> None:
+    new = table(
+        (0, 0, TREE, "trees", "1"),
+        (8, 4, TREE, "trees", "2"),
+        (9, 0, TREE, "lamps", "1"),
+        (7, 7, LAMP, "lamps", "3"),
+        (7, 8, LAMP, "lamps", "4"),
+    )
+    changes = compare_objects(OLD, new)
+    assert changes.same.tolist() == [[0, 0]]
+    assert changes.moved.tolist() == [[1, 1]]
+    assert changes.changed.tolist() == [[2, 2]]
+    assert changes.removed.tolist() == [3]
+    assert changes.added.tolist() == [3, 4]
+    assert sorted(changes.gone.tolist()) == [1, 2, 3]
+    assert sorted(changes.come.tolist()) == [1, 2, 3, 4]
+    trees, lamps = (by_name(changes.classes)[n] for n in ("alignment_tree", "street_light"))
+    assert (trees.before, trees.after, trees.moved, trees.moved_m, trees.gained) == (2, 3, 1, 5, 1)
+    assert (lamps.before, lamps.after, lamps.added, lamps.removed, lamps.lost) == (2, 2, 2, 1, 1)
+    assert (lamps.moved, lamps.moved_m) == (0, None)
+    assert len(changes.classes) == 2
+
+
+def test_ids_that_were_given_anew_change_nothing() -> None:
+    ids = OLD.table["source_id"].to_numpy()[[1, 0, 3, 2]]
+    new = dataclasses.replace(OLD, table=OLD.table.assign(source_id=ids))
+    changes = compare_objects(OLD, new)
+    assert changes.same.tolist() == [[row, row] for row in range(4)]
+    assert len(changes.gone) == len(changes.come) == 0
+    everywhere = dataclasses.replace(OLD, table=OLD.table.assign(source="other", source_id=""))
+    assert len(compare_objects(OLD, everywhere).gone) == 0
+
+
+@pytest.mark.parametrize("number", ["", "7"])
+def test_objects_without_an_id_of_their_own_do_not_move(number: str) -> None:
+    """Nobody can tell which of them went where."""
+    old = table((0, 0, TREE, "trees", number), (1, 1, TREE, "trees", number))
+    new = table((0, 0, TREE, "trees", number), (2, 2, TREE, "trees", number))
+    changes = compare_objects(old, new)
+    assert changes.same.tolist() == [[0, 0]]
+    assert (changes.removed.tolist(), changes.added.tolist()) == ([1], [1])
+    once = table((5, 5, TREE, "trees", number))
+    assert len(compare_objects(old, once).moved) == 0
+    assert len(compare_objects(once, old).moved) == 0
+
+
+def test_an_id_counts_within_its_layer() -> None:
+    old, new = table((0, 0, TREE, "trees", "1")), table((5, 0, TREE, "woods", "1"))
+    changes = compare_objects(old, new)
+    assert (changes.removed.tolist(), changes.added.tolist()) == ([0], [0])
+
+
+def test_of_several_at_one_place_the_one_with_the_id_is_the_same() -> None:
+    old = table((0, 0, TREE, "trees", "1"), (0, 0, TREE, "trees", "2"))
+    new = table((0, 0, TREE, "trees", "2"), (3, 4, TREE, "trees", "1"))
+    changes = compare_objects(old, new)
+    assert changes.same.tolist() == [[1, 0]]
+    assert changes.moved.tolist() == [[0, 1]]
+
+
+THINGS = st.lists(
+    st.tuples(
+        st.integers(0, 2).map(float),
+        st.integers(0, 1).map(float),
+        st.sampled_from([TREE, LAMP]),
+        st.sampled_from(["trees", "lamps"]),
+        st.sampled_from(["", "1", "2", "3", "4"]),
+    ),
+    max_size=12,
+)
+
+
+@given(THINGS, THINGS)
+def test_every_row_is_told_of_once(before: list[Thing], now: list[Thing]) -> None:
+    old, new = table(*before), table(*now)
+    changes = compare_objects(old, new)
+    old_rows = [*changes.same[:, 0], *changes.gone]
+    new_rows = [*changes.same[:, 1], *changes.come]
+    assert sorted(old_rows) == list(range(len(old)))
+    assert sorted(new_rows) == list(range(len(new)))
+    # What is gone and has come is what differs in class and place, and no more.
+    looks = [Counter(thing[:3] for thing in things) for things in (before, now)]
+    assert Counter(before[row][:3] for row in changes.gone) == looks[0] - looks[1]
+    assert Counter(now[row][:3] for row in changes.come) == looks[1] - looks[0]
+    for kind, alike in ((changes.moved, True), (changes.changed, False)):
+        for row, other in kind:
+            assert before[row][3:] == now[other][3:]
+            assert before[row][4]
+            assert (before[row][2] == now[other][2]) == alike
+            for things, number in ((before, row), (now, other)):
+                assert [thing[3:] for thing in things].count(things[number][3:]) == 1
+    names = {before[row][3:] for row in changes.removed} & {now[row][3:] for row in changes.added}
+    for name in names:
+        assert (
+            not name[1]
+            or max([thing[3:] for thing in things].count(name) for things in (before, now)) > 1
+        )
+    for item in changes.classes:
+        gains, losses = item.added + item.gained, item.removed + item.lost
+        assert item.after == item.before + gains - losses
+    assert sum(item.before for item in changes.classes) == len(old)
+    assert sum(item.after for item in changes.classes) == len(new)
+
+
+def test_layers_that_were_not_loaded_anew_stay() -> None:
+    old = table(
+        (0, 0, TREE, "trees", "1"),
+        (9, 0, LAMP, "lamps", "1"),
+        (9, 9, LAMP, "signals", "1"),
+        licenses=("City (CC0): trees, lamps", "Roads (OGL): signals"),
+    )
+    # The layer of signals was read and is empty now.
+    new = table(
+        (4, 4, TREE, "trees", "5"), licenses=("City (CC0): trees", "Streets (OGL): signals")
+    )
+    objects, kept, notes = replace_layers(old, new)
+    assert objects.table["source"].tolist() == ["lamps", "trees"]
+    assert objects.xy.tolist() == [[9, 0], [4, 4]]
+    assert objects.codes.dtype == np.uint8
+    assert objects.crs == old.crs
+    assert kept == ("lamps",)
+    assert objects.licenses == ("City (CC0): lamps, trees", "Streets (OGL): signals")
+    assert notes == ()
+
+
+def test_all_layers_may_be_loaded_anew() -> None:
+    new = table((4, 4, TREE, "trees", "5"))
+    objects, kept, _ = replace_layers(OLD, new)
+    assert kept == ()
+    assert objects.table.equals(new.table)
+    assert objects.licenses == new.licenses
+
+
+def test_what_may_be_twice_is_told() -> None:
+    old = table(
+        (0, 0, LAMP, "lamps", "1"),
+        (5, 5, LAMP, "lamps", "2"),
+        (9, 9, TREE, "trees", "1"),
+        merged=["posts:4; signals:2", "", ""],
+    )
+    new = table((1, 0, LAMP, "posts", "4"), (9, 9, TREE, "posts", "5"), licenses=())
+    objects, kept, notes = replace_layers(old, new)
+    assert kept == ("lamps", "trees")
+    assert objects.table["merged"].tolist() == ["posts:4; signals:2", "", "", "", ""]
+    assert "1 objects of layers that stay were merged with objects of 'posts'" in notes[0]
+    assert "1 new objects stand exactly where" in notes[1]
+    assert len(notes) == 2
+
+
+def test_another_crs_is_refused() -> None:
+    with pytest.raises(CrsError) as caught:
+        replace_layers(OLD, table((0, 0, TREE, "trees", "1"), crs="EPSG:32631"))
+    assert_sentence(caught.value, "EPSG:32631", "EPSG:2154", "--metric-crs")
+
+
+def changed(**values: object) -> Taxonomy:
+    first, *others = TAXONOMY.classes
+    return Taxonomy((dataclasses.replace(first, **values), *others))  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(
+    ("taxonomy", "words"),
+    [
+        (changed(symbol="9"), ["symbol 9", "again"]),
+        (changed(name="shrub"), ["'shrub'", "'alignment_tree'"]),
+        (changed(range_m=50.0), ["seen from 50 m"]),
+        (changed(code=251), ["given to both", "again"]),
+        (changed(code=251, symbol="9"), ["name 'alignment_tree' is given to both"]),
+    ],
+)
+def test_another_meaning_of_a_class_is_refused(taxonomy: Taxonomy, words: list[str]) -> None:
+    old = dataclasses.replace(OLD, taxonomy=Taxonomy(TAXONOMY.classes[:2]))
+    new = table((4, 4, LAMP, "lamps", "5"), taxonomy=taxonomy)
+    with pytest.raises(InputError) as caught:
+        replace_layers(old, new)
+    assert_sentence(caught.value, *words)
+
+
+def test_further_classes_are_fine() -> None:
+    few, further = TAXONOMY.classes[:3], ObjectClass(250, "9", "drain", "Drain")
+    old = dataclasses.replace(OLD, taxonomy=Taxonomy(few))
+    new = table((4, 4, 250, "drains", "5"), taxonomy=Taxonomy((further,)), licenses=())
+    objects, _, _ = replace_layers(old, new)
+    assert objects.taxonomy.classes == (*few, further)
+    both = Taxonomy((further, *few[::-1]))
+    objects, _, _ = replace_layers(old, dataclasses.replace(new, taxonomy=both))
+    assert objects.taxonomy == both
+    changes = compare_objects(old, objects)
+    assert by_name(changes.classes)["drain"].added == 1
+    titled = changed(title="Tree in a row")
+    objects, _, _ = replace_layers(OLD, table((4, 4, LAMP, "lamps", "5"), taxonomy=titled))
+    assert objects.taxonomy == titled

@@ -1,0 +1,379 @@
+from __future__ import annotations
+
+import dataclasses
+import math
+from typing import TYPE_CHECKING
+
+import geopandas as gpd
+import numpy as np
+import pytest
+import shapely
+from geopandas.testing import assert_geodataframe_equal
+from hypothesis import given
+from hypothesis import strategies as st
+from sentences import assert_sentence
+
+from semsig_gis.core.errors import InputError, UnknownNameError
+from semsig_gis.objects.clean import build_objects
+from semsig_gis.objects.conflate import ConflatedPair, ConflationReport, conflate
+from semsig_gis.objects.table import StreetObjects, open_objects, save_objects
+from semsig_gis.sources.catalog import load_catalog, paper_taxonomy
+from semsig_gis.sources.vector.reader import read_layer
+
+if TYPE_CHECKING:
+    import random
+    from collections.abc import Mapping, Sequence
+    from pathlib import Path
+
+TAXONOMY = paper_taxonomy()
+
+# class, source, identifier, count, x, y
+Thing = tuple[str, str, str, int, float, float]
+
+
+def world(things: Sequence[Thing]) -> StreetObjects:
+    columns = list(zip(*things, strict=True)) if things else [()] * 6
+    names, sources, ids, counts, x, y = columns
+    table = gpd.GeoDataFrame(
+        {
+            "class_code": np.array([TAXONOMY.by_name(name).code for name in names], np.uint8),
+            "source": np.array(sources, dtype=object),
+            "source_id": np.array(ids, dtype=object),
+            "count": np.array(counts, np.int32),
+        },
+        geometry=shapely.points(np.array(x, float), np.array(y, float)),
+        crs="EPSG:2154",
+    )
+    return StreetObjects(table, TAXONOMY, ("A (CC0): a", "B (ODbL): b"))
+
+
+def content(objects: StreetObjects) -> list[tuple[object, ...]]:
+    """Return what is in the table, row by row."""
+    columns = ["class_code", "source", "source_id", "count", "merged"]
+    rows = objects.table[columns].to_numpy().tolist()
+    return [(*row, *place) for row, place in zip(rows, objects.xy.tolist(), strict=True)]
+
+
+def merge(*things: Thing, **radii: float) -> list[tuple[object, ...]]:
+    objects, _ = conflate(world(things), radii or {"bench": 5.0})
+    return [tuple(row[1:5]) for row in content(objects)]
+
+
+def bench(source: str, name: str, x: float, y: float = 0.0) -> Thing:
+    return ("bench", source, name, 1, x, y)
+
+
+# --- The rule ---------------------------------------------------------------------------------
+
+
+def test_the_same_object_in_two_sources_is_one() -> None:
+    objects, report = conflate(
+        world([bench("city", "1", 0), bench("osm", "node/7", 3, 4), bench("osm", "node/8", 50)]),
+        {"bench": 5.0},
+    )
+    assert content(objects) == [
+        (10, "city", "1", 2, "osm:node/7", 0.0, 0.0),
+        (10, "osm", "node/8", 1, "", 50.0, 0.0),
+    ]
+    assert objects.table["count"].dtype == np.int32
+    assert objects.table["class_code"].dtype == np.uint8
+    assert objects.table.columns.tolist() == [
+        "class_code",
+        "source",
+        "source_id",
+        "count",
+        "merged",
+        "geometry",
+    ]
+    assert objects.table.index.tolist() == [0, 1]
+    assert objects.crs.to_epsg() == 2154
+    # The identifier and the count of the merged row come from its source, so its licence holds.
+    assert objects.licenses == ("A (CC0): a", "B (ODbL): b")
+    pair = ConflatedPair(
+        class_name="bench",
+        radius=5.0,
+        kept="city",
+        merged="osm",
+        count=1,
+        median_m=5.0,
+        largest_m=5.0,
+    )
+    assert report == ConflationReport((pair,))
+    assert report.count == 1
+    assert report.to_list() == [dataclasses.asdict(pair)]
+
+
+def test_beyond_the_radius_they_are_two() -> None:
+    assert len(merge(bench("city", "1", 0), bench("osm", "2", 5.001))) == 2
+
+
+def test_objects_of_one_source_are_never_merged() -> None:
+    assert len(merge(bench("city", "1", 0), bench("city", "2", 0.1))) == 2
+    # Not through a third one in another source either.
+    rows = merge(bench("city", "1", 0), bench("city", "2", 2), bench("osm", "3", 1.5))
+    assert rows == [("city", "1", 1, ""), ("city", "2", 2, "osm:3")]
+    rows = merge(bench("city", "1", 0), bench("osm", "2", -1), bench("osm", "3", 2))
+    assert rows == [("city", "1", 2, "osm:2"), ("osm", "3", 1, "")]
+
+
+def test_classes_are_kept_apart_and_only_those_asked_for_are_merged() -> None:
+    things = [
+        bench("city", "1", 0),
+        ("bus_stop", "osm", "2", 1, 0.0, 0.0),
+        ("bus_stop", "city", "3", 1, 1.0, 0.0),
+        ("street_light", "city", "4", 1, 1.0, 0.0),
+        ("street_light", "osm", "5", 1, 1.0, 0.0),
+    ]
+    rows = merge(*things, bench=50.0, bus_stop=2.0)
+    assert rows == [
+        ("city", "1", 1, ""),
+        ("city", "3", 2, "osm:2"),  # the city's rows begin first
+        ("city", "4", 1, ""),
+        ("osm", "5", 1, ""),
+    ]
+
+
+def test_the_nearest_pair_is_merged_first() -> None:
+    # 2 is nearest to b, and a then takes what is left within its reach.
+    rows = merge(
+        bench("city", "a", 0), bench("city", "b", 4), bench("osm", "1", -3), bench("osm", "2", 3)
+    )
+    assert rows == [("city", "a", 2, "osm:1"), ("city", "b", 2, "osm:2")]
+
+
+def test_of_three_sources_each_gives_one_and_all_lie_within_the_radius() -> None:
+    rows = merge(bench("a", "1", 0), bench("b", "2", 4), bench("c", "3", 8))
+    # 3 is near 2, which is no longer there, and not near 1, whose position is kept.
+    assert rows == [("a", "1", 2, "b:2"), ("c", "3", 1, "")]
+    rows = merge(bench("a", "1", 0), bench("b", "2", 4), bench("c", "3", -4))
+    assert rows == [("a", "1", 3, "b:2; c:3")]
+    rows = merge(bench("a", "1", 100), bench("b", "2", 4), bench("c", "3", -1))
+    assert rows == [("a", "1", 1, ""), ("b", "2", 2, "c:3")]
+
+
+def test_counts_are_added() -> None:
+    rows = merge(("bench", "a", "1", 3, 0.0, 0.0), ("bench", "b", "2", 4, 1.0, 0.0))
+    assert rows == [("a", "1", 7, "b:2")]
+
+
+def test_pairs_of_sources_are_reported_apart() -> None:
+    things = [
+        bench("a", "1", 0),
+        bench("a", "2", 100),
+        bench("b", "3", 1),
+        bench("b", "4", 102),
+        bench("b", "5", 200),
+        bench("c", "6", 203),
+        ("bus_stop", "b", "7", 1, 0.0, 0.0),
+        ("bus_stop", "c", "8", 1, 0.0, 0.0),
+    ]
+    _, report = conflate(world(things), {"bus_stop": 1.0, "bench": 5, "automatic_wc": 9})
+    assert [dataclasses.astuple(pair) for pair in report.pairs] == [
+        ("bus_stop", 1.0, "b", "c", 1, 0.0, 0.0),
+        ("bench", 5.0, "a", "b", 2, 1.5, 2.0),
+        ("bench", 5.0, "b", "c", 1, 3.0, 3.0),
+    ]
+    assert report.count == 4
+
+
+def test_nothing_to_merge_is_no_error() -> None:
+    for radii in ({}, {"automatic_wc": 5.0}, {"bench": 5.0}):
+        objects, report = conflate(world([bench("a", "1", 0)]), radii)
+        assert content(objects) == [(10, "a", "1", 1, "", 0.0, 0.0)]
+        assert report.count == 0
+
+
+def test_the_given_objects_are_not_changed() -> None:
+    before = world([bench("a", "1", 0), bench("b", "2", 1)])
+    conflate(before, {"bench": 5.0})
+    assert "merged" not in before.table.columns
+    assert before.table["count"].tolist() == [1, 1]
+
+
+# --- Laws -------------------------------------------------------------------------------------
+
+THINGS = st.lists(
+    st.tuples(
+        st.sampled_from(["bench", "bus_stop", "street_light"]),
+        st.sampled_from(["a", "b", "c"]),
+        st.sampled_from("0123456789"),
+        st.integers(1, 3),
+        st.integers(0, 6).map(float),
+        st.integers(0, 3).map(float),
+    ),
+    min_size=1,
+    max_size=25,
+)
+RADII = st.dictionaries(st.sampled_from(["bench", "bus_stop"]), st.sampled_from([1.0, 1.5, 3.0]))
+
+
+@dataclasses.dataclass
+class Row:
+    """An object while it is merged by hand."""
+
+    thing: Thing
+    order: tuple[object, ...]
+    count: int
+    merged: list[str]
+    gone: bool = False
+
+
+def by_hand(things: Sequence[Thing], radii: Mapping[str, float]) -> list[tuple[object, ...]]:
+    """Merge by looking at all pairs again and again."""
+    sources = list(dict.fromkeys(source for _, source, *_ in things))
+    rows = [
+        Row((name, source, i, count, x, y), (sources.index(source), x, y, i, count), count, [])
+        for name, source, i, count, x, y in things
+    ]
+    for name, radius in radii.items():
+        members = [row for row in rows if row.thing[0] == name]
+        for place, source in enumerate(sources):
+            new = [row for row in members if row.thing[1] == source]
+            old = [row for row in members if row.thing[1] in sources[:place] and not row.gone]
+            while near := [
+                (metres, left.order, right.order, i, j)
+                for i, left in enumerate(old)
+                for j, right in enumerate(new)
+                if (metres := math.dist(left.thing[4:], right.thing[4:])) <= radius
+            ]:
+                *_, i, j = min(near)
+                left, right = old.pop(i), new.pop(j)
+                right.gone = True
+                left.count += right.count
+                left.merged.append(f"{source}:{right.thing[2]}")
+    return [
+        (
+            TAXONOMY.by_name(row.thing[0]).code,
+            *row.thing[1:3],
+            row.count,
+            "; ".join(row.merged),
+            *row.thing[4:],
+        )
+        for row in rows
+        if not row.gone
+    ]
+
+
+@given(THINGS, RADII)
+def test_the_fast_way_gives_what_the_slow_way_gives(
+    things: list[Thing], radii: dict[str, float]
+) -> None:
+    objects, _ = conflate(world(things), radii)
+    # Rows that are the same in every respect may stand for each other.
+    assert sorted(content(objects)) == sorted(by_hand(things, radii))
+
+
+@given(THINGS, RADII, st.randoms(use_true_random=False))
+def test_the_order_of_rows_inside_a_source_does_not_matter(
+    things: list[Thing], radii: dict[str, float], chance: random.Random
+) -> None:
+    shuffled = list(things)
+    for name in {source for _, source, *_ in things}:
+        places = [place for place, thing in enumerate(things) if thing[1] == name]
+        moved = chance.sample(places, len(places))
+        for place, other in zip(places, moved, strict=True):
+            shuffled[place] = things[other]
+    one, first = conflate(world(things), radii)
+    two, second = conflate(world(shuffled), radii)
+    assert sorted(content(one)) == sorted(content(two))
+    assert first == second
+
+
+@given(THINGS, RADII)
+def test_every_row_is_accounted_for(things: list[Thing], radii: dict[str, float]) -> None:
+    before = world(things)
+    objects, report = conflate(before, radii)
+    assert len(objects) == len(before) - report.count
+    assert objects.table["count"].sum() == before.table["count"].sum()
+    named = [
+        f"{source}:{name}"
+        for source, name in zip(objects.table["source"], objects.table["source_id"], strict=True)
+    ]
+    for source, text in zip(objects.table["source"], objects.table["merged"], strict=True):
+        merged = text.split("; ") if text else []
+        named += merged
+        sources = [source, *(entry.partition(":")[0] for entry in merged)]
+        assert len(set(sources)) == len(sources)  # never two of one source
+    assert sorted(named) == sorted(f"{source}:{name}" for _, source, name, *_ in things)
+
+
+# --- Errors -----------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("radius", [0, -1, 100, math.nan, math.inf])
+def test_a_radius_must_be_one(radius: float) -> None:
+    with pytest.raises(InputError) as caught:
+        conflate(world([bench("a", "1", 0)]), {"bench": radius})
+    assert_sentence(caught.value, "'bench'", repr(radius), "above 0 and below 100")
+
+
+def test_an_unknown_class_is_named() -> None:
+    with pytest.raises(UnknownNameError) as caught:
+        conflate(world([bench("a", "1", 0)]), {"banch": 5.0})
+    assert_sentence(caught.value, "'banch'", "'bench'")
+
+
+def test_conflating_twice_is_refused() -> None:
+    # What was left over for want of a partner would find one of a source already merged.
+    objects, _ = conflate(world([bench("a", "1", 0), bench("b", "2", 0), bench("b", "3", 1)]),
+                          {"bench": 5.0})  # fmt: skip
+    with pytest.raises(InputError) as caught:
+        conflate(objects, {"bench": 5.0})
+    assert_sentence(caught.value, "conflated already", "all sources at once")
+
+
+# --- Files ------------------------------------------------------------------------------------
+
+
+def test_provenance_is_kept_in_the_file(tmp_path: Path) -> None:
+    things = [bench("a", "1", 0), bench("b", "é;2", 1), bench("b", "3", 50)]
+    objects, _ = conflate(world(things), {"bench": 5.0})
+    save_objects(objects, tmp_path / "objects.parquet")
+    again = open_objects(tmp_path / "objects.parquet")
+    assert again.table["merged"].tolist() == ["b:é;2", ""]
+    assert_geodataframe_equal(again.table, objects.table)
+
+
+def test_a_file_of_objects_that_were_not_conflated_has_no_such_column(tmp_path: Path) -> None:
+    objects = world([bench("a", "1", 0)])
+    save_objects(objects, tmp_path / "objects.parquet")
+    again = open_objects(tmp_path / "objects.parquet")
+    assert_geodataframe_equal(again.table, objects.table)
+    assert "merged" not in again.table.columns
+
+
+# --- Montpellier ------------------------------------------------------------------------------
+
+
+def test_disabled_bays_that_stand_in_two_layers(geodata: Path) -> None:
+    catalog = load_catalog("montpellier")
+    layers = []
+    for name in ("disabled_bays", "reserved_bays"):
+        spec = catalog.layer(name)
+        (pattern,) = spec.files
+        layers.append(read_layer(geodata / "montpellier" / pattern, spec, filters=False))
+    objects, _ = build_objects(layers, taxonomy=catalog.taxonomy, crs=catalog.metric_crs or "")
+    code = catalog.taxonomy.by_name("disabled_bay").code
+    bays = objects.codes == code
+    city, other = (
+        objects.xy[bays & (objects.table["source"] == name).to_numpy()]
+        for name in ("disabled_bays", "reserved_bays")
+    )
+    assert len(city) == 477
+    merged, report = conflate(objects, {"disabled_bay": 10.0})
+    (pair,) = report.pairs
+    assert (pair.kept, pair.merged) == ("disabled_bays", "reserved_bays")
+    assert len(merged) == len(objects) - pair.count
+    # A plain loop over all pairs, nearest first.
+    distance = np.hypot(*(city[:, None] - other[None]).transpose(2, 0, 1))
+    near = sorted((distance[i, j], i, j) for i, j in zip(*np.nonzero(distance <= 10), strict=True))
+    left: set[int] = set()
+    right: set[int] = set()
+    count = 0
+    for _, i, j in near:
+        if i not in left and j not in right:
+            left.add(i)
+            right.add(j)
+            count += 1
+    assert pair.count == count
+    assert 0.4 < count / len(other) < 0.6  # about half of them

@@ -1,0 +1,139 @@
+"""From catalogues to street objects."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import geopandas as gpd
+import pytest
+import shapely
+from osm_xml import node, way, write_osm
+from sentences import assert_sentence
+
+from semsig_gis.core.crs import MERGED
+from semsig_gis.core.errors import CrsError, EmptyResultError
+from semsig_gis.database.build import build_database
+from semsig_gis.database.file import open_database, save_database
+from semsig_gis.objects.load import assemble, choose_layers, metric_crs_of, read_files
+from semsig_gis.objects.table import open_objects, save_objects
+from semsig_gis.sources import RawLayer
+from semsig_gis.sources.catalog import Catalog, load_catalog, paper_taxonomy
+from semsig_gis.sources.layers import LayerSpec
+from semsig_gis.sources.osm import file as osm_file
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+    from pathlib import Path
+
+
+BENCH = LayerSpec(name="benches", class_name="bench")
+
+
+def raw(name: str, *places: tuple[float, float], crs: str | None = "EPSG:2154") -> RawLayer:
+    """Return a layer of benches."""
+    table = gpd.GeoDataFrame(
+        {"class_name": ["bench"] * len(places), "source_id": [str(i) for i in range(len(places))]},
+        geometry=shapely.points(places) if places else [],
+        crs=crs,
+    )
+    return RawLayer(spec=LayerSpec(name=name, class_name="bench"), table=table, read=len(places))
+
+
+def catalog_of(**values: object) -> Catalog:
+    plain = {"name": "town", "title": "Town", "taxonomy": paper_taxonomy(), "layers": (BENCH,)}
+    return Catalog(**{**plain, **values})  # type: ignore[arg-type]
+
+
+def test_layers_are_chosen() -> None:
+    osm = load_catalog("openstreetmap")
+    names = [spec.name for spec in choose_layers(osm)]
+    assert "trees" in names
+    assert "fire_hydrants" not in names
+    assert "buildings" not in names
+    assert [spec.name for spec in choose_layers(osm, ["fire_hydrants"])] == ["fire_hydrants"]
+    roles = {spec.role for spec in choose_layers(osm, ["trees"], surroundings=True)}
+    assert roles == {"objects", "buildings", "streets"}
+
+
+def test_a_file_is_read_once_for_all_its_layers(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    osm = load_catalog("openstreetmap")
+    path = write_osm(
+        tmp_path / "town.osm",
+        node(1, 7.42, 43.73, {"amenity": "bench"}),
+        node(2, 7.42, 43.74, {"natural": "tree"}),
+        node(3, 7.43, 43.74),
+        way(9, [1, 2, 3, 1], {"building": "yes"}),
+        way(10, [1, 2], {"highway": "primary"}),
+        way(11, [2, 3], {"highway": "road"}),
+    )
+    real, calls = osm_file.read_layers, []
+
+    def counted(file: Path, specs: Sequence[LayerSpec], **options: Any) -> tuple[RawLayer, ...]:  # noqa: ANN401
+        calls.append(file)
+        return real(file, specs, **options)
+
+    monkeypatch.setattr(osm_file, "read_layers", counted)
+    specs = choose_layers(osm, surroundings=True)
+    done: list[tuple[int, int]] = []
+    layers, absent = read_files(specs, [path], progress=lambda *step: done.append(step))
+    assert (len(calls), absent, done) == (1, (), [(1, 1)])
+    assert [layer.spec for layer in layers] == list(specs)
+    loaded = assemble(layers, osm)
+    assert loaded.objects.crs.to_epsg() == 32632
+    assert sorted(loaded.objects.table["source"]) == ["benches", "trees"]
+    assert loaded.buildings is not None
+    assert list(loaded.buildings.geom_type) == ["Polygon"]
+    assert loaded.buildings.crs == loaded.objects.crs
+    assert loaded.streets is not None
+    assert loaded.streets["half_width"].tolist()[0] == 12.0
+    assert loaded.streets["half_width"].isna().tolist() == [False, True]
+
+
+def test_one_bench_in_two_layers_is_one_bench() -> None:
+    layers = [
+        raw("city", (770000, 6280000), (770050, 6280000)),
+        raw("osm", (770000, 6280000), (770051, 6280000), (770099, 6280000)),
+    ]
+    catalog = catalog_of(metric_crs="EPSG:2154", conflate=(("bench", 3.0),))
+    merged = assemble(layers, catalog)
+    assert len(merged.objects) == 3
+    assert merged.conflation.count == 2
+    # The one at the very same place is accounted for as well.
+    assert merged.objects.table[MERGED].tolist() == ["osm:0", "osm:1", ""]
+    assert merged.buildings is None
+    apart = assemble(layers, catalog, merge=False)
+    assert len(apart.objects) == 4
+    assert apart.conflation.count == 0
+    assert len(assemble(layers, catalog, merge=False, collapse=False).objects) == 5
+
+
+def test_ranges_of_the_catalogue_reach_the_database(tmp_path: Path) -> None:
+    taxonomy = paper_taxonomy().with_ranges({"bench": 12.0})
+    loaded = assemble(
+        [raw("city", (770005, 6280005))], catalog_of(metric_crs="EPSG:2154", taxonomy=taxonomy)
+    )
+    save_objects(loaded.objects, tmp_path / "objects.parquet")
+    objects = open_objects(tmp_path / "objects.parquet")
+    assert objects.taxonomy.by_name("bench").range_m == 12.0
+    save_database(build_database(objects), tmp_path / "city.parquet")
+    database = open_database(tmp_path / "city.parquet")
+    assert database.taxonomy == taxonomy
+    assert len(database) == 5  # a cell and those beside it, of the 29 within 30 m
+
+
+def test_the_zone_of_the_data() -> None:
+    crs, notes = metric_crs_of([raw("a", (7.4, 43.7), crs="EPSG:4326"), raw("b")])
+    assert (crs.to_epsg(), notes) == (32632, ())
+    wide = raw("a", (0.0, 45.0), (9.0, 45.0), crs="EPSG:4326")
+    _, notes = metric_crs_of([wide])
+    assert "9.0 degrees wide" in notes[0]
+    assert assemble([wide], catalog_of()).notes == notes
+    assert assemble([wide], catalog_of(), metric_crs="EPSG:2154").objects.crs.to_epsg() == 2154
+    with pytest.raises(EmptyResultError) as empty:
+        metric_crs_of([raw("a")])
+    assert_sentence(empty.value, "no layer")
+    with pytest.raises(CrsError) as bare:
+        metric_crs_of([raw("a", (1, 1), crs=None)])
+    assert_sentence(bare.value, "'a'")

@@ -1,0 +1,554 @@
+from __future__ import annotations
+
+import dataclasses
+import math
+import tempfile
+from collections import Counter
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import geopandas as gpd
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+import pytest
+import shapely
+from geopandas.testing import assert_geodataframe_equal
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from pyproj import CRS, Transformer
+from sentences import assert_sentence
+
+from semsig_gis.core.errors import CrsError, DatabaseError, EmptyResultError, UnknownNameError
+from semsig_gis.objects.clean import build_objects
+from semsig_gis.objects.table import open_objects, save_objects
+from semsig_gis.sources import RawLayer
+from semsig_gis.sources.catalog import load_catalog, paper_taxonomy
+from semsig_gis.sources.layers import LayerSpec
+from semsig_gis.storage.geoparquet import geo_metadata, write_geoparquet
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from semsig_gis.objects.table import StreetObjects
+
+LAMBERT = "EPSG:2154"
+TAXONOMY = paper_taxonomy()
+NAN = math.nan
+
+
+def layer(
+    geometries: Sequence[object],
+    *,
+    name: str = "trees",
+    classes: str | Sequence[str] = "alignment_tree",
+    ids: Sequence[str] | None = None,
+    crs: str | None = LAMBERT,
+    attribution: str = "Town",
+    filtered: int = 0,
+    error_count: int = 0,
+    notes: tuple[str, ...] = (),
+) -> RawLayer:
+    """Return a layer as a reader would."""
+    size = len(geometries)
+    names = [classes] * size if isinstance(classes, str) else list(classes)
+    table = gpd.GeoDataFrame(
+        {
+            "class_name": np.array(names, dtype=object),
+            "source_id": np.array(ids or [str(row) for row in range(size)], dtype=object),
+        },
+        geometry=gpd.GeoSeries(list(geometries), crs=crs),
+    )
+    return RawLayer(
+        spec=LayerSpec(
+            name=name,
+            class_name=names[0] if names else "alignment_tree",
+            license="CC0",
+            attribution=attribution,
+        ),
+        table=table,
+        read=size + filtered + error_count,
+        filtered=filtered,
+        errors=tuple(f"row {row}: broken" for row in range(min(error_count, 10))),
+        error_count=error_count,
+        notes=notes,
+    )
+
+
+def build(*layers: RawLayer, collapse: bool = True) -> StreetObjects:
+    objects, _ = build_objects(layers, taxonomy=TAXONOMY, crs=LAMBERT, collapse=collapse)
+    return objects
+
+
+def points(*places: tuple[float, float]) -> list[shapely.Point]:
+    return [shapely.Point(x, y) for x, y in places]
+
+
+# --- One layer --------------------------------------------------------------------------------
+
+
+def test_the_table_has_the_columns_it_promises() -> None:
+    objects = build(
+        layer(points((1, 2), (3, 4)), ids=["a7", "é8"], classes=["bench", "street_light"])
+    )
+    assert len(objects) == 2
+    assert list(objects.table.columns) == [
+        "class_code",
+        "source",
+        "source_id",
+        "count",
+        "geometry",
+    ]
+    assert objects.table["class_code"].dtype == np.uint8
+    assert objects.table["count"].dtype == np.int32
+    assert objects.codes.tolist() == [10, 3]
+    assert objects.xy.tolist() == [[1, 2], [3, 4]]
+    assert objects.table["source_id"].tolist() == ["a7", "é8"]
+    assert objects.table["source"].tolist() == ["trees", "trees"]
+    assert objects.table["count"].tolist() == [1, 1]
+    assert objects.table.index.tolist() == [0, 1]
+    assert objects.crs == CRS(LAMBERT)
+    assert objects.licenses == ("Town (CC0): trees",)
+
+
+def test_every_publisher_is_named_once_with_the_layers_it_gave() -> None:
+    place = points((1, 2))
+    objects = build(
+        layer(place, name="trees"),
+        layer(place, name="lights", attribution=""),
+        layer(place, name="taps"),
+        layer(place, name="taps"),
+    )
+    assert objects.licenses == (
+        "Town (CC0): trees, taps",
+        "no attribution given (CC0): lights",
+    )
+
+
+@pytest.mark.parametrize(
+    ("wkt", "centre"),
+    [
+        ("POINT (1 2)", (1, 2)),
+        ("POINT Z (1 2 30)", (1, 2)),
+        ("MULTIPOINT ((0 0), (4 2))", (2, 1)),
+        ("LINESTRING (0 0, 10 0)", (5, 0)),
+        ("LINESTRING Z (0 0 5, 10 0 7)", (5, 0)),
+        ("LINESTRING (0 0, 10 0, 10 10)", (7.5, 2.5)),
+        ("LINESTRING (3 3, 3 3)", (3, 3)),
+        ("MULTILINESTRING ((0 0, 2 0), (0 4, 2 4))", (1, 2)),
+        ("POLYGON ((0 0, 6 0, 0 6, 0 0))", (2, 2)),
+        ("POLYGON ((5 5, 5 5, 5 5, 5 5))", (5, 5)),
+        ("MULTIPOLYGON (((0 0, 2 0, 2 2, 0 2, 0 0)), ((4 0, 6 0, 6 2, 4 2, 4 0)))", (3, 1)),
+        ("GEOMETRYCOLLECTION (POINT (9 9), LINESTRING (0 0, 2 0))", (1, 0)),
+    ],
+)
+def test_an_object_stands_at_its_centroid(wkt: str, centre: tuple[float, float]) -> None:
+    objects = build(layer([shapely.from_wkt(wkt), shapely.Point(100, 100)]))
+    assert objects.xy[0] == pytest.approx(centre)
+    assert set(objects.table.geom_type) == {"Point"}
+    assert not objects.table.has_z.any()
+
+
+def test_rows_without_a_place_are_dropped_and_counted() -> None:
+    bad = [
+        None,
+        shapely.Point(),
+        shapely.Polygon(),
+        shapely.from_wkt("MULTILINESTRING EMPTY"),
+        shapely.from_wkt("GEOMETRYCOLLECTION EMPTY"),
+    ]
+    with np.errstate(invalid="ignore"):
+        broken = shapely.linestrings([[(0, 0), (NAN, 1)], [(0, 0), (math.inf, 1)]])
+    nowhere = [
+        *points((NAN, 2), (NAN, NAN), (math.inf, 2)),
+        *broken,
+        shapely.from_wkt("LINESTRING (0 0, 1e308 1, -1e308 1)"),
+        *points((-1.7976931348623157e308, 5), (3, -1e38), (1e8, 0)),
+    ]
+    good = points((1, 2), (3, 4))
+    mixed = [good[0], *bad, *nowhere, good[1]]
+    ids = [str(row) for row in range(len(mixed))]
+    objects, report = build_objects([layer(mixed, ids=ids)], taxonomy=TAXONOMY, crs=LAMBERT)
+    assert objects.xy.tolist() == [[1, 2], [3, 4]]
+    assert objects.table["source_id"].tolist() == ["0", ids[-1]]
+    (counts,) = report.layers
+    assert (counts.read, counts.missing, counts.misplaced, counts.kept) == (16, 5, 9, 2)
+
+
+def test_a_place_off_the_earth_is_misplaced() -> None:
+    with np.errstate(invalid="ignore"):
+        broken = shapely.linestrings([(3.88, 43.61), (NAN, 43.61)])
+    places = points((3.88, 43.61), (500, 900), (3.9, 43.6), (1e38, 0))
+    degrees = layer([*places, broken], crs="EPSG:4326")
+    objects, report = build_objects([degrees], taxonomy=TAXONOMY, crs=LAMBERT)
+    assert len(objects) == 2
+    assert report.layers[0].misplaced == 3
+    assert objects.table["source_id"].tolist() == ["0", "2"]
+
+
+def test_a_row_keeps_its_class_when_others_are_dropped() -> None:
+    objects = build(
+        layer(
+            [None, shapely.Point(1, 1), shapely.Point(NAN, 1), shapely.Point(2, 2)],
+            classes=["bench", "bus_stop", "bench", "street_light"],
+        )
+    )
+    assert [TAXONOMY.by_code(code).name for code in objects.codes] == ["bus_stop", "street_light"]
+
+
+# --- Collapsing -------------------------------------------------------------------------------
+
+
+def test_one_class_at_one_place_is_one_object() -> None:
+    places = points((0, 0), (5, 5), (0, 0), (0, 0.001), (0, 1))
+    objects, report = build_objects([layer(places)], taxonomy=TAXONOMY, crs=LAMBERT)
+    assert objects.xy.tolist() == [[0, 0], [5, 5], [0, 1]]
+    assert objects.table["count"].tolist() == [3, 1, 1]
+    assert objects.table["source_id"].tolist() == ["0", "1", "4"]
+    assert report.layers[0].collapsed == 2
+
+
+def test_different_classes_at_one_place_stay_apart() -> None:
+    objects = build(layer(points((0, 0), (0, 0)), classes=["bench", "bus_stop"]))
+    assert objects.codes.tolist() == [10, 11]
+
+
+def test_collapsing_can_be_left_out() -> None:
+    objects = build(layer(points((0, 0), (0, 0))), collapse=False)
+    assert len(objects) == 2
+    assert objects.table["count"].tolist() == [1, 1]
+
+
+def test_layers_of_one_class_collapse_into_the_first() -> None:
+    layers = [
+        layer(points((0, 0), (1, 1)), name="north"),
+        layer(points((1, 1), (1, 1), (2, 2)), name="south"),
+    ]
+    objects, report = build_objects(layers, taxonomy=TAXONOMY, crs=LAMBERT)
+    assert objects.table["source"].tolist() == ["north", "north", "south"]
+    assert objects.table["count"].tolist() == [1, 3, 1]
+    assert [(item.collapsed, item.kept) for item in report.layers] == [(0, 2), (2, 1)]
+
+
+def test_two_layers_of_one_name_are_reported_apart() -> None:
+    layers = [layer(points((0, 0))), layer(points((0, 0), (1, 1), (2, 2)))]
+    _, report = build_objects(layers, taxonomy=TAXONOMY, crs=LAMBERT)
+    assert [(item.name, item.read, item.collapsed, item.kept) for item in report.layers] == [
+        ("trees", 1, 0, 1),
+        ("trees", 3, 1, 2),
+    ]
+
+
+# --- Coordinate systems -----------------------------------------------------------------------
+
+
+def test_layers_in_several_systems_meet_in_one() -> None:
+    lon, lat = 3.876716, 43.610769
+    x, y = Transformer.from_crs("EPSG:4171", LAMBERT, always_xy=True).transform(lon, lat)
+    layers = [
+        layer(points((lon, lat)), name="degrees", crs="EPSG:4171"),
+        layer(points((x, y + 10)), name="metres"),
+        layer(points((x, y + 20)), name="esri", crs=CRS(LAMBERT).to_wkt("WKT1_ESRI")),
+    ]
+    objects = build(*layers)
+    assert objects.xy == pytest.approx(np.array([[x, y], [x, y + 10], [x, y + 20]]), abs=1e-3)
+    assert objects.crs == CRS(LAMBERT)
+
+
+def test_a_layer_without_a_system_is_asked_about() -> None:
+    with pytest.raises(CrsError) as caught:
+        build(layer(points((1, 2))), layer(points((1, 2)), name="parks", crs=None))
+    assert_sentence(caught.value, "'parks'", "no coordinate reference system", "state its crs")
+
+
+@pytest.mark.parametrize("crs", ["EPSG:4326", "EPSG:3857", "EPSG:2263", "nonsense"])
+def test_a_system_to_work_in_must_be_metric(crs: str) -> None:
+    with pytest.raises(CrsError) as caught:
+        build_objects([layer(points((1, 2)))], taxonomy=TAXONOMY, crs=crs)
+    assert_sentence(caught.value, "projected CRS in metres")
+
+
+# --- Errors -----------------------------------------------------------------------------------
+
+
+def test_an_unknown_class_is_named() -> None:
+    with pytest.raises(UnknownNameError) as caught:
+        build(layer(points((1, 2)), classes="kiosk"))
+    assert_sentence(caught.value, "'kiosk'")
+
+
+def test_nothing_left_is_an_error() -> None:
+    nothing = layer([None, shapely.Point(NAN, NAN)], filtered=7)
+    for layers in ([], [layer([])], [nothing], [nothing, layer([], crs="EPSG:4326")]):
+        with pytest.raises(EmptyResultError) as caught:
+            build(*layers)
+        rows = sum(item.read for item in layers)
+        assert_sentence(caught.value, f"of {rows} rows in {len(layers)} layers", "look at")
+
+
+def test_an_empty_layer_beside_a_full_one_is_fine() -> None:
+    for crs in ("EPSG:4326", LAMBERT):
+        objects, report = build_objects(
+            [
+                layer([], name="a", crs=crs),
+                layer(points((1, 2))),
+                layer([None], name="b", crs=crs),
+            ],
+            taxonomy=TAXONOMY,
+            crs=LAMBERT,
+        )
+        assert objects.xy.tolist() == [[1, 2]]
+        assert [item.kept for item in report.layers] == [0, 1, 0]
+
+
+# --- The report -------------------------------------------------------------------------------
+
+PLACES = st.tuples(st.integers(0, 2), st.integers(0, 2)).map(shapely.Point)
+BAD = st.sampled_from([None, shapely.Point(), shapely.Point(NAN, 1), shapely.Point(1, math.inf)])
+LINES = st.just(shapely.LineString([(0, 0), (2, 2)]))
+
+
+@st.composite
+def raw_layers(draw: st.DrawFn) -> RawLayer:
+    geometries = draw(st.lists(st.one_of(PLACES, BAD, LINES), max_size=12))
+    names = st.sampled_from(["bench", "bus_stop"])
+    return layer(
+        geometries,
+        name=draw(st.sampled_from(["a", "b"])),
+        classes=draw(st.lists(names, min_size=len(geometries), max_size=len(geometries))),
+        filtered=draw(st.integers(0, 5)),
+        error_count=draw(st.integers(0, 15)),
+        notes=draw(st.sampled_from([(), ("odd",)])),
+    )
+
+
+@given(st.lists(raw_layers(), max_size=4), st.booleans())
+def test_every_row_is_accounted_for(layers: list[RawLayer], collapse: bool) -> None:  # noqa: FBT001
+    expected: Counter[tuple[str, float, float]] = Counter()
+    for item in layers:
+        for name, geometry in zip(item.table["class_name"], item.table.geometry, strict=True):
+            if geometry is not None and not geometry.is_empty:
+                centre = geometry.centroid if geometry.geom_type != "Point" else geometry
+                if math.isfinite(centre.x) and math.isfinite(centre.y):
+                    expected[name, centre.x, centre.y] += 1
+    if not expected:
+        with pytest.raises(EmptyResultError):
+            build(*layers)
+        return
+    objects, report = build_objects(layers, taxonomy=TAXONOMY, crs=LAMBERT, collapse=collapse)
+    assert len(report.layers) == len(layers)
+    for item, counts in zip(layers, report.layers, strict=True):
+        parts = dataclasses.asdict(counts)
+        numbers = [parts[key] for key in ("unreadable", "filtered", "missing", "misplaced")]
+        assert min(numbers) >= 0
+        assert counts.collapsed >= 0
+        assert counts.kept >= 0
+        assert counts.read == item.read == sum(numbers) + counts.collapsed + counts.kept
+        assert (counts.unreadable, counts.filtered) == (item.error_count, item.filtered)
+        assert counts.notes == (*item.notes, *item.errors)
+    assert sum(item.kept for item in report.layers) == len(objects)
+    assert report.to_list() == [dataclasses.asdict(item) for item in report.layers]
+    found: Counter[tuple[str, float, float]] = Counter()
+    for code, (x, y), count in zip(
+        objects.codes, objects.xy.tolist(), objects.table["count"], strict=True
+    ):
+        found[TAXONOMY.by_code(code).name, x, y] += int(count)
+    assert found == expected
+    assert len(objects) == (len(expected) if collapse else expected.total())
+
+
+# --- Files ------------------------------------------------------------------------------------
+
+
+def test_saved_objects_come_back(tmp_path: Path) -> None:
+    taxonomy = load_catalog("montpellier").taxonomy
+    layers = [
+        layer(points((700_000.123456789, 6_600_000.1)), ids=["Écusson n°7 - 東"], name="é"),
+        layer(points((1, 2), (1, 2)), ids=["", "b"], name="meters", classes="parking_meter"),
+    ]
+    objects, _ = build_objects(layers, taxonomy=taxonomy, crs=LAMBERT)
+    path = tmp_path / "objects.parquet"
+    save_objects(objects, path, keep_order=True)
+    again = open_objects(str(path))
+    assert_geodataframe_equal(again.table, objects.table)
+    assert again.table["count"].tolist() == [1, 2]
+    assert again.taxonomy == taxonomy
+    assert again.licenses == objects.licenses
+    assert again.crs == objects.crs
+    assert again.xy.tolist() == objects.xy.tolist()
+    frame = gpd.read_parquet(path)
+    assert frame["source_id"].tolist() == ["Écusson n°7 - 東", ""]
+    assert frame.crs == CRS(LAMBERT)
+
+
+def scattered(count: int) -> StreetObjects:
+    rng = np.random.default_rng(9)
+    places = rng.uniform(0, 5_000, (count, 2)) + np.array([765_000.0, 6_275_000.0])
+    return build(layer(points(*map(tuple, places.tolist()))))
+
+
+def test_saved_objects_come_back_in_an_order_that_stays() -> None:
+    objects = scattered(3_000)
+    with tempfile.TemporaryDirectory() as folder:
+        one, two = Path(folder) / "one.parquet", Path(folder) / "two.parquet"
+        save_objects(objects, one)
+        again = open_objects(one)
+        # Every object once, whatever the order.
+        by_id = {number: row for row, number in enumerate(objects.table["source_id"])}
+        rows = [by_id[number] for number in again.table["source_id"]]
+        assert sorted(rows) == list(range(len(objects)))
+        expected = objects.table.iloc[rows].reset_index(drop=True)
+        assert_geodataframe_equal(again.table, expected)
+        save_objects(again, two)
+        assert one.read_bytes() == two.read_bytes()
+    # Neighbours in the file are neighbours in the city.
+    steps = np.hypot(*np.diff(again.xy, axis=0).T)
+    assert np.median(steps) < 150
+    assert np.median(np.hypot(*np.diff(objects.xy, axis=0).T)) > 1_500
+
+
+@given(
+    places=st.lists(st.tuples(st.integers(-20, 20), st.integers(-20, 20)), min_size=1, max_size=40),
+    corner=st.tuples(st.integers(-20, 20), st.integers(-20, 20)),
+    size=st.tuples(st.integers(0, 20), st.integers(0, 20)),
+    at=st.sampled_from([(0.0, 0.0), (765_200.1, 6_275_000.7)]),
+    group_rows=st.sampled_from([1, 3, 8192]),
+    keep_order=st.booleans(),
+)
+@settings(max_examples=60)
+def test_a_box_holds_exactly_the_objects_in_it(
+    *,
+    places: list[tuple[int, int]],
+    corner: tuple[int, int],
+    size: tuple[int, int],
+    at: tuple[float, float],
+    group_rows: int,
+    keep_order: bool,
+) -> None:
+    placed = [(x * 0.1 + at[0], y * 0.1 + at[1]) for x, y in places]
+    # The edges of the box go through objects.
+    west, south = corner[0] * 0.1 + at[0], corner[1] * 0.1 + at[1]
+    east, north = (corner[0] + size[0]) * 0.1 + at[0], (corner[1] + size[1]) * 0.1 + at[1]
+    objects, _ = build_objects(
+        [layer(points(*placed))], taxonomy=TAXONOMY, crs=LAMBERT, collapse=False
+    )
+    with tempfile.TemporaryDirectory() as folder, pytest.MonkeyPatch.context() as patch:
+        patch.setattr("semsig_gis.objects.table.GROUP_ROWS", group_rows)
+        save_objects(objects, f"{folder}/objects.parquet", keep_order=keep_order)
+        found = open_objects(f"{folder}/objects.parquet", box=(west, south, east, north))
+    inside = [
+        number for number, (x, y) in enumerate(placed) if west <= x <= east and south <= y <= north
+    ]
+    assert sorted(int(number) for number in found.table["source_id"]) == inside
+    assert found.xy.shape == (len(inside), 2)
+    assert found.taxonomy == objects.taxonomy
+
+
+def test_only_the_groups_near_a_box_are_read(tmp_path: Path) -> None:
+    objects = scattered(40_000)
+    save_objects(objects, tmp_path / "objects.parquet")
+    read: list[list[int]] = []
+    original = pq.ParquetFile.read_row_groups
+
+    def watched(self: pq.ParquetFile, groups: list[int], *args: object) -> pa.Table:
+        read.append(groups)
+        return original(self, groups, *args)
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(pq.ParquetFile, "read_row_groups", watched)
+        box = (765_100.0, 6_275_100.0, 765_500.0, 6_275_500.0)
+        found = open_objects(tmp_path / "objects.parquet", box=box)
+    assert 100 < len(found) < 500
+    assert [len(groups) for groups in read] == [1]  # of five
+
+
+def test_geopandas_reads_a_box_of_the_file(tmp_path: Path) -> None:
+    objects = scattered(500)
+    path = tmp_path / "objects.parquet"
+    save_objects(objects, path)
+    box = (766_000.0, 6_276_000.0, 768_000.0, 6_277_000.0)
+    frame = gpd.read_parquet(path, bbox=box)
+    found = open_objects(path, box=box)
+    assert frame["source_id"].tolist() == found.table["source_id"].tolist()
+    assert "bbox" not in frame.columns
+
+
+def test_a_file_of_before_is_read_by_box_too(tmp_path: Path) -> None:
+    objects = scattered(50)
+    path = tmp_path / "objects.parquet"
+    save_objects(objects, path)
+    table = pq.read_table(path)
+    pq.write_table(table.drop_columns(["bbox"]), path)
+    box = (*objects.xy[7], *objects.xy[7])
+    assert open_objects(path, box=box).xy.tolist() == [objects.xy[7].tolist()]
+
+
+def test_positions_cannot_be_changed_by_accident() -> None:
+    objects = build(layer(points((1, 2))))
+    with pytest.raises(ValueError, match="read-only"):
+        objects.xy[0, 0] = 9
+    with pytest.raises(dataclasses.FrozenInstanceError):
+        objects.licenses = ()  # type: ignore[misc]
+
+
+def test_a_cut_file_is_an_error(tmp_path: Path) -> None:
+    path = tmp_path / "objects.parquet"
+    save_objects(build(layer(points((1, 2), (3, 4)))), path)
+    content = path.read_bytes()
+    for size in range(0, len(content), 50):
+        path.write_bytes(content[:size])
+        with pytest.raises(DatabaseError) as caught:
+            open_objects(path)
+        assert_sentence(caught.value, str(path), "street objects")
+
+
+@pytest.mark.parametrize(
+    ("column", "values"),
+    [
+        ("class_code", pa.array([1, 99], pa.uint8())),
+        ("class_code", pa.array([1, None], pa.uint8())),
+        ("class_code", None),
+        ("source_id", None),
+        ("geometry", pa.array([b"POINT", b"x"])),
+        ("geometry", pa.array([shapely.to_wkb(shapely.Point(1, 2)), None], pa.binary())),
+        ("geometry", pa.array(shapely.to_wkb([shapely.Point(1, 2), shapely.Point()]))),
+        ("geometry", pa.array(shapely.to_wkb([shapely.Point(1, 2), shapely.box(0, 0, 1, 1)]))),
+        ("geometry", pa.array(shapely.to_wkb([shapely.Point(1, 2), shapely.Point(1, NAN)]))),
+        ("geometry", None),
+        ("specs", {"taxonomy": None}),
+        ("specs", {"taxonomy": [{"code": 1}]}),
+        ("specs", {"taxonomy": [{"code": 0, "symbol": "B", "name": "b", "title": "B"}]}),
+        ("specs", {"licenses": None}),
+        ("specs", {}),
+        ("rows", None),
+    ],
+)
+def test_a_file_that_does_not_fit_itself_is_an_error(
+    tmp_path: Path, column: str, values: object
+) -> None:
+    objects = build(layer(points((1, 2), (3, 4))))
+    table = pa.table(
+        {
+            "class_code": pa.array(objects.codes),
+            "source": ["trees", "trees"],
+            "source_id": ["0", "1"],
+            "count": pa.array([1, 1], pa.int32()),
+            "geometry": pa.array(shapely.to_wkb(objects.table.geometry.array), pa.binary()),
+        }
+    )
+    specs = {"kind": "street objects", "taxonomy": TAXONOMY.to_list(), "licenses": []}
+    if column == "specs":
+        assert isinstance(values, dict)
+        specs = {"kind": "street objects", **values}
+    elif column == "rows":
+        table = table.slice(0, 0)
+    elif values is None:
+        table = table.drop_columns([column])
+    else:
+        table = table.set_column(table.column_names.index(column), column, [values])
+    path = tmp_path / "objects.parquet"
+    geo = geo_metadata(objects.crs, geometry_types=["Point"], bounds=[1, 2, 3, 4])
+    write_geoparquet(table, path, geo=geo, specs=specs)
+    with pytest.raises(DatabaseError) as caught:
+        open_objects(path)
+    assert_sentence(caught.value, str(path), "is damaged", "load the street objects again")

@@ -1,0 +1,231 @@
+from __future__ import annotations
+
+import json
+import math
+from statistics import median
+from typing import TYPE_CHECKING
+
+import geopandas as gpd
+import numpy as np
+import pytest
+import shapely
+from hypothesis import given
+from hypothesis import strategies as st
+
+from semsig_gis.objects.clean import build_objects
+from semsig_gis.objects.conflate import conflate
+from semsig_gis.objects.load import choose_layers
+from semsig_gis.objects.quality import quality_report
+from semsig_gis.objects.table import StreetObjects
+from semsig_gis.reports.tables import Table
+from semsig_gis.sources import RawLayer, find_files
+from semsig_gis.sources.catalog import load_catalog, paper_taxonomy
+from semsig_gis.sources.layers import LayerSpec
+from semsig_gis.sources.vector.reader import read_layer
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+    from pathlib import Path
+
+    from semsig_gis.objects.clean import LoadReport
+    from semsig_gis.objects.quality import QualityReport
+
+TAXONOMY = paper_taxonomy()
+# Montpellier, in the plane of France.
+X, Y = 770_000.0, 6_280_000.0
+
+
+def layer(
+    places: Sequence[tuple[float, float] | None],
+    *,
+    name: str = "city",
+    class_name: str = "bench",
+    notes: tuple[str, ...] = (),
+) -> RawLayer:
+    geometry = [None if place is None else shapely.Point(*place) for place in places]
+    table = gpd.GeoDataFrame(
+        {"class_name": class_name, "source_id": [str(row) for row in range(len(places))]},
+        geometry=gpd.GeoSeries(geometry, crs="EPSG:2154"),
+    )
+    return RawLayer(
+        spec=LayerSpec(name=name, class_name=class_name, license="CC0", attribution="Town"),
+        table=table,
+        read=len(places) + 3,
+        filtered=2,
+        errors=("row 9: broken",),
+        error_count=1,
+        notes=notes,
+    )
+
+
+def built(*layers: RawLayer) -> tuple[StreetObjects, LoadReport]:
+    return build_objects(layers, taxonomy=TAXONOMY, crs="EPSG:2154")
+
+
+def report_on(*layers: RawLayer, **radii: float) -> QualityReport:
+    objects, load = built(*layers)
+    merged, conflation = conflate(objects, radii)
+    return quality_report(merged, load, conflation)
+
+
+def test_the_objects_of_a_class_are_counted() -> None:
+    square = [(X, Y), (X + 1000, Y), (X + 1000, Y + 1000), (X, Y + 1000), (X, Y)]
+    report = report_on(
+        layer(square, name="benches"),
+        layer([(X + 500, Y + 500)], name="stops", class_name="bus_stop"),
+    )
+    benches, stops = report.classes
+    assert (benches.class_name, benches.objects, benches.rows) == ("bench", 4, 5)
+    assert (stops.class_name, stops.objects, stops.rows) == ("bus_stop", 1, 1)
+    assert report.objects == 5
+    assert report.hull_km2 == pytest.approx(1.0)
+    assert benches.per_km2_hull == pytest.approx(4.0)
+    assert benches.nearest_m == pytest.approx(1000.0)
+    assert stops.nearest_m is None
+    # Five squares of a hectare each, whatever their classes.
+    assert report.occupied_km2 == pytest.approx(0.05)
+    assert benches.per_km2_occupied == pytest.approx(80.0)
+    assert stops.per_km2_occupied == pytest.approx(20.0)
+    assert set(report.absent) == {item.name for item in TAXONOMY.classes} - {"bench", "bus_stop"}
+
+
+def test_a_line_of_objects_has_no_area_of_its_own() -> None:
+    for places in ([(X, Y)], [(X, Y), (X + 50, Y), (X + 99, Y)]):
+        report = report_on(layer(places))
+        assert report.hull_km2 == 0
+        assert report.classes[0].per_km2_hull is None
+        assert report.classes[0].per_km2_occupied == pytest.approx(100 * len(places))
+
+
+def test_squares_are_counted_on_both_sides_of_zero() -> None:
+    objects, load = built(layer([(X, Y), (X + 1, Y)]))
+    moved = objects.table.set_geometry(shapely.points([[-1.0, 5.0], [1.0, 5.0]]), crs=objects.crs)
+    report = quality_report(StreetObjects(moved, TAXONOMY, ()), load)
+    assert report.occupied_km2 == pytest.approx(0.02)
+
+
+def test_what_was_dropped_is_told_by_layer() -> None:
+    city = layer([(X, Y), (X, Y), None, (math.inf, Y), (X + 50, Y)], notes=("odd",))
+    osm = layer([(X + 2, Y), (X + 90, Y)], name="osm")
+    report = report_on(city, osm, bench=5.0)
+    first, second = report.sources
+    reasons = ("unreadable", "filtered", "missing", "duplicates", "misplaced", "collapsed")
+    assert (first.name, first.read) == ("city", 8)
+    assert [getattr(first, reason) for reason in reasons] == [1, 2, 1, 0, 1, 1]
+    for item in report.sources:
+        dropped = sum(getattr(item, reason) for reason in (*reasons, "conflated"))
+        assert item.read == dropped + item.objects
+    assert (first.conflated, first.objects) == (0, 2)
+    assert first.notes == ("odd", "row 9: broken")
+    assert (second.read, second.conflated, second.objects) == (5, 1, 1)
+    (pair,) = report.conflated
+    assert (pair.kept, pair.merged, pair.count) == ("city", "osm", 1)
+    assert report.licenses == ("Town (CC0): city, osm",)
+
+
+def test_layers_of_one_name_share_what_was_conflated() -> None:
+    report = report_on(
+        layer([(X, Y), (X + 20, Y), (X + 40, Y)]),
+        layer([(X + 1, Y)], name="osm"),
+        layer([(X + 21, Y), (X + 41, Y), (X + 60, Y)], name="osm"),
+        bench=5.0,
+    )
+    assert [(item.conflated, item.objects) for item in report.sources] == [(0, 3), (1, 0), (2, 1)]
+
+
+def test_the_place_is_told_in_metres_and_degrees() -> None:
+    report = report_on(layer([(X, Y), (X + 100, Y + 200)]))
+    assert report.crs == "EPSG:2154"
+    assert report.extent == (X, Y, X + 100, Y + 200)
+    west, south, east, north = report.extent_degrees
+    assert 3.86 < west < east < 3.88
+    assert 43.60 < south < north < 43.62
+
+
+def test_a_system_without_a_code_is_told_by_name() -> None:
+    own = (
+        'PROJCS["Our town",GEOGCS["WGS 84",DATUM["WGS_1984",SPHEROID["WGS 84",6378137,'
+        '298.257223563]],PRIMEM["Greenwich",0],UNIT["degree",0.0174532925199433]],'
+        'PROJECTION["Transverse_Mercator"],PARAMETER["latitude_of_origin",43.6],'
+        'PARAMETER["central_meridian",3.9],PARAMETER["scale_factor",1],'
+        'PARAMETER["false_easting",0],PARAMETER["false_northing",0],UNIT["metre",1]]'
+    )
+    objects, load = build_objects([layer([(X, Y)])], taxonomy=TAXONOMY, crs=own)
+    assert quality_report(objects, load).crs == "Our town"
+
+
+@given(
+    st.lists(
+        st.tuples(st.integers(0, 9), st.integers(0, 9)).map(lambda at: (X + at[0], Y + at[1])),
+        min_size=1,
+        max_size=20,
+    ),
+    st.booleans(),
+)
+def test_the_nearest_neighbour_is_that_of_a_plain_loop(
+    places: list[tuple[float, float]],
+    collapse: bool,  # noqa: FBT001
+) -> None:
+    objects, load = build_objects(
+        [layer(places)], taxonomy=TAXONOMY, crs="EPSG:2154", collapse=collapse
+    )
+    (benches,) = quality_report(objects, load).classes
+    rest = objects.xy.tolist()
+    nearest = [
+        min(math.dist(one, two) for j, two in enumerate(rest) if j != i)
+        for i, one in enumerate(rest)
+        if len(rest) > 1
+    ]
+    expected = median(nearest) if nearest else None
+    assert benches.nearest_m == (None if expected is None else pytest.approx(expected))
+    assert benches.rows == len(places)
+
+
+def test_the_report_is_ready_for_json_and_for_printing() -> None:
+    report = report_on(
+        layer([(X, Y), (X + 50, Y + 30), (X, Y + 70)]),
+        layer([(X + 2, Y)], name="osm"),
+        bench=5.0,
+    )
+    plain = json.loads(json.dumps(report.to_dict()))
+    assert plain["objects"] == 3
+    assert plain["classes"][0]["class_name"] == "bench"
+    assert plain["conflated"][0]["count"] == 1
+    tables = [Table(*table) for table in report.tables()]
+    assert [table.title for table in tables] == [
+        "Objects by class",
+        "Rows by layer",
+        "Conflated",
+        "Place",
+        "Licences",
+    ]
+    for table in tables:
+        assert all(len(row) == len(table.columns) for row in table.rows), table.title
+        assert table.markdown()
+    assert tables[0].rows[0][:3] == ("bench", "3", "4")
+    assert "convex hull" in tables[0].note
+    assert "squares of 100 m" in tables[0].note
+    assert "No objects of: alignment_tree" in tables[0].note
+    assert tables[2].rows == (("bench", "osm", "city", "1", "5.0", "2.0", "2.0"),)
+    assert "Conflated" not in {title for title, *_ in report_on(layer([(X, Y)])).tables()}
+
+
+def test_montpellier(geodata: Path) -> None:
+    catalog = load_catalog("montpellier")
+    pairs, _ = find_files(choose_layers(catalog), [geodata / "montpellier"])
+    layers = [read_layer(path, spec) for spec, path in pairs]
+    objects, load = build_objects(layers, taxonomy=catalog.taxonomy, crs=catalog.metric_crs or "")
+    report = quality_report(objects, load)
+    assert sum(item.objects for item in report.sources) == report.objects == len(objects)
+    assert sum(item.objects for item in report.classes) == len(objects)
+    by_name = {item.class_name: item for item in report.classes}
+    assert by_name["alignment_tree"].objects == 23_972
+    assert by_name["alignment_tree"].nearest_m == pytest.approx(6.5, abs=0.1)
+    assert by_name["parking_meter"].rows == 823
+    assert by_name["parking_meter"].objects == 701
+    # The commune has 57 km2; the hull of its objects is of that size, what is lit is less.
+    assert 40 < report.hull_km2 < 80
+    squares = {(int(x // 100), int(y // 100)) for x, y in objects.xy.tolist()}
+    assert report.occupied_km2 == pytest.approx(len(squares) / 100)
+    assert report.occupied_km2 < report.hull_km2
+    assert np.allclose(report.extent_degrees, (3.81, 43.57, 3.94, 43.65), atol=0.02)

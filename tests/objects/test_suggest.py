@@ -1,0 +1,360 @@
+from __future__ import annotations
+
+import json
+import re
+import tomllib
+from typing import TYPE_CHECKING, Any
+
+import geopandas as gpd
+import pandas as pd
+import pyogrio
+import pytest
+import shapely
+from sentences import assert_sentence
+
+from semsig_gis.core.errors import CatalogError, SourceError
+from semsig_gis.objects.draft import suggest_catalog
+from semsig_gis.sources import reader
+from semsig_gis.sources.catalog import catalog_names, load_catalog
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from semsig_gis.sources import RawLayer
+    from semsig_gis.sources.catalog import Catalog
+
+SUGGESTION = re.compile(r"# (?=(?:where|class_by|id_field|unique_id) = )")
+
+
+def load(draft: str, folder: Path) -> Catalog:
+    path = folder / "draft.toml"
+    path.write_text(draft, encoding="utf-8")
+    return load_catalog(path)
+
+
+def read(draft: str, file: Path, folder: Path) -> tuple[RawLayer, ...]:
+    catalog = load(draft, folder)
+    return reader(catalog.reader)(file, catalog.layers)
+
+
+def layers(draft: str) -> list[dict[str, Any]]:
+    found: list[dict[str, Any]] = tomllib.loads(draft)["layers"]
+    return found
+
+
+def edited(draft: str) -> str:
+    """Fill in what a person must."""
+    draft = draft.replace('class = "EDIT"', 'class = "bench"')
+    return re.sub(r"# EDIT: the file does not say its coordinate.*", 'crs = "EPSG:2154"', draft)
+
+
+def write(
+    path: Path, fields: dict[str, list[object]], *, crs: str = "EPSG:2154", layer: str = ""
+) -> Path:
+    size = len(next(iter(fields.values())))
+    x, y, step = (3.88, 43.61, 1e-5) if crs == "EPSG:4326" else (770_000.0, 6_280_000.0, 1.0)
+    places = shapely.points([(x + row * step, y) for row in range(size)])
+    options = {"layer": layer} if layer else {}
+    gpd.GeoDataFrame(fields, geometry=places, crs=crs).to_file(path, **options)
+    return path
+
+
+# --- What is drafted --------------------------------------------------------------------------
+
+
+def test_a_sure_draft_loads_as_it_is(tmp_path: Path) -> None:
+    file = write(
+        tmp_path / "Bancs_publics.gpkg",
+        {
+            "Numéro": [f"b{row}" for row in range(6)],
+            "etat": ["neuf", "usé", "neuf", None, "neuf", "usé"],
+        },
+    )
+    draft = suggest_catalog(file)
+    (layer,) = read(draft, file, tmp_path)
+    assert layer.spec.name == "bancs_publics"
+    assert layer.spec.class_name == "bench"
+    assert layer.spec.files == ("Bancs_publics.gpkg",)
+    assert layer.spec.id_field == "Numéro"
+    assert layer.spec.crs == load(draft, tmp_path).metric_crs == "EPSG:2154"
+    assert layer.spec.rows == (3, 12)
+    assert (layer.read, len(layer.table), layer.notes) == (6, 6, ())
+    assert '# where = { etat = ["neuf", "usé"] }  # rows: 3, 2; without: 1' in draft
+    assert "# Fields: Numéro, etat" in draft
+    assert draft.count("EDIT") == 3  # in the introduction, for the licence and the attribution
+
+
+def test_a_draft_that_knows_no_class_does_not_load(tmp_path: Path) -> None:
+    file = write(tmp_path / "stuff.gpkg", {"a": [1, 2]})
+    draft = suggest_catalog(file)
+    with pytest.raises(CatalogError) as caught:
+        load(draft, tmp_path)
+    assert_sentence(caught.value, "'EDIT'")
+    assert len(read(edited(draft), file, tmp_path)) == 1
+
+
+def test_a_class_that_only_values_name_is_marked(tmp_path: Path) -> None:
+    file = write(tmp_path / "layer1.geojson", {"amenity": ["post_box"] * 3}, crs="EPSG:4326")
+    draft = suggest_catalog(file)
+    assert 'class = "post_box"  # EDIT: from amenity = post_box; is it so?' in draft
+    assert load(draft, tmp_path).layers[0].class_name == "post_box"
+
+
+def test_a_name_that_means_two_things_is_marked(tmp_path: Path) -> None:
+    draft = suggest_catalog(write(tmp_path / "signalisation.gpkg", {"a": [1]}))
+    assert (
+        'class = "indicator"  # EDIT: from the name: "signalisation"; or is it traffic_light?'
+        in (draft)
+    )
+
+
+def test_a_class_of_its_own_has_the_code_of_the_shipped_catalogues(tmp_path: Path) -> None:
+    catalog = load(suggest_catalog(write(tmp_path / "horodateurs.gpkg", {"a": [1]})), tmp_path)
+    assert catalog.taxonomy.by_name("parking_meter") == load_catalog(
+        "montpellier"
+    ).taxonomy.by_name("parking_meter")
+
+
+def test_a_class_that_no_shipped_catalogue_has_takes_what_is_free(tmp_path: Path) -> None:
+    catalog = load(suggest_catalog(write(tmp_path / "defibrillateurs.gpkg", {"a": [1]})), tmp_path)
+    own = catalog.taxonomy.by_name("defibrillator")
+    for name in catalog_names():
+        for item in load_catalog(name).taxonomy.classes:
+            assert own.code != item.code
+            assert own.symbol != item.symbol
+
+
+def test_every_layer_of_a_file_is_drafted(tmp_path: Path) -> None:
+    file = tmp_path / "town.gpkg"
+    for layer in ("Arbres", "arbres!", "Bancs"):
+        write(file, {"a": [1]}, layer=layer)
+    draft = suggest_catalog(file)
+    assert [(item["name"], item["layer"]) for item in layers(draft)] == [
+        ("arbres", "Arbres"),
+        ("arbres_2", "arbres!"),
+        ("bancs", "Bancs"),
+    ]
+    assert [layer.read for layer in read(draft, file, tmp_path)] == [1, 1, 1]
+
+
+def test_tables_without_geometry_are_named_and_left_out(tmp_path: Path) -> None:
+    file = write(tmp_path / "town.gpkg", {"a": [1]}, layer="benches")
+    pyogrio.write_dataframe(pd.DataFrame({"text": ["x"]}), file, layer="legend", append=True)
+    draft = suggest_catalog(file)
+    assert '# Left out, because they have no geometry: "legend"' in draft
+    assert [item["name"] for item in layers(draft)] == ["benches"]
+
+
+def test_buildings_and_streets_get_their_role(tmp_path: Path) -> None:
+    for name, shape, role in (
+        ("batiments", shapely.box(0, 0, 1, 1), "buildings"),
+        ("streets", shapely.LineString([(0, 0), (1, 1)]), "streets"),
+    ):
+        file = tmp_path / f"{name}.gpkg"
+        gpd.GeoDataFrame({"a": [1]}, geometry=[shape], crs="EPSG:2154").to_file(file)
+        (spec,) = load(suggest_catalog(file), tmp_path).layers
+        assert (spec.role, spec.class_name) == (role, "")
+
+
+def test_a_value_that_tells_another_class_is_offered(tmp_path: Path) -> None:
+    kinds: list[object] = ["Livraison", "Taxi", "GIG/GIC"] * 3
+    file = write(tmp_path / "PlacesReserv.gpkg", {"Type": kinds})
+    draft = suggest_catalog(file)
+    offered = SUGGESTION.sub("", draft).replace("# [[classes]]", "[[classes]]")
+    offered = re.sub(r"# (code|symbol|name|title) = ", r"\1 = ", offered)
+    (layer,) = read(offered, file, tmp_path)
+    assert (
+        layer.table["class_name"].tolist() == ["reserved_bay", "taxi_station", "disabled_bay"] * 3
+    )
+
+
+def test_ids_that_come_again_are_offered(tmp_path: Path) -> None:
+    file = write(tmp_path / "lampadaires.gpkg", {"code": ["a", "a", "b"], "x": [1, 2, 3]})
+    draft = suggest_catalog(file)
+    assert '# id_field = "code"  # 2 values in 3 rows' in draft
+    (spec,) = load(SUGGESTION.sub("", draft), tmp_path).layers
+    assert (spec.id_field, spec.unique_id) == ("code", True)
+
+
+def test_an_id_of_another_name_is_offered(tmp_path: Path) -> None:
+    values: dict[str, list[object]] = {
+        "height": [1.5, 2.5, 3.25],
+        "kind": ["a", "a", "b"],
+        "baumnr": [17, 18, 21],
+    }
+    draft = suggest_catalog(write(tmp_path / "trees.gpkg", values))
+    assert '# id_field = "baumnr"' in draft
+    (spec,) = load(SUGGESTION.sub("", draft), tmp_path).layers
+    assert spec.id_field == "baumnr"
+
+
+# --- Positions and coordinate systems ---------------------------------------------------------
+
+
+def test_degrees_in_a_csv_file_are_guessed_and_marked(tmp_path: Path) -> None:
+    file = tmp_path / "bancs.csv"
+    file.write_text("X;Y\n3.88;43.61\n3.89;43.62\n", encoding="utf-8")
+    draft = suggest_catalog(file)
+    assert 'crs = "EPSG:4326"  # EDIT' in draft
+    (layer,) = read(draft, file, tmp_path)
+    assert (layer.spec.x_field, layer.spec.y_field) == ("X", "Y")
+    assert layer.table.geometry[0] == shapely.Point(3.88, 43.61)
+
+
+def test_a_plane_that_nobody_names_is_left_to_the_person(tmp_path: Path) -> None:
+    file = tmp_path / "bancs.csv"
+    file.write_text("X;Y\n770000;6280000\n", encoding="utf-8")
+    draft = suggest_catalog(file)
+    assert "crs" not in layers(draft)[0]
+    assert "# EDIT: the file does not say its coordinate system" in draft
+    (layer,) = read(edited(draft), file, tmp_path)
+    assert layer.table.crs.to_epsg() == 2154
+
+
+@pytest.mark.parametrize(
+    ("suffix", "content"),
+    [
+        ("csv", "id;Geo point\na;43.61, 3.88\nb;43.62,3.89\n"),
+        ("csv", 'id,geo_point_2d\na,"43.61, 3.88"\nb,"43.62, 3.89"\n'),
+        ("json", [{"id": "a", "lng": 3.88, "lat": 43.61}, {"id": "b", "lng": 3.89, "lat": 43.62}]),
+        ("json", [{"id": i, "geo_point_2d": {"lon": 3.88, "lat": 43.61}} for i in "ab"]),
+        (
+            "json",
+            [{"recordid": i, "fields": {"id": i, "geo_point_2d": [43.61, 3.88]}} for i in "ab"],
+        ),
+    ],
+)
+def test_tables_of_portals_are_drafted(tmp_path: Path, suffix: str, content: object) -> None:
+    file = tmp_path / f"sanisettes.{suffix}"
+    text = content if isinstance(content, str) else json.dumps(content)
+    file.write_text(text, encoding="utf-8")
+    draft = suggest_catalog(file)
+    (layer,) = read(draft, file, tmp_path)
+    assert load(draft, tmp_path).reader == "opendatasoft"
+    assert layer.spec.class_name == "automatic_wc"
+    assert layer.table["source_id"].tolist() == ["a", "b"]
+    assert layer.table.geometry[0] == shapely.Point(3.88, 43.61)
+
+
+# --- Whatever is in a file --------------------------------------------------------------------
+
+
+def test_strange_names_and_values_stay_within_their_quotes(tmp_path: Path) -> None:
+    file = write(
+        tmp_path / 'arbres [2] "x" # ü.geojson',
+        {
+            'a "quoted" # field': ["x\ny", 'q"q', "\x7f"] * 4,
+            "etat\n[[layers]]": ["]", "# [", "\\"] * 4,
+            "statut": [True, False, True] * 4,
+            "classe": ["/.*/", "a", "b"] * 4,
+        },
+        crs="EPSG:4326",
+    )
+    draft = suggest_catalog(file)
+    (layer,) = read(draft, file, tmp_path)
+    assert (layer.spec.name, layer.read) == ("arbres_2_x_u", 12)
+    lines = draft.splitlines()
+    offered = [place for place, line in enumerate(lines) if line.startswith("# where")]
+    assert len(offered) == 3  # a pattern is no value
+    for place in offered:
+        tried = [*lines[:place], SUGGESTION.sub("", lines[place]), *lines[place + 1 :]]
+        (layer,) = read("\n".join(tried), file, tmp_path)
+        assert (layer.read, layer.filtered) == (12, 0), lines[place]
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "words"),
+    [
+        ("town.osm.pbf", b"x", ("OpenStreetMap", "'openstreetmap'")),
+        ("town.osm", b"<osm/>", ("OpenStreetMap", "'openstreetmap'")),
+        ("town.csv", b"name;size\na;1\n", ("no field that looks like a position", "name, size")),
+        ("town.json", b'[{"a": 1}]', ("no field that looks like a position",)),
+        ("town.json", b"[", ("town.json",)),
+        ("town.shp", b"x", ("town.shp",)),
+        ("town.parquet", b"x", ("town.parquet",)),
+        ("town.txt", b"x", ("town.txt",)),
+        ("town.csv", None, ("town.csv", "does not exist")),
+        ("town.gpkg", None, ("town.gpkg", "does not exist")),
+    ],
+)
+def test_what_cannot_be_drafted_is_an_error(
+    tmp_path: Path, name: str, content: bytes | None, words: tuple[str, ...]
+) -> None:
+    if content is not None:
+        (tmp_path / name).write_bytes(content)
+    with pytest.raises(SourceError) as caught:
+        suggest_catalog(tmp_path / name)
+    assert_sentence(caught.value, *words)
+
+
+# --- Real files -------------------------------------------------------------------------------
+
+GUESSES = {
+    "AffichageLibre": "notice_board",
+    "ArbresAlign": "alignment_tree",
+    "ArbresRemarq": "alignment_tree",
+    "Batiments": "buildings",
+    "BoiteLettre": "post_box",
+    "CameraSurv": "camera",
+    "Defibrillateurs": "defibrillator",
+    "EclairagePublic": "street_light",
+    "FilaireVoies": "streets",
+    "Fontaines": "water_fountain",
+    "Horodateurs": "parking_meter",
+    "ParkingOuv": "car_park",
+    "PassagesPiet": "pedestrian_crossing",
+    "PlacesGIG": "disabled_bay",
+    "PlacesReserv": "reserved_bay",
+    "Recyclage": "recycling_point",
+    "Signalisation": "indicator",  # marked; the traffic lights are named second
+    "TelephonePublic": "telephone",
+    "Autolib": "car_station",
+    "bike_stations": "bike_station",
+    "feurouge": "traffic_light",
+    "fontaines-a-boire": "water_fountain",
+    "les-arbres": "alignment_tree",
+    "paris_trees": "alignment_tree",
+    "ratp": "bus_stop",
+    "sanisettes": "automatic_wc",
+    "signalisation-tricolore": "traffic_light",
+    "taxi": "taxi_station",
+    "velib": "bike_station",
+}
+NO_GUESS = {
+    "AccTrottoir", "EspacesVertsGlobal", "LimiteCommune", "arrondissements", "districts",
+    "land_use", "perimeter",
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("folder", ["montpellier", "paris"])
+def test_published_files_are_drafted_and_read_by_their_drafts(
+    geodata: Path, tmp_path: Path, folder: str
+) -> None:
+    files = [path for path in sorted((geodata / folder).iterdir()) if path.suffix != ".txt"]
+    assert len(files) > 20
+    for file in files:
+        draft = suggest_catalog(file)
+        (stanza,) = layers(draft)
+        expected = {name for part, name in GUESSES.items() if part in file.name}
+        assert expected or any(part in file.name for part in NO_GUESS), file.name
+        assert stanza.get("class", stanza.get("role")) in (expected or {"EDIT"}), file.name
+        (layer,) = read(edited(draft), file, tmp_path)
+        assert layer.read > 0
+        assert layer.error_count == 0
+        assert len(layer.table) == layer.read
+        assert layer.spec.rows is not None
+        assert layer.spec.rows[0] <= layer.read <= layer.spec.rows[1]
+        if layer.spec.id_field is not None:
+            assert layer.table["source_id"].is_unique, file.name
+
+
+def test_the_filters_of_the_montpellier_catalogue_are_offered(geodata: Path) -> None:
+    for name, field, value in (
+        ("FontainesPublic", "ETAT", "en fonction"),
+        ("EclairagePublic", "type_lante", "Lanterne"),  # stands once, in row 29,000 or so
+        ("ParkingOuv", "TYPARK_C_2", "Superstructure"),
+        ("PlacesReserv", "F01_TYPE_D", "Livraison"),
+    ):
+        draft = suggest_catalog(geodata / "montpellier" / f"VilleMTP_MTP_{name}.zip")
+        (line,) = (line for line in draft.splitlines() if f"where = {{ {field} =" in line)
+        assert f'"{value}"' in line

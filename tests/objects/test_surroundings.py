@@ -1,0 +1,138 @@
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import geopandas as gpd
+import pytest
+import shapely
+from osm_xml import node, way, write_osm
+from sentences import assert_sentence
+
+from semsig_gis.core.errors import InputError, SourceError
+from semsig_gis.objects.surroundings import (
+    licenses_of,
+    read_area,
+    read_surroundings,
+    save_surroundings,
+)
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+HOUSE = shapely.box(770_000, 6_280_000, 770_010, 6_280_010)
+CRS = "EPSG:2154"
+
+
+def write(path: Path, *shapes: shapely.Geometry | None) -> Path:
+    table = gpd.GeoDataFrame({"n": range(len(shapes))}, geometry=list(shapes), crs=CRS)
+    table = table.to_crs("EPSG:4326")
+    table.to_parquet(path) if path.suffix == ".parquet" else table.to_file(path)
+    return path
+
+
+@pytest.mark.parametrize("name", ["houses.parquet", "houses.gpkg", "houses.geojson"])
+def test_files_are_moved_to_the_crs_asked_for(tmp_path: Path, name: str) -> None:
+    table = read_surroundings(write(tmp_path / name, HOUSE, None), role="buildings", crs=CRS)
+    assert len(table) == 1
+    assert table.geometry[0].hausdorff_distance(HOUSE) < 0.01
+    area = read_area(write(tmp_path / name, HOUSE, HOUSE.buffer(5)), crs=CRS)
+    assert area.area == pytest.approx(HOUSE.buffer(5).area, rel=1e-3)
+
+
+def test_an_openstreetmap_file_gives_what_it_tags(tmp_path: Path) -> None:
+    nodes = [node(1, 24.9, 60.1), node(2, 24.91, 60.1), node(3, 24.91, 60.11)]
+    ways = [way(4, [1, 2, 3, 1], {"building": "yes"}), way(5, [1, 2], {"highway": "residential"})]
+    path = write_osm(tmp_path / "city.osm", *nodes, *ways)
+    houses = read_surroundings(path, role="buildings", crs="EPSG:32635")
+    streets = read_surroundings(path, role="streets", crs="EPSG:32635")
+    assert (houses.geom_type.tolist(), streets.geom_type.tolist()) == (["Polygon"], ["LineString"])
+    named = tuple(
+        f"OpenStreetMap contributors (ODbL 1.0): {name}" for name in ("buildings", "streets")
+    )
+    assert licenses_of(houses, streets, houses) == named
+    shouted = path.rename(path.with_name("CITY.OSM"))
+    assert licenses_of(read_surroundings(shouted, role="streets", crs=CRS)) == named[1:]
+
+
+def test_a_file_of_something_else_is_refused(tmp_path: Path) -> None:
+    line = shapely.LineString([(770_000, 6_280_000), (770_100, 6_280_000)])
+    for name in ("x.parquet", "x.gpkg"):
+        streets, houses = write(tmp_path / f"s{name}", line), write(tmp_path / f"h{name}", HOUSE)
+        with pytest.raises(InputError) as caught:
+            read_surroundings(streets, role="buildings", crs=CRS)
+        assert_sentence(caught.value, name, "LineString", "polygons")
+        with pytest.raises(InputError) as caught:
+            read_surroundings(houses, role="streets", crs=CRS)
+        assert_sentence(caught.value, name, "Polygon", "lines")
+    with pytest.raises(InputError) as caught:
+        read_area(write(tmp_path / "none.parquet", None), crs=CRS)
+    assert_sentence(caught.value, "no polygon", "polygons")
+    flat = shapely.Polygon([(770_000, 6_280_000)] * 3)
+    with pytest.raises(InputError) as caught:
+        read_area(write(tmp_path / "flat.parquet", flat), crs=CRS)
+    assert_sentence(caught.value, "encloses no area")
+
+
+def test_a_file_that_cannot_be_used_is_named(tmp_path: Path) -> None:
+    for name in ("nowhere.parquet", "nowhere.gpkg"):
+        with pytest.raises(SourceError) as caught:
+            read_area(tmp_path / name, crs=CRS)
+        assert_sentence(caught.value, name, "does not exist")
+    broken = tmp_path / "broken.parquet"
+    broken.write_text("no", encoding="utf-8")
+    with pytest.raises(SourceError) as caught:
+        read_area(broken, crs=CRS)
+    assert_sentence(caught.value, "broken.parquet", "damaged")
+    gpd.GeoDataFrame(geometry=[HOUSE]).to_parquet(tmp_path / "bare.parquet")
+    with pytest.raises(SourceError) as caught:
+        read_area(tmp_path / "bare.parquet", crs=CRS)
+    assert_sentence(caught.value, "bare.parquet", "coordinate reference system")
+
+
+def rows_of_houses() -> gpd.GeoDataFrame:
+    shapes = [
+        shapely.box(770_000 + x, 6_280_000 + y, 770_006 + x, 6_280_006 + y)
+        for x in range(0, 900, 10)
+        for y in range(900, 0, -10)
+    ]
+    return gpd.GeoDataFrame({"n": range(len(shapes))}, geometry=shapes, crs=CRS)
+
+
+def test_saved_surroundings_come_back_by_box(tmp_path: Path) -> None:
+    table = rows_of_houses()
+    table.attrs["licenses"] = ["City (CC0): houses"]
+    path = tmp_path / "new" / "houses.parquet"
+    save_surroundings(table, path)
+    again = read_surroundings(path, role="buildings", crs=CRS)
+    assert again.sort_values("n").reset_index(drop=True).equals(table)
+    box = (770_106.0, 6_280_400.0, 770_130.0, 6_280_456.0)  # from an edge to a corner
+    near = read_surroundings(path, role="buildings", crs=CRS, box=box)
+    assert sorted(near["n"]) == sorted(table["n"][table.intersects(shapely.box(*box))])
+    assert list(near.columns) == ["n", "geometry"]
+    assert licenses_of(near) == licenses_of(again) == ("City (CC0): houses",)
+    save_surroundings(again, tmp_path / "again.parquet")
+    assert (tmp_path / "again.parquet").read_bytes() == path.read_bytes()
+
+
+def test_a_box_without_any_is_empty(tmp_path: Path) -> None:
+    save_surroundings(rows_of_houses(), tmp_path / "houses.parquet")
+    path = tmp_path / "houses.parquet"
+    near = read_surroundings(path, role="buildings", crs=CRS, box=(0, 0, 9, 9))
+    assert (len(near), near.crs) == (0, CRS)
+    near = read_surroundings(path, role="buildings", crs="EPSG:32631", box=(0, 0, 9, 9))
+    assert (len(near), near.crs) == (0, "EPSG:32631")
+
+
+def test_a_file_without_bounds_is_not_read_by_box(tmp_path: Path) -> None:
+    path = tmp_path / "houses.parquet"
+    rows_of_houses().to_parquet(path)
+    with pytest.raises(SourceError) as caught:
+        read_surroundings(path, role="buildings", crs=CRS, box=(0, 0, 9, 9))
+    assert_sentence(caught.value, "houses.parquet")
+
+
+def test_no_surroundings_at_all_can_be_saved(tmp_path: Path) -> None:
+    save_surroundings(rows_of_houses().iloc[:0], tmp_path / "none.parquet")
+    with pytest.raises(InputError) as caught:
+        read_surroundings(tmp_path / "none.parquet", role="buildings", crs=CRS)
+    assert_sentence(caught.value, "holds no polygon")

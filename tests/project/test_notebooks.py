@@ -1,0 +1,139 @@
+"""The notebooks run from top to bottom, show what they promise, and are kept without outputs."""
+
+from __future__ import annotations
+
+import ast
+import gc
+import json
+import re
+import sys
+import tempfile
+import time
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import matplotlib as mpl
+import matplotlib.pyplot as plt
+import pytest
+
+from semsig_gis.maps.page import MapFrame
+from semsig_gis.reports.plots import Picture
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+FOLDER = Path(__file__).parents[2] / "notebooks"
+NOTEBOOKS = sorted(FOLDER.glob("*.ipynb"))
+KERNEL = {"display_name": "Python 3", "language": "python", "name": "python3"}
+# What a reader has who installed the package: it, what it stands on, and Python.
+IMPORTED = {"geopandas", "matplotlib", "numpy", "pandas", "semsig_gis"}
+MOST_SECONDS = 60  # of a processor: how busy the machine is does not count
+# How a notebook shows a value, best first; anything can be shown as text.
+SHOWN_BY = ("_repr_html_", "_repr_svg_", "_repr_markdown_", "__repr__")
+
+each_notebook = pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda path: path.stem)
+
+
+def opened(path: Path) -> dict[str, Any]:
+    notebook: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
+    return notebook
+
+
+def code_of(path: Path) -> list[tuple[str, str]]:
+    """Return the name and the text of every cell of code."""
+    cells = opened(path)["cells"]
+    return [(cell["id"], "".join(cell["source"])) for cell in cells if cell["cell_type"] == "code"]
+
+
+def test_the_folder_lists_its_notebooks() -> None:
+    listed = re.findall(r"\]\((\d\d_\w+\.ipynb)\)", (FOLDER / "README.md").read_text("utf-8"))
+    assert listed == [path.name for path in NOTEBOOKS]
+    assert [name[:2] for name in listed] == [f"{number:02}" for number in range(1, 8)]
+
+
+@each_notebook
+def test_a_notebook_is_kept_clean(path: Path) -> None:
+    notebook = opened(path)
+    assert (notebook["nbformat"], notebook["nbformat_minor"]) == (4, 5)
+    assert notebook["metadata"] == {"kernelspec": KERNEL, "language_info": {"name": "python"}}
+    names = [cell["id"] for cell in notebook["cells"]]
+    assert len(set(names)) == len(names)
+    for cell in notebook["cells"]:
+        assert re.fullmatch(r"[a-z][a-z0-9-]{1,63}", cell["id"])  # a name, not a random number
+        assert cell["metadata"] == {}
+        if cell["cell_type"] == "code":
+            assert cell["outputs"] == []
+            assert cell["execution_count"] is None
+    title, *_ = notebook["cells"][0]["source"]
+    assert title == f"# {int(path.name[:2])}. {title[5:]}"
+    # The same bytes, whichever program has saved it.
+    text = json.dumps(notebook, indent=1, ensure_ascii=False) + "\n"
+    assert path.read_text(encoding="utf-8") == text
+
+
+@each_notebook
+def test_a_notebook_uses_what_everybody_has(path: Path) -> None:
+    for _, text in code_of(path):
+        for node in ast.walk(ast.parse(text)):
+            modules: list[str] = []
+            if isinstance(node, ast.Import):
+                modules = [alias.name for alias in node.names]
+            elif isinstance(node, ast.ImportFrom):
+                modules = [node.module or "", *(alias.name for alias in node.names)]
+                assert node.level == 0
+            for module in modules:
+                assert not any(part.startswith("_") for part in module.split("."))
+            for module in modules[:1]:
+                package = module.split(".")[0]
+                assert package in IMPORTED | sys.stdlib_module_names
+
+
+@pytest.fixture
+def elsewhere(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
+    """Give an empty folder to run in, and take temporary files to another one in it."""
+    work, temporary = tmp_path / "work", tmp_path / "temporary"
+    for folder in (work, temporary):
+        folder.mkdir()
+    monkeypatch.chdir(work)
+    monkeypatch.setattr(tempfile, "tempdir", str(temporary))
+    with mpl.rc_context({"backend": "agg"}):
+        yield tmp_path
+    plt.close("all")
+
+
+@each_notebook
+def test_a_notebook_runs(path: Path, elsewhere: Path) -> None:
+    beside = sorted(FOLDER.rglob("*"))
+    begun = time.process_time()
+    names: dict[str, Any] = {"__name__": "__main__"}
+    shown: list[Any] = []
+    for cell, text in code_of(path):
+        shown.append(run_cell(text, names, where=f"{path.name}:{cell}"))
+        figures = [plt.figure(number) for number in plt.get_fignums()]
+        for figure in figures:
+            figure.canvas.draw()
+        shown += figures
+        plt.close("all")
+    assert time.process_time() - begun < MOST_SECONDS
+    # A picture of its own, and last a map that can be moved.
+    assert any(isinstance(one, Picture | mpl.figure.Figure) for one in shown)
+    assert isinstance(shown[-1], MapFrame)
+    names.clear()
+    shown.clear()
+    gc.collect()
+    assert sorted(FOLDER.rglob("*")) == beside
+    assert [found for found in elsewhere.rglob("*") if found.is_file()] == []
+
+
+def run_cell(text: str, names: dict[str, Any], *, where: str) -> object:
+    """Run a cell, and show what its last line is worth, as a notebook does."""
+    body = ast.parse(text)
+    last = body.body.pop() if isinstance(body.body[-1], ast.Expr) else None
+    exec(compile(body, where, "exec"), names)  # noqa: S102
+    if last is None:
+        return None
+    assert isinstance(last, ast.Expr)
+    value: object = eval(compile(ast.Expression(last.value), where, "eval"), names)  # noqa: S307
+    show = next(getattr(value, name) for name in SHOWN_BY if hasattr(value, name))
+    assert value is None or show()
+    return value

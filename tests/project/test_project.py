@@ -1,0 +1,152 @@
+"""Facts about the project itself: what is tracked, what is shipped, what is documented."""
+
+from __future__ import annotations
+
+import re
+import shutil
+import socket
+import subprocess
+import sys
+import tomllib
+import zipfile
+from pathlib import Path
+from typing import Any
+
+import pytest
+from packaging.requirements import Requirement
+from packaging.utils import canonicalize_name
+
+import semsig_gis
+from semsig_gis.maps import page as map_assets
+
+ROOT = Path(__file__).parents[2]
+PACKAGE = ROOT / "semsig_gis"
+
+pytestmark = pytest.mark.skipif(
+    not (ROOT / "pyproject.toml").is_file(), reason="the tests do not run from a checkout"
+)
+
+# Written so that this file does not contain what it looks for.
+REGISTRY_HOST = re.compile(r"py(?:pi[.]org|thonhosted[.])|npm(?:js)[.]|proxy[.]golang|crates[.]io")
+MACHINE_PATH = re.compile(r"(?<![\w.~:/-])/(?:home|root|work|tmp|opt|mnt|Users)[/]\w")
+
+
+@pytest.fixture(scope="module")
+def pyproject() -> dict[str, Any]:
+    return tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
+
+
+@pytest.fixture(scope="module")
+def wheel(tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
+    """Build the wheel and return the text of each file in it (empty for other files)."""
+    folder = tmp_path_factory.mktemp("wheel")
+    subprocess.run(
+        [sys.executable, "-m", "hatchling", "build", "-t", "wheel", "-d", str(folder)],
+        cwd=ROOT,
+        check=True,
+        capture_output=True,
+        env={"PATH": ""},  # no npm, thus no network; files that are there are packed all the same
+    )
+    (path,) = folder.glob("*.whl")
+    with zipfile.ZipFile(path) as archive:
+        return {
+            name: archive.read(name).decode("utf-8") if "dist-info" in name else ""
+            for name in archive.namelist()
+        }
+
+
+def tracked_files() -> list[Path]:
+    """Return the files that git tracks, or would after ``git add``."""
+    git = shutil.which("git")
+    if git is None or not (ROOT / ".git").exists():
+        pytest.skip("not a git checkout")
+    command = [git, "ls-files", "-z", "--cached", "--others", "--exclude-standard"]
+    listed = subprocess.run(command, cwd=ROOT, check=True, capture_output=True, text=True).stdout
+    return [ROOT / name for name in listed.split("\0") if name and (ROOT / name).is_file()]
+
+
+def modules() -> set[str]:
+    """Return the dotted names of the package's public modules, without the package itself."""
+    names = {
+        ".".join(path.relative_to(ROOT).with_suffix("").parts) for path in PACKAGE.rglob("*.py")
+    }
+    names = {name.removesuffix(".__init__") for name in names} - {"semsig_gis"}
+    return {name for name in names if "._" not in name}
+
+
+@pytest.mark.parametrize("pattern", [REGISTRY_HOST, MACHINE_PATH], ids=["host", "path"])
+def test_no_tracked_file_names_a_registry_or_a_machine(pattern: re.Pattern[str]) -> None:
+    found = []
+    for path in tracked_files():
+        content = path.read_bytes()
+        if b"\0" not in content:
+            lines = content.decode("utf-8", errors="replace").splitlines()
+            found += [f"{path.name}: {line.strip()}" for line in lines if pattern.search(line)]
+    assert found == []
+
+
+def test_the_patterns_find_what_they_look_for() -> None:
+    assert REGISTRY_HOST.search("https://" + "pypi" + ".org/simple")
+    assert REGISTRY_HOST.search("registry." + "npmjs" + ".org")
+    assert MACHINE_PATH.search('open("/' + 'home/me/x")')
+    assert not MACHINE_PATH.search("https://example.org/home/x, docs/work/x, ~/tmp/x")
+
+
+def test_data_sources_hold_data_only() -> None:
+    suffixes = {path.suffix for path in (ROOT / "data_sources").rglob("*") if path.is_file()}
+    assert suffixes <= {".toml", ".md"}
+    assert ".toml" in suffixes
+
+
+def test_the_wheel_is_complete(wheel: dict[str, str]) -> None:
+    data = {f"semsig_gis/{path.relative_to(ROOT)}" for path in ROOT.glob("data_sources/*")}
+    code = {str(path.relative_to(ROOT)) for path in PACKAGE.rglob("*.py")}
+    assert data | code <= wheel.keys()
+    assert "semsig_gis/py.typed" in wheel
+    assert "semsig_gis/assets/manifest.toml" in wheel
+    assert "semsig_gis/templates/report.html" in wheel
+    if map_assets.available():
+        assert {f"semsig_gis/assets/{name}" for name in map_assets.assets()} <= wheel.keys()
+    assert {name.partition("/")[0] for name in wheel} == {
+        "semsig_gis",
+        f"semsig_gis-{semsig_gis.__version__}.dist-info",
+    }
+
+
+def test_the_wheel_says_what_it_is(wheel: dict[str, str]) -> None:
+    info = f"semsig_gis-{semsig_gis.__version__}.dist-info"
+    assert "semsig = semsig_gis.cli:main" in wheel[f"{info}/entry_points.txt"]
+    assert "License-Expression: BSD-3-Clause" in wheel[f"{info}/METADATA"]
+    assert "BSD 3-Clause License" in wheel[f"{info}/licenses/LICENSE"]
+
+
+def test_every_dependency_is_pinned(pyproject: dict[str, Any]) -> None:
+    extras = pyproject["project"]["optional-dependencies"].values()
+    wanted = [*pyproject["project"]["dependencies"], *(name for extra in extras for name in extra)]
+    lines = (ROOT / "constraints.txt").read_text(encoding="utf-8").splitlines()
+    pins = [Requirement(line) for line in lines if line and not line.startswith("#")]
+    assert all(str(pin.specifier).startswith("==") and pin.url is None for pin in pins)
+    names = {canonicalize_name(pin.name) for pin in pins}
+    assert {canonicalize_name(Requirement(name).name) for name in wanted} - names == {"semsig-gis"}
+
+
+def test_the_version_is_the_same_everywhere() -> None:
+    citation = (ROOT / "CITATION.cff").read_text(encoding="utf-8")
+    assert f"\nversion: {semsig_gis.__version__}\n" in citation
+
+
+def test_no_public_name_is_also_a_module() -> None:
+    # Importing such a module would put it in the place of the name.
+    assert {f"semsig_gis.{name}" for name in semsig_gis.__all__} & modules() == set()
+
+
+def test_no_test_reaches_the_network() -> None:
+    with (
+        socket.socket() as outward,
+        pytest.raises(RuntimeError, match=r"tried to reach \('192\.0\.2\.1', 80\)"),
+    ):
+        outward.connect(("192.0.2.1", 80))
+    with pytest.raises(RuntimeError, match=r"tried to reach \('example\.org',\)"):
+        socket.getaddrinfo("example.org", 80)
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        socket.create_connection(server.getsockname(), timeout=1).close()

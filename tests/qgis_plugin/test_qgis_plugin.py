@@ -1,0 +1,387 @@
+"""The QGIS plugin: its zip file, and what it does in a real QGIS."""
+
+from __future__ import annotations
+
+import ast
+import configparser
+import importlib.util
+import json
+import os
+import shutil
+import subprocess
+import sys
+import zipfile
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+from xml.etree import ElementTree as ET
+
+import geopandas as gpd
+import pyogrio
+import pytest
+
+import semsig_gis
+from conftest import unavailable
+from semsig_gis.database.build import build_database
+from semsig_gis.database.file import open_database
+from semsig_gis.database.store import ObjectStore, save_with_store
+from semsig_gis.objects.clean import build_objects
+from semsig_gis.objects.table import open_objects, save_objects
+from semsig_gis.sources.catalog import paper_taxonomy
+from semsig_gis.sources.synthetic.city import CitySpec, synthetic_city
+
+if TYPE_CHECKING:
+    from types import ModuleType
+
+ROOT = Path(__file__).parents[2]
+PLUGIN = ROOT / "qgis_plugin" / "semsig"
+SCRIPT = Path(__file__).parents[1] / "qgis_session.py"
+
+# The command with few simulated queries.
+QUICK = """
+import functools
+from semsig_gis import identifying
+from semsig_gis.cli import main
+identifying.identify = functools.partial(identifying.identify, trials=60, class_trials=5)
+main()
+"""
+
+pytestmark = pytest.mark.skipif(not PLUGIN.is_dir(), reason="the tests do not run from a checkout")
+
+
+@pytest.fixture(scope="module")
+def package() -> ModuleType:
+    spec = importlib.util.spec_from_file_location("package", ROOT / "qgis_plugin" / "package.py")
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+# --- The zip file -------------------------------------------------------------------------------
+
+
+def test_the_zip_file_is_the_same_every_time(package: ModuleType, tmp_path: Path) -> None:
+    first, second = package.write_zip(tmp_path / "a"), package.write_zip(tmp_path / "b")
+    assert first.name == second.name == f"semsig-qgis-{semsig_gis.__version__}.zip"
+    assert first.read_bytes() == second.read_bytes()
+
+
+def test_the_zip_file_holds_what_a_plugin_needs(package: ModuleType, tmp_path: Path) -> None:
+    with zipfile.ZipFile(package.write_zip(tmp_path)) as archive:
+        names = archive.namelist()
+        assert names == sorted(names)
+        assert {name.partition("/")[0] for name in names} == {"semsig"}
+        assert {"semsig/__init__.py", "semsig/metadata.txt", "semsig/LICENSE"} <= set(names)
+        assert {Path(name).suffix for name in names} == {".py", ".txt", ".svg", ".qml", ""}
+        assert {entry.date_time for entry in archive.infolist()} == {(1980, 1, 1, 0, 0, 0)}
+        code = {name for name in names if name.endswith(".py")}
+    assert code == {f"semsig/{path.name}" for path in PLUGIN.glob("*.py")}
+
+
+def test_the_metadata_is_that_of_the_package() -> None:
+    metadata = configparser.ConfigParser()
+    metadata.read(PLUGIN / "metadata.txt", encoding="utf-8")
+    general = metadata["general"]
+    assert general["version"] == semsig_gis.__version__
+    assert general["qgisMinimumVersion"] == "3.22"
+    assert general["hasProcessingProvider"] == "yes"
+    assert (PLUGIN / general["icon"]).is_file()
+
+
+@pytest.mark.parametrize("path", [*PLUGIN.rglob("*.qml"), *PLUGIN.rglob("*.svg")], ids=str)
+def test_styles_and_the_icon_are_sound(path: Path) -> None:
+    root = ET.parse(path).getroot()  # noqa: S314 - our own file
+    symbols = {one.get("name") for one in root.iterfind("renderer-v2/symbols/symbol")}
+    used = {one.get("symbol") for one in root.iter() if one.get("symbol")}
+    assert used == symbols
+
+
+def test_the_plugin_runs_on_an_old_python() -> None:
+    for path in PLUGIN.glob("*.py"):
+        ast.parse(path.read_text(encoding="utf-8"), path.name, feature_version=(3, 9))
+
+
+# --- In QGIS ------------------------------------------------------------------------------------
+
+
+class Qgis:
+    """A fresh profile with the plugin from its zip file, and a small city."""
+
+    def __init__(self, place: Path, environment: dict[str, str], program: Path) -> None:
+        self.place = place
+        self.environment = environment
+        self.program = program
+
+    def process(self, *arguments: object) -> subprocess.CompletedProcess[str]:
+        return subprocess.run(
+            [str(argument) for argument in arguments],
+            cwd=self.place,
+            env=self.environment,
+            check=False,
+            capture_output=True,
+            text=True,
+            timeout=300,
+        )
+
+    def run(self, algorithm: str, **parameters: object) -> dict[str, str]:
+        """Run an algorithm with `qgis_process`, and return its outputs."""
+        given = [f"{name}={value}" for name, value in parameters.items()]
+        done = self.process(self.program, "run", f"semsig:{algorithm}", "--", *given)
+        assert done.returncode == 0, done.stdout + done.stderr
+        results = done.stdout.rpartition("Results\n")[2].splitlines()
+        return dict(line.split(":\t", 1) for line in results if ":\t" in line)
+
+
+@pytest.fixture(scope="module")
+def qgis(qgis_process: Path, package: ModuleType, tmp_path_factory: pytest.TempPathFactory) -> Qgis:
+    place = tmp_path_factory.mktemp("qgis")
+    layers = synthetic_city(CitySpec(size=300.0))
+    objects, _ = build_objects(layers, taxonomy=paper_taxonomy(), crs=layers[0].table.crs)
+    save_objects(objects, place / "objects.parquet")
+    save_with_store(build_database(objects), ObjectStore.of(objects), place / "city.parquet")
+    profile = place / "profile" / "profiles" / "default"
+    with zipfile.ZipFile(package.write_zip(place)) as archive:
+        archive.extractall(profile / "python" / "plugins")
+    # The command is chosen in the settings of the provider; it is not on the path of QGIS.
+    command = place / "semsig of this test"
+    (place / "run.py").write_text(QUICK)
+    command.write_text(
+        f'#!/bin/sh\necho $$ >> "{place}/processes"\n'
+        f'test -z "$PYTHONPATH$QT_QPA_PLATFORM$GDAL_DATA" || exit 9\n'
+        f'PYTHONPATH="{ROOT}" exec "{sys.executable}" "{place}/run.py" "$@"\n'
+    )
+    command.chmod(0o755)
+    settings = profile / "QGIS" / "QGIS3.ini"
+    settings.parent.mkdir(parents=True)
+    settings.write_text(
+        f"[Processing]\nConfiguration\\SEMSIG_COMMAND={command}\n[PythonPlugins]\nsemsig=true\n"
+    )
+    place.chmod(0o700)  # as Qt wishes its runtime folder to be
+    environment = {
+        "GDAL_DATA": "/usr/share/gdal",
+        "HOME": str(place),
+        "LANG": "C.UTF-8",
+        "PATH": os.defpath,
+        "QGIS_CUSTOM_CONFIG_PATH": str(place / "profile"),
+        "QT_QPA_PLATFORM": "offscreen",
+        "XDG_RUNTIME_DIR": str(place),
+    }
+    return Qgis(place, environment, qgis_process)
+
+
+@pytest.fixture(scope="module")
+def lamps(qgis: Qgis) -> Path:
+    """Return the catalogue of a file with three lamps."""
+    lamps = gpd.GeoDataFrame(geometry=gpd.points_from_xy([0, 40, 80], [0, 0, 0]), crs="EPSG:2154")
+    lamps.to_file(qgis.place / "lamps.geojson", driver="GeoJSON")
+    catalog = qgis.place / "town.toml"
+    catalog.write_text(
+        'name = "town"\ntitle = "Town"\nurl = "https://example.org"\nmetric_crs = "EPSG:2154"\n'
+        'license = "CC0"\nattribution = "Town"\n'
+        '[[layers]]\nname = "lamps"\nclass = "street_light"\nfiles = ["lamps.geojson"]\n'
+        'geometry = "point"\n'
+    )
+    return catalog
+
+
+def test_load_and_build(qgis: Qgis, lamps: Path) -> None:
+    done = qgis.run(
+        "load",
+        FOLDER=qgis.place,
+        CATALOG_FILE=lamps,
+        OUTPUT=qgis.place / "lamps.parquet",
+        BUILDINGS=qgis.place / "no_buildings.parquet",
+    )
+    assert done == {"OUTPUT": str(qgis.place / "lamps.parquet")}
+    assert len(open_objects(done["OUTPUT"])) == 3
+    done = qgis.run(
+        "build",
+        OBJECTS=done["OUTPUT"],
+        RADIUS=20,
+        OUTPUT=qgis.place / "lamps_city.parquet",
+        CELLS=qgis.place / "lamps.gpkg",
+    )
+    database = open_database(done["OUTPUT"])
+    assert database.spec.radius == 20.0
+    assert done["CELLS"] == f"{qgis.place}/lamps.gpkg|layername=cells"
+    assert len(gpd.read_file(qgis.place / "lamps.gpkg", layer="cells")) == len(database)
+
+
+def test_localize(qgis: Qgis) -> None:
+    database = open_database(qgis.place / "city.parquet")
+    cell = int(database.lengths.argmax())
+    seen = database.signature(cell)
+    assert seen.bearings is not None
+    outputs = ("CANDIDATES", "PLACE", "REGIONS")
+    written = {name: qgis.place / f"{name}.gpkg" for name in outputs}
+    qgis.run(
+        "localize",
+        DATABASE=qgis.place / "city.parquet",
+        TYPES=database.types(cell),
+        BEARINGS=",".join(f"{bearing:.1f}" for bearing in seen.bearings),
+        METHOD="likelihood",
+        TOP=3,
+        MAP=qgis.place / "place.html",
+        **written,
+    )
+    candidates = gpd.read_file(written["CANDIDATES"], layer="CANDIDATES")
+    assert candidates["rank"].tolist() == [1, 2, 3]
+    assert candidates["cell_id"][0] == database.cell_ids[cell]
+    assert candidates["chance"].is_monotonic_decreasing
+    assert candidates["distance"].isna().all()
+    assert candidates.crs == database.crs
+    for name in ("CANDIDATES", "PLACE"):
+        styles = gpd.read_file(written[name], layer="layer_styles")
+        assert styles["styleName"].tolist() == [name.lower()]
+        assert styles["useAsDefault"].all()
+    place = gpd.read_file(written["PLACE"], layer="PLACE")
+    assert place["answered"].tolist() == ["yes"]
+    regions = gpd.read_file(written["REGIONS"], layer="regions")
+    assert regions.geometry[0].distance(candidates.geometry[0]) == 0
+    assert place.geometry[0].centroid.distance(candidates.geometry[0]) < 10
+    assert "<html" in (qgis.place / "place.html").read_text(encoding="utf-8")[:200].lower()
+
+
+def test_evaluate(qgis: Qgis) -> None:
+    done = qgis.run(
+        "evaluate",
+        DATABASE=qgis.place / "city.parquet",
+        QUERIES=20,
+        DISTORTION="light",
+        MORE="compass:5",
+        METHOD="edit+edit",
+        OUTPUT=qgis.place / "evaluation",
+        LAYERS=qgis.place / "evaluation.gpkg",
+        MAP=qgis.place / "evaluation.html",
+    )
+    assert 0 < float(done["WITHIN_50_M"]) <= 1
+    summary = json.loads((qgis.place / "evaluation" / "evaluation.json").read_text("utf-8"))
+    assert summary["settings"]["queries"] == 20
+    assert summary["settings"]["distortions"] == ["light", "compass:5"]
+    assert done["LAYERS"] == f"{qgis.place}/evaluation.gpkg|layername=evaluation"
+    assert len(gpd.read_file(qgis.place / "evaluation.gpkg", layer="evaluation")) == 20
+    assert Path(done["MAP"]).is_file()
+
+
+@pytest.fixture(scope="module")
+def session(qgis: Qgis, lamps: Path) -> dict[str, Any]:
+    """Play `qgis_session.py` in QGIS's own Python, and return what it tells."""
+    python = shutil.which("python3", path=os.defpath) or "python3"
+    shutil.copy(qgis.place / "city.parquet", qgis.place / "session.parquet")
+    done = qgis.process(python, SCRIPT, qgis.place, lamps)
+    if "No module named 'qgis'" in done.stderr:
+        unavailable("qgis", f"{python} does not have QGIS's modules")
+    assert done.returncode == 0, done.stdout + done.stderr
+    told: dict[str, Any] = json.loads(done.stdout.splitlines()[-1])
+    return told
+
+
+def test_qgis_lists_the_algorithms_in_their_order(session: dict[str, Any]) -> None:
+    assert session["listed"] == ["load", "build", "localize", "evaluate", "identify", "export"]
+    told = session["help"]
+    assert "<p>Tells where in the city a view was taken from: what is seen, clockwise" in told
+    assert "?&lt;=10" in told
+
+
+def test_layers_are_shown_with_their_styles(session: dict[str, Any]) -> None:
+    assert session["shown"] == {
+        "Candidates": ["graduatedSymbol", "rank"],
+        "Place": ["categorizedSymbol", "answered"],
+        "Regions to search": ["graduatedSymbol", "rank"],
+        "Cells": ["graduatedSymbol", "chance_found"],
+        "Street objects": ["categorizedSymbol", "class_code"],
+        "Queries": ["categorizedSymbol", "outcome"],
+        "From the true to the best place": ["categorizedSymbol", "outcome"],
+    }
+    order = session["order"]
+    assert order.index("Queries") < order.index("From the true to the best place")
+
+
+def test_a_second_run_into_the_same_files_is_shown(session: dict[str, Any]) -> None:
+    first, second = session["first"], session["second"]
+    for name in ("Candidates", "Regions to search"):
+        ((rows, extent, _),), ((new_rows, new_extent, _),) = first[name], second[name]
+        assert new_rows < rows
+        assert new_extent != extent
+    told, new_told = first["Regions to search"][0][2], second["Regions to search"][0][2]
+    assert "chance" in set(new_told) - set(told)
+    assert "Place" not in first
+    assert "Place" in second
+    shared, tied, searched = first["infos"]
+    assert shared.startswith("The best ")
+    assert tied.endswith("further cells tie with the last candidate.")
+    assert searched.startswith("To search: ")
+    placed, searched = second["infos"][-2:]
+    assert "m of the ellipse's middle with a chance of" in placed
+    assert searched.startswith("To search: ")
+
+
+def test_what_cannot_be_is_refused_before_the_work(session: dict[str, Any]) -> None:
+    refused = iter(session["refused"])
+    for words in (
+        ("--heading and --area are for --method likelihood",),
+        ("Place was given with the method types:edit",),
+        ("Detector was given with the method edit+edit",),
+        ("b.shp does not end in .gpkg",),
+        ("told.json does not end in .html",),
+        ("lamps.geojson is not a folder",),
+        ("/bin/true is not the semsig command", "later.parquet"),
+    ):
+        (sentence,) = next(refused)
+        for word in words:
+            assert word in sentence
+    assert list(refused) == []
+
+
+@pytest.mark.usefixtures("session")
+def test_identify_and_export(qgis: Qgis) -> None:
+    source = qgis.place / "session.parquet"  # of which everything is known by now
+    done = qgis.run(
+        "identify",
+        DATABASE=source,
+        NOISE="light",
+        CELLS=qgis.place / "told.gpkg",
+        MAP=qgis.place / "told.html",
+    )
+    assert set(done) == {"CELLS", "MAP"}
+    cells = gpd.read_file(qgis.place / "told.gpkg", layer="cells")
+    assert cells["chance_found"].between(0, 1).all()
+    qgis.run(
+        "export",
+        DATABASE=source,
+        OBJECTS=qgis.place / "objects.parquet",
+        GEOMETRY="point",
+        OUTPUT=qgis.place / "export.gpkg",
+    )
+    layers = dict(pyogrio.list_layers(qgis.place / "export.gpkg").tolist())
+    assert layers["cells"] == layers["objects"] == "Point"
+
+
+def test_files_one_by_one(session: dict[str, Any], qgis: Qgis) -> None:
+    assert session["loaded"] is True
+    assert len(open_objects(qgis.place / "session_lamps.parquet")) == 3
+
+
+def test_a_failing_run_shows_the_sentence_and_leaves_nothing(session: dict[str, Any]) -> None:
+    told = session["failed"]
+    (sentence,) = told["errors"]
+    assert sentence.endswith(
+        "objects.parquet is a street objects file; give a signature database file."
+    )
+    assert told["successful"] is False
+    assert told["left"] == []
+
+
+def test_a_cancel_leaves_no_process_and_no_file(session: dict[str, Any]) -> None:
+    told = session["cancelled"]
+    assert told["errors"] == ["Cancelled; no file is half-written."]
+    assert told["successful"] is False
+    assert told["left"] == []
+    assert told["percents"] != []
+    with pytest.raises(ProcessLookupError):
+        os.kill(told["process"], 0)
+
+
+def test_without_the_command_it_is_told_how_to_get_it(session: dict[str, Any]) -> None:
+    assert "install semsig_gis" in session["lost"]

@@ -1,0 +1,250 @@
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
+
+import geopandas as gpd
+import numpy as np
+import pytest
+import shapely
+from sentences import assert_sentence
+from worlds import CORNER, TAXONOMY, World, random_town
+
+from semsig_gis.core.errors import CrsError, InputError, UnknownNameError
+from semsig_gis.core.taxonomy import Taxonomy
+from semsig_gis.database.build import build_database
+from semsig_gis.database.store import ObjectStore
+from semsig_gis.database.viewpoints import ViewpointSpec
+from semsig_gis.objects.load import assemble, choose_layers, read_files
+from semsig_gis.queries.chain import parse_chain
+from semsig_gis.queries.draw import QuerySpec, draw_queries
+from semsig_gis.sources.catalog import load_catalog
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from semsig_gis.database.database import SignatureDatabase
+    from semsig_gis.queries.draw import Query, SeenFrom
+
+TOWN = random_town()
+DATABASE = TOWN.database
+STORE = ObjectStore.of(TOWN.street_objects)
+PLAIN = QuerySpec(number=40, distortions=())
+ANYWHERE = replace(PLAIN, seen_from="anywhere")
+
+
+def rows(query: Query) -> list[tuple[int, float]]:
+    return list(zip(query.asked.codes.tolist(), query.asked.bearings.tolist(), strict=True))
+
+
+def brute_force(x: float, y: float) -> list[tuple[int, float]]:
+    """Return class code and bearing of what is seen from a place, one object at a time."""
+    seen = []
+    for other_x, other_y, code in TOWN.objects:
+        if math.hypot(other_x - x, other_y - y) <= TOWN.radius:
+            bearing = math.degrees(math.atan2(other_x - x, other_y - y)) % 360.0
+            seen.append((code, bearing))
+    return sorted(seen, key=lambda one: one[1])
+
+
+def test_from_the_cells_it_is_their_signatures() -> None:
+    drawn = draw_queries(DATABASE, PLAIN)
+    assert len({query.cell for query in drawn}) == 40
+    for number, query in enumerate(drawn):
+        signature = DATABASE.signature(query.cell)
+        assert query.asked.codes.tolist() == signature.codes.tolist()  # type: ignore[union-attr]
+        assert query.asked.bearings.tolist() == signature.bearings.tolist()  # type: ignore[union-attr]
+        assert query.length == len(signature)
+        assert query.xy == tuple(DATABASE.xy[query.cell])
+        assert (query.seed, query.number, query.asked.heading) == (0, number, 0.0)
+        part = slice(DATABASE.offsets[query.cell], DATABASE.offsets[query.cell + 1])
+        assert query.asked.distances == pytest.approx(DATABASE.distances[part])
+
+
+def test_from_anywhere_it_is_what_is_seen_from_there() -> None:
+    drawn = draw_queries(DATABASE, ANYWHERE, store=STORE)
+    offsets = []
+    for query in drawn:
+        away = np.array(query.xy) - DATABASE.xy[query.cell]
+        assert (np.abs(away) <= 5.0).all()
+        offsets.append(away)
+        told = brute_force(*query.xy)
+        assert [code for code, _ in rows(query)] == [code for code, _ in told]
+        assert [turn for _, turn in rows(query)] == pytest.approx([turn for _, turn in told])
+        assert query.length == len(told)
+    # Anywhere: a place in a cell is uniform.
+    assert np.abs(np.mean(offsets, axis=0)).max() < 6 * 10 / math.sqrt(12 * len(offsets))
+    assert np.std(offsets) == pytest.approx(10 / math.sqrt(12), rel=0.25)
+
+
+@pytest.mark.parametrize("seen_from", ["cells", "anywhere"])
+def test_more_queries_keep_the_first_ones(seen_from: SeenFrom) -> None:
+    spec = QuerySpec(number=30, seen_from=seen_from, distortions=parse_chain("strong, view:180"))
+    many = draw_queries(DATABASE, spec, store=STORE)
+    few = draw_queries(DATABASE, replace(spec, number=5), store=STORE)
+    for one, other in zip(few, many, strict=False):
+        assert (one.xy, one.pick, rows(one)) == (other.xy, other.pick, rows(other))
+
+
+@pytest.mark.parametrize("seen_from", ["cells", "anywhere"])
+def test_parts_are_parts_of_the_whole(seen_from: SeenFrom) -> None:
+    spec = QuerySpec(number=5, seeds=(2, 7), seen_from=seen_from)
+    whole = draw_queries(DATABASE, spec, store=STORE)
+    for start, stop in ((0, 10), (0, 3), (3, 7), (5, 10), (9, 20), (10, 12)):
+        part = draw_queries(DATABASE, spec, store=STORE, part=slice(start, stop))
+        assert [(one.seed, one.number, one.xy, rows(one)) for one in part] == [
+            (one.seed, one.number, one.xy, rows(one)) for one in whole[start:stop]
+        ]
+
+
+def test_each_seed_has_queries_of_its_own() -> None:
+    spec = replace(PLAIN, number=20, seeds=(3, 1))
+    drawn = draw_queries(DATABASE, spec)
+    assert [(query.seed, query.number) for query in drawn] == [
+        (seed, number) for seed in (3, 1) for number in range(20)
+    ]
+    alone = draw_queries(DATABASE, replace(spec, seeds=(1,)))
+    assert [query.xy for query in drawn[20:]] == [query.xy for query in alone]
+    assert [query.xy for query in drawn[:20]] != [query.xy for query in alone]
+
+
+def test_distortions_do_not_move_the_places() -> None:
+    spoiled = replace(ANYWHERE, distortions=parse_chain("medium, compass:20"))
+    drawn = draw_queries(DATABASE, spoiled, store=STORE)
+    plain = draw_queries(DATABASE, ANYWHERE, store=STORE)
+    assert [query.xy for query in drawn] == [query.xy for query in plain]
+    assert [query.length for query in drawn] == [query.length for query in plain]
+    assert len({query.asked.heading for query in drawn}) == 40
+
+
+def store_with(*houses: shapely.Polygon) -> ObjectStore:
+    footprints = gpd.GeoDataFrame(geometry=list(houses), crs="EPSG:2154")
+    return ObjectStore.of(TOWN.street_objects, footprints=footprints)
+
+
+def test_nobody_stands_in_a_building() -> None:
+    x, y = CORNER
+    house = shapely.box(x + 20, y + 20, x + 146, y + 150)  # it ends within cells
+    drawn = draw_queries(DATABASE, replace(ANYWHERE, number=150), store=store_with(house))
+    places = [shapely.Point(query.xy) for query in drawn]
+    assert not any(house.intersects(place) for place in places)
+    assert any(house.distance(place) < 5.0 for place in places)
+    for query in drawn:  # and buildings hide what is behind them
+        shown = brute_force(*query.xy)
+        assert len(query.asked) <= len(shown)
+    assert sum(len(query.asked) for query in drawn) < sum(
+        len(brute_force(*query.xy)) for query in drawn
+    )
+
+
+def test_more_queries_than_places_outside() -> None:
+    x, y = CORNER
+    house = shapely.box(x - 100, y - 100, x + 300, y + 195)
+    with pytest.raises(InputError) as caught:
+        draw_queries(DATABASE, replace(ANYWHERE, number=200), store=store_with(house))
+    assert_sentence(caught.value, "200 queries", "outside the buildings", "smaller number")
+
+
+def later() -> SignatureDatabase:
+    """Return the town after half of its objects have moved far away."""
+    objects = tuple(
+        (x + 500.0 * (row % 2), y, code) for row, (x, y, code) in enumerate(TOWN.objects)
+    )
+    return World(objects).database
+
+
+def test_another_city_is_looked_at() -> None:
+    city = later()
+    drawn = draw_queries(DATABASE, replace(PLAIN, number=len(city)), city=city)
+    known = [query for query in drawn if query.cell >= 0]
+    assert 0 < len(known) < len(drawn)
+    for query in drawn:
+        row = int(np.flatnonzero((city.xy == query.xy).all(axis=1))[0])
+        assert query.asked.codes.tolist() == city.signature(row).codes.tolist()  # type: ignore[union-attr]
+        held = (DATABASE.xy == query.xy).all(axis=1)
+        assert query.cell == (int(np.flatnonzero(held)[0]) if held.any() else -1)
+
+
+def test_classes_are_known_by_name_and_only_if_the_database_has_them() -> None:
+    shifted = Taxonomy(tuple(replace(item, code=item.code % 200 + 3) for item in TAXONOMY.classes))
+    moved = np.zeros(256, np.uint8)
+    for item in TAXONOMY.classes:
+        moved[item.code] = item.code % 200 + 3
+    city = replace(DATABASE, codes=moved[DATABASE.codes], taxonomy=shifted)
+    rare = int(DATABASE.present_codes[0])
+    kept = DATABASE.select(
+        (DATABASE.lengths > 0) & ~np.isin(np.arange(len(DATABASE)), seeing(rare))
+    )
+    assert rare not in kept.present_codes
+    for query in draw_queries(kept, replace(PLAIN, number=len(city)), city=city):
+        row = int(np.flatnonzero((city.xy == query.xy).all(axis=1))[0])
+        codes = DATABASE.signature(row).codes
+        assert codes is not None
+        assert query.asked.codes.tolist() == [code for code in codes.tolist() if code != rare]
+        assert query.length == len(codes)
+
+
+def seeing(code: int) -> np.ndarray[Any, Any]:
+    """Return the rows of the cells that see a class."""
+    owners = np.repeat(np.arange(len(DATABASE)), DATABASE.lengths)
+    return np.unique(owners[DATABASE.codes == code])
+
+
+def test_inputs_that_are_refused() -> None:
+    with pytest.raises(InputError) as caught:
+        draw_queries(DATABASE, replace(PLAIN, number=10**6))
+    assert_sentence(caught.value, "1000000 queries", f"1 to {len(DATABASE)}")
+    with pytest.raises(InputError) as caught:
+        draw_queries(DATABASE, ANYWHERE)
+    assert_sentence(caught.value, "street objects")
+    with pytest.raises(CrsError) as crs_error:
+        draw_queries(DATABASE, PLAIN, city=replace(DATABASE, crs=gpd.GeoSeries(crs=32631).crs))
+    assert_sentence(crs_error.value, "EPSG:32631", "EPSG:2154")
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        ({"number": 0}, ["0 queries"]),
+        ({"seeds": ()}, ["seeds are []"]),
+        ({"seeds": (1, 1)}, ["none twice"]),
+        ({"seeds": (2, -1)}, ["seed of -1"]),
+    ],
+)
+def test_specs_that_are_refused(options: dict[str, Any], words: list[str]) -> None:
+    with pytest.raises(InputError) as caught:
+        QuerySpec(**options)
+    assert_sentence(caught.value, *words)
+    wrong: Any = "anywere"
+    with pytest.raises(UnknownNameError, match="nearest is 'anywhere'"):
+        QuerySpec(seen_from=wrong)
+
+
+def monaco(geodata: Path, year: int) -> tuple[SignatureDatabase, ObjectStore]:
+    catalog = load_catalog("openstreetmap")
+    layers, _ = read_files(
+        choose_layers(catalog, surroundings=True), [geodata / "osm" / f"monaco_{year}.osm.pbf"]
+    )
+    loaded = assemble(layers, catalog)
+    database = build_database(
+        loaded.objects, viewpoints=ViewpointSpec(mode="outdoor"), footprints=loaded.buildings
+    )
+    return database, ObjectStore.of(loaded.objects, footprints=loaded.buildings)
+
+
+def test_monaco_a_year_later(geodata: Path) -> None:
+    database, _ = monaco(geodata, 2021)
+    city, store = monaco(geodata, 2022)
+    drawn = draw_queries(database, replace(ANYWHERE, number=200), store=store, city=city)
+    unknown = sum(query.cell < 0 for query in drawn)
+    assert 5 < unknown < 100  # new objects, where nothing was to be seen
+    present = set(database.present_codes.tolist())
+    assert all(set(query.asked.codes.tolist()) <= present for query in drawn)
+    houses = store.footprints
+    assert houses is not None
+    places = gpd.GeoSeries([shapely.Point(query.xy) for query in drawn], crs=city.crs)
+    assert len(houses.sindex.query(places, predicate="intersects")[0]) == 0
+    # What is asked is as much as the cells of that year see.
+    seen = np.mean([query.length for query in drawn])
+    assert seen == pytest.approx(city.lengths.mean(), rel=0.3)

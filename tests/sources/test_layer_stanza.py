@@ -1,0 +1,60 @@
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+from sentences import assert_sentence
+
+from semsig_gis.core.errors import CatalogError
+from semsig_gis.sources.catalog import paper_taxonomy
+from semsig_gis.sources.layers import LayerSpec, WidthBy, layer_of, require_class
+
+SHARED = {"files": ("all.gpkg",), "reader": "vector_file", "license": "CC0", "attribution": "Town"}
+
+
+def read(item: object) -> LayerSpec:
+    return layer_of(item, "town.toml", taxonomy=paper_taxonomy(), shared=SHARED)
+
+
+def test_a_layer_has_what_all_of_the_catalogue_have() -> None:
+    assert read({"name": "benches", "class": "bench"}) == LayerSpec(
+        name="benches",
+        class_name="bench",
+        files=("all.gpkg",),
+        license="CC0",
+        attribution="Town",
+    )
+
+
+def test_streets_need_no_class_and_may_have_widths() -> None:
+    item: dict[str, Any] = {"name": "streets", "role": "streets", "geometry": "line"}
+    assert not read(item).has_width
+    by = {"field": "KIND", "values": {"Rue": 14}}
+    spec = read({**item, "width_by": by, "width_field": "W", "where": {"STATE": "open"}})
+    assert spec.width_by == WidthBy("KIND", (("Rue", 14.0),))
+    assert spec.has_width
+    assert spec.fields == (("where", "STATE"), ("width_by", "KIND"), ("width_field", "W"))
+
+
+@pytest.mark.parametrize(
+    ("item", "words"),
+    [
+        ("benches", ["the layer 'benches'", "[[layers]]"]),
+        ({"class": "bench"}, ["layer '?'", "the key 'name'"]),
+        ({"name": "a", "class": "bench", "role": "streets"}, ["layer 'a'", "needs no class"]),
+        ({"name": "a", "class": "bench", "width_by": {}}, ["width_by", "only streets"]),
+        ({"name": "a", "class": "bench", "width_field": "W"}, ["width_field", "only streets"]),
+        ({"name": "a", "role": "buildings", "width_field": "W"}, ["width_field", "only streets"]),
+    ],
+)
+def test_a_mistake_has_its_sentence(item: object, words: list[str]) -> None:
+    with pytest.raises(CatalogError) as caught:
+        read(item)
+    assert_sentence(caught.value, "town.toml", *words)
+
+
+def test_an_unknown_class_is_named() -> None:
+    require_class("bench", paper_taxonomy(), "town.toml")
+    with pytest.raises(CatalogError) as caught:
+        require_class("bensh", paper_taxonomy(), "town.toml")
+    assert_sentence(caught.value, "town.toml", "'bensh'", "the nearest is 'bench'")

@@ -1,0 +1,153 @@
+from __future__ import annotations
+
+import warnings
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pytest
+import rasterio
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from pyproj import CRS, Transformer
+from rasterio.transform import Affine
+from sentences import assert_sentence
+
+from semsig_gis.core.errors import CrsError, InputError, SourceError
+from semsig_gis.core.grid import GridSpec
+from semsig_gis.storage.raster import raster_at_cells
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+    from pathlib import Path
+
+    from numpy.typing import NDArray
+
+LAMBERT = CRS("EPSG:2154")
+GRID = GridSpec(step=10.0, origin=(3.0, -4.0))
+CORNER = (650_003.0, 6_860_006.0)  # lower left corner of cell FIRST
+FIRST = (65_000, 686_001)
+
+
+def write(
+    path: Path,
+    values: Any,  # noqa: ANN401 - whatever makes an array
+    *,
+    pixel: float = 10.0,
+    corner: tuple[float, float] = CORNER,
+    crs: CRS | None = LAMBERT,
+    **options: Any,  # noqa: ANN401 - those of rasterio
+) -> Path:
+    """Write bands (the first row is the southern one) whose lower left corner is given."""
+    bands = np.atleast_3d(np.asarray(values))
+    bands = bands.transpose(2, 0, 1) if np.ndim(values) == 2 else np.asarray(values)
+    height = bands.shape[1]
+    place = Affine(pixel, 0, corner[0], 0, -pixel, corner[1] + height * pixel)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", rasterio.errors.NotGeoreferencedWarning)
+        file = rasterio.open(
+            path,
+            "w",
+            driver="GTiff",
+            count=len(bands),
+            height=height,
+            width=bands.shape[2],
+            dtype=bands.dtype,
+            crs=None if crs is None else crs.to_wkt(),
+            transform=place,
+            **options,
+        )
+    with file:
+        file.write(bands[:, ::-1])
+    return path
+
+
+def read(path: Path, cells: Sequence[tuple[int, int]], **options: Any) -> NDArray[np.float64]:  # noqa: ANN401
+    """Read the raster at cells counted from the first one."""
+    columns, rows = (np.array(cells) + FIRST).T
+    return raster_at_cells(path, grid=GRID, columns=columns, rows=rows, crs=LAMBERT, **options)
+
+
+@settings(max_examples=20)
+@given(seed=st.integers(0, 99), pixel=st.sampled_from([5.0, 10.0, 20.0]), shift=st.integers(-3, 3))
+def test_a_cell_has_the_mean_of_its_pixels(
+    tmp_path_factory: pytest.TempPathFactory, seed: int, pixel: float, shift: int
+) -> None:
+    values = np.random.default_rng(seed).uniform(0, 9, (6, 8))
+    corner = CORNER[0] + shift * 10, CORNER[1]
+    path = write(tmp_path_factory.mktemp("raster") / "x.tif", values, pixel=pixel, corner=corner)
+    cells = [(x, y) for x in range(-4, 20) for y in range(-1, 14)]
+    size = round(20 / pixel)  # of a cell, in half pixels
+    whole = np.kron(values, np.ones((2, 2)))
+    for (x, y), found in zip(cells, read(path, cells), strict=True):
+        left, low = (x - shift) * size, y * size
+        if 0 <= left < whole.shape[1] and 0 <= low < whole.shape[0]:
+            assert found == pytest.approx(whole[low : low + size, left : left + size].mean())
+        elif not (-size <= left <= whole.shape[1] and -size <= low <= whole.shape[0]):
+            assert np.isnan(found)  # neither inside nor next to the edge
+
+
+def test_other_coordinates_and_any_order_of_the_cells(tmp_path: Path) -> None:
+    lon, lat = Transformer.from_crs(LAMBERT, 4326, always_xy=True).transform(*CORNER)
+    values = np.arange(400.0).reshape(20, 20)
+    path = write(
+        tmp_path / "degrees.tif", values, pixel=0.001, corner=(lon, lat), crs=CRS("EPSG:4326")
+    )
+    cells = [(30, 12), (2, 100), (80, 3), (30, 12)]
+    found = read(path, cells)
+    to_degrees = Transformer.from_crs(LAMBERT, 4326, always_xy=True)
+    centres = GRID.viewpoints(*(np.array(cells) + FIRST).T)
+    for centre, value in zip(centres, found, strict=True):
+        corners = np.add(centre, [[-5, -5], [-5, 5], [5, -5], [5, 5]])
+        lons, lats = np.array(to_degrees.transform(*corners.T))
+        seen = values[((lats - lat) / 0.001).astype(int), ((lons - lon) / 0.001).astype(int)]
+        assert seen.min() <= value <= seen.max()
+
+
+def test_no_data_is_not_a_number(tmp_path: Path) -> None:
+    marked = write(tmp_path / "marked.tif", np.array([[1, 255, 0]], np.uint8), nodata=255)
+    assert read(marked, [(0, 0), (1, 0), (2, 0)]).tolist() == pytest.approx(
+        [1, np.nan, 0], nan_ok=True
+    )
+    gaps = write(tmp_path / "gaps.tif", np.array([[1.0, np.nan, 0.0]]))
+    assert read(gaps, [(0, 0), (1, 0), (2, 0)]).tolist() == pytest.approx(
+        [1, np.nan, 0], nan_ok=True
+    )
+    half = write(tmp_path / "half.tif", np.array([[3.0, -9.0]]), pixel=5.0, nodata=-9.0)
+    assert read(half, [(0, 0)]).tolist() == [3.0]
+
+
+def test_which_band_is_read(tmp_path: Path) -> None:
+    three = write(tmp_path / "three.tif", np.arange(3, dtype=np.uint16).reshape(3, 1, 1))
+    assert read(three, [(0, 0)], band=3).tolist() == [2]
+    opaque = np.array([[[7, 8]], [[255, 0]]], np.uint8)
+    path = write(tmp_path / "opaque.tif", opaque, photometric="MINISBLACK", alpha="YES")
+    assert read(path, [(0, 0)]).tolist() == [7]
+    for band, said in ((None, "none was named"), (4, "band 4 was asked for"), (0, "band 0 was")):
+        with pytest.raises(InputError, match=said) as caught:
+            read(three, [(0, 0)], band=band)
+        assert_sentence(caught.value)
+
+
+def test_what_is_no_raster_is_refused(tmp_path: Path) -> None:
+    text = tmp_path / "text.tif"
+    text.write_text("no raster")
+    cut = write(tmp_path / "cut.tif", np.random.default_rng(1).uniform(size=(300, 300)))
+    cut.write_bytes(cut.read_bytes()[:5000])
+    for path in (text, cut, tmp_path / "absent.tif", tmp_path):
+        with pytest.raises(SourceError, match="cannot be read as a raster") as caught:
+            read(path, [(0, 0), (200, 200)])
+        assert_sentence(caught.value)
+
+
+def test_a_raster_without_a_place_is_refused(tmp_path: Path) -> None:
+    path = write(tmp_path / "nowhere.tif", np.ones((2, 2)), crs=None)
+    with pytest.raises(CrsError, match="does not say its coordinate reference system"):
+        read(path, [(0, 0)])
+
+
+def test_a_place_that_is_not_on_this_earth(tmp_path: Path) -> None:
+    moon = CRS("+proj=longlat +R=1737400 +no_defs")
+    path = write(tmp_path / "moon.tif", np.ones((2, 2)), crs=moon)
+    with pytest.raises(CrsError, match="cannot be turned into that of the cells") as caught:
+        read(path, [(0, 0)])
+    assert_sentence(caught.value)
