@@ -38,7 +38,7 @@ if TYPE_CHECKING:
     from semsig_gis.likelihood.refine import Refinement
     from semsig_gis.likelihood.route import Leg
 
-DEFAULT_RULE = AnswerRule(threshold=0.9)
+DEFAULT_RULE: AnswerRule = AnswerRule(threshold=0.9)
 """Answer where the place is within 50 m of the best one with a chance of 0.9 by the model."""
 
 

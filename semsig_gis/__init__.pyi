@@ -1,0 +1,144 @@
+"""The public names and where each lives: the one table, read by `__init__` and by type checkers."""
+
+from .core.errors import SemsigError as SemsigError
+from .core.grid import GridSpec as GridSpec
+from .core.signature import Signature as Signature, SignatureSpec as SignatureSpec
+from .core.signs import class_signs as class_signs
+from .core.statistics import wilson_interval as wilson_interval
+from .core.taxonomy import ObjectClass as ObjectClass, Taxonomy as Taxonomy
+from .sources import RawLayer as RawLayer, find_files as find_files
+from .sources.catalog import (
+    Catalog as Catalog,
+    combine_catalogs as combine_catalogs,
+    load_catalog as load_catalog,
+    paper_taxonomy as paper_taxonomy,
+)
+from .sources.layers import LayerSpec as LayerSpec
+from .sources.synthetic.city import (
+    CitySpec as CitySpec,
+    PARIS_LIKE as PARIS_LIKE,
+    synthetic_city as synthetic_city,
+    synthetic_surroundings as synthetic_surroundings,
+)
+from .sources.vector.reader import read_layer as read_layer
+from .objects.clean import build_objects as build_objects
+from .objects.conflate import conflate as conflate
+from .objects.draft import suggest_catalog as suggest_catalog
+from .objects.load import (
+    Loaded as Loaded,
+    assemble as assemble,
+    choose_layers as choose_layers,
+    fetch_layers as fetch_layers,
+    find_area as find_area,
+    open_cache as open_cache,
+    read_files as read_files,
+)
+from .objects.quality import quality_report as quality_report
+from .objects.surroundings import (
+    read_surroundings as read_surroundings,
+    save_surroundings as save_surroundings,
+)
+from .objects.table import (
+    StreetObjects as StreetObjects,
+    open_objects as open_objects,
+    save_objects as save_objects,
+)
+from .database.build import build_database as build_database
+from .database.database import SignatureDatabase as SignatureDatabase
+from .database.file import (
+    PartitionedDatabase as PartitionedDatabase,
+    open_database as open_database,
+    open_dataset as open_dataset,
+    save_database as save_database,
+)
+from .database.occlusion import Footprints as Footprints
+from .database.properties import database_summary as database_summary
+from .database.requirement import Requirement as Requirement
+from .database.store import (
+    ObjectStore as ObjectStore,
+    open_store as open_store,
+    save_with_store as save_with_store,
+)
+from .database.tiles import TileSpec as TileSpec, build_tiles as build_tiles
+from .database.update import update_database as update_database, update_file as update_file
+from .database.viewpoints import ViewpointSpec as ViewpointSpec
+from .matching.method import Method as Method
+from .matching.result import Localization as Localization
+from .matching.scores import score_cells as score_cells
+from .matching.search import localize as localize
+from .likelihood.answer_rule import (
+    AnswerRule as AnswerRule,
+    calibrate as calibrate,
+    open_rule as open_rule,
+    save_rule as save_rule,
+)
+from .likelihood.index import LikelihoodIndex as LikelihoodIndex, build_index as build_index
+from .likelihood.index_file import ready_index as ready_index
+from .likelihood.locate import locate as locate, locate_route as locate_route
+from .likelihood.method import LikelihoodMethod as LikelihoodMethod
+from .likelihood.noise.learn import learn_noise as learn_noise, read_samples as read_samples
+from .likelihood.noise.model import (
+    NoiseMixture as NoiseMixture,
+    NoiseSpec as NoiseSpec,
+    named_noise as named_noise,
+)
+from .likelihood.posterior import Posterior as Posterior
+from .likelihood.priors import (
+    area_prior as area_prior,
+    position_prior as position_prior,
+    raster_prior as raster_prior,
+    weight_prior as weight_prior,
+)
+from .likelihood.refine import cell_noise as cell_noise
+from .likelihood.result import Location as Location
+from .likelihood.route import Leg as Leg
+from .queries.draw import QuerySpec as QuerySpec, draw_queries as draw_queries
+from .queries.paper_errors import (
+    Distortion as Distortion,
+    distort as distort,
+    named_distortion as named_distortion,
+)
+from .queries.sight import Sight as Sight
+from .evaluation.compare import compare_evaluations as compare_evaluations
+from .evaluation.evaluate import evaluate as evaluate
+from .evaluation.identify.check import (
+    IdentifiabilityCheck as IdentifiabilityCheck,
+    check_identifiability as check_identifiability,
+)
+from .evaluation.identify.identify import identify as identify
+from .evaluation.identify.result import (
+    Identifiability as Identifiability,
+    open_identifiability as open_identifiability,
+    save_identifiability as save_identifiability,
+)
+from .evaluation.identify.trials import leave_class_out as leave_class_out
+from .evaluation.methods import parse_method as parse_method
+from .evaluation.result import Evaluation as Evaluation
+from .evaluation.spec import (
+    ExperimentSpec as ExperimentSpec,
+    open_experiment_spec as open_experiment_spec,
+)
+from .maps.cells import ambiguity_map as ambiguity_map, identifiability_map as identifiability_map
+from .maps.drift import drift_map as drift_map
+from .maps.evaluation import evaluation_map as evaluation_map
+from .maps.localization import localization_map as localization_map
+from .maps.location import location_map as location_map
+from .maps.objects import ground_map as ground_map, objects_map as objects_map
+from .maps.page import save_map as save_map, show_map as show_map
+from .exports import export_answer as export_answer, export_database as export_database
+from .exports.geopackage import (
+    GeopackageContents as GeopackageContents,
+    read_geopackage as read_geopackage,
+)
+from .exports.geotiff import export_geotiff as export_geotiff
+from .exports.regions import SearchRegions as SearchRegions, search_regions as search_regions
+from .reports.evaluation import evaluation_tables as evaluation_tables
+from .reports.parts import Curve as Curve, Plot as Plot
+from .reports.plots import draw_plot as draw_plot
+from .reports.scenes import cell_scene as cell_scene, draw_scene as draw_scene
+from .reports.tables import Table as Table
+from .experiments.folder import open_results as open_results
+from .experiments.paper.reproduce import Reproduction as Reproduction, reproduce as reproduce
+from .experiments.run import run_experiment as run_experiment, run_experiments as run_experiments
+
+__version__: str
