@@ -19,7 +19,6 @@ from semsig_gis.core.grid import GridSpec
 from semsig_gis.core.signature import SignatureSpec
 from semsig_gis.database.database import BEARING_UNITS, SignatureDatabase
 from semsig_gis.matching.method import Method
-from semsig_gis.matching.nearest import nearest
 from semsig_gis.matching.scores import score_cells
 from semsig_gis.reports.paper_figures import PARIS_QUERY_MS
 from semsig_gis.sources.catalog import paper_taxonomy
@@ -165,18 +164,7 @@ def comparisons(size: str) -> Iterator[Comparison]:
             paper=PARIS_QUERY_MS.get(method),
         )
 
-    def hundred(part: str, repeat: int) -> None:
-        table = database.type_sequences if part == "types" else database.angle_sequences
-        nearest(table[table.inverse[picked[repeat]]], table, 100)
-
     for part in of_cells:
-        yield compare(
-            f"the nearest 100 of {cells} by edit distance of {part}",
-            partial(hundred, part),
-            partial(peer, 1, (part,)),
-            peer_name="rapidfuzz.process.cdist([query], cells), edit distance",
-            repeats=scale.repeats,
-        )
         yield compare(
             f"{scale.batch:,} edit queries by {part}, {cells}",
             partial(score, scale.batch, f"{part}:edit"),

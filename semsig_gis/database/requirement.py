@@ -92,11 +92,8 @@ class PatternIndex:
         np.add.at(sizes, self.groups.inverse, self.sequences.counts)
         return sizes
 
-    def sequences_meeting(self, requirement: Requirement) -> NDArray[np.bool_]:
-        """Tell which distinct type sequences meet a requirement.
-
-        The result, shape (d,), is what `matching.nearest.nearest` takes.
-        """
+    def meeting(self, requirement: Requirement) -> NDArray[np.bool_]:
+        """Tell which cells meet a requirement, shape (n,)."""
         counts = self.groups.histogram
         met = np.ones(len(self), np.bool_)
         for code, least, most in requirement.limits:
@@ -107,11 +104,7 @@ class PatternIndex:
             else:
                 seen = np.zeros(len(self), np.int64)
             met &= (seen >= least) & (seen <= most)
-        return np.asarray(met[self.groups.inverse])
-
-    def meeting(self, requirement: Requirement) -> NDArray[np.bool_]:
-        """Tell which cells meet a requirement, shape (n,)."""
-        return np.asarray(self.sequences_meeting(requirement)[self.sequences.inverse])
+        return np.asarray(met[self.groups.inverse][self.sequences.inverse])
 
 
 def _read(part: str, text: str) -> tuple[str, int, float]:

@@ -84,23 +84,6 @@ class SequenceTable:
         """Return one distinct sequence."""
         return self.values[self.offsets[index] : self.offsets[index + 1]]
 
-    def rows(self, wanted: NDArray[np.int64]) -> NDArray[np.int64]:
-        """Return the rows that hold some of the distinct sequences.
-
-        Those of the first wanted sequence come first, in their order, then those of the second, and
-        so on.
-        """
-        counts = self.counts[wanted]
-        ends = np.cumsum(counts)
-        starts = np.cumsum(self.counts)[wanted] - counts
-        total = int(ends[-1]) if len(ends) else 0
-        return self._grouped_rows[np.repeat(starts - ends + counts, counts) + np.arange(total)]
-
-    @cached_property
-    def _grouped_rows(self) -> NDArray[np.int64]:
-        """All rows, those of one distinct sequence together."""
-        return np.argsort(self.inverse, kind="stable")
-
     @cached_property
     def lengths(self) -> NDArray[np.int64]:
         """Length of each distinct sequence, shape (d,)."""

@@ -12,7 +12,7 @@ from semsig_gis.core.errors import InputError, UnknownNameError
 from semsig_gis.core.taxonomy import WILDCARD
 from semsig_gis.database.requirement import PatternIndex, Requirement
 from semsig_gis.database.sequences import SequenceTable
-from semsig_gis.matching.nearest import nearest
+from semsig_gis.matching.metrics import edit
 from semsig_gis.sources.catalog import paper_taxonomy
 
 PAPER = paper_taxonomy()
@@ -83,7 +83,8 @@ def test_parts_that_exclude_each_other_and_unknown_symbols() -> None:
 def test_a_pattern_finds_the_cells_that_it_may_mean() -> None:
     index = index_of([[11, 1, 1], [11, 3, 1], [11, 1], [3, 3, 3]])
     pattern = PAPER.encode("M?B")
-    found = nearest(pattern, index.sequences, 1, wildcard=WILDCARD)
-    assert found.rows.tolist() == [0, 1]
-    among = index.sequences_meeting(Requirement.parse("2B", PAPER))
-    assert nearest(pattern, index.sequences, 1, among=among).rows.tolist() == [0]
+    (distances,) = edit.distances([pattern], index.sequences, wildcard=WILDCARD)
+    fits = distances[index.sequences.inverse] == 0
+    assert fits.tolist() == [True, True, False, False]
+    met = index.meeting(Requirement.parse("2B", PAPER))
+    assert (fits & met).tolist() == [True, False, False, False]

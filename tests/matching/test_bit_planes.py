@@ -94,8 +94,6 @@ def test_several_blocks_and_a_thousand_objects(*, normalized: bool) -> None:
     for threads in (2, 3, 7):
         shared = planes.edit_distances(queries, normalized=normalized, threads=threads)
         np.testing.assert_array_equal(shared, found)
-    last = planes.edit_distances(queries, normalized=normalized, blocks=(1, 3))
-    np.testing.assert_array_equal(last, found[:, BLOCK:])
 
 
 def test_a_wildcard_in_a_long_query() -> None:

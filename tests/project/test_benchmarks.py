@@ -23,7 +23,6 @@ PARTS = {
     "one edit+edit:5% query": False,
     "edit queries by types": True,
     "edit queries by angles": True,
-    "the nearest 100 of": False,
     "growth: an edit query": False,
     "growth: a likelihood query": False,
     "likelihood index of": False,

@@ -94,37 +94,33 @@ class BitPlanes:
         *,
         normalized: bool = True,
         wildcard: int | None = None,
-        blocks: tuple[int, int] | None = None,
         threads: int = 1,
     ) -> NDArray[np.float32]:
         """Measure the fewest changes that turn each query into each sequence, shape (queries, d).
 
         `normalized` divides by the longer of the two lengths, and a `wildcard` in a query equals
-        every value. `blocks` is the first block and the one after the last, if not all are wanted.
+        every value.
         """
-        low, high = (0, len(self.bounds) - 1) if blocks is None else blocks
-        lengths = self.lengths[low * BLOCK : high * BLOCK]
-        bounds = self.bounds[low : high + 1]
         digits = self.digits
         if wildcard is not None:
             digits = digits.copy()
             digits[wildcard] = 0
         ends = np.cumsum([0, *map(len, queries)])
         wanted = digits[np.concatenate([*queries, np.empty(0, np.uint8)])]
-        result = np.empty((len(queries), len(lengths)), np.float32)
+        result = np.empty((len(queries), len(self.lengths)), np.float32)
         per_position = int(self.digits.max()) + 1
         scan = partial(
             _kernels().scan,
             self.planes,
-            bounds,
+            self.bounds,
             per_position,
-            lengths,
+            self.lengths,
             wanted,
             ends,
             normalized,
             result,
         )
-        cuts = np.linspace(0, high - low, max(1, threads) + 1).astype(np.int64).tolist()
+        cuts = np.linspace(0, len(self.bounds) - 1, max(1, threads) + 1).astype(np.int64).tolist()
         if threads > 1:
             with ThreadPoolExecutor(threads) as pool:
                 list(pool.map(scan, cuts[:-1], cuts[1:]))
