@@ -93,13 +93,8 @@ def score_cells(
 
     Examples
     --------
-    >>> from semsig_gis.sources.catalog import paper_taxonomy
-    >>> from semsig_gis.database.build import build_database
-    >>> from semsig_gis.objects.clean import build_objects
-    >>> from semsig_gis.sources.synthetic.city import CitySpec, synthetic_city
-    >>> layers = synthetic_city(CitySpec(size=300.0))
-    >>> objects, _ = build_objects(layers, taxonomy=paper_taxonomy(), crs="EPSG:32631")
-    >>> database = build_database(objects)
+    >>> from semsig_gis import Method
+    >>> database = demo_database
     >>> queries = [database.signature(cell) for cell in (0, 10)]
     >>> for scores in score_cells(database, queries, Method.parse("edit+jaccard:5%")):
     ...     print(len(scores) == len(database), scores.min())

@@ -66,10 +66,7 @@ class StreetObjects:
 
     Examples
     --------
-    >>> from semsig_gis.sources.synthetic.city import CitySpec, synthetic_city
-    >>> from semsig_gis.sources.catalog import paper_taxonomy
-    >>> layers = synthetic_city(CitySpec(size=300.0))
-    >>> objects, _ = build_objects(layers, taxonomy=paper_taxonomy(), crs="EPSG:32631")
+    >>> objects = demo_objects
     >>> objects.xy.shape == (len(objects), 2)
     True
     """
@@ -143,10 +140,7 @@ def save_objects(objects: StreetObjects, path: str | Path, *, keep_order: bool =
     Examples
     --------
     >>> import tempfile
-    >>> from semsig_gis.sources.synthetic.city import CitySpec, synthetic_city
-    >>> from semsig_gis.sources.catalog import paper_taxonomy
-    >>> layers = synthetic_city(CitySpec(size=300.0))
-    >>> objects, _ = build_objects(layers, taxonomy=paper_taxonomy(), crs="EPSG:32631")
+    >>> objects = demo_objects
     >>> with tempfile.TemporaryDirectory() as folder:
     ...     save_objects(objects, f"{folder}/objects.parquet")
     ...     len(open_objects(f"{folder}/objects.parquet")) == len(objects)

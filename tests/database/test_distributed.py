@@ -66,8 +66,8 @@ def script(folder: Path, body: str) -> list[str]:
     head = f"""
         import sys
         sys.path.insert(0, {str(CHECKOUT)!r})
-        from semsig_gis.distributed import build_tiles
-        from semsig_gis.tiles import TileSpec
+        from semsig_gis.database.tiles import build_tiles
+        from semsig_gis.database.tiles import TileSpec
         paths = {str(folder / "objects.parquet")!r}, {str(folder / "city")!r}
         tile = TileSpec({SIDE})
     """
@@ -299,10 +299,10 @@ def test_a_full_disk_leaves_the_database_that_was_there(tmp_path: Path) -> None:
     save_objects(World(TOWN.objects[-40:]).street_objects, tmp_path / "small.parquet")
     save_objects(TOWN.street_objects, tmp_path / "objects.parquet")
     body = f"""
-        from semsig_gis.building import build_database
-        from semsig_gis.database_file import open_database, save_database
-        from semsig_gis.errors import SemsigError
-        from semsig_gis.objects import open_objects
+        from semsig_gis.database.build import build_database
+        from semsig_gis.database.file import open_database, save_database
+        from semsig_gis.core.errors import SemsigError
+        from semsig_gis.objects.table import open_objects
         city, file = {str(disk / "city")!r}, {str(disk / "city.parquet")!r}
         build_tiles({str(tmp_path / "small.parquet")!r}, city, tile=tile)
         small = open_database(city)

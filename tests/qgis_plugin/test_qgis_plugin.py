@@ -39,7 +39,7 @@ SCRIPT = Path(__file__).parents[1] / "qgis_session.py"
 # The command with few simulated queries.
 QUICK = """
 import functools
-from semsig_gis import identifying
+from semsig_gis.evaluation.identify import identify as identifying
 from semsig_gis.cli import main
 identifying.identify = functools.partial(identifying.identify, trials=60, class_trials=5)
 main()
