@@ -7,8 +7,9 @@ author = "semsig_gis authors"
 project_copyright = "2026, semsig_gis authors"
 version = release = semsig_gis.__version__
 
-extensions = ["myst_parser", "numpydoc", "sphinx.ext.autodoc"]
+extensions = ["myst_parser", "numpydoc", "sphinx.ext.autodoc", "sphinx.ext.autosummary"]
 exclude_patterns = ["_build"]
+templates_path = ["_templates"]
 default_role = "py:obj"
 
 autodoc_member_order = "bysource"

@@ -1,4 +1,4 @@
-"""The `semsig` command: argument parsing and printing, nothing else.
+"""Parse, call, print: a module a command.
 
 Results go to standard output, progress and remarks to standard error. The exit code is 0 when the
 work is done, 2 when the input cannot be used (with one plain sentence), 1 when the fault is ours.

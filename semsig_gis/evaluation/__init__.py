@@ -1,1 +1,1 @@
-"""Queries of known places -> error, recall, calibration."""
+"""Answers to queries of known places: error, recall, calibration."""

@@ -1,4 +1,4 @@
-"""Hand results on to other programs: pick a format by the suffix of the file.
+"""Files for other programs, by their suffix.
 
 ``.gpkg`` (`exports.geopackage`) holds many layers, with styles for QGIS; ``.parquet``
 (`exports.geoparquet`) and ``.csv`` (`exports.csv`) hold one; ``.tif``

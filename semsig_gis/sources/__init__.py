@@ -1,4 +1,4 @@
-"""Readers of open data: pick the module for the source; each returns `RawLayer` values."""
+"""Which layer holds what, and how each kind of source is read."""
 
 from __future__ import annotations
 

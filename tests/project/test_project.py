@@ -135,6 +135,16 @@ def test_the_version_is_the_same_everywhere() -> None:
     assert f"\nversion: {semsig_gis.__version__}\n" in citation
 
 
+def test_the_api_page_lists_the_public_names() -> None:
+    page = (ROOT / "docs/api.md").read_text(encoding="utf-8")
+    assert sorted(re.findall(r"^   (\w+)$", page, re.MULTILINE)) == sorted(dir(semsig_gis))
+
+
+def test_the_picture_of_the_architecture_is_current() -> None:
+    check = [sys.executable, str(ROOT / "docs/architecture.py"), "--check"]
+    assert subprocess.run(check, check=False, cwd=ROOT).returncode == 0
+
+
 def test_no_public_name_is_also_a_module() -> None:
     # Importing such a module would put it in the place of the name.
     assert {f"semsig_gis.{name}" for name in dir(semsig_gis)} & modules() == set()
