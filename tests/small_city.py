@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import functools
 from typing import TYPE_CHECKING
 
@@ -12,7 +13,7 @@ from semsig_gis.likelihood.locate import locate
 from semsig_gis.likelihood.noise.model import named_noise
 from semsig_gis.matching.search import localize
 from semsig_gis.objects.clean import build_objects
-from semsig_gis.objects.table import StreetObjects
+from semsig_gis.objects.table import Licence
 from semsig_gis.sources.catalog import paper_taxonomy
 from semsig_gis.sources.synthetic.city import CitySpec, synthetic_city
 
@@ -21,13 +22,14 @@ if TYPE_CHECKING:
     from semsig_gis.evaluation.result import Evaluation
     from semsig_gis.likelihood.result import Location
     from semsig_gis.matching.result import Localization
+    from semsig_gis.objects.table import StreetObjects
 
 
 @functools.cache
 def small_city() -> tuple[SignatureDatabase, StreetObjects]:
     layers = synthetic_city(CitySpec(size=300.0))
     objects, _ = build_objects(layers, taxonomy=paper_taxonomy(), crs="EPSG:32631")
-    named = StreetObjects(objects.table, objects.taxonomy, ("Town (CC0): trees, lamps",))
+    named = dataclasses.replace(objects, licenses=(Licence("Town (CC0)", ("trees", "lamps")),))
     return build_database(named), named
 
 

@@ -20,7 +20,7 @@ from semsig_gis.core.grid import GridSpec
 from semsig_gis.core.signature import SignatureSpec
 from semsig_gis.database.build import build_database
 from semsig_gis.database.database import BEARING_UNITS, DISTANCE_UNITS
-from semsig_gis.objects.table import StreetObjects
+from semsig_gis.objects.table import Licence, StreetObjects
 from semsig_gis.sources.catalog import load_catalog
 
 if TYPE_CHECKING:
@@ -56,7 +56,7 @@ class World:
             geometry=shapely.points(x.astype(float), y.astype(float)),
             crs="EPSG:2154",
         )
-        return StreetObjects(table, TAXONOMY, ("World (CC0): world",))
+        return StreetObjects(table, TAXONOMY, (Licence("World (CC0)", ("world",)),))
 
     @property
     def database(self) -> SignatureDatabase:

@@ -184,7 +184,7 @@ def build_cells(
         spec=spec,
         taxonomy=objects.taxonomy,
         crs=objects.crs,
-        licenses=(*objects.licenses, *licenses_of(footprints, along)),
+        licenses=(*map(str, objects.licenses), *licenses_of(footprints, along)),
         viewpoints=viewpoints,
         occlusion=None if buildings is None else buildings.tolerance,
     )

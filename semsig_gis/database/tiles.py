@@ -231,7 +231,7 @@ def _seen_from(plan: TilePlan, tile: Tile, objects: StreetObjects) -> SignatureD
         database,
         viewpoints=plan.viewpoints,
         occlusion=None if footprints is None else TOLERANCE_M,
-        licenses=(*objects.licenses, *licenses_of(footprints, streets)),
+        licenses=(*map(str, objects.licenses), *licenses_of(footprints, streets)),
     )
 
 

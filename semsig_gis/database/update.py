@@ -270,7 +270,7 @@ def update_database(
     _require_surroundings(database, store)
     merged, kept, notes = replace_layers(store.objects, objects)
     along = store.streets if database.viewpoints.mode == "streets" else None
-    licenses = (*merged.licenses, *licenses_of(store.footprints, along))
+    licenses = (*map(str, merged.licenses), *licenses_of(store.footprints, along))
     new = replace(database, taxonomy=merged.taxonomy, licenses=licenses, version=__version__)
     _require_reach(database, new)
     changes = compare_objects(store.objects, merged)

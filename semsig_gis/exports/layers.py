@@ -195,7 +195,7 @@ def objects_layer(objects: StreetObjects) -> Layer:
         rows=len(objects),
         bounds=(*objects.xy.min(axis=0).tolist(), *objects.xy.max(axis=0).tolist()),
         read=read,
-        licenses=objects.licenses,
+        licenses=tuple(map(str, objects.licenses)),
         facts={**objects_specs(objects), "crs": objects.crs.to_json_dict()},
         styles=(by_class(objects.taxonomy, objects.class_counts),),
     )

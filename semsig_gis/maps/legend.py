@@ -215,7 +215,7 @@ def objects_legend(objects: StreetObjects) -> str:
         "<summary>Street objects</summary>"
         f"<p>{len(objects):,} objects of {len(counts)} classes; shapes show from near, letters "
         f"from nearer, and a click tells what is known of one.</p><table>{rows}</table>"
-        f"{_sources(objects.licenses)}"
+        f"{_sources(map(str, objects.licenses))}"
     )
 
 

@@ -227,7 +227,7 @@ def objects_map(
     view = to_latlon(corners, objects.crs) if map_ is None else None
     Legend(objects_legend(objects), view).add_to(chosen)
     source = objects if database is None else database
-    return finished_map(chosen, source, licenses=objects.licenses)
+    return finished_map(chosen, source, licenses=tuple(map(str, objects.licenses)))
 
 
 def _drawn(objects: StreetObjects) -> tuple[dict[str, list[str]], dict[str, Any]]:

@@ -177,7 +177,7 @@ def finished_map(
     """
     children = layers_of(chosen)
     area = None if source is None else _area(source)
-    names = (*(() if source is None else source.licenses), *licenses)
+    names = (*(() if source is None else map(str, source.licenses)), *licenses)
     for name, child in list(children.items()):
         if isinstance(child, Surroundings):
             names = child.names + names

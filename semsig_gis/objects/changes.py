@@ -11,7 +11,7 @@ import pandas as pd
 
 from semsig_gis.core.crs import CLASS_CODE, MERGED, SOURCE, SOURCE_ID
 from semsig_gis.core.errors import CatalogError, CrsError, InputError
-from semsig_gis.objects.table import StreetObjects
+from semsig_gis.objects.table import Licence, StreetObjects, join_licences
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -22,7 +22,6 @@ if TYPE_CHECKING:
 
 NAME = [SOURCE, SOURCE_ID]
 LOOKS = [CLASS_CODE, "x", "y"]
-LICENSE_MARK = ": "
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -190,8 +189,8 @@ def replace_layers(
 
     Return the objects of the other layers followed by the new ones, with the licences of both; the
     names of the layers that stay; and notes for the user about layers that were not loaded
-    together. A layer was loaded anew if one of the new objects comes from it, or if a line of the
-    new licences names it: so a layer that was read and has no object any more leaves none behind. A
+    together. A layer was loaded anew if one of the new objects comes from it, or if one of the new
+    licences is about it: so a layer that was read and has no object any more leaves none behind. A
     different CRS is a CrsError, and classes that do not fit are an InputError (see
     `joined_taxonomy`).
     """
@@ -202,7 +201,7 @@ def replace_layers(
         )
         raise CrsError(msg)
     taxonomy = joined_taxonomy(old.taxonomy, new.taxonomy)
-    renewed = set(new.table[SOURCE].unique()).union(*(_layers_of(line) for line in new.licenses))
+    renewed = set(new.table[SOURCE].unique()).union(*(licence.layers for licence in new.licenses))
     stays = ~old.table[SOURCE].isin(renewed).to_numpy()
     if not stays.any():
         return StreetObjects(new.table, taxonomy, new.licenses), (), ()
@@ -210,11 +209,16 @@ def replace_layers(
     table = pd.concat([remaining, new.table], ignore_index=True)
     if MERGED in table:
         table[MERGED] = table[MERGED].fillna("")
-    objects = StreetObjects(
-        table.astype({CLASS_CODE: np.uint8}), taxonomy, _joined_licenses(old, new, renewed)
+    staying = (
+        Licence(licence.terms, tuple(name for name in licence.layers if name not in renewed))
+        for licence in old.licenses
+        if not licence.layers or not renewed.issuperset(licence.layers)
     )
+    licenses = join_licences([*staying, *new.licenses])
+    objects = StreetObjects(table.astype({CLASS_CODE: np.uint8}), taxonomy, licenses)
     kept = tuple(sorted(remaining[SOURCE].unique()))
-    return objects, kept, tuple(_doubts(objects, len(remaining), renewed))
+    notes = [*_doubts(objects, len(remaining), renewed), *_unclear(new.licenses)]
+    return objects, kept, tuple(notes)
 
 
 def joined_taxonomy(old: Taxonomy, new: Taxonomy) -> Taxonomy:
@@ -249,25 +253,6 @@ def _crs_name(objects: StreetObjects) -> str:
     return objects.crs.to_string()
 
 
-def _layers_of(license_line: str) -> set[str]:
-    """Return the layers that a line of `StreetObjects.licenses` is about."""
-    return set(license_line.rpartition(LICENSE_MARK)[2].split(", "))
-
-
-def _joined_licenses(old: StreetObjects, new: StreetObjects, renewed: set[str]) -> tuple[str, ...]:
-    """Return the licences of the layers that stay and of the new ones, a publisher a line."""
-    layers_of: dict[str, list[str]] = {}
-    for line in old.licenses:
-        terms, _, names = line.rpartition(LICENSE_MARK)
-        stay = [name for name in names.split(", ") if name not in renewed]
-        if stay:
-            layers_of.setdefault(terms, []).extend(stay)
-    for line in new.licenses:
-        terms, _, names = line.rpartition(LICENSE_MARK)
-        layers_of.setdefault(terms, []).extend(names.split(", "))
-    return tuple(f"{terms}{LICENSE_MARK}{', '.join(names)}" for terms, names in layers_of.items())
-
-
 def _brief(item: ObjectClass) -> str:
     reach = "" if item.range_m is None else f", seen from {item.range_m:g} m"
     return f"{item.name!r} (symbol {item.symbol}{reach})"
@@ -292,3 +277,13 @@ def _doubts(objects: StreetObjects, kept: int, renewed: set[str]) -> Iterable[st
             f"{len(twice):,} new objects stand exactly where an object of a layer that stays does; "
             "load layers that overlap together"
         )
+
+
+def _unclear(licences: Iterable[Licence]) -> Iterable[str]:
+    """Yield which licences do not say what was loaded: those of files of earlier versions."""
+    for licence in licences:
+        if not licence.layers:
+            yield (
+                f"the new objects do not say which layers {licence.terms!r} is about, so what a "
+                "layer had that is empty now stays; load them again"
+            )

@@ -19,7 +19,7 @@ from semsig_gis.core.crs import (
     require_metric_crs,
 )
 from semsig_gis.core.errors import CrsError, EmptyResultError
-from semsig_gis.objects.table import StreetObjects, license_lines
+from semsig_gis.objects.table import StreetObjects, layer_licences
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterable
@@ -182,7 +182,7 @@ def build_objects(
             layers, parts, repeated, remaining, strict=True
         )
     )
-    return StreetObjects(table, taxonomy, license_lines(layers)), LoadReport(reports)
+    return StreetObjects(table, taxonomy, layer_licences(layers)), LoadReport(reports)
 
 
 def _positions(layer: RawLayer, taxonomy: Taxonomy, crs: CRS) -> tuple[pd.DataFrame, int, int]:

@@ -13,7 +13,7 @@ from semsig_gis.core.crs import CLASS_NAME, LICENSES
 from semsig_gis.core.errors import CrsError, EmptyResultError, InputError
 from semsig_gis.objects.clean import build_objects
 from semsig_gis.objects.conflate import ConflationReport, conflate
-from semsig_gis.objects.table import license_lines
+from semsig_gis.objects.table import layer_licences
 from semsig_gis.sources import find_files, reader
 from semsig_gis.sources.area import clip_layer, names_place, parse_area
 from semsig_gis.sources.http.cache import Cache
@@ -424,5 +424,5 @@ def _surroundings(layers: Sequence[RawLayer], role: str, crs: CRS) -> gpd.GeoDat
     tables = [layer.table.to_crs(crs) for layer in chosen]
     table = pd.concat(tables, ignore_index=True).drop(columns=CLASS_NAME)
     table = table[~(table.geometry.isna() | table.geometry.is_empty)].reset_index(drop=True)
-    table.attrs[LICENSES] = list(license_lines(chosen))
+    table.attrs[LICENSES] = [str(licence) for licence in layer_licences(chosen)]
     return table

@@ -239,7 +239,7 @@ def quality_report(
         ).transform_bounds(west, south, east, north, densify_pts=EDGE_POINTS),
         hull_km2=hull_km2,
         occupied_km2=occupied_km2,
-        licenses=objects.licenses,
+        licenses=tuple(map(str, objects.licenses)),
     )
 
 

@@ -12,7 +12,7 @@ import shapely
 
 from semsig_gis.core.crs import LICENSES
 from semsig_gis.core.errors import InputError, SourceError
-from semsig_gis.objects.table import license_lines
+from semsig_gis.objects.table import layer_licences
 from semsig_gis.sources.area import join_areas
 from semsig_gis.sources.catalog import load_catalog
 from semsig_gis.sources.layers import LayerSpec
@@ -154,7 +154,7 @@ def _read(
         spec = load_catalog("openstreetmap").layer(role)
         (layer,) = osm_file.read_layers(path, [spec])
         table = layer.table
-        table.attrs[LICENSES] = list(license_lines([layer]))
+        table.attrs[LICENSES] = [str(licence) for licence in layer_licences([layer])]
     else:
         layer = vector_file.read_layer(path, LayerSpec(name=role, class_name="", geometry=kind))
         if layer.error_count:

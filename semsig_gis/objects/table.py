@@ -36,7 +36,7 @@ from semsig_gis.storage.geoparquet import (
 )
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Sequence
+    from collections.abc import Collection, Iterable, Mapping, Sequence
     from pathlib import Path
 
     from numpy.typing import NDArray
@@ -46,6 +46,39 @@ if TYPE_CHECKING:
 
 
 KIND = "street objects"
+BETWEEN_LAYERS = ", "
+BEFORE_LAYERS = ": "
+# Key of the layers that each line of ``licenses`` is about, where the line does not tell.
+LICENSE_LAYERS = "license_layers"
+
+
+@dataclass(frozen=True, slots=True)
+class Licence:
+    """Whom to name for layers and under which licence; as text, a line for people.
+
+    `layers` is empty where it is not known which they are.
+    """
+
+    terms: str
+    layers: tuple[str, ...] = ()
+
+    def __str__(self) -> str:
+        """Return the line."""
+        layers = BETWEEN_LAYERS.join(self.layers)
+        return f"{self.terms}{BEFORE_LAYERS}{layers}" if layers else self.terms
+
+
+def join_licences(licences: Iterable[Licence]) -> tuple[Licence, ...]:
+    """Return one licence for all layers of the same terms, each layer once."""
+    layers_of: dict[str, dict[str, None]] = {}
+    for licence in licences:
+        layers_of.setdefault(licence.terms, {}).update(dict.fromkeys(licence.layers))
+    return tuple(Licence(terms, tuple(layers)) for terms, layers in layers_of.items())
+
+
+def layer_licences(layers: Iterable[RawLayer]) -> tuple[Licence, ...]:
+    """Return whom to name for layers."""
+    return join_licences(Licence(layer.spec.terms, (layer.spec.name,)) for layer in layers)
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,8 +94,8 @@ class StreetObjects:
         say of the same object, as ``"source:id; source:id"``, or empty.
     taxonomy : Taxonomy
         The classes that the codes belong to.
-    licenses : tuple of str
-        One line for every publisher and licence: who, under what, which layers.
+    licenses : tuple of Licence
+        One for every publisher and licence: who, under what, which layers.
 
     Examples
     --------
@@ -73,7 +106,7 @@ class StreetObjects:
 
     table: gpd.GeoDataFrame
     taxonomy: Taxonomy
-    licenses: tuple[str, ...]
+    licenses: tuple[Licence, ...]
 
     def __len__(self) -> int:  # noqa: D105
         return len(self.table)
@@ -102,20 +135,6 @@ class StreetObjects:
         xy: NDArray[np.float64] = shapely.get_coordinates(self.table.geometry.array)
         xy.setflags(write=False)
         return xy
-
-
-def license_lines(layers: Iterable[RawLayer]) -> tuple[str, ...]:
-    """Return whom to name for layers.
-
-    There is a line for every publisher and licence, with the names of the layers that they cover.
-    """
-    layers_of: dict[str, list[str]] = {}
-    for layer in layers:
-        publisher = layer.spec.attribution or "no attribution given"
-        names = layers_of.setdefault(f"{publisher} ({layer.spec.license})", [])
-        if layer.spec.name not in names:
-            names.append(layer.spec.name)
-    return tuple(f"{terms}: {', '.join(names)}" for terms, names in layers_of.items())
 
 
 def save_objects(objects: StreetObjects, path: str | Path, *, keep_order: bool = False) -> None:
@@ -177,8 +196,56 @@ def objects_specs(objects: StreetObjects) -> dict[str, Any]:
         "kind": KIND,
         "version": __version__,
         "taxonomy": objects.taxonomy.to_list(),
-        "licenses": list(objects.licenses),
+        **_licence_specs(objects),
     }
+
+
+def _licence_specs(objects: StreetObjects) -> dict[str, Any]:
+    """Return the lines of the licences, and their layers where the lines do not tell."""
+    specs: dict[str, Any] = {"licenses": [str(licence) for licence in objects.licenses]}
+    if _licences(specs, objects.table[SOURCE]) != objects.licenses:
+        specs[LICENSE_LAYERS] = [list(licence.layers) for licence in objects.licenses]
+    return specs
+
+
+def _licences(specs: Mapping[str, Any], sources: Iterable[str]) -> tuple[Licence, ...]:
+    """Return the licences of a file from its specs and the layers that its objects come from."""
+    lines = specs["licenses"]
+    if LICENSE_LAYERS not in specs:
+        layers = frozenset(sources)
+        return tuple(_licence_of(line, layers) for line in lines)
+    licences = []
+    for line, names in zip(lines, specs[LICENSE_LAYERS], strict=True):
+        end = f"{BEFORE_LAYERS}{BETWEEN_LAYERS.join(names)}" if names else ""
+        if not line.endswith(end):
+            msg = f"licence {line!r} is not that of {names}"
+            raise ValueError(msg)
+        licences.append(Licence(line.removesuffix(end), tuple(names)))
+    return tuple(licences)
+
+
+def _licence_of(line: str, sources: Collection[str]) -> Licence:
+    """Return the licence that a line states, without layers if it can be read in several ways."""
+    parts = line.split(BEFORE_LAYERS)
+    readings = [
+        Licence(BEFORE_LAYERS.join(parts[:mark]), names)
+        for mark in range(1, len(parts))
+        for names in _names_in(BEFORE_LAYERS.join(parts[mark:]), sources)
+    ]
+    return readings[0] if len(readings) == 1 else Licence(line)
+
+
+def _names_in(text: str, sources: Collection[str]) -> list[tuple[str, ...]]:
+    """Return the ways to read a text as a list of layers, at most two."""
+    parts = text.split(BETWEEN_LAYERS)
+    ways: list[list[tuple[str, ...]]] = [[] for _ in parts] + [[()]]  # from each part to the end
+    for start in reversed(range(len(parts))):
+        for end in range(start + 1, len(parts) + 1):
+            name = BETWEEN_LAYERS.join(parts[start:end])
+            if name in sources:
+                ways[start] += [(name, *rest) for rest in ways[end]]
+        del ways[start][2:]
+    return ways[0]
 
 
 def open_objects(path: str | Path, *, box: Sequence[float] | None = None) -> StreetObjects:
@@ -247,7 +314,7 @@ def objects_of(
         )
         for code in pc.unique(arrow[CLASS_CODE]).to_pylist():
             taxonomy.by_code(code)
-        licenses = tuple(specs["licenses"])
+        licenses = _licences(specs, columns[SOURCE])
     except (TypeError, ValueError, LookupError, shapely.errors.ShapelyError) as error:
         msg = f"{path} is damaged ({error}); load the street objects again."
         raise DatabaseError(msg) from error

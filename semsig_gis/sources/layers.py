@@ -164,6 +164,11 @@ class LayerSpec:
         return self.width_by is not None or self.width_field is not None
 
     @property
+    def terms(self) -> str:
+        """Whom to name for the layer, and under which licence."""
+        return f"{self.attribution or 'no attribution given'} ({self.license})"
+
+    @property
     def fields(self) -> tuple[tuple[str, str], ...]:
         """The keys that name a field of the file, but for coordinates, and the fields."""
         uses = [("where", field) for field, _ in self.where]

@@ -101,7 +101,7 @@ def test_buildings_and_streets_are_kept_in_the_crs_of_the_objects(tmp_path: Path
     assert again.footprints.columns.tolist() == ["geometry"]
     assert again.footprints.attrs["licenses"] == ["City (CC0): houses"]
     licenses = open_database(tmp_path / "city.parquet").licenses
-    assert licenses == (*TOWN.licenses, "City (CC0): houses")
+    assert licenses == (*map(str, TOWN.licenses), "City (CC0): houses")
     assert again.streets["half_width"].tolist() == [7.5]
     bare = gpd.GeoDataFrame(geometry=[shapely.box(0, 0, 1, 1)])
     with pytest.raises(CrsError) as caught:

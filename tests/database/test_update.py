@@ -24,7 +24,7 @@ from semsig_gis.database.store import ObjectStore, open_store, save_with_store, 
 from semsig_gis.database.update import update_database, update_file
 from semsig_gis.database.viewpoints import ViewpointSpec
 from semsig_gis.objects.load import assemble, choose_layers, read_files
-from semsig_gis.objects.table import StreetObjects
+from semsig_gis.objects.table import Licence, StreetObjects
 from semsig_gis.sources.catalog import load_catalog
 
 if TYPE_CHECKING:
@@ -73,11 +73,11 @@ def objects_of(table: pd.DataFrame, taxonomy: Taxonomy = CLASSES) -> StreetObjec
     columns = table[["class_code", "source", "source_id", "count"]].reset_index(drop=True)
     columns = columns.astype({"class_code": np.uint8, "count": np.int32})
     places = shapely.points(table["x"].to_numpy(float), table["y"].to_numpy(float))
-    layers = ", ".join(sorted(table["source"].unique()))
+    layers = tuple(sorted(table["source"].unique()))
     return StreetObjects(
         gpd.GeoDataFrame(columns, geometry=places, crs="EPSG:2154"),
         taxonomy,
-        (f"A (CC0): {layers}",),
+        (Licence("A (CC0)", layers),),
     )
 
 

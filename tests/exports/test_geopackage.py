@@ -41,7 +41,7 @@ from semsig_gis.exports import export_answer, export_database
 from semsig_gis.exports import layers as _layers
 from semsig_gis.exports.styles import CLASS_MARKERS, by_class
 from semsig_gis.objects.clean import build_objects
-from semsig_gis.objects.table import StreetObjects
+from semsig_gis.objects.table import Licence, StreetObjects
 from semsig_gis.sources.catalog import paper_taxonomy
 from semsig_gis.sources.synthetic.city import CitySpec, synthetic_city
 
@@ -66,7 +66,7 @@ def objects() -> StreetObjects:
     classes = tuple(
         dataclasses.replace(item, title=f"{FORMULA} {item.title}") for item in made.taxonomy.classes
     )
-    return StreetObjects(made.table, Taxonomy(classes), (LICENSE,))
+    return StreetObjects(made.table, Taxonomy(classes), (Licence(LICENSE),))
 
 
 @pytest.fixture(scope="module")
@@ -572,7 +572,7 @@ def test_qgis_colours_the_layers_at_once(qgis_draw: Draw, tmp_path: Path) -> Non
     city, seen = small_city()
     nasty = HOSTILE + "[% env('HOME') %]" + "é" * 10_000
     classes = [ObjectClass(one.code, one.symbol, one.name, nasty) for one in seen.taxonomy.classes]
-    hostile = StreetObjects(seen.table, Taxonomy(tuple(classes)), (nasty,))
+    hostile = StreetObjects(seen.table, Taxonomy(tuple(classes)), (Licence(nasty),))
     file = tmp_path / "city.gpkg"
     export_database(
         dataclasses.replace(city, taxonomy=hostile.taxonomy, licenses=(nasty,)),
@@ -623,7 +623,7 @@ def test_text_that_no_program_may_stumble_over(tmp_path: Path) -> None:
     classes = [
         ObjectClass(item.code, item.symbol, item.name, nasty) for item in made.taxonomy.classes
     ]
-    hostile = StreetObjects(table, Taxonomy(tuple(classes)), (nasty,))
+    hostile = StreetObjects(table, Taxonomy(tuple(classes)), (Licence(nasty),))
     file = tmp_path / "city.gpkg"
     export_database(build_database(hostile), file, objects=hostile)
     read = gpd.read_file(file, layer="objects")

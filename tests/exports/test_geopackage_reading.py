@@ -26,7 +26,7 @@ from semsig_gis.database.viewpoints import ViewpointSpec
 from semsig_gis.evaluation.identify.result import Identifiability
 from semsig_gis.exports import export_database
 from semsig_gis.exports.geopackage import read_geopackage
-from semsig_gis.objects.table import StreetObjects, open_objects, save_objects
+from semsig_gis.objects.table import Licence, StreetObjects, open_objects, save_objects
 
 if TYPE_CHECKING:
     from semsig_gis.exports.layers import CellGeometry
@@ -103,7 +103,7 @@ def test_all_else_comes_back_too(tmp_path: Path) -> None:
     database, seen = small_city()
     texts = [HOSTILE, "", "a:1; b:2"]
     table = seen.table.assign(merged=[texts[row % 3] for row in range(len(seen))])
-    seen = StreetObjects(table, seen.taxonomy, (*seen.licenses, HOSTILE))
+    seen = StreetObjects(table, seen.taxonomy, (*seen.licenses, Licence(HOSTILE)))
     told, file = told_of(database), tmp_path / "city.gpkg"
     export_database(database, file, objects=seen, identifiability=told)
     found = read_geopackage(file)

@@ -59,7 +59,7 @@ def test_the_metadata_says_what_it_is(tmp_path: Path) -> None:
     assert column["geometry_types"] == ["Point"]
     assert np.allclose(column["bbox"], gpd.read_parquet(file).total_bounds)
     specs = json.loads(metadata[b"semsig"])
-    assert specs["licenses"] == list(objects.licenses)
+    assert specs["licenses"] == list(map(str, objects.licenses))
     assert specs["taxonomy"] == objects.taxonomy.to_list()
 
 

@@ -24,6 +24,7 @@ from semsig_gis.database.update import compare_cells
 from semsig_gis.maps.drift import drift_map
 from semsig_gis.maps.objects import objects_map
 from semsig_gis.objects.changes import compare_objects
+from semsig_gis.objects.table import Licence
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -150,7 +151,10 @@ def test_hostile_data_is_shown_and_never_run(browser: Chrome, tmp_path: Path) ->
     taxonomy = hostile_database(NEW).taxonomy
     objects = [
         dataclasses.replace(
-            one, table=one.table.assign(source=HOSTILE), taxonomy=taxonomy, licenses=(HOSTILE,)
+            one,
+            table=one.table.assign(source=HOSTILE),
+            taxonomy=taxonomy,
+            licenses=(Licence(HOSTILE),),
         )
         for one in (BEFORE, AFTER)
     ]

@@ -89,7 +89,7 @@ def test_the_ground_lies_below_all_else(
     credit = browser.find_element(By.CSS_SELECTOR, ".leaflet-control-attribution")
     said = browser.execute_script("return arguments[0].textContent", credit)
     assert "Mapper (CC0)" in said
-    assert WORLD.street_objects.licenses[0] in said
+    assert str(WORLD.street_objects.licenses[0]) in said
     assert_quiet(browser)
 
 

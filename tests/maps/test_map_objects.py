@@ -35,7 +35,7 @@ from semsig_gis.maps.objects import objects_map
 from semsig_gis.maps.page import save_map
 from semsig_gis.maps.parts import to_latlon
 from semsig_gis.matching.search import localize
-from semsig_gis.objects.table import StreetObjects
+from semsig_gis.objects.table import Licence, StreetObjects
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -84,7 +84,7 @@ def test_objects_in_a_browser(browser: Chrome, tmp_path: Path) -> None:
             colours = [getattr(SIGNS[code], named) for code in OBJECTS.class_counts]
             assert [one.get_attribute("fill") for one in shown] == colours
     credit = browser.find_element(By.CSS_SELECTOR, ".leaflet-control-attribution").text
-    assert OBJECTS.licenses[0] in credit
+    assert str(OBJECTS.licenses[0]) in credit
     assert drawn(browser, SIGNS[CODE].colour, BOARD) > 0
     boxes = ".leaflet-control-layers-overlays input:checked"
     asked(browser, "document.querySelectorAll(arguments[0]).forEach((box) => box.click())", boxes)
@@ -277,7 +277,7 @@ def test_hostile_data_is_shown_and_never_run(browser: Chrome, tmp_path: Path) ->
         for item in OBJECTS.taxonomy.classes
     )
     table = OBJECTS.table.assign(source=harm, source_id=harm, merged=harm)
-    harmful = StreetObjects(table, Taxonomy(classes), (f"{harm}: {harm}",))
+    harmful = StreetObjects(table, Taxonomy(classes), (Licence(harm, (harm,)),))
     opened(browser, objects_map(harmful), tmp_path)  # an alert would fail the next command
     text = "return document.querySelector(arguments[0]).textContent"
     for selector, times in (
@@ -322,7 +322,7 @@ def test_objects_over_another_map(browser: Chrome, tmp_path: Path) -> None:
     assert searched(browser, str(CITY.cell_ids[0]), Keys.ENTER) == [f"Cell {CITY.cell_ids[0]}"]
     credit = browser.find_element(By.CSS_SELECTOR, ".leaflet-control-attribution")
     said = browser.execute_script("return arguments[0].textContent", credit)
-    assert said.count(OBJECTS.licenses[0]) == 1
+    assert said.count(str(OBJECTS.licenses[0])) == 1
     assert_quiet(browser)
 
 

@@ -16,9 +16,14 @@ from worlds import CODES, TAXONOMY
 from semsig_gis.core.errors import CrsError, InputError
 from semsig_gis.core.taxonomy import ObjectClass, Taxonomy
 from semsig_gis.objects.changes import compare_objects, replace_layers
-from semsig_gis.objects.table import StreetObjects
+from semsig_gis.objects.clean import build_objects
+from semsig_gis.objects.table import Licence, StreetObjects, open_objects, save_objects
+from semsig_gis.sources import RawLayer
+from semsig_gis.sources.layers import LayerSpec
 
 if TYPE_CHECKING:
+    from pathlib import Path
+
     from semsig_gis.objects.changes import ClassChange
 
 TREE, FOUNTAIN, LAMP = CODES[:3]
@@ -27,7 +32,7 @@ Thing = tuple[float, float, int, str, str]  # x, y, class code, source, id
 
 def table(
     *things: Thing,
-    licenses: tuple[str, ...] = ("City (CC0): trees, lamps",),
+    licenses: tuple[Licence, ...] = (Licence("City (CC0)", ("trees", "lamps")),),
     taxonomy: Taxonomy = TAXONOMY,
     merged: list[str] | None = None,
     crs: str = "EPSG:2154",
@@ -167,11 +172,12 @@ def test_layers_that_were_not_loaded_anew_stay() -> None:
         (0, 0, TREE, "trees", "1"),
         (9, 0, LAMP, "lamps", "1"),
         (9, 9, LAMP, "signals", "1"),
-        licenses=("City (CC0): trees, lamps", "Roads (OGL): signals"),
+        licenses=(Licence("City (CC0)", ("trees", "lamps")), Licence("Roads (OGL)", ("signals",))),
     )
     # The layer of signals was read and is empty now.
     new = table(
-        (4, 4, TREE, "trees", "5"), licenses=("City (CC0): trees", "Streets (OGL): signals")
+        (4, 4, TREE, "trees", "5"),
+        licenses=(Licence("City (CC0)", ("trees",)), Licence("Streets (OGL)", ("signals",))),
     )
     objects, kept, notes = replace_layers(old, new)
     assert objects.table["source"].tolist() == ["lamps", "trees"]
@@ -179,8 +185,44 @@ def test_layers_that_were_not_loaded_anew_stay() -> None:
     assert objects.codes.dtype == np.uint8
     assert objects.crs == old.crs
     assert kept == ("lamps",)
-    assert objects.licenses == ("City (CC0): lamps, trees", "Streets (OGL): signals")
+    assert objects.licenses == (
+        Licence("City (CC0)", ("lamps", "trees")),
+        Licence("Streets (OGL)", ("signals",)),
+    )
     assert notes == ()
+
+
+@pytest.mark.parametrize("name", ["parks, trees", "parks: trees", "A: parks, trees", ": trees, "])
+@pytest.mark.parametrize("has_objects", [True, False])
+def test_a_layer_may_have_any_name(tmp_path: Path, name: str, *, has_objects: bool) -> None:
+    def saved(file: str, **places: list[tuple[float, float]]) -> StreetObjects:
+        """Save a layer for each name, all of one publisher, and open them again."""
+        objects, _ = build_objects(
+            [
+                RawLayer(
+                    spec=LayerSpec(name=layer, class_name="alignment_tree", attribution="City"),
+                    table=gpd.GeoDataFrame(
+                        {"class_name": "alignment_tree", "source_id": list("ab"[: len(points)])},
+                        geometry=[shapely.Point(point) for point in points],
+                        crs="EPSG:2154",
+                    ),
+                    read=len(points),
+                )
+                for layer, points in places.items()
+            ],
+            taxonomy=TAXONOMY,
+            crs="EPSG:2154",
+        )
+        save_objects(objects, tmp_path / file)
+        return open_objects(tmp_path / file)
+
+    city = saved("city.parquet", trees=[(0, 0), (1, 0)], parks=[(3, 0)], **{name: [(2.0, 0.0)]})
+    renewed: dict[str, list[tuple[float, float]]] = {name: [(5, 0)] if has_objects else []}
+    objects, kept, _ = replace_layers(city, saved("new.parquet", **renewed, lamps=[(9, 9)]))
+    assert kept == ("parks", "trees")
+    assert Counter(objects.table["source"]) == Counter(
+        {"trees": 2, "parks": 1, "lamps": 1} | ({name: 1} if has_objects else {})
+    )
 
 
 def test_all_layers_may_be_loaded_anew() -> None:
@@ -205,6 +247,16 @@ def test_what_may_be_twice_is_told() -> None:
     assert "1 objects of layers that stay were merged with objects of 'posts'" in notes[0]
     assert "1 new objects stand exactly where" in notes[1]
     assert len(notes) == 2
+
+
+def test_a_licence_of_unknown_layers_renews_none() -> None:
+    """Nothing is lost by it; and what may have stayed too long is told."""
+    unclear = Licence("City (CC0): lamps, trees")
+    old = dataclasses.replace(OLD, licenses=(unclear,))
+    new = table((4, 4, TREE, "trees", "5"), licenses=(unclear,))
+    objects, kept, notes = replace_layers(old, new)
+    assert (kept, objects.licenses) == (("lamps",), (unclear,))
+    assert "which layers 'City (CC0): lamps, trees' is about" in notes[0]
 
 
 def test_another_crs_is_refused() -> None:

@@ -16,7 +16,7 @@ from sentences import assert_sentence
 from semsig_gis.core.errors import InputError, UnknownNameError
 from semsig_gis.objects.clean import build_objects
 from semsig_gis.objects.conflate import ConflatedPair, ConflationReport, conflate
-from semsig_gis.objects.table import StreetObjects, open_objects, save_objects
+from semsig_gis.objects.table import Licence, StreetObjects, open_objects, save_objects
 from semsig_gis.sources.catalog import load_catalog, paper_taxonomy
 from semsig_gis.sources.vector.reader import read_layer
 
@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
 TAXONOMY = paper_taxonomy()
+LICENCES = (Licence("A (CC0)", ("a",)), Licence("B (ODbL)", ("b",)))
 
 # class, source, identifier, count, x, y
 Thing = tuple[str, str, str, int, float, float]
@@ -44,7 +45,7 @@ def world(things: Sequence[Thing]) -> StreetObjects:
         geometry=shapely.points(np.array(x, float), np.array(y, float)),
         crs="EPSG:2154",
     )
-    return StreetObjects(table, TAXONOMY, ("A (CC0): a", "B (ODbL): b"))
+    return StreetObjects(table, TAXONOMY, LICENCES)
 
 
 def content(objects: StreetObjects) -> list[tuple[object, ...]]:
@@ -88,7 +89,7 @@ def test_the_same_object_in_two_sources_is_one() -> None:
     assert objects.table.index.tolist() == [0, 1]
     assert objects.crs.to_epsg() == 2154
     # The identifier and the count of the merged row come from its source, so its licence holds.
-    assert objects.licenses == ("A (CC0): a", "B (ODbL): b")
+    assert objects.licenses == LICENCES
     pair = ConflatedPair(
         class_name="bench",
         radius=5.0,

@@ -21,7 +21,7 @@ from sentences import assert_sentence
 
 from semsig_gis.core.errors import CrsError, DatabaseError, EmptyResultError, UnknownNameError
 from semsig_gis.objects.clean import build_objects
-from semsig_gis.objects.table import open_objects, save_objects
+from semsig_gis.objects.table import Licence, objects_specs, open_objects, save_objects
 from semsig_gis.sources import RawLayer
 from semsig_gis.sources.catalog import load_catalog, paper_taxonomy
 from semsig_gis.sources.layers import LayerSpec
@@ -108,7 +108,7 @@ def test_the_table_has_the_columns_it_promises() -> None:
     assert objects.table["count"].tolist() == [1, 1]
     assert objects.table.index.tolist() == [0, 1]
     assert objects.crs == CRS(LAMBERT)
-    assert objects.licenses == ("Town (CC0): trees",)
+    assert objects.licenses == (Licence("Town (CC0)", ("trees",)),)
 
 
 def test_every_publisher_is_named_once_with_the_layers_it_gave() -> None:
@@ -120,9 +120,10 @@ def test_every_publisher_is_named_once_with_the_layers_it_gave() -> None:
         layer(place, name="taps"),
     )
     assert objects.licenses == (
-        "Town (CC0): trees, taps",
-        "no attribution given (CC0): lights",
+        Licence("Town (CC0)", ("trees", "taps")),
+        Licence("no attribution given (CC0)", ("lights",)),
     )
+    assert str(objects.licenses[0]) == "Town (CC0): trees, taps"
 
 
 @pytest.mark.parametrize(
@@ -357,6 +358,70 @@ def test_every_row_is_accounted_for(layers: list[RawLayer], collapse: bool) -> N
     assert len(objects) == (len(expected) if collapse else expected.total())
 
 
+LICENCE = st.builds(
+    Licence,
+    st.sampled_from(["Town (CC0)", "A: b, c", ""]),
+    st.lists(st.text("ab,: ", min_size=1, max_size=6), unique=True, max_size=3).map(tuple),
+)
+
+
+@given(st.lists(LICENCE, max_size=3).map(tuple), st.sets(st.text("ab,: ", max_size=4)))
+def test_licences_come_back_whatever_layers_are_called(
+    licenses: tuple[Licence, ...], sources: set[str]
+) -> None:
+    layers = sources.union(*(licence.layers for licence in licenses)) or {"trees"}
+    objects = build(*(layer(points((1, number)), name=n) for number, n in enumerate(layers)))
+    objects = dataclasses.replace(objects, licenses=licenses)
+    with tempfile.TemporaryDirectory() as folder:
+        save_objects(objects, f"{folder}/objects.parquet")
+        assert open_objects(f"{folder}/objects.parquet").licenses == licenses
+
+
+@pytest.mark.parametrize(
+    ("line", "layers"),
+    [
+        ("Town: of (CC0): parks, trees, lamps", ("parks, trees", "lamps")),
+        ("Town (CC0): lamps, x: y", ("lamps", "x: y")),
+        ("Town (CC0): lamps, benches", ()),  # a layer without objects, or one called by both
+        ("Town (CC0): b, b, b", ()),  # two layers, and which?
+        ("Town (CC0)", ()),
+    ],
+)
+def test_an_older_file_tells_layers_by_its_objects(
+    tmp_path: Path, line: str, layers: tuple[str, ...]
+) -> None:
+    """Files of earlier versions have lines for people, and nothing beside them."""
+    names = ("parks, trees", "lamps", "x: y", "b", "b, b")
+    objects = build(*(layer(points((1, number)), name=name) for number, name in enumerate(names)))
+    terms = line.removesuffix(f": {', '.join(layers)}")
+    objects = dataclasses.replace(objects, licenses=(Licence(terms, layers),))
+    specs = {
+        name: value for name, value in objects_specs(objects).items() if name != "license_layers"
+    }
+    assert specs["licenses"] == [line]
+    columns = pa.table(
+        {
+            "class_code": objects.codes,
+            "source": names,
+            "source_id": names,
+            "count": np.ones(5, np.int32),
+            "geometry": shapely.to_wkb(objects.table.geometry.array),
+        }
+    )
+    path = tmp_path / "objects.parquet"
+    geo = geo_metadata(objects.crs, geometry_types=["Point"], bounds=[1, 0, 1, 4])
+    write_geoparquet(columns, path, geo=geo, specs=specs)
+    assert open_objects(path).licenses == objects.licenses
+
+
+def test_a_file_says_of_layers_only_what_its_lines_do_not_tell() -> None:
+    lamps, benches = layer(points((1, 2)), name="lamps"), layer(points((3, 4)), name="benches")
+    assert "license_layers" not in objects_specs(build(lamps, benches))
+    specs = objects_specs(build(lamps, layer([], name="benches")))
+    assert specs["licenses"] == ["Town (CC0): lamps, benches"]
+    assert specs["license_layers"] == [["lamps", "benches"]]
+
+
 # --- Files ------------------------------------------------------------------------------------
 
 
@@ -519,6 +584,10 @@ def test_a_cut_file_is_an_error(tmp_path: Path) -> None:
         ("specs", {"taxonomy": [{"code": 1}]}),
         ("specs", {"taxonomy": [{"code": 0, "symbol": "B", "name": "b", "title": "B"}]}),
         ("specs", {"licenses": None}),
+        ("specs", {"license_layers": None}),
+        ("specs", {"license_layers": []}),
+        ("specs", {"license_layers": [["parks"]]}),
+        ("specs", {"license_layers": [5]}),
         ("specs", {}),
         ("rows", None),
     ],
@@ -540,6 +609,8 @@ def test_a_file_that_does_not_fit_itself_is_an_error(
     if column == "specs":
         assert isinstance(values, dict)
         specs = {"kind": "street objects", **values}
+        if "license_layers" in values:
+            specs |= {"taxonomy": TAXONOMY.to_list(), "licenses": ["Town (CC0): trees"]}
     elif column == "rows":
         table = table.slice(0, 0)
     elif values is None:
