@@ -31,7 +31,7 @@ from semsig_gis.database.occlusion import TOLERANCE_M
 from semsig_gis.database.parts import digest, part_name
 from semsig_gis.database.tile_run import (
     INPUTS,
-    abandon,
+    RUN,
     describe,
     finished_tiles,
     mark_empty,
@@ -305,7 +305,7 @@ def plan_tiles(
             street_reach=0.0 if lines is None else max(viewpoints.width, _widest(lines)),
         )
     except BaseException:
-        abandon(folder)
+        RUN.abandon(folder)
         raise
 
 
@@ -465,7 +465,7 @@ def build_tiles(
     try:
         parts = _run(plan, workers, scheduler, progress, tell)
     finally:
-        abandon(plan.folder)
+        RUN.abandon(plan.folder)
     if not parts:
         shutil.rmtree(plan.folder, ignore_errors=True)
         msg = (

@@ -6,17 +6,18 @@ written there first; what is there later must be of the same.
 
 from __future__ import annotations
 
-import json
 import os
 import shutil
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from semsig_gis.core.errors import DatabaseError, InputError
+from semsig_gis.core.errors import DatabaseError
 from semsig_gis.evaluation.result import Evaluation
 from semsig_gis.evaluation.spec import parse_experiment
 from semsig_gis.reports.experiment import experiment_figures, experiment_markdown
-from semsig_gis.storage.whole import whole_file
+from semsig_gis.storage.runs import RunKind, finish, partial_folder, read_json, write_json
+from semsig_gis.storage.toml import toml_text
+from semsig_gis.storage.whole import write_whole
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -26,52 +27,64 @@ if TYPE_CHECKING:
     from semsig_gis.evaluation.spec import ExperimentSpec
 
 PARTS = "_parts"
-"""Folder of what is answered, in a run that is not finished."""
+"""Folder of the answers in a run that is not finished."""
 
 SPEC = "experiment.toml"
 INPUTS = "inputs.json"
 FIGURES = "figures.csv"
 REPORT = "report.md"
 DISTRICTS = "districts.csv"
-# Files that were being written when a run was killed (see semsig_gis.storage.geoparquet).
-HALF_WRITTEN = ".semsig-"
 
 
-def finished_run(out: str | Path, identity: Mapping[str, Any]) -> bool:
-    """Tell whether the results of an experiment are there; False if there is no such folder.
+def _read_recipe(folder: Path) -> dict[str, Any]:
+    text = (folder / SPEC).read_text(encoding="utf-8")
+    spec = parse_experiment(text, where=str(folder / SPEC))
+    return {**spec.to_dict(), **read_json(folder / INPUTS)}
 
-    ``identity`` is what the experiment is, as plain values: ``experiment``, ``inputs``,
-    ``versions``. Raises `InputError` if the folder holds the results of another experiment, or
-    something else.
+
+def _write_recipe(folder: Path, recipe: dict[str, Any]) -> None:
+    inputs = {name: recipe[name] for name in ("inputs", "versions")}
+    write_json(folder / INPUTS, inputs)
+    spec = {name: value for name, value in recipe.items() if name not in inputs}
+    write_whole(folder / SPEC, toml_text(spec))
+
+
+EXPERIMENT_RUN = RunKind(
+    content="results of an experiment",
+    another=(
+        "{folder} holds the results of another experiment, which differs in {difference}; choose "
+        "another folder, or delete that one."
+    ),
+    read=_read_recipe,
+    write=_write_recipe,
+    names={SPEC, INPUTS, PARTS},
+    results=f"{PARTS}/*",
+)
+
+
+def finished_run(out: str | Path, recipe: dict[str, Any]) -> bool:
+    """Return whether `out` holds the results of an experiment; False if it does not exist.
+
+    The `recipe` is `ExperimentSpec.to_dict` with ``inputs`` and ``versions``. Raise InputError if
+    the folder holds anything else.
     """
     target = Path(os.path.realpath(out))
     if not target.exists():
         return False
-    _require_same(target, identity)
+    EXPERIMENT_RUN.require_same(target, recipe)
     shutil.rmtree(target / PARTS, ignore_errors=True)  # of a run that was killed at the very end
     return True
 
 
-def begin_run(out: str | Path, spec: ExperimentSpec, identity: Mapping[str, Any]) -> Path:
+def begin_run(out: str | Path, recipe: dict[str, Any]) -> Path:
     """Begin a run, or take up an unfinished one, and return the folder to work in.
 
-    Raises `InputError` if that holds an unfinished run of another ``identity`` (see
-    `finished_run`), or something else.
+    Raise InputError if that holds an unfinished run of another recipe (see `finished_run`) or
+    something else.
     """
-    target = Path(os.path.realpath(out))
-    partial = target.with_name(f"{target.name}.partial")
-    if partial.exists() and not any((partial / PARTS).glob("*")):
-        _require_ours(partial)
-        shutil.rmtree(partial)  # it has not come to anything
-    if partial.exists():
-        _require_same(partial, identity)
-        for left in [*partial.rglob(f"{HALF_WRITTEN}*")]:
-            shutil.rmtree(left, ignore_errors=True)
-        return partial
-    rest = {name: value for name, value in identity.items() if name != "experiment"}
-    _write_text(partial / INPUTS, json.dumps(rest, indent=2) + "\n")
-    _write_text(partial / SPEC, spec.to_toml())
-    return partial
+    folder = partial_folder(out)
+    EXPERIMENT_RUN.begin(folder, recipe)
+    return folder
 
 
 def write_results(
@@ -86,23 +99,14 @@ def write_results(
         evaluation.save(partial / name)
         if districts is not None and spec.districts is not None:
             by_district = evaluation.by_district(districts, spec.districts.name)
-            _write_text(partial / name / DISTRICTS, by_district.to_csv(index=False))
-    _write_text(partial / FIGURES, experiment_figures(results).to_csv(index=False))
-    _write_text(partial / REPORT, experiment_markdown(spec, results))
+            write_whole(partial / name / DISTRICTS, by_district.to_csv(index=False))
+    write_whole(partial / FIGURES, experiment_figures(results).to_csv(index=False))
+    write_whole(partial / REPORT, experiment_markdown(spec, results))
 
 
 def finish_run(partial: Path) -> None:
     """Put the results of a run in their place, by renaming the folder to work in."""
-    target = partial.with_name(partial.name.removesuffix(".partial"))
-    try:
-        partial.rename(target)
-    except OSError as error:
-        msg = (
-            f"{target} could not be put in its place ({os.strerror(error.errno or 0)}); the "
-            f"results are in {partial}, so run the same command again."
-        )
-        raise InputError(msg) from error
-    shutil.rmtree(target / PARTS)
+    shutil.rmtree(finish(partial) / PARTS)
 
 
 def open_results(folder: str | Path) -> dict[str, Evaluation]:
@@ -142,47 +146,3 @@ def open_results(folder: str | Path) -> dict[str, Evaluation]:
         raise DatabaseError(msg) from error
     spec = parse_experiment(text, where=str(place / SPEC))
     return {case.name: Evaluation.load(place / case.name) for case in spec.cases}
-
-
-def _require_ours(folder: Path) -> None:
-    """Refuse a folder with anything in it that no run wrote."""
-    ours = {SPEC, INPUTS, PARTS}
-    others = [
-        path.name
-        for path in folder.iterdir()
-        if path.name not in ours and not path.name.startswith(HALF_WRITTEN)
-    ]
-    if others:
-        msg = f"{folder} holds {min(others)!r}, which no experiment wrote; choose another folder."
-        raise InputError(msg)
-
-
-def _require_same(folder: Path, wanted: Mapping[str, Any]) -> None:
-    """Refuse a folder with the results of another experiment, or of none."""
-    try:
-        text = (folder / SPEC).read_text(encoding="utf-8")
-        found = json.loads((folder / INPUTS).read_text(encoding="utf-8"))
-        found["experiment"] = parse_experiment(text, where=str(folder / SPEC)).to_dict()
-    except (OSError, TypeError, ValueError) as error:
-        msg = f"{folder} is not the results of an experiment; choose another folder."
-        raise InputError(msg) from error
-    for what, values in wanted.items():
-        if found.get(what) != values:
-            name = _difference(found.get(what), values)
-            told = name if what == "experiment" else f"{what}, {name}"
-            msg = (
-                f"{folder} holds the results of another experiment, which differs in {told}; "
-                "choose another folder, or delete that one."
-            )
-            raise InputError(msg)
-
-
-def _difference(found: Any, wanted: dict[str, Any]) -> str:  # noqa: ANN401 - whatever JSON holds
-    """Return the name of the first thing in which two tables differ."""
-    others = found if isinstance(found, dict) else {}
-    return str(next(name for name in {**wanted, **others} if others.get(name) != wanted.get(name)))
-
-
-def _write_text(path: Path, text: str) -> None:
-    with whole_file(path) as half:
-        half.write_text(text, encoding="utf-8")

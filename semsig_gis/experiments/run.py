@@ -459,9 +459,9 @@ def run_experiments(
     running: dict[Path, _Running] = {}
     for out, spec in specs.items():
         work = ExperimentWork(spec, Path(folder), note)
-        identity = {"experiment": spec.to_dict(), "inputs": work.digests(), "versions": versions()}
-        if not finished_run(out, identity):
-            running[out] = _Running(work, begin_run(out, spec, identity))
+        recipe = {**spec.to_dict(), "inputs": work.digests(), "versions": versions()}
+        if not finished_run(out, recipe):
+            running[out] = _Running(work, begin_run(out, recipe))
     for work, _ in running.values():
         work.prepare()
     _answer(running, workers=workers, scheduler=scheduler, progress=progress)

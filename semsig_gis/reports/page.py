@@ -21,7 +21,7 @@ from semsig_gis.core.text import escaped, one_line
 from semsig_gis.reports.plots import draw_plot
 from semsig_gis.reports.scenes import draw_scene
 from semsig_gis.reports.tables import number_table
-from semsig_gis.storage.whole import whole_file
+from semsig_gis.storage.whole import write_whole
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Sequence
@@ -158,16 +158,16 @@ def write_report(report: Report, folder: str | Path) -> None:
     for section in report.sections:
         for plot in section.plots:
             pictures[plot.name] = draw_plot(plot)
-            _write(place / FIGURES / f"{plot.name}.csv", _csv(POINT_COLUMNS, _points(plot)))
+            write_whole(place / FIGURES / f"{plot.name}.csv", _csv(POINT_COLUMNS, _points(plot)))
         for scene in section.scenes:
             pictures[scene.name] = draw_scene(scene, report.taxonomy)
     for name, picture in pictures.items():
-        _write(place / FIGURES / f"{name}.svg", picture.svg)
-        _write(place / FIGURES / f"{name}.png", picture.png)
-    _write(place / "numbers.csv", _csv(NUMBER_COLUMNS, _numbers(report)))
-    _write(place / "report.json", _json(report))
-    _write(place / "report.md", markdown_page(report, pictures))
-    _write(place / "report.html", html_page(report, pictures))
+        write_whole(place / FIGURES / f"{name}.svg", picture.svg)
+        write_whole(place / FIGURES / f"{name}.png", picture.png)
+    write_whole(place / "numbers.csv", _csv(NUMBER_COLUMNS, _numbers(report)))
+    write_whole(place / "report.json", _json(report))
+    write_whole(place / "report.md", markdown_page(report, pictures))
+    write_whole(place / "report.html", html_page(report, pictures))
 
 
 def _require_names(names: Sequence[str]) -> None:
@@ -181,11 +181,6 @@ def _require_names(names: Sequence[str]) -> None:
             msg = f"{name!r} is in the report twice; give each part a name of its own."
             raise InputError(msg)
         seen.add(name.lower())
-
-
-def _write(path: Path, content: str | bytes) -> None:
-    with whole_file(path) as half:
-        half.write_bytes(content.encode("utf-8") if isinstance(content, str) else content)
 
 
 # --- CSV ----------------------------------------------------------------------------------------

@@ -21,7 +21,7 @@ from pyproj import CRS
 from pyproj.exceptions import CRSError
 
 from semsig_gis.core.errors import DatabaseError
-from semsig_gis.storage.whole import _reason, whole_file
+from semsig_gis.storage.whole import reason, whole_file
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -266,7 +266,7 @@ def read_geoparquet(
         parquet = pq.ParquetFile(file, memory_map=True, page_checksum_verification=True)
         metadata = parquet.schema_arrow.metadata or {}
     except PermissionError as error:
-        msg = f"{file} cannot be read ({_reason(error)}); ask its owner for access."
+        msg = f"{file} cannot be read ({reason(error)}); ask its owner for access."
         raise DatabaseError(msg) from error
     except (pa.ArrowException, OSError, ValueError) as error:
         msg = (

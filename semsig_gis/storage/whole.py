@@ -15,6 +15,10 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
 
 
+HALF_WRITTEN = ".semsig-"
+"""How the names of temporary folders begin; a process that was killed leaves them."""
+
+
 @contextlib.contextmanager
 def whole_file(path: str | Path) -> Iterator[Path]:
     """Give a temporary path that replaces `path` if, and only if, the block succeeds.
@@ -32,9 +36,9 @@ def whole_file(path: str | Path) -> Iterator[Path]:
         raise InputError(msg)
     try:
         target.parent.mkdir(parents=True, exist_ok=True)
-        folder = tempfile.mkdtemp(prefix=".semsig-", dir=target.parent)
+        folder = tempfile.mkdtemp(prefix=HALF_WRITTEN, dir=target.parent)
     except OSError as error:
-        msg = f"{path} cannot be written ({_reason(error)}); choose a folder you can write to."
+        msg = f"{path} cannot be written ({reason(error)}); choose a folder you can write to."
         raise InputError(msg) from error
     # A folder of its own, because some formats write companions beside the file (-journal, -wal).
     partial = Path(folder) / Path(path).name
@@ -45,12 +49,18 @@ def whole_file(path: str | Path) -> Iterator[Path]:
         if error.errno is None or error.filename not in {None, str(partial), str(target)}:
             raise
         msg = (
-            f"{path} could not be written ({_reason(error)}); what was there before is unchanged, "
+            f"{path} could not be written ({reason(error)}); what was there before is unchanged, "
             "so make room or choose another place."
         )
         raise InputError(msg) from error
     finally:
         shutil.rmtree(folder, ignore_errors=True)
+
+
+def write_whole(path: str | Path, content: str | bytes) -> None:
+    """Write bytes, or text in UTF-8, as a whole file (see `whole_file`)."""
+    with whole_file(path) as partial:
+        partial.write_bytes(content.encode() if isinstance(content, str) else content)
 
 
 @contextlib.contextmanager
@@ -64,13 +74,13 @@ def whole_folder(path: str | Path) -> Iterator[Path]:
         partial = box / target.name
         partial.mkdir()
         yield partial
-        _put(partial, target, aside=box / "old")
+        put_in_place(partial, target, aside=box / "old")
 
 
 def move_folder(new: Path, place: Path) -> None:
     """Rename a folder to its place beside it; what is there is replaced, or stays if that fails."""
     with _box(place) as box:
-        _put(new, place, aside=box / "old")
+        put_in_place(new, place, aside=box / "old")
 
 
 @contextlib.contextmanager
@@ -78,20 +88,20 @@ def _box(target: Path) -> Iterator[Path]:
     """Give a temporary folder beside a folder that is being written."""
     try:
         target.parent.mkdir(parents=True, exist_ok=True)
-        box = Path(tempfile.mkdtemp(prefix=".semsig-", dir=target.parent))
+        box = Path(tempfile.mkdtemp(prefix=HALF_WRITTEN, dir=target.parent))
         try:
             yield box
         finally:
             shutil.rmtree(box, ignore_errors=True)
     except OSError as error:
         msg = (
-            f"{target} could not be written ({_reason(error)}); what was there before is "
+            f"{target} could not be written ({reason(error)}); what was there before is "
             "unchanged, so make room or choose another place."
         )
         raise InputError(msg) from error
 
 
-def _put(new: Path, place: Path, *, aside: Path) -> None:
+def put_in_place(new: Path, place: Path, *, aside: Path) -> None:
     """Rename a folder to its place; what is there is put aside, or back if that fails."""
     with contextlib.suppress(FileNotFoundError):
         place.rename(aside)
@@ -103,6 +113,6 @@ def _put(new: Path, place: Path, *, aside: Path) -> None:
         raise
 
 
-def _reason(error: OSError) -> str:
+def reason(error: OSError) -> str:
     """Return the system's few words about an error, such as "Permission denied"."""
     return os.strerror(error.errno) if error.errno else str(error)

@@ -12,7 +12,7 @@ from semsig_gis.core.errors import InputError
 from semsig_gis.database.file import open_database, save_database
 from semsig_gis.database.parts import MANIFEST, part_name
 from semsig_gis.database.tile_run import (
-    abandon,
+    RUN,
     describe,
     finished_tiles,
     mark_empty,
@@ -55,7 +55,7 @@ def test_another_recipe_is_refused_and_named_where_a_tile_is_done(tmp_path: Path
         ({**SPECS, "inputs": {"objects": "abd"}}, "inputs, objects"),
         ({**SPECS, "inputs": {"objects": "abc", "buildings": "x"}}, "inputs, buildings"),
         ({**SPECS, "version": "9"}, "version"),
-        ({"grid": SPECS["grid"]}, "what it was given"),
+        ({"grid": SPECS["grid"]}, "inputs"),
     ):
         with pytest.raises(InputError) as caught:
             start(tmp_path / "city", other)
@@ -72,11 +72,11 @@ def test_another_recipe_replaces_a_run_that_has_done_nothing(tmp_path: Path) -> 
 
 def test_a_run_is_given_up_only_while_no_tile_is_done(tmp_path: Path) -> None:
     folder = start(tmp_path / "city", SPECS)
-    assert abandon(folder)
+    assert RUN.abandon(folder)
     assert not folder.exists()
     folder = start(tmp_path / "city", SPECS)
     mark_empty(folder, (0, 0))
-    assert not abandon(folder)
+    assert not RUN.abandon(folder)
     assert folder.exists()
 
 
@@ -143,12 +143,12 @@ def test_what_is_not_a_run_is_not_taken_for_one(tmp_path: Path) -> None:
     (folder / "letter.txt").touch()
     with pytest.raises(InputError) as caught:
         start(tmp_path / "city", SPECS)
-    assert_sentence(caught.value, str(folder), "not an unfinished run")
+    assert_sentence(caught.value, str(folder), "'letter.txt'", "no unfinished run")
     folder = tmp_path / "a" / "city.partial"
     folder.parent.write_text("a file")
     with pytest.raises(InputError) as caught:
         start(tmp_path / "a" / "city", SPECS)
-    assert_sentence(caught.value, str(folder), "Not a directory", "another place")
+    assert_sentence(caught.value, str(folder), "Not a directory", "choose a folder")
 
 
 @pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="the system has no named pipes")

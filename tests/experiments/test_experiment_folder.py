@@ -29,8 +29,8 @@ queries = 20
 methods.fused = "edit+edit"
 distortions.medium = "medium"
 """)
-IDENTITY: dict[str, Any] = {
-    "experiment": SPEC.to_dict(),
+RECIPE: dict[str, Any] = {
+    **SPEC.to_dict(),
     "inputs": {"city.parquet": "ab"},
     "versions": {"numpy": "2"},
 }
@@ -39,7 +39,7 @@ IDENTITY: dict[str, Any] = {
 @pytest.fixture
 def partial(tmp_path: Path) -> Path:
     """Return the folder of a run that has answered something."""
-    folder = begin_run(tmp_path / "out", SPEC, IDENTITY)
+    folder = begin_run(tmp_path / "out", RECIPE)
     (folder / PARTS).mkdir()
     (folder / PARTS / "one").touch()
     return folder
@@ -47,13 +47,13 @@ def partial(tmp_path: Path) -> Path:
 
 def test_from_the_beginning_to_the_end(partial: Path, tmp_path: Path) -> None:
     assert partial == tmp_path / "out.partial"
-    assert not finished_run(tmp_path / "out", IDENTITY)
-    assert begin_run(tmp_path / "out", SPEC, IDENTITY) == partial
+    assert not finished_run(tmp_path / "out", RECIPE)
+    assert begin_run(tmp_path / "out", RECIPE) == partial
     assert (partial / PARTS / "one").exists()
     found = {"medium/fused-top1": evaluate(random_database(5, cells=150), queries=20)}
     write_results(partial, SPEC, found)
     finish_run(partial)
-    assert finished_run(tmp_path / "out", IDENTITY)
+    assert finished_run(tmp_path / "out", RECIPE)
     (loaded,) = open_results(tmp_path / "out").values()
     assert loaded.summary() == found["medium/fused-top1"].summary()
     (alone,) = open_results(tmp_path / "out" / "medium" / "fused-top1").values()
@@ -70,8 +70,8 @@ def test_from_the_beginning_to_the_end(partial: Path, tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("change", "words"),
     [
-        ({"experiment": {**SPEC.to_dict(), "queries": 21}}, ["differs in queries"]),
-        ({"experiment": {**SPEC.to_dict(), "city": "b.parquet"}}, ["differs in city"]),
+        ({"queries": 21}, ["differs in queries"]),
+        ({"city": "b.parquet"}, ["differs in city"]),
         ({"inputs": {"city.parquet": "cd"}}, ["differs in inputs, city.parquet"]),
         ({"versions": {"numpy": "2", "pandas": "3"}}, ["differs in versions, pandas"]),
     ],
@@ -80,23 +80,23 @@ def test_a_run_of_something_else_is_not_gone_on_with(
     change: dict[str, Any], words: list[str], partial: Path, tmp_path: Path
 ) -> None:
     with pytest.raises(InputError) as caught:
-        begin_run(tmp_path / "out", SPEC, IDENTITY | change)
+        begin_run(tmp_path / "out", RECIPE | change)
     assert_sentence(caught.value, str(partial), *words)
     assert (partial / PARTS / "one").exists()
     partial.rename(tmp_path / "out")
     with pytest.raises(InputError) as caught:
-        finished_run(tmp_path / "out", IDENTITY | change)
+        finished_run(tmp_path / "out", RECIPE | change)
     assert_sentence(caught.value, *words)
 
 
 def test_damaged_papers_are_refused(partial: Path, tmp_path: Path) -> None:
     (partial / "inputs.json").write_text("{", encoding="utf-8")
     with pytest.raises(InputError) as caught:
-        begin_run(tmp_path / "out", SPEC, IDENTITY)
-    assert_sentence(caught.value, "not the results of an experiment")
+        begin_run(tmp_path / "out", RECIPE)
+    assert_sentence(caught.value, "no results of an experiment")
     (partial / "inputs.json").write_text("[]", encoding="utf-8")
     with pytest.raises(InputError):
-        begin_run(tmp_path / "out", SPEC, IDENTITY)
+        begin_run(tmp_path / "out", RECIPE)
 
 
 def test_a_place_that_is_taken_meanwhile(partial: Path, tmp_path: Path) -> None:

@@ -6,9 +6,7 @@ finished stays in the folder of the results, so that an interrupted run goes on 
 
 from __future__ import annotations
 
-import json
 import os
-import shutil
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, get_args
@@ -35,10 +33,10 @@ from semsig_gis.sources.synthetic.city import (
     synthetic_city,
     synthetic_surroundings,
 )
-from semsig_gis.storage.whole import whole_file
+from semsig_gis.storage.runs import RunKind, read_json, write_json
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator, Mapping
+    from collections.abc import Callable, Mapping
 
     from semsig_gis.database.database import SignatureDatabase
     from semsig_gis.evaluation.result import Evaluation
@@ -57,6 +55,27 @@ EXPERIMENTS = Path("experiments")
 NO_RANGES = (
     "Other visibility ranges need the street objects of the database, which `semsig build` puts "
     "beside it; they are not there."
+)
+
+
+def _read_settings(folder: Path) -> dict[str, Any]:
+    settings = read_json(folder / SETTINGS)
+    if settings.keys() != {"size", "database", "queries", "seed", "versions"}:
+        msg = f"{SETTINGS} was written by another program"
+        raise ValueError(msg)
+    return settings
+
+
+RUN = RunKind(
+    content="results of `semsig reproduce`",
+    another=(
+        "{folder} holds results of other settings, which differ in {difference}; choose another "
+        "folder, or delete that one."
+    ),
+    read=_read_settings,
+    write=lambda folder, settings: write_json(folder / SETTINGS, settings),
+    names={SETTINGS, CITY.parent.name, VARIANTS.name},
+    results=EXPERIMENTS.name,
 )
 
 
@@ -169,7 +188,7 @@ def reproduce(
     city = None if given is None else open_database(given)
     if city is not None:
         _check_queries(queries, city)
-    _take_up(folder, settings)
+    RUN.begin(folder, settings)
     file = given or begun.city(CITIES[size])
     if city is None:
         city = open_database(file)
@@ -300,57 +319,8 @@ class _Begun:
                 {text: Method.parse(text) for text in PARIS_QUERY_MS},
                 progress=self.progress("measuring times"),
             )
-            _write_json(file, found)
-        return dict(_read_json(file))
-
-
-def _take_up(folder: Path, settings: dict[str, Any]) -> None:
-    """Begin a run in a folder, or take up one with the same settings."""
-    file = folder / SETTINGS
-    if not file.exists():
-        if folder.exists() and any(_entries(folder)):
-            msg = (
-                f"{folder} holds {min(_entries(folder))!r}, but no results of `semsig reproduce`; "
-                "choose another folder."
-            )
-            raise InputError(msg)
-        _write_json(file, settings)
-        return
-    found = _read_json(file)
-    for name, value in settings.items():
-        if found.get(name) != value:
-            if found.keys() == settings.keys() and not (folder / EXPERIMENTS).exists():
-                # Nothing has come of it.
-                for part in (CITY.parent, VARIANTS):
-                    shutil.rmtree(folder / part, ignore_errors=True)
-                _write_json(file, settings)
-                return
-            msg = (
-                f"{folder} holds results of other settings, which differ in {name}; choose another "
-                "folder, or delete that one."
-            )
-            raise InputError(msg)
-
-
-def _entries(folder: Path) -> Iterator[str]:
-    if not folder.is_dir():
-        yield folder.name
-        return
-    yield from (path.name for path in folder.iterdir())
-
-
-def _read_json(file: Path) -> dict[str, Any]:
-    try:
-        found = json.loads(file.read_text(encoding="utf-8"))
-    except (OSError, ValueError) as error:
-        msg = f"{file} cannot be read ({error}); choose another folder, or delete this one."
-        raise InputError(msg) from error
-    return found if isinstance(found, dict) else {}
-
-
-def _write_json(file: Path, values: Mapping[str, Any]) -> None:
-    with whole_file(file) as half:
-        half.write_text(json.dumps(values, indent=2) + "\n", encoding="utf-8")
+            write_json(file, found)
+        return read_json(file)
 
 
 def _quiet(_: str) -> None:

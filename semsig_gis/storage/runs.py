@@ -1,0 +1,169 @@
+"""Runs that can be interrupted: the folder of a run, which only the same recipe takes up again.
+
+A run writes its recipe into the folder first. A step is done when its file is there, and every file
+appears whole, so the same command goes on after the last finished step.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from semsig_gis.core.errors import InputError
+from semsig_gis.storage.whole import HALF_WRITTEN, put_in_place, reason, write_whole
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Collection, Mapping
+
+    Recipe = dict[str, Any]
+    """What a run is, as plain JSON values by name."""
+
+PARTIAL = ".partial"
+
+
+@dataclass(frozen=True, kw_only=True)
+class RunKind:
+    """One kind of run, and how its folders are recognized.
+
+    `content` says what such a folder holds, and `another` is the refusal of a run of another
+    recipe, with ``{folder}`` and ``{difference}`` in it. `read` returns the recipe in a folder or
+    raises OSError, TypeError or ValueError; `write` puts one there. `names` are the entries of a
+    run that has no results yet, and `results` is the pattern of these.
+    """
+
+    content: str
+    another: str
+    read: Callable[[Path], Recipe]
+    write: Callable[[Path, Recipe], None]
+    names: Collection[str]
+    results: str
+
+    def begin(self, folder: Path, recipe: Recipe) -> None:
+        """Begin a run in a folder, or take up the one in it; one without results is replaced.
+
+        Raise InputError if the folder holds results of another recipe or something else, or cannot
+        be written.
+        """
+        recipe = _plain(recipe)
+        entries = self._entries(folder)
+        if entries:
+            stored = self._read(folder, entries)
+            if stored == recipe:
+                for leftover in [*folder.rglob(f"{HALF_WRITTEN}*")]:
+                    shutil.rmtree(leftover, ignore_errors=True)
+                return
+            if not entries <= set(self.names) or not self.abandon(folder):
+                self._refuse(folder, stored, recipe)
+        self.write(folder, recipe)
+
+    def require_same(self, folder: Path, recipe: Recipe) -> None:
+        """Refuse a folder with results of another recipe, or with something else."""
+        recipe = _plain(recipe)
+        stored = self._read(folder, self._entries(folder))
+        if stored != recipe:
+            self._refuse(folder, stored, recipe)
+
+    def abandon(self, folder: Path) -> bool:
+        """Remove the folder of a run without results, and return whether it was one."""
+        if any(folder.glob(self.results)):
+            return False
+        shutil.rmtree(folder, ignore_errors=True)
+        return True
+
+    def _entries(self, folder: Path) -> set[str]:
+        """Return the names in a folder; none if it does not exist."""
+        try:
+            names = {path.name for path in folder.iterdir()} if folder.exists() else set()
+        except OSError as error:
+            msg = f"{folder} cannot be read ({reason(error)}); choose another folder."
+            raise InputError(msg) from error
+        return {name for name in names if not name.startswith(HALF_WRITTEN)}
+
+    def _read(self, folder: Path, entries: set[str]) -> Recipe:
+        try:
+            return self.read(folder)
+        except (OSError, TypeError, ValueError) as error:
+            first = min(entries - set(self.names) or entries, default="nothing")
+            msg = (
+                f"{folder} holds {first!r}, but no {self.content} that can be read; choose another "
+                "folder."
+            )
+            raise InputError(msg) from error
+
+    def _refuse(self, folder: Path, stored: Recipe, recipe: Recipe) -> None:
+        difference = ", ".join(_difference(stored, recipe))
+        raise InputError(self.another.format(folder=folder, difference=difference))
+
+
+def _plain(recipe: Recipe) -> Recipe:
+    """Return a recipe as it is read again from JSON: with lists in the place of tuples."""
+    plain: Recipe = json.loads(json.dumps(recipe))
+    return plain
+
+
+def _difference(one: Any, other: Any) -> list[str]:  # noqa: ANN401 - whatever JSON holds
+    """Return the names that lead to the first value in which two recipes differ."""
+    if not (isinstance(one, dict) and isinstance(other, dict)):
+        return []
+    name = next(name for name in {**other, **one} if one.get(name, ...) != other.get(name, ...))
+    return [name, *_difference(one.get(name), other.get(name))]
+
+
+def partial_folder(out: str | Path) -> Path:
+    """Return the folder beside `out` in which a run works until it is finished."""
+    target = Path(os.path.realpath(out))
+    return target.with_name(f"{target.name}{PARTIAL}")
+
+
+def finish(folder: Path, *, keep: Collection[str] | None = None) -> Path:
+    """Rename the folder of a run (see `partial_folder`) to its place, and return that.
+
+    With `keep`, all other entries are removed first, and what is in the place is replaced. Raise
+    InputError if that fails; the results then stay in the folder.
+    """
+    target = folder.with_name(folder.name.removesuffix(PARTIAL))
+    try:
+        if keep is None:
+            folder.rename(target)
+        else:
+            for path in folder.iterdir():
+                if path.name not in keep:
+                    _remove(path)
+            # Killed between its two renames, the next run finds all steps done and renames again.
+            aside = target.with_name(f"{HALF_WRITTEN}{target.name}")
+            if target.exists():
+                _remove(aside)
+            put_in_place(folder, target, aside=aside)
+            _remove(aside)
+    except OSError as error:
+        msg = (
+            f"{target} could not be put in its place ({reason(error)}); the results are in "
+            f"{folder}, so run the same command again."
+        )
+        raise InputError(msg) from error
+    return target
+
+
+def _remove(path: Path) -> None:
+    if path.is_dir():
+        shutil.rmtree(path)
+    else:
+        path.unlink(missing_ok=True)
+
+
+def read_json(path: Path) -> Recipe:
+    """Return the values of a JSON file; TypeError if it holds anything but an object."""
+    values = json.loads(path.read_text(encoding="utf-8"))
+    if not isinstance(values, dict):
+        msg = f"{path} holds no values by name"
+        raise TypeError(msg)
+    return values
+
+
+def write_json(path: Path, values: Mapping[str, Any]) -> None:
+    """Write values into a JSON file."""
+    write_whole(path, json.dumps(values, indent=2) + "\n")

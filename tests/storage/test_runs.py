@@ -1,0 +1,102 @@
+from __future__ import annotations
+
+import json
+import shutil
+from typing import TYPE_CHECKING, Any
+
+import pytest
+from sentences import assert_sentence
+
+from semsig_gis.core.errors import InputError
+from semsig_gis.storage.runs import RunKind, finish, partial_folder, read_json, write_json
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+RUN = RunKind(
+    content="results of a trial",
+    another="{folder} differs in {difference}; choose another folder.",
+    read=lambda folder: read_json(folder / "recipe.json"),
+    write=lambda folder, recipe: write_json(folder / "recipe.json", recipe),
+    names={"recipe.json", "inputs"},
+    results="part_*",
+)
+RECIPE: dict[str, Any] = {"step": 10.0, "inputs": {"trees": "ab"}, "seeds": (1, 2)}
+OTHERS: list[tuple[dict[str, Any], str]] = [
+    ({**RECIPE, "step": 5.0}, "step"),
+    ({**RECIPE, "inputs": {"trees": "cd"}}, "inputs, trees"),
+    ({**RECIPE, "inputs": {"trees": "ab", "lamps": None}}, "inputs, lamps"),
+    ({**RECIPE, "inputs": None}, "inputs"),
+    ({**RECIPE, "version": "9"}, "version"),
+    ({"step": 10.0, "inputs": {"trees": "ab"}}, "seeds"),
+]
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    """Return the folder of a run that has a result."""
+    place = partial_folder(tmp_path / "new" / "out")
+    RUN.begin(place, RECIPE)
+    (place / "part_1").touch()
+    return place
+
+
+def test_a_run_is_taken_up_by_the_same_recipe(folder: Path) -> None:
+    (folder / "deep" / ".semsig-x").mkdir(parents=True)  # a killed process leaves such a folder
+    RUN.begin(folder, RECIPE)
+    assert sorted(path.name for path in folder.iterdir()) == ["deep", "part_1", "recipe.json"]
+    assert list((folder / "deep").iterdir()) == []
+
+
+@pytest.mark.parametrize(("other", "difference"), OTHERS)
+def test_another_recipe_is_refused_or_replaces_a_run_without_results(
+    folder: Path, other: dict[str, Any], difference: str
+) -> None:
+    for refuse in (RUN.begin, RUN.require_same):
+        with pytest.raises(InputError) as caught:
+            refuse(folder, other)
+        assert_sentence(caught.value, str(folder), f"differs in {difference};")
+    (folder / "part_1").unlink()
+    (folder / "letter.txt").touch()  # never thrown away
+    with pytest.raises(InputError):
+        RUN.begin(folder, other)
+    (folder / "letter.txt").unlink()
+    RUN.begin(folder, other)
+    assert RUN.read(folder) == json.loads(json.dumps(other))
+
+
+@pytest.mark.parametrize("text", ["{", "[]", "\0", None])
+def test_what_is_not_a_run_is_not_taken_for_one(folder: Path, text: str | None) -> None:
+    recipe = folder / "recipe.json"
+    recipe.unlink() if text is None else recipe.write_text(text, encoding="utf-8")
+    with pytest.raises(InputError) as caught:
+        RUN.begin(folder, RECIPE)
+    assert_sentence(caught.value, str(folder), "'part_1'", "no results of a trial")
+
+
+def test_a_folder_that_cannot_be_written_to(tmp_path: Path) -> None:
+    (tmp_path / "file").touch()
+    for place in (tmp_path / "file", tmp_path / "file" / "out"):
+        with pytest.raises(InputError) as caught:
+            RUN.begin(place, RECIPE)
+        assert_sentence(caught.value, str(place), "Not a directory", "choose a")
+
+
+def test_a_run_is_abandoned_only_without_results(folder: Path) -> None:
+    assert not RUN.abandon(folder)
+    (folder / "part_1").unlink()
+    assert RUN.abandon(folder)
+    assert not folder.exists()
+
+
+def test_a_finished_run_is_renamed_to_its_place(folder: Path) -> None:
+    out = finish(folder)
+    assert not folder.exists()
+    assert {path.name for path in out.iterdir()} == {"recipe.json", "part_1"}
+    shutil.copytree(out, folder)
+    with pytest.raises(InputError) as caught:
+        finish(folder)
+    assert_sentence(caught.value, str(folder), "run the same command again")
+    assert finish(folder, keep={"part_1"}) == out
+    assert [path.name for path in out.iterdir()] == ["part_1"]
+    assert [path.name for path in out.parent.iterdir()] == ["out"]
