@@ -18,18 +18,19 @@ from semsig_gis.cli.console import stop_with_supervisor, supervised
 
 # The order of these imports is that of the help.
 # isort: off
-from semsig_gis.cli import demo as _demo  # noqa: F401
-from semsig_gis.cli import load as _sources  # noqa: F401
-from semsig_gis.cli import load as _load  # noqa: F401
-from semsig_gis.cli import demo as _synthesize  # noqa: F401
-from semsig_gis.cli import build as _build  # noqa: F401
-from semsig_gis.cli import localize as _localize  # noqa: F401
-from semsig_gis.cli import learn as _learn  # noqa: F401
-from semsig_gis.cli import evaluate as _evaluate  # noqa: F401
-from semsig_gis.cli import reproduce as _reproduce  # noqa: F401
-from semsig_gis.cli import identify as _identify  # noqa: F401
-from semsig_gis.cli import maps as _map  # noqa: F401
-from semsig_gis.cli import export as _export  # noqa: F401
+from semsig_gis.cli import (  # noqa: F401
+    demo,
+    load,
+    build,
+    maps,
+    localize,
+    learn,
+    evaluate,
+    experiment,
+    reproduce,
+    identify,
+    export,
+)
 
 # isort: on
 from semsig_gis.cli.app import app

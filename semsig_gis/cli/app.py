@@ -33,7 +33,7 @@ app = typer.Typer(
 )
 
 
-Database = Annotated[Path, typer.Argument(help="Signature database that `semsig build` wrote.")]
+Database = Annotated[Path, typer.Argument(help="Signature database written by `semsig build`.")]
 
 
 AsJson = Annotated[bool, typer.Option("--json", help="Print JSON instead of tables.")]
@@ -43,11 +43,17 @@ MethodText = Annotated[
     str,
     typer.Option(
         "--method",
-        help="likelihood; or TYPES+ANGLES (edit, histogram, jaccard), or one part as types:edit or "
-        "angles:edit; add :5% for two stages, :alpha=0.7, :raw or "
+        help="Rank by likelihood, or by distance as TYPES+ANGLES (edit, histogram, jaccard), "
+        "types:edit or angles:edit; add :5% for two stages, :alpha=0.7, :raw or "
         ":weights=INSERT/DELETE/SUBSTITUTE.",
     ),
 ]
+
+
+Workers = Annotated[int, typer.Option(help="Number of processes on this machine.")]
+
+
+Scheduler = Annotated[str | None, typer.Option(help="Dask scheduler, as tcp://HOST:PORT.")]
 
 
 LIKELIHOOD = "likelihood"
@@ -73,7 +79,7 @@ def require_suffix(suffix: str, *written: Path | None) -> None:
     """Refuse a name that says that a file is of another kind than it will be."""
     for path in written:
         if path is not None and path.suffix.lower() != suffix and not path.is_dir():
-            msg = f"{path} does not end in {suffix}, which says what it will be; name it so."
+            msg = f"{path} cannot be written; the name must end in {suffix}."
             raise InputError(msg)
 
 

@@ -11,6 +11,8 @@ import typer
 from semsig_gis.cli.app import (
     AsJson,
     Database,
+    Scheduler,
+    Workers,
     app,
     keep_inputs,
     known_identifiability,
@@ -37,17 +39,16 @@ class Viewpoints(enum.StrEnum):
 
 @app.command()
 def build(
-    objects: Annotated[Path, typer.Argument(help="Street objects that `semsig load` wrote.")],
+    objects: Annotated[Path, typer.Argument(help="Street objects written by `semsig load`.")],
     *,
     out: Annotated[
-        Path, typer.Option(help="Signature database to write: a file, or with tiles a folder.")
+        Path, typer.Option(help="Signature database to write (.parquet), or a folder with tiles.")
     ],
     step: Annotated[float, typer.Option(help="Side of a cell in metres.")] = 10.0,
     radius: Annotated[
         float,
         typer.Option(
-            help="Visibility range in metres, of all classes to which the catalogue gives none "
-            "of their own."
+            help="Visibility range in metres for classes without a range in the catalogue."
         ),
     ] = 30.0,
     levels: Annotated[int, typer.Option(help="Number of angle levels.")] = 16,
@@ -55,30 +56,26 @@ def build(
         str, typer.Option(help="Corner of a cell as X,Y in metres, in the CRS of the objects.")
     ] = "0,0",
     buildings: Annotated[
-        Path | None, typer.Option(help="Building footprints: what they hide is not seen.")
+        Path | None, typer.Option(help="Building footprints that hide what is behind them.")
     ] = None,
     streets: Annotated[Path | None, typer.Option(help="Centre lines of streets.")] = None,
     viewpoints: Annotated[
         Viewpoints,
-        typer.Option(help="Every cell, those outside --buildings, or those along --streets."),
+        typer.Option(help="Look from every cell, outside --buildings, or along --streets."),
     ] = Viewpoints.all,
     street_width: Annotated[
-        float, typer.Option(help="Width in metres of streets of which --streets says none.")
+        float, typer.Option(help="Default street width in metres, where --streets has none.")
     ] = 16.0,
-    area: Annotated[Path | None, typer.Option(help="Polygons that the cells must lie in.")] = None,
+    area: Annotated[Path | None, typer.Option(help="Polygons to keep the cells of.")] = None,
     tile: Annotated[
         float | None,
-        typer.Option(help="Build in tiles of so many metres; 2000 where workers are given."),
+        typer.Option(help="Tile size in metres; 2000 with --workers or --scheduler."),
     ] = None,
-    workers: Annotated[
-        int, typer.Option(help="Build tiles in so many processes of this machine.")
-    ] = 0,
-    scheduler: Annotated[
-        str | None, typer.Option(help="Build tiles on a dask cluster: tcp://HOST:PORT.")
-    ] = None,
+    workers: Workers = 0,
+    scheduler: Scheduler = None,
     as_json: AsJson = False,
 ) -> None:
-    """Compute the signature of every cell that sees an object."""
+    """Build a signature database from street objects."""
     from semsig_gis.core.grid import GridSpec
     from semsig_gis.core.signature import SignatureSpec
     from semsig_gis.database.viewpoints import ViewpointSpec
@@ -158,14 +155,12 @@ def update(
     database: Database,
     *,
     objects: Annotated[
-        Path, typer.Option(help="Street objects loaded anew; each layer in it is replaced whole.")
+        Path, typer.Option(help="New street objects; their layers replace those of the database.")
     ],
-    out: Annotated[
-        Path | None, typer.Option(help="Database to write; the one that was given by default.")
-    ] = None,
+    out: Annotated[Path | None, typer.Option(help="Database to write; default: in place.")] = None,
     as_json: AsJson = False,
 ) -> None:
-    """Apply changed street objects to a database, and tell how far the city has drifted."""
+    """Apply changed street objects to a database."""
     from semsig_gis.database.file import has_added
     from semsig_gis.database.update import update_file
     from semsig_gis.objects.table import open_objects
@@ -183,7 +178,7 @@ def update(
 
 @app.command()
 def info(database: Database, *, as_json: AsJson = False) -> None:
-    """Print the paper's tables of properties for a database."""
+    """Print the properties of a database, as the paper's tables do."""
     if as_json:
         print_json(_info(database))
         return

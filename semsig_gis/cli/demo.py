@@ -1,4 +1,4 @@
-"""`semsig demo`: the whole road on a made-up city."""
+"""`semsig demo`, `semsig synthesize`: made-up cities."""
 
 from __future__ import annotations
 
@@ -17,10 +17,10 @@ DEMO_QUERIES = 200
 def demo(
     *,
     out: Annotated[Path, typer.Option(help="Folder to write to.")] = Path("demo"),
-    queries: Annotated[int, typer.Option(help="Number of queries.")] = DEMO_QUERIES,
-    seed: Annotated[int, typer.Option(help="Seed of the city and of the queries.")] = 0,
+    queries: Annotated[int, typer.Option(help="Number of queries to ask.")] = DEMO_QUERIES,
+    seed: Annotated[int, typer.Option(help="Seed of the city and the queries.")] = 0,
 ) -> None:
-    """Run the whole road on the embedded synthetic city, without a network."""
+    """Run every step on the embedded synthetic city, offline."""
     from semsig_gis.database.build import build_database
     from semsig_gis.database.file import save_database
     from semsig_gis.evaluation.evaluate import evaluate as run
@@ -68,11 +68,11 @@ def synthesize(
     out: Annotated[Path, typer.Option(help="Folder to write to.")],
     size: Annotated[
         float | None,
-        typer.Option(help="Side of the square city in metres; as many cells as Paris by default."),
+        typer.Option(help="Side of the square city in metres; default: as many cells as Paris."),
     ] = None,
     seed: Annotated[int, typer.Option(help="Seed of the random numbers.")] = 0,
 ) -> None:
-    """Make up a city: street objects, buildings and streets of no real place."""
+    """Make up a city: street objects, buildings and streets."""
     from semsig_gis.objects.clean import build_objects
     from semsig_gis.objects.surroundings import save_surroundings
     from semsig_gis.objects.table import save_objects

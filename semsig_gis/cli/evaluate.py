@@ -1,4 +1,4 @@
-"""`semsig evaluate`, `semsig compare`: many distorted queries, and how far off the answers are."""
+"""`semsig evaluate`: many distorted queries, and how far off the answers are."""
 
 from __future__ import annotations
 
@@ -8,8 +8,8 @@ from typing import Annotated
 
 import typer
 
-from semsig_gis.cli.app import LIKELIHOOD, AsJson, MethodText, app, print_evaluation, print_table
-from semsig_gis.cli.console import print_json, progress, remark
+from semsig_gis.cli.app import LIKELIHOOD, AsJson, Database, MethodText, app, print_evaluation
+from semsig_gis.cli.console import print_json, progress
 from semsig_gis.cli.options import NoiseName, prepared_index, read_noise
 from semsig_gis.core.errors import InputError
 
@@ -23,24 +23,19 @@ class FalseClass(enum.StrEnum):
 
 @app.command()
 def evaluate(
-    context: typer.Context,
-    database: Annotated[
-        Path,
-        typer.Argument(
-            help="Signature database that `semsig build` wrote; or an experiment, a .toml file "
-            "that says all but --out, --workers, --scheduler and --json."
-        ),
-    ],
+    database: Database,
     *,
-    queries: Annotated[int, typer.Option(help="Number of queries.")] = 500,
+    queries: Annotated[int, typer.Option(help="Number of queries to ask.")] = 500,
     distortion: Annotated[
         str,
         typer.Option(
-            help="none, light, medium or strong; or several, such as medium,compass:10,view:90."
+            help="Distort queries: none, light, medium or strong, or several, such as "
+            "medium,compass:10,view:90."
         ),
     ] = "medium",
     keep_order: Annotated[
-        bool, typer.Option("--keep-order", help="Do not re-sort after the bearing noise.")
+        bool,
+        typer.Option("--keep-order", help="Do not sort again after the bearing noise."),
     ] = False,
     false_class: Annotated[
         FalseClass | None,
@@ -48,28 +43,12 @@ def evaluate(
     ] = None,
     method: MethodText = "edit+edit",
     noise: NoiseName = "generic",
-    top: Annotated[int, typer.Option(help="Number t of best candidates that count.")] = 1,
-    seed: Annotated[int, typer.Option(help="Seed of all chances.")] = 0,
-    out: Annotated[Path | None, typer.Option(help="Folder for the results.")] = None,
-    workers: Annotated[
-        int, typer.Option(help="Run an experiment in so many processes of this machine.")
-    ] = 0,
-    scheduler: Annotated[
-        str | None, typer.Option(help="Run an experiment on a dask cluster: tcp://HOST:PORT.")
-    ] = None,
+    top: Annotated[int, typer.Option(help="Count the best of this many candidates (t).")] = 1,
+    seed: Annotated[int, typer.Option(help="Seed of the random numbers.")] = 0,
+    out: Annotated[Path | None, typer.Option(help="Folder to write the results to.")] = None,
     as_json: AsJson = False,
 ) -> None:
-    """Query a database with distorted signatures of its own and measure the answers."""
-    if database.suffix == ".toml":
-        _experiment(context, database, out, workers, scheduler, as_json=as_json)
-        return
-    if workers or scheduler is not None:
-        option = "--workers" if workers else "--scheduler"
-        msg = (
-            f"{option} was given with a database; it is for experiments, so write a .toml file, or "
-            "leave it out."
-        )
-        raise InputError(msg)
+    """Ask queries from known places and measure the errors."""
     if noise != "generic" and method != LIKELIHOOD:
         msg = f"--noise is for --method likelihood, not for {method!r}; leave it out."
         raise InputError(msg)
@@ -115,68 +94,3 @@ def evaluate(
     print_evaluation(evaluation)
     if out is not None:
         typer.echo(f"results: {out}")
-
-
-def _experiment(
-    context: typer.Context,
-    file: Path,
-    out: Path | None,
-    workers: int,
-    scheduler: str | None,
-    *,
-    as_json: bool,
-) -> None:
-    from semsig_gis.evaluation.spec import open_experiment_spec
-    from semsig_gis.experiments.run import run_experiment
-    from semsig_gis.reports.experiment import experiment_tables
-
-    for name in context.params:
-        source = context.get_parameter_source(name)
-        free = {"database", "out", "workers", "scheduler", "as_json"}
-        if name in free or source is None or source.name != "COMMANDLINE":
-            continue
-        option = name.replace("_", "-")
-        msg = f"--{option} was given with an experiment; write that into {file} instead."
-        raise InputError(msg)
-    if out is None:
-        msg = "an experiment needs a folder for its results; give --out."
-        raise InputError(msg)
-    spec = open_experiment_spec(file)
-    with progress("answering") as advance:
-        results = run_experiment(
-            spec,
-            out,
-            folder=file.parent,
-            workers=workers,
-            scheduler=scheduler,
-            note=remark,
-            progress=advance,
-        )
-    if as_json:
-        print_json({name: evaluation.summary() for name, evaluation in results.items()})
-        return
-    for table in experiment_tables(spec, results):
-        print_table(table)
-    typer.echo(f"results: {out}")
-
-
-Results = Annotated[
-    Path, typer.Argument(help="Folder of an experiment, or of one evaluation, to compare.")
-]
-
-
-@app.command()
-def compare(first: Results, second: Results, *, as_json: AsJson = False) -> None:
-    """Tell by how much two results differ that asked queries from the same places."""
-    from semsig_gis.evaluation.compare import common_cases, compare_evaluations
-    from semsig_gis.evaluation.figures import plain_records
-    from semsig_gis.experiments.folder import open_results
-    from semsig_gis.reports.experiment import comparison_table
-
-    pairs = common_cases(open_results(first), open_results(second))
-    found = {name: compare_evaluations(*pair) for name, pair in pairs.items()}
-    if as_json:
-        print_json({name: plain_records(table) for name, table in found.items()})
-        return
-    for name, table in found.items():
-        print_table(comparison_table(table, f"{name}: " * bool(name) + f"{first} and {second}"))

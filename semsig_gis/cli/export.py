@@ -35,7 +35,7 @@ def export(
     objects: Annotated[Path | None, typer.Option(help="Street objects to add as a layer.")] = None,
     evaluation: Annotated[
         Path | None,
-        typer.Option(help="Folder that `semsig evaluate --out` wrote, to add its queries."),
+        typer.Option(help="Folder written by `semsig evaluate --out`, to add its queries."),
     ] = None,
     layer: Annotated[
         list[str] | None,
@@ -53,7 +53,7 @@ def export(
         ),
     ] = None,
 ) -> None:
-    """Write the cells, and what else there is of the city, for QGIS and other programs."""
+    """Export cells, objects and queries for QGIS and other programs."""
     from semsig_gis.database.file import open_database
     from semsig_gis.evaluation.result import Evaluation
     from semsig_gis.exports import export_database
@@ -79,14 +79,14 @@ def export(
 
 @app.command(name="import")
 def import_(
-    geopackage: Annotated[Path, typer.Argument(help="GeoPackage that `semsig export` wrote.")],
+    geopackage: Annotated[Path, typer.Argument(help="GeoPackage written by `semsig export`.")],
     *,
     out: Annotated[Path, typer.Option(help="Signature database to write (.parquet).")],
     objects: Annotated[
-        Path | None, typer.Option(help="Street objects to write, where they were exported too.")
+        Path | None, typer.Option(help="Street objects to write, if exported.")
     ] = None,
 ) -> None:
-    """Turn an exported GeoPackage into the database that it was, without loss."""
+    """Restore a database from an exported GeoPackage."""
     from semsig_gis.database.file import save_database
     from semsig_gis.evaluation.identify.result import save_identifiability
     from semsig_gis.exports.geopackage import read_geopackage

@@ -33,23 +33,23 @@ def identify(
     *,
     noise: NoiseName = "generic",
     on_grid: OnGrid = False,
-    radius: Annotated[float, typer.Option(help="Metres that count as near.")] = 50.0,
+    radius: Annotated[float, typer.Option(help="Distance in metres that counts as found.")] = 50.0,
     seed: Annotated[int, typer.Option(help="Seed of the simulated queries.")] = 0,
     threads: Annotated[
-        int | None, typer.Option(help="How many threads to use; all processors by default.")
+        int | None, typer.Option(help="Number of threads; default: all processors.")
     ] = None,
     check: Annotated[
         int | None,
-        typer.Option(help="Ask so many fresh queries, and tell whether the chances come true."),
+        typer.Option(help="Number of new queries to verify the predictions with."),
     ] = None,
     out: Annotated[
-        Path | None, typer.Option(help="Folder for a report of the check, with a plot.")
+        Path | None, typer.Option(help="Folder to write a report of the check to.")
     ] = None,
     as_json: AsJson = False,
 ) -> None:
-    """Tell of every cell how well a query from it will be placed, and what it is taken for.
+    """Predict how well each cell can be found, before any query.
 
-    The database gets columns that say so; `semsig info`, `map` and `export` show them.
+    Adds columns to the database, which `semsig info`, `map` and `export` show.
     """
     from semsig_gis.database.file import open_database
     from semsig_gis.evaluation.identify.check import check_identifiability
@@ -116,5 +116,5 @@ def _require_numbers(check: int | None, threads: int | None, out: Path | None) -
             msg = f"{option} was given as {number}; give a whole number from 1."
             raise InputError(msg)
     if out is not None and check is None:
-        msg = "--out was given without --check, of which it is the report; give both or none."
+        msg = "--out was given without --check; give both or none."
         raise InputError(msg)

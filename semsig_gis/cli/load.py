@@ -9,7 +9,6 @@ import typer
 
 from semsig_gis.cli.app import AsJson, app, keep_inputs, print_report, require_suffix
 from semsig_gis.cli.console import print_json, print_rows, progress, remark
-from semsig_gis.core.errors import InputError
 
 if TYPE_CHECKING:
     from semsig_gis.objects.load import Loaded
@@ -18,7 +17,7 @@ if TYPE_CHECKING:
 
 Catalogs = Annotated[
     list[str],
-    typer.Option(help="Catalogue, by name or .toml file; several are merged, best source first."),
+    typer.Option(help="Catalogue, by name or .toml file; repeat to merge, best first."),
 ]
 
 
@@ -27,13 +26,13 @@ Objects = Annotated[Path, typer.Option(help="Street objects to write (.parquet).
 
 Layers = Annotated[
     list[str] | None,
-    typer.Option(help="Only this layer, optional ones too; may be given several times."),
+    typer.Option(help="Read only this layer; may be repeated."),
 ]
 
 
 MetricCrs = Annotated[
     str | None,
-    typer.Option(help="CRS in metres to work in; the catalogue's or the UTM zone by default."),
+    typer.Option(help="CRS in metres to work in; default: the catalogue's or the UTM zone."),
 ]
 
 
@@ -62,7 +61,7 @@ Streets = Annotated[
 
 @app.command()
 def load(
-    files: Annotated[list[Path], typer.Argument(help="Files, or a folder that holds them.")],
+    files: Annotated[list[Path], typer.Argument(help="Files, or a folder of files.")],
     *,
     catalog: Catalogs,
     out: Objects,
@@ -78,7 +77,7 @@ def load(
     streets: Streets = None,
     as_json: AsJson = False,
 ) -> None:
-    """Read local files into one table of street objects."""
+    """Read files of open data into street objects."""
     from semsig_gis.objects.load import assemble, choose_layers, read_files
     from semsig_gis.sources.catalog import combine_catalogs, load_catalog
 
@@ -105,11 +104,9 @@ def fetch(
     out: Objects,
     layer: Layers = None,
     cache: Annotated[
-        Path | None, typer.Option(help="Folder of the cache; semsig's own by default.")
+        Path | None, typer.Option(help="Folder of the cache; default: semsig's own.")
     ] = None,
-    offline: Annotated[
-        bool, typer.Option("--offline", help="Take everything from the cache.")
-    ] = False,
+    offline: Annotated[bool, typer.Option("--offline", help="Use the cache only.")] = False,
     metric_crs: MetricCrs = None,
     filters: Filters = True,
     collapse: Collapse = True,
@@ -118,7 +115,7 @@ def fetch(
     streets: Streets = None,
     as_json: AsJson = False,
 ) -> None:
-    """Download an area from the service of a catalogue into one table of street objects."""
+    """Download the street objects of an area."""
     from semsig_gis.objects.load import assemble, choose_layers, fetch_layers, find_area, open_cache
     from semsig_gis.sources.catalog import load_catalog
 
@@ -169,34 +166,30 @@ def _save_loaded(
 
 
 @app.command()
+def suggest(
+    file: Annotated[Path, typer.Argument(help="Vector file to draft a catalogue for.")],
+) -> None:
+    """Draft a catalogue for a vector file, to be edited."""
+    from semsig_gis.objects.draft import suggest_catalog
+
+    typer.echo(suggest_catalog(file), nl=False)
+
+
+@app.command()
 def sources(
     name: Annotated[
-        str | None, typer.Argument(help="A catalogue, by name or .toml file; or `suggest`.")
-    ] = None,
-    file: Annotated[
-        Path | None, typer.Argument(help="With `suggest`: a file to draft a catalogue for.")
+        str | None, typer.Argument(help="Catalogue, by name or .toml file; default: list all.")
     ] = None,
     *,
     as_json: AsJson = False,
 ) -> None:
-    """List the catalogues and readers, or the layers of one; `suggest FILE` drafts a new one."""
+    """List the catalogues, or the layers of one."""
     import dataclasses
 
     from semsig_gis.core.plugins import installed_readers
     from semsig_gis.sources import READERS
     from semsig_gis.sources.catalog import catalog_names, load_catalog
 
-    if name == "suggest":
-        from semsig_gis.objects.draft import suggest_catalog
-
-        if file is None:
-            msg = "`semsig sources suggest` needs a file; give the path of a vector file."
-            raise InputError(msg)
-        typer.echo(suggest_catalog(file), nl=False)
-        return
-    if file is not None:
-        msg = f"{file} was given after {name!r}; only `semsig sources suggest` takes a file."
-        raise InputError(msg)
     if name is None:
         catalogs = [load_catalog(known) for known in catalog_names()]
         readers = sorted({*READERS, *installed_readers(taken=READERS)})

@@ -1,4 +1,4 @@
-"""Streets and buildings below the maps of the commands."""
+"""`semsig map`, and the streets and buildings below every map."""
 
 from __future__ import annotations
 
@@ -32,18 +32,13 @@ AROUND_M = 100.0
 
 Buildings = Annotated[
     Path | None,
-    typer.Option(
-        help="Footprints to draw below the map; those that the database was built with by default."
-    ),
+    typer.Option(help="Footprints to draw below the map; default: those of the database."),
 ]
 
 
 Streets = Annotated[
     Path | None,
-    typer.Option(
-        help="Centre lines to draw below the map; those that the database was built with by "
-        "default."
-    ),
+    typer.Option(help="Centre lines to draw below the map; default: those of the database."),
 ]
 
 
@@ -90,12 +85,13 @@ def map_(
     database: Database,
     *,
     evaluation: Annotated[
-        Path | None, typer.Option(help="Folder that `semsig evaluate --out` wrote.")
+        Path | None, typer.Option(help="Folder written by `semsig evaluate --out`.")
     ] = None,
     identifiability: Annotated[
         bool,
         typer.Option(
-            "--identifiability", help="Draw where a query can be placed (after `semsig identify`)."
+            "--identifiability",
+            help="Draw how well cells can be found (after `semsig identify`).",
         ),
     ] = False,
     ambiguity: Annotated[
@@ -103,16 +99,16 @@ def map_(
     ] = False,
     drift: Annotated[
         Path | None,
-        typer.Option(help="Draw what has changed up to this newer database of the city."),
+        typer.Option(help="Draw the changes up to this newer database."),
     ] = None,
     objects: Annotated[
-        Path | None, typer.Option(help="Draw the street objects that `semsig load` wrote.")
+        Path | None, typer.Option(help="Draw street objects written by `semsig load`.")
     ] = None,
     buildings: Buildings = None,
     streets: Streets = None,
     out: Annotated[Path, typer.Option(help="Map to write (.html).")],
 ) -> None:
-    """Draw an evaluation, where queries can be placed, cells that look alike, changes, objects."""
+    """Draw an evaluation, cells, changes or street objects on a map."""
     import numpy as np
 
     from semsig_gis.database.database import require_same_place
@@ -170,6 +166,6 @@ def _objects_of_both(
     """Return the street objects of two databases; tell where those of one are not at hand."""
     old, new = stored_objects(before), stored_objects(after)
     if old is None or new is None:
-        remark("the street objects of both are not at hand, so only cells are drawn")
+        remark("street objects of both databases were not found; drawing cells only")
         return None, None
     return old, new

@@ -27,29 +27,28 @@ def reproduce(
     database: Annotated[
         Path | None,
         typer.Argument(
-            help="Signature database that `semsig build` wrote; a city like Paris is made up by "
-            "default."
+            help="Signature database written by `semsig build`; default: a made-up Paris."
         ),
     ] = None,
     *,
-    out: Annotated[Path, typer.Option(help="Folder for the report and all results.")],
+    out: Annotated[Path, typer.Option(help="Folder to write the report and results to.")],
     size: Annotated[
-        Size, typer.Option(help="As many queries as the paper asks, or 300 (of a small city).")
+        Size, typer.Option(help="Ask the paper's 10,000 queries, or 300 of a small city.")
     ] = Size.full,
     queries: Annotated[
-        int | None, typer.Option(help="Number of queries, instead of what the size says.")
+        int | None, typer.Option(help="Number of queries, in place of that of --size.")
     ] = None,
-    seed: Annotated[int, typer.Option(help="Seed of all chances.")] = 0,
+    seed: Annotated[int, typer.Option(help="Seed of the random numbers.")] = 0,
     workers: Annotated[
         int | None,
         typer.Option(
-            help="Number of processes that answer, 0 for none but this; by default one for each "
-            "processor, or 0 where little is run."
+            help="Number of processes, 0 for this one alone; default: all processors, 0 for "
+            "--size small."
         ),
     ] = None,
     as_json: AsJson = False,
 ) -> None:
-    """Run all experiments of the paper and write a report, ours beside the paper's figures."""
+    """Run the paper's experiments, ours beside its figures."""
     import contextlib
     import os
 

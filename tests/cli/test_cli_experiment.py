@@ -1,4 +1,4 @@
-"""`semsig evaluate SPEC.toml` and `semsig compare`."""
+"""`semsig experiment` and `semsig compare`."""
 
 from __future__ import annotations
 
@@ -39,18 +39,18 @@ def spec(tmp_path: Path) -> Path:
 
 def test_an_experiment_is_run_and_compared(spec: Path, run: Run) -> None:
     out = spec.parent / "results"
-    code, shown, err = run("evaluate", spec, "--out", out)
+    code, shown, err = run("experiment", spec, "--out", out)
     assert code == 0
     assert "phone: medium, compass:5, view:180" in shown
     assert "refined, t = 1" in shown
     assert f"results: {out}" in shown
     assert "index does not exist yet" in err
-    code, again, err = run("evaluate", spec, "--out", out, "--json")
+    code, again, err = run("experiment", spec, "--out", out, "--json")
     assert (code, err) == (0, "")
     found = json.loads(again)
     assert list(found) == ["phone/paper-top1", "phone/refined-top1"]
     side_by_side = spec.parent / "side-by-side"
-    code, shown, _ = run("evaluate", spec, "--out", side_by_side, "--workers", 2)
+    code, shown, _ = run("experiment", spec, "--out", side_by_side, "--workers", 2)
     assert code == 0
     assert (side_by_side / "figures.csv").read_text() == (out / "figures.csv").read_text()
     cases = [out / name for name in found]
@@ -71,25 +71,21 @@ def test_an_experiment_is_run_and_compared(spec: Path, run: Run) -> None:
 
 def test_what_is_refused(spec: Path, run: Run) -> None:
     out = spec.parent / "results"
-    sentence(run("evaluate", spec), "--out")
-    sentence(run("evaluate", spec, "--out", out, "--queries", 9), "--queries", "spec.toml")
-    sentence(run("evaluate", spec, "--out", out, "--workers", -1), "-1 workers", "from 0 up")
-    for option, value in (("--workers", 2), ("--scheduler", "tcp://127.0.0.1:9")):
-        refused = run("evaluate", spec.parent / "city.parquet", option, value)
-        sentence(refused, f"{option} was given with a database", ".toml")
-    sentence(run("evaluate", spec.parent / "no.toml", "--out", out), "no.toml", "cannot be read")
+    assert run("experiment", spec)[0] == 2
+    sentence(run("experiment", spec, "--out", out, "--workers", -1), "-1 workers", "from 0 up")
+    sentence(run("experiment", spec.parent / "no.toml", "--out", out), "no.toml", "cannot be read")
     spec.write_text(SPEC.replace("edit+edit", "edti+edit"), encoding="utf-8")
-    sentence(run("evaluate", spec, "--out", out), "'edti'", "nearest is 'edit'")
+    sentence(run("experiment", spec, "--out", out), "'edti'", "nearest is 'edit'")
     spec.write_text(SPEC.replace("30", "1000000"), encoding="utf-8")
-    sentence(run("evaluate", spec, "--out", out), "1000000 queries")
+    sentence(run("experiment", spec, "--out", out), "1000000 queries")
     spec.write_text(SPEC, encoding="utf-8")
-    assert run("evaluate", spec, "--out", out)[0] == 0
+    assert run("experiment", spec, "--out", out)[0] == 0
     spec.write_text(SPEC.replace("compass:5", "compass:6"), encoding="utf-8")
-    sentence(run("evaluate", spec, "--out", out), "another experiment", "distortions")
+    sentence(run("experiment", spec, "--out", out), "another experiment", "distortions")
     sentence(run("compare", out, spec.parent), "holds no results")
     other = spec.parent / "other"
     spec.write_text(SPEC.replace("paper", "best").replace("30", "20"), encoding="utf-8")
-    assert run("evaluate", spec, "--out", other)[0] == 0
+    assert run("experiment", spec, "--out", other)[0] == 0
     sentence(run("compare", out, other), "other queries")
     pair = (out / "phone" / "paper-top1", other)
     sentence(run("compare", *pair), "a single evaluation", "none in common")

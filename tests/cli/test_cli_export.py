@@ -186,4 +186,4 @@ def test_a_name_says_what_a_file_will_be(city: Path, run: Run) -> None:
         ("map", city, "--ambiguity", "--out", folder / "map.png"),
         ("import", folder / "a.gpkg", "--out", folder / "b.gpkg"),
     ):
-        sentence(run(*command), "does not end in .", "name it so")
+        sentence(run(*command), "must end in .")

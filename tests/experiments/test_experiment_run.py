@@ -165,7 +165,7 @@ def test_a_run_that_was_killed_ends_with_the_same_bytes(
     spec = folder / "killed.toml"
     spec.write_text(SPEC.to_toml(), encoding="utf-8")
     out = tmp_path / "out"
-    command = [sys.executable, "-m", "semsig_gis.cli", "evaluate", str(spec), "--out", str(out)]
+    command = [sys.executable, "-m", "semsig_gis.cli", "experiment", str(spec), "--out", str(out)]
     with subprocess.Popen(
         command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, env=os.environ
     ) as run:
