@@ -14,9 +14,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from benchmarks.comparison import Comparison, compare
+from semsig_gis.database.city import City
 from semsig_gis.database.file import save_database
 from semsig_gis.likelihood.index import build_index
-from semsig_gis.likelihood.index_file import index_path, open_index, save_index
+from semsig_gis.likelihood.index_file import open_index, save_index
 from semsig_gis.likelihood.locate import locate
 from semsig_gis.likelihood.noise.model import named_noise
 from semsig_gis.likelihood.rerank import rerank
@@ -70,7 +71,7 @@ def likelihood_rows(
         city = Path(folder) / "city.parquet"
         save_database(database, city)
         yield from _index_rows(database, city)
-        index = open_index(database, _NOISE, index_path(city, _NOISE))
+        index = open_index(database, _NOISE, City(city).index_path(_NOISE))
 
         def batch(threads: int, _: int) -> None:
             deque(index.scores_of(queries, threads=threads), maxlen=0)
@@ -141,7 +142,7 @@ def growth_of_likelihood(database: SignatureDatabase, one: _Peer, *, repeats: in
 
 def _index_rows(database: SignatureDatabase, city: Path) -> Iterator[Comparison]:
     """Measure how long the index takes to build, beside the bare writing, and its size."""
-    path = index_path(city, _NOISE)
+    path = City(city).index_path(_NOISE)
     save_index(database, _NOISE, path)  # kernels are loaded
     size = path.stat().st_size
     zeros, copy = np.zeros(size, np.uint8), path.with_suffix(".copy")

@@ -44,6 +44,7 @@ from .objects.table import (
     save_objects as save_objects,
 )
 from .database.build import build_database as build_database
+from .database.city import City as City, open_city as open_city
 from .database.database import SignatureDatabase as SignatureDatabase
 from .database.file import (
     PartitionedDatabase as PartitionedDatabase,

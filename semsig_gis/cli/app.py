@@ -14,12 +14,11 @@ from semsig_gis.core.errors import DatabaseError, InputError
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
-    from semsig_gis.database.database import SignatureDatabase
+    from semsig_gis.database.city import City
     from semsig_gis.database.update import UpdateReport
     from semsig_gis.evaluation.identify.result import Identifiability
     from semsig_gis.evaluation.result import Evaluation
     from semsig_gis.objects.quality import QualityReport
-    from semsig_gis.objects.table import StreetObjects
     from semsig_gis.reports.tables import Table
 
 
@@ -92,28 +91,12 @@ def numbers(text: str, option: str) -> list[float]:
         raise InputError(msg) from error
 
 
-def stored_objects(path: Path) -> StreetObjects | None:
-    """Return the objects that a database was built from, where its store is at hand."""
-    from semsig_gis.database.store import open_store
-
-    try:
-        return open_store(path).objects
-    except DatabaseError:  # a database may do without its objects
-        return None
-
-
-def object_counts(path: Path) -> dict[int, int] | None:
-    """Return how many objects of each class a database has, where its store is at hand."""
-    objects = stored_objects(path)
-    return None if objects is None else objects.class_counts
-
-
-def known_identifiability(path: Path, opened: SignatureDatabase) -> Identifiability | None:
+def known_identifiability(city: City) -> Identifiability | None:
     """Return what the columns of a database tell; None, and say so, where they do not fit it."""
     from semsig_gis.evaluation.identify.result import open_identifiability
 
     try:
-        return open_identifiability(opened, path)
+        return open_identifiability(city.database, city.path)
     except DatabaseError as error:
         remark(str(error))
         return None

@@ -17,7 +17,6 @@ from semsig_gis.cli.app import (
     keep_inputs,
     known_identifiability,
     numbers,
-    object_counts,
     print_report,
     print_table,
     require_suffix,
@@ -26,7 +25,7 @@ from semsig_gis.cli.console import print_json, progress, remark
 from semsig_gis.core.errors import InputError
 
 if TYPE_CHECKING:
-    from semsig_gis.database.database import SignatureDatabase
+    from semsig_gis.database.city import City
 
 
 class Viewpoints(enum.StrEnum):
@@ -78,6 +77,7 @@ def build(
     """Build a signature database from street objects."""
     from semsig_gis.core.grid import GridSpec
     from semsig_gis.core.signature import SignatureSpec
+    from semsig_gis.database.city import open_city
     from semsig_gis.database.viewpoints import ViewpointSpec
     from semsig_gis.objects.surroundings import read_area
     from semsig_gis.objects.table import open_objects
@@ -122,9 +122,8 @@ def build(
     if as_json:
         print_json(_info(out))
         return
-    typer.echo(
-        f"{cells:,} cells of mean length {entries / cells:.3f}, {_bytes(out) / 1e6:.1f} MB: {out}"
-    )
+    size = open_city(out).bytes / 1e6
+    typer.echo(f"{cells:,} cells of mean length {entries / cells:.3f}, {size:.1f} MB: {out}")
 
 
 def _build_whole(
@@ -161,12 +160,12 @@ def update(
     as_json: AsJson = False,
 ) -> None:
     """Apply changed street objects to a database."""
-    from semsig_gis.database.file import has_added
+    from semsig_gis.database.city import open_city
     from semsig_gis.database.update import update_file
     from semsig_gis.objects.table import open_objects
 
     keep_inputs(out, read=(objects,))
-    had_columns = has_added(database)
+    had_columns = open_city(database).has_columns
     with progress("updating") as advance:
         report = update_file(database, open_objects(objects), out=out, progress=advance)
     if had_columns:
@@ -185,40 +184,31 @@ def info(database: Database, *, as_json: AsJson = False) -> None:
     from semsig_gis.reports.database import database_tables
     from semsig_gis.reports.identifiability import identifiability_tables
 
-    opened, facts = _opened(database)
-    for table in database_tables(opened, **facts):
+    city, facts = _opened(database)
+    for table in database_tables(city.database, **facts):
         print_table(table)
-    told = known_identifiability(database, opened)
+    told = known_identifiability(city)
     if told is not None:
-        for table in identifiability_tables(told, object_counts=facts.get("object_counts")):
+        for table in identifiability_tables(told, object_counts=facts["object_counts"]):
             print_table(table)
-    for line in opened.licenses:
+    for line in city.licenses:
         typer.echo(line)
 
 
 def _info(path: Path) -> dict[str, Any]:
     from semsig_gis.database.properties import database_summary
 
-    opened, facts = _opened(path)
-    told = known_identifiability(path, opened)
+    city, facts = _opened(path)
+    told = known_identifiability(city)
     more = {}
     if told is not None:
-        counts = facts.get("object_counts")
-        more["identifiability"] = told.summary(object_counts=counts)
-    return database_summary(opened, **facts) | more
+        more["identifiability"] = told.summary(object_counts=facts["object_counts"])
+    return database_summary(city.database, **facts) | more
 
 
-def _opened(path: Path) -> tuple[SignatureDatabase, dict[str, Any]]:
+def _opened(path: Path) -> tuple[City, dict[str, Any]]:
     """Open a database; return also what its files tell of it."""
-    from semsig_gis.database.file import open_database
+    from semsig_gis.database.city import open_city
 
-    opened = open_database(path)
-    facts: dict[str, Any] = {"file_bytes": _bytes(path)}
-    counts = object_counts(path)
-    return opened, facts if counts is None else facts | {"object_counts": counts}
-
-
-def _bytes(path: Path) -> int:
-    """Return the size of a file, or of the files of a folder."""
-    files = path.iterdir() if path.is_dir() else [path]
-    return sum(file.stat().st_size for file in files)
+    city = open_city(path)
+    return city, {"file_bytes": city.bytes, "object_counts": city.object_counts}

@@ -54,7 +54,7 @@ def evaluate(
         raise InputError(msg)
     import dataclasses
 
-    from semsig_gis.database.file import open_database
+    from semsig_gis.database.city import open_city
     from semsig_gis.evaluation.evaluate import evaluate as run
     from semsig_gis.matching.method import Method
     from semsig_gis.queries.chain import parse_chain
@@ -70,15 +70,14 @@ def evaluate(
         else one
         for one in parse_chain(distortion)
     ]
-    opened = open_database(database)
+    city = open_city(database)
+    cells = city.database
     chosen = (
-        prepared_index(database, opened, read_noise(noise))
-        if method == LIKELIHOOD
-        else Method.parse(method)
+        prepared_index(city, read_noise(noise)) if method == LIKELIHOOD else Method.parse(method)
     )
     with progress("evaluating") as advance:
         evaluation = run(
-            opened,
+            cells,
             queries=queries,
             method=chosen,
             distortion=chain,

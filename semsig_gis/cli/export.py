@@ -54,23 +54,24 @@ def export(
     ] = None,
 ) -> None:
     """Export cells, objects and queries for QGIS and other programs."""
-    from semsig_gis.database.file import open_database
+    from semsig_gis.database.city import open_city
     from semsig_gis.evaluation.result import Evaluation
     from semsig_gis.exports import export_database
     from semsig_gis.objects.table import open_objects
 
     keep_inputs(out, read=(database, objects))
-    opened = open_database(database)
+    city = open_city(database)
+    cells = city.database
     seen = None if objects is None else open_objects(objects)
     results = None if evaluation is None else Evaluation.load(evaluation)
     with progress(f"writing {out.name}") as advance:
         export_database(
-            opened,
+            cells,
             out,
             layers=layer or (),
             objects=seen,
             evaluation=results,
-            identifiability=known_identifiability(database, opened),
+            identifiability=known_identifiability(city),
             geometry=None if geometry is None else geometry.value,
             progress=advance,
         )

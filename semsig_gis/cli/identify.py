@@ -13,7 +13,6 @@ from semsig_gis.cli.app import (
     Database,
     app,
     known_identifiability,
-    object_counts,
     print_table,
 )
 from semsig_gis.cli.console import print_json, progress, remark
@@ -51,7 +50,7 @@ def identify(
 
     Adds columns to the database, which `semsig info`, `map` and `export` show.
     """
-    from semsig_gis.database.file import open_database
+    from semsig_gis.database.city import open_city
     from semsig_gis.evaluation.identify.check import check_identifiability
     from semsig_gis.evaluation.identify.identify import identify as identified
     from semsig_gis.evaluation.identify.result import save_identifiability
@@ -60,14 +59,14 @@ def identify(
 
     _require_numbers(check, threads, out)
     model = read_noise(noise)
-    opened = open_database(database)
+    city = open_city(database)
     if not on_grid:
-        model = cell_noise(model, opened.grid.step)
-    told = known_identifiability(database, opened)
+        model = cell_noise(model, city.database.grid.step)
+    told = known_identifiability(city)
     known = told is not None and (told.noise, told.radius, told.seed) == (model, radius, seed)
     workers = (os.cpu_count() or 1) if threads is None else threads
     if not known or check is not None:
-        index = prepared_index(database, opened, model)
+        index = prepared_index(city, model)
     if told is None or not known:
         with progress("comparing cells") as advance:
             told = identified(index, radius=radius, seed=seed, threads=workers, progress=advance)
@@ -80,7 +79,7 @@ def identify(
             checked = check_identifiability(
                 told, index, queries=check, threads=workers, progress=advance
             )
-    counts = object_counts(database)
+    counts = city.object_counts
     if out is not None and checked is not None:
         _write_page(told, checked, database, counts, out)
     if as_json:

@@ -25,6 +25,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+    from semsig_gis.database.city import City
     from semsig_gis.database.database import SignatureDatabase
     from semsig_gis.likelihood.noise.learn import NoiseEstimate, Sample
 
@@ -49,14 +50,15 @@ def learn(
     """Learn how a detector fails: what it misses, misnames and makes up, and how far off it is."""
     from dataclasses import replace
 
-    from semsig_gis.database.file import open_database
+    from semsig_gis.database.city import open_city
     from semsig_gis.likelihood.noise.learn import read_samples
     from semsig_gis.likelihood.noise.model import save_noise
 
     keep_inputs(out, read=(database, samples, objects))
-    opened = open_database(database)
+    city = open_city(database)
+    known = read_samples(samples, taxonomy=city.database.taxonomy)
     with progress("learning"):
-        found = _learnt(database, opened, read_samples(samples, taxonomy=opened.taxonomy), objects)
+        found = _learnt(city, known, objects)
     # How far the places were known is no matter of the detector.
     found = replace(found, spec=replace(found.spec, position_sigma=0.0, name=out.stem))
     save_noise(found.spec, out)
@@ -67,15 +69,14 @@ def learn(
     typer.echo(f"noise model: {out}")
 
 
-def _learnt(
-    path: Path, opened: SignatureDatabase, samples: Sequence[Sample], objects: Path | None
-) -> NoiseEstimate:
+def _learnt(city: City, samples: Sequence[Sample], objects: Path | None) -> NoiseEstimate:
     import numpy as np
 
     from semsig_gis.likelihood.noise.learn import Sample, learn_noise
 
+    opened = city.database
     places = _places(opened, samples)
-    store = object_store(path, opened, objects, needed=False)
+    store = object_store(city, objects, needed=False)
     if store is None:
         columns, rows = opened.grid.cells_at(places)
         away = places - opened.grid.viewpoints(columns, rows)
@@ -148,16 +149,15 @@ def calibrate(
 
     import numpy as np
 
-    from semsig_gis.database.file import open_database
+    from semsig_gis.database.city import open_city
     from semsig_gis.likelihood import answer_rule as abstention
     from semsig_gis.likelihood.noise.learn import read_samples
 
     keep_inputs(out, read=(database, samples, noise, objects))
-    opened = open_database(database)
-    known = read_samples(samples, taxonomy=opened.taxonomy)
+    city = open_city(database)
+    known = read_samples(samples, taxonomy=city.database.taxonomy)
     ready = locator(
-        database,
-        opened,
+        city,
         noise=noise,
         heading=heading,
         on_grid=on_grid,

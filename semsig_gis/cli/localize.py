@@ -31,6 +31,7 @@ if TYPE_CHECKING:
     from semsig_gis.cli.options import Locator
     from semsig_gis.core.signature import Signature
     from semsig_gis.core.taxonomy import Taxonomy
+    from semsig_gis.database.city import City
     from semsig_gis.likelihood.result import Location
     from semsig_gis.likelihood.route import Leg
     from semsig_gis.matching.result import Localization
@@ -238,7 +239,7 @@ def localize(
     as_json: AsJson = False,
 ) -> None:
     """Rank the cells of a database for a query, or for many."""
-    from semsig_gis.database.file import open_database
+    from semsig_gis.database.city import open_city
 
     given = [value for value in (types, bearings, map_, out) if value is not None]
     if queries is not None and given:
@@ -284,13 +285,13 @@ def localize(
         asked = _asked(ranked.taxonomy, queries, types, bearings)
         _answer(ranked, asked, files, as_json=as_json)
         return
-    opened = open_database(database)
+    city = open_city(database)
+    taxonomy = city.database.taxonomy
     # Before the index, which takes much longer than to find a slip in a query.
-    views = _views(str(queries), opened.taxonomy) if route else None
-    asked = [] if route else _asked(opened.taxonomy, queries, types, bearings)
+    views = _views(str(queries), taxonomy) if route else None
+    asked = [] if route else _asked(taxonomy, queries, types, bearings)
     ready = locator(
-        database,
-        opened,
+        city,
         noise=noise,
         heading=heading,
         on_grid=on_grid,
@@ -304,15 +305,15 @@ def localize(
     if views is not None:
         _answer_route(ready, *views)
     else:
-        located = _Answerer(database, opened.taxonomy, ready.locate)
+        located = _Answerer(city, taxonomy, ready.locate)
         _answer(located, asked, files, as_json=as_json)
 
 
 @dataclass(frozen=True, slots=True)
 class _Answerer:
-    """A database and what answers a query to it."""
+    """A city and what answers a query to it."""
 
-    path: Path
+    city: City
     taxonomy: Taxonomy
     ask: Callable[..., Localization | Location]
 
@@ -333,19 +334,20 @@ class _Files:
 
 
 def _by_distance(path: Path, method: str, require: str | None, top: int) -> _Answerer:
-    from semsig_gis.database.file import open_database, open_dataset
+    from semsig_gis.database.city import open_city
     from semsig_gis.database.requirement import Requirement
     from semsig_gis.matching.method import Method
     from semsig_gis.matching.search import localize
 
     chosen = Method.parse(method)
-    opened = open_dataset(path) if path.is_dir() else open_database(path)
+    city = open_city(path)
+    opened = city.dataset
     wanted = None if require is None else Requirement.parse(require, opened.taxonomy)
 
     def ask(query: Signature, more: int = 0) -> Localization:
         return localize(opened, query, method=chosen, requirement=wanted, top=top + more)
 
-    return _Answerer(path, opened.taxonomy, ask)
+    return _Answerer(city, opened.taxonomy, ask)
 
 
 def _refuse_options(method: str, options: dict[str, bool]) -> None:
@@ -388,7 +390,7 @@ def _answer(
         return
     found = answerer.ask(asked)
     if files.map is not None:
-        _draw(found, answerer.path, files.map)
+        _draw(found, answerer.city, files.map)
     searched = _write(answerer, asked, found, files)
     told = found.to_dict() | ({} if searched is None else {"searched": searched})
     if as_json:
@@ -427,7 +429,6 @@ def _write(
     answerer: _Answerer, query: Signature, found: Localization | Location, files: _Files
 ) -> dict[str, Any] | None:
     """Write the regions to search, and return what there is to say of them."""
-    from semsig_gis.database.file import open_database
     from semsig_gis.exports import export_answer
     from semsig_gis.likelihood.result import REGION_SHARE, Location
 
@@ -436,7 +437,7 @@ def _write(
     if isinstance(found, Location):
         opened = found.posterior.database
     else:
-        opened = open_database(answerer.path)
+        opened = answerer.city.database
         if found.tied_beyond:
             # No cell is left out of the search that is as good as the last candidate.
             found = answerer.ask(query, found.tied_beyond)
@@ -445,19 +446,17 @@ def _write(
     return None if files.holds_chances else regions.to_dict()
 
 
-def _draw(found: Localization | Location, database: Path, out: Path) -> None:
-    from semsig_gis.database.file import open_database
+def _draw(found: Localization | Location, city: City, out: Path) -> None:
     from semsig_gis.maps.localization import localization_map
     from semsig_gis.maps.location import location_map
     from semsig_gis.maps.page import save_map
     from semsig_gis.matching.result import Localization
 
     with progress("drawing the map"):
-        opened = open_database(database)
         drawn = (
-            localization_map(found, opened)
+            localization_map(found, city.database)
             if isinstance(found, Localization)
             else location_map(found)
         )
-        draw_ground(drawn, database, opened)
+        draw_ground(drawn, city)
         tell_if_online(save_map(drawn, out))

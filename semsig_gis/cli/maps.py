@@ -14,7 +14,6 @@ from semsig_gis.cli.app import (
     keep_inputs,
     known_identifiability,
     require_suffix,
-    stored_objects,
     tell_if_online,
 )
 from semsig_gis.cli.console import progress, remark
@@ -23,7 +22,7 @@ from semsig_gis.core.errors import DatabaseError, EmptyResultError, InputError
 if TYPE_CHECKING:
     import folium
 
-    from semsig_gis.database.database import SignatureDatabase
+    from semsig_gis.database.city import City
     from semsig_gis.objects.table import StreetObjects
 
 
@@ -44,30 +43,28 @@ Streets = Annotated[
 
 def draw_ground(
     drawn: folium.Map,
-    path: Path,
-    opened: SignatureDatabase,
+    city: City,
     *,
     buildings: Path | None = None,
     streets: Path | None = None,
 ) -> None:
     """Add streets and buildings to a map: those of files, else of the store of the database."""
-    from semsig_gis.database.store import open_store
     from semsig_gis.maps.objects import ground_map
     from semsig_gis.objects.surroundings import read_surroundings
 
     houses = lines = None
     if buildings is not None:
-        houses = read_surroundings(buildings, role="buildings", crs=opened.crs)
+        houses = read_surroundings(buildings, role="buildings", crs=city.database.crs)
     if streets is not None:
-        lines = read_surroundings(streets, role="streets", crs=opened.crs)
+        lines = read_surroundings(streets, role="streets", crs=city.database.crs)
     if houses is None or lines is None:
         with contextlib.suppress(DatabaseError):  # a map may do without
-            store = open_store(path)
-            houses = store.footprints if houses is None else houses
-            lines = store.streets if lines is None else lines
+            houses = city.store.footprints if houses is None else houses
+            lines = city.store.streets if lines is None else lines
     if houses is None and lines is None:
         return
-    low, high = opened.xy.min(axis=0) - AROUND_M, opened.xy.max(axis=0) + AROUND_M
+    xy = city.database.xy
+    low, high = xy.min(axis=0) - AROUND_M, xy.max(axis=0) + AROUND_M
     try:
         ground_map(
             buildings=houses,
@@ -111,8 +108,8 @@ def map_(
     """Draw an evaluation, cells, changes or street objects on a map."""
     import numpy as np
 
+    from semsig_gis.database.city import open_city
     from semsig_gis.database.database import require_same_place
-    from semsig_gis.database.file import open_database
     from semsig_gis.evaluation.result import Evaluation
     from semsig_gis.maps.cells import ambiguity_map, identifiability_map
     from semsig_gis.maps.drift import drift_map
@@ -131,13 +128,14 @@ def map_(
     keep_inputs(out, read=(database, drift, objects, buildings, streets))
     require_suffix(".html", out)
     results = None if evaluation is None else Evaluation.load(evaluation)
-    opened = open_database(database)
-    told = known_identifiability(database, opened) if identifiability or ambiguity else None
+    city = open_city(database)
+    opened = city.database
+    told = known_identifiability(city) if identifiability or ambiguity else None
     if identifiability and told is None:
         msg = f"{database} does not tell where a query can be placed; run semsig identify first."
         raise InputError(msg)
     seen = None if objects is None else open_objects(objects)
-    newer = None if drift is None else open_database(drift)
+    newer = None if drift is None else open_city(drift)
     if seen is not None:
         places = seen.table.geometry.to_crs(opened.crs)
         require_same_place(opened, np.stack([places.x, places.y], axis=1), "street objects")
@@ -149,23 +147,22 @@ def map_(
             drawn = identifiability_map(told)
         elif results is not None:
             drawn = evaluation_map(results, opened)
-        elif drift is not None and newer is not None:
-            before, after = _objects_of_both(database, drift)
-            drawn = drift_map(opened, newer, objects_before=before, objects_after=after)
+        elif newer is not None:
+            before, after = _objects_of_both(city, newer)
+            drawn = drift_map(opened, newer.database, objects_before=before, objects_after=after)
         if seen is not None:
             drawn = objects_map(seen, database=opened if drawn is None else None, map_=drawn)
-        draw_ground(drawn, database, opened, buildings=buildings, streets=streets)
+        draw_ground(drawn, city, buildings=buildings, streets=streets)
         offline = save_map(drawn, out)
     typer.echo(f"map: {out}")
     tell_if_online(offline)
 
 
 def _objects_of_both(
-    before: Path, after: Path
+    before: City, after: City
 ) -> tuple[StreetObjects | None, StreetObjects | None]:
     """Return the street objects of two databases; tell where those of one are not at hand."""
-    old, new = stored_objects(before), stored_objects(after)
-    if old is None or new is None:
+    if before.objects is None or after.objects is None:
         remark("street objects of both databases were not found; drawing cells only")
         return None, None
-    return old, new
+    return before.objects, after.objects

@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from semsig_gis.core.signature import Signature
+    from semsig_gis.database.city import City
     from semsig_gis.database.database import SignatureDatabase
     from semsig_gis.database.store import ObjectStore
     from semsig_gis.likelihood.index import LikelihoodIndex
@@ -104,8 +105,7 @@ class Locator:
 
 
 def locator(
-    path: Path,
-    opened: SignatureDatabase,
+    city: City,
     *,
     noise: str,
     heading: str,
@@ -140,22 +140,23 @@ def locator(
     }
     model = read_noise(noise)
     if not on_grid:
-        model = cell_noise(model, opened.grid.step)
+        model = cell_noise(model, city.database.grid.step)
     if known is not None:
-        options["log_prior"] = _prior(opened, **known)
+        options["log_prior"] = _prior(city.database, **known)
     if wanted or explain:
-        store = object_store(path, opened, objects, needed=bool(refine))
+        store = object_store(city, objects, needed=bool(refine))
         options |= {"store": store, "refined": wanted and store is not None}
-    index = prepared_index(path, opened, model)
+    index = prepared_index(city, model)
     return Locator(index=index, options=options, lenient=refine is None)
 
 
-def prepared_index(path: Path, opened: SignatureDatabase, model: Noise) -> LikelihoodIndex:
+def prepared_index(city: City, model: Noise) -> LikelihoodIndex:
     """Return the likelihood index beside a database; it is built where it is not there."""
-    from semsig_gis.likelihood.index_file import index_path, ready_index
+    from semsig_gis.likelihood.index_file import ready_index
 
     with progress("preparing the likelihood index") as advance:
-        return ready_index(opened, model, index_path(path, model), note=remark, progress=advance)
+        path = city.index_path(model)
+        return ready_index(city.database, model, path, note=remark, progress=advance)
 
 
 def read_noise(noise: str) -> Noise:
@@ -165,24 +166,22 @@ def read_noise(noise: str) -> Noise:
     return open_noise(noise) if noise not in NOISES and Path(noise).suffix else named_noise(noise)
 
 
-def object_store(
-    path: Path, opened: SignatureDatabase, objects: Path | None, *, needed: bool
-) -> ObjectStore | None:
+def object_store(city: City, objects: Path | None, *, needed: bool) -> ObjectStore | None:
     """Return the street objects of a database; None where there are none, unless needed."""
     from semsig_gis.database.store import ObjectStore, open_store
     from semsig_gis.objects.table import open_objects
 
     if objects is not None and not objects.is_dir():
         store = ObjectStore.of(open_objects(objects))
-        if store.objects.crs != opened.crs:
+        if store.objects.crs != city.database.crs:
             msg = (
                 f"{objects} is in {store.objects.crs.to_string()} and the database in "
-                f"{opened.crs.to_string()}; give the objects that it was built from."
+                f"{city.database.crs.to_string()}; give the objects that it was built from."
             )
             raise CrsError(msg)
         return store
     try:
-        store = open_store(path, objects)
+        store = city.store if objects is None else open_store(city.path, objects)
     except DatabaseError as error:
         if needed or objects is not None:
             raise

@@ -21,9 +21,8 @@ import pyarrow.parquet as pq
 
 from semsig_gis.core.errors import DatabaseError, SourceError
 from semsig_gis.core.parallel import check_workers, run_tasks
-from semsig_gis.database.file import built_digest, open_database
-from semsig_gis.database.parts import digest, part_files
-from semsig_gis.database.store import open_store, store_path
+from semsig_gis.database.city import City
+from semsig_gis.database.parts import digest
 from semsig_gis.evaluation.answer import Answerer
 from semsig_gis.evaluation.evaluate import (
     check_count,
@@ -42,7 +41,7 @@ from semsig_gis.experiments.folder import (
     open_results,
     write_results,
 )
-from semsig_gis.likelihood.index_file import index_path, ready_index
+from semsig_gis.likelihood.index_file import ready_index
 from semsig_gis.likelihood.method import LikelihoodMethod
 from semsig_gis.likelihood.refine import cell_noise
 from semsig_gis.matching.memo import DistanceMemo
@@ -54,7 +53,6 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping, Sequence
 
     from semsig_gis.database.database import SignatureDatabase
-    from semsig_gis.database.store import ObjectStore
     from semsig_gis.evaluation.result import Evaluation
     from semsig_gis.evaluation.spec import ExperimentSpec
     from semsig_gis.likelihood.index import LikelihoodIndex
@@ -94,7 +92,7 @@ class ExperimentWork:
     spec: ExperimentSpec
     folder: Path
     note: Callable[[str], None] | None = None
-    _stored: dict[str, ObjectStore] = field(default_factory=dict)
+    _cities: dict[str, City] = field(default_factory=dict)
     _indexes: dict[Path, LikelihoodIndex] = field(default_factory=dict)
     _answerers: dict[str, Answerer] = field(default_factory=dict)
 
@@ -105,11 +103,9 @@ class ExperimentWork:
         """
         found = {}
         for name in dict.fromkeys([self.spec.database, self.spec.city or self.spec.database]):
-            files = _files(self.folder / name)
-            # Columns that were put into a database later change nothing here.
-            found[name] = built_digest(*files) if len(files) == 1 else digest(*files)
+            found[name] = self._city(name).digest
         for name in self._stores():
-            store = store_path(self.folder / name)
+            store = self._city(name).store_path
             if store.is_dir():
                 key = f"{name.removesuffix('.parquet')}{store.suffix}"
                 found[key] = digest(*sorted(store.glob("*.parquet")))
@@ -143,6 +139,10 @@ class ExperimentWork:
         if self.districts is not None and self.spec.districts is not None:
             nowhere = gpd.GeoDataFrame(geometry=[], crs=self.database.crs)
             district_labels(nowhere, self.districts, self.spec.districts.name)
+        for name in self._stores():
+            for sentence in self._city(name).store.notes:
+                if self.note is not None:
+                    self.note(sentence)
         for distortion in self.spec.distortions:
             self._queries(distortion, slice(1))
         for name in self.spec.methods:
@@ -151,12 +151,12 @@ class ExperimentWork:
     @cached_property
     def database(self) -> SignatureDatabase:
         """What is searched."""
-        return open_database(self.folder / self.spec.database)
+        return self._city(self.spec.database).database
 
     @cached_property
     def city(self) -> SignatureDatabase | None:
         """What is looked at, if it is something else."""
-        return None if self.spec.city is None else open_database(self.folder / self.spec.city)
+        return None if self.spec.city is None else self._city(self.spec.city).database
 
     @cached_property
     def districts(self) -> gpd.GeoDataFrame | None:
@@ -232,7 +232,7 @@ class ExperimentWork:
 
     def evaluations(self, place: Path) -> dict[str, Evaluation]:
         """Return all evaluations by the names of their cases, once all queries are answered."""
-        size = sum(file.stat().st_size for file in _files(self.folder / self.spec.database))
+        size = sum(file.stat().st_size for file in self._city(self.spec.database).files)
         found = {}
         for distortion, method in product(self.spec.distortions, self.spec.methods):
             scored = self._answers(place, distortion, method)
@@ -270,7 +270,7 @@ class ExperimentWork:
         return draw_queries(
             self.database,
             self.spec.asked(distortion),
-            store=self._store(looked_at) if self.spec.seen_from == "anywhere" else None,
+            store=self._city(looked_at).store if self.spec.seen_from == "anywhere" else None,
             city=self.city,
             part=part,
         )
@@ -282,38 +282,20 @@ class ExperimentWork:
             more: dict[str, Any] = {}
             if isinstance(method, LikelihoodMethod):
                 more["index"] = self._index(method)
-                more["store"] = self._store(self.spec.database) if method.refined else None
+                more["store"] = self._city(self.spec.database).store if method.refined else None
             self._answerers[name] = Answerer(database=self.database, method=method, **more)
         return self._answerers[name]
 
-    def _store(self, name: str) -> ObjectStore:
-        if name not in self._stored:
-            self._stored[name] = open_store(self.folder / name)
-            for sentence in self._stored[name].notes:
-                self._say(sentence)
-        return self._stored[name]
+    def _city(self, name: str) -> City:
+        return self._cities.setdefault(name, City(self.folder / name))
 
     def _index(self, method: LikelihoodMethod) -> LikelihoodIndex:
         step = self.database.grid.step
         noise = method.noise if method.on_grid else cell_noise(method.noise, step)
-        path = index_path(self.folder / self.spec.database, noise)
+        path = self._city(self.spec.database).index_path(noise)
         if path not in self._indexes:
             self._indexes[path] = ready_index(self.database, noise, path, note=self.note)
         return self._indexes[path]
-
-    def _say(self, sentence: str) -> None:
-        if self.note is not None:
-            self.note(sentence)
-
-
-def _files(database: Path) -> tuple[Path, ...]:
-    """Return the files of a database."""
-    if database.is_dir():
-        return part_files(database)
-    if not database.is_file():
-        msg = f"{database} does not exist; give a signature database file."
-        raise DatabaseError(msg)
-    return (database,)
 
 
 def _part_file(place: Path, part: Part, method: str) -> Path:

@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from semsig_gis.core.errors import DatabaseError, InputError
+from semsig_gis.database.city import City
 from semsig_gis.likelihood.index import (
     build_index,
     index_fingerprint,
@@ -30,23 +31,10 @@ if TYPE_CHECKING:
     from semsig_gis.likelihood.index import LikelihoodIndex
     from semsig_gis.likelihood.noise.model import Noise
 
-SUFFIX = ".likelihood"
 KIND = "semsig likelihood index"
 PARQUET = b"PAR1"
 PAGE = 4096
 HEADER_PAGES = 4
-
-
-def index_path(database_path: str | Path, noise: Noise) -> Path:
-    """Return the path of an index, next to its database; each noise model has its own.
-
-    For ``city.parquet`` and generic noise that is ``city.parquet.generic-8d47.likelihood``.
-    """
-    said = json.dumps(noise.to_dict(), sort_keys=True)
-    plain = "".join(letter if letter.isalnum() else "_" for letter in noise.name)
-    mark = f"{zlib.crc32(said.encode()) & 0xFFFF:04x}"
-    path = Path(database_path)
-    return path.with_name(f"{path.name}.{plain}-{mark}{SUFFIX}")
 
 
 def ready_index(
@@ -67,7 +55,7 @@ def ready_index(
     noise : NoiseSpec or NoiseMixture
         The noise model.
     path : str or Path
-        File of the index, such as `index_path` gives.
+        File of the index, such as `City.index_path` gives.
     note : callable, optional
         Called with a sentence where the index is built or cannot be saved.
     progress : callable, optional
@@ -217,7 +205,7 @@ def _keep_database(path: str | Path, noise: Noise) -> None:
     if begin == PARQUET:
         msg = (
             f"{path} is a Parquet file, such as a database, and no likelihood index; "
-            f"give a place of its own, such as {index_path(path, noise)}."
+            f"give a place of its own, such as {City(path).index_path(noise)}."
         )
         raise InputError(msg)
 

@@ -12,7 +12,8 @@ import pytest
 from sentences import sentence
 from worlds import random_town
 
-from semsig_gis.database.file import add_columns, open_database, read_added, save_database
+from semsig_gis.database.city import City
+from semsig_gis.database.file import open_database, save_database
 from semsig_gis.database.store import ObjectStore, open_store, save_with_store
 from semsig_gis.database.tiles import TileSpec, build_tiles
 from semsig_gis.evaluation.identify import identify as identifying
@@ -111,14 +112,13 @@ def test_columns_that_do_not_fit_are_told_and_left_out(city: Path, run: Run) -> 
     assert run("identify", city, *QUICK, "--json")[0] == 0
     whole = open_database(city)
     save_database(whole.select(slice(9, None)), city.parent / "other.parquet")
-    columns, facts = read_added(city, name="identifiability")
-    assert columns is not None
-    assert facts is not None
-    add_columns(
-        city.parent / "other.parquet",
+    stored = City(city).columns("identifiability")
+    assert stored is not None
+    columns, facts = stored
+    City(city.parent / "other.parquet").put_columns(
+        "identifiability",
         columns.drop_columns(["cell_id"]).slice(9),
         cell_ids=whole.cell_ids[9:],
-        name="identifiability",
         facts=facts,
     )
     code, out, told = run("info", city.parent / "other.parquet")

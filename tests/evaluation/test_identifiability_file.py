@@ -15,7 +15,8 @@ from noisy_cells import mixtures, random_database
 from sentences import assert_sentence
 
 from semsig_gis.core.errors import DatabaseError
-from semsig_gis.database.file import add_columns, open_database, save_database
+from semsig_gis.database.city import City
+from semsig_gis.database.file import open_database, save_database
 from semsig_gis.evaluation.identify import result as identifiability_file
 from semsig_gis.evaluation.identify.result import open_identifiability, save_identifiability
 
@@ -77,8 +78,8 @@ def test_another_format_is_told(city: Path, monkeypatch: pytest.MonkeyPatch) -> 
 @pytest.mark.parametrize("facts", [{}, {"noise": 3}, {"noise": {"name": "x", "detection": 7.0}}])
 def test_damage_is_told(city: Path, facts: dict[str, object]) -> None:
     columns = pa.table({"chance_itself": np.zeros(len(DATABASE))})
-    add_columns(
-        city, columns, cell_ids=DATABASE.cell_ids, name=identifiability_file.NAME, facts=facts
+    City(city).put_columns(
+        identifiability_file.NAME, columns, cell_ids=DATABASE.cell_ids, facts=facts
     )
     with pytest.raises(DatabaseError) as caught:
         open_identifiability(DATABASE, city)

@@ -8,9 +8,10 @@ from noisy_cells import random_database, random_query
 from sentences import assert_sentence
 
 from semsig_gis.core.errors import DatabaseError, InputError
+from semsig_gis.database.city import City
 from semsig_gis.database.file import save_database
 from semsig_gis.likelihood.index import build_index
-from semsig_gis.likelihood.index_file import index_path, open_index, ready_index, save_index
+from semsig_gis.likelihood.index_file import open_index, ready_index, save_index
 from semsig_gis.likelihood.noise.model import NoiseSpec, named_noise
 
 if TYPE_CHECKING:
@@ -35,12 +36,12 @@ def test_an_index_comes_back_from_its_file(tmp_path: Path) -> None:
 
 def test_each_model_has_a_file_of_its_own(tmp_path: Path) -> None:
     names = {
-        index_path(tmp_path / "city.parquet", noise).name
+        City(tmp_path / "city.parquet").index_path(noise).name
         for noise in (NOISE, named_noise("light"), NoiseSpec(), NoiseSpec(clutter=2.0))
     }
     assert len(names) == 4
     assert all(name.startswith("city.parquet.") for name in names)
-    strange = index_path(tmp_path / "city.parquet", NoiseSpec(name="a/b c"))
+    strange = City(tmp_path / "city.parquet").index_path(NoiseSpec(name="a/b c"))
     assert strange.parent == tmp_path
 
 
@@ -51,7 +52,7 @@ def test_a_database_is_not_replaced(make: Callable[..., object], tmp_path: Path)
     content = path.read_bytes()
     with pytest.raises(InputError) as caught:
         make(DATABASE, NOISE, path)
-    assert_sentence(caught.value, str(index_path(path, NOISE)))
+    assert_sentence(caught.value, str(City(path).index_path(NOISE)))
     assert path.read_bytes() == content
 
 

@@ -12,7 +12,7 @@ import numpy as np
 import pyarrow as pa
 
 from semsig_gis.core.errors import DatabaseError, InputError, SemsigError
-from semsig_gis.database.file import add_columns, read_added
+from semsig_gis.database.city import City
 from semsig_gis.likelihood.index import index_fingerprint
 from semsig_gis.likelihood.noise.model import noise_from_dict
 
@@ -226,11 +226,10 @@ def save_identifiability(told: Identifiability, path: str | Path) -> None:
     The columns are those of `Identifiability.table`. Whoever builds or updates the database gets
     one without them.
     """
-    add_columns(
-        path,
+    City(path).put_columns(
+        NAME,
         told.table(),
         cell_ids=told.database.cell_ids,
-        name=NAME,
         facts=identifiability_facts(told),
     )
 
@@ -294,10 +293,8 @@ def open_identifiability(database: SignatureDatabase, path: str | Path) -> Ident
     >>> before is None, bool((after.found == told.found).all())
     (True, True)
     """
-    table, facts = read_added(path, name=NAME)
-    if table is None or facts is None:
-        return None
-    return identifiability_of(database, table, facts, path)
+    columns = City(path).columns(NAME)
+    return None if columns is None else identifiability_of(database, *columns, path)
 
 
 def identifiability_of(

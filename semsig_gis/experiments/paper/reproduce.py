@@ -14,9 +14,10 @@ from typing import TYPE_CHECKING, Any, Literal, get_args
 from semsig_gis.core.errors import DatabaseError, InputError
 from semsig_gis.core.parallel import check_workers
 from semsig_gis.database.build import build_database
-from semsig_gis.database.file import built_digest, open_database, save_database
+from semsig_gis.database.city import City
+from semsig_gis.database.file import open_database, save_database
 from semsig_gis.database.properties import database_summary
-from semsig_gis.database.store import ObjectStore, open_store, save_with_store, store_path
+from semsig_gis.database.store import ObjectStore, save_with_store
 from semsig_gis.database.viewpoints import ViewpointSpec
 from semsig_gis.evaluation.evaluate import check_count, versions
 from semsig_gis.experiments.paper.experiments import QUERIES, RANGES, SCALES, paper_experiments
@@ -178,34 +179,34 @@ def reproduce(
         raise DatabaseError(msg)
     settings = {
         "size": size,
-        "database": None if given is None else built_digest(given),
+        "database": None if given is None else City(given).digest,
         "queries": queries,
         "seed": seed,
         "versions": versions(),
     }
     QuerySpec(seeds=(seed,))  # looks at the seed
     check_workers(workers, None)
-    city = None if given is None else open_database(given)
+    city = None if given is None else City(given)
     if city is not None:
-        _check_queries(queries, city)
+        _check_queries(queries, city.database)
     RUN.begin(folder, settings)
-    file = given or begun.city(CITIES[size])
     if city is None:
-        city = open_database(file)
-        _check_queries(queries, city)
-    count = queries or min(QUERIES if size == "full" else SMALL_QUERIES, len(city))
-    ranges = begun.ranges(file, city)
-    scales = begun.scales(city)
-    found = _experiments(begun, file, ranges, scales, queries=count, seed=seed, workers=workers)
-    counts = None
-    if store_path(file).is_dir():
-        counts = open_store(file).objects.class_counts
+        city = City(begun.city(CITIES[size]))
+        _check_queries(queries, city.database)
+    opened = city.database
+    count = queries or min(QUERIES if size == "full" else SMALL_QUERIES, len(opened))
+    ranges = begun.ranges(city)
+    scales = begun.scales(opened)
+    found = _experiments(
+        begun, city.path, ranges, scales, queries=count, seed=seed, workers=workers
+    )
+    counts = city.store.objects.class_counts if city.has_store else None
     return Reproduction(
-        database=city,
-        summary=database_summary(city, file_bytes=file.stat().st_size, object_counts=counts),
+        database=opened,
+        summary=database_summary(opened, file_bytes=city.bytes, object_counts=counts),
         variants={r: database_summary(open_database(path)) for r, path in ranges.items()},
         experiments=found,
-        seconds=begun.times(city),
+        seconds=begun.times(opened),
         settings={
             "size": size,
             "database": "a made-up city" if given is None else given.name,
@@ -278,22 +279,23 @@ class _Begun:
             save_with_store(database, ObjectStore.of(objects, streets=streets.table), file)
         return file
 
-    def ranges(self, file: Path, city: SignatureDatabase) -> dict[float, Path]:
+    def ranges(self, city: City) -> dict[float, Path]:
         """Return databases of the other visibility ranges."""
-        wanted = [radius for radius in RANGES if radius != city.spec.radius]
-        if not store_path(file).is_dir():
+        spec = city.database.spec
+        wanted = [radius for radius in RANGES if radius != spec.radius]
+        if not city.has_store:
             return {}
         found = {radius: self.folder / VARIANTS / f"range-{radius:g}.parquet" for radius in wanted}
         left = {radius: path for radius, path in found.items() if not path.is_file()}
         if not left:
             return found
-        store = open_store(file)
+        store = city.store
         for radius, path in left.items():
             database = build_database(
                 store.objects,
-                grid=city.grid,
-                spec=replace(city.spec, radius=radius),
-                viewpoints=city.viewpoints,
+                grid=city.database.grid,
+                spec=replace(spec, radius=radius),
+                viewpoints=city.database.viewpoints,
                 footprints=store.footprints,
                 streets=store.streets,
                 progress=self.progress(f"building for a visibility range of {radius:g} m"),

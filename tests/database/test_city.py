@@ -1,4 +1,4 @@
-"""Columns that are put into databases: there whole or not at all, and nothing else changes."""
+"""Cities: a database and what lies beside it, and columns put in whole or not at all."""
 
 from __future__ import annotations
 
@@ -15,14 +15,8 @@ from sentences import assert_sentence
 from worlds import assert_same, random_town
 
 from semsig_gis.core.errors import DatabaseError, InputError
-from semsig_gis.database.file import (
-    add_columns,
-    built_digest,
-    has_added,
-    open_database,
-    read_added,
-    save_database,
-)
+from semsig_gis.database.city import City, open_city
+from semsig_gis.database.file import PartitionedDatabase, built_digest, open_database, save_database
 from semsig_gis.database.parts import MANIFEST, digest, part_files
 from semsig_gis.database.store import ObjectStore, open_store, save_with_store
 from semsig_gis.database.tiles import TileSpec, build_tiles
@@ -49,41 +43,81 @@ def city(request: pytest.FixtureRequest, tmp_path: Path) -> Path:
     return tmp_path / "city"
 
 
+# --- What lies beside a database ------------------------------------------------------------------
+
+
+def test_a_city_is_the_database_and_what_lies_beside_it(tmp_path: Path) -> None:
+    path = tmp_path / "city.parquet"
+    save_with_store(CITY, ObjectStore.of(WORLD.street_objects), path)
+    city = open_city(str(path))
+    assert_same(city.database, CITY)
+    assert city.dataset is city.database
+    assert city.licenses == CITY.licenses
+    assert (city.files, city.bytes, city.digest) == ((path,), path.stat().st_size, digest(path))
+    assert city.has_store
+    assert city.store is city.store
+    assert city.object_counts == WORLD.street_objects.class_counts
+    shutil.rmtree(city.store_path)
+    city = open_city(path)
+    assert not city.has_store
+    assert city.objects is None
+    assert city.object_counts is None
+    with pytest.raises(DatabaseError, match="has no object store"):
+        _ = city.store
+
+
+def test_a_city_in_parts_is_opened_whole_or_in_parts(city: Path) -> None:
+    opened = open_city(city)
+    assert_same(opened.database, CITY)
+    assert isinstance(opened.dataset, PartitionedDatabase) == city.is_dir()
+    assert len(opened.dataset) == len(CITY)
+    if city.is_dir():
+        assert opened.files == part_files(city)
+        assert opened.bytes == sum(file.stat().st_size for file in city.iterdir())
+        assert opened.digest == digest(*opened.files)
+
+
+# --- Columns that are put into a database ---------------------------------------------------------
+
+
 def columns(database: SignatureDatabase = CITY, *, times: float = 1.0) -> pa.Table:
     numbers = np.arange(len(database)) * times
     return pa.table({"number": numbers, "maybe": pa.array(numbers.astype(int), mask=numbers < 9)})
 
 
 def put(path: Path, table: pa.Table, *, name: str = "numbers", facts: Any = None) -> None:  # noqa: ANN401
-    add_columns(path, table, cell_ids=CITY.cell_ids, name=name, facts=facts or {"made": "up"})
+    City(path).put_columns(name, table, cell_ids=CITY.cell_ids, facts=facts or {"made": "up"})
+
+
+def columns_of(path: Path, name: str = "numbers") -> tuple[pa.Table, dict[str, Any]]:
+    stored = City(path).columns(name)
+    assert stored is not None
+    return stored
 
 
 def test_columns_come_back_beside_signatures_that_stay(city: Path) -> None:
-    assert read_added(city, name="numbers") == (None, None)
-    assert not has_added(city)
+    assert City(city).columns("numbers") is None
+    assert not City(city).has_columns
     before = open_database(city)
     put(city, columns())
-    table, facts = read_added(city, name="numbers")
-    assert table is not None
+    table, facts = columns_of(city)
     assert facts == {"made": "up"}
     assert table["cell_id"].to_numpy().tolist() == CITY.cell_ids.tolist()
     assert table.drop_columns(["cell_id"]).combine_chunks().equals(columns().combine_chunks())
-    assert has_added(city)
+    assert City(city).has_columns
     assert_same(open_database(city), before)
-    assert read_added(city, name="others") == (None, None)
+    assert City(city).columns("others") is None
 
 
 def test_columns_of_one_name_replace_each_other(city: Path) -> None:
     put(city, columns())
     put(city, pa.table({"other": np.ones(len(CITY))}), name="ones")
     put(city, columns(times=3.0).drop_columns(["maybe"]), facts={"times": 3})
-    table, facts = read_added(city, name="numbers")
-    assert table is not None
+    table, facts = columns_of(city)
     assert table.column_names == ["cell_id", "number"]
     assert table["number"].to_numpy().tolist() == (np.arange(len(CITY)) * 3.0).tolist()
     assert facts == {"times": 3}
-    ones, _ = read_added(city, name="ones")
-    assert ones is not None
+    ones, _ = columns_of(city, "ones")
     assert ones["other"].to_numpy().sum() == len(CITY)
 
 
@@ -125,7 +159,7 @@ def test_a_store_still_belongs_to_its_database(tmp_path: Path) -> None:
         assert len(store.objects) == len(WORLD.street_objects)
     # What is built anew has another digest, and no columns.
     save_with_store(CITY, ObjectStore.of(WORLD.street_objects), path)
-    assert not has_added(path)
+    assert not City(path).has_columns
     save_database(CITY.select(slice(0, 9)), path)
     with pytest.raises(DatabaseError, match="belongs to another database"):
         open_store(path, tmp_path / "elsewhere")
@@ -162,9 +196,9 @@ def test_an_end_on_the_way_leaves_what_was_there(
 def test_other_cells_are_refused(city: Path) -> None:
     some = CITY.select(np.arange(5, len(CITY)))
     with pytest.raises(DatabaseError) as caught:
-        add_columns(city, columns(some), cell_ids=some.cell_ids, name="numbers", facts={})
+        City(city).put_columns("numbers", columns(some), cell_ids=some.cell_ids, facts={})
     assert_sentence(caught.value, "other cells", "open the database again")
-    assert not has_added(city)
+    assert not City(city).has_columns
 
 
 def test_parts_that_do_not_agree_are_told(tmp_path: Path) -> None:
@@ -178,14 +212,21 @@ def test_parts_that_do_not_agree_are_told(tmp_path: Path) -> None:
     manifest["parts"][1] |= {"bytes": one.stat().st_size, "sha256": digest(one)}
     (tmp_path / "city" / MANIFEST).write_text(json.dumps(manifest))
     with pytest.raises(DatabaseError) as caught:
-        read_added(tmp_path / "city", name="numbers")
+        City(tmp_path / "city").columns("numbers")
     assert_sentence(caught.value, "do not agree on their numbers")
 
 
 def test_what_is_no_database_is_told(tmp_path: Path) -> None:
-    for act in (has_added, lambda path: read_added(path, name="numbers")):
+    nowhere = City(tmp_path / "nowhere.parquet")
+    for act in (
+        lambda: open_city(nowhere.path),
+        lambda: nowhere.database,
+        lambda: nowhere.digest,
+        lambda: nowhere.has_columns,
+        lambda: nowhere.columns("numbers"),
+    ):
         with pytest.raises(DatabaseError) as caught:
-            act(tmp_path / "nowhere.parquet")
+            act()
         assert_sentence(caught.value, "nowhere.parquet does not exist")
     text = tmp_path / "text.parquet"
     text.write_text("no database")

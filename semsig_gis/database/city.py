@@ -1,0 +1,293 @@
+"""A city: a signature database with what lies beside its file, opened as one thing."""
+
+from __future__ import annotations
+
+import json
+import os
+import zlib
+from dataclasses import replace
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Protocol
+
+import numpy as np
+import pyarrow as pa
+
+from semsig_gis.core.errors import DatabaseError
+from semsig_gis.database.file import (
+    BUILT_DIGEST,
+    KIND,
+    built_digest,
+    open_database,
+    open_dataset,
+)
+from semsig_gis.database.parts import Manifest, digest, part_files, read_manifest
+from semsig_gis.database.store import open_store, store_path
+from semsig_gis.storage.geoparquet import read_geoparquet, write_geoparquet
+from semsig_gis.storage.whole import whole_folder
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from semsig_gis.database.database import SignatureDatabase
+    from semsig_gis.database.file import PartitionedDatabase
+    from semsig_gis.database.store import ObjectStore
+    from semsig_gis.objects.table import StreetObjects
+
+ADDED = "added"
+GEOMETRY = "geometry"
+
+
+class Model(Protocol):
+    """A noise model, as far as it names the file of its likelihood index."""
+
+    @property
+    def name(self) -> str:
+        """Its name."""
+        ...
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return what tells it from other models, as plain values for JSON."""
+        ...
+
+
+class City:
+    """A signature database with what lies beside its file; made by `open_city`.
+
+    Each part is opened when it is first looked at, and then kept.
+
+    Parameters
+    ----------
+    path : str or Path
+        File of the database, or folder of its parts.
+
+    Attributes
+    ----------
+    path : Path
+        Where the database is.
+
+    Examples
+    --------
+    >>> from semsig_gis.database.store import ObjectStore, save_with_store
+    >>> import tempfile
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     store = ObjectStore.of(demo_objects)
+    ...     save_with_store(demo_database, store, f"{folder}/city.parquet")
+    ...     city = open_city(f"{folder}/city.parquet")
+    ...     len(city.database) == len(demo_database), len(city.store.objects) == len(demo_objects)
+    (True, True)
+    """
+
+    def __init__(self, path: str | Path) -> None:
+        self.path = Path(path)
+
+    @cached_property
+    def database(self) -> SignatureDatabase:
+        """The whole database (see `open_database`)."""
+        return open_database(self.path)
+
+    @cached_property
+    def dataset(self) -> SignatureDatabase | PartitionedDatabase:
+        """The database; in parts, where it lies in parts (see `open_dataset`)."""
+        return open_dataset(self.path) if self._is_folder else self.database
+
+    @property
+    def licenses(self) -> tuple[str, ...]:
+        """Attribution and licence of each source."""
+        return self.database.licenses
+
+    @property
+    def files(self) -> tuple[Path, ...]:
+        """The file of the database, or those of its parts.
+
+        Raises
+        ------
+        DatabaseError
+            If one is missing, or is not the part that was built.
+        """
+        if self._is_folder:
+            return part_files(self.path)
+        if not os.path.isfile(self.path):  # noqa: PTH113 - it answers where Path.is_file raises
+            msg = f"{self.path} does not exist; give a signature database file."
+            raise DatabaseError(msg)
+        return (self.path,)
+
+    @property
+    def bytes(self) -> int:
+        """Size of the file, or of all files in the folder."""
+        files = self.path.iterdir() if self._is_folder else [self.path]
+        return sum(file.stat().st_size for file in files)
+
+    @property
+    def digest(self) -> str:
+        """SHA-256 digest of the database; columns that were put into its file do not change it."""
+        files = self.files
+        return built_digest(*files) if len(files) == 1 else digest(*files)
+
+    @property
+    def store_path(self) -> Path:
+        """The folder of the object store, whether it is there or not."""
+        return store_path(self.path)
+
+    @property
+    def has_store(self) -> bool:
+        """Whether an object store lies beside the database."""
+        return self.store_path.is_dir()
+
+    @cached_property
+    def store(self) -> ObjectStore:
+        """The object store.
+
+        Raises
+        ------
+        DatabaseError
+            If it is missing or damaged, or belongs to another database.
+        """
+        return open_store(self.path)
+
+    @property
+    def objects(self) -> StreetObjects | None:
+        """The objects that the database was built from; None where its store cannot be used."""
+        try:
+            return self.store.objects
+        except DatabaseError:
+            return None
+
+    @property
+    def object_counts(self) -> dict[int, int] | None:
+        """How many objects there are by class code; None where the store cannot be used."""
+        return None if self.objects is None else self.objects.class_counts
+
+    def index_path(self, noise: Model) -> Path:
+        """Return the path of the likelihood index for a noise model, to give to `ready_index`.
+
+        For ``city.parquet`` and generic noise that is ``city.parquet.generic-8d47.likelihood``.
+        """
+        content = json.dumps(noise.to_dict(), sort_keys=True)
+        plain = "".join(letter if letter.isalnum() else "_" for letter in noise.name)
+        mark = f"{zlib.crc32(content.encode()) & 0xFFFF:04x}"
+        return self.path.with_name(f"{self.path.name}.{plain}-{mark}.likelihood")
+
+    @property
+    def has_columns(self) -> bool:
+        """Whether columns were put into the file, or the first part."""
+        return bool(_specs(self.files[0]).get(ADDED))
+
+    def columns(self, name: str) -> tuple[pa.Table, dict[str, Any]] | None:
+        """Return columns that were put into the database under a name, and their facts.
+
+        The table has ``cell_id``, ascending, and the columns.
+
+        Raises
+        ------
+        DatabaseError
+            If the database is missing or damaged, or its parts do not agree on the columns.
+        """
+        files = self.files
+        entries = [_specs(file).get(ADDED, {}).get(name) for file in files]
+        if not any(entries):
+            return None
+        if any(entry != entries[0] for entry in entries):
+            msg = f"the parts of {self.path} do not agree on their {name}; work it out again."
+            raise DatabaseError(msg)
+        names = ["cell_id", *entries[0]["columns"]]
+        tables = [read_geoparquet(file, kind=KIND, columns=names)[0] for file in files]
+        return pa.concat_tables(tables).sort_by("cell_id"), dict(entries[0]["facts"])
+
+    def put_columns(
+        self, name: str, columns: pa.Table, *, cell_ids: NDArray[np.int64], facts: dict[str, Any]
+    ) -> None:
+        """Put columns into the database, in the place of those that bear this name.
+
+        `columns` has a row for each of `cell_ids`, which ascend and are all cells of the database.
+        `facts` describe the columns, as plain values for JSON. The file, or the folder of parts, is
+        replaced as a whole.
+
+        Raises
+        ------
+        DatabaseError
+            If the database is damaged or has other cells; it is unchanged then.
+        InputError
+            If it cannot be written; it is unchanged then.
+        """
+        added = {name: {"columns": columns.column_names, "facts": facts}}
+        if not self._is_folder:
+            _extend(self.path, self.path, columns, cell_ids, added)
+            return
+        files, manifest = self.files, read_manifest(self.path)
+        with whole_folder(self.path) as partial:
+            parts = []
+            for file, part in zip(files, manifest.parts, strict=True):
+                new = partial / file.name
+                _extend(file, new, columns, cell_ids, added)
+                parts.append(replace(part, bytes=new.stat().st_size, sha256=digest(new)))
+            Manifest(manifest.recipe, tuple(parts)).write(partial)
+
+    @property
+    def _is_folder(self) -> bool:
+        return os.path.isdir(self.path)  # noqa: PTH112 - it answers where Path.is_dir raises
+
+
+def open_city(path: str | Path) -> City:
+    """Open a signature database with all that lies beside its file.
+
+    Parameters
+    ----------
+    path : str or Path
+        File of the database, or folder of its parts.
+
+    Returns
+    -------
+    City
+        The city; each part of it is read when it is first looked at.
+
+    Raises
+    ------
+    DatabaseError
+        If there is no such file or folder.
+
+    Examples
+    --------
+    >>> open_city("nowhere.parquet")
+    Traceback (most recent call last):
+    ...
+    semsig_gis.core.errors.DatabaseError: nowhere.parquet does not exist;
+    give a signature database file.
+    """
+    if not os.path.exists(path):  # noqa: PTH110 - it answers where Path.exists raises
+        msg = f"{path} does not exist; give a signature database file."
+        raise DatabaseError(msg)
+    return City(path)
+
+
+def _specs(file: Path) -> dict[str, Any]:
+    return read_geoparquet(file, kind=KIND, columns=[])[1]
+
+
+def _extend(
+    path: Path,
+    out: Path,
+    columns: pa.Table,
+    cell_ids: NDArray[np.int64],
+    added: dict[str, Any],
+) -> None:
+    """Write the file of a database, or of a part of it, with columns put into it."""
+    table, specs, _ = read_geoparquet(path, kind=KIND)
+    cells = table["cell_id"].to_numpy()
+    rows = np.minimum(np.searchsorted(cell_ids, cells), len(cell_ids) - 1)
+    if not np.array_equal(cell_ids[rows], cells):
+        msg = f"{path} has other cells than those that were looked at; open the database again."
+        raise DatabaseError(msg)
+    before = specs.get(ADDED, {})
+    replaced = [name for one in before.keys() & added for name in before[one]["columns"]]
+    # The geometry stays the last column.
+    geometry = table[GEOMETRY]
+    table = table.drop_columns([*replaced, GEOMETRY])
+    for column in columns.column_names:
+        table = table.append_column(column, columns[column].take(rows))
+    write_geoparquet(
+        table.append_column(GEOMETRY, geometry),
+        out,
+        geo=json.loads(table.schema.metadata[b"geo"]),
+        specs={**specs, BUILT_DIGEST: built_digest(path), ADDED: before | added},
+    )
