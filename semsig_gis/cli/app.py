@@ -31,12 +31,8 @@ app = typer.Typer(
     rich_markup_mode=None,
 )
 
-
 Database = Annotated[Path, typer.Argument(help="Signature database written by `semsig build`.")]
-
-
 AsJson = Annotated[bool, typer.Option("--json", help="Print JSON instead of tables.")]
-
 
 MethodText = Annotated[
     str,
@@ -48,13 +44,8 @@ MethodText = Annotated[
     ),
 ]
 
-
 Workers = Annotated[int, typer.Option(help="Number of processes on this machine.")]
-
-
 Scheduler = Annotated[str | None, typer.Option(help="Dask scheduler, as tcp://HOST:PORT.")]
-
-
 LIKELIHOOD = "likelihood"
 """What `--method` says for the likelihood method."""
 

@@ -54,7 +54,6 @@ def _interrupt_at_end_of(watched: int) -> None:
 # A bar appears for work that takes longer than this.
 PATIENCE_S = 2.0
 
-
 # Whole numbers from here on are identifiers, which read better without separators.
 LARGEST_COUNT = 10**9
 

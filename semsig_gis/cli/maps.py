@@ -28,12 +28,10 @@ if TYPE_CHECKING:
 
 AROUND_M = 100.0
 
-
 Buildings = Annotated[
     Path | None,
     typer.Option(help="Footprints to draw below the map; default: those of the database."),
 ]
-
 
 Streets = Annotated[
     Path | None,

@@ -12,13 +12,9 @@ if TYPE_CHECKING:
 # Blue and orange of Okabe and Ito, which colour-blind people tell apart.
 SUCCESSFUL, FAILED = "#0072b2", "#e69f00"
 
-
 # Both ramps change their lightness steadily, so that the hue does not matter.
 ERROR_RAMP = ("#fde0dd", "#fa9fb5", "#dd3497", "#7a0177")
-
-
 CANDIDATE_RAMP = ("#31688e", "#35b779", "#fde725")  # of which none is lost in the dark
-
 
 # Ten steps of viridis, whose lightness rises steadily.
 FOUND_RAMP = (

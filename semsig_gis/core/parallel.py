@@ -137,9 +137,11 @@ def _client(workers: int, scheduler: str | None) -> Iterator[Client]:
             stack.enter_context(where)
         try:
             client = Client(where, timeout=PATIENCE_S, set_as_default=False)
-        except (OSError, ValueError) as error:
+        except Exception as error:  # on a loaded machine, dask fails in ways of its own
             msg = (
-                f"the scheduler {scheduler} cannot be reached; give the address that `dask "
+                f"{workers} processes could not be started; ask for fewer, or try again."
+                if scheduler is None
+                else f"the scheduler {scheduler} cannot be reached; give the address that `dask "
                 "scheduler` printed, such as tcp://10.0.0.5:8786."
             )
             raise InputError(msg) from error

@@ -142,38 +142,22 @@ def _near(
 
 
 NAME = "rtree"
-
-
 TREE_FILES = (f"{NAME}.dat", f"{NAME}.idx")
-
-
 NUMBERS_FILE = f"{NAME}.npy"
-
-
 INDEX_FILES = (*TREE_FILES, NUMBERS_FILE)
-
 
 # A node that falls below half of this is dissolved, and its points are put in again: with the
 # 100 of libspatialindex a deletion takes ten times as long.
 NODE_CAPACITY = 32
-
-
 NODE_FILL = 0.5
-
-
 PAGE_BYTES = 1024
-
 
 # An edit takes as long as packing this many points anew.
 POINTS_AN_EDIT = 256
 
-
 # Three times what an edit makes a tree grow by, and what any edit may.
 EDIT_BYTES = 256
-
-
 EDITS_BYTES = 1 << 16
-
 
 # So few edits are quick in any case.
 FEW_EDITS = 1000

@@ -130,23 +130,9 @@ class Signature:
         return 0 if part is None else len(part)
 
     def to_dict(self, taxonomy: Taxonomy) -> dict[str, Any]:
-        """Return the signature as plain values that JSON can hold.
+        """Return ``types`` (symbols), ``bearings`` (degrees) and ``length``, ready for JSON.
 
-        Parameters
-        ----------
-        taxonomy : Taxonomy
-            Classes of the codes.
-
-        Returns
-        -------
-        dict
-            ``types`` (symbols) and ``bearings`` (degrees), None where unknown, and ``length``.
-
-        Examples
-        --------
-        >>> from semsig_gis.sources.catalog import paper_taxonomy
-        >>> Signature(np.array([3, 1], np.uint8), None).to_dict(paper_taxonomy())
-        {'types': 'DB', 'bearings': None, 'length': 2}
+        A part that is unknown is None.
         """
         return {
             "types": None if self.codes is None else taxonomy.decode(self.codes),
@@ -155,23 +141,7 @@ class Signature:
         }
 
     def levels(self, levels: int) -> NDArray[np.uint8]:
-        """Return the angle levels.
-
-        Parameters
-        ----------
-        levels : int
-            Number Q of levels.
-
-        Returns
-        -------
-        ndarray of uint8, shape (n,)
-            Level of each bearing.
-
-        Raises
-        ------
-        InputError
-            If the bearings are unknown.
-        """
+        """Return the angle level of each bearing, shape (n,); InputError where they are unknown."""
         if self.bearings is None:
             msg = "the query has no bearings; give them, or use a method on types."
             raise InputError(msg)

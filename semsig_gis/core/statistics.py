@@ -105,17 +105,9 @@ def _deviations(percent: float) -> float:
 
 
 DEGREE = 3
-
-
 RIDGE = 1e-3  # keeps a power that tells nothing from growing
-
-
 STEPS = 100
-
-
 SETTLED = 1e-9
-
-
 LARGEST = 30.0  # logits beyond it are as good as certain
 
 

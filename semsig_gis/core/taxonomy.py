@@ -122,79 +122,25 @@ class Taxonomy:
 
     @classmethod
     def from_list(cls, items: Iterable[Mapping[str, Any]]) -> Taxonomy:
-        """Make a taxonomy from plain mappings, the inverse of `to_list`.
-
-        Parameters
-        ----------
-        items : iterable of mapping
-            Each with ``code``, ``symbol``, ``name`` and ``title``, and ``range_m`` where the
-            class has a range of its own.
-
-        Returns
-        -------
-        Taxonomy
-            The classes, checked.
-        """
+        """Make a taxonomy from plain mappings, the inverse of `to_list`."""
         return cls(tuple(ObjectClass(**item) for item in items))
 
     def to_list(self) -> list[dict[str, Any]]:
-        """Return the classes as plain mappings, ready for JSON.
-
-        Returns
-        -------
-        list of dict
-            One mapping a class.
-        """
+        """Return the classes as plain mappings, ready for JSON; what is not set is left out."""
         return [
             {key: value for key, value in asdict(item).items() if value is not None}
             for item in self.classes
         ]
 
     def extended(self, classes: Iterable[ObjectClass]) -> Taxonomy:
-        """Return a taxonomy with further classes.
-
-        Parameters
-        ----------
-        classes : iterable of ObjectClass
-            Classes with codes, symbols and names that are still free.
-
-        Returns
-        -------
-        Taxonomy
-            This taxonomy's classes, then the new ones.
-
-        Raises
-        ------
-        CatalogError
-            If a code, symbol or name is taken.
-        """
+        """Return a taxonomy with further classes, whose codes, symbols and names are free."""
         return Taxonomy((*self.classes, *classes))
 
     def with_ranges(self, ranges: Mapping[str, float]) -> Taxonomy:
-        """Return a taxonomy in which some classes are seen from another distance.
+        """Return a taxonomy in which some classes, by name, are seen from so many metres.
 
-        Parameters
-        ----------
-        ranges : mapping of str to float
-            Names of classes, and from how far each is seen in metres.
-
-        Returns
-        -------
-        Taxonomy
-            The same classes; those that are not named keep the range they have, if any.
-
-        Raises
-        ------
-        UnknownNameError
-            If there is no class of a name; the nearest is offered.
-        CatalogError
-            If a range is not above 0, or is too large.
-
-        Examples
-        --------
-        >>> stops = Taxonomy((ObjectClass(11, "M", "bus_stop", "Bus stop"),))
-        >>> stops.with_ranges({"bus_stop": 50.0}).ranges(30.0)[11]
-        np.float64(50.0)
+        The others keep the range they have, if any. UnknownNameError where there is no class of a
+        name, CatalogError where a range is not above 0 or too large.
         """
         for name in ranges:
             self.by_name(name)
@@ -206,23 +152,7 @@ class Taxonomy:
         )
 
     def by_name(self, name: str) -> ObjectClass:
-        """Return the class of that name.
-
-        Parameters
-        ----------
-        name : str
-            Identifier of the class.
-
-        Returns
-        -------
-        ObjectClass
-            The class.
-
-        Raises
-        ------
-        UnknownNameError
-            If there is none; the nearest name is offered.
-        """
+        """Return the class of a name; UnknownNameError offers the nearest where there is none."""
         for item in self.classes:
             if item.name == name:
                 return item
@@ -234,23 +164,7 @@ class Taxonomy:
         raise UnknownNameError(msg)
 
     def by_code(self, code: int) -> ObjectClass:
-        """Return the class of that code.
-
-        Parameters
-        ----------
-        code : int
-            Code of the class.
-
-        Returns
-        -------
-        ObjectClass
-            The class.
-
-        Raises
-        ------
-        UnknownNameError
-            If there is none.
-        """
+        """Return the class of a code; UnknownNameError where there is none."""
         for item in self.classes:
             if item.code == code:
                 return item
@@ -258,46 +172,16 @@ class Taxonomy:
         raise UnknownNameError(msg)
 
     def by_symbol(self, symbol: str) -> ObjectClass:
-        """Return the class of that symbol.
-
-        Parameters
-        ----------
-        symbol : str
-            One character.
-
-        Returns
-        -------
-        ObjectClass
-            The class.
-
-        Raises
-        ------
-        UnknownNameError
-            If there is none.
-        """
+        """Return the class of a symbol; UnknownNameError where there is none."""
         for item in self.classes:
             if item.symbol == symbol:
                 return item
         raise self._unknown_symbol(symbol)
 
     def encode(self, symbols: str) -> NDArray[np.uint8]:
-        """Turn symbols into class codes.
+        """Turn symbols such as ``"DDBL"`` into class codes, shape (n,), with `WILDCARD` for ``?``.
 
-        Parameters
-        ----------
-        symbols : str
-            A type sequence such as ``"DDBL"``, of n characters; ``?`` is an object of unknown
-            class.
-
-        Returns
-        -------
-        ndarray of uint8, shape (n,)
-            One code a symbol; `WILDCARD` for ``?``.
-
-        Raises
-        ------
-        UnknownNameError
-            If a symbol belongs to no class.
+        UnknownNameError if a symbol belongs to no class.
         """
         codes = {item.symbol: item.code for item in self.classes}
         codes["?"] = WILDCARD
@@ -312,18 +196,7 @@ class Taxonomy:
         return UnknownNameError(f"symbol {symbol!r} is unknown{near}; the symbols are {legend}.")
 
     def decode(self, codes: ArrayLike) -> str:
-        """Turn class codes into symbols, the inverse of `encode`.
-
-        Parameters
-        ----------
-        codes : array_like of int, shape (n,)
-            Codes of classes in this taxonomy.
-
-        Returns
-        -------
-        str
-            One symbol a code.
-        """
+        """Turn class codes, shape (n,), into symbols, the inverse of `encode`."""
         return self.symbol_bytes[np.asarray(codes, dtype=np.uint8)].tobytes().decode("ascii")
 
     @functools.cached_property
@@ -336,17 +209,9 @@ class Taxonomy:
         return table
 
     def ranges(self, radius: float) -> NDArray[np.float64]:
-        """Return from how far each class is seen.
+        """Return from how far each class code is seen, in metres, shape (256,).
 
-        Parameters
-        ----------
-        radius : float
-            Visibility range in metres of classes without one of their own.
-
-        Returns
-        -------
-        ndarray of float64, shape (256,)
-            Metres by class code; `radius` where there is no class.
+        `radius` is for classes without a range of their own, and where there is no class.
         """
         table = np.full(MAX_CODE + 1, float(radius))
         for item in self.classes:

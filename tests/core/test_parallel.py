@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import os
 import signal
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import pytest
 from sentences import assert_sentence
 
 from semsig_gis import __version__
-from semsig_gis.core import parallel as workers
+from semsig_gis.core import parallel as parallel
 from semsig_gis.core.errors import InputError
 from semsig_gis.core.parallel import Outcome, check_workers, run_tasks
 
@@ -75,11 +75,30 @@ def test_a_scheduler_that_does_not_answer_is_named(
     address: str,
     capfd: pytest.CaptureFixture[str],
 ) -> None:
-    monkeypatch.setattr(workers, "PATIENCE_S", 0.3)
+    monkeypatch.setattr(parallel, "PATIENCE_S", 0.3)
     with pytest.raises(InputError) as caught:
         list(run_tasks(abs, [1], scheduler=address))
     assert_sentence(caught.value, address, "cannot be reached", "dask scheduler")
     assert capfd.readouterr() == ("", "")
+
+
+@pytest.mark.parametrize(
+    ("where", "words"),
+    [
+        ({"scheduler": "tcp://127.0.0.1:9"}, ("tcp://127.0.0.1:9", "cannot be reached")),
+        ({"workers": 2}, ("2 processes", "could not be started", "fewer")),
+    ],
+)
+def test_whatever_dask_raises_is_one_sentence(
+    monkeypatch: pytest.MonkeyPatch, where: dict[str, Any], words: tuple[str, ...]
+) -> None:
+    def fail(*_: object, **__: object) -> None:
+        raise AssertionError
+
+    monkeypatch.setattr("distributed.Client", fail)
+    with pytest.raises(InputError) as caught:
+        list(run_tasks(abs, [1], **where))
+    assert_sentence(caught.value, *words)
 
 
 def test_a_scheduler_without_workers_is_named() -> None:
@@ -116,7 +135,7 @@ def test_workers_that_see_something_else_are_named(
             raise ModuleNotFoundError(msg)
         return there
 
-    monkeypatch.setattr(workers, "_view", view)
+    monkeypatch.setattr(parallel, "_view", view)
     with pytest.raises(InputError) as caught:
         list(run_tasks(abs, [1], scheduler=cluster.scheduler_address, files=[tmp_path]))
     assert_sentence(caught.value, "the worker tcp://127.0.0.1", *words)
