@@ -10,7 +10,7 @@ import pytest
 from sentences import assert_sentence
 
 from semsig_gis import __version__
-from semsig_gis.core import parallel as parallel
+from semsig_gis.core import parallel
 from semsig_gis.core.errors import InputError
 from semsig_gis.core.parallel import Outcome, check_workers, run_tasks
 
