@@ -1,0 +1,26 @@
+semsig.arrays = async (packed) => {
+  const kinds = {
+    u1: Uint8Array, u2: Uint16Array, i4: Int32Array, f8: Float64Array,
+  };
+  const read = async ([kind, text]) => {
+    const bytes = Uint8Array.from(atob(text), (sign) => sign.charCodeAt(0));
+    const stream = new Blob([bytes]).stream().pipeThrough(new DecompressionStream("deflate"));
+    const response = new Response(stream);
+    if (kind === "json") return response.json();
+    if (kind !== "steps") return new kinds[kind](await response.arrayBuffer());
+    // The four bytes of all numbers one after the other; each number is what it is more than the
+    // one before.
+    const planes = new Uint8Array(await response.arrayBuffer());
+    const values = new Int32Array(planes.length / 4);
+    const size = values.length;
+    for (let at = 0, sum = 0; at < size; at += 1) {
+      sum += planes[at] | planes[at + size] << 8 | planes[at + 2 * size] << 16
+        | planes[at + 3 * size] << 24;
+      values[at] = sum;
+    }
+    return values;
+  };
+  const names = Object.keys(packed);
+  const arrays = await Promise.all(names.map((name) => read(packed[name])));
+  return Object.fromEntries(names.map((name, at) => [name, arrays[at]]));
+};

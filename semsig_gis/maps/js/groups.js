@@ -1,0 +1,62 @@
+semsig.told.groups = (city, cell) => {
+  const grid = city.grid;
+  const {"now.types": types, "now.levels": levels, "now.ends": ends} = city.data;
+  const [from, to] = city.part("now", cell);
+  const equal = (values, start) => {
+    for (let at = from; at < to; at += 1) {
+      if (values[at] !== values[start + at - from]) return false;
+    }
+    return true;
+  };
+  const alike = [];
+  const twins = [];
+  let start = 0;
+  for (let other = 0; other < city.count; other += 1) {
+    const end = ends[other];
+    if (end - start === to - from && equal(types, start)) {
+      alike.push(other);
+      if (equal(levels, start)) twins.push(other);
+    }
+    start = end;
+  }
+  const byDistance = (cells) => cells.filter((other) => other !== cell)
+    .map((other) => [city.metres(cell, other), other])
+    .sort((one, two) => one[0] - two[0]).map((one) => one[1]);
+  const goal = (other, hint) => [(hint === "farthest" ? "farthest: " : "")
+    + city.far(cell, other) + " "
+    + ["N", "NE", "E", "SE", "S", "SW", "W", "NW"][city.eighth(cell, other)], other, hint];
+  const jumps = (label, cells, sorted) => {
+    const at = cells.indexOf(cell);
+    const beside = (step) => cells[(at + step + cells.length) % cells.length];
+    const number = (value) => value.toLocaleString("en");
+    return [
+      [`${label}: ${number(at + 1)} of ${number(cells.length)}`,
+        [["\u2039", beside(-1), "previous, from the west"],
+          ["\u203a", beside(1), "next, from the west"]]],
+      ["", [...sorted.slice(0, 3).map((other) => goal(other, "near")),
+        ...sorted.slice(3).slice(-1).map((other) => goal(other, "farthest"))]],
+    ];
+  };
+  // The nearest ones, and some from everywhere.
+  const drawn = (sorted) => sorted.filter(
+    (_, at) => at < grid.near || at % Math.ceil(sorted.length / grid.dots) === 0);
+  const told = {
+    title: "Cells that look the same",
+    rows: [["It sees", city.signature("now", cell)]],
+    jumps: [],
+    dots: [],
+  };
+  for (const [label, cells, colour] of [
+    ["Same types", alike, grid.colours[0]],
+    ["Types and angle levels", twins, grid.colours[1]],
+  ].slice(0, alike.length)) {
+    if (cells.length === 1) {
+      told.rows.push([label, "no other cell"]);
+    } else {
+      const sorted = byDistance(cells);
+      told.jumps.push(...jumps(label, cells, sorted));
+      told.dots.push(...drawn(sorted).reverse().map((one) => [one, colour]));
+    }
+  }
+  return told;
+};

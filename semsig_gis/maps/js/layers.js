@@ -1,0 +1,89 @@
+window.semsig = {
+  // Fields that say what a thing is called; the search knows it by them, too.
+  naming: new Set(["Class", "Class before", "Seen as", "Street object", "Identifier"]),
+  points(fields, titles, records) {
+    const group = L.featureGroup();
+    const markers = [];
+    for (const [place, colour, radius, found, name, values, label] of records) {
+      const marker = L.circleMarker(place, {
+        pane: "markerPane", radius: radius, color: "#222", weight: 1,
+        fillColor: colour, fillOpacity: 0.95,
+      });
+      marker.bindPopup(() => semsig.details(name, fields, values, titles),
+        {maxWidth: 340, minWidth: 220});
+      if (label) {
+        const text = L.DomUtil.create("b", "");
+        text.textContent = label;
+        const look = {permanent: true, direction: "center", className: "semsig-number"};
+        marker.bindTooltip(text, look);
+      }
+      if (found !== null) {
+        const look = {pane: "shadowPane", interactive: false, color: "#d55e00", weight: 2};
+        const hint = L.layerGroup([
+          L.polyline([place, found[0]], {...look, dashArray: "5 5"}),
+          ...found.map((one, at) => L.circleMarker(one, {
+            ...look, radius: at ? 5 : 8, weight: at ? 1 : 2, fill: false,
+          })),
+        ]);
+        marker.on("popupopen", (event) => hint.addTo(event.popup._map));
+        marker.on("popupclose", () => hint.remove());
+      }
+      marker.addTo(group);
+      markers.push(marker);
+    }
+    const outline = () => group.setStyle({color: semsig.outline(group._map)});
+    group.on("add", () => {
+      group._map.on("semsig-colours", outline);
+      outline();
+    });
+    group.on("remove", () => group._map.off("semsig-colours", outline));
+    const named = [...fields.keys()].filter((at) => semsig.naming.has(fields[at]));
+    const hint = (values) => [...new Set(named.map((at) => values[at]))].filter(Boolean).join(", ");
+    let names = null;
+    semsig.finders.push((words, limit) => {
+      // What has a number is called by it alone, too.
+      names = names || records.map(([, , , , name, values]) => semsig.plain(
+        [name, /\d[\d,]*/.exec(name), ...named.map((at) => values[at])].join("\n")));
+      return semsig.matches(names, words, limit).map(({rank, at}) => ({
+        rank,
+        name: records[at][4],
+        hint: hint(records[at][5]),
+        show: (map) => {
+          semsig.reveal(map, group, markers[at].getLatLng());
+          markers[at].openPopup();
+        },
+      }));
+    });
+    return group;
+  },
+  lines(bundles) {
+    return L.featureGroup(bundles.map(([look, lines]) => L.polyline(lines, {
+      pane: "shadowPane", interactive: false, weight: 1, opacity: 0.6, ...look,
+    })));
+  },
+  drawings(parts) {
+    const group = L.featureGroup();
+    for (const [name, ...values] of parts) {
+      const part = semsig[name](...values);
+      part.semsigWhole = group;
+      part.addTo(group);
+    }
+    return group;
+  },
+  legend(map, text, view, zoom) {
+    const box = L.DomUtil.create("details", "semsig-legend");
+    box.open = !semsig.small.matches && !document.querySelector(".semsig-legend[open]");
+    box.setAttribute("name", "semsig-legend");  // one is open at a time
+    box.innerHTML = text;
+    L.DomEvent.disableClickPropagation(box);
+    L.DomEvent.disableScrollPropagation(box);
+    const control = L.control({position: "bottomleft"});
+    control.onAdd = () => box;
+    control.addTo(map);
+    // Cells have edges from near, and melt into each other from afar.
+    const close = () => map.getContainer().classList.toggle("semsig-close", map.getZoom() > 16);
+    map.on("zoomend", close);
+    close();
+    if (view !== null) map.semsigView = {view, zoom};
+  },
+};

@@ -1,0 +1,35 @@
+semsig.told.lookalikes = (city, cell) => {
+  const {data, grid} = city;
+  const percent = (steps) => {
+    const value = 100 * steps / grid.chances;
+    return value < 1 ? "below 1 %" : value > 99 ? "above 99 %" : `${Math.round(value)} %`;
+  };
+  const bits = data.bits[cell] / grid.bits;
+  const like = Number((2 ** bits).toPrecision(2));
+  const rows = [
+    [`Found within ${grid.radius} m`, percent(data.found[cell])],
+    ["Chance given", percent(data.itself[cell]) + " to this cell, " + percent(data.near[cell])
+      + " to all within " + grid.radius + " m"],
+    ["Looks like", "about " + like.toLocaleString("en") + (like === 1 ? " cell (" : " cells (")
+      + bits.toFixed(1) + " bits are left)"],
+  ];
+  const marks = [];
+  for (let at = cell * grid.places; at < (cell + 1) * grid.places; at += 1) {
+    const other = data.lookalikes[at];
+    if (other < 0) continue;
+    marks.push(other);
+    const types = city.types("now", other);
+    const towards = ["north", "north-east", "east", "south-east", "south", "south-west", "west",
+      "north-west"][city.eighth(cell, other)];
+    rows.push([`Taken for ${marks.length}`, percent(data.lookalikeChances[at]) + ": "
+      + city.far(cell, other) + " to the " + towards
+      + ", sees " + (types.length > 16 ? `${types.slice(0, 16)}\u2026` : types)]);
+  }
+  const helpers = [];
+  for (let at = cell * grid.helpers; at < (cell + 1) * grid.helpers; at += 1) {
+    const gain = 100 * data.gains[at] / grid.chances;
+    if (gain >= 1) helpers.push(`${grid.classes[data.helpers[at]]} +${Math.round(gain)} %`);
+  }
+  if (helpers.length) rows.push(["Helped by", helpers.join(", ")]);
+  return {title: "A query from here", rows, marks};
+};

@@ -1,0 +1,193 @@
+semsig.held = {};
+// Street objects of all classes on one canvas; `classLayer` switches a class on and off.
+semsig.streetObjects = (key, packed, about) => {
+  const {classes, sources, fields} = about;
+  const shown = new Set();
+  const chunk = 256;
+  let data = null;
+  let board = null;
+  let layers = [];
+  const sprites = {};
+  semsig.arrays(packed).then((arrays) => {
+    data = arrays;
+    for (const one of classes) {
+      const starts = [];
+      for (let at = one.start; at < one.end; at += chunk) starts.push(at);
+      starts.push(one.end);
+      one.starts = starts;
+      one.boxes = semsig.blocks(data.x, data.y, starts);
+    }
+    data.names = data.ids.map(semsig.plain);
+    if (board) board.redraw();
+  });
+  // What is near enough to be told apart has its shape, and from nearer its letter.
+  const sizes = [[12, 1], [13.5, 1.5], [15, 2.2], [16.5, 4], [17.5, 6], [19, 8], [Infinity, 10]];
+  const sizeAt = (zoom) => sizes.find(([below]) => zoom < below)[1];
+  // The pixels of a sign that are not clear: how far right and down, and colour.
+  const spriteOf = (number, size, dark, dots) => {
+    const name = [number, size, dark, dots].join();
+    if (sprites[name]) return sprites[name];
+    const {outline, colour, ink, symbol, drop} = classes[number];
+    const half = Math.ceil((1.3 * size + 1) * dots);
+    const canvas = document.createElement("canvas");
+    canvas.width = canvas.height = 2 * half;
+    const ctx = canvas.getContext("2d");
+    ctx.translate(half, half);
+    ctx.scale(size * dots, size * dots);
+    const path = new Path2D(outline);
+    ctx.fillStyle = colour;
+    ctx.fill(path);
+    if (size >= 4) {
+      ctx.lineWidth = 1 / size;
+      const bright = ink === "#000000";
+      ctx.strokeStyle = dark ? "#131518" : bright ? "#444" : "#fff";
+      ctx.stroke(path);
+    }
+    if (size >= 8) {
+      ctx.font = "bold 1.2px system-ui, sans-serif";
+      ctx.textAlign = "center";
+      ctx.fillStyle = ink;
+      ctx.fillText(symbol, 0, drop + 0.42);
+    }
+    const colours = new Uint32Array(ctx.getImageData(0, 0, 2 * half, 2 * half).data.buffer);
+    const found = [...colours.keys()].filter((at) => colours[at] >>> 24 > 40);
+    sprites[name] = {
+      right: Int16Array.from(found, (at) => at % (2 * half) - half),
+      down: Int16Array.from(found, (at) => Math.floor(at / (2 * half)) - half),
+      colour: Uint32Array.from(found, (at) => colours[at]),
+    };
+    return sprites[name];
+  };
+  // Half of one colour and half of another.
+  const mixed = (one, other) => (((one ^ other) & 0xfefefefe) >>> 1) + (one & other) >>> 0;
+  // Calls back for the objects of a class that are in a box of pixels.
+  const within = (frame, {starts, boxes}, min, max, call) => {
+    const {scale, left, top} = frame;
+    for (let block = 0; block + 1 < starts.length; block += 1) {
+      const at = 4 * block;
+      if (boxes[at + 2] * scale + left < min.x || boxes[at] * scale + left > max.x
+        || top - boxes[at + 1] * scale < min.y || top - boxes[at + 3] * scale > max.y) continue;
+      for (let one = starts[block]; one < starts[block + 1]; one += 1) {
+        const x = data.x[one] * scale + left;
+        const y = top - data.y[one] * scale;
+        if (x >= min.x && x <= max.x && y >= min.y && y <= max.y) call(x, y, one);
+      }
+    }
+  };
+  // Signs are copied pixel by pixel, many times faster than a canvas draws so many images.
+  const paint = (map) => (ctx, min, max) => {
+    const {width, height} = ctx.canvas;
+    if (data === null || !width || !height) return;  // a page that is not shown has no size
+    const image = ctx.createImageData(width, height);
+    const pixels = new Uint32Array(image.data.buffer);
+    const dots = width / (max.x - min.x);
+    const size = sizeAt(map.getZoom());
+    for (const number of about.order) {
+      if (!shown.has(number)) continue;
+      const {right, down, colour} = spriteOf(number, size, semsig.isDark(map), dots);
+      within(semsig.frame(map, about), classes[number], min, max, (x, y) => {
+        const [left, top] = [Math.round((x - min.x) * dots), Math.round((y - min.y) * dots)];
+        for (let at = 0; at < colour.length; at += 1) {
+          const [across, along] = [left + right[at], top + down[at]];
+          if (across < 0 || across >= width || along < 0 || along >= height) continue;
+          const place = along * width + across;
+          const whole = colour[at] >>> 24 > 200 || !pixels[place];
+          pixels[place] = whole ? colour[at] : mixed(colour[at], pixels[place]);
+        }
+      });
+    }
+    ctx.putImageData(image, 0, 0);
+  };
+  const placeOf = (one) => L.CRS.EPSG3857.unproject(L.point(
+    about.origin[0] + data.x[one] * about.quantum, about.origin[1] + data.y[one] * about.quantum));
+  const classOf = (one) => classes.findIndex(({start, end}) => start <= one && one < end);
+  const tell = (map, one) => {
+    const {title, symbol} = classes[classOf(one)];
+    const place = placeOf(one);
+    const values = [
+      `${symbol} ${title}`, sources[data.source[one]], data.ids[one],
+      data.count[one] > 1 ? `${data.count[one]} rows of its source` : null,
+      data.merged[one] || null,
+      `${place.lat.toFixed(6)}, ${place.lng.toFixed(6)}`,
+    ];
+    const mark = L.circleMarker(place, {pane: "shadowPane", interactive: false, fill: false,
+      radius: 13, color: "#d55e00", weight: 3}).addTo(map);
+    const popup = L.popup({maxWidth: 340, minWidth: 200}).setLatLng(place);
+    popup.setContent(semsig.details(title, fields, values, {}));
+    popup.on("remove", () => mark.remove());
+    popup.openOn(map);
+  };
+  const click = (event) => {
+    const map = event.target;
+    if (data === null || event.semsigSearch) return;
+    const point = map.latLngToLayerPoint(event.latlng);
+    const frame = semsig.frame(map, about);
+    const reach = Math.max(10, sizeAt(map.getZoom()));
+    let [best, least] = [-1, reach ** 2];
+    for (const number of shown) {
+      within(frame, classes[number], point.subtract([reach, reach]), point.add([reach, reach]),
+        (x, y, one) => {
+          const away = (x - point.x) ** 2 + (y - point.y) ** 2;
+          if (away <= least) [best, least] = [one, away];
+        });
+    }
+    // After what else hears of the click, so that the object is told of.
+    if (best >= 0) setTimeout(() => tell(map, best), 0);
+  };
+  const layerOf = (number) => {
+    const layer = new L.Layer();
+    layer.onAdd = (map) => {
+      if (!shown.size) {
+        board = semsig.board(map, "overlayPane", paint(map));
+        map.on("click", click);
+      }
+      shown.add(number);
+      board.redraw();
+    };
+    layer.onRemove = (map) => {
+      shown.delete(number);
+      board.redraw();
+      if (!shown.size) {
+        map.off("click", click);
+        board.remove();
+      }
+    };
+    return layer;
+  };
+  semsig.finders.push((words, limit) => {
+    if (data === null) return [];
+    const titles = semsig.matches(classes.map(({title}) => semsig.plain(title)), words, limit);
+    const byTitle = titles.map(({rank, at: number}) => ({
+      rank: rank - 0.5,  // before what is of this class
+      name: classes[number].title,
+      hint: `all ${(classes[number].end - classes[number].start).toLocaleString("en")}`,
+      show: (map) => {
+        map.addLayer(layers[number]);
+        const {start, end, boxes} = classes[number];
+        const {origin, quantum} = about;
+        const edge = (part, pick) => {
+          let value = boxes[part];
+          for (let at = part; at < boxes.length; at += 4) value = pick(value, boxes[at]);
+          return value * quantum;
+        };
+        map.fitBounds(L.latLngBounds([[0, 1, Math.min], [2, 3, Math.max]].map(
+          ([x, y, pick]) => L.CRS.EPSG3857.unproject(L.point(
+            origin[0] + edge(x, pick), origin[1] + edge(y, pick))))), {maxZoom: 18});
+        if (end - start === 1) tell(map, start);
+      },
+    }));
+    const byId = semsig.matches(data.names, words, limit).map(({rank, at: one}) => ({
+      rank,
+      name: data.ids[one],
+      hint: `${classes[classOf(one)].title}, ${sources[data.source[one]]}`,
+      show: (map) => {
+        semsig.reveal(map, layers[classOf(one)], placeOf(one));
+        tell(map, one);
+      },
+    }));
+    return [...byTitle, ...byId];
+  });
+  layers = classes.map((_, number) => layerOf(number));
+  semsig.held[key] = layers;
+};
+semsig.classLayer = (key, number) => semsig.held[key][number];

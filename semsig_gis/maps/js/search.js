@@ -1,0 +1,213 @@
+semsig.finders = [];  // of each layer with named things: what is called so, with how to show it
+semsig.plain = (text) => String(text).toLowerCase().replace(/(\d),(?=\d{3})/g, "$1").trim();
+// Which of the names hold the words, best first: one of their lines is the words (rank 0), has
+// them as whole words (1) or within others (2).
+semsig.matches = (names, words, limit) => {
+  const quoted = words.replace(/[\\^$.*+?()[\]{}|]/g, "\\$&");
+  const line = new RegExp(`^${quoted}$`, "mu");
+  const whole = new RegExp(`(?<![\\p{L}\\p{N}])${quoted}(?![\\p{L}\\p{N}])`, "u");
+  const found = [[], [], []];
+  names.forEach((name, at) => {
+    if (!name.includes(words)) return;
+    const rank = line.test(name) ? 0 : whole.test(name) ? 1 : 2;
+    if (found[rank].length < limit) found[rank].push({rank, at});
+  });
+  return found.flat().slice(0, limit);
+};
+semsig.reveal = (map, layer, place) => {
+  let outermost = layer;
+  while (outermost.semsigWhole) outermost = outermost.semsigWhole;
+  map.addLayer(outermost);
+  map.setView(place, Math.max(map.getZoom(), 18), {animate: false});
+};
+// Latitude and longitude of a place in the coordinate system of the data.
+semsig.latlng = ({middle, half, terms}, x, y) => {
+  const [u, v] = [(x - middle[0]) / half, (y - middle[1]) / half];
+  return terms.reduce(([latitude, longitude], [i, j, north, east]) => {
+    const power = u ** i * v ** j;
+    return [latitude + north * power, longitude + east * power];
+  }, [0, 0]);
+};
+// The way back, by Newton's steps.
+semsig.xy = (area, place) => {
+  const reach = area.half / 1000;
+  let [x, y] = area.middle;
+  for (let step = 0; step < 8; step += 1) {
+    const [here, east, north] = [[0, 0], [reach, 0], [0, reach]].map(
+      ([right, up]) => semsig.latlng(area, x + right, y + up));
+    const [a, b, c, d] = [east[0] - here[0], north[0] - here[0], east[1] - here[1],
+      north[1] - here[1]];
+    const [u, v] = [place[0] - here[0], place[1] - here[1]];
+    x += reach * (d * u - b * v) / (a * d - b * c);
+    y += reach * (a * v - c * u) / (a * d - b * c);
+  }
+  return [x, y];
+};
+semsig.whereabouts = (area, place, xy) => {
+  const facts = [["Latitude, longitude", place.map((part) => part.toFixed(6)).join(", ")]];
+  if (area) facts.push([`x, y in ${area.crs}`, xy.map((part) => part.toFixed(2)).join(", ")]);
+  return facts;
+};
+semsig.point = (map, name, place, facts, corners) => {
+  const look = {pane: "shadowPane", interactive: false, color: "#d55e00", weight: 3, fill: false};
+  const mark = corners ? L.polygon(corners, look) : L.circleMarker(place, {...look, radius: 10});
+  const popup = L.popup({maxWidth: 300, minWidth: 180}).setLatLng(place).setContent(
+    semsig.details(name, facts.map((fact) => fact[0]), facts.map((fact) => fact[1]), {}));
+  popup.on("remove", () => mark.remove());
+  map.setView(place, Math.max(map.getZoom(), 18), {animate: false});
+  mark.addTo(map);
+  popup.openOn(map);
+};
+semsig.within = ({columns, rows}, cell) =>
+  [columns, rows].every(([low, high], at) => low <= cell[at] && cell[at] <= high);
+// The number of the cell around a place, where the map knows cells there.
+semsig.cellAround = (area, xy) => {
+  if (!area?.grid) return [];
+  const {step, origin} = area.grid;
+  const cell = xy.map((part, at) => Math.floor((part - origin[at]) / step));
+  const number = BigInt(cell[0]) * 100000000n + BigInt(cell[1]);
+  return semsig.within(area.grid, cell) ? [["Cell", String(number)]] : [];
+};
+semsig.cellsCalled = (typed, area) => {
+  if (!area?.grid || !/^-?(\d{1,19}|\d{1,3}(,\d{3}){1,6})$/.test(typed)) return [];
+  const {step, origin} = area.grid;
+  const [span, half] = [100000000n, 50000000n];
+  const number = BigInt(typed.replaceAll(",", ""));
+  const row = (((number + half) % span) + span) % span - half;
+  const cell = [(number - row) / span, row].map(Number);
+  if (!semsig.within(area.grid, cell)) return [];
+  const at = ([across, along]) => [
+    origin[0] + step * (cell[0] + across), origin[1] + step * (cell[1] + along)];
+  const [middle, ...corners] = [[0.5, 0.5], [0, 0], [1, 0], [1, 1], [0, 1]].map(at);
+  const latlngs = corners.map((corner) => semsig.latlng(area, ...corner));
+  const name = `Cell ${number}`;
+  const show = (map) => {
+    const place = semsig.latlng(area, ...middle);
+    semsig.point(map, name, place, semsig.whereabouts(area, place, middle), latlngs);
+    // A layer that knows the cell tells of it instead.
+    map.fire("click", {latlng: L.latLng(place), semsigSearch: true});
+  };
+  return [{rank: 0, name, hint: "", show}];
+};
+semsig.placesAt = (text, area) => {
+  const part = (letters) => `(-?\\d+(?:[.,]\\d+)?)\\s*\u00b0?\\s*([${letters}]?)`;
+  const pair = new RegExp(`^[(\\s]*${part("NS")}[\\s,;]+${part("EW")}[)\\s]*$`, "i").exec(text);
+  if (!pair) return [];
+  const [first, second] = [[pair[1], pair[2]], [pair[3], pair[4]]].map(
+    ([number, letter]) => Number(number.replace(",", ".")) * (/[SW]/i.test(letter) ? -1 : 1));
+  const name = `${first}, ${second}`;
+  const found = [];
+  const offer = (hint, place, xy) => {
+    const facts = [...semsig.whereabouts(area, place, xy), ...semsig.cellAround(area, xy)];
+    found.push({rank: 0, name, hint, show: (map) => semsig.point(map, name, place, facts)});
+  };
+  const bounds = area && L.latLngBounds([[0, 1], [2, 1], [0, 3], [2, 3]].map(
+    ([x, y]) => semsig.latlng(area, area.box[x], area.box[y]))).pad(0.1);
+  const degrees = Math.abs(first) <= 90 && Math.abs(second) <= 180;
+  if (degrees && (!bounds || bounds.contains([first, second]))) {
+    const place = [first, second];
+    offer("latitude, longitude", place, area && semsig.xy(area, place));
+  }
+  const [west, south, east, north] = area ? area.box : [0, 0, 0, 0];
+  if (area && west <= first && first <= east && south <= second && second <= north) {
+    offer(`x, y in ${area.crs}`, semsig.latlng(area, first, second), [first, second]);
+  }
+  return found;
+};
+semsig.search = (map, area) => {
+  const most = 8;
+  const box = L.DomUtil.create("form", "semsig-search");
+  const input = L.DomUtil.create("input", "", box);
+  const list = L.DomUtil.create("ul", "", box);
+  const message = L.DomUtil.create("p", "", box);
+  const number = document.querySelectorAll(".semsig-search").length;
+  list.id = `semsig-found-${number}`;
+  list.hidden = true;
+  message.hidden = true;
+  for (const [part, values] of [
+    [box, {role: "search"}],
+    [input, {type: "search", role: "combobox", autocomplete: "off",
+      placeholder: "Cell, place or name\u2026",
+      "aria-label": "Search: the number of a cell, latitude and longitude, x and y, or a name",
+      title: "The number of a cell, latitude and longitude, x and y, or a name",
+      spellcheck: "false", "aria-autocomplete": "list", "aria-expanded": "false",
+      "aria-controls": list.id}],
+    [list, {role: "listbox", "aria-label": "Found"}],
+    [message, {role: "status"}],
+  ]) for (const [name, value] of Object.entries(values)) part.setAttribute(name, value);
+  let found = [];
+  let chosen = -1;
+  const tell = (text) => {
+    message.textContent = text;
+    message.hidden = !text;
+  };
+  const choose = (one) => {
+    chosen = one;
+    for (const [at, item] of [...list.children].entries()) {
+      item.setAttribute("aria-selected", at === one);
+    }
+    if (one >= 0) input.setAttribute("aria-activedescendant", list.children[one].id);
+    else input.removeAttribute("aria-activedescendant");
+    if (one >= 0) list.children[one].scrollIntoView({block: "nearest"});
+  };
+  const close = () => {
+    list.hidden = true;
+    input.setAttribute("aria-expanded", "false");
+    choose(-1);
+  };
+  const take = (one) => {
+    close();
+    tell("");
+    input.value = one.name;
+    input.blur();
+    map.getContainer().focus({preventScroll: true});  // so that Escape closes what is shown
+    one.show(map);
+  };
+  const look = () => {
+    const text = input.value.trim();
+    const words = semsig.plain(text);
+    tell("");
+    found = [];
+    if (words) {
+      found = [...semsig.cellsCalled(text, area), ...semsig.placesAt(text, area)];
+      for (const finder of semsig.finders) found.push(...finder(words, most));
+      found = found.sort((one, other) => one.rank - other.rank).slice(0, most);
+    }
+    list.replaceChildren(...found.map((one, at) => {
+      const item = L.DomUtil.create("li", "");
+      item.id = `${list.id}-${at}`;
+      item.setAttribute("role", "option");
+      semsig.text(item, "span", one.name);
+      if (one.hint) semsig.text(item, "small", one.hint);
+      L.DomEvent.on(item, "mousedown", L.DomEvent.preventDefault);
+      L.DomEvent.on(item, "click", () => take(one));
+      return item;
+    }));
+    list.hidden = !found.length;
+    input.setAttribute("aria-expanded", String(!list.hidden));
+    choose(found.length ? 0 : -1);
+  };
+  L.DomEvent.on(input, "input", look);
+  L.DomEvent.on(input, "focus", () => { if (input.value) look(); });
+  L.DomEvent.on(input, "blur", close);
+  L.DomEvent.on(input, "keydown", (event) => {
+    const steps = {ArrowDown: 1, ArrowUp: -1}[event.key];
+    if (steps && found.length && !list.hidden) {
+      choose((chosen + steps + found.length) % found.length);
+      event.preventDefault();
+    } else if (event.key === "Escape") close();
+  });
+  L.DomEvent.on(box, "submit", (event) => {
+    L.DomEvent.preventDefault(event);
+    if (list.hidden) look();
+    if (found.length) take(found[Math.max(chosen, 0)]);
+    else if (input.value.trim()) tell("Nothing on this map is called so, or lies there.");
+  });
+  L.DomEvent.disableClickPropagation(box);
+  L.DomEvent.disableScrollPropagation(box);
+  const control = L.control({position: "topleft"});
+  control.onAdd = () => box;
+  control.addTo(map);
+  L.DomUtil.addClass(box, "leaflet-control");
+  box.parentElement.prepend(box);
+};
