@@ -9,6 +9,7 @@ INSTALL := $(BIN)/python -m pip install --quiet --disable-pip-version-check -c c
 FRAME := pyproject.toml constraints.txt hatch_build.py semsig_gis/assets/manifest.toml
 RUNTIME := $(VENV)/.runtime
 DEV := $(VENV)/.dev
+BIOME := @biomejs/biome@2.6.8
 
 .DEFAULT_GOAL := help
 .NOTPARALLEL:
@@ -23,12 +24,19 @@ demo: $(RUNTIME) ## the embedded city end to end, into demo/: database, evaluati
 test: $(DEV) ## the whole test suite on all processors, with coverage
 	$(BIN)/python -m pytest -n auto --dist loadfile --cov --cov-report=term:skip-covered
 
-lint: $(DEV) ## style, types, import layers, docstrings
+lint: $(DEV) ## style, types, import layers, docstrings, browser code
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
 	$(BIN)/lint-imports
 	$(BIN)/numpydoc lint $$(find semsig_gis -name '*.py')
+	@if command -v npx >/dev/null; then \
+		echo 'npx $(BIOME) lint'; \
+		npx --yes --prefer-offline $(BIOME) lint --error-on-warnings; \
+	else \
+		echo 'There is no npx on this machine, so the browser code was not checked.'; \
+		case "$${CI:+browser},$$SEMSIG_REQUIRE" in *browser*) exit 1 ;; esac; \
+	fi
 
 bench: $(DEV) ## the benchmarks
 	$(BIN)/python -m benchmarks

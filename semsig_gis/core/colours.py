@@ -5,8 +5,12 @@ from __future__ import annotations
 from types import MappingProxyType
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Mapping, Sequence
+
+    from numpy.typing import NDArray
 
 
 # Blue and orange of Okabe and Ito, which colour-blind people tell apart.
@@ -77,3 +81,11 @@ OBJECT_COLOURS: Mapping[str, str] = MappingProxyType(
     {"added": "#0072b2", "removed": "#6d1a47", "moved": "#e69f00", "of another class": "#ffffff"}
 )
 """Colour of an object by what became of it: that of the cells, but darker."""
+
+
+def mixed(values: NDArray[np.float64], ramp: Sequence[str]) -> list[str]:
+    """Return the colour of each value in [0, 1] on a ramp of evenly spaced colours."""
+    anchors = np.array([list(bytes.fromhex(colour[1:])) for colour in ramp])
+    stops = np.linspace(0.0, 1.0, len(ramp))
+    parts = np.stack([np.interp(values, stops, part) for part in anchors.T], axis=1)
+    return [f"#{bytes(row).hex()}" for row in np.rint(parts).astype(np.uint8)]

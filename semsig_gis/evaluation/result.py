@@ -245,6 +245,22 @@ class Evaluation:
         return query_figures(self.queries, cells=self.database["cells"])
 
     @property
+    def query_bearings(self) -> list[list[float]]:
+        """Bearings of what each query asked for, in degrees."""
+        return [
+            [float(part) for part in text.split(",") if part]
+            for text in self.queries["query_bearings"]
+        ]
+
+    @property
+    def next_cell_ids(self) -> list[list[int]]:
+        """Ids of the best cells of each query after the answer."""
+        return [
+            [int(part) for part in text.split(",") if part]
+            for text in self.queries["next_cell_ids"]
+        ]
+
+    @property
     def successful(self) -> NDArray[np.bool_]:
         """Whether each query has an error of at most 50 m with probability 0.5 or more."""
         within = self.queries[f"p{SUCCESS_METRES}"].to_numpy(dtype=np.float64)

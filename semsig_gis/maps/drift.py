@@ -13,19 +13,11 @@ from semsig_gis.core.crs import SOURCE, SOURCE_ID
 from semsig_gis.core.errors import CrsError
 from semsig_gis.database.database import join_databases, require_same_place
 from semsig_gis.database.update import compare_cells
-from semsig_gis.maps.cell_layer import CellFacts, CellLayer, city_view, packed_signatures
+from semsig_gis.maps.cell_layer import CellFacts, add_cells, city_view, packed_signatures
 from semsig_gis.maps.image import level_image
 from semsig_gis.maps.legend import drift_legend
 from semsig_gis.maps.packing import packed
-from semsig_gis.maps.parts import (
-    Drawing,
-    Legend,
-    add_image,
-    finished_map,
-    free_name,
-    prepared_map,
-    to_latlon,
-)
+from semsig_gis.maps.parts import add_image, draw, finished_map, prepared_map, to_latlon
 from semsig_gis.objects.changes import compare_objects, joined_taxonomy
 
 if TYPE_CHECKING:
@@ -40,28 +32,8 @@ if TYPE_CHECKING:
     from semsig_gis.objects.table import StreetObjects
 
 OBJECT_FIELDS = ("Class", "Class before", "Moved by", "Source", "Identifier")
-SAID = ["title", "was", "by", SOURCE, SOURCE_ID]
+POPUP = ["title", "was", "by", SOURCE, SOURCE_ID]
 PLACE = ["latitude", "longitude"]
-SCRIPT = """\
-semsig.told.change = (city, cell) => {
-  const kind = city.grid.kinds[city.data.kind[cell] - 1];
-  const [before, after] = ["before", "now"].map((part) => city.signature(part, cell));
-  const title = {same: "A cell that sees what it saw", changed: "A cell that sees something else",
-    appeared: "A new cell: it saw nothing", vanished: "A cell that sees nothing any more"}[kind];
-  if (kind === "same") return {title, rows: [["It sees", after]]};
-  const count = {};
-  for (const symbol of after[0]) count[symbol] = (count[symbol] || 0) + 1;
-  for (const symbol of before[0]) count[symbol] = (count[symbol] || 0) - 1;
-  const differences = Object.entries(count).filter((one) => one[1] !== 0).map(
-    ([symbol, more]) => (more > 0 ? "+" : "\\u2212") + Math.abs(more) + "\\u00a0" + symbol);
-  const shown = (signature) => (signature[0] ? signature : "nothing");
-  return {title, rows: [
-    ["Before", shown(before)],
-    ["Now", shown(after)],
-    ["Difference", differences.join(", ") || "of bearings or distances alone"],
-  ]};
-};
-"""
 
 
 def drift_map(
@@ -106,15 +78,11 @@ def drift_map(
 
     Examples
     --------
-    >>> from semsig_gis.sources.catalog import paper_taxonomy
-    >>> from semsig_gis.database.build import build_database
+    >>> from semsig_gis import build_database
     >>> from semsig_gis.objects.table import StreetObjects
-    >>> from semsig_gis.objects.clean import build_objects
-    >>> from semsig_gis.sources.synthetic.city import CitySpec, synthetic_city
-    >>> layers = synthetic_city(CitySpec(size=200.0))
-    >>> objects, _ = build_objects(layers, taxonomy=paper_taxonomy(), crs="EPSG:32631")
-    >>> fewer = StreetObjects(objects.table[5:], objects.taxonomy, objects.licenses)
-    >>> drift_map(build_database(objects), build_database(fewer)).options["maxZoom"]
+    >>> table = demo_objects.table[5:]
+    >>> fewer = StreetObjects(table, demo_objects.taxonomy, demo_objects.licenses)
+    >>> drift_map(demo_database, build_database(fewer)).options["maxZoom"]
     20
     """
     cells = compare_cells(before, after)
@@ -126,36 +94,31 @@ def drift_map(
     if len(old) and len(new):
         require_same_place(old, new.xy, "cells of the newer database")
     kinds = _kinds(city, old, new, cells)
-    chosen = prepared_map(map_, tiles, title="What has changed")
+    page = prepared_map(map_, tiles, title="What has changed")
     colours, same = list(DRIFT_COLOURS.values()), kinds == 1
     if same.any():
         image = level_image(city.select(same), kinds[same], colours)
-        add_image(chosen, *image, name="Cells that are the same", dark="flip")
+        add_image(page, *image, name="Cells that are the same", dark="flip")
     if not same.all():
         image = level_image(city.select(~same), kinds[~same], colours)
-        add_image(chosen, *image, name="Cells that differ", dark="lift")
+        add_image(page, *image, name="Cells that differ", dark="lift")
     differing = old.select(np.sort(np.concatenate([cells.changed[:, 0], cells.vanished])))
-    facts = CellFacts(
-        name="change",
-        script=SCRIPT,
-        arrays={
-            "kind": packed(kinds),
-            **_signatures("before", differing, city),
-            **_signatures("now", new, city),
-        },
-        settings={"kinds": list(DRIFT_COLOURS)},
-    )
-    CellLayer(free_name(chosen, "Tell of a cell when clicked"), city, [facts]).add_to(chosen)
+    arrays = {
+        "kind": packed(kinds),
+        **_signatures("before", differing, city),
+        **_signatures("now", new, city),
+    }
+    facts = CellFacts(name="change", arrays=arrays, settings={"kinds": list(DRIFT_COLOURS)})
+    add_cells(page, city, [facts])
     objects = None
     if objects_before is not None and objects_after is not None:
         for some in (objects_before, objects_after):
             _require_crs(some, city)
         objects = compare_objects(objects_before, objects_after)
-        for name, drawn in _object_drawings(objects_before, objects_after, objects):
-            Drawing(free_name(chosen, name), "drawings", drawn).add_to(chosen)
+        for name, drawings in _object_drawings(objects_before, objects_after, objects):
+            draw(page, name, "drawings", drawings)
     legend = drift_legend(cells, objects, taxonomy=taxonomy, licenses=city.licenses)
-    Legend(legend, view if map_ is None else None).add_to(chosen)
-    return finished_map(chosen, city)
+    return finished_map(page, city, legend=legend, view=view if map_ is None else None)
 
 
 def _kinds(
@@ -196,36 +159,32 @@ def _object_drawings(
     old: StreetObjects, new: StreetObjects, changes: ObjectChanges
 ) -> Iterator[tuple[str, list[list[Any]]]]:
     """Yield name and drawings of a layer of each kind of change that there is."""
-    kinds = (
-        ("removed", _facts(old, changes.removed), None),
-        ("added", _facts(new, changes.added), None),
-        ("moved", *_pair(old, new, changes.moved)),
-        ("of another class", *_pair(old, new, changes.changed)),
-    )
-    for what, facts, before in kinds:
+    kinds = {
+        "removed": (_facts(old, changes.removed), None),
+        "added": (_facts(new, changes.added), None),
+        "moved": (_facts(new, changes.moved[:, 1]), _facts(old, changes.moved[:, 0])),
+        "of another class": (
+            _facts(new, changes.changed[:, 1]),
+            _facts(old, changes.changed[:, 0]),
+        ),
+    }
+    for kind, (facts, before) in kinds.items():
         if facts.empty:
             continue
-        drawn: list[list[Any]] = []
+        drawings: list[list[Any]] = []
         if before is not None:
             moves = np.hypot(facts["x"] - before["x"], facts["y"] - before["y"])
             facts["by"] = [f"{metres:.1f} m" for metres in moves]
             facts["was"] = before["title"]
             lines = np.stack([before[PLACE], facts[PLACE]], axis=1).tolist()
-            drawn = [["lines", [[{"color": "#808080", "weight": 2, "opacity": 0.9}, lines]]]]
-        places, said = (facts[some].to_numpy().tolist() for some in (PLACE, SAID))
+            drawings = [["lines", [[{"color": "#808080", "weight": 2, "opacity": 0.9}, lines]]]]
+        places, details = (facts[columns].to_numpy().tolist() for columns in (PLACE, POPUP))
         records = [
-            [place, OBJECT_COLOURS[what], 5, None, f"Object {what}", details]
-            for place, details in zip(places, said, strict=True)
+            [place, OBJECT_COLOURS[kind], 5, None, f"Object {kind}", values]
+            for place, values in zip(places, details, strict=True)
         ]
-        drawn.append(["points", OBJECT_FIELDS, {}, records])
-        yield f"Objects {what} ({len(facts):,})", drawn
-
-
-def _pair(
-    old: StreetObjects, new: StreetObjects, rows: NDArray[np.int64]
-) -> tuple[pd.DataFrame, pd.DataFrame]:
-    """Return what there is to say of objects now and before."""
-    return _facts(new, rows[:, 1]), _facts(old, rows[:, 0])
+        drawings.append(["points", OBJECT_FIELDS, {}, records])
+        yield f"Objects {kind} ({len(facts):,})", drawings
 
 
 def _facts(objects: StreetObjects, rows: NDArray[np.int64]) -> pd.DataFrame:

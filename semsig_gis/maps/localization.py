@@ -2,28 +2,34 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from semsig_gis.maps.evaluation import _CANDIDATE_FIELDS, _candidate_records
+from semsig_gis.core.colours import CANDIDATE_RAMP, mixed
+from semsig_gis.database.database import rows_of_result
 from semsig_gis.maps.legend import localization_legend
 from semsig_gis.maps.parts import (
-    Drawing,
-    Legend,
     add_city,
+    cell_signature,
     class_titles,
+    draw,
     finished_map,
-    free_name,
     prepared_map,
+    query_signature,
+    ranks_text,
+    ties_text,
     to_latlon,
 )
 
 if TYPE_CHECKING:
     import folium
+    from numpy.typing import NDArray
 
     from semsig_gis.database.database import SignatureDatabase
     from semsig_gis.matching.result import Localization
+
+CANDIDATE_FIELDS = ("Query", "Signature", "Rank", "Distance", "Cell", "Position")
 
 
 def localization_map(
@@ -60,30 +66,46 @@ def localization_map(
 
     Examples
     --------
-    >>> from semsig_gis.sources.catalog import paper_taxonomy
-    >>> from semsig_gis.database.build import build_database
-    >>> from semsig_gis.matching.search import localize
-    >>> from semsig_gis.objects.clean import build_objects
-    >>> from semsig_gis.sources.synthetic.city import CitySpec, synthetic_city
-    >>> layers = synthetic_city(CitySpec(size=300.0))
-    >>> objects, _ = build_objects(layers, taxonomy=paper_taxonomy(), crs="EPSG:32631")
-    >>> database = build_database(objects)
-    >>> answer = localize(database, database.signature(0), top=5)
-    >>> localization_map(answer, database).options["maxZoom"]
+    >>> from semsig_gis import localize
+    >>> localization = localize(demo_database, demo_database.signature(0), top=5)
+    >>> localization_map(localization, demo_database).options["maxZoom"]
     20
     """
-    candidates = localization.candidates
-    xy = candidates[["x", "y"]].to_numpy(np.float64)
+    xy = localization.candidates[["x", "y"]].to_numpy(np.float64)
     places = to_latlon(xy, database.crs)
     records = _candidate_records(localization, database, places)
-    chosen = prepared_map(map_, tiles, title="Candidate places")
-    add_city(chosen, database)
-    Drawing(
-        free_name(chosen, f"Candidates ({len(records):,})"),
-        "points",
-        _CANDIDATE_FIELDS,
-        class_titles(database),
-        records[::-1],  # the best last, so that they lie on top
-    ).add_to(chosen)
-    Legend(localization_legend(localization), places if map_ is None else None).add_to(chosen)
-    return finished_map(chosen, database)
+    page = prepared_map(map_, tiles, title="Candidate places")
+    add_city(page, database)
+    name = f"Candidates ({len(records):,})"
+    # The best last, so that they lie on top.
+    draw(page, name, "points", CANDIDATE_FIELDS, class_titles(database), records[::-1])
+    legend = localization_legend(localization)
+    return finished_map(page, database, legend=legend, view=places if map_ is None else None)
+
+
+def _candidate_records(
+    localization: Localization, database: SignatureDatabase, places: NDArray[np.float64]
+) -> list[list[Any]]:
+    """Return what the script draws of each candidate, best first."""
+    candidates = localization.candidates
+    rows = rows_of_result(database, candidates["cell_id"], candidates["types"], what="localization")
+    distances = candidates["distance"].to_numpy(np.float64)
+    spread = np.ptp(distances) or 1.0
+    colours = mixed((distances - distances.min()) / spread, CANDIDATE_RAMP)
+    query = query_signature(localization.query, database.taxonomy)
+    records = []
+    for number, candidate in enumerate(candidates.to_dict("records")):
+        rank = ranks_text(candidate["rank_low"], candidate["rank_high"])
+        latitude, longitude = places[number].tolist()
+        details = [
+            query,
+            cell_signature(database, int(rows[number])),
+            f"{rank} of {len(database):,}{ties_text(candidate['tied'])}",
+            f"{candidate['distance']:.4f}",
+            str(candidate["cell_id"]),
+            f"{latitude:.6f}, {longitude:.6f}",
+        ]
+        radius = 9 if candidate["rank_low"] == 1 else 6
+        place = [latitude, longitude]
+        records.append([place, colours[number], radius, None, f"Rank {rank}", details])
+    return records

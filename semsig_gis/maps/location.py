@@ -10,14 +10,12 @@ from semsig_gis.core.colours import CELL_CHANCES, CHANCES, FAILED, SUCCESSFUL, V
 from semsig_gis.maps.image import level_image
 from semsig_gis.maps.legend import location_legend
 from semsig_gis.maps.parts import (
-    Drawing,
-    Legend,
     add_city,
     add_image,
     cell_signature,
     class_titles,
+    draw,
     finished_map,
-    free_name,
     prepared_map,
     query_signature,
     to_latlon,
@@ -31,26 +29,25 @@ if TYPE_CHECKING:
     from semsig_gis.likelihood.posterior import Posterior
     from semsig_gis.likelihood.result import Location
 
+Image = tuple[bytes, list[list[float]]]
+"""A PNG with the latitudes and longitudes of its corners."""
+
 PLACE_FIELDS = ("Chance", "Place", "Give or take", "North of the query", "Cell")
 CANDIDATE_FIELDS = (
-    "Query",
-    "Cell sees",
-    "Chance",
-    "Log-likelihood",
-    "North of the query",
-    "Cell",
-    "Place",
+    *("Query", "Cell sees", "Chance", "Log-likelihood"),
+    *("North of the query", "Cell", "Place"),
 )
 OBJECT_FIELDS = (
-    "Chance",
-    "Seen as",
-    "Seen at",
-    "Street object",
-    "It is at",
-    "Off by",
-    "Source",
-    "Identifier",
+    *("Chance", "Seen as", "Seen at", "Street object", "It is at", "Off by"),
+    *("Source", "Identifier"),
 )
+RAYS = {
+    "matched": {"color": VERDICTS["matched"], "weight": 2, "opacity": 0.9, "dashArray": None},
+    "misnamed": {"color": VERDICTS["misnamed"], "weight": 2, "opacity": 0.9, "dashArray": "9 4"},
+    "missed": {"color": "#808080", "weight": 1, "opacity": 0.9, "dashArray": "3 5"},
+    "false": {"color": VERDICTS["false"], "weight": 2, "opacity": 0.9, "dashArray": "3 5"},
+}
+"""Lines to the objects by what became of them."""
 SURROUNDINGS_M = 45.0  # to see around the answer
 CLOSEST_ZOOM = 20
 ELLIPSE_STEPS = 72
@@ -86,73 +83,67 @@ def location_map(
 
     Examples
     --------
-    >>> from semsig_gis.sources.catalog import paper_taxonomy
-    >>> from semsig_gis.database.build import build_database
-    >>> from semsig_gis.likelihood.index import build_index
-    >>> from semsig_gis.likelihood.locate import locate
-    >>> from semsig_gis.likelihood.noise.model import named_noise
-    >>> from semsig_gis.objects.clean import build_objects
-    >>> from semsig_gis.sources.synthetic.city import CitySpec, synthetic_city
-    >>> layers = synthetic_city(CitySpec(size=300.0))
-    >>> objects, _ = build_objects(layers, taxonomy=paper_taxonomy(), crs="EPSG:32631")
-    >>> database = build_database(objects)
-    >>> index = build_index(database, named_noise("generic"))
-    >>> location_map(locate(index, database.signature(0))).options["maxZoom"]
+    >>> from semsig_gis import build_index, locate, named_noise
+    >>> index = build_index(demo_database, named_noise("generic"))
+    >>> location_map(locate(index, demo_database.signature(0))).options["maxZoom"]
     20
     """
-    drawn = _Drawn(location)
-    chosen = prepared_map(map_, tiles, title="Where it was seen")
-    add_city(chosen, location.posterior.database)
-    _add_chances(chosen, location)
-    for number, why in enumerate(location.explanations, start=1):
-        name = free_name(chosen, f"Objects from rank {number}")
-        Drawing(name, "drawings", drawn.explanation(why), show=number == 1).add_to(chosen)
-    candidates = drawn.candidates()
-    name = free_name(chosen, f"Candidates ({len(candidates):,})")
-    titles = class_titles(location.posterior.database)
+    database = location.posterior.database
+    drawings = _Drawings(location)
+    page = prepared_map(map_, tiles, title="Where it was seen")
+    add_city(page, database)
+    _add_chances(page, location)
+    for number, explanation in enumerate(location.explanations, start=1):
+        parts = drawings.explanation(explanation)
+        draw(page, f"Objects from rank {number}", "drawings", parts, show=number == 1)
+    candidates = drawings.candidates()
+    name = f"Candidates ({len(candidates):,})"
     # The best last, so that they lie on top.
-    Drawing(name, "points", CANDIDATE_FIELDS, titles, candidates[::-1]).add_to(chosen)
-    Drawing(free_name(chosen, "Best place"), "drawings", drawn.place()).add_to(chosen)
-    view = drawn.view() if map_ is None else None
-    Legend(location_legend(location), view, zoom=CLOSEST_ZOOM).add_to(chosen)
-    return finished_map(chosen, location.posterior.database)
+    draw(page, name, "points", CANDIDATE_FIELDS, class_titles(database), candidates[::-1])
+    draw(page, "Best place", "drawings", drawings.place())
+    return finished_map(
+        page,
+        database,
+        legend=location_legend(location),
+        view=drawings.view() if map_ is None else None,
+        zoom=CLOSEST_ZOOM,
+    )
 
 
-def _add_chances(chosen: folium.Map, location: Location) -> None:
+def _add_chances(map_: folium.Map, location: Location) -> None:
     """Add images of the chances: from near those of the cells, from afar those around them."""
-    found, radius, near = location.posterior, location.rule.radius, location.answer.given
+    posterior, radius, near = location.posterior, location.rule.radius, location.answer.given
+    around, cell = posterior.mass_within(radius), posterior.chances
     for name, image, show in (
-        (f"Chance within {radius:g} m", _chances(found, found.mass_within(radius)), not near),
-        ("Chance of a cell", _chances(found, found.chances), near),
-        ("Regions of 50, 90 and 99 %", _regions(found), False),
+        (f"Chance within {radius:g} m", _chances(posterior, around), not near),
+        ("Chance of a cell", _chances(posterior, cell), near),
+        ("Regions of 50, 90 and 99 %", _regions(posterior), False),
     ):
-        add_image(chosen, *image, name=name, opacity=0.85, dark="flip", show=show)
+        add_image(map_, *image, name=name, opacity=0.85, dark="flip", show=show)
 
 
-def _chances(found: Posterior, chances: NDArray[np.float64]) -> tuple[bytes, list[list[float]]]:
+def _chances(posterior: Posterior, chances: NDArray[np.float64]) -> Image:
     """Return an image of a chance of each cell."""
     levels = np.digitize(chances, list(CELL_CHANCES))
-    return _image(found, levels, list(CELL_CHANCES.values()))
+    return _image(posterior, levels, list(CELL_CHANCES.values()))
 
 
-def _regions(found: Posterior) -> tuple[bytes, list[list[float]]]:
+def _regions(posterior: Posterior) -> Image:
     """Return an image of the fewest cells that hold each share of the chance."""
     shares = sorted(CHANCES, reverse=True)
-    levels = np.zeros(len(found.database), np.int64)
+    levels = np.zeros(len(posterior.database), np.int64)
     for level, share in enumerate(shares, start=1):
-        levels[found.credible_cells(share)] = level
-    return _image(found, levels, [CHANCES[share] for share in shares])
+        levels[posterior.credible_cells(share)] = level
+    return _image(posterior, levels, [CHANCES[share] for share in shares])
 
 
-def _image(
-    found: Posterior, levels: NDArray[np.int64], colours: list[str]
-) -> tuple[bytes, list[list[float]]]:
+def _image(posterior: Posterior, levels: NDArray[np.int64], colours: list[str]) -> Image:
     """Return an image of the cells that have a level above 0, and of the likeliest."""
-    some = np.union1d(np.flatnonzero(levels), [int(found.chances.argmax())])
-    return level_image(found.database.select(some), levels[some].astype(np.uint8), colours)
+    cells = np.union1d(np.flatnonzero(levels), [int(posterior.chances.argmax())])
+    return level_image(posterior.database.select(cells), levels[cells].astype(np.uint8), colours)
 
 
-class _Drawn:
+class _Drawings:
     """What the script of the page draws of a location."""
 
     def __init__(self, location: Location) -> None:
@@ -162,8 +153,8 @@ class _Drawn:
 
     def latlon(self, xy: ArrayLike) -> list[list[float]]:
         places = np.asarray(xy, dtype=np.float64).reshape(-1, 2)
-        found: list[list[float]] = to_latlon(places, self.database.crs, digits=7).tolist()
-        return found
+        degrees: list[list[float]] = to_latlon(places, self.database.crs, digits=7).tolist()
+        return degrees
 
     def view(self) -> NDArray[np.float64]:
         """Return the corners of what is shown first."""
@@ -189,8 +180,11 @@ class _Drawn:
             ]
         )
         (centre,) = self.latlon([place.x, place.y])
-        given = location.answer.given
-        colour = SUCCESSFUL if given else FAILED
+        name, colour = (
+            ("The answer", SUCCESSFUL)
+            if location.answer.given
+            else ("Cannot tell: the best place", FAILED)
+        )
         details = [
             f"{location.answer.mass:.1%} within {location.rule.radius:g} m",
             _position(centre),
@@ -201,7 +195,6 @@ class _Drawn:
             _north(place.heading, place.heading_sigma),
             str(location.cell_id),
         ]
-        name = "The answer" if given else "Cannot tell: the best place"
         outline = {"color": colour, "weight": 3, "opacity": 0.9}
         return [
             ["lines", [[outline, [self.latlon(ring)]]]],
@@ -211,12 +204,12 @@ class _Drawn:
     def candidates(self) -> list[list[Any]]:
         """Return the candidates, likeliest first."""
         rows = self.location.candidates
-        asked = query_signature(self.location.query, self.database.taxonomy)
+        query = query_signature(self.location.query, self.database.taxonomy)
         records = []
         places = self.latlon(rows[["x", "y"]].to_numpy())
         for place, row in zip(places, rows.to_dict("records"), strict=True):
             details = [
-                asked,
+                query,
                 cell_signature(self.database, row["cell"]),
                 f"{row['chance']:.2%}",
                 f"{row['loglik']:.2f}",
@@ -228,43 +221,34 @@ class _Drawn:
             records.append([place, "#ffffff", 8, None, name, details, str(row["rank"])])
         return records
 
-    def explanation(self, why: Explanation) -> list[list[Any]]:
+    def explanation(self, explanation: Explanation) -> list[list[Any]]:
         """Return the rays of the query and the street objects."""
+        here = np.array(explanation.xy)
         rays: dict[str, list[list[list[float]]]] = {verdict: [] for verdict in VERDICTS}
         records = []
-        for row, shape in zip(why.to_dict()["rows"], why.table.geometry, strict=True):
+        shapes = explanation.table.geometry
+        for row, shape in zip(explanation.to_dict()["rows"], shapes, strict=True):
             verdict = row["verdict"]
-            away = self.database.reach if row["distance"] is None else row["distance"]
-            seen = row["query_bearing"]
-            bearing = np.radians(row["object_bearing"] if seen is None else seen)
-            end = np.array(why.xy) + away * np.array([np.sin(bearing), np.cos(bearing)])
-            rays[verdict].append(self.latlon(np.stack([np.array(why.xy), end])))
-            at = end if shape is None else np.array([shape.x, shape.y])
+            seen_at, object_at = row["query_bearing"], row["object_bearing"]
+            distance = self.database.reach if row["distance"] is None else row["distance"]
+            bearing = np.radians(object_at if seen_at is None else seen_at)
+            end = here + distance * np.array([np.sin(bearing), np.cos(bearing)])
+            rays[verdict].append(self.latlon(np.stack([here, end])))
+            place = end if shape is None else np.array([shape.x, shape.y])
             details = [
                 f"{row['chance']:.2f}",
                 self._title(row["query_class"]),
-                _degrees(seen),
+                _degrees(seen_at),
                 self._title(row["object_class"]),
-                _degrees(row["object_bearing"], row["distance"]),
+                _degrees(object_at, row["distance"]),
                 None if row["bearing_error"] is None else f"{row['bearing_error']:+.1f}°",
                 row["source"],
                 row["source_id"],
             ]
             name = verdict.capitalize()
-            records.append([*self.latlon(at), VERDICTS[verdict], 6, None, name, details])
-        looks = [
-            [
-                {
-                    "color": "#808080" if verdict == "missed" else colour,
-                    "weight": 1 if verdict == "missed" else 2,
-                    "opacity": 0.9,
-                    "dashArray": {"matched": None, "misnamed": "9 4"}.get(verdict, "3 5"),
-                },
-                rays[verdict],
-            ]
-            for verdict, colour in VERDICTS.items()
-        ]
-        return [["lines", looks], ["points", OBJECT_FIELDS, {}, records]]
+            records.append([*self.latlon(place), VERDICTS[verdict], 6, None, name, details])
+        lines = [[look, rays[verdict]] for verdict, look in RAYS.items()]
+        return [["lines", lines], ["points", OBJECT_FIELDS, {}, records]]
 
     def _title(self, name: str | None) -> str | None:
         """Return the title of a class; "unknown" and nothing stay what they are."""

@@ -1,4 +1,4 @@
-"""Streets and buildings below a map, where there are no tiles."""
+"""Maps of the street objects, and of streets and buildings below them."""
 
 from __future__ import annotations
 
@@ -11,16 +11,14 @@ import shapely
 from semsig_gis.core.crs import COUNT, MERGED, SOURCE, SOURCE_ID
 from semsig_gis.core.errors import CrsError, EmptyResultError
 from semsig_gis.core.signs import class_signs
-from semsig_gis.maps.board import mercator
 from semsig_gis.maps.legend import OUTLINES, objects_legend, sign_svg
-from semsig_gis.maps.packing import packed, steps
+from semsig_gis.maps.packing import mercator, packed, steps
 from semsig_gis.maps.parts import (
-    Drawing,
-    Legend,
-    Script,
+    Call,
     add_city,
+    corners_of,
+    draw,
     finished_map,
-    free_name,
     layer_text,
     layers_of,
     prepared_map,
@@ -40,12 +38,9 @@ if TYPE_CHECKING:
 
 
 STREET_M = 6.0
-
-
 DETAIL_M = 0.6  # what is smaller is not drawn
-
-
 POLYGONAL = 2
+FIELDS = ("Class", "Source", "Identifier", "Stands for", "Also", "Place")
 
 
 def ground_map(
@@ -93,29 +88,30 @@ def ground_map(
     >>> ground_map(buildings=house).options["maxZoom"]
     20
     """
-    given = {
+    tables = {
         kind: table
         for kind, table in (("buildings", buildings), ("streets", streets))
         if table is not None
     }
-    systems = [table.crs for table in given.values()]
+    systems = [table.crs for table in tables.values()]
     if None in systems or len(set(systems)) > 1:
-        named = " and ".join("no CRS" if one is None else one.name for one in systems)
-        msg = f"the streets and buildings have {named}; give both in one CRS."
+        names = " and ".join("no CRS" if crs is None else crs.name for crs in systems)
+        msg = f"the streets and buildings have {names}; give both in one CRS."
         raise CrsError(msg)
-    shapes = {kind: _simple(table, box) for kind, table in given.items()}
+    shapes = {kind: _simple(table, box) for kind, table in tables.items()}
     shapes = {kind: parts for kind, parts in shapes.items() if len(parts)}
     if not shapes:
         msg = "there are no streets or buildings to show; give some that are in the city."
         raise EmptyResultError(msg)
-    chosen = prepared_map(map_, None, title="Streets and buildings")
-    name = free_name(chosen, "Streets and buildings")
-    Drawing(name, "ground", *_drawn_ground(shapes, systems[0])).add_to(chosen)
+    page = prepared_map(map_, None, title="Streets and buildings")
+    draw(page, "Streets and buildings", "ground", *_ground(shapes, systems[0]))
+    legend, view = "", None
     if map_ is None:
         bounds = shapely.total_bounds(np.concatenate(list(shapes.values()))).reshape(2, 2)
-        text = "<summary>Streets and buildings</summary>"
-        Legend(text, to_latlon(bounds, systems[0])).add_to(chosen)
-    return finished_map(chosen, None, licenses=licenses_of(buildings, streets))
+        legend = "<summary>Streets and buildings</summary>"
+        view = to_latlon(bounds, systems[0])
+    licenses = licenses_of(buildings, streets)
+    return finished_map(page, None, legend=legend, view=view, licenses=licenses)
 
 
 def _simple(
@@ -133,7 +129,7 @@ def _simple(
     return parts[hilbert_order(parts)] if len(parts) else parts
 
 
-def _drawn_ground(
+def _ground(
     shapes: dict[str, NDArray[np.object_]], crs: CRS
 ) -> tuple[dict[str, dict[str, list[str]]], dict[str, Any]]:
     """Return the shapes for the script: points, where rings end, and where shapes do."""
@@ -145,7 +141,7 @@ def _drawn_ground(
     }
     points = {kind: shapely.get_coordinates(lines) for kind, (lines, _) in rings.items()}
     places, about = mercator(np.concatenate(list(points.values())), crs)
-    told = {}
+    arrays = {}
     start = 0
     for kind, (lines, owner) in rings.items():
         part = places[start : start + len(points[kind])]
@@ -156,13 +152,10 @@ def _drawn_ground(
             "ends": np.cumsum(shapely.get_num_coordinates(lines)),
             "rings": np.cumsum(np.bincount(owner, minlength=len(shapes[kind]))),
         }
-        told[kind] = {name: steps(values.astype(np.int32)) for name, values in numbers.items()}
+        arrays[kind] = {name: steps(values.astype(np.int32)) for name, values in numbers.items()}
     middle = np.concatenate(list(points.values())).mean(axis=0, keepdims=True)
     latitude = float(to_latlon(middle, crs)[0, 0])
-    return told, about | {"width": STREET_M / float(np.cos(np.radians(latitude)))}
-
-
-FIELDS = ("Class", "Source", "Identifier", "Stands for", "Also", "Place")
+    return arrays, about | {"width": STREET_M / float(np.cos(np.radians(latitude)))}
 
 
 def objects_map(
@@ -202,35 +195,31 @@ def objects_map(
 
     Examples
     --------
-    >>> from semsig_gis.sources.catalog import paper_taxonomy
-    >>> from semsig_gis.objects.clean import build_objects
-    >>> from semsig_gis.sources.synthetic.city import CitySpec, synthetic_city
-    >>> layers = synthetic_city(CitySpec(size=300.0))
-    >>> objects, _ = build_objects(layers, taxonomy=paper_taxonomy(), crs="EPSG:32631")
-    >>> objects_map(objects).options["maxZoom"]
+    >>> objects_map(demo_objects).options["maxZoom"]
     20
     """
     if len(objects) == 0:
         msg = "there is no street object to show; look at what was loaded."
         raise EmptyResultError(msg)
-    chosen = prepared_map(map_, tiles, title="Street objects")
+    page = prepared_map(map_, tiles, title="Street objects")
     if database is not None:
-        add_city(chosen, database, show=False)
-    key = f"objects{len(layers_of(chosen))}"
-    Script("streetObjects", key, *_drawn(objects)).add_to(chosen)
+        add_city(page, database, show=False)
+    key = f"objects{len(layers_of(page))}"
+    Call("streetObjects", key, *_packed_objects(objects)).add_to(page)
     signs, counts = class_signs(objects.taxonomy), objects.class_counts
     for number, (code, count) in enumerate(counts.items()):
-        title = layer_text(signs[code].title)
-        name = free_name(chosen, f"{sign_svg(signs[code])} {title} ({count:,})")
-        Drawing(name, "classLayer", key, number, show=map_ is None).add_to(chosen)
-    corners = np.stack([objects.xy.min(axis=0), objects.xy.max(axis=0)])
-    view = to_latlon(corners, objects.crs) if map_ is None else None
-    Legend(objects_legend(objects), view).add_to(chosen)
-    source = objects if database is None else database
-    return finished_map(chosen, source, licenses=tuple(map(str, objects.licenses)))
+        name = f"{sign_svg(signs[code])} {layer_text(signs[code].title)} ({count:,})"
+        draw(page, name, "classLayer", key, number, show=map_ is None)
+    return finished_map(
+        page,
+        objects if database is None else database,
+        legend=objects_legend(objects),
+        view=corners_of(objects) if map_ is None else None,
+        licenses=tuple(map(str, objects.licenses)),
+    )
 
 
-def _drawn(objects: StreetObjects) -> tuple[dict[str, list[str]], dict[str, Any]]:
+def _packed_objects(objects: StreetObjects) -> tuple[dict[str, list[str]], dict[str, Any]]:
     """Return the objects for the script: class by class, neighbours together; and what they are."""
     near = hilbert_order(objects.table.geometry.array)
     order = near[np.argsort(objects.codes[near], kind="stable")]
@@ -265,6 +254,6 @@ def _drawn(objects: StreetObjects) -> tuple[dict[str, list[str]], dict[str, Any]
         # The rare ones last, so that they lie on top.
         "order": np.argsort([-count for count in counts.values()], kind="stable").tolist(),
     }
-    told = {name: packed(values) for name, values in arrays.items()}
-    told |= {name: steps(part) for name, part in zip("xy", places.T, strict=True)}
-    return told, about
+    columns = {name: packed(values) for name, values in arrays.items()}
+    columns |= {name: steps(part) for name, part in zip("xy", places.T, strict=True)}
+    return columns, about

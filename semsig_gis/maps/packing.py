@@ -1,47 +1,42 @@
-"""Numbers of very many things in a page: compressed arrays, which a script unpacks."""
+"""Data in the script of a page: JSON made safe for it, and compressed arrays of numbers.
+
+folium renders what it has rendered once more as a Jinja template, so that ``{{...}}`` in a class
+title would be *run* when the map is made. Text from data therefore enters a page only through
+`script_json`, and the script shows it as text nodes; legends are HTML-escaped as well.
+"""
 
 from __future__ import annotations
 
 import base64
 import json
+import re
 import zlib
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from pyproj import Transformer
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from numpy.typing import NDArray
+    from pyproj import CRS
 
-SCRIPT = """\
-semsig.arrays = async (packed) => {
-  const kinds = {
-    u1: Uint8Array, u2: Uint16Array, i4: Int32Array, f8: Float64Array,
-  };
-  const read = async ([kind, text]) => {
-    const bytes = Uint8Array.from(atob(text), (sign) => sign.charCodeAt(0));
-    const stream = new Blob([bytes]).stream().pipeThrough(new DecompressionStream("deflate"));
-    const response = new Response(stream);
-    if (kind === "json") return response.json();
-    if (kind !== "steps") return new kinds[kind](await response.arrayBuffer());
-    // The four bytes of all numbers one after the other; each number is what it is more than the
-    // one before.
-    const planes = new Uint8Array(await response.arrayBuffer());
-    const values = new Int32Array(planes.length / 4);
-    const size = values.length;
-    for (let at = 0, sum = 0; at < size; at += 1) {
-      sum += planes[at] | planes[at + size] << 8 | planes[at + 2 * size] << 16
-        | planes[at + 3 * size] << 24;
-      values[at] = sum;
-    }
-    return values;
-  };
-  const names = Object.keys(packed);
-  const arrays = await Promise.all(names.map((name) => read(packed[name])));
-  return Object.fromEntries(names.map((name, at) => [name, arrays[at]]));
-};
-"""
+QUANTUM_M = 0.25  # of Web Mercator
+
+
+def script_json(value: object) -> str:
+    """Return a value as JSON that may stand in the script of a folium page.
+
+    It is ASCII that no HTML parser takes for markup and no Jinja rendering changes. Numbers must be
+    finite.
+    """
+    text = json.dumps(value, separators=(",", ":"), allow_nan=False)
+    # Only a brace of text can be followed by one of these: JSON's own is by a quote or a "}".
+    text = re.sub(r"\{(?=[{%#])", r"\\u007b", text)
+    for sign in "<>&":
+        text = text.replace(sign, f"\\u{ord(sign):04x}")
+    return text
 
 
 def packed(values: NDArray[Any] | Sequence[str]) -> list[str]:
@@ -57,6 +52,15 @@ def steps(values: NDArray[np.int32]) -> list[str]:
     """Return numbers that change little from one to the next, for `semsig.arrays`."""
     change = np.diff(values.astype("<i4"), prepend=np.int32(0))
     return ["steps", _text(change.view(np.uint8).reshape(-1, 4).T.tobytes())]
+
+
+def mercator(xy: NDArray[np.float64], crs: CRS) -> tuple[NDArray[np.int32], dict[str, Any]]:
+    """Return places as whole numbers, shape (n, 2), and how the script gets them back."""
+    to_mercator = Transformer.from_crs(crs, "EPSG:3857", always_xy=True)
+    metres = np.stack(to_mercator.transform(xy[:, 0], xy[:, 1]), axis=1)
+    origin = metres.min(axis=0)
+    places = np.rint((metres - origin) / QUANTUM_M).astype(np.int32)
+    return places, {"origin": origin.tolist(), "quantum": QUANTUM_M}
 
 
 def _text(content: bytes) -> str:

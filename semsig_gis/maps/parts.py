@@ -1,10 +1,12 @@
-"""What all maps are made of: the page, the cells as an image, drawings, a legend."""
+"""What all maps are made of: the script of the page, the cells as an image, drawings, a legend."""
 
 from __future__ import annotations
 
 import base64
+import functools
 import itertools
 from html import escape
+from importlib import resources
 from typing import TYPE_CHECKING, Any, Literal, cast
 
 import folium
@@ -19,13 +21,8 @@ from pyproj import Transformer
 from semsig_gis.core.colours import SHADES
 from semsig_gis.core.errors import InputError
 from semsig_gis.database.database import SignatureDatabase
-from semsig_gis.maps import board as _map_board
-from semsig_gis.maps import heat as _map_heat
-from semsig_gis.maps import packing as _map_packing
-from semsig_gis.maps import popup as _map_popup
-from semsig_gis.maps import search as _map_search
 from semsig_gis.maps.image import city_image
-from semsig_gis.maps.map_page import SCRIPT, STYLE, script_json
+from semsig_gis.maps.packing import script_json
 
 if TYPE_CHECKING:
     from branca.element import Figure
@@ -38,108 +35,80 @@ if TYPE_CHECKING:
 
 MAX_ZOOM = 20
 CLOSE_ZOOM = 17  # the closest that a new map shows by itself
-SCRIPTS = (
-    *(SCRIPT, _map_popup.SCRIPT, _map_search.SCRIPT),
-    *(_map_packing.SCRIPT, _map_board.SCRIPT, _map_heat.SCRIPT),
+PAGE_FILES = (
+    *("page.css", "layers.js", "popup.js", "search.js", "controls.js", "arrays.js"),
+    *("board.js", "heat.js", "objects.js", "ground.js"),
 )
+"""Files of the folder ``js`` that every page has, in this order."""
 POWERS = 4  # of x and y, which tell a place within millimetres in a city
 LATTICE = 9
 
 
-class Furniture(MacroElement):
-    """An element that needs the style and the script of this module in the page, once."""
+@functools.cache
+def page_element(file: str) -> str:
+    """Return a file of the folder ``js`` as an element of a page."""
+    text = resources.files("semsig_gis.maps").joinpath("js", file).read_text(encoding="utf-8")
+    if file.endswith(".css"):
+        return f"<style>{text}</style>"
+    # The name by which the tools of a browser show the script.
+    return f"<script>{text}//# sourceURL=semsig/{file}\n</script>"
+
+
+class Call(MacroElement):
+    """A call of a function of the page's script, which is put into the page once.
+
+    The arguments are elements of the map, such as the map itself, or plain values.
+    """
+
+    files: tuple[str, ...] = PAGE_FILES
+    _template = Template(
+        "{% macro script(this, kwargs) %}semsig.{{ this.function }}({{ this.arguments }});"
+        "{% endmacro %}"
+    )
+
+    def __init__(self, function: str, *arguments: object, **layer: Any) -> None:  # noqa: ANN401
+        super().__init__(**layer)  # type: ignore[no-untyped-call]
+        self._name = "Semsig"
+        self.function = function
+        self.arguments = ", ".join(
+            one.get_name() if isinstance(one, Element) else script_json(one) for one in arguments
+        )
 
     def render(self, **kwargs: Any) -> Any:  # noqa: ANN401 - as branca has it
-        """Put the style and script into the page, then the element."""
-        figure = cast("Figure", self.get_root())
-        page = f"<style>{STYLE}</style>\n<script>{''.join(SCRIPTS)}</script>"
-        figure.header.add_child(Element(page), name="semsig")
+        """Put the style and the script into the page, then the call."""
+        header = cast("Figure", self.get_root()).header
+        for file in self.files:
+            header.add_child(Element(page_element(file)), name=file)
         return super().render(**kwargs)  # type: ignore[no-untyped-call]
 
 
-class Legend(Furniture):
-    """A box with the meaning of the signs, folded on small screens, and what to show beside it."""
+class Drawing(Call, Layer):
+    """A layer that a function of the page's script makes."""
 
     _template = Template(
-        """
-        {% macro script(this, kwargs) %}
-        semsig.legend(
-          {{ this._parent.get_name() }}, {{ this.text }}, {{ this.view }}, {{ this.zoom }});
-        {% endmacro %}
-        """
-    )
-
-    def __init__(
-        self, text: str, view: NDArray[np.float64] | None, *, zoom: int = CLOSE_ZOOM
-    ) -> None:
-        super().__init__()  # type: ignore[no-untyped-call]
-        self._name = "SemsigLegend"
-        self.text = script_json(text)
-        self.zoom = zoom
-        corners = None if view is None else [view.min(axis=0).tolist(), view.max(axis=0).tolist()]
-        self.view = script_json(corners)
-
-
-class Drawing(Furniture, Layer):
-    """A layer that a function of this module's script draws, on a canvas where the map has one."""
-
-    _template = Template(
-        """
-        {% macro script(this, kwargs) %}
-        var {{ this.get_name() }} = semsig.{{ this.function }}({{ this.arguments }});
-        {% endmacro %}
-        """
+        "{% macro script(this, kwargs) %}var {{ this.get_name() }} = "
+        "semsig.{{ this.function }}({{ this.arguments }});{% endmacro %}"
     )
 
     def __init__(self, name: str, function: str, *arguments: object, show: bool = True) -> None:
-        super().__init__(name=name, overlay=True, show=show)
-        self._name = "SemsigDrawing"
-        self.function = function
-        self.arguments = ", ".join(map(script_json, arguments))
+        super().__init__(function, *arguments, name=name, overlay=True, show=show)
 
 
-class Script(Furniture):
-    """A call of a function of this module's script, which draws nothing by itself."""
-
-    _template = Template(
-        """
-        {% macro script(this, kwargs) %}
-        semsig.{{ this.function }}({{ this.arguments }});
-        {% endmacro %}
-        """
-    )
-
-    def __init__(self, function: str, *arguments: object) -> None:
-        super().__init__()  # type: ignore[no-untyped-call]
-        self._name = "SemsigScript"
-        self.function = function
-        self.arguments = ", ".join(map(script_json, arguments))
-
-
-class Surroundings(Furniture):
-    """What stands around a map: search, light and dark, and who is to be named for the data.
+class Surroundings(Call):
+    """What stands around a map: search, light and dark, and whom to name for the data.
 
     It comes last, when all boxes are there, and shows what the map is to show between them.
     """
 
-    _template = Template(
-        """
-        {% macro script(this, kwargs) %}
-        semsig.furnish({{ this._parent.get_name() }}, {{ this.layers.get_name() }},
-          {{ this.area }}, {{ this.credits_ }});
-        {% endmacro %}
-        """
-    )
-
     def __init__(
-        self, layers: folium.LayerControl, area: dict[str, Any] | None, names: tuple[str, ...]
+        self,
+        map_: folium.Map,
+        layers: folium.LayerControl,
+        area: dict[str, Any] | None,
+        names: tuple[str, ...],
     ) -> None:
-        super().__init__()  # type: ignore[no-untyped-call]
-        self._name = "SemsigSurroundings"
-        self.layers = layers
-        self.names = names
-        self.found = area
-        self.area, self.credits_ = script_json(area), script_json(names)
+        super().__init__("furnish", map_, layers, area, names)
+        self.area, self.names = area, names
 
 
 def prepared_map(map_: folium.Map | None, tiles: str | None, *, title: str) -> folium.Map:
@@ -164,31 +133,43 @@ def prepared_map(map_: folium.Map | None, tiles: str | None, *, title: str) -> f
     return made
 
 
+def draw(map_: folium.Map, name: str, function: str, *arguments: object, show: bool = True) -> None:
+    """Add a layer that a function of the page's script makes."""
+    Drawing(free_name(map_, name), function, *arguments, show=show).add_to(map_)
+
+
 def finished_map(
-    chosen: folium.Map,
+    map_: folium.Map,
     source: SignatureDatabase | StreetObjects | None,
     *,
+    legend: str = "",
+    view: NDArray[np.float64] | None = None,
+    zoom: int = CLOSE_ZOOM,
     licenses: tuple[str, ...] = (),
 ) -> folium.Map:
     """Add what every map has, last, where the layer control knows all layers.
 
-    The source of what was drawn names whom to credit and what a search finds: cells by number,
-    places by x and y in its CRS.
+    ``view`` holds places to show at first, at most as close as ``zoom``. The source of what was
+    drawn names whom to credit and what a search finds: cells by number, places by x and y in its
+    CRS.
     """
-    children = layers_of(chosen)
+    if legend:
+        corners = None if view is None else [view.min(axis=0).tolist(), view.max(axis=0).tolist()]
+        Call("legend", map_, legend, corners, zoom).add_to(map_)
+    children = layers_of(map_)
     area = None if source is None else _area(source)
     names = (*(() if source is None else map(str, source.licenses)), *licenses)
     for name, child in list(children.items()):
         if isinstance(child, Surroundings):
             names = child.names + names
             if area is None or area["grid"] is None:
-                area = child.found or area
+                area = child.area or area
         if isinstance(child, folium.LayerControl | Surroundings):
             del children[name]
     layers = folium.LayerControl(collapsed=cast("bool", JsCode("semsig.small.matches")))
-    layers.add_to(chosen)
-    Surroundings(layers, area, tuple(dict.fromkeys(names))).add_to(chosen)
-    return chosen
+    layers.add_to(map_)
+    Surroundings(map_, layers, area, tuple(dict.fromkeys(names))).add_to(map_)
+    return map_
 
 
 def _area(source: SignatureDatabase | StreetObjects) -> dict[str, Any]:
@@ -224,7 +205,7 @@ def _area(source: SignatureDatabase | StreetObjects) -> dict[str, Any]:
 
 def layer_text(text: str) -> str:
     """Return text for the name of a layer, which the layer control reads as HTML."""
-    # A brace could begin what folium renders once more (see `maps.map_page`), and a sign of
+    # A brace could begin what folium renders once more (see `maps.packing`), and a sign of
     # direction turns text round as far as the element goes.
     return f"<bdi>{escape(text)}</bdi>".replace("{", "&#123;")
 
@@ -240,6 +221,11 @@ def to_latlon(xy: NDArray[np.float64], crs: CRS, *, digits: int = 6) -> NDArray[
     longitude, latitude = to_degrees.transform(xy[:, 0], xy[:, 1])
     degrees = np.round(np.stack([latitude, longitude], axis=1), digits)
     return np.where(np.isfinite(degrees), degrees, np.nan)
+
+
+def corners_of(source: SignatureDatabase | StreetObjects) -> NDArray[np.float64]:
+    """Return latitudes and longitudes of the corners of all places."""
+    return to_latlon(np.stack([source.xy.min(axis=0), source.xy.max(axis=0)]), source.crs)
 
 
 def class_titles(database: SignatureDatabase) -> dict[str, str]:
@@ -266,6 +252,16 @@ def cell_signature(database: SignatureDatabase, cell: int) -> list[Any]:
     return popup_signature(database.types(cell), database.signature(cell).bearings)
 
 
+def ranks_text(low: int, high: int) -> str:
+    """Return the ranks that ties allow."""
+    return f"{low:,}" if low == high else f"{low:,} to {high:,}"
+
+
+def ties_text(tied: int) -> str:
+    """Return how many are as good, to follow a rank or a distance."""
+    return f", {tied:,} tied" if tied > 1 else ""
+
+
 def free_name(map_: folium.Map, name: str) -> str:
     """Return the name for a layer, with a number where the map has one of that name."""
     taken = {child.layer_name for child in layers_of(map_).values() if isinstance(child, Layer)}
@@ -273,17 +269,17 @@ def free_name(map_: folium.Map, name: str) -> str:
     return next(one for one in itertools.chain([name], numbered) if one not in taken)
 
 
-def add_city(chosen: folium.Map, database: SignatureDatabase, *, show: bool = True) -> None:
+def add_city(map_: folium.Map, database: SignatureDatabase, *, show: bool = True) -> None:
     """Add the cells as an image, unless the map shows them already."""
     picture = city_image(database, SHADES)
-    shown = {child.url for child in layers_of(chosen).values() if isinstance(child, ImageOverlay)}
+    shown = {child.url for child in layers_of(map_).values() if isinstance(child, ImageOverlay)}
     if _data_url(picture[0]) not in shown:
         # In the pane of tiles, below everything else.
-        add_image(chosen, *picture, name="Objects seen from a cell", dark="flip", show=show)
+        add_image(map_, *picture, name="Objects seen from a cell", dark="flip", show=show)
 
 
 def add_image(
-    chosen: folium.Map,
+    map_: folium.Map,
     image: bytes,
     bounds: list[list[float]],
     *,
@@ -300,12 +296,12 @@ def add_image(
     ImageOverlay(
         _data_url(image),
         bounds,
-        name=free_name(chosen, name),
+        name=free_name(map_, name),
         pane="tilePane",
         opacity=opacity,
         class_name=f"semsig-{dark}",
         show=show,
-    ).add_to(chosen)
+    ).add_to(map_)
 
 
 def _data_url(image: bytes) -> str:

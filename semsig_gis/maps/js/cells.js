@@ -97,7 +97,7 @@ semsig.City = class {
       Array.from(levels, (level) => Math.floor((level + 0.5) * degrees))];
   }
 };
-semsig.told = {};
+semsig.cellFacts = {};
 semsig.cells = (packed, grid, titles, told) => {
   const group = L.layerGroup();
   const ready = semsig.arrays(packed).then((data) => new semsig.City(data, grid));
@@ -134,7 +134,7 @@ semsig.cells = (packed, grid, titles, told) => {
       ([across, along]) => city.latlng(column + across, row + along));
     drawn.addLayer(L.polygon(corners, {...look, fill: false}));
     const parts = told.map((name) => ({
-      rows: [], jumps: [], marks: [], dots: [], ...semsig.told[name](city, cell)}));
+      rows: [], jumps: [], marks: [], dots: [], ...semsig.cellFacts[name](city, cell)}));
     const sign = (other, options) => {
       const marker = L.circleMarker(city.middle(other), {
         pane: "markerPane", color: semsig.outline(map), weight: 1, fillOpacity: 0.95,

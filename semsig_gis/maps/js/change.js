@@ -1,4 +1,4 @@
-semsig.told.change = (city, cell) => {
+semsig.cellFacts.change = (city, cell) => {
   const kind = city.grid.kinds[city.data.kind[cell] - 1];
   const [before, after] = ["before", "now"].map((part) => city.signature(part, cell));
   const title = {same: "A cell that sees what it saw", changed: "A cell that sees something else",

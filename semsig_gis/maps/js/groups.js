@@ -1,4 +1,4 @@
-semsig.told.groups = (city, cell) => {
+semsig.cellFacts.groups = (city, cell) => {
   const grid = city.grid;
   const {"now.types": types, "now.levels": levels, "now.ends": ends} = city.data;
   const [from, to] = city.part("now", cell);

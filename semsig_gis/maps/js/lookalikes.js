@@ -1,4 +1,4 @@
-semsig.told.lookalikes = (city, cell) => {
+semsig.cellFacts.lookalikes = (city, cell) => {
   const {data, grid} = city;
   const percent = (steps) => {
     const value = 100 * steps / grid.chances;

@@ -1,18 +1,22 @@
-"""Text from data that goes into the script of a page."""
+"""Data that goes into the script of a page."""
 
 from __future__ import annotations
 
 import json
 import re
+from importlib import resources
 
 import pytest
 from folium.template import Template
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from semsig_gis.maps.map_page import STYLE, script_json
-from semsig_gis.maps.parts import SCRIPTS
+from semsig_gis.maps.packing import script_json
+from semsig_gis.maps.parts import page_element
 
+BROWSER_FILES = sorted(
+    one.name for one in resources.files("semsig_gis.maps").joinpath("js").iterdir()
+)
 nasty = st.text(st.sampled_from(list("{}%#<>&'\"`$\\/-! 7*é\u2028\ud7ff")), max_size=12)
 values = st.recursive(
     st.none() | st.integers() | st.text() | nasty,
@@ -45,7 +49,8 @@ def test_numbers_that_json_does_not_have_are_refused(number: float) -> None:
         script_json([number])
 
 
-@pytest.mark.parametrize("text", [STYLE, *SCRIPTS])
-def test_style_and_script_are_no_templates_themselves(text: str) -> None:
-    assert Template(text, keep_trailing_newline=True).render() == text
-    assert "</" not in text
+@pytest.mark.parametrize("file", BROWSER_FILES)
+def test_style_and_script_are_no_templates_themselves(file: str) -> None:
+    element = page_element(file)
+    assert Template(element).render() == element
+    assert element.count("</") == 1
