@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import zlib
 from collections import Counter
 from dataclasses import fields, replace
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ClassVar, Protocol, runtime_checkable
 
 import numpy as np
 
@@ -27,19 +26,23 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Mapping, Sequence
 
     from semsig_gis.likelihood.noise.model import Noise
-    from semsig_gis.queries.sight import CitySights, Sight
+    from semsig_gis.queries.sight import CitySights, Sight, Spoiling
 
-QueryDistortion = (
-    Distortion
-    | CompassBias
-    | MissingClasses
-    | FieldOfView
-    | HiddenBehind
-    | Obstacles
-    | BlockedSectors
-    | Detector
-)
-"""Anything that happens to a query between the street and the search."""
+
+@runtime_checkable
+class QueryDistortion(Protocol):
+    """Anything that happens to a query between the street and the search: a frozen dataclass.
+
+    `stream` keys its random numbers. It belongs to the kind of distortion for ever: another number
+    changes every seeded result.
+    """
+
+    stream: ClassVar[int]
+    __dataclass_fields__: ClassVar[dict[str, Any]]
+
+    def ready(self, city: CitySights) -> Spoiling:
+        """Return what it does to a query of a city, with all chances from a generator."""
+
 
 NAMED_DISTORTIONS: Mapping[str, QueryDistortion] = MappingProxyType(
     {
@@ -102,12 +105,11 @@ def ready_chain(
     else happens to it, and experiments that differ in one distortion differ in nothing else. Raises
     SemsigError if a distortion does not fit the city.
     """
-    repeats: Counter[str] = Counter()
+    repeats: Counter[int] = Counter()
     steps = []
     for one in distortions:
-        kind = type(one).__name__
-        steps.append(((zlib.crc32(kind.encode()), repeats[kind]), one.ready(city)))
-        repeats[kind] += 1
+        steps.append(((one.stream, repeats[one.stream]), one.ready(city)))
+        repeats[one.stream] += 1
 
     def spoil(sight: Sight, seed: int, number: int) -> Sight:
         for stream, step in steps:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
@@ -27,6 +27,8 @@ class CompassBias:
     The angle is normal, with a standard deviation of `sigma` degrees, 0 or more.
     """
 
+    stream: ClassVar[int] = 3_628_719_812
+
     sigma: float = 10.0
 
     def __post_init__(self) -> None:  # noqa: D105
@@ -48,6 +50,8 @@ class MissingClasses:
 
     With `others`, the named classes are the ones it knows, and all others are missing.
     """
+
+    stream: ClassVar[int] = 2_848_656_676
 
     classes: tuple[str, ...] = ()
     others: bool = False
@@ -72,6 +76,8 @@ class FieldOfView:
     It sees `degrees`, above 0 and at most 360. Bearings are still counted from north; nothing tells
     which part of the turn was looked at.
     """
+
+    stream: ClassVar[int] = 20_362_731
 
     degrees: float = 90.0
 
@@ -103,6 +109,8 @@ class HiddenBehind:
     distance d covers ``atan(w / 2 d)`` to either side.
     """
 
+    stream: ClassVar[int] = 3_881_164_136
+
     width: float = 0.5
 
     def __post_init__(self) -> None:  # noqa: D105
@@ -125,6 +133,8 @@ class Obstacles:
     Their number around a place is a Poisson one with mean `count`; each is `width` metres wide and
     stands anywhere within the range of the city. Both are 0 or more.
     """
+
+    stream: ClassVar[int] = 626_356_719
 
     count: float = 2.0
     width: float = 4.0
@@ -153,6 +163,8 @@ class BlockedSectors:
     There are `count` of them (0 or more), each of `degrees` (0 to 360) anywhere in the turn; they
     may overlap.
     """
+
+    stream: ClassVar[int] = 4_207_042_345
 
     count: int = 1
     degrees: float = 30.0
@@ -207,6 +219,8 @@ class Detector:
     one model is drawn for each query. The chances are those of `likelihood.noise.table`, with which
     the likelihood method computes: none is quite 0 or 1.
     """
+
+    stream: ClassVar[int] = 4_129_241_295
 
     noise: Noise
     half: float = math.inf

@@ -10,7 +10,7 @@ import math
 from bisect import bisect_right
 from dataclasses import dataclass, replace
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Literal, get_args
+from typing import TYPE_CHECKING, ClassVar, Literal, get_args
 
 import numpy as np
 
@@ -71,6 +71,8 @@ class Distortion:
     ...
     semsig_gis.core.errors.InputError: -1 occurrences of distortion were given; give 0 or more.
     """
+
+    stream: ClassVar[int] = 795_306_091
 
     occurrences: int = 7
     bearing_sigma: float = 5.0

@@ -57,10 +57,10 @@ def test_the_distortions_are_the_papers_levels_in_the_order_that_was_kept() -> N
     chains = {**SPECS["levels"].distortions, **SPECS["medium"].distortions}
     assert set(chains) == set(LEVELS)
     for level, (one,) in chains.items():
-        assert one.occurrences == DISTORTIONS[level].occurrences  # type: ignore[union-attr]
-        assert not one.resort  # type: ignore[union-attr]
+        assert one.occurrences == DISTORTIONS[level].occurrences  # type: ignore[attr-defined]
+        assert not one.resort  # type: ignore[attr-defined]
     readings = SPECS["readings"].distortions.values()
-    said = {(one.resort, one.false_class) for (one,) in readings}  # type: ignore[union-attr]
+    said = {(one.resort, one.false_class) for (one,) in readings}  # type: ignore[attr-defined]
     assert len(said) == 4
 
 
