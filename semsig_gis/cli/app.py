@@ -8,17 +8,15 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from semsig_gis.cli.console import print_json, print_rows, remark
+from semsig_gis.cli.console import print_rows, remark
 from semsig_gis.core.errors import DatabaseError, InputError
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
     from semsig_gis.database.city import City
-    from semsig_gis.database.update import UpdateReport
     from semsig_gis.evaluation.identify.result import Identifiability
     from semsig_gis.evaluation.result import Evaluation
-    from semsig_gis.objects.quality import QualityReport
     from semsig_gis.reports.tables import Table
 
 
@@ -105,17 +103,6 @@ def print_evaluation(evaluation: Evaluation) -> None:
 
     for table in evaluation_tables(evaluation):
         print_table(table)
-
-
-def print_report(report: QualityReport | UpdateReport, *, as_json: bool) -> None:
-    """Print a report as tables or as JSON."""
-    if as_json:
-        print_json(report.to_dict())
-        return
-    for title, columns, rows, note in report.tables():
-        print_rows(title, columns, rows)
-        if note:
-            typer.echo(note)
 
 
 def print_table(table: Table) -> None:

@@ -17,7 +17,6 @@ from semsig_gis.cli.app import (
     keep_inputs,
     known_identifiability,
     numbers,
-    print_report,
     print_table,
     require_suffix,
 )
@@ -172,7 +171,13 @@ def update(
         remark("the new database lacks the columns of semsig identify; run semsig identify again")
     for note in report.notes:
         remark(note)
-    print_report(report, as_json=as_json)
+    if as_json:
+        print_json(report.to_dict())
+        return
+    from semsig_gis.reports.update import update_tables
+
+    for table in update_tables(report):
+        print_table(table)
 
 
 @app.command()

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
-from semsig_gis.cli.app import AsJson, app, keep_inputs, print_report, require_suffix
+from semsig_gis.cli.app import AsJson, app, keep_inputs, print_table, require_suffix
 from semsig_gis.cli.console import print_json, print_rows, progress, remark
 
 if TYPE_CHECKING:
@@ -152,9 +152,14 @@ def _save_loaded(
             save_surroundings(table, path)
     for note in loaded.notes:
         remark(note)
-    print_report(report, as_json=as_json)
-    if not as_json:
-        typer.echo(f"street objects: {out}")
+    if as_json:
+        print_json(report.to_dict())
+        return
+    from semsig_gis.reports.quality import quality_tables
+
+    for table in quality_tables(report):
+        print_table(table)
+    typer.echo(f"street objects: {out}")
 
 
 @app.command()

@@ -18,7 +18,7 @@ from semsig_gis.database.database import join_databases, require_same
 from semsig_gis.database.file import open_database
 from semsig_gis.database.occlusion import TOUCHING_M, buildings_near
 from semsig_gis.database.store import open_store, save_with_store
-from semsig_gis.objects.changes import ClassChange, compare_objects, replace_layers
+from semsig_gis.objects.changes import compare_objects, replace_layers
 from semsig_gis.objects.surroundings import licenses_of
 
 if TYPE_CHECKING:
@@ -30,8 +30,7 @@ if TYPE_CHECKING:
 
     from semsig_gis.database.database import SignatureDatabase
     from semsig_gis.database.store import ObjectStore
-    from semsig_gis.objects.changes import ObjectChanges
-    from semsig_gis.objects.quality import PlainTable
+    from semsig_gis.objects.changes import ClassChange, ObjectChanges
     from semsig_gis.objects.table import StreetObjects
 
     _Cells = tuple[NDArray[np.int64], NDArray[np.int64]]  # columns and rows
@@ -67,44 +66,6 @@ class UpdateReport:
     def to_dict(self) -> dict[str, Any]:
         """Return the fields and ``share`` as plain values, ready for JSON."""
         return {**asdict(self), "share": self.share}
-
-    def tables(self) -> tuple[PlainTable, ...]:
-        """Return the report as tables to print, in the form of `reports.tables.Table`.
-
-        They show objects by class, and cells.
-        """
-        names = [name for name in ClassChange.__slots__ if name not in {"class_name", "moved_m"}]
-        numbers = [[getattr(item, name) for name in names] for item in self.classes]
-        totals = np.array(numbers, np.int64).reshape(-1, len(names)).sum(axis=0).tolist()
-        rows = [
-            (item.class_name, *(f"{number:,}" for number in row), _metres(item.moved_m))
-            for item, row in zip(self.classes, numbers, strict=True)
-        ]
-        rows.append(("all", *(f"{number:,}" for number in totals), ""))
-        cells = (
-            ("before", self.cells_before),
-            ("after", self.cells),
-            ("computed again", self.recomputed),
-            ("changed", self.changed),
-            ("appeared", self.appeared),
-            ("vanished", self.vanished),
-        )
-        layers = f"Layers replaced: {', '.join(self.replaced)}."
-        if self.kept:
-            layers += f" Layers that stay as they were: {', '.join(self.kept)}."
-        return (
-            ("Objects by class", ("class", *names, "moved by, m"), tuple(rows), layers),
-            (
-                "Cells",
-                ("what", "cells"),
-                tuple((name, f"{number:,}") for name, number in cells),
-                f"The city has drifted by {self.share:.2%} of its cells.",
-            ),
-        )
-
-
-def _metres(number: float | None) -> str:
-    return "" if number is None else f"{number:,.2f}"
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections import Counter
 from dataclasses import asdict, dataclass
-from typing import TYPE_CHECKING, Any, TypeAlias
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import shapely
@@ -27,9 +27,6 @@ if TYPE_CHECKING:
     from semsig_gis.objects.clean import LayerReport, LoadReport
     from semsig_gis.objects.conflate import ConflatedPair, ConflationReport
     from semsig_gis.objects.table import StreetObjects
-
-# Title, headings, rows of text, and what a reader must know.
-PlainTable: TypeAlias = tuple[str, tuple[str, ...], tuple[tuple[str, ...], ...], str]
 
 SQUARE_M = 100.0
 M2_PER_KM2 = 1e6
@@ -104,86 +101,6 @@ class QualityReport:
     def to_dict(self) -> dict[str, Any]:
         """Return the fields and ``objects``, their number, as plain values for JSON."""
         return {"objects": self.objects, **asdict(self)}
-
-    def tables(self) -> tuple[PlainTable, ...]:
-        """Return the report as tables to print, in the form of `reports.tables.Table`.
-
-        They show objects by class, rows by layer, what was conflated (where something was), the
-        place, and the licences.
-        """
-        tables: list[PlainTable] = [
-            (
-                "Objects by class",
-                ("class", "objects", "rows", "per km² of hull", "per km² occupied", "nearest, m"),
-                tuple(
-                    (
-                        item.class_name,
-                        f"{item.objects:,}",
-                        f"{item.rows:,}",
-                        _text(item.per_km2_hull),
-                        _text(item.per_km2_occupied),
-                        _text(item.nearest_m),
-                    )
-                    for item in self.classes
-                ),
-                f"The convex hull of all objects is {self.hull_km2:,.2f} km², ground without "
-                f"objects included; the squares of {SQUARE_M:.0f} m that hold an object are "
-                f"{self.occupied_km2:,.2f} km². Nearest: the median distance to the nearest other "
-                "object of the class."
-                + (f" No objects of: {', '.join(self.absent)}." if self.absent else ""),
-            ),
-            ("Rows by layer", _SOURCE_COLUMNS, tuple(map(_source_row, self.sources)), ""),
-        ]
-        if self.conflated:
-            rows = tuple(
-                (
-                    item.class_name,
-                    item.merged,
-                    item.kept,
-                    f"{item.count:,}",
-                    _text(item.radius),
-                    _text(item.median_m),
-                    _text(item.largest_m),
-                )
-                for item in self.conflated
-            )
-            tables.append(("Conflated", _CONFLATED_COLUMNS, rows, ""))
-        place = (
-            ("coordinate system", self.crs),
-            ("west, south, east, north, m", ", ".join(f"{edge:.0f}" for edge in self.extent)),
-            (
-                "west, south, east, north, degrees",
-                ", ".join(f"{edge:.5f}" for edge in self.extent_degrees),
-            ),
-        )
-        tables.append(("Place", ("what", "value"), place, ""))
-        tables.append(("Licences", ("licence",), tuple((line,) for line in self.licenses), ""))
-        return tuple(tables)
-
-
-_SOURCE_COLUMNS = (
-    "layer",
-    "read",
-    "unreadable",
-    "filtered",
-    "missing",
-    "duplicates",
-    "misplaced",
-    "collapsed",
-    "conflated",
-    "objects",
-    "notes",
-)
-_CONFLATED_COLUMNS = ("class", "from", "into", "objects", "radius, m", "median, m", "largest, m")
-
-
-def _source_row(item: SourceQuality) -> tuple[str, ...]:
-    *numbers, notes = (getattr(item, column) for column in _SOURCE_COLUMNS[1:])
-    return (item.name, *(f"{number:,}" for number in numbers), "; ".join(notes))
-
-
-def _text(number: float | None) -> str:
-    return "" if number is None else f"{number:,.1f}"
 
 
 def quality_report(

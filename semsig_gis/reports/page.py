@@ -20,7 +20,7 @@ from semsig_gis.core.errors import InputError
 from semsig_gis.core.text import escaped, one_line
 from semsig_gis.reports.plots import draw_plot
 from semsig_gis.reports.scenes import draw_scene
-from semsig_gis.reports.tables import number_table
+from semsig_gis.reports.tables import Table, markdown_rows, number_table
 from semsig_gis.storage.whole import write_whole
 
 if TYPE_CHECKING:
@@ -28,7 +28,6 @@ if TYPE_CHECKING:
 
     from semsig_gis.reports.parts import Number, Plot, Report, Section
     from semsig_gis.reports.plots import Picture
-    from semsig_gis.reports.tables import NumberCell, NumberTable
 
 
 # What has a meaning to Markdown anywhere, besides what `escaped` knows, and at the beginning.
@@ -65,13 +64,15 @@ def markdown_page(report: Report, pictures: Mapping[str, Picture]) -> str:
     """Return a report as Markdown, with its pictures shown from the folder ``figures``."""
     blocks = [f"# {_inline(report.title)}", *map(_paragraph, report.text)]
     if report.settings:
-        rows = [(_inline(name), _inline(value)) for name, value in report.settings]
-        blocks.append(_table(("Setting", "Value"), rows, texts=2))
+        settings = Table("", ("Setting", "Value"), report.settings, labels=2)
+        blocks.append(markdown_rows(settings, _inline))
     tables = _tables(report)
     for section in report.sections:
         blocks += [f"## {_inline(section.title)}", *map(_paragraph, section.text)]
         if section.name in tables:
-            blocks += _number_blocks(tables[section.name])
+            table = tables[section.name]
+            blocks.append(markdown_rows(table, _inline))
+            blocks += [_paragraph(table.note)] if table.note else []
         blocks += _picture_blocks(section, pictures)
     return "\n\n".join(blocks) + "\n"
 
@@ -80,7 +81,7 @@ def _finalized(value: Any) -> Any:  # noqa: ANN401 - whatever a template shows
     return one_line(value) if type(value) is str else value
 
 
-def _tables(report: Report) -> dict[str, NumberTable]:
+def _tables(report: Report) -> dict[str, Table]:
     return {
         section.name: number_table(section.numbers)
         for section in report.sections
@@ -95,24 +96,6 @@ def _inline(text: str) -> str:
 
 def _paragraph(text: str) -> str:
     return FIRST_MARKS.sub(r"\1\\\2", _inline(text))
-
-
-def _number_blocks(table: NumberTable) -> Iterator[str]:
-    rows = [(*map(_inline, row.labels), *map(_markdown_cell, row.cells)) for row in table.rows]
-    headings = [*[""] * table.labels, *map(_inline, table.headings)]
-    yield _table(headings, rows, texts=table.labels)
-    if table.note:
-        yield _paragraph(table.note)
-
-
-def _markdown_cell(cell: NumberCell) -> str:
-    text = f"**{_inline(cell.text)}**" if cell.strong else _inline(cell.text)
-    return f"{text} ({_inline(cell.interval)})" if cell.interval else text
-
-
-def _table(headings: Sequence[str], rows: Sequence[Sequence[str]], *, texts: int) -> str:
-    rules = ["---"] * texts + ["---:"] * (len(headings) - texts)
-    return "\n".join(f"| {' | '.join(line)} |" for line in (headings, rules, *rows))
 
 
 def _picture_blocks(section: Section, pictures: Mapping[str, Picture]) -> Iterator[str]:

@@ -1,34 +1,43 @@
-"""Tables as rows of text, for a terminal or for Markdown."""
+"""Tables for people: on a terminal, in Markdown and on a page."""
 
 from __future__ import annotations
 
 import itertools
 import math
-from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING, NamedTuple
 
 from semsig_gis.core.text import escaped, one_line
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Sequence
+    from collections.abc import Callable, Iterable, Mapping, Sequence
 
     from semsig_gis.reports.parts import Number
 
 
 @dataclass(frozen=True, slots=True)
 class Table:
-    """A table to print.
+    """A table for people.
 
     Parameters
     ----------
     title : str
         What it shows.
     columns : tuple of str
-        Headings; the first column is text, the others are numbers with their units.
+        Headings, with units.
     rows : tuple of tuple of str
         Cells as text, one for each column; empty where there is nothing to say.
     note : str, default ""
         What a reader must know to read it rightly.
+    labels : int, default 1
+        How many columns from the left are text; the others are numbers.
+    groups : tuple of (str, tuple of str), optional
+        The headings after the labels once more, for where they can be shown in two rows: each group
+        with its columns.
+    bold : frozenset of (int, int), optional
+        Row and column of the cells in bold.
+    intervals : mapping of (int, int) to str, optional
+        Intervals of the numbers in cells, by row and column.
 
     Examples
     --------
@@ -40,6 +49,22 @@ class Table:
     columns: tuple[str, ...]
     rows: tuple[tuple[str, ...], ...]
     note: str = ""
+    labels: int = 1
+    groups: tuple[tuple[str, tuple[str, ...]], ...] = ()
+    bold: frozenset[tuple[int, int]] = frozenset()
+    intervals: Mapping[tuple[int, int], str] = field(default_factory=dict)
+
+    @property
+    def group_starts(self) -> frozenset[int]:
+        """At which columns a group begins."""
+        widths = [len(columns) for _, columns in self.groups[:-1]]
+        return frozenset(itertools.accumulate(widths, initial=self.labels) if self.groups else ())
+
+    @property
+    def spans(self) -> tuple[int, ...]:
+        """How many rows from here on share the first label; 0 where the row above has it."""
+        runs = (len(list(rows)) for _, rows in itertools.groupby(row[0] for row in self.rows))
+        return tuple(span for run in runs for span in (run, *[0] * (run - 1)))
 
     def _repr_markdown_(self) -> str:
         """Show the table in a notebook."""
@@ -62,11 +87,26 @@ class Table:
         | --- | ---: |
         | step | 10 |
         """
-        rules = ["---", *["---:"] * (len(self.columns) - 1)]
-        lines = [self.columns, tuple(rules), *self.rows]
-        table = "\n".join(f"| {' | '.join(escaped(cell) for cell in line)} |" for line in lines)
         note = f"\n{escaped(self.note)}\n" if self.note else ""
-        return f"### {escaped(self.title)}\n\n{table}\n{note}"
+        return f"### {escaped(self.title)}\n\n{markdown_rows(self, escaped)}\n{note}"
+
+
+def markdown_rows(table: Table, escape: Callable[[str], str]) -> str:
+    """Return the headings and rows of a table as Markdown, with its texts escaped."""
+
+    def cell(row: int, column: int) -> str:
+        text = escape(table.rows[row][column])
+        bold = f"**{text}**" if (row, column) in table.bold else text
+        interval = table.intervals.get((row, column))
+        return f"{bold} ({escape(interval)})" if interval else bold
+
+    columns = range(len(table.columns))
+    lines = [
+        [escape(heading) for heading in table.columns],
+        ["---" if column < table.labels else "---:" for column in columns],
+        *([cell(row, column) for column in columns] for row in range(len(table.rows))),
+    ]
+    return "\n".join(f"| {' | '.join(line)} |" for line in lines)
 
 
 def percent(share: float) -> str:
@@ -75,98 +115,21 @@ def percent(share: float) -> str:
 
 
 OURS, INTERVAL, PAPER, DIFFERENCE = "ours", "95 %", "paper", "difference"
-
-
 NARROW = {DIFFERENCE: "diff."}
-
-
 NOTHING = "\u2013"
-
-
 # In letters: what fits on A4 paper and on 900 pixels; labels take so much before they wrap.
 WIDEST = 102
-
-
 NARROWEST_LABEL, WIDEST_LABEL, GAP = 14, 28, 3
-
-
 OUTSIDE = "Bold: the paper's figure is outside our interval of 95 %."
 
 
-@dataclass(frozen=True, slots=True)
-class NumberCell:
-    """A cell: the figure as it is shown, and its interval where that has no column of its own.
-
-    It is strong where the paper's figure is outside our interval.
-    """
-
+class _Cell(NamedTuple):
     text: str
     interval: str = ""
-    strong: bool = False
+    bold: bool = False
 
 
-@dataclass(frozen=True, slots=True)
-class NumberGroup:
-    """Columns that belong together.
-
-    They are some of ``ours``, ``95 %``, ``paper`` and ``difference`` (or ``diff.``).
-    """
-
-    name: str
-    columns: tuple[str, ...]
-
-
-@dataclass(frozen=True, slots=True)
-class NumberRow:
-    """A row with one cell for each column of each group.
-
-    ``span`` is how many rows from here on share the first label; 0 where the row above has it.
-    """
-
-    labels: tuple[str, ...]
-    cells: tuple[NumberCell, ...]
-    span: int = 1
-
-
-@dataclass(frozen=True, slots=True)
-class NumberTable:
-    """A table of numbers, laid out, with a note that a reader needs to read it rightly."""
-
-    groups: tuple[NumberGroup, ...]
-    rows: tuple[NumberRow, ...]
-    note: str = ""
-
-    @property
-    def labels(self) -> int:
-        """How many labels a row has."""
-        return len(self.rows[0].labels)
-
-    @property
-    def grouped(self) -> bool:
-        """Whether a group has more than one column."""
-        return any(len(group.columns) > 1 for group in self.groups)
-
-    @property
-    def firsts(self) -> frozenset[int]:
-        """At which columns a group begins, where groups have names."""
-        if not self.grouped or not any(group.name for group in self.groups):
-            return frozenset()
-        widths = [len(group.columns) for group in self.groups]
-        return frozenset(itertools.accumulate(widths[:-1], initial=0))
-
-    @property
-    def headings(self) -> tuple[str, ...]:
-        """One heading a column, for where groups cannot be shown."""
-        return tuple(
-            group.name
-            if group.name and len(group.columns) == 1
-            else ": ".join(part for part in (group.name, column) if part)
-            for group in self.groups
-            for column in group.columns
-        )
-
-
-def number_table(numbers: Sequence[Number]) -> NumberTable:
+def number_table(numbers: Sequence[Number]) -> Table:
     """Lay out at least one number, rows and columns in the order in which they first come.
 
     Where the columns side by side would be too wide for a sheet of paper, each number has a row of
@@ -177,14 +140,10 @@ def number_table(numbers: Sequence[Number]) -> NumberTable:
     for column, name in names.items():
         unit = one_line(units[column] or "")
         names[column] = ", ".join(part for part in (name, unit) if part)
-    note = OUTSIDE if any(_is_outside(number) for number in numbers) else ""
     table = _side_by_side(numbers, names, units)
     if table is None or _width(table) > WIDEST:
         table = _one_a_row(numbers, names, units)
-    return NumberTable(*table, note)
-
-
-Parts = tuple[tuple[NumberGroup, ...], tuple[NumberRow, ...]]
+    return replace(table, note=OUTSIDE if any(map(_is_outside, numbers)) else "")
 
 
 Units = dict[str, str | None]
@@ -192,99 +151,122 @@ Units = dict[str, str | None]
 
 def _units(numbers: Iterable[Number]) -> Units:
     """Return the unit of each column; None where its numbers have several."""
-    found: Units = {}
+    units: Units = {}
     for number in numbers:
-        unit = found.setdefault(number.column, number.unit)
-        found[number.column] = unit if unit == number.unit else None
-    return found
+        unit = units.setdefault(number.column, number.unit)
+        units[number.column] = unit if unit == number.unit else None
+    return units
 
 
-def _side_by_side(numbers: Sequence[Number], names: dict[str, str], units: Units) -> Parts | None:
+def _side_by_side(numbers: Sequence[Number], names: dict[str, str], units: Units) -> Table | None:
     """Return a group of columns for each column; None where a place has two numbers."""
     placed = {(number.row, number.column): number for number in numbers}
     if len(placed) < len(numbers):
         return None
+    own = len(names) == 1  # then the interval has a column of its own
     kinds = {
-        column: _kinds([number for number in numbers if number.column == column])
+        column: [
+            kind
+            for kind in _kinds(number for number in numbers if number.column == column)
+            if own or kind != INTERVAL
+        ]
         for column in names
     }
-    own = len(names) == 1  # then the interval has a column of its own
-    if not own:
-        kinds = {
-            column: tuple(kind for kind in shown if kind != INTERVAL)
-            for column, shown in kinds.items()
-        }
-    rows = []
-    for row in dict.fromkeys(number.row for number in numbers):
-        cells: list[NumberCell] = []
-        for column, shown in kinds.items():
-            number = placed.get((row, column))
-            cells += _cells(number, shown, with_unit=units[column] is None, own=own)
-        rows.append(NumberRow((one_line(row),), tuple(cells)))
+    rows = [
+        [
+            _Cell(one_line(row)),
+            *(
+                cell
+                for column, shown in kinds.items()
+                for cell in _cells(
+                    placed.get((row, column)), shown, with_unit=units[column] is None, own=own
+                )
+            ),
+        ]
+        for row in dict.fromkeys(number.row for number in numbers)
+    ]
     groups = tuple(
-        NumberGroup(
-            names[column], shown if own else tuple(NARROW.get(kind, kind) for kind in shown)
-        )
+        (names[column], tuple(shown if own else [NARROW.get(kind, kind) for kind in shown]))
         for column, shown in kinds.items()
     )
-    return groups, tuple(rows)
+    columns = [
+        name if name and len(shown) == 1 else ": ".join(part for part in (name, kind) if part)
+        for name, shown in groups
+        for kind in shown
+    ]
+    in_two_rows = any(name for name, _ in groups) and any(len(shown) > 1 for _, shown in groups)
+    return _table(1, columns, rows, groups if in_two_rows else ())
 
 
-def _one_a_row(numbers: Sequence[Number], names: dict[str, str], units: Units) -> Parts:
-    shown = _kinds(numbers)
-    rows = []
-    for row in dict.fromkeys(number.row for number in numbers):
-        same = [number for number in numbers if number.row == row]
-        for at, number in enumerate(same):
-            labels = (one_line(row), names[number.column])
-            cells = _cells(number, shown, with_unit=units[number.column] is None, own=True)
-            rows.append(NumberRow(labels, tuple(cells), len(same) if at == 0 else 0))
-    return (NumberGroup("", shown),), tuple(rows)
+def _one_a_row(numbers: Sequence[Number], names: dict[str, str], units: Units) -> Table:
+    kinds = _kinds(numbers)
+    rows = [
+        [
+            _Cell(one_line(row)),
+            _Cell(names[number.column]),
+            *_cells(number, kinds, with_unit=units[number.column] is None, own=True),
+        ]
+        for row in dict.fromkeys(number.row for number in numbers)
+        for number in numbers
+        if number.row == row
+    ]
+    return _table(2, kinds, rows)
 
 
-def _kinds(numbers: Iterable[Number]) -> tuple[str, ...]:
+def _table(
+    labels: int,
+    columns: Iterable[str],
+    rows: Sequence[Sequence[_Cell]],
+    groups: tuple[tuple[str, tuple[str, ...]], ...] = (),
+) -> Table:
+    cells = {(row, at): cell for row, line in enumerate(rows) for at, cell in enumerate(line)}
+    return Table(
+        title="",
+        columns=(*[""] * labels, *columns),
+        rows=tuple(tuple(cell.text for cell in line) for line in rows),
+        labels=labels,
+        groups=groups,
+        bold=frozenset(place for place, cell in cells.items() if cell.bold),
+        intervals={place: cell.interval for place, cell in cells.items() if cell.interval},
+    )
+
+
+def _kinds(numbers: Iterable[Number]) -> list[str]:
     """Return the columns that some of the numbers fill."""
-    told = {OURS}
+    filled = {OURS}
     for number in numbers:
         if number.low is not None or number.high is not None:
-            told.add(INTERVAL)
+            filled.add(INTERVAL)
         if number.paper is not None:
-            told |= {PAPER, DIFFERENCE}
-    return tuple(kind for kind in (OURS, INTERVAL, PAPER, DIFFERENCE) if kind in told)
+            filled |= {PAPER, DIFFERENCE}
+    return [kind for kind in (OURS, INTERVAL, PAPER, DIFFERENCE) if kind in filled]
 
 
 def _cells(
     number: Number | None, kinds: Iterable[str], *, with_unit: bool, own: bool
-) -> list[NumberCell]:
+) -> list[_Cell]:
     if number is None:
-        return [NumberCell("") for _ in kinds]
+        return [_Cell("") for _ in kinds]
     unit = f" {one_line(number.unit)}" if with_unit and number.unit else ""
-    interval = _interval(number)
-    interval = f"{interval}{unit}" if interval else ""
-    difference = number.difference
+
+    def shown(value: float | None, sign: str = "") -> str:
+        return "" if value is None else _shown(value, number.decimals, sign) + unit
+
+    ours = math.nan if number.ours is None else number.ours
+    interval = ""
+    if number.low is not None and number.high is not None:
+        interval = f"{_shown(number.low, number.decimals)} to {shown(number.high)}"
     cells = {
-        OURS: NumberCell(_shown(number.ours, number.decimals) + unit, "" if own else interval),
-        INTERVAL: NumberCell(interval),
-        PAPER: NumberCell("" if number.paper is None else _shown(number.paper, number.decimals)),
-        DIFFERENCE: NumberCell(
-            "" if difference is None else _shown(difference, number.decimals, "+"),
-            strong=_is_outside(number),
-        ),
+        OURS: _Cell(shown(ours), "" if own else interval),
+        INTERVAL: _Cell(interval),
+        PAPER: _Cell(shown(number.paper)),
+        DIFFERENCE: _Cell(shown(number.difference, "+"), bold=_is_outside(number)),
     }
-    for kind in (PAPER, DIFFERENCE):
-        if cells[kind].text:
-            cells[kind] = NumberCell(cells[kind].text + unit, strong=cells[kind].strong)
     return [cells[kind] for kind in kinds]
 
 
-def _interval(number: Number) -> str:
-    if number.low is None or number.high is None:
-        return ""
-    return " to ".join(_shown(end, number.decimals) for end in (number.low, number.high))
-
-
-def _shown(value: float | None, decimals: int, sign: str = "") -> str:
-    if value is None or math.isnan(value):
+def _shown(value: float, decimals: int, sign: str = "") -> str:
+    if math.isnan(value):
         return NOTHING
     if math.isinf(value):
         return "infinite" if value > 0 else "-infinite"
@@ -298,21 +280,21 @@ def _is_outside(number: Number) -> bool:
     return not number.low <= number.paper <= number.high
 
 
-def _width(table: Parts) -> int:
-    """Return about how many letters wide a table is."""
-    groups, rows = table
-    longest = max(len(label) for row in rows for label in row.labels)
+def _width(table: Table) -> int:
+    """Return about how many letters wide a table with one column of labels is."""
+    longest = max(len(row[0]) for row in table.rows)
     total = min(max(longest, NARROWEST_LABEL), WIDEST_LABEL)
+    groups = table.groups or [(column, (column,)) for column in table.columns[1:]]
     headings = [
-        column if len(group.columns) > 1 else max(group.name.split(), key=len, default=column)
-        for group in groups
-        for column in group.columns
+        column if len(columns) > 1 else max(name.split(), key=len, default=column)
+        for name, columns in groups
+        for column in columns
     ]
-    for at, heading in enumerate(headings):
-        total += GAP + max(len(heading), *(_letters(row.cells[at]) for row in rows))
-    return total
-
-
-def _letters(cell: NumberCell) -> int:
     small = 0.8  # an interval below its figure is in small letters
-    return max(len(cell.text), round(small * len(cell.interval)))
+    for at, heading in enumerate(headings, start=1):
+        letters = (
+            max(len(line[at]), round(small * len(table.intervals.get((row, at), ""))))
+            for row, line in enumerate(table.rows)
+        )
+        total += GAP + max(len(heading), *letters)
+    return total

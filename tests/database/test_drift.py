@@ -63,54 +63,6 @@ def test_machines_get_all_of_it() -> None:
     assert (values["cells_before"], values["cells"], values["recomputed"]) == (9000, 9900, 3000)
 
 
-def test_people_get_tables() -> None:
-    (objects, columns, rows, layers), (cells, heading, numbers, share) = REPORT.tables()
-    assert (objects, cells, heading) == ("Objects by class", "Cells", ("what", "cells"))
-    assert [dict(zip(columns, row, strict=True)) for row in rows] == [
-        {
-            "class": "tree",
-            "before": "1,200",
-            "after": "1,290",
-            "added": "100",
-            "removed": "9",
-            "moved": "2",
-            "gained": "0",
-            "lost": "1",
-            "moved by, m": "2.50",
-        },
-        {
-            "class": "lamp",
-            "before": "8",
-            "after": "9",
-            "added": "0",
-            "removed": "0",
-            "moved": "0",
-            "gained": "1",
-            "lost": "0",
-            "moved by, m": "",
-        },
-        {
-            "class": "all",
-            "before": "1,208",
-            "after": "1,299",
-            "added": "100",
-            "removed": "9",
-            "moved": "2",
-            "gained": "1",
-            "lost": "1",
-            "moved by, m": "",
-        },
-    ]
-    assert layers == "Layers replaced: lamps, trees."
-    assert ("computed again", "3,000") in numbers
-    assert "26.00%" in share
-    partial = dataclasses.replace(REPORT, kept=("signs",), replaced=("trees",))
-    assert partial.tables()[0][3] == (
-        "Layers replaced: trees. Layers that stay as they were: signs."
-    )
-    assert dataclasses.replace(REPORT, classes=()).tables()[0][2][0][:3] == ("all", "0", "0")
-
-
 def test_cells_differ_in_length_class_bearing_or_distance() -> None:
     database = random_town().database
     long = np.flatnonzero(database.lengths > 1)[:4]

@@ -17,7 +17,6 @@ from semsig_gis.objects.conflate import conflate
 from semsig_gis.objects.load import choose_layers
 from semsig_gis.objects.quality import quality_report
 from semsig_gis.objects.table import StreetObjects
-from semsig_gis.reports.tables import Table
 from semsig_gis.sources import RawLayer, find_files
 from semsig_gis.sources.catalog import load_catalog, paper_taxonomy
 from semsig_gis.sources.layers import LayerSpec
@@ -181,7 +180,7 @@ def test_the_nearest_neighbour_is_that_of_a_plain_loop(
     assert benches.rows == len(places)
 
 
-def test_the_report_is_ready_for_json_and_for_printing() -> None:
+def test_the_report_is_ready_for_json() -> None:
     report = report_on(
         layer([(X, Y), (X + 50, Y + 30), (X, Y + 70)]),
         layer([(X + 2, Y)], name="osm"),
@@ -191,23 +190,6 @@ def test_the_report_is_ready_for_json_and_for_printing() -> None:
     assert plain["objects"] == 3
     assert plain["classes"][0]["class_name"] == "bench"
     assert plain["conflated"][0]["count"] == 1
-    tables = [Table(*table) for table in report.tables()]
-    assert [table.title for table in tables] == [
-        "Objects by class",
-        "Rows by layer",
-        "Conflated",
-        "Place",
-        "Licences",
-    ]
-    for table in tables:
-        assert all(len(row) == len(table.columns) for row in table.rows), table.title
-        assert table.markdown()
-    assert tables[0].rows[0][:3] == ("bench", "3", "4")
-    assert "convex hull" in tables[0].note
-    assert "squares of 100 m" in tables[0].note
-    assert "No objects of: alignment_tree" in tables[0].note
-    assert tables[2].rows == (("bench", "osm", "city", "1", "5.0", "2.0", "2.0"),)
-    assert "Conflated" not in {title for title, *_ in report_on(layer([(X, Y)])).tables()}
 
 
 def test_montpellier(geodata: Path) -> None:

@@ -1,0 +1,92 @@
+"""Tables of the quality of a load of street objects."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from semsig_gis.objects.quality import SQUARE_M
+from semsig_gis.reports.tables import Table
+
+if TYPE_CHECKING:
+    from semsig_gis.objects.quality import QualityReport
+
+SOURCE_COUNTS = (
+    "read",
+    "unreadable",
+    "filtered",
+    "missing",
+    "duplicates",
+    "misplaced",
+    "collapsed",
+    "conflated",
+    "objects",
+)
+
+
+def quality_tables(report: QualityReport) -> tuple[Table, ...]:
+    """Return objects by class, rows by layer, conflated objects if any, place and licences."""
+    tables = (
+        _class_table(report),
+        Table(
+            "Rows by layer",
+            ("layer", *SOURCE_COUNTS, "notes"),
+            tuple(
+                (
+                    item.name,
+                    *(f"{getattr(item, count):,}" for count in SOURCE_COUNTS),
+                    "; ".join(item.notes),
+                )
+                for item in report.sources
+            ),
+        ),
+        Table(
+            "Conflated",
+            ("class", "from", "into", "objects", "radius, m", "median, m", "largest, m"),
+            tuple(
+                (
+                    *(item.class_name, item.merged, item.kept, f"{item.count:,}"),
+                    *map(_text, (item.radius, item.median_m, item.largest_m)),
+                )
+                for item in report.conflated
+            ),
+        ),
+        Table(
+            "Place",
+            ("what", "value"),
+            (
+                ("coordinate system", report.crs),
+                ("west, south, east, north, m", ", ".join(f"{edge:.0f}" for edge in report.extent)),
+                (
+                    "west, south, east, north, degrees",
+                    ", ".join(f"{edge:.5f}" for edge in report.extent_degrees),
+                ),
+            ),
+        ),
+        Table("Licences", ("licence",), tuple((line,) for line in report.licenses)),
+    )
+    return tuple(table for table in tables if table.title != "Conflated" or table.rows)
+
+
+def _class_table(report: QualityReport) -> Table:
+    absent = f" No objects of: {', '.join(report.absent)}." if report.absent else ""
+    return Table(
+        "Objects by class",
+        ("class", "objects", "rows", "per km² of hull", "per km² occupied", "nearest, m"),
+        tuple(
+            (
+                *(item.class_name, f"{item.objects:,}", f"{item.rows:,}"),
+                *map(_text, (item.per_km2_hull, item.per_km2_occupied, item.nearest_m)),
+            )
+            for item in report.classes
+        ),
+        note=(
+            f"The convex hull of all objects is {report.hull_km2:,.2f} km², ground without objects "
+            f"included; the squares of {SQUARE_M:.0f} m that hold an object are "
+            f"{report.occupied_km2:,.2f} km². Nearest: the median distance to the nearest other "
+            f"object of the class.{absent}"
+        ),
+    )
+
+
+def _text(number: float | None) -> str:
+    return "" if number is None else f"{number:,.1f}"
