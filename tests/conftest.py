@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any, NoReturn
 
 import hypothesis
 import pytest
+from browser_coverage import BrowserCoverage
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -37,6 +38,8 @@ hypothesis.settings.load_profile("semsig-ci" if os.environ.get("CI") else "semsi
 # environment variable SEMSIG_REQUIRE names it: then the missing thing is a failure.
 OPTIONAL = frozenset({"browser", "geodata", "qgis"})
 
+BROWSER_COVERAGE = BrowserCoverage()
+
 
 def required() -> frozenset[str]:
     """Return the names that SEMSIG_REQUIRE lists, separated by commas."""
@@ -44,7 +47,8 @@ def required() -> frozenset[str]:
     return frozenset(name.strip() for name in listed if name.strip())
 
 
-def pytest_configure() -> None:
+def pytest_configure(config: pytest.Config) -> None:
+    config.pluginmanager.register(BROWSER_COVERAGE)
     unknown = required() - OPTIONAL
     if unknown:
         msg = f"SEMSIG_REQUIRE names {sorted(unknown)}; it may name {sorted(OPTIONAL)}."
@@ -186,7 +190,9 @@ def _chromium(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Chrome]:
     options.set_capability("goog:loggingPrefs", {"browser": "ALL", "performance": "ALL"})
     service = webdriver.ChromeService(executable_path=driver)
     browser = webdriver.Chrome(options=options, service=service)
+    BROWSER_COVERAGE.start(browser)
     yield browser
+    BROWSER_COVERAGE.take(browser)
     browser.quit()
 
 

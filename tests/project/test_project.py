@@ -100,7 +100,8 @@ def test_data_sources_hold_data_only() -> None:
 
 def test_the_wheel_is_complete(wheel: dict[str, str]) -> None:
     data = {f"semsig_gis/{path.relative_to(ROOT)}" for path in ROOT.glob("data_sources/*")}
-    code = {str(path.relative_to(ROOT)) for path in PACKAGE.rglob("*.py")}
+    suffixes = {".css", ".js", ".py"}
+    code = {str(path.relative_to(ROOT)) for path in PACKAGE.rglob("*") if path.suffix in suffixes}
     assert data | code <= wheel.keys()
     assert "semsig_gis/py.typed" in wheel
     assert "semsig_gis/assets/manifest.toml" in wheel
