@@ -7,17 +7,18 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from semsig_gis.core.errors import CrsError, EmptyResultError
-from semsig_gis.core.grid import GridSpec, cells_near
+from semsig_gis.core.grid import GridSpec, cell_ids, cells_near, split_ids
 from semsig_gis.core.rtree import PackedIndex
 from semsig_gis.core.signature import SignatureSpec
 from semsig_gis.database.database import BEARING_UNITS, DISTANCE_UNITS, SignatureDatabase
-from semsig_gis.database.occlusion import Footprints, hidden
+from semsig_gis.database.occlusion import Footprints
+from semsig_gis.database.sequences import consecutive
 from semsig_gis.database.viewpoints import ViewpointSpec, choose_viewpoints
-from semsig_gis.database.visibility import clockwise_order, visible_objects
+from semsig_gis.database.visibility import clockwise_order, sightings
 from semsig_gis.objects.surroundings import licenses_of
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Iterator
 
     import geopandas as gpd
     from numpy.typing import NDArray
@@ -26,15 +27,12 @@ if TYPE_CHECKING:
     from semsig_gis.database.visibility import Sightings
     from semsig_gis.objects.table import StreetObjects
 
-    _Block = tuple[NDArray[np.int64], NDArray[np.uint8], NDArray[np.uint16], NDArray[np.uint8]]
-
-# Lengths, codes, bearings and distances of no cell.
-_NOTHING: _Block = (
-    np.empty(0, np.int64),
-    np.empty(0, np.uint8),
-    np.empty(0, np.uint16),
-    np.empty(0, np.uint8),
-)
+# So many that the arrays of a block stay in the cache of a processor.
+CELLS_A_BLOCK = 1 << 14
+PAIRS_A_BLOCK = 1 << 20
+TILE_CELLS = 16
+# More than any rounding, so that the measured distance decides alone.
+ROUNDING_CELLS = 1e-3
 
 
 def build_database(
@@ -88,22 +86,14 @@ def build_database(
 
     Examples
     --------
-    >>> from semsig_gis.sources.synthetic.city import CitySpec, synthetic_city
-    >>> from semsig_gis.sources.catalog import paper_taxonomy
-    >>> from semsig_gis.objects.clean import build_objects
-    >>> layers = synthetic_city(CitySpec(size=300.0))
-    >>> objects, _ = build_objects(layers, taxonomy=paper_taxonomy(), crs="EPSG:32631")
-    >>> build_database(objects, spec=SignatureSpec(radius=20.0)).lengths.min() >= 1
+    >>> build_database(demo_objects, spec=SignatureSpec(radius=20.0)).lengths.min() >= 1
     np.True_
     """
-    grid = grid or GridSpec()
-    spec = spec or SignatureSpec()
+    grid, spec = grid or GridSpec(), spec or SignatureSpec()
     reach = float(objects.taxonomy.ranges(spec.radius).max())
-    columns, rows = cells_near(objects.xy, grid=grid, radius=reach)
     database = build_cells(
         objects,
-        columns,
-        rows,
+        *cells_near(objects.xy, grid=grid, radius=reach),
         grid=grid,
         spec=spec,
         viewpoints=viewpoints,
@@ -136,13 +126,7 @@ def build_cells(
     """Compute the signatures of some cells; what they see must be among the objects.
 
     The cells are distinct and ordered by column and row; the result has those that are viewpoints
-    and see something, possibly none. Further objects do no harm. `footprints` hide what is behind
-    them; `streets` are centre lines, with half their width in metres in a column ``half_width``
-    where it is there; both may be in any CRS. `progress` is called with the number of cells done
-    and in all.
-
-    Raise InputError if footprints, streets or viewpoints cannot be used or needed ones are missing,
-    and CrsError if footprints or streets have no CRS.
+    and see something, possibly none. All else is as in `build_database`.
     """
     viewpoints = viewpoints or ViewpointSpec()
     buildings = None if footprints is None else Footprints(_moved(footprints, objects.crs))
@@ -156,35 +140,50 @@ def build_cells(
         widths=None if streets is None else streets.get("half_width"),
     )
     columns, rows = columns[chosen], rows[chosen]
-    along = streets if viewpoints.mode == "streets" else None
-    by_class = objects.taxonomy.ranges(spec.radius)
-    index = PackedIndex(objects.xy, objects.table.geometry.to_numpy())
-    ranges = by_class[objects.codes]
-    blocks = []
+    codes, ranges = objects.codes, objects.taxonomy.ranges(spec.radius)
+    # Lengths, codes, bearings and distances, block by block; the first is that of no cell.
+    blocks = [tuple(np.empty(0, kind) for kind in (np.int64, np.uint8, np.uint16, np.uint8))]
     for cells, seen in visible_objects(
-        columns, rows, objects.xy, grid=grid, index=index, ranges=ranges
+        columns,
+        rows,
+        objects.xy,
+        grid=grid,
+        index=PackedIndex(objects.xy, objects.table.geometry.to_numpy()),
+        ranges=ranges[codes],
+        footprints=buildings,
     ):
-        centres = grid.viewpoints(columns[cells], rows[cells])
-        block = _block(objects, centres, seen, reach=by_class.max(), footprints=buildings)
-        blocks.append(block)
+        order = clockwise_order(seen, codes)
+        turned = np.floor(seen.bearing * (BEARING_UNITS / 360.0))
+        away = np.rint(seen.distance * (DISTANCE_UNITS / ranges.max()))
+        blocks.append(
+            (
+                np.bincount(seen.viewpoint, minlength=cells.stop - cells.start),
+                codes[seen.object][order],
+                np.minimum(turned, BEARING_UNITS - 1).astype(np.uint16)[order],
+                away.astype(np.uint8)[order],
+            )
+        )
         if progress is not None:
             progress(cells.stop, len(columns))
-    lengths, codes, bearing_units, distance_units = (
-        np.concatenate(parts) for parts in zip(_NOTHING, *blocks, strict=True)
+    lengths, seen_codes, bearing_units, distance_units = (
+        np.concatenate(parts) for parts in zip(*blocks, strict=True)
     )
     some = lengths > 0
     return SignatureDatabase(
         columns=columns[some].astype(np.int32),
         rows=rows[some].astype(np.int32),
-        offsets=np.concatenate([[0], np.cumsum(lengths[some])]),
-        codes=codes,
+        offsets=np.append(0, np.cumsum(lengths[some])),
+        codes=seen_codes,
         bearing_units=bearing_units,
         distance_units=distance_units,
         grid=grid,
         spec=spec,
         taxonomy=objects.taxonomy,
         crs=objects.crs,
-        licenses=(*map(str, objects.licenses), *licenses_of(footprints, along)),
+        licenses=(
+            *map(str, objects.licenses),
+            *licenses_of(footprints, streets if viewpoints.mode == "streets" else None),
+        ),
         viewpoints=viewpoints,
         occlusion=None if buildings is None else buildings.tolerance,
     )
@@ -199,24 +198,75 @@ def _moved(table: gpd.GeoDataFrame, crs: CRS) -> NDArray[np.object_]:
     return moved
 
 
-def _block(
-    objects: StreetObjects,
-    centres: NDArray[np.float64],
-    seen: Sightings,
+def visible_objects(
+    columns: NDArray[np.int64],
+    rows: NDArray[np.int64],
+    objects: NDArray[np.float64],
     *,
-    reach: float,
-    footprints: Footprints | None,
-) -> _Block:
-    """Return lengths, codes, bearings and distances of cells with these centres."""
-    if footprints is not None:
-        seen = seen.only(np.argsort(seen.viewpoint))  # as `hidden` is fastest
-        ends = centres[seen.viewpoint], objects.xy[seen.object]
-        seen = seen.only(~hidden(*ends, footprints=footprints))
-    units = np.floor(seen.bearing * (BEARING_UNITS / 360.0))
-    order = clockwise_order(seen, objects.codes)
-    return (
-        np.bincount(seen.viewpoint, minlength=len(centres)),
-        objects.codes[seen.object][order],
-        np.minimum(units, BEARING_UNITS - 1).astype(np.uint16)[order],
-        np.rint(seen.distance * (DISTANCE_UNITS / reach)).astype(np.uint8)[order],
+    grid: GridSpec,
+    index: PackedIndex,
+    ranges: NDArray[np.float64],
+    footprints: Footprints | None = None,
+) -> Iterator[tuple[slice, Sightings]]:
+    """Yield what is seen from the centres of grid cells, block by block.
+
+    The cells are distinct and ordered by column and row. `index` is an R-tree over `objects`,
+    positions in metres; `ranges` tells from how far each object is seen: its visibility range R in
+    metres. Each block is a slice of the cells and the pairs within range (paper, section on
+    semantic signatures) that no building hides, viewpoints counted from the first cell of the
+    block, in any order.
+    """
+    starts = range(0, len(columns), CELLS_A_BLOCK)
+    blocks = [slice(start, min(start + CELLS_A_BLOCK, len(columns))) for start in reversed(starts)]
+    while blocks:
+        block = blocks.pop()
+        here = columns[block], rows[block]
+        item, first, size = _runs(*here, objects, grid=grid, index=index, ranges=ranges)
+        if size.sum() > PAIRS_A_BLOCK and block.stop - block.start > 1:
+            middle = (block.start + block.stop) // 2
+            blocks += [slice(middle, block.stop), slice(block.start, middle)]
+            continue
+        pairs = consecutive(first, size), np.repeat(item, size)
+        centres = grid.viewpoints(*here)
+        yield block, sightings(*pairs, centres, objects, ranges=ranges, footprints=footprints)
+
+
+def _runs(
+    columns: NDArray[np.int64],
+    rows: NDArray[np.int64],
+    objects: NDArray[np.float64],
+    *,
+    grid: GridSpec,
+    index: PackedIndex,
+    ranges: NDArray[np.float64],
+) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]:
+    """Return objects, and the first and the number of the cells of a column that may see each.
+
+    The R-tree is asked which objects are near each tile of cells. Around such an object, the cells
+    of one column that see it follow each other, so that two searches in the list of cells find them
+    all.
+    """
+    ids = cell_ids(columns, rows)
+    # Tiles, and the corners of the part of them that is in this block.
+    tile = np.stack(
+        split_ids(np.unique(cell_ids(columns // TILE_CELLS, rows // TILE_CELLS))), axis=-1
     )
+    low = np.maximum(tile * TILE_CELLS, [columns[0], rows.min()])
+    high = np.minimum((tile + 1) * TILE_CELLS - 1, [columns[-1], rows.max()])
+    furthest = ranges.max() / grid.step + ROUNDING_CELLS
+    corners = grid.viewpoints(*(low - furthest).T), grid.viewpoints(*(high + furthest).T)
+    box, item = index.pairs_in(*corners)
+
+    # The columns in reach of each object, then the rows in each of them.
+    place = (objects[item] - grid.origin) / grid.step - 0.5
+    reach = ranges[item] / grid.step + ROUNDING_CELLS
+    first = np.maximum(np.ceil(place[:, 0] - reach), low[box, 0]).astype(np.int64)
+    last = np.minimum(np.floor(place[:, 0] + reach), high[box, 0]).astype(np.int64)
+    size = np.maximum(last + 1 - first, 0)
+    pair, column = np.repeat(np.arange(len(size)), size), consecutive(first, size)
+    half = np.sqrt(np.maximum(reach[pair] ** 2 - (column - place[pair, 0]) ** 2, 0.0))
+    first = np.maximum(np.ceil(place[pair, 1] - half), low[box[pair], 1])
+    last = np.minimum(np.floor(place[pair, 1] + half), high[box[pair], 1])
+    begin = np.searchsorted(ids, cell_ids(column, first))
+    end = np.searchsorted(ids, cell_ids(column, last), side="right")
+    return item[pair], begin, np.maximum(end - begin, 0)

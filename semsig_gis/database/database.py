@@ -6,7 +6,7 @@ import functools
 import operator
 from dataclasses import dataclass, replace
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING
 
 import numpy as np
 from pyproj import CRS
@@ -15,7 +15,7 @@ from semsig_gis import __version__
 from semsig_gis.core.errors import DatabaseError, InputError
 from semsig_gis.core.grid import cell_ids
 from semsig_gis.core.signature import Signature, quantize
-from semsig_gis.database.sequences import SequenceTable
+from semsig_gis.database.sequences import SequenceTable, consecutive, frozen
 from semsig_gis.database.viewpoints import ViewpointSpec
 
 if TYPE_CHECKING:
@@ -26,8 +26,6 @@ if TYPE_CHECKING:
     from semsig_gis.core.grid import GridSpec
     from semsig_gis.core.signature import SignatureSpec
     from semsig_gis.core.taxonomy import Taxonomy
-
-_Array = TypeVar("_Array", bound="NDArray[Any]")
 
 # Divisible by 8, 16, 24, 32 and 72, so that the usual angle levels come out exactly. A unit is a
 # hundredth of the noise of a good detector.
@@ -113,7 +111,7 @@ class SignatureDatabase:
 
     def __post_init__(self) -> None:  # noqa: D105
         for name in ("columns", "rows", "offsets", "codes", "bearing_units", "distance_units"):
-            getattr(self, name).setflags(write=False)
+            frozen(getattr(self, name))
 
     def __len__(self) -> int:  # noqa: D105
         return len(self.columns)
@@ -126,12 +124,12 @@ class SignatureDatabase:
     @functools.cached_property
     def xy(self) -> NDArray[np.float64]:
         """Viewpoint of every cell in metres, shape (n, 2)."""
-        return _frozen(self.grid.viewpoints(self.columns, self.rows))
+        return frozen(self.grid.viewpoints(self.columns, self.rows))
 
     @functools.cached_property
     def lengths(self) -> NDArray[np.int64]:
         """Number of objects that every cell sees, shape (n,)."""
-        return _frozen(np.diff(self.offsets))
+        return frozen(np.diff(self.offsets))
 
     @property
     def bearings(self) -> NDArray[np.float64]:
@@ -153,18 +151,18 @@ class SignatureDatabase:
         """Angle level of every entry, shape (m,)."""
         if BEARING_UNITS % self.spec.levels == 0:
             levels = self.bearing_units // (BEARING_UNITS // self.spec.levels)
-            return _frozen(levels.astype(np.uint8))
-        return _frozen(quantize(self.bearings, self.spec.levels))
+            return frozen(levels.astype(np.uint8))
+        return frozen(quantize(self.bearings, self.spec.levels))
 
     @functools.cached_property
     def occurrences(self) -> NDArray[np.int64]:
         """How often each class code occurs over all signatures, shape (256,)."""
-        return _frozen(np.bincount(self.codes, minlength=256))
+        return frozen(np.bincount(self.codes, minlength=256))
 
     @functools.cached_property
     def present_codes(self) -> NDArray[np.uint8]:
         """Class codes that occur, ascending."""
-        return _frozen(np.flatnonzero(self.occurrences).astype(np.uint8))
+        return frozen(np.flatnonzero(self.occurrences).astype(np.uint8))
 
     @functools.cached_property
     def type_sequences(self) -> SequenceTable:
@@ -179,12 +177,12 @@ class SignatureDatabase:
     @functools.cached_property
     def type_group_sizes(self) -> NDArray[np.int64]:
         """For every cell, how many cells have its type sequence, shape (n,)."""
-        return _frozen(self.type_sequences.counts[self.type_sequences.inverse])
+        return frozen(self.type_sequences.counts[self.type_sequences.inverse])
 
     @functools.cached_property
     def angle_group_sizes(self) -> NDArray[np.int64]:
         """For every cell, how many cells have its angle-level sequence, shape (n,)."""
-        return _frozen(self.angle_sequences.counts[self.angle_sequences.inverse])
+        return frozen(self.angle_sequences.counts[self.angle_sequences.inverse])
 
     def cells_at(self, xy: ArrayLike) -> NDArray[np.int64]:
         """Return the cells in which places lie.
@@ -233,15 +231,14 @@ class SignatureDatabase:
         SignatureDatabase
             Those cells.
         """
-        chosen = np.arange(len(self))[cells]
-        lengths = self.lengths[chosen]
-        offsets = np.concatenate([[0], np.cumsum(lengths)])
-        entries = np.repeat(self.offsets[chosen] - offsets[:-1], lengths) + np.arange(offsets[-1])
+        kept = np.arange(len(self))[cells]
+        lengths = self.lengths[kept]
+        entries = consecutive(self.offsets[kept], lengths)
         return replace(
             self,
-            columns=self.columns[chosen],
-            rows=self.rows[chosen],
-            offsets=offsets,
+            columns=self.columns[kept],
+            rows=self.rows[kept],
+            offsets=np.append(0, np.cumsum(lengths)),
             codes=self.codes[entries],
             bearing_units=self.bearing_units[entries],
             distance_units=self.distance_units[entries],
@@ -353,9 +350,3 @@ def rows_of_result(
 def _brief(value: object) -> str:
     text = value.to_string() if isinstance(value, CRS) else str(value)
     return text if len(text) <= LONGEST_VALUE else f"{text[: LONGEST_VALUE - 3]}..."
-
-
-def _frozen(array: _Array) -> _Array:
-    """Return an array that cannot be written to."""
-    array.setflags(write=False)
-    return array

@@ -72,9 +72,7 @@ class SequenceTable:
         # int64: NumPy gathers with a native index without converting it at every query.
         inverse = rank[encoded.indices.to_numpy()]
         counts = np.bincount(inverse, minlength=distinct).astype(np.int64, copy=False)
-        for array in (distinct_values, distinct_offsets, inverse, counts):
-            array.setflags(write=False)
-        return cls(distinct_values, distinct_offsets, inverse, counts)
+        return cls(*map(frozen, (distinct_values, distinct_offsets, inverse, counts)))
 
     def __len__(self) -> int:
         """Return the number of distinct sequences."""
@@ -87,7 +85,7 @@ class SequenceTable:
     @cached_property
     def lengths(self) -> NDArray[np.int64]:
         """Length of each distinct sequence, shape (d,)."""
-        return _frozen(np.diff(self.offsets))
+        return frozen(np.diff(self.offsets))
 
     @cached_property
     def strings(self) -> list[str]:
@@ -113,7 +111,7 @@ class SequenceTable:
             values = self.values[self.offsets[low] : self.offsets[high]]
             bins = np.bincount(rows * size + values, minlength=(high - low) * size)
             counts[low:high] = bins.reshape(high - low, size)
-        return _frozen(counts)
+        return frozen(counts)
 
     @cached_property
     def value_sets(self) -> NDArray[np.uint64]:
@@ -124,12 +122,12 @@ class SequenceTable:
         for value in range(present.shape[1]):
             word, bit = divmod(value, _WORD_BITS)
             sets[:, word] |= present[:, value].astype(np.uint64) << np.uint64(bit)
-        return _frozen(sets)
+        return frozen(sets)
 
     @cached_property
     def value_set_sizes(self) -> NDArray[np.int16]:
         """How many different values each distinct sequence has, shape (d,)."""
-        return _frozen(np.bitwise_count(self.value_sets).sum(axis=1, dtype=np.int16))
+        return frozen(np.bitwise_count(self.value_sets).sum(axis=1, dtype=np.int16))
 
     def overlap(
         self, query: NDArray[np.uint8], *, only: NDArray[np.int64] | None = None
@@ -183,7 +181,13 @@ def _checked_csr(
     return flat, ends
 
 
-def _frozen(array: _Array) -> _Array:
+def consecutive(first: NDArray[np.int64], size: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Return the whole numbers of some ranges, one range after the other."""
+    ends = np.cumsum(size)
+    return np.repeat(first - ends + size, size) + np.arange(size.sum())
+
+
+def frozen(array: _Array) -> _Array:
     """Return the array, made read-only."""
     array.setflags(write=False)
     return array

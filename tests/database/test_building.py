@@ -30,7 +30,7 @@ from semsig_gis.core.errors import CrsError, EmptyResultError
 from semsig_gis.core.grid import GridSpec
 from semsig_gis.core.signature import SignatureSpec
 from semsig_gis.core.taxonomy import Taxonomy
-from semsig_gis.database import visibility
+from semsig_gis.database import build
 from semsig_gis.database.build import build_cells, build_database
 from semsig_gis.database.file import open_database, save_database
 from semsig_gis.database.viewpoints import ViewpointSpec
@@ -105,7 +105,7 @@ def test_nothing_seen_is_an_error() -> None:
 def test_blocks_leave_no_seam(town: World, size: int, monkeypatch: pytest.MonkeyPatch) -> None:
     whole = town.database
     calls: list[tuple[int, int]] = []
-    monkeypatch.setattr(visibility, "CELLS_A_BLOCK", size)
+    monkeypatch.setattr(build, "CELLS_A_BLOCK", size)
     parts = build_database(
         town.street_objects, progress=lambda done, total: calls.append((done, total))
     )

@@ -11,8 +11,9 @@ from hypothesis import strategies as st
 from semsig_gis.core.geometry import bearings, wrap_degrees
 from semsig_gis.core.grid import GridSpec, cells_near
 from semsig_gis.core.rtree import PackedIndex
-from semsig_gis.database import visibility
-from semsig_gis.database.visibility import Sightings, visible_objects
+from semsig_gis.database import build
+from semsig_gis.database.build import visible_objects
+from semsig_gis.database.visibility import Sightings
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -122,8 +123,8 @@ def test_what_is_seen_is_what_measuring_every_pair_finds(
     near = np.stack(cells_near(objects, grid=grid, radius=radius), axis=-1)
     chosen = np.flatnonzero(rng.random(len(near)) < max(kept, 5 / len(near)))[:3000]
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(visibility, "CELLS_A_BLOCK", blocks[0])
-        patch.setattr(visibility, "PAIRS_A_BLOCK", blocks[1])
+        patch.setattr(build, "CELLS_A_BLOCK", blocks[0])
+        patch.setattr(build, "PAIRS_A_BLOCK", blocks[1])
         found = look(near[chosen], objects, ranges, grid)
     assert_equal(found, slow_look(near[chosen], objects, ranges, grid))
 
@@ -137,7 +138,7 @@ def test_objects_in_one_direction_have_one_bearing(dx: int, dy: int, times: int)
 
 @pytest.mark.parametrize("most", [1, 50, 10**6])
 def test_a_block_that_sees_very_much_is_halved(most: int, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(visibility, "PAIRS_A_BLOCK", most)
+    monkeypatch.setattr(build, "PAIRS_A_BLOCK", most)
     objects = np.random.default_rng(3).uniform(0, 60, (40, 2))
     columns, rows = cells_near(objects, grid=GridSpec(), radius=30.0)
     index = PackedIndex(objects)
