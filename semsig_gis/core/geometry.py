@@ -9,7 +9,7 @@ import numpy as np
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
-FULL_TURN = 360.0
+FULL_TURN, HALF_TURN = 360.0, 180.0
 
 
 def wrap_degrees(angles: ArrayLike) -> NDArray[np.float64]:
@@ -17,6 +17,11 @@ def wrap_degrees(angles: ArrayLike) -> NDArray[np.float64]:
     wrapped = np.mod(np.asarray(angles, dtype=np.float64), FULL_TURN)
     # The remainder of a tiny negative angle rounds to 360 itself.
     return np.where(wrapped >= FULL_TURN, 0.0, wrapped)
+
+
+def signed_degrees(angles: ArrayLike) -> NDArray[np.float64]:
+    """Return angles in degrees as the same directions in [-180, 180)."""
+    return np.asarray((np.asarray(angles) + HALF_TURN) % FULL_TURN - HALF_TURN)
 
 
 def bearings(dx: ArrayLike, dy: ArrayLike) -> NDArray[np.float64]:

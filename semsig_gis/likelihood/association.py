@@ -3,22 +3,93 @@
 A detection is one of the objects or clutter, an object is detected once or missed. Each pair has a
 weight, how much likelier the two are one thing than a miss and clutter; the weight of an
 association is the product over its pairs.
+
+The sums are the Bethe approximation that belief propagation settles on (Williams and Lau,
+"Approximate evaluation of marginal association probabilities with belief propagation", 2014): exact
+if the pairs form no loop, otherwise a little too small.
 """
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from semsig_gis.core.errors import InputError
+from semsig_gis.core.geometry import signed_degrees
+from semsig_gis.database.database import BEARING_UNITS, DISTANCE_UNITS
+
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from numpy.typing import NDArray
 
+    from semsig_gis.core.signature import Signature
+    from semsig_gis.database.visibility import Views
     from semsig_gis.likelihood.noise.table import NoiseTable
 
 WIDE = 45.0  # degrees of deviation from which on the tails meet behind the observer
 LAPS = 360.0 * np.arange(-3, 4)
+
+
+def place_loglik(
+    query: Signature,
+    views: Views,
+    tables: Sequence[NoiseTable],
+    weights: NDArray[np.float64],
+    *,
+    turns: NDArray[np.float64],
+    reach: float,
+) -> NDArray[np.float64]:
+    """Return the log-likelihood of a query by place and turn, shape (v, r).
+
+    The query needs bearings; its types may be unknown. `weights` are the chances of the tables,
+    `turns` the degrees to turn the query by at each place, and `reach` the largest visibility range
+    of any class in metres. The scale is that of `likelihood.index`.
+    """
+    from semsig_gis.likelihood.kernels import align  # noqa: PLC0415 - numba loads slowly
+
+    bearings = query_bearings(query)
+    rows = tables[0].query_rows(query)
+    bearing_units = np.minimum(views.bearings * (BEARING_UNITS / 360.0), BEARING_UNITS - 1)
+    distance_units = np.rint(views.distances * (DISTANCE_UNITS / reach))
+    logliks = np.empty((len(tables), *turns.shape))
+    align(
+        views.offsets,
+        tables[0].row_of[views.codes],
+        bearing_units.astype(np.uint16),
+        distance_units.astype(np.uint8),
+        360.0 / BEARING_UNITS,
+        rows,
+        bearings,
+        turns,
+        np.stack([table.odds for table in tables]),
+        np.stack([table.naming for table in tables]),
+        np.stack([table.sigmas(reach) for table in tables]),
+        logliks,
+    )
+    for model, (table, weight) in enumerate(zip(tables, weights.tolist(), strict=True)):
+        logliks[model] += table.nothing_seen(views.offsets, views.codes)[:, None]
+        logliks[model] += float(np.log(table.density[rows]).sum()) + math.log(weight)
+    return np.asarray(np.logaddexp.reduce(logliks, axis=0))
+
+
+def query_bearings(query: Signature) -> NDArray[np.float64]:
+    """Return the bearings of a query, or refuse a query without."""
+    if query.bearings is None:
+        msg = "the query has no bearings, on which its place rests; give them."
+        raise InputError(msg)
+    return query.bearings
+
+
+def turn_logs(turns: NDArray[np.float64], step: float, north_sigma: float) -> NDArray[np.float64]:
+    """Return the logarithm of the chance of each turn, one step wide, all in degrees."""
+    if math.isinf(north_sigma):
+        return np.full(turns.shape, math.log(step / 360.0))
+    scale = math.log(step / (north_sigma * math.sqrt(2.0 * math.pi)))
+    return np.asarray(scale - 0.5 * (signed_degrees(turns) / north_sigma) ** 2)
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -35,14 +106,6 @@ class Pairs:
     detections: NDArray[np.int64]
     away: NDArray[np.float64]
     counts: tuple[int, int]
-
-
-@dataclass(frozen=True, eq=False, kw_only=True)
-class Associations:
-    """The chance that each pair is one thing, and the log of the sum of weights of each problem."""
-
-    chances: NDArray[np.float64]
-    log_sums: NDArray[np.float64]
 
 
 def near_pairs(
@@ -64,8 +127,7 @@ def near_pairs(
     row, column = np.divmod(inside, there[problem])
     objects = object_starts[problem] + row
     detections = detection_starts[problem] + column
-    away = detection_bearings[detections] - object_bearings[objects]
-    away = (away + 180.0) % 360.0 - 180.0
+    away = signed_degrees(detection_bearings[detections] - object_bearings[objects])
     near = np.abs(away) <= reach
     starts = np.concatenate([[0], np.cumsum(np.bincount(problem[near], minlength=len(here)))])
     return Pairs(
@@ -75,6 +137,34 @@ def near_pairs(
         away=away[near],
         counts=(len(object_bearings), len(detection_bearings)),
     )
+
+
+def associate(
+    table: NoiseTable,
+    pairs: Pairs,
+    *,
+    kinds: NDArray[np.int64],
+    distances: NDArray[np.float64],
+    lengths: NDArray[np.int64],
+    names: NDArray[np.int64],
+) -> tuple[NDArray[np.float64], float]:
+    """Return the chance that each pair is one thing, and the log-likelihood of all detections.
+
+    By object, `kinds` is the row of its class in the table, `distances` its distance in metres and
+    `lengths` how many objects are seen together with it, itself included. `names` is the class row
+    of each detection, k if it is unknown.
+    """
+    weights = pair_weights(
+        table, pairs, kinds=kinds, distances=distances, lengths=lengths, names=names
+    )
+    chances, log_sums = associate_pairs(pairs, weights)
+    loglik = (
+        log_sums.sum()
+        + np.log(table.missed[table.length_rows(lengths), kinds]).sum()
+        + np.log(table.density[names]).sum()
+        - len(log_sums) * table.clutter.sum()
+    )
+    return chances, float(loglik)
 
 
 def pair_weights(
@@ -88,13 +178,11 @@ def pair_weights(
 ) -> NDArray[np.float64]:
     """Return how much likelier each pair is one thing than a miss and clutter, shape (e,).
 
-    The weight is ``p / (1 - p) * C * N / lambda``, in the notation of `likelihood.index`. By
-    object, `kinds` is the row of its class in the table, `distances` its distance in metres and
-    `lengths` how many objects are seen together with it, itself included. `names` is the class row
-    of each detection, k if it is unknown.
+    The weight is ``p / (1 - p) * C * N / lambda``, in the notation of `likelihood.index`; the
+    arguments are those of `associate`.
     """
     kind = kinds[pairs.objects]
-    length = np.minimum(lengths[pairs.objects], len(table.missed) - 1)
+    length = table.length_rows(lengths[pairs.objects])
     turned = np.degrees(table.position_sigma / np.maximum(distances[pairs.objects], 1e-3))
     spread = np.minimum(np.hypot(table.sigma[kind], turned), 180.0)
     density = np.exp(-0.5 * (pairs.away / spread) ** 2)
@@ -106,11 +194,12 @@ def pair_weights(
     return np.asarray(table.odds[length, kind] * naming * density)
 
 
-def associate_pairs(pairs: Pairs, weights: NDArray[np.float64]) -> Associations:
-    """Sum over the one-to-one associations of each problem, given the weights of the pairs.
+def associate_pairs(
+    pairs: Pairs, weights: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Sum over the one-to-one associations of each problem, given weights of 0 or more.
 
-    Weights are 0 or more. Belief propagation (Williams and Lau, "Approximate evaluation of marginal
-    association probabilities with belief propagation", 2014): exact if the pairs form no loop.
+    Returns the chance that each pair is one thing, and the logarithm of the sum of each problem.
     """
     from semsig_gis.likelihood.kernels import associate  # noqa: PLC0415 - numba loads slowly
 
@@ -126,4 +215,4 @@ def associate_pairs(pairs: Pairs, weights: NDArray[np.float64]) -> Associations:
         chances,
         log_sums,
     )
-    return Associations(chances=chances, log_sums=log_sums)
+    return chances, log_sums

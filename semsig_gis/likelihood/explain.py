@@ -11,10 +11,10 @@ import pandas as pd
 import shapely
 
 from semsig_gis.core.crs import SOURCE, SOURCE_ID
-from semsig_gis.core.errors import InputError
+from semsig_gis.core.geometry import signed_degrees
 from semsig_gis.core.taxonomy import WILDCARD
 from semsig_gis.database.visibility import views_at, views_in
-from semsig_gis.likelihood.association import associate_pairs, near_pairs, pair_weights
+from semsig_gis.likelihood.association import associate, near_pairs, query_bearings
 from semsig_gis.likelihood.noise.table import LONGEST_TABLE, noise_tables
 
 if TYPE_CHECKING:
@@ -144,10 +144,7 @@ def _explained(  # noqa: PLR0917 - two callers that have just these
     view: Views,
     heading: float,
 ) -> Explanation:
-    if query.bearings is None:
-        msg = "the query has no bearings to explain; give them."
-        raise InputError(msg)
-    turned = (query.bearings + heading) % 360.0
+    turned = (query_bearings(query) + heading) % 360.0
     chances, loglik = _chances(query, turned, view, noise, city)
     table = _table(query, turned, view, chances, city)
     placed = gpd.GeoDataFrame(table, geometry=_places(table, xy, city), crs=city.crs)
@@ -170,28 +167,19 @@ def _chances(
     pairs = near_pairs(view.offsets, view.bearings, np.array([0, len(query)]), turned)
     logliks = np.log(weights)
     each = np.zeros((len(tables), len(view.codes), len(query)))
-    length = min(len(kinds), LONGEST_TABLE)
     for number, table in enumerate(tables):
-        found = associate_pairs(
+        chances, loglik = associate(
+            table,
             pairs,
-            pair_weights(
-                table,
-                pairs,
-                kinds=kinds,
-                distances=view.distances,
-                lengths=np.full(len(kinds), len(kinds)),
-                names=names,
-            ),
+            kinds=kinds,
+            distances=view.distances,
+            lengths=np.full(len(kinds), len(kinds)),
+            names=names,
         )
-        each[number, pairs.objects, pairs.detections] = found.chances
-        logliks[number] += (
-            found.log_sums.sum()
-            + np.log(table.missed[length, kinds]).sum()
-            + np.log(table.density[names]).sum()
-            - table.clutter.sum()
-        )
-    loglik = float(np.logaddexp.reduce(logliks))
-    return np.tensordot(np.exp(logliks - loglik), each, axes=1), loglik
+        each[number, pairs.objects, pairs.detections] = chances
+        logliks[number] += loglik
+    total = float(np.logaddexp.reduce(logliks))
+    return np.tensordot(np.exp(logliks - total), each, axes=1), total
 
 
 def _table(
@@ -217,11 +205,10 @@ def _table(
         if number in partners:
             entry = partners[number]
             other = code not in {WILDCARD, int(view.codes[entry])}
-            away = (turned[number] - view.bearings[entry] + 180.0) % 360.0 - 180.0
             row |= {
                 "verdict": "misnamed" if other else "matched",
                 "chance": float(chances[entry, number]),
-                "bearing_error": float(away),
+                "bearing_error": float(signed_degrees(turned[number] - view.bearings[entry])),
                 **_object(entry, view, city),
             }
         rows.append(row)

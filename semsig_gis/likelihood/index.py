@@ -402,7 +402,7 @@ def build_index(
         database,
         noise,
         columns=columns,
-        constants=table.nothing_seen(database).astype(np.float32),
+        constants=table.nothing_seen(database.offsets, database.codes).astype(np.float32),
         step=step,
         fingerprint=index_fingerprint(database, noise),
     )

@@ -1,4 +1,4 @@
-"""The loop of the re-ranking, as machine code; it has a slow, obvious twin in the tests."""
+"""The loops of the likelihood method, compiled; each has a slow, obvious twin in the tests."""
 
 from __future__ import annotations
 
@@ -12,48 +12,46 @@ from semsig_gis.core.jit import compiled
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-
-_REACH = 4.5  # deviations beyond which a detection is not taken for an object
-
-
-_WIDE = 45.0  # deviation in degrees from which on the tails meet behind the observer
-
-
-_ROUNDS = 30
-
-
-_SETTLED = 1e-2  # relative change at which the messages are taken for settled
-
-
-_LARGE = 1e200
-
-
 _TURN = 360.0
+_REACH = 4.5  # deviations beyond which a detection is not taken for an object
+_WIDE = 45.0  # deviation in degrees from which on the tails meet behind the observer
+_LARGE = 1e200
+# How often messages are sent, and the relative change at which they are taken for settled.
+_ROUNDS, _SETTLED = 30, 1e-2
+_PAIR_ROUNDS, _PAIR_SETTLED = 60, 1e-5
+
+LINE = 64
+"""Cells that are worked out together: as many as a cache line has bytes."""
+MANTISSA_BITS = 9
+"""Of a float32, how many the table of logarithms looks at."""
+_SHIFT = 23 - MANTISSA_BITS
+_ONE = 127 << MANTISSA_BITS  # where the bits of 1.0 begin
+_BLOCK = 4096  # cells whose sums stay in the fastest cache
+_BINS = 1024  # scores are counted in so many bins to find the best of them
+_BINS_A_NAT = np.float32(16.0)
 
 
 @compiled
-def align(  # noqa: C901, PLR0912, PLR0915, PLR0917 - one pass over the cells; a kernel takes no keywords
-    cells: NDArray[np.int64],
+def align(  # noqa: C901, PLR0912, PLR0915, PLR0917 - a kernel takes no keywords
     offsets: NDArray[np.int64],
-    codes: NDArray[np.uint8],
+    kinds: NDArray[np.int64],
     bearing_units: NDArray[np.uint16],
     distance_units: NDArray[np.uint8],
-    row_of: NDArray[np.int64],
     unit: float,
-    kinds: NDArray[np.int64],
-    seen: NDArray[np.float64],
+    names: NDArray[np.int64],
+    bearings: NDArray[np.float64],
     turns: NDArray[np.float64],
     odds: NDArray[np.float64],
     naming: NDArray[np.float64],
     sigma: NDArray[np.float64],
-    found: NDArray[np.float64],
+    totals: NDArray[np.float64],
 ) -> None:
-    """Sum over the one-to-one associations of a query with each of some cells.
+    """Sum over the one-to-one associations of a query with what is seen from some places.
 
-    Fills `found`, shape (models, cells, turns), with logarithms; the empty association counts as
-    one. The query has class rows `kinds` and bearings `seen` in degrees, and is turned by `turns`
-    degrees, shape (cells, turns). `unit` is the degrees in a unit of bearing, and `row_of`, shape
-    (256,), the row of each class code in the tables.
+    Fills `totals`, shape (models, places, turns), with logarithms; the empty association counts as
+    one. The objects seen have class rows `kinds` in the tables and bearings of `unit` degrees a
+    unit. The query has class rows `names` and `bearings` in degrees, and is turned by `turns`
+    degrees, shape (places, turns).
 
     Tables are by model, signature length (0 to longest) and class: `odds` of detection over a miss,
     and `naming`, with a fourth axis of k + 1 names, the chance of each name over the density of
@@ -61,34 +59,34 @@ def align(  # noqa: C901, PLR0912, PLR0915, PLR0917 - one pass over the cells; a
     distance.
     """
     models, longest = odds.shape[0], odds.shape[1] - 1
-    size = len(kinds)
+    size = len(names)
     most = 0
-    for cell in cells:
-        most = max(most, offsets[cell + 1] - offsets[cell])
+    for place in range(len(offsets) - 1):
+        most = max(most, offsets[place + 1] - offsets[place])
     pairs = most * size
     left = np.empty(pairs, np.int64)
     right = np.empty(pairs, np.int64)
     weight = np.empty(pairs)
-    forth = np.empty(pairs)  # messages from the objects of the cell to those of the query
+    forth = np.empty(pairs)  # messages from the objects of the place to those of the query
     back = np.empty(pairs)
     at_left = np.empty(most)
     at_right = np.empty(size)
-    for number in range(len(cells)):
-        low = offsets[cells[number]]
-        count = offsets[cells[number] + 1] - low
+    for place in range(len(offsets) - 1):
+        low = offsets[place]
+        count = offsets[place + 1] - low
         length = min(count, longest)
         for way in range(turns.shape[1]):
-            turn = turns[number, way]
+            turn = turns[place, way]
             for model in range(models):
                 edges = 0
                 for one in range(count):
-                    kind = row_of[codes[low + one]]
+                    kind = kinds[low + one]
                     spread = sigma[model, kind, distance_units[low + one]]
                     factor = odds[model, length, kind] / (spread * math.sqrt(2.0 * math.pi))
                     reach = min(_REACH * spread, 180.0)
                     shift = turn - (bearing_units[low + one] + 0.5) * unit
                     for other in range(size):
-                        away = seen[other] + shift
+                        away = bearings[other] + shift
                         away -= _TURN * math.floor(away / _TURN + 0.5)
                         if abs(away) > reach:
                             continue
@@ -99,10 +97,10 @@ def align(  # noqa: C901, PLR0912, PLR0915, PLR0917 - one pass over the cells; a
                                 density += math.exp(-0.5 * ((away - _TURN * lap) / spread) ** 2)
                         left[edges] = one
                         right[edges] = other
-                        weight[edges] = factor * density * naming[model, length, kind, kinds[other]]
+                        weight[edges] = factor * density * naming[model, length, kind, names[other]]
                         back[edges] = 1.0
                         edges += 1
-                # Belief propagation; what is settled is the Bethe approximation of the sum.
+                # Belief propagation, as in `associate`; as a function of its own it is slower.
                 for _ in range(_ROUNDS):
                     at_left[:count] = 1.0
                     for edge in range(edges):
@@ -139,17 +137,11 @@ def align(  # noqa: C901, PLR0912, PLR0915, PLR0917 - one pass over the cells; a
                     if product < 1.0 / _LARGE:
                         total += math.log(product)
                         product = 1.0
-                found[model, number, way] = total + math.log(product)
-
-
-_PAIR_ROUNDS = 60
-
-
-_PAIR_SETTLED = 1e-5  # relative change at which the messages are taken for settled
+                totals[model, place, way] = total + math.log(product)
 
 
 @compiled
-def associate(  # noqa: C901, PLR0917 - a kernel takes no keywords
+def associate(  # noqa: C901, PLR0917
     starts: NDArray[np.int64],
     left: NDArray[np.int64],
     right: NDArray[np.int64],
@@ -202,29 +194,6 @@ def associate(  # noqa: C901, PLR0917 - a kernel takes no keywords
             at_left[left[edge]] = 1.0
             at_right[right[edge]] = 1.0
         total[problem] = sums
-
-
-LINE = 64
-"""Cells that are worked out together: as many as a cache line has bytes."""
-
-
-_BLOCK = 4096  # cells whose sums stay in the fastest cache
-
-
-MANTISSA_BITS = 9
-"""Of a float32, how many the table of logarithms looks at."""
-
-
-_SHIFT = 23 - MANTISSA_BITS
-
-
-_ONE = 127 << MANTISSA_BITS  # where the bits of 1.0 begin
-
-
-_BINS = 1024  # scores are counted in so many bins to find the best of them
-
-
-_BINS_A_NAT = np.float32(16.0)
 
 
 @compiled
@@ -422,14 +391,14 @@ def promising_cells(scores: NDArray[np.float32], count: int) -> NDArray[np.int64
     while inside < count:
         last += 1
         inside += counts[last]
-    chosen = np.empty(inside, np.int64)
-    found = 0
+    best = np.empty(inside, np.int64)
+    filled = 0
     for cell in range(len(scores)):
         place = int(min((top - scores[cell]) * _BINS_A_NAT, np.float32(_BINS - 1)))
         if place <= last:
-            chosen[found] = cell
-            found += 1
-    return chosen
+            best[filled] = cell
+            filled += 1
+    return best
 
 
 @compiled
@@ -437,7 +406,7 @@ def count_types(  # noqa: C901, PLR0917
     offsets: NDArray[np.int64],
     codes: NDArray[np.uint8],
     row_of: NDArray[np.int64],
-    wanted: NDArray[np.int64],
+    query: NDArray[np.int64],
     detected: NDArray[np.float64],
     named: NDArray[np.float64],
     clutter: NDArray[np.float64],
@@ -445,7 +414,7 @@ def count_types(  # noqa: C901, PLR0917
 ) -> None:
     """Compare how many objects of each class a query and each sequence of types have.
 
-    Fills `scores`, shape (d,), with log-likelihoods. `wanted`, shape (k + 1,), counts the objects
+    Fills `scores`, shape (d,), with log-likelihoods. `query`, shape (k + 1,), counts the objects
     of the query by class, those of unknown class last. By length and class, `detected` is the
     chance of detection and `named`, shape (longest + 1, k, k), that of each name; `clutter` is in
     false objects per signature, and `row_of` the row of each class code.
@@ -454,11 +423,11 @@ def count_types(  # noqa: C901, PLR0917
     most = 0
     for row in range(len(offsets) - 1):
         most = max(most, offsets[row + 1] - offsets[row])
-    asked = wanted.sum()
-    factorials = np.zeros(max(most, asked) + 1)
-    for number in range(1, len(factorials)):
-        factorials[number] = factorials[number - 1] + math.log(number)
-    share = (asked - wanted[kinds]) / asked  # of the detections whose class is known
+    size = query.sum()
+    factorials = np.zeros(max(most, size) + 1)
+    for value in range(1, len(factorials)):
+        factorials[value] = factorials[value - 1] + math.log(value)
+    share = (size - query[kinds]) / size  # of the detections whose class is known
     counts = np.empty(kinds, np.int64)
     for row in range(len(scores)):
         length = min(offsets[row + 1] - offsets[row], len(detected) - 1)
@@ -475,21 +444,21 @@ def count_types(  # noqa: C901, PLR0917
             unnamed += clutter[name] + counts[name] * detected[length, name]
             stray *= share
             chance = share * detected[length, name] * named[length, name, name]
-            own, given = counts[name], wanted[name]
+            own, number = counts[name], query[name]
             if stray == 0.0:
                 continue  # no class of the query is known
-            # Binomial hits and Poisson strays that make up the number given.
+            # Binomial hits and Poisson strays that make up the number of the query.
             peak = -np.inf
             mass = 0.0
-            for hits in range(min(own, given) + 1):
+            for hits in range(min(own, number) + 1):
                 part = (
                     factorials[own]
                     - factorials[hits]
                     - factorials[own - hits]
                     + hits * math.log(chance)
                     + (own - hits) * math.log1p(-chance)
-                    + (given - hits) * math.log(stray)
-                    - factorials[given - hits]
+                    + (number - hits) * math.log(stray)
+                    - factorials[number - hits]
                     - stray
                 )
                 if part > peak:
@@ -498,7 +467,7 @@ def count_types(  # noqa: C901, PLR0917
                 else:
                     mass += math.exp(part - peak)
             total += peak + math.log(mass)
-        if wanted[kinds] > 0:
+        if query[kinds] > 0:
             unnamed *= 1.0 - share
-            total += wanted[kinds] * math.log(unnamed) - factorials[wanted[kinds]] - unnamed
+            total += query[kinds] * math.log(unnamed) - factorials[query[kinds]] - unnamed
         scores[row] = total

@@ -9,73 +9,21 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from semsig_gis.core.errors import InputError
-from semsig_gis.database.database import BEARING_UNITS, DISTANCE_UNITS
+from semsig_gis.core.geometry import signed_degrees
 from semsig_gis.database.visibility import views_at
+from semsig_gis.likelihood.association import place_loglik, turn_logs
 from semsig_gis.likelihood.noise.model import NoiseMixture
 from semsig_gis.likelihood.noise.table import LONGEST_TABLE, noise_tables
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
     from numpy.typing import NDArray
 
     from semsig_gis.core.rtree import ObjectIndex, StoredIndex
     from semsig_gis.core.signature import Signature
     from semsig_gis.database.occlusion import Footprints
-    from semsig_gis.database.visibility import Views
     from semsig_gis.likelihood.noise.model import Noise
     from semsig_gis.likelihood.noise.table import NoiseTable
     from semsig_gis.objects.table import StreetObjects
-
-
-def place_loglik(
-    query: Signature,
-    views: Views,
-    tables: Sequence[NoiseTable],
-    weights: NDArray[np.float64],
-    *,
-    turns: NDArray[np.float64],
-    reach: float,
-) -> NDArray[np.float64]:
-    """Return the log-likelihood of a query by place and turn, shape (v, r).
-
-    The query needs bearings; its types may be unknown. `weights` are the chances of the tables,
-    `turns` the degrees to turn the query by at each place, and `reach` the largest visibility range
-    of any class in metres. The sum is that of `likelihood.rerank`, on the scale of
-    `likelihood.index`.
-    """
-    from semsig_gis.likelihood.kernels import align  # noqa: PLC0415 - numba loads slowly
-
-    if query.bearings is None:
-        msg = "the query has no bearings, which its place rests on; give them."
-        raise InputError(msg)
-    kinds = tables[0].query_rows(query)
-    units = np.minimum(views.bearings * (BEARING_UNITS / 360.0), BEARING_UNITS - 1)
-    far = np.rint(views.distances * (DISTANCE_UNITS / reach))
-    found = np.empty((len(tables), *turns.shape))
-    align(
-        np.arange(len(views)),
-        views.offsets,
-        views.codes,
-        units.astype(np.uint16),
-        far.astype(np.uint8),
-        tables[0].row_of,
-        360.0 / BEARING_UNITS,
-        kinds,
-        query.bearings,
-        turns,
-        np.stack([table.odds for table in tables]),
-        np.stack([table.naming for table in tables]),
-        np.stack([table.sigmas(reach) for table in tables]),
-        found,
-    )
-    owners = np.repeat(np.arange(len(views)), views.lengths)
-    for one, (table, weight) in enumerate(zip(tables, weights.tolist(), strict=True)):
-        rows = np.minimum(views.lengths, len(table.missed) - 1)[owners]
-        missed = np.log(table.missed)[rows, table.row_of[views.codes]]
-        found[one] += np.bincount(owners, missed, len(views))[:, None] - table.clutter.sum()
-        found[one] += float(np.log(table.density[kinds]).sum()) + math.log(weight)
-    return np.asarray(np.logaddexp.reduce(found, axis=0))
 
 
 KEPT = (1000, 400, 200, 100)
@@ -136,14 +84,14 @@ class Refinement:
         _, inside = self._around()
         angles = np.radians(self.headings[inside])
         mean = np.exp(1j * angles) @ self.chances[inside]
-        return (math.degrees(float(np.angle(mean))) + 180.0) % 360.0 - 180.0
+        return float(signed_degrees(math.degrees(float(np.angle(mean)))))
 
     @property
     def covariance(self) -> NDArray[np.float64]:
         """Of x, y (metres) and heading (degrees) around the best place, shape (3, 3)."""
         _, inside = self._around()
         weights = self.chances[inside] / self.chances[inside].sum()
-        turned = (self.headings[inside] - self.heading + 180.0) % 360.0 - 180.0
+        turned = signed_degrees(self.headings[inside] - self.heading)
         away = np.column_stack([self.places[inside] - self.xy, turned])
         covariance = (weights[:, None] * away).T @ away
         # The place may be anywhere in a part.
@@ -243,7 +191,7 @@ def refine(
         turns = turned[:, None] + steps
         found = place_loglik(query, views, spread, weights, turns=turns, reach=reach)
         if north_sigma > 0:
-            found += _log_chance(turns, steps[1] - steps[0], north_sigma)
+            found += turn_logs(turns, steps[1] - steps[0], north_sigma)
         loglik = np.logaddexp.reduce(found, axis=1)
         shares = np.exp(found - loglik[:, None])
         turned = (shares * turns).sum(axis=1)
@@ -268,7 +216,7 @@ def refine(
         places=places,
         sizes=sizes,
         loglik=loglik,
-        headings=(turned + 180.0) % 360.0 - 180.0,
+        headings=signed_degrees(turned),
         heading_sigmas=sigmas,
         chances=chances / chances.sum(),
         near=near,
@@ -300,12 +248,3 @@ def _quarters(parts: NDArray[np.float64], size: float) -> NDArray[np.float64]:
 def _with_place(table: NoiseTable, size: float) -> NoiseTable:
     """Return a noise model for places anywhere in a square."""
     return replace(table, position_sigma=math.hypot(table.position_sigma, size / math.sqrt(12.0)))
-
-
-def _log_chance(turns: NDArray[np.float64], step: float, north_sigma: float) -> NDArray[np.float64]:
-    """Return the logarithm of the chance of a turn, one step wide."""
-    if math.isinf(north_sigma):
-        return np.full(turns.shape, math.log(step / 360.0))
-    away = (turns + 180.0) % 360.0 - 180.0
-    scale = math.log(step / (north_sigma * math.sqrt(2.0 * math.pi)))
-    return np.asarray(scale - 0.5 * (away / north_sigma) ** 2)

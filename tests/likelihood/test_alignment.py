@@ -74,7 +74,7 @@ def slow_loglik(database: SignatureDatabase, query: Signature, noise: Noise, cel
         tables, shares, pair_weights(database, query, noise, cell), strict=True
     ):
         alone = (
-            table.nothing_seen(database)[cell]
+            table.nothing_seen(database.offsets, database.codes)[cell]
             + np.log(table.density[table.query_rows(query)]).sum()
         )
         total += share * math.exp(alone) * associations(weights)
@@ -227,7 +227,7 @@ def test_what_cannot_be_aligned_is_refused_or_left() -> None:
     types = Signature(np.array([1, 2], np.uint8), None)
     scores = index.scores(types)
     assert rerank(index, types, scores) is scores
-    with pytest.raises(InputError, match="the query has no bearings to align"):
+    with pytest.raises(InputError, match="the query has no bearings"):
         align_cells(database, types, index.noise, np.arange(2))
     query = random_query(database, 2, size=3)
     with pytest.raises(InputError, match="0 cells were to be re-ranked"):

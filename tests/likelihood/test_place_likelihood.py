@@ -14,9 +14,9 @@ from semsig_gis.core.errors import InputError
 from semsig_gis.core.rtree import ObjectIndex
 from semsig_gis.core.signature import Signature
 from semsig_gis.database.visibility import views_at
+from semsig_gis.likelihood.association import place_loglik
 from semsig_gis.likelihood.noise.model import NoiseSpec
 from semsig_gis.likelihood.noise.table import noise_tables
-from semsig_gis.likelihood.refine import place_loglik
 from semsig_gis.likelihood.rerank import align_cells
 
 if TYPE_CHECKING:

@@ -15,7 +15,7 @@ import pandas as pd
 
 from semsig_gis.core.errors import InputError
 from semsig_gis.core.statistics import log_interval, poisson_interval, wilson_interval
-from semsig_gis.likelihood.association import associate_pairs, near_pairs, pair_weights
+from semsig_gis.likelihood.association import associate, near_pairs
 from semsig_gis.likelihood.noise.table import NoiseTable
 
 if TYPE_CHECKING:
@@ -131,7 +131,7 @@ def expected_counts(evidence: Evidence, model: NoiseTable) -> Counts:
     The model must be the same for signatures of all lengths.
     """
     pairs, size = evidence.pairs, len(evidence.codes)
-    weights = pair_weights(
+    chances, loglik = associate(
         model,
         pairs,
         kinds=evidence.kinds,
@@ -139,27 +139,20 @@ def expected_counts(evidence: Evidence, model: NoiseTable) -> Counts:
         lengths=np.zeros(len(evidence.kinds), np.int64),
         names=evidence.given,
     )
-    found = associate_pairs(pairs, weights)
     kind = evidence.kinds[pairs.objects]
     # Of a difference, the place and the bearing noise have their shares by their variances.
     place = np.degrees(model.position_sigma / np.maximum(evidence.distances[pairs.objects], 1e-3))
     own = model.sigma[kind] ** 2
     share = own / (own + place**2)
-    true = np.bincount(pairs.detections, found.chances, len(evidence.given))
+    true = np.bincount(pairs.detections, chances, len(evidence.given))
     named = np.zeros((size, size))
-    np.add.at(named, (kind, evidence.given[pairs.detections]), found.chances)
-    log_likelihood = (
-        found.log_sums.sum()
-        + np.log(model.missed[0, evidence.kinds]).sum()
-        + np.log(model.density[evidence.given]).sum()
-        - evidence.samples * model.clutter.sum()
-    )
+    np.add.at(named, (kind, evidence.given[pairs.detections]), chances)
     return Counts(
-        chances=found.chances,
+        chances=chances,
         squares=(pairs.away * share) ** 2 + place**2 * share,
         false=np.clip(1.0 - true, 0.0, 1.0),
         named=named,
-        log_likelihood=float(log_likelihood),
+        log_likelihood=loglik,
     )
 
 

@@ -92,22 +92,22 @@ class NoiseTable:
         turned = np.degrees(self.position_sigma / distances)
         return np.asarray(np.minimum(np.hypot(self.sigma[:, None], turned), WIDEST_SIGMA))
 
-    def nothing_seen(
-        self, database: SignatureDatabase, cells: NDArray[np.int64] | None = None
-    ) -> NDArray[np.float64]:
-        """Return the log-likelihood that nothing is detected in some or all cells of a database.
+    def length_rows(self, lengths: NDArray[np.int64]) -> NDArray[np.int64]:
+        """Return the row of each signature length; lengths beyond the longest take the last."""
+        return np.minimum(lengths, len(self.missed) - 1)
 
-        It is ``sum_i log(missed_i) - sum_t clutter_t``. The classes must be those of the table.
+    def nothing_seen(
+        self, offsets: NDArray[np.int64], codes: NDArray[np.uint8]
+    ) -> NDArray[np.float64]:
+        """Return the log-likelihood that nothing is detected of the objects of each place.
+
+        It is ``sum_i log(missed_i) - sum_t clutter_t``; the objects of place i have class codes
+        ``codes[offsets[i]:offsets[i + 1]]``, which must be those of the table.
         """
-        lengths, codes = database.lengths, database.codes
-        if cells is not None:
-            lengths = lengths[cells]
-            starts = database.offsets[cells] - np.cumsum(lengths) + lengths
-            codes = codes[np.repeat(starts, lengths) + np.arange(lengths.sum())]
-        rows = np.minimum(lengths, len(self.missed) - 1)
-        each = np.log(self.missed)[np.repeat(rows, lengths), self.row_of[codes]]
-        sums = np.bincount(np.repeat(np.arange(len(lengths)), lengths), each, len(lengths))
-        return np.asarray(sums - self.clutter.sum())
+        lengths = np.diff(offsets)
+        owners = np.repeat(np.arange(len(lengths)), lengths)
+        each = np.log(self.missed)[self.length_rows(lengths)[owners], self.row_of[codes]]
+        return np.asarray(np.bincount(owners, each, len(lengths)) - self.clutter.sum())
 
     def query_rows(self, query: Signature) -> NDArray[np.int64]:
         """Return the class row of each object of a query, k if the class is unknown.
