@@ -64,9 +64,8 @@ from .database.tiles import TileSpec as TileSpec, build_tiles as build_tiles
 from .database.update import update_database as update_database, update_file as update_file
 from .database.viewpoints import ViewpointSpec as ViewpointSpec
 from .matching.method import Method as Method
-from .matching.result import Localization as Localization
 from .matching.scores import score_cells as score_cells
-from .matching.search import localize as localize
+from .matching.search import Localization as Localization, localize as localize
 from .likelihood.answer_rule import (
     AnswerRule as AnswerRule,
     calibrate as calibrate,
@@ -75,7 +74,11 @@ from .likelihood.answer_rule import (
 )
 from .likelihood.index import LikelihoodIndex as LikelihoodIndex, build_index as build_index
 from .likelihood.index_file import ready_index as ready_index
-from .likelihood.locate import locate as locate, locate_route as locate_route
+from .likelihood.locate import (
+    Location as Location,
+    locate as locate,
+    locate_route as locate_route,
+)
 from .likelihood.method import LikelihoodMethod as LikelihoodMethod
 from .likelihood.noise.learn import learn_noise as learn_noise, read_samples as read_samples
 from .likelihood.noise.model import (
@@ -91,7 +94,6 @@ from .likelihood.priors import (
     weight_prior as weight_prior,
 )
 from .likelihood.refine import cell_noise as cell_noise
-from .likelihood.result import Location as Location
 from .likelihood.route import Leg as Leg
 from .queries.draw import QuerySpec as QuerySpec, draw_queries as draw_queries
 from .queries.paper_errors import (

@@ -20,15 +20,15 @@ from semsig_gis import __version__
 from semsig_gis.core.errors import InputError
 from semsig_gis.core.geometry import angular_distance
 from semsig_gis.core.grid import cell_ids
-from semsig_gis.evaluation.answer import Answerer
 from semsig_gis.evaluation.result import (
     QUERY_COLUMNS,
     SUCCESS_METRES,
     Evaluation,
 )
+from semsig_gis.likelihood.locate import LikelihoodLocator
 from semsig_gis.likelihood.method import LikelihoodMethod
-from semsig_gis.likelihood.result import REGION_SHARE
 from semsig_gis.matching.method import DEFAULT_METHOD, Method
+from semsig_gis.matching.search import DistanceLocator
 from semsig_gis.matching.ties import (
     NEAR_METRES,
     NEAR_PLACES,
@@ -47,11 +47,10 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+    from semsig_gis.database.answer import Answer, DistanceMemo, Locator, Ranking
     from semsig_gis.database.database import SignatureDatabase
-    from semsig_gis.evaluation.answer import RankedAnswer
+    from semsig_gis.evaluation.methods import AnyMethod
     from semsig_gis.likelihood.index import LikelihoodIndex
-    from semsig_gis.likelihood.posterior import Posterior
-    from semsig_gis.matching.memo import DistanceMemo
     from semsig_gis.queries.draw import Query
 
 NEXT_CELLS = 4  # that are named after the best candidate
@@ -125,32 +124,32 @@ def evaluate(
 
     Examples
     --------
-    >>> from semsig_gis.sources.catalog import paper_taxonomy
-    >>> from semsig_gis.database.build import build_database
-    >>> from semsig_gis.objects.clean import build_objects
-    >>> from semsig_gis.sources.synthetic.city import CitySpec, synthetic_city
-    >>> layers = synthetic_city(CitySpec(size=300.0))
-    >>> objects, _ = build_objects(layers, taxonomy=paper_taxonomy(), crs="EPSG:32631")
-    >>> evaluation = evaluate(build_database(objects), queries=20, distortion="none")
+    >>> evaluation = evaluate(demo_database, queries=20, distortion="none")
     >>> len(evaluation.queries), evaluation.recall(100)
     (20, 1.0)
     """
     check_count("queries", queries, len(database))
     check_count("candidates", top, len(database))
     spec = QuerySpec(number=queries, seeds=(seed,), distortions=_chain(distortion))
+    used: AnyMethod
+    locator: Locator[Answer]
     if isinstance(method, Method):
-        answerer = Answerer(database=database, method=method)
+        used, locator = method, DistanceLocator(database=database, method=method)
+    elif method.database is database:
+        used = LikelihoodMethod(noise=method.noise, on_grid=True)
+        locator = LikelihoodLocator(index=method)
     else:
-        by_likelihood = LikelihoodMethod(noise=method.noise, on_grid=True)
-        answerer = Answerer(database=database, method=by_likelihood, index=method)
+        msg = "the likelihood index belongs to another database; build that of the one to search."
+        raise InputError(msg)
     drawn = draw_queries(database, spec)
-    outcomes = score_queries(answerer, drawn, tops=(top,), progress=progress)
+    outcomes = score_queries(database, locator, drawn, tops=(top,), progress=progress)
     scored = scored_tables(database, drawn, outcomes)[top]
-    return make_evaluation(database, answerer.method, spec, scored, top=top)
+    return make_evaluation(database, used, spec, scored, top=top)
 
 
 def score_queries(
-    answerer: Answerer,
+    database: SignatureDatabase,
+    locator: Locator[Answer],
     queries: Sequence[Query],
     *,
     tops: Sequence[int] = (1,),
@@ -163,16 +162,15 @@ def score_queries(
     query, for `scored_tables`. `memo` keeps distances of these queries that other methods have
     needed; `progress` is called with the number of queries done and in all.
     """
-    database = answerer.database
-    asked = [one.asked.signature for one in queries if len(one.asked)]
-    answers = answerer.answers(asked, memo=memo)
+    views = [query.asked.signature for query in queries if len(query.asked)]
+    rankings = locator.rankings(views, memo=memo)
     outcomes: dict[int, list[dict[str, Any]]] = {top: [] for top in tops}
     for done, query in enumerate(queries, start=1):
         if len(query.asked):
-            answer = next(answers)
-            pool = _Pool(database, query, answer, max(*tops, *NEAR_PLACES))
-            shared = _told(database, query, answer, pool)
-            shared |= _near(pool, judged=answer.posterior is not None)
+            ranking = next(rankings)
+            pool = _Pool(database, query, ranking, max(*tops, *NEAR_PLACES))
+            shared = _told(database, query, ranking, pool)
+            shared |= _near(pool, judged=ranking.chances is not None)
             for top in tops:
                 outcomes[top].append(shared | _outcome(pool, top))
         else:
@@ -204,7 +202,7 @@ def scored_tables(
 
 def make_evaluation(
     database: SignatureDatabase,
-    method: Method | LikelihoodMethod,
+    method: AnyMethod,
     spec: QuerySpec,
     scored: pd.DataFrame,
     *,
@@ -256,36 +254,35 @@ def _chain(
 
 
 def _told(
-    database: SignatureDatabase, query: Query, answer: RankedAnswer, pool: _Pool
+    database: SignatureDatabase, query: Query, ranking: Ranking, pool: _Pool
 ) -> dict[str, Any]:
     """Return the columns that do not depend on how many candidates count."""
-    scores = answer.scores
+    scores = ranking.scores
     low, high = rank_range(scores, query.cell) if query.cell >= 0 else (len(scores),) * 2
-    found = answer.posterior
     off = math.nan
-    if answer.heading is not None:
-        off = float(angular_distance(answer.heading, query.asked.heading))
+    if ranking.heading is not None:
+        off = float(angular_distance(ranking.heading, query.asked.heading))
     return {
-        "distance": answer.best_score,
+        "distance": ranking.best_score,
         "rank_low": low,
         "rank_high": high,
-        "chance": answer.chance,
-        "in_region": math.nan if found is None else _in_region(found, query.cell),
+        "chance": ranking.chance,
+        "in_region": _in_region(ranking, query.cell),
         "heading_error": off,
-        "seconds": answer.seconds,
-        **_shown(database, query, answer, pool),
+        "seconds": ranking.seconds,
+        **_shown(database, query, ranking, pool),
     }
 
 
 def _shown(
-    database: SignatureDatabase, query: Query, answer: RankedAnswer, pool: _Pool
+    database: SignatureDatabase, query: Query, ranking: Ranking, pool: _Pool
 ) -> dict[str, Any]:
     """Return the best candidate, or one of equals."""
     best = pool.cells[pool.scores == pool.scores.min()]
     shown = best[int(query.pick * len(best))]
     after = pool.cells[pool.best(NEXT_CELLS + 1)]
     after = after[after != shown][:NEXT_CELLS]
-    x, y = database.xy[shown].tolist() if answer.place is None else answer.place
+    x, y = database.xy[shown].tolist() if ranking.place is None else ranking.place
     return {
         "best_cell_id": int(cell_ids(database.columns[shown], database.rows[shown])),
         "best_x": x,
@@ -298,16 +295,16 @@ def _shown(
 
 
 class _Pool:
-    """The best cells of an answer with all that tie with the last of them, and their errors."""
+    """The best cells of a ranking with all that tie with the last of them, and their errors."""
 
     def __init__(
-        self, database: SignatureDatabase, query: Query, answer: RankedAnswer, count: int
+        self, database: SignatureDatabase, query: Query, ranking: Ranking, count: int
     ) -> None:
-        self.cells = best_cells(answer.scores, min(count, len(database)))
+        self.cells = best_cells(ranking.scores, min(count, len(database)))
         places = database.xy.take(self.cells, axis=0)
-        self.scores = answer.scores[self.cells]
-        if answer.place is not None:
-            places[self.scores.argmin()] = answer.place
+        self.scores = ranking.scores[self.cells]
+        if ranking.place is not None:
+            places[self.scores.argmin()] = ranking.place
         places -= query.xy
         # So that a cell 50 m away is not a rounding beyond 50 m.
         self.errors = np.round(np.sqrt((places**2).sum(axis=1)), 6)
@@ -365,15 +362,17 @@ def _unlocalized(cells: int) -> dict[str, Any]:
     }
 
 
-def _in_region(found: Posterior, cell: int) -> float:
+def _in_region(ranking: Ranking, cell: int) -> float:
     """Return the probability that a cell is in the region, whose last cell is one of equals."""
+    chances, region = ranking.chances, ranking.region
+    if chances is None or region is None:
+        return math.nan
     if cell < 0:
         return 0.0
-    region = found.credible_cells(REGION_SHARE)
-    least, own = found.chances[region[-1]], found.chances[cell]
+    least, own = chances[region[-1]], chances[cell]
     if own != least:
         return float(own > least)
-    return float((found.chances[region] == least).sum() / (found.chances == least).sum())
+    return float((chances[region] == least).sum() / (chances == least).sum())
 
 
 def _query_table(database: SignatureDatabase, queries: Sequence[Query]) -> pd.DataFrame:

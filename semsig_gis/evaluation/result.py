@@ -33,7 +33,6 @@ from semsig_gis.evaluation.figures import (
     query_figures,
 )
 from semsig_gis.evaluation.methods import parse_method
-from semsig_gis.likelihood.method import LikelihoodMethod
 from semsig_gis.likelihood.noise.model import noise_from_dict
 from semsig_gis.matching.ties import NEAR_PLACES, THRESHOLDS, expected_recall
 from semsig_gis.queries.chain import chain_text, parse_chain
@@ -48,8 +47,8 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from semsig_gis.database.database import SignatureDatabase
+    from semsig_gis.evaluation.methods import AnyMethod
     from semsig_gis.likelihood.noise.model import Noise
-    from semsig_gis.matching.method import Method
     from semsig_gis.queries.chain import QueryDistortion
 
 
@@ -70,7 +69,7 @@ def machine() -> dict[str, Any]:
 
 
 def used_noises(
-    methods: Iterable[Method | LikelihoodMethod], distortions: Iterable[QueryDistortion]
+    methods: Iterable[AnyMethod], distortions: Iterable[QueryDistortion]
 ) -> dict[str, Noise]:
     """Return the noise models of likelihood methods and detectors by name.
 
@@ -78,7 +77,7 @@ def used_noises(
     texts of methods and distortions use.
     """
     found: dict[str, Noise] = {}
-    models = [one.noise for one in methods if isinstance(one, LikelihoodMethod)]
+    models = [one.noise for one in methods if one.noise is not None]
     models += [one.noise for one in distortions if isinstance(one, Detector)]
     for noise in models:
         if set(noise.name) & set(",:/="):
@@ -90,7 +89,7 @@ def used_noises(
     return found
 
 
-def settings_to_dict(method: Method | LikelihoodMethod, asked: QuerySpec) -> dict[str, Any]:
+def settings_to_dict(method: AnyMethod, asked: QuerySpec) -> dict[str, Any]:
     """Return a method and what it was asked as plain values for JSON.
 
     Keys are ``method``, ``asked`` and ``noises``: all noise models in full, so that nothing else is
@@ -109,7 +108,7 @@ def settings_to_dict(method: Method | LikelihoodMethod, asked: QuerySpec) -> dic
     }
 
 
-def settings_from_dict(values: Mapping[str, Any]) -> tuple[Method | LikelihoodMethod, QuerySpec]:
+def settings_from_dict(values: Mapping[str, Any]) -> tuple[AnyMethod, QuerySpec]:
     """Read a method and what it was asked, the inverse of `settings_to_dict`.
 
     Other values raise AttributeError, LookupError, TypeError or ValueError, which the caller turns
@@ -230,7 +229,7 @@ class Evaluation:
     """
 
     queries: gpd.GeoDataFrame
-    method: Method | LikelihoodMethod
+    method: AnyMethod
     asked: QuerySpec
     top: int
     seconds_per_query: float
@@ -419,12 +418,12 @@ class Evaluation:
         -------
         dict of str to float
             ``coverage``, the share of the queries that are answered, those whose answer is right
-            with a chance that `likelihood.locate.DEFAULT_RULE` asks for; ``precision``, the
+            with a chance that `likelihood.answer_rule.DEFAULT_RULE` asks for; ``precision``, the
             share of these answers that are right; and ``in_region``, the share of the regions of
             90 % that hold the true cell. NaN where there is no query to tell; empty for other
             methods.
         """
-        if not isinstance(self.method, LikelihoodMethod):
+        if self.method.noise is None:
             return {}
         means = self.means()["value"]
         return {
@@ -464,7 +463,7 @@ class Evaluation:
         """
         errors = self.queries["error_m"].to_numpy(dtype=np.float64)
         turns = self.queries["heading_error"].to_numpy(dtype=np.float64)
-        by_chance = isinstance(self.method, LikelihoodMethod)
+        by_chance = self.method.noise is not None
         return {
             "settings": {
                 "method": str(self.method),

@@ -19,9 +19,7 @@ from semsig_gis.storage.toml import check_keys, toml_text
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
 
-    from semsig_gis.likelihood.method import LikelihoodMethod
     from semsig_gis.likelihood.noise.model import Noise
-    from semsig_gis.matching.method import Method
     from semsig_gis.queries.chain import QueryDistortion
     from semsig_gis.queries.draw import SeenFrom
 
@@ -112,7 +110,7 @@ class ExperimentSpec:
     """
 
     database: str
-    methods: Mapping[str, Method | LikelihoodMethod]
+    methods: Mapping[str, AnyMethod]
     distortions: Mapping[str, tuple[QueryDistortion, ...]]
     queries: int = 500
     seeds: tuple[int, ...] = (0,)

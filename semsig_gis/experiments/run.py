@@ -21,9 +21,9 @@ import pyarrow.parquet as pq
 
 from semsig_gis.core.errors import DatabaseError, SourceError
 from semsig_gis.core.parallel import check_workers, run_tasks
+from semsig_gis.database.answer import DistanceMemo
 from semsig_gis.database.city import City
 from semsig_gis.database.parts import digest
-from semsig_gis.evaluation.answer import Answerer
 from semsig_gis.evaluation.evaluate import (
     check_count,
     make_evaluation,
@@ -32,6 +32,7 @@ from semsig_gis.evaluation.evaluate import (
     versions,
 )
 from semsig_gis.evaluation.figures import district_labels
+from semsig_gis.evaluation.methods import make_locator
 from semsig_gis.evaluation.spec import Case, parse_experiment
 from semsig_gis.experiments.folder import (
     PARTS,
@@ -42,20 +43,18 @@ from semsig_gis.experiments.folder import (
     write_results,
 )
 from semsig_gis.likelihood.index_file import ready_index
-from semsig_gis.likelihood.method import LikelihoodMethod
-from semsig_gis.likelihood.refine import cell_noise
-from semsig_gis.matching.memo import DistanceMemo
-from semsig_gis.matching.method import Method
 from semsig_gis.queries.draw import draw_queries
 from semsig_gis.storage.whole import whole_file
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping, Sequence
 
+    from semsig_gis.database.answer import Answer, Locator
     from semsig_gis.database.database import SignatureDatabase
     from semsig_gis.evaluation.result import Evaluation
     from semsig_gis.evaluation.spec import ExperimentSpec
     from semsig_gis.likelihood.index import LikelihoodIndex
+    from semsig_gis.likelihood.noise.model import Noise
     from semsig_gis.queries.draw import Query
 
 
@@ -94,7 +93,7 @@ class ExperimentWork:
     note: Callable[[str], None] | None = None
     _cities: dict[str, City] = field(default_factory=dict)
     _indexes: dict[Path, LikelihoodIndex] = field(default_factory=dict)
-    _answerers: dict[str, Answerer] = field(default_factory=dict)
+    _locators: dict[str, Locator[Answer]] = field(default_factory=dict)
 
     def digests(self) -> dict[str, str]:
         """Return a digest of the content of each file that is looked at, by name.
@@ -122,10 +121,7 @@ class ExperimentWork:
         some = []
         if self.spec.seen_from == "anywhere":
             some.append(self.spec.city or self.spec.database)
-        if any(
-            isinstance(method, LikelihoodMethod) and method.refined
-            for method in self.spec.methods.values()
-        ):
+        if any(method.refined for method in self.spec.methods.values()):
             some.append(self.spec.database)
         return list(dict.fromkeys(some))
 
@@ -146,7 +142,7 @@ class ExperimentWork:
         for distortion in self.spec.distortions:
             self._queries(distortion, slice(1))
         for name in self.spec.methods:
-            self._answerer(name)
+            self._locator(name)
 
     @cached_property
     def database(self) -> SignatureDatabase:
@@ -193,7 +189,7 @@ class ExperimentWork:
             return
         start = part.number * QUERIES_A_PART
         queries = self._queries(part.distortion, slice(start, start + QUERIES_A_PART))
-        by_distance = [name for name in left if isinstance(self.spec.methods[name], Method)]
+        by_distance = [name for name in left if self.spec.methods[name].noise is None]
         for names in (by_distance, *([name] for name in left if name not in by_distance)):
             for name, scored in self._scored(names, queries):
                 with whole_file(left[name]) as half:
@@ -211,7 +207,8 @@ class ExperimentWork:
             memo = DistanceMemo() if len(names) > 1 else None
             for name in names:
                 outcomes = score_queries(
-                    self._answerer(name),
+                    self.database,
+                    self._locator(name),
                     queries[start : start + step],
                     tops=self.spec.top,
                     memo=memo,
@@ -275,23 +272,21 @@ class ExperimentWork:
             part=part,
         )
 
-    def _answerer(self, name: str) -> Answerer:
+    def _locator(self, name: str) -> Locator[Answer]:
         """Return a method with all that it needs."""
-        if name not in self._answerers:
-            method = self.spec.methods[name]
-            more: dict[str, Any] = {}
-            if isinstance(method, LikelihoodMethod):
-                more["index"] = self._index(method)
-                more["store"] = self._city(self.spec.database).store if method.refined else None
-            self._answerers[name] = Answerer(database=self.database, method=method, **more)
-        return self._answerers[name]
+        if name not in self._locators:
+            self._locators[name] = make_locator(
+                self.database,
+                self.spec.methods[name],
+                index=self._index,
+                store=lambda: self._city(self.spec.database).store,
+            )
+        return self._locators[name]
 
     def _city(self, name: str) -> City:
         return self._cities.setdefault(name, City(self.folder / name))
 
-    def _index(self, method: LikelihoodMethod) -> LikelihoodIndex:
-        step = self.database.grid.step
-        noise = method.noise if method.on_grid else cell_noise(method.noise, step)
+    def _index(self, noise: Noise) -> LikelihoodIndex:
         path = self._city(self.spec.database).index_path(noise)
         if path not in self._indexes:
             self._indexes[path] = ready_index(self.database, noise, path, note=self.note)

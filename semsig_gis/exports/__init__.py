@@ -20,17 +20,17 @@ from semsig_gis.exports import geopackage, geoparquet
 from semsig_gis.exports.geotiff import cell_errors, export_geotiff
 from semsig_gis.exports.layers import answer_layers, cells_layer, evaluation_layers, objects_layer
 from semsig_gis.exports.regions import search_regions
-from semsig_gis.likelihood.result import REGION_SHARE, Location
+from semsig_gis.database.answer import REGION_SHARE
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
 
+    from semsig_gis.database.answer import Answer
     from semsig_gis.database.database import SignatureDatabase
     from semsig_gis.evaluation.identify.result import Identifiability
     from semsig_gis.evaluation.result import Evaluation
     from semsig_gis.exports.layers import CellGeometry, Layer
     from semsig_gis.exports.regions import SearchRegions
-    from semsig_gis.matching.result import Localization
     from semsig_gis.objects.table import StreetObjects
 
     Progress = Callable[[int, int], None]
@@ -236,7 +236,7 @@ def _chosen_layers(
 
 
 def export_answer(
-    answer: Location | Localization,
+    answer: Answer,
     database: SignatureDatabase,
     path: str | Path,
     *,
@@ -270,15 +270,15 @@ def export_answer(
         another database, or the file cannot be written.
     """
     suffix = _suffix(path, (".gpkg", *_ONE_LAYER, *_TIFF))
-    if suffix in _TIFF and not isinstance(answer, Location):
+    if suffix in _TIFF and answer.chances is None:
         msg = (
             f"{path} is to hold the chance of every cell, which the method does not tell; use the "
             "likelihood method, or write a GeoPackage."
         )
         raise InputError(msg)
     regions = search_regions(answer, database, share=share, within=within)
-    if suffix in _TIFF and isinstance(answer, Location):
-        export_geotiff(database, answer.posterior.chances, path, name="posterior")
+    if suffix in _TIFF and answer.chances is not None:
+        export_geotiff(database, answer.chances, path, name="posterior")
     elif suffix == ".gpkg":
         geopackage.write_layers(answer_layers(answer, regions), path)
     else:

@@ -27,7 +27,6 @@ from semsig_gis.exports.styles import (
     by_outcome,
     by_rank,
 )
-from semsig_gis.likelihood.result import Location
 from semsig_gis.objects.table import objects_specs
 
 if TYPE_CHECKING:
@@ -37,12 +36,12 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
     from pyproj import CRS
 
+    from semsig_gis.database.answer import Answer
     from semsig_gis.database.database import SignatureDatabase
     from semsig_gis.evaluation.identify.result import Identifiability
     from semsig_gis.evaluation.result import Evaluation
     from semsig_gis.exports.regions import SearchRegions
     from semsig_gis.exports.styles import Style
-    from semsig_gis.matching.result import Localization
     from semsig_gis.objects.table import StreetObjects
 
 CellGeometry = Literal["polygon", "point"]
@@ -248,12 +247,11 @@ def evaluation_layers(evaluation: Evaluation, licenses: tuple[str, ...]) -> list
     ]
 
 
-def answer_layers(answer: Location | Localization, regions: SearchRegions) -> list[Layer]:
+def answer_layers(answer: Answer, regions: SearchRegions) -> list[Layer]:
     """Return the regions that must be searched, and the candidates of a query."""
     told = answer.to_dict()
     facts = {name: told[name] for name in told if name not in {"candidates", "crs", "licenses"}}
     facts["searched"] = regions.to_dict()
-    rank = "rank" if isinstance(answer, Location) else "rank_low"
     licenses = tuple(told["licenses"])
     return [
         _table_layer(
@@ -274,7 +272,7 @@ def answer_layers(answer: Location | Localization, regions: SearchRegions) -> li
             geometry="point",
             licenses=licenses,
             facts=facts,
-            style=by_rank(rank, geometry="point"),
+            style=by_rank(str(answer.candidates.columns[0]), geometry="point"),
         ),
     ]
 

@@ -15,15 +15,14 @@ import numpy as np
 import shapely
 
 from semsig_gis.core.errors import InputError
-from semsig_gis.database.database import rows_of_result
+from semsig_gis.database.answer import REGION_SHARE
 from semsig_gis.likelihood.posterior import Posterior
-from semsig_gis.likelihood.result import REGION_SHARE, Location
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+    from semsig_gis.database.answer import Answer
     from semsig_gis.database.database import SignatureDatabase
-    from semsig_gis.matching.result import Localization
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,7 +63,7 @@ class SearchRegions:
 
 
 def search_regions(
-    answer: Location | Localization,
+    answer: Answer,
     database: SignatureDatabase,
     *,
     share: float = REGION_SHARE,
@@ -115,16 +114,7 @@ def search_regions(
     if not (math.isfinite(within) and within >= 0):
         msg = f"regions within {within} m were asked for; give metres, 0 or more."
         raise InputError(msg)
-    chances: NDArray[np.float64] | None = None
-    if isinstance(answer, Location):
-        chances = answer.posterior.chances
-        cells = answer.posterior.credible_cells(share)
-        if not np.array_equal(answer.posterior.database.cell_ids, database.cell_ids):
-            msg = "the answer was found in another database; give the database that was searched."
-            raise InputError(msg)
-    else:
-        found = answer.candidates
-        cells = rows_of_result(database, found["cell_id"], found["types"], what="localization")
+    chances, cells = answer.chances, answer.region_cells(database, share)
     if within > 0:
         cells = np.concatenate([cells, _around(database, cells, within)])
     shapes = shapely.get_parts(shapely.union_all(_runs(database, np.sort(cells))))

@@ -102,7 +102,7 @@ class AnswerRule:
         """
         return bool(mass >= self.threshold)
 
-    def decide(self, found: Posterior) -> Answer:
+    def decide(self, found: Posterior) -> Decision:
         """Return the best place, and whether to give it as the answer.
 
         Parameters
@@ -112,16 +112,20 @@ class AnswerRule:
 
         Returns
         -------
-        Answer
+        Decision
             The place, its chance, and the decision.
         """
         cell, mass = found.best_place(self.radius)
         x, y = found.database.xy[cell].tolist()
-        return Answer(cell=cell, x=x, y=y, mass=mass, given=self.answers(mass))
+        return Decision(cell=cell, x=x, y=y, mass=mass, given=self.answers(mass))
+
+
+DEFAULT_RULE = AnswerRule(threshold=0.9)
+"""Answer where the place is within 50 m of the best one with a chance of 0.9 by the model."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Answer:
+class Decision:
     """A cell (row number) with its viewpoint in metres, and whether it is given as the answer.
 
     `mass` is the chance that the place is near it; `given` is False for "cannot tell".

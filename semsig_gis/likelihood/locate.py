@@ -7,39 +7,398 @@ street objects are at hand, look for the place between the viewpoints and say wh
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import TYPE_CHECKING
+import math
+import time
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pandas as pd
 
 from semsig_gis.core.errors import InputError
 from semsig_gis.core.grid import cell_ids
-from semsig_gis.likelihood.answer_rule import AnswerRule
-from semsig_gis.likelihood.estimate import cell_estimate, refined_estimate
+from semsig_gis.database.answer import REGION_SHARE, Answer, Ranking, check_query, check_top
+from semsig_gis.likelihood.answer_rule import DEFAULT_RULE
 from semsig_gis.likelihood.explain import explain, explain_cell
 from semsig_gis.likelihood.index import CellScores
 from semsig_gis.likelihood.posterior import Posterior, posterior
-from semsig_gis.likelihood.refine import KEPT, cell_noise, place_noise, refine
-from semsig_gis.likelihood.rerank import rerank
-from semsig_gis.likelihood.result import REGION_SHARE, Location
+from semsig_gis.likelihood.refine import KEPT, Refinement, cell_noise, place_noise, refine
+from semsig_gis.likelihood.rerank import align_cells, rerank
 from semsig_gis.likelihood.route import route_posteriors
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Iterator, Sequence
 
     from numpy.typing import NDArray
 
     from semsig_gis.core.signature import Signature
+    from semsig_gis.database.answer import DistanceMemo
     from semsig_gis.database.database import SignatureDatabase
     from semsig_gis.database.store import ObjectStore
+    from semsig_gis.likelihood.answer_rule import AnswerRule, Decision
     from semsig_gis.likelihood.explain import Explanation
     from semsig_gis.likelihood.index import LikelihoodIndex
-    from semsig_gis.likelihood.refine import Refinement
+    from semsig_gis.likelihood.noise.model import Noise
     from semsig_gis.likelihood.route import Leg
 
-DEFAULT_RULE: AnswerRule = AnswerRule(threshold=0.9)
-"""Answer where the place is within 50 m of the best one with a chance of 0.9 by the model."""
+MOST_CELLS = 200
+"""Likeliest cells near the answer that are averaged; the others hold next to nothing."""
+TURN = 2.0  # degrees between the headings that are tried
+
+
+@dataclass(frozen=True, eq=False, slots=True, kw_only=True)
+class PlaceEstimate:
+    """A mean place in metres and a heading, each with its uncertainty.
+
+    `heading` is in degrees to add to the bearings of the query, in [-180, 180), or None if they are
+    known. `covariance`, shape (3, 3), is of x, y (metres) and heading (degrees). `refined` tells
+    whether the place comes from between the viewpoints rather than from whole cells.
+    """
+
+    x: float
+    y: float
+    heading: float | None
+    covariance: NDArray[np.float64]
+    refined: bool
+
+    @property
+    def sigma(self) -> float:
+        """Standard deviation of the place in metres, the root of the mean of both ways."""
+        return math.sqrt(float(self.covariance[0, 0] + self.covariance[1, 1]) / 2.0)
+
+    @property
+    def heading_sigma(self) -> float:
+        """Standard deviation of the heading in degrees."""
+        return math.sqrt(float(self.covariance[2, 2]))
+
+    def ellipse(self, share: float = 0.9) -> tuple[float, float, float]:
+        """Return the ellipse that holds a share of a normal distribution of this covariance.
+
+        It is the longer and the shorter half axis in metres, and the bearing of the longer one in
+        degrees clockwise from grid north, in [0, 180).
+        """
+        values, vectors = np.linalg.eigh(self.covariance[:2, :2])
+        scale = math.sqrt(-2.0 * math.log(1.0 - share))
+        shorter, longer = (scale * np.sqrt(np.maximum(values, 0.0))).tolist()
+        bearing = math.degrees(math.atan2(*vectors[:, 1].tolist())) % 180.0
+        return longer, shorter, bearing
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return plain values for JSON; the covariance has two rows if the heading is known."""
+        size = 2 if self.heading is None else 3
+        longer, shorter, bearing = self.ellipse(0.9)
+        return {
+            "x": self.x,
+            "y": self.y,
+            "sigma": self.sigma,
+            "heading": self.heading,
+            "heading_sigma": None if self.heading is None else self.heading_sigma,
+            "covariance": self.covariance[:size, :size].tolist(),
+            "ellipse_90": {"longer": longer, "shorter": shorter, "bearing": bearing},
+            "refined": self.refined,
+        }
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Location(Answer):
+    """The answer of the likelihood method to a query.
+
+    Parameters
+    ----------
+    query : Signature
+        What was searched for.
+    noise : str
+        Name of the noise model.
+    candidates : DataFrame
+        One row a cell, likeliest first: ``rank`` (from 1), ``cell`` (row in the database),
+        ``cell_id``, ``x`` and ``y`` (viewpoint, CRS of the database), ``types`` (symbols),
+        ``length`` (objects), ``loglik`` (natural logarithm of the likelihood), ``chance`` and,
+        where north was not known for sure, ``heading`` (degrees to add to the bearings of the
+        query).
+    cells : int
+        How many cells were searched.
+    crs, taxonomy, licenses
+        Those of the database.
+    answer : Decision
+        The cell around which the chance is largest, that chance, and whether it is enough for an
+        answer.
+    estimate : PlaceEstimate
+        The place around that cell and the heading, each with its uncertainty: what to take for
+        the place if it is there.
+    rule : AnswerRule
+        What the decision rests on.
+    region : ndarray of int64
+        Row numbers of the fewest cells that hold 90 % of the chance, likeliest first.
+    posterior : Posterior
+        The chance of every cell.
+    loglik : ndarray of float, shape (n,)
+        Natural logarithm of the likelihood of every cell.
+    explanations : tuple of Explanation
+        Of the first candidates, in their order: which detections are which street objects.
+    """
+
+    noise: str
+    answer: Decision
+    estimate: PlaceEstimate
+    rule: AnswerRule
+    region: NDArray[np.int64]
+    posterior: Posterior
+    loglik: NDArray[np.floating]
+    explanations: tuple[Explanation, ...] = ()
+
+    @property
+    def region_km2(self) -> float:
+        """Area of the cells of the region in square kilometres."""
+        return len(self.region) * self.posterior.database.grid.step**2 / 1e6
+
+    @property
+    def cell_id(self) -> int:
+        """Id of the grid cell in which the estimated place is; a database may lack it."""
+        estimate = np.array([[self.estimate.x, self.estimate.y]])
+        return int(cell_ids(*self.posterior.database.grid.cells_at(estimate))[0])
+
+    @property
+    def chances(self) -> NDArray[np.float64]:
+        """The chance of every cell."""
+        return self.posterior.chances
+
+    def region_cells(self, database: SignatureDatabase, share: float) -> NDArray[np.int64]:
+        """Return the rows of the fewest cells that hold a share of the chance, likeliest first."""
+        cells = self.posterior.credible_cells(share)
+        if not np.array_equal(self.posterior.database.cell_ids, database.cell_ids):
+            msg = "the answer was found in another database; give the database that was searched."
+            raise InputError(msg)
+        return cells
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return everything but the chances of all cells as plain values that JSON can hold.
+
+        Returns
+        -------
+        dict
+            ``query``, ``noise``, ``cells``, ``answered``, ``place`` (what
+            `PlaceEstimate.to_dict` gives, its ``cell_id``, ``lon``, ``lat``, ``chance`` and
+            ``within_m``), ``threshold`` (None where nothing is answered), ``region`` (``share``,
+            ``cells``, ``km2``), ``entropy_bits``, ``crs``, ``licenses``, and ``candidates``, a
+            list with the columns of `candidates`, ``lon``, ``lat`` (degrees, WGS 84) and, of the
+            first ones, ``explanation``.
+        """
+        lon, lat = self._to_degrees.transform(self.estimate.x, self.estimate.y)
+        candidates = self._candidate_records()
+        for candidate, why in zip(candidates, self.explanations, strict=False):
+            candidate["explanation"] = why.to_dict()
+        threshold = self.rule.threshold
+        return {
+            "query": self.query.to_dict(self.taxonomy),
+            "noise": self.noise,
+            "cells": self.cells,
+            "answered": self.answer.given,
+            "place": {
+                "cell_id": self.cell_id,
+                **self.estimate.to_dict(),
+                "lon": round(lon, 7),
+                "lat": round(lat, 7),
+                "chance": self.answer.mass,
+                "within_m": self.rule.radius,
+            },
+            "threshold": threshold if math.isfinite(threshold) else None,
+            "region": {
+                "share": REGION_SHARE,
+                "cells": len(self.region),
+                "km2": self.region_km2,
+            },
+            "entropy_bits": self.posterior.entropy,
+            "crs": self.crs.to_string(),
+            "licenses": list(self.licenses),
+            "candidates": candidates,
+        }
+
+
+@dataclass(frozen=True, eq=False, slots=True, kw_only=True)
+class LikelihoodLocator:
+    """An index, and how queries to it are answered; `locate` describes the fields.
+
+    A place is refined, too, where `refined` is None and there are a store and bearings.
+    """
+
+    index: LikelihoodIndex
+    north_sigma: float = 0.0
+    log_prior: NDArray[np.float64] | None = None
+    rule: AnswerRule = DEFAULT_RULE
+    top: int = 10
+    store: ObjectStore | None = None
+    refined: bool | None = False
+    explained: int = 0
+
+    def __post_init__(self) -> None:
+        check_top(self.top)
+        if self.refined and self.store is None:
+            msg = "a place between the viewpoints was asked for; give the store of the database."
+            raise InputError(msg)
+
+    def locate(self, query: Signature, *, top: int | None = None) -> Location:
+        """Find where a query was seen from."""
+        check_query(query)
+        scores = self._scores(query, self.log_prior)
+        chances = posterior(self.index.database, scores.loglik, log_prior=self.log_prior)
+        store = self._store_for([query])
+        return self._location(query, scores, chances, top=top or self.top, store=store)
+
+    def locate_route(
+        self, queries: Sequence[Signature], legs: Sequence[Leg]
+    ) -> tuple[Location, ...]:
+        """Find where the views of a route were seen from; any of them may have no objects."""
+        scores = [
+            self._scores(query, None if row else self.log_prior)
+            for row, query in enumerate(queries)
+        ]
+        logliks = [one.loglik for one in scores]
+        database, store = self.index.database, self._store_for(queries)
+        chances = route_posteriors(database, logliks, legs, log_prior=self.log_prior)
+        return tuple(
+            self._location(*view, top=self.top, store=store)
+            for view in zip(queries, scores, chances, strict=True)
+        )
+
+    def rankings(
+        self,
+        queries: Sequence[Signature],
+        *,
+        memo: DistanceMemo | None = None,  # noqa: ARG002 - there are no distances
+    ) -> Iterator[Ranking]:
+        """Rank all cells for each query; see `Locator`."""
+        for query in queries[:1]:
+            self.locate(query, top=1)  # kernels are loaded once
+        for query in queries:
+            start = time.perf_counter()
+            location = self.locate(query, top=1)
+            seconds = time.perf_counter() - start
+            answer, estimate = location.answer, location.estimate
+            scores = -location.loglik.astype(np.float32)
+            first = [answer.cell] if self.refined else _places_like(location)
+            scores[first] = scores.min() - 1.0
+            yield Ranking(
+                scores=scores,
+                best_score=-float(location.loglik[answer.cell]),
+                place=(estimate.x, estimate.y) if self.refined else None,
+                heading=estimate.heading,
+                chance=answer.mass,
+                chances=location.chances,
+                region=location.region,
+                seconds=seconds,
+            )
+
+    def _scores(self, query: Signature, log_prior: NDArray[np.float64] | None) -> CellScores:
+        """Return the scores of all cells, the best ones by one-to-one associations."""
+        if not len(query):
+            return CellScores(loglik=self.index.constants)
+        north_sigma = self.north_sigma
+        scores = self.index.scores(query, north_sigma=north_sigma)
+        return rerank(self.index, query, scores, north_sigma=north_sigma, log_prior=log_prior)
+
+    def _store_for(self, queries: Sequence[Signature]) -> ObjectStore | None:
+        """Return the street objects to refine places with, if they are to be refined."""
+        blind = any(len(query) and query.bearings is None for query in queries)
+        return self.store if self.refined or (self.refined is None and not blind) else None
+
+    def _location(
+        self,
+        query: Signature,
+        scores: CellScores,
+        posterior: Posterior,
+        *,
+        top: int,
+        store: ObjectStore | None,
+    ) -> Location:
+        """Return the answer to a query, from the chances of the cells; a store is to refine it."""
+        parts = None
+        if store is not None and len(query):
+            parts = self._parts(query, scores, posterior, store)
+            scores, posterior = _with_parts(parts, scores, posterior)
+        answer = self.rule.decide(posterior)
+        radius, database = self.rule.radius, self.index.database
+        estimate = None
+        if parts is not None:
+            turned = self.north_sigma > 0
+            estimate = refined_estimate(parts, (answer.x, answer.y), radius=radius, turned=turned)
+        if estimate is None:
+            estimate = cell_estimate(
+                query,
+                self.index.noise,
+                posterior,
+                answer.cell,
+                radius=radius,
+                north_sigma=self.north_sigma,
+            )
+        candidates = _candidates(scores, posterior, min(top, len(database)))
+        first = candidates["cell"].to_list()[: self.explained if len(query) else 0]
+        return Location(
+            query=query,
+            noise=self.index.noise.name,
+            candidates=candidates,
+            cells=len(database),
+            crs=database.crs,
+            taxonomy=database.taxonomy,
+            licenses=database.licenses,
+            answer=answer,
+            estimate=estimate,
+            rule=self.rule,
+            region=posterior.credible_cells(REGION_SHARE),
+            posterior=posterior,
+            loglik=scores.loglik,
+            explanations=tuple(self._explanation(query, cell, scores, parts) for cell in first),
+        )
+
+    def _parts(
+        self, query: Signature, scores: CellScores, posterior: Posterior, store: ObjectStore
+    ) -> Refinement:
+        """Return the chances of the parts of the likeliest cells."""
+        database, chances = posterior.database, posterior.chances
+        count = min(KEPT[0], len(database))
+        cells = np.argpartition(-chances, count - 1)[:count]
+        cells = cells[chances[cells] > 0]
+        cells = cells[np.argsort(-chances[cells], kind="stable")]
+        return refine(
+            query,
+            database.xy[cells],
+            place_noise(self.index.noise, database.grid.step),
+            objects=store.objects,
+            index=store.index,
+            step=database.grid.step,
+            radius=database.spec.radius,
+            north_sigma=self.north_sigma,
+            headings=None if scores.heading is None else scores.heading[cells],
+            # All that is known of the cells but for what this query tells.
+            log_prior=np.log(chances[cells]) - scores.loglik[cells],
+            footprints=store.buildings_around(
+                database.xy[cells], distance=database.reach + database.grid.step
+            ),
+        )
+
+    def _explanation(
+        self, query: Signature, cell: int, scores: CellScores, parts: Refinement | None
+    ) -> Explanation:
+        """Return what speaks for a cell: at the likeliest part of it, or at its middle."""
+        database, noise = self.index.database, self.index.noise
+        heading = 0.0 if scores.heading is None else float(scores.heading[cell])
+        if self.store is None:
+            return explain_cell(query, cell, noise, database=database, heading=heading)
+        x, y = database.xy[cell].tolist()
+        if parts is not None and len(inside := np.flatnonzero(_owners(parts, database) == cell)):
+            best = inside[parts.loglik[inside].argmax()]
+            x, y = parts.places[best].tolist()
+            heading = float(parts.headings[best])
+            noise = cell_noise(place_noise(noise, database.grid.step), float(parts.sizes[best]))
+        return explain(
+            query,
+            (x, y),
+            noise,
+            objects=self.store.objects,
+            index=self.store.index,
+            radius=database.spec.radius,
+            heading=heading,
+            footprints=self.store.buildings_around(np.array([[x, y]]), distance=database.reach),
+        )
 
 
 def locate(
@@ -94,36 +453,32 @@ def locate(
 
     Examples
     --------
-    >>> from semsig_gis.sources.catalog import paper_taxonomy
-    >>> from semsig_gis.database.build import build_database
-    >>> from semsig_gis.likelihood.index import build_index
-    >>> from semsig_gis.likelihood.noise.model import named_noise
-    >>> from semsig_gis.objects.clean import build_objects
-    >>> from semsig_gis.sources.synthetic.city import CitySpec, synthetic_city
-    >>> from semsig_gis.database.store import ObjectStore
-    >>> layers = synthetic_city(CitySpec(size=300.0))
-    >>> objects, _ = build_objects(layers, taxonomy=paper_taxonomy(), crs="EPSG:32631")
-    >>> database = build_database(objects)
-    >>> index = build_index(database, cell_noise(named_noise("generic"), 10.0))
-    >>> longest = int(database.lengths.argmax())
-    >>> query = database.signature(longest)
-    >>> found = locate(index, query, top=3)
-    >>> int(found.candidates["cell"][0]) == longest, len(found.candidates)
+    >>> from semsig_gis import ObjectStore, build_index, named_noise
+    >>> index = build_index(demo_database, cell_noise(named_noise("generic"), 10.0))
+    >>> longest = int(demo_database.lengths.argmax())
+    >>> query = demo_database.signature(longest)
+    >>> location = locate(index, query, top=3)
+    >>> int(location.candidates["cell"][0]) == longest, len(location.candidates)
     (True, 3)
-    >>> store = ObjectStore.of(objects)
-    >>> found = locate(index, query, store=store, refined=True, explained=1)
-    >>> bool(np.hypot(*(database.xy[longest] - [found.estimate.x, found.estimate.y])) < 2.0)
+    >>> store = ObjectStore.of(demo_objects)
+    >>> location = locate(index, query, store=store, refined=True, explained=1)
+    >>> x, y = demo_database.xy[longest]
+    >>> bool(np.hypot(location.estimate.x - x, location.estimate.y - y) < 2.0)
     True
-    >>> found.explanations[0].counts["matched"] == len(query)
+    >>> location.explanations[0].counts["matched"] == len(query)
     True
     """
-    task = _Task(index, north_sigma, rule, top, store, refined, explained)
-    if not len(query):
-        msg = "the query has no objects; give at least one type or bearing."
-        raise InputError(msg)
-    scores = _scores(index, query, north_sigma, log_prior)
-    found = posterior(index.database, scores.loglik, log_prior=log_prior)
-    return task.location(query, scores, found)
+    locator = LikelihoodLocator(
+        index=index,
+        north_sigma=north_sigma,
+        log_prior=log_prior,
+        rule=rule,
+        top=top,
+        store=store,
+        refined=refined,
+        explained=explained,
+    )
+    return locator.locate(query)
 
 
 def locate_route(
@@ -176,179 +531,67 @@ def locate_route(
 
     Examples
     --------
-    >>> from semsig_gis.sources.catalog import paper_taxonomy
-    >>> from semsig_gis.database.build import build_database
-    >>> from semsig_gis.likelihood.index import build_index
-    >>> from semsig_gis.likelihood.noise.model import named_noise
-    >>> from semsig_gis.objects.clean import build_objects
-    >>> from semsig_gis.likelihood.route import Leg
-    >>> from semsig_gis.sources.synthetic.city import CitySpec, synthetic_city
-    >>> layers = synthetic_city(CitySpec(size=300.0))
-    >>> objects, _ = build_objects(layers, taxonomy=paper_taxonomy(), crs="EPSG:32631")
-    >>> database = build_database(objects)
-    >>> index = build_index(database, named_noise("light"))
-    >>> way = database.xy[200] - database.xy[0]
-    >>> views = [database.signature(0), database.signature(200)]
+    >>> from semsig_gis import Leg, build_index, named_noise
+    >>> index = build_index(demo_database, named_noise("light"))
+    >>> way = demo_database.xy[200] - demo_database.xy[0]
+    >>> views = [demo_database.signature(0), demo_database.signature(200)]
     >>> first, last = locate_route(index, views, [Leg(dx=way[0], dy=way[1])])
     >>> int(first.candidates["cell"][0]), int(last.candidates["cell"][0])
     (0, 200)
     """
-    task = _Task(index, north_sigma, rule, top, store, refined, explained)
-    scores = [
-        _scores(index, query, north_sigma, None if row else log_prior)
-        for row, query in enumerate(queries)
-    ]
-    logliks = [one.loglik for one in scores]
-    found = route_posteriors(index.database, logliks, legs, log_prior=log_prior)
-    return tuple(map(task.location, queries, scores, found))
+    locator = LikelihoodLocator(
+        index=index,
+        north_sigma=north_sigma,
+        log_prior=log_prior,
+        rule=rule,
+        top=top,
+        store=store,
+        refined=refined,
+        explained=explained,
+    )
+    return locator.locate_route(queries, legs)
 
 
-def _scores(
-    index: LikelihoodIndex,
-    query: Signature,
-    north_sigma: float,
-    log_prior: NDArray[np.float64] | None,
-) -> CellScores:
-    """Return the scores of all cells, the best ones by one-to-one associations."""
-    if not len(query):
-        return CellScores(loglik=index.constants)
-    scores = index.scores(query, north_sigma=north_sigma)
-    return rerank(index, query, scores, north_sigma=north_sigma, log_prior=log_prior)
+def _candidates(scores: CellScores, posterior: Posterior, count: int) -> pd.DataFrame:
+    """Return the likeliest cells."""
+    database, chances = posterior.database, posterior.chances
+    likely = np.argpartition(-chances, count - 1)[:count]
+    listed = likely[np.lexsort((likely, -chances[likely]))]
+    xy = database.xy[listed]
+    columns = {
+        "rank": np.arange(1, count + 1),
+        "cell": listed,
+        "cell_id": database.cell_ids[listed],
+        "x": xy[:, 0],
+        "y": xy[:, 1],
+        "types": [database.types(cell) for cell in listed.tolist()],
+        "length": database.lengths[listed],
+        "loglik": scores.loglik[listed].astype(np.float64),
+        "chance": chances[listed],
+    }
+    if scores.heading is not None:
+        columns["heading"] = scores.heading[listed].astype(np.float64)
+    return pd.DataFrame(columns)
 
 
-@dataclass(frozen=True, slots=True)
-class _Task:
-    """How queries are to be answered."""
-
-    index: LikelihoodIndex
-    north_sigma: float
-    rule: AnswerRule
-    top: int
-    store: ObjectStore | None
-    refined: bool
-    explained: int
-
-    def __post_init__(self) -> None:
-        if self.top < 1:
-            msg = f"{self.top} candidates were asked for; give a whole number from 1."
-            raise InputError(msg)
-        if self.refined and self.store is None:
-            msg = "a place between the viewpoints was asked for; give the store of the database."
-            raise InputError(msg)
-
-    def location(self, query: Signature, scores: CellScores, found: Posterior) -> Location:
-        """Return the answer to a query, from the chances of the cells."""
-        parts = None
-        if self.refined and self.store is not None and len(query):
-            parts = self._parts(query, scores, found, self.store)
-            scores, found = _with_parts(parts, scores, found)
-        answer = self.rule.decide(found)
-        around = {"radius": self.rule.radius}
-        estimate = None
-        if parts is not None:
-            turned = self.north_sigma > 0
-            estimate = refined_estimate(parts, (answer.x, answer.y), turned=turned, **around)
-        if estimate is None:
-            north = {"north_sigma": self.north_sigma}
-            noise = self.index.noise
-            estimate = cell_estimate(query, noise, found, answer.cell, **around, **north)
-        candidates = self._candidates(scores, found)
-        first = candidates["cell"].to_list()[: self.explained if len(query) else 0]
-        return Location(
-            query=query,
-            noise=self.index.noise.name,
-            candidates=candidates,
-            answer=answer,
-            estimate=estimate,
-            rule=self.rule,
-            region=found.credible_cells(REGION_SHARE),
-            posterior=found,
-            loglik=scores.loglik,
-            explanations=tuple(self._explanation(query, cell, scores, parts) for cell in first),
-        )
-
-    def _candidates(self, scores: CellScores, found: Posterior) -> pd.DataFrame:
-        database, count = found.database, min(self.top, len(found.database))
-        likely = np.argpartition(-found.chances, count - 1)[:count]
-        listed = likely[np.lexsort((likely, -found.chances[likely]))]
-        xy = database.xy[listed]
-        columns = {
-            "rank": np.arange(1, count + 1),
-            "cell": listed,
-            "cell_id": database.cell_ids[listed],
-            "x": xy[:, 0],
-            "y": xy[:, 1],
-            "types": [database.types(cell) for cell in listed.tolist()],
-            "length": database.lengths[listed],
-            "loglik": scores.loglik[listed].astype(np.float64),
-            "chance": found.chances[listed],
-        }
-        if scores.heading is not None:
-            columns["heading"] = scores.heading[listed].astype(np.float64)
-        return pd.DataFrame(columns)
-
-    def _parts(
-        self, query: Signature, scores: CellScores, found: Posterior, store: ObjectStore
-    ) -> Refinement:
-        """Return the chances of the parts of the likeliest cells."""
-        database = found.database
-        count = min(KEPT[0], len(database))
-        cells = np.argpartition(-found.chances, count - 1)[:count]
-        cells = cells[found.chances[cells] > 0]
-        cells = cells[np.argsort(-found.chances[cells], kind="stable")]
-        return refine(
-            query,
-            database.xy[cells],
-            place_noise(self.index.noise, database.grid.step),
-            objects=store.objects,
-            index=store.index,
-            step=database.grid.step,
-            radius=database.spec.radius,
-            north_sigma=self.north_sigma,
-            headings=None if scores.heading is None else scores.heading[cells],
-            # All that is known of the cells but for what this query tells.
-            log_prior=np.log(found.chances[cells]) - scores.loglik[cells],
-            footprints=store.buildings_around(
-                database.xy[cells], distance=database.reach + database.grid.step
-            ),
-        )
-
-    def _explanation(
-        self, query: Signature, cell: int, scores: CellScores, parts: Refinement | None
-    ) -> Explanation:
-        """Return what speaks for a cell: at the likeliest part of it, or at its middle."""
-        database, noise = self.index.database, self.index.noise
-        heading = 0.0 if scores.heading is None else float(scores.heading[cell])
-        if self.store is None:
-            return explain_cell(query, cell, noise, database=database, heading=heading)
-        x, y = database.xy[cell].tolist()
-        if parts is not None and len(inside := np.flatnonzero(_owners(parts, database) == cell)):
-            best = inside[parts.loglik[inside].argmax()]
-            x, y = parts.places[best].tolist()
-            heading = float(parts.headings[best])
-            noise = cell_noise(place_noise(noise, database.grid.step), float(parts.sizes[best]))
-        return explain(
-            query,
-            (x, y),
-            noise,
-            objects=self.store.objects,
-            index=self.store.index,
-            radius=database.spec.radius,
-            heading=heading,
-            footprints=self.store.buildings_around(np.array([[x, y]]), distance=database.reach),
-        )
+def _places_like(location: Location) -> NDArray[np.intp]:
+    """Return the cells that might have been the answer as well, and the answer."""
+    chances, answer = location.chances, location.answer
+    alike = np.flatnonzero(chances == chances[answer.cell])
+    masses = location.posterior.mass_within(location.rule.radius, alike)
+    return np.asarray(alike[np.round(masses, 9) == answer.mass])
 
 
 def _with_parts(
-    parts: Refinement, scores: CellScores, found: Posterior
+    parts: Refinement, scores: CellScores, before: Posterior
 ) -> tuple[CellScores, Posterior]:
     """Return the scores and chances of the cells, those of the parts in the place of older ones."""
-    database = found.database
+    database = before.database
     owners = _owners(parts, database)
     cells, rows = np.unique(owners, return_inverse=True)
     shares = np.bincount(rows, parts.chances)
-    chances = found.chances.copy()
-    chances[cells] = shares * found.chances[cells].sum()
+    chances = before.chances.copy()
+    chances[cells] = shares * before.chances[cells].sum()
     means = np.full(len(cells), -np.inf)
     np.logaddexp.at(means, rows, parts.loglik + 2.0 * np.log(parts.sizes / database.grid.step))
     loglik = scores.loglik.astype(np.float64)
@@ -365,3 +608,87 @@ def _owners(parts: Refinement, database: SignatureDatabase) -> NDArray[np.int64]
     """Return the row of the cell that each part lies in."""
     ids = cell_ids(*database.grid.cells_at(parts.places))
     return np.asarray(np.searchsorted(database.cell_ids, ids))
+
+
+def cell_estimate(
+    query: Signature,
+    noise: Noise,
+    found: Posterior,
+    cell: int,
+    *,
+    radius: float,
+    north_sigma: float = 0.0,
+) -> PlaceEstimate:
+    """Return the mean place within `radius` metres of a cell, from the chances of the cells.
+
+    For a place in two streets at once the mean lies between them, as it has the least mean squared
+    error. The covariance has ``step ** 2 / 12`` each way for the place in a cell. `north_sigma` is
+    the standard deviation in degrees of the query's north: 0 if known, infinite if not known at
+    all. Headings are tried every two degrees all round, cell by cell.
+    """
+    database = found.database
+    away = database.xy - database.xy[cell]
+    inside = np.flatnonzero((np.hypot(away[:, 0], away[:, 1]) <= radius) & (found.chances > 0))
+    inside = inside[np.argsort(-found.chances[inside], kind="stable")[:MOST_CELLS]]
+    headings = sigmas = np.zeros(len(inside))
+    turned = north_sigma > 0 and query.bearings is not None and len(query) > 0
+    if turned:
+        headings, sigmas = _headings(query, noise, found, inside, north_sigma)
+    parts = Refinement(
+        places=database.xy[inside],
+        sizes=np.full(len(inside), database.grid.step),
+        loglik=np.zeros(len(inside)),
+        headings=headings,
+        heading_sigmas=sigmas,
+        chances=found.chances[inside],
+        near=math.inf,
+    )
+    return _estimate(parts, turned=turned, refined=False)
+
+
+def refined_estimate(
+    found: Refinement, xy: tuple[float, float], *, radius: float, turned: bool
+) -> PlaceEstimate | None:
+    """Return the best place within `radius` metres of another, from the chances of parts of cells.
+
+    It is the mean over what is near the best part, or None if no part is in the circle. `turned`
+    tells whether the heading was looked for, too.
+    """
+    away = found.places - np.asarray(xy)
+    inside = np.hypot(away[:, 0], away[:, 1]) <= radius
+    if not found.chances[inside].sum() > 0:
+        return None
+    parts = replace(
+        found,
+        places=found.places[inside],
+        sizes=found.sizes[inside],
+        loglik=found.loglik[inside],
+        headings=found.headings[inside],
+        heading_sigmas=found.heading_sigmas[inside],
+        chances=found.chances[inside] / found.chances[inside].sum(),
+    )
+    return _estimate(parts, turned=turned, refined=True)
+
+
+def _estimate(parts: Refinement, *, turned: bool, refined: bool) -> PlaceEstimate:
+    x, y = parts.xy
+    heading = parts.heading if turned else None
+    return PlaceEstimate(x=x, y=y, heading=heading, covariance=parts.covariance, refined=refined)
+
+
+def _headings(
+    query: Signature,
+    noise: Noise,
+    found: Posterior,
+    cells: NDArray[np.int64],
+    north_sigma: float,
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return the mean heading in each cell and its standard deviation, in degrees."""
+    turns = np.arange(-180.0, 180.0, TURN)
+    each = np.broadcast_to(turns, (len(cells), len(turns)))
+    logs = align_cells(found.database, query, noise, cells, turns=each)
+    logs -= 0.5 * (turns / north_sigma) ** 2
+    shares = np.exp(logs - np.logaddexp.reduce(logs, axis=1)[:, None])
+    means = np.degrees(np.angle(shares @ np.exp(1j * np.radians(turns))))
+    away = (turns - means[:, None] + 180.0) % 360.0 - 180.0
+    return means, np.sqrt((shares * away**2).sum(axis=1) + TURN**2 / 12.0)

@@ -38,8 +38,8 @@ if TYPE_CHECKING:
     from semsig_gis.database.update import CellChanges
     from semsig_gis.evaluation.identify.result import Identifiability
     from semsig_gis.evaluation.result import Evaluation
-    from semsig_gis.likelihood.result import Location
-    from semsig_gis.matching.result import Localization
+    from semsig_gis.likelihood.locate import Location
+    from semsig_gis.matching.search import Localization
     from semsig_gis.objects.changes import ObjectChanges
     from semsig_gis.objects.table import StreetObjects
 

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from semsig_gis.database.database import SignatureDatabase
-    from semsig_gis.matching.result import Localization
+    from semsig_gis.matching.search import Localization
 
 CANDIDATE_FIELDS = ("Query", "Signature", "Rank", "Distance", "Cell", "Position")
 

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
     from semsig_gis.likelihood.explain import Explanation
     from semsig_gis.likelihood.posterior import Posterior
-    from semsig_gis.likelihood.result import Location
+    from semsig_gis.likelihood.locate import Location
 
 Image = tuple[bytes, list[list[float]]]
 """A PNG with the latitudes and longitudes of its corners."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
 from semsig_gis.core.errors import InputError, SemsigError
 from semsig_gis.core.text import plain_number
@@ -60,6 +60,9 @@ class Method:
     >>> Method.parse("edit+jaccard:5%") == method
     True
     """
+
+    noise: ClassVar[None] = None  # none is assumed, so no chances are told
+    refined: ClassVar[bool] = False
 
     types: str | None = "edit"
     angles: str | None = "edit"

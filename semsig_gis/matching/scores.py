@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from semsig_gis.core.signature import Signature
     from semsig_gis.database.database import SignatureDatabase
     from semsig_gis.database.sequences import SequenceTable
-    from semsig_gis.matching.memo import DistanceMemo
+    from semsig_gis.database.answer import DistanceMemo
     from semsig_gis.matching.method import Method
 
     _SecondStage = Callable[[NDArray[np.int64]], NDArray[np.float32]]
@@ -94,10 +94,9 @@ def score_cells(
     Examples
     --------
     >>> from semsig_gis import Method
-    >>> database = demo_database
-    >>> queries = [database.signature(cell) for cell in (0, 10)]
-    >>> for scores in score_cells(database, queries, Method.parse("edit+jaccard:5%")):
-    ...     print(len(scores) == len(database), scores.min())
+    >>> queries = [demo_database.signature(cell) for cell in (0, 10)]
+    >>> for scores in score_cells(demo_database, queries, Method.parse("edit+jaccard:5%")):
+    ...     print(len(scores) == len(demo_database), scores.min())
     True 0.0
     True 0.0
     """
@@ -108,7 +107,7 @@ def score_cells(
     )
 
 
-def _score_parts(
+def score_parts(
     database: SignatureDatabase | PartitionedDatabase, query: Signature, method: Method
 ) -> Iterator[tuple[SignatureDatabase, NDArray[np.float32]]]:
     """Score a query part by part, as if the parts were one database."""

@@ -5,31 +5,214 @@ Scores are distances: lower is better. Cells that tie are told as such, never ra
 
 from __future__ import annotations
 
+import time
+from collections import Counter
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+import pandas as pd
 
 from semsig_gis.core.errors import EmptyResultError, InputError
 from semsig_gis.core.taxonomy import WILDCARD
+from semsig_gis.database.answer import Answer, Ranking, check_query, check_top
+from semsig_gis.database.database import rows_of_result
 from semsig_gis.database.file import PartitionedDatabase
 from semsig_gis.database.requirement import PatternIndex
 from semsig_gis.matching.method import DEFAULT_METHOD
-from semsig_gis.matching.result import Localization, Shortlist
-from semsig_gis.matching.scores import _score_parts
+from semsig_gis.matching.scores import score_cells, score_parts
+from semsig_gis.matching.ties import top_candidates
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Collection, Hashable
+    from collections.abc import Collection, Iterator, Sequence
 
     from numpy.typing import NDArray
 
     from semsig_gis.core.signature import Signature
     from semsig_gis.core.taxonomy import Taxonomy
+    from semsig_gis.database.answer import DistanceMemo
     from semsig_gis.database.database import SignatureDatabase
     from semsig_gis.database.requirement import Requirement
     from semsig_gis.matching.method import Method
 
-    _SecondStage = Callable[[NDArray[np.int64]], NDArray[np.float32]]
-    _Known = Callable[[Hashable, Callable[[], NDArray[Any]]], NDArray[Any]]
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Localization(Answer):
+    """The best cells for a query, by distance.
+
+    Parameters
+    ----------
+    query : Signature
+        What was searched for.
+    method : Method
+        How the cells were ranked.
+    used : str
+        Which parts of the query were compared: ``"types"``, ``"angles"`` or ``"types+angles"``.
+    candidates : DataFrame
+        One row a cell, best first, equal distances in the order of the database: ``rank_low``
+        and ``rank_high`` (the first and last rank, from 1, that the cell can have when ties are
+        broken either way), ``tied`` (how many cells share its distance), ``cell`` (row in the
+        database), ``cell_id``, ``x`` and ``y`` (viewpoint, CRS of the database), ``types``
+        (symbols), ``length`` (objects), ``distance``.
+    cells : int
+        How many cells were searched.
+    tied_beyond : int
+        How many cells are as good as the last candidate but are not listed.
+    crs : pyproj.CRS
+        CRS of ``x`` and ``y``.
+    taxonomy : Taxonomy
+        The classes behind the symbols.
+    licenses : tuple of str
+        Where the street objects of the database come from.
+    """
+
+    method: Method
+    used: str
+
+    def region_cells(self, database: SignatureDatabase, share: float) -> NDArray[np.int64]:  # noqa: ARG002
+        """Return the rows of the candidates in the database that was searched."""
+        ids, types = self.candidates["cell_id"], self.candidates["types"]
+        return rows_of_result(database, ids, types, what="localization")
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return everything as plain values that JSON can hold.
+
+        Returns
+        -------
+        dict
+            ``query``, ``method``, ``used``, ``cells``, ``tied_beyond``, ``crs``, ``licenses``
+            and ``candidates``, a list with the columns of `candidates` and ``lon``, ``lat``
+            (degrees, WGS 84).
+        """
+        return {
+            "query": self.query.to_dict(self.taxonomy),
+            "method": str(self.method),
+            "used": self.used,
+            "cells": self.cells,
+            "tied_beyond": self.tied_beyond,
+            "crs": self.crs.to_string(),
+            "licenses": list(self.licenses),
+            "candidates": self._candidate_records(),
+        }
+
+
+@dataclass(eq=False, kw_only=True)
+class DistanceLocator:
+    """Measures of distance, and the cells that they rank."""
+
+    database: SignatureDatabase | PartitionedDatabase
+    method: Method = DEFAULT_METHOD
+    requirement: Requirement | None = None
+    top: int = 100
+    _compared: set[str] = field(default_factory=set)  # parts of queries
+
+    def __post_init__(self) -> None:
+        check_top(self.top)
+
+    def locate(self, query: Signature, *, top: int | None = None) -> Localization:
+        """List the cells whose signature is most like a query, of all parts of a database."""
+        check_query(query)
+        shortlist = Shortlist(top or self.top)
+        met = np.empty(0, np.bool_)
+        for part, scores in score_parts(self.database, query, self.method):
+            shortlist.present.update(part.present_codes.tolist())
+            if self.requirement is None:
+                shortlist.add(part, scores)
+                continue
+            met = PatternIndex.build(part.type_sequences).meeting(self.requirement)
+            if met.any():
+                shortlist.add(part.select(met), scores[met])
+        _require_present(query, shortlist.present, part.taxonomy)
+        if shortlist.cells == 0:
+            cells = len(self.database)
+            msg = f"none of the {cells:,} cells meets the requirement; ask for less."
+            raise EmptyResultError(msg)
+        candidates, tied_beyond = shortlist.ranked()
+        if isinstance(self.database, PartitionedDatabase):
+            candidates["cell"] = self.database.row_numbers(candidates["cell_id"].to_numpy())
+        elif self.requirement is not None:
+            candidates["cell"] = np.flatnonzero(met)[candidates["cell"]]
+        return Localization(
+            query=query,
+            method=self.method,
+            used=self.method.used(query),
+            candidates=candidates,
+            cells=shortlist.cells,
+            tied_beyond=tied_beyond,
+            crs=part.crs,
+            taxonomy=part.taxonomy,
+            licenses=part.licenses,
+        )
+
+    def rankings(
+        self, queries: Sequence[Signature], *, memo: DistanceMemo | None = None
+    ) -> Iterator[Ranking]:
+        """Rank all cells for each query; see `Locator`."""
+        if not queries:
+            return
+        # What the database works out once and keeps is no part of the time of a query.
+        parts = self.method.used(queries[0])
+        if parts not in self._compared:
+            next(iter(score_cells(self.database, queries[:1], self.method)))
+            self._compared.add(parts)
+        rows = iter(score_cells(self.database, queries, self.method, memo=memo))
+        for _ in queries:
+            start, spared = time.perf_counter(), memo.spared if memo else 0.0
+            scores = next(rows)
+            seconds = time.perf_counter() - start + (memo.spared - spared if memo else 0.0)
+            yield Ranking(scores=scores, best_score=float(scores.min()), seconds=seconds)
+
+
+class Shortlist:
+    """The best `top` cells of a search, gathered from one part of a database after the other.
+
+    `listed` holds them best first, equal distances in the order of columns and rows; `present` the
+    class codes that some cell sees; `cells` how many cells were looked at.
+    """
+
+    def __init__(self, top: int) -> None:
+        self.listed = pd.DataFrame()
+        self.present: set[int] = set()
+        self.cells = 0
+        self._top = top
+        # How many cells have each distance, up to that of the last listed one at least.
+        self._sizes: Counter[float] = Counter()
+
+    def add(self, database: SignatureDatabase, scores: NDArray[np.float32]) -> None:
+        """Take the best cells of a part, given the distances of all its cells."""
+        better, level = top_candidates(scores, min(self._top, len(scores)))
+        better = better[np.argsort(scores[better], kind="stable")]
+        cells = np.concatenate([better, level])
+        values, sizes = np.unique(scores[cells], return_counts=True)
+        self._sizes.update(dict(zip(values.tolist(), sizes.tolist(), strict=True)))
+        cells = cells[: self._top]
+        xy = database.xy[cells]
+        part = pd.DataFrame(
+            {
+                "cell": cells,
+                "cell_id": database.cell_ids[cells],
+                "x": xy[:, 0],
+                "y": xy[:, 1],
+                "types": [database.types(cell) for cell in cells.tolist()],
+                "length": database.lengths[cells],
+                "distance": scores[cells].astype(np.float64),
+            }
+        )
+        if self.cells:
+            both = pd.concat([self.listed, part], ignore_index=True)
+            part = both.sort_values(["distance", "cell_id"], ignore_index=True).head(self._top)
+        self.listed = part
+        self.present.update(database.present_codes.tolist())
+        self.cells += len(database)
+
+    def ranked(self) -> tuple[pd.DataFrame, int]:
+        """Return the candidates and the number of ties beyond them, as in `Localization`."""
+        values = np.array(sorted(self._sizes))
+        sizes = np.array([self._sizes[value] for value in values.tolist()])
+        place = np.searchsorted(values, self.listed["distance"].to_numpy())
+        high, tied = np.cumsum(sizes)[place], sizes[place]
+        ranks = pd.DataFrame({"rank_low": high - tied + 1, "rank_high": high, "tied": tied})
+        return pd.concat([ranks, self.listed], axis=1), int(high[-1]) - len(self.listed)
 
 
 def localize(
@@ -71,51 +254,14 @@ def localize(
 
     Examples
     --------
-    >>> from semsig_gis.sources.catalog import paper_taxonomy
-    >>> from semsig_gis.database.build import build_database
-    >>> from semsig_gis.objects.clean import build_objects
-    >>> from semsig_gis.sources.synthetic.city import CitySpec, synthetic_city
-    >>> layers = synthetic_city(CitySpec(size=300.0))
-    >>> objects, _ = build_objects(layers, taxonomy=paper_taxonomy(), crs="EPSG:32631")
-    >>> database = build_database(objects)
-    >>> found = localize(database, database.signature(10), top=3)
-    >>> found.used, found.candidates["distance"][0]
+    >>> answer = localize(demo_database, demo_database.signature(10), top=3)
+    >>> answer.used, answer.candidates["distance"][0]
     ('types+angles', np.float64(0.0))
     """
-    if top < 1:
-        msg = f"{top} candidates were asked for; give a whole number from 1."
-        raise InputError(msg)
-    if len(query) == 0:
-        msg = "the query has no objects; give at least one type or bearing."
-        raise InputError(msg)
-    shortlist = Shortlist(top)
-    met = np.empty(0, np.bool_)
-    for part, scores in _score_parts(database, query, method):
-        shortlist.present.update(part.present_codes.tolist())
-        if requirement is None:
-            shortlist.add(part, scores)
-        elif (met := PatternIndex.build(part.type_sequences).meeting(requirement)).any():
-            shortlist.add(part.select(met), scores[met])
-    _require_present(query, shortlist.present, part.taxonomy)
-    if shortlist.cells == 0:
-        msg = f"none of the {len(database):,} cells meets the requirement; ask for less."
-        raise EmptyResultError(msg)
-    candidates, tied_beyond = shortlist.ranked()
-    if isinstance(database, PartitionedDatabase):
-        candidates["cell"] = database.row_numbers(candidates["cell_id"].to_numpy())
-    elif requirement is not None:
-        candidates["cell"] = np.flatnonzero(met)[candidates["cell"]]
-    return Localization(
-        query=query,
-        method=method,
-        used=method.used(query),
-        candidates=candidates,
-        cells=shortlist.cells,
-        tied_beyond=tied_beyond,
-        crs=part.crs,
-        taxonomy=part.taxonomy,
-        licenses=part.licenses,
+    locator = DistanceLocator(
+        database=database, method=method, requirement=requirement, top=top
     )
+    return locator.locate(query)
 
 
 def _require_present(query: Signature, present: Collection[int], taxonomy: Taxonomy) -> None:

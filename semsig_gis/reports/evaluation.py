@@ -11,8 +11,7 @@ from typing import TYPE_CHECKING, get_args
 import numpy as np
 
 from semsig_gis.evaluation.figures import percentile
-from semsig_gis.likelihood.locate import DEFAULT_RULE
-from semsig_gis.matching.method import Method
+from semsig_gis.likelihood.answer_rule import DEFAULT_RULE
 from semsig_gis.matching.ties import NEAR_METRES, NEAR_PLACES
 from semsig_gis.queries.chain import chain_text
 from semsig_gis.queries.paper_errors import DISTORTIONS, FalseClass
@@ -218,21 +217,16 @@ def _rule_table(evaluation: Evaluation) -> Table:
 
 def _paris_accuracy(evaluation: Evaluation) -> tuple[float | None, float | None]:
     """Return the paper's P(error <= 50 m) and recall@10 % if it ran these settings."""
-    method, asked, database = evaluation.method, evaluation.asked, evaluation.database
+    asked, database = evaluation.asked, evaluation.database
     # The paper does not say whether it normalised, sorted again or drew classes by frequency.
-    same_method = (
-        isinstance(method, Method)
-        and (method.types, method.angles, method.alpha, method.keep) == ("edit", "edit", 0.5, 5.0)
-        and method.weights.as_tuple() == (1, 1, 1)
-        and evaluation.top == 1
-    )
+    same_method = str(evaluation.method) in {"edit+edit:5%", "edit+edit:5%:raw"}
     medium = DISTORTIONS["medium"]
     same_noise = asked.seen_from == "cells" and any(
         asked.distortions == (replace(medium, resort=resort, false_class=false_class),)
         for resort in (True, False)
         for false_class in get_args(FalseClass)
     )
-    if not (same_method and same_noise and database["step_m"] == PARIS_STEP_M):
+    if not (same_method and evaluation.top == 1 and same_noise and database["step_m"] == PARIS_STEP_M):
         return None, None
     key = (database["radius_m"], database["levels"])
     return PARIS_ACCURACY.get(key, (None, None))

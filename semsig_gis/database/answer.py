@@ -1,0 +1,176 @@
+"""What answers queries, and what it answers: the best cells listed, or all cells ranked."""
+
+from __future__ import annotations
+
+import math
+import time
+from abc import ABC, abstractmethod
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import TYPE_CHECKING, Any, Protocol, TypeVar
+
+import geopandas as gpd
+import numpy as np
+from pyproj import Transformer
+
+from semsig_gis.core.errors import InputError
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Hashable, Iterator, Sequence
+
+    import pandas as pd
+    from numpy.typing import NDArray
+    from pyproj import CRS
+
+    from semsig_gis.core.signature import Signature
+    from semsig_gis.core.taxonomy import Taxonomy
+    from semsig_gis.database.database import SignatureDatabase
+
+REGION_SHARE = 0.9
+"""Of the chance, that the region of an answer holds."""
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Answer(ABC):
+    """The best cells for a query, whatever ranked them.
+
+    `candidates` has one row a cell, best first: its rank, ``cell`` (row in the database),
+    ``cell_id``, ``x`` and ``y`` (viewpoint in `crs`), ``types`` (symbols), ``length`` (objects) and
+    what the method tells of it. `cells` counts the cells that were searched.
+    """
+
+    query: Signature
+    candidates: pd.DataFrame
+    cells: int
+    crs: CRS
+    taxonomy: Taxonomy
+    licenses: tuple[str, ...]
+    tied_beyond: int = 0
+
+    @property
+    def chances(self) -> NDArray[np.float64] | None:
+        """The chance of every cell; None where the method tells none."""
+        return None
+
+    @abstractmethod
+    def region_cells(self, database: SignatureDatabase, share: float) -> NDArray[np.int64]:
+        """Return the rows of the cells where to look, best first, in the database searched.
+
+        They hold a share of the chance, or are the candidates where there are no chances. Raises
+        InputError if the answer is from another database.
+        """
+
+    @abstractmethod
+    def to_dict(self) -> dict[str, Any]:
+        """Return what was found as plain values that JSON can hold."""
+
+    def to_geodataframe(self) -> gpd.GeoDataFrame:
+        """Return the candidates with their viewpoints as points in the CRS of the database.
+
+        Returns
+        -------
+        GeoDataFrame
+            The columns of `candidates` and ``geometry``.
+        """
+        points = gpd.points_from_xy(self.candidates["x"], self.candidates["y"])
+        return gpd.GeoDataFrame(self.candidates.copy(), geometry=points, crs=self.crs)
+
+    @cached_property
+    def _to_degrees(self) -> Transformer:
+        return Transformer.from_crs(self.crs, "EPSG:4326", always_xy=True)
+
+    def _candidate_records(self) -> list[dict[Hashable, Any]]:
+        """Return the candidates as plain values, with ``lon`` and ``lat`` to a centimetre."""
+        x, y = (self.candidates[name].to_numpy() for name in ("x", "y"))
+        lon, lat = np.round(self._to_degrees.transform(x, y), 7)
+        return self.candidates.assign(lon=lon, lat=lat).to_dict(orient="records")
+
+
+@dataclass(frozen=True, eq=False, slots=True, kw_only=True)
+class Ranking:
+    """How all cells rank for a query.
+
+    `scores` (n,) has one value a cell, lower is better: distances; or, of the likelihood method,
+    negative log-likelihoods, with the cells of its answer before all others. `best_score` is the
+    distance or negative log-likelihood of the answer. `place` (metres) and `heading` (degrees to
+    add to the bearings of the query) are None where they were not looked for. `chance` is the
+    method's own probability that the answer is within 50 m, `chances` (n,) that of every cell and
+    `region` the rows that hold 90 % of it: NaN and None where it tells none. `seconds` is how long
+    the answer took.
+    """
+
+    scores: NDArray[np.float32]
+    best_score: float
+    place: tuple[float, float] | None = None
+    heading: float | None = None
+    chance: float = math.nan
+    chances: NDArray[np.float64] | None = None
+    region: NDArray[np.int64] | None = None
+    seconds: float
+
+
+@dataclass(eq=False, slots=True)
+class DistanceMemo:
+    """Distances between one batch of queries and one database, and how long each took to measure.
+
+    Most methods of an experiment differ only in how they join the same distances. Make another memo
+    for the next batch.
+    """
+
+    _known: dict[Hashable, tuple[NDArray[Any], float]] = field(default_factory=dict)
+    _spared: float = 0.0
+
+    @property
+    def spared(self) -> float:
+        """Seconds that it would have taken to measure again what was known."""
+        return self._spared
+
+    def get(self, key: Hashable, measure: Callable[[], NDArray[Any]]) -> NDArray[Any]:
+        """Return the distances under a key, calling `measure` only if they are not known yet.
+
+        The key must name all that they depend on. Do not write to the result.
+        """
+        if key in self._known:
+            distances, seconds = self._known[key]
+            self._spared += seconds
+            return distances
+        start = time.perf_counter()
+        distances = measure()
+        self._known[key] = distances, time.perf_counter() - start
+        return distances
+
+
+_Answer_co = TypeVar("_Answer_co", bound=Answer, covariant=True)
+
+
+class Locator(Protocol[_Answer_co]):
+    """A method with the cells that it searches and all else that it needs."""
+
+    def locate(self, query: Signature, *, top: int | None = None) -> _Answer_co:
+        """Answer a query, with its own number of candidates or another one.
+
+        Raises InputError if the query has nothing to compare.
+        """
+
+    def rankings(
+        self, queries: Sequence[Signature], *, memo: DistanceMemo | None = None
+    ) -> Iterator[Ranking]:
+        """Rank all cells for each query, in order; each query has at least one object.
+
+        `memo` keeps distances of these queries that other methods have needed; the time it took to
+        measure them counts for each method.
+        """
+
+
+def check_top(top: int) -> None:
+    """Refuse a list of no candidates."""
+    if top < 1:
+        msg = f"{top} candidates were asked for; give a whole number from 1."
+        raise InputError(msg)
+
+
+def check_query(query: Signature) -> None:
+    """Refuse a query of nothing."""
+    if not len(query):
+        msg = "the query has no objects; give at least one type or bearing."
+        raise InputError(msg)
