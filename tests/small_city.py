@@ -20,8 +20,8 @@ from semsig_gis.sources.synthetic.city import CitySpec, synthetic_city
 if TYPE_CHECKING:
     from semsig_gis.database.database import SignatureDatabase
     from semsig_gis.evaluation.result import Evaluation
-    from semsig_gis.likelihood.result import Location
-    from semsig_gis.matching.result import Localization
+    from semsig_gis.likelihood.locate import Location
+    from semsig_gis.matching.search import Localization
     from semsig_gis.objects.table import StreetObjects
 
 

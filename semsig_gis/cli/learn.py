@@ -165,11 +165,11 @@ def calibrate(
         refine=refine,
         top=1,
     )
-    radius = ready.options["rule"].radius
+    radius = ready.rule.radius
     masses, errors = np.zeros(len(known)), np.full(len(known), np.inf)
     with progress("answering") as advance:
         for number, (sample, place) in enumerate(
-            zip(known, _places(ready.database, known), strict=True)
+            zip(known, _places(city.database, known), strict=True)
         ):
             if len(sample.signature):  # what saw nothing cannot be told
                 found = ready.locate(sample.signature)

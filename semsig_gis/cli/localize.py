@@ -28,13 +28,14 @@ from semsig_gis.core.errors import InputError
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
-    from semsig_gis.cli.options import Locator
     from semsig_gis.core.signature import Signature
     from semsig_gis.core.taxonomy import Taxonomy
+    from semsig_gis.database.answer import Answer, Locator
     from semsig_gis.database.city import City
-    from semsig_gis.likelihood.result import Location
+    from semsig_gis.database.database import SignatureDatabase
+    from semsig_gis.likelihood.locate import LikelihoodLocator, Location
     from semsig_gis.likelihood.route import Leg
-    from semsig_gis.matching.result import Localization
+    from semsig_gis.matching.search import Localization
     from semsig_gis.queries.file import Queries, Route
 
 
@@ -305,7 +306,7 @@ def localize(
     if views is not None:
         _answer_route(ready, *views)
     else:
-        located = _Answerer(city, taxonomy, ready.locate)
+        located = _Answerer(city, taxonomy, ready, top, _draw_location)
         _answer(located, asked, files, as_json=as_json)
 
 
@@ -315,7 +316,9 @@ class _Answerer:
 
     city: City
     taxonomy: Taxonomy
-    ask: Callable[..., Localization | Location]
+    locator: Locator[Any]
+    top: int
+    draw: Callable[[Any, SignatureDatabase], Any]
 
 
 @dataclass(frozen=True, slots=True)
@@ -337,17 +340,14 @@ def _by_distance(path: Path, method: str, require: str | None, top: int) -> _Ans
     from semsig_gis.database.city import open_city
     from semsig_gis.database.requirement import Requirement
     from semsig_gis.matching.method import Method
-    from semsig_gis.matching.search import localize
+    from semsig_gis.matching.search import DistanceLocator
 
     chosen = Method.parse(method)
     city = open_city(path)
     opened = city.dataset
     wanted = None if require is None else Requirement.parse(require, opened.taxonomy)
-
-    def ask(query: Signature, more: int = 0) -> Localization:
-        return localize(opened, query, method=chosen, requirement=wanted, top=top + more)
-
-    return _Answerer(city, opened.taxonomy, ask)
+    found = DistanceLocator(database=opened, method=chosen, requirement=wanted, top=top)
+    return _Answerer(city, opened.taxonomy, found, top, _draw_localization)
 
 
 def _refuse_options(method: str, options: dict[str, bool]) -> None:
@@ -386,11 +386,11 @@ def _answer(
     """Answer a query, or many, and print it."""
     if isinstance(asked, list):
         for name, query in asked:
-            print_json({"id": name, **answerer.ask(query).to_dict()}, indent=None)
+            print_json({"id": name, **answerer.locator.locate(query).to_dict()}, indent=None)
         return
-    found = answerer.ask(asked)
+    found = answerer.locator.locate(asked)
     if files.map is not None:
-        _draw(found, answerer.city, files.map)
+        _draw(answerer, found, files.map)
     searched = _write(answerer, asked, found, files)
     told = found.to_dict() | ({} if searched is None else {"searched": searched})
     if as_json:
@@ -418,45 +418,48 @@ def _views(source: str, taxonomy: Taxonomy) -> Route:
     return read_route(source, taxonomy=taxonomy)
 
 
-def _answer_route(ready: Locator, views: Queries, legs: Sequence[Leg]) -> None:
+def _answer_route(ready: LikelihoodLocator, views: Queries, legs: Sequence[Leg]) -> None:
     """Answer the views of a route, each given all of them."""
-    found = ready.route([query for _, query in views], legs)
+    found = ready.locate_route([query for _, query in views], legs)
     for (name, _), location in zip(views, found, strict=True):
         print_json({"id": name, **location.to_dict()}, indent=None)
 
 
 def _write(
-    answerer: _Answerer, query: Signature, found: Localization | Location, files: _Files
+    answerer: _Answerer, query: Signature, found: Answer, files: _Files
 ) -> dict[str, Any] | None:
     """Write the regions to search, and return what there is to say of them."""
-    from semsig_gis.exports import export_answer
-    from semsig_gis.likelihood.result import REGION_SHARE, Location
-
     if files.out is None:
         return None
-    if isinstance(found, Location):
-        opened = found.posterior.database
-    else:
-        opened = answerer.city.database
-        if found.tied_beyond:
-            # No cell is left out of the search that is as good as the last candidate.
-            found = answerer.ask(query, found.tied_beyond)
+    from semsig_gis.database.answer import REGION_SHARE
+    from semsig_gis.exports import export_answer
+
+    if found.tied_beyond:
+        # No cell is left out of the search that is as good as the last candidate.
+        found = answerer.locator.locate(query, top=answerer.top + found.tied_beyond)
     share = REGION_SHARE if files.share is None else files.share
-    regions = export_answer(found, opened, files.out, share=share, within=files.within)
+    regions = export_answer(
+        found, answerer.city.database, files.out, share=share, within=files.within
+    )
     return None if files.holds_chances else regions.to_dict()
 
 
-def _draw(found: Localization | Location, city: City, out: Path) -> None:
-    from semsig_gis.maps.localization import localization_map
-    from semsig_gis.maps.location import location_map
+def _draw(answerer: _Answerer, found: Answer, out: Path) -> None:
     from semsig_gis.maps.page import save_map
-    from semsig_gis.matching.result import Localization
 
     with progress("drawing the map"):
-        drawn = (
-            localization_map(found, city.database)
-            if isinstance(found, Localization)
-            else location_map(found)
-        )
-        draw_ground(drawn, city)
+        drawn = answerer.draw(found, answerer.city.database)
+        draw_ground(drawn, answerer.city)
         tell_if_online(save_map(drawn, out))
+
+
+def _draw_localization(found: Localization, opened: SignatureDatabase) -> Any:  # noqa: ANN401 - folium's
+    from semsig_gis.maps.localization import localization_map
+
+    return localization_map(found, opened)
+
+
+def _draw_location(found: Location, _opened: SignatureDatabase) -> Any:  # noqa: ANN401 - folium's
+    from semsig_gis.maps.location import location_map
+
+    return location_map(found)

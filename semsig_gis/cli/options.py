@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -14,18 +13,14 @@ from semsig_gis.cli.console import progress, remark
 from semsig_gis.core.errors import CrsError, DatabaseError, InputError
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
     from numpy.typing import NDArray
 
-    from semsig_gis.core.signature import Signature
     from semsig_gis.database.city import City
     from semsig_gis.database.database import SignatureDatabase
     from semsig_gis.database.store import ObjectStore
     from semsig_gis.likelihood.index import LikelihoodIndex
+    from semsig_gis.likelihood.locate import LikelihoodLocator
     from semsig_gis.likelihood.noise.model import Noise
-    from semsig_gis.likelihood.result import Location
-    from semsig_gis.likelihood.route import Leg
 
 EXPLAINED = 3
 """How many candidates are explained."""
@@ -73,37 +68,6 @@ Objects = Annotated[
 ]
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Locator:
-    """A database and a noise model, ready to be asked."""
-
-    index: LikelihoodIndex
-    options: dict[str, Any]
-    lenient: bool
-    """Whether what has no bearings is answered without being refined."""
-
-    @property
-    def database(self) -> SignatureDatabase:
-        """The cells that are searched."""
-        return self.index.database
-
-    def locate(self, query: Signature) -> Location:
-        """Answer one query."""
-        from semsig_gis.likelihood.locate import locate
-
-        return locate(self.index, query, **self._options_for([query]))
-
-    def route(self, queries: Sequence[Signature], legs: Sequence[Leg]) -> tuple[Location, ...]:
-        """Answer the queries of a route, each with what the others tell."""
-        from semsig_gis.likelihood.locate import locate_route
-
-        return locate_route(self.index, queries, legs, **self._options_for(queries))
-
-    def _options_for(self, queries: Sequence[Signature]) -> dict[str, Any]:
-        blind = any(len(query) and query.bearings is None for query in queries)
-        return self.options | ({"refined": False} if self.lenient and blind else {})
-
-
 def locator(
     city: City,
     *,
@@ -116,10 +80,10 @@ def locator(
     rule: Path | None = None,
     top: int = 10,
     known: dict[str, Any] | None = None,
-) -> Locator:
+) -> LikelihoodLocator:
     """Return what answers the queries of a command."""
-    from semsig_gis.likelihood.answer_rule import open_rule
-    from semsig_gis.likelihood.locate import DEFAULT_RULE
+    from semsig_gis.likelihood.answer_rule import DEFAULT_RULE, open_rule
+    from semsig_gis.likelihood.locate import LikelihoodLocator
     from semsig_gis.likelihood.refine import cell_noise
 
     if on_grid and refine:
@@ -131,23 +95,24 @@ def locator(
         given = "--on-grid" if on_grid else "--no-refine"
         msg = f"--objects and {given} were given, so that nothing looks at them; leave out one."
         raise InputError(msg)
-    options: dict[str, Any] = {
-        "north_sigma": north_sigma(heading),
-        "rule": DEFAULT_RULE if rule is None else open_rule(rule),
-        "top": top,
-        "refined": False,
-        "explained": EXPLAINED if explain else 0,
-    }
+    sigma, answer_rule = north_sigma(heading), DEFAULT_RULE if rule is None else open_rule(rule)
     model = read_noise(noise)
     if not on_grid:
         model = cell_noise(model, city.database.grid.step)
-    if known is not None:
-        options["log_prior"] = _prior(city.database, **known)
+    log_prior = None if known is None else _prior(city.database, **known)
+    store = None
     if wanted or explain:
         store = object_store(city, objects, needed=bool(refine))
-        options |= {"store": store, "refined": wanted and store is not None}
-    index = prepared_index(city, model)
-    return Locator(index=index, options=options, lenient=refine is None)
+    return LikelihoodLocator(
+        index=prepared_index(city, model),
+        north_sigma=sigma,
+        log_prior=log_prior,
+        rule=answer_rule,
+        top=top,
+        store=store,
+        refined=None if wanted and refine is None else refine,
+        explained=EXPLAINED if explain else 0,
+    )
 
 
 def prepared_index(city: City, model: Noise) -> LikelihoodIndex:

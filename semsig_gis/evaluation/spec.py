@@ -19,6 +19,7 @@ from semsig_gis.storage.toml import check_keys, toml_text
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
 
+    from semsig_gis.evaluation.methods import AnyMethod
     from semsig_gis.likelihood.noise.model import Noise
     from semsig_gis.queries.chain import QueryDistortion
     from semsig_gis.queries.draw import SeenFrom

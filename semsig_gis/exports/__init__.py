@@ -14,13 +14,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from semsig_gis.core.errors import EmptyResultError, InputError, UnknownNameError, nearest_name
+from semsig_gis.database.answer import REGION_SHARE
 from semsig_gis.database.database import require_same_place
 from semsig_gis.exports import csv as csv_text
 from semsig_gis.exports import geopackage, geoparquet
 from semsig_gis.exports.geotiff import cell_errors, export_geotiff
 from semsig_gis.exports.layers import answer_layers, cells_layer, evaluation_layers, objects_layer
 from semsig_gis.exports.regions import search_regions
-from semsig_gis.database.answer import REGION_SHARE
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence

@@ -30,6 +30,16 @@ STARTS = 4
 STEPS = 100
 
 
+def _is_number(value: object) -> TypeGuard[float]:
+    return isinstance(value, (int, float))
+
+
+def _check_share(name: str, value: object) -> None:
+    if not (_is_number(value) and 0 < value < 1):
+        msg = f"{name} of the answers is {value!r}; give a share above 0 and below 1."
+        raise InputError(msg)
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class AnswerRule:
     """When to answer.
@@ -279,13 +289,3 @@ def open_rule(path: str | Path) -> AnswerRule:
         reason = error.strerror if isinstance(error, OSError) else str(error).rstrip(".")
         msg = f"answer rule {path} cannot be used ({reason}); give a file that save_rule wrote."
         raise InputError(msg) from error
-
-
-def _is_number(value: object) -> TypeGuard[float]:
-    return isinstance(value, (int, float))
-
-
-def _check_share(name: str, value: object) -> None:
-    if not (_is_number(value) and 0 < value < 1):
-        msg = f"{name} of the answers is {value!r}; give a share above 0 and below 1."
-        raise InputError(msg)

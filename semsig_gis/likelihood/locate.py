@@ -230,7 +230,7 @@ class LikelihoodLocator:
     refined: bool | None = False
     explained: int = 0
 
-    def __post_init__(self) -> None:
+    def __post_init__(self) -> None:  # noqa: D105
         check_top(self.top)
         if self.refined and self.store is None:
             msg = "a place between the viewpoints was asked for; give the store of the database."

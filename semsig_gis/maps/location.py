@@ -26,8 +26,8 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
     from semsig_gis.likelihood.explain import Explanation
-    from semsig_gis.likelihood.posterior import Posterior
     from semsig_gis.likelihood.locate import Location
+    from semsig_gis.likelihood.posterior import Posterior
 
 Image = tuple[bytes, list[list[float]]]
 """A PNG with the latitudes and longitudes of its corners."""

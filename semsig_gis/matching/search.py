@@ -16,7 +16,7 @@ import pandas as pd
 from semsig_gis.core.errors import EmptyResultError, InputError
 from semsig_gis.core.taxonomy import WILDCARD
 from semsig_gis.database.answer import Answer, Ranking, check_query, check_top
-from semsig_gis.database.database import rows_of_result
+from semsig_gis.database.database import join_databases, rows_of_result
 from semsig_gis.database.file import PartitionedDatabase
 from semsig_gis.database.requirement import PatternIndex
 from semsig_gis.matching.method import DEFAULT_METHOD
@@ -106,7 +106,7 @@ class DistanceLocator:
     top: int = 100
     _compared: set[str] = field(default_factory=set)  # parts of queries
 
-    def __post_init__(self) -> None:
+    def __post_init__(self) -> None:  # noqa: D105
         check_top(self.top)
 
     def locate(self, query: Signature, *, top: int | None = None) -> Localization:
@@ -150,12 +150,15 @@ class DistanceLocator:
         """Rank all cells for each query; see `Locator`."""
         if not queries:
             return
+        database = self.database
+        if isinstance(database, PartitionedDatabase):
+            database = join_databases(list(database.parts()))
         # What the database works out once and keeps is no part of the time of a query.
         parts = self.method.used(queries[0])
         if parts not in self._compared:
-            next(iter(score_cells(self.database, queries[:1], self.method)))
+            next(iter(score_cells(database, queries[:1], self.method)))
             self._compared.add(parts)
-        rows = iter(score_cells(self.database, queries, self.method, memo=memo))
+        rows = iter(score_cells(database, queries, self.method, memo=memo))
         for _ in queries:
             start, spared = time.perf_counter(), memo.spared if memo else 0.0
             scores = next(rows)
@@ -258,9 +261,7 @@ def localize(
     >>> answer.used, answer.candidates["distance"][0]
     ('types+angles', np.float64(0.0))
     """
-    locator = DistanceLocator(
-        database=database, method=method, requirement=requirement, top=top
-    )
+    locator = DistanceLocator(database=database, method=method, requirement=requirement, top=top)
     return locator.locate(query)
 
 

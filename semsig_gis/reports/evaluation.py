@@ -219,14 +219,15 @@ def _paris_accuracy(evaluation: Evaluation) -> tuple[float | None, float | None]
     """Return the paper's P(error <= 50 m) and recall@10 % if it ran these settings."""
     asked, database = evaluation.asked, evaluation.database
     # The paper does not say whether it normalised, sorted again or drew classes by frequency.
-    same_method = str(evaluation.method) in {"edit+edit:5%", "edit+edit:5%:raw"}
+    measures = str(evaluation.method)
+    same_method = measures in {"edit+edit:5%", "edit+edit:5%:raw"} and evaluation.top == 1
     medium = DISTORTIONS["medium"]
     same_noise = asked.seen_from == "cells" and any(
         asked.distortions == (replace(medium, resort=resort, false_class=false_class),)
         for resort in (True, False)
         for false_class in get_args(FalseClass)
     )
-    if not (same_method and evaluation.top == 1 and same_noise and database["step_m"] == PARIS_STEP_M):
+    if not (same_method and same_noise and database["step_m"] == PARIS_STEP_M):
         return None, None
     key = (database["radius_m"], database["levels"])
     return PARIS_ACCURACY.get(key, (None, None))

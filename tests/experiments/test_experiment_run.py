@@ -34,7 +34,6 @@ if TYPE_CHECKING:
 
     from distributed import LocalCluster
 
-    from semsig_gis.evaluation.answer import Answerer
     from semsig_gis.evaluation.spec import ExperimentSpec
     from semsig_gis.queries.draw import Query
 
@@ -216,11 +215,11 @@ def test_several_experiments_at_once_are_as_one_by_one(
 def test_parts_that_fail_are_told_and_the_others_are_kept(
     folder: Path, results: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    def fail(answerer: Answerer, queries: Sequence[Query], **options: Any) -> object:  # noqa: ANN401
+    def fail(database: Any, locator: Any, queries: Sequence[Query], **options: Any) -> object:  # noqa: ANN401
         if len(queries) < QUERIES_A_PART:
             msg = "the disk hiccups"
             raise OSError(msg)
-        return score_queries(answerer, queries, **options)
+        return score_queries(database, locator, queries, **options)
 
     monkeypatch.setattr("semsig_gis.experiments.run.score_queries", fail)
     with pytest.raises(DatabaseError) as caught:

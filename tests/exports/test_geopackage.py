@@ -49,8 +49,8 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
     from semsig_gis.database.database import SignatureDatabase
-    from semsig_gis.likelihood.result import Location
-    from semsig_gis.matching.result import Localization
+    from semsig_gis.likelihood.locate import Location
+    from semsig_gis.matching.search import Localization
 
     Draw = Callable[..., list[dict[str, Any]]]
 

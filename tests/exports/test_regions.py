@@ -21,7 +21,7 @@ from semsig_gis.likelihood.posterior import Posterior
 
 if TYPE_CHECKING:
     from semsig_gis.database.database import SignatureDatabase
-    from semsig_gis.likelihood.result import Location
+    from semsig_gis.likelihood.locate import Location
 
 Cell = tuple[int, int]
 PLACES = st.tuples(st.integers(-3, 3), st.integers(-3, 3))

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from noisy_cells import random_database
 
 from semsig_gis.core.signature import Signature
-from semsig_gis.likelihood.estimate import PlaceEstimate, cell_estimate, refined_estimate
+from semsig_gis.likelihood.locate import PlaceEstimate, cell_estimate, refined_estimate
 from semsig_gis.likelihood.noise.model import NoiseSpec
 from semsig_gis.likelihood.posterior import Posterior, posterior
 from semsig_gis.likelihood.refine import Refinement

@@ -32,7 +32,7 @@ if TYPE_CHECKING:
     from selenium.webdriver import Chrome
 
     from semsig_gis.database.database import SignatureDatabase
-    from semsig_gis.likelihood.result import Location
+    from semsig_gis.likelihood.locate import Location
 
 WORLD = random_town()
 CITY = WORLD.database

@@ -7,8 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from worlds import World, random_town
 
-from semsig_gis.matching.result import Shortlist
-from semsig_gis.matching.search import localize
+from semsig_gis.matching.search import Shortlist, localize
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

@@ -21,10 +21,10 @@ from worlds import random_town
 from semsig_gis.core.errors import EmptyResultError, InputError
 from semsig_gis.core.grid import GridSpec
 from semsig_gis.core.signature import Signature, SignatureSpec
+from semsig_gis.database.answer import DistanceMemo
 from semsig_gis.database.database import BEARING_UNITS, SignatureDatabase
 from semsig_gis.database.file import PartitionedDatabase, open_database, save_database
 from semsig_gis.database.requirement import PatternIndex, Requirement
-from semsig_gis.matching.memo import DistanceMemo
 from semsig_gis.matching.method import Method
 from semsig_gis.matching.metrics import METRICS
 from semsig_gis.matching.scores import _MANY_QUERIES, score_cells
@@ -36,7 +36,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from semsig_gis.matching.result import Localization
+    from semsig_gis.matching.search import Localization
 
 
 TAXONOMY = paper_taxonomy()

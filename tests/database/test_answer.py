@@ -1,4 +1,4 @@
-"""Tests of semsig_gis.matching.memo."""
+"""Tests of semsig_gis.database.answer."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from semsig_gis.matching.memo import DistanceMemo
+from semsig_gis.database.answer import DistanceMemo
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

@@ -1,17 +1,14 @@
 from __future__ import annotations
 
 import math
+from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
-from noisy_cells import random_database
-from sentences import assert_sentence
 from worlds import random_town
 
-from semsig_gis.core.errors import InputError
 from semsig_gis.database.store import ObjectStore
-from semsig_gis.evaluation.answer import Answerer
-from semsig_gis.evaluation.methods import parse_method
+from semsig_gis.evaluation.methods import make_locator, parse_method
 from semsig_gis.likelihood.index import build_index
 from semsig_gis.likelihood.locate import locate
 from semsig_gis.likelihood.method import LikelihoodMethod
@@ -20,6 +17,15 @@ from semsig_gis.likelihood.refine import cell_noise
 from semsig_gis.matching.method import Method
 from semsig_gis.matching.scores import score_cells
 from semsig_gis.queries.draw import QuerySpec, draw_queries
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Sequence
+
+    from semsig_gis.core.signature import Signature
+    from semsig_gis.database.answer import Ranking
+    from semsig_gis.evaluation.methods import AnyMethod
+    from semsig_gis.likelihood.index import LikelihoodIndex
+    from semsig_gis.likelihood.noise.model import Noise
 
 TOWN = random_town()
 DATABASE = TOWN.database
@@ -35,13 +41,21 @@ QUERIES = [
 ]
 
 
+def rankings(method: AnyMethod, queries: Sequence[Signature]) -> Iterator[Ranking]:
+    def index(noise: Noise) -> LikelihoodIndex:
+        assert noise == INDEX.noise
+        return INDEX
+
+    return make_locator(DATABASE, method, index=index, store=lambda: STORE).rankings(queries)
+
+
 def test_a_method_of_distances() -> None:
     method = Method.parse("edit+edit:5%")
-    answers = list(Answerer(database=DATABASE, method=method).answers(QUERIES))
+    answers = list(rankings(method, QUERIES))
     for answer, scores in zip(answers, score_cells(DATABASE, QUERIES, method), strict=True):
         assert answer.scores.tolist() == scores.tolist()
         assert answer.best_score == scores.min()
-        assert (answer.posterior, answer.place, answer.heading) == (None, None, None)
+        assert (answer.chances, answer.region, answer.place, answer.heading) == (None,) * 4
         assert math.isnan(answer.chance)
         assert answer.seconds > 0
 
@@ -50,8 +64,7 @@ def test_a_method_of_distances() -> None:
 def test_the_likelihood_method_answers_as_it_locates(text: str) -> None:
     method = parse_method(text)
     assert isinstance(method, LikelihoodMethod)
-    answerer = Answerer(database=DATABASE, method=method, index=INDEX, store=STORE)
-    for query, answer in zip(QUERIES, answerer.answers(QUERIES), strict=True):
+    for query, answer in zip(QUERIES, rankings(method, QUERIES), strict=True):
         found = locate(
             INDEX, query, north_sigma=method.north_sigma, store=STORE, refined=method.refined
         )
@@ -59,6 +72,10 @@ def test_the_likelihood_method_answers_as_it_locates(text: str) -> None:
         others = np.arange(len(DATABASE)) != found.answer.cell
         assert answer.scores[others] == pytest.approx(-found.loglik[others], rel=1e-6)
         assert answer.chance == found.answer.mass
+        assert answer.chances is not None
+        assert answer.region is not None
+        assert answer.chances.tolist() == found.chances.tolist()
+        assert answer.region.tolist() == found.region.tolist()
         assert answer.best_score == pytest.approx(-found.loglik[found.answer.cell])
         if method.refined:
             assert answer.place == (found.estimate.x, found.estimate.y)
@@ -68,17 +85,4 @@ def test_the_likelihood_method_answers_as_it_locates(text: str) -> None:
 
 
 def test_nothing_is_asked() -> None:
-    assert list(Answerer(database=DATABASE, method=Method()).answers([])) == []
-
-
-def test_what_a_method_lacks_is_told() -> None:
-    refined = LikelihoodMethod(noise=LIGHT, refined=True)
-    with pytest.raises(InputError) as caught:
-        Answerer(database=DATABASE, method=refined)
-    assert_sentence(caught.value, "likelihood:light:refined", "index")
-    with pytest.raises(InputError) as caught:
-        Answerer(database=DATABASE, method=refined, index=INDEX)
-    assert_sentence(caught.value, "street objects")
-    with pytest.raises(InputError) as caught:
-        Answerer(database=random_database(1), method=LikelihoodMethod(noise=LIGHT), index=INDEX)
-    assert_sentence(caught.value, "another database")
+    assert list(rankings(Method(), [])) == list(rankings(LikelihoodMethod(noise=LIGHT), [])) == []
