@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass
-from typing import TYPE_CHECKING, Any
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import geopandas as gpd
 import numpy as np
@@ -28,37 +28,23 @@ if TYPE_CHECKING:
     from pyproj import CRS
 
     from semsig_gis.core.taxonomy import Taxonomy
-    from semsig_gis.sources import RawLayer
-
+    from semsig_gis.sources import RawLayer, RowCounts
 
 # Two objects of a class within the same centimetre are one object listed twice.
 SAME_PLACE_M = 0.01
-
-
 # Larger than any projected coordinate; files write -1.8e308 and the like for "no value".
 BEYOND_EARTH_M = 1e8
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, slots=True)
 class LayerReport:
-    """What became of the rows of one layer; the numbers add up to `read`.
+    """What became of the rows of one layer.
 
-    Rows are dropped as `unreadable`, `filtered` (by the catalogue's filter), `missing` (no
-    geometry, or an empty one), `duplicates` (the id of an earlier row, where the catalogue says
-    that ids are unique), `misplaced` (no finite coordinates in the metric CRS, or off the Earth) or
-    `collapsed` (at the same place as an earlier object of the class). `notes` are warnings and the
-    first messages about unreadable rows.
+    `notes` are warnings and the first messages about unreadable rows.
     """
 
     name: str
-    read: int
-    unreadable: int
-    filtered: int
-    missing: int
-    misplaced: int
-    collapsed: int
-    kept: int
-    duplicates: int = 0
+    counts: RowCounts
     notes: tuple[str, ...] = ()
 
 
@@ -67,10 +53,6 @@ class LoadReport:
     """What became of every layer, in the order they were given."""
 
     layers: tuple[LayerReport, ...]
-
-    def to_list(self) -> list[dict[str, Any]]:
-        """Return the reports as plain mappings, ready for JSON."""
-        return [asdict(layer) for layer in self.layers]
 
 
 def build_objects(
@@ -119,11 +101,10 @@ def build_objects(
 
     Examples
     --------
-    >>> from semsig_gis.sources.synthetic.city import CitySpec, synthetic_city
-    >>> from semsig_gis.sources.catalog import paper_taxonomy
+    >>> from semsig_gis import CitySpec, build_objects, paper_taxonomy, synthetic_city
     >>> layers = synthetic_city(CitySpec(size=300.0))
     >>> _, report = build_objects(layers, taxonomy=paper_taxonomy(), crs="EPSG:32631")
-    >>> all(layer.kept == layer.read for layer in report.layers)
+    >>> all(layer.counts.kept == layer.counts.read for layer in report.layers)
     True
     """
     system = require_metric_crs(crs)
@@ -137,8 +118,8 @@ def build_objects(
     )
     if everything.empty:
         msg = (
-            f"no object remains of {sum(layer.read for layer in layers)} rows in {len(layers)} "
-            "layers; look at the filters, the geometries and the coordinate systems."
+            f"no object remains of {sum(layer.counts.read for layer in layers)} rows in "
+            f"{len(layers)} layers; look at the filters, the geometries and the coordinate systems."
         )
         raise EmptyResultError(msg)
     # By number, because two layers may bear one name.
@@ -165,24 +146,19 @@ def build_objects(
         crs=system,
     )
     remaining = np.bincount(owner[first], minlength=len(parts)).tolist()
-    reports = tuple(
-        LayerReport(
-            name=layer.spec.name,
-            read=layer.read,
-            unreadable=layer.error_count,
-            filtered=layer.filtered,
+    reports = []
+    for layer, (part, missing, misplaced), twice, kept_here in zip(
+        layers, parts, repeated, remaining, strict=True
+    ):
+        dropped = replace(
+            layer.counts,
             missing=missing,
-            duplicates=layer.duplicates + twice,
+            duplicates=layer.counts.duplicates + twice,
             misplaced=misplaced,
             collapsed=len(part) - twice - kept_here,
-            kept=kept_here,
-            notes=(*layer.notes, *layer.errors),
         )
-        for layer, (part, missing, misplaced), twice, kept_here in zip(
-            layers, parts, repeated, remaining, strict=True
-        )
-    )
-    return StreetObjects(table, taxonomy, layer_licences(layers)), LoadReport(reports)
+        reports.append(LayerReport(layer.spec.name, dropped, (*layer.notes, *layer.errors)))
+    return StreetObjects(table, taxonomy, layer_licences(layers)), LoadReport(tuple(reports))
 
 
 def _positions(layer: RawLayer, taxonomy: Taxonomy, crs: CRS) -> tuple[pd.DataFrame, int, int]:

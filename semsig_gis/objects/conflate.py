@@ -105,28 +105,15 @@ def conflate(
 
     Examples
     --------
-    >>> import geopandas as gpd
-    >>> from semsig_gis.sources.catalog import paper_taxonomy
-    >>> from semsig_gis.sources.layers import LayerSpec
-    >>> from semsig_gis.objects.clean import build_objects
-    >>> from semsig_gis.sources import RawLayer
-    >>> layers = [
-    ...     RawLayer(
-    ...         spec=LayerSpec(name=name, class_name="bench"),
-    ...         table=gpd.GeoDataFrame(
-    ...             {"class_name": ["bench"] * len(x), "source_id": [str(i) for i in x]},
-    ...             geometry=gpd.points_from_xy(x, [0] * len(x)), crs="EPSG:2154",
-    ...         ),
-    ...         read=len(x),
-    ...     )
-    ...     for name, x in (("city", [0, 4]), ("osm", [3, 50]))
-    ... ]
-    >>> benches, _ = build_objects(layers, taxonomy=paper_taxonomy(), crs="EPSG:2154")
-    >>> merged, report = conflate(benches, {"bench": 5.0})
-    >>> merged.table[["source", "source_id", "count", "merged"]].to_numpy().tolist()
-    [['city', '0', 1, ''], ['city', '4', 2, 'osm:3'], ['osm', '50', 1, '']]
-    >>> report.count
-    1
+    >>> from dataclasses import replace
+    >>> import pandas as pd
+    >>> from semsig_gis import conflate
+    >>> town = demo_objects.table
+    >>> other = town.assign(source="osm", geometry=town.translate(1.0))
+    >>> twice = replace(demo_objects, table=pd.concat([town, other], ignore_index=True))
+    >>> merged, report = conflate(twice, {"street_light": 1.5})
+    >>> report.count == len(twice) - len(merged) > 100
+    True
     """
     table = objects.table
     if MERGED in table.columns:

@@ -114,7 +114,7 @@ def fetch_layers(
         if tell is not None:
             source = "the cache" if file.from_cache else "the portal"
             tell(
-                f"{spec.name}: {sum(layer.read for layer in read):,} rows, "
+                f"{spec.name}: {sum(layer.counts.read for layer in read):,} rows, "
                 f"{file.bytes / 1e6:.2f} MB, from {source}, fetched {file.fetched_at}"
             )
     return tuple(layers)

@@ -9,7 +9,7 @@ class, which leave out empty ground but grow with every object. The truth mostly
 from __future__ import annotations
 
 from collections import Counter
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -52,27 +52,6 @@ class ClassQuality:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class SourceQuality:
-    """What became of the rows of one layer; all that is dropped and `objects` add up to `read`.
-
-    For the reasons see `objects.table.LayerReport`; `conflated` objects were merged into those
-    of an earlier source. `notes` are warnings and the first messages about unreadable rows.
-    """
-
-    name: str
-    read: int
-    unreadable: int
-    filtered: int
-    missing: int
-    duplicates: int
-    misplaced: int
-    collapsed: int
-    conflated: int
-    objects: int
-    notes: tuple[str, ...] = ()
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
 class QualityReport:
     """The quality report of a load.
 
@@ -84,7 +63,7 @@ class QualityReport:
 
     classes: tuple[ClassQuality, ...]
     absent: tuple[str, ...]
-    sources: tuple[SourceQuality, ...]
+    sources: tuple[LayerReport, ...]
     conflated: tuple[ConflatedPair, ...]
     crs: str
     extent: tuple[float, float, float, float]
@@ -100,7 +79,13 @@ class QualityReport:
 
     def to_dict(self) -> dict[str, Any]:
         """Return the fields and ``objects``, their number, as plain values for JSON."""
-        return {"objects": self.objects, **asdict(self)}
+        sources = [
+            {"name": item.name}
+            | asdict(item.counts)
+            | {"objects": item.counts.kept, "notes": item.notes}
+            for item in self.sources
+        ]
+        return {"objects": self.objects, **asdict(self), "sources": sources}
 
 
 def quality_report(
@@ -124,9 +109,8 @@ def quality_report(
 
     Examples
     --------
-    >>> from semsig_gis.sources.synthetic.city import CitySpec, synthetic_city
-    >>> from semsig_gis.sources.catalog import paper_taxonomy
-    >>> from semsig_gis.objects.clean import build_objects
+    >>> from semsig_gis import build_objects, paper_taxonomy, quality_report, synthetic_city
+    >>> from semsig_gis import CitySpec
     >>> layers = synthetic_city(CitySpec(size=300.0))
     >>> objects, load = build_objects(layers, taxonomy=paper_taxonomy(), crs="EPSG:32631")
     >>> quality_report(objects, load).classes[0].class_name
@@ -194,15 +178,13 @@ def _nearest(xy: NDArray[np.float64]) -> float | None:
 
 def _sources(
     layers: Sequence[LayerReport], pairs: Iterable[ConflatedPair]
-) -> Iterator[SourceQuality]:
-    """Yield what became of the rows of every layer."""
+) -> Iterator[LayerReport]:
+    """Yield what became of the rows of every layer, with those that were merged into others."""
     merged: Counter[str] = Counter()
     for pair in pairs:
         merged[pair.merged] += pair.count
     for layer in layers:
         # Layers of one name are one source to conflation: the first has given what it can.
-        conflated = min(layer.kept, merged[layer.name])
+        conflated = min(layer.counts.kept, merged[layer.name])
         merged[layer.name] -= conflated
-        facts = asdict(layer)
-        objects = facts.pop("kept") - conflated
-        yield SourceQuality(**facts, conflated=conflated, objects=objects)
+        yield replace(layer, counts=replace(layer.counts, conflated=conflated))

@@ -157,9 +157,9 @@ def _read(
         table.attrs[LICENSES] = [str(licence) for licence in layer_licences([layer])]
     else:
         layer = vector_file.read_layer(path, LayerSpec(name=role, class_name="", geometry=kind))
-        if layer.error_count:
+        if layer.errors:
             msg = (
-                f"{path} has {layer.error_count} features that cannot be read "
+                f"{path} has {layer.counts.unreadable} features that cannot be read "
                 f"({layer.errors[0]}); correct the file."
             )
             raise SourceError(msg)

@@ -2,25 +2,17 @@
 
 from __future__ import annotations
 
+from dataclasses import astuple, fields
 from typing import TYPE_CHECKING
 
 from semsig_gis.objects.quality import SQUARE_M
 from semsig_gis.reports.tables import Table
+from semsig_gis.sources import RowCounts
 
 if TYPE_CHECKING:
     from semsig_gis.objects.quality import QualityReport
 
-SOURCE_COUNTS = (
-    "read",
-    "unreadable",
-    "filtered",
-    "missing",
-    "duplicates",
-    "misplaced",
-    "collapsed",
-    "conflated",
-    "objects",
-)
+ROW_COUNTS = tuple(field.name for field in fields(RowCounts))
 
 
 def quality_tables(report: QualityReport) -> tuple[Table, ...]:
@@ -29,11 +21,11 @@ def quality_tables(report: QualityReport) -> tuple[Table, ...]:
         _class_table(report),
         Table(
             "Rows by layer",
-            ("layer", *SOURCE_COUNTS, "notes"),
+            ("layer", *ROW_COUNTS, "objects", "notes"),
             tuple(
                 (
                     item.name,
-                    *(f"{getattr(item, count):,}" for count in SOURCE_COUNTS),
+                    *(f"{number:,}" for number in (*astuple(item.counts), item.counts.kept)),
                     "; ".join(item.notes),
                 )
                 for item in report.sources

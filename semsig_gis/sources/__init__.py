@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import importlib
-from dataclasses import dataclass
+from dataclasses import astuple, dataclass
 from fnmatch import fnmatchcase
 from pathlib import Path
 from typing import TYPE_CHECKING, Protocol
@@ -44,11 +44,36 @@ FILE_SUFFIXES = frozenset(
 )
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RowCounts:
+    """How many rows a layer has, and how many of them are left out for each reason.
+
+    Rows are `unreadable`, `filtered` (by the catalogue's filter, or outside the area), `missing`
+    (no geometry, or an empty one), `duplicates` (the id of an earlier row, where the catalogue says
+    that ids are unique), `misplaced` (no finite coordinates in the metric CRS, or off the Earth),
+    `collapsed` (at the same place as an earlier object of the class) or `conflated` (merged into an
+    object of an earlier layer).
+    """
+
+    read: int
+    unreadable: int = 0
+    filtered: int = 0
+    missing: int = 0
+    duplicates: int = 0
+    misplaced: int = 0
+    collapsed: int = 0
+    conflated: int = 0
+
+    @property
+    def kept(self) -> int:
+        """Number of the others."""
+        dropped: int = sum(astuple(self)[1:])
+        return self.read - dropped
+
+
 @dataclass(frozen=True, eq=False, kw_only=True)
 class RawLayer:
     """One layer as its reader found it.
-
-    ``read == len(table) + filtered + error_count + duplicates``.
 
     Parameters
     ----------
@@ -58,36 +83,26 @@ class RawLayer:
         One row a feature: ``class_name``, ``source_id`` and ``geometry`` (of any type, empty, or
         None), in the CRS of the source; ``half_width`` (metres from the centre line, or NaN)
         where the catalogue says something about the widths of streets.
-    read : int
-        Features in the source.
-    filtered : int
-        Features that the catalogue's filter leaves out.
+    counts : RowCounts
+        Features in the source, and those that are not in the table; ``counts.kept == len(table)``.
     errors : tuple of str
         What was wrong with features that could not be read, the first ten of them.
-    error_count : int
-        Features that could not be read.
     notes : tuple of str
         Where the source differs from what the catalogue expects of it.
-    duplicates : int
-        Features left out because an earlier one has the same id, where the catalogue says that
-        ids are unique.
 
     Examples
     --------
     >>> from semsig_gis.sources.synthetic.city import CitySpec, synthetic_city
     >>> layer = synthetic_city(CitySpec(size=300.0))[0]
-    >>> layer.spec.class_name, layer.read == len(layer.table)
+    >>> layer.spec.class_name, layer.counts.read == len(layer.table)
     ('alignment_tree', True)
     """
 
     spec: LayerSpec
     table: GeoDataFrame
-    read: int
-    filtered: int = 0
+    counts: RowCounts
     errors: tuple[str, ...] = ()
-    error_count: int = 0
     notes: tuple[str, ...] = ()
-    duplicates: int = 0
 
 
 class Reader(Protocol):

@@ -78,8 +78,9 @@ def clip_layer(layer: RawLayer, area: Area) -> RawLayer:
     else:
         inside = shapely.intersects(area.polygon, geometry)
     kept = layer.table[nowhere | inside].reset_index(drop=True)
-    dropped = len(layer.table) - len(kept)
-    return dataclasses.replace(layer, table=kept, filtered=layer.filtered + dropped)
+    filtered = layer.counts.filtered + len(layer.table) - len(kept)
+    counts = dataclasses.replace(layer.counts, filtered=filtered)
+    return dataclasses.replace(layer, table=kept, counts=counts)
 
 
 def _box(text: str) -> Area:
@@ -102,7 +103,7 @@ def _box(text: str) -> Area:
 def _outline(path: Path) -> Area:
     wanted = LayerSpec(name="area", class_name="", geometry="polygon")
     layer = vector_file.read_layer(path, wanted)
-    if layer.error_count:
+    if layer.errors:
         msg = f"{path} has polygons that cannot be read ({layer.errors[0]}); correct the file."
         raise InputError(msg)
     geometry = layer.table.geometry.dropna()

@@ -1,21 +1,21 @@
-"""From the rows that a reader collects to a `RawLayer`: geometries built and checked at once."""
+"""From the rows that a reader collects to a `RawLayer`, column by column."""
 
 from __future__ import annotations
 
+import dataclasses
 import functools
 import math
 import re
-from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import geopandas as gpd
 import numpy as np
 import pandas as pd
 import shapely
 
-from semsig_gis.core.crs import CLASS_NAME, HALF_WIDTH, SOURCE_ID
+from semsig_gis.core.crs import CLASS_NAME, GEOMETRY, HALF_WIDTH, SOURCE_ID
 from semsig_gis.core.errors import CatalogError, CrsError, nearest_name
-from semsig_gis.sources import RawLayer
+from semsig_gis.sources import RawLayer, RowCounts
 from semsig_gis.sources.crs import crs_label, fits_the_globe, off_the_globe
 from semsig_gis.sources.layers import MAX_WIDTH_M, MIN_WIDTH_M
 
@@ -27,196 +27,172 @@ if TYPE_CHECKING:
 
     from semsig_gis.sources.layers import LayerSpec, Value
 
-
 KINDS = {
     "point": ("Point", "MultiPoint"),
     "line": ("LineString", "LinearRing", "MultiLineString"),
     "polygon": ("Polygon", "MultiPolygon"),
 }
-
-
 ERRORS_KEPT = 10
-
-
 # Rows of one id farther apart than this are told of: about a metre, by unit of the CRS.
 APART_DEGREES, APART_METRES = 1e-5, 1.0
+WHOLE_FLOAT = re.compile(r"(-?\d+)\.0+")
+# A value that a catalogue writes between slashes is a pattern.
+BETWEEN_SLASHES = re.compile(r"/(.+)/")
 
-
+T = TypeVar("T")
 # A point as its two coordinates, so that all points are built at once; else a built geometry.
 Position = tuple[float, float] | shapely.Geometry | None
 
 
-class Row(NamedTuple):
-    """A row that is wanted and, so far, good."""
-
-    number: int  # from 1, in the order of the file
-    class_name: str
-    source_id: str
-    position: Position
-    half_width: float = math.nan  # metres; of streets
+class BadFeatureError(ValueError):
+    """A feature cannot be used; readers catch it and report the message."""
 
 
-@dataclass(slots=True)
+@dataclasses.dataclass(slots=True)
 class Rows:
-    """What a reader has seen so far of a layer: how many rows, and those that are wanted.
+    """The rows of a layer as a reader collects them, each in four lists.
 
-    `filtered` counts rows that the filter leaves out; `errors` says what is wrong with others.
+    `numbers` count from 1 in the order of the file; `names` are the identifiers that rows have
+    without a field for it; `values` are those of `RowRules.fields`; of a row that cannot be used,
+    `positions` has the text that says why. `read` counts all rows, `filtered` those that the reader
+    leaves out, and `errors` says by number what is wrong with rows that have no values at all.
     """
 
     read: int = 0
     filtered: int = 0
-    kept: list[Row] = field(default_factory=list)
-    errors: dict[int, str] = field(default_factory=dict)  # by number of the row
+    errors: dict[int, str] = dataclasses.field(default_factory=dict)
+    numbers: list[int] = dataclasses.field(default_factory=list)
+    names: list[str] = dataclasses.field(default_factory=list)
+    values: list[Sequence[Any]] = dataclasses.field(default_factory=list)
+    positions: list[Position | str] = dataclasses.field(default_factory=list)
 
-    def refuse(self, bad: Mapping[int, str]) -> None:
-        """Move rows from the kept ones to the errors."""
-        self.errors.update(bad)
-        self.kept = [row for row in self.kept if row.number not in bad]
+    def add(self, values: Sequence[Any], name: str, position: Position | str) -> None:
+        """Add the row that was read last."""
+        self.numbers.append(self.read)
+        self.names.append(name)
+        self.values.append(values)
+        self.positions.append(position)
 
 
 def raw_layer(
     rows: Rows,
-    spec: LayerSpec,
+    rules: RowRules,
     crs: CRS,
     *,
     by_file: bool,
     where: str,
     notes: tuple[str, ...] = (),
 ) -> RawLayer:
-    """Build the geometries of a layer and check them against its CRS and its specification.
+    """Filter and classify the rows, build their geometries and check these against the CRS.
 
-    Rows with impossible coordinates are refused in place. `by_file` says whether the file itself
-    states the CRS. CrsError if that is in degrees and most coordinates cannot be.
+    `by_file` says whether the file itself states the CRS. CrsError if that is in degrees and most
+    coordinates cannot be.
     """
-    geometry = _geometries(rows)
-    geometry = _on_globe(rows, geometry, crs, where=where, by_file=by_file)
-    duplicates = 0
+    spec = rules.spec
+    table = rules.table(rows)
+    filtered = rows.filtered + len(rows.numbers) - len(table)
+    broken = table[GEOMETRY][[isinstance(position, str) for position in table[GEOMETRY]]]
+    errors: dict[int, str] = {**rows.errors, **dict(zip(broken.index, broken, strict=True))}
+    table = table.drop(index=broken.index)
+    table[GEOMETRY] = pd.Series(_geometries(table[GEOMETRY]), table.index, dtype=object)
+    for check in (_not_finite, functools.partial(_off_globe, crs=crs, by_file=by_file, file=where)):
+        bad = check(table)
+        errors |= bad
+        table = table.drop(index=list(bad))
+    repeated = 0
     if spec.unique_id:
         apart = APART_DEGREES if crs.is_geographic else APART_METRES
-        geometry, duplicates, more = _one_of_each_id(rows, geometry, apart=apart)
+        table, repeated, more = _one_of_each_id(table, apart=apart)
         notes += more
+    geometry = table[GEOMETRY].to_numpy()
     if crs.is_projected and not by_file and fits_the_globe(shapely.get_coordinates(geometry)):
         notes += (f"the coordinates look like degrees, yet {crs_label(crs)} is stated",)
-    columns: dict[str, pd.Series[Any]] = {
-        CLASS_NAME: pd.Series([row.class_name for row in rows.kept], dtype="str"),
-        SOURCE_ID: pd.Series([row.source_id for row in rows.kept], dtype="str"),
-    }
-    if spec.has_width:
-        columns[HALF_WIDTH] = pd.Series([row.half_width for row in rows.kept], dtype="float64")
-    first_errors = sorted(rows.errors.items())[:ERRORS_KEPT]
+    notes += tuple(_surprises(rows.read, table, spec))
+    table = table.drop(columns=GEOMETRY).reset_index(drop=True)
     return RawLayer(
         spec=spec,
-        table=gpd.GeoDataFrame(columns, geometry=geometry, crs=crs),
-        read=rows.read,
-        filtered=rows.filtered,
-        errors=tuple(f"row {number}: {message}" for number, message in first_errors),
-        error_count=len(rows.errors),
-        notes=(*notes, *_surprises(rows, geometry, spec)),
-        duplicates=duplicates,
+        table=gpd.GeoDataFrame(table, geometry=geometry, crs=crs),
+        counts=RowCounts(
+            read=rows.read, unreadable=len(errors), filtered=filtered, duplicates=repeated
+        ),
+        errors=tuple(f"row {row}: {text}" for row, text in sorted(errors.items())[:ERRORS_KEPT]),
+        notes=notes,
     )
 
 
-def _geometries(rows: Rows) -> NDArray[np.object_]:
-    """Build the geometries of the kept rows; those that are not finite are refused."""
-    geometry = np.empty(len(rows.kept), dtype=object)
-    points = []
-    for index, row in enumerate(rows.kept):
-        if isinstance(row.position, tuple):
-            points.append(index)
-        else:
-            geometry[index] = row.position
+def _geometries(positions: Iterable[Position]) -> NDArray[np.object_]:
+    positions = list(positions)
+    geometry = np.empty(len(positions), dtype=object)
+    geometry[:] = [None if isinstance(position, tuple) else position for position in positions]
+    points = [row for row, position in enumerate(positions) if isinstance(position, tuple)]
     if points:
-        geometry[points] = shapely.points(np.array([rows.kept[index].position for index in points]))
-    xy, owner = shapely.get_coordinates(geometry, return_index=True)
+        geometry[points] = shapely.points(np.array([positions[row] for row in points]))
+    return geometry
+
+
+def _not_finite(table: pd.DataFrame) -> dict[int, str]:
+    xy, owner = shapely.get_coordinates(table[GEOMETRY].to_numpy(), return_index=True)
     wrong = ~np.isfinite(xy).all(axis=1)
-    return _without(rows, geometry, owner[wrong], xy[wrong], "are not finite")
+    return _refused(table.index[owner[wrong]], xy[wrong], "are not finite")
 
 
-def _on_globe(
-    rows: Rows, geometry: NDArray[np.object_], crs: CRS, *, where: str, by_file: bool
-) -> NDArray[np.object_]:
+def _off_globe(table: pd.DataFrame, *, crs: CRS, by_file: bool, file: str) -> dict[int, str]:
     """Refuse rows that cannot be longitudes and latitudes where they must be.
 
     A few are bad rows; if they are most of the layer, then it is the CRS that is wrong.
     """
-    xy, owner = shapely.get_coordinates(geometry, return_index=True)
+    xy, owner = shapely.get_coordinates(table[GEOMETRY].to_numpy(), return_index=True)
     wrong = off_the_globe(xy, crs)
     if 2 * wrong.sum() > len(xy):
         x, y = xy[wrong][0]
         remedy = "correct the file" if by_file else "state the crs they are in, such as 'EPSG:2154'"
         msg = (
-            f"{where} has coordinates such as ({x:.12g}, {y:.12g}), which are not the degrees that "
+            f"{file} has coordinates such as ({x:.12g}, {y:.12g}), which are not the degrees that "
             f"{crs_label(crs)} means; {remedy}."
         )
         raise CrsError(msg)
-    return _without(rows, geometry, owner[wrong], xy[wrong], f"are not in {crs_label(crs)}")
+    return _refused(table.index[owner[wrong]], xy[wrong], f"are not in {crs_label(crs)}")
 
 
-def _without(
-    rows: Rows,
-    geometry: NDArray[np.object_],
-    indices: NDArray[np.intp],
-    xy: NDArray[np.float64],
-    what: str,
-) -> NDArray[np.object_]:
-    """Refuse the rows of these indices, for the coordinates beside them."""
-    bad = {
-        rows.kept[index].number: f"its coordinates ({x:.12g}, {y:.12g}) {what}"
-        for index, (x, y) in zip(indices[::-1], xy[::-1], strict=True)  # the first one stays
-    }
-    if not bad:
-        return geometry
-    rows.refuse(bad)
-    return np.delete(geometry, indices)
+def _refused(numbers: Iterable[int], xy: NDArray[np.float64], what: str) -> dict[int, str]:
+    bad: dict[int, str] = {}
+    for number, (x, y) in zip(numbers, xy, strict=True):
+        bad.setdefault(number, f"its coordinates ({x:.12g}, {y:.12g}) {what}")
+    return bad
 
 
 def _one_of_each_id(
-    rows: Rows, geometry: NDArray[np.object_], *, apart: float
-) -> tuple[NDArray[np.object_], int, tuple[str, ...]]:
+    table: pd.DataFrame, *, apart: float
+) -> tuple[pd.DataFrame, int, tuple[str, ...]]:
     """Keep the first row of every id, but one that has a position rather than one that has none."""
-    ids = pd.Series([row.source_id for row in rows.kept], dtype="str")
+    geometry = table[GEOMETRY].to_numpy()
     nowhere = shapely.is_missing(geometry) | shapely.is_empty(geometry)
-    ranked = ids.iloc[np.argsort(nowhere, kind="stable")]
-    firsts = ranked[ranked != ""].drop_duplicates()
-    repeated = ranked.index[ranked.duplicated() & (ranked != "")].to_numpy(np.intp)
-    if not len(repeated):
-        return geometry, 0, ()
-    first_of = pd.Series(firsts.index, index=firsts).loc[ids[repeated]].to_numpy(np.intp)
-    distances = shapely.distance(geometry[repeated], geometry[first_of])
-    far = int((distances > apart).sum())  # NaN where there is no position
-    rows.kept = [rows.kept[index] for index in np.delete(np.arange(len(ids)), repeated)]
+    ids = table[SOURCE_ID].iloc[np.argsort(nowhere, kind="stable")]
+    ids = ids[ids != ""]
+    firsts, repeated = ids.drop_duplicates(), ids[ids.duplicated()]
+    first_of = pd.Series(firsts.index, index=firsts).loc[repeated]
+    here, there = table[GEOMETRY].loc[repeated.index], table[GEOMETRY].loc[first_of]
+    metres = shapely.distance(here.to_numpy(), there.to_numpy())  # NaN where there is no position
+    far = int((metres > apart).sum())
     note = f"{far} rows have the id of a row that stands elsewhere; the first one's place is used"
-    return np.delete(geometry, repeated), len(repeated), (note,) if far else ()
+    return table.drop(index=repeated.index), len(repeated), (note,) if far else ()
 
 
-def _surprises(rows: Rows, geometry: NDArray[np.object_], spec: LayerSpec) -> tuple[str, ...]:
-    """Return where a layer is not what its specification expects."""
-    notes = []
-    if rows.read == 0:
-        notes.append("the layer has no rows")
-    elif spec.rows is not None and not spec.rows[0] <= rows.read <= spec.rows[1]:
+def _surprises(read: int, table: pd.DataFrame, spec: LayerSpec) -> Iterable[str]:
+    """Yield where a layer is not what its specification expects."""
+    if read == 0:
+        yield "the layer has no rows"
+    elif spec.rows is not None and not spec.rows[0] <= read <= spec.rows[1]:
         least, most = spec.rows
-        notes.append(f"the layer has {rows.read} rows, and {least} to {most} were expected")
-    types = pd.Series([item.geom_type for item in geometry if item is not None], dtype="str")
+        yield f"the layer has {read} rows, and {least} to {most} were expected"
+    types = pd.Series([item.geom_type for item in table[GEOMETRY].dropna()], dtype="str")
     others = types[~types.isin(KINDS[spec.geometry])]
     if len(others):
         names = ", ".join(sorted(others.unique()))
-        notes.append(f"{len(others)} of {rows.read} rows are {names}, not {spec.geometry}")
-    unknown = sum(math.isnan(row.half_width) for row in rows.kept) if spec.has_width else 0
+        yield f"{len(others)} of {read} rows are {names}, not {spec.geometry}"
+    unknown = table[HALF_WIDTH].isna().sum() if spec.has_width else 0
     if unknown:
-        notes.append(f"{unknown} of {len(rows.kept)} streets have no known width")
-    return tuple(notes)
-
-
-WHOLE_FLOAT = re.compile(r"(-?\d+)\.0+")
-
-
-# A value that a catalogue writes between slashes is a pattern.
-BETWEEN_SLASHES = re.compile(r"/(.+)/")
-
-
-class BadFeatureError(ValueError):
-    """A feature cannot be used; readers catch it and report the message."""
+        yield f"{unknown} of {len(table)} streets have no known width"
 
 
 def as_text(value: object) -> str:
@@ -256,7 +232,7 @@ def _pattern(wanted: str) -> re.Pattern[str] | None:
 
 
 class RowRules:
-    """The filter, classes, widths and identifier of one layer, checked against its fields.
+    """The filter, classes, widths and identifiers of one layer, checked against its fields.
 
     `filters` says whether the layer's ``where`` holds. CatalogError if a field that the layer names
     does not exist, or a pattern is wrong.
@@ -265,13 +241,8 @@ class RowRules:
     def __init__(
         self, spec: LayerSpec, fields: Sequence[str], *, filters: bool, where: str
     ) -> None:
-        self._class_name = spec.class_name
+        self.spec = spec
         self._where = spec.where if filters else ()
-        self._class_by = spec.class_by
-        self._id_field = spec.id_field
-        self._unique_id = spec.unique_id
-        self._width_by = spec.width_by
-        self._width_field = spec.width_field
         values = [wanted for _, accepted in self._where for wanted in accepted]
         if spec.class_by is not None:
             values.extend(wanted for wanted, _ in spec.class_by.classes)
@@ -283,40 +254,58 @@ class RowRules:
             require_field(column, fields, where=where, key=key)
         self.fields = tuple(dict.fromkeys(column for _, column in uses))
 
-    def keeps(self, row: Mapping[str, Any]) -> bool:
-        """Tell whether the row passes every condition of the filter."""
-        return all(
-            any(matches(row[field], wanted) for wanted in accepted)
-            for field, accepted in self._where
-        )
+    def table(self, rows: Rows) -> pd.DataFrame:
+        """Return class, identifier, half-width in metres and position of the rows that pass.
 
-    def class_name(self, row: Mapping[str, Any]) -> str:
-        """Return the class of the row."""
-        if self._class_by is not None:
-            value = row[self._class_by.field]
-            for wanted, name in self._class_by.classes:
-                if matches(value, wanted):
-                    return name
-        return self._class_name
-
-    def half_width(self, row: Mapping[str, Any]) -> float:
-        """Return half the width of a street in metres, NaN where nobody knows it."""
-        own = math.nan if self._width_field is None else _metres(row[self._width_field])
-        if math.isnan(own) and self._width_by is not None:
-            value, by = row[self._width_by.field], self._width_by
-            known = (width for wanted, width in by.widths if matches(value, wanted))
-            own = next(known, math.nan if by.default is None else by.default)
-        return own / 2
-
-    def source_id(self, row: Mapping[str, Any], number: str) -> str:
-        """Return the identifier of the row, or the feature's number where it has none.
-
-        Where ids are unique it is empty then, because the number could be another row's id.
+        The index has their numbers. The half-width is NaN where nobody knows it; the identifier is
+        the row's name where it has none, or empty where ids are unique, because the name could be
+        another row's id.
         """
-        value = None if self._id_field is None else row[self._id_field]
-        text = "" if value is None else as_text(value).strip()
-        whole = WHOLE_FLOAT.fullmatch(text)
-        return (whole[1] if whole else text) or ("" if self._unique_id else number)
+        spec = self.spec
+        columns = dict(zip(self.fields, zip(*rows.values, strict=True), strict=False))
+        kept = np.ones(len(rows.numbers), bool)
+        for field, accepted in self._where if rows.numbers else ():
+            kept &= [any(matches(value, one) for one in accepted) for value in columns[field]]
+        ids = columns.get(spec.id_field or "", [None] * len(kept))
+        names = [""] * len(kept) if spec.unique_id else rows.names
+        table = pd.DataFrame(
+            {
+                CLASS_NAME: pd.Series(self._classes(columns, len(kept)), dtype="str"),
+                SOURCE_ID: pd.Series(map(_identifier, ids, names), dtype="str"),
+                HALF_WIDTH: pd.Series(self._half_widths(columns, len(kept)), dtype="float64"),
+                GEOMETRY: pd.Series(rows.positions, dtype=object),
+            }
+        )
+        unused = [] if spec.has_width else [HALF_WIDTH]
+        return table.set_index(pd.Index(rows.numbers, dtype=int))[kept].drop(columns=unused)
+
+    def _classes(self, columns: Mapping[str, Sequence[Any]], size: int) -> list[str]:
+        by, name = self.spec.class_by, self.spec.class_name
+        if by is None:
+            return [name] * size
+        return [_first(by.classes, value, name) for value in columns.get(by.field, ())]
+
+    def _half_widths(self, columns: Mapping[str, Sequence[Any]], size: int) -> NDArray[np.float64]:
+        by, own = self.spec.width_by, self.spec.width_field
+        widths = np.full(size, math.nan)
+        if own is not None and size:
+            widths = np.array([_metres(value) for value in columns[own]])
+        if by is not None and size:
+            default = math.nan if by.default is None else by.default
+            typical = [_first(by.widths, value, default) for value in columns[by.field]]
+            widths = np.where(np.isnan(widths), typical, widths)
+        return widths / 2
+
+
+def _first(choices: Iterable[tuple[Value, T]], value: object, default: T) -> T:
+    """Return what belongs to the first of the wanted values that a value is."""
+    return next((result for wanted, result in choices if matches(value, wanted)), default)
+
+
+def _identifier(value: object, name: str) -> str:
+    text = "" if value is None else as_text(value).strip()
+    whole = WHOLE_FLOAT.fullmatch(text)
+    return (whole[1] if whole else text) or name
 
 
 def _metres(value: object) -> float:

@@ -188,11 +188,11 @@ def test_every_object_is_loaded(everything: tuple[StreetObjects, LoadReport]) ->
     assert len(objects) == 59_477
     corner = np.array([765_200.0, 6_275_000.0])
     assert ((objects.xy >= corner) & (objects.xy <= corner + 10_500.0)).all()
-    assert {item.name: item.read for item in report.layers} == {
+    assert {item.name: item.counts.read for item in report.layers} == {
         name: rows for name, (_, _, rows, _) in LAYERS.items()
     }
     for item in report.layers:
-        assert item.kept == item.read
+        assert item.counts.kept == item.counts.read
         assert item.notes == ()
 
 
@@ -265,7 +265,7 @@ def test_the_catalogue_leaves_what_it_should(
     chosen: tuple[StreetObjects, LoadReport], geodata: Path
 ) -> None:
     objects, report = chosen
-    assert {item.name: item.kept for item in report.layers} == {
+    assert {item.name: item.counts.kept for item in report.layers} == {
         name: kept for name, (_, _, _, kept) in LAYERS.items()
     }
     assert len(objects) == 55_652
@@ -287,11 +287,11 @@ def test_the_catalogue_leaves_what_it_should(
 
 def test_duplicates_at_one_place_are_counted(geodata: Path) -> None:
     objects, report = load(geodata, filters=False, collapse=True)
-    kept = {item.name: item.kept for item in report.layers}
+    kept = {item.name: item.counts.kept for item in report.layers}
     assert kept["street_lights"] == 29_743
     assert kept["parking_meters"] == 701
     assert int(objects.table["count"].sum()) == 59_477
-    assert sum(item.collapsed for item in report.layers) == 59_477 - len(objects)
+    assert sum(item.counts.collapsed for item in report.layers) == 59_477 - len(objects)
 
 
 def test_the_figures_with_the_catalogue_as_it_is(
@@ -310,7 +310,7 @@ def test_streets_are_as_wide_as_their_kind_is(geodata: Path) -> None:
     layer = read_layer(pair[1], pair[0])
     frame = pyogrio.read_dataframe(pair[1])
     kinds = frame.set_index(frame["IDARC"].astype(str)).loc[layer.table["source_id"], "TYPVOI"]
-    assert (layer.read, layer.filtered, len(layer.table)) == (8_011, 51, 7_960)
+    assert (layer.counts.read, layer.counts.filtered, len(layer.table)) == (8_011, 51, 7_960)
     half = layer.table["half_width"].to_numpy()
     expected = {"RUE": {7.0}, "AV": {12.0}, "PASS": {3.0}}
     assert {kind: set(half[kinds == kind]) for kind in expected} == expected

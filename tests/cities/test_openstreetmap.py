@@ -241,7 +241,7 @@ def found(path: Path, text: str) -> dict[str, set[str]]:
     )
     kinds = {}
     for layer in read_layers(path, CATALOG.layers):
-        assert layer.error_count == 0
+        assert layer.counts.unreadable == 0
         if len(layer.table):
             kinds[layer.spec.name] = set(layer.table.source_id.str.split("/").str[0])
     return kinds
@@ -283,7 +283,7 @@ def test_near_misses_are_of_no_layer(tmp_path: Path, text: str) -> None:
 def test_a_bus_stop_on_a_way_is_left_out_and_told(tmp_path: Path) -> None:
     path = write_osm(tmp_path / "city.osm", *PLACES, way(5, [1, 2], {"highway": "bus_stop"}))
     (layer,) = read_layers(path, [CATALOG.layer("bus_stops")])
-    assert (layer.read, layer.filtered, len(layer.table)) == (1, 1, 0)
+    assert (layer.counts.read, layer.counts.filtered, len(layer.table)) == (1, 1, 0)
 
 
 def test_a_pole_with_the_tags_of_a_platform_is_one_stop(tmp_path: Path) -> None:
@@ -409,7 +409,7 @@ def read_extract(geodata: Path, city: str) -> Mapping[str, RawLayer]:
 def by_kind(layers: Mapping[str, RawLayer]) -> Counter[str]:
     kept: Counter[str] = Counter()
     for name, layer in layers.items():
-        assert layer.read == len(layer.table) + layer.filtered + layer.error_count
+        assert layer.counts.kept == len(layer.table)
         kept.update(name + " " + layer.table.source_id.str.split("/").str[0])
     return kept
 
@@ -421,7 +421,7 @@ def test_objects_of_the_classes_of_the_paper(geodata: Path, city: str) -> None:
     platforms = classes.pop("bus_platforms")
     assert len(platforms.table) == PLATFORMS[city]
     assert by_kind(classes) == EXPECTED[city]
-    assert all(layer.error_count == 0 for layer in classes.values())
+    assert all(layer.counts.unreadable == 0 for layer in classes.values())
 
 
 @pytest.mark.parametrize("city", EXTRACTS)
@@ -432,7 +432,7 @@ def test_a_bare_loop_counts_the_same(geodata: Path, city: str) -> None:
     assert seen["buildings way"] == BUILDINGS[city][0]
     for name in BARE_TAGS:
         spec = layers[name].spec
-        assert layers[name].read == sum(
+        assert layers[name].counts.read == sum(
             seen[f"{name} {kind}"] for kind in ("node", "way", "relation")
         )
         for kind in ("node", "way"):
@@ -557,8 +557,8 @@ def test_a_database_is_built_and_evaluated(
     system = places.estimate_utm_crs()
     assert system == crs
     objects, report = build_objects(layers, taxonomy=CATALOG.taxonomy, crs=system)
-    assert sum(layer.kept + layer.collapsed for layer in report.layers) == len(places)
-    assert all(layer.missing == layer.misplaced == 0 for layer in report.layers)
+    assert sum(layer.counts.kept + layer.counts.collapsed for layer in report.layers) == len(places)
+    assert all(layer.counts.missing == layer.counts.misplaced == 0 for layer in report.layers)
     assert tuple(map(str, objects.licenses)) == (
         f"OpenStreetMap contributors (ODbL 1.0): {', '.join(spec.name for spec in specs)}",
     )

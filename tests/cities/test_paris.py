@@ -13,6 +13,7 @@ import pytest
 import shapely
 
 from semsig_gis.objects.clean import build_objects
+from semsig_gis.sources import RowCounts
 from semsig_gis.sources.catalog import load_catalog, paper_taxonomy
 from semsig_gis.sources.opendatasoft.reader import read_layers
 
@@ -102,9 +103,8 @@ def test_published_files_load_as_they_are(
 ) -> None:
     file, name, rows, filtered, duplicates, places = published
     layer = read(paris / file, name)
-    counts = (layer.read, layer.filtered, layer.duplicates, layer.error_count)
-    assert counts == (rows, filtered, duplicates, 0)
-    assert layer.read == len(layer.table) + layer.filtered + layer.duplicates + layer.error_count
+    assert layer.counts == RowCounts(read=rows, filtered=filtered, duplicates=duplicates)
+    assert layer.counts.kept == len(layer.table)
     assert (layer.errors, layer.notes) == ((), ())
     assert set(layer.table["class_name"]) == {layer.spec.class_name}
     if layer.table.crs == "EPSG:4326":
@@ -118,8 +118,8 @@ def test_published_files_load_as_they_are(
 @pytest.mark.parametrize(("file", "name"), [(file, name) for file, name, *_ in FILES])
 def test_filters_can_be_off(paris: Path, file: str, name: str) -> None:
     layer = read(paris / file, name, filters=False)
-    assert (layer.filtered, layer.error_count) == (0, 0)
-    assert len(layer.table) + layer.duplicates == layer.read
+    assert (layer.counts.filtered, layer.counts.unreadable) == (0, 0)
+    assert len(layer.table) + layer.counts.duplicates == layer.counts.read
 
 
 # --- Trap by trap -------------------------------------------------------------------------------

@@ -64,7 +64,7 @@ def find_catalog():
     "semsig_testville/testville.toml": CATALOG,
     "semsig_testville/reader.py": """
 import geopandas as gpd
-from semsig_gis.sources import RawLayer
+from semsig_gis.sources import RawLayer, RowCounts
 
 
 def read_layers(path, specs, *, filters=True, crs=None):
@@ -74,7 +74,8 @@ def read_layers(path, specs, *, filters=True, crs=None):
         geometry=gpd.points_from_xy([row[1] for row in rows], [row[2] for row in rows]),
         crs=crs or "EPSG:2154",
     )
-    return tuple(RawLayer(spec=spec, table=table, read=len(rows)) for spec in specs)
+    counts = RowCounts(read=len(rows))
+    return tuple(RawLayer(spec=spec, table=table, counts=counts) for spec in specs)
 """,
     "semsig_testville/broken.py": "import a_module_that_is_not_there\n",
 }
@@ -90,7 +91,7 @@ print(*catalogs)
 print(*readers)
 catalog = load_catalog(catalogs["testville"])
 layer, = readers[catalog.reader](Path(sys.argv[1]), catalog.layers)
-print(layer.spec.name, layer.read, *layer.table["source_id"])
+print(layer.spec.name, layer.counts.read, *layer.table["source_id"])
 for warning in caught:
     print(warning.message)
 """

@@ -18,7 +18,7 @@ from semsig_gis.core.taxonomy import ObjectClass, Taxonomy
 from semsig_gis.objects.changes import compare_objects, replace_layers
 from semsig_gis.objects.clean import build_objects
 from semsig_gis.objects.table import Licence, StreetObjects, open_objects, save_objects
-from semsig_gis.sources import RawLayer
+from semsig_gis.sources import RawLayer, RowCounts
 from semsig_gis.sources.layers import LayerSpec
 
 if TYPE_CHECKING:
@@ -206,7 +206,7 @@ def test_a_layer_may_have_any_name(tmp_path: Path, name: str, *, has_objects: bo
                         geometry=[shapely.Point(point) for point in points],
                         crs="EPSG:2154",
                     ),
-                    read=len(points),
+                    counts=RowCounts(read=len(points)),
                 )
                 for layer, points in places.items()
             ],

@@ -16,7 +16,7 @@ from semsig_gis.database.build import build_database
 from semsig_gis.database.file import open_database, save_database
 from semsig_gis.objects.load import assemble, choose_layers, metric_crs_of, read_files
 from semsig_gis.objects.table import open_objects, save_objects
-from semsig_gis.sources import RawLayer
+from semsig_gis.sources import RawLayer, RowCounts
 from semsig_gis.sources.catalog import Catalog, load_catalog, paper_taxonomy
 from semsig_gis.sources.layers import LayerSpec
 from semsig_gis.sources.osm import file as osm_file
@@ -36,7 +36,8 @@ def raw(name: str, *places: tuple[float, float], crs: str | None = "EPSG:2154") 
         geometry=shapely.points(places) if places else [],
         crs=crs,
     )
-    return RawLayer(spec=LayerSpec(name=name, class_name="bench"), table=table, read=len(places))
+    spec = LayerSpec(name=name, class_name="bench")
+    return RawLayer(spec=spec, table=table, counts=RowCounts(read=len(places)))
 
 
 def catalog_of(**values: object) -> Catalog:

@@ -22,7 +22,7 @@ from sentences import assert_sentence
 from semsig_gis.core.errors import CrsError, DatabaseError, EmptyResultError, UnknownNameError
 from semsig_gis.objects.clean import build_objects
 from semsig_gis.objects.table import Licence, objects_specs, open_objects, save_objects
-from semsig_gis.sources import RawLayer
+from semsig_gis.sources import RawLayer, RowCounts
 from semsig_gis.sources.catalog import load_catalog, paper_taxonomy
 from semsig_gis.sources.layers import LayerSpec
 from semsig_gis.storage.geoparquet import geo_metadata, write_geoparquet
@@ -67,10 +67,10 @@ def layer(
             attribution=attribution,
         ),
         table=table,
-        read=size + filtered + error_count,
-        filtered=filtered,
+        counts=RowCounts(
+            read=size + filtered + error_count, filtered=filtered, unreadable=error_count
+        ),
         errors=tuple(f"row {row}: broken" for row in range(min(error_count, 10))),
-        error_count=error_count,
         notes=notes,
     )
 
@@ -172,8 +172,8 @@ def test_rows_without_a_place_are_dropped_and_counted() -> None:
     objects, report = build_objects([layer(mixed, ids=ids)], taxonomy=TAXONOMY, crs=LAMBERT)
     assert objects.xy.tolist() == [[1, 2], [3, 4]]
     assert objects.table["source_id"].tolist() == ["0", ids[-1]]
-    (counts,) = report.layers
-    assert (counts.read, counts.missing, counts.misplaced, counts.kept) == (16, 5, 9, 2)
+    (told,) = report.layers
+    assert told.counts == RowCounts(read=16, missing=5, misplaced=9)
 
 
 def test_a_place_off_the_earth_is_misplaced() -> None:
@@ -183,7 +183,7 @@ def test_a_place_off_the_earth_is_misplaced() -> None:
     degrees = layer([*places, broken], crs="EPSG:4326")
     objects, report = build_objects([degrees], taxonomy=TAXONOMY, crs=LAMBERT)
     assert len(objects) == 2
-    assert report.layers[0].misplaced == 3
+    assert report.layers[0].counts.misplaced == 3
     assert objects.table["source_id"].tolist() == ["0", "2"]
 
 
@@ -206,7 +206,7 @@ def test_one_class_at_one_place_is_one_object() -> None:
     assert objects.xy.tolist() == [[0, 0], [5, 5], [0, 1]]
     assert objects.table["count"].tolist() == [3, 1, 1]
     assert objects.table["source_id"].tolist() == ["0", "1", "4"]
-    assert report.layers[0].collapsed == 2
+    assert report.layers[0].counts.collapsed == 2
 
 
 def test_different_classes_at_one_place_stay_apart() -> None:
@@ -228,15 +228,15 @@ def test_layers_of_one_class_collapse_into_the_first() -> None:
     objects, report = build_objects(layers, taxonomy=TAXONOMY, crs=LAMBERT)
     assert objects.table["source"].tolist() == ["north", "north", "south"]
     assert objects.table["count"].tolist() == [1, 3, 1]
-    assert [(item.collapsed, item.kept) for item in report.layers] == [(0, 2), (2, 1)]
+    assert [(item.counts.collapsed, item.counts.kept) for item in report.layers] == [(0, 2), (2, 1)]
 
 
 def test_two_layers_of_one_name_are_reported_apart() -> None:
     layers = [layer(points((0, 0))), layer(points((0, 0), (1, 1), (2, 2)))]
     _, report = build_objects(layers, taxonomy=TAXONOMY, crs=LAMBERT)
-    assert [(item.name, item.read, item.collapsed, item.kept) for item in report.layers] == [
-        ("trees", 1, 0, 1),
-        ("trees", 3, 1, 2),
+    assert [(item.name, item.counts) for item in report.layers] == [
+        ("trees", RowCounts(read=1)),
+        ("trees", RowCounts(read=3, collapsed=1)),
     ]
 
 
@@ -283,7 +283,7 @@ def test_nothing_left_is_an_error() -> None:
     for layers in ([], [layer([])], [nothing], [nothing, layer([], crs="EPSG:4326")]):
         with pytest.raises(EmptyResultError) as caught:
             build(*layers)
-        rows = sum(item.read for item in layers)
+        rows = sum(item.counts.read for item in layers)
         assert_sentence(caught.value, f"of {rows} rows in {len(layers)} layers", "look at")
 
 
@@ -299,7 +299,7 @@ def test_an_empty_layer_beside_a_full_one_is_fine() -> None:
             crs=LAMBERT,
         )
         assert objects.xy.tolist() == [[1, 2]]
-        assert [item.kept for item in report.layers] == [0, 1, 0]
+        assert [item.counts.kept for item in report.layers] == [0, 1, 0]
 
 
 # --- The report -------------------------------------------------------------------------------
@@ -338,17 +338,12 @@ def test_every_row_is_accounted_for(layers: list[RawLayer], collapse: bool) -> N
         return
     objects, report = build_objects(layers, taxonomy=TAXONOMY, crs=LAMBERT, collapse=collapse)
     assert len(report.layers) == len(layers)
-    for item, counts in zip(layers, report.layers, strict=True):
-        parts = dataclasses.asdict(counts)
-        numbers = [parts[key] for key in ("unreadable", "filtered", "missing", "misplaced")]
-        assert min(numbers) >= 0
-        assert counts.collapsed >= 0
-        assert counts.kept >= 0
-        assert counts.read == item.read == sum(numbers) + counts.collapsed + counts.kept
-        assert (counts.unreadable, counts.filtered) == (item.error_count, item.filtered)
-        assert counts.notes == (*item.notes, *item.errors)
-    assert sum(item.kept for item in report.layers) == len(objects)
-    assert report.to_list() == [dataclasses.asdict(item) for item in report.layers]
+    for item, told in zip(layers, report.layers, strict=True):
+        assert min(*dataclasses.astuple(told.counts), told.counts.kept) >= 0
+        for reason in ("read", "unreadable", "filtered"):
+            assert getattr(told.counts, reason) == getattr(item.counts, reason)
+        assert told.notes == (*item.notes, *item.errors)
+    assert sum(item.counts.kept for item in report.layers) == len(objects)
     found: Counter[tuple[str, float, float]] = Counter()
     for code, (x, y), count in zip(
         objects.codes, objects.xy.tolist(), objects.table["count"], strict=True

@@ -17,7 +17,7 @@ from semsig_gis.objects.conflate import conflate
 from semsig_gis.objects.load import choose_layers
 from semsig_gis.objects.quality import quality_report
 from semsig_gis.objects.table import StreetObjects
-from semsig_gis.sources import RawLayer, find_files
+from semsig_gis.sources import RawLayer, RowCounts, find_files
 from semsig_gis.sources.catalog import load_catalog, paper_taxonomy
 from semsig_gis.sources.layers import LayerSpec
 from semsig_gis.sources.vector.reader import read_layer
@@ -49,10 +49,8 @@ def layer(
     return RawLayer(
         spec=LayerSpec(name=name, class_name=class_name, license="CC0", attribution="Town"),
         table=table,
-        read=len(places) + 3,
-        filtered=2,
+        counts=RowCounts(read=len(places) + 3, filtered=2, unreadable=1),
         errors=("row 9: broken",),
-        error_count=1,
         notes=notes,
     )
 
@@ -109,14 +107,11 @@ def test_what_was_dropped_is_told_by_layer() -> None:
     report = report_on(city, osm, bench=5.0)
     first, second = report.sources
     reasons = ("unreadable", "filtered", "missing", "duplicates", "misplaced", "collapsed")
-    assert (first.name, first.read) == ("city", 8)
-    assert [getattr(first, reason) for reason in reasons] == [1, 2, 1, 0, 1, 1]
-    for item in report.sources:
-        dropped = sum(getattr(item, reason) for reason in (*reasons, "conflated"))
-        assert item.read == dropped + item.objects
-    assert (first.conflated, first.objects) == (0, 2)
+    assert (first.name, first.counts.read) == ("city", 8)
+    assert [getattr(first.counts, reason) for reason in reasons] == [1, 2, 1, 0, 1, 1]
+    assert (first.counts.conflated, first.counts.kept) == (0, 2)
     assert first.notes == ("odd", "row 9: broken")
-    assert (second.read, second.conflated, second.objects) == (5, 1, 1)
+    assert (second.counts.read, second.counts.conflated, second.counts.kept) == (5, 1, 1)
     (pair,) = report.conflated
     assert (pair.kept, pair.merged, pair.count) == ("city", "osm", 1)
     assert report.licenses == ("Town (CC0): city, osm",)
@@ -129,7 +124,8 @@ def test_layers_of_one_name_share_what_was_conflated() -> None:
         layer([(X + 21, Y), (X + 41, Y), (X + 60, Y)], name="osm"),
         bench=5.0,
     )
-    assert [(item.conflated, item.objects) for item in report.sources] == [(0, 3), (1, 0), (2, 1)]
+    counts = [item.counts for item in report.sources]
+    assert [(item.conflated, item.kept) for item in counts] == [(0, 3), (1, 0), (2, 1)]
 
 
 def test_the_place_is_told_in_metres_and_degrees() -> None:
@@ -198,7 +194,7 @@ def test_montpellier(geodata: Path) -> None:
     layers = [read_layer(path, spec) for spec, path in pairs]
     objects, load = build_objects(layers, taxonomy=catalog.taxonomy, crs=catalog.metric_crs or "")
     report = quality_report(objects, load)
-    assert sum(item.objects for item in report.sources) == report.objects == len(objects)
+    assert sum(item.counts.kept for item in report.sources) == report.objects == len(objects)
     assert sum(item.objects for item in report.classes) == len(objects)
     by_name = {item.class_name: item for item in report.classes}
     assert by_name["alignment_tree"].objects == 23_972

@@ -78,7 +78,7 @@ def test_a_sure_draft_loads_as_it_is(tmp_path: Path) -> None:
     assert layer.spec.id_field == "Numéro"
     assert layer.spec.crs == load(draft, tmp_path).metric_crs == "EPSG:2154"
     assert layer.spec.rows == (3, 12)
-    assert (layer.read, len(layer.table), layer.notes) == (6, 6, ())
+    assert (layer.counts.read, len(layer.table), layer.notes) == (6, 6, ())
     assert '# where = { etat = ["neuf", "usé"] }  # rows: 3, 2; without: 1' in draft
     assert "# Fields: Numéro, etat" in draft
     assert draft.count("EDIT") == 3  # in the introduction, for the licence and the attribution
@@ -134,7 +134,7 @@ def test_every_layer_of_a_file_is_drafted(tmp_path: Path) -> None:
         ("arbres_2", "arbres!"),
         ("bancs", "Bancs"),
     ]
-    assert [layer.read for layer in read(draft, file, tmp_path)] == [1, 1, 1]
+    assert [layer.counts.read for layer in read(draft, file, tmp_path)] == [1, 1, 1]
 
 
 def test_tables_without_geometry_are_named_and_left_out(tmp_path: Path) -> None:
@@ -252,14 +252,14 @@ def test_strange_names_and_values_stay_within_their_quotes(tmp_path: Path) -> No
     )
     draft = suggest_catalog(file)
     (layer,) = read(draft, file, tmp_path)
-    assert (layer.spec.name, layer.read) == ("arbres_2_x_u", 12)
+    assert (layer.spec.name, layer.counts.read) == ("arbres_2_x_u", 12)
     lines = draft.splitlines()
     offered = [place for place, line in enumerate(lines) if line.startswith("# where")]
     assert len(offered) == 3  # a pattern is no value
     for place in offered:
         tried = [*lines[:place], SUGGESTION.sub("", lines[place]), *lines[place + 1 :]]
         (layer,) = read("\n".join(tried), file, tmp_path)
-        assert (layer.read, layer.filtered) == (12, 0), lines[place]
+        assert (layer.counts.read, layer.counts.filtered) == (12, 0), lines[place]
 
 
 @pytest.mark.parametrize(
@@ -339,11 +339,11 @@ def test_published_files_are_drafted_and_read_by_their_drafts(
         assert expected or any(part in file.name for part in NO_GUESS), file.name
         assert stanza.get("class", stanza.get("role")) in (expected or {"EDIT"}), file.name
         (layer,) = read(edited(draft), file, tmp_path)
-        assert layer.read > 0
-        assert layer.error_count == 0
-        assert len(layer.table) == layer.read
+        assert layer.counts.read > 0
+        assert layer.counts.unreadable == 0
+        assert len(layer.table) == layer.counts.read
         assert layer.spec.rows is not None
-        assert layer.spec.rows[0] <= layer.read <= layer.spec.rows[1]
+        assert layer.spec.rows[0] <= layer.counts.read <= layer.spec.rows[1]
         if layer.spec.id_field is not None:
             assert layer.table["source_id"].is_unique, file.name
 

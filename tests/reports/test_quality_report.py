@@ -2,9 +2,11 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+from semsig_gis.objects.clean import LayerReport
 from semsig_gis.objects.conflate import ConflatedPair
-from semsig_gis.objects.quality import ClassQuality, QualityReport, SourceQuality
+from semsig_gis.objects.quality import ClassQuality, QualityReport
 from semsig_gis.reports.quality import quality_tables
+from semsig_gis.sources import RowCounts
 
 REPORT = QualityReport(
     classes=(
@@ -19,17 +21,17 @@ REPORT = QualityReport(
     ),
     absent=("alignment_tree", "taxi_station"),
     sources=(
-        SourceQuality(
+        LayerReport(
             name="city",
-            read=1405,
-            unreadable=1,
-            filtered=2,
-            missing=1,
-            duplicates=0,
-            misplaced=1,
-            collapsed=50,
-            conflated=50,
-            objects=1300,
+            counts=RowCounts(
+                read=1405,
+                unreadable=1,
+                filtered=2,
+                missing=1,
+                misplaced=1,
+                collapsed=50,
+                conflated=50,
+            ),
             notes=("row 9: broken", "old"),
         ),
     ),

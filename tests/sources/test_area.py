@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from sentences import assert_sentence
 
 from semsig_gis.core.errors import InputError, SemsigError
-from semsig_gis.sources import RawLayer
+from semsig_gis.sources import RawLayer, RowCounts
 from semsig_gis.sources.area import clip_layer, join_areas, names_place, parse_area
 from semsig_gis.sources.layers import LayerSpec
 
@@ -150,12 +150,12 @@ def test_a_layer_is_clipped(role: str, kept: list[str], crs: str) -> None:
         crs="EPSG:4326",
     ).to_crs(crs)
     spec = LayerSpec(name="x", class_name="", role=role, geometry="line")  # type: ignore[arg-type]
-    layer = RawLayer(spec=spec, table=table, read=9, filtered=5)
+    layer = RawLayer(spec=spec, table=table, counts=RowCounts(read=9, filtered=5))
     clipped = clip_layer(layer, parse_area(",".join(map(str, BOX))))
     assert clipped.table["source_id"].tolist() == kept
     assert clipped.table.index.tolist() == list(range(len(kept)))
     assert clipped.table.crs == table.crs
-    assert clipped.read == len(clipped.table) + clipped.filtered
+    assert clipped.counts.read == len(clipped.table) + clipped.counts.filtered
 
 
 def test_nothing_has_no_outline() -> None:

@@ -55,8 +55,7 @@ PLACES = [
 
 def read(path: Path, spec: LayerSpec = TREES, **options: Any) -> RawLayer:  # noqa: ANN401
     (layer,) = read_layers(path, [spec], **options)
-    counted = len(layer.table) + layer.filtered + layer.error_count + layer.duplicates
-    assert layer.read == counted
+    assert layer.counts.kept == len(layer.table)
     return layer
 
 
@@ -180,7 +179,7 @@ def test_every_kind_of_file_says_the_same(tmp_path: Path, name: str) -> None:
     assert everything.table.crs == "EPSG:4326"
     assert (everything.errors, everything.notes) == ((), ())
     assert some.table["source_id"].tolist() == ["11", "13"]
-    assert (some.filtered, everything.spec, some.spec) == (1, TREES, chosen)
+    assert (some.counts.filtered, everything.spec, some.spec) == (1, TREES, chosen)
     assert len(read(path, chosen, filters=False).table) == 3
 
 
@@ -354,7 +353,7 @@ def test_a_bad_row_is_counted_and_the_others_are_read(tmp_path: Path, message: s
     path.write_text(json.dumps([good, BAD_ROWS[message], good, "what?"]))
     layer = read(path, LayerSpec(name="a", class_name="bench"))
     assert xy(layer) == [(2.35, 48.85)] * 2
-    assert layer.error_count == 2
+    assert layer.counts.unreadable == 2
     assert layer.errors[0].startswith(f"row 2: {message}")
     assert layer.errors[1] == 'row 4: is "what?", not a record'
 
@@ -402,11 +401,11 @@ def test_rows_of_one_id_are_one_object(tmp_path: Path) -> None:
     # Of the first id, the row that has a position stays; rows without an id all stay.
     assert layer.table["source_id"].tolist() == ["2", "1", "", "", "5"]
     assert xy(layer) == [(2.2, 48.2), (2.1, 48.1), (2.3, 48.3), (2.4, 48.4)]
-    assert (layer.read, layer.duplicates, layer.error_count) == (8, 2, 1)
+    assert (layer.counts.read, layer.counts.duplicates, layer.counts.unreadable) == (8, 2, 1)
     assert layer.notes == ()
     others = read(path, replace(TREES, unique_id=False))
     assert others.table["source_id"].tolist() == ["1", "2", "1", "2", "5", "6", "5"]
-    assert others.duplicates == 0
+    assert others.counts.duplicates == 0
 
 
 def test_rows_of_one_id_that_are_apart_are_told(tmp_path: Path) -> None:
@@ -414,7 +413,7 @@ def test_rows_of_one_id_that_are_apart_are_told(tmp_path: Path) -> None:
     path.write_text("IDBASE;geo_point_2d\n1;48.1,2.1\n1;48.1,2.1000001\n1;48.1,2.2\n2;48,2\n")
     layer = read(path)
     assert xy(layer) == [(2.1, 48.1), (2.0, 48.0)]
-    assert layer.duplicates == 2
+    assert layer.counts.duplicates == 2
     assert layer.notes == (
         "1 rows have the id of a row that stands elsewhere; the first one's place is used",
     )
@@ -425,7 +424,7 @@ def test_the_filter_comes_before_the_ids(tmp_path: Path) -> None:
     path.write_text("IDBASE;state;geo_point_2d\n1;old;48.1,2.1\n1;new;48.2,2.2\n")
     layer = read(path, replace(TREES, where=(("state", ("new",)),)))
     assert xy(layer) == [(2.2, 48.2)]
-    assert (layer.filtered, layer.duplicates) == (1, 0)
+    assert (layer.counts.filtered, layer.counts.duplicates) == (1, 0)
 
 
 # --- Coordinate systems -------------------------------------------------------------------------
@@ -528,7 +527,7 @@ def test_no_rows_are_no_fault(tmp_path: Path, content: str) -> None:
     path = tmp_path / "a.json"
     path.write_text(content)
     layer = read(path, replace(TREES, where=(("DOMANIALITE", ("Alignement",)),)))
-    assert (layer.read, len(layer.table), layer.table.crs) == (0, 0, "EPSG:4326")
+    assert (layer.counts.read, len(layer.table), layer.table.crs) == (0, 0, "EPSG:4326")
     assert layer.notes == ("the layer has no rows",)
 
 
@@ -574,7 +573,7 @@ def test_a_page_of_a_longer_answer_is_told(
     path = tmp_path / "page.json"
     path.write_text(json.dumps(rows), encoding="utf-8")
     layer = read(path, LayerSpec(name="a", class_name="bench"))
-    assert layer.read == 2
+    assert layer.counts.read == 2
     assert len(layer.notes) == (rest is not None)
     assert rest is None or rest in layer.notes[0]
 
@@ -703,7 +702,7 @@ def test_what_is_not_wanted_is_not_sent(server: Server, cache: Cache, kind: Any)
     assert query["select"] == "idbase,domanialite,geo_shape,geo_point_2d"
     layer = read(file.path, spec)
     assert layer.table["source_id"].tolist() == ["11"]
-    assert (layer.read, layer.filtered) == (1, 0)
+    assert (layer.counts.read, layer.counts.filtered) == (1, 0)
 
 
 def test_an_area_may_be_a_polygon(server: Server, cache: Cache) -> None:

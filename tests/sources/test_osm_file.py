@@ -18,6 +18,7 @@ from osmium.osm.mutable import Node
 from sentences import assert_sentence
 
 from semsig_gis.core.errors import CatalogError, SourceError
+from semsig_gis.sources import RowCounts
 from semsig_gis.sources.layers import ClassBy, LayerSpec
 from semsig_gis.sources.osm.file import read_layers
 
@@ -55,7 +56,7 @@ CORNERS = [node(1, 0, 0), node(2, 1, 0), node(3, 1, 1), node(4, 0, 1)]
 
 
 def found(layer: RawLayer) -> dict[str, str]:
-    assert layer.read == len(layer.table) + layer.filtered + layer.error_count
+    assert layer.counts.read == len(layer.table) + layer.counts.filtered + layer.counts.unreadable
     return dict(zip(layer.table.source_id, layer.table.geometry.to_wkt(), strict=True))
 
 
@@ -120,8 +121,9 @@ def test_elements_of_another_kind_are_filtered(tmp_path: Path) -> None:
         relation(7, {6: ""}, {"type": "site", **BENCH}),
     )
     points, anything = read_layers(path, [spec_of(elements=("node",)), BENCHES])
-    assert (points.read, points.filtered, list(found(points))) == (3, 2, ["node/5"])
-    assert (anything.read, anything.filtered, list(found(anything))) == (3, 1, ["node/5", "way/6"])
+    assert (points.counts, list(found(points))) == (RowCounts(read=3, filtered=2), ["node/5"])
+    assert anything.counts == RowCounts(read=3, filtered=1)
+    assert list(found(anything)) == ["node/5", "way/6"]
 
 
 def test_squares_are_no_streets(tmp_path: Path) -> None:
@@ -133,7 +135,7 @@ def test_squares_are_no_streets(tmp_path: Path) -> None:
     )
     (streets,) = read_layers(path, [STREETS])
     assert found(streets) == {"way/5": "LINESTRING (0 0, 1 0, 1 1, 0 0)"}
-    assert streets.filtered == 1
+    assert streets.counts.filtered == 1
 
 
 def test_multipolygons_with_untagged_members(tmp_path: Path) -> None:
@@ -178,7 +180,7 @@ def test_deleted_elements_are_not_there(tmp_path: Path) -> None:
     gone = '<node id="2" visible="false" lat="1" lon="1"><tag k="natural" v="tree"/></node>'
     path = write_osm(tmp_path / "city.osm", node(1, 2, 48, TREE), gone)
     (trees,) = read_layers(path, [TREES])
-    assert (trees.read, list(found(trees))) == (1, ["node/1"])
+    assert (trees.counts.read, list(found(trees))) == (1, ["node/1"])
 
 
 def test_where_and_class_by_are_by_tag(tmp_path: Path) -> None:
@@ -196,16 +198,16 @@ def test_where_and_class_by_are_by_tag(tmp_path: Path) -> None:
     (layer,) = read_layers(path, [spec])
     assert list(found(layer)) == ["node/1", "node/4"]
     assert layer.table.class_name.tolist() == ["bench", "taxi_station"]
-    assert layer.filtered == 2
+    assert layer.counts.filtered == 2
     (everything,) = read_layers(path, [spec], filters=False)
-    assert (len(everything.table), everything.filtered) == (4, 0)
+    assert (len(everything.table), everything.counts.filtered) == (4, 0)
 
 
 def test_no_layers_and_no_elements(tmp_path: Path) -> None:
     path = write_osm(tmp_path / "city.osm")
     assert read_layers(path, []) == ()
     (trees,) = read_layers(path, [TREES])
-    assert (trees.read, len(trees.table)) == (0, 0)
+    assert (trees.counts.read, len(trees.table)) == (0, 0)
     assert trees.table.crs == "EPSG:4326"
 
 
@@ -229,7 +231,7 @@ def test_no_user_metadata_is_kept(tmp_path: Path) -> None:
     )
     (layer,) = read_layers(path, [BENCHES])
     assert layer.table.columns.tolist() == ["class_name", "source_id", "geometry"]
-    assert (len(layer.table), layer.error_count) == (2, 1)
+    assert (len(layer.table), layer.counts.unreadable) == (2, 1)
     kept = pickle.dumps(layer) + repr(layer).encode()
     for secret in (b"Quasimodo", b"Esmeralda", b"987654321", b"876543210", b"2019", b"05:04"):
         assert secret not in kept
@@ -257,7 +259,7 @@ def test_what_is_incomplete_or_broken_is_skipped_and_counted(tmp_path: Path) -> 
     )
     (buildings,) = read_layers(path, [BUILDINGS])
     assert list(found(buildings)) == ["way/10"]
-    assert (buildings.read, buildings.error_count) == (10, 9)
+    assert (buildings.counts.read, buildings.counts.unreadable) == (10, 9)
     assert buildings.errors == (
         "row 1: node/5 has no valid position",
         "row 2: way/6 lacks 2 of its 5 nodes, as where a file is clipped",

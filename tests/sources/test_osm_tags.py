@@ -9,7 +9,7 @@ from sentences import assert_sentence
 
 from semsig_gis.core.errors import CatalogError
 from semsig_gis.sources.layers import LayerSpec
-from semsig_gis.sources.osm.tags import TagIndex, counts, matches
+from semsig_gis.sources.osm.elements import TagIndex, has_shape, has_tags
 
 KEYS = st.sampled_from("abc")
 VALUES = st.sampled_from(["x", "y", "no", "*"])
@@ -55,12 +55,12 @@ def test_values_are_compared_exactly(tags: dict[str, str], *, expected: bool) ->
         {"sign": "*"},
         {"public_transport": "platform", "bus": "yes|designated"},
     )
-    assert matches(tags, spec) is expected
+    assert has_tags(tags, spec) is expected
     assert TagIndex([spec]).layers(tags) == [0] * expected
 
 
 def test_no_can_be_asked_for_by_name() -> None:
-    assert matches({"building": "no"}, spec_of({"building": "no"}))
+    assert has_tags({"building": "no"}, spec_of({"building": "no"}))
 
 
 @given(st.lists(SPECS, min_size=1, max_size=4), TAGS)
@@ -68,7 +68,7 @@ def test_the_index_finds_what_trying_every_layer_finds(
     specs: list[LayerSpec], tags: dict[str, str]
 ) -> None:
     index = TagIndex(specs)
-    expected = [number for number, spec in enumerate(specs) if matches(tags, spec)]
+    expected = [number for number, spec in enumerate(specs) if has_tags(tags, spec)]
     assert index.layers(tags) == expected
     if expected:
         assert set(index.keys) & set(tags)
@@ -84,14 +84,14 @@ def test_kinds_of_element() -> None:
     points = LayerSpec(name="points", class_name="bench", elements=("node",))
     anything = LayerSpec(name="anything", class_name="bench")
     streets = LayerSpec(name="streets", class_name="", role="streets", elements=("way",))
-    assert counts("node", {}, points)
-    assert not counts("way", {}, points)
-    assert counts("way", {}, anything)
-    assert counts("relation", {"type": "multipolygon"}, anything)
+    assert has_shape("node", {}, points)
+    assert not has_shape("way", {}, points)
+    assert has_shape("way", {}, anything)
+    assert has_shape("relation", {"type": "multipolygon"}, anything)
     for kind in ("site", "building", "boundary"):
-        assert not counts("relation", {"type": kind}, anything)
-    assert not counts("relation", {}, anything)
-    assert counts("way", {"highway": "pedestrian"}, streets)
-    assert counts("way", {"highway": "pedestrian", "area": "no"}, streets)
-    assert not counts("way", {"highway": "pedestrian", "area": "yes"}, streets)
-    assert counts("way", {"area": "yes"}, anything)
+        assert not has_shape("relation", {"type": kind}, anything)
+    assert not has_shape("relation", {}, anything)
+    assert has_shape("way", {"highway": "pedestrian"}, streets)
+    assert has_shape("way", {"highway": "pedestrian", "area": "no"}, streets)
+    assert not has_shape("way", {"highway": "pedestrian", "area": "yes"}, streets)
+    assert has_shape("way", {"area": "yes"}, anything)

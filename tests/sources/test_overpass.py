@@ -139,7 +139,7 @@ def asked(server: Server) -> int:
 
 def ids(paths: list[Path]) -> list[str]:
     (layer,) = read_layers(paths, [spec_of()])
-    assert layer.error_count == 0
+    assert layer.counts.unreadable == 0
     return sorted(layer.table["source_id"])
 
 
@@ -399,7 +399,7 @@ def read(folder: Path, elements: list[Any], *specs: LayerSpec) -> Any:  # noqa: 
     path.write_bytes(sent(elements))
     layers = read_layers(path, specs)
     for layer in layers:
-        assert layer.read == len(layer.table) + layer.filtered + layer.error_count
+        assert layer.counts.kept == len(layer.table)
     return layers[0] if len(layers) == 1 else layers
 
 
@@ -468,7 +468,7 @@ def test_buildings_and_streets_keep_their_shape(tmp_path: Path) -> None:
     whole, holed = footprints.table.geometry
     assert whole.area == pytest.approx(0.002**2)
     assert holed.area == pytest.approx(0.002**2 - shapely.Polygon(hole).area)
-    assert footprints.filtered == 1  # the site
+    assert footprints.counts.filtered == 1  # the site
     assert footprints.errors == ("row 4: way/10 has no positions",)
     assert lines.table.geometry.geom_type.tolist() == ["LineString"]
 
@@ -491,7 +491,7 @@ def test_an_incomplete_element_is_counted(
 ) -> None:
     tags = {"amenity": "bench", "type": "multipolygon"}
     layer = read(tmp_path, [BENCHES[0], element | {"tags": tags, "id": 99}], spec_of())
-    assert layer.error_count == 1
+    assert layer.counts.unreadable == 1
     assert len(layer.table) == 1
     assert words.replace("/1 ", "/99 ") in layer.errors[0]
 
@@ -505,7 +505,7 @@ def test_the_kinds_and_filters_of_a_layer_hold(tmp_path: Path) -> None:
     ]
     layer = read(tmp_path, elements, stops)
     assert layer.table["source_id"].tolist() == ["node/1"]
-    assert (layer.read, layer.filtered) == (3, 2)
+    assert (layer.counts.read, layer.counts.filtered) == (3, 2)
     (unfiltered,) = read_layers(tmp_path / "tile.json", [stops], filters=False)
     assert unfiltered.table["source_id"].tolist() == ["node/1", "node/2"]
 
@@ -580,8 +580,8 @@ def test_a_server_and_a_file_say_the_same_of_a_city(geodata: Path, tmp_path: Pat
         other = theirs.table.set_index("source_id").sort_index()
         assert mine.index.tolist() == other.index.tolist(), ours.spec.name
         assert mine.geometry.geom_equals_exact(other.geometry, 1e-7).all(), ours.spec.name
-        assert (ours.read, ours.filtered) == (theirs.read, theirs.filtered)
-        assert ours.error_count == theirs.error_count
+        assert ours.counts == theirs.counts
+
         found += len(mine)
     assert found > 300
 

@@ -18,10 +18,24 @@ from sentences import assert_sentence
 from semsig_gis.core.errors import CatalogError
 from semsig_gis.sources import reader
 from semsig_gis.sources.layers import LayerSpec, WidthBy
-from semsig_gis.sources.raw_layer import BETWEEN_SLASHES, RowRules, as_text, matches
+from semsig_gis.sources.raw_layer import BETWEEN_SLASHES, RowRules, Rows, as_text, matches
 
 if TYPE_CHECKING:
     from pathlib import Path
+
+    import pandas as pd
+
+
+def table(spec: LayerSpec, **columns: list[object]) -> pd.DataFrame:
+    """Return what the rules of a layer make of rows with these fields."""
+    rules = RowRules(spec, list(columns), filters=True, where="here")
+    rows = Rows()
+    for row in zip(*columns.values(), strict=True):
+        rows.read += 1
+        values = dict(zip(columns, row, strict=True))
+        rows.add([values[field] for field in rules.fields], str(rows.read), (0.0, 0.0))
+    return rules.table(rows)
+
 
 numbers = st.integers(-(2**53), 2**53) | st.floats(allow_nan=False, allow_infinity=False)
 plain = st.text().filter(lambda text: not BETWEEN_SLASHES.fullmatch(text))
@@ -70,11 +84,9 @@ def test_near_is_not_equal(value: object, wanted: Any) -> None:  # noqa: ANN401
 @given(st.integers(-(2**53), 2**53))
 def test_whole_identifiers_have_no_decimals(number: int) -> None:
     spec = LayerSpec(name="things", class_name="bench", id_field="n")
-    rules = RowRules(spec, ["n"], filters=True, where="here")
-    for value in (number, float(number), str(number), f"{number}.0", f" {number}.00 "):
-        assert rules.source_id({"n": value}, "7") == str(number)
-    for nothing in (None, "", "  "):
-        assert rules.source_id({"n": nothing}, "7") == "7"
+    same = [number, float(number), str(number), f"{number}.0", f" {number}.00 "]
+    ids = table(spec, n=[*same, None, "", "  "])["source_id"]
+    assert ids.tolist() == [str(number)] * 5 + ["6", "7", "8"]
 
 
 @pytest.mark.parametrize(
@@ -107,13 +119,7 @@ def test_a_pattern_that_is_none() -> None:
 
 def test_only_true_ids_may_be_unique() -> None:
     spec = LayerSpec(name="things", class_name="bench", id_field="n", unique_id=True)
-    rules = RowRules(spec, ["n"], filters=True, where="things")
-    assert [rules.source_id({"n": value}, "7") for value in (3.0, "3.0", None, " ")] == [
-        "3",
-        "3",
-        "",
-        "",
-    ]
+    assert table(spec, n=[3.0, "3.0", None, " "])["source_id"].tolist() == ["3", "3", "", ""]
 
 
 # --- Widths of streets --------------------------------------------------------------------------
@@ -126,7 +132,8 @@ def street(**what: Any) -> LayerSpec:  # noqa: ANN401 - any field of a LayerSpec
 
 
 def half_width(spec: LayerSpec, **row: object) -> float:
-    return RowRules(spec, list(row), filters=True, where="streets").half_width(row)
+    widths = table(spec, **{name: [value] for name, value in row.items()}).get("half_width")
+    return math.nan if widths is None else float(widths.iloc[0])
 
 
 @pytest.mark.parametrize(

@@ -122,8 +122,8 @@ def test_same_seed_same_city_within_its_square(spec: CitySpec) -> None:
     again = (*synthetic_city(spec), *synthetic_surroundings(spec))
     for layer, twin in zip(layers, again, strict=True):
         pd.testing.assert_frame_equal(layer.table, twin.table)
-        assert layer.read == len(layer.table)
-        assert (layer.filtered, layer.error_count, layer.notes) == (0, 0, ())
+        assert layer.counts.read == len(layer.table)
+        assert (layer.counts.filtered, layer.counts.unreadable, layer.notes) == (0, 0, ())
         assert list(layer.table.columns)[:3] == ["class_name", "source_id", "geometry"]
         assert (layer.table["class_name"] == layer.spec.class_name).all()
         assert layer.table["source_id"].is_unique
@@ -197,7 +197,7 @@ def test_the_centre_moves_the_city_and_no_more() -> None:
 @pytest.mark.parametrize("seed", range(4))
 def test_a_small_city_has_about_the_shares_of_paris(seed: int) -> None:
     layers = synthetic_city(CitySpec(seed=seed))
-    counts = {layer.spec.class_name: layer.read for layer in layers}
+    counts = {layer.spec.class_name: layer.counts.read for layer in layers}
     total = sum(counts.values())
     assert 9_000 < total < 15_000
     for name, occurrences in PARIS.items():
@@ -334,8 +334,8 @@ def test_houses_stand_side_by_side(surroundings: tuple[RawLayer, RawLayer]) -> N
 @pytest.mark.parametrize("seed", range(30))
 def test_the_smallest_city_is_a_city(seed: int) -> None:
     spec = CitySpec(size=100.0, seed=seed)
-    assert of_class(synthetic_city(spec), "street_light").read > 0
-    assert synthetic_surroundings(spec)[1].read > 0
+    assert of_class(synthetic_city(spec), "street_light").counts.read > 0
+    assert synthetic_surroundings(spec)[1].counts.read > 0
 
 
 def test_the_paris_like_city_has_the_counts_of_the_paper() -> None:

@@ -97,7 +97,7 @@ def xy(layer: RawLayer) -> list[list[float]]:
 
 
 def adds_up(layer: RawLayer) -> bool:
-    return layer.read == len(layer.table) + layer.filtered + layer.error_count
+    return layer.counts.read == len(layer.table) + layer.counts.filtered + layer.counts.unreadable
 
 
 # --- Montpellier as published -----------------------------------------------------------------
@@ -125,8 +125,8 @@ def test_published_layers(
     montpellier: Callable[[str], Path], name: str, rows: int, unique: int, epsg: int
 ) -> None:
     layer = read_layer(montpellier(f"{name}.zip"), spec_of())
-    assert (layer.read, len(layer.table)) == (rows, rows)
-    assert (layer.filtered, layer.error_count, layer.notes) == (0, 0, ())
+    assert (layer.counts.read, len(layer.table)) == (rows, rows)
+    assert (layer.counts.filtered, layer.counts.unreadable, layer.notes) == (0, 0, ())
     assert list(layer.table.columns) == ["class_name", "source_id", "geometry"]
     assert layer.table.crs == CRS.from_epsg(epsg)
     assert len(np.unique(np.round(xy(layer), 6 if epsg == 4171 else 2), axis=0)) == unique
@@ -145,7 +145,7 @@ def test_published_fountains_in_service(montpellier: Callable[[str], Path]) -> N
     path = montpellier("FontainesPublic.zip")
     spec = spec_of(where=(("ETAT", ("en fonction",)),), id_field="ID")
     layer = read_layer(path, spec)
-    assert (layer.read, layer.filtered, len(layer.table)) == (89, 25, 64)
+    assert (layer.counts.read, layer.counts.filtered, len(layer.table)) == (89, 25, 64)
     assert layer.table["source_id"].iloc[0] == "1"
     assert len(read_layer(path, spec, filters=False).table) == 89
 
@@ -160,7 +160,7 @@ def test_published_polygons_and_lines_are_kept_as_they_are(
     montpellier: Callable[[str], Path],
 ) -> None:
     layer = read_layer(montpellier("Batiments.zip"), spec_of(geometry="polygon"))
-    assert (len(layer.table), layer.error_count, layer.notes) == (3356, 0, ())
+    assert (len(layer.table), layer.counts.unreadable, layer.notes) == (3356, 0, ())
     assert set(layer.table.geom_type) <= {"Polygon", "MultiPolygon"}
     layer = read_layer(montpellier("AccTrottoir.zip"), spec_of())
     assert layer.notes == ("7654 of 7654 rows are LineString, not point",)
@@ -204,8 +204,8 @@ def test_published_layers_are_listed(montpellier: Callable[[str], Path]) -> None
 
 def test_published_paris_geopackage_and_csv(geodata: Path) -> None:
     layer = read_layer(geodata / "paris" / "gpdtut_paris_trees.gpkg", spec_of())
-    assert (layer.error_count, layer.notes) == (0, ())
-    assert len(layer.table) == layer.read > 1000
+    assert (layer.counts.unreadable, layer.notes) == (0, ())
+    assert len(layer.table) == layer.counts.read > 1000
     with pytest.raises(SourceError, match=r"no coordinate columns.*its columns are IDBASE, TYPE"):
         read_layer(geodata / "paris" / "les-arbres_julien2019.csv", spec_of())
 
@@ -225,17 +225,17 @@ def cut(path: Path, size: int) -> None:
 def test_truncated_shapefile_loses_only_its_end(fountains: Path, tmp_path: Path) -> None:
     cut(fountains, 100 + 28 * 50)  # 50 whole records
     layer = read_layer(fountains, spec_of())
-    assert (layer.read, len(layer.table), layer.error_count) == (89, 50, 39)
+    assert (layer.counts.read, len(layer.table), layer.counts.unreadable) == (89, 50, 39)
     assert len(layer.errors) == 10
     assert layer.errors[0].startswith("row 51: Error in fread()")
     zipped = read_layer(pack(fountains.parent, tmp_path / "cut.zip"), spec_of())
-    assert (zipped.read, len(zipped.table), zipped.error_count) == (89, 50, 39)
+    assert (zipped.counts.read, len(zipped.table), zipped.counts.unreadable) == (89, 50, 39)
 
 
 def test_truncated_attributes_lose_only_their_end(fountains: Path) -> None:
     cut(fountains.with_suffix(".dbf"), 10_000)
     layer = read_layer(fountains, spec_of(id_field="ID"))
-    assert (layer.read, len(layer.table), layer.error_count) == (89, 27, 62)
+    assert (layer.counts.read, len(layer.table), layer.counts.unreadable) == (89, 27, 62)
     assert layer.errors[0] == "row 28: fread(343) failed on DBF file"
 
 
@@ -246,7 +246,7 @@ def test_corrupt_records_are_counted(fountains: Path) -> None:
     struct.pack_into("<i", content, 100 + 28 * 11 + 8, 5)  # row 12 becomes a polygon
     fountains.write_bytes(content)
     layer = read_layer(fountains, spec_of())
-    assert (layer.read, len(layer.table), layer.error_count) == (89, 87, 2)
+    assert (layer.counts.read, len(layer.table), layer.counts.unreadable) == (89, 87, 2)
     assert layer.errors[0].startswith("row 6: its coordinates (nan, 6279715.2637")
     assert layer.errors[1].startswith("row 12: Corrupted .shp file")
     assert layer.table.geometry.isna().sum() == 1
@@ -295,11 +295,11 @@ def test_round_trip(suffix: str, rows: list[tuple[float, float, str]]) -> None:
         layer = read_layer(path, spec)
         (info,) = list_layers(path)
         numbered = read_layer(path, spec_of(crs="EPSG:2154"), filters=False)
-    assert info.rows == layer.read == len(rows)
+    assert info.rows == layer.counts.read == len(rows)
     assert info.crs == (None if suffix == "csv" else "EPSG:2154")
     assert {"ident", "kind"} <= dict(info.fields).keys()
     assert adds_up(layer)
-    assert layer.error_count == 0
+    assert layer.counts.unreadable == 0
     assert layer.table.crs == CRS.from_epsg(2154)
     expected = {
         str(100 + n): [a, b] for n, (a, b, kind) in enumerate(rows) if kind in {"Bänk", "a, b; c"}
@@ -320,7 +320,7 @@ def test_names_that_a_url_would_cut(suffix: str, tmp_path: Path) -> None:
     path = folder / path.name
     if suffix != "shp":
         path = path.rename(folder / f"x#y?z! %20.{suffix}")
-    assert read_layer(path, spec_of(crs="EPSG:2154")).read == 1
+    assert read_layer(path, spec_of(crs="EPSG:2154")).counts.read == 1
     assert list_layers(path)[0].rows == 1
 
 
@@ -332,7 +332,7 @@ def test_null_and_empty_geometries_are_no_errors(suffix: str, tmp_path: Path) ->
     path = tmp_path / f"things.{suffix}"
     table.to_file(path, **({"SPATIAL_INDEX": "NO"} if suffix == "fgb" else {}))
     layer = read_layer(path, spec_of())
-    assert (layer.read, len(layer.table), layer.error_count) == (4, 4, 0)
+    assert (layer.counts.read, len(layer.table), layer.counts.unreadable) == (4, 4, 0)
     missing = layer.table.geometry.isna() | layer.table.geometry.is_empty
     assert missing.tolist() == [False, True, True, False]
 
@@ -345,7 +345,7 @@ def test_empty_layer_is_read(suffix: str, tmp_path: Path) -> None:
     with fiona.open(path, "w", driver=driver, crs="EPSG:2154", schema=schema):
         pass
     layer = read_layer(path, spec_of(rows=(1, 5)))
-    assert (layer.read, len(layer.table), layer.notes) == (0, 0, ("the layer has no rows",))
+    assert (layer.counts.read, len(layer.table), layer.notes) == (0, 0, ("the layer has no rows",))
     assert list(layer.table.columns) == ["class_name", "source_id", "geometry"]
     assert list_layers(path)[0].rows == 0
 
@@ -394,7 +394,7 @@ def test_broken_geojson_geometries_are_told_from_null_ones(tmp_path: Path) -> No
         {"type": "Polygon", "coordinates": [[[1, 2], [2, 3]]]},
     ]
     layer = read_layer(geojson(tmp_path, *bad, *good), spec_of())
-    assert (layer.read, len(layer.table), layer.error_count) == (13, 5, 8)
+    assert (layer.counts.read, len(layer.table), layer.counts.unreadable) == (13, 5, 8)
     assert [message.split(":")[0] for message in layer.errors] == [f"row {n}" for n in range(1, 9)]
     assert layer.errors[0] == "row 1: its geometry is not valid GeoJSON"
     assert layer.errors[6].startswith("row 7: its LineString is not valid")
@@ -439,7 +439,7 @@ class Failing:
 def test_features_that_raise_do_not_stop_the_rest() -> None:
     rules = RowRules(spec_of(), [], filters=True, where="here")
     rows = vector_file._read_rows(Failing(9, bad=frozenset({0, 4, 8})), rules, None, [])
-    assert (rows.read, [row.number for row in rows.kept]) == (9, [2, 3, 4, 6, 7, 8])
+    assert (rows.read, rows.numbers) == (9, [2, 3, 4, 6, 7, 8])
     assert rows.errors == dict.fromkeys((1, 5, 9), "cannot be read (unlucky)")
 
 
@@ -447,15 +447,15 @@ def test_features_that_raise_do_not_stop_the_rest() -> None:
 def test_reader_that_is_stuck_comes_to_an_end(size: int) -> None:
     rules = RowRules(spec_of(), [], filters=True, where="here")
     rows = vector_file._read_rows(Failing(size, stuck=3), rules, None, [])
-    assert [row.number for row in rows.kept] == [1, 2, 3]
-    assert rows.read == len(rows.kept) + len(rows.errors) == max(size, 1003)
+    assert rows.numbers == [1, 2, 3]
+    assert rows.read == len(rows.numbers) + len(rows.errors) == max(size, 1003)
 
 
 def test_coordinates_that_are_not_finite(tmp_path: Path) -> None:
     line = {"type": "LineString", "coordinates": [[1, 2], [math.nan, 3]]}
     path = geojson(tmp_path, point(3, 43), point(math.nan, 43), point(3, math.inf), line)
     layer = read_layer(path, spec_of())
-    assert (layer.read, len(layer.table), layer.error_count) == (4, 1, 3)
+    assert (layer.counts.read, len(layer.table), layer.counts.unreadable) == (4, 1, 3)
     assert layer.errors == (
         "row 2: its coordinates (nan, 43) are not finite",
         "row 3: its coordinates (3, inf) are not finite",
@@ -468,7 +468,7 @@ def test_truncated_flatgeobuf_loses_only_its_end(tmp_path: Path) -> None:
     cut(path, 2 * path.stat().st_size // 3)
     layer = read_layer(path, spec_of())
     assert adds_up(layer)
-    assert layer.read == 2000
+    assert layer.counts.read == 2000
     assert 0 < len(layer.table) < 2000
     assert len(layer.errors) == 10
 
@@ -486,9 +486,9 @@ def test_gdal_keeps_quiet(
 ) -> None:
     path = write(frame([(n, n) for n in range(9)], n=range(9)), tmp_path, "shp")
     cut(path, 200)
-    assert read_layer(path, spec_of()).error_count == 6
+    assert read_layer(path, spec_of()).counts.unreadable == 6
     geojson(tmp_path, point("a", "b"), point(3, 43))
-    assert read_layer(tmp_path / "things.geojson", spec_of()).error_count == 1
+    assert read_layer(tmp_path / "things.geojson", spec_of()).counts.unreadable == 1
     with pytest.raises(SourceError):
         read_layer(text_file(tmp_path, "none.gpkg", "none"), spec_of())
     assert caplog.records == []
@@ -535,7 +535,7 @@ def test_csv_rows_without_numbers_are_errors(tmp_path: Path) -> None:
     rows = ["1;2", "here;2", "1;", ";", " ; ", "nan;1", "1;inf", "1,5;2", "1", "1;2;3;4"]
     path = text_file(tmp_path, "things.csv", "x;y\n" + "\n".join(rows) + "\n")
     layer = read_layer(path, spec_of(crs="EPSG:2154"))
-    assert (layer.read, len(layer.table), layer.error_count) == (10, 5, 5)
+    assert (layer.counts.read, len(layer.table), layer.counts.unreadable) == (10, 5, 5)
     assert layer.errors == (
         "row 2: x 'here' is not a number",
         "row 3: y '' is not a number",
@@ -549,7 +549,7 @@ def test_csv_rows_without_numbers_are_errors(tmp_path: Path) -> None:
 
 def test_csv_numeric_headers_are_headers(tmp_path: Path) -> None:
     path = text_file(tmp_path, "things.csv", "x,y,2014\n1,2,3\n")
-    assert read_layer(path, spec_of(crs="EPSG:2154", where=(("2014", (3,)),))).read == 1
+    assert read_layer(path, spec_of(crs="EPSG:2154", where=(("2014", (3,)),))).counts.read == 1
 
 
 def test_csv_needs_coordinates(tmp_path: Path) -> None:
@@ -631,7 +631,7 @@ def test_a_property_named_crs_is_no_crs(tmp_path: Path) -> None:
 def test_a_few_points_off_the_globe_are_bad_rows(tmp_path: Path) -> None:
     path = geojson(tmp_path, point(3, 43), point(3, 430), point(180, 90), point(-180, -90))
     layer = read_layer(path, spec_of())
-    assert (len(layer.table), layer.error_count) == (3, 1)
+    assert (len(layer.table), layer.counts.unreadable) == (3, 1)
     assert layer.errors == ("row 2: its coordinates (3, 430) are not in EPSG:4326",)
 
 
@@ -684,9 +684,9 @@ def test_where_on_logical_and_missing_values(tmp_path: Path) -> None:
     features = [{"type": "Feature", "properties": row, "geometry": point(3, 43)} for row in rows]
     document = {"type": "FeatureCollection", "features": features}
     path = text_file(tmp_path, "things.geojson", json.dumps(document))
-    assert read_layer(path, spec_of(where=(("on", (True,)),))).filtered == 3
-    assert read_layer(path, spec_of(where=(("on", ("false",)),))).filtered == 3
-    assert read_layer(path, spec_of(where=(("on", (1,)),))).filtered == 4
+    assert read_layer(path, spec_of(where=(("on", (True,)),))).counts.filtered == 3
+    assert read_layer(path, spec_of(where=(("on", ("false",)),))).counts.filtered == 3
+    assert read_layer(path, spec_of(where=(("on", (1,)),))).counts.filtered == 4
 
 
 @pytest.mark.parametrize(
@@ -746,7 +746,7 @@ def test_layers_of_a_container(container: Path) -> None:
         ("trees", 1),
         ("lights", 2),
     ]
-    assert read_layer(container, spec_of(layer="lights")).read == 2
+    assert read_layer(container, spec_of(layer="lights")).counts.read == 2
     with pytest.raises(SourceError, match=r"holds 2 layers \(trees, lights\); name the one"):
         read_layer(container, spec_of())
     with pytest.raises(UnknownNameError, match=r"no layer 'light'; the nearest is 'lights'"):
@@ -760,7 +760,7 @@ def test_tables_without_geometry_are_not_meant(container: Path, tmp_path: Path) 
     for path in (alone, container):
         with fiona.open(path, "w", driver="GPKG", layer="layer_styles", schema=schema) as table:
             table.write({"geometry": None, "properties": {"styleName": "red"}})
-    assert read_layer(alone, spec_of()).read == 1
+    assert read_layer(alone, spec_of()).counts.read == 1
     with pytest.raises(SourceError, match=r"holds 2 layers \(trees, lights\)"):
         read_layer(container, spec_of())
     with pytest.raises(SourceError, match="has no geometry"):
@@ -776,7 +776,7 @@ def test_archive_with_folders_and_companions(tmp_path: Path) -> None:
     text_file(inner, "metadata.json", "{}")
     path = pack(inner, tmp_path / "city.zip", inside="data/2014/")
     assert [layer.name for layer in list_layers(path)] == ["things"]
-    assert read_layer(path, spec_of()).read == 1
+    assert read_layer(path, spec_of()).counts.read == 1
     geojson(inner, point(3, 43))
     two = pack(inner, tmp_path / "two.zip")
     with pytest.raises(SourceError, match="holds 2 layers"):

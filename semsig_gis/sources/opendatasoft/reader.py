@@ -14,13 +14,11 @@ import shapely
 from semsig_gis.core.errors import CatalogError, InputError, SourceError
 from semsig_gis.sources.crs import WGS84, settle_crs
 from semsig_gis.sources.http.fetch import fetch
-from semsig_gis.sources.http.wire import HttpError, HttpSpec
-from semsig_gis.sources.layers import LayerSpec
+from semsig_gis.sources.http.wire import DEFAULT_HTTP, HttpError
 from semsig_gis.sources.opendatasoft.fields import POINT, Positions, find_field, settle_fields
 from semsig_gis.sources.opendatasoft.table import open_table
 from semsig_gis.sources.raw_layer import (
     BadFeatureError,
-    Row,
     RowRules,
     Rows,
     raw_layer,
@@ -36,7 +34,10 @@ if TYPE_CHECKING:
     from semsig_gis.sources import RawLayer
     from semsig_gis.sources.area import Area
     from semsig_gis.sources.http.cache import Cache, Fetched
+    from semsig_gis.sources.http.wire import HttpSpec
+    from semsig_gis.sources.layers import LayerSpec
     from semsig_gis.sources.opendatasoft.table import Record, Table
+    from semsig_gis.sources.raw_layer import Position
 
 # What people make of a portal's data with other programs, and leave beside its own files.
 VECTOR_SUFFIXES = frozenset({".fgb", ".gpkg", ".shp", ".zip"})
@@ -100,12 +101,11 @@ def read_layers(
     if path.suffix.lower() in VECTOR_SUFFIXES:
         return tuple(_read_vector(path, spec, filters=filters, crs=crs) for spec in specs)
     table = open_table(path)
-    jobs = [_Job(spec, table, path, filters=filters, crs=crs) for spec in specs]
-    wanted = [field for job in jobs for field in job.fields]
-    for number, record in enumerate(table.records(wanted), start=1):
-        for job in jobs:
-            job.take(number, record)
-    return tuple(job.layer() for job in jobs)
+    layers = [_TableLayer(spec, table, path, filters=filters, crs=crs) for spec in specs]
+    for record in table.records([field for layer in layers for field in layer.fields]):
+        for layer in layers:
+            layer.add(record)
+    return tuple(layer.raw() for layer in layers)
 
 
 def _read_vector(path: Path, spec: LayerSpec, *, filters: bool, crs: str | None) -> RawLayer:
@@ -116,11 +116,7 @@ def _read_vector(path: Path, spec: LayerSpec, *, filters: bool, crs: str | None)
     return dataclasses.replace(layer, spec=spec)
 
 
-# What holds for a table without rows, which has no fields to look at.
-_NO_FIELDS = LayerSpec(name="", class_name="")
-
-
-class _Job:
+class _TableLayer:
     """One layer that is being read from a table."""
 
     def __init__(
@@ -142,43 +138,38 @@ class _Job:
                 "export the whole dataset instead"
             )
             self._notes += (rest,)
-        own = _NO_FIELDS if table.empty else settle_fields(spec, table.fields)
-        self._rules = RowRules(own, table.fields, filters=filters, where=self._where)
+        # A table without rows has no fields to look at.
+        fields = [field for _, field in spec.fields] if table.empty else table.fields
+        own = settle_fields(spec, fields)
+        self._rules = RowRules(own, fields, filters=filters, where=self._where)
         self._positions = Positions(spec, table, where=self._where)
         self._rows = Rows()
         self.fields = (*self._rules.fields, *self._positions.fields)
 
-    def take(self, number: int, record: Record | str) -> None:
-        """Take the next row of the table."""
-        self._rows.read = number
-        try:
-            self._keep(number, record)
-        except BadFeatureError as error:
-            self._rows.errors[number] = str(error)
-
-    def _keep(self, number: int, record: Record | str) -> None:
+    def add(self, record: Record | str) -> None:
+        """Add the next row of the table."""
+        self._rows.read += 1
         if isinstance(record, str):
-            raise BadFeatureError(record)
-        rules = self._rules
-        row = {field: record.values.get(field) for field in rules.fields}  # JSON leaves nulls out
-        if not rules.keeps(row):
-            self._rows.filtered += 1
+            self._rows.errors[self._rows.read] = record
             return
-        position = self._positions.of(record)
-        identifier = rules.source_id(row, str(number))
-        half_width = rules.half_width(row)
-        self._rows.kept.append(Row(number, rules.class_name(row), identifier, position, half_width))
+        try:
+            position: Position | str = self._positions.of(record)
+        except BadFeatureError as error:
+            position = str(error)
+        values = [record.values.get(field) for field in self._rules.fields]  # JSON omits nulls
+        self._rows.add(values, str(self._rows.read), position)
 
-    def layer(self) -> RawLayer:
+    def raw(self) -> RawLayer:
         """Return what was read."""
-        return raw_layer(
+        layer = raw_layer(
             self._rows,
-            self._spec,
+            self._rules,
             self._crs,
             by_file=self._by_file,
             where=self._where,
             notes=self._notes,
         )
+        return dataclasses.replace(layer, spec=self._spec)
 
 
 # --- Live -------------------------------------------------------------------------------------
@@ -190,7 +181,7 @@ def fetch_layers(
     portal: str,
     area: Area | None = None,
     cache: Cache,
-    spec: HttpSpec = HttpSpec(),  # noqa: B008 - frozen
+    spec: HttpSpec = DEFAULT_HTTP,
     format: Literal["geojson", "csv", "parquet"] = "geojson",  # noqa: A002 - the API's own word
     progress: Callable[[LayerSpec, int, int], None] | None = None,
 ) -> list[tuple[LayerSpec, Fetched]]:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import contextlib
 import itertools
 import math
-from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -15,10 +14,9 @@ from osmium.filter import KeyFilter
 from osmium.osm import NODE, RELATION, WAY, Node, Relation, Way
 
 from semsig_gis.core.errors import CatalogError, SourceError
-from semsig_gis.sources.crs import WGS84, settle_crs
+from semsig_gis.sources.osm.elements import ElementLayer, TagIndex
 from semsig_gis.sources.osm.shapes import relation_shape, way_shape
-from semsig_gis.sources.osm.tags import TagIndex, counts
-from semsig_gis.sources.raw_layer import BadFeatureError, Row, RowRules, Rows, raw_layer
+from semsig_gis.sources.raw_layer import BadFeatureError
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -28,6 +26,7 @@ if TYPE_CHECKING:
 
     from semsig_gis.sources import RawLayer
     from semsig_gis.sources.layers import ElementKind, LayerSpec
+    from semsig_gis.sources.raw_layer import Position
 
 # What a file is by its name, and what pyosmium calls it.
 FORMATS = {".osm": "xml", ".osm.bz2": "xml.bz2", ".osm.pbf": "pbf"}
@@ -37,27 +36,15 @@ PLACES = "sparse_file_array"
 NOWHERE = (math.nan, math.nan)
 
 
-@dataclass(frozen=True, slots=True)
-class _Layer:
-    """A layer that is looked for, and what has been seen of it."""
-
-    spec: LayerSpec
-    rules: RowRules
-    rows: Rows
-
-
 class _Outline(NamedTuple):
     """A way or multipolygon that a layer wants, before the places of its nodes are known."""
 
-    layer: _Layer
-    row: Row
-    way: int | None  # its number; None for a multipolygon
-    outer: tuple[int, ...] = ()  # ways of a multipolygon
+    layer: ElementLayer
+    row: int  # of the layer
+    name: str
+    outer: tuple[int, ...]  # ways; of a way, itself
     inner: tuple[int, ...] = ()
-
-    @property
-    def ways(self) -> tuple[int, ...]:
-        return (*self.outer, *self.inner) if self.way is None else (self.way,)
+    is_way: bool = True
 
 
 def read_layers(
@@ -83,38 +70,24 @@ def read_layers(
     """
     path = Path(path)
     file = _file(path)
-    layers = tuple(_layer(spec, filters=filters) for spec in specs)
+    layers = [ElementLayer(spec, filters=filters, where=str(path)) for spec in specs]
     if not layers:
         return ()
-    index = TagIndex([layer.spec for layer in layers])
+    for spec in specs:
+        if spec.id_field is not None:
+            msg = (
+                f"layer {spec.name!r} has id_field = {spec.id_field!r}, yet the kind and number of "
+                "an element identify it; remove it."
+            )
+            raise CatalogError(msg)
+    index = TagIndex(specs)
     with _plainly(path):
         outlines = _scan(file, layers, index)
-        numbers = {way for outline in outlines for way in outline.ways}
-        lines = _lines(file, numbers) if numbers else {}
+        ways = {way for outline in outlines for way in (*outline.outer, *outline.inner)}
+        lines = _lines(file, ways) if ways else {}
     for outline in outlines:
-        _place(outline, lines)
-    done = []
-    for layer in layers:
-        system, notes = settle_crs(
-            WGS84, implicit=False, expected=layer.spec.crs, given=crs, where=str(path)
-        )
-        where = f"layer {layer.spec.name!r} of {path}"
-        done.append(
-            raw_layer(layer.rows, layer.spec, system, by_file=True, where=where, notes=notes)
-        )
-    return tuple(done)
-
-
-def _layer(spec: LayerSpec, *, filters: bool) -> _Layer:
-    where = f"layer {spec.name!r}"
-    if spec.id_field is not None:
-        msg = (
-            f"{where} has id_field = {spec.id_field!r}, yet the kind and number of an element "
-            "identify it; remove it."
-        )
-        raise CatalogError(msg)
-    fields = [field for _, field in spec.fields]
-    return _Layer(spec, RowRules(spec, fields, filters=filters, where=where), Rows())
+        outline.layer.rows.positions[outline.row] = _position(outline, lines)
+    return tuple(layer.raw(crs) for layer in layers)
 
 
 # --- The file ---------------------------------------------------------------------------------
@@ -155,53 +128,33 @@ def _plainly(path: Path) -> Iterator[None]:
 # --- Reading ----------------------------------------------------------------------------------
 
 
-def _scan(file: osmium.io.File, layers: Sequence[_Layer], index: TagIndex) -> list[_Outline]:
-    """Collect the nodes of every layer; return its ways and multipolygons."""
+def _scan(file: osmium.io.File, layers: Sequence[ElementLayer], index: TagIndex) -> list[_Outline]:
+    """Collect the elements of every layer; return its ways and multipolygons."""
     outlines = []
     processor = osmium.FileProcessor(file, NODE | WAY | RELATION)
     for element in processor.with_filter(KeyFilter(*index.keys)):
         if not isinstance(element, Node | Way | Relation) or element.deleted:
             continue
         tags = {tag.k: tag.v for tag in element.tags}
-        for number in index.layers(tags):
-            layer = layers[number]
-            row = _row(layer, KINDS[element.type_str()], element.id, tags)
-            if row is None:
-                continue
+        kind = KINDS[element.type_str()]
+        for layer in (layers[number] for number in index.layers(tags)):
             if isinstance(element, Node):
-                location = element.location
-                if location.valid():
-                    layer.rows.kept.append(row._replace(position=(location.lon, location.lat)))
-                else:
-                    layer.rows.errors[row.number] = f"{row.source_id} has no valid position"
-            elif isinstance(element, Way):
-                outlines.append(_Outline(layer, row, element.id))
-            else:
-                outlines.append(_multipolygon(layer, row, element))
+                valid = element.location.valid()
+                place = _lonlat(element.location) if valid else "has no valid position"
+                layer.add(kind, element.id, tags, place)
+            elif layer.add(kind, element.id, tags, None):
+                row, name = len(layer.rows.positions) - 1, layer.rows.names[-1]
+                outlines.append(_Outline(layer, row, name, *_ways(element)))
     return outlines
 
 
-def _row(layer: _Layer, kind: ElementKind, number: int, tags: Mapping[str, str]) -> Row | None:
-    """Return the row of an element that has the tags of a layer; None where it is left out."""
-    rows, rules = layer.rows, layer.rules
-    rows.read += 1
-    fields = {field: tags.get(field) for field in rules.fields}
-    if not (counts(kind, tags, layer.spec) and rules.keeps(fields)):
-        rows.filtered += 1
-        return None
-    name = f"{kind}/{number}"
-    return Row(rows.read, rules.class_name(fields), name, None, rules.half_width(fields))
-
-
-def _multipolygon(layer: _Layer, row: Row, relation: Relation) -> _Outline:
-    ways = [member for member in relation.members if member.type == "w"]
-    return _Outline(
-        layer,
-        row,
-        None,
-        outer=tuple(member.ref for member in ways if member.role != "inner"),
-        inner=tuple(member.ref for member in ways if member.role == "inner"),
-    )
+def _ways(element: Way | Relation) -> tuple[tuple[int, ...], tuple[int, ...], bool]:
+    """Return the ways that bound an element, those of its holes, and whether it is a way itself."""
+    if isinstance(element, Way):
+        return (element.id,), (), True
+    ways = [member for member in element.members if member.type == "w"]
+    outer = tuple(member.ref for member in ways if member.role != "inner")
+    return outer, tuple(member.ref for member in ways if member.role == "inner"), False
 
 
 def _lines(file: osmium.io.File, numbers: set[int]) -> dict[int, NDArray[np.float64]]:
@@ -246,32 +199,25 @@ def _line(places: Iterable[tuple[float, float]]) -> NDArray[np.float64]:
     return np.array(list(places), np.float64).reshape(-1, 2)
 
 
-def _place(outline: _Outline, lines: Mapping[int, NDArray[np.float64]]) -> None:
-    """Give a layer what a way or multipolygon stands for, or what is wrong with it."""
-    rows, row = outline.layer.rows, outline.row
+def _position(outline: _Outline, lines: Mapping[int, NDArray[np.float64]]) -> Position | str:
+    """Return what a way or multipolygon stands for, or what is wrong with it."""
     try:
-        _require_whole(outline, lines)
+        _require_whole((*outline.outer, *outline.inner), lines)
         outer, inner = ([lines[way] for way in ways] for ways in (outline.outer, outline.inner))
         role = outline.layer.spec.role
-        position = (
-            relation_shape(outer, inner, role)
-            if outline.way is None
-            else way_shape(lines[outline.way], role)
-        )
+        return way_shape(outer[0], role) if outline.is_way else relation_shape(outer, inner, role)
     except BadFeatureError as error:
-        rows.errors[row.number] = f"{row.source_id} {error}"
-    else:
-        rows.kept.append(row._replace(position=position))
+        return f"{outline.name} {error}"
 
 
-def _require_whole(outline: _Outline, lines: Mapping[int, NDArray[np.float64]]) -> None:
+def _require_whole(ways: Sequence[int], lines: Mapping[int, NDArray[np.float64]]) -> None:
     """Refuse what has ways or nodes that the file lacks, as at the edge of an extract."""
-    absent = [way for way in outline.ways if way not in lines]
+    absent = [way for way in ways if way not in lines]
     if absent:
-        msg = f"lacks {len(absent)} of its {len(outline.ways)} ways, as where a file is clipped"
+        msg = f"lacks {len(absent)} of its {len(ways)} ways, as where a file is clipped"
         raise BadFeatureError(msg)
-    nodes = sum(len(lines[way]) for way in outline.ways)
-    missing = sum(int(np.isnan(lines[way][:, 0]).sum()) for way in outline.ways)
+    nodes = sum(len(lines[way]) for way in ways)
+    missing = sum(int(np.isnan(lines[way][:, 0]).sum()) for way in ways)
     if missing:
         msg = f"lacks {missing} of its {nodes} nodes, as where a file is clipped"
         raise BadFeatureError(msg)

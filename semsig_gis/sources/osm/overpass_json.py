@@ -3,17 +3,16 @@
 from __future__ import annotations
 
 import json
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from semsig_gis.core.errors import SourceError
-from semsig_gis.sources.crs import WGS84, settle_crs
+from semsig_gis.sources.osm.elements import ElementLayer, TagIndex
 from semsig_gis.sources.osm.shapes import relation_shape, way_shape
-from semsig_gis.sources.osm.tags import TagIndex, counts
-from semsig_gis.sources.raw_layer import BadFeatureError, Row, RowRules, Rows, raw_layer
+from semsig_gis.sources.raw_layer import BadFeatureError
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -21,7 +20,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from semsig_gis.sources import RawLayer
-    from semsig_gis.sources.layers import ElementKind, LayerSpec
+    from semsig_gis.sources.layers import LayerSpec
     from semsig_gis.sources.raw_layer import Position
 
 KINDS = ("node", "way", "relation")
@@ -88,7 +87,7 @@ def read_layers(
     """
     paths = [Path(path)] if isinstance(path, str | Path) else list(path)
     where = str(paths[0]) if len(paths) == 1 else f"{len(paths)} tiles"
-    layers = [_Layer(spec, _rules(spec, filters=filters, where=where)) for spec in specs]
+    layers = [ElementLayer(spec, filters=filters, where=where) for spec in specs]
     if not layers:
         return ()
     index = TagIndex(specs)
@@ -100,58 +99,14 @@ def read_layers(
             raise SourceError(msg)
         places = _Places(document)
         for element in document.elements:
-            name = element["type"], element["id"]
+            name = kind, number = element["type"], element["id"]
             # what has no tags is there for the positions of others
             if "tags" in element and name not in seen:
                 seen.add(name)
-                for number in index.layers(element["tags"]):
-                    layers[number].take(element, places)
-    done = []
-    for layer in layers:
-        system, notes = settle_crs(
-            WGS84, implicit=False, expected=layer.spec.crs, given=crs, where=where
-        )
-        place = f"layer {layer.spec.name!r} of {where}"
-        done.append(
-            raw_layer(layer.rows, layer.spec, system, by_file=True, where=place, notes=notes)
-        )
-    return tuple(done)
-
-
-def _rules(spec: LayerSpec, *, filters: bool, where: str) -> RowRules:
-    fields = [field for _, field in spec.fields]
-    return RowRules(spec, fields, filters=filters, where=where)
-
-
-@dataclass(frozen=True, slots=True)
-class _Layer:
-    """A layer that is looked for, and what has been seen of it."""
-
-    spec: LayerSpec
-    rules: RowRules
-    rows: Rows = field(default_factory=Rows)
-
-    def take(self, element: dict[str, Any], places: _Places) -> None:
-        """Count an element that has the tags of the layer, and keep it if it is wanted."""
-        kind: ElementKind = element["type"]
-        tags = element["tags"]
-        rows, rules = self.rows, self.rules
-        rows.read += 1
-        values = {name: tags.get(name) for name in rules.fields}
-        if not (counts(kind, tags, self.spec) and rules.keeps(values)):
-            rows.filtered += 1
-            return
-        name = f"{kind}/{element['id']}"
-        try:
-            position = places.position(element, self.spec)
-        except BadFeatureError as error:
-            rows.errors[rows.read] = f"{name} {error}"
-        except (AttributeError, KeyError, TypeError):
-            rows.errors[rows.read] = f"{name} is not as Overpass servers send elements"
-        else:
-            source_id = rules.source_id(values, name)
-            class_name, half_width = rules.class_name(values), rules.half_width(values)
-            rows.kept.append(Row(rows.read, class_name, source_id, position, half_width))
+                tags = element["tags"]
+                for layer in (layers[place] for place in index.layers(tags)):
+                    layer.add(kind, number, tags, places.position(element, layer.spec))
+    return tuple(layer.raw(crs) for layer in layers)
 
 
 class _Places:
@@ -167,11 +122,16 @@ class _Places:
             if element["type"] in self._by_kind:
                 self._by_kind[element["type"]][element["id"]] = element
 
-    def position(self, element: dict[str, Any], spec: LayerSpec) -> Position:
-        """Return what an element stands for.
+    def position(self, element: dict[str, Any], spec: LayerSpec) -> Position | str:
+        """Return what an element stands for, or what is wrong with it."""
+        try:
+            return self._shape(element, spec)
+        except BadFeatureError as error:
+            return str(error)
+        except (AttributeError, KeyError, TypeError):
+            return "is not as Overpass servers send elements"
 
-        BadFeatureError if its position is not there, or not in full.
-        """
+    def _shape(self, element: dict[str, Any], spec: LayerSpec) -> Position:
         if element["type"] == "node":
             return _point(element)
         if "center" in element and spec.role == "objects" and not _has_outline(element):

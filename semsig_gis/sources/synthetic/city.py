@@ -17,7 +17,7 @@ import shapely
 
 from semsig_gis.core.crs import CLASS_NAME, SOURCE_ID
 from semsig_gis.core.errors import InputError
-from semsig_gis.sources import RawLayer
+from semsig_gis.sources import RawLayer, RowCounts
 from semsig_gis.sources.layers import LayerSpec
 from semsig_gis.sources.synthetic.blocks import build_houses, cut_back, open_ground
 from semsig_gis.sources.synthetic.furniture import CLASSES, furnish
@@ -111,7 +111,7 @@ def synthetic_city(spec: CitySpec | None = None) -> tuple[RawLayer, ...]:
     >>> layers = synthetic_city(CitySpec(size=500.0, seed=1))
     >>> [layer.spec.class_name for layer in layers[:3]]
     ['alignment_tree', 'water_fountain', 'street_light']
-    >>> layers[2].read > 100
+    >>> layers[2].counts.read > 100
     True
     """
     spec = spec or CitySpec()
@@ -148,7 +148,7 @@ def synthetic_surroundings(spec: CitySpec | None = None) -> tuple[RawLayer, RawL
     Examples
     --------
     >>> buildings, streets = synthetic_surroundings(CitySpec(size=500.0, seed=1))
-    >>> buildings.read > 100, bool(streets.table["half_width"].between(5, 21).all())
+    >>> buildings.counts.read > 100, bool(streets.table["half_width"].between(5, 21).all())
     (True, True)
     """
     spec = spec or CitySpec()
@@ -206,5 +206,5 @@ def _layer(spec: CitySpec, what: str, shapes: NDArray[np.object_], ids: Sequence
             attribution=f"synthetic city of semsig_gis, seed {spec.seed}: no real place",
         ),
         table=table,
-        read=len(table),
+        counts=RowCounts(read=len(table)),
     )

@@ -23,9 +23,10 @@ KNOWN_NAMES = ((("lon", "longitude"), ("lat", "latitude")), (("x",), ("y",)))
 
 @dataclass(frozen=True, slots=True)
 class CsvColumns:
-    """Separator, one character, and coordinate columns: x is easting or longitude."""
+    """Separator, one character, names, and coordinate columns: x is easting or longitude."""
 
     separator: str
+    names: tuple[str, ...]
     x: str | None
     y: str | None
 
@@ -73,16 +74,16 @@ def csv_columns(header: str, spec: LayerSpec | None, *, where: str) -> CsvColumn
             raise CatalogError(msg)
         for separator, names in layouts.items():
             if x in names and y in names:
-                return CsvColumns(separator, x, y)
+                return CsvColumns(separator, tuple(names), x, y)
         require_field(x, layouts[widest], where=where, key="x_field")
         require_field(y, layouts[widest], where=where, key="y_field")
     for separator, names in layouts.items():
         for x_names, y_names in KNOWN_NAMES:
-            found_x, found_y = _first(names, x_names), _first(names, y_names)
-            if found_x and found_y:
-                return CsvColumns(separator, found_x, found_y)
+            x, y = _first(names, x_names), _first(names, y_names)
+            if x and y:
+                return CsvColumns(separator, tuple(names), x, y)
     if spec is None:
-        return CsvColumns(widest, None, None)
+        return CsvColumns(widest, tuple(layouts[widest]), None, None)
     msg = (
         f"{where} has no coordinate columns lon and lat, or x and y; name them in x_field and "
         f"y_field; its columns are {', '.join(layouts[widest])}."

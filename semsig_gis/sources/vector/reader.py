@@ -19,12 +19,12 @@ import shapely.geometry
 
 from semsig_gis.core.errors import SourceError, UnknownNameError, nearest_name
 from semsig_gis.sources.crs import WGS84, crs_label, fits_the_globe, settle_crs, usable_crs
-from semsig_gis.sources.raw_layer import BadFeatureError, Row, RowRules, Rows, raw_layer
+from semsig_gis.sources.raw_layer import BadFeatureError, RowRules, Rows, raw_layer
 from semsig_gis.sources.vector.archive import Member, members, unreadable
 from semsig_gis.sources.vector.csv import csv_columns
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator
+    from collections.abc import Iterable, Iterator, Sequence
 
     from pyproj import CRS
 
@@ -77,6 +77,7 @@ def first_error(heard: list[logging.LogRecord]) -> str:
 
 
 NO_GEOMETRY = "None"
+CONTAINER = "GPKG"  # the one driver whose files hold several layers
 
 
 HEADER_BYTES = 65_536  # enough for the first line of a CSV file
@@ -166,18 +167,15 @@ def read_layer(
     ...     path = Path(folder, "benches.csv")
     ...     _ = path.write_text("id;lon;lat\n7;3.88;43.61\n8;here;43.61\n")
     ...     layer = read_layer(path, spec)
-    >>> len(layer.table), layer.read, layer.errors
+    >>> len(layer.table), layer.counts.read, layer.errors
     (1, 2, ("row 2: lon 'here' is not a number",))
     """
     where = f"layer {spec.name!r} ({path})"
     with listening() as heard:
         member = _pick(Path(path), spec.layer)
         columns = _columns(member, spec, where=where)
-        with _opened(member, columns) as source:
-            if columns is None and source.schema["geometry"] == NO_GEOMETRY:
-                msg = f"{where} has no geometry; give the layer that holds the positions."
-                raise SourceError(msg)
-            rules = RowRules(spec, list(source.schema["properties"]), filters=filters, where=where)
+        fields = _fields(member, spec, columns, where=where)
+        rules = RowRules(spec, fields, filters=filters, where=where)
         with _opened(member, columns, fields=rules.fields) as source:
             own, implicit = _own_crs(source)
             system, notes = settle_crs(
@@ -189,7 +187,7 @@ def read_layer(
         if any(record.getMessage().startswith("Failed to decode") for record in heard):
             notes += ("some text is not UTF-8 and was read as missing",)
     by_file = own is not None and not implicit
-    return raw_layer(rows, spec, system, by_file=by_file, where=where, notes=notes)
+    return raw_layer(rows, rules, system, by_file=by_file, where=where, notes=notes)
 
 
 def read_layers(
@@ -244,6 +242,9 @@ def _layers_in(member: Member) -> Iterator[Member]:
 
 def _pick(path: Path, wanted: str | None) -> Member:
     """Return the layer that a specification means."""
+    files = members(path)
+    if wanted is None and len(files) == 1 and files[0].driver != CONTAINER:
+        return files[0]
     layers = _layers(path)
     if wanted is None and len(layers) > 1:
         # A GeoPackage keeps its styles in a table without geometry, which is never meant.
@@ -264,11 +265,27 @@ def _pick(path: Path, wanted: str | None) -> Member:
 
 
 def _columns(member: Member, spec: LayerSpec | None, *, where: str) -> CsvColumns | None:
+    """Return what the first line of a CSV file says; None for a file of another kind."""
     if member.driver != "CSV":
         return None
-    # What is not UTF-8 here was refused when the file was first opened.
     head = member.content(HEADER_BYTES).decode("utf-8-sig", errors="replace")
+    if not head or "\0" in head or "\ufffd" in head:
+        with _opened(member):  # which refuses what is no CSV file, or has names that are not UTF-8
+            pass
     return csv_columns(head.splitlines()[0], spec, where=where)
+
+
+def _fields(
+    member: Member, spec: LayerSpec, columns: CsvColumns | None, *, where: str
+) -> Sequence[str]:
+    """Return the fields of a layer, by the header alone if it has all that are needed."""
+    if columns is not None and {field for _, field in spec.fields} <= set(columns.names):
+        return columns.names
+    with _opened(member, columns) as source:
+        if columns is None and source.schema["geometry"] == NO_GEOMETRY:
+            msg = f"{where} has no geometry; give the layer that holds the positions."
+            raise SourceError(msg)
+        return list(source.schema["properties"])
 
 
 def _describe(member: Member) -> LayerInfo:
@@ -336,39 +353,19 @@ def _read_rows(
         if feature is None:
             break
         rows.read += 1
+        properties = feature.properties
         try:
-            _read_row(rows, feature, rules, columns, damage)
+            position = columns.position(properties) if columns else _position(feature.geometry)
+            # From the first damage on, GDAL gives null for what it cannot read.
+            place: Position | str = (damage or None) if position is None else position
         except BadFeatureError as error:
-            rows.errors[rows.read] = str(error)
+            place = str(error)
+        rows.add([properties[field] for field in rules.fields], feature.id, place)
     if rows.read < expected and (damage or failures):
         rest = range(rows.read + 1, expected + 1)
         rows.errors.update(dict.fromkeys(rest, damage or "out of reach behind unreadable rows"))
         rows.read = expected
     return rows
-
-
-def _read_row(
-    rows: Rows,
-    feature: fiona.Feature,
-    rules: RowRules,
-    columns: CsvColumns | None,
-    damage: str,
-) -> None:
-    if not rules.keeps(feature.properties):
-        rows.filtered += 1
-        return
-    position: Position
-    if columns is not None:
-        position = columns.position(feature.properties)
-    else:
-        position = _position(feature.geometry)
-    if position is None and damage:
-        # From the first damage on, GDAL gives null for what it cannot read.
-        raise BadFeatureError(damage)
-    class_name = rules.class_name(feature.properties)
-    source_id = rules.source_id(feature.properties, feature.id)
-    half_width = rules.half_width(feature.properties)
-    rows.kept.append(Row(rows.read, class_name, source_id, position, half_width))
 
 
 def _position(geometry: fiona.Geometry | None) -> Position:
@@ -388,7 +385,7 @@ def _position(geometry: fiona.Geometry | None) -> Position:
 
 def _refuse_broken(rows: Rows, member: Member) -> None:
     """Tell the null geometries of a GeoJSON file from those that GDAL could make nothing of."""
-    null = [row.number for row in rows.kept if row.position is None]
+    null = [row for row, position in enumerate(rows.positions) if position is None]
     if not null:
         return
     document = json.loads(member.content().decode("utf-8-sig", errors="replace"))
@@ -396,8 +393,9 @@ def _refuse_broken(rows: Rows, member: Member) -> None:
     features = [item for item in listed if isinstance(item, dict) and item.get("type") == "Feature"]
     if len(features) != rows.read:
         return  # GDAL counts otherwise, so that rows cannot be told apart
-    broken = [number for number in null if not _is_nothing(features[number - 1].get("geometry"))]
-    rows.refuse(dict.fromkeys(broken, "its geometry is not valid GeoJSON"))
+    for row in null:
+        if not _is_nothing(features[rows.numbers[row] - 1].get("geometry")):
+            rows.positions[row] = "its geometry is not valid GeoJSON"
 
 
 def _is_nothing(geometry: object) -> bool:

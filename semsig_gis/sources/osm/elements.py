@@ -1,19 +1,23 @@
-"""Which OpenStreetMap elements a layer means: exact tags, shared by every reader of such data."""
+"""OpenStreetMap elements of a layer: which it means, by exact tags, and how they become rows."""
 
 from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
 from semsig_gis.core.errors import CatalogError
+from semsig_gis.sources.crs import WGS84, settle_crs
 from semsig_gis.sources.layers import ANY_VALUE
+from semsig_gis.sources.raw_layer import RowRules, Rows, raw_layer
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
+    from semsig_gis.sources import RawLayer
     from semsig_gis.sources.layers import ElementKind, LayerSpec
+    from semsig_gis.sources.raw_layer import Position
 
 
-def matches(tags: Mapping[str, str], spec: LayerSpec) -> bool:
+def has_tags(tags: Mapping[str, str], spec: LayerSpec) -> bool:
     """Tell whether an element has the tags of the layer; without ``tags``, none has.
 
     One of the layer's alternatives must hold, in all its keys. Values compare exactly, so that
@@ -26,7 +30,7 @@ def matches(tags: Mapping[str, str], spec: LayerSpec) -> bool:
     )
 
 
-def counts(kind: ElementKind, tags: Mapping[str, str], spec: LayerSpec) -> bool:
+def has_shape(kind: ElementKind, tags: Mapping[str, str], spec: LayerSpec) -> bool:
     """Tell whether an element that has the tags of the layer is of a shape that it wants.
 
     It is not if its kind is not among the layer's ``elements``, if it is a relation but no
@@ -70,8 +74,41 @@ class TagIndex:
         for key, value in tags.items():
             for looked_up in (value, ANY_VALUE):
                 candidates |= self._by_tag.get((key, looked_up), set())
-        return [number for number in sorted(candidates) if matches(tags, self._specs[number])]
+        return [number for number in sorted(candidates) if has_tags(tags, self._specs[number])]
 
 
 def _accepts(accepted: tuple[str, ...], value: str | None) -> bool:
     return value in accepted or (ANY_VALUE in accepted and value not in {None, "no"})
+
+
+class ElementLayer:
+    """A layer that is being read, of elements that have its tags."""
+
+    def __init__(self, spec: LayerSpec, *, filters: bool, where: str) -> None:
+        self.spec = spec
+        self.rows = Rows()
+        self._where = f"layer {spec.name!r} of {where}"
+        fields = [field for _, field in spec.fields]  # any key of a tag may be one
+        self._rules = RowRules(spec, fields, filters=filters, where=self._where)
+
+    def add(
+        self, kind: ElementKind, number: int, tags: Mapping[str, str], position: Position | str
+    ) -> bool:
+        """Add an element, with what is wrong with it in the place of its position, if it counts."""
+        self.rows.read += 1
+        if not has_shape(kind, tags, self.spec):
+            self.rows.filtered += 1
+            return False
+        name = f"{kind}/{number}"
+        text = f"{name} {position}" if isinstance(position, str) else position
+        self.rows.add([tags.get(field) for field in self._rules.fields], name, text)
+        return True
+
+    def raw(self, crs: str | None) -> RawLayer:
+        """Return the layer; elements are in WGS 84, whatever CRS the user states."""
+        system, notes = settle_crs(
+            WGS84, implicit=False, expected=self.spec.crs, given=crs, where=self._where
+        )
+        return raw_layer(
+            self.rows, self._rules, system, by_file=True, where=self._where, notes=notes
+        )
