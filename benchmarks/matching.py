@@ -20,7 +20,7 @@ from semsig_gis.core.signature import SignatureSpec
 from semsig_gis.database.database import BEARING_UNITS, SignatureDatabase
 from semsig_gis.matching.method import Method
 from semsig_gis.matching.scores import score_cells
-from semsig_gis.reports.paper_figures import PARIS_QUERY_MS
+from semsig_gis.reports import paris
 from semsig_gis.sources.catalog import paper_taxonomy
 
 if TYPE_CHECKING:
@@ -152,7 +152,7 @@ def comparisons(size: str) -> Iterator[Comparison]:
             peer_name="rapidfuzz.process.cdist([query], cells), edit distance",
             repeats=scale.repeats,
             bar=bar,
-            paper=PARIS_QUERY_MS[f"{part}:{measure}"],
+            paper=paris.QUERY_MS[f"{part}:{measure}"],
         )
     for method in ("edit+edit", "edit+edit:5%", "jaccard+jaccard:5%", "histogram+histogram:5%"):
         yield compare(
@@ -161,7 +161,7 @@ def comparisons(size: str) -> Iterator[Comparison]:
             partial(peer, 1, tuple(of_cells)),
             peer_name="rapidfuzz.process.cdist([query], cells), by types and by angles",
             repeats=scale.repeats,
-            paper=PARIS_QUERY_MS.get(method),
+            paper=paris.QUERY_MS.get(method),
         )
 
     for part in of_cells:

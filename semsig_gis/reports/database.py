@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 from semsig_gis.core.text import escaped
 from semsig_gis.database.properties import database_summary
-from semsig_gis.reports.paper_figures import PARIS, PARIS_GROUPS, PARIS_OCCURRENCES
+from semsig_gis.reports import paris
 from semsig_gis.reports.tables import Table, percent
 
 if TYPE_CHECKING:
@@ -57,22 +57,16 @@ def database_markdown(
 
 
 def _occurrence_table(facts: Mapping[str, Any]) -> Table:
-    total = sum(PARIS_OCCURRENCES.values())
+    total = sum(paris.OCCURRENCES.values())
     rows = []
     for item in facts["occurrences"]:
-        paris = PARIS_OCCURRENCES.get(item["name"])
-        rows.append(
-            (
-                f"{item['title']} ({item['symbol']})",
-                f"{item['number']:,}",
-                percent(item["share"]),
-                "" if paris is None else f"{paris:,}",
-                "" if paris is None else percent(paris / total),
-            )
-        )
+        number = paris.OCCURRENCES.get(item["name"])
+        theirs = ("", "") if number is None else (f"{number:,}", percent(number / total))
+        label = f"{item['title']} ({item['symbol']})"
+        rows.append((label, f"{item['number']:,}", percent(item["share"]), *theirs))
     return Table(
         title="Occurrences by class",
-        columns=("Class (symbol)", "Number", "Share", PARIS, "Share"),
+        columns=("Class (symbol)", "Number", "Share", paris.COLUMN, "Share"),
         rows=tuple(rows),
         note="An object counts once in every signature that holds it.",
     )
@@ -109,7 +103,7 @@ def _property_table(facts: Mapping[str, Any]) -> Table:
     )
     return Table(
         title="Database",
-        columns=("Property", "Ours", PARIS),
+        columns=("Property", "Ours", paris.COLUMN),
         rows=rows,
         note=(
             "Our covered area is cells times the area of a cell; by that count "
@@ -136,12 +130,12 @@ def _group_table(facts: Mapping[str, Any]) -> Table:
     groups = facts["groups"]
     kinds = ("type", "angle", "both")
     rows = []
-    for name, paris in PARIS_GROUPS.items():
+    for name, theirs in paris.GROUPS.items():
         label = GROUP_LABELS.get(name, name)
-        rows.append((label, *(_statistic(name, groups[kind][name]) for kind in kinds), *paris))
+        rows.append((label, *(_statistic(name, groups[kind][name]) for kind in kinds), *theirs))
     return Table(
         title="Sizes of the signature groups, in cells",
-        columns=("", "By type", "By angle", "By both", f"{PARIS}, by type", "by angle"),
+        columns=("", "By type", "By angle", "By both", f"{paris.COLUMN}, by type", "by angle"),
         rows=tuple(rows),
         note=(
             "The paper counts distinct patterns over its 10,000 queries, not over all cells. "

@@ -15,7 +15,7 @@ from semsig_gis.likelihood.answer_rule import DEFAULT_RULE
 from semsig_gis.matching.ties import NEAR_METRES, NEAR_PLACES
 from semsig_gis.queries.chain import chain_text
 from semsig_gis.queries.paper_errors import DISTORTIONS, FalseClass
-from semsig_gis.reports.paper_figures import PARIS, PARIS_ACCURACY, PARIS_STEP_M
+from semsig_gis.reports import paris
 from semsig_gis.reports.tables import Table
 
 if TYPE_CHECKING:
@@ -137,13 +137,13 @@ def _figure_table(evaluation: Evaluation) -> Table:
         "Ties are scored by expectation. A query is successful when its error is at most 50 m "
         "with probability 0.5 or more."
     )
-    paris = "" if p50 is None else " The paper's figures are for another city, Paris."
+    elsewhere = "" if p50 is None else " The paper's figures are for another city, Paris."
     columns = ("Figure", "Ours", "95 %")
     return Table(
         title="Figures",
-        columns=columns if p50 is None else (*columns, PARIS),
+        columns=columns if p50 is None else (*columns, paris.COLUMN),
         rows=tuple(row[:3] if p50 is None else row for row in rows),
-        note=ties + paris,
+        note=ties + elsewhere,
     )
 
 
@@ -227,7 +227,7 @@ def _paris_accuracy(evaluation: Evaluation) -> tuple[float | None, float | None]
         for resort in (True, False)
         for false_class in get_args(FalseClass)
     )
-    if not (same_method and same_noise and database["step_m"] == PARIS_STEP_M):
+    if not (same_method and same_noise and database["step_m"] == paris.STEP_M):
         return None, None
     key = (database["radius_m"], database["levels"])
-    return PARIS_ACCURACY.get(key, (None, None))
+    return paris.ACCURACY.get(key, (None, None))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import KW_ONLY, dataclass, field
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
@@ -11,7 +11,7 @@ if TYPE_CHECKING:
     from semsig_gis.core.taxonomy import Taxonomy
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, slots=True)
 class Number:
     """A number of ours, beside the paper's where it prints one.
 
@@ -23,6 +23,7 @@ class Number:
     row: str
     column: str
     ours: float | None
+    _: KW_ONLY
     low: float | None = None
     high: float | None = None
     paper: float | None = None

@@ -13,7 +13,7 @@ from sentences import assert_sentence
 from semsig_gis.core.errors import DatabaseError, InputError, SemsigError
 from semsig_gis.database.file import open_database, save_database
 from semsig_gis.experiments.paper.reproduce import reproduce
-from semsig_gis.reports.paper_figures import PARIS_QUERY_MS
+from semsig_gis.reports import paris
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -49,7 +49,7 @@ def test_everything_is_run(reproduction: Reproduction) -> None:
     for results in reproduction.experiments.values():
         for evaluation in results.values():
             assert len(evaluation.queries) == QUERIES
-    assert list(reproduction.seconds) == list(PARIS_QUERY_MS)
+    assert list(reproduction.seconds) == list(paris.QUERY_MS)
     levels = reproduction.experiments["levels-8"]["medium/stages-5-top1"]
     assert levels.database["levels"] == 8
     wide = reproduction.experiments["range-40"]["medium/stages-5-top1"]

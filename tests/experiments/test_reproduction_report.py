@@ -11,16 +11,8 @@ import pytest
 from reproductions import QUERIES
 
 from semsig_gis.experiments.paper.report import reproduction_report
+from semsig_gis.reports import paris
 from semsig_gis.reports.page import write_report
-from semsig_gis.reports.paper_figures import (
-    PARIS_ACCURACY,
-    PARIS_ALONE,
-    PARIS_DATABASE,
-    PARIS_GROUPS,
-    PARIS_OCCURRENCES,
-    PARIS_QUERY_MS,
-    PARIS_READ_OFF,
-)
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -43,17 +35,17 @@ def numbers(report: Report, section: str) -> dict[tuple[str, str], Number]:
 def test_every_figure_that_the_paper_prints_stands_beside_ours(report: Report) -> None:
     told = [one.paper for part in report.sections for one in part.numbers if one.paper is not None]
     printed = [
-        *PARIS_OCCURRENCES.values(),
-        *PARIS_DATABASE.values(),
+        *paris.OCCURRENCES.values(),
+        *paris.DATABASE.values(),
         *(float(text.replace(",", "")) for key in ("count", "mean", "std", "max")
-          for text in PARIS_GROUPS[key]),
-        *(value for pair in PARIS_ACCURACY.values() for value in pair if value is not None),
-        *PARIS_QUERY_MS.values(),
-        PARIS_ALONE,
+          for text in paris.GROUPS[key]),
+        *(value for pair in paris.ACCURACY.values() for value in pair if value is not None),
+        *paris.QUERY_MS.values(),
+        paris.ALONE,
     ]  # fmt: skip
     assert set(printed) <= set(told)
     points = [y for part in report.sections for plot in part.plots for _, y, _ in plot.paper]
-    assert set(PARIS_READ_OFF.values()) <= {*told, *points}
+    assert set(paris.READ_OFF.values()) <= {*told, *points}
 
 
 def test_figures_are_those_of_the_evaluations(report: Report, reproduction: Reproduction) -> None:

@@ -8,7 +8,6 @@ would change.
 
 from __future__ import annotations
 
-from types import MappingProxyType
 from typing import TYPE_CHECKING
 
 from semsig_gis.evaluation.methods import parse_method
@@ -18,73 +17,42 @@ from semsig_gis.queries.chain import parse_chain
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
+MEASURES = ("jaccard", "histogram", "edit")
+LEVELS = ("light", "medium", "strong")  # of distortion
+RANGES = (20.0, 30.0, 40.0)  # of sight, in metres
+SCALES = (8, 16, 24, 32)  # numbers of angle levels
 QUERIES = 10_000
-"""How many queries the paper asks."""
+MANY = 100  # so many candidates count where the paper does not look at the first alone
+READ = 1_000  # queries of each reading of what the paper leaves open, unless fewer are asked
+FEWER = 500  # queries of the likelihood method, unless fewer are asked
 
-MANY = 100
-"""How many best candidates count where the paper does not look at the first alone."""
-
-READ = 1_000
-"""Queries of each reading of what the paper leaves open, unless fewer are asked."""
-
-FEWER = 500
-"""Queries of the likelihood method, unless fewer are asked."""
-
-SINGLES: Mapping[str, str] = MappingProxyType(
-    {
-        f"{part}-{measure}": f"{part}:{measure}"
-        for measure in ("jaccard", "histogram", "edit")
-        for part in ("types", "angles")
-    }
-)
-"""Methods of one measure of one part, by their names in the experiments."""
-
-FUSIONS: Mapping[str, str] = MappingProxyType(
-    {f"fusion-{measure}": f"edit+{measure}" for measure in ("jaccard", "histogram", "edit")}
-)
-"""Fusions of the edit distance of types with a measure of angles."""
-
-WEIGHTS: Mapping[float, str] = MappingProxyType(
-    {
-        **{share: f"weights-{round(100 * share)}" for share in (0.1, 0.3)},
-        0.5: "fusion-edit",
-        **{share: f"weights-{round(100 * share)}" for share in (0.7, 0.9)},
-    }
-)
-"""The names of the fusions of two edit distances, by the share of the types."""
-
-PERCENTS: Mapping[int, str] = MappingProxyType(
-    {**{percent: f"stages-{percent}" for percent in (1, 5, 10, 20, 50)}, 100: "fusion-edit"}
-)
-"""The names of the two-stage fusions of edit distances, by the percentage that is kept."""
-
-BEST = "stages-5"
-"""The name of the method that the paper recommends."""
-
-FIRST_STAGE = "types-edit"
-"""The name of its first stage alone."""
-
-LEVELS = ("light", "medium", "strong")
-"""The paper's levels of distortion."""
-
-RANGES = (20.0, 30.0, 40.0)
-"""Visibility ranges in metres."""
-
-SCALES = (8, 16, 24, 32)
-"""Numbers of angle levels."""
-
-READINGS: Mapping[str, str] = MappingProxyType(
-    {
-        "kept-uniform": "order kept, false objects of any class",
-        "kept-frequency": "order kept, false objects as frequent as true ones",
-        "sorted-uniform": "sorted again, false objects of any class",
-        "sorted-frequency": "sorted again, false objects as frequent as true ones",
-    }
-)
-"""What the paper leaves open of the distortion."""
-
+# Names of methods in the experiments: measures of one part, fusions of the edit distance of types
+# with a measure of angles, fusions of edit distances by the share of the types, and the same in two
+# stages by the percentage that the first one keeps.
+SINGLES: Mapping[str, str] = {
+    f"{part}-{measure}": f"{part}:{measure}" for measure in MEASURES for part in ("types", "angles")
+}
+FUSIONS: Mapping[str, str] = {f"fusion-{measure}": f"edit+{measure}" for measure in MEASURES}
+WEIGHTS: Mapping[float, str] = {
+    **{share: f"weights-{round(100 * share)}" for share in (0.1, 0.3)},
+    0.5: "fusion-edit",
+    **{share: f"weights-{round(100 * share)}" for share in (0.7, 0.9)},
+}
+PERCENTS: Mapping[int, str] = {
+    **{percent: f"stages-{percent}" for percent in (1, 5, 10, 20, 50)},
+    100: "fusion-edit",
+}
+BEST = "stages-5"  # the one that the paper recommends
+FIRST_STAGE = "types-edit"  # its first stage alone
 OURS = "likelihood"
-"""The name of the likelihood method."""
+
+# What the paper leaves open of the distortion.
+READINGS: Mapping[str, str] = {
+    "kept-uniform": "order kept, false objects of any class",
+    "kept-frequency": "order kept, false objects as frequent as true ones",
+    "sorted-uniform": "sorted again, false objects of any class",
+    "sorted-frequency": "sorted again, false objects as frequent as true ones",
+}
 
 
 def paper_experiments(

@@ -26,7 +26,7 @@ from semsig_gis.experiments.run import run_experiments
 from semsig_gis.matching.method import Method
 from semsig_gis.objects.clean import build_objects
 from semsig_gis.queries.draw import QuerySpec
-from semsig_gis.reports.paper_figures import PARIS_QUERY_MS
+from semsig_gis.reports import paris
 from semsig_gis.sources.catalog import paper_taxonomy
 from semsig_gis.sources.synthetic.city import (
     PARIS_LIKE,
@@ -318,7 +318,7 @@ class _Begun:
         if not file.is_file():
             found = time_queries(
                 city,
-                {text: Method.parse(text) for text in PARIS_QUERY_MS},
+                {text: Method.parse(text) for text in paris.QUERY_MS},
                 progress=self.progress("measuring times"),
             )
             write_json(file, found)
