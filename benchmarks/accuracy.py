@@ -32,8 +32,7 @@ from semsig_gis.database.build import build_database
 from semsig_gis.database.viewpoints import ViewpointSpec
 from semsig_gis.likelihood.answer_rule import calibrate
 from semsig_gis.likelihood.index import build_index
-from semsig_gis.likelihood.noise.model import named_noise
-from semsig_gis.likelihood.refine import cell_noise
+from semsig_gis.likelihood.noise.model import cell_noise, named_noise
 from semsig_gis.matching.method import Method
 from semsig_gis.objects.clean import build_objects
 from semsig_gis.objects.load import choose_layers, read_files

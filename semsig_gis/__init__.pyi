@@ -84,6 +84,7 @@ from .likelihood.noise.learn import learn_noise as learn_noise, read_samples as 
 from .likelihood.noise.model import (
     NoiseMixture as NoiseMixture,
     NoiseSpec as NoiseSpec,
+    cell_noise as cell_noise,
     named_noise as named_noise,
 )
 from .likelihood.posterior import Posterior as Posterior
@@ -93,7 +94,6 @@ from .likelihood.priors import (
     raster_prior as raster_prior,
     weight_prior as weight_prior,
 )
-from .likelihood.refine import cell_noise as cell_noise
 from .likelihood.route import Leg as Leg
 from .queries.draw import QuerySpec as QuerySpec, draw_queries as draw_queries
 from .queries.paper_errors import (

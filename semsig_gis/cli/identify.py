@@ -54,7 +54,7 @@ def identify(
     from semsig_gis.evaluation.identify.check import check_identifiability
     from semsig_gis.evaluation.identify.identify import identify as identified
     from semsig_gis.evaluation.identify.result import save_identifiability
-    from semsig_gis.likelihood.refine import cell_noise
+    from semsig_gis.likelihood.noise.model import cell_noise
     from semsig_gis.reports.identifiability import check_tables, identifiability_tables
 
     _require_numbers(check, threads, out)

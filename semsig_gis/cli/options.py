@@ -84,7 +84,7 @@ def locator(
     """Return what answers the queries of a command."""
     from semsig_gis.likelihood.answer_rule import DEFAULT_RULE, open_rule
     from semsig_gis.likelihood.locate import LikelihoodLocator
-    from semsig_gis.likelihood.refine import cell_noise
+    from semsig_gis.likelihood.noise.model import cell_noise
 
     if on_grid and refine:
         msg = "--on-grid and --refine were given; a place on the grid is not to be refined, so "

@@ -6,8 +6,7 @@ from typing import TYPE_CHECKING
 
 from semsig_gis.likelihood.locate import LikelihoodLocator
 from semsig_gis.likelihood.method import LIKELIHOOD, LikelihoodMethod
-from semsig_gis.likelihood.noise.model import NOISES
-from semsig_gis.likelihood.refine import cell_noise
+from semsig_gis.likelihood.noise.model import NOISES, cell_noise
 from semsig_gis.matching.method import Method
 from semsig_gis.matching.search import DistanceLocator
 

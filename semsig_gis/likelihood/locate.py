@@ -21,8 +21,9 @@ from semsig_gis.database.answer import REGION_SHARE, Answer, Ranking, check_quer
 from semsig_gis.likelihood.answer_rule import DEFAULT_RULE
 from semsig_gis.likelihood.explain import explain, explain_cell
 from semsig_gis.likelihood.index import CellScores
+from semsig_gis.likelihood.noise.model import cell_noise, place_noise
 from semsig_gis.likelihood.posterior import Posterior, posterior
-from semsig_gis.likelihood.refine import KEPT, Refinement, cell_noise, place_noise, refine
+from semsig_gis.likelihood.refine import KEPT, Refinement, refine
 from semsig_gis.likelihood.rerank import align_cells, rerank
 from semsig_gis.likelihood.route import route_posteriors
 
@@ -419,7 +420,7 @@ def locate(
     ----------
     index : LikelihoodIndex
         The cells and the noise model. For queries from anywhere, not from the middles of cells
-        alone, that is ``cell_noise(noise, step)`` (see `likelihood.refine`).
+        alone, that is ``cell_noise(noise, step)`` (see `likelihood.noise.model`).
     query : Signature
         At least one object; types or bearings may be unknown.
     north_sigma : float, default 0

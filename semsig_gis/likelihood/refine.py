@@ -12,7 +12,6 @@ from semsig_gis.core.errors import InputError
 from semsig_gis.core.geometry import signed_degrees
 from semsig_gis.database.visibility import views_at
 from semsig_gis.likelihood.association import place_loglik, turn_logs
-from semsig_gis.likelihood.noise.model import NoiseMixture
 from semsig_gis.likelihood.noise.table import LONGEST_TABLE, noise_tables
 
 if TYPE_CHECKING:
@@ -110,36 +109,6 @@ class Refinement:
 
 BEST = 300
 """Likeliest parts among which the best place is looked for."""
-
-
-def cell_noise(noise: Noise, step: float) -> Noise:
-    """Return a noise model for queries from anywhere in a cell, not from its middle alone.
-
-    It adds ``step / 12 ** 0.5`` metres of uncertainty of the place, each way, in quadrature.
-    """
-    if isinstance(noise, NoiseMixture):
-        specs = tuple(cell_noise(spec, step) for spec in noise.specs)
-        return replace(noise, specs=specs)  # type: ignore[arg-type]
-    sigma = math.hypot(noise.position_sigma, step / math.sqrt(12.0))
-    return replace(noise, position_sigma=sigma)
-
-
-def place_noise(noise: Noise, step: float) -> Noise:
-    """Return the noise model for a known place, the inverse of `cell_noise`.
-
-    Raises `InputError` if the model has too little uncertainty of the place to take away.
-    """
-    if isinstance(noise, NoiseMixture):
-        specs = tuple(place_noise(spec, step) for spec in noise.specs)
-        return replace(noise, specs=specs)  # type: ignore[arg-type]
-    known = noise.position_sigma**2 - step**2 / 12.0
-    if known < -ROUNDING:
-        msg = (
-            f"noise model {noise.name!r} is for queries from the middles of cells; build the index "
-            f"for cell_noise(noise, {step:g}), which is for queries from anywhere in them."
-        )
-        raise InputError(msg)
-    return replace(noise, position_sigma=0.0 if known < ROUNDING else math.sqrt(known))
 
 
 def refine(

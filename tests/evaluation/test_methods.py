@@ -12,8 +12,7 @@ from semsig_gis.evaluation.methods import make_locator, parse_method
 from semsig_gis.likelihood.index import build_index
 from semsig_gis.likelihood.locate import locate
 from semsig_gis.likelihood.method import LikelihoodMethod
-from semsig_gis.likelihood.noise.model import named_noise
-from semsig_gis.likelihood.refine import cell_noise
+from semsig_gis.likelihood.noise.model import cell_noise, named_noise
 from semsig_gis.matching.method import Method
 from semsig_gis.matching.scores import score_cells
 from semsig_gis.queries.draw import QuerySpec, draw_queries

@@ -17,9 +17,8 @@ from semsig_gis.database.visibility import views_at
 from semsig_gis.likelihood.answer_rule import AnswerRule
 from semsig_gis.likelihood.index import build_index
 from semsig_gis.likelihood.locate import locate, locate_route
-from semsig_gis.likelihood.noise.model import named_noise
+from semsig_gis.likelihood.noise.model import cell_noise, named_noise
 from semsig_gis.likelihood.priors import position_prior
-from semsig_gis.likelihood.refine import cell_noise
 from semsig_gis.likelihood.route import Leg
 
 WORLD = random_town()

@@ -13,8 +13,14 @@ from semsig_gis.core.rtree import ObjectIndex
 from semsig_gis.core.signature import Signature
 from semsig_gis.database.occlusion import Footprints
 from semsig_gis.database.visibility import views_at
-from semsig_gis.likelihood.noise.model import NoiseMixture, NoiseSpec, named_noise
-from semsig_gis.likelihood.refine import Refinement, cell_noise, place_noise, refine
+from semsig_gis.likelihood.noise.model import (
+    NoiseMixture,
+    NoiseSpec,
+    cell_noise,
+    named_noise,
+    place_noise,
+)
+from semsig_gis.likelihood.refine import Refinement, refine
 
 SHARP = NoiseSpec(detection=0.95, misnamed=0.02, clutter=0.5, bearing_sigma=3.0)
 
@@ -123,9 +129,8 @@ def test_a_mixture_of_noise_is_widened() -> None:
 def test_the_noise_of_a_known_place_comes_back(sigma: float) -> None:
     for noise in (NoiseSpec(position_sigma=sigma), named_noise("generic")):
         back = place_noise(cell_noise(noise, 10.0), 10.0)
-        specs = (noise, back) if isinstance(noise, NoiseSpec) else (noise.specs[0], back.specs[0])  # type: ignore[union-attr]
-        one, other = (spec.position_sigma for spec in specs)  # type: ignore[union-attr]
-        assert one == pytest.approx(other, abs=2e-3)
+        for one, other in zip(noise.specs, back.specs, strict=True):
+            assert one.position_sigma == pytest.approx(other.position_sigma, abs=2e-3)
     with pytest.raises(InputError) as caught:
         place_noise(named_noise("light"), 10.0)
     assert_sentence(caught.value, "'light'", "cell_noise")

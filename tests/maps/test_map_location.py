@@ -22,8 +22,7 @@ from semsig_gis.core.signature import Signature
 from semsig_gis.database.store import ObjectStore
 from semsig_gis.likelihood.index import build_index
 from semsig_gis.likelihood.locate import locate
-from semsig_gis.likelihood.noise.model import named_noise
-from semsig_gis.likelihood.refine import cell_noise
+from semsig_gis.likelihood.noise.model import cell_noise, named_noise
 from semsig_gis.maps.location import location_map
 
 if TYPE_CHECKING:

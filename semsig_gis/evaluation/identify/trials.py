@@ -12,7 +12,6 @@ import numpy as np
 from semsig_gis.core.signature import Signature
 from semsig_gis.evaluation.identify.lookalikes import city_extent
 from semsig_gis.likelihood.index import build_index
-from semsig_gis.likelihood.noise.model import NoiseMixture
 from semsig_gis.likelihood.posterior import posterior
 from semsig_gis.likelihood.rerank import rerank
 from semsig_gis.queries.chain import ready_chain
@@ -280,6 +279,4 @@ def _without_class(noise: Noise, name: str, classes: int) -> Noise:
         clutter = spec.clutter if spec.clutter_shares else spec.clutter * (1.0 - 1.0 / classes)
         return replace(spec, confusion=confusion, clutter=clutter)
 
-    if isinstance(noise, NoiseMixture):
-        return replace(noise, specs=tuple(without(spec) for spec in noise.specs))
-    return without(noise)
+    return noise.changed(without)

@@ -10,19 +10,20 @@ import json
 import math
 import tomllib
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, field, fields
+from dataclasses import asdict, dataclass, field, fields, replace
 from pathlib import Path
 from types import MappingProxyType
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from semsig_gis.core.errors import InputError, UnknownNameError, nearest_name
+from semsig_gis.core.geometry import HALF_TURN
 from semsig_gis.storage.toml import toml_text
 from semsig_gis.storage.whole import whole_file
 
-HALF_TURN = 180.0
+if TYPE_CHECKING:
+    from collections.abc import Callable
 
-
-SUM_TOLERANCE = 1e-6
+ROUNDING = 1e-6  # of sums of shares, and of squares of metres
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -100,24 +101,33 @@ class NoiseSpec:
         if not isinstance(self.name, str):
             msg = f"name of the noise is {self.name!r}; give a text."
             raise InputError(msg)
-        for label, check in _CHECKS.items():
-            check(label, getattr(self, label))
-        for label in _BY_CLASS:
+        for label, number in _NUMBERS.items():
+            number.check(label, getattr(self, label))
+        for label in ("detection_by_class", "misnamed_by_class", "bearing_sigma_by_class"):
+            number = _NUMBERS[label.removesuffix("_by_class")]
             for name, value in _table(label, getattr(self, label)).items():
-                _CHECKS[label.removesuffix("_by_class")](f"{label} {name!r}", value)
+                number.check(f"{label} {name!r}", value)
         for name, row in _table("confusion", self.confusion).items():
             _check_shares(f"confusion row {name!r}", _table(f"confusion row {name!r}", row))
         if _table("clutter_shares", self.clutter_shares):
             _check_shares("clutter_shares", self.clutter_shares)
 
-    def to_dict(self) -> dict[str, Any]:
-        """Return the model as plain values, ready for JSON.
+    @property
+    def specs(self) -> tuple[NoiseSpec, ...]:
+        """The model itself, the only one, as in a mixture of one."""
+        return (self,)
 
-        Returns
-        -------
-        dict
-            What `noise_from_dict` reads.
-        """
+    @property
+    def weights(self) -> tuple[float, ...]:
+        """Its chance, which is one."""
+        return (1.0,)
+
+    def changed(self, change: Callable[[NoiseSpec], NoiseSpec]) -> NoiseSpec:
+        """Return the model after a change, which a mixture makes in each of its models."""
+        return change(self)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the model as plain values, ready for JSON, that `noise_from_dict` reads."""
         values: dict[str, Any] = _plain(asdict(self))
         return values
 
@@ -168,14 +178,12 @@ class NoiseMixture:
             msg = f"weights of the mixture are {self.weights}; leave models of no weight out."
             raise InputError(msg)
 
-    def to_dict(self) -> dict[str, Any]:
-        """Return the mixture as plain values, ready for JSON.
+    def changed(self, change: Callable[[NoiseSpec], NoiseSpec]) -> NoiseMixture:
+        """Return the mixture after a change of each of its models."""
+        return replace(self, specs=tuple(map(change, self.specs)))
 
-        Returns
-        -------
-        dict
-            What `noise_from_dict` reads.
-        """
+    def to_dict(self) -> dict[str, Any]:
+        """Return the mixture as plain values, ready for JSON, that `noise_from_dict` reads."""
         return {
             "name": self.name,
             "weights": list(self.weights),
@@ -197,27 +205,75 @@ def noise_from_dict(values: Mapping[str, Any]) -> Noise:
         msg = f"a noise model is {values!r}; give a table of its fields."
         raise InputError(msg)
     kind = NoiseMixture if "specs" in values else NoiseSpec
-    known = [item.name for item in fields(kind)]
+    labels = [item.name for item in fields(kind)]
     for name in values:
-        if name not in known:
-            hint = nearest_name(str(name), known)
-            msg = f"a noise model has no field {name!r}{hint}; its fields are {', '.join(known)}."
+        if name not in labels:
+            hint = nearest_name(str(name), labels)
+            msg = f"a noise model has no field {name!r}{hint}; its fields are {', '.join(labels)}."
             raise InputError(msg)
     if kind is NoiseSpec:
         return NoiseSpec(**values)
     try:
-        specs = tuple(noise_from_dict(one) for one in values["specs"])
-        weights = tuple(float(one) for one in values["weights"])
+        specs = tuple(map(noise_from_dict, values["specs"]))
+        weights = tuple(map(float, values["weights"]))
     except (KeyError, TypeError, ValueError) as error:
         if isinstance(error, InputError):
             raise
         msg = f"a mixture of noise models is not usable ({error}); give lists specs and weights."
         raise InputError(msg) from error
-    if not all(isinstance(one, NoiseSpec) for one in specs):
+    plain = tuple(spec for spec in specs if isinstance(spec, NoiseSpec))
+    if len(plain) < len(specs):
         msg = "a mixture of noise models holds another mixture; give plain models."
         raise InputError(msg)
-    plain = tuple(one for one in specs if isinstance(one, NoiseSpec))
     return NoiseMixture(specs=plain, weights=weights, name=values.get("name", "custom"))
+
+
+def cell_noise(noise: Noise, step: float) -> Noise:
+    """Return a noise model for queries from anywhere in a cell, not from its middle alone.
+
+    Parameters
+    ----------
+    noise : NoiseSpec or NoiseMixture
+        The model for a known place.
+    step : float
+        Side of the cells in metres.
+
+    Returns
+    -------
+    NoiseSpec or NoiseMixture
+        The model with ``step / 12 ** 0.5`` metres more of uncertainty of the place, each way, in
+        quadrature.
+
+    Examples
+    --------
+    >>> round(cell_noise(NoiseSpec(), 10.0).position_sigma, 2)
+    2.89
+    """
+    return noise.changed(
+        lambda spec: replace(
+            spec, position_sigma=math.hypot(spec.position_sigma, step / math.sqrt(12.0))
+        )
+    )
+
+
+def place_noise(noise: Noise, step: float) -> Noise:
+    """Return the noise model for a known place, the inverse of `cell_noise`.
+
+    Raises `InputError` if the model has too little uncertainty of the place to take away.
+    """
+
+    def without_step(spec: NoiseSpec) -> NoiseSpec:
+        variance = spec.position_sigma**2 - step**2 / 12.0
+        if variance < -ROUNDING:
+            msg = (
+                f"noise model {spec.name!r} is for queries from the middles of cells; build the "
+                f"index for cell_noise(noise, {step:g}), which is for queries from anywhere in "
+                "them."
+            )
+            raise InputError(msg)
+        return replace(spec, position_sigma=0.0 if variance < ROUNDING else math.sqrt(variance))
+
+    return noise.changed(without_step)
 
 
 def named_noise(name: str) -> Noise:
@@ -251,46 +307,43 @@ def named_noise(name: str) -> Noise:
     return NOISES[name]
 
 
-def _check_chance(label: str, value: object) -> None:
-    if not _is_number(value) or not 0 <= value <= 1:  # type: ignore[operator]
-        msg = f"{label} of the noise is {value!r}; give a chance from 0 to 1."
-        raise InputError(msg)
+@dataclass(frozen=True, slots=True)
+class _Number:
+    """A kind of finite number, in words and as a test."""
+
+    words: str
+    fits: Callable[[float], bool]
+
+    def check(self, label: str, value: object) -> None:
+        """Refuse anything else."""
+        number = value if isinstance(value, (int, float)) else math.nan
+        if isinstance(value, bool) or not math.isfinite(number) or not self.fits(number):
+            msg = f"{label} of the noise is {value!r}; give {self.words}."
+            raise InputError(msg)
 
 
-def _check_amount(label: str, value: object) -> None:
-    if not _is_number(value) or not value >= 0:  # type: ignore[operator]
-        msg = f"{label} of the noise is {value!r}; give a number, 0 or more."
-        raise InputError(msg)
-
-
-def _check_degrees(label: str, value: object) -> None:
-    if not _is_number(value) or not 0 < value <= HALF_TURN:  # type: ignore[operator]
-        msg = f"{label} of the noise is {value!r}; give degrees above 0 and up to 180."
-        raise InputError(msg)
-
-
-_CHECKS = MappingProxyType(
+_CHANCE = _Number("a chance from 0 to 1", lambda value: 0 <= value <= 1)
+_AMOUNT = _Number("a number, 0 or more", lambda value: value >= 0)
+_DEGREES = _Number("degrees above 0 and up to 180", lambda value: 0 < value <= HALF_TURN)
+_NUMBERS = MappingProxyType(
     {
-        "detection": _check_chance,
-        "misnamed": _check_chance,
-        "clutter": _check_amount,
-        "bearing_sigma": _check_degrees,
-        "position_sigma": _check_amount,
-        "missed_each": _check_amount,
-        "misnamed_each": _check_amount,
+        "detection": _CHANCE,
+        "misnamed": _CHANCE,
+        "clutter": _AMOUNT,
+        "bearing_sigma": _DEGREES,
+        "position_sigma": _AMOUNT,
+        "missed_each": _AMOUNT,
+        "misnamed_each": _AMOUNT,
     }
 )
-
-
-_BY_CLASS = ("detection_by_class", "misnamed_by_class", "bearing_sigma_by_class")
 
 
 def _check_shares(label: str, shares: Mapping[str, float]) -> None:
     """Refuse shares that are not chances or do not sum to one."""
     for name, value in shares.items():
-        _check_chance(f"{label}, {name!r},", value)
+        _CHANCE.check(f"{label}, {name!r},", value)
     total = math.fsum(shares.values())
-    if abs(total - 1.0) > SUM_TOLERANCE:
+    if abs(total - 1.0) > ROUNDING:
         msg = f"{label} of the noise sums to {total:.6g}; give shares that sum to 1."
         raise InputError(msg)
 
@@ -303,14 +356,10 @@ def _table(label: str, value: object) -> Mapping[str, Any]:
     return value
 
 
-def _is_number(value: object) -> bool:
-    return isinstance(value, (int, float)) and not isinstance(value, bool) and math.isfinite(value)
-
-
 def _plain(value: Any) -> Any:  # noqa: ANN401
     """Return mappings of any kind as dictionaries."""
     if isinstance(value, Mapping):
-        return {name: _plain(one) for name, one in value.items()}
+        return {name: _plain(part) for name, part in value.items()}
     return value
 
 

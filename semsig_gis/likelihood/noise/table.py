@@ -10,7 +10,6 @@ import numpy as np
 
 from semsig_gis.core.errors import InputError, nearest_name
 from semsig_gis.core.taxonomy import WILDCARD
-from semsig_gis.likelihood.noise.model import NoiseMixture
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -139,12 +138,9 @@ def noise_tables(
     it names a class that the taxonomy does not have, or gives a class no chance at all of being
     named as one that counts.
     """
-    specs, weights = (
-        (noise.specs, noise.weights) if isinstance(noise, NoiseMixture) else ((noise,), (1.0,))
-    )
     names = {item.name: item.code for item in taxonomy.classes}
-    tables = tuple(_table(spec, names, codes, longest) for spec in specs)
-    return tables, np.asarray(weights, dtype=np.float64)
+    tables = tuple(_table(spec, names, codes, longest) for spec in noise.specs)
+    return tables, np.asarray(noise.weights, dtype=np.float64)
 
 
 def database_tables(
