@@ -44,7 +44,8 @@ RASTERS = ("ambiguity", "identifiability", "error")
 _ONE_LAYER: Mapping[str, Callable[..., None]] = MappingProxyType(
     {".parquet": geoparquet.write_layer, ".csv": csv_text.write_layer}
 )
-_TIFF = (".tif", ".tiff")
+_RASTER = frozenset({".tif", ".tiff"})
+# What a layer or a raster is made from, beside the cells.
 _NEEDS = MappingProxyType(
     {
         "objects": "objects",
@@ -124,36 +125,29 @@ def export_database(
     --------
     >>> import tempfile
     >>> import geopandas as gpd
-    >>> from semsig_gis.database.build import build_database
-    >>> from semsig_gis.sources.catalog import paper_taxonomy
-    >>> from semsig_gis.objects.clean import build_objects
-    >>> from semsig_gis.sources.synthetic.city import CitySpec, synthetic_city
-    >>> layers = synthetic_city(CitySpec(size=300.0))
-    >>> objects, _ = build_objects(layers, taxonomy=paper_taxonomy(), crs="EPSG:32631")
-    >>> database = build_database(objects)
     >>> with tempfile.TemporaryDirectory() as folder:
-    ...     export_database(database, f"{folder}/cells.parquet")
-    ...     export_database(database, f"{folder}/city.gpkg", objects=objects)
-    ...     len(gpd.read_parquet(f"{folder}/cells.parquet")) == len(database)
+    ...     export_database(demo_database, f"{folder}/cells.parquet")
+    ...     export_database(demo_database, f"{folder}/city.gpkg", objects=demo_objects)
+    ...     len(gpd.read_parquet(f"{folder}/cells.parquet")) == len(demo_database)
     ...     gpd.list_layers(f"{folder}/city.gpkg")["name"].tolist()
     True
     ['cells', 'objects', 'layer_styles']
     """
-    suffix = _suffix(path, (".gpkg", *_ONE_LAYER, *_TIFF))
-    given = {
-        name
-        for name, value in (
-            ("objects", objects),
-            ("identifiability", identifiability),
-            ("evaluation", evaluation),
-            ("geometry", geometry),
-        )
-        if value is not None
+    suffix = _suffix(path)
+    options = {
+        "objects": objects,
+        "identifiability": identifiability,
+        "evaluation": evaluation,
+        "geometry": geometry,
     }
-    wanted = [layers] if isinstance(layers, str) else layers
-    names = _chosen_layers(path, wanted, suffix=suffix, given=given)
+    names = _content(
+        path,
+        [layers] if isinstance(layers, str) else layers,
+        suffix=suffix,
+        given={name for name, value in options.items() if value is not None},
+    )
     _require_one_city(path, database, objects, evaluation)
-    if suffix in _TIFF:
+    if suffix in _RASTER:
         values, unit = database.type_group_sizes.astype(np.float64), "cells"
         if names == ["error"] and evaluation is not None:
             values, unit = cell_errors(evaluation, database), "m"
@@ -161,19 +155,18 @@ def export_database(
             values, unit = identifiability.found, ""
         export_geotiff(database, values, path, name=names[0], unit=unit)
         return
-    known: dict[str, Layer] = {}
+    by_name: dict[str, Layer] = {}
     if "cells" in names:
-        drawn = geometry or ("point" if suffix == ".csv" else "polygon")
-        known["cells"] = cells_layer(database, identifiability=identifiability, geometry=drawn)
+        shape = geometry or ("point" if suffix == ".csv" else "polygon")
+        by_name["cells"] = cells_layer(database, identifiability=identifiability, geometry=shape)
     if objects is not None:
-        known["objects"] = objects_layer(objects)
+        by_name["objects"] = objects_layer(objects)
     if evaluation is not None:
-        known |= {one.name: one for one in evaluation_layers(evaluation, database.licenses)}
-    chosen = [known[name] for name in names]
+        by_name |= {one.name: one for one in evaluation_layers(evaluation, database.licenses)}
     if suffix == ".gpkg":
-        geopackage.write_layers(chosen, path, progress=progress)
+        geopackage.write_layers([by_name[name] for name in names], path, progress=progress)
     else:
-        _ONE_LAYER[suffix](chosen[0], path, progress=progress)
+        _ONE_LAYER[suffix](by_name[names[0]], path, progress=progress)
 
 
 def _require_one_city(
@@ -199,40 +192,38 @@ def _require_one_city(
         evaluation.rows_in(database)
 
 
-def _chosen_layers(
-    path: str | Path, wanted: Sequence[str], *, suffix: str, given: set[str]
-) -> list[str]:
+def _content(path: str | Path, names: Sequence[str], *, suffix: str, given: set[str]) -> list[str]:
     """Return what a file holds, and refuse what lacks its data, or data that it would not hold."""
-    known = RASTERS if suffix in _TIFF else LAYERS
-    for name in wanted:
-        if name not in known:
-            hint = nearest_name(name, known)
-            msg = f"{path} cannot hold {name!r}; give one of {', '.join(known)}{hint}."
+    accepted = RASTERS if suffix in _RASTER else LAYERS
+    for name in names:
+        if name not in accepted:
+            hint = nearest_name(name, accepted)
+            msg = f"{path} cannot hold {name!r}; give one of {', '.join(accepted)}{hint}."
             raise UnknownNameError(msg)
-    whole = suffix == ".gpkg"
-    if len(wanted) > 1 and not whole:
+    many = suffix == ".gpkg"
+    if len(names) > 1 and not many:
         msg = (
-            f"{path} holds one layer, but {' and '.join(wanted)} were asked for; name one of them, "
+            f"{path} holds one layer, but {' and '.join(names)} were asked for; name one of them, "
             "or write a GeoPackage."
         )
         raise InputError(msg)
-    all_given = [name for name in known if _NEEDS.get(name) in {None, *given}]
-    names = list(dict.fromkeys(wanted)) or (all_given if whole else [known[0]])
-    for name in names:
-        if name not in all_given:
+    possible = [name for name in accepted if _NEEDS.get(name) in {None, *given}]
+    content = list(dict.fromkeys(names)) or (possible if many else [accepted[0]])
+    for name in content:
+        if name not in possible:
             msg = f"{path} is to hold the {name}, but there is no {_NEEDS[name]}; give that too."
             raise InputError(msg)
     # Identifiability is part of a database, wherever it is not asked for.
-    used = {"identifiability", *(_NEEDS[name] for name in names if name in _NEEDS)}
-    used |= {"geometry"} if "cells" in names else set()
+    used = {"identifiability", *(_NEEDS[name] for name in content if name in _NEEDS)}
+    used |= {"geometry"} if "cells" in content else set()
     unused = sorted(given - used)
     if unused:
         msg = (
-            f"{path} holds the {' and '.join(names)} alone, and no {' or '.join(unused)}; leave "
-            f"that out or name another layer{'' if whole else ', or write a GeoPackage'}."
+            f"{path} holds the {' and '.join(content)} alone, and no {' or '.join(unused)}; leave "
+            f"that out or name another layer{'' if many else ', or write a GeoPackage'}."
         )
         raise InputError(msg)
-    return names
+    return content
 
 
 def export_answer(
@@ -269,15 +260,15 @@ def export_answer(
         If the suffix is another, a number is out of range, the answer has no chances or is from
         another database, or the file cannot be written.
     """
-    suffix = _suffix(path, (".gpkg", *_ONE_LAYER, *_TIFF))
-    if suffix in _TIFF and answer.chances is None:
+    suffix = _suffix(path)
+    if suffix in _RASTER and answer.chances is None:
         msg = (
             f"{path} is to hold the chance of every cell, which the method does not tell; use the "
             "likelihood method, or write a GeoPackage."
         )
         raise InputError(msg)
     regions = search_regions(answer, database, share=share, within=within)
-    if suffix in _TIFF and answer.chances is not None:
+    if suffix in _RASTER and answer.chances is not None:
         export_geotiff(database, answer.chances, path, name="posterior")
     elif suffix == ".gpkg":
         geopackage.write_layers(answer_layers(answer, regions), path)
@@ -286,11 +277,13 @@ def export_answer(
     return regions
 
 
-def _suffix(path: str | Path, known: tuple[str, ...]) -> str:
+def _suffix(path: str | Path) -> str:
     """Return the suffix of a file, in lower case."""
     suffix = Path(path).suffix.lower()
-    if suffix not in known:
-        names = f"{', '.join(known[:-2])} or {known[-2]}"
-        msg = f"{path} does not end in {names}; give a name that says the format."
+    if suffix not in {".gpkg", *_ONE_LAYER, *_RASTER}:
+        msg = (
+            f"{path} does not end in .gpkg, .parquet, .csv or .tif; give a name that says the "
+            "format."
+        )
         raise InputError(msg)
     return suffix

@@ -19,7 +19,6 @@ from pyogrio.errors import DataLayerError, DataSourceError, FeatureError
 from pyproj import CRS
 from pyproj.exceptions import CRSError
 
-from semsig_gis import __version__
 from semsig_gis.core.crs import CLASS_CODE, COUNT, GEOMETRY, MERGED, SOURCE, SOURCE_ID
 from semsig_gis.core.errors import DatabaseError, InputError
 from semsig_gis.core.taxonomy import Taxonomy
@@ -42,19 +41,31 @@ if TYPE_CHECKING:
 
 
 CELLS, OBJECTS = "cells", "objects"
-
-
 CELL_COLUMNS = ("cell_id", "types", "bearings", "distances")
-
-
 OBJECT_COLUMNS = (CLASS_CODE, SOURCE, SOURCE_ID, COUNT, MERGED)
-
-
 # How the columns of `Identifiability.table` begin.
-TOLD = ("chance_", "bits_", "lookalike_", "gain_")
-
-
+IDENTIFIABILITY_COLUMNS = ("chance_", "bits_", "lookalike_", "gain_")
 ROWS_A_BATCH = 1 << 16
+
+VERSION = "1.2"  # the newest that QGIS 3.22 opens without a warning
+# As QGIS makes it, but for the dates, which it leaves to the rules of GeoPackages.
+STYLES = """
+CREATE TABLE layer_styles (
+  id INTEGER PRIMARY KEY AUTOINCREMENT NOT NULL,
+  f_table_catalog TEXT(256), f_table_schema TEXT(256), f_table_name TEXT(256),
+  f_geometry_column TEXT(256), styleName TEXT(30), styleQML TEXT, styleSLD TEXT,
+  useAsDefault BOOLEAN, description TEXT, owner TEXT(30), ui TEXT(30),
+  update_time DATETIME DEFAULT (strftime('%Y-%m-%dT%H:%M:%fZ', 'now'))
+);
+INSERT INTO gpkg_contents (table_name, data_type, identifier, description, srs_id)
+VALUES ('layer_styles', 'attributes', 'layer_styles', 'How QGIS draws the layers.', 0);
+"""
+STYLE = """
+INSERT INTO layer_styles (f_table_catalog, f_table_schema, f_table_name, f_geometry_column,
+  styleName, styleQML, styleSLD, useAsDefault, description, owner)
+SELECT '', '', table_name, column_name, ?, ?, '', ?, ?, '' FROM gpkg_geometry_columns
+WHERE table_name = ?
+"""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -100,18 +111,11 @@ def read_geopackage(path: str | Path) -> GeopackageContents:
     Examples
     --------
     >>> import tempfile
-    >>> from semsig_gis.sources.catalog import paper_taxonomy
-    >>> from semsig_gis.database.build import build_database
-    >>> from semsig_gis.exports import export_database
-    >>> from semsig_gis.objects.clean import build_objects
-    >>> from semsig_gis.sources.synthetic.city import CitySpec, synthetic_city
-    >>> layers = synthetic_city(CitySpec(size=300.0))
-    >>> objects, _ = build_objects(layers, taxonomy=paper_taxonomy(), crs="EPSG:32631")
-    >>> database = build_database(objects)
+    >>> from semsig_gis import export_database
     >>> with tempfile.TemporaryDirectory() as folder:
-    ...     export_database(database, f"{folder}/city.gpkg")
+    ...     export_database(demo_database, f"{folder}/city.gpkg")
     ...     again = read_geopackage(f"{folder}/city.gpkg").database
-    >>> bool((again.bearing_units == database.bearing_units).all())
+    >>> bool((again.bearing_units == demo_database.bearing_units).all())
     True
     """
     if not os.path.isfile(path):  # noqa: PTH113 - it answers where Path.is_file raises
@@ -125,9 +129,9 @@ def read_geopackage(path: str | Path) -> GeopackageContents:
             msg = f"{path} has no layer {CELLS!r}; give a GeoPackage with the cells of a database."
             raise DatabaseError(msg)
         specs, crs, fields = _facts(path, CELLS)
-        told_fields = [name for name in fields if name.startswith(TOLD)]
-        wanted = [*CELL_COLUMNS, *(told_fields if specs["identifiability"] else [])]
-        cells = _read(path, CELLS, wanted).sort_by("cell_id")
+        more = [name for name in fields if name.startswith(IDENTIFIABILITY_COLUMNS)]
+        columns = [*CELL_COLUMNS, *(more if specs["identifiability"] else [])]
+        cells = _read(path, CELLS, columns).sort_by("cell_id")
         reach = Taxonomy.from_list(specs["taxonomy"]).ranges(specs["signature"]["radius"]).max()
         signatures = pa.table(
             {
@@ -138,11 +142,12 @@ def read_geopackage(path: str | Path) -> GeopackageContents:
             }
         )
         database = database_of(signatures, specs, crs, path=path)
-        told = None
+        identifiability = None
         if specs["identifiability"]:
             try:
-                columns = cells.select(told_fields)
-                told = identifiability_of(database, columns, specs["identifiability"], path)
+                identifiability = identifiability_of(
+                    database, cells.select(more), specs["identifiability"], path
+                )
             except DatabaseError as error:
                 notes.append(str(error))
         objects = _objects(path) if OBJECTS in names else None
@@ -153,7 +158,7 @@ def read_geopackage(path: str | Path) -> GeopackageContents:
         msg = f"{path} is damaged, or was not written by semsig export; export the database again."
         raise DatabaseError(msg) from error
     return GeopackageContents(
-        database=database, objects=objects, identifiability=told, notes=tuple(notes)
+        database=database, objects=objects, identifiability=identifiability, notes=tuple(notes)
     )
 
 
@@ -177,9 +182,9 @@ def _objects(path: str | Path) -> StreetObjects:
 def _facts(path: str | Path, layer: str) -> tuple[dict[str, Any], CRS, list[str]]:
     """Return the specs of a layer, its CRS and the names of its fields."""
     info = pyogrio.read_info(path, layer=layer)
-    told = info["layer_metadata"] or {}
+    metadata = info["layer_metadata"] or {}
     # GDAL's own are in capital letters.
-    specs = {name: json.loads(text) for name, text in told.items() if name.islower()}
+    specs = {name: json.loads(text) for name, text in metadata.items() if name.islower()}
     return specs, CRS.from_user_input(specs.pop("crs")), list(info["fields"])
 
 
@@ -212,32 +217,6 @@ def _units(texts: pa.ChunkedArray, units: float, kind: DTypeLike) -> pa.ChunkedA
         units_of_cells = pa.array(values.astype(kind))
         lists.append(pa.ListArray.from_arrays(pa.array(starts - starts[0]), units_of_cells))
     return pa.chunked_array(lists)
-
-
-# The newest version that QGIS 3.22 opens without a warning.
-VERSION = "1.2"
-
-
-# As QGIS makes it, but for the dates, which it leaves to the rules of GeoPackages.
-STYLES = """
-CREATE TABLE layer_styles (
-  id INTEGER PRIMARY KEY AUTOINCREMENT NOT NULL,
-  f_table_catalog TEXT(256), f_table_schema TEXT(256), f_table_name TEXT(256),
-  f_geometry_column TEXT(256), styleName TEXT(30), styleQML TEXT, styleSLD TEXT,
-  useAsDefault BOOLEAN, description TEXT, owner TEXT(30), ui TEXT(30),
-  update_time DATETIME DEFAULT (strftime('%Y-%m-%dT%H:%M:%fZ', 'now'))
-);
-INSERT INTO gpkg_contents (table_name, data_type, identifier, description, srs_id)
-VALUES ('layer_styles', 'attributes', 'layer_styles', 'How QGIS draws the layers.', 0);
-"""
-
-
-STYLE = """
-INSERT INTO layer_styles (f_table_catalog, f_table_schema, f_table_name, f_geometry_column,
-  styleName, styleQML, styleSLD, useAsDefault, description, owner)
-SELECT '', '', table_name, column_name, ?, ?, '', ?, ?, '' FROM gpkg_geometry_columns
-WHERE table_name = ?
-"""
 
 
 def write_layers(
@@ -281,16 +260,12 @@ def write_layers(
 def _write_layer(layer: Layer, path: Path) -> Iterator[int]:
     """Write one layer block by block, and yield the number of rows of each block."""
     code = layer.crs.to_epsg()
-    told = {
-        **layer.facts,
-        "licenses": list(layer.licenses),
-        "written_by": f"semsig_gis {__version__}",
-    }
     # Of the layer and not of the file: for that, GDAL leaves a copy beside the file whenever the
     # file is read.
     once: dict[str, Any] = {
         "layer_metadata": {
-            name: json.dumps(value, allow_nan=False) for name, value in told.items()
+            name: json.dumps(value, allow_nan=False)
+            for name, value in {**layer.facts, **layer.credits}.items()
         },
         "layer_options": {
             "IDENTIFIER": layer.title,

@@ -6,7 +6,6 @@ from typing import TYPE_CHECKING
 
 import shapely
 
-from semsig_gis import __version__
 from semsig_gis.core.crs import GEOMETRY
 from semsig_gis.exports.layers import GEOMETRY_TYPES
 from semsig_gis.storage.geoparquet import (
@@ -43,12 +42,7 @@ def write_layer(
     geo["columns"][GEOMETRY]["covering"] = COVERING
     if not layer.rows:
         del geo["columns"][GEOMETRY]["bbox"]
-    specs = {
-        **layer.facts,
-        "kind": f"{layer.title} export".lower(),
-        "licenses": list(layer.licenses),
-        "written_by": f"semsig_gis {__version__}",
-    }
+    specs = {**layer.facts, "kind": f"{layer.title} export".lower(), **layer.credits}
 
     def blocks() -> Iterator[pa.Table]:
         for block in layer.blocks(progress):

@@ -51,20 +51,14 @@ def export_geotiff(
     Examples
     --------
     >>> import tempfile
-    >>> from semsig_gis.database.build import build_database
-    >>> from semsig_gis.sources.catalog import paper_taxonomy
-    >>> from semsig_gis.objects.clean import build_objects
     >>> from semsig_gis.storage.raster import raster_at_cells
-    >>> from semsig_gis.sources.synthetic.city import CitySpec, synthetic_city
-    >>> layers = synthetic_city(CitySpec(size=300.0))
-    >>> objects, _ = build_objects(layers, taxonomy=paper_taxonomy(), crs="EPSG:32631")
-    >>> database = build_database(objects)
-    >>> where = {"grid": database.grid, "columns": database.columns, "rows": database.rows}
+    >>> database = demo_database
     >>> with tempfile.TemporaryDirectory() as folder:
     ...     path = f"{folder}/objects.tif"
     ...     export_geotiff(database, database.lengths, path, name="objects seen")
-    ...     read = raster_at_cells(path, **where, crs=database.crs)
-    >>> bool((read == database.lengths).all())
+    ...     where = {"grid": database.grid, "columns": database.columns, "rows": database.rows}
+    ...     pixels = raster_at_cells(path, **where, crs=database.crs)
+    >>> bool((pixels == database.lengths).all())
     True
     """
     numbers = np.asarray(values, dtype=np.float64)

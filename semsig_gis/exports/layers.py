@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Literal, get_args
@@ -12,6 +13,7 @@ import pyarrow as pa
 import pyarrow.compute as pc
 import shapely
 
+from semsig_gis import __version__
 from semsig_gis.core.crs import CLASS_CODE, CLASS_NAME, COUNT, GEOMETRY, MERGED, SOURCE, SOURCE_ID
 from semsig_gis.core.errors import UnknownNameError, nearest_name
 from semsig_gis.database.database import BEARING_UNITS, DISTANCE_UNITS
@@ -66,6 +68,11 @@ class Layer:
     facts: Mapping[str, Any]  # plain values for JSON
     styles: tuple[Style, ...]  # the first is the default
 
+    @property
+    def credits(self) -> dict[str, Any]:
+        """Whom to name for the data and what wrote it, for the metadata of a file."""
+        return {"licenses": list(self.licenses), "written_by": f"semsig_gis {__version__}"}
+
     def blocks(self, progress: Callable[[int, int], None] | None = None) -> Iterator[pa.Table]:
         """Read the layer block by block; one without rows is a block without rows."""
         for low in range(0, max(self.rows, 1), ROWS_A_BLOCK):
@@ -92,47 +99,43 @@ def cells_layer(
     symbols = pa.array([chr(symbol) for symbol in database.taxonomy.symbol_bytes])
     degrees = pa.array([f"{unit * 360 / BEARING_UNITS:.2f}" for unit in range(BEARING_UNITS)])
     whole_numbers = pa.array([str(level) for level in range(1 << 8)])
-    decimals = distance_decimals(database.reach)
-    metres = pa.array(
-        [
-            f"{unit * database.reach / DISTANCE_UNITS:.{decimals}f}"
-            for unit in range(DISTANCE_UNITS + 1)
-        ]
-    )
+    distances = database.reach * np.arange(DISTANCE_UNITS + 1) / DISTANCE_UNITS
+    decimals = max(2, math.ceil(-math.log10(distances[1])))  # which tell each from the next
+    metres = pa.array([f"{distance:.{decimals}f}" for distance in distances.tolist()])
     type_groups, angle_groups = database.type_group_sizes, database.angle_group_sizes
 
     def read(rows: slice) -> pa.Table:
         places = database.xy[rows]
         offsets = database.offsets[rows.start : rows.stop + 1]
-        squares = geometry == "polygon"
-        shapes = _squares(database, rows) if squares else shapely.points(places)
-        more = {}
+        columns = {
+            "cell_id": database.cell_ids[rows],
+            "x": np.ascontiguousarray(places[:, 0]),
+            "y": np.ascontiguousarray(places[:, 1]),
+            "length": database.lengths[rows].astype(np.int32),
+            "types": _joined(database.codes, offsets, texts=symbols, separator=""),
+            "bearings": _joined(database.bearing_units, offsets, texts=degrees),
+            "levels": _joined(database.levels, offsets, texts=whole_numbers),
+            "distances": _joined(database.distance_units, offsets, texts=metres),
+            "type_group_size": type_groups[rows],
+            "angle_group_size": angle_groups[rows],
+        }
         if identifiability is not None:
-            told = identifiability.table(rows)
-            more = dict(zip(told.column_names, told.columns, strict=True))
-        return pa.table(
-            {
-                "cell_id": database.cell_ids[rows],
-                "x": np.ascontiguousarray(places[:, 0]),
-                "y": np.ascontiguousarray(places[:, 1]),
-                "length": database.lengths[rows].astype(np.int32),
-                "types": _joined(database.codes, offsets, texts=symbols, separator=""),
-                "bearings": _joined(database.bearing_units, offsets, texts=degrees),
-                "levels": _joined(database.levels, offsets, texts=whole_numbers),
-                "distances": _joined(database.distance_units, offsets, texts=metres),
-                "type_group_size": type_groups[rows],
-                "angle_group_size": angle_groups[rows],
-                **more,
-                GEOMETRY: shapely.to_wkb(shapes),
-            }
-        )
+            more = identifiability.table(rows)
+            columns |= dict(zip(more.column_names, more.columns, strict=True))
+        shapes = shapely.points(places) if geometry == "point" else _squares(database, rows)
+        return pa.table({**columns, GEOMETRY: shapely.to_wkb(shapes)})
 
     step = database.grid.step
-    drawn: dict[str, Any] = {"geometry": geometry, "size": step}
-    styles = [by_amount("Ambiguity", "type_group_size", AMBIGUITY, **drawn)]
+    facts = {
+        **database_specs(database),
+        "crs": database.crs.to_json_dict(),
+        "identifiability": None,
+    }
+    draw = functools.partial(by_amount, geometry=geometry, size=step)
+    styles = [draw("Ambiguity", "type_group_size", AMBIGUITY)]
     if identifiability is not None:
-        chances = by_amount("Identifiability", "chance_found", IDENTIFIABILITY, **drawn)
-        styles.insert(0, chances)
+        facts["identifiability"] = identifiability_facts(identifiability)
+        styles.insert(0, draw("Identifiability", "chance_found", IDENTIFIABILITY))
     corners = [(part.min(), part.max()) for part in (database.columns, database.rows)]
     (west, south), (east, north) = database.grid.viewpoints(*corners).tolist()
     margin = step / 2 if geometry == "polygon" else 0.0
@@ -149,20 +152,9 @@ def cells_layer(
         bounds=(west - margin, south - margin, east + margin, north + margin),
         read=read,
         licenses=database.licenses,
-        facts={
-            **database_specs(database),
-            "crs": database.crs.to_json_dict(),
-            "identifiability": (
-                None if identifiability is None else identifiability_facts(identifiability)
-            ),
-        },
+        facts=facts,
         styles=tuple(styles),
     )
-
-
-def distance_decimals(reach: float) -> int:
-    """Return how many decimals tell every unit of a distance from the next."""
-    return max(2, math.ceil(-math.log10(reach / DISTANCE_UNITS)))
 
 
 def objects_layer(objects: StreetObjects) -> Layer:
@@ -204,44 +196,39 @@ def evaluation_layers(evaluation: Evaluation, licenses: tuple[str, ...]) -> list
     """Return the queries at their true places, and lines from there to the best places."""
     queries = evaluation.queries
     found, missed, empty = OUTCOMES
-    nothing = (queries["query_length"] == 0).to_numpy()
-    told = queries.assign(
-        outcome=np.select([nothing, evaluation.successful], [empty, found], missed)
-    )
-    placed = told[told["best_x"].notna().to_numpy()]
+    unseen = (queries["query_length"] == 0).to_numpy()
+    outcomes = np.select([unseen, evaluation.successful], [empty, found], missed)
+    queries = queries.assign(outcome=outcomes)
+    placed = queries[queries["best_x"].notna().to_numpy()]
     truth = shapely.get_coordinates(placed.geometry.array)
     best = placed[["best_x", "best_y"]].to_numpy(np.float64)
     lines = placed[["seed", "number", "cell_id", "best_cell_id", "outcome", "error_m"]].assign(
         off_m=np.hypot(*(best - truth).T)
     )
-    lines = lines.set_geometry(
-        shapely.linestrings(np.stack([truth, best], axis=1)), crs=queries.crs
-    )
+    ends = shapely.linestrings(np.stack([truth, best], axis=1))
+    lines = lines.set_geometry(ends, crs=queries.crs)
     lines = lines[lines["off_m"] > 0]  # a line has a length
     summary = evaluation.summary()
     facts = {name: summary[name] for name in ("settings", "database", "versions")}
+    layer = functools.partial(_table_layer, licenses=licenses, facts=facts)
     return [
-        _table_layer(
-            told,
+        layer(
+            queries,
             name="evaluation",
             title="Queries",
             description=(
-                f"{len(told)} queries at their true places; found: the best place is within "
+                f"{len(queries)} queries at their true places; found: the best place is within "
                 f"{SUCCESS_METRES} m with a probability of {SUCCESS_PROBABILITY:g} or more."
             ),
             geometry="point",
-            licenses=licenses,
-            facts=facts,
             style=by_outcome(geometry="point"),
         ),
-        _table_layer(
+        layer(
             lines,
             name="evaluation_lines",
             title="From the true to the best place",
             description="Each query's true place, joined to the best place that was found for it.",
             geometry="line",
-            licenses=licenses,
-            facts=facts,
             style=by_outcome(geometry="line"),
         ),
     ]
@@ -249,29 +236,26 @@ def evaluation_layers(evaluation: Evaluation, licenses: tuple[str, ...]) -> list
 
 def answer_layers(answer: Answer, regions: SearchRegions) -> list[Layer]:
     """Return the regions that must be searched, and the candidates of a query."""
-    told = answer.to_dict()
-    facts = {name: told[name] for name in told if name not in {"candidates", "crs", "licenses"}}
+    facts = answer.to_dict()
+    licenses = tuple(facts["licenses"])
+    facts = {name: facts[name] for name in facts if name not in {"candidates", "crs", "licenses"}}
     facts["searched"] = regions.to_dict()
-    licenses = tuple(told["licenses"])
+    layer = functools.partial(_table_layer, licenses=licenses, facts=facts)
     return [
-        _table_layer(
+        layer(
             regions.table,
             name="regions",
             title="Regions to search",
             description="Where the query may have been seen from, the best first.",
             geometry="polygon",
-            licenses=licenses,
-            facts=facts,
             style=by_rank("rank", geometry="polygon"),
         ),
-        _table_layer(
+        layer(
             answer.to_geodataframe(),
             name="candidates",
             title="Candidates",
             description="The best cells for the query.",
             geometry="point",
-            licenses=licenses,
-            facts=facts,
             style=by_rank(str(answer.candidates.columns[0]), geometry="point"),
         ),
     ]
@@ -317,13 +301,10 @@ def _table_layer(
 
 def _squares(database: SignatureDatabase, rows: slice) -> NDArray[np.object_]:
     """Return the squares of some cells; neighbours share their corners to the last bit."""
-    step = database.grid.step
-    (left, right), (bottom, top) = (
-        (start + numbers[rows] * step, start + (numbers[rows] + 1) * step)
-        for start, numbers in zip(
-            database.grid.origin, (database.columns, database.rows), strict=True
-        )
-    )
+    step, (west, south) = database.grid.step, database.grid.origin
+    columns, lines = database.columns[rows], database.rows[rows]
+    left, right = west + columns * step, west + (columns + 1) * step
+    bottom, top = south + lines * step, south + (lines + 1) * step
     return np.asarray(shapely.box(left, bottom, right, top))
 
 

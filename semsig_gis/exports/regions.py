@@ -51,15 +51,15 @@ class SearchRegions:
             likelihood method, ``chance``.
         """
         last = self.table.iloc[-1]
-        told = {
+        summary = {
             "regions": len(self.table),
             "cells": int(self.table["cells"].sum()),
             "km2": float(last["searched_km2"]),
             "percent": float(last["searched_percent"]),
         }
         if "chance" in self.table.columns:
-            told["chance"] = float(last["searched_chance"])
-        return told
+            summary["chance"] = float(last["searched_chance"])
+        return summary
 
 
 def search_regions(
@@ -96,16 +96,9 @@ def search_regions(
 
     Examples
     --------
-    >>> from semsig_gis.database.build import build_database
-    >>> from semsig_gis.sources.catalog import paper_taxonomy
-    >>> from semsig_gis.matching.search import localize
-    >>> from semsig_gis.objects.clean import build_objects
-    >>> from semsig_gis.sources.synthetic.city import CitySpec, synthetic_city
-    >>> layers = synthetic_city(CitySpec(size=300.0))
-    >>> objects, _ = build_objects(layers, taxonomy=paper_taxonomy(), crs="EPSG:32631")
-    >>> database = build_database(objects)
-    >>> answer = localize(database, database.signature(0), top=5)
-    >>> search_regions(answer, database).to_dict()["cells"]
+    >>> from semsig_gis import localize
+    >>> answer = localize(demo_database, demo_database.signature(0), top=5)
+    >>> search_regions(answer, demo_database).to_dict()["cells"]
     5
     """
     if not 0 < share <= 1:
@@ -168,7 +161,7 @@ def _around(
     database: SignatureDatabase, cells: NDArray[np.int64], within: float
 ) -> NDArray[np.int64]:
     """Return the other cells that are near to some."""
-    chosen = np.zeros(len(database))
-    chosen[cells] = 1.0
-    near = Posterior(database=database, chances=chosen).mass_within(within) > 0
-    return np.flatnonzero(near & (chosen == 0))
+    marks = np.zeros(len(database))
+    marks[cells] = 1.0
+    near = Posterior(database=database, chances=marks).mass_within(within) > 0
+    return np.flatnonzero(near & (marks == 0))

@@ -50,15 +50,10 @@ IDENTIFIABILITY: Classes = {
 """What is said of a cell, and its colour, by the chance that a query from it is found."""
 
 RANKS: Classes = {
-    (low, high): (label, colour)
-    for (low, high, label), colour in zip(
-        (
-            *((1, 1, "rank 1"), (1, 3, "rank 2 to 3"), (3, 10, "rank 4 to 10")),
-            (10, 1e9, "rank 11 and more"),
-        ),
-        reversed(ERROR_RAMP),
-        strict=True,
-    )
+    (1, 1): ("rank 1", ERROR_RAMP[3]),
+    (1, 3): ("rank 2 to 3", ERROR_RAMP[2]),
+    (3, 10): ("rank 4 to 10", ERROR_RAMP[1]),
+    (10, 1e9): ("rank 11 and more", ERROR_RAMP[0]),
 }
 LABEL_LETTERS = 60
 # What lies below, such as a street map, shows through.
@@ -67,6 +62,9 @@ CELLS_OPACITY = 0.7
 SMALLEST_MM, LARGEST_MM = 0.9, 6.0
 # Diameter of a circle, and the height of letters in diameters.
 CIRCLE_METRES, LETTER = 7.0, 0.6
+
+# What QGIS calls the symbol of a geometry, in the order of its numbers of geometries.
+SYMBOLS = {"point": "marker", "line": "line", "polygon": "fill"}
 
 Options = Mapping[str, object]
 # The class of a layer of a symbol, its options, and the symbol that it places along a line.
@@ -80,25 +78,25 @@ class Style(NamedTuple):
     qml: str
 
 
+class Entry(NamedTuple):
+    """An entry of a legend: the values that it is about, its text, and how they are drawn."""
+
+    values: dict[str, str]
+    label: str
+    symbol: tuple[SymbolLayer, ...]
+
+
 def by_class(taxonomy: Taxonomy, codes: Iterable[int]) -> Style:
     """Return a style of points by the class code that they have: a shape with the symbol."""
-    renderer = ET.Element("renderer-v2", type="categorizedSymbol", attr="class_code")
-    categories = ET.SubElement(renderer, "categories")
-    symbols = ET.SubElement(renderer, "symbols")
     present = set(codes)
-    for code, sign in class_signs(taxonomy).items():
-        if code not in present:
-            continue
-        ET.SubElement(
-            categories,
-            "category",
-            value=str(code),
-            symbol=str(code),
-            label=_label(f"{sign.symbol}  {sign.title}"),
-            render="true",
+    entries = {
+        str(code): Entry(
+            {"value": str(code)}, _label(f"{sign.symbol}  {sign.title}"), _class_layers(sign)
         )
-        _add_symbol(symbols, code, "marker", *_class_layers(sign))
-    return Style("Classes", _document(renderer, "point"))
+        for code, sign in class_signs(taxonomy).items()
+        if code in present
+    }
+    return Style("Classes", _document("class_code", entries, "point"))
 
 
 def _class_layers(sign: ClassSign) -> tuple[SymbolLayer, SymbolLayer]:
@@ -137,17 +135,11 @@ def _of_circle(length: str, share: float, *, smallest: float = SMALLEST_MM) -> O
     return _metres(metres, smallest=smallest * share, largest=most, length=length)
 
 
-def by_amount(
-    name: str,
-    column: str,
-    classes: Classes,
-    *,
-    geometry: str,
-    size: float,
-) -> Style:
+def by_amount(name: str, column: str, classes: Classes, *, geometry: str, size: float) -> Style:
     """Return a style of cells by a number, each as its square."""
     symbols = [_area(colour, geometry, size) for _, colour in classes.values()]
-    return Style(name, _graduated(column, classes, symbols, geometry, opacity=CELLS_OPACITY))
+    entries = _ranges(classes, symbols)
+    return Style(name, _document(column, entries, geometry, opacity=CELLS_OPACITY))
 
 
 def by_rank(column: str, *, geometry: str) -> Style:
@@ -163,75 +155,41 @@ def by_rank(column: str, *, geometry: str) -> Style:
             # Pale places stand out from a pale map by their edges.
             edge, metres, smallest = ERROR_RAMP[-1], 12.0 - 2.0 * number, 3.2 - 0.4 * number
             symbols.append(_marker("circle", colour, metres, smallest=smallest, outline=edge))
-    return Style("Rank", _graduated(column, RANKS, symbols, geometry, last_first=True))
+    entries = _ranges(RANKS, symbols)
+    return Style("Rank", _document(column, entries, geometry, last_first=True))
 
 
 def by_outcome(*, geometry: str) -> Style:
     """Return a style of queries by what became of them; a line ends in a mark at the best place."""
-    renderer = ET.Element("renderer-v2", type="categorizedSymbol", attr="outcome")
-    categories = ET.SubElement(renderer, "categories")
-    symbols = ET.SubElement(renderer, "symbols")
-    for number, (outcome, colour) in enumerate(OUTCOMES.items()):
-        if geometry == "line" and outcome == "nothing seen":
-            continue  # it has no best place
-        ET.SubElement(
-            categories,
-            "category",
-            value=outcome,
-            symbol=str(number),
-            label=outcome,
-            render="true",
-        )
-        if geometry == "point":
-            shape = {"found": "circle", "missed": "triangle"}.get(outcome, "cross2")
-            edge = colour if shape == "cross2" else ""  # its lines are its outline
-            mark = _marker(shape, colour, 12.0, smallest=1.8, outline=edge)
-            _add_symbol(symbols, number, "marker", mark)
-        else:
-            line = {"line_color": _rgba(colour, 150), "line_width": 0.26, "line_style": "solid"}
-            end = _marker("cross2", colour, 10.0, smallest=1.4, outline=colour)
-            _add_symbol(
-                symbols,
-                number,
-                "line",
-                ("SimpleLine", line),
-                ("MarkerLine", {"placement": "lastvertex", "rotate": 0}, end),
-            )
-    return Style("Outcome", _document(renderer, geometry))
+    draw = _outcome_line if geometry == "line" else _outcome_point
+    entries = {
+        str(number): Entry({"value": outcome}, outcome, draw(outcome, colour))
+        for number, (outcome, colour) in enumerate(OUTCOMES.items())
+        if geometry == "point" or outcome != "nothing seen"  # which has no best place
+    }
+    return Style("Outcome", _document("outcome", entries, geometry))
 
 
-def _graduated(
-    column: str,
-    classes: Classes,
-    layers: Sequence[SymbolLayer],
-    geometry: str,
-    *,
-    opacity: float = 1.0,
-    last_first: bool = False,
-) -> str:
-    """Return a document that draws by a number; of two ranges, the first holds their border."""
-    renderer = ET.Element(
-        "renderer-v2", type="graduatedSymbol", attr=column, graduatedMethod="GraduatedColor"
-    )
-    if last_first:  # so that the least number lies on top
-        renderer.set("enableorderby", "1")
-        clause = ET.SubElement(ET.SubElement(renderer, "orderby"), "orderByClause", asc="0")
-        clause.text = f'"{column}"'
-    ranges = ET.SubElement(renderer, "ranges")
-    symbols = ET.SubElement(renderer, "symbols")
-    for number, ((low, high), (label, _)) in enumerate(classes.items()):
-        ET.SubElement(
-            ranges,
-            "range",
-            lower=repr(float(low)),
-            upper=repr(float(high)),
-            symbol=str(number),
-            label=label,
-            render="true",
+def _outcome_point(outcome: str, colour: str) -> tuple[SymbolLayer, ...]:
+    shape = {"found": "circle", "missed": "triangle"}.get(outcome, "cross2")
+    edge = colour if shape == "cross2" else ""  # its lines are its outline
+    return (_marker(shape, colour, 12.0, smallest=1.8, outline=edge),)
+
+
+def _outcome_line(_outcome: str, colour: str) -> tuple[SymbolLayer, ...]:
+    line = {"line_color": _rgba(colour, 150), "line_width": 0.26, "line_style": "solid"}
+    end = _marker("cross2", colour, 10.0, smallest=1.4, outline=colour)
+    return ("SimpleLine", line), ("MarkerLine", {"placement": "lastvertex", "rotate": 0}, end)
+
+
+def _ranges(classes: Classes, symbols: Sequence[SymbolLayer]) -> dict[str, Entry]:
+    """Return an entry for each range of numbers; of two ranges, the first holds their border."""
+    return {
+        str(number): Entry(
+            {"lower": repr(float(low)), "upper": repr(float(high))}, label, (symbols[number],)
         )
-        kind = "fill" if geometry == "polygon" else "marker"
-        _add_symbol(symbols, number, kind, layers[number])
-    return _document(renderer, geometry, opacity=opacity)
+        for number, ((low, high), (label, _)) in enumerate(classes.items())
+    }
 
 
 def _area(colour: str, geometry: str, size: float) -> SymbolLayer:
@@ -275,10 +233,8 @@ def _metres(size: float, *, smallest: float, largest: float, length: str = "size
     }
 
 
-def _add_symbol(parent: ET.Element, name: object, kind: str, *layers: SymbolLayer) -> None:
-    symbol = ET.SubElement(
-        parent, "symbol", name=str(name), type=kind, alpha="1", clip_to_extent="1"
-    )
+def _add_symbol(parent: ET.Element, name: str, kind: str, *layers: SymbolLayer) -> None:
+    symbol = ET.SubElement(parent, "symbol", name=name, type=kind, alpha="1", clip_to_extent="1")
     for number, (class_name, options, *along) in enumerate(layers):
         layer = ET.SubElement(
             symbol, "layer", attrib={"class": class_name, "enabled": "1", "locked": "0"}
@@ -290,12 +246,37 @@ def _add_symbol(parent: ET.Element, name: object, kind: str, *layers: SymbolLaye
             _add_symbol(layer, f"@{name}@{number}", "marker", inner)
 
 
-def _document(renderer: ET.Element, geometry: str, *, opacity: float = 1.0) -> str:
+def _document(
+    column: str,
+    entries: Mapping[str, Entry],
+    geometry: str,
+    *,
+    opacity: float = 1.0,
+    last_first: bool = False,
+) -> str:
+    """Return a document that draws by a column: its entries by the names of their symbols."""
     root = ET.Element("qgis", version="3.22.0", styleCategories="Symbology")
-    root.append(renderer)
+    ranges = any("lower" in entry.values for entry in entries.values())
+    kind, parent, child = (
+        ("graduatedSymbol", "ranges", "range")
+        if ranges
+        else ("categorizedSymbol", "categories", "category")
+    )
+    renderer = ET.SubElement(root, "renderer-v2", type=kind, attr=column)
+    if ranges:
+        renderer.set("graduatedMethod", "GraduatedColor")
+    if last_first:  # so that the least number lies on top
+        renderer.set("enableorderby", "1")
+        clause = ET.SubElement(ET.SubElement(renderer, "orderby"), "orderByClause", asc="0")
+        clause.text = f'"{column}"'
+    listed, symbols = ET.SubElement(renderer, parent), ET.SubElement(renderer, "symbols")
+    for name, entry in entries.items():
+        ET.SubElement(
+            listed, child, {**entry.values, "symbol": name, "label": entry.label, "render": "true"}
+        )
+        _add_symbol(symbols, name, SYMBOLS[geometry], *entry.symbol)
     ET.SubElement(root, "layerOpacity").text = str(opacity)
-    kind = ET.SubElement(root, "layerGeometryType")
-    kind.text = str(("point", "line", "polygon").index(geometry))
+    ET.SubElement(root, "layerGeometryType").text = str(list(SYMBOLS).index(geometry))
     return ET.tostring(root, encoding="unicode")
 
 
