@@ -137,6 +137,7 @@ from .exports.geotiff import export_geotiff as export_geotiff
 from .exports.regions import SearchRegions as SearchRegions, search_regions as search_regions
 from .reports.evaluation import evaluation_tables as evaluation_tables
 from .reports.parts import Curve as Curve, Plot as Plot
+from .reports.quality import quality_tables as quality_tables
 from .reports.plots import draw_plot as draw_plot
 from .reports.scenes import cell_scene as cell_scene, draw_scene as draw_scene
 from .reports.tables import Table as Table
