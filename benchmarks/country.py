@@ -26,7 +26,7 @@ from semsig_gis.sources.synthetic.city import CitySpec, synthetic_city
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from semsig_gis.database.parts import Manifest
+    from semsig_gis.database.file import Manifest
     from semsig_gis.sources import RawLayer
 
 __all__ = ["comparisons"]

@@ -117,7 +117,7 @@ def build(
                 tell=remark,
                 **specs,
             )
-        cells, entries = manifest.cells, sum(part.entries for part in manifest.parts)
+        cells, entries = manifest.cells, manifest.entries
     if as_json:
         print_json(_info(out))
         return

@@ -127,16 +127,21 @@ def cells_near(
     The square around a point is taken, so that some cells see nothing in the end. Raises InputError
     if the step is so small that there would be too many cells, or they cannot be numbered.
     """
+    require_step(grid, radius)
+    reach = math.ceil(radius / grid.step + 0.5)
+    columns, rows = grid.cells_at(xy)
+    rows, columns = split_ids(_widened(cell_ids(rows, columns), reach))
+    return split_ids(_widened(cell_ids(columns, rows), reach))
+
+
+def require_step(grid: GridSpec, radius: float) -> None:
+    """Raise InputError if the step is so small that a range would hold too many cells."""
     if radius > (MAX_REACH - 1) * grid.step:
         msg = (
             f"a step of {grid.step:g} m is too small for a range of {radius:g} m; make the step "
             f"larger, at least {radius / (MAX_REACH - 1):.3g} m."
         )
         raise InputError(msg)
-    reach = math.ceil(radius / grid.step + 0.5)
-    columns, rows = grid.cells_at(xy)
-    rows, columns = split_ids(_widened(cell_ids(rows, columns), reach))
-    return split_ids(_widened(cell_ids(columns, rows), reach))
 
 
 def _widened(ids: NDArray[np.int64], reach: int) -> NDArray[np.int64]:

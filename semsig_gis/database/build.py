@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -11,7 +12,7 @@ from semsig_gis.core.grid import GridSpec, cell_ids, cells_near, split_ids
 from semsig_gis.core.rtree import PackedIndex
 from semsig_gis.core.signature import SignatureSpec
 from semsig_gis.database.database import BEARING_UNITS, DISTANCE_UNITS, SignatureDatabase
-from semsig_gis.database.occlusion import Footprints
+from semsig_gis.database.occlusion import TOLERANCE_M, Footprints
 from semsig_gis.database.sequences import consecutive
 from semsig_gis.database.viewpoints import ViewpointSpec, choose_viewpoints
 from semsig_gis.database.visibility import clockwise_order, sightings
@@ -121,22 +122,32 @@ def build_cells(
     viewpoints: ViewpointSpec | None = None,
     footprints: gpd.GeoDataFrame | None = None,
     streets: gpd.GeoDataFrame | None = None,
+    partial: bool = False,
     progress: Callable[[int, int], None] | None = None,
 ) -> SignatureDatabase:
     """Compute the signatures of some cells; what they see must be among the objects.
 
     The cells are distinct and ordered by column and row; the result has those that are viewpoints
-    and see something, possibly none. All else is as in `build_database`.
+    and see something, possibly none. `partial` cells are some of a city: no building or street need
+    be near them, so their tables may be empty. All else is as in `build_database`.
     """
     viewpoints = viewpoints or ViewpointSpec()
-    buildings = None if footprints is None else Footprints(_moved(footprints, objects.crs))
+    buildings = None
+    if footprints is not None and not (partial and footprints.empty):
+        buildings = Footprints(moved(footprints, objects.crs).geometry.to_numpy())
+    choice = viewpoints
+    chosen_by = {"outdoor": footprints, "streets": streets}.get(viewpoints.mode)
+    if partial and chosen_by is not None and chosen_by.empty:
+        choice = replace(viewpoints, mode="all")
+        if viewpoints.mode == "streets":
+            columns, rows = columns[:0], rows[:0]
     chosen = choose_viewpoints(
         columns,
         rows,
         grid=grid,
-        spec=viewpoints,
+        spec=choice,
         footprints=buildings,
-        streets=None if streets is None else _moved(streets, objects.crs),
+        streets=None if streets is None else moved(streets, objects.crs).geometry.to_numpy(),
         widths=None if streets is None else streets.get("half_width"),
     )
     columns, rows = columns[chosen], rows[chosen]
@@ -185,17 +196,16 @@ def build_cells(
             *licenses_of(footprints, streets if viewpoints.mode == "streets" else None),
         ),
         viewpoints=viewpoints,
-        occlusion=None if buildings is None else buildings.tolerance,
+        occlusion=None if footprints is None else TOLERANCE_M,
     )
 
 
-def _moved(table: gpd.GeoDataFrame, crs: CRS) -> NDArray[np.object_]:
-    """Return the geometries of a table in a CRS."""
+def moved(table: gpd.GeoDataFrame, crs: CRS) -> gpd.GeoDataFrame:
+    """Return buildings or streets in a CRS; raise CrsError if theirs is not known."""
     if table.crs is None:
         msg = "buildings or streets have no coordinate reference system; state their crs."
         raise CrsError(msg)
-    moved: NDArray[np.object_] = table.geometry.to_crs(crs).to_numpy()
-    return moved
+    return table.to_crs(crs)
 
 
 def visible_objects(

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
 import zlib
 from dataclasses import replace
 from functools import cached_property
@@ -17,12 +16,18 @@ from semsig_gis.core.errors import DatabaseError
 from semsig_gis.database.file import (
     BUILT_DIGEST,
     KIND,
+    Manifest,
     built_digest,
+    digest,
+    is_folder,
     open_database,
     open_dataset,
+    part_files,
+    read_manifest,
+    read_specs,
+    require_file,
+    store_path,
 )
-from semsig_gis.database.parts import Manifest, digest, part_files, read_manifest
-from semsig_gis.database.store import open_store, store_path
 from semsig_gis.storage.geoparquet import read_geoparquet, write_geoparquet
 from semsig_gis.storage.whole import whole_folder
 
@@ -107,9 +112,7 @@ class City:
         """
         if self._is_folder:
             return part_files(self.path)
-        if not os.path.isfile(self.path):  # noqa: PTH113 - it answers where Path.is_file raises
-            msg = f"{self.path} does not exist; give a signature database file."
-            raise DatabaseError(msg)
+        require_file(self.path)
         return (self.path,)
 
     @property
@@ -143,6 +146,8 @@ class City:
         DatabaseError
             If it is missing or damaged, or belongs to another database.
         """
+        from semsig_gis.database.store import open_store  # noqa: PLC0415 - its readers load slowly
+
         return open_store(self.path)
 
     @property
@@ -171,7 +176,7 @@ class City:
     @property
     def has_columns(self) -> bool:
         """Whether columns were put into the file, or the first part."""
-        return bool(_specs(self.files[0]).get(ADDED))
+        return bool(read_specs(self.files[0]).get(ADDED))
 
     def columns(self, name: str) -> tuple[pa.Table, dict[str, Any]] | None:
         """Return columns that were put into the database under a name, and their facts.
@@ -184,7 +189,7 @@ class City:
             If the database is missing or damaged, or its parts do not agree on the columns.
         """
         files = self.files
-        entries = [_specs(file).get(ADDED, {}).get(name) for file in files]
+        entries = [read_specs(file).get(ADDED, {}).get(name) for file in files]
         if not any(entries):
             return None
         if any(entry != entries[0] for entry in entries):
@@ -225,7 +230,7 @@ class City:
 
     @property
     def _is_folder(self) -> bool:
-        return os.path.isdir(self.path)  # noqa: PTH112 - it answers where Path.is_dir raises
+        return is_folder(self.path)
 
 
 def open_city(path: str | Path) -> City:
@@ -254,14 +259,9 @@ def open_city(path: str | Path) -> City:
     semsig_gis.core.errors.DatabaseError: nowhere.parquet does not exist;
     give a signature database file.
     """
-    if not os.path.exists(path):  # noqa: PTH110 - it answers where Path.exists raises
-        msg = f"{path} does not exist; give a signature database file."
-        raise DatabaseError(msg)
+    if not is_folder(path):
+        require_file(path)
     return City(path)
-
-
-def _specs(file: Path) -> dict[str, Any]:
-    return read_geoparquet(file, kind=KIND, columns=[])[1]
 
 
 def _extend(

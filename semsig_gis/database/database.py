@@ -5,8 +5,7 @@ from __future__ import annotations
 import functools
 import operator
 from dataclasses import dataclass, replace
-from types import MappingProxyType
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from pyproj import CRS
@@ -19,7 +18,7 @@ from semsig_gis.database.sequences import SequenceTable, consecutive, frozen
 from semsig_gis.database.viewpoints import ViewpointSpec
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Mapping, Sequence
+    from collections.abc import Iterable, Sequence
 
     from numpy.typing import ArrayLike, NDArray
 
@@ -34,15 +33,18 @@ BEARING_UNITS = 7200
 DISTANCE_UNITS = 255
 LONGEST_VALUE = 80
 
-_MADE: Mapping[str, str] = MappingProxyType(
-    {
-        "crs": "coordinate reference system",
-        "grid": "grid",
-        "spec": "range or angle levels",
-        "viewpoints": "viewpoints",
-        "occlusion": "occlusion",
-    }
-)
+# What two databases that were made in the same way have in common, and what it is called.
+MADE = {
+    "crs": "coordinate reference system",
+    "grid": "grid",
+    "spec": "range or angle levels",
+    "viewpoints": "viewpoints",
+    "occlusion": "occlusion",
+    "taxonomy": "classes",
+    "reach": "longest visibility range",
+}
+CELL_ARRAYS = ("columns", "rows")
+ENTRY_ARRAYS = ("codes", "bearing_units", "distance_units")
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,14 +85,7 @@ class SignatureDatabase:
 
     Examples
     --------
-    >>> from semsig_gis.sources.synthetic.city import CitySpec, synthetic_city
-    >>> from semsig_gis.sources.catalog import paper_taxonomy
-    >>> from semsig_gis.objects.clean import build_objects
-    >>> layers = synthetic_city(CitySpec(size=300.0))
-    >>> objects, _ = build_objects(layers, taxonomy=paper_taxonomy(), crs="EPSG:32631")
-    >>> from semsig_gis.database.build import build_database
-    >>> database = build_database(objects)
-    >>> len(database.types(0)) == int(database.lengths[0])
+    >>> len(demo_database.types(0)) == int(demo_database.lengths[0])
     True
     """
 
@@ -110,7 +105,7 @@ class SignatureDatabase:
     occlusion: float | None = None
 
     def __post_init__(self) -> None:  # noqa: D105
-        for name in ("columns", "rows", "offsets", "codes", "bearing_units", "distance_units"):
+        for name in ("offsets", *CELL_ARRAYS, *ENTRY_ARRAYS):
             frozen(getattr(self, name))
 
     def __len__(self) -> int:  # noqa: D105
@@ -236,12 +231,9 @@ class SignatureDatabase:
         entries = consecutive(self.offsets[kept], lengths)
         return replace(
             self,
-            columns=self.columns[kept],
-            rows=self.rows[kept],
             offsets=np.append(0, np.cumsum(lengths)),
-            codes=self.codes[entries],
-            bearing_units=self.bearing_units[entries],
-            distance_units=self.distance_units[entries],
+            **{name: getattr(self, name)[kept] for name in CELL_ARRAYS},
+            **{name: getattr(self, name)[entries] for name in ENTRY_ARRAYS},
         )
 
     def types(self, cell: int) -> str:
@@ -272,35 +264,35 @@ def join_databases(parts: Sequence[SignatureDatabase]) -> SignatureDatabase:
         raise DatabaseError(msg)
     first = parts[0]
     for part in parts[1:]:
-        require_same(first, part, {**_MADE, "taxonomy": "classes"})
+        require_same(first, part)
     ids = np.concatenate([part.cell_ids for part in parts])
     order = np.argsort(ids, kind="stable")
     if (np.diff(ids[order]) == 0).any():
         msg = "two of the databases hold the same cell; join databases of different cells."
         raise DatabaseError(msg)
+    arrays: dict[str, Any] = {
+        name: np.concatenate([getattr(part, name) for part in parts])
+        for name in ("lengths", *CELL_ARRAYS, *ENTRY_ARRAYS)
+    }
     joined = replace(
         first,
-        columns=np.concatenate([part.columns for part in parts]),
-        rows=np.concatenate([part.rows for part in parts]),
-        offsets=np.concatenate([[0], np.cumsum(np.concatenate([part.lengths for part in parts]))]),
-        codes=np.concatenate([part.codes for part in parts]),
-        bearing_units=np.concatenate([part.bearing_units for part in parts]),
-        distance_units=np.concatenate([part.distance_units for part in parts]),
+        offsets=np.append(0, np.cumsum(arrays.pop("lengths"))),
         licenses=tuple(dict.fromkeys(line for part in parts for line in part.licenses)),
+        **arrays,
     )
     return joined if (np.diff(order) == 1).all() else joined.select(order)
 
 
 def require_same(
-    first: SignatureDatabase, other: SignatureDatabase, what: Mapping[str, str] = _MADE
+    first: SignatureDatabase, other: SignatureDatabase, *, classes: bool = True
 ) -> None:
     """Raise DatabaseError where two databases were not made in the same way.
 
-    `what` maps the attributes to compare to what they are called; by default all but the classes.
+    Without `classes`, these may differ.
     """
-    for name, title in what.items():
+    for name, title in MADE.items():
         ours, theirs = getattr(first, name), getattr(other, name)
-        if ours != theirs:
+        if ours != theirs and (classes or name != "taxonomy"):
             msg = (
                 f"the databases differ in their {title} ({_brief(ours)} and {_brief(theirs)}); "
                 "build both in the same way."
@@ -314,10 +306,8 @@ def require_same_place(database: SignatureDatabase, xy: NDArray[np.float64], wha
     Elsewhere is outside of the box of the cells widened by the longest visibility range; an empty
     array of places is accepted. `what` names the places in the message.
     """
-    low, high = (
-        database.xy.min(axis=0) - database.reach,
-        database.xy.max(axis=0) + database.reach,
-    )
+    low = database.xy.min(axis=0) - database.reach
+    high = database.xy.max(axis=0) + database.reach
     if len(xy) and not ((low <= xy) & (xy <= high)).all(axis=1).any():
         msg = f"none of the {len(xy):,} {what} is where the cells are; give those of the same city."
         raise InputError(msg)
@@ -331,11 +321,11 @@ def rows_of_result(
     Raise InputError if the database lacks one of the cell ids, or if the types seen from a cell are
     not those of the result. `what` names the kind of result in the message.
     """
-    wanted = np.asarray(ids, np.int64)
-    rows = np.searchsorted(database.cell_ids, wanted)
+    cells = np.asarray(ids, np.int64)
+    rows = np.searchsorted(database.cell_ids, cells)
     same = (
         rows.max(initial=-1) < len(database)
-        and np.array_equal(database.cell_ids[rows], wanted)
+        and np.array_equal(database.cell_ids[rows], cells)
         and all(map(operator.eq, types, map(database.types, rows.tolist())))
     )
     if not same:

@@ -1,7 +1,9 @@
-"""The files of a signature database."""
+"""The files of a signature database: one GeoParquet file, or a folder of parts with a manifest."""
 
 from __future__ import annotations
 
+import hashlib
+import json
 import os
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -10,12 +12,16 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pyarrow as pa
 
-from semsig_gis.core.errors import DatabaseError, SemsigError
+from semsig_gis.core.errors import DatabaseError, InputError, SemsigError
 from semsig_gis.core.grid import GridSpec, split_ids
 from semsig_gis.core.signature import SignatureSpec
 from semsig_gis.core.taxonomy import Taxonomy
-from semsig_gis.database.database import BEARING_UNITS, SignatureDatabase, join_databases
-from semsig_gis.database.parts import digest, part_files, read_manifest
+from semsig_gis.database.database import (
+    BEARING_UNITS,
+    SignatureDatabase,
+    join_databases,
+    require_same,
+)
 from semsig_gis.database.viewpoints import ViewpointSpec
 from semsig_gis.storage.geoparquet import (
     geo_metadata,
@@ -23,6 +29,7 @@ from semsig_gis.storage.geoparquet import (
     read_geoparquet,
     write_geoparquet,
 )
+from semsig_gis.storage.whole import write_whole
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -30,12 +37,15 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
     from pyproj import CRS
 
-
 KIND = "signature database"
-
-
 # Raised whenever a file of before would be read wrongly.
 FORMAT = 2
+BUILT_DIGEST = "built_digest"
+STORE_SUFFIX = ".objects"
+# Readers of Parquet folders, such as pyarrow, leave out what begins so.
+MANIFEST = "_manifest.json"
+PARTS_KIND = "signature database in parts"
+CHUNK = 1 << 20
 
 
 def save_database(database: SignatureDatabase, path: str | Path) -> None:
@@ -58,16 +68,9 @@ def save_database(database: SignatureDatabase, path: str | Path) -> None:
     Examples
     --------
     >>> import tempfile
-    >>> from semsig_gis.sources.synthetic.city import CitySpec, synthetic_city
-    >>> from semsig_gis.sources.catalog import paper_taxonomy
-    >>> from semsig_gis.objects.clean import build_objects
-    >>> from semsig_gis.database.build import build_database
-    >>> layers = synthetic_city(CitySpec(size=300.0))
-    >>> objects, _ = build_objects(layers, taxonomy=paper_taxonomy(), crs="EPSG:32631")
-    >>> database = build_database(objects)
     >>> with tempfile.TemporaryDirectory() as folder:
-    ...     save_database(database, f"{folder}/city.parquet")
-    ...     open_database(f"{folder}/city.parquet").types(0) == database.types(0)
+    ...     save_database(demo_database, f"{folder}/city.parquet")
+    ...     open_database(f"{folder}/city.parquet").types(0) == demo_database.types(0)
     True
     """
     symbols = pa.py_buffer(database.taxonomy.symbol_bytes[database.codes])
@@ -133,7 +136,7 @@ def open_database(path: str | Path) -> SignatureDatabase:
     semsig_gis.core.errors.DatabaseError: nowhere.parquet does not exist;
     give a signature database file.
     """
-    if os.path.isdir(path):  # noqa: PTH112 - it answers where Path.is_dir raises
+    if is_folder(path):
         return join_databases([open_database(part) for part in part_files(path)])
     columns = ["cell_id", "types", "bearings", "distances"]
     return database_of(*read_geoparquet(path, kind=KIND, columns=columns), path=path)
@@ -154,56 +157,50 @@ def database_of(
         )
         raise DatabaseError(msg)
     try:
-        grid = GridSpec(specs["grid"]["step"], tuple(specs["grid"]["origin"]))
-        spec = SignatureSpec(**specs["signature"])
         taxonomy = Taxonomy.from_list(specs["taxonomy"])
-        symbols, offsets = _text(table["types"])
         codes_of = np.zeros(256, np.uint8)
         for item in taxonomy.classes:
             codes_of[ord(item.symbol)] = item.code
-        codes = codes_of[symbols]
+        symbols, offsets = _text(table["types"])
         bearing_units, bearing_offsets = _numbers(table["bearings"], pa.uint16())
         distance_units, distance_offsets = _numbers(table["distances"], pa.uint8())
         cells = table["cell_id"].to_numpy().astype(np.int64, casting="safe")
-        licenses = tuple(specs["licenses"])
-        version = specs["version"]
-        viewpoints = ViewpointSpec.from_dict(specs["viewpoints"])
-        occlusion = None if specs["occlusion"] is None else float(specs["occlusion"])
+        columns, rows = split_ids(cells)
+        database = SignatureDatabase(
+            columns=columns.astype(np.int32),
+            rows=rows.astype(np.int32),
+            offsets=offsets,
+            codes=codes_of[symbols],
+            bearing_units=bearing_units,
+            distance_units=distance_units,
+            grid=GridSpec(specs["grid"]["step"], tuple(specs["grid"]["origin"])),
+            spec=SignatureSpec(**specs["signature"]),
+            taxonomy=taxonomy,
+            crs=crs,
+            licenses=tuple(specs["licenses"]),
+            version=specs["version"],
+            viewpoints=ViewpointSpec.from_dict(specs["viewpoints"]),
+            occlusion=None if specs["occlusion"] is None else float(specs["occlusion"]),
+        )
     except (KeyError, TypeError, ValueError, SemsigError) as error:
         msg = f"{path} is damaged ({error}); build the database again."
         raise DatabaseError(msg) from error
     # What every signature keeps to; a sum of bytes would not find columns that were swapped.
-    inside = np.ones(len(codes), bool)
-    inside[offsets[:-1]] = False
+    follows = np.ones(len(symbols), bool)
+    follows[offsets[:-1]] = False
     consistent = (
         np.array_equal(offsets, bearing_offsets)
         and np.array_equal(offsets, distance_offsets)
         and (np.diff(offsets) > 0).all()
         and (np.diff(cells) > 0).all()
-        and codes.all()
+        and database.codes.all()
         and (bearing_units < BEARING_UNITS).all()
-        and not (inside[1:] & (bearing_units[1:] < bearing_units[:-1])).any()
+        and not (follows[1:] & (bearing_units[1:] < bearing_units[:-1])).any()
     )
     if not consistent:
         msg = f"{path} is damaged (its columns do not fit each other); build the database again."
         raise DatabaseError(msg)
-    columns_, rows = split_ids(cells)
-    return SignatureDatabase(
-        columns=columns_.astype(np.int32),
-        rows=rows.astype(np.int32),
-        offsets=offsets,
-        codes=codes,
-        bearing_units=bearing_units,
-        distance_units=distance_units,
-        grid=grid,
-        spec=spec,
-        taxonomy=taxonomy,
-        crs=crs,
-        licenses=licenses,
-        version=version,
-        viewpoints=viewpoints,
-        occlusion=occlusion,
-    )
+    return database
 
 
 def _text(column: pa.ChunkedArray) -> tuple[NDArray[np.uint8], NDArray[np.int64]]:
@@ -232,7 +229,14 @@ def _from_zero(offsets: NDArray[np.int32]) -> NDArray[np.int64]:
     return offsets.astype(np.int64) - np.int64(offsets[0])
 
 
-BUILT_DIGEST = "built_digest"
+def digest(*paths: Path) -> str:
+    """Return the SHA-256 digest, in hexadecimal, of the content of files one after the other."""
+    total = hashlib.sha256()
+    for path in paths:
+        with path.open("rb") as file:
+            while chunk := file.read(CHUNK):
+                total.update(chunk)
+    return total.hexdigest()
 
 
 def built_digest(path: str | Path) -> str:
@@ -241,10 +245,153 @@ def built_digest(path: str | Path) -> str:
     Without such columns it is the digest of the file as it is, even if that is damaged.
     """
     try:
-        _, specs, _ = read_geoparquet(path, kind=KIND, columns=[])
-    except DatabaseError:  # whatever it is, it is as it is
-        specs = {}
-    return str(specs[BUILT_DIGEST]) if BUILT_DIGEST in specs else digest(Path(path))
+        return str(read_specs(path)[BUILT_DIGEST])
+    except (DatabaseError, KeyError):
+        return digest(Path(path))
+
+
+def read_specs(path: str | Path) -> dict[str, Any]:
+    """Return what a database file, or a part file, says of itself."""
+    return read_geoparquet(path, kind=KIND, columns=[])[1]
+
+
+def is_folder(path: str | Path) -> bool:
+    """Return whether a path is that of a folder, as of a database in parts."""
+    return os.path.isdir(path)  # noqa: PTH112 - it answers where Path.is_dir raises
+
+
+def require_file(path: str | Path) -> None:
+    """Raise DatabaseError if a path is not that of a file."""
+    if not os.path.isfile(path):  # noqa: PTH113 - it answers where Path.is_file raises
+        msg = f"{path} does not exist; give a signature database file."
+        raise DatabaseError(msg)
+
+
+def store_path(database: str | Path) -> Path:
+    """Return the folder beside a database file where its object store lies.
+
+    Links are followed. Raise InputError if the name of the database has the ending of a store.
+    """
+    file = Path(os.path.realpath(database))
+    if file.suffix == STORE_SUFFIX:
+        msg = f"{database} is a name for an object store; give a database another ending."
+        raise InputError(msg)
+    return file.with_suffix(STORE_SUFFIX)
+
+
+@dataclass(frozen=True, slots=True, order=True)
+class Part:
+    """One part file, which holds the cells of one tile.
+
+    `tile` is its column and row, counted in tiles from grid column 0 and row 0. `entries` is the
+    sum of the lengths of all signatures; `bytes` and `sha256` are the size and digest of the file.
+    """
+
+    tile: tuple[int, int]
+    cells: int
+    entries: int
+    bytes: int
+    sha256: str
+
+    @property
+    def file(self) -> str:
+        """Name of the file in the folder."""
+        return part_name(self.tile)
+
+
+@dataclass(frozen=True, slots=True)
+class Manifest:
+    """A signature database in parts, ordered by tile.
+
+    `recipe` says how it was built, as plain JSON values: the specs and the digests of the inputs.
+    """
+
+    recipe: dict[str, Any]
+    parts: tuple[Part, ...]
+
+    @property
+    def cells(self) -> int:
+        """Number of cells in all parts."""
+        return sum(part.cells for part in self.parts)
+
+    @property
+    def entries(self) -> int:
+        """Sum of the lengths of all signatures."""
+        return sum(part.entries for part in self.parts)
+
+    def write(self, folder: Path) -> None:
+        """Write the manifest into the folder of the parts; it appears whole, by rename."""
+        content = {
+            "kind": PARTS_KIND,
+            "recipe": self.recipe,
+            "parts": [{"file": part.file, **asdict(part)} for part in self.parts],
+        }
+        write_whole(folder / MANIFEST, json.dumps(content, indent=1) + "\n")
+
+
+def part_name(tile: tuple[int, int]) -> str:
+    """Return the name of the part file of a tile, such as ``tile_12_-3.parquet``."""
+    return f"tile_{tile[0]}_{tile[1]}.parquet"
+
+
+def read_manifest(folder: str | Path) -> Manifest:
+    """Read what a database in parts consists of.
+
+    Raise DatabaseError if the folder has no manifest, or it is damaged.
+    """
+    path = Path(folder) / MANIFEST
+    try:
+        content = json.loads(path.read_text(encoding="utf-8"))
+        parts = tuple(
+            Part(
+                tile=(int(one["tile"][0]), int(one["tile"][1])),
+                cells=int(one["cells"]),
+                entries=int(one["entries"]),
+                bytes=int(one["bytes"]),
+                sha256=str(one["sha256"]),
+            )
+            for one in content["parts"]
+        )
+        recipe = dict(content["recipe"])
+        kind = content["kind"]
+    except (FileNotFoundError, NotADirectoryError) as error:
+        msg = (
+            f"{folder} is not a signature database in parts (it has no {MANIFEST}); give a "
+            "folder that `semsig build --tile` wrote."
+        )
+        raise DatabaseError(msg) from error
+    except (OSError, ValueError, LookupError, TypeError) as error:
+        msg = f"{path} is damaged or cannot be read; build the database again."
+        raise DatabaseError(msg) from error
+    if kind != PARTS_KIND:
+        msg = f"{path} is of another kind; give a folder that `semsig build --tile` wrote."
+        raise DatabaseError(msg)
+    return Manifest(recipe, parts)
+
+
+def part_files(folder: str | Path) -> tuple[Path, ...]:
+    """Return the part files of a database, ordered by tile, after checking that it is whole.
+
+    Raise DatabaseError if a part is missing or damaged, or a Parquet file is there that is no part.
+    """
+    manifest = read_manifest(folder)
+    folder = Path(folder)
+    for part in manifest.parts:
+        path = folder / part.file
+        if not path.is_file():
+            msg = f"{path} is missing; put the part back or build the database again."
+            raise DatabaseError(msg)
+        if path.stat().st_size != part.bytes or digest(path) != part.sha256:
+            msg = f"{path} is not the part that was built; put it back or build the database again."
+            raise DatabaseError(msg)
+    others = {path.name for path in folder.glob("*.parquet")} - {p.file for p in manifest.parts}
+    if others:
+        msg = f"{folder / min(others)} is no part of the database in {folder}; move it elsewhere."
+        raise DatabaseError(msg)
+    if not manifest.parts:
+        msg = f"{folder / MANIFEST} lists no parts; build the database again."
+        raise DatabaseError(msg)
+    return tuple(folder / part.file for part in manifest.parts)
 
 
 @dataclass(frozen=True, slots=True)
@@ -278,12 +425,13 @@ class PartitionedDatabase:
         DatabaseError
             If a part is damaged, or was made in another way than the first.
         """
-        none = None
+        first = None
         for file in self.files:
             part = open_database(file)
-            if none is None:
-                none = part.select(slice(0))
-            yield join_databases([none, part])  # refuses a part that differs
+            if first is None:
+                first = part.select(slice(0))
+            require_same(first, part)
+            yield part
 
     @property
     def taxonomy(self) -> Taxonomy:
@@ -321,7 +469,7 @@ def open_dataset(folder: str | Path) -> PartitionedDatabase:
     Returns
     -------
     PartitionedDatabase
-        The parts. For all cells at once, use `database.file.open_database`.
+        The parts. For all cells at once, use `open_database`.
 
     Raises
     ------

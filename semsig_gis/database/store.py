@@ -8,7 +8,6 @@ update needs it, and so does whatever looks at objects from a place off the grid
 from __future__ import annotations
 
 import json
-import os
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -18,11 +17,18 @@ import pyarrow as pa
 
 from semsig_gis import __version__
 from semsig_gis.core.crs import HALF_WIDTH, LICENSES
-from semsig_gis.core.errors import CrsError, DatabaseError, InputError
+from semsig_gis.core.errors import DatabaseError, InputError
 from semsig_gis.core.rtree import INDEX_FILES, StoredIndex
-from semsig_gis.database.file import built_digest, save_database
+from semsig_gis.database.build import moved
+from semsig_gis.database.file import (
+    built_digest,
+    digest,
+    is_folder,
+    require_file,
+    save_database,
+    store_path,
+)
 from semsig_gis.database.occlusion import Footprints, buildings_near
-from semsig_gis.database.parts import digest
 from semsig_gis.objects.surroundings import licenses_of
 from semsig_gis.objects.table import open_objects, save_objects
 from semsig_gis.storage.whole import move_folder, whole_file, whole_folder
@@ -30,6 +36,7 @@ from semsig_gis.storage.whole import move_folder, whole_file, whole_folder
 if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
+    from pyproj import CRS
 
     from semsig_gis.database.database import SignatureDatabase
     from semsig_gis.objects.table import StreetObjects
@@ -37,7 +44,6 @@ if TYPE_CHECKING:
 KIND = "object store"
 # Raised whenever a store of before would be read wrongly.
 FORMAT = 1
-SUFFIX = ".objects"
 MANIFEST = "manifest.json"
 OBJECTS = "objects.parquet"
 FOOTPRINTS = "footprints.parquet"
@@ -65,13 +71,8 @@ class ObjectStore:
 
     Examples
     --------
-    >>> from semsig_gis.sources.synthetic.city import CitySpec, synthetic_city
-    >>> from semsig_gis.sources.catalog import paper_taxonomy
-    >>> from semsig_gis.objects.clean import build_objects
-    >>> layers = synthetic_city(CitySpec(size=300.0))
-    >>> objects, _ = build_objects(layers, taxonomy=paper_taxonomy(), crs="EPSG:32631")
-    >>> store = ObjectStore(objects=objects, index=StoredIndex.pack(objects.xy))
-    >>> _, near = store.index.pairs_within(objects.xy[:1], radius=0.0)
+    >>> store = ObjectStore.of(demo_objects)
+    >>> _, near = store.index.pairs_within(demo_objects.xy[:1], radius=0.0)
     >>> near.tolist()
     [0]
     """
@@ -114,8 +115,8 @@ class ObjectStore:
         return cls(
             objects=objects,
             index=StoredIndex.pack(objects.xy),
-            footprints=None if footprints is None else _surroundings(footprints, objects),
-            streets=None if streets is None else _surroundings(streets, objects),
+            footprints=None if footprints is None else _stored(footprints, objects.crs),
+            streets=None if streets is None else _stored(streets, objects.crs),
         )
 
     def buildings_around(
@@ -142,30 +143,14 @@ class ObjectStore:
         return Footprints(polygons[near]) if len(near) else None
 
 
-def _surroundings(table: gpd.GeoDataFrame, objects: StreetObjects) -> gpd.GeoDataFrame:
-    """Return what the building of a database takes of a table, in the CRS of the objects."""
-    if table.crs is None:
-        msg = "buildings or streets have no coordinate reference system; state their crs."
-        raise CrsError(msg)
+def _stored(table: gpd.GeoDataFrame, crs: CRS) -> gpd.GeoDataFrame:
+    """Return what the building of a database takes of a table, in a CRS."""
     geometry = table.geometry
-    kept = table[~(geometry.isna() | geometry.is_empty)]
+    kept = moved(table[~(geometry.isna() | geometry.is_empty)], crs)
     columns = {HALF_WIDTH: kept[HALF_WIDTH].to_numpy(float)} if HALF_WIDTH in kept else {}
-    taken = gpd.GeoDataFrame(columns, geometry=kept.geometry.to_numpy(), crs=table.crs)
-    taken.attrs[LICENSES] = list(licenses_of(table))
-    return taken.to_crs(objects.crs)
-
-
-def store_path(database: str | Path) -> Path:
-    """Return the folder beside a database file where its object store lies.
-
-    Links are followed. Raise InputError if the name of the database has the ending of a store.
-    """
-    # A link to a database has the store of the database.
-    file = Path(os.path.realpath(database))
-    if file.suffix == SUFFIX:
-        msg = f"{database} is a name for an object store; give a database another ending."
-        raise InputError(msg)
-    return file.with_suffix(SUFFIX)
+    stored = gpd.GeoDataFrame(columns, geometry=kept.geometry.to_numpy(), crs=crs)
+    stored.attrs[LICENSES] = list(licenses_of(table))
+    return stored
 
 
 def save_with_store(database: SignatureDatabase, store: ObjectStore, path: str | Path) -> None:
@@ -196,16 +181,10 @@ def save_with_store(database: SignatureDatabase, store: ObjectStore, path: str |
     Examples
     --------
     >>> import tempfile
-    >>> from semsig_gis.database.build import build_database
-    >>> from semsig_gis.sources.synthetic.city import CitySpec, synthetic_city
-    >>> from semsig_gis.sources.catalog import paper_taxonomy
-    >>> from semsig_gis.objects.clean import build_objects
-    >>> layers = synthetic_city(CitySpec(size=300.0))
-    >>> objects, _ = build_objects(layers, taxonomy=paper_taxonomy(), crs="EPSG:32631")
     >>> with tempfile.TemporaryDirectory() as folder:
     ...     file = Path(folder, "city.parquet")
-    ...     save_with_store(build_database(objects), ObjectStore.of(objects), file)
-    ...     len(open_store(file).objects) == len(objects)
+    ...     save_with_store(demo_database, ObjectStore.of(demo_objects), file)
+    ...     len(open_store(file).objects) == len(demo_objects)
     True
     """
     final = store_path(path)
@@ -252,12 +231,13 @@ def open_store(database: str | Path, folder: str | Path | None = None) -> Object
     semsig_gis.core.errors.DatabaseError: nowhere.parquet does not exist;
     give a signature database file.
     """
-    if not os.path.isfile(database):  # noqa: PTH113 - it answers where Path.is_file raises
-        what = "does not exist"
-        if os.path.isdir(database):  # noqa: PTH112
-            what = "is a folder, and only a database in one file has an object store"
-        msg = f"{database} {what}; give a signature database file."
+    if is_folder(database):
+        msg = (
+            f"{database} is a folder, and only a database in one file has an object store; give a "
+            "signature database file."
+        )
         raise DatabaseError(msg)
+    require_file(database)
     return _read(_settle(Path(database)) if folder is None else Path(folder), Path(database))
 
 
@@ -286,7 +266,7 @@ def _manifest(folder: Path) -> dict[str, Any]:
 
 
 def _read(folder: Path, database: Path) -> ObjectStore:
-    if not os.path.isdir(folder):  # noqa: PTH112 - it answers where Path.is_dir raises
+    if not is_folder(folder):
         msg = f"{database} has no object store ({folder.name} beside it); build the database again."
         raise DatabaseError(msg)
     manifest = _manifest(folder)

@@ -1,13 +1,18 @@
-"""Tiles: building a signature database square by square, each from what lies near it alone."""
+"""Tiles: building a signature database square by square, each from what lies near it alone.
+
+The run works in ``OUT.partial``, where the same command finds the tiles that an interrupted run has
+left; when all are there, the folder is renamed to ``OUT``.
+"""
 
 from __future__ import annotations
 
 import contextlib
 import json
 import math
+import os
 import shutil
 from collections import Counter
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
@@ -22,51 +27,70 @@ from pyproj.exceptions import CRSError
 from semsig_gis import __version__
 from semsig_gis.core.crs import HALF_WIDTH
 from semsig_gis.core.errors import DatabaseError, EmptyResultError, InputError, SourceError
-from semsig_gis.core.grid import GridSpec, cell_ids, cells_near, split_ids
+from semsig_gis.core.grid import GridSpec, cell_ids, cells_near, require_step, split_ids
 from semsig_gis.core.parallel import check_workers, run_tasks
 from semsig_gis.core.signature import SignatureSpec
 from semsig_gis.database.build import build_cells
-from semsig_gis.database.file import save_database
-from semsig_gis.database.occlusion import TOLERANCE_M
-from semsig_gis.database.parts import digest, part_name
-from semsig_gis.database.tile_run import (
-    INPUTS,
-    RUN,
-    describe,
-    finished_tiles,
-    mark_empty,
-    publish,
-    start,
+from semsig_gis.database.file import (
+    MANIFEST,
+    Manifest,
+    Part,
+    digest,
+    open_database,
+    part_name,
+    read_manifest,
+    save_database,
 )
-from semsig_gis.database.viewpoints import ViewpointSpec, choose_viewpoints
-from semsig_gis.objects.surroundings import licenses_of, read_surroundings, save_surroundings
+from semsig_gis.database.occlusion import TOLERANCE_M
+from semsig_gis.database.sequences import consecutive
+from semsig_gis.database.viewpoints import ViewpointSpec, require_surroundings
+from semsig_gis.objects.surroundings import read_surroundings, save_surroundings
 from semsig_gis.objects.table import open_objects, save_objects
 from semsig_gis.storage.geoparquet import NOWHERE, each_bounds
+from semsig_gis.storage.runs import (
+    PARTIAL,
+    RunKind,
+    finish,
+    partial_folder,
+    read_json,
+    write_json,
+)
+from semsig_gis.storage.whole import HALF_WRITTEN
 
 if TYPE_CHECKING:
+    from collections.abc import Callable, Iterable, Sequence
+
     import geopandas as gpd
 
     from semsig_gis.database.database import SignatureDatabase
-    from semsig_gis.database.parts import Part
-    from semsig_gis.objects.table import StreetObjects
 
     Tile = tuple[int, int]
     Box = tuple[float, float, float, float]
     Role = Literal["buildings", "streets"]
-    from collections.abc import Callable
-
-    from semsig_gis.database.parts import Manifest
-
 
 # Beyond the range: for rounding, and for walls as near as occlusion.GAP_M and TOLERANCE_M look.
 MARGIN_M = 2.0
-
-
 # Tiles that one object may touch in a row, and tiles in all.
 MOST_REACHED = 16
-
-
 MOST_TILES = 1_000_000
+# When so many have failed, the rest would too.
+MOST_FAILED = 10
+
+RECIPE = "_recipe.json"
+# Copies of inputs that can be read by box.
+INPUTS = "_inputs"
+EMPTY = ".empty"
+RUN = RunKind(
+    content="unfinished run",
+    another=(
+        "{folder} holds an unfinished run that differs in {difference}; delete that folder to "
+        "start anew, or finish it with the same command and inputs as before."
+    ),
+    read=lambda folder: read_json(folder / RECIPE),
+    write=lambda folder, recipe: write_json(folder / RECIPE, recipe),
+    names={RECIPE, INPUTS},
+    results="tile_*",
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -97,19 +121,154 @@ class TileSpec:
             raise InputError(msg)
 
     def cells(self, grid: GridSpec) -> int:
-        """Return the side in cells.
-
-        Parameters
-        ----------
-        grid : GridSpec
-            The cells.
-
-        Returns
-        -------
-        int
-            At least 1.
-        """
+        """Return the side in cells of a grid, at least 1."""
         return max(1, round(self.side / grid.step))
+
+
+def build_tiles(
+    objects: str | Path,
+    out: str | Path,
+    *,
+    tile: TileSpec | None = None,
+    grid: GridSpec | None = None,
+    spec: SignatureSpec | None = None,
+    viewpoints: ViewpointSpec | None = None,
+    buildings: str | Path | None = None,
+    streets: str | Path | None = None,
+    workers: int = 0,
+    scheduler: str | None = None,
+    progress: Callable[[int, int], None] | None = None,
+    tell: Callable[[str], None] | None = None,
+) -> Manifest:
+    """Build a signature database in tiles: a folder that is opened like a single file.
+
+    Parameters
+    ----------
+    objects : str or Path
+        Street objects that `objects.table.save_objects` wrote.
+    out : str or Path
+        Folder to write. It appears whole, by rename; a database that is there is replaced.
+    tile : TileSpec, optional
+        Size of a tile; 2000 m by default.
+    grid : GridSpec, optional
+        The cells; 10 m by default.
+    spec : SignatureSpec, optional
+        Visibility range and angle levels; 30 m and 16 by default.
+    viewpoints : ViewpointSpec, optional
+        Which cells are looked from; all by default.
+    buildings, streets : str or Path, optional
+        Files that `objects.surroundings.read_surroundings` reads. Those that cannot be read by
+        box are copied into such a file first.
+    workers : int, default 0
+        How many processes of this machine build tiles; 0 builds them here, without dask.
+    scheduler : str, optional
+        Address of a dask scheduler, such as ``tcp://10.0.0.5:8786``, whose workers see the same
+        files under the same paths; then `workers` stays 0.
+    progress : callable, optional
+        Called with the number of tiles done and in all.
+    tell : callable, optional
+        Called with a remark for the user, as about a run that is taken up again.
+
+    Returns
+    -------
+    Manifest
+        What the database consists of.
+
+    Raises
+    ------
+    InputError
+        If an option cannot be used, the scheduler cannot be reached, or `out` holds something
+        else or an unfinished run with other inputs or specs.
+    DatabaseError
+        If the street objects cannot be read, or a tile cannot be built; the other tiles are kept
+        for the next run.
+    EmptyResultError
+        If no cell sees an object.
+
+    Notes
+    -----
+    The files are the same byte for byte whatever the number of workers. An interrupted run leaves
+    its tiles in ``OUT.partial``, and the same command goes on from there, if the specs are the same
+    and the input files have the same content (by SHA-256). A script that gives `workers` needs the
+    guard ``if __name__ == "__main__":``, because the workers import it.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     save_objects(demo_objects, f"{folder}/objects.parquet")
+    ...     parts = build_tiles(f"{folder}/objects.parquet", f"{folder}/town")
+    ...     len(open_database(f"{folder}/town")) == parts.cells
+    True
+    """
+    check_workers(workers, scheduler)
+    plan = plan_tiles(
+        objects,
+        out,
+        tile=tile or TileSpec(),
+        grid=grid or GridSpec(),
+        spec=spec or SignatureSpec(),
+        viewpoints=viewpoints or ViewpointSpec(),
+        buildings=buildings,
+        streets=streets,
+    )
+    try:
+        parts = _run(plan, workers, scheduler, progress, tell)
+    finally:
+        RUN.abandon(plan.folder)
+    if not parts:
+        shutil.rmtree(plan.folder, ignore_errors=True)
+        msg = (
+            f"no cell sees an object of {objects}; make the step ({plan.grid.step:g} m) smaller or "
+            f"the visibility range ({plan.spec.radius:g} m) larger, or look at the area, the "
+            "streets and the buildings."
+        )
+        raise EmptyResultError(msg)
+    return publish(plan.folder, parts)
+
+
+def _run(
+    plan: TilePlan,
+    workers: int,
+    scheduler: str | None,
+    progress: Callable[[int, int], None] | None,
+    tell: Callable[[str], None] | None,
+) -> list[Part]:
+    """Build the tiles that are not done yet, and return the parts of all."""
+    tiles = touched_tiles(plan.objects, grid=plan.grid, side=plan.side, reach=plan.reach)
+    done = finished_tiles(plan.folder, tiles)
+    if done and tell is not None:
+        tell(f"an unfinished run has left {len(done):,} of {len(tiles):,} tiles; it goes on")
+    todo = [one for one in tiles if one not in done]
+    failed: dict[Tile, str] = {}
+    paths = [plan.folder, plan.objects, plan.buildings, plan.streets]
+    running = run_tasks(
+        partial(build_tile, plan),
+        todo,
+        workers=workers,
+        scheduler=scheduler,
+        files=[path for path in paths if path is not None],
+    )
+    with contextlib.closing(running) as outcomes:
+        for outcome in outcomes:
+            if outcome.reason is None:
+                done[outcome.task] = outcome.value
+            else:
+                failed[outcome.task] = outcome.reason
+            if len(failed) == MOST_FAILED:
+                break
+            if progress is not None:
+                progress(len(done), len(tiles))
+    if failed:
+        first = min(failed)
+        others = f" and {len(failed) - 1} more" if len(failed) > 1 else ""
+        msg = (
+            f"{part_name(first)}{others} could not be built ({failed[first]}); the {len(done):,} "
+            f"tiles that are done are kept in {plan.folder}, so mend that and run the same command "
+            "again."
+        )
+        raise DatabaseError(msg)
+    return sorted(part for part in done.values() if part is not None)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -142,115 +301,6 @@ class TilePlan:
         return west - margin, south - margin, west + side + margin, south + side + margin
 
 
-def touched_tiles(path: str | Path, *, grid: GridSpec, side: int, reach: float) -> list[Tile]:
-    """Return the tiles that may have a cell from which some object is seen, fullest first.
-
-    Only the bounds in the file of objects are read. `side` is that of a tile in cells, `reach` the
-    largest visibility range of any class in metres. Raise InputError if tiles are so small that an
-    object would touch very many, or if there are too many.
-    """
-    metres = side * grid.step
-    if reach > MOST_REACHED * metres:
-        msg = (
-            f"a tile of {metres:g} m is too small for a visibility range of {reach:g} m; make it "
-            f"at least {reach / MOST_REACHED:g} m."
-        )
-        raise InputError(msg)
-    objects: Counter[int] = Counter()
-    for bounds in each_bounds(path):
-        widened = bounds + np.array([-reach, -reach, reach, reach])
-        places = np.floor((widened - np.tile(grid.origin, 2)) / metres).astype(np.int64)
-        ranges, count = np.unique(places, axis=0, return_counts=True)
-        width, height = (ranges[:, 2:] - ranges[:, :2] + 1).T
-        which = np.repeat(np.arange(len(ranges)), width * height)
-        inside = np.arange(len(which)) - np.repeat(
-            np.cumsum(width * height) - width * height, width * height
-        )
-        ids = cell_ids(
-            ranges[which, 0] + inside // height[which], ranges[which, 1] + inside % height[which]
-        )
-        distinct, row = np.unique(ids, return_inverse=True)
-        total = np.bincount(row, weights=count[which]).astype(np.int64)
-        objects.update(dict(zip(distinct.tolist(), total.tolist(), strict=True)))
-        if len(objects) > MOST_TILES:
-            msg = f"tiles of {metres:g} m would be more than {MOST_TILES:,}; make them larger."
-            raise InputError(msg)
-    ordered = sorted(objects, key=lambda number: (-objects[number], number))
-    columns, rows = split_ids(np.array(ordered, np.int64))
-    return list(zip(columns.tolist(), rows.tolist(), strict=True))
-
-
-def build_tile(plan: TilePlan, tile: Tile) -> Part | None:
-    """Build and save the part of one tile; return None where none of its cells sees anything.
-
-    What decides about a cell lies within the largest range of it: objects, and buildings together
-    with their neighbours; a street lies within its own width. So only that is read, and the cells
-    are the same as when everything is.
-    """
-    if not plan.folder.is_dir():
-        msg = f"{plan.folder} is not there any more; run the same command again."
-        raise InputError(msg)
-    objects = open_objects(plan.objects, box=plan.box(tile, plan.reach + MARGIN_M))
-    database = _seen_from(plan, tile, objects) if len(objects) else None
-    if database is None or len(database) == 0:
-        mark_empty(plan.folder, tile)
-        return None
-    path = plan.folder / part_name(tile)
-    save_database(database, path)
-    return describe(tile, database, path)
-
-
-def _seen_from(plan: TilePlan, tile: Tile, objects: StreetObjects) -> SignatureDatabase | None:
-    """Return the cells of a tile; None where it has surely none."""
-    columns, rows = cells_near(objects.xy, grid=plan.grid, radius=plan.reach)
-    inside = (columns // plan.side == tile[0]) & (rows // plan.side == tile[1])
-    streets = None
-    viewpoints = plan.viewpoints
-    if plan.streets is not None:
-        box = plan.box(tile, plan.street_reach + MARGIN_M)
-        streets = read_surroundings(plan.streets, role="streets", crs=objects.crs, box=box)
-        if streets.empty:
-            return None
-    footprints = None
-    if plan.buildings is not None:
-        footprints = _footprints(plan.buildings, plan.box(tile, plan.reach + MARGIN_M), objects.crs)
-        if footprints.empty and viewpoints.mode == "outdoor":
-            viewpoints = replace(viewpoints, mode="all")
-    database = build_cells(
-        objects,
-        columns[inside],
-        rows[inside],
-        grid=plan.grid,
-        spec=plan.spec,
-        viewpoints=viewpoints,
-        footprints=None if footprints is None or footprints.empty else footprints,
-        streets=streets,
-    )
-    # A tile without buildings was made in the same way as the others.
-    return replace(
-        database,
-        viewpoints=plan.viewpoints,
-        occlusion=None if footprints is None else TOLERANCE_M,
-        licenses=(*map(str, objects.licenses), *licenses_of(footprints, streets)),
-    )
-
-
-def _footprints(path: Path, box: Box, crs: CRS) -> gpd.GeoDataFrame:
-    """Return the footprints that meet a box, and all neighbours of those that do."""
-    near = read_surroundings(path, role="buildings", crs=crs, box=box)
-    if len(near):
-        low, high = near.total_bounds[:2], near.total_bounds[2:]
-        around = (*(np.minimum(low, box[:2]) - MARGIN_M), *(np.maximum(high, box[2:]) + MARGIN_M))
-        near = read_surroundings(path, role="buildings", crs=crs, box=around)
-    # Flat ones are left out there too, but a tile may have no others.
-    flat = shapely.area(near.geometry.to_numpy()) == 0
-    flat[flat] = shapely.area(shapely.make_valid(near.geometry.to_numpy()[flat])) == 0
-    return near[~flat]
-
-
-NEEDED = {"outdoor": "buildings", "streets": "streets"}
-
-
 def plan_tiles(
     objects: str | Path,
     out: str | Path,
@@ -276,10 +326,8 @@ def plan_tiles(
     paths = {name: Path(path).absolute() for name, path in places.items() if path is not None}
     nothing = open_objects(paths["objects"], box=NOWHERE)
     reach = float(nothing.taxonomy.ranges(spec.radius).max())
-    cells_near(np.array([grid.origin]), grid=grid, radius=reach)  # refuses a step that is too small
-    if viewpoints.mode != "all" and NEEDED[viewpoints.mode] not in paths:
-        no_cells = np.empty(0, np.int64)
-        choose_viewpoints(no_cells, no_cells, grid=grid, spec=viewpoints)  # says what is missing
+    require_step(grid, reach)
+    require_surroundings(viewpoints, paths.get("buildings"), paths.get("streets"))
     recipe: dict[str, Any] = {
         "version": __version__,
         "grid": asdict(grid),
@@ -289,7 +337,7 @@ def plan_tiles(
         "tile": {"cells": tile.cells(grid)},
         "inputs": {name: _fingerprint(path) for name, path in paths.items()},
     }
-    folder = start(out, recipe)
+    folder = begin(out, recipe)
     try:
         lines = _by_box(paths, "streets", nothing.crs, folder)
         return TilePlan(
@@ -364,158 +412,161 @@ def _widest(streets: Path) -> float:
     return float(finite.max(initial=0.0))
 
 
-# When so many have failed, the rest would too.
-MOST_FAILED = 10
+def touched_tiles(path: str | Path, *, grid: GridSpec, side: int, reach: float) -> list[Tile]:
+    """Return the tiles that may have a cell from which some object is seen, fullest first.
 
-
-def build_tiles(
-    objects: str | Path,
-    out: str | Path,
-    *,
-    tile: TileSpec | None = None,
-    grid: GridSpec | None = None,
-    spec: SignatureSpec | None = None,
-    viewpoints: ViewpointSpec | None = None,
-    buildings: str | Path | None = None,
-    streets: str | Path | None = None,
-    workers: int = 0,
-    scheduler: str | None = None,
-    progress: Callable[[int, int], None] | None = None,
-    tell: Callable[[str], None] | None = None,
-) -> Manifest:
-    """Build a signature database in tiles: a folder that is opened like a single file.
-
-    Parameters
-    ----------
-    objects : str or Path
-        Street objects that `objects.table.save_objects` wrote.
-    out : str or Path
-        Folder to write. It appears whole, by rename; a database that is there is replaced.
-    tile : TileSpec, optional
-        Size of a tile; 2000 m by default.
-    grid : GridSpec, optional
-        The cells; 10 m by default.
-    spec : SignatureSpec, optional
-        Visibility range and angle levels; 30 m and 16 by default.
-    viewpoints : ViewpointSpec, optional
-        Which cells are looked from; all by default.
-    buildings, streets : str or Path, optional
-        Files that `objects.surroundings.read_surroundings` reads. Those that cannot be read by
-        box are copied into such a file first.
-    workers : int, default 0
-        How many processes of this machine build tiles; 0 builds them here, without dask.
-    scheduler : str, optional
-        Address of a dask scheduler, such as ``tcp://10.0.0.5:8786``, whose workers see the same
-        files under the same paths; then `workers` stays 0.
-    progress : callable, optional
-        Called with the number of tiles done and in all.
-    tell : callable, optional
-        Called with a remark for the user, as about a run that is taken up again.
-
-    Returns
-    -------
-    Manifest
-        What the database consists of.
-
-    Raises
-    ------
-    InputError
-        If an option cannot be used, the scheduler cannot be reached, or `out` holds something
-        else or an unfinished run with other inputs or specs.
-    DatabaseError
-        If the street objects cannot be read, or a tile cannot be built; the other tiles are kept
-        for the next run.
-    EmptyResultError
-        If no cell sees an object.
-
-    Notes
-    -----
-    The files are the same byte for byte whatever the number of workers. An interrupted run leaves
-    its tiles in ``OUT.partial``, and the same command goes on from there, if the specs are the same
-    and the input files have the same content (by SHA-256). A script that gives `workers` needs the
-    guard ``if __name__ == "__main__":``, because the workers import it.
-
-    Examples
-    --------
-    >>> import tempfile
-    >>> from semsig_gis.sources.catalog import paper_taxonomy
-    >>> from semsig_gis.database.file import open_database
-    >>> from semsig_gis.objects.clean import build_objects
-    >>> from semsig_gis.objects.table import save_objects
-    >>> from semsig_gis.sources.synthetic.city import CitySpec, synthetic_city
-    >>> layers = synthetic_city(CitySpec(size=300.0))
-    >>> town, _ = build_objects(layers, taxonomy=paper_taxonomy(), crs="EPSG:32631")
-    >>> with tempfile.TemporaryDirectory() as folder:
-    ...     save_objects(town, f"{folder}/objects.parquet")
-    ...     parts = build_tiles(f"{folder}/objects.parquet", f"{folder}/town")
-    ...     len(open_database(f"{folder}/town")) == parts.cells
-    True
+    Only the bounds in the file of objects are read. `side` is that of a tile in cells, `reach` the
+    largest visibility range of any class in metres. Raise InputError if tiles are so small that an
+    object would touch very many, or if there are too many.
     """
-    check_workers(workers, scheduler)
-    plan = plan_tiles(
-        objects,
-        out,
-        tile=tile or TileSpec(),
-        grid=grid or GridSpec(),
-        spec=spec or SignatureSpec(),
-        viewpoints=viewpoints or ViewpointSpec(),
-        buildings=buildings,
-        streets=streets,
-    )
-    try:
-        parts = _run(plan, workers, scheduler, progress, tell)
-    finally:
-        RUN.abandon(plan.folder)
-    if not parts:
-        shutil.rmtree(plan.folder, ignore_errors=True)
+    metres = side * grid.step
+    if reach > MOST_REACHED * metres:
         msg = (
-            f"no cell sees an object of {objects}; make the step ({plan.grid.step:g} m) smaller or "
-            f"the visibility range ({plan.spec.radius:g} m) larger, or look at the area, the "
-            "streets and the buildings."
+            f"a tile of {metres:g} m is too small for a visibility range of {reach:g} m; make it "
+            f"at least {reach / MOST_REACHED:g} m."
         )
-        raise EmptyResultError(msg)
-    return publish(plan.folder, parts)
+        raise InputError(msg)
+    objects: Counter[int] = Counter()
+    for bounds in each_bounds(path):
+        widened = bounds + np.array([-reach, -reach, reach, reach])
+        places = np.floor((widened - np.tile(grid.origin, 2)) / metres).astype(np.int64)
+        boxes, count = np.unique(places, axis=0, return_counts=True)
+        west, south, east, north = boxes.T
+        height = north + 1 - south
+        size = (east + 1 - west) * height
+        box = np.repeat(np.arange(len(boxes)), size)
+        column, row = np.divmod(consecutive(np.zeros_like(size), size), height[box])
+        ids = cell_ids(west[box] + column, south[box] + row)
+        distinct, number = np.unique(ids, return_inverse=True)
+        total = np.bincount(number, weights=count[box]).astype(np.int64)
+        objects.update(dict(zip(distinct.tolist(), total.tolist(), strict=True)))
+        if len(objects) > MOST_TILES:
+            msg = f"tiles of {metres:g} m would be more than {MOST_TILES:,}; make them larger."
+            raise InputError(msg)
+    ordered = sorted(objects, key=lambda number: (-objects[number], number))
+    columns, rows = split_ids(np.array(ordered, np.int64))
+    return list(zip(columns.tolist(), rows.tolist(), strict=True))
 
 
-def _run(
-    plan: TilePlan,
-    workers: int,
-    scheduler: str | None,
-    progress: Callable[[int, int], None] | None,
-    tell: Callable[[str], None] | None,
-) -> list[Part]:
-    """Build the tiles that are not done yet, and return the parts of all."""
-    tiles = touched_tiles(plan.objects, grid=plan.grid, side=plan.side, reach=plan.reach)
-    done = finished_tiles(plan.folder, tiles)
-    if done and tell is not None:
-        tell(f"an unfinished run has left {len(done):,} of {len(tiles):,} tiles; it goes on")
-    todo = [one for one in tiles if one not in done]
-    failed: dict[Tile, str] = {}
-    paths = [plan.folder, plan.objects, plan.buildings, plan.streets]
-    running = run_tasks(
-        partial(build_tile, plan),
-        todo,
-        workers=workers,
-        scheduler=scheduler,
-        files=[path for path in paths if path is not None],
-    )
-    with contextlib.closing(running) as outcomes:
-        for outcome in outcomes:
-            if outcome.reason is None:
-                done[outcome.task] = outcome.value
-            else:
-                failed[outcome.task] = outcome.reason
-            if len(failed) == MOST_FAILED:
-                break
-            if progress is not None:
-                progress(len(done), len(tiles))
-    if failed:
-        first = min(failed)
-        others = f" and {len(failed) - 1} more" if len(failed) > 1 else ""
-        msg = (
-            f"{part_name(first)}{others} could not be built ({failed[first]}); the {len(done):,} "
-            f"tiles that are done are kept in {plan.folder}, so mend that and run the same command "
-            "again."
+def build_tile(plan: TilePlan, tile: Tile) -> Part | None:
+    """Build and save the part of one tile; return None where none of its cells sees anything.
+
+    What decides about a cell lies within the largest range of it: objects, and buildings together
+    with their neighbours; a street lies within its own width. So only that is read, and the cells
+    are the same as when everything is.
+    """
+    if not plan.folder.is_dir():
+        msg = f"{plan.folder} is not there any more; run the same command again."
+        raise InputError(msg)
+    around = plan.box(tile, plan.reach + MARGIN_M)
+    objects = open_objects(plan.objects, box=around)
+    if len(objects):
+        crs = objects.crs
+        columns, rows = cells_near(objects.xy, grid=plan.grid, radius=plan.reach)
+        inside = (columns // plan.side == tile[0]) & (rows // plan.side == tile[1])
+        along = plan.box(tile, plan.street_reach + MARGIN_M)
+        database = build_cells(
+            objects,
+            columns[inside],
+            rows[inside],
+            grid=plan.grid,
+            spec=plan.spec,
+            viewpoints=plan.viewpoints,
+            footprints=None if plan.buildings is None else _footprints(plan.buildings, around, crs),
+            streets=None
+            if plan.streets is None
+            else read_surroundings(plan.streets, role="streets", crs=crs, box=along),
+            partial=True,
         )
-        raise DatabaseError(msg)
-    return sorted(part for part in done.values() if part is not None)
+        if len(database):
+            path = plan.folder / part_name(tile)
+            save_database(database, path)
+            return describe(tile, database, path)
+    mark_empty(plan.folder, tile)
+    return None
+
+
+def _footprints(path: Path, box: Box, crs: CRS) -> gpd.GeoDataFrame:
+    """Return the footprints that meet a box, and all neighbours of those that do."""
+    near = read_surroundings(path, role="buildings", crs=crs, box=box)
+    if len(near):
+        low, high = near.total_bounds[:2], near.total_bounds[2:]
+        around = (*(np.minimum(low, box[:2]) - MARGIN_M), *(np.maximum(high, box[2:]) + MARGIN_M))
+        near = read_surroundings(path, role="buildings", crs=crs, box=around)
+    # Flat ones are left out there too, but a tile may have no others.
+    flat = shapely.area(near.geometry.to_numpy()) == 0
+    flat[flat] = shapely.area(shapely.make_valid(near.geometry.to_numpy()[flat])) == 0
+    return near[~flat]
+
+
+def begin(out: str | Path, recipe: dict[str, Any]) -> Path:
+    """Begin a run, or take up an unfinished one, and return its folder: `out` with ``.partial``.
+
+    `recipe` says how the database is built. Raise InputError if `out` holds something that may not
+    be replaced, the folder cannot be written to, or it holds tiles of an unfinished run by another
+    recipe, which are never thrown away unasked.
+    """
+    _require_replaceable(Path(os.path.realpath(out)))
+    folder = partial_folder(out)
+    RUN.begin(folder, recipe)
+    return folder
+
+
+def _require_replaceable(target: Path) -> None:
+    """Refuse to put a database in the place of anything but a database."""
+    if not target.is_dir():
+        if target.exists() and not target.is_file():
+            msg = f"{target} is a device or a pipe; give the name of a folder to write."
+            raise InputError(msg)
+        return
+    others = {path.name for path in target.iterdir() if not path.name.startswith(HALF_WRITTEN)}
+    if MANIFEST in others:
+        others -= {MANIFEST, RECIPE, *(part.file for part in read_manifest(target).parts)}
+    if others:
+        msg = (
+            f"{target} holds {min(others)!r}, which is no part of a signature database; give the "
+            "name of a new folder, or move that elsewhere."
+        )
+        raise InputError(msg)
+
+
+def describe(tile: Tile, database: SignatureDatabase, path: Path) -> Part:
+    """Return the manifest's entry for a part that was saved to a path."""
+    return Part(tile, len(database), len(database.codes), path.stat().st_size, digest(path))
+
+
+def mark_empty(folder: Path, tile: Tile) -> None:
+    """Note that a tile is done and that none of its cells sees anything."""
+    (folder / part_name(tile)).with_suffix(EMPTY).touch()
+
+
+def finished_tiles(folder: Path, tiles: Iterable[Tile]) -> dict[Tile, Part | None]:
+    """Return the parts of the tiles that are done, None where no cell sees anything.
+
+    A damaged file is deleted, and its tile is not done.
+    """
+    done: dict[Tile, Part | None] = {}
+    for tile in tiles:
+        path = folder / part_name(tile)
+        if path.with_suffix(EMPTY).exists():
+            done[tile] = None
+        elif path.exists():
+            try:
+                done[tile] = describe(tile, open_database(path), path)
+            except DatabaseError:
+                path.unlink()
+    return done
+
+
+def publish(folder: Path, parts: Sequence[Part]) -> Manifest:
+    """Put a database whose tiles are all done in its place; one that was there is replaced.
+
+    The parts are ordered by tile. Raise InputError if the folder cannot be renamed; the parts then
+    stay in it.
+    """
+    manifest = Manifest(read_json(folder / RECIPE), tuple(parts))
+    _require_replaceable(folder.with_name(folder.name.removesuffix(PARTIAL)))
+    manifest.write(folder)
+    target = finish(folder, keep={MANIFEST, RECIPE, *(part.file for part in manifest.parts)})
+    (target / RECIPE).unlink()
+    return manifest

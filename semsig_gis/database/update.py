@@ -89,8 +89,7 @@ def compare_cells(before: SignatureDatabase, after: SignatureDatabase) -> CellCh
     Raise DatabaseError if the databases were not made in the same way, or differ in their longest
     visibility range.
     """
-    require_same(before, after)
-    require_same(before, after, {"reach": "longest visibility range"})
+    require_same(before, after, classes=False)
     _, first, second = np.intersect1d(
         before.cell_ids, after.cell_ids, assume_unique=True, return_indices=True
     )
@@ -337,15 +336,9 @@ def _recomputed(
     if footprints is not None:
         polygons = footprints.geometry.to_numpy()
         footprints = footprints.iloc[buildings_near(polygons, places, distance=around)]
-        if len(footprints) == 0:
-            footprints = None  # so that none of the cells is in a building either
-            if viewpoints.mode == "outdoor":
-                viewpoints = replace(viewpoints, mode="all")
     if viewpoints.mode == "streets" and streets is not None:
         streets = _streets_near(streets, database.grid.viewpoints(*cells), viewpoints.width)
-        if len(streets) == 0:
-            return database.select(slice(0))
-    fresh = build_cells(
+    return build_cells(
         objects,
         *cells,
         grid=database.grid,
@@ -353,11 +346,9 @@ def _recomputed(
         viewpoints=viewpoints,
         footprints=footprints,
         streets=streets,
+        partial=True,
         progress=progress,
     )
-    if footprints is None:
-        fresh = replace(fresh, occlusion=database.occlusion)
-    return replace(fresh, viewpoints=database.viewpoints)
 
 
 def _streets_near(

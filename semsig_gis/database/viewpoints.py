@@ -137,23 +137,28 @@ def choose_viewpoints(
     not finite where ``spec.width`` holds. Raise InputError if what the mode needs is missing, or
     the streets are not lines.
     """
+    require_surroundings(spec, footprints, streets)
     places = grid.viewpoints(columns, rows)
     chosen = np.ones(len(places), bool)
     if spec.area is not None:
         shapely.prepare(spec.area)
         chosen &= shapely.intersects_xy(spec.area, places[:, 0], places[:, 1])
-    if spec.mode == "outdoor":
-        if footprints is None:
-            msg = "viewpoints 'outdoor' need the buildings; give their footprints."
-            raise InputError(msg)
+    if spec.mode == "outdoor" and footprints is not None:
         chosen[chosen] = ~footprints.cover(places[chosen])
-    elif spec.mode == "streets":
-        if streets is None:
-            msg = "viewpoints 'streets' need the streets; give their centre lines."
-            raise InputError(msg)
+    elif spec.mode == "streets" and streets is not None:
         lines, reaches = _lines(streets, widths, spec.width)
         chosen[chosen] = _within(places[chosen], lines, reaches)
     return chosen
+
+
+def require_surroundings(spec: ViewpointSpec, footprints: object, streets: object) -> None:
+    """Raise InputError if what viewpoints are chosen by is missing, which is None then."""
+    if spec.mode == "outdoor" and footprints is None:
+        msg = "viewpoints 'outdoor' need the buildings; give their footprints."
+        raise InputError(msg)
+    if spec.mode == "streets" and streets is None:
+        msg = "viewpoints 'streets' need the streets; give their centre lines."
+        raise InputError(msg)
 
 
 def _lines(

@@ -23,7 +23,7 @@ from semsig_gis.core.errors import DatabaseError, SourceError
 from semsig_gis.core.parallel import check_workers, run_tasks
 from semsig_gis.database.answer import DistanceMemo
 from semsig_gis.database.city import City
-from semsig_gis.database.parts import digest
+from semsig_gis.database.file import digest
 from semsig_gis.evaluation.evaluate import (
     check_count,
     make_evaluation,

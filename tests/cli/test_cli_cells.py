@@ -11,7 +11,8 @@ from sentences import sentence
 from worlds import random_town
 
 from semsig_gis.database.build import build_database
-from semsig_gis.database.store import ObjectStore, save_with_store, store_path
+from semsig_gis.database.file import store_path
+from semsig_gis.database.store import ObjectStore, save_with_store
 
 if TYPE_CHECKING:
     from collections.abc import Callable

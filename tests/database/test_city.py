@@ -16,8 +16,15 @@ from worlds import assert_same, random_town
 
 from semsig_gis.core.errors import DatabaseError, InputError
 from semsig_gis.database.city import City, open_city
-from semsig_gis.database.file import PartitionedDatabase, built_digest, open_database, save_database
-from semsig_gis.database.parts import MANIFEST, digest, part_files
+from semsig_gis.database.file import (
+    MANIFEST,
+    PartitionedDatabase,
+    built_digest,
+    digest,
+    open_database,
+    part_files,
+    save_database,
+)
 from semsig_gis.database.store import ObjectStore, open_store, save_with_store
 from semsig_gis.database.tiles import TileSpec, build_tiles
 from semsig_gis.objects.table import save_objects

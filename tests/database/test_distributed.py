@@ -27,7 +27,7 @@ from semsig_gis.objects.table import save_objects
 if TYPE_CHECKING:
     from distributed import LocalCluster
 
-    from semsig_gis.database.parts import Part
+    from semsig_gis.database.file import Part
     from semsig_gis.database.tiles import TilePlan
 
 SIDE = 200.0

@@ -9,20 +9,19 @@ from sentences import assert_sentence
 from worlds import random_town
 
 from semsig_gis.core.errors import InputError
-from semsig_gis.database.file import open_database, save_database
-from semsig_gis.database.parts import MANIFEST, part_name
-from semsig_gis.database.tile_run import (
+from semsig_gis.database.file import MANIFEST, open_database, part_name, save_database
+from semsig_gis.database.tiles import (
     RUN,
+    begin,
     describe,
     finished_tiles,
     mark_empty,
     publish,
-    start,
 )
 
 if TYPE_CHECKING:
     from semsig_gis.database.database import SignatureDatabase
-    from semsig_gis.database.parts import Part
+    from semsig_gis.database.file import Part
 
 SPECS = {"grid": {"step": 10.0, "origin": (0.0, 0.0)}, "inputs": {"objects": "abc"}}
 DATABASE = random_town().database
@@ -36,19 +35,19 @@ def build(folder: Path, database: SignatureDatabase = DATABASE) -> Part:
 
 
 def test_a_run_is_taken_up_by_the_same_recipe(tmp_path: Path) -> None:
-    folder = start(tmp_path / "new" / "city", SPECS)
+    folder = begin(tmp_path / "new" / "city", SPECS)
     assert folder == tmp_path / "new" / "city.partial"
     assert not (tmp_path / "new" / "city").exists()
     assert finished_tiles(folder, [(0, 0), (0, 1)]) == {}
     part = build(folder)
     (folder / ".semsig-x").mkdir()  # a killed worker leaves such a folder
-    assert start(tmp_path / "new" / "city", SPECS) == folder
+    assert begin(tmp_path / "new" / "city", SPECS) == folder
     assert not (folder / ".semsig-x").exists()
     assert finished_tiles(folder, [(0, 0), (0, 1), (7, 7)]) == {(0, 0): part, (0, 1): None}
 
 
 def test_another_recipe_is_refused_and_named_where_a_tile_is_done(tmp_path: Path) -> None:
-    folder = start(tmp_path / "city", SPECS)
+    folder = begin(tmp_path / "city", SPECS)
     build(folder)
     for other, what in (
         ({**SPECS, "grid": {"step": 5.0, "origin": (0.0, 0.0)}}, "grid, step"),
@@ -58,30 +57,30 @@ def test_another_recipe_is_refused_and_named_where_a_tile_is_done(tmp_path: Path
         ({"grid": SPECS["grid"]}, "inputs"),
     ):
         with pytest.raises(InputError) as caught:
-            start(tmp_path / "city", other)
+            begin(tmp_path / "city", other)
         assert_sentence(caught.value, str(folder), what, "delete that folder")
-    assert start(tmp_path / "city", SPECS) == folder
+    assert begin(tmp_path / "city", SPECS) == folder
 
 
 def test_another_recipe_replaces_a_run_that_has_done_nothing(tmp_path: Path) -> None:
-    folder = start(tmp_path / "city", SPECS)
-    assert start(tmp_path / "city", {**SPECS, "version": "9"}) == folder
+    folder = begin(tmp_path / "city", SPECS)
+    assert begin(tmp_path / "city", {**SPECS, "version": "9"}) == folder
     build(folder)
-    assert start(tmp_path / "city", {**SPECS, "version": "9"}) == folder
+    assert begin(tmp_path / "city", {**SPECS, "version": "9"}) == folder
 
 
 def test_a_run_is_given_up_only_while_no_tile_is_done(tmp_path: Path) -> None:
-    folder = start(tmp_path / "city", SPECS)
+    folder = begin(tmp_path / "city", SPECS)
     assert RUN.abandon(folder)
     assert not folder.exists()
-    folder = start(tmp_path / "city", SPECS)
+    folder = begin(tmp_path / "city", SPECS)
     mark_empty(folder, (0, 0))
     assert not RUN.abandon(folder)
     assert folder.exists()
 
 
 def test_a_part_that_is_damaged_is_built_again(tmp_path: Path) -> None:
-    folder = start(tmp_path / "city", SPECS)
+    folder = begin(tmp_path / "city", SPECS)
     build(folder)
     path = folder / part_name((0, 0))
     path.write_bytes(path.read_bytes()[:-20])
@@ -92,7 +91,7 @@ def test_a_part_that_is_damaged_is_built_again(tmp_path: Path) -> None:
 def test_a_database_appears_whole_and_replaces_the_one_before(tmp_path: Path) -> None:
     target = tmp_path / "city"
     for database in (DATABASE, DATABASE.select(slice(20))):
-        folder = start(target, SPECS)
+        folder = begin(target, SPECS)
         parts = [build(folder, database)]
         (folder / "_inputs").mkdir()
         (folder / "_inputs" / "buildings.parquet").touch()
@@ -105,7 +104,7 @@ def test_a_database_appears_whole_and_replaces_the_one_before(tmp_path: Path) ->
 def test_a_file_that_was_there_is_replaced(tmp_path: Path) -> None:
     target = tmp_path / "city.parquet"
     save_database(DATABASE, target)
-    folder = start(target, SPECS)
+    folder = begin(target, SPECS)
     publish(folder, [build(folder)])
     assert target.is_dir()
     assert [path.name for path in tmp_path.iterdir()] == ["city.parquet"]
@@ -114,7 +113,7 @@ def test_a_file_that_was_there_is_replaced(tmp_path: Path) -> None:
 def test_a_link_stays_and_the_folder_that_it_names_is_replaced(tmp_path: Path) -> None:
     (tmp_path / "real").mkdir()
     (tmp_path / "latest").symlink_to(tmp_path / "real")
-    folder = start(tmp_path / "latest", SPECS)
+    folder = begin(tmp_path / "latest", SPECS)
     publish(folder, [build(folder)])
     assert (tmp_path / "latest").is_symlink()
     assert (tmp_path / "real" / MANIFEST).is_file()
@@ -125,14 +124,14 @@ def test_a_folder_with_other_things_is_never_replaced(tmp_path: Path) -> None:
     target.mkdir()
     (target / "letter.txt").touch()
     with pytest.raises(InputError) as caught:
-        start(target, SPECS)
+        begin(target, SPECS)
     assert_sentence(caught.value, "'letter.txt'", "no part of a signature database")
     (target / "letter.txt").unlink()
-    folder = start(target, SPECS)
+    folder = begin(target, SPECS)
     publish(folder, [build(folder)])
     (target / "notes.txt").touch()  # beside the parts
     with pytest.raises(InputError) as caught:
-        start(target, SPECS)
+        begin(target, SPECS)
     assert_sentence(caught.value, "'notes.txt'", "move that elsewhere")
     assert {path.name for path in target.iterdir()} == {MANIFEST, part_name((0, 0)), "notes.txt"}
 
@@ -142,12 +141,12 @@ def test_what_is_not_a_run_is_not_taken_for_one(tmp_path: Path) -> None:
     folder.mkdir()
     (folder / "letter.txt").touch()
     with pytest.raises(InputError) as caught:
-        start(tmp_path / "city", SPECS)
+        begin(tmp_path / "city", SPECS)
     assert_sentence(caught.value, str(folder), "'letter.txt'", "no unfinished run")
     folder = tmp_path / "a" / "city.partial"
     folder.parent.write_text("a file")
     with pytest.raises(InputError) as caught:
-        start(tmp_path / "a" / "city", SPECS)
+        begin(tmp_path / "a" / "city", SPECS)
     assert_sentence(caught.value, str(folder), "Not a directory", "choose a folder")
 
 
@@ -155,7 +154,7 @@ def test_what_is_not_a_run_is_not_taken_for_one(tmp_path: Path) -> None:
 def test_a_pipe_is_refused(tmp_path: Path) -> None:
     os.mkfifo(tmp_path / "pipe")
     with pytest.raises(InputError) as caught:
-        start(tmp_path / "pipe", SPECS)
+        begin(tmp_path / "pipe", SPECS)
     assert_sentence(caught.value, "is a device or a pipe")
 
 
@@ -164,9 +163,9 @@ def test_a_rename_that_fails_leaves_one_whole_database_and_the_run(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, fails: int
 ) -> None:
     target = tmp_path / "city"
-    folder = start(target, SPECS)
+    folder = begin(target, SPECS)
     publish(folder, [build(folder)])
-    folder = start(target, SPECS)
+    folder = begin(target, SPECS)
     part = build(folder, DATABASE.select(slice(20)))
     rename, calls = Path.rename, []
 
@@ -183,7 +182,7 @@ def test_a_rename_that_fails_leaves_one_whole_database_and_the_run(
     assert_sentence(caught.value, str(target), "Permission denied", "run the same command again")
     assert len(open_database(target)) == len(DATABASE)
     # As the same command does.
-    folder = start(target, SPECS)
+    folder = begin(target, SPECS)
     assert finished_tiles(folder, [(0, 0)]) == {(0, 0): part}
     publish(folder, [part])
     assert len(open_database(target)) == 20

@@ -19,8 +19,8 @@ from semsig_gis.core.rtree import ObjectIndex
 from semsig_gis.core.taxonomy import ObjectClass, Taxonomy
 from semsig_gis.database import store as store_module
 from semsig_gis.database.build import build_database
-from semsig_gis.database.file import open_database
-from semsig_gis.database.store import ObjectStore, open_store, save_with_store, store_path
+from semsig_gis.database.file import open_database, store_path
+from semsig_gis.database.store import ObjectStore, open_store, save_with_store
 from semsig_gis.database.update import update_database, update_file
 from semsig_gis.database.viewpoints import ViewpointSpec
 from semsig_gis.objects.load import assemble, choose_layers, read_files
