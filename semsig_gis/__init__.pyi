@@ -72,8 +72,11 @@ from .likelihood.answer_rule import (
     open_rule as open_rule,
     save_rule as save_rule,
 )
-from .likelihood.index import LikelihoodIndex as LikelihoodIndex, build_index as build_index
-from .likelihood.index_file import ready_index as ready_index
+from .likelihood.index import (
+    LikelihoodIndex as LikelihoodIndex,
+    build_index as build_index,
+    ready_index as ready_index,
+)
 from .likelihood.locate import (
     Location as Location,
     locate as locate,

@@ -117,7 +117,7 @@ def locator(
 
 def prepared_index(city: City, model: Noise) -> LikelihoodIndex:
     """Return the likelihood index beside a database; it is built where it is not there."""
-    from semsig_gis.likelihood.index_file import ready_index
+    from semsig_gis.likelihood.index import ready_index
 
     with progress("preparing the likelihood index") as advance:
         path = city.index_path(model)

@@ -42,7 +42,7 @@ from semsig_gis.experiments.folder import (
     open_results,
     write_results,
 )
-from semsig_gis.likelihood.index_file import ready_index
+from semsig_gis.likelihood.index import ready_index
 from semsig_gis.queries.draw import draw_queries
 from semsig_gis.storage.whole import whole_file
 

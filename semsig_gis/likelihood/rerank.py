@@ -54,10 +54,10 @@ def align_cells(
     As `association.place_loglik`: the shape is (c,), or (c, r) if `turns`, the degrees to turn the
     query by for each cell, are given.
     """
-    tables, weights = database_tables(database, noise)
+    models = database_tables(database, noise)
     ways = np.zeros((len(cells), 1)) if turns is None else np.asarray(turns, dtype=np.float64)
     views = views_in(database, cells)
-    loglik = place_loglik(query, views, tables, weights, turns=ways, reach=database.reach)
+    loglik = place_loglik(query, views, *models, turns=ways, reach=database.reach)
     return loglik[:, 0] if turns is None else loglik
 
 
@@ -115,9 +115,9 @@ def _aligned(
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Return the log-likelihood in some cells, and the turn that is likeliest in each."""
     turns = np.zeros((len(cells), 1)) if heading is None else heading[cells, None] + TURNS
-    views = views_in(index.database, cells)
-    reach = index.database.reach
-    logliks = place_loglik(query, views, index.tables, index.weights, turns=turns, reach=reach)
+    database = index.database
+    views = views_in(database, cells)
+    logliks = place_loglik(query, views, *index.models, turns=turns, reach=database.reach)
     if heading is not None:
         logliks += turn_logs(turns, TURNS[1] - TURNS[0], north_sigma)
     likeliest = turns[np.arange(len(cells)), logliks.argmax(axis=1)]

@@ -18,7 +18,6 @@ from semsig_gis.likelihood.index import (
     LEAST_PRIOR,
     build_index,
     index_fingerprint,
-    write_columns,
 )
 from semsig_gis.likelihood.kernels import promising_cells
 from semsig_gis.likelihood.noise.model import NoiseMixture, NoiseSpec, named_noise
@@ -243,15 +242,14 @@ def test_any_number_of_cells_is_worked_out(cells: int) -> None:
 
 def test_columns_come_out_the_same_whatever_the_threads_and_the_progress_is_told() -> None:
     database = random_database(8, cells=390)
-    table = build_index(database, named_noise("medium")).table
     told: list[tuple[int, int]] = []
     written = []
     for threads in (1, 4):
         columns = np.zeros((5, BINS, 390), np.uint8)
-        write_columns(
+        build_index(
             database,
-            table,
-            columns,
+            named_noise("medium"),
+            out=columns,
             threads=threads,
             progress=lambda done, cells: told.append((done, cells)),
         )
@@ -266,7 +264,7 @@ def test_an_index_of_a_mixture_holds_its_mean() -> None:
     both = build_index(database, NoiseMixture(specs=specs, weights=(0.5, 0.5)))
     mean = build_index(database, NoiseSpec(detection=0.7))
     assert np.array_equal(both.columns, mean.columns)
-    assert len(both.tables) == 2
+    assert len(both.models[0]) == 2
 
 
 def test_the_fingerprint_changes_with_what_the_index_depends_on() -> None:

@@ -10,8 +10,7 @@ from sentences import assert_sentence
 from semsig_gis.core.errors import DatabaseError, InputError
 from semsig_gis.database.city import City
 from semsig_gis.database.file import save_database
-from semsig_gis.likelihood.index import build_index
-from semsig_gis.likelihood.index_file import open_index, ready_index, save_index
+from semsig_gis.likelihood.index import build_index, open_index, ready_index, save_index
 from semsig_gis.likelihood.noise.model import NoiseSpec, named_noise
 
 if TYPE_CHECKING:
