@@ -76,10 +76,9 @@ def compare_objects(old: StreetObjects, new: StreetObjects) -> ObjectChanges:
     """Tell what was added, removed, moved, or is of another class now.
 
     Both tables are in the same CRS and use the same class codes. An object of the same class at
-    exactly the same place is the same object, whatever its id: portals that number their rows anew
-    at each export would otherwise have moved everything. What is left is matched by source and id,
-    where an id is given and stands once in either table: so an object has moved, or changed its
-    class. The rest was removed and added.
+    exactly the same place is the same object, whatever its id, because some portals number rows
+    anew at each export. What is left is matched by source and id, where an id stands once in either
+    table.
     """
     tables = _keys(old), _keys(new)
     same = _twins(*tables)
@@ -188,11 +187,9 @@ def replace_layers(
     """Replace the layers of a city that were loaded anew; the others stay.
 
     Return the objects of the other layers followed by the new ones, with the licences of both; the
-    names of the layers that stay; and notes for the user about layers that were not loaded
-    together. A layer was loaded anew if one of the new objects comes from it, or if one of the new
-    licences is about it: so a layer that was read and has no object any more leaves none behind. A
-    different CRS is a CrsError, and classes that do not fit are an InputError (see
-    `joined_taxonomy`).
+    names of the layers that stay; and notes for the user. A layer was loaded anew if a new object
+    comes from it or a new licence is about it, so that one that is empty now leaves no object
+    behind. A different CRS is a CrsError, and classes that do not fit are an InputError.
     """
     if new.crs != old.crs:
         msg = (
@@ -224,8 +221,8 @@ def replace_layers(
 def joined_taxonomy(old: Taxonomy, new: Taxonomy) -> Taxonomy:
     """Return all classes of two dates of one city, with the titles of the new ones.
 
-    Raise InputError if they use one class code or symbol for different classes, or if a class is
-    seen from another distance.
+    InputError if a code or symbol means different classes, or a class is seen from another
+    distance.
     """
     theirs = {item.code: item for item in new.classes}
     for item in old.classes:

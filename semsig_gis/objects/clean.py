@@ -71,9 +71,9 @@ def build_objects(
     Parameters
     ----------
     layers : iterable of RawLayer
-        What the readers of `sources` return; each has a coordinate reference system.
+        What readers return. CrsError if one has no coordinate reference system.
     taxonomy : Taxonomy
-        Classes that the layers name.
+        Classes that the layers name. UnknownNameError if it lacks one.
     crs : pyproj.CRS or str
         Metric coordinate reference system to work in.
     collapse : bool, default True
@@ -81,23 +81,14 @@ def build_objects(
         with their number in ``count``.
     apart : collection of str
         Classes that are collapsed within each layer only, because they will be conflated (see
-        `objects.conflate`), which keeps account of where objects came from.
+        `conflate`), which keeps account of where objects came from.
 
     Returns
     -------
     objects : StreetObjects
-        The objects, in the order of the layers.
+        The objects, in the order of the layers; EmptyResultError if there is none.
     report : LoadReport
         What became of every row.
-
-    Raises
-    ------
-    CrsError
-        If `crs` is not metric, or a layer has no coordinate reference system.
-    UnknownNameError
-        If a layer names a class that `taxonomy` does not have.
-    EmptyResultError
-        If no object remains.
 
     Examples
     --------

@@ -69,39 +69,29 @@ def conflate(
 ) -> tuple[StreetObjects, ConflationReport]:
     """Merge objects that stand in several sources.
 
+    Source after source is compared with what remains of those before it. Of all pairs of a
+    remaining and a new object within the radius, the nearest is merged first, and each object takes
+    part once. Pairs of equal distance go by source, position and identifier, so that the order of
+    the rows in a source does not matter.
+
     Parameters
     ----------
     objects : StreetObjects
         The objects; the column ``source`` tells the sources apart, and one whose rows begin
-        earlier is trusted more.
+        earlier is trusted more. InputError if they were conflated before.
     radii : mapping of str to float
-        Classes, and the metres within which two objects of different sources are the same; a
-        distance of exactly so much counts. Other classes are left as they are.
+        Classes, and the metres (above 0, below 100) within which two objects of different sources
+        are the same. Other classes are left as they are. UnknownNameError if there is no such
+        class.
 
     Returns
     -------
     objects : StreetObjects
         The remaining objects in their order. An object that others were merged into keeps its
         source and position, its ``count`` is the sum of theirs, and its column ``merged`` lists
-        them as ``"source:id; source:id"``; for all others that is empty. The licences of all
-        sources still hold.
+        them as ``"source:id; source:id"``. The licences of all sources still hold.
     report : ConflationReport
         How many were merged, a class and pair of sources.
-
-    Raises
-    ------
-    UnknownNameError
-        If a class is not in the taxonomy.
-    InputError
-        If a radius is not above 0 and below 100 metres, or the objects were conflated before.
-
-    Notes
-    -----
-    Source after source is compared with what remains of those before it. Of all pairs of a
-    remaining and a new object within the radius, the nearest is merged first, and each object of
-    either side takes part once. Thus no two objects of one source are ever merged, and whatever
-    is merged lies within the radius of the position that is kept. Pairs of equal distance go by
-    source, position and identifier, so that the order of the rows in a source does not matter.
 
     Examples
     --------

@@ -1,7 +1,8 @@
-"""Words of several languages that tell which class a layer or a value is about."""
+"""Drafts of catalogues: what a file seems to hold, by its names, fields and values."""
 
 from __future__ import annotations
 
+import contextlib
 import functools
 import glob
 import itertools
@@ -29,26 +30,39 @@ if TYPE_CHECKING:
 
     from semsig_gis.sources.vector.sample import Sample
 
-
+# Marks what a person must fill in; as a class, it does not load.
+EDIT = "EDIT"
+SAMPLE_ROWS = 100_000
+FILTERS_SHOWN = 8
+# A field that has more rows a value than this does not identify anything.
+FEW_PER_ID = 10
+FIRST_OWN_CODE = 12
+SYMBOLS = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789"
+GEOMETRIES = {"Point": "point", "LineString": "line", "LinearRing": "line", "Polygon": "polygon"}
+ROLE_GEOMETRY = {"buildings": "polygon", "streets": "line"}
 # Boundaries in ArbresAlign and in WCPublic.
 HUMPS = re.compile(r"(?<=[a-z])(?=[A-Z])|(?<=[A-Z])(?=[A-Z][a-z])")
-
-
+# Shorter words are the beginnings of too many others.
+WHOLE_WORD_LETTERS = 3
 ARTICLES = frozenset(
     {"a", "al", "alla", "and", "au", "aux", "d", "da", "das", "de", "dei", "del", "della", "dem",
      "den", "der", "des", "di", "die", "do", "dos", "du", "e", "el", "en", "et", "for", "fur",
      "het", "i", "il", "in", "l", "la", "las", "le", "les", "lo", "los", "mit", "o", "of", "on",
      "per", "pour", "the", "to", "und", "van", "von"}
 )  # fmt: skip
-
-
-# Shorter words are the beginnings of too many others.
-WHOLE_WORD_LETTERS = 3
+# A field with no more values is one to filter by, unless most of them are seen only once.
+FEW_VALUES = 12
+LONGEST_VALUE = 60
+LEAST_SHARE = 0.1
+# A class must be named by the values of at least this share of the rows.
+MOST_ROWS = 0.5
+DATE = re.compile(r"\d{4}-\d\d-\d\d|\d\d[-/.]\d\d[-/.]\d{4}")
+LAT_LON = re.compile(r"\s*-?\d{1,2}\.\d+\s*,\s*-?\d{1,3}\.\d+\s*")
 
 
 @dataclass(frozen=True, slots=True)
-class Found:
-    """A class or role whose keyword was found, and the words of the text in which it was.
+class Match:
+    """A class or role whose keyword stands in a text, and the words there.
 
     `letters` is the length of the keyword: the longer, the surer.
     """
@@ -66,16 +80,12 @@ def words_of(text: str) -> tuple[str, ...]:
     letters = unicodedata.normalize("NFKD", text)
     plain = "".join(letter for letter in letters if not unicodedata.combining(letter))
     parts = re.findall(r"[^\W\d_]+|\d+", HUMPS.sub(" ", plain))
-    folded = (part.casefold() for part in parts)
-    return tuple(word for word in folded if word not in ARTICLES)
+    return tuple(word for part in parts if (word := part.casefold()) not in ARTICLES)
 
 
 @dataclass(frozen=True, slots=True)
 class Keywords:
-    """Keywords of classes, roles or kinds of field.
-
-    Each phrase is a name and the words that stand for it, one after the other.
-    """
+    """Names of classes, roles or kinds of field, each with words that stand for it in a row."""
 
     phrases: tuple[tuple[str, tuple[str, ...]], ...]
 
@@ -84,28 +94,27 @@ class Keywords:
         """Return the keywords of pairs of a name and a phrase, each once."""
         return cls(tuple(dict.fromkeys((name, words_of(phrase)) for name, phrase in pairs)))
 
-    def find(self, text: str) -> tuple[Found, ...]:
+    def find(self, text: str) -> tuple[Match, ...]:
         """Find the keywords in a text, the longest first and each name once.
 
         Words that are part of those of a longer keyword do not count.
         """
         words = words_of(text)
-        found: list[tuple[int, int, Found]] = []
-        for name, phrase in self.phrases:
-            for start in range(len(words)):
-                end = _end(words, start, phrase)
-                if end is not None:
-                    what = Found(name, " ".join(words[start:end]), sum(map(len, phrase)))
-                    found.append((start, end, what))
+        spans = [
+            (start, end, Match(name, " ".join(words[start:end]), sum(map(len, phrase))))
+            for name, phrase in self.phrases
+            for start in range(len(words))
+            if (end := _end(words, start, phrase)) is not None
+        ]
         # Python's sort keeps the order of the file among keywords of the same length.
-        found.sort(key=lambda item: (-item[2].letters, item[0]))
-        best: dict[str, Found] = {}
-        for start, end, what in found:
+        spans.sort(key=lambda span: (-span[2].letters, span[0]))
+        best: dict[str, Match] = {}
+        for start, end, match in spans:
             if not any(
-                first <= start and end <= last and other.letters > what.letters
-                for first, last, other in found
+                first <= start and end <= last and other.letters > match.letters
+                for first, last, other in spans
             ):
-                best.setdefault(what.name, what)
+                best.setdefault(match.name, match)
         return tuple(best.values())
 
 
@@ -128,46 +137,20 @@ def _begins(word: str, keyword: str) -> bool:
 def keywords(kind: str) -> Keywords:
     """Return the shipped keywords of a kind.
 
-    The kinds are ``"classes"`` (what a class is called), ``"class_fields"`` (fields that tell the
-    class of a layer), ``"roles"`` (what layers without objects are called) and ``"fields"`` (what a
-    field is for).
+    They are ``"classes"`` (what a class is called), ``"class_fields"`` (fields that tell the class
+    of a layer), ``"roles"`` (layers without objects) and ``"fields"`` (what a field is for).
     """
-    text = (data_folder() / "keywords.toml").read_text(encoding="utf-8")
-    content = tomllib.loads(text)
+    content = tomllib.loads((data_folder() / "keywords.toml").read_text(encoding="utf-8"))
     if kind == "fields":
         groups = content["fields"].items()
         return Keywords.of((name, word) for name, words in groups for word in words)
-    table = content["classes" if kind == "class_fields" else kind]
     return Keywords.of(
         (name, word)
-        for name, lists in table.items()
+        for name, lists in content["classes" if kind == "class_fields" else kind].items()
         for key, words in lists.items()
         if (key == "fields") == (kind == "class_fields")
         for word in words
     )
-
-
-# A field with no more values is one to filter by, unless most of them are seen only once.
-FEW_VALUES = 12
-
-
-LONGEST_VALUE = 60
-
-
-LEAST_SHARE = 0.1
-
-
-DATE = re.compile(r"\d{4}-\d\d-\d\d|\d\d[-/.]\d\d[-/.]\d{4}")
-
-
-# A class must be named by the values of at least this share of the rows.
-MOST_ROWS = 0.5
-
-
-ROLE_GEOMETRY = {"buildings": "polygon", "streets": "line"}
-
-
-LAT_LON = re.compile(r"\s*-?\d{1,2}\.\d+\s*,\s*-?\d{1,3}\.\d+\s*")
 
 
 @dataclass(frozen=True, slots=True)
@@ -199,11 +182,8 @@ class Column:
         )
 
     def meant_for(self, purpose: str) -> bool:
-        """Tell whether the name is typical of fields for a purpose.
-
-        The purposes are ``"filter"``, ``"identifier"``, ``"row_number"``, ``"x"`` and ``"y"``.
-        """
-        return any(found.name == purpose for found in keywords("fields").find(self.name))
+        """Tell whether the name is typical of a filter, identifier, row_number, x or y."""
+        return any(match.name == purpose for match in keywords("fields").find(self.name))
 
     def within(self, limit: float) -> bool:
         """Tell whether all values are numbers from ``-limit`` to ``limit``."""
@@ -211,14 +191,9 @@ class Column:
 
 
 def _names_something(value: object) -> bool:
-    if isinstance(value, bool):
-        return True
-    return (
-        isinstance(value, str)
-        and len(value) <= LONGEST_VALUE
-        and not _number(value)
-        and not DATE.search(value)
-    )
+    if not isinstance(value, str):
+        return isinstance(value, bool)
+    return len(value) <= LONGEST_VALUE and not _number(value) and not DATE.search(value)
 
 
 def _number(value: object) -> bool:
@@ -244,8 +219,8 @@ def columns_of(sample: Sample) -> tuple[Column, ...]:
 class ClassGuess:
     """What a layer seems to hold: a class, or a role if `is_role`; empty if nothing points to one.
 
-    `reason` tells people what it was seen by, `others` are further classes that the name could
-    mean, and `sure` says that the name means this and nothing else.
+    `reason` says by what, `others` are further classes that the name could mean, and `sure` says
+    that the name means this and nothing else.
     """
 
     name: str = ""
@@ -260,21 +235,20 @@ def guess_class(
 ) -> ClassGuess:
     """Guess the class of a layer, or its role where it holds no objects.
 
-    `names` holds those of the file and of the layer; `geometry` is ``"point"``, ``"line"`` or
-    ``"polygon"``, or None where it is of several kinds; `rows` is the size of the sample. The name
-    decides; else values that most rows have; else a field that only one class has.
+    `names` are those of the file and of the layer; `geometry` is None where it is of several kinds;
+    `rows` is the size of the sample. The name decides; else values that most rows have; else a
+    field that only one class has.
     """
     classes = keywords("classes").find(names)
     for role in keywords("roles").find(names):
-        longer = any(found.letters > role.letters for found in classes)
+        longer = any(match.letters > role.letters for match in classes)
         if ROLE_GEOMETRY[role.name] == geometry and not longer:
-            return ClassGuess(
-                role.name, is_role=True, reason=f'from the name: "{role.words}"', sure=True
-            )
+            reason = f'from the name: "{role.words}"'
+            return ClassGuess(role.name, is_role=True, reason=reason, sure=True)
     if classes:
         first, *others = classes
         reason = f'from the name: "{first.words}"'
-        also = tuple(found.name for found in others)
+        also = tuple(match.name for match in others)
         return ClassGuess(first.name, reason=reason, others=also, sure=not also)
     if geometry not in {"point", None}:
         return ClassGuess()
@@ -286,37 +260,35 @@ def _by_content(columns: Sequence[Column], rows: int) -> Iterator[ClassGuess]:
         seen: Counter[str] = Counter()
         example: dict[str, str] = {}
         for value, number in column.counts.items() if len(column.counts) <= FEW_VALUES else ():
-            for found in keywords("classes").find(str(value))[:1]:
-                seen[found.name] += number
-                example.setdefault(found.name, str(value))
+            for match in keywords("classes").find(str(value))[:1]:
+                seen[match.name] += number
+                example.setdefault(match.name, str(value))
         for name, number in seen.most_common(1):
             if number >= MOST_ROWS * rows:
                 yield ClassGuess(name, reason=f"from {column.name} = {example[name]}")
     for column in columns:
-        for found in keywords("class_fields").find(column.name):
-            yield ClassGuess(found.name, reason=f"from the field {column.name}")
+        for match in keywords("class_fields").find(column.name):
+            yield ClassGuess(match.name, reason=f"from the field {column.name}")
 
 
 def guess_class_by(columns: Sequence[Column], class_name: str) -> tuple[str, dict[str, str]] | None:
-    """Return the field whose values name other classes than that of the layer, and which.
-
-    The mapping leads from value to class. Of several such fields, the one with most of these values
-    is chosen, and the first of equals.
-    """
-    best: tuple[str, dict[str, str]] | None = None
-    for column in columns:
-        if not column.few:
-            continue
-        classes = {
-            value: found.name
-            for value in column.counts
-            if isinstance(value, str)
-            for found in keywords("classes").find(value)[:1]
-            if found.name != class_name
-        }
-        if classes and (best is None or len(classes) > len(best[1])):
-            best = column.name, classes
-    return best
+    """Return the field with most values that name other classes than the layer's, and which."""
+    fields = [
+        (
+            column.name,
+            {
+                value: match.name
+                for value in column.counts
+                if isinstance(value, str)
+                for match in keywords("classes").find(value)[:1]
+                if match.name != class_name
+            },
+        )
+        for column in columns
+        if column.few
+    ]
+    best = max(fields, key=lambda field: len(field[1]), default=None)
+    return best if best and best[1] else None
 
 
 def guess_position(sample: Sample, columns: Sequence[Column]) -> tuple[str, ...]:
@@ -330,29 +302,6 @@ def guess_position(sample: Sample, columns: Sequence[Column]) -> tuple[str, ...]
         [column.name for column in numbers if column.meant_for(purpose)] for purpose in ("x", "y")
     )
     return (x[0], y[0]) if x and y else ()
-
-
-# Marks what a person must fill in; as a class, it does not load.
-EDIT = "EDIT"
-
-
-SAMPLE_ROWS = 100_000
-
-
-FILTERS_SHOWN = 8
-
-
-# A field that has more rows a value than this does not identify anything.
-FEW_PER_ID = 10
-
-
-GEOMETRIES = {"Point": "point", "LineString": "line", "LinearRing": "line", "Polygon": "polygon"}
-
-
-FIRST_OWN_CODE = 12
-
-
-SYMBOLS = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789"
 
 
 @dataclass(frozen=True, slots=True)
@@ -409,8 +358,8 @@ def suggest_catalog(path: str | Path) -> str:
     # Fields: id, lon, lat, wood
     """
     path = Path(path)
-    found = samples(path, limit=SAMPLE_ROWS)
-    layers = [item for item in found if item.info.geometry != NO_GEOMETRY]
+    items = samples(path, limit=SAMPLE_ROWS)
+    layers = [item for item in items if item.info.geometry != NO_GEOMETRY]
     if not layers:
         msg = f"{path} holds no layer with positions; give a file that does."
         raise SourceError(msg)
@@ -423,15 +372,15 @@ def suggest_catalog(path: str | Path) -> str:
         f"title = {_text(path.stem)}",
         f'license = "unknown"  # {EDIT}: what the publisher allows',
         f'attribution = ""  # {EDIT}: the line that the publisher asks for',
-        *_metric_crs(layers),
+        _metric_crs(layers),
     ]
     if layers[0].reader != VECTOR:
         lines.append(f"reader = {_text(layers[0].reader)}")
     lines += _classes(drafts)
     for name, draft in zip(_unique(_snake(item.info.name) for item in layers), drafts, strict=True):
         lines += ["", *_stanza(name, draft, several=len(layers) > 1)]
-    if len(layers) < len(found):
-        tables = ", ".join(_text(item.info.name) for item in found if item not in layers)
+    if len(layers) < len(items):
+        tables = ", ".join(_text(item.info.name) for item in items if item not in layers)
         lines += ["", f"# Left out, because they have no geometry: {tables}"]
     return "\n".join(lines) + "\n"
 
@@ -454,19 +403,15 @@ def _draft(path: Path, sample: Sample) -> _Draft:
     return _Draft(path, sample, columns, geometry, guess, class_by, position)
 
 
-# --- The top of the catalogue -----------------------------------------------------------------
-
-
-def _metric_crs(layers: Sequence[Sample]) -> list[str]:
+def _metric_crs(layers: Sequence[Sample]) -> str:
     """Take the CRS of the layers, where it is one in which distances can be taken."""
     systems = {item.info.crs for item in layers}
-    for crs in systems if len(systems) == 1 else ():
-        try:
+    if len(systems) == 1:
+        (crs,) = systems
+        with contextlib.suppress(CrsError):
             require_metric_crs(crs)
-        except CrsError:
-            break
-        return [f"metric_crs = {_text(str(crs))}"]
-    return ["# Without metric_crs, distances are taken in the UTM zone of the data."]
+            return f"metric_crs = {_text(str(crs))}"
+    return "# Without metric_crs, distances are taken in the UTM zone of the data."
 
 
 def _classes(drafts: Sequence[_Draft]) -> Iterator[str]:
@@ -483,14 +428,10 @@ def _classes(drafts: Sequence[_Draft]) -> Iterator[str]:
         item = shipped.get(name) or _new_class(name, taken)
         taken.append(item)
         comment = "" if name in sure else "# "
-        yield ""
-        if comment:
-            yield "# For class_by below:"
+        yield from [""] if name in sure else ["", "# For class_by below:"]
         yield f"{comment}[[classes]]"
-        yield f"{comment}code = {item.code}"
-        yield f"{comment}symbol = {_text(item.symbol)}"
-        yield f"{comment}name = {_text(item.name)}"
-        yield f"{comment}title = {_text(item.title)}"
+        for key in ("code", "symbol", "name", "title"):
+            yield f"{comment}{key} = {json.dumps(getattr(item, key), ensure_ascii=False)}"
 
 
 def _new_class(name: str, taken: Sequence[ObjectClass]) -> ObjectClass:
@@ -498,19 +439,16 @@ def _new_class(name: str, taken: Sequence[ObjectClass]) -> ObjectClass:
     codes = {item.code for item in taken}
     symbols = {item.symbol for item in taken}
     code = next(code for code in range(FIRST_OWN_CODE, MAX_CODE) if code not in codes)
-    wanted = name.upper() + name + SYMBOLS
-    symbol = next(letter for letter in wanted if letter in SYMBOLS and letter not in symbols)
+    letters = name.upper() + name + SYMBOLS
+    symbol = next(letter for letter in letters if letter in SYMBOLS and letter not in symbols)
     return ObjectClass(code, symbol, name, name.replace("_", " ").capitalize())
-
-
-# --- A layer ----------------------------------------------------------------------------------
 
 
 def _stanza(name: str, draft: _Draft, *, several: bool) -> Iterator[str]:
     info = draft.sample.info
     yield "[[layers]]"
     yield f"name = {_text(name)}"
-    yield from _class(draft.guess)
+    yield _class(draft.guess)
     yield f"files = [{_text(glob.escape(draft.file.name))}]"
     if several:
         yield f"layer = {_text(info.name)}"
@@ -526,18 +464,17 @@ def _stanza(name: str, draft: _Draft, *, several: bool) -> Iterator[str]:
     yield f"# Fields: {', '.join(_plain(field) for field, _ in info.fields) or 'none'}"
 
 
-def _class(guess: ClassGuess) -> Iterator[str]:
-    key = "role" if guess.is_role else "class"
+def _class(guess: ClassGuess) -> str:
     if not guess.name:
-        yield (
+        return (
             f'class = "{EDIT}"  # {EDIT}: nothing tells what this is; write a class (or role = '
             '"buildings" or "streets" instead), or remove the layer'
         )
-    elif guess.sure:
-        yield f"{key} = {_text(guess.name)}  # {_plain(guess.reason)}"
-    else:
-        others = f"; or is it {' or '.join(guess.others)}?" if guess.others else "; is it so?"
-        yield f"{key} = {_text(guess.name)}  # {EDIT}: {_plain(guess.reason)}{others}"
+    line = f"{'role' if guess.is_role else 'class'} = {_text(guess.name)}  # "
+    if guess.sure:
+        return line + _plain(guess.reason)
+    others = f"; or is it {' or '.join(guess.others)}?" if guess.others else "; is it so?"
+    return f"{line}{EDIT}: {_plain(guess.reason)}{others}"
 
 
 def _identifier(draft: _Draft) -> Iterator[str]:
@@ -560,20 +497,17 @@ def _identifier(draft: _Draft) -> Iterator[str]:
         yield f"# id_field = {_text(best.name)}  # {len(best.counts):,} values in {rows:,} rows"
         yield "# unique_id = true  # if rows of the same id are the same object"
         return
-    others = (column for column in draft.columns if column.unique and not _measured(column))
-    other = next((column for column in others if column.name not in draft.position), None)
-    if other is not None:
-        yield f"# id_field = {_text(other.name)}  # has one, if it is meant to identify a row"
-
-
-def _measured(column: Column) -> bool:
-    """Tell whether the values are numbers with decimals, which are different by chance."""
-    return any(str(value).count(".") == 1 for value in column.counts)
+    for column in draft.columns:
+        # Numbers with decimals are different by chance.
+        measured = any(str(value).count(".") == 1 for value in column.counts)
+        if column.unique and not measured and column.name not in draft.position:
+            yield f"# id_field = {_text(column.name)}  # has one, if it is meant to identify a row"
+            return
 
 
 def _place(draft: _Draft) -> Iterator[str]:
     """Yield where positions are found, and in which CRS."""
-    info, sample = draft.sample.info, draft.sample
+    crs, by_gdal = draft.sample.info.crs, draft.sample.reader == VECTOR
     if len(draft.position) == 1:
         (field,) = draft.position
         yield f"aliases = {{ geo_point_2d = [{_text(field)}] }}  # latitude, longitude"
@@ -586,26 +520,22 @@ def _place(draft: _Draft) -> Iterator[str]:
         degrees = all(
             column.within(limits[column.name]) for column in draft.columns if column.name in limits
         )
-    if info.crs is not None and sample.reader == VECTOR:
-        yield from _known_crs(info.crs)
-    elif draft.position and degrees and sample.reader == VECTOR:
+    if crs is not None and by_gdal:
+        try:
+            CRS.from_user_input(crs)
+        except CRSError:
+            yield f"# The file states its own coordinate system, {_text(crs)}, which has no code."
+        else:
+            yield f"crs = {_text(crs)}"
+    elif draft.position and degrees and by_gdal:
         yield (
             f'crs = "EPSG:4326"  # {EDIT}: the file does not say; its coordinates could be degrees'
         )
-    elif not degrees or sample.reader == VECTOR:
+    elif not degrees or by_gdal:
         yield (
             f"# {EDIT}: the file does not say its coordinate system; write its code, such as "
             'crs = "EPSG:2154"'
         )
-
-
-def _known_crs(crs: str) -> Iterator[str]:
-    try:
-        CRS.from_user_input(crs)
-    except CRSError:
-        yield f"# The file states its own coordinate system, {_text(crs)}, which has no code."
-    else:
-        yield f"crs = {_text(crs)}"
 
 
 def _filters(draft: _Draft) -> Iterator[str]:
@@ -615,7 +545,12 @@ def _filters(draft: _Draft) -> Iterator[str]:
         values = ", ".join(f"{_key(value)} = {_text(name)}" for value, name in classes.items())
         yield f"# If {_plain(field)} tells the class of a row:"
         yield f"# class_by = {{ field = {_text(field)}, values = {{ {values} }} }}"
-    few = [column for column in draft.columns if column.few and not _pattern(column)]
+    few = [
+        column
+        for column in draft.columns
+        # A catalogue would take a value with a slash for a pattern.
+        if column.few and not any(str(value).startswith("/") for value in column.counts)
+    ]
     few.sort(key=lambda column: not column.meant_for("filter"))  # the others keep their order
     if few:
         rows = len(draft.sample.rows)
@@ -629,14 +564,6 @@ def _filters(draft: _Draft) -> Iterator[str]:
     if len(few) > FILTERS_SHOWN:
         names = ", ".join(_plain(column.name) for column in few[FILTERS_SHOWN:])
         yield f"# More fields of few values: {names}"
-
-
-def _pattern(column: Column) -> bool:
-    """Tell whether a catalogue would take a value for a pattern."""
-    return any(str(value).startswith("/") for value in column.counts)
-
-
-# --- TOML -------------------------------------------------------------------------------------
 
 
 def _text(text: str) -> str:
@@ -667,6 +594,5 @@ def _unique(names: Iterable[str]) -> Iterator[str]:
     seen: set[str] = set()
     for name in names:
         free = (f"{name}_{number}" if number > 1 else name for number in itertools.count(1))
-        chosen = next(candidate for candidate in free if candidate not in seen)
-        seen.add(chosen)
-        yield chosen
+        seen.add(first := next(candidate for candidate in free if candidate not in seen))
+        yield first

@@ -64,22 +64,16 @@ def fetch_layers(
     filters : bool, default True
         Whether the filters of the layers apply.
     progress : callable, optional
-        Called with how much has arrived and how much there is, 0 where nobody knows: bytes of
-        a portal's file, tiles of OpenStreetMap.
+        Takes how much has arrived and how much there is, 0 where nobody knows: bytes of a portal's
+        file, tiles of OpenStreetMap.
     tell : callable, optional
-        Called with a line about each layer that has arrived: rows, size and date.
+        Takes a line about each layer that has arrived: rows, size and date.
 
     Returns
     -------
     tuple of RawLayer
-        The layers, cut to the area.
-
-    Raises
-    ------
-    InputError
-        If the catalogue has no service to fetch from.
-    SourceError
-        If a service refuses, fails, or sends something else.
+        The layers, cut to the area. InputError if the catalogue has no service to fetch from,
+        SourceError if a service refuses, fails, or sends something else.
     """
     if not catalog.endpoints or catalog.reader not in {"opendatasoft", "osm_file"}:
         msg = (
@@ -135,17 +129,8 @@ def open_cache(
 
     Returns
     -------
-    cache : Cache
-        The cache.
-    http : HttpSpec
-        How requests are made.
-
-    Examples
-    --------
-    >>> import tempfile
-    >>> with tempfile.TemporaryDirectory() as folder:
-    ...     open_cache(folder, offline=True)[1].offline
-    True
+    tuple of (Cache, HttpSpec)
+        The cache, and how requests are made.
     """
     base = os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
     return Cache(Path(folder or Path(base) / "semsig")), HttpSpec(offline=offline)
@@ -160,26 +145,18 @@ def find_area(text: str, catalog: Catalog, *, cache: Cache, http: HttpSpec) -> A
         ``west,south,east,north`` in degrees, the path of a polygon file, or the name of a place.
     catalog : Catalog
         Whose geocoder knows places by name.
-    cache : Cache
-        Where the answer about a name is kept.
-    http : HttpSpec
-        How a name is asked for.
+    cache, http : Cache, HttpSpec
+        Where the answer about a name is kept, and how it is asked for (see `open_cache`).
 
     Returns
     -------
     Area
-        The area.
-
-    Raises
-    ------
-    InputError
-        If the numbers are no box on the Earth, or the catalogue has no geocoder for a name.
-    SourceError
-        If the file cannot be read, or no place has that name.
+        The area. InputError if the numbers are no box on the Earth, or the catalogue has no
+        geocoder; SourceError if the file cannot be read.
 
     Examples
     --------
-    >>> from semsig_gis.sources.catalog import load_catalog
+    >>> from semsig_gis import find_area, load_catalog, open_cache
     >>> cache, http = open_cache("unused", offline=True)
     >>> osm = load_catalog("openstreetmap")
     >>> find_area("2.3,48.8,2.4,48.9", osm, cache=cache, http=http).bounds
@@ -208,10 +185,8 @@ class Loaded:
     ----------
     objects : StreetObjects
         The street objects.
-    report : LoadReport
-        What became of every row.
-    conflation : ConflationReport
-        What was merged between layers.
+    report, conflation : LoadReport, ConflationReport
+        What became of every row, and what was merged between layers.
     buildings, streets : GeoDataFrame, optional
         Footprints (polygons) and centre lines in the CRS of the objects, where layers hold them;
         of streets whose widths a layer knows, ``half_width`` in metres.
@@ -230,30 +205,25 @@ class Loaded:
 def choose_layers(
     catalog: Catalog, names: Sequence[str] = (), *, surroundings: bool = False
 ) -> tuple[LayerSpec, ...]:
-    """Return the layers to load.
+    """Return the layers to load, in the order of the catalogue.
 
     Parameters
     ----------
     catalog : Catalog
         The catalogue.
     names : sequence of str
-        Layers by name; by default all that are not optional.
+        Layers by name; by default all that are not optional. UnknownNameError if there is none.
     surroundings : bool, default False
         Whether buildings and streets are wanted too.
 
     Returns
     -------
     tuple of LayerSpec
-        The layers, in the order of the catalogue.
-
-    Raises
-    ------
-    UnknownNameError
-        If there is no layer of a name; the nearest is offered.
+        The layers.
 
     Examples
     --------
-    >>> from semsig_gis.sources.catalog import load_catalog
+    >>> from semsig_gis import choose_layers, load_catalog
     >>> [spec.name for spec in choose_layers(load_catalog("montpellier"), ["cameras"])]
     ['cameras']
     """
@@ -282,13 +252,14 @@ def read_files(
     specs : sequence of LayerSpec
         The layers to look for.
     paths : iterable of str or Path
-        Files, and folders that hold them.
+        Files, and folders that hold them. SourceError if one does not exist, matches no layer, or
+        cannot be read.
     filters : bool, default True
         Whether the filters of the layers apply.
     crs : str, optional
         CRS of files that state none.
     progress : callable, optional
-        Called with the number of files done and in all.
+        Takes the number of files done and in all.
 
     Returns
     -------
@@ -296,16 +267,6 @@ def read_files(
         What was read, in the order of `specs`.
     absent : tuple of LayerSpec
         Layers that have no file among `paths`.
-
-    Raises
-    ------
-    SourceError
-        If a path does not exist, matches no layer, or cannot be read.
-
-    Examples
-    --------
-    >>> read_files([], [])
-    ((), ())
     """
     found, absent = find_files(specs, paths)
     by_file: dict[tuple[Path, str], list[LayerSpec]] = {}
@@ -376,19 +337,12 @@ def assemble(
     Returns
     -------
     Loaded
-        The objects and what became of every row.
-
-    Raises
-    ------
-    CrsError
-        If the CRS is not metric, or a layer has none.
-    EmptyResultError
-        If no object remains.
+        The objects and what became of every row. CrsError if the CRS is not metric or a layer has
+        none, EmptyResultError if no object remains.
 
     Examples
     --------
-    >>> from semsig_gis.sources.catalog import load_catalog
-    >>> from semsig_gis.sources.synthetic.city import CitySpec, synthetic_city
+    >>> from semsig_gis import CitySpec, assemble, load_catalog, synthetic_city
     >>> layers = synthetic_city(CitySpec(size=300.0))
     >>> assemble(layers, load_catalog("openstreetmap")).objects.crs.name
     'WGS 84 / UTM zone 31N'

@@ -98,9 +98,9 @@ def quality_report(
     objects : StreetObjects
         What was loaded, after conflation if there was one.
     load : LoadReport
-        What `objects.clean.build_objects` says of the layers.
+        What `build_objects` says of the layers.
     conflation : ConflationReport, optional
-        What `objects.conflate.conflate` says, if it was used.
+        What `conflate` says, if it was used.
 
     Returns
     -------
@@ -109,11 +109,9 @@ def quality_report(
 
     Examples
     --------
-    >>> from semsig_gis import build_objects, paper_taxonomy, quality_report, synthetic_city
-    >>> from semsig_gis import CitySpec
-    >>> layers = synthetic_city(CitySpec(size=300.0))
-    >>> objects, load = build_objects(layers, taxonomy=paper_taxonomy(), crs="EPSG:32631")
-    >>> quality_report(objects, load).classes[0].class_name
+    >>> from semsig_gis import CitySpec, assemble, load_catalog, quality_report, synthetic_city
+    >>> loaded = assemble(synthetic_city(CitySpec(size=300.0)), load_catalog("openstreetmap"))
+    >>> quality_report(loaded.objects, loaded.report).classes[0].class_name
     'alignment_tree'
     """
     xy = objects.xy

@@ -38,14 +38,10 @@ def save_surroundings(table: gpd.GeoDataFrame, path: str | Path) -> None:
     Parameters
     ----------
     table : GeoDataFrame
-        Features, each with a geometry; all columns are kept.
+        Features, each with a geometry; all columns and the `attrs` are kept. The file holds them in
+        a spatial order, with their bounds in the column ``bbox``.
     path : str or Path
         File to write; it appears whole, by rename.
-
-    Notes
-    -----
-    The file holds the features in a spatial order, with their bounds in the column ``bbox``, and
-    the `attrs` of the table.
 
     Examples
     --------
@@ -83,12 +79,13 @@ def read_surroundings(
     Parameters
     ----------
     path : str or Path
-        Any vector file that `sources.vector.reader` reads, an OpenStreetMap file, or a
-        ``.parquet`` file such as ``semsig load --buildings`` writes.
+        Any vector file that `read_layer` reads, an OpenStreetMap file, or a ``.parquet`` file such
+        as ``semsig load --buildings`` writes. SourceError if it is missing, damaged, or of another
+        kind.
     role : {"buildings", "streets"}
-        What the file holds: polygons or lines.
+        What the file holds: polygons or lines. InputError if it has none, or something else too.
     crs : pyproj.CRS or str
-        CRS to move it to.
+        CRS to move it to. CrsError if nobody knows its own.
     box : sequence of float, optional
         ``xmin, ymin, xmax, ymax`` in the CRS of the file, which `save_surroundings` wrote: only
         features whose bounds meet it.
@@ -97,24 +94,7 @@ def read_surroundings(
     -------
     GeoDataFrame
         One row a feature that has a geometry; in a box there may be none. Of a ``.parquet`` file
-        all columns are kept. Whom to name for it, where that is known, is in ``attrs["licenses"]``
-        (see `licenses_of`).
-
-    Raises
-    ------
-    SourceError
-        If the file is missing, damaged, or of another kind.
-    CrsError
-        If nobody knows its CRS.
-    InputError
-        If it holds no polygon or line at all, or something else too.
-
-    Examples
-    --------
-    >>> read_surroundings("nowhere.parquet", role="buildings", crs="EPSG:2154")
-    Traceback (most recent call last):
-    ...
-    semsig_gis.core.errors.SourceError: nowhere.parquet does not exist; give a file of polygons.
+        all columns are kept. ``attrs["licenses"]`` says whom to name for it, where that is known.
     """
     return _read(Path(path), role, "polygon" if role == "buildings" else "line", crs, box)
 

@@ -90,8 +90,8 @@ class StreetObjects:
     table : GeoDataFrame
         One row an object: ``class_code`` (uint8), ``source`` (layer name), ``source_id``,
         ``count`` (rows of the sources that were collapsed into it) and ``geometry`` (point in a
-        metric CRS). After `objects.conflate.conflate` also ``merged``: what other sources
-        say of the same object, as ``"source:id; source:id"``, or empty.
+        metric CRS). After `conflate` also ``merged``: what other sources say of the same object, as
+        ``"source:id; source:id"``, or empty.
     taxonomy : Taxonomy
         The classes that the codes belong to.
     licenses : tuple of Licence
@@ -99,8 +99,7 @@ class StreetObjects:
 
     Examples
     --------
-    >>> objects = demo_objects
-    >>> objects.xy.shape == (len(objects), 2)
+    >>> demo_objects.xy.shape == (len(demo_objects), 2)
     True
     """
 
@@ -148,21 +147,16 @@ def save_objects(objects: StreetObjects, path: str | Path, *, keep_order: bool =
         File to write; it appears whole, by rename.
     keep_order : bool, default False
         Whether the objects stay in their order, for whoever knows them by row number. Else the
-        file holds them in a spatial order, of which a box is read faster, and so does what
-        `open_objects` returns; saving that again does not change the order.
-
-    Notes
-    -----
-    The column ``bbox`` holds the bounds of every object, and the rows are in groups of
-    `storage.geoparquet.GROUP_ROWS`.
+        file holds them in a spatial order, in groups of rows, of which a box is read faster; saving
+        that again does not change the order.
 
     Examples
     --------
     >>> import tempfile
-    >>> objects = demo_objects
+    >>> from semsig_gis import open_objects, save_objects
     >>> with tempfile.TemporaryDirectory() as folder:
-    ...     save_objects(objects, f"{folder}/objects.parquet")
-    ...     len(open_objects(f"{folder}/objects.parquet")) == len(objects)
+    ...     save_objects(demo_objects, f"{folder}/objects.parquet")
+    ...     len(open_objects(f"{folder}/objects.parquet")) == len(demo_objects)
     True
     """
     table = objects.table
@@ -254,7 +248,7 @@ def open_objects(path: str | Path, *, box: Sequence[float] | None = None) -> Str
     Parameters
     ----------
     path : str or Path
-        File to read.
+        File to read. DatabaseError if it is missing, damaged, or holds something else.
     box : sequence of float, optional
         ``xmin, ymin, xmax, ymax`` in metres: only objects in it or on its edge.
 
@@ -262,19 +256,6 @@ def open_objects(path: str | Path, *, box: Sequence[float] | None = None) -> Str
     -------
     StreetObjects
         The objects; there is at least one, but in a box there may be none.
-
-    Raises
-    ------
-    DatabaseError
-        If the file is missing, damaged, or holds something else.
-
-    Examples
-    --------
-    >>> open_objects("nowhere.parquet")
-    Traceback (most recent call last):
-    ...
-    semsig_gis.core.errors.DatabaseError: nowhere.parquet does not exist;
-    give a street objects file.
     """
     arrow, specs, crs = read_geoparquet(path, kind=KIND, box=box)
     if box is not None:

@@ -56,17 +56,15 @@ class Catalog:
 
     Parameters
     ----------
-    name : str
-        Short name.
-    title : str
-        Name to show to people.
-    metric_crs : str, optional
-        Coordinate reference system in metres in which distances are taken; where it is left
-        out, the UTM zone of the data.
+    name, title : str
+        Short name, and the one to show to people.
     taxonomy : Taxonomy
         The paper's classes and the catalogue's own.
     layers : tuple of LayerSpec
         The layers.
+    metric_crs : str, optional
+        Coordinate reference system in metres in which distances are taken; by default the UTM zone
+        of the data.
     url : str
         Where the data is published.
     reader : str
@@ -79,11 +77,6 @@ class Catalog:
         Classes whose objects from different layers are the same thing within so many metres.
     license, attribution : str
         What holds for every layer that does not say otherwise.
-
-    Examples
-    --------
-    >>> load_catalog("montpellier").layer("trees").class_name
-    'alignment_tree'
     """
 
     name: str
@@ -100,23 +93,7 @@ class Catalog:
     attribution: str = ""
 
     def layer(self, name: str) -> LayerSpec:
-        """Return the layer of that name.
-
-        Parameters
-        ----------
-        name : str
-            Name of a layer.
-
-        Returns
-        -------
-        LayerSpec
-            The layer.
-
-        Raises
-        ------
-        UnknownNameError
-            If there is none; the nearest name is offered.
-        """
+        """Return the layer of that name; UnknownNameError, with the nearest, if there is none."""
         for spec in self.layers:
             if spec.name == name:
                 return spec
@@ -135,11 +112,6 @@ def paper_taxonomy() -> Taxonomy:
     -------
     Taxonomy
         Codes 1 to 11 (paper, table of semantic objects).
-
-    Examples
-    --------
-    >>> "".join(item.symbol for item in paper_taxonomy().classes)
-    'BCDEGHIJKLM'
     """
     source = data_folder() / "taxonomy.toml"
     content = parse_toml(source.read_text(encoding="utf-8"), "taxonomy.toml")
@@ -169,24 +141,20 @@ def load_catalog(name: str | Path) -> Catalog:
     ----------
     name : str or Path
         Name of a built-in or installed catalogue, or path of a TOML file (it ends in ``.toml``).
+        UnknownNameError if there is none of that name.
 
     Returns
     -------
     Catalog
-        The catalogue; its taxonomy is the paper's classes followed by its own.
-
-    Raises
-    ------
-    UnknownNameError
-        If there is no catalogue of that name.
-    CatalogError
-        If the file is missing, is not TOML, has a key that means nothing, lacks one that is
-        needed, or names a class or CRS that does not exist.
+        The catalogue; its taxonomy is the paper's classes followed by its own. CatalogError if the
+        file is missing or not TOML, has a key that means nothing, lacks one that is needed, or
+        names a class or CRS that does not exist.
 
     Examples
     --------
-    >>> load_catalog("montpellier").metric_crs
-    'EPSG:2154'
+    >>> from semsig_gis import load_catalog
+    >>> load_catalog("montpellier").layer("trees").class_name
+    'alignment_tree'
     """
     text = str(name)
     source: Path | Traversable
@@ -221,24 +189,19 @@ def combine_catalogs(catalogs: Sequence[Catalog]) -> Catalog:
     Parameters
     ----------
     catalogs : sequence of Catalog
-        At least one; the first is trusted most when objects are merged.
+        At least one, each once (else InputError); the first is trusted most when objects are
+        merged.
 
     Returns
     -------
     Catalog
         With several, each layer's name begins with its catalogue's. The first of them that says
         a metric CRS, how far a class is seen, or within how many metres it is merged, decides
-        that.
-
-    Raises
-    ------
-    InputError
-        If there is no catalogue, or one stands twice.
-    CatalogError
-        If two catalogues mean different classes by one name, code or symbol.
+        that. CatalogError if they mean different classes by one name, code or symbol.
 
     Examples
     --------
+    >>> from semsig_gis import combine_catalogs, load_catalog
     >>> both = combine_catalogs([load_catalog("montpellier"), load_catalog("openstreetmap")])
     >>> both.layers[0].name
     'montpellier/trees'

@@ -69,10 +69,8 @@ class LayerSpec:
 
     Parameters
     ----------
-    name : str
-        Name of the layer in the catalogue.
-    class_name : str
-        Class of its rows.
+    name, class_name : str
+        Name of the layer in the catalogue, and class of its rows.
     files : tuple of str
         File-name patterns (``*``, ``?``) by which the layer's file is recognised.
     layer : str, optional
@@ -82,13 +80,13 @@ class LayerSpec:
         between slashes is a regular expression that the whole value must match.
     class_by : ClassBy, optional
         Field that decides the class row by row.
-    width_by : WidthBy, optional
-        Of streets: the field that says how wide they are by its class of street.
-    width_field : str, optional
-        Of streets: the field that holds their width in metres; where it says nothing usable,
-        `width_by` holds.
+    width_by, width_field : WidthBy, str, optional
+        Of streets: the field that says how wide they are by its class of street, and the one that
+        holds their width in metres, which goes first.
     id_field : str, optional
         Field that identifies a row in its source; else the feature's number.
+    unique_id : bool
+        Whether rows of the same id are the same object, also across several files.
     geometry : {"point", "line", "polygon"}
         Geometry that is expected.
     crs : str, optional
@@ -99,14 +97,9 @@ class LayerSpec:
         Coordinate columns of a CSV file.
     aliases : tuple of (str, tuple of str)
         Fields and the names that they go by in other editions of the file (Opendatasoft only).
-    unique_id : bool
-        Whether rows of the same id are the same object, also across several files.
-    dataset : str, optional
-        Name of the dataset on its portal.
-    server_where : str, optional
-        Filter that the portal applies before it sends, in its own language.
-    select : tuple of str
-        Fields to ask the portal for; all by default.
+    dataset, server_where, select : str, str, tuple of str, optional
+        Name of the dataset on its portal, filter in the portal's own language, and fields to ask
+        for.
     tags : tuple of tuple of (str, tuple of str)
         OpenStreetMap tags: alternatives, each of keys and accepted values that must all hold;
         the value ``"*"`` accepts every value but ``"no"``.
@@ -123,11 +116,6 @@ class LayerSpec:
         Remark for people, such as how sure a dataset name is.
     license, attribution : str
         Licence of the data and the line that its publisher asks for.
-
-    Examples
-    --------
-    >>> LayerSpec(name="trees", class_name="alignment_tree", files=("*trees*.geojson",)).geometry
-    'point'
     """
 
     name: str

@@ -4,7 +4,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from semsig_gis.objects.draft import Found, Keywords, keywords, words_of
+from semsig_gis.objects.draft import Keywords, Match, keywords, words_of
 from semsig_gis.sources.catalog import catalog_names, load_catalog, paper_taxonomy
 
 
@@ -77,9 +77,9 @@ def test_layers_are_recognised_by_their_names(name: str, expected: list[str]) ->
 
 def test_the_longest_keyword_decides_and_hides_its_parts() -> None:
     own = Keywords.of([("sign", "light"), ("lamp", "street light"), ("lamp", "lamp")])
-    assert own.find("Street_Lights") == (Found("lamp", "street lights", 11),)
+    assert own.find("Street_Lights") == (Match("lamp", "street lights", 11),)
     assert [item.name for item in own.find("light and street light")] == ["lamp", "sign"]
-    assert own.find("streetlight") == (Found("lamp", "streetlight", 11),)
+    assert own.find("streetlight") == (Match("lamp", "streetlight", 11),)
 
 
 def test_every_class_can_be_found_by_its_own_words() -> None:

@@ -79,20 +79,19 @@ def fetch(
 ) -> Fetched:
     """Fetch a file into the cache, or find it there; with `data`, post a form.
 
-    `accept` are the content types that may come, all by default. `suffix` is that of the file in
-    the cache, else by the content type. `identity` is what the cache knows the request by instead
-    of the address, for services that mirror one another. `check` takes the path of what was sent
-    and raises SourceError if it is not to be kept; `before` is called before each request that is
-    sent; `progress` takes the bytes that have arrived and those there are, 0 where nobody knows.
+    `accept` are the content types that may come, all by default; `suffix` is that of the file in
+    the cache, else by the content type. The cache knows the request by `identity` instead of the
+    address where services mirror one another. `check` takes the path of what was sent and raises
+    SourceError if it is not to be kept; `before` is called before each request; `progress` takes
+    the bytes that have arrived and those there are, 0 where nobody knows.
 
     A cached copy is confirmed by a conditional request where the server gave an ETag or a date;
-    where it gave neither, the copy is taken as it is for ``spec.fresh_s``. A connection that is cut
-    goes on where it was cut (RFC 9110, If-Range), also in a later run, if the server can do that.
+    else it is taken as it is for ``spec.fresh_s``. A connection that is cut goes on where it was
+    cut (RFC 9110, If-Range), also in a later run, if the server can do that.
 
-    InputError for the address or the cache folder; HttpError if the server refuses or fails until
-    the attempts are used up; TooLargeError above ``spec.max_bytes``; NotCachedError if offline
-    without a sound copy; SourceError if something else is sent, or a redirect leads to another
-    host.
+    HttpError if the server refuses or fails until the attempts are used up; TooLargeError above
+    ``spec.max_bytes``; NotCachedError if offline without a sound copy; SourceError if something
+    else is sent, or a redirect leads to another host.
     """
     require_address(url)
     request = Request(url, _pairs(params), _pairs(data))

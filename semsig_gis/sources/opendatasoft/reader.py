@@ -88,14 +88,9 @@ def read_layers(
     """Read layers, in one pass, from a file that a portal exports, as it is.
 
     JSON of version 1, 2.0 or 2.1 of the API, GeoJSON, CSV and Parquet are told apart by what is in
-    the file; a GeoPackage, shapefile, FlatGeobuf or archive that was made of such a file will do
-    too. Fields are found by name, by alias, or by a name that differs in capitals, accents, spaces
-    and signs only. A shape (``geo_shape``) goes before a point (``geo_point_2d``, latitude first),
-    and that before ``x_field`` and ``y_field``. What portals publish is in WGS 84.
-
-    `filters` says whether the ``where`` of the layers holds; `crs` is for a file that states none.
-    SourceError if the file cannot be used or has no positions, CatalogError if it lacks a field
-    that a layer names, CrsError if it is in degrees and most coordinates cannot be.
+    the file; a vector file or archive made of such a file will do too. A shape (``geo_shape``) goes
+    before a point (``geo_point_2d``, latitude first), and that before ``x_field`` and ``y_field``.
+    What portals publish is in WGS 84; `crs` is for a file that states none.
     """
     path = Path(path)
     if path.suffix.lower() in VECTOR_SUFFIXES:

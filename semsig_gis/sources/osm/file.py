@@ -56,17 +56,12 @@ def read_layers(
 ) -> tuple[RawLayer, ...]:
     """Read layers of a ``.osm``, ``.osm.pbf`` or ``.osm.bz2`` file, one for each of `specs`.
 
-    The file is streamed, so that memory grows with what is kept. Where a layer has ways, the places
-    of all nodes are kept meanwhile in an unnamed temporary file, of 16 bytes a node. A layer is
-    found by its ``tags`` and ``elements``; fields in ``where``, ``class_by``, ``width_by`` and
-    ``width_field`` are keys of tags.
-
-    Identifiers are such as ``"node/123"``. Street objects are points, the centroid of a way or an
-    area; buildings are polygons and streets lines. ``read`` counts the elements with the layer's
-    tags, ``filtered`` those that are mapped in another way than it wants, and errors are incomplete
-    (clipped) or broken elements. `crs` is ignored but for a note: such files are in EPSG:4326.
-    SourceError if the file cannot be used, CatalogError if a layer says no tags, or an
-    ``id_field``.
+    The file is streamed; where a layer has ways, the places of all nodes are kept meanwhile in an
+    unnamed temporary file, of 16 bytes a node. Fields that a layer names are keys of tags, and
+    identifiers such as ``"node/123"``. Street objects are points, the centroid of a way or an area;
+    buildings are polygons and streets lines. Filtered are also elements that are mapped in another
+    way than the layer wants; incomplete (clipped) and broken ones are unreadable. `crs` is ignored
+    but for a note.
     """
     path = Path(path)
     file = _file(path)

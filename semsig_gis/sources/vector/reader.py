@@ -122,11 +122,14 @@ def read_layer(
     r"""Read one layer of a vector file.
 
     Features are streamed. One that cannot be read is counted and reported, and the rest are read.
+    The file's own CRS holds; what `spec` and `crs` say is for a file without one. GeoJSON without a
+    ``crs`` member counts as such: it is WGS 84 only if nothing else is said and the coordinates
+    fit.
 
     Parameters
     ----------
     path : str or Path
-        A file that `list_layers` takes.
+        A shapefile, GeoJSON, GeoPackage, FlatGeobuf or CSV file, or an archive of such.
     spec : LayerSpec
         Which layer and rows are wanted, and what they are.
     filters : bool, default True
@@ -144,24 +147,15 @@ def read_layer(
     SourceError
         If the file is missing, damaged or of another kind, or has several layers and `spec` names
         none.
-    UnknownNameError
-        If the file does not have the layer that `spec` names.
-    CatalogError
-        If the file does not have a field that `spec` names.
+    UnknownNameError, CatalogError
+        If the file does not have the layer, or a field, that `spec` names.
     CrsError
         If nobody states the CRS, or it is in degrees and most coordinates cannot be.
-
-    Notes
-    -----
-    The file's own CRS holds; what `spec` and `crs` say is for a file without one. A GeoJSON file
-    without a ``crs`` member counts as such: by RFC 7946 it is WGS 84, but that is taken only if
-    nothing else is said and the coordinates fit. A null or empty geometry is passed on; so is a
-    CSV row whose coordinate columns are both blank.
 
     Examples
     --------
     >>> import tempfile
-    >>> from semsig_gis.sources.layers import LayerSpec
+    >>> from semsig_gis import LayerSpec, read_layer
     >>> spec = LayerSpec(name="benches", class_name="bench", crs="EPSG:4326")
     >>> with tempfile.TemporaryDirectory() as folder:
     ...     path = Path(folder, "benches.csv")
