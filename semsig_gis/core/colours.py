@@ -71,6 +71,10 @@ GROUP_COLOURS: Mapping[int, str] = MappingProxyType(
 """Colour of a cell by the smallest number of cells with its signature, itself among them."""
 
 
+SAME_TYPES, SAME_LEVELS = "#ffffff", "#e69f00"
+"""Colours of the cells with the same types, and with the same angle levels, too."""
+
+
 DRIFT_COLOURS: Mapping[str, str] = MappingProxyType(
     {"same": "#b3b3ad", "changed": "#f0bf5c", "appeared": "#5aa5d6", "vanished": "#8a3f66"}
 )

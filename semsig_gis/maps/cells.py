@@ -2,23 +2,22 @@
 
 from __future__ import annotations
 
+import itertools
+from html import escape
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from semsig_gis.core.colours import FOUND_RAMP, GROUP_COLOURS
+from semsig_gis.core.colours import FOUND_RAMP, GROUP_COLOURS, SAME_LEVELS, SAME_TYPES
 from semsig_gis.maps.cell_layer import CellFacts, add_cells, city_view, packed_signatures
 from semsig_gis.maps.image import level_image
-from semsig_gis.maps.legend import (
-    SAME_LEVELS,
-    SAME_TYPES,
-    ambiguity_legend,
-    identifiability_legend,
-)
+from semsig_gis.maps.legend import LIFTING, NAMED_CLASSES, isolated, ramp_bar, sources, swatch
 from semsig_gis.maps.packing import packed
 from semsig_gis.maps.parts import add_image, finished_map, prepared_map
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
     import folium
     from numpy.typing import NDArray
 
@@ -180,3 +179,61 @@ def _lookalike_facts(identifiability: Identifiability) -> CellFacts:
 
 def _chance_bytes(chances: NDArray[np.float64]) -> list[str]:
     return packed(np.rint(chances * CHANCES).clip(0, CHANCES).astype(np.uint8))
+
+
+def ambiguity_legend(sizes: Mapping[str, NDArray[np.int64]], *, licenses: Sequence[str]) -> str:
+    """Return the legend of a map of how many cells look the same, as HTML with data escaped.
+
+    ``sizes`` has for every cell how many look the same, by what is compared.
+    """
+    starts = list(GROUP_COLOURS)
+    labels = [
+        "no other",
+        *(f"{low:,} to {high - 1:,}" for low, high in itertools.pairwise(starts[1:])),
+        f"{starts[-1]:,} or more",
+    ]
+    shares = [
+        np.bincount(np.digitize(size, starts), minlength=len(starts) + 1)[1:] / len(size)
+        for size in sizes.values()
+    ]
+    rows = "".join(
+        f"<tr><td>{swatch(colour, LIFTING)}{label}</td>"
+        + "".join(f"<td>{share:.1%}</td>" for share in line)
+        + "</tr>"
+        for colour, label, *line in zip(GROUP_COLOURS.values(), labels, *shares, strict=True)
+    )
+    head = "".join(f"<td><small>{escape(name)}</small></td>" for name in sizes)
+    cells = len(next(iter(sizes.values())))
+    return (
+        "<summary>Cells that look the same</summary>"
+        f"<p>{cells:,} cells, by how many look the same</p>"
+        f"<table><tr><td></td>{head}</tr>{rows}</table>"
+        "<p>Click a cell to see its signature, and to go to cells that look the same:<br>"
+        f"{swatch(SAME_TYPES)}same types &ensp;{swatch(SAME_LEVELS)}and angle levels</p>"
+        f"{sources(licenses)}"
+    )
+
+
+def identifiability_legend(identifiability: Identifiability) -> str:
+    """Return the legend of a map of where a query can be placed, as HTML with data escaped."""
+    facts = identifiability.summary()
+    within = f"within {facts['radius_m']:g} m"
+    bands = "<br>".join(
+        f"{band['from']:.0%} to {band['to']:.0%}: {band['share']:.1%} of the cells"
+        for band in reversed(facts["bands"])
+    )
+    classes = "".join(
+        f"<tr><td class='title'>{isolated(item['title'])}</td>"
+        f"<td>{100 * item['chance_near']:+.1f} %</td></tr>"
+        for item in facts["classes"][:NAMED_CLASSES]
+    )
+    return (
+        "<summary>Where a query can be placed</summary>"
+        f"<p>{facts['cells']:,} cells, {isolated(facts['noise'])} noise</p>"
+        f"<p>Chance that the answer to a query is {within}; {facts['chance_found']:.1%} for the "
+        f"mean cell{ramp_bar(FOUND_RAMP, '0 %', '100 %', sign='ramp semsig-lift')}</p>"
+        f"<p>{bands}</p>"
+        f"<p>What each class adds to the chance {within}</p><table>{classes}</table>"
+        "<p>Click a cell to see what it is taken for.</p>"
+        f"{sources(identifiability.database.licenses)}"
+    )

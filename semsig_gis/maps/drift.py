@@ -15,17 +15,25 @@ from semsig_gis.database.database import join_databases, require_same_place
 from semsig_gis.database.update import compare_cells
 from semsig_gis.maps.cell_layer import CellFacts, add_cells, city_view, packed_signatures
 from semsig_gis.maps.image import level_image
-from semsig_gis.maps.legend import drift_legend
+from semsig_gis.maps.legend import (
+    FLIPPING,
+    LIFTING,
+    NAMED_CLASSES,
+    isolated,
+    sources,
+    swatch,
+)
 from semsig_gis.maps.packing import packed
 from semsig_gis.maps.parts import add_image, draw, finished_map, prepared_map, to_latlon
 from semsig_gis.objects.changes import compare_objects, joined_taxonomy
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Iterator, Sequence
 
     import folium
     from numpy.typing import NDArray
 
+    from semsig_gis.core.taxonomy import Taxonomy
     from semsig_gis.database.database import SignatureDatabase
     from semsig_gis.database.update import CellChanges
     from semsig_gis.objects.changes import ObjectChanges
@@ -196,3 +204,61 @@ def _facts(objects: StreetObjects, rows: NDArray[np.int64]) -> pd.DataFrame:
     facts[["x", "y"]] = objects.xy[rows]
     facts[PLACE] = to_latlon(objects.xy[rows], objects.crs)
     return facts
+
+
+def drift_legend(
+    cells: CellChanges,
+    objects: ObjectChanges | None,
+    *,
+    taxonomy: Taxonomy,
+    licenses: Sequence[str],
+) -> str:
+    """Return the legend of a map of changes between two dates, as HTML with data escaped.
+
+    ``objects`` is None where the street objects are not at hand.
+    """
+    kinds = {
+        "same": (cells.same, "see what they saw"),
+        "changed": (cells.changed, "see something else"),
+        "appeared": (cells.appeared, "saw nothing before"),
+        "vanished": (cells.vanished, "see nothing now"),
+    }
+    total = sum(len(rows) for rows, _ in kinds.values())
+    lines = "".join(
+        f"<tr><td>{swatch(colour, FLIPPING if kind == 'same' else LIFTING)}{kinds[kind][1]}</td>"
+        f"<td>{len(kinds[kind][0]):,}</td><td>{len(kinds[kind][0]) / total:.1%}</td></tr>"
+        for kind, colour in DRIFT_COLOURS.items()
+    )
+    return (
+        "<summary>What has changed</summary>"
+        f"<p>Cells, of {total:,} before or after</p><table>{lines}</table>"
+        f"{'' if objects is None else _object_changes(objects, taxonomy)}"
+        "<p>Click a cell to see its signature before and after.</p>"
+        f"{sources(licenses)}"
+    )
+
+
+def _object_changes(objects: ObjectChanges, taxonomy: Taxonomy) -> str:
+    """Return how many objects have changed, and of which classes most."""
+    kinds = {
+        "added": objects.added,
+        "removed": objects.removed,
+        "moved": objects.moved,
+        "of another class": objects.changed,
+    }
+    counts = "<br>".join(
+        f"{swatch(OBJECT_COLOURS[kind])}{len(rows):,} {kind}" for kind, rows in kinds.items()
+    )
+    changes = {
+        item: item.added + item.removed + item.moved + item.gained + item.lost
+        for item in objects.classes
+    }
+    most = sorted((item for item in changes if changes[item]), key=lambda one: -changes[one])
+    rows = "".join(
+        f"<tr><td class='title'>{isolated(taxonomy.by_name(item.class_name).title)}</td>"
+        f"<td>{item.added:,}</td><td>{item.removed:,}</td><td>{item.moved:,}</td></tr>"
+        for item in most[:NAMED_CLASSES]
+    )
+    head = "".join(f"<td><small>{name}</small></td>" for name in ("added", "removed", "moved"))
+    table = f"<table><tr><td></td>{head}</tr>{rows}</table>" if most else ""
+    return f"<p>Street objects<br>{counts}</p>{table}"

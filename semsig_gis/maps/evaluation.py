@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import itertools
 import math
+from html import escape
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from semsig_gis.core.colours import ERROR_RAMP, FAILED, SUCCESSFUL, mixed
-from semsig_gis.evaluation.result import SUCCESS_METRES
-from semsig_gis.maps.legend import evaluation_legend
+from semsig_gis.evaluation.result import SUCCESS_METRES, SUCCESS_PROBABILITY
+from semsig_gis.maps.legend import isolated, ramp_bar, shades, sources, swatch
 from semsig_gis.maps.packing import mercator, packed
 from semsig_gis.maps.parts import (
     add_city,
@@ -25,8 +26,11 @@ from semsig_gis.maps.parts import (
     ties_text,
     to_latlon,
 )
+from semsig_gis.queries.chain import chain_text
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     import folium
     from numpy.typing import NDArray
 
@@ -39,6 +43,7 @@ QUERY_FIELDS = (
 )
 MANY = 2000  # queries, whose circles are smaller
 KILOMETRE = 1000
+THRESHOLDS = (10, 25, 50, 100)  # metres of error that the legend tells of
 
 
 def evaluation_map(
@@ -199,3 +204,30 @@ def _heat(
         "error": packed(np.rint(255.0 * errors).astype(np.uint8)),
     }
     return arrays, {**about, "colours": mixed(np.linspace(0.0, 1.0, 256), ERROR_RAMP)}
+
+
+def evaluation_legend(evaluation: Evaluation, *, error_limit: str, licenses: Sequence[str]) -> str:
+    """Return the legend of a map of errors, as HTML for a ``details`` element with data escaped.
+
+    ``error_limit`` is the error at the end of the colour ramp, with its unit.
+    """
+    count, distortions = len(evaluation.queries), chain_text(evaluation.asked.distortions)
+    successes = int(evaluation.successful.sum())
+    best = "the best candidate" if evaluation.top == 1 else f"the best of {evaluation.top:,}"
+    shares = "".join(
+        f"<tr><td>P(error ≤ {threshold} m)</td><td>{share:.1%}</td></tr>"
+        for threshold, share in zip(THRESHOLDS, evaluation.cdf(THRESHOLDS), strict=True)
+    )
+    return (
+        "<summary>Localization errors</summary>"
+        f"<p>{count:,} queries among {evaluation.database['cells']:,} cells<br>"
+        f"Method: {escape(str(evaluation.method))}, {best}<br>"
+        f"Distortion: {isolated(distortions or 'none')}</p>"
+        f"<table>{shares}</table>"
+        f"<p>{swatch(SUCCESSFUL)}{successes:,} successful: within {SUCCESS_METRES} m "
+        f"with probability {SUCCESS_PROBABILITY:g} or more<br>"
+        f"{swatch(FAILED)}{count - successes:,} failed</p>"
+        "<p>Mean expected error nearby"
+        f"{ramp_bar(ERROR_RAMP, '0 m', f'{error_limit}, as bad as a guess', sign='ramp heat')}</p>"
+        f"{shades()}{sources(licenses)}"
+    )

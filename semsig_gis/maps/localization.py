@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from html import escape
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from semsig_gis.core.colours import CANDIDATE_RAMP, mixed
 from semsig_gis.database.database import rows_of_result
-from semsig_gis.maps.legend import localization_legend
+from semsig_gis.maps.legend import query_text, ramp_bar, shades, sources
 from semsig_gis.maps.parts import (
     add_city,
     cell_signature,
@@ -109,3 +110,21 @@ def _candidate_records(
         place = [latitude, longitude]
         records.append([place, colours[number], radius, None, f"Rank {rank}", details])
     return records
+
+
+def localization_legend(localization: Localization) -> str:
+    """Return the legend of a map of candidates, as HTML with data escaped."""
+    candidates = localization.candidates
+    more = localization.tied_beyond
+    cells = "1 more cell is" if more == 1 else f"{more:,} more cells are"
+    beyond = f"<br>{cells} as good as the last one" if more else ""
+    distances = candidates["distance"]
+    return (
+        "<summary>Candidate places</summary>"
+        f"<p>{query_text(localization.query, localization.taxonomy)}"
+        f"Method: {escape(str(localization.method))}, by {escape(localization.used)}</p>"
+        f"<p>The best {len(candidates):,} of {localization.cells:,} cells{beyond}</p>"
+        "<p>Distance to the query (large sign: rank 1)"
+        f"{ramp_bar(CANDIDATE_RAMP, f'{distances.min():.3f}', f'{distances.max():.3f}')}</p>"
+        f"{shades()}{sources(localization.licenses)}"
+    )

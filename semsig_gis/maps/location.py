@@ -8,7 +8,7 @@ import numpy as np
 
 from semsig_gis.core.colours import CELL_CHANCES, CHANCES, FAILED, SUCCESSFUL, VERDICTS
 from semsig_gis.maps.image import level_image
-from semsig_gis.maps.legend import location_legend
+from semsig_gis.maps.legend import FLIPPING, isolated, query_text, shades, sources, swatch
 from semsig_gis.maps.parts import (
     add_city,
     add_image,
@@ -48,6 +48,15 @@ RAYS = {
     "false": {"color": VERDICTS["false"], "weight": 2, "opacity": 0.9, "dashArray": "3 5"},
 }
 """Lines to the objects by what became of them."""
+BEST_PLACE = (
+    "<p>The best place is where most of the chance is around it; ranks are of single cells.</p>"
+)
+RAY_TEXTS = {
+    "matched": "matched: a street object",
+    "misnamed": "misnamed: one of another class",
+    "missed": "missed: a street object not in the query",
+    "false": "false: no street object",
+}
 SURROUNDINGS_M = 45.0  # to see around the answer
 CLOSEST_ZOOM = 20
 ELLIPSE_STEPS = 72
@@ -269,3 +278,44 @@ def _north(heading: float | None, sigma: float | None = None) -> str | None:
     if heading is None:
         return None
     return f"{heading % 360.0:.1f}°" + (f" ± {sigma:.1f}°" if sigma is not None else "")
+
+
+def location_legend(location: Location) -> str:
+    """Return the legend of a map of chances, as HTML with data escaped."""
+    posterior, answer, estimate = location.posterior, location.answer, location.estimate
+    colour, verdict, note = (
+        (SUCCESSFUL, "The answer", "")
+        if answer.given
+        else (
+            FAILED,
+            "Cannot tell; the best place",
+            BEST_PLACE,
+        )
+    )
+    counts = {share: len(posterior.credible_cells(share)) for share in CHANCES}
+    regions = "<br>".join(
+        f"{swatch(CHANCES[share], FLIPPING)}{share:.0%} in {count:,} cell{'s' * (count != 1)}"
+        for share, count in counts.items()
+    )
+    chances = " ".join(
+        f"<span style='white-space:nowrap'>{swatch(shade, FLIPPING)}{100.0 * least:g}+</span>"
+        for least, shade in sorted(CELL_CHANCES.items(), reverse=True)
+    )
+    rays = "".join(f"<br>{swatch(VERDICTS[name])}{text}" for name, text in RAY_TEXTS.items())
+    return (
+        "<summary>Where it was seen</summary>"
+        f"<p>{query_text(location.query, posterior.database.taxonomy)}"
+        f"Method: likelihood, {isolated(location.noise)} noise, {len(posterior.database):,} cells"
+        f"</p><p>{swatch(colour)}<b>{verdict}</b>: within {location.rule.radius:g} m with a chance "
+        f"of {answer.mass:.1%}; if there, ±&nbsp;{estimate.sigma:.1f}&nbsp;m each way "
+        f"(ellipse: 90 %)</p>{note}"
+        f"<p>Chance of a cell, or around it, in percent<br>{chances}</p>"
+        f"<p>Regions, the fewest cells that hold<br>{regions}</p>"
+        f"<p>{swatch('#ffffff')}Candidates by rank</p>"
+        + (
+            f"<p>Objects of the query, as rays where they were seen{rays}</p>"
+            if location.explanations
+            else ""
+        )
+        + f"{shades()}{sources(posterior.database.licenses)}"
+    )

@@ -11,7 +11,7 @@ import shapely
 from semsig_gis.core.crs import COUNT, MERGED, SOURCE, SOURCE_ID
 from semsig_gis.core.errors import CrsError, EmptyResultError
 from semsig_gis.core.signs import class_signs
-from semsig_gis.maps.legend import OUTLINES, objects_legend, sign_svg
+from semsig_gis.maps.legend import OUTLINES, isolated, sign_svg, sources
 from semsig_gis.maps.packing import mercator, packed, steps
 from semsig_gis.maps.parts import (
     Call,
@@ -19,7 +19,6 @@ from semsig_gis.maps.parts import (
     corners_of,
     draw,
     finished_map,
-    layer_text,
     layers_of,
     prepared_map,
     to_latlon,
@@ -208,7 +207,9 @@ def objects_map(
     Call("streetObjects", key, *_packed_objects(objects)).add_to(page)
     signs, counts = class_signs(objects.taxonomy), objects.class_counts
     for number, (code, count) in enumerate(counts.items()):
-        name = f"{sign_svg(signs[code])} {layer_text(signs[code].title)} ({count:,})"
+        title = isolated(signs[code].title)
+        # The layer control reads it as HTML; a brace could begin what folium renders once more.
+        name = f"{sign_svg(signs[code])} {title} ({count:,})".replace("{", "&#123;")
         draw(page, name, "classLayer", key, number, show=map_ is None)
     return finished_map(
         page,
@@ -257,3 +258,20 @@ def _packed_objects(objects: StreetObjects) -> tuple[dict[str, list[str]], dict[
     columns = {name: packed(values) for name, values in arrays.items()}
     columns |= {name: steps(part) for name, part in zip("xy", places.T, strict=True)}
     return columns, about
+
+
+def objects_legend(objects: StreetObjects) -> str:
+    """Return the legend of a map of street objects, as HTML with data escaped."""
+    signs, counts = class_signs(objects.taxonomy), objects.class_counts
+    rows = "".join(
+        f"<tr><td>{sign_svg(signs[code])}</td>"
+        f"<td class='title'>{isolated(signs[code].title)}</td>"
+        f'<td class="count">{count:,}</td></tr>'
+        for code, count in counts.items()
+    )
+    return (
+        "<summary>Street objects</summary>"
+        f"<p>{len(objects):,} objects of {len(counts)} classes; shapes show from near, letters "
+        f"from nearer, and a click tells what is known of one.</p><table>{rows}</table>"
+        f"{sources(map(str, objects.licenses))}"
+    )

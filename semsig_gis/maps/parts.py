@@ -5,7 +5,6 @@ from __future__ import annotations
 import base64
 import functools
 import itertools
-from html import escape
 from importlib import resources
 from typing import TYPE_CHECKING, Any, Literal, cast
 
@@ -201,13 +200,6 @@ def _area(source: SignatureDatabase | StreetObjects) -> dict[str, Any]:
         "terms": [[*power, *weight] for power, weight in zip(powers, weights, strict=True)],
         "grid": grid,
     }
-
-
-def layer_text(text: str) -> str:
-    """Return text for the name of a layer, which the layer control reads as HTML."""
-    # A brace could begin what folium renders once more (see `maps.packing`), and a sign of
-    # direction turns text round as far as the element goes.
-    return f"<bdi>{escape(text)}</bdi>".replace("{", "&#123;")
 
 
 def layers_of(map_: folium.Map) -> dict[str, Element]:

@@ -19,14 +19,11 @@ from semsig_gis.likelihood.answer_rule import AnswerRule
 from semsig_gis.likelihood.index import build_index
 from semsig_gis.likelihood.locate import locate
 from semsig_gis.likelihood.noise.model import named_noise
-from semsig_gis.maps.legend import (
-    ambiguity_legend,
-    drift_legend,
-    evaluation_legend,
-    identifiability_legend,
-    localization_legend,
-    location_legend,
-)
+from semsig_gis.maps.cells import ambiguity_legend, identifiability_legend
+from semsig_gis.maps.drift import drift_legend
+from semsig_gis.maps.evaluation import evaluation_legend
+from semsig_gis.maps.localization import localization_legend
+from semsig_gis.maps.location import location_legend
 from semsig_gis.matching.search import localize
 from semsig_gis.objects.changes import ClassChange, ObjectChanges
 from semsig_gis.objects.clean import build_objects
