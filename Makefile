@@ -13,7 +13,7 @@ BIOME := @biomejs/biome@2.6.8
 
 .DEFAULT_GOAL := help
 .NOTPARALLEL:
-.PHONY: help demo test lint bench accuracy reproduce docs plugin clean
+.PHONY: help demo test lint bench accuracy reproduce golden walks docs plugin clean
 
 help: ## show this list
 	@sed -n 's/^\([a-z]*\):.*## \(.*\)/  make \1\t\2/p' $(MAKEFILE_LIST) | expand -t 14
@@ -54,11 +54,17 @@ reproduce: $(DEV) ## the paper's experiments, into reproduction/: report and fig
 docs: $(DEV) ## the documentation, into docs/_build/html
 	$(BIN)/sphinx-build -W --keep-going -b html docs docs/_build/html
 
+golden: $(DEV) ## what must not change, into golden/: outputs and files of all commands
+	$(BIN)/python -m benchmarks.golden golden
+
+walks: $(DEV) ## the functions and modules that a row of trees and a query cross
+	$(BIN)/python -m benchmarks.walks
+
 plugin: ## the QGIS plugin, into dist/: a zip file to install
 	$(PYTHON) qgis_plugin/package.py dist
 
 clean: ## remove .venv and everything that the targets write
-	rm -rf $(VENV) demo reproduction reproduction.json build dist docs/_build docs/generated htmlcov .coverage .coverage.* \
+	rm -rf $(VENV) demo golden reproduction reproduction.json build dist docs/_build docs/generated htmlcov .coverage .coverage.* \
 		.hypothesis .import_linter_cache .mypy_cache .pytest_cache .ruff_cache
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +
 

@@ -1,0 +1,257 @@
+"""Freeze what the commands print and write, to see that new code changes none of it.
+
+``python -m benchmarks.golden OUT`` runs the commands of ``golden.toml`` on a made-up city, on
+Helsinki and Monaco, and on Montpellier (from the folder that SEMSIG_GEODATA names).
+``OUT/golden.json`` gets the SHA-256 of what each command printed and of each file that it wrote;
+``OUT/CITY.txt`` what it printed, as a transcript to read with ``diff -F '^[$]'``.
+``--compare OLD NEW`` tells which of it differs. Both need the same versions of other packages.
+"""
+
+from __future__ import annotations
+
+import argparse
+import contextlib
+import csv
+import hashlib
+import io
+import json
+import os
+import re
+import shlex
+import sqlite3
+import sys
+import tempfile
+import time
+import tomllib
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import semsig_gis
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+semsig_gis.__version__ = "0"  # it is in the metadata of every file; processes of ours do so, too
+from semsig_gis.cli import main as semsig  # noqa: E402
+
+_CITIES = ("general", "synthetic", "helsinki", "montpellier")  # the last one is not quick
+_QUERIES, _SAMPLES = 6, 30
+_SEEN = 6  # objects at least, of cells that queries are made from
+
+# What differs from run to run, or from machine to machine, and what stands there instead.
+_MASKS = (
+    (r'"(seconds\w*|\w+_seconds)": [\d.e-]+', r'"\1": 0'),
+    (r'"(timing|machine|versions)": \{[^{}]*\}', r'"\1": {}'),
+    (r"(Seconds a query\s*│\s*)[\d.]+\s*", r"\1"),
+    # The table of times in `semsig reproduce`: as JSON, CSV, Markdown and HTML.
+    (r'\{[^{}]*"unit": "ms"[^{}]*\}', "{}"),
+    (r"(?m:^)times,.*\n", ""),
+    (r"(?s)(## |>)Retrieval times\b(?:(?!\n## |<h2).)*", r"\1"),
+    # folium makes up the names of what a map has.
+    (r"_[0-9a-f]{32}\b", "_"),
+    # Leaflet and jQuery are in a page, or linked where they were not when the package was built.
+    (r'[ \t]*(<script src="http[^>]*></script>|<link rel="stylesheet" href="http[^>]*>)\s*', ""),
+    (r"(?s)[ \t]*<(script|style)>\n/\*(! jQuery| @preserve| required styles).*?</\1>\s*", ""),
+    (r"semsig: the map takes Leaflet from the web.*\n", ""),
+)
+# How an R-tree that was updated lies on the disk; its store has the digest of that.
+_LOOSE = re.compile(r"update .*> .*\.objects/(rtree\..*|manifest\.json)")
+_TEXTS = {".csv", ".geojson", ".html", ".json", ".jsonl", ".md", ".svg", ".toml"}
+_TIMES = {"timing.json", "times.json"}  # seconds and machine, nothing else
+_SCHEMA = "SELECT type, name, sql FROM sqlite_master ORDER BY name"
+_STAMPS = {"last_change", "timestamp", "update_time"}  # columns of a GeoPackage
+
+_TABLE = tomllib.loads(Path(__file__).with_name("golden.toml").read_text(encoding="utf-8"))
+
+
+def main() -> None:
+    """Read the options, then freeze or compare."""
+    parser = argparse.ArgumentParser(prog="python -m benchmarks.golden", description=__doc__)
+    parser.add_argument("out", type=Path, nargs="?", metavar="OUT")
+    parser.add_argument("--quick", action="store_true", help="all but Montpellier")
+    parser.add_argument("--compare", type=Path, nargs=2, metavar=("OLD", "NEW"))
+    options = parser.parse_args()
+    if options.compare:
+        sys.exit(_compare(*options.compare))
+    if options.out is None or "SEMSIG_GEODATA" not in os.environ:
+        parser.error("give OUT, and the folder of the open data in SEMSIG_GEODATA")
+    out, geodata = options.out.resolve(), Path(os.environ["SEMSIG_GEODATA"]).resolve()
+    out.mkdir(parents=True, exist_ok=True)
+    frozen: dict[str, str] = {}
+    for city in _CITIES[:-1] if options.quick else _CITIES:
+        start, transcript = time.perf_counter(), []
+        with tempfile.TemporaryDirectory() as folder, contextlib.chdir(folder):
+            Path("geodata").symlink_to(geodata)  # so that no path depends on the machine
+            for command in _commands(city):
+                printed, written = _run(command)
+                transcript.append(f"$ semsig {command}\n{printed}\n")
+                frozen[f"{city}: {command}"] = _digest(printed.encode())
+                frozen |= {f"{city}: {name}": digest for name, digest in written.items()}
+        (out / f"{city}.txt").write_text("".join(transcript), encoding="utf-8")
+        took = time.perf_counter() - start
+        print(f"{city}: {len(transcript)} commands, {took:.0f} s", flush=True)
+    _write_lines(out / "golden.json", [json.dumps(frozen, indent=1, sort_keys=True)])
+
+
+def _commands(city: str) -> Iterator[str]:
+    """Yield the commands of a city; some need what those before them wrote."""
+    table = _TABLE[city]
+    if city == "general":
+        yield from _lines(table["before"])
+        return
+    _write_area(*table["box"])
+    _write_lines(Path("experiment.toml"), [_TABLE["experiment"]])
+    yield from _lines(table["before"])
+    yield "export city.parquet --out cells.csv"
+    yield from _lines(_TABLE["suite"].format(objects=table["objects"], **_write_queries()))
+    if "after" in table:
+        yield from _lines(table["after"])
+
+
+def _lines(table: str) -> Iterator[str]:
+    """Yield the commands of a table."""
+    for line in table.strip().splitlines():
+        shared, _, rests = line.partition("|")
+        for rest in rests.split(";"):
+            yield " ".join(f"{shared} {rest}".split())
+
+
+def _write_area(west: float, south: float, east: float, north: float) -> None:
+    """Write a part of the city as a polygon."""
+    ring = [[west, south], [east, south], [east, north], [west, north], [west, south]]
+    feature = {
+        "type": "Feature",
+        "properties": {"title": "part"},
+        "geometry": {"type": "Polygon", "coordinates": [ring]},
+    }
+    area = {"type": "FeatureCollection", "features": [feature]}
+    _write_lines(Path("area.geojson"), [json.dumps(area)])
+
+
+def _write_queries() -> dict[str, str]:
+    """Write samples, queries and a route from cells.csv; return a query for the commands."""
+    with Path("cells.csv").open(encoding="utf-8", newline="") as file:
+        seen = [row for row in csv.DictReader(file) if int(row["length"]) >= _SEEN]
+    views: dict[tuple[float, float], dict[str, Any]] = {
+        (float(row["x"]), float(row["y"])): {
+            "types": row["types"],
+            "bearings": [float(part) for part in row["bearings"].split()],
+        }
+        for row in seen
+    }
+    samples = [view | {"x": x + 2, "y": y - 1} for (x, y), view in views.items()]
+    _write_rows("samples.jsonl", samples[:: len(samples) // _SAMPLES])
+    # One object is missed, every other time another one is not known.
+    queries = [
+        {
+            "id": f"q{number}",
+            "types": "?" * (number % 2) + view["types"][1 + number % 2 :],
+            "bearings": view["bearings"][1:],
+        }
+        for number, view in enumerate(samples[:: len(samples) // _QUERIES])
+    ]
+    _write_rows("queries.jsonl", queries)
+    rows = [f"{one['id']},{one['types']},{_joined(one['bearings'], ' ')}" for one in queries]
+    _write_lines(Path("queries.csv"), ["id,types,bearings", *rows])
+    route = next(
+        [view, views[x + 20, y], views[x + 20, y + 30]]
+        for (x, y), view in views.items()
+        if (x + 20, y) in views and (x + 20, y + 30) in views
+    )
+    legs: list[dict[str, int]] = [
+        {},
+        {"dx": 20, "dy": 0},
+        {"distance": 30, "bearing": 0, "sigma": 2},
+    ]
+    _write_rows("route.jsonl", [view | leg for view, leg in zip(route, legs, strict=True)])
+    one = samples[len(samples) // 2]
+    types = one["types"][1:]
+    return {
+        "types": types,
+        "query": f"--types {types} --bearings {_joined(one['bearings'][1:], ',')}",
+        "near": f"{one['x']},{one['y']},200",
+        "lamp": types[0],
+    }
+
+
+def _joined(numbers: list[float], separator: str) -> str:
+    return separator.join(map(str, numbers))
+
+
+def _write_rows(name: str, rows: list[dict[str, Any]]) -> None:
+    _write_lines(Path(name), [json.dumps(row) for row in rows])
+
+
+def _write_lines(path: Path, lines: list[str]) -> None:
+    path.write_text("".join(f"{line}\n" for line in lines), encoding="utf-8")
+
+
+def _run(command: str) -> tuple[str, dict[str, str]]:
+    """Run a command; return what it printed, and the digests of the files that it wrote."""
+    words, _, given = command.partition(" < ")
+    before = _files()
+    printed, remarked = io.StringIO(), io.StringIO()
+    with contextlib.redirect_stdout(printed), contextlib.redirect_stderr(remarked):
+        sys.argv = ["semsig", *shlex.split(words)]
+        sys.stdin = io.StringIO(Path(given).read_text(encoding="utf-8") if given else "")
+        code: object = 0
+        try:
+            semsig()
+        except SystemExit as end:
+            code = end.code or 0
+        except Exception as fault:  # noqa: BLE001 - the other commands are to be seen nevertheless
+            code = repr(fault)
+    text = _masked(f"{printed.getvalue()}{remarked.getvalue()}exit code: {code}\n")
+    changed = [path for path, state in _files().items() if before.get(path) != state]
+    named = {f"{command} > {path}": path for path in changed if path.name not in _TIMES}
+    return text, {n: _file_digest(path) for n, path in named.items() if not _LOOSE.fullmatch(n)}
+
+
+def _files() -> dict[Path, tuple[int, int]]:
+    """Return when each file was written last, and its size."""
+    paths = [Path(root, name) for root, _, names in os.walk(".") for name in names]
+    return {path: (path.stat().st_mtime_ns, path.stat().st_size) for path in paths}
+
+
+def _masked(text: str) -> str:
+    for pattern, instead in _MASKS:
+        text = re.sub(pattern, instead, text)
+    return text
+
+
+def _digest(content: bytes) -> str:
+    return hashlib.sha256(content).hexdigest()
+
+
+def _file_digest(path: Path) -> str:
+    if path.suffix == ".gpkg":
+        return _digest("\n".join(_dump(path)).encode())
+    content = path.read_bytes()
+    return _digest(_masked(content.decode()).encode() if path.suffix in _TEXTS else content)
+
+
+def _dump(path: Path) -> Iterator[str]:
+    """Yield the rows of all tables of a GeoPackage, but for the times when they were written."""
+    with contextlib.closing(sqlite3.connect(path)) as file:
+        for kind, name, sql in file.execute(_SCHEMA).fetchall():
+            yield f"{kind} {name}: {sql}"
+            if kind == "table":
+                rows = file.execute(f'SELECT * FROM "{name}"')  # noqa: S608 - as the file says
+                kept = [i for i, (item, *_) in enumerate(rows.description) if item not in _STAMPS]
+                yield from sorted(repr([row[i] for i in kept]) for row in rows)
+
+
+def _compare(old: Path, new: Path) -> int:
+    """Print what differs, and return 1 if anything does."""
+    before, after = (json.loads((folder / "golden.json").read_text()) for folder in (old, new))
+    names = sorted(before.keys() | after.keys())
+    wrong = [name for name in names if before.get(name) != after.get(name)]
+    for name in wrong:
+        state = "new" if name not in before else "differs" if name in after else "missing"
+        print(f"{state}: {name}")
+    print(f"{len(wrong)} of {len(names)} outputs differ")
+    return min(len(wrong), 1)
+
+
+if __name__ == "__main__":
+    main()
