@@ -16,7 +16,7 @@ from semsig_gis.cli.options import (
     Objects,
     OnGrid,
     Refine,
-    locator,
+    SearchOptions,
     object_store,
 )
 
@@ -156,23 +156,18 @@ def calibrate(
     keep_inputs(out, read=(database, samples, noise, objects))
     city = open_city(database)
     known = read_samples(samples, taxonomy=city.database.taxonomy)
-    ready = locator(
-        city,
-        noise=noise,
-        heading=heading,
-        on_grid=on_grid,
-        objects=objects,
-        refine=refine,
-        top=1,
+    options = SearchOptions(
+        noise=noise, heading=heading, on_grid=on_grid, refine=refine, objects=objects, top=1
     )
-    radius = ready.rule.radius
+    locator = options.locator(city)
+    radius = locator.rule.radius
     masses, errors = np.zeros(len(known)), np.full(len(known), np.inf)
     with progress("answering") as advance:
         for number, (sample, place) in enumerate(
             zip(known, _places(city.database, known), strict=True)
         ):
             if len(sample.signature):  # what saw nothing cannot be told
-                found = ready.locate(sample.signature)
+                found = locator.locate(sample.signature)
                 masses[number] = found.answer.mass
                 errors[number] = math.dist((found.estimate.x, found.estimate.y), place)
             advance(number + 1, len(known))

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import sys
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 
 import typer
 
@@ -14,7 +14,6 @@ from semsig_gis.cli.app import (
     AsJson,
     Database,
     MethodText,
-    app,
     keep_inputs,
     numbers,
     require_suffix,
@@ -22,24 +21,267 @@ from semsig_gis.cli.app import (
 )
 from semsig_gis.cli.console import print_json, print_rows, progress
 from semsig_gis.cli.maps import draw_ground
-from semsig_gis.cli.options import Heading, NoiseName, Objects, OnGrid, Refine, locator
+from semsig_gis.cli.options import SearchOptions, command
 from semsig_gis.core.errors import InputError
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections.abc import Callable
 
-    from semsig_gis.core.signature import Signature
     from semsig_gis.core.taxonomy import Taxonomy
     from semsig_gis.database.answer import Answer, Locator
     from semsig_gis.database.city import City
-    from semsig_gis.database.database import SignatureDatabase
-    from semsig_gis.likelihood.locate import LikelihoodLocator, Location
-    from semsig_gis.likelihood.route import Leg
+    from semsig_gis.likelihood.locate import Location
     from semsig_gis.matching.search import Localization
     from semsig_gis.queries.file import Queries, Route
 
 
+@dataclass(frozen=True, kw_only=True)
+class QueryOptions:
+    """What is asked of which database, and how cells are ranked."""
+
+    database: Database
+    types: Annotated[
+        str | None,
+        typer.Option(help="Symbols clockwise from north, such as DDBL; ? where one is unknown."),
+    ] = None
+    bearings: Annotated[
+        str | None, typer.Option(help="Degrees clockwise from north, such as 10,80,200,310.")
+    ] = None
+    queries: Annotated[
+        str | None,
+        typer.Option(
+            help="Many queries: a CSV or JSON lines file with types and bearings, or - for JSON "
+            "lines from standard input; the answers are JSON lines."
+        ),
+    ] = None
+    route: Annotated[
+        bool,
+        typer.Option(
+            "--route",
+            help="Take --queries as one route, each line after the first with dx,dy or "
+            "distance,bearing (metres, degrees) from the line before, and its sigma.",
+        ),
+    ] = False
+    method: MethodText = "edit+edit"
+
+    def read_queries(self, taxonomy: Taxonomy) -> Queries:
+        """Return the queries with their names; one from the command line has none."""
+        if self.queries is None:
+            from semsig_gis.core.signature import Signature
+
+            angles = None if self.bearings is None else numbers(self.bearings, "--bearings")
+            return [("", Signature.parse(self.types, angles, taxonomy=taxonomy))]
+        from semsig_gis.queries.file import parse_queries, read_queries
+
+        if self.queries == "-":
+            return parse_queries(sys.stdin.read(), "standard input", taxonomy=taxonomy)
+        return read_queries(self.queries, taxonomy=taxonomy)
+
+    def read_route(self, taxonomy: Taxonomy) -> Route:
+        """Return the views of a route with their names, and the legs between them."""
+        from semsig_gis.queries.file import parse_route, read_route
+
+        if self.queries == "-":
+            return parse_route(sys.stdin.read(), "standard input", taxonomy=taxonomy)
+        return read_route(str(self.queries), taxonomy=taxonomy)
+
+
+@dataclass(frozen=True, kw_only=True)
+class LocalizeOptions(SearchOptions, QueryOptions):
+    """The options of `semsig localize`."""
+
+    map_: Annotated[Path | None, typer.Option("--map", help="Map to write (.html).")] = None
+    out: Annotated[
+        Path | None,
+        typer.Option(
+            help="Search regions to write: with candidates for QGIS (.gpkg) or alone (.parquet, "
+            ".csv); or the chance of every cell (.tif)."
+        ),
+    ] = None
+    share: Annotated[
+        float | None,
+        typer.Option(help="Of the chance, that the regions of --out hold.  [default: 0.9]"),
+    ] = None
+    within: Annotated[
+        float, typer.Option(help="Metres around the cells of --out to search, too.")
+    ] = 0.0
+    as_json: AsJson = False
+
+    def __post_init__(self) -> None:
+        """Refuse options that do not go together."""
+        query = (self.types, self.bearings, self.map_, self.out)
+        if self.queries is not None and any(value is not None for value in query):
+            msg = (
+                "--queries was given with --types, --bearings, --map or --out; give a file or one "
+                "query."
+            )
+            raise InputError(msg)
+        if self.out is None and (self.share is not None or self.within):
+            msg = "--share and --within are for the regions of --out; give that too."
+            raise InputError(msg)
+        if self.route and self.queries is None:
+            msg = "--route was given without --queries; give the file of its views."
+            raise InputError(msg)
+        read = (self.database, self.objects, self.area, self.popularity, self.rule, self.noise)
+        keep_inputs(self.map_, self.out, read=read)
+        require_suffix(".html", self.map_)
+        if self.writes_chances and (self.share is not None or self.within):
+            msg = (
+                f"{self.out} holds the chances of all cells, not the regions that --share and "
+                "--within are for; leave them out, or write a GeoPackage."
+            )
+            raise InputError(msg)
+        if self.method != LIKELIHOOD:
+            self._refuse_likelihood()
+
+    @property
+    def writes_chances(self) -> bool:
+        """Whether the file holds the chances of all cells, and no regions."""
+        return self.out is not None and self.out.suffix.lower() in {".tif", ".tiff"}
+
+    def _refuse_likelihood(self) -> None:
+        """Refuse options that only the likelihood has."""
+        shared = {"require", "top"}
+        names = [field.name for field in fields(SearchOptions) if field.name not in shared]
+        options = [
+            f"--{name.replace('_', '-')}"
+            for name in (*names, "route", "share")
+            if getattr(self, name) != getattr(LocalizeOptions, name)  # the default
+        ]
+        if options:
+            msg = (
+                f"{' and '.join(options)} {'is' if len(options) == 1 else 'are'} for --method "
+                f"likelihood, not for {self.method!r}; give that method, or leave out what is for "
+                "it."
+            )
+            raise InputError(msg)
+
+
+@command(LocalizeOptions)
+def localize(options: LocalizeOptions) -> None:
+    """Rank the cells of a database for a query, or for many.
+
+    The options --route, --share and those from --noise to --objects are for --method likelihood.
+    """
+    if options.method == LIKELIHOOD:
+        _localize_by_likelihood(options)
+    else:
+        _localize_by_distance(options)
+
+
+def _localize_by_distance(options: LocalizeOptions) -> None:
+    from semsig_gis.database.city import open_city
+    from semsig_gis.matching.method import Method
+    from semsig_gis.matching.search import DistanceLocator
+
+    method = Method.parse(options.method)
+    city = open_city(options.database)
+    taxonomy, requirement = city.dataset.taxonomy, None
+    if options.require is not None:
+        from semsig_gis.database.requirement import Requirement
+
+        requirement = Requirement.parse(options.require, taxonomy)
+    locator = DistanceLocator(
+        database=city.dataset, method=method, requirement=requirement, top=options.top
+    )
+    _answer(options, city, locator, options.read_queries(taxonomy), _localization_map)
+
+
+def _localize_by_likelihood(options: LocalizeOptions) -> None:
+    from semsig_gis.database.city import open_city
+
+    city = open_city(options.database)
+    taxonomy = city.database.taxonomy
+    # Queries are read before the index, which takes much longer than to find a slip in a query.
+    if options.route:
+        views, legs = options.read_route(taxonomy)
+        locations = options.locator(city).locate_route([query for _, query in views], legs)
+        for (name, _), location in zip(views, locations, strict=True):
+            print_json({"id": name, **location.to_dict()}, indent=None)
+    else:
+        queries = options.read_queries(taxonomy)
+        _answer(options, city, options.locator(city), queries, _location_map)
+
+
+_Answer = TypeVar("_Answer", bound="Answer")
+
+
+def _answer(
+    options: LocalizeOptions,
+    city: City,
+    locator: Locator[_Answer],
+    queries: Queries,
+    draw: Callable[[_Answer, City], Any],
+) -> None:
+    """Answer a query, or many, and print it."""
+    if options.queries is not None:
+        for name, query in queries:
+            print_json({"id": name, **locator.locate(query).to_dict()}, indent=None)
+        return
+    ((_, query),) = queries
+    answer = locator.locate(query)
+    if options.map_ is not None:
+        _save_map(options.map_, city, lambda: draw(answer, city))
+    result = answer.to_dict()
+    if options.out is not None:
+        searched = _write(options, options.out, city, answer, locator)
+        result |= {} if options.writes_chances else {"searched": searched}
+    if options.as_json:
+        print_json(result)
+        return
+    print_answer(result)
+    if options.map_ is not None:
+        typer.echo(f"map: {options.map_}")
+    if options.writes_chances:
+        typer.echo(f"chances: {options.out}")
+    elif options.out is not None:
+        count = searched["regions"]
+        typer.echo(
+            f"to search: {count:,} region{'' if count == 1 else 's'}, {searched['km2']:.4g} km2, "
+            f"{searched['percent']:.3g} % of the city: {options.out}"
+        )
+
+
+def _write(
+    options: LocalizeOptions, out: Path, city: City, answer: Answer, locator: Locator[Answer]
+) -> dict[str, Any]:
+    """Write the regions to search, or all chances, and return what there is to say of regions."""
+    from semsig_gis.database.answer import REGION_SHARE
+    from semsig_gis.exports import export_answer
+
+    if answer.tied_beyond:
+        # No cell is left out of the search that is as good as the last candidate.
+        answer = locator.locate(answer.query, top=options.top + answer.tied_beyond)
+    share = REGION_SHARE if options.share is None else options.share
+    regions = export_answer(answer, city.database, out, share=share, within=options.within)
+    return regions.to_dict()
+
+
+def _save_map(out: Path, city: City, draw: Callable[[], Any]) -> None:
+    from semsig_gis.maps.page import save_map
+
+    with progress("drawing the map"):
+        drawn = draw()
+        draw_ground(drawn, city)
+        tell_if_online(save_map(drawn, out))
+
+
+def _localization_map(localization: Localization, city: City) -> Any:  # noqa: ANN401 - folium's
+    from semsig_gis.maps.localization import localization_map
+
+    return localization_map(localization, city.database)
+
+
+def _location_map(location: Location, _city: City) -> Any:  # noqa: ANN401 - folium's
+    from semsig_gis.maps.location import location_map
+
+    return location_map(location)
+
+
 VERDICTS = ("matched", "misnamed", "missed", "false")
+EXPLANATION = (
+    *("verdict", "chance", "seen", "at", "object", "at", "off by", "distance", "source", "id"),
+)
 
 
 def print_answer(result: dict[str, Any]) -> None:
@@ -51,7 +293,7 @@ def print_answer(result: dict[str, Any]) -> None:
     print_rows(
         f"{len(candidates)} best of {result['cells']:,} cells, by {said}",
         ("rank", "cell", "x", "y", "lon", "lat", score, "types"),
-        (
+        [
             [
                 row["rank"] if by_chance else _rank_text(row["rank_low"], row["rank_high"]),
                 row["cell_id"],
@@ -63,7 +305,7 @@ def print_answer(result: dict[str, Any]) -> None:
                 row["types"],
             ]
             for row in candidates
-        ),
+        ],
     )
     if by_chance:
         _print_explanations(candidates)
@@ -84,14 +326,13 @@ def _print_place(result: dict[str, Any]) -> None:
         typer.echo(f"Cannot tell: the best place is {where}, {chance}.")
     ellipse = place["ellipse_90"]
     typer.echo(
-        f"If there, at x {place['x']:.1f}, y {place['y']:.1f}, give or take {place['sigma']:.1f} m "
+        f"Estimated position: x {place['x']:.1f}, y {place['y']:.1f} ± {place['sigma']:.1f} m "
         f"(90%: {ellipse['longer']:.1f} m along {ellipse['bearing']:.0f}°, "
         f"{ellipse['shorter']:.1f} m across)."
     )
     if place["heading"] is not None:
         typer.echo(
-            f"The north of the query lies at {place['heading'] % 360.0:.1f}°, give or take "
-            f"{place['heading_sigma']:.1f}°."
+            f"North of the query: {place['heading'] % 360.0:.1f}° ± {place['heading_sigma']:.1f}°."
         )
     typer.echo(
         f"{region['share']:.0%} of the chance is in {region['cells']:,} "
@@ -117,19 +358,8 @@ def _print_explanations(candidates: list[dict[str, Any]]) -> None:
             continue
         print_rows(
             title,
-            (
-                "verdict",
-                "chance",
-                "seen",
-                "at",
-                "object",
-                "at",
-                "off by",
-                "distance",
-                "source",
-                "id",
-            ),
-            (
+            EXPLANATION,
+            [
                 [
                     one["verdict"],
                     f"{one['chance']:.2f}",
@@ -143,7 +373,7 @@ def _print_explanations(candidates: list[dict[str, Any]]) -> None:
                     one["source_id"] or "",
                 ]
                 for one in sorted(why["rows"], key=lambda one: VERDICTS.index(one["verdict"]))
-            ),
+            ],
         )
 
 
@@ -153,313 +383,3 @@ def _measure(value: float | None, unit: str, *, sign: str = "") -> str:
 
 def _rank_text(low: int, high: int) -> str:
     return str(low) if low == high else f"{low}-{high}"
-
-
-@app.command()
-def localize(
-    database: Database,
-    *,
-    types: Annotated[
-        str | None,
-        typer.Option(help="Symbols clockwise from north, such as DDBL; ? where one is unknown."),
-    ] = None,
-    bearings: Annotated[
-        str | None, typer.Option(help="Degrees clockwise from north, such as 10,80,200,310.")
-    ] = None,
-    queries: Annotated[
-        str | None,
-        typer.Option(
-            help="Many queries: a CSV or JSON lines file with types and bearings, or - for JSON "
-            "lines from standard input; the answers are JSON lines."
-        ),
-    ] = None,
-    route: Annotated[
-        bool,
-        typer.Option(
-            "--route",
-            help="With likelihood: the lines of --queries are one route, and each after the first "
-            "has dx,dy or distance,bearing (metres, degrees) from the one before, and its sigma.",
-        ),
-    ] = False,
-    method: MethodText = "edit+edit",
-    noise: NoiseName = "generic",
-    heading: Heading = "known",
-    on_grid: OnGrid = False,
-    near: Annotated[
-        str | None,
-        typer.Option(help="With likelihood, the last known place: X,Y,SIGMA in metres."),
-    ] = None,
-    area: Annotated[
-        Path | None, typer.Option(help="With likelihood: polygons that the place lies in.")
-    ] = None,
-    popularity: Annotated[
-        Path | None,
-        typer.Option(
-            help="With likelihood: a raster of how likely each place is, such as of people."
-        ),
-    ] = None,
-    require: Annotated[
-        str | None,
-        typer.Option(help="What a cell must see: M (one), 2B (two or more), B=0, ?<=10 (in all)."),
-    ] = None,
-    rule: Annotated[
-        Path | None,
-        typer.Option(
-            help="With likelihood, when to answer: a file that `semsig calibrate` wrote; from a "
-            "chance of 0.9 by default."
-        ),
-    ] = None,
-    refine: Refine = None,
-    explain: Annotated[
-        bool,
-        typer.Option(
-            "--explain",
-            help="With likelihood: tell which objects of the query are which street objects, "
-            "which were missed, and which look false.",
-        ),
-    ] = False,
-    objects: Objects = None,
-    top: Annotated[int, typer.Option(help="Number of candidates.")] = 10,
-    map_: Annotated[Path | None, typer.Option("--map", help="Map to write (.html).")] = None,
-    out: Annotated[
-        Path | None,
-        typer.Option(
-            help="What of the city must be searched: regions and candidates for QGIS (.gpkg), the "
-            "regions alone (.parquet, .csv), or with likelihood the chance of every cell (.tif)."
-        ),
-    ] = None,
-    share: Annotated[
-        float | None,
-        typer.Option(
-            help="For --out, with likelihood: of the chance, that the regions hold; 0.9 by default."
-        ),
-    ] = None,
-    within: Annotated[
-        float, typer.Option(help="For --out: metres around these cells that are searched too.")
-    ] = 0.0,
-    as_json: AsJson = False,
-) -> None:
-    """Rank the cells of a database for a query, or for many."""
-    from semsig_gis.database.city import open_city
-
-    given = [value for value in (types, bearings, map_, out) if value is not None]
-    if queries is not None and given:
-        msg = (
-            "--queries was given with --types, --bearings, --map or --out; give a file or one "
-            "query."
-        )
-        raise InputError(msg)
-    if out is None and (share is not None or within):
-        msg = "--share and --within are for the regions of --out; give that too."
-        raise InputError(msg)
-    if route and queries is None:
-        msg = "--route was given without --queries; give the file of its views."
-        raise InputError(msg)
-    keep_inputs(map_, out, read=(database, objects, area, popularity, rule, noise))
-    require_suffix(".html", map_)
-    files = _Files(map_, out, share, within)
-    if files.holds_chances and (share is not None or within):
-        msg = (
-            f"{out} holds the chances of all cells, not the regions that --share and --within are "
-            "for; leave them out, or write a GeoPackage."
-        )
-        raise InputError(msg)
-    if method != LIKELIHOOD:
-        _refuse_options(
-            method,
-            {
-                "--noise": noise != "generic",
-                "--heading": heading != "known",
-                "--on-grid": on_grid,
-                "--near": near is not None,
-                "--area": area is not None,
-                "--popularity": popularity is not None,
-                "--rule": rule is not None,
-                "--refine": refine is not None,
-                "--explain": explain,
-                "--objects": objects is not None,
-                "--route": route,
-                "--share": share is not None,
-            },
-        )
-        ranked = _by_distance(database, method, require, top)
-        asked = _asked(ranked.taxonomy, queries, types, bearings)
-        _answer(ranked, asked, files, as_json=as_json)
-        return
-    city = open_city(database)
-    taxonomy = city.database.taxonomy
-    # Before the index, which takes much longer than to find a slip in a query.
-    views = _views(str(queries), taxonomy) if route else None
-    asked = [] if route else _asked(taxonomy, queries, types, bearings)
-    ready = locator(
-        city,
-        noise=noise,
-        heading=heading,
-        on_grid=on_grid,
-        objects=objects,
-        refine=refine,
-        explain=explain,
-        rule=rule,
-        top=top,
-        known={"near": near, "area": area, "popularity": popularity, "require": require},
-    )
-    if views is not None:
-        _answer_route(ready, *views)
-    else:
-        located = _Answerer(city, taxonomy, ready, top, _draw_location)
-        _answer(located, asked, files, as_json=as_json)
-
-
-@dataclass(frozen=True, slots=True)
-class _Answerer:
-    """A city and what answers a query to it."""
-
-    city: City
-    taxonomy: Taxonomy
-    locator: Locator[Any]
-    top: int
-    draw: Callable[[Any, SignatureDatabase], Any]
-
-
-@dataclass(frozen=True, slots=True)
-class _Files:
-    """What is written of an answer."""
-
-    map: Path | None
-    out: Path | None
-    share: float | None
-    within: float
-
-    @property
-    def holds_chances(self) -> bool:
-        """Whether the file holds the chances of all cells, and no regions."""
-        return self.out is not None and self.out.suffix.lower() in {".tif", ".tiff"}
-
-
-def _by_distance(path: Path, method: str, require: str | None, top: int) -> _Answerer:
-    from semsig_gis.database.city import open_city
-    from semsig_gis.database.requirement import Requirement
-    from semsig_gis.matching.method import Method
-    from semsig_gis.matching.search import DistanceLocator
-
-    chosen = Method.parse(method)
-    city = open_city(path)
-    opened = city.dataset
-    wanted = None if require is None else Requirement.parse(require, opened.taxonomy)
-    found = DistanceLocator(database=opened, method=chosen, requirement=wanted, top=top)
-    return _Answerer(city, opened.taxonomy, found, top, _draw_localization)
-
-
-def _refuse_options(method: str, options: dict[str, bool]) -> None:
-    """Refuse options that only the likelihood has."""
-    given = [name for name, wanted in options.items() if wanted]
-    if given:
-        msg = (
-            f"{' and '.join(given)} {'is' if len(given) == 1 else 'are'} for --method likelihood, "
-            f"not for {method!r}; give that method, or leave out what is for it."
-        )
-        raise InputError(msg)
-
-
-def _asked(
-    taxonomy: Taxonomy, queries: str | None, types: str | None, bearings: str | None
-) -> Signature | Queries:
-    """Return the query, or the many with their names."""
-    from semsig_gis.core.signature import Signature
-    from semsig_gis.queries.file import parse_queries, read_queries
-
-    if queries is None:
-        angles = None if bearings is None else numbers(bearings, "--bearings")
-        return Signature.parse(types, angles, taxonomy=taxonomy)
-    if queries == "-":
-        return parse_queries(sys.stdin.read(), "standard input", taxonomy=taxonomy)
-    return read_queries(queries, taxonomy=taxonomy)
-
-
-def _answer(
-    answerer: _Answerer,
-    asked: Signature | Queries,
-    files: _Files,
-    *,
-    as_json: bool,
-) -> None:
-    """Answer a query, or many, and print it."""
-    if isinstance(asked, list):
-        for name, query in asked:
-            print_json({"id": name, **answerer.locator.locate(query).to_dict()}, indent=None)
-        return
-    found = answerer.locator.locate(asked)
-    if files.map is not None:
-        _draw(answerer, found, files.map)
-    searched = _write(answerer, asked, found, files)
-    told = found.to_dict() | ({} if searched is None else {"searched": searched})
-    if as_json:
-        print_json(told)
-        return
-    print_answer(told)
-    if files.map is not None:
-        typer.echo(f"map: {files.map}")
-    if searched is not None:
-        count = searched["regions"]
-        typer.echo(
-            f"to search: {count:,} region{'' if count == 1 else 's'}, {searched['km2']:.4g} km2, "
-            f"{searched['percent']:.3g} % of the city: {files.out}"
-        )
-    elif files.out is not None:
-        typer.echo(f"chances: {files.out}")
-
-
-def _views(source: str, taxonomy: Taxonomy) -> Route:
-    """Return the views of a route with their names, and the legs between them."""
-    from semsig_gis.queries.file import parse_route, read_route
-
-    if source == "-":
-        return parse_route(sys.stdin.read(), "standard input", taxonomy=taxonomy)
-    return read_route(source, taxonomy=taxonomy)
-
-
-def _answer_route(ready: LikelihoodLocator, views: Queries, legs: Sequence[Leg]) -> None:
-    """Answer the views of a route, each given all of them."""
-    found = ready.locate_route([query for _, query in views], legs)
-    for (name, _), location in zip(views, found, strict=True):
-        print_json({"id": name, **location.to_dict()}, indent=None)
-
-
-def _write(
-    answerer: _Answerer, query: Signature, found: Answer, files: _Files
-) -> dict[str, Any] | None:
-    """Write the regions to search, and return what there is to say of them."""
-    if files.out is None:
-        return None
-    from semsig_gis.database.answer import REGION_SHARE
-    from semsig_gis.exports import export_answer
-
-    if found.tied_beyond:
-        # No cell is left out of the search that is as good as the last candidate.
-        found = answerer.locator.locate(query, top=answerer.top + found.tied_beyond)
-    share = REGION_SHARE if files.share is None else files.share
-    regions = export_answer(
-        found, answerer.city.database, files.out, share=share, within=files.within
-    )
-    return None if files.holds_chances else regions.to_dict()
-
-
-def _draw(answerer: _Answerer, found: Answer, out: Path) -> None:
-    from semsig_gis.maps.page import save_map
-
-    with progress("drawing the map"):
-        drawn = answerer.draw(found, answerer.city.database)
-        draw_ground(drawn, answerer.city)
-        tell_if_online(save_map(drawn, out))
-
-
-def _draw_localization(found: Localization, opened: SignatureDatabase) -> Any:  # noqa: ANN401 - folium's
-    from semsig_gis.maps.localization import localization_map
-
-    return localization_map(found, opened)
-
-
-def _draw_location(found: Location, _opened: SignatureDatabase) -> Any:  # noqa: ANN401 - folium's
-    from semsig_gis.maps.location import location_map
-
-    return location_map(found)

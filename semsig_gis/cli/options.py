@@ -1,18 +1,22 @@
-"""What the commands by likelihood share: their options, and what they make of them."""
+"""Options that several commands share: what a query was seen with, and what is known of it."""
 
 from __future__ import annotations
 
+import inspect
 import math
+from dataclasses import MISSING, dataclass, fields
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, TypeVar, get_type_hints
 
 import typer
 
-from semsig_gis.cli.app import numbers
+from semsig_gis.cli.app import app, numbers
 from semsig_gis.cli.console import progress, remark
 from semsig_gis.core.errors import CrsError, DatabaseError, InputError
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from numpy.typing import NDArray
 
     from semsig_gis.database.city import City
@@ -29,32 +33,31 @@ NoiseName = Annotated[
     str,
     typer.Option(
         "--noise",
-        help="With likelihood, how the detector fails: light, medium, strong, generic (which of "
-        "them is not known), or a file such as `semsig learn` writes.",
+        help="How the detector fails: light, medium, strong, generic (any of them), or a file "
+        "written by `semsig learn`.",
     ),
 ]
 Heading = Annotated[
     str,
     typer.Option(
         "--heading",
-        help="With likelihood: known, unknown, or by how many degrees the north of the query may "
-        "be off (standard deviation).",
+        help="North of the query: known, unknown, or its standard deviation in degrees.",
     ),
 ]
 OnGrid = Annotated[
     bool,
     typer.Option(
         "--on-grid",
-        help="With likelihood: the query is from the very middle of a cell, as in the paper's "
-        "experiment, not from anywhere in it.",
+        help="Take queries as seen from the middle of a cell, as in the paper's experiment, not "
+        "from anywhere in it.",
     ),
 ]
 Refine = Annotated[
     bool | None,
     typer.Option(
         "--refine/--no-refine",
-        help="With likelihood: look for the place between the middles of the cells, too; by "
-        "default where the street objects are there and the query has bearings.",
+        help="Look for the place between the middles of cells, too.  [default: where there are "
+        "street objects and bearings]",
         show_default=False,
     ),
 ]
@@ -62,57 +65,141 @@ Objects = Annotated[
     Path | None,
     typer.Option(
         "--objects",
-        help="With likelihood, the street objects: a file that `semsig load` wrote, or an object "
-        "store; that beside the database by default.",
+        help="Street objects: a file written by `semsig load`, or an object store.  [default: "
+        "the store beside the database]",
     ),
 ]
 
+_Options = TypeVar("_Options")
 
-def locator(
-    city: City,
-    *,
-    noise: str,
-    heading: str,
-    on_grid: bool,
-    objects: Path | None,
-    refine: bool | None,
-    explain: bool = False,
-    rule: Path | None = None,
-    top: int = 10,
-    known: dict[str, Any] | None = None,
-) -> LikelihoodLocator:
-    """Return what answers the queries of a command."""
-    from semsig_gis.likelihood.answer_rule import DEFAULT_RULE, open_rule
-    from semsig_gis.likelihood.locate import LikelihoodLocator
-    from semsig_gis.likelihood.noise.model import cell_noise
 
-    if on_grid and refine:
-        msg = "--on-grid and --refine were given; a place on the grid is not to be refined, so "
-        msg += "leave out one of them."
-        raise InputError(msg)
-    wanted = not on_grid if refine is None else refine
-    if objects is not None and not (wanted or explain):
-        given = "--on-grid" if on_grid else "--no-refine"
-        msg = f"--objects and {given} were given, so that nothing looks at them; leave out one."
-        raise InputError(msg)
-    sigma, answer_rule = north_sigma(heading), DEFAULT_RULE if rule is None else open_rule(rule)
-    model = read_noise(noise)
-    if not on_grid:
-        model = cell_noise(model, city.database.grid.step)
-    log_prior = None if known is None else _prior(city.database, **known)
-    store = None
-    if wanted or explain:
-        store = object_store(city, objects, needed=bool(refine))
-    return LikelihoodLocator(
-        index=prepared_index(city, model),
-        north_sigma=sigma,
-        log_prior=log_prior,
-        rule=answer_rule,
-        top=top,
-        store=store,
-        refined=None if wanted and refine is None else refine,
-        explained=EXPLAINED if explain else 0,
+def command(
+    options: type[_Options],
+) -> Callable[[Callable[[_Options], None]], Callable[..., None]]:
+    """Make a command of a function that takes a dataclass, whose fields are the options."""
+    hints = get_type_hints(options, include_extras=True)
+    parameters = [
+        inspect.Parameter(
+            field.name,
+            inspect.Parameter.KEYWORD_ONLY,
+            default=inspect.Parameter.empty if field.default is MISSING else field.default,
+            annotation=hints[field.name],
+        )
+        for field in fields(options)  # type: ignore[arg-type]
+    ]
+
+    def register(function: Callable[[_Options], None]) -> Callable[..., None]:
+        def run(**values: Any) -> None:  # noqa: ANN401 - as many types as options
+            function(options(**values))
+
+        run.__signature__ = inspect.Signature(parameters)  # type: ignore[attr-defined]
+        return app.command(function.__name__, help=inspect.getdoc(function))(run)
+
+    return register
+
+
+@dataclass(frozen=True, kw_only=True)
+class SearchOptions:
+    """How cells are searched: `require` and `top` by any method, the others by likelihood."""
+
+    require: Annotated[
+        str | None,
+        typer.Option(help="What a cell must see: M (one), 2B (two or more), B=0, ?<=10 (in all)."),
+    ] = None
+    top: Annotated[int, typer.Option(help="Number of candidates.")] = 10
+    noise: NoiseName = "generic"
+    heading: Heading = "known"
+    on_grid: OnGrid = False
+    near: Annotated[str | None, typer.Option(help="Last known place, as X,Y,SIGMA in metres.")] = (
+        None
     )
+    area: Annotated[Path | None, typer.Option(help="Polygons that the place lies in.")] = None
+    popularity: Annotated[
+        Path | None, typer.Option(help="Raster of how likely each place is, such as of people.")
+    ] = None
+    rule: Annotated[
+        Path | None,
+        typer.Option(
+            help="When to answer: a file written by `semsig calibrate`.  [default: from a chance "
+            "of 0.9]"
+        ),
+    ] = None
+    refine: Refine = None
+    explain: Annotated[
+        bool,
+        typer.Option(
+            "--explain",
+            help="Tell which objects of the query are which street objects, which were missed, "
+            "and which look false.",
+        ),
+    ] = False
+    objects: Objects = None
+
+    def locator(self, city: City) -> LikelihoodLocator:
+        """Return what answers queries by likelihood."""
+        from semsig_gis.likelihood.answer_rule import DEFAULT_RULE, open_rule
+        from semsig_gis.likelihood.locate import LikelihoodLocator
+        from semsig_gis.likelihood.noise.model import cell_noise
+
+        if self.on_grid and self.refine:
+            msg = "--on-grid and --refine were given; a place on the grid is not to be refined, "
+            msg += "so leave out one of them."
+            raise InputError(msg)
+        refined = False if self.on_grid else self.refine
+        needs_objects = refined is not False or self.explain
+        if self.objects is not None and not needs_objects:
+            option = "--on-grid" if self.on_grid else "--no-refine"
+            msg = f"--objects and {option} were given, so that nothing looks at them; leave out "
+            msg += "one."
+            raise InputError(msg)
+        sigma = _north_sigma(self.heading)
+        rule = DEFAULT_RULE if self.rule is None else open_rule(self.rule)
+        noise = read_noise(self.noise)
+        if not self.on_grid:
+            noise = cell_noise(noise, city.database.grid.step)
+        log_prior = self._log_prior(city.database)
+        store = None
+        if needs_objects:
+            store = object_store(city, self.objects, needed=bool(self.refine))
+        return LikelihoodLocator(
+            index=prepared_index(city, noise),
+            north_sigma=sigma,
+            log_prior=log_prior,
+            rule=rule,
+            top=self.top,
+            store=store,
+            refined=refined,
+            explained=EXPLAINED if self.explain else 0,
+        )
+
+    def _log_prior(self, database: SignatureDatabase) -> NDArray[Any] | None:
+        """Return what is known of the place; None where that is nothing."""
+        parts = []
+        if self.near is not None:
+            from semsig_gis.likelihood.priors import position_prior
+
+            place = numbers(self.near, "--near")
+            if len(place) != 3:  # noqa: PLR2004 - x, y and sigma
+                msg = f"--near was given as {self.near!r}; give X,Y,SIGMA in metres."
+                raise InputError(msg)
+            parts.append(position_prior(database, (place[0], place[1]), sigma=place[2]))
+        if self.area is not None:
+            from semsig_gis.likelihood.priors import area_prior
+            from semsig_gis.objects.surroundings import read_area
+
+            parts.append(area_prior(database, read_area(self.area, crs=database.crs)))
+        if self.popularity is not None:
+            from semsig_gis.likelihood.priors import raster_prior
+
+            parts.append(raster_prior(database, self.popularity))
+        if self.require is not None:
+            from semsig_gis.database.requirement import PatternIndex, Requirement
+            from semsig_gis.likelihood.priors import weight_prior
+
+            requirement = Requirement.parse(self.require, database.taxonomy)
+            met = PatternIndex.build(database.type_sequences).meeting(requirement)
+            parts.append(weight_prior(database, met.astype(float)))
+        return sum(parts[1:], parts[0]) if parts else None
 
 
 def prepared_index(city: City, model: Noise) -> LikelihoodIndex:
@@ -150,14 +237,14 @@ def object_store(city: City, objects: Path | None, *, needed: bool) -> ObjectSto
     except DatabaseError as error:
         if needed or objects is not None:
             raise
-        remark(f"the street objects are not at hand, so the cells must do: {error}")
+        remark(f"no street objects found; answering at cell precision: {error}")
         return None
     for note in store.notes:
         remark(note)
     return store
 
 
-def north_sigma(heading: str) -> float:
+def _north_sigma(heading: str) -> float:
     """Return the deviation of north that an option says."""
     if heading in {"known", "unknown"}:
         return 0.0 if heading == "known" else math.inf
@@ -169,36 +256,3 @@ def north_sigma(heading: str) -> float:
         msg = f"--heading was given as {heading!r}; give known, unknown, or degrees from 0 up."
         raise InputError(msg)
     return sigma
-
-
-def _prior(
-    opened: SignatureDatabase,
-    *,
-    near: str | None,
-    area: Path | None,
-    popularity: Path | None,
-    require: str | None,
-) -> NDArray[Any] | None:
-    """Return the log-prior that the options ask for."""
-    import numpy as np
-
-    from semsig_gis.database.requirement import PatternIndex, Requirement
-    from semsig_gis.likelihood.priors import area_prior, position_prior, raster_prior, weight_prior
-    from semsig_gis.objects.surroundings import read_area
-
-    parts = []
-    if near is not None:
-        place = numbers(near, "--near")
-        if len(place) != 3:  # noqa: PLR2004 - x, y and sigma
-            msg = f"--near was given as {near!r}; give X,Y,SIGMA in metres."
-            raise InputError(msg)
-        parts.append(position_prior(opened, (place[0], place[1]), sigma=place[2]))
-    if area is not None:
-        parts.append(area_prior(opened, read_area(area, crs=opened.crs)))
-    if popularity is not None:
-        parts.append(raster_prior(opened, popularity))
-    if require is not None:
-        wanted = Requirement.parse(require, opened.taxonomy)
-        met = PatternIndex.build(opened.type_sequences).meeting(wanted)
-        parts.append(weight_prior(opened, met.astype(np.float64)))
-    return None if not parts else np.sum(parts, axis=0)

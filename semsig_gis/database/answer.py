@@ -7,6 +7,7 @@ import time
 from abc import ABC, abstractmethod
 from dataclasses import dataclass, field
 from functools import cached_property
+from itertools import pairwise
 from typing import TYPE_CHECKING, Any, Protocol, TypeVar
 
 import geopandas as gpd
@@ -84,6 +85,20 @@ class Answer(ABC):
         x, y = (self.candidates[name].to_numpy() for name in ("x", "y"))
         lon, lat = np.round(self._to_degrees.transform(x, y), 7)
         return self.candidates.assign(lon=lon, lat=lat).to_dict(orient="records")
+
+
+def candidate_columns(database: SignatureDatabase, cells: NDArray[np.int64]) -> dict[str, Any]:
+    """Return what `Answer.candidates` tells of some cells, whatever ranked them."""
+    listed = database.select(cells)
+    symbols, ends = database.taxonomy.decode(listed.codes), listed.offsets.tolist()
+    return {
+        "cell": cells,
+        "cell_id": listed.cell_ids,
+        "x": listed.xy[:, 0],
+        "y": listed.xy[:, 1],
+        "types": [symbols[start:end] for start, end in pairwise(ends)],
+        "length": listed.lengths,
+    }
 
 
 @dataclass(frozen=True, eq=False, slots=True, kw_only=True)

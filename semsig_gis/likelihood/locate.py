@@ -17,7 +17,14 @@ import pandas as pd
 
 from semsig_gis.core.errors import InputError
 from semsig_gis.core.grid import cell_ids
-from semsig_gis.database.answer import REGION_SHARE, Answer, Ranking, check_query, check_top
+from semsig_gis.database.answer import (
+    REGION_SHARE,
+    Answer,
+    Ranking,
+    candidate_columns,
+    check_query,
+    check_top,
+)
 from semsig_gis.likelihood.answer_rule import DEFAULT_RULE
 from semsig_gis.likelihood.explain import explain, explain_cell
 from semsig_gis.likelihood.index import CellScores
@@ -558,15 +565,9 @@ def _candidates(scores: CellScores, posterior: Posterior, count: int) -> pd.Data
     database, chances = posterior.database, posterior.chances
     likely = np.argpartition(-chances, count - 1)[:count]
     listed = likely[np.lexsort((likely, -chances[likely]))]
-    xy = database.xy[listed]
     columns = {
         "rank": np.arange(1, count + 1),
-        "cell": listed,
-        "cell_id": database.cell_ids[listed],
-        "x": xy[:, 0],
-        "y": xy[:, 1],
-        "types": [database.types(cell) for cell in listed.tolist()],
-        "length": database.lengths[listed],
+        **candidate_columns(database, listed),
         "loglik": scores.loglik[listed].astype(np.float64),
         "chance": chances[listed],
     }

@@ -15,7 +15,13 @@ import pandas as pd
 
 from semsig_gis.core.errors import EmptyResultError, InputError
 from semsig_gis.core.taxonomy import WILDCARD
-from semsig_gis.database.answer import Answer, Ranking, check_query, check_top
+from semsig_gis.database.answer import (
+    Answer,
+    Ranking,
+    candidate_columns,
+    check_query,
+    check_top,
+)
 from semsig_gis.database.database import join_databases, rows_of_result
 from semsig_gis.database.file import PartitionedDatabase
 from semsig_gis.database.requirement import PatternIndex
@@ -189,18 +195,8 @@ class Shortlist:
         values, sizes = np.unique(scores[cells], return_counts=True)
         self._sizes.update(dict(zip(values.tolist(), sizes.tolist(), strict=True)))
         cells = cells[: self._top]
-        xy = database.xy[cells]
-        part = pd.DataFrame(
-            {
-                "cell": cells,
-                "cell_id": database.cell_ids[cells],
-                "x": xy[:, 0],
-                "y": xy[:, 1],
-                "types": [database.types(cell) for cell in cells.tolist()],
-                "length": database.lengths[cells],
-                "distance": scores[cells].astype(np.float64),
-            }
-        )
+        part = pd.DataFrame(candidate_columns(database, cells))
+        part["distance"] = scores[cells].astype(np.float64)
         if self.cells:
             both = pd.concat([self.listed, part], ignore_index=True)
             part = both.sort_values(["distance", "cell_id"], ignore_index=True).head(self._top)
