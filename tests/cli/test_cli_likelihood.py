@@ -84,7 +84,7 @@ def test_the_likelihood_answers_or_cannot_tell(city: Path, run: Run) -> None:
     assert code == 0
     assert "2 best of" in out
     assert "Estimated position: x" in out
-    assert "The north of the query lies at" in out
+    assert "North of the query: " in out
     code, out, told = run("localize", city, "--types", SEEN["types"][:1], *BY)
     assert (code, "is built" in told) == (0, False)
     assert "Cannot tell: the best place is" in out
