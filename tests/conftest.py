@@ -21,8 +21,6 @@ if TYPE_CHECKING:
     from distributed import LocalCluster
     from selenium.webdriver import Chrome
 
-    from semsig_gis.experiments.paper.reproduce import Reproduction
-
     Run = Callable[..., tuple[int, str, str]]
 
 # QGIS runs these with its own Python.
@@ -241,14 +239,3 @@ def reproduced(tmp_path_factory: pytest.TempPathFactory) -> Path:
     place = tmp_path_factory.mktemp("reproduced")
     reproduce(place / "out", database=save_town(place), queries=QUERIES)
     return place / "out"
-
-
-@pytest.fixture(scope="session")
-def reproduction(reproduced: Path) -> Reproduction:
-    """Return what was found there."""
-    from reproductions import QUERIES
-
-    from semsig_gis.experiments.paper.reproduce import reproduce
-
-    database = reproduced.parent / "city.parquet"
-    return reproduce(reproduced, database=database, queries=QUERIES)

@@ -1,4 +1,4 @@
-"""A town on which the experiments of the paper are run, for the tests of that."""
+"""Runs of experiments: a town for those of the paper, and the files that a run leaves."""
 
 from __future__ import annotations
 
@@ -20,3 +20,12 @@ def save_town(folder: Path) -> Path:
     file = folder / "city.parquet"
     save_with_store(TOWN.database, ObjectStore.of(TOWN.street_objects), file)
     return file
+
+
+def contents(folder: Path) -> dict[str, bytes]:
+    """Return all files in a folder, but for those that tell times."""
+    return {
+        path.relative_to(folder).as_posix(): path.read_bytes()
+        for path in sorted(folder.rglob("*"))
+        if path.is_file() and path.name not in {"timing.json", "times.json"}
+    }

@@ -1,4 +1,4 @@
-"""The work of an experiment: the files that it names, its queries, and what its methods answer.
+"""Experiments: the files that they name, their queries, and what their methods answer.
 
 Queries are answered a hundred at a time. Each method's answers to a hundred are a file of their
 own, so that little is lost when a run is interrupted, and many processes can share the work.
@@ -8,7 +8,8 @@ from __future__ import annotations
 
 import contextlib
 import math
-from dataclasses import dataclass, field
+import os
+import shutil
 from functools import cached_property, lru_cache, partial
 from itertools import product
 from pathlib import Path
@@ -34,16 +35,10 @@ from semsig_gis.evaluation.evaluate import (
 from semsig_gis.evaluation.figures import district_labels
 from semsig_gis.evaluation.methods import make_locator
 from semsig_gis.evaluation.spec import Case, parse_experiment
-from semsig_gis.experiments.folder import (
-    PARTS,
-    begin_run,
-    finish_run,
-    finished_run,
-    open_results,
-    write_results,
-)
+from semsig_gis.experiments.folder import PARTS, RUN, open_results, write_results
 from semsig_gis.likelihood.index import ready_index
 from semsig_gis.queries.draw import draw_queries
+from semsig_gis.storage.runs import finish, partial_folder
 from semsig_gis.storage.whole import whole_file
 
 if TYPE_CHECKING:
@@ -58,16 +53,11 @@ if TYPE_CHECKING:
     from semsig_gis.queries.draw import Query
 
 
-QUERIES_A_PART = 100
-
-
+PART_QUERIES = 100
 MEMO_BYTES = 256 << 20  # distances that the methods of an experiment share
-
-
 MEASURES = 3  # each of types and of angles
-
-
 STAGES = 2
+MOST_FAILED = 10  # when so many parts have failed, the rest would too
 
 
 class Part(NamedTuple):
@@ -81,54 +71,50 @@ class Part(NamedTuple):
     number: int
 
 
-@dataclass(frozen=True, eq=False)
 class ExperimentWork:
-    """An experiment with the files that it names, which are looked for in ``folder``.
+    """An experiment with the files that it names, which are looked for in a folder.
 
-    ``note`` is called with a sentence where an index is built or a file was put right.
+    `note` is called with a sentence where an index is built or a file was put right.
     """
 
-    spec: ExperimentSpec
-    folder: Path
-    note: Callable[[str], None] | None = None
-    _cities: dict[str, City] = field(default_factory=dict)
-    _indexes: dict[Path, LikelihoodIndex] = field(default_factory=dict)
-    _locators: dict[str, Locator[Answer]] = field(default_factory=dict)
+    def __init__(
+        self, spec: ExperimentSpec, folder: Path, note: Callable[[str], None] | None = None
+    ) -> None:
+        self.spec, self.folder, self.note = spec, folder, note
+        self._cities: dict[str, City] = {}
+        self._indexes: dict[Path, LikelihoodIndex] = {}
+        self._locators: dict[str, Locator[Answer]] = {}
 
     def digests(self) -> dict[str, str]:
         """Return a digest of the content of each file that is looked at, by name.
 
-        Raises `SemsigError` if a file is missing.
+        Raise SemsigError if a file is missing.
         """
-        found = {}
-        for name in dict.fromkeys([self.spec.database, self.spec.city or self.spec.database]):
-            found[name] = self._city(name).digest
+        names = (self.spec.database, self._seen_city)
+        digests = {name: self._city(name).digest for name in dict.fromkeys(names)}
         for name in self._stores():
             store = self._city(name).store_path
             if store.is_dir():
                 key = f"{name.removesuffix('.parquet')}{store.suffix}"
-                found[key] = digest(*sorted(store.glob("*.parquet")))
+                digests[key] = digest(*sorted(store.glob("*.parquet")))
         if self.spec.districts is not None:
             file = self.folder / self.spec.districts.file
             if not file.is_file():
                 msg = f"districts {file} do not exist; give a file of polygons."
                 raise SourceError(msg)
-            found[self.spec.districts.file] = digest(file)
-        return found
+            digests[self.spec.districts.file] = digest(file)
+        return digests
 
-    def _stores(self) -> list[str]:
-        """Return the databases of which the street objects are looked at."""
-        some = []
-        if self.spec.seen_from == "anywhere":
-            some.append(self.spec.city or self.spec.database)
-        if any(method.refined for method in self.spec.methods.values()):
-            some.append(self.spec.database)
-        return list(dict.fromkeys(some))
+    def _stores(self) -> dict[str, None]:
+        """Return the databases of which the street objects are looked at, each once."""
+        anywhere = [self._seen_city] if self.spec.seen_from == "anywhere" else []
+        refined = any(method.refined for method in self.spec.methods.values())
+        return dict.fromkeys([*anywhere, *([self.spec.database] if refined else [])])
 
     def prepare(self) -> None:
         """Build the indexes that methods need.
 
-        Raises `SemsigError` if a file cannot be read, or something does not fit the database.
+        Raise SemsigError if a file cannot be read, or something does not fit the database.
         """
         for top in self.spec.top:
             check_count("candidates", top, len(self.database))
@@ -144,15 +130,15 @@ class ExperimentWork:
         for name in self.spec.methods:
             self._locator(name)
 
-    @cached_property
+    @property
     def database(self) -> SignatureDatabase:
         """What is searched."""
         return self._city(self.spec.database).database
 
-    @cached_property
-    def city(self) -> SignatureDatabase | None:
-        """What is looked at, if it is something else."""
-        return None if self.spec.city is None else self._city(self.spec.city).database
+    @property
+    def _seen_city(self) -> str:
+        """The city in which queries are drawn."""
+        return self.spec.city or self.spec.database
 
     @cached_property
     def districts(self) -> gpd.GeoDataFrame | None:
@@ -169,13 +155,12 @@ class ExperimentWork:
     @property
     def parts(self) -> tuple[Part, ...]:
         """All parts of the work."""
-        numbers = range(math.ceil(self._queries_of_each / QUERIES_A_PART))
+        numbers = range(math.ceil(self._number / PART_QUERIES))
         return tuple(Part(name, number) for name in self.spec.distortions for number in numbers)
 
     def queries_in(self, part: Part) -> int:
         """Return how many queries are in a part: a hundred, or fewer in the last one."""
-        before = part.number * QUERIES_A_PART
-        return min(QUERIES_A_PART, self._queries_of_each - before)
+        return min(PART_QUERIES, self._number - part.number * PART_QUERIES)
 
     def answer(self, place: Path, part: Part) -> None:
         """Let every method answer the queries of a part, unless it has done so before.
@@ -187,8 +172,8 @@ class ExperimentWork:
         left = {name: file for name, file in files.items() if not _is_whole(file, rows=count)}
         if not left:
             return
-        start = part.number * QUERIES_A_PART
-        queries = self._queries(part.distortion, slice(start, start + QUERIES_A_PART))
+        start = part.number * PART_QUERIES
+        queries = self._queries(part.distortion, slice(start, start + PART_QUERIES))
         by_distance = [name for name in left if self.spec.methods[name].noise is None]
         for names in (by_distance, *([name] for name in left if name not in by_distance)):
             for name, scored in self._scored(names, queries):
@@ -199,7 +184,7 @@ class ExperimentWork:
         self, names: Sequence[str], queries: Sequence[Query]
     ) -> Iterator[tuple[str, pd.DataFrame]]:
         """Yield the scored answers of some methods that share what they measure."""
-        found: dict[str, dict[int, list[dict[str, Any]]]] = {
+        scores: dict[str, dict[int, list[dict[str, Any]]]] = {
             name: {top: [] for top in self.spec.top} for name in names
         }
         step = self._batch if len(names) > 1 else len(queries)
@@ -214,8 +199,8 @@ class ExperimentWork:
                     memo=memo,
                 )
                 for top, rows in outcomes.items():
-                    found[name][top] += rows
-        for name, outcomes in found.items():
+                    scores[name][top] += rows
+        for name, outcomes in scores.items():
             scored = scored_tables(self.database, queries, outcomes)
             tables = [table.assign(top=top) for top, table in scored.items()]
             yield name, pd.concat(tables, ignore_index=True)
@@ -225,17 +210,19 @@ class ExperimentWork:
         """For how many queries the distances are kept that methods share."""
         distinct = len(self.database.type_sequences) + len(self.database.angle_sequences)
         of_each = 4 * (MEASURES * distinct + STAGES * len(self.database))
-        return max(1, min(QUERIES_A_PART, MEMO_BYTES // max(of_each, 1)))
+        return max(1, min(PART_QUERIES, MEMO_BYTES // max(of_each, 1)))
 
     def evaluations(self, place: Path) -> dict[str, Evaluation]:
         """Return all evaluations by the names of their cases, once all queries are answered."""
         size = sum(file.stat().st_size for file in self._city(self.spec.database).files)
-        found = {}
+        evaluations = {}
         for distortion, method in product(self.spec.distortions, self.spec.methods):
-            scored = self._answers(place, distortion, method)
+            parts = [part for part in self.parts if part.distortion == distortion]
+            tables = [pq.read_table(_part_file(place, part, method)) for part in parts]
+            scored = pa.concat_tables(tables, promote_options="default").to_pandas()
             for top in self.spec.top:
                 case = Case(distortion=distortion, method=method, top=top)
-                found[case.name] = make_evaluation(
+                evaluations[case.name] = make_evaluation(
                     self.database,
                     self.spec.methods[method],
                     self.spec.asked(distortion),
@@ -244,31 +231,21 @@ class ExperimentWork:
                     city=self.spec.city,
                     file_bytes=size,
                 )
-        return found
-
-    def _answers(self, place: Path, distortion: str, method: str) -> pd.DataFrame:
-        """Return all answers of a method."""
-        files = [
-            _part_file(place, part, method) for part in self.parts if part.distortion == distortion
-        ]
-        found: pd.DataFrame = pa.concat_tables(
-            map(pq.read_table, files), promote_options="default"
-        ).to_pandas()
-        return found
+        return evaluations
 
     @property
-    def _queries_of_each(self) -> int:
+    def _number(self) -> int:
         """How many queries each distortion has."""
         return self.spec.queries * len(self.spec.seeds)
 
     def _queries(self, distortion: str, part: slice) -> list[Query]:
         """Return some of the queries after a distortion."""
-        looked_at = self.spec.city or self.spec.database
+        seen = self._city(self._seen_city)
         return draw_queries(
             self.database,
             self.spec.asked(distortion),
-            store=self._city(looked_at).store if self.spec.seen_from == "anywhere" else None,
-            city=self.city,
+            store=seen.store if self.spec.seen_from == "anywhere" else None,
+            city=None if self.spec.city is None else seen.database,
             part=part,
         )
 
@@ -305,10 +282,6 @@ def _is_whole(file: Path, *, rows: int) -> bool:
         return bool(pq.read_table(file).num_rows == rows)
     except (OSError, ValueError, pa.ArrowException):
         return False
-
-
-# When so many parts have failed, the rest would too.
-MOST_FAILED = 10
 
 
 def run_experiment(
@@ -365,14 +338,8 @@ def run_experiment(
     Examples
     --------
     >>> import tempfile
-    >>> from semsig_gis.database.build import build_database
-    >>> from semsig_gis.sources.catalog import paper_taxonomy
-    >>> from semsig_gis.database.file import save_database
+    >>> from semsig_gis import save_database
     >>> from semsig_gis.evaluation.spec import parse_experiment
-    >>> from semsig_gis.objects.clean import build_objects
-    >>> from semsig_gis.sources.synthetic.city import CitySpec, synthetic_city
-    >>> layers = synthetic_city(CitySpec(size=300.0))
-    >>> objects, _ = build_objects(layers, taxonomy=paper_taxonomy(), crs="EPSG:32631")
     >>> spec = parse_experiment('''
     ... database = "city.parquet"
     ... queries = 10
@@ -380,12 +347,12 @@ def run_experiment(
     ... distortions.phone = "medium, view:90"
     ... ''')
     >>> with tempfile.TemporaryDirectory() as folder:
-    ...     save_database(build_database(objects), f"{folder}/city.parquet")
-    ...     found = run_experiment(spec, f"{folder}/results", folder=folder)
-    >>> list(found), len(found["phone/paper-top1"].queries)
+    ...     save_database(demo_database, f"{folder}/city.parquet")
+    ...     results = run_experiment(spec, f"{folder}/results", folder=folder)
+    >>> list(results), len(results["phone/paper-top1"].queries)
     (['phone/paper-top1'], 10)
     """
-    (found,) = run_experiments(
+    (results,) = run_experiments(
         {Path(out): spec},
         folder=folder,
         workers=workers,
@@ -393,7 +360,7 @@ def run_experiment(
         note=note,
         progress=progress,
     ).values()
-    return found
+    return results
 
 
 def run_experiments(
@@ -437,21 +404,26 @@ def run_experiments(
     for out, spec in specs.items():
         work = ExperimentWork(spec, Path(folder), note)
         recipe = {**spec.to_dict(), "inputs": work.digests(), "versions": versions()}
-        if not finished_run(out, recipe):
-            running[out] = _Running(work, begin_run(out, recipe))
+        target, partial_out = Path(os.path.realpath(out)), partial_folder(out)
+        if target.exists():
+            RUN.require_same(target, recipe)
+            shutil.rmtree(target / PARTS, ignore_errors=True)  # of a run killed at the very end
+        else:
+            RUN.begin(partial_out, recipe)
+            running[out] = _Running(work, partial_out)
     for work, _ in running.values():
         work.prepare()
     _answer(running, workers=workers, scheduler=scheduler, progress=progress)
-    found = {}
+    results = {}
     for out in specs:
         if out in running:
-            work, partial_ = running[out]
-            found[out] = work.evaluations(partial_ / PARTS)
-            write_results(partial_, work.spec, found[out], districts=work.districts)
-            finish_run(partial_)
+            work, place = running[out]
+            results[out] = work.evaluations(place / PARTS)
+            write_results(place, work.spec, results[out], districts=work.districts)
+            shutil.rmtree(finish(place) / PARTS)
         else:
-            found[out] = open_results(out)
-    return found
+            results[out] = open_results(out)
+    return results
 
 
 class _Running(NamedTuple):

@@ -7,9 +7,12 @@ finished stays in the folder of the results, so that an interrupted run goes on 
 from __future__ import annotations
 
 import os
+import time
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, get_args
+
+import numpy as np
 
 from semsig_gis.core.errors import DatabaseError, InputError
 from semsig_gis.core.parallel import check_workers
@@ -21,9 +24,9 @@ from semsig_gis.database.store import ObjectStore, save_with_store
 from semsig_gis.database.viewpoints import ViewpointSpec
 from semsig_gis.evaluation.evaluate import check_count, versions
 from semsig_gis.experiments.paper.experiments import QUERIES, RANGES, SCALES, paper_experiments
-from semsig_gis.experiments.paper.timing import time_queries
 from semsig_gis.experiments.run import run_experiments
 from semsig_gis.matching.method import Method
+from semsig_gis.matching.scores import score_cells
 from semsig_gis.objects.clean import build_objects
 from semsig_gis.queries.draw import QuerySpec
 from semsig_gis.reports import paris
@@ -50,9 +53,9 @@ SMALL_QUERIES = 300
 CITIES = {"full": PARIS_LIKE, "small": CitySpec(size=2000.0)}
 SETTINGS = "settings.json"
 TIMES = "times.json"
-CITY = Path("city") / "city.parquet"
-VARIANTS = Path("variants")
-EXPERIMENTS = Path("experiments")
+CITY = "city/city.parquet"
+VARIANTS = "variants"
+EXPERIMENTS = "experiments"
 NO_RANGES = (
     "Other visibility ranges need the street objects of the database, which `semsig build` puts "
     "beside it; they are not there."
@@ -75,8 +78,8 @@ RUN = RunKind(
     ),
     read=_read_settings,
     write=lambda folder, settings: write_json(folder / SETTINGS, settings),
-    names={SETTINGS, CITY.parent.name, VARIANTS.name},
-    results=EXPERIMENTS.name,
+    names={SETTINGS, "city", VARIANTS},
+    results=EXPERIMENTS,
 )
 
 
@@ -171,45 +174,57 @@ def reproduce(
     if size not in get_args(Size):
         msg = f"the size is {size!r}; give full or small."
         raise InputError(msg)
-    folder = Path(out)
-    begun = _Begun(folder, note or _quiet, progress or _unseen)
-    given = None if database is None else Path(database)
-    if given is not None and not given.is_file():
-        msg = f"{given} is not a file; give a signature database in one file."
+    if database is not None and not Path(database).is_file():
+        msg = f"{database} is not a file; give a signature database in one file."
         raise DatabaseError(msg)
+    folder, show = Path(out), progress or (lambda _: None)
+    city = City(folder / CITY if database is None else database)
     settings = {
         "size": size,
-        "database": None if given is None else City(given).digest,
+        "database": None if database is None else city.digest,
         "queries": queries,
         "seed": seed,
         "versions": versions(),
     }
     QuerySpec(seeds=(seed,))  # looks at the seed
     check_workers(workers, None)
-    city = None if given is None else City(given)
-    if city is not None:
-        _check_queries(queries, city.database)
+    if database is not None:
+        _check_queries(queries, city)
     RUN.begin(folder, settings)
-    if city is None:
-        city = City(begun.city(CITIES[size]))
-        _check_queries(queries, city.database)
-    opened = city.database
-    count = queries or min(QUERIES if size == "full" else SMALL_QUERIES, len(opened))
-    ranges = begun.ranges(city)
-    scales = begun.scales(opened)
-    found = _experiments(
-        begun, city.path, ranges, scales, queries=count, seed=seed, workers=workers
+    if database is None:
+        if not city.path.is_file():
+            _make_city(CITIES[size], city.path, note, show)
+        _check_queries(queries, city)
+    count = queries or min(QUERIES if size == "full" else SMALL_QUERIES, len(city.database))
+    ranges, scales = _variants(city, folder / VARIANTS, show)
+    specs = paper_experiments(
+        os.path.relpath(city.path, folder / VARIANTS),
+        ranges={radius: path.name for radius, path in ranges.items()},
+        scales={levels: path.name for levels, path in scales.items()},
+        queries=count,
+        seed=seed,
     )
+    results = run_experiments(
+        {folder / EXPERIMENTS / name: spec for name, spec in specs.items()},
+        folder=folder / VARIANTS,
+        workers=workers,
+        note=note,
+        progress=show("answering queries"),
+    )
+    if not (folder / TIMES).is_file():
+        methods = {text: Method.parse(text) for text in paris.QUERY_MS}
+        times = time_queries(city.database, methods, progress=show("measuring times"))
+        write_json(folder / TIMES, times)
     counts = city.store.objects.class_counts if city.has_store else None
     return Reproduction(
-        database=opened,
-        summary=database_summary(opened, file_bytes=city.bytes, object_counts=counts),
+        database=city.database,
+        summary=database_summary(city.database, file_bytes=city.bytes, object_counts=counts),
         variants={r: database_summary(open_database(path)) for r, path in ranges.items()},
-        experiments=found,
-        seconds=begun.times(opened),
+        experiments={place.name: evaluations for place, evaluations in results.items()},
+        seconds=read_json(folder / TIMES),
         settings={
             "size": size,
-            "database": "a made-up city" if given is None else given.name,
+            "database": "a made-up city" if database is None else city.path.name,
             "queries": count,
             "seed": seed,
         },
@@ -217,117 +232,96 @@ def reproduce(
     )
 
 
-def _check_queries(queries: int | None, city: SignatureDatabase) -> None:
+def _check_queries(queries: int | None, city: City) -> None:
     if queries is not None:
-        check_count("queries", queries, len(city))
+        check_count("queries", queries, len(city.database))
 
 
-def _experiments(
-    begun: _Begun,
-    file: Path,
-    ranges: Mapping[float, Path],
-    scales: Mapping[int, Path],
+def _make_city(
+    spec: CitySpec, file: Path, note: Callable[[str], None] | None, show: Progress
+) -> None:
+    layers = synthetic_city(spec)
+    objects, _ = build_objects(layers, taxonomy=paper_taxonomy(), crs=layers[0].table.crs)
+    _, streets = synthetic_surroundings(spec)
+    if note is not None:
+        note(f"made up a city of {len(objects):,} street objects")
+    database = build_database(
+        objects,
+        viewpoints=ViewpointSpec(mode="streets"),
+        streets=streets.table,
+        progress=show("building the database"),
+    )
+    save_with_store(database, ObjectStore.of(objects, streets=streets.table), file)
+
+
+def _variants(
+    city: City, folder: Path, show: Progress
+) -> tuple[dict[float, Path], dict[int, Path]]:
+    """Return databases of other visibility ranges and angle levels, built where they are missing.
+
+    Without street objects there are no other ranges.
+    """
+    folder.mkdir(parents=True, exist_ok=True)
+    database = city.database
+    ranges = {
+        radius: folder / f"range-{radius:g}.parquet"
+        for radius in RANGES
+        if radius != database.spec.radius and city.has_store
+    }
+    scales = {
+        levels: folder / f"levels-{levels}.parquet"
+        for levels in SCALES
+        if levels != database.spec.levels
+    }
+    for radius, path in ranges.items():
+        if not path.is_file():
+            variant = build_database(
+                city.store.objects,
+                grid=database.grid,
+                spec=replace(database.spec, radius=radius),
+                viewpoints=database.viewpoints,
+                footprints=city.store.footprints,
+                streets=city.store.streets,
+                progress=show(f"building for a visibility range of {radius:g} m"),
+            )
+            save_database(variant, path)
+    for levels, path in scales.items():
+        if not path.is_file():
+            save_database(replace(database, spec=replace(database.spec, levels=levels)), path)
+    return ranges, scales
+
+
+def time_queries(
+    database: SignatureDatabase,
+    methods: Mapping[str, Method],
     *,
-    queries: int,
-    seed: int,
-    workers: int,
-) -> dict[str, dict[str, Evaluation]]:
-    """Run the experiments in one go."""
-    base = begun.folder / VARIANTS
-    base.mkdir(parents=True, exist_ok=True)
+    length: int = 14,
+    repetitions: int = 100,
+    progress: Callable[[int, int], None] | None = None,
+) -> dict[str, float]:
+    """Return the mean seconds that each method takes to compare one query with all cells.
 
-    def named(path: Path) -> str:
-        return os.path.relpath(path, base)
-
-    specs = paper_experiments(
-        named(file),
-        ranges={r: named(path) for r, path in ranges.items()},
-        scales={q: named(path) for q, path in scales.items()},
-        queries=queries,
-        seed=seed,
-    )
-    found = run_experiments(
-        {begun.folder / EXPERIMENTS / name: spec for name, spec in specs.items()},
-        folder=base,
-        workers=workers,
-        note=begun.note,
-        progress=begun.progress("answering queries"),
-    )
-    return {place.name: results for place, results in found.items()}
-
-
-class _Begun:
-    """A run in a folder: makes what is not there."""
-
-    def __init__(self, folder: Path, note: Callable[[str], None], progress: Progress) -> None:
-        self.folder, self.note, self.progress = folder, note, progress
-
-    def city(self, spec: CitySpec) -> Path:
-        """Return a city that is made up."""
-        file = self.folder / CITY
-        if not file.is_file():
-            layers = synthetic_city(spec)
-            objects, _ = build_objects(layers, taxonomy=paper_taxonomy(), crs=layers[0].table.crs)
-            _, streets = synthetic_surroundings(spec)
-            self.note(f"made up a city of {len(objects):,} street objects")
-            database = build_database(
-                objects,
-                viewpoints=ViewpointSpec(mode="streets"),
-                streets=streets.table,
-                progress=self.progress("building the database"),
-            )
-            save_with_store(database, ObjectStore.of(objects, streets=streets.table), file)
-        return file
-
-    def ranges(self, city: City) -> dict[float, Path]:
-        """Return databases of the other visibility ranges."""
-        spec = city.database.spec
-        wanted = [radius for radius in RANGES if radius != spec.radius]
-        if not city.has_store:
-            return {}
-        found = {radius: self.folder / VARIANTS / f"range-{radius:g}.parquet" for radius in wanted}
-        left = {radius: path for radius, path in found.items() if not path.is_file()}
-        if not left:
-            return found
-        store = city.store
-        for radius, path in left.items():
-            database = build_database(
-                store.objects,
-                grid=city.database.grid,
-                spec=replace(spec, radius=radius),
-                viewpoints=city.database.viewpoints,
-                footprints=store.footprints,
-                streets=store.streets,
-                progress=self.progress(f"building for a visibility range of {radius:g} m"),
-            )
-            save_database(database, path)
-        return found
-
-    def scales(self, city: SignatureDatabase) -> dict[int, Path]:
-        """Return databases of the other numbers of angle levels."""
-        wanted = [levels for levels in SCALES if levels != city.spec.levels]
-        found = {levels: self.folder / VARIANTS / f"levels-{levels}.parquet" for levels in wanted}
-        for levels, path in found.items():
-            if not path.is_file():
-                save_database(replace(city, spec=replace(city.spec, levels=levels)), path)
-        return found
-
-    def times(self, city: SignatureDatabase) -> dict[str, float]:
-        """Return the times of the paper's table."""
-        file = self.folder / TIMES
-        if not file.is_file():
-            found = time_queries(
-                city,
-                {text: Method.parse(text) for text in paris.QUERY_MS},
-                progress=self.progress("measuring times"),
-            )
-            write_json(file, found)
-        return read_json(file)
-
-
-def _quiet(_: str) -> None:
-    """Say nothing."""
-
-
-def _unseen(_: str) -> None:
-    """Show nothing."""
+    Paper, table of retrieval times: the mean of 100 repetitions with a query of mean length, asked
+    one at a time, on one thread. The queries are cells with `length` objects, or of the nearest
+    length; what is worked out once for a database does not count. `progress` is called with the
+    methods done and in all.
+    """
+    if repetitions < 1:
+        msg = f"{repetitions} repetitions were asked for; give a whole number from 1."
+        raise InputError(msg)
+    away = np.abs(database.lengths - length)
+    cells = np.random.default_rng(0).choice(np.flatnonzero(away == away.min()), repetitions)
+    queries = [database.signature(int(cell)) for cell in cells]
+    times = {}
+    for done, (name, method) in enumerate(methods.items(), start=1):
+        for _ in range(2):  # the second time, kernels for many queries are loaded
+            next(iter(score_cells(database, queries[:1], method)))
+        seconds = []
+        for query in queries:
+            start = time.perf_counter()
+            next(iter(score_cells(database, [query], method)))
+            seconds.append(time.perf_counter() - start)
+        times[name] = float(np.mean(seconds))
+        if progress is not None:
+            progress(done, len(methods))
+    return times

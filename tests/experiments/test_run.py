@@ -1,4 +1,4 @@
-"""Experiments from end to end: the files, interrupted runs, folders that are refused."""
+"""Experiments from end to end: the files, interrupted runs, what is refused."""
 
 from __future__ import annotations
 
@@ -17,6 +17,8 @@ import pandas as pd
 import pytest
 import shapely
 from geopandas.testing import assert_geodataframe_equal
+from pandas.testing import assert_frame_equal
+from reproductions import contents
 from sentences import assert_sentence
 from worlds import CORNER, World, random_town
 
@@ -25,7 +27,13 @@ from semsig_gis.database.store import ObjectStore, save_with_store
 from semsig_gis.evaluation.evaluate import evaluate, score_queries
 from semsig_gis.evaluation.spec import Districts, parse_experiment
 from semsig_gis.experiments.folder import open_results
-from semsig_gis.experiments.run import QUERIES_A_PART, run_experiment, run_experiments
+from semsig_gis.experiments.run import (
+    PART_QUERIES,
+    ExperimentWork,
+    Part,
+    run_experiment,
+    run_experiments,
+)
 from semsig_gis.matching.method import Method
 
 if TYPE_CHECKING:
@@ -52,8 +60,21 @@ phone = "light, compass:5, view:180"
 SAME_IN_EVERY_RUN = {"experiment.toml", "inputs.json", "figures.csv", "report.md"}
 
 
-class KilledError(Exception):
-    """The end of a run, somewhere in the middle."""
+def interrupt(spec: ExperimentSpec, out: Path, folder: Path, *, after: int) -> None:
+    """Run an experiment until so many answers are done."""
+
+    def stop(done: int, total: int) -> None:
+        assert total == spec.queries * len(spec.distortions) * len(spec.methods)
+        if done >= after:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        run_experiment(spec, out, folder=folder, progress=stop)
+    assert not out.exists()
+
+
+def never(*_: object, **__: object) -> None:
+    raise AssertionError
 
 
 @pytest.fixture(scope="module")
@@ -83,15 +104,6 @@ def results(folder: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     return out
 
 
-def contents(folder: Path) -> dict[str, bytes]:
-    """Return all files, but for those that tell times."""
-    return {
-        path.relative_to(folder).as_posix(): path.read_bytes()
-        for path in sorted(folder.rglob("*"))
-        if path.is_file() and path.name != "timing.json"
-    }
-
-
 def test_a_folder_holds_everything(results: Path) -> None:
     files = contents(results)
     cases = {case.name for case in SPEC.cases}
@@ -107,6 +119,8 @@ def test_a_folder_holds_everything(results: Path) -> None:
     assert set(figures["case"]) == cases
     for name, evaluation in open_results(results).items():
         mine = figures[figures["case"] == name].set_index("figure")
+        alone = open_results(results / name)[""]
+        assert alone.summary() == evaluation.summary()
         assert mine["value"]["p50"] == pytest.approx(evaluation.cdf([50])[0])
         assert (mine["low"] <= mine["value"]).all()
         timing = json.loads((results / name / "timing.json").read_text("utf-8"))
@@ -140,19 +154,12 @@ def test_an_experiment_is_what_an_evaluation_is(results: Path) -> None:
     assert_geodataframe_equal(found.queries, alone.queries)
 
 
-@pytest.mark.parametrize("done", [1, QUERIES_A_PART, 131, 400, 520])
+@pytest.mark.parametrize("done", [1, PART_QUERIES, 131, 400, 520])
 def test_a_run_that_was_interrupted_ends_with_the_same_bytes(
     done: int, folder: Path, results: Path, tmp_path: Path
 ) -> None:
-    def stop(count: int, total: int) -> None:
-        assert total == 520
-        if count >= done:
-            raise KilledError
-
     out = tmp_path / "out"
-    with pytest.raises(KilledError):
-        run_experiment(SPEC, out, folder=folder, progress=stop)
-    assert not out.exists()
+    interrupt(SPEC, out, folder, after=done)
     run_experiment(SPEC, out, folder=folder)
     assert contents(out) == contents(results)
     assert [path.name for path in tmp_path.iterdir()] == ["out"]
@@ -216,7 +223,7 @@ def test_parts_that_fail_are_told_and_the_others_are_kept(
     folder: Path, results: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def fail(database: Any, locator: Any, queries: Sequence[Query], **options: Any) -> object:  # noqa: ANN401
-        if len(queries) < QUERIES_A_PART:
+        if len(queries) < PART_QUERIES:
             msg = "the disk hiccups"
             raise OSError(msg)
         return score_queries(database, locator, queries, **options)
@@ -243,13 +250,8 @@ def test_killed_at_the_very_end(folder: Path, results: Path, tmp_path: Path) -> 
 
 
 def test_a_part_that_is_damaged_is_done_again(folder: Path, results: Path, tmp_path: Path) -> None:
-    def stop(count: int, total: int) -> None:
-        if count == total:
-            raise KilledError
-
     out = tmp_path / "out"
-    with pytest.raises(KilledError):
-        run_experiment(SPEC, out, folder=folder, progress=stop)
+    interrupt(SPEC, out, folder, after=520)
     first, second, *_ = sorted((tmp_path / "out.partial" / "_parts").iterdir())
     first.write_bytes(first.read_bytes()[:-50])
     pd.read_parquet(second).iloc[1:].to_parquet(second)
@@ -262,9 +264,6 @@ def test_a_part_that_is_damaged_is_done_again(folder: Path, results: Path, tmp_p
 def test_results_that_are_there_are_not_made_again(
     folder: Path, results: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    def never(*_: object, **__: object) -> None:
-        raise AssertionError
-
     monkeypatch.setattr("semsig_gis.experiments.run.score_queries", never)
     before = contents(results)
     found = run_experiment(SPEC, results, folder=folder)
@@ -293,13 +292,8 @@ def test_results_of_another_experiment_are_refused(
 
 
 def test_an_unfinished_run_of_another_experiment_is_refused(folder: Path, tmp_path: Path) -> None:
-    def stop(count: int, _: int) -> None:
-        if count > 100:
-            raise KilledError
-
     out = tmp_path / "out"
-    with pytest.raises(KilledError):
-        run_experiment(SPEC, out, folder=folder, progress=stop)
+    interrupt(SPEC, out, folder, after=101)
     other = replace(SPEC, queries=20)
     with pytest.raises(InputError) as caught:
         run_experiment(other, out, folder=folder)
@@ -407,3 +401,52 @@ def test_progress_counts_every_answer(folder: Path, tmp_path: Path) -> None:
     assert [done for done, _ in seen] == [200, 260, 460, 520]
     assert {total for _, total in seen} == {520}
     assert all("index" in note for note in notes)
+
+
+def test_an_evaluation_that_is_missing(results: Path, tmp_path: Path) -> None:
+    shutil.copytree(results, tmp_path / "out")
+    shutil.rmtree(tmp_path / "out" / "none" / "paper-top1")
+    with pytest.raises(DatabaseError) as caught:
+        open_results(tmp_path / "out")
+    assert_sentence(caught.value, "queries.parquet", "does not exist")
+
+
+MANY_METHODS = parse_experiment("""
+database = "city.parquet"
+queries = 130
+seeds = [0, 5]
+[methods]
+fusion = "edit+edit"
+stages = "edit+edit:5%"
+types = "types:jaccard"
+[distortions]
+none = []
+medium = "medium"
+""")
+
+
+def test_the_parts_are_all_the_work(folder: Path) -> None:
+    work = ExperimentWork(MANY_METHODS, folder)
+    assert work.parts == tuple(Part(name, n) for name in ("none", "medium") for n in range(3))
+    assert [work.queries_in(part) for part in work.parts] == [100, 100, 60] * 2
+
+
+def test_methods_that_share_distances_answer_as_alone(
+    folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    work = ExperimentWork(MANY_METHODS, folder)
+
+    def answers(place: Path) -> dict[str, pd.DataFrame]:
+        place.mkdir()
+        work.answer(place, Part("medium", 1))
+        files = sorted(place.iterdir())
+        return {file.name: pd.read_parquet(file).drop(columns="seconds") for file in files}
+
+    together = answers(tmp_path / "together")
+    assert list(together) == [f"medium.{name}.00001.parquet" for name in sorted(work.spec.methods)]
+    seeds = together["medium.fusion.00001.parquet"]["seed"]
+    assert seeds.value_counts().to_dict() == {0: 30, 5: 70}
+    monkeypatch.setattr("semsig_gis.experiments.run.MEMO_BYTES", 1)
+    one_by_one = answers(tmp_path / "one_by_one")
+    for name, table in together.items():
+        assert_frame_equal(one_by_one[name], table)

@@ -1,5 +1,3 @@
-"""Tests of the paper's experiments as a run; their report is in test_reproduction_report.py."""
-
 from __future__ import annotations
 
 import json
@@ -7,12 +5,14 @@ import shutil
 from typing import TYPE_CHECKING, Any
 
 import pytest
-from reproductions import QUERIES, TOWN, save_town
+from reproductions import QUERIES, TOWN, contents, save_town
 from sentences import assert_sentence
 
 from semsig_gis.core.errors import DatabaseError, InputError, SemsigError
 from semsig_gis.database.file import open_database, save_database
-from semsig_gis.experiments.paper.reproduce import reproduce
+from semsig_gis.experiments.paper.reproduce import reproduce, time_queries
+from semsig_gis.matching.method import Method
+from semsig_gis.matching.scores import score_cells
 from semsig_gis.reports import paris
 
 if TYPE_CHECKING:
@@ -20,19 +20,6 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from semsig_gis.experiments.paper.reproduce import Reproduction
-
-
-class KilledError(Exception):
-    """The end of a run, somewhere in the middle."""
-
-
-def contents(folder: Path) -> dict[str, bytes]:
-    """Return all files, but for those that tell times or are made again."""
-    return {
-        path.relative_to(folder).as_posix(): path.read_bytes()
-        for path in sorted(folder.rglob("*"))
-        if path.is_file() and path.name not in {"timing.json", "times.json"}
-    }
 
 
 def test_everything_is_run(reproduction: Reproduction) -> None:
@@ -69,12 +56,12 @@ def test_a_run_that_was_interrupted_ends_with_the_same_bytes(
             nonlocal calls
             calls += 1
             if calls == 3:
-                raise KilledError
+                raise KeyboardInterrupt
 
         return stop if label == "answering queries" else None
 
     options: dict[str, Any] = {"database": tmp_path / "city.parquet", "queries": QUERIES}
-    with pytest.raises(KilledError):
+    with pytest.raises(KeyboardInterrupt):
         reproduce(tmp_path / "out", progress=progress, **options)
     half = {path.name for path in (tmp_path / "out" / "experiments").iterdir()}
     assert all(name.endswith(".partial") for name in half)
@@ -200,3 +187,33 @@ def test_folders_of_other_things_are_refused(reproduced: Path, tmp_path: Path) -
     with pytest.raises(InputError) as damaged:
         reproduce(tmp_path / "photos", database=tmp_path / "city.parquet", queries=5)
     assert_sentence(damaged.value, "photos", "another folder")
+
+
+def test_every_method_is_asked_that_often(monkeypatch: pytest.MonkeyPatch) -> None:
+    lengths: list[int] = []
+
+    def counted(database: object, queries: list[object], method: object) -> object:
+        lengths.append(len(queries[0]))  # type: ignore[arg-type]
+        return score_cells(database, queries, method)  # type: ignore[arg-type]
+
+    monkeypatch.setattr("semsig_gis.experiments.paper.reproduce.score_cells", counted)
+    methods = {"types": Method.parse("types:edit"), "both": Method()}
+    told: list[tuple[int, int]] = []
+    times = time_queries(
+        TOWN.database, methods, length=5, repetitions=4, progress=lambda *done: told.append(done)
+    )
+    assert list(times) == ["types", "both"]
+    assert min(times.values()) > 0
+    assert lengths == [5] * 12  # twice before the four that count
+    assert told == [(1, 2), (2, 2)]
+
+
+def test_the_nearest_length_is_taken() -> None:
+    longest = int(TOWN.database.lengths.max())
+    assert time_queries(TOWN.database, {"a": Method()}, length=longest + 50, repetitions=1)["a"] > 0
+
+
+def test_no_repetitions_are_refused() -> None:
+    with pytest.raises(InputError) as caught:
+        time_queries(TOWN.database, {}, repetitions=0)
+    assert_sentence(caught.value, "0 repetitions", "from 1")
