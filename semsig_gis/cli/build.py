@@ -192,9 +192,9 @@ def info(database: Database, *, as_json: AsJson = False) -> None:
     city, facts = _opened(database)
     for table in database_tables(city.database, **facts):
         print_table(table)
-    told = known_identifiability(city)
-    if told is not None:
-        for table in identifiability_tables(told, object_counts=facts["object_counts"]):
+    columns = known_identifiability(city)
+    if columns is not None:
+        for table in identifiability_tables(columns, object_counts=facts["object_counts"]):
             print_table(table)
     for line in city.licenses:
         typer.echo(line)
@@ -204,10 +204,10 @@ def _info(path: Path) -> dict[str, Any]:
     from semsig_gis.database.properties import database_summary
 
     city, facts = _opened(path)
-    told = known_identifiability(city)
+    columns = known_identifiability(city)
     more = {}
-    if told is not None:
-        more["identifiability"] = told.summary(object_counts=facts["object_counts"])
+    if columns is not None:
+        more["identifiability"] = columns.summary(object_counts=facts["object_counts"])
     return database_summary(city.database, **facts) | more
 
 

@@ -95,17 +95,17 @@ def import_(
 
     keep_inputs(out, objects, read=(geopackage,))
     require_suffix(".parquet", out, objects)
-    found = read_geopackage(geopackage)
-    if objects is not None and found.objects is None:
+    contents = read_geopackage(geopackage)
+    if objects is not None and contents.objects is None:
         msg = f"{geopackage} holds no street objects; leave out --objects."
         raise InputError(msg)
-    for note in found.notes:
+    for note in contents.notes:
         remark(note)
-    if objects is not None and found.objects is not None:
-        save_objects(found.objects, objects, keep_order=True)
-    save_database(found.database, out)
-    if found.identifiability is not None:
-        save_identifiability(found.identifiability, out)
-    typer.echo(f"database: {out}  ({len(found.database):,} cells)")
+    if objects is not None and contents.objects is not None:
+        save_objects(contents.objects, objects, keep_order=True)
+    save_database(contents.database, out)
+    if contents.identifiability is not None:
+        save_identifiability(contents.identifiability, out)
+    typer.echo(f"database: {out}  ({len(contents.database):,} cells)")
     if objects is not None:
         typer.echo(f"objects:  {objects}")

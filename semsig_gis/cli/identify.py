@@ -52,7 +52,7 @@ def identify(
     """
     from semsig_gis.database.city import open_city
     from semsig_gis.evaluation.identify.check import check_identifiability
-    from semsig_gis.evaluation.identify.identify import identify as identified
+    from semsig_gis.evaluation.identify.identify import identify as run
     from semsig_gis.evaluation.identify.result import save_identifiability
     from semsig_gis.likelihood.noise.model import cell_noise
     from semsig_gis.reports.identifiability import check_tables, identifiability_tables
@@ -62,32 +62,37 @@ def identify(
     city = open_city(database)
     if not on_grid:
         model = cell_noise(model, city.database.grid.step)
-    told = known_identifiability(city)
-    known = told is not None and (told.noise, told.radius, told.seed) == (model, radius, seed)
+    columns = known_identifiability(city)
+    if columns is not None and (columns.noise, columns.radius, columns.seed) != (
+        model,
+        radius,
+        seed,
+    ):
+        columns = None
     workers = (os.cpu_count() or 1) if threads is None else threads
-    if not known or check is not None:
+    if columns is None or check is not None:
         index = prepared_index(city, model)
-    if told is None or not known:
+    if columns is None:
         with progress("comparing cells") as advance:
-            told = identified(index, radius=radius, seed=seed, threads=workers, progress=advance)
-        save_identifiability(told, database)
+            columns = run(index, radius=radius, seed=seed, threads=workers, progress=advance)
+        save_identifiability(columns, database)
     else:
         remark("The database has these columns already; they are kept.")
-    checked = None
+    verification = None
     if check is not None:
         with progress("checking") as advance:
-            checked = check_identifiability(
-                told, index, queries=check, threads=workers, progress=advance
+            verification = check_identifiability(
+                columns, index, queries=check, threads=workers, progress=advance
             )
     counts = city.object_counts
-    if out is not None and checked is not None:
-        _write_page(told, checked, database, counts, out)
+    if out is not None and verification is not None:
+        _write_page(columns, verification, database, counts, out)
     if as_json:
-        more = {} if checked is None else {"check": checked.to_dict()}
-        print_json(told.summary(object_counts=counts) | more)
+        more = {} if verification is None else {"check": verification.to_dict()}
+        print_json(columns.summary(object_counts=counts) | more)
         return
-    tables = identifiability_tables(told, object_counts=counts)
-    for part in tables if checked is None else (*tables, *check_tables(checked)):
+    tables = identifiability_tables(columns, object_counts=counts)
+    for part in tables if verification is None else (*tables, *check_tables(verification)):
         print_table(part)
     typer.echo(f"columns: {database}")
     if out is not None:
@@ -95,8 +100,8 @@ def identify(
 
 
 def _write_page(
-    told: Identifiability,
-    checked: IdentifiabilityCheck,
+    columns: Identifiability,
+    verification: IdentifiabilityCheck,
     database: Path,
     counts: Mapping[int, int] | None,
     out: Path,
@@ -104,7 +109,7 @@ def _write_page(
     from semsig_gis.reports.identifiability import identifiability_page
     from semsig_gis.reports.page import write_report
 
-    page = identifiability_page(told, checked, name=database.name, object_counts=counts)
+    page = identifiability_page(columns, verification, name=database.name, object_counts=counts)
     write_report(page, out)
 
 

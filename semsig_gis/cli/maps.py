@@ -128,8 +128,8 @@ def map_(
     results = None if evaluation is None else Evaluation.load(evaluation)
     city = open_city(database)
     opened = city.database
-    told = known_identifiability(city) if identifiability or ambiguity else None
-    if identifiability and told is None:
+    columns = known_identifiability(city) if identifiability or ambiguity else None
+    if identifiability and columns is None:
         msg = f"{database} does not tell where a query can be placed; run semsig identify first."
         raise InputError(msg)
     seen = None if objects is None else open_objects(objects)
@@ -140,9 +140,9 @@ def map_(
     with progress("drawing the map"):
         drawn: Any = None  # a map of folium, which the command line does not know
         if ambiguity:
-            drawn = ambiguity_map(opened, identifiability=told)
-        elif told is not None:
-            drawn = identifiability_map(told)
+            drawn = ambiguity_map(opened, identifiability=columns)
+        elif columns is not None:
+            drawn = identifiability_map(columns)
         elif results is not None:
             drawn = evaluation_map(results, opened)
         elif newer is not None:

@@ -64,7 +64,7 @@ def reproduce(
             bar.close()  # one at a time
             return bar.enter_context(progress(label))
 
-        found = run(
+        reproduction = run(
             out,
             database=database,
             size=size.value,
@@ -75,7 +75,7 @@ def reproduce(
             progress=show,
         )
     with progress("drawing the report"):
-        report = reproduction_report(found)
+        report = reproduction_report(reproduction)
         write_report(report, out)
     numbers = [
         (section, number)
