@@ -45,7 +45,7 @@ def fetch_layers(
     http: HttpSpec,
     filters: bool = True,
     progress: Callable[[int, int], None] | None = None,
-    tell: Callable[[str], None] | None = None,
+    tell: Callable[[str], None] = lambda _: None,
 ) -> tuple[RawLayer, ...]:
     """Fetch layers of an area from the service that a catalogue names, and read them.
 
@@ -80,37 +80,25 @@ def fetch_layers(
             f"catalogue {catalog.name!r} has no service to fetch from; use `semsig load` on files."
         )
         raise InputError(msg)
-    if catalog.reader == "osm_file":
-        files = overpass.fetch_layers(
-            specs, area=area, endpoints=catalog.endpoints, cache=cache, spec=http, progress=progress
-        )
-        # Tiles and long outlines cover more than the area.
-        found = [
-            clip_layer(layer, area)
-            for layer in overpass_json.read_layers(files, specs, filters=filters)
-        ]
-        if tell is not None:
-            for layer in found:
-                tell(f"{layer.spec.name}: {len(layer.table):,} rows")
-        return tuple(found)
-    fetched = opendatasoft.fetch_layers(
-        specs,
-        portal=catalog.endpoints[0],
-        area=area,
-        cache=cache,
-        spec=http,
-        progress=None if progress is None else lambda _, done, total: progress(done, total),
-    )
     layers: list[RawLayer] = []
-    for spec, file in fetched:
-        read = reader(catalog.reader)(file.path, [spec], filters=filters)
-        layers.extend(clip_layer(layer, area) for layer in read)
-        if tell is not None:
-            source = "the cache" if file.from_cache else "the portal"
-            tell(
-                f"{spec.name}: {sum(layer.counts.read for layer in read):,} rows, "
-                f"{file.bytes / 1e6:.2f} MB, from {source}, fetched {file.fetched_at}"
-            )
+    if catalog.reader == "osm_file":
+        tiles = overpass.fetch_layers(
+            specs, endpoints=catalog.endpoints, area=area, cache=cache, spec=http, progress=progress
+        )
+        for layer in overpass_json.read_layers(tiles, specs, filters=filters):
+            layers.append(clip_layer(layer, area))
+            tell(f"{layer.spec.name}: {len(layers[-1].table):,} rows")
+        return tuple(layers)
+    for spec, file in opendatasoft.fetch_layers(
+        specs, endpoints=catalog.endpoints, area=area, cache=cache, spec=http, progress=progress
+    ):
+        (layer,) = opendatasoft.read_layers(file.path, [spec], filters=filters)
+        layers.append(clip_layer(layer, area))
+        origin = "the cache" if file.from_cache else "the portal"
+        tell(
+            f"{spec.name}: {layer.counts.read:,} rows, {file.bytes / 1e6:.2f} MB, from {origin}, "
+            f"fetched {file.fetched_at}"
+        )
     return tuple(layers)
 
 

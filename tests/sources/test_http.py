@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 from sentences import assert_sentence
-from servers import Answer, Server, published, zipped
+from servers import Answer, published, zipped
 
 from semsig_gis import __version__
 from semsig_gis.core.errors import InputError, SourceError
@@ -24,26 +24,17 @@ from semsig_gis.sources.http.fetch import NotCachedError, TooLargeError, fetch, 
 from semsig_gis.sources.http.wire import HttpError, HttpSpec
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
+    from collections.abc import Callable
     from pathlib import Path
 
-    from servers import Seen
+    from servers import Seen, Server
 
     from semsig_gis.sources.http.cache import Fetched
 
+    Get = Callable[..., Fetched]
+
 CONTENT = json.dumps({"trees": list(range(5_000))}).encode()
 JSON = ("application/json",)
-
-
-@pytest.fixture
-def server() -> Iterator[Server]:
-    with Server() as running:
-        yield running
-
-
-@pytest.fixture
-def cache(tmp_path: Path) -> Cache:
-    return Cache(tmp_path / "cache")
 
 
 @pytest.fixture
@@ -57,7 +48,7 @@ def spec(slept: list[float]) -> HttpSpec:
 
 
 @pytest.fixture
-def get(server: Server, cache: Cache, spec: HttpSpec) -> Callable[..., Fetched]:
+def get(server: Server, cache: Cache, spec: HttpSpec) -> Get:
     """Fetch a path of the server; keywords change the specification or are those of `fetch`."""
     fields = {field.name for field in dataclasses.fields(HttpSpec)}
 
@@ -85,7 +76,7 @@ def leftovers(cache: Cache) -> set[str]:
 # --- What works ---------------------------------------------------------------------------------
 
 
-def test_a_file_arrives_whole_and_described(server: Server, get: Callable[..., Fetched]) -> None:
+def test_a_file_arrives_whole_and_described(server: Server, get: Get) -> None:
     server.on("/trees", Answer(CONTENT, type="application/json; charset=utf-8"))
     seen: list[tuple[int, int]] = []
     fetched = get(
@@ -106,11 +97,12 @@ def test_a_file_arrives_whole_and_described(server: Server, get: Callable[..., F
     (asked,) = server.seen
     assert asked.query == {"limit": "-1", "where": "a=1"}
     assert asked.headers["user-agent"].startswith(f"semsig_gis/{__version__} (")
+    assert get(suffix=".txt").path.suffix == ".txt"
 
 
 def test_no_password_is_taken_from_the_users_files(
     server: Server,
-    get: Callable[..., Fetched],
+    get: Get,
     tmp_path: Path,
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
@@ -124,23 +116,19 @@ def test_no_password_is_taken_from_the_users_files(
 
 
 @pytest.mark.parametrize("chunked", [False, True])
-def test_a_packed_body_is_unpacked(
-    server: Server, get: Callable[..., Fetched], *, chunked: bool
-) -> None:
+def test_a_packed_body_is_unpacked(server: Server, get: Get, *, chunked: bool) -> None:
     server.on("/trees", dataclasses.replace(zipped(CONTENT), chunked=chunked))
     assert get().path.read_bytes() == CONTENT
     assert server.seen[0].headers["accept-encoding"] == "gzip"
 
 
-def test_a_packed_body_may_have_several_members(
-    server: Server, get: Callable[..., Fetched]
-) -> None:
+def test_a_packed_body_may_have_several_members(server: Server, get: Get) -> None:
     body = gzip.compress(CONTENT[:9]) + gzip.compress(CONTENT[9:])
     server.on("/trees", Answer(body, headers={"Content-Encoding": "gzip"}))
     assert get().path.read_bytes() == CONTENT
 
 
-def test_a_form_is_posted(server: Server, get: Callable[..., Fetched]) -> None:
+def test_a_form_is_posted(server: Server, get: Get) -> None:
     server.on("/trees", lambda seen: Answer(json.dumps(seen.form).encode()))
     assert json.loads(get(data={"data": "node;out é;"}).path.read_bytes()) == {
         "data": "node;out é;"
@@ -149,21 +137,7 @@ def test_a_form_is_posted(server: Server, get: Callable[..., Fetched]) -> None:
     assert json.loads(get(data={"data": "way;out;"}).path.read_bytes()) == {"data": "way;out;"}
 
 
-@pytest.mark.parametrize(
-    ("type_", "suffix"),
-    [("text/csv", ".csv"), ("application/geo+json", ".geojson"), ("", ".bin")],
-)
-def test_the_suffix_says_what_it_is(
-    server: Server, get: Callable[..., Fetched], type_: str, suffix: str
-) -> None:
-    server.on("/trees", Answer(CONTENT, type=type_))
-    assert get().path.suffix == suffix
-    assert get("/trees?again", suffix=".txt").path.suffix == ".txt"
-
-
-def test_a_redirect_within_the_host_is_followed(
-    server: Server, get: Callable[..., Fetched]
-) -> None:
+def test_a_redirect_within_the_host_is_followed(server: Server, get: Get) -> None:
     server.on("/trees", Answer(status=302, headers={"Location": "/moved/trees?x=1"}))
     server.on("/moved/trees", Answer(CONTENT))
     fetched = get(params={"y": 2})
@@ -183,46 +157,30 @@ def test_a_short_text_is_read(server: Server, spec: HttpSpec) -> None:
 
 @pytest.mark.parametrize("status", [429, 500, 502, 503, 504])
 def test_a_passing_failure_is_waited_out(
-    server: Server, get: Callable[..., Fetched], slept: list[float], status: int
+    server: Server, get: Get, slept: list[float], status: int
 ) -> None:
     server.on("/trees", Answer(status=status), Answer(status=status), Answer(CONTENT))
     assert get().path.read_bytes() == CONTENT
     assert slept == [1.0, 2.0]
 
 
-def test_retry_after_in_seconds_is_honoured(
-    server: Server, get: Callable[..., Fetched], slept: list[float]
-) -> None:
-    server.on("/trees", Answer(status=429, headers={"Retry-After": "17"}), Answer(CONTENT))
-    get()
-    assert slept == [17.0]
-
-
-def test_retry_after_as_a_date_is_honoured(
-    server: Server, get: Callable[..., Fetched], slept: list[float]
-) -> None:
+def test_a_server_says_how_long_to_wait(server: Server, get: Get, slept: list[float]) -> None:
     date = email.utils.format_datetime(datetime.now(UTC) + timedelta(seconds=40), usegmt=True)
     past = "Thu, 01 Jan 2015 00:00:00 GMT"
-    busy = [Answer(status=503, headers={"Retry-After": text}) for text in (date, past)]
-    server.on("/trees", *busy, Answer(CONTENT))
-    get()
-    assert 35 < slept[0] <= 40
-    assert slept[1] == 0
-
-
-def test_retry_after_that_means_nothing_is_ignored(
-    server: Server, get: Callable[..., Fetched], slept: list[float]
-) -> None:
-    server.on("/trees", Answer(status=429, headers={"Retry-After": "soon"}), Answer(CONTENT))
-    get()
-    assert slept == [1.0]
+    for texts in (("17", "soon"), (date, past)):
+        busy = [Answer(status=503, headers={"Retry-After": text}) for text in texts]
+        server.on("/trees", *busy, Answer(CONTENT))
+        get(params={"say": texts[0]})
+    assert slept[:2] == [17.0, 2.0]  # what means nothing is ignored
+    assert 35 < slept[2] <= 40
+    assert slept[3] == 0
 
 
 @pytest.mark.parametrize(
     "validators", [{"etag": '"7"'}, {"modified": "Thu, 01 Jan 2026 00:00:00 GMT"}]
 )
 def test_a_cut_download_goes_on_where_it_was_cut(
-    server: Server, get: Callable[..., Fetched], validators: dict[str, Any]
+    server: Server, get: Get, validators: dict[str, Any]
 ) -> None:
     server.on("/trees", published(CONTENT, cuts=[1_000, 2_000], **validators))
     assert get().path.read_bytes() == CONTENT
@@ -231,9 +189,7 @@ def test_a_cut_download_goes_on_where_it_was_cut(
     assert server.seen[1].headers["if-range"] in validators.values()
 
 
-def test_a_cut_download_of_a_packed_body_goes_on(
-    server: Server, get: Callable[..., Fetched]
-) -> None:
+def test_a_cut_download_of_a_packed_body_goes_on(server: Server, get: Get) -> None:
     packed = gzip.compress(CONTENT)
     plain = published(packed, etag='"7"', cuts=[500])
 
@@ -248,7 +204,7 @@ def test_a_cut_download_of_a_packed_body_goes_on(
     assert server.seen[1].headers["range"] == "bytes=500-"
 
 
-def test_a_cut_download_goes_on_in_a_later_run(server: Server, get: Callable[..., Fetched]) -> None:
+def test_a_cut_download_goes_on_in_a_later_run(server: Server, get: Get) -> None:
     server.on("/trees", published(CONTENT, etag='"7"', cuts=[1_000]))
     refused(get, "cut the connection", attempts=1)
     seen: list[int] = []
@@ -261,7 +217,7 @@ def test_a_cut_download_goes_on_in_a_later_run(server: Server, get: Callable[...
     "what", [{"etag": '"7"', "ranges": False}, {}, {"etag": 'W/"7"'}], ids=["ranges", "tag", "weak"]
 )
 def test_a_cut_download_starts_again_where_it_cannot_go_on(
-    server: Server, get: Callable[..., Fetched], what: dict[str, Any]
+    server: Server, get: Get, what: dict[str, Any]
 ) -> None:
     server.on("/trees", published(CONTENT, cuts=[1_000], **what))
     assert get().path.read_bytes() == CONTENT
@@ -270,16 +226,14 @@ def test_a_cut_download_starts_again_where_it_cannot_go_on(
 
 @pytest.mark.parametrize("chunked", [False, True])
 def test_a_cut_is_noticed_however_the_length_is_said(
-    server: Server, get: Callable[..., Fetched], *, chunked: bool
+    server: Server, get: Get, *, chunked: bool
 ) -> None:
     server.on("/trees", Answer(CONTENT, cut=70_000 // 3, chunked=chunked), Answer(CONTENT))
     assert get().path.read_bytes() == CONTENT
     assert len(server.seen) == 2
 
 
-def test_a_file_that_changed_meanwhile_starts_again(
-    server: Server, get: Callable[..., Fetched]
-) -> None:
+def test_a_file_that_changed_meanwhile_starts_again(server: Server, get: Get) -> None:
     newer = b'{"trees": []}'
     server.on("/trees", published(CONTENT, etag='"7"', cuts=[1_000]), published(newer, etag='"8"'))
     assert get().path.read_bytes() == newer
@@ -295,24 +249,20 @@ def test_a_file_that_changed_meanwhile_starts_again(
     ],
     ids=["elsewhere", "other edition", "beyond"],
 )
-def test_a_wrong_part_is_not_glued_on(
-    server: Server, get: Callable[..., Fetched], wrong: Answer
-) -> None:
+def test_a_wrong_part_is_not_glued_on(server: Server, get: Get, wrong: Answer) -> None:
     server.on("/trees", published(CONTENT, etag='"7"', cuts=[1_000]), wrong, Answer(CONTENT))
     assert get().path.read_bytes() == CONTENT
     assert "range" not in server.seen[2].headers
 
 
-def test_a_part_that_nobody_asked_for_is_not_the_file(
-    server: Server, get: Callable[..., Fetched]
-) -> None:
+def test_a_part_that_nobody_asked_for_is_not_the_file(server: Server, get: Get) -> None:
     server.on("/trees", Answer(CONTENT[:50], status=206), Answer(CONTENT))
     assert get().path.read_bytes() == CONTENT
 
 
 @pytest.mark.parametrize("damage", [lambda body: body[:-20], lambda body: b"\0" + body[1:]])
 def test_a_damaged_gzip_body_is_fetched_again(
-    server: Server, get: Callable[..., Fetched], damage: Callable[[bytes], bytes]
+    server: Server, get: Get, damage: Callable[[bytes], bytes]
 ) -> None:
     bad = Answer(damage(gzip.compress(CONTENT)), headers={"Content-Encoding": "gzip"})
     server.on("/trees", bad, zipped(CONTENT))
@@ -322,9 +272,7 @@ def test_a_damaged_gzip_body_is_fetched_again(
 # --- What ends in a sentence --------------------------------------------------------------------
 
 
-def test_a_server_that_stays_busy_is_given_up(
-    server: Server, get: Callable[..., Fetched], slept: list[float]
-) -> None:
+def test_a_server_that_stays_busy_is_given_up(server: Server, get: Get, slept: list[float]) -> None:
     server.on("/trees", Answer(status=504))
     error = refused(get, f"127.0.0.1:{server.port} answered 504 Gateway Timeout, 3 times")
     assert isinstance(error, HttpError)
@@ -333,7 +281,7 @@ def test_a_server_that_stays_busy_is_given_up(
 
 
 def test_a_server_that_asks_to_wait_too_long_is_not_waited_for(
-    server: Server, get: Callable[..., Fetched], slept: list[float]
+    server: Server, get: Get, slept: list[float]
 ) -> None:
     server.on("/trees", Answer(status=429, headers={"Retry-After": "3600"}))
     refused(get, "429 Too Many Requests", "asks to wait 3600 s")
@@ -341,18 +289,14 @@ def test_a_server_that_asks_to_wait_too_long_is_not_waited_for(
     assert len(server.seen) == 1
 
 
-def test_something_that_is_not_there_is_not_asked_for_twice(
-    server: Server, get: Callable[..., Fetched]
-) -> None:
+def test_something_that_is_not_there_is_not_asked_for_twice(server: Server, get: Get) -> None:
     error = refused(get, "404 Not Found", "/trees (there is no such thing)")
     assert isinstance(error, HttpError)
     assert error.status == 404
     assert len(server.seen) == 1
 
 
-def test_what_a_server_says_of_an_error_is_told_in_short(
-    server: Server, get: Callable[..., Fetched]
-) -> None:
+def test_what_a_server_says_of_an_error_is_told_in_short(server: Server, get: Get) -> None:
     said = json.dumps({"message": "Unknown field: a. Write\nanother one."}).encode()
     server.on("/trees", dataclasses.replace(zipped(said), status=400))
     refused(get, "400 Bad Request", "(Unknown field: a, Write another one)")
@@ -360,9 +304,7 @@ def test_what_a_server_says_of_an_error_is_told_in_short(
     refused(get, "403 Forbidden to", "/trees;")
 
 
-def test_another_kind_of_content_is_refused(
-    server: Server, cache: Cache, get: Callable[..., Fetched]
-) -> None:
+def test_another_kind_of_content_is_refused(server: Server, cache: Cache, get: Get) -> None:
     server.on("/trees", Answer(b"<html>Sorry</html>", type="text/html"))
     refused(get, "sent text/html where application/json was expected", accept=JSON)
     assert leftovers(cache) == set()
@@ -372,9 +314,7 @@ def test_another_kind_of_content_is_refused(
     "target",
     ["http://localhost:{port}/trees", "http://127.0.0.1:1/trees", "//localhost:{port}/trees"],
 )
-def test_a_redirect_to_another_host_is_refused(
-    server: Server, get: Callable[..., Fetched], target: str
-) -> None:
+def test_a_redirect_to_another_host_is_refused(server: Server, get: Get, target: str) -> None:
     location = target.format(port=server.port)
     server.on("/trees", Answer(status=301, headers={"Location": location}))
     refused(get, f"127.0.0.1:{server.port} sends us to {location.split('/')[2]}, which neither")
@@ -382,9 +322,7 @@ def test_a_redirect_to_another_host_is_refused(
 
 
 @pytest.mark.parametrize("target", ["file:///etc/hostname", "http://127.0.0.1:port/", ""])
-def test_a_redirect_to_nowhere_is_refused(
-    server: Server, get: Callable[..., Fetched], target: str
-) -> None:
+def test_a_redirect_to_nowhere_is_refused(server: Server, get: Get, target: str) -> None:
     server.on("/trees", Answer(status=308, headers={"Location": target}))
     refused(get, f"127.0.0.1:{server.port}")
 
@@ -411,7 +349,7 @@ def test_the_only_way_to_another_scheme_is_the_safer_one(
         refused(lambda: _require_same_host(source, target), "sends us to")
 
 
-def test_redirects_in_circles_end(server: Server, get: Callable[..., Fetched]) -> None:
+def test_redirects_in_circles_end(server: Server, get: Get) -> None:
     server.on("/trees", Answer(status=302, headers={"Location": "/trees"}))
     refused(get, "in circles")
     assert len(server.seen) < 10
@@ -419,7 +357,7 @@ def test_redirects_in_circles_end(server: Server, get: Callable[..., Fetched]) -
 
 @pytest.mark.parametrize(("drip", "words"), [((1, 0.02), "too slowly"), ((1, 30.0), "stopped")])
 def test_a_slow_drip_is_not_waited_for(
-    server: Server, get: Callable[..., Fetched], drip: tuple[int, float], words: str
+    server: Server, get: Get, drip: tuple[int, float], words: str
 ) -> None:
     server.on("/trees", Answer(CONTENT, drip=drip))
     start = time.monotonic()
@@ -441,7 +379,7 @@ def test_a_server_that_says_nothing_is_not_waited_for() -> None:
 
 @pytest.mark.parametrize("chunked", [False, True])
 def test_a_gzip_bomb_does_not_go_off(
-    server: Server, cache: Cache, get: Callable[..., Fetched], *, chunked: bool
+    server: Server, cache: Cache, get: Get, *, chunked: bool
 ) -> None:
     bomb = zipped(b"\0" * 50_000_000)
     assert len(bomb.body) < 100_000
@@ -453,23 +391,19 @@ def test_a_gzip_bomb_does_not_go_off(
 
 @pytest.mark.parametrize("chunked", [False, True])
 def test_a_body_that_is_too_large_is_refused(
-    server: Server, cache: Cache, get: Callable[..., Fetched], *, chunked: bool
+    server: Server, cache: Cache, get: Get, *, chunked: bool
 ) -> None:
     server.on("/trees", Answer(CONTENT, chunked=chunked))
     refused(get, "more than the 9,999 bytes", max_bytes=9_999)
     assert leftovers(cache) == set()
 
 
-def test_a_packing_that_was_not_asked_for_is_refused(
-    server: Server, get: Callable[..., Fetched]
-) -> None:
+def test_a_packing_that_was_not_asked_for_is_refused(server: Server, get: Get) -> None:
     server.on("/trees", Answer(CONTENT, headers={"Content-Encoding": "br"}))
     refused(get, "packed as br")
 
 
-def test_what_the_caller_does_not_want_is_not_kept(
-    server: Server, cache: Cache, get: Callable[..., Fetched]
-) -> None:
+def test_what_the_caller_does_not_want_is_not_kept(server: Server, cache: Cache, get: Get) -> None:
     def check(path: Path) -> None:
         try:
             json.loads(path.read_bytes())
@@ -526,9 +460,7 @@ def test_a_cache_that_cannot_be_written_is_said(server: Server, tmp_path: Path) 
     assert_sentence(caught.value, "cache folder", "choose a folder")
 
 
-def test_a_full_disk_is_said(
-    server: Server, get: Callable[..., Fetched], monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_full_disk_is_said(server: Server, get: Get, monkeypatch: pytest.MonkeyPatch) -> None:
     def full(*_: object) -> None:
         raise OSError(28, "No space left on device")
 
@@ -550,7 +482,7 @@ def test_a_full_disk_is_said(
     ],
 )
 def test_a_second_run_asks_whether_the_file_changed(
-    server: Server, get: Callable[..., Fetched], validators: dict[str, Any], header: str
+    server: Server, get: Get, validators: dict[str, Any], header: str
 ) -> None:
     server.on("/trees", published(CONTENT, **validators))
     first = get()
@@ -565,9 +497,7 @@ def test_a_second_run_asks_whether_the_file_changed(
     assert first.path.read_bytes() == CONTENT  # for who was given its path just now
 
 
-def test_a_copy_that_nobody_can_confirm_is_used_for_a_while(
-    server: Server, get: Callable[..., Fetched]
-) -> None:
+def test_a_copy_that_nobody_can_confirm_is_used_for_a_while(server: Server, get: Get) -> None:
     server.on("/trees", Answer(CONTENT))
     get()
     assert get().from_cache
@@ -577,7 +507,7 @@ def test_a_copy_that_nobody_can_confirm_is_used_for_a_while(
 
 
 def test_a_superseded_copy_goes_when_nobody_has_used_it_for_long(
-    server: Server, cache: Cache, get: Callable[..., Fetched], monkeypatch: pytest.MonkeyPatch
+    server: Server, cache: Cache, get: Get, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(_http_cache, "KEPT_S", -60.0)
     server.on("/trees", Answer(CONTENT), Answer(b"{}"))
@@ -587,7 +517,7 @@ def test_a_superseded_copy_goes_when_nobody_has_used_it_for_long(
     assert leftovers(cache) == {"json", "meta.json"}
 
 
-def test_offline_asks_nobody(server: Server, get: Callable[..., Fetched]) -> None:
+def test_offline_asks_nobody(server: Server, get: Get) -> None:
     server.on("/trees", published(CONTENT, etag='"7"'))
     first = get(params={"a": 1})
     again = get(params={"a": 1}, offline=True)
@@ -605,9 +535,7 @@ def test_mirrors_share_what_they_sent(server: Server, cache: Cache, spec: HttpSp
     assert len(server.seen) == 1
 
 
-def test_a_server_that_fails_leaves_the_copy_there_was(
-    server: Server, get: Callable[..., Fetched]
-) -> None:
+def test_a_server_that_fails_leaves_the_copy_there_was(server: Server, get: Get) -> None:
     server.on("/trees", published(CONTENT, etag='"7"'), Answer(status=503))
     first = get()
     refused(get, "503", f"work offline with the copy of {first.fetched_at}")
@@ -616,7 +544,7 @@ def test_a_server_that_fails_leaves_the_copy_there_was(
 
 @pytest.mark.parametrize("how", ["body", "gone", "sidecar"])
 def test_a_damaged_copy_is_noticed_and_fetched_again(
-    server: Server, cache: Cache, get: Callable[..., Fetched], how: str
+    server: Server, cache: Cache, get: Get, how: str
 ) -> None:
     server.on("/trees", published(CONTENT, etag='"7"'))
     path = get().path
@@ -633,7 +561,7 @@ def test_a_damaged_copy_is_noticed_and_fetched_again(
     assert get(offline=True).path.read_bytes() == CONTENT
 
 
-def test_an_unchanged_file_needs_no_part(server: Server, get: Callable[..., Fetched]) -> None:
+def test_an_unchanged_file_needs_no_part(server: Server, get: Get) -> None:
     # A newer edition was cut, then the former one came back.
     plain = published(CONTENT, etag='"7"')
     server.on("/trees", plain, published(CONTENT * 2, etag='"8"', cuts=[10]), plain)

@@ -19,23 +19,25 @@ import shapely
 from hypothesis import given
 from hypothesis import strategies as st
 from sentences import assert_sentence
-from servers import Answer, Server, published
+from servers import Answer, published
 
-from semsig_gis.core.errors import CatalogError, CrsError, InputError, SourceError
+from semsig_gis.core.errors import CatalogError, CrsError, SourceError
 from semsig_gis.sources.area import Area
-from semsig_gis.sources.http.cache import Cache
-from semsig_gis.sources.http.wire import HttpSpec
 from semsig_gis.sources.layers import ClassBy, LayerSpec
 from semsig_gis.sources.opendatasoft.fields import find_field, fold
 from semsig_gis.sources.opendatasoft.reader import _outline, fetch_layers, read_layers
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
+    from collections.abc import Callable
     from pathlib import Path
 
-    from servers import Seen
+    from servers import Seen, Server
 
     from semsig_gis.sources import RawLayer
+    from semsig_gis.sources.http.cache import Cache, Fetched
+    from semsig_gis.sources.http.wire import HttpSpec
+
+    Fetch = Callable[..., Fetched]
 
 TREES = LayerSpec(
     name="trees",
@@ -580,39 +582,38 @@ def test_a_page_of_a_longer_answer_is_told(
 
 # --- A portal -----------------------------------------------------------------------------------
 
-CATALOG = "/api/explore/v2.1/catalog/datasets"
+DATASETS = "/api/explore/v2.1/catalog/datasets"
+EXPORT = f"{DATASETS}/les-arbres/exports/geojson"
 TYPES = {
     "idbase": "int",
     "domanialite": "text",
     "geo_shape": "geo_shape",
     "geo_point_2d": "geo_point_2d",
 }
-MODIFIED = "Sat, 21 Nov 2026 00:00:00 GMT"
-EXPORT = f"{CATALOG}/les-arbres/exports/geojson"
+ROWS = [v21(*place) for place in PLACES]
 
 
 class Portal:
     """Plays the Explore API v2.1 for one dataset, with as much of its language as we speak."""
 
-    def __init__(
-        self, server: Server, rows: list[dict[str, Any]], dataset: str = "les-arbres"
-    ) -> None:
-        self.url = server.url
-        self._rows = rows
-        path = f"{CATALOG}/{dataset}"
-        fields = [{"name": name, "type": kind} for name, kind in TYPES.items()]
-        described = json.dumps({"dataset_id": dataset, "fields": fields}).encode()
-        server.on(path, published(described, etag='"d"'))
-        for kind in ("geojson", "csv", "parquet"):
-            server.on(f"{path}/exports/{kind}", getattr(self, kind))
+    def __init__(self, server: Server) -> None:
+        described = {"fields": [{"name": name, "type": kind} for name, kind in TYPES.items()]}
+        server.on(f"{DATASETS}/les-arbres", published(json.dumps(described).encode(), etag='"d"'))
+        server.on(EXPORT, self.geojson)
 
-    def _chosen(self, seen: Seen) -> list[dict[str, Any]]:
+    def geojson(self, seen: Seen) -> Answer:
         assert seen.query["limit"] == "-1"
         conditions = re.findall(r"\((.+?)\)(?: and (?=\()|$)", seen.query.get("where", ""))
-        kept = [row for row in self._rows if all(self._holds(text, row) for text in conditions)]
         names = seen.query.get("select", ",".join(TYPES)).split(",")
         assert set(names) <= set(TYPES)
-        return [{name: row[name] for name in names} for row in kept]
+        features = []
+        for row in ROWS:
+            if all(self._holds(text, row) for text in conditions):
+                properties = {name: row[name] for name in names}
+                geometry = properties.pop("geo_shape")["geometry"]
+                features.append({"type": "Feature", "geometry": geometry, "properties": properties})
+        content = {"type": "FeatureCollection", "features": features}
+        return Answer(json.dumps(content).encode(), type="application/geo+json", chunked=True)
 
     @staticmethod
     def _holds(condition: str, row: dict[str, Any]) -> bool:
@@ -628,72 +629,42 @@ class Portal:
         assert equals, condition
         return bool(row[equals[1]] == equals[2])
 
-    def geojson(self, seen: Seen) -> Answer:
-        features = []
-        for row in self._chosen(seen):
-            geometry = row.pop("geo_shape")["geometry"]
-            features.append({"type": "Feature", "geometry": geometry, "properties": row})
-        content = {"type": "FeatureCollection", "features": features}
-        return Answer(json.dumps(content).encode(), type="application/geo+json", chunked=True)
-
-    def csv(self, seen: Seen) -> Answer:
-        assert (seen.query["delimiter"], seen.query["use_labels"]) == (";", "false")
-        rows = self._chosen(seen)
-        names = seen.query.get("select", ",".join(TYPES)).split(",")
-        for row in rows:
-            row["geo_point_2d"] = "{lat}, {lon}".format(**row["geo_point_2d"])
-            row["geo_shape"] = json.dumps(row["geo_shape"]["geometry"])
-        text = "\ufeff" + as_csv(names, [[row[name] for name in names] for row in rows])
-        return Answer(text.encode(), type="text/csv; charset=utf-8", chunked=True)
-
-    def parquet(self, seen: Seen) -> Answer:
-        rows = self._chosen(seen)
-        columns: dict[str, Any] = {name: [row[name] for row in rows] for name in rows[0]}
-        for name in ("geo_shape", "geo_point_2d"):
-            points = [row["geo_point_2d"] for row in rows]
-            columns[name] = [shapely.to_wkb(shapely.Point(p["lon"], p["lat"])) for p in points]
-        return Answer(parquet(columns), type="application/octet-stream")
-
 
 @pytest.fixture
-def server() -> Iterator[Server]:
-    with Server() as running:
-        yield running
+def fetched(server: Server, cache: Cache, quick: HttpSpec) -> Fetch:
+    """Fetch one layer from the server."""
+
+    def fetch(layer: LayerSpec = TREES, **options: Any) -> Fetched:  # noqa: ANN401
+        given = {"endpoints": [server.url], "cache": cache, "spec": quick, **options}
+        ((spec, file),) = fetch_layers([layer], **given)
+        assert spec is layer
+        return file
+
+    return fetch
 
 
-@pytest.fixture
-def cache(tmp_path: Path) -> Cache:
-    return Cache(tmp_path / "cache")
+def box(west: float, south: float, east: float, north: float) -> Area:
+    return Area(shapely.box(west, south, east, north), "a box")
 
 
-QUICK = HttpSpec(timeout=(2.0, 2.0), attempts=3, backoff_s=0.0, sleep=lambda _: None)
-ROWS = [v21(*place) for place in PLACES]
-
-
-@pytest.mark.parametrize("kind", ["geojson", "csv", "parquet"])
-def test_an_export_is_fetched_and_read(server: Server, cache: Cache, kind: Any) -> None:  # noqa: ANN401
-    portal = Portal(server, ROWS)
-    ((spec, file),) = fetch_layers([TREES], portal=portal.url, cache=cache, spec=QUICK, format=kind)
-    assert spec is TREES
-    layer = read(file.path)
+def test_an_export_is_fetched_and_read(server: Server, fetched: Fetch) -> None:
+    Portal(server)
+    layer = read(fetched().path)
     assert layer.table["source_id"].tolist() == ["11", "12", "13"]
     assert xy(layer) == [place[:2] for place in PLACES]
-    assert server.paths() == [f"{CATALOG}/les-arbres", f"{CATALOG}/les-arbres/exports/{kind}"]
+    assert server.paths() == [f"{DATASETS}/les-arbres", EXPORT]
+    assert len(read(fetched(area=box(5.0, 48.0, 5.1, 48.1)).path).table) == 0  # which is no fault
 
 
-@pytest.mark.parametrize("kind", ["geojson", "csv", "parquet"])
-def test_what_is_not_wanted_is_not_sent(server: Server, cache: Cache, kind: Any) -> None:  # noqa: ANN401
-    portal = Portal(server, ROWS)
+def test_what_is_not_wanted_is_not_sent(server: Server, fetched: Fetch) -> None:
+    Portal(server)
     spec = replace(
         TREES,
         server_where="domanialite = 'Alignement'",
         select=("IDBASE",),
         where=(("DOMANIALITE", ("Alignement",)),),
     )
-    area = Area(shapely.box(2.0, 48.0, 2.36, 48.9), "the west")
-    ((_, file),) = fetch_layers(
-        [spec], portal=f"{portal.url}/", area=area, cache=cache, spec=QUICK, format=kind
-    )
+    file = fetched(spec, endpoints=[f"{server.url}/"], area=box(2.0, 48.0, 2.36, 48.9))
     query = server.seen[-1].query
     assert query["where"] == (
         "(domanialite = 'Alignement') and "
@@ -705,19 +676,12 @@ def test_what_is_not_wanted_is_not_sent(server: Server, cache: Cache, kind: Any)
     assert (layer.counts.read, layer.counts.filtered) == (1, 0)
 
 
-def test_an_area_may_be_a_polygon(server: Server, cache: Cache) -> None:
-    portal = Portal(server, ROWS)
+def test_an_area_may_be_a_polygon(server: Server, fetched: Fetch) -> None:
+    Portal(server)
     area = Area(shapely.Polygon([(2.355, 48.855), (2.4, 48.855), (2.38, 48.9)]), "a corner")
-    ((_, file),) = fetch_layers([TREES], portal=portal.url, area=area, cache=cache, spec=QUICK)
+    file = fetched(area=area)
     assert server.seen[-1].query["where"].startswith("(intersects(geo_point_2d, geom'POLYGON ((")
     assert read(file.path).table["source_id"].tolist() == ["12", "13"]
-
-
-def test_an_area_without_objects_is_no_fault(server: Server, cache: Cache) -> None:
-    portal = Portal(server, ROWS)
-    area = Area(shapely.box(5.0, 48.0, 5.1, 48.1), "elsewhere")
-    ((_, file),) = fetch_layers([TREES], portal=portal.url, area=area, cache=cache, spec=QUICK)
-    assert len(read(file.path).table) == 0
 
 
 @given(st.integers(3, 3_000), st.floats(0.0, 0.5), st.integers(0, 10**6))
@@ -736,188 +700,158 @@ def test_a_long_outline_is_shortened_and_loses_nothing(
     assert shapely.from_wkt(text).buffer(1e-7).covers(area)
 
 
-def test_a_second_run_is_answered_from_the_cache(server: Server, cache: Cache) -> None:
-    Portal(server, ROWS)
+def test_a_second_run_is_answered_from_the_cache(
+    server: Server, fetched: Fetch, quick: HttpSpec
+) -> None:
+    offline = replace(quick, offline=True)
+    with pytest.raises(SourceError) as caught:
+        fetched(spec=offline)
+    assert_sentence(caught.value, "les-arbres", "cache")
+    assert server.seen == []
+    Portal(server)
+    date = "Sat, 21 Nov 2026 00:00:00 GMT"
     body = str(FILES["v21.geojson"]).encode()
-    server.on(EXPORT, published(body, type="application/geo+json", modified=MODIFIED))
-    first, second = (
-        fetch_layers([TREES], portal=server.url, cache=cache, spec=QUICK)[0][1] for _ in range(2)
-    )
+    server.on(EXPORT, published(body, type="application/geo+json", modified=date))
+    first, second = fetched(), fetched()
     assert (first.from_cache, second.from_cache) == (False, True)
     assert (first.sha256, first.path) == (second.sha256, second.path)
-    assert server.seen[-1].headers["if-modified-since"] == MODIFIED
+    assert server.seen[-1].headers["if-modified-since"] == date
     asked = len(server.seen)
-    offline = replace(QUICK, offline=True)
-    ((_, third),) = fetch_layers([TREES], portal=server.url, cache=cache, spec=offline)
-    assert third.sha256 == first.sha256
+    assert fetched(spec=offline).sha256 == first.sha256
     assert len(server.seen) == asked
 
 
-def test_offline_without_a_copy(server: Server, cache: Cache) -> None:
-    Portal(server, ROWS)
-    with pytest.raises(SourceError) as caught:
-        fetch_layers([TREES], portal=server.url, cache=cache, spec=replace(QUICK, offline=True))
-    assert_sentence(caught.value, "les-arbres", "cache")
-    assert server.seen == []
-
-
-def test_a_busy_portal_is_asked_again(server: Server, cache: Cache) -> None:
-    portal = Portal(server, ROWS)
+def test_a_busy_portal_is_asked_again(server: Server, fetched: Fetch, quick: HttpSpec) -> None:
+    portal = Portal(server)
     waits: list[float] = []
     busy = Answer(b'{"message": "slow down"}', status=429, headers={"Retry-After": "7"})
     server.on(EXPORT, busy, busy, portal.geojson)
-    spec = replace(QUICK, sleep=waits.append)
-    ((_, file),) = fetch_layers([TREES], portal=portal.url, cache=cache, spec=spec)
-    assert len(read(file.path).table) == 3
+    assert len(read(fetched(spec=replace(quick, sleep=waits.append)).path).table) == 3
     assert waits == [7.0, 7.0]
 
 
-def test_a_cut_connection_goes_on_where_it_was_cut(server: Server, cache: Cache) -> None:
-    Portal(server, ROWS)
+def test_a_cut_connection_goes_on_where_it_was_cut(server: Server, fetched: Fetch) -> None:
+    Portal(server)
     body = str(FILES["v21.geojson"]).encode()
     server.on(EXPORT, published(body, type="application/geo+json", etag='"1"', cuts=[100]))
-    seen: list[tuple[str, int, int]] = []
-    ((_, file),) = fetch_layers(
-        [TREES],
-        portal=server.url,
-        cache=cache,
-        spec=QUICK,
-        progress=lambda layer, done, total: seen.append((layer.name, done, total)),
-    )
+    seen: list[tuple[int, int]] = []
+    file = fetched(progress=lambda done, total: seen.append((done, total)))
     assert file.path.read_bytes() == body
     assert server.seen[-1].headers["range"] == "bytes=100-"
-    assert seen[-1] == ("trees", len(body), len(body))
+    assert seen[-1] == (len(body), len(body))
 
 
-@pytest.mark.parametrize("kind", ["geojson", "parquet"])
-def test_an_export_that_ends_too_soon_is_not_kept(
-    server: Server,
-    cache: Cache,
-    kind: Any,  # noqa: ANN401
-) -> None:
-    portal = Portal(server, ROWS)
-    path = f"{CATALOG}/les-arbres/exports/{kind}"
+def test_an_export_that_ends_too_soon_is_not_kept(server: Server, fetched: Fetch) -> None:
+    portal = Portal(server)
 
     def half(seen: Seen) -> Answer:
-        whole: Answer = getattr(portal, kind)(seen)
+        whole = portal.geojson(seen)
         return replace(whole, body=whole.body[: len(whole.body) // 2], chunked=True)
 
-    server.on(path, half)
+    server.on(EXPORT, half)
     with pytest.raises(SourceError) as caught:
-        fetch_layers([TREES], portal=portal.url, cache=cache, spec=QUICK, format=kind)
-    assert_sentence(caught.value, f"whole {kind}")
-    server.on(path, getattr(portal, kind))
-    ((_, file),) = fetch_layers([TREES], portal=portal.url, cache=cache, spec=QUICK, format=kind)
-    assert len(read(file.path).table) == 3
+        fetched()
+    assert_sentence(caught.value, "whole geojson")
+    server.on(EXPORT, portal.geojson)
+    assert len(read(fetched().path).table) == 3
 
 
-def test_a_dataset_that_is_not_there(server: Server, cache: Cache) -> None:
-    Portal(server, ROWS, dataset="les-arbres-plantes")
-    with pytest.raises(CatalogError) as caught:
-        fetch_layers([TREES], portal=server.url, cache=cache, spec=QUICK)
-    assert_sentence(
-        caught.value, server.url, "'les-arbres'", "'trees'", "/explore", "`dataset`", "catalogue"
-    )
+UNKNOWN_FIELD = b'{"error_code": "ODSQLError", "message": "Unknown field: kind. Check it."}'
+NO_POSITIONS = b'{"fields": [{"name": "idbase", "type": "int"}]}'
 
 
-def test_a_dataset_that_is_not_open(server: Server, cache: Cache) -> None:
-    server.on(f"{CATALOG}/les-arbres", Answer(b'{"message": "Log in"}', status=403))
-    with pytest.raises(SourceError) as caught:
-        fetch_layers([TREES], portal=server.url, cache=cache, spec=QUICK)
-    assert_sentence(caught.value, "layer 'trees'", "403", "Log in")
+@pytest.mark.parametrize(
+    ("layer", "answers", "error", "words"),
+    [
+        (
+            replace(TREES, dataset="arbres"),
+            {},
+            CatalogError,
+            ["http://", "'arbres'", "'trees'", "/explore", "`dataset`", "catalogue"],
+        ),
+        (
+            TREES,
+            {f"{DATASETS}/les-arbres": Answer(b'{"message": "Log in"}', status=403)},
+            SourceError,
+            ["layer 'trees'", "403", "Log in"],
+        ),
+        (
+            replace(TREES, server_where="kind = 'x'"),
+            {EXPORT: Answer(UNKNOWN_FIELD, status=400)},
+            SourceError,
+            ["layer 'trees'", "400", "Unknown field: kind"],
+        ),
+        (
+            replace(TREES, select=("idbaze",)),
+            {},
+            CatalogError,
+            ["les-arbres", "'idbaze'", "select", "'idbase'"],
+        ),
+        (
+            TREES,
+            {f"{DATASETS}/les-arbres": Answer(NO_POSITIONS)},
+            CatalogError,
+            ["les-arbres", "trees", "positions"],
+        ),
+        *(
+            (TREES, {f"{DATASETS}/les-arbres": answer}, SourceError, ["address"])
+            for answer in (
+                Answer(b"<html></html>", type="text/html"),
+                Answer(b"[1, 2]"),
+                Answer(b'{"fields": [{"id": 1}]}'),
+                Answer(b'{"fields":'),
+            )
+        ),
+    ],
+)
+def test_what_a_portal_cannot_give_is_told(
+    server: Server,
+    fetched: Fetch,
+    *,
+    layer: LayerSpec,
+    answers: dict[str, Answer],
+    error: type[Exception],
+    words: list[str],
+) -> None:
+    Portal(server)
+    for path, answer in answers.items():
+        server.on(path, answer)
+    with pytest.raises(error) as caught:
+        fetched(layer, area=box(2.0, 48.0, 3.0, 49.0))
+    assert_sentence(caught.value, *words)
 
 
-def test_a_filter_that_the_portal_does_not_take(server: Server, cache: Cache) -> None:
-    Portal(server, ROWS)
-    refusal = {"error_code": "ODSQLError", "message": "Unknown field: kind. Check it."}
-    server.on(EXPORT, Answer(json.dumps(refusal).encode(), status=400))
-    with pytest.raises(SourceError) as caught:
-        fetch_layers(
-            [replace(TREES, server_where="kind = 'x'")], portal=server.url, cache=cache, spec=QUICK
-        )
-    assert_sentence(caught.value, "layer 'trees'", "400", "Unknown field: kind")
-
-
-def test_a_field_that_the_dataset_lacks(server: Server, cache: Cache) -> None:
-    Portal(server, ROWS)
-    with pytest.raises(CatalogError) as caught:
-        fetch_layers(
-            [replace(TREES, select=("idbaze",))], portal=server.url, cache=cache, spec=QUICK
-        )
-    assert_sentence(caught.value, "les-arbres", "'idbaze'", "select", "'idbase'")
-
-
-def test_a_dataset_without_positions(server: Server, cache: Cache) -> None:
-    fields = [{"name": "idbase", "type": "int"}]
-    server.on(f"{CATALOG}/les-arbres", Answer(json.dumps({"fields": fields}).encode()))
-    area = Area(shapely.box(2.0, 48.0, 3.0, 49.0), "a box")
-    with pytest.raises(CatalogError) as caught:
-        fetch_layers([TREES], portal=server.url, area=area, cache=cache, spec=QUICK)
-    assert_sentence(caught.value, "les-arbres", "trees", "positions")
-
-
-def test_the_field_of_the_area_goes_by_its_own_name(server: Server, cache: Cache) -> None:
+def test_the_field_of_the_area_goes_by_its_own_name(server: Server, fetched: Fetch) -> None:
     fields = [
         {"name": "other_point", "type": "geo_point_2d"},
         {"name": "coordonnees_geo", "type": "geo_point_2d"},
         {"name": "stationcode", "type": "text"},
     ]
-    server.on(f"{CATALOG}/velib", Answer(json.dumps({"fields": fields}).encode()))
+    server.on(f"{DATASETS}/velib", Answer(json.dumps({"fields": fields}).encode()))
     content = b'{"type": "FeatureCollection", "features": []}'
-    server.on(f"{CATALOG}/velib/exports/geojson", Answer(content))
-    spec = LayerSpec(
-        name="bikes",
-        class_name="bike_station",
-        dataset="velib",
-        aliases=(("geo_point_2d", ("coordonnees_geo",)),),
-    )
-    area = Area(shapely.box(2.0, 48.0, 3.0, 49.0), "a box")
-    fetch_layers([spec], portal=server.url, area=area, cache=cache, spec=QUICK)
+    server.on(f"{DATASETS}/velib/exports/geojson", Answer(content))
+    aliases = (("geo_point_2d", ("coordonnees_geo",)),)
+    spec = LayerSpec(name="bikes", class_name="bike_station", dataset="velib", aliases=aliases)
+    fetched(spec, area=box(2.0, 48.0, 3.0, 49.0))
     assert "in_bbox(coordonnees_geo, " in server.seen[-1].query["where"]
 
 
-@pytest.mark.parametrize(
-    "answer",
-    [
-        Answer(b"<html></html>", type="text/html"),
-        Answer(b"[1, 2]"),
-        Answer(b'{"fields": [{"id": 1}]}'),
-        Answer(b'{"fields":'),
-    ],
-)
-def test_what_is_no_portal_is_told(server: Server, cache: Cache, answer: Answer) -> None:
-    server.on(f"{CATALOG}/les-arbres", answer)
+def test_another_host_is_not_followed(server: Server, fetched: Fetch) -> None:
+    Portal(server)
+    server.on(EXPORT, Answer(status=302, headers={"Location": f"{server.other_host}{EXPORT}"}))
     with pytest.raises(SourceError) as caught:
-        fetch_layers([TREES], portal=server.url, cache=cache, spec=QUICK)
-    assert_sentence(caught.value, "address")
-
-
-def test_another_host_is_not_followed(server: Server, cache: Cache) -> None:
-    Portal(server, ROWS)
-    target = {"Location": f"{server.other_host}{EXPORT}"}
-    server.on(EXPORT, Answer(status=302, headers=target))
-    with pytest.raises(SourceError) as caught:
-        fetch_layers([TREES], portal=server.url, cache=cache, spec=QUICK)
+        fetched()
     assert_sentence(caught.value, "localhost")
     assert server.paths().count(EXPORT) == 1
 
 
-def test_the_name_of_a_dataset_is_part_of_the_path(server: Server, cache: Cache) -> None:
+def test_the_name_of_a_dataset_is_part_of_the_path(
+    server: Server, cache: Cache, quick: HttpSpec
+) -> None:
+    files_only = replace(TREES, dataset=None)
+    assert fetch_layers([files_only], endpoints=[server.url], cache=cache, spec=quick) == []
     with pytest.raises(CatalogError):
         fetch_layers(
-            [replace(TREES, dataset="a/../b?c")], portal=server.url, cache=cache, spec=QUICK
+            [replace(TREES, dataset="a/../b?c")], endpoints=[server.url], cache=cache, spec=quick
         )
-    assert server.paths() == [f"{CATALOG}/a%2F..%2Fb%3Fc"]
-
-
-def test_layers_without_a_dataset_are_left_out(server: Server, cache: Cache) -> None:
-    portal = Portal(server, ROWS)
-    others = [replace(TREES, name="files only", dataset=None), TREES]
-    found = fetch_layers(others, portal=portal.url, cache=cache, spec=QUICK)
-    assert [spec.name for spec, _ in found] == ["trees"]
-
-
-def test_a_format_that_is_not_exported(cache: Cache) -> None:
-    with pytest.raises(InputError) as caught:
-        fetch_layers([TREES], portal="https://example.org", cache=cache, format="shp")  # type: ignore[arg-type]
-    assert_sentence(caught.value, "'shp'", "geojson", "csv", "parquet")
+    assert server.paths() == [f"{DATASETS}/a%2F..%2Fb%3Fc"]

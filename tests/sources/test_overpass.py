@@ -34,6 +34,8 @@ if TYPE_CHECKING:
 
     from servers import Seen
 
+    Get = Callable[..., list[Path]]
+
 AREA = parse_area("2,48,2.2,48.1")  # two tiles
 TIMED_OUT = 'runtime error: Query timed out in "query" at line 3 after 91 seconds.'
 NO_MEMORY = "runtime error: Query run out of memory using about 512 MB of RAM."
@@ -114,7 +116,7 @@ def slept() -> list[float]:
 
 
 @pytest.fixture
-def get(server: Server, tmp_path: Path, slept: list[float]) -> Callable[..., list[Path]]:
+def get(server: Server, tmp_path: Path, slept: list[float]) -> Get:
     """Fetch the benches of the area; keywords change the specification or those of the call."""
     fields = {field.name for field in dataclasses.fields(HttpSpec)}
 
@@ -204,9 +206,7 @@ def test_the_builtin_catalogue_can_be_asked_for() -> None:
 # --- Fetching -----------------------------------------------------------------------------------
 
 
-def test_an_area_is_fetched_in_tiles(
-    server: Server, get: Callable[..., list[Path]], slept: list[float]
-) -> None:
+def test_an_area_is_fetched_in_tiles(server: Server, get: Get, slept: list[float]) -> None:
     steps: list[tuple[int, int]] = []
     paths = get(progress=lambda *step: steps.append(step))
     assert len(paths) == 2
@@ -217,15 +217,13 @@ def test_an_area_is_fetched_in_tiles(
     assert slept == []
 
 
-def test_tiles_outside_the_polygon_are_not_asked_for(
-    server: Server, get: Callable[..., list[Path]]
-) -> None:
+def test_tiles_outside_the_polygon_are_not_asked_for(server: Server, get: Get) -> None:
     corner = shapely.Polygon([(2, 48), (2.05, 48), (2.2, 48.1), (2.2, 48.1), (2.0, 48.05)])
     get(area=Area(corner, "corner"), tile_deg=0.05)
     assert 0 < asked(server) < 8
 
 
-def test_a_second_run_needs_no_server(server: Server, get: Callable[..., list[Path]]) -> None:
+def test_a_second_run_needs_no_server(server: Server, get: Get) -> None:
     first = get()
     assert get() == first
     assert get(offline=True) == first
@@ -236,7 +234,7 @@ def test_a_second_run_needs_no_server(server: Server, get: Callable[..., list[Pa
     assert_sentence(caught.value, "is not in the cache")
 
 
-def test_an_interrupted_run_goes_on(server: Server, get: Callable[..., list[Path]]) -> None:
+def test_an_interrupted_run_goes_on(server: Server, get: Get) -> None:
     server.on("/api/interpreter", in_box, Answer(b"bad", status=400))
     with pytest.raises(SourceError):
         get()
@@ -246,9 +244,7 @@ def test_an_interrupted_run_goes_on(server: Server, get: Callable[..., list[Path
 
 
 @pytest.mark.parametrize("remark", [TIMED_OUT, NO_MEMORY])
-def test_a_tile_that_is_too_much_is_split(
-    server: Server, get: Callable[..., list[Path]], remark: str
-) -> None:
+def test_a_tile_that_is_too_much_is_split(server: Server, get: Get, remark: str) -> None:
     # A time-out comes with what was found so far, inside an answer 200.
     server.on("/api/interpreter", wider_than(0.05, Answer(sent(BENCHES[:1], remark))))
     steps: list[tuple[int, int]] = []
@@ -263,16 +259,14 @@ def test_a_tile_that_is_too_much_is_split(
     assert asked(server) == 2 + 8
 
 
-def test_a_tile_that_a_gateway_gives_up_is_split(
-    server: Server, get: Callable[..., list[Path]]
-) -> None:
+def test_a_tile_that_a_gateway_gives_up_is_split(server: Server, get: Get) -> None:
     server.on("/api/interpreter", wider_than(0.05, Answer(status=504)))
     paths = get()
     assert ids(paths) == ALL
     assert get(offline=True) == paths
 
 
-def test_a_tile_of_too_many_bytes_is_split(server: Server, get: Callable[..., list[Path]]) -> None:
+def test_a_tile_of_too_many_bytes_is_split(server: Server, get: Get) -> None:
     assert ids(get(max_bytes=len(sent(BENCHES[:2])) + 5)) == ALL
     assert asked(server) > 2
 
@@ -284,32 +278,26 @@ def test_a_tile_of_too_many_bytes_is_split(server: Server, get: Callable[..., li
         (Answer(status=504), "504 Gateway Timeout"),
     ],
 )
-def test_splitting_ends(
-    server: Server, get: Callable[..., list[Path]], answer: Answer, words: str
-) -> None:
+def test_splitting_ends(server: Server, get: Get, answer: Answer, words: str) -> None:
     server.on("/api/interpreter", answer)
     with pytest.raises(SourceError) as caught:
         get()
     assert_sentence(caught.value, words, f"127.0.0.1:{server.port}")
 
 
-def test_a_remark_that_is_no_error_is_no_error(
-    server: Server, get: Callable[..., list[Path]]
-) -> None:
+def test_a_remark_that_is_no_error_is_no_error(server: Server, get: Get) -> None:
     server.on("/api/interpreter", Answer(sent(BENCHES, "data is a minute old")))
     assert ids(get()) == ALL
 
 
-def test_slots_are_waited_for(
-    server: Server, get: Callable[..., list[Path]], slept: list[float]
-) -> None:
+def test_slots_are_waited_for(server: Server, get: Get, slept: list[float]) -> None:
     server.on("/api/status", Answer(BUSY.encode(), type="text/plain"), Answer(FREE.encode()))
     assert ids(get()) == ALL
     assert slept == [8.0]
 
 
 def test_slots_that_are_far_away_are_not_waited_for(
-    server: Server, get: Callable[..., list[Path]], slept: list[float]
+    server: Server, get: Get, slept: list[float]
 ) -> None:
     later = BUSY.replace("in 7 s", "in 700 s").replace("in 60 s", "in 900 s")
     server.on("/api/status", Answer(later.encode(), type="text/plain"))
@@ -321,7 +309,7 @@ def test_slots_that_are_far_away_are_not_waited_for(
 
 
 def test_a_server_without_status_is_asked_all_the_same(
-    server: Server, get: Callable[..., list[Path]], slept: list[float]
+    server: Server, get: Get, slept: list[float]
 ) -> None:
     server.on("/api/status", Answer(status=404))
     server.on("/api/interpreter", Answer(status=429, headers={"Retry-After": "5"}), in_box)
@@ -359,9 +347,7 @@ def test_the_status_says_how_long_to_wait(status: str, seconds: float) -> None:
     ],
     ids=["503", "html", "cut", "list", "number", "no id", "tags", "not ready", "redirect"],
 )
-def test_another_server_is_asked_where_one_fails(
-    server: Server, get: Callable[..., list[Path]], bad: Answer
-) -> None:
+def test_another_server_is_asked_where_one_fails(server: Server, get: Get, bad: Answer) -> None:
     server.on("/broken/interpreter", bad)
     endpoints = [f"{server.url}/broken", f"{server.url}/api/interpreter/"]
     assert ids(get(endpoints=endpoints)) == ALL
@@ -372,16 +358,14 @@ def test_another_server_is_asked_where_one_fails(
     assert_sentence(caught.value, f"127.0.0.1:{server.port}")
 
 
-def test_where_all_servers_fail_each_is_told(
-    server: Server, get: Callable[..., list[Path]]
-) -> None:
+def test_where_all_servers_fail_each_is_told(server: Server, get: Get) -> None:
     server.on("/a/interpreter", Answer(status=503))
     with pytest.raises(SourceError) as caught:
         get(endpoints=[f"{server.url}/a", f"{server.other_host}/b"])
     assert_sentence(caught.value, "no Overpass server", "503", "localhost", "404")
 
 
-def test_what_cannot_be_asked_is_said(get: Callable[..., list[Path]]) -> None:
+def test_what_cannot_be_asked_is_said(get: Get) -> None:
     with pytest.raises(InputError) as caught:
         get(tile_deg=0)
     assert_sentence(caught.value, "tile_deg is 0")

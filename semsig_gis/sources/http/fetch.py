@@ -45,14 +45,6 @@ Progress = Callable[[int, int], None]
 
 NOT_MODIFIED, PARTIAL, BEYOND_THE_END = 304, 206, 416
 TEXT_BYTES = 2**16  # the most that `read_text` takes
-SUFFIXES = {
-    "application/geo+json": ".geojson",
-    "application/json": ".json",
-    "application/parquet": ".parquet",
-    "application/vnd.apache.parquet": ".parquet",
-    "application/vnd.geo+json": ".geojson",
-    "text/csv": ".csv",
-}
 
 
 class TooLargeError(SourceError):
@@ -71,16 +63,16 @@ def fetch(
     cache: Cache,
     spec: HttpSpec = DEFAULT_HTTP,
     accept: tuple[str, ...] = (),
-    suffix: str | None = None,
+    suffix: str = ".json",
     identity: str = "",
-    check: Callable[[Path], None] | None = None,
+    check: Callable[[Path], object] | None = None,
     before: Callable[[], None] | None = None,
     progress: Progress | None = None,
 ) -> Fetched:
     """Fetch a file into the cache, or find it there; with `data`, post a form.
 
     `accept` are the content types that may come, all by default; `suffix` is that of the file in
-    the cache, else by the content type. The cache knows the request by `identity` instead of the
+    the cache. The cache knows the request by `identity` instead of the
     address where services mirror one another. `check` takes the path of what was sent and raises
     SourceError if it is not to be kept; `before` is called before each request; `progress` takes
     the bytes that have arrived and those there are, 0 where nobody knows.
@@ -144,8 +136,8 @@ class _Job:
     held: Copy | None
     spec: HttpSpec
     accept: tuple[str, ...]
-    suffix: str | None
-    check: Callable[[Path], None] | None
+    suffix: str
+    check: Callable[[Path], object] | None
     progress: Progress | None
 
 
@@ -197,7 +189,7 @@ def _attempt(session: requests.Session, job: _Job) -> Fetched:
             entry.start_part(edition)
         _receive(response, job, have)
         url = response.url
-    body = entry.scratch(job.suffix or SUFFIXES.get(edition.content_type, ".bin"))
+    body = entry.scratch(job.suffix)
     try:
         sha256, size = _unpack(entry.part, body, edition.encoding, job)
         if job.check is not None:

@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 import dataclasses
-import functools
 import json
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal, NamedTuple
+from typing import TYPE_CHECKING, Any
 from urllib.parse import quote
 
 import shapely
 
-from semsig_gis.core.errors import CatalogError, InputError, SourceError
+from semsig_gis.core.errors import CatalogError, SourceError
 from semsig_gis.sources.crs import WGS84, settle_crs
 from semsig_gis.sources.http.fetch import fetch
 from semsig_gis.sources.http.wire import DEFAULT_HTTP, HttpError
@@ -44,35 +43,7 @@ VECTOR_SUFFIXES = frozenset({".fgb", ".gpkg", ".shp", ".zip"})
 # Longer addresses are refused by some servers.
 LONGEST_OUTLINE = 2_000
 GEO_TYPES = ("geo_point_2d", "geo_shape")
-
-
-class _Export(NamedTuple):
-    suffix: str
-    types: tuple[str, ...]
-    begin: bytes = b""
-    end: bytes = b""
-
-
-EXPORTS = {
-    "geojson": _Export(
-        ".geojson",
-        ("application/geo+json", "application/vnd.geo+json", "application/json"),
-        b"{",
-        b"}",
-    ),
-    "csv": _Export(".csv", ("text/csv", "application/csv")),
-    "parquet": _Export(
-        ".parquet",
-        (
-            "application/parquet",
-            "application/vnd.apache.parquet",
-            "application/x-parquet",
-            "application/octet-stream",
-        ),
-        b"PAR1",
-        b"PAR1",
-    ),
-}
+GEOJSON = ("application/geo+json", "application/vnd.geo+json", "application/json")
 
 
 # --- Files ------------------------------------------------------------------------------------
@@ -173,50 +144,43 @@ class _TableLayer:
 def fetch_layers(
     specs: Sequence[LayerSpec],
     *,
-    portal: str,
+    endpoints: Sequence[str],
     area: Area | None = None,
     cache: Cache,
     spec: HttpSpec = DEFAULT_HTTP,
-    format: Literal["geojson", "csv", "parquet"] = "geojson",  # noqa: A002 - the API's own word
-    progress: Callable[[LayerSpec, int, int], None] | None = None,
+    progress: Callable[[int, int], None] | None = None,
 ) -> list[tuple[LayerSpec, Fetched]]:
-    """Fetch the datasets of layers from a portal into the cache, as files for `read_layers`.
+    """Fetch layers from the portal at the first address, as files for `read_layers`.
 
     Layers without a dataset are left out, because the portal does not have them. For each dataset
     its description is asked for, then one export (Explore API v2.1), whose ``where`` is the layer's
     ``server_where`` and the area; for an outline of very many corners, a somewhat larger one. Where
-    a layer selects fields, those that its other keys name are selected too. `progress` takes a
-    layer, the bytes of it that have arrived, and those there are, 0 where nobody knows.
-
-    InputError for a wrong address or format, CatalogError if the portal lacks the dataset or a
-    selected field, SourceError if it refuses, fails, or sends something else.
+    a layer selects fields, those that its other keys name are selected too. CatalogError if the
+    portal lacks the dataset or a selected field, SourceError if it refuses or sends something else.
     """
-    if format not in EXPORTS:
-        msg = f"format {format!r} is unknown; give one of {', '.join(EXPORTS)}."
-        raise InputError(msg)
-    fetched = []
+    portal = endpoints[0]
+    files = []
     for layer in specs:
         if layer.dataset is None:
             continue
-        found = functools.partial(progress, layer) if progress is not None else None
         address = _address(portal, layer.dataset)
         try:
             types = _field_types(address, layer, portal, cache=cache, spec=spec)
             file = fetch(
-                f"{address}/exports/{format}",
-                params=_query(layer, types, area, format, where=f"dataset {layer.dataset!r}"),
+                f"{address}/exports/geojson",
+                params=_query(layer, types, area, where=f"dataset {layer.dataset!r}"),
                 cache=cache,
                 spec=spec,
-                accept=EXPORTS[format].types,
-                suffix=EXPORTS[format].suffix,
-                check=functools.partial(_require_whole, export=EXPORTS[format]),
-                progress=found,
+                accept=GEOJSON,
+                suffix=".geojson",
+                check=_require_whole,
+                progress=progress,
             )
         except HttpError as error:
             msg = f"layer {layer.name!r}: {error}"
             raise HttpError(msg, error.status) from error
-        fetched.append((layer, file))
-    return fetched
+        files.append((layer, file))
+    return files
 
 
 def _address(portal: str, dataset: str) -> str:
@@ -229,7 +193,7 @@ def _field_types(
     """Return the fields of a dataset and their types, as its description has them."""
     try:
         file = fetch(
-            address, cache=cache, spec=spec, accept=("application/json",), check=_require_described
+            address, cache=cache, spec=spec, accept=("application/json",), check=_described
         )
     except HttpError as error:
         if error.status != 404:  # noqa: PLR2004 - not found
@@ -241,10 +205,6 @@ def _field_types(
         )
         raise CatalogError(msg) from error
     return _described(file.path)
-
-
-def _require_described(path: Path) -> None:
-    _described(path)
 
 
 def _described(path: Path) -> dict[str, str]:
@@ -260,7 +220,7 @@ def _described(path: Path) -> dict[str, str]:
 
 
 def _query(
-    layer: LayerSpec, types: Mapping[str, str], area: Area | None, kind: str, *, where: str
+    layer: LayerSpec, types: Mapping[str, str], area: Area | None, *, where: str
 ) -> dict[str, str | float]:
     """Return the parameters of an export."""
     fields = list(types)
@@ -281,8 +241,6 @@ def _query(
             require_field(field, fields, where=where, key="select")
         rules = RowRules(own, fields, filters=True, where=where)
         query["select"] = ",".join(dict.fromkeys([*own.select, *rules.fields, *places]))
-    if kind == "csv":
-        query |= {"delimiter": ";", "use_labels": "false"}
     return query
 
 
@@ -306,12 +264,12 @@ def _outline(polygon: BaseGeometry) -> str:
     return text
 
 
-def _require_whole(path: Path, *, export: _Export) -> None:
-    """Refuse a file that does not begin and end as its kind does."""
+def _require_whole(path: Path) -> None:
+    """Refuse a file that does not begin and end as GeoJSON does."""
     with path.open("rb") as stream:
         begin = stream.read(16).lstrip()
         stream.seek(max(0, path.stat().st_size - 16))
         end = stream.read().rstrip()
-    if not (begin.startswith(export.begin) and end.endswith(export.end)):
-        msg = f"what the portal sent is not whole {export.suffix[1:]}; try again later."
+    if not (begin.startswith(b"{") and end.endswith(b"}")):
+        msg = "what the portal sent is not whole geojson; try again later."
         raise SourceError(msg)

@@ -1,0 +1,31 @@
+"""What tests of sources share: a server on this machine, a cache, and requests without pauses."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import pytest
+from servers import Server
+
+from semsig_gis.sources.http.cache import Cache
+from semsig_gis.sources.http.wire import HttpSpec
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+    from pathlib import Path
+
+
+@pytest.fixture
+def server() -> Iterator[Server]:
+    with Server() as running:
+        yield running
+
+
+@pytest.fixture
+def cache(tmp_path: Path) -> Cache:
+    return Cache(tmp_path / "cache")
+
+
+@pytest.fixture
+def quick() -> HttpSpec:
+    return HttpSpec(timeout=(2.0, 2.0), attempts=3, backoff_s=0.0, sleep=lambda _: None)
