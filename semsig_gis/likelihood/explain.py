@@ -32,6 +32,11 @@ if TYPE_CHECKING:
 
 UNKNOWN_NAME = "unknown"
 LEAST_CHANCE = 0.01  # of two things being one, to be set beside each other
+VERDICTS = ("matched", "misnamed", "missed", "false")
+COLUMNS = [
+    *("verdict", "chance", "query", "query_class", "query_bearing", "object", "source"),
+    *("source_id", "object_class", "object_bearing", "distance", "bearing_error"),
+]
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -57,10 +62,8 @@ class Explanation:
     @property
     def counts(self) -> dict[str, int]:
         """How many rows there are of each verdict."""
-        found = self.table["verdict"].value_counts()
-        return {
-            name: int(found.get(name, 0)) for name in ("matched", "misnamed", "missed", "false")
-        }
+        counts = self.table["verdict"].value_counts()
+        return {verdict: int(counts.get(verdict, 0)) for verdict in VERDICTS}
 
     def to_dict(self) -> dict[str, Any]:
         """Return plain values for JSON; what does not apply in a row is None."""
@@ -98,10 +101,12 @@ def explain(
     paired with the street object that it most likely is. An empty query and a class that the city
     does not have raise `InputError`.
     """
-    place = np.array([xy], dtype=np.float64)
+    x, y = map(float, xy)
+    place = np.array([[x, y]])
     view = views_at(objects, place, index=index, radius=radius, footprints=footprints)
-    city = _City(objects.taxonomy, np.unique(objects.codes), objects.crs, objects)
-    return _explained(query, (float(xy[0]), float(xy[1])), noise, city, view, heading)
+    codes = np.unique(objects.codes)
+    scene = _Scene((x, y), view, codes, objects.taxonomy, objects.crs, objects.table)
+    return scene.explanation(query, noise, heading)
 
 
 def explain_cell(
@@ -117,169 +122,131 @@ def explain_cell(
     As `explain`, but a database does not know which objects a cell sees: the columns ``object``,
     ``source`` and ``source_id`` are missing, and places of objects are good to some decimetres.
     """
-    view = views_in(database, np.array([cell]))
-    city = _City(database.taxonomy, database.present_codes, database.crs)
     x, y = database.xy[cell].tolist()
-    return _explained(query, (x, y), noise, city, view, heading)
+    view = views_in(database, np.array([cell]))
+    scene = _Scene((x, y), view, database.present_codes, database.taxonomy, database.crs)
+    return scene.explanation(query, noise, heading)
 
 
 @dataclass(frozen=True, slots=True)
-class _City:
-    """What there is to see."""
+class _Scene:
+    """What is seen from a place, of the classes that the city has."""
 
-    taxonomy: Taxonomy
+    xy: tuple[float, float]
+    view: Views
     codes: NDArray[np.uint8]
+    taxonomy: Taxonomy
     crs: CRS
-    objects: StreetObjects | None = None
+    objects: gpd.GeoDataFrame | None = None
 
-    def class_name(self, code: int) -> str:
-        return UNKNOWN_NAME if code == WILDCARD else self.taxonomy.by_code(code).name
+    def explanation(self, query: Signature, noise: Noise, heading: float) -> Explanation:
+        """Return the verdicts on the objects of a query and those of the scene."""
+        bearings = (query_bearings(query) + heading) % 360.0
+        chances, loglik = self._chances(query, bearings, noise)
+        partners = _partners(chances)
+        rows = self._detections(query, bearings, chances, partners)
+        for entry, whole in enumerate(chances.sum(axis=1).tolist()):
+            if entry not in partners.values():
+                chance = max(1.0 - whole, 0.0)
+                rows.append({"verdict": "missed", "chance": chance, **self._object(entry)})
+        shapes = [row.get("geometry") for row in rows]
+        table = pd.DataFrame(rows, columns=COLUMNS).astype({"query": "Int64", "object": "Int64"})
+        placed = gpd.GeoDataFrame(table, geometry=shapes, crs=self.crs)
+        return Explanation(table=placed, xy=self.xy, heading=heading, loglik=loglik)
 
-
-def _explained(  # noqa: PLR0917 - two callers that have just these
-    query: Signature,
-    xy: tuple[float, float],
-    noise: Noise,
-    city: _City,
-    view: Views,
-    heading: float,
-) -> Explanation:
-    turned = (query_bearings(query) + heading) % 360.0
-    chances, loglik = _chances(query, turned, view, noise, city)
-    table = _table(query, turned, view, chances, city)
-    placed = gpd.GeoDataFrame(table, geometry=_places(table, xy, city), crs=city.crs)
-    return Explanation(table=placed, xy=xy, heading=heading, loglik=loglik)
-
-
-def _chances(
-    query: Signature,
-    turned: NDArray[np.float64],
-    view: Views,
-    noise: Noise,
-    city: _City,
-) -> tuple[NDArray[np.float64], float]:
-    """Return the chance that each object is each detection, and the log-likelihood of the query."""
-    tables, weights = noise_tables(
-        noise, taxonomy=city.taxonomy, codes=city.codes, longest=LONGEST_TABLE
-    )
-    names = tables[0].query_rows(query)
-    kinds = tables[0].row_of[view.codes]
-    pairs = near_pairs(view.offsets, view.bearings, np.array([0, len(query)]), turned)
-    logliks = np.log(weights)
-    each = np.zeros((len(tables), len(view.codes), len(query)))
-    for number, table in enumerate(tables):
-        chances, loglik = associate(
-            table,
-            pairs,
-            kinds=kinds,
-            distances=view.distances,
-            lengths=np.full(len(kinds), len(kinds)),
-            names=names,
+    def _chances(
+        self, query: Signature, bearings: NDArray[np.float64], noise: Noise
+    ) -> tuple[NDArray[np.float64], float]:
+        """Return the chance that each object is each detection, and the log-likelihood of all."""
+        view = self.view
+        tables, weights = noise_tables(
+            noise, taxonomy=self.taxonomy, codes=self.codes, longest=LONGEST_TABLE
         )
-        each[number, pairs.objects, pairs.detections] = chances
-        logliks[number] += loglik
-    total = float(np.logaddexp.reduce(logliks))
-    return np.tensordot(np.exp(logliks - total), each, axes=1), total
+        names = tables[0].query_rows(query)
+        kinds = tables[0].row_of[view.codes]
+        pairs = near_pairs(view.offsets, view.bearings, np.array([0, len(query)]), bearings)
+        logliks = np.log(weights)
+        each = np.zeros((len(tables), len(view.codes), len(query)))
+        for number, table in enumerate(tables):
+            chances, loglik = associate(
+                table,
+                pairs,
+                kinds=kinds,
+                distances=view.distances,
+                lengths=np.full(len(kinds), len(kinds)),
+                names=names,
+            )
+            each[number, pairs.objects, pairs.detections] = chances
+            logliks[number] += loglik
+        total = float(np.logaddexp.reduce(logliks))
+        return np.tensordot(np.exp(logliks - total), each, axes=1), total
 
-
-def _table(
-    query: Signature,
-    turned: NDArray[np.float64],
-    view: Views,
-    chances: NDArray[np.float64],
-    city: _City,
-) -> pd.DataFrame:
-    """Return the verdicts as a table, without geometry."""
-    codes = np.full(len(query), WILDCARD) if query.codes is None else query.codes
-    rows: list[dict[str, Any]] = []
-    partners = _partners(chances)
-    for number, code in enumerate(codes.tolist()):
-        whole = float(chances[:, number].sum())
-        row = {
-            "verdict": "false",
-            "chance": max(1.0 - whole, 0.0),
-            "query": number,
-            "query_class": city.class_name(code),
-            "query_bearing": float(turned[number]),
-        }
-        if number in partners:
-            entry = partners[number]
-            other = code not in {WILDCARD, int(view.codes[entry])}
-            row |= {
-                "verdict": "misnamed" if other else "matched",
-                "chance": float(chances[entry, number]),
-                "bearing_error": float(signed_degrees(turned[number] - view.bearings[entry])),
-                **_object(entry, view, city),
+    def _detections(
+        self,
+        query: Signature,
+        bearings: NDArray[np.float64],
+        chances: NDArray[np.float64],
+        partners: dict[int, int],
+    ) -> list[dict[str, Any]]:
+        """Return one row for each object of the query."""
+        codes = np.full(len(query), WILDCARD) if query.codes is None else query.codes
+        rows = []
+        for number, code in enumerate(codes.tolist()):
+            row: dict[str, Any] = {
+                "verdict": "false",
+                "chance": max(1.0 - float(chances[:, number].sum()), 0.0),
+                "query": number,
+                "query_class": self._class_name(code),
+                "query_bearing": float(bearings[number]),
             }
-        rows.append(row)
-    for entry in range(len(view.codes)):
-        if entry not in partners.values():
-            chance = max(1.0 - float(chances[entry].sum()), 0.0)
-            rows.append({"verdict": "missed", "chance": chance, **_object(entry, view, city)})
-    table = pd.DataFrame(rows, columns=COLUMNS)
-    for name in ("query", "object"):
-        table[name] = table[name].astype("Int64")
-    return table
+            if number in partners:
+                entry = partners[number]
+                other = code not in {WILDCARD, int(self.view.codes[entry])}
+                away = signed_degrees(bearings[number] - self.view.bearings[entry])
+                row |= {
+                    "verdict": "misnamed" if other else "matched",
+                    "chance": float(chances[entry, number]),
+                    "bearing_error": float(away),
+                    **self._object(entry),
+                }
+            rows.append(row)
+        return rows
 
+    def _object(self, entry: int) -> dict[str, Any]:
+        """Return what the table says of a street object."""
+        view = self.view
+        bearing, distance = float(view.bearings[entry]), float(view.distances[entry])
+        facts: dict[str, Any] = {
+            "object_class": self._class_name(int(view.codes[entry])),
+            "object_bearing": bearing,
+            "distance": distance,
+        }
+        if self.objects is None:
+            x, y = self.xy
+            angle = np.radians(bearing)
+            place = shapely.Point(x + distance * np.sin(angle), y + distance * np.cos(angle))
+            return facts | {"geometry": place}
+        row = int(view.objects[entry])
+        street_object = self.objects.iloc[row]
+        return facts | {
+            "object": row,
+            "source": str(street_object[SOURCE]),
+            "source_id": str(street_object[SOURCE_ID]),
+            "geometry": street_object.geometry,
+        }
 
-def _places(
-    table: pd.DataFrame, xy: tuple[float, float], city: _City
-) -> list[shapely.Point | None]:
-    """Return where the street objects of a table stand."""
-    if city.objects is not None:
-        points = city.objects.table.geometry.array
-        return [None if pd.isna(row) else points[int(row)] for row in table["object"]]
-    angle = np.radians(table["object_bearing"].to_numpy(np.float64))
-    away = table["distance"].to_numpy(np.float64)
-    x, y = xy[0] + away * np.sin(angle), xy[1] + away * np.cos(angle)
-    seen = np.isfinite(away)
-    return [
-        shapely.Point(*place) if there else None for *place, there in zip(x, y, seen, strict=True)
-    ]
+    def _class_name(self, code: int) -> str:
+        return UNKNOWN_NAME if code == WILDCARD else self.taxonomy.by_code(code).name
 
 
 def _partners(chances: NDArray[np.float64]) -> dict[int, int]:
     """Return the object that each detection most likely is, no object twice."""
     real = chances.sum(axis=0) > 0.5  # noqa: PLR2004 - more likely than not
-    found: dict[int, int] = {}
+    partners: dict[int, int] = {}
     for place in np.argsort(-chances, axis=None, kind="stable").tolist():
         entry, number = divmod(place, chances.shape[1])
         if chances[entry, number] <= LEAST_CHANCE:
             break
-        if real[number] and number not in found and entry not in found.values():
-            found[number] = entry
-    return found
-
-
-COLUMNS = [
-    "verdict",
-    "chance",
-    "query",
-    "query_class",
-    "query_bearing",
-    "object",
-    "source",
-    "source_id",
-    "object_class",
-    "object_bearing",
-    "distance",
-    "bearing_error",
-]
-
-
-def _object(entry: int, view: Views, city: _City) -> dict[str, Any]:
-    """Return what a row of the table says of a street object."""
-    found: dict[str, Any] = {
-        "object_class": city.class_name(int(view.codes[entry])),
-        "object_bearing": float(view.bearings[entry]),
-        "distance": float(view.distances[entry]),
-    }
-    if city.objects is not None:
-        row = int(view.objects[entry])
-        of_object = city.objects.table.iloc[row]
-        found |= {
-            "object": row,
-            "source": str(of_object[SOURCE]),
-            "source_id": str(of_object[SOURCE_ID]),
-        }
-    return found
+        if real[number] and number not in partners and entry not in partners.values():
+            partners[number] = entry
+    return partners

@@ -33,15 +33,8 @@ class Posterior:
 
     Examples
     --------
-    >>> from semsig_gis.sources.catalog import paper_taxonomy
-    >>> from semsig_gis.database.build import build_database
-    >>> from semsig_gis.objects.clean import build_objects
-    >>> from semsig_gis.sources.synthetic.city import CitySpec, synthetic_city
-    >>> layers = synthetic_city(CitySpec(size=300.0))
-    >>> objects, _ = build_objects(layers, taxonomy=paper_taxonomy(), crs="EPSG:32631")
-    >>> database = build_database(objects)
-    >>> flat = posterior(database, np.zeros(len(database)))
-    >>> bool(np.isclose(flat.entropy, np.log2(len(database))))
+    >>> flat = posterior(demo_database, np.zeros(len(demo_database)))
+    >>> bool(np.isclose(flat.entropy, np.log2(len(demo_database))))
     True
     """
 
@@ -51,8 +44,8 @@ class Posterior:
     @property
     def entropy(self) -> float:
         """How much is not known of the cell, in bits: 0 for one cell, 1 for two alike, ..."""
-        some = self.chances[self.chances > 0]
-        return float(-(some * np.log2(some)).sum())
+        chances = self.chances[self.chances > 0]
+        return float(-(chances * np.log2(chances)).sum())
 
     def credible_cells(self, share: float = 0.9) -> NDArray[np.int64]:
         """Return the fewest cells that hold a share of the chance.
@@ -81,10 +74,9 @@ class Posterior:
         level = 0.5 * (1.0 - share) / len(self.chances)
         likely = cells[self.chances[cells] >= level]
         cells = likely[np.argsort(-self.chances[likely], kind="stable")]
-        held = np.cumsum(self.chances[cells])
+        total = np.cumsum(self.chances[cells])
         # The small term keeps a sum of 0.9 - 1e-17 from asking for one cell more.
-        needed = int(np.searchsorted(held, share * (1.0 - 1e-12))) + 1
-        return cells[:needed]
+        return cells[: int(np.searchsorted(total, share * (1.0 - 1e-12))) + 1]
 
     def mass_within(
         self, radius: float, cells: NDArray[np.int64] | None = None
@@ -112,14 +104,14 @@ class Posterior:
             msg = f"a radius of {radius} m was given; give metres, 0 or more."
             raise InputError(msg)
         database = self.database
-        chosen = np.arange(len(database)) if cells is None else np.asarray(cells)
-        columns = database.columns[chosen].astype(np.int64)
-        rows = database.rows[chosen].astype(np.int64)
+        centres = slice(None) if cells is None else cells
+        columns = database.columns[centres].astype(np.int64)
+        rows = database.rows[centres].astype(np.int64)
         # The cells are ordered by column and row: in each column, the circle is one run of them.
         ids = database.cell_ids
         before = np.concatenate([[0.0], np.cumsum(self.chances)])
         steps = radius / database.grid.step + 1e-9
-        total = np.zeros(len(chosen))
+        total = np.zeros(len(columns))
         for aside in range(-math.floor(steps), math.floor(steps) + 1):
             up = math.floor(math.sqrt(steps**2 - aside**2))
             low = np.searchsorted(ids, cell_ids(columns + aside, rows - up), side="left")

@@ -58,14 +58,7 @@ def area_prior(
 
     Examples
     --------
-    >>> from semsig_gis.sources.catalog import paper_taxonomy
-    >>> from semsig_gis.database.build import build_database
-    >>> from semsig_gis.objects.clean import build_objects
-    >>> from semsig_gis.sources.synthetic.city import CitySpec, synthetic_city
-    >>> layers = synthetic_city(CitySpec(size=300.0))
-    >>> objects, _ = build_objects(layers, taxonomy=paper_taxonomy(), crs="EPSG:32631")
-    >>> database = build_database(objects)
-    >>> prior = area_prior(database, shapely.Point(database.xy[7]).buffer(3.0))
+    >>> prior = area_prior(demo_database, shapely.Point(demo_database.xy[7]).buffer(3.0))
     >>> np.flatnonzero(np.isfinite(prior)).tolist()
     [7]
     """
@@ -120,15 +113,8 @@ def position_prior(
 
     Examples
     --------
-    >>> from semsig_gis.sources.catalog import paper_taxonomy
-    >>> from semsig_gis.database.build import build_database
-    >>> from semsig_gis.objects.clean import build_objects
-    >>> from semsig_gis.sources.synthetic.city import CitySpec, synthetic_city
-    >>> layers = synthetic_city(CitySpec(size=300.0))
-    >>> objects, _ = build_objects(layers, taxonomy=paper_taxonomy(), crs="EPSG:32631")
-    >>> database = build_database(objects)
-    >>> x, y = database.xy[7].tolist()
-    >>> int(position_prior(database, (x + 2.0, y), sigma=50.0).argmax())
+    >>> x, y = demo_database.xy[7].tolist()
+    >>> int(position_prior(demo_database, (x + 2.0, y), sigma=50.0).argmax())
     7
     """
     if not (math.isfinite(sigma) and sigma > 0):
@@ -179,21 +165,14 @@ def raster_prior(
     --------
     >>> import tempfile
     >>> import rasterio
-    >>> from semsig_gis.sources.catalog import paper_taxonomy
-    >>> from semsig_gis.database.build import build_database
-    >>> from semsig_gis.objects.clean import build_objects
-    >>> from semsig_gis.sources.synthetic.city import CitySpec, synthetic_city
-    >>> layers = synthetic_city(CitySpec(size=300.0))
-    >>> objects, _ = build_objects(layers, taxonomy=paper_taxonomy(), crs="EPSG:32631")
-    >>> database = build_database(objects)
-    >>> x, y = database.xy.min(axis=0) - 5.0
+    >>> x, y = demo_database.xy.min(axis=0) - 5.0
     >>> options = {"count": 1, "dtype": "uint8", "crs": "EPSG:32631", "width": 2, "height": 1}
     >>> with tempfile.TemporaryDirectory() as folder:
     ...     path = f"{folder}/people.tif"
     ...     place = rasterio.Affine(150, 0, x, 0, -400, y + 400)
     ...     with rasterio.open(path, "w", transform=place, **options) as file:
     ...         file.write(np.array([[1, 3]], np.uint8), 1)
-    ...     chances = np.exp(raster_prior(database, path))
+    ...     chances = np.exp(raster_prior(demo_database, path))
     >>> round(float(chances.max() / chances.min()), 6)
     3.0
     """
@@ -207,15 +186,15 @@ def raster_prior(
         crs=database.crs,
         band=band,
     )
-    unknown = np.isnan(weights)
-    if unknown.all():
+    missing = np.isnan(weights)
+    if missing.all():
         msg = f"{path} has no data at any cell of the database; give a raster of its area."
         raise InputError(msg)
-    known = weights[~unknown]
-    if np.isinf(known).any() or (known < 0).any():
-        msg = f"{path} holds {known.min():g} to {known.max():g}; give finite values, 0 or more."
+    values = weights[~missing]
+    if np.isinf(values).any() or (values < 0).any():
+        msg = f"{path} holds {values.min():g} to {values.max():g}; give finite values, 0 or more."
         raise InputError(msg)
-    weights[unknown] = known[known > 0].min(initial=known.max())
+    weights[missing] = values[values > 0].min(initial=values.max())
     return weight_prior(database, weights)
 
 
@@ -241,14 +220,7 @@ def weight_prior(database: SignatureDatabase, weights: ArrayLike) -> NDArray[np.
 
     Examples
     --------
-    >>> from semsig_gis.sources.catalog import paper_taxonomy
-    >>> from semsig_gis.database.build import build_database
-    >>> from semsig_gis.objects.clean import build_objects
-    >>> from semsig_gis.sources.synthetic.city import CitySpec, synthetic_city
-    >>> layers = synthetic_city(CitySpec(size=300.0))
-    >>> objects, _ = build_objects(layers, taxonomy=paper_taxonomy(), crs="EPSG:32631")
-    >>> database = build_database(objects)
-    >>> prior = weight_prior(database, np.arange(len(database)))
+    >>> prior = weight_prior(demo_database, np.arange(len(demo_database)))
     >>> float(prior[0]), bool(np.exp(prior).sum().round(9) == 1)
     (-inf, True)
     """

@@ -1,9 +1,14 @@
-"""The likelihood of a query at places anywhere, summed over one-to-one associations."""
+"""Look for the place of a query between the viewpoints, part by part of the likeliest cells.
+
+A part of side s counts with an uncertainty of the place of ``s / 12 ** 0.5`` each way, the
+deviation of places anywhere in it, so that its likelihood stands for the mean over the part.
+"""
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -12,6 +17,7 @@ from semsig_gis.core.errors import InputError
 from semsig_gis.core.geometry import signed_degrees
 from semsig_gis.database.visibility import views_at
 from semsig_gis.likelihood.association import place_loglik, turn_logs
+from semsig_gis.likelihood.index import check_north
 from semsig_gis.likelihood.noise.table import LONGEST_TABLE, noise_tables
 
 if TYPE_CHECKING:
@@ -21,24 +27,15 @@ if TYPE_CHECKING:
     from semsig_gis.core.signature import Signature
     from semsig_gis.database.occlusion import Footprints
     from semsig_gis.likelihood.noise.model import Noise
-    from semsig_gis.likelihood.noise.table import NoiseTable
     from semsig_gis.objects.table import StreetObjects
-
 
 KEPT = (1000, 400, 200, 100)
 """How many parts are divided, level by level: cells, their quarters, and so on."""
-
-
 LEAST_CHANCE = 1e-6  # of a part, against the likeliest, to be divided
-
-
 TURNS = (7.5, 6.0, 4.5, 3.0)  # degrees to each side that are tried, level by level
-
-
 TURNS_A_SIDE = 3
-
-
-ROUNDING = 1e-6  # square metres
+BEST = 300  # likeliest parts among which the best place is looked for
+CORNERS = np.array([[-1.0, -1.0], [-1.0, 1.0], [1.0, -1.0], [1.0, 1.0]])
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -60,35 +57,28 @@ class Refinement:
     near: float
 
     @property
-    def best(self) -> int:
-        """The part around which most of the chance lies."""
-        return self._around()[0]
-
-    @property
     def mass(self) -> float:
         """Chance that the place is within `near` of the best one."""
-        _, inside = self._around()
-        return float(self.chances[inside].sum())
+        return float(self.chances[self._inside].sum())
 
     @property
     def xy(self) -> tuple[float, float]:
         """The mean place around the best one, in metres."""
-        _, inside = self._around()
+        inside = self._inside
         x, y = np.average(self.places[inside], axis=0, weights=self.chances[inside]).tolist()
         return x, y
 
     @property
     def heading(self) -> float:
         """Degrees to add to the bearings of the query there, in [-180, 180)."""
-        _, inside = self._around()
-        angles = np.radians(self.headings[inside])
-        mean = np.exp(1j * angles) @ self.chances[inside]
+        angles = np.radians(self.headings[self._inside])
+        mean = np.exp(1j * angles) @ self.chances[self._inside]
         return float(signed_degrees(math.degrees(float(np.angle(mean)))))
 
     @property
     def covariance(self) -> NDArray[np.float64]:
         """Of x, y (metres) and heading (degrees) around the best place, shape (3, 3)."""
-        _, inside = self._around()
+        inside = self._inside
         weights = self.chances[inside] / self.chances[inside].sum()
         turned = signed_degrees(self.headings[inside] - self.heading)
         away = np.column_stack([self.places[inside] - self.xy, turned])
@@ -98,17 +88,13 @@ class Refinement:
         covariance[2, 2] += weights @ self.heading_sigmas[inside] ** 2
         return np.asarray(covariance)
 
-    def _around(self) -> tuple[int, NDArray[np.bool_]]:
-        """Return the best part, and which parts are near it."""
+    @cached_property
+    def _inside(self) -> NDArray[np.bool_]:
+        """Which parts are near the one around which most of the chance lies."""
         order = np.argsort(-self.chances, kind="stable")[:BEST]
         away = self.places[order, None] - self.places[None]
         inside = np.hypot(away[..., 0], away[..., 1]) <= self.near
-        best = int(np.round(inside @ self.chances, 9).argmax())
-        return int(order[best]), inside[best]
-
-
-BEST = 300
-"""Likeliest parts among which the best place is looked for."""
+        return np.asarray(inside[np.round(inside @ self.chances, 9).argmax()])
 
 
 def refine(
@@ -134,35 +120,41 @@ def refine(
     `Refinement`) and `radius`, the visibility range of classes that have none of their own, are in
     metres. `north_sigma` is the standard deviation in degrees of the query's north, infinite if it
     is not known at all; then `headings`, the likeliest one in each cell, are needed. `log_prior` is
-    what else is known of the cells, and what `footprints` hide is not seen.
-
-    The likelihood is that of `likelihood.rerank`. A part of side s counts with an uncertainty of
-    the place of ``s / 12 ** 0.5`` each way, the deviation of places anywhere in it, so that its
-    likelihood stands for the mean over the part; chances are likelihood times area.
+    what else is known of the cells, and what `footprints` hide is not seen. The chances are the
+    likelihood of `likelihood.rerank` times area.
     """
-    _check(cells, north_sigma, headings)
-    codes = np.unique(objects.codes)
+    check_north(north_sigma)
+    if len(cells) == 0 or (headings is None and north_sigma > 0):
+        msg = (
+            f"{len(cells)} cells and {'no' if headings is None else 'some'} headings were given; "
+            "give at least one cell, and headings where north is not known."
+        )
+        raise InputError(msg)
     tables, weights = noise_tables(
-        noise, taxonomy=objects.taxonomy, codes=codes, longest=LONGEST_TABLE
+        noise, taxonomy=objects.taxonomy, codes=np.unique(objects.codes), longest=LONGEST_TABLE
     )
+    reach = float(objects.taxonomy.ranges(radius).max())
     size = float(step)
     parts = np.asarray(cells[: KEPT[0]], dtype=np.float64)
     prior = np.zeros(len(parts)) if log_prior is None else np.asarray(log_prior)[: KEPT[0]]
     turned = np.zeros(len(parts)) if headings is None else np.asarray(headings)[: KEPT[0]]
     done: list[tuple[NDArray[np.float64], ...]] = []
     for level, turn in enumerate(TURNS):
-        parts, prior, turned = _quarters(parts, size), np.repeat(prior, 4), np.repeat(turned, 4)
+        parts = (parts[:, None] + CORNERS * (size / 4.0)).reshape(-1, 2)
+        prior, turned = np.repeat(prior, 4), np.repeat(turned, 4)
         size /= 2.0
         views = views_at(objects, parts, index=index, radius=radius, footprints=footprints)
-        spread = [_with_place(table, size) for table in tables]
-        reach = float(objects.taxonomy.ranges(radius).max())
+        wide = [
+            replace(table, position_sigma=math.hypot(table.position_sigma, size / math.sqrt(12.0)))
+            for table in tables
+        ]
         steps = np.linspace(-turn, turn, 2 * TURNS_A_SIDE + 1) if north_sigma > 0 else np.zeros(1)
         turns = turned[:, None] + steps
-        found = place_loglik(query, views, spread, weights, turns=turns, reach=reach)
+        by_turn = place_loglik(query, views, wide, weights, turns=turns, reach=reach)
         if north_sigma > 0:
-            found += turn_logs(turns, steps[1] - steps[0], north_sigma)
-        loglik = np.logaddexp.reduce(found, axis=1)
-        shares = np.exp(found - loglik[:, None])
+            by_turn += turn_logs(turns, steps[1] - steps[0], north_sigma)
+        loglik = np.logaddexp.reduce(by_turn, axis=1)
+        shares = np.exp(by_turn - loglik[:, None])
         turned = (shares * turns).sum(axis=1)
         sigmas = np.sqrt((shares * (turns - turned[:, None]) ** 2).sum(axis=1))
         total = loglik + prior
@@ -170,15 +162,10 @@ def refine(
         if level + 1 < len(TURNS):
             best = np.argsort(-total, kind="stable")[: KEPT[level + 1]]
             divided[best] = total[best] > total[best[0]] + math.log(LEAST_CHANCE)
-        kept = ~divided
-        sizes = np.full(len(parts), size)
-        done.append(
-            (parts[kept], sizes[kept], loglik[kept], prior[kept], turned[kept], sigmas[kept])
-        )
+        columns = parts, np.full(len(parts), size), loglik, prior, turned, sigmas
+        done.append(tuple(column[~divided] for column in columns))
         parts, prior, turned = parts[divided], prior[divided], turned[divided]
-    places, sizes, loglik, prior, turned, sigmas = (
-        np.concatenate(column) for column in zip(*done, strict=True)
-    )
+    places, sizes, loglik, prior, turned, sigmas = map(np.concatenate, zip(*done, strict=True))
     weight = loglik + prior + 2.0 * np.log(sizes)
     chances = np.exp(weight - weight.max())
     return Refinement(
@@ -190,30 +177,3 @@ def refine(
         chances=chances / chances.sum(),
         near=near,
     )
-
-
-def _check(
-    cells: NDArray[np.float64],
-    north_sigma: float,
-    headings: NDArray[np.floating] | None,
-) -> None:
-    if not north_sigma >= 0:
-        msg = f"the deviation of north is {north_sigma} degrees; give 0 or more, or infinity."
-        raise InputError(msg)
-    if len(cells) == 0 or (headings is None and north_sigma > 0):
-        msg = (
-            f"{len(cells)} cells and {'no' if headings is None else 'some'} headings were given; "
-            "give at least one cell, and headings where north is not known."
-        )
-        raise InputError(msg)
-
-
-def _quarters(parts: NDArray[np.float64], size: float) -> NDArray[np.float64]:
-    """Return the middles of the four quarters of squares."""
-    corners = np.array([[-1.0, -1.0], [-1.0, 1.0], [1.0, -1.0], [1.0, 1.0]]) * (size / 4.0)
-    return np.asarray((parts[:, None] + corners).reshape(-1, 2))
-
-
-def _with_place(table: NoiseTable, size: float) -> NoiseTable:
-    """Return a noise model for places anywhere in a square."""
-    return replace(table, position_sigma=math.hypot(table.position_sigma, size / math.sqrt(12.0)))
