@@ -28,9 +28,8 @@ LOOKS = [CLASS_CODE, "x", "y"]
 class ClassChange:
     """What changed in one class; ``after = before + added - removed + gained - lost``.
 
-    The counts are of objects. `added` and `removed` are nowhere in the other table; `gained` were
-    of another class before and `lost` are of another class now. `moved_m` is the median distance in
-    metres, None where none moved.
+    `added` and `removed` objects are nowhere in the other table; `gained` were of another class
+    before, `lost` are now. `moved_m` is the median distance in metres, None where none moved.
     """
 
     class_name: str
@@ -48,10 +47,9 @@ class ClassChange:
 class ObjectChanges:
     """Which rows of two tables of street objects are the same object.
 
-    `same` (same class and place), `moved` (same source, id and class, other place) and `changed`
-    (same source and id, other class, at the same place or not) have shape (n, 2): rows of the old
-    and of the new table. `removed` and `added`, shape (n,), are the other rows of the old and of
-    the new table; `classes` has the classes that are in one of the tables.
+    `same` (class and place), `moved` (same source, id and class) and `changed` (same source and id,
+    other class) have shape (n, 2): rows of the old and of the new table. `removed` and `added`,
+    shape (n,), are the others. `classes` has the classes that are in one of the tables.
     """
 
     same: NDArray[np.int64]

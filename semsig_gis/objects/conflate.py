@@ -31,9 +31,8 @@ RADIUS_LIMIT_M = 100.0
 class ConflatedPair:
     """What was merged of one class between two sources.
 
-    `count` objects of the source `merged` lay within `radius` metres of objects of the source
-    `kept`, whose positions stay; `median_m` and `largest_m` are the distances between the two in
-    metres.
+    `count` objects of the source `merged` lay within `radius` metres of objects of `kept`, whose
+    positions stay; `median_m` and `largest_m` are the distances between the two.
     """
 
     class_name: str

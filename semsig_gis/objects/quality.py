@@ -38,9 +38,8 @@ EDGE_POINTS = 21
 class ClassQuality:
     """The objects of one class, after collapsing and conflation, and their density.
 
-    `rows` counts the rows of the sources that they stand for. `per_km2_hull` is None where the
-    convex hull has no area. `nearest_m` is the median distance in metres from an object to the
-    nearest other one of its class, None for a single object.
+    `rows` of the sources stand behind them. `per_km2_hull` is None where the hull has no area;
+    `nearest_m` is the median distance to the nearest other object of the class, None for one alone.
     """
 
     class_name: str

@@ -109,10 +109,9 @@ def licenses_of(*tables: gpd.GeoDataFrame | None) -> tuple[str, ...]:
 
 
 def read_area(path: str | Path, *, crs: CRS | str) -> shapely.Polygon | shapely.MultiPolygon:
-    """Read what all polygons of a vector or ``.parquet`` file enclose together, moved to a CRS.
+    """Read what all polygons of a file enclose together, moved to a CRS.
 
-    Raise SourceError if the file is missing, damaged, or of another kind, CrsError if its CRS is
-    not known, and InputError if it holds no polygon, or something else too.
+    Errors are as of `read_surroundings`.
     """
     area = join_areas(_read(Path(path), "area", "polygon", crs).geometry.to_numpy())
     if area is None:

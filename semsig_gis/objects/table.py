@@ -44,7 +44,6 @@ if TYPE_CHECKING:
 
     from semsig_gis.sources import RawLayer
 
-
 KIND = "street objects"
 BETWEEN_LAYERS = ", "
 BEFORE_LAYERS = ": "
@@ -273,10 +272,9 @@ def objects_of(
 ) -> StreetObjects:
     """Return the street objects that columns and the values of `objects_specs` hold.
 
-    The columns are those of `StreetObjects.table`, ``geometry`` as WKB. With a box ``xmin, ymin,
-    xmax, ymax`` in metres, only objects in it or on its edge are returned, possibly none. Raise
-    DatabaseError, which names `path`, if they are damaged; without a box, a table without objects
-    is damaged.
+    The columns are those of `StreetObjects.table`, ``geometry`` as WKB. With a box, only objects in
+    it or on its edge are returned, possibly none. DatabaseError, which names `path`, if they are
+    damaged; without a box, a table without objects is.
     """
     try:
         taxonomy = Taxonomy.from_list(specs["taxonomy"])

@@ -43,8 +43,7 @@ class Area:
 def parse_area(text: str) -> Area:
     """Return the area of ``"west,south,east,north"`` in degrees, or of a vector file's polygons.
 
-    InputError if the text is neither or is no area, SourceError if the file cannot be read, and
-    CrsError if it does not say its CRS.
+    InputError if the text is neither or is no area, SourceError if the file cannot be read.
     """
     if NUMBERS.fullmatch(text):
         return _box(text)
@@ -65,10 +64,10 @@ def names_place(text: str) -> bool:
 
 
 def clip_layer(layer: RawLayer, area: Area) -> RawLayer:
-    """Leave out the rows of a layer, in any CRS, that are outside an area; they count as filtered.
+    """Leave out the rows of a layer that are outside an area; they count as filtered.
 
     Objects stay where their centroid is in the area, buildings and streets where they touch it. A
-    row without a position stays, to be counted as such.
+    row without a position stays.
     """
     geometry = layer.table.geometry.to_crs(WGS84).to_numpy()
     nowhere = shapely.is_missing(geometry) | shapely.is_empty(geometry)

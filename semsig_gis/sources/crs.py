@@ -33,8 +33,7 @@ def parse_crs(text: str) -> CRS:
 def usable_crs(wkt: str) -> CRS | None:
     """Return the CRS that a file states, or None where it does not tie coordinates to the Earth.
 
-    A definition that equals an EPSG one, such as Esri's WKT, becomes that one, so that coordinates
-    already in it are not transformed.
+    One that equals an EPSG definition becomes that, so that coordinates in it are not transformed.
     """
     if not wkt.strip():
         return None
@@ -66,9 +65,9 @@ def settle_crs(
 ) -> tuple[CRS, tuple[str, ...]]:
     """Return the CRS of a layer: the file's own statement, else the user's, catalogue's or default.
 
-    `implicit` says that `own` is only the default of the format (GeoJSON without a ``crs`` member);
-    `expected` is the catalogue's word and `given` the user's. A note comes with it where the file
-    contradicts what was expected. CrsError if nobody states one.
+    `implicit` says that `own` is only the default of the format; `expected` is the catalogue's word
+    and `given` the user's. A note says where the file contradicts it. CrsError if nobody states
+    one.
     """
     stated = given or expected
     if own is not None and not implicit:

@@ -16,27 +16,14 @@ if TYPE_CHECKING:
 
     from semsig_gis.core.taxonomy import Taxonomy
 
-
 Value = str | int | float | bool
-
-
 GeometryKind = Literal["point", "line", "polygon"]
-
-
 ElementKind = Literal["node", "way", "relation"]
-
-
 Role = Literal["objects", "buildings", "streets"]
-
-
 # Stands for every value of a tag but "no".
 ANY_VALUE = "*"
-
-
 # No street is narrower or wider; the number is in another unit, or means something else.
 MIN_WIDTH_M = 0.1
-
-
 MAX_WIDTH_M = 200.0
 
 
@@ -195,28 +182,8 @@ LAYER_KEYS = {
     "license": str,
     "attribution": str,
 }
-
-
 CLASS_BY_KEYS = {"field": str, "values": dict}
-
-
 WIDTH_BY_KEYS = {"field": str, "values": dict, "default": object}
-
-
-# Keys whose values are taken as they are.
-PLAIN_KEYS = (
-    "layer",
-    "id_field",
-    "unique_id",
-    "dataset",
-    "server_where",
-    "optional",
-    "note",
-    "crs",
-    "x_field",
-    "y_field",
-    "width_field",
-)
 
 
 def layer_of(
@@ -224,8 +191,7 @@ def layer_of(
 ) -> LayerSpec:
     """Return the checked layer of a ``[[layers]]`` table; CatalogError says what is wrong in it.
 
-    `shared` holds for layers that do not say otherwise: ``files``, ``reader``, ``license`` and
-    ``attribution``.
+    `shared` has files, reader, license and attribution of layers that do not say otherwise.
     """
     if not isinstance(item, dict):
         msg = f"{where} has the layer {item!r}; write a [[layers]] table."
@@ -259,31 +225,30 @@ def layer_of(
         msg = f"{where} has files = []; write a list of file names or patterns."
         raise CatalogError(msg)
     kinds = texts(item.get("elements", list(get_args(ElementKind))), "elements", where)
-    return LayerSpec(
-        name=item["name"],
-        class_name=item.get("class", ""),
-        role=role,
-        files=files,
-        where=tuple(
+    plain = {key: value for key, value in item.items() if LAYER_KEYS[key] in {str, bool}}
+    own = {
+        "class_name": plain.pop("class", ""),
+        "role": role,
+        "files": files,
+        "where": tuple(
             (field, _values(accepted, field, where))
             for field, accepted in item.get("where", {}).items()
         ),
-        class_by=_class_by(item["class_by"], taxonomy, where) if "class_by" in item else None,
-        width_by=_width_by(item["width_by"], where) if "width_by" in item else None,
-        aliases=tuple(
+        "class_by": _class_by(item["class_by"], taxonomy, where) if "class_by" in item else None,
+        "width_by": _width_by(item["width_by"], where) if "width_by" in item else None,
+        "aliases": tuple(
             (field, texts(names, f"aliases of {field!r}", where))
             for field, names in item.get("aliases", {}).items()
         ),
-        geometry=one_of(item.get("geometry", "point"), "geometry", get_args(GeometryKind), where),
-        rows=_rows(item["rows"], where) if "rows" in item else None,
-        select=texts(item.get("select", []), "select", where),
-        tags=tuple(_tags(tags, where) for tags in item.get("tags", [])),
-        elements=tuple(one_of(kind, "elements", get_args(ElementKind), where) for kind in kinds),
-        reader=shared["reader"],
-        license=item.get("license", shared["license"]),
-        attribution=item.get("attribution", shared["attribution"]),
-        **{key: item[key] for key in PLAIN_KEYS if key in item},
-    )
+        "geometry": one_of(
+            item.get("geometry", "point"), "geometry", get_args(GeometryKind), where
+        ),
+        "rows": _rows(item["rows"], where) if "rows" in item else None,
+        "select": texts(item.get("select", []), "select", where),
+        "tags": tuple(_tags(tags, where) for tags in item.get("tags", [])),
+        "elements": tuple(one_of(kind, "elements", get_args(ElementKind), where) for kind in kinds),
+    }
+    return LayerSpec(**{**shared, **plain, **own})
 
 
 def _tags(item: object, where: str) -> tuple[tuple[str, tuple[str, ...]], ...]:

@@ -207,9 +207,9 @@ def as_text(value: object) -> str:
 def matches(value: object, wanted: Value) -> bool:
     """Tell whether a field value is the one a catalogue names.
 
-    Text compares as text and numbers as numbers, so that 3 is found in the text field of a CSV file
-    and the key "3" of a TOML table in a numeric field. A text between slashes, such as
-    ``"/Taxi.*/"``, is a regular expression, which the whole value must match.
+    Text compares as text and numbers as numbers, so that 3 is found in a text field and the key "3"
+    in a numeric one. A text between slashes is a regular expression that the whole value must
+    match.
     """
     if value is None:
         return False
@@ -234,8 +234,7 @@ def _pattern(wanted: str) -> re.Pattern[str] | None:
 class RowRules:
     """The filter, classes, widths and identifiers of one layer, checked against its fields.
 
-    `filters` says whether the layer's ``where`` holds. CatalogError if a field that the layer names
-    does not exist, or a pattern is wrong.
+    `filters` says whether its ``where`` holds. CatalogError for an absent field or a wrong pattern.
     """
 
     def __init__(

@@ -317,7 +317,7 @@ def test_another_kind_of_content_is_refused(server: Server, cache: Cache, get: G
 def test_a_redirect_to_another_host_is_refused(server: Server, get: Get, target: str) -> None:
     location = target.format(port=server.port)
     server.on("/trees", Answer(status=301, headers={"Location": location}))
-    refused(get, f"127.0.0.1:{server.port} sends us to {location.split('/')[2]}, which neither")
+    refused(get, f"127.0.0.1:{server.port} redirects to {location.split('/')[2]}, which neither")
     assert len(server.seen) == 1
 
 
@@ -346,12 +346,12 @@ def test_the_only_way_to_another_scheme_is_the_safer_one(
     if allowed:
         _require_same_host(source, target)
     else:
-        refused(lambda: _require_same_host(source, target), "sends us to")
+        refused(lambda: _require_same_host(source, target), "redirects to")
 
 
 def test_redirects_in_circles_end(server: Server, get: Get) -> None:
     server.on("/trees", Answer(status=302, headers={"Location": "/trees"}))
-    refused(get, "in circles")
+    refused(get, "redirects too often")
     assert len(server.seen) < 10
 
 
@@ -400,7 +400,7 @@ def test_a_body_that_is_too_large_is_refused(
 
 def test_a_packing_that_was_not_asked_for_is_refused(server: Server, get: Get) -> None:
     server.on("/trees", Answer(CONTENT, headers={"Content-Encoding": "br"}))
-    refused(get, "packed as br")
+    refused(get, "unsupported Content-Encoding br")
 
 
 def test_what_the_caller_does_not_want_is_not_kept(server: Server, cache: Cache, get: Get) -> None:

@@ -34,28 +34,10 @@ KEPT_S = 86_400.0  # how long a superseded body stays after its last use
 
 
 @dataclass(frozen=True, slots=True)
-class Fetched:
-    """A file that was fetched, now or earlier (`from_cache`): where it lies and came from.
-
-    `fetched_at` is in UTC by ISO 8601; `url` is the address after redirects; `content_type` is the
-    server's word, such as ``"application/json"``.
-    """
-
-    path: Path
-    sha256: str
-    fetched_at: str
-    url: str
-    from_cache: bool
-    bytes: int
-    content_type: str
-
-
-@dataclass(frozen=True, slots=True)
 class Edition:
     """What a server says of the file that it sends; empty where it says nothing.
 
-    `encoding` is how the file is packed for sending, such as ``"gzip"``; `content_type` is in lower
-    case and without parameters.
+    `encoding` is how it is packed for sending, such as ``"gzip"``, `content_type` in lower case.
     """
 
     etag: str = ""
@@ -75,23 +57,38 @@ class Edition:
         )
 
     @property
-    def condition(self) -> dict[str, str]:
-        """Return headers that ask for the file only if it is another edition."""
-        wanted = {"If-None-Match": self.etag, "If-Modified-Since": self.last_modified}
-        return {name: value for name, value in wanted.items() if value}
-
-    @property
     def if_range(self) -> str:
         """Return what asks for the rest of this very edition; a weak tag does not promise that."""
         return self.last_modified if self.etag.startswith("W/") else self.etag or self.last_modified
 
 
-@dataclass(frozen=True, slots=True)
-class Copy:
-    """An entry of the cache whose checksum holds."""
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Fetched:
+    """A file that was fetched, now or earlier (`from_cache`): where it lies and came from.
 
-    fetched: Fetched
-    edition: Edition
+    `fetched_at` is in UTC by ISO 8601; `url` is the address after redirects. The last three are the
+    server's words, empty where it said nothing.
+    """
+
+    path: Path
+    sha256: str
+    fetched_at: str
+    url: str
+    from_cache: bool
+    bytes: int
+    content_type: str
+    etag: str
+    last_modified: str
+
+    @property
+    def condition(self) -> dict[str, str]:
+        """Return headers that ask for the file only if it is another edition."""
+        headers = {"If-None-Match": self.etag, "If-Modified-Since": self.last_modified}
+        return {name: value for name, value in headers.items() if value}
+
+
+# What the sidecar keeps of it, beside the name of the file and the request.
+KEPT = ("url", "sha256", "fetched_at", "bytes", "content_type", "etag", "last_modified")
 
 
 @dataclass(frozen=True, slots=True)
@@ -149,51 +146,31 @@ class Entry:
         """Return a path to unpack a body to, for the holder of the lock."""
         return self.folder / f"{self.key}.tmp{suffix}"
 
-    def copy(self) -> Copy | None:
+    def copy(self) -> Fetched | None:
         """Return the cached copy, or None where there is none or it is damaged."""
         try:
             meta = json.loads(self.sidecar.read_text(encoding="utf-8"))
             path = self.folder / Path(meta["file"]).name
-            if checksum(path) != meta["sha256"]:
+            copy = Fetched(path=path, from_cache=True, **{name: meta[name] for name in KEPT})
+            if checksum(path) != copy.sha256:
                 return None
-            fetched = Fetched(
-                path=path,
-                sha256=meta["sha256"],
-                fetched_at=meta["fetched_at"],
-                url=meta["url"],
-                from_cache=True,
-                bytes=int(meta["bytes"]),
-                content_type=meta["content_type"],
-            )
-            edition = Edition(meta["etag"], meta["last_modified"])
         except (OSError, KeyError, TypeError, ValueError):
             return None
         with contextlib.suppress(OSError):  # a cache on a read-only disk serves all the same
             path.touch()  # still wanted, see `store`
-        return Copy(fetched, edition)
+        return copy
 
-    def store(
-        self, body: Path, fetched: Fetched, edition: Edition, request: Mapping[str, object]
-    ) -> Fetched:
+    def store(self, fetched: Fetched, request: Mapping[str, object]) -> Fetched:
         """Make a checked body, at `scratch`, the entry; forget what was under way; return its file.
 
-        The path of `fetched` is decided here. `request` is kept for people who look into the cache.
+        `request` is kept for people who look into the cache.
         """
-        final = self.folder / f"{self.key}-{fetched.sha256[:16]}{body.suffix}"
-        body.replace(final)
-        meta = {
-            "request": request,
-            "url": fetched.url,
-            "file": final.name,
-            "sha256": fetched.sha256,
-            "fetched_at": fetched.fetched_at,
-            "bytes": fetched.bytes,
-            "content_type": fetched.content_type,
-            "etag": edition.etag,
-            "last_modified": edition.last_modified,
-        }
+        final = self.folder / f"{self.key}-{fetched.sha256[:16]}{fetched.path.suffix}"
+        fetched.path.replace(final)
+        meta = {name: getattr(fetched, name) for name in KEPT}
         with whole_file(self.sidecar) as partial:
-            partial.write_text(json.dumps(meta, indent=1), encoding="utf-8")
+            told = {"request": request, "url": fetched.url, "file": final.name, **meta}
+            partial.write_text(json.dumps(told, indent=1), encoding="utf-8")
         self.drop_part()
         # Another process may have been given the path of the former body and has yet to read it.
         for old in self.folder.glob(f"{self.key}-*"):

@@ -36,10 +36,8 @@ if TYPE_CHECKING:
 
     import requests
 
-    from semsig_gis.sources.http.cache import Cache, Copy, Entry
-    from semsig_gis.sources.http.wire import (
-        HttpSpec,
-    )
+    from semsig_gis.sources.http.cache import Cache, Entry
+    from semsig_gis.sources.http.wire import HttpSpec
 
 Progress = Callable[[int, int], None]
 
@@ -87,13 +85,16 @@ def fetch(
     """
     require_address(url)
     request = Request(url, _pairs(params), _pairs(data))
-    key = _key(request, identity)
+    what = json.dumps([request.method, identity or url, request.params, request.data])
+    key = hashlib.sha256(what.encode()).hexdigest()[:32]
     if spec.offline:
         return _from_cache(cache.entry(key), cache, url)
     with cache.locked(key) as entry:
         held = entry.copy()
-        if held is not None and not held.edition.condition and _age_s(held) < spec.fresh_s:
-            return held.fetched
+        if held is not None and not held.condition:
+            age = datetime.now(UTC) - datetime.fromisoformat(held.fetched_at)
+            if age.total_seconds() < spec.fresh_s:
+                return held
         job = _Job(request, entry, held, spec, accept, suffix, check, progress)
         try:
             return _persist(job, before)
@@ -133,7 +134,7 @@ def read_text(url: str, *, spec: HttpSpec = DEFAULT_HTTP) -> str:
 class _Job:
     request: Request
     entry: Entry
-    held: Copy | None
+    held: Fetched | None
     spec: HttpSpec
     accept: tuple[str, ...]
     suffix: str
@@ -161,7 +162,7 @@ def _persist(job: _Job, before: Callable[[], None] | None) -> Fetched:
         else:
             remedy = f", {spec.attempts} times; try again later"
     if job.held is not None:
-        remedy += f", or work offline with the copy of {job.held.fetched.fetched_at} in the cache"
+        remedy += f", or work offline with the copy of {job.held.fetched_at} in the cache"
     msg = f"{host_of(job.request.url)} {failure}{remedy}."
     raise HttpError(msg, failure.status) from failure
 
@@ -169,13 +170,13 @@ def _persist(job: _Job, before: Callable[[], None] | None) -> Fetched:
 def _attempt(session: requests.Session, job: _Job) -> Fetched:
     request, entry, spec = job.request, job.entry, job.spec
     have, begun = entry.resumable() if request.method == "GET" else (0, Edition())
-    headers = job.held.edition.condition if job.held and request.method == "GET" else {}
+    headers = job.held.condition if job.held and request.method == "GET" else {}
     if have:
         headers |= {"Range": f"bytes={have}-", "If-Range": begun.if_range}
     with answer_to(session, request, headers, spec) as response:
         if response.status_code == NOT_MODIFIED and job.held is not None:
             entry.drop_part()
-            return job.held.fetched
+            return job.held
         if not (have and _continues(response, have, begun)):
             have = 0
             if response.status_code in {PARTIAL, BEYOND_THE_END}:
@@ -184,7 +185,12 @@ def _attempt(session: requests.Session, job: _Job) -> Fetched:
                 raise PassingError(what, wait=0.0)
         require_success(response, spec)
         edition = begun if have else Edition.of(response.headers)
-        _require_type(edition, job)
+        if job.accept and edition.content_type and edition.content_type not in job.accept:
+            msg = (
+                f"{host_of(request.url)} sent {edition.content_type} where "
+                f"{' or '.join(job.accept)} was expected; check the address {request.url}."
+            )
+            raise SourceError(msg)
         if not have:
             entry.start_part(edition)
         _receive(response, job, have)
@@ -202,8 +208,10 @@ def _attempt(session: requests.Session, job: _Job) -> Fetched:
             from_cache=False,
             bytes=size,
             content_type=edition.content_type,
+            etag=edition.etag,
+            last_modified=edition.last_modified,
         )
-        return entry.store(body, fetched, edition, dataclasses.asdict(request))
+        return entry.store(fetched, dataclasses.asdict(request))
     finally:
         body.unlink(missing_ok=True)
         entry.drop_part()  # it was whole: what is wrong with it now stays wrong
@@ -214,15 +222,6 @@ def _continues(response: requests.Response, have: int, begun: Edition) -> bool:
     starts = response.headers.get("Content-Range", "").startswith(f"bytes {have}-")
     tag = response.headers.get("ETag", begun.etag)
     return response.status_code == PARTIAL and starts and tag == begun.etag
-
-
-def _require_type(edition: Edition, job: _Job) -> None:
-    if job.accept and edition.content_type and edition.content_type not in job.accept:
-        msg = (
-            f"{host_of(job.request.url)} sent {edition.content_type} where "
-            f"{' or '.join(job.accept)} was expected; check the address {job.request.url}."
-        )
-        raise SourceError(msg)
 
 
 def _receive(response: requests.Response, job: _Job, have: int) -> None:
@@ -259,7 +258,7 @@ def _unpacked(read: Callable[[int], bytes], encoding: str, host: str) -> Iterato
             yield block
         return
     if encoding not in {"gzip", "x-gzip"}:
-        msg = f"{host} sent a body packed as {encoding}, which was not asked for; tell its keeper."
+        msg = f"{host} sent the unsupported Content-Encoding {encoding}; report it to the service."
         raise SourceError(msg)
     unzip = zlib.decompressobj(wbits=31)
     try:
@@ -284,20 +283,8 @@ def _require_room(size: int, job: _Job) -> None:
         raise TooLargeError(msg)
 
 
-# --- The cache ----------------------------------------------------------------------------------
-
-
 def _pairs(items: Mapping[str, str | float] | None) -> tuple[tuple[str, str], ...]:
     return tuple(sorted((name, str(value)) for name, value in (items or {}).items()))
-
-
-def _key(request: Request, identity: str) -> str:
-    what = json.dumps([request.method, identity or request.url, request.params, request.data])
-    return hashlib.sha256(what.encode()).hexdigest()[:32]
-
-
-def _age_s(held: Copy) -> float:
-    return (datetime.now(UTC) - datetime.fromisoformat(held.fetched.fetched_at)).total_seconds()
 
 
 def _from_cache(entry: Entry, cache: Cache, url: str) -> Fetched:
@@ -306,4 +293,4 @@ def _from_cache(entry: Entry, cache: Cache, url: str) -> Fetched:
         state = "is damaged in" if entry.sidecar.exists() else "is not in"
         msg = f"{url} {state} the cache {cache.folder}; run once without --offline to fetch it."
         raise NotCachedError(msg)
-    return held.fetched
+    return held

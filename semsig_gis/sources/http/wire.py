@@ -32,12 +32,10 @@ BLOCK = 2**16
 class HttpSpec:
     """How requests are made: times in seconds, sizes in bytes.
 
-    `timeout` is for the connection, and for the next bytes; a server that sends less than `slowest`
-    bytes a second over the latter counts as stalled. `attempts` counts the first one too. The pause
-    after a failure, `backoff_s`, doubles each time; a server that asks for more than
-    `longest_wait_s` is not waited for. `max_bytes` holds as sent and as unpacked. `fresh_s` is how
-    long a cached copy is used where the server has no way to confirm it. `offline` takes everything
-    from the cache.
+    `timeout` is for the connection and for the next bytes; less than `slowest` bytes a second over
+    the latter counts as stalled. The pause after a failure, `backoff_s`, doubles each time; a
+    server that asks for more than `longest_wait_s` is not waited for. `max_bytes` holds as sent and
+    as unpacked. `fresh_s` is how long a copy is used that the server cannot confirm.
     """
 
     timeout: tuple[float, float] = (10.0, 60.0)
@@ -107,8 +105,8 @@ def answer_to(
 ) -> Iterator[requests.Response]:
     """Send a request and give the response, of which no body is read yet.
 
-    Redirects within the host are followed; SourceError for one to another host. PassingError if the
-    server cannot be reached now, HttpError if it never can.
+    Redirects within the host are followed. PassingError if the server cannot be reached now,
+    HttpError if it never can, SourceError for a redirect to another host.
     """
     url = request.url
     params: tuple[tuple[str, str], ...] | None = request.params
@@ -133,7 +131,7 @@ def answer_to(
             target = urljoin(response.url, response.headers.get("Location", ""))
             _require_same_host(response.url, target)
             url, params = target, None
-    msg = f"{host_of(request.url)} sends us in circles from {request.url}; check the address."
+    msg = f"{host_of(request.url)} redirects too often from {request.url}; check the address."
     raise HttpError(msg)
 
 
@@ -148,8 +146,8 @@ def _require_same_host(source: str, target: str) -> None:
         same = safer = False
     if not (same or safer):
         msg = (
-            f"{old.netloc} sends us to {new.netloc or target}, which neither you nor the catalogue "
-            f"named; if you trust it, put its address in the catalogue."
+            f"{old.netloc} redirects to {new.netloc or target}, which neither you nor the "
+            f"catalogue named; if you trust it, put its address in the catalogue."
         )
         raise SourceError(msg)
 

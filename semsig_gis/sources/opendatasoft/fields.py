@@ -31,11 +31,7 @@ def fold(name: str) -> str:
 
 
 def find_field(name: str, spec: LayerSpec, fields: Sequence[str]) -> str | None:
-    """Return the field that a catalogue means, or None where there is none.
-
-    A field of exactly that name goes first, then an alias, then one that differs in capitals,
-    accents, spaces and signs only.
-    """
+    """Return the field of that name, of an alias, or of one that differs in style, or None."""
     names = (name, *dict(spec.aliases).get(name, ()))
     folded = {fold(field): field for field in reversed(fields) if fold(field)}
     exact = (candidate for candidate in names if candidate in fields)
@@ -66,17 +62,14 @@ def settle_fields(spec: LayerSpec, fields: Sequence[str]) -> LayerSpec:
 
 # What portals call the two by default; a catalogue lists other names as their aliases.
 SHAPE = "geo_shape"
-
-
 POINT = "geo_point_2d"
 
 
 class Positions:
     """Finds the position of the records of a table; SourceError if it has no field for one.
 
-    The shape goes first, because it says which coordinate is which and may be more than a point;
-    then the point, which is ``lat, lon``, and then two fields with a coordinate each. The layer may
-    name them: aliases of `SHAPE` and `POINT`, ``x_field``, ``y_field``.
+    The shape goes first, because it says which coordinate is which; then the point, which is ``lat,
+    lon``, and then two fields with a coordinate each.
     """
 
     def __init__(self, spec: LayerSpec, table: Table, *, where: str) -> None:

@@ -20,9 +20,8 @@ if TYPE_CHECKING:
 def has_tags(tags: Mapping[str, str], spec: LayerSpec) -> bool:
     """Tell whether an element has the tags of the layer; without ``tags``, none has.
 
-    One of the layer's alternatives must hold, in all its keys. Values compare exactly, so that
-    ``amenity=toilets;bench`` is neither. Every value is every one but "no", by which mappers say
-    that there is none.
+    One of the alternatives must hold, in all its keys. Values compare exactly, so that
+    ``amenity=toilets;bench`` is neither.
     """
     return any(
         all(_accepts(accepted, tags.get(key)) for key, accepted in alternative)
@@ -34,8 +33,7 @@ def has_shape(kind: ElementKind, tags: Mapping[str, str], spec: LayerSpec) -> bo
     """Tell whether an element that has the tags of the layer is of a shape that it wants.
 
     It is not if its kind is not among the layer's ``elements``, if it is a relation but no
-    multipolygon (it groups elements that are mapped themselves), or the outline of a square where
-    centre lines of streets are wanted.
+    multipolygon, or the outline of a square where centre lines of streets are wanted.
     """
     if kind not in spec.elements:
         return False

@@ -155,8 +155,7 @@ def _ways(element: Way | Relation) -> tuple[tuple[int, ...], tuple[int, ...], bo
 def _lines(file: osmium.io.File, numbers: set[int]) -> dict[int, NDArray[np.float64]]:
     """Return longitude and latitude of the nodes of ways; NaN for nodes that the file lacks.
 
-    An index of these nodes alone would be smaller, yet pyosmium's filters by number take more than
-    a gigabyte for the numbers that nodes have today.
+    pyosmium's filters by number would take more than a gigabyte for today's numbers of nodes.
     """
     places = osmium.NodeLocationsForWays(osmium.index.create_map(PLACES))
     places.ignore_errors()

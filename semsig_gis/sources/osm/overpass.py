@@ -45,9 +45,9 @@ def overpass_query(
 ) -> str:
     """Return the Overpass QL for the elements of layers, by their ``tags`` and ``elements``.
 
-    Bounds are west, south, east and north in degrees; the server may take `timeout` seconds. Values
-    are exact; ways and multipolygons come with all their positions, and nothing comes with the
-    names of mappers. CatalogError if a layer says no tags.
+    Bounds are west, south, east and north in degrees. Values are exact, ways and multipolygons come
+    with their positions, and nothing with the names of mappers. CatalogError if a layer says no
+    tags.
     """
     west, south, east, north = bounds
     # a dict keeps the order, and an element asked for by two layers is asked for once
@@ -114,14 +114,11 @@ def fetch_layers(
     """Fetch the elements of layers in an area, and a little more, as files for `read_layers`.
 
     There is a file for each tile of at most `tile_deg` degrees; one that is too much for the
-    servers is split into four. Endpoints are such as ``"https://overpass-api.de/api"``, best first;
-    one that fails is asked last from then on. Before each query that is sent, the server is asked
-    for its free slots, and waited for. The answers of all servers count as the same in the cache,
-    so that a run that was interrupted goes on where it stopped. `progress` takes the number of
-    tiles that are done and of those there are, which may grow.
-
-    InputError if there is no server to ask or `tile_deg` is not above 0, CatalogError if a layer
-    says no tags, SourceError if no server gives a tile.
+    servers is split into four. Endpoints are such as ``"https://overpass-api.de/api"``; one that
+    fails is asked last from then on. Before each query the server is asked for its free slots, and
+    waited for. In the cache the answers of all servers count as the same, so that a run that was
+    interrupted goes on where it stopped. `progress` takes the tiles done and those there are, which
+    may grow. SourceError if no server gives a tile.
     """
     if not endpoints:
         msg = "there is no Overpass server to ask; name one in endpoints."

@@ -81,9 +81,8 @@ def read_layers(
 ) -> tuple[RawLayer, ...]:
     """Read layers of a file of Overpass JSON, or of the tiles of an area, one for each of `specs`.
 
-    Layers, `crs` and what is returned are as of `sources.osm.file.read_layers`. An
-    element that is in several tiles counts once. SourceError if a file is missing, is not Overpass
-    JSON, or is incomplete by its own remark; CatalogError if a layer says no tags.
+    They are as of `sources.osm.file.read_layers`; an element in several tiles counts once.
+    SourceError if a file is not Overpass JSON, or is incomplete by its own remark.
     """
     paths = [Path(path)] if isinstance(path, str | Path) else list(path)
     where = str(paths[0]) if len(paths) == 1 else f"{len(paths)} tiles"
@@ -110,7 +109,7 @@ def read_layers(
 
 
 class _Places:
-    """The positions of the elements of a document, however it says them.
+    """The positions of the elements of a document.
 
     A way has its nodes' positions (``out geom``), only its centre (``out center``), or names nodes
     that are elements of their own (``out; >; out skel``).

@@ -24,9 +24,8 @@ RING_NODES = 4  # of the smallest, a triangle: the first node comes again at its
 def way_shape(xy: NDArray[np.float64], role: Role) -> Position:
     """Return what a way stands for: a centroid for objects, a polygon for buildings, or a line.
 
-    Nodes are longitude and latitude, shape (n, 2). A closed way is taken for the outline of an
-    area, but for a street. BadFeatureError for less than two nodes, and for the outline of a
-    building that is not closed or encloses nothing.
+    Nodes are longitude and latitude, shape (n, 2). A closed way is the outline of an area, but for
+    a street. BadFeatureError for less than two nodes, and for a building that encloses nothing.
     """
     if len(xy) < 2:  # noqa: PLR2004
         msg = "has less than two nodes"
@@ -49,8 +48,8 @@ def relation_shape(
 ) -> Position:
     """Return what a multipolygon stands for: a centroid for objects, or the area of a building.
 
-    The ways that bound it on the outside, and those of its holes, come in any order and direction.
-    BadFeatureError if they do not join to rings, or enclose nothing.
+    Its ways come in any order and direction. BadFeatureError if they do not join to rings, or
+    enclose nothing.
     """
     area: BaseGeometry = shapely.Polygon()
     for ring in (*_rings(outer), *_rings(inner)):

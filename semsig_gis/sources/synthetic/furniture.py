@@ -34,10 +34,8 @@ CLASSES = (
     "bench",
     "bus_stop",
 )
-
 # The numbers below are calibrated together: the signatures of PARIS_LIKE then hold each class as
 # often as the paper's. Change one, and its test tells which counts have left their range.
-
 # Metres between neighbours in a row; one rhythm a street.
 STREET_LIGHT_SPACING_M = (15.0, 32.0)
 AVENUE_LIGHT_SPACING_M = (6.0, 11.0)

@@ -62,8 +62,8 @@ class CsvColumns:
 def csv_columns(header: str, spec: LayerSpec | None, *, where: str) -> CsvColumns:
     """Find the separator and the coordinate columns from the first line of a file.
 
-    CatalogError if `spec` names only one column, or one that does not exist; SourceError if it
-    names none and none is recognised. Without `spec`, there may be none.
+    CatalogError if `spec` names only one column, or one that does not exist; SourceError if none is
+    recognised, but without `spec`.
     """
     layouts = {sep: next(csv.reader([header], delimiter=sep), []) for sep in SEPARATORS}
     widest = max(layouts, key=lambda separator: len(layouts[separator]))

@@ -33,11 +33,8 @@ if TYPE_CHECKING:
     from semsig_gis.sources.raw_layer import Position
     from semsig_gis.sources.vector.csv import CsvColumns
 
-
 # fiona's loggers; a filter acts on the very logger that emits, not on those below it.
 LOGGERS = ("fiona._env", "fiona._err", "fiona.collection", "fiona.ogrext")
-
-
 _heard: contextvars.ContextVar[list[logging.LogRecord] | None] = contextvars.ContextVar(
     "_heard", default=None
 )
@@ -78,15 +75,9 @@ def first_error(heard: list[logging.LogRecord]) -> str:
 
 NO_GEOMETRY = "None"
 CONTAINER = "GPKG"  # the one driver whose files hold several layers
-
-
 HEADER_BYTES = 65_536  # enough for the first line of a CSV file
-
-
 # A reader that fails so often without a good feature between does not move on.
 FAILURES_IN_A_ROW = 1_000
-
-
 WGS84_NAMES = re.compile(r"4326|CRS84|WGS ?84", re.IGNORECASE)
 
 
@@ -94,9 +85,8 @@ WGS84_NAMES = re.compile(r"4326|CRS84|WGS ?84", re.IGNORECASE)
 class LayerInfo:
     """What one layer of a file is: its name, kind, CRS, number of features and fields with types.
 
-    `geometry` is the type as GDAL calls it; ``"Point"`` for a CSV file with coordinate columns,
-    ``"None"`` for a table without geometry. `crs` is a code or name, None where the file does not
-    say, or says too little to transform coordinates.
+    `geometry` is as GDAL calls it, ``"Point"`` for a CSV file with coordinates. `crs` is a code or
+    name, None where the file does not say enough to transform coordinates.
     """
 
     name: str
@@ -107,11 +97,7 @@ class LayerInfo:
 
 
 def list_layers(path: str | Path) -> tuple[LayerInfo, ...]:
-    """List the layers of a vector file, in its order; SourceError if it cannot be used.
-
-    It is a ``.shp``, ``.geojson``, ``.json``, ``.gpkg``, ``.fgb`` or ``.csv`` file, or a ``.zip``
-    with such files in it.
-    """
+    """List the layers of a vector file or archive, in its order; SourceError if it is none."""
     with listening():
         return tuple(_describe(member) for member in _layers(Path(path)))
 

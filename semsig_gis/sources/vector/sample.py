@@ -37,8 +37,8 @@ POINT_TYPE = "Point"
 class Sample:
     """One layer, the name of its reader, and the fields of its first rows.
 
-    The CRS of a table is that of portals. `placed` says whether the reader finds the positions by
-    itself; `coordinates` are the two fields in which it finds them, where they are two.
+    `placed` says whether the reader finds the positions by itself; `coordinates` are the two fields
+    in which it finds them, where they are two.
     """
 
     reader: str
