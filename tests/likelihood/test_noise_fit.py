@@ -40,7 +40,7 @@ def test_counts_add_up(seed: int) -> None:
     assert evidence.present.sum() == len(database.codes)
     hits = counts.named.sum()
     assert hits == pytest.approx(counts.chances.sum())
-    assert hits + counts.false.sum() == pytest.approx(len(evidence.given), abs=0.05)
+    assert hits + counts.false.sum() == pytest.approx(len(evidence.labels), abs=0.05)
     assert (counts.named.sum(axis=1) <= evidence.present + 0.05).all()
     assert (counts.squares >= 0).all()
     new = next_model(evidence, counts, model)

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -29,17 +30,14 @@ if TYPE_CHECKING:
     from semsig_gis.likelihood.association import Pairs
 
 
-PRIOR_SAMPLES = 8.0
-"""Samples that the overall value counts for, against those of a class."""
-
-
+ALL = "all"
+"""What stands for all classes together."""
+PRIOR_SAMPLES = 8.0  # that the overall value counts for, against those of a class
 REACH = 75.0  # degrees beyond which a detection is never taken for an object
-
-
 LEAST, MOST = 1e-3, 1.0 - 1e-3
-
-
 LEAST_SIGMA, MOST_SIGMA = 0.05, 60.0
+LEAST_INFORMATION = 0.05
+PERCENTS = (90, 95)  # of the intervals
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -47,8 +45,8 @@ class Evidence:
     """What was there and what was detected, over all samples (signatures).
 
     `names` and `codes` list the k classes that occur. Each object has a class (`kinds`, its number
-    among the k), a sample (`owners`) and a distance in metres; each detection a class (`given`) and
-    a sample (`givers`). `pairs` are objects and detections that may be one thing.
+    among the k), a sample (`owners`) and a distance in metres; each detection a class (`labels`)
+    and a sample (`givers`). `pairs` are objects and detections that may be one thing.
     """
 
     names: list[str]
@@ -57,7 +55,7 @@ class Evidence:
     kinds: NDArray[np.int64]
     owners: NDArray[np.int64]
     distances: NDArray[np.float64]
-    given: NDArray[np.int64]
+    labels: NDArray[np.int64]
     givers: NDArray[np.int64]
     pairs: Pairs
 
@@ -66,6 +64,16 @@ class Evidence:
         """Number of objects by class, shape (k,)."""
         return np.bincount(self.kinds, minlength=len(self.codes)).astype(np.float64)
 
+    @property
+    def pair_kinds(self) -> NDArray[np.int64]:
+        """The class of the object of each pair."""
+        return self.kinds[self.pairs.objects]
+
+    @property
+    def pair_labels(self) -> NDArray[np.int64]:
+        """The class of the detection of each pair."""
+        return self.labels[self.pairs.detections]
+
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Counts:
@@ -73,7 +81,7 @@ class Counts:
 
     By pair, `chances` that it is one thing and `squares` of the bearing noise if it is, in square
     degrees; `false`, the chance that each detection is clutter; `named`, shape (k, k), detected
-    objects by true and given class; `log_likelihood` of all detections.
+    objects by class and label; `log_likelihood` of all detections.
     """
 
     chances: NDArray[np.float64]
@@ -96,16 +104,16 @@ def gather_evidence(views: Views, detected: Sequence[Signature], *, taxonomy: Ta
             "detections; give samples with some of both."
         )
         raise InputError(msg)
-    known = np.union1d(views.codes, codes)
+    classes = np.union1d(views.codes, codes)
     starts = np.concatenate([[0], np.cumsum([len(one) for one in detected])])
     return Evidence(
-        names=[taxonomy.by_code(int(code)).name for code in known],
-        codes=known,
+        names=[taxonomy.by_code(int(code)).name for code in classes],
+        codes=classes,
         samples=len(detected),
-        kinds=np.searchsorted(known, views.codes),
+        kinds=np.searchsorted(classes, views.codes),
         owners=np.repeat(np.arange(len(detected)), views.lengths),
         distances=views.distances,
-        given=np.searchsorted(known, codes),
+        labels=np.searchsorted(classes, codes),
         givers=np.repeat(np.arange(len(detected)), np.diff(starts)),
         pairs=near_pairs(views.offsets, views.bearings, starts, seen, reach=REACH),
     )
@@ -137,16 +145,16 @@ def expected_counts(evidence: Evidence, model: NoiseTable) -> Counts:
         kinds=evidence.kinds,
         distances=evidence.distances,
         lengths=np.zeros(len(evidence.kinds), np.int64),
-        names=evidence.given,
+        names=evidence.labels,
     )
-    kind = evidence.kinds[pairs.objects]
+    kind = evidence.pair_kinds
     # Of a difference, the place and the bearing noise have their shares by their variances.
     place = np.degrees(model.position_sigma / np.maximum(evidence.distances[pairs.objects], 1e-3))
     own = model.sigma[kind] ** 2
     share = own / (own + place**2)
-    true = np.bincount(pairs.detections, chances, len(evidence.given))
+    true = np.bincount(pairs.detections, chances, len(evidence.labels))
     named = np.zeros((size, size))
-    np.add.at(named, (kind, evidence.given[pairs.detections]), chances)
+    np.add.at(named, (kind, evidence.pair_labels), chances)
     return Counts(
         chances=chances,
         squares=(pairs.away * share) ** 2 + place**2 * share,
@@ -163,10 +171,8 @@ def next_model(evidence: Evidence, counts: Counts, model: NoiseTable) -> NoiseTa
     wrong = counts.named * (1.0 - np.eye(size))
     misnamed = np.clip(drawn_rates(wrong.sum(axis=1), detected), LEAST, MOST)
     spread = wrong + PRIOR_SAMPLES * misnamed[:, None] * _others(size)
-    kind = evidence.kinds[evidence.pairs.objects]
-    squares = np.zeros(size)
-    np.add.at(squares, kind, counts.chances * counts.squares)
-    false = np.bincount(evidence.given, counts.false, size)
+    squares = np.bincount(evidence.pair_kinds, counts.chances * counts.squares, size)
+    false = np.bincount(evidence.labels, counts.false, size)
     shares = (false + PRIOR_SAMPLES / size) / (false.sum() + PRIOR_SAMPLES)
     return replace(
         model,
@@ -178,7 +184,7 @@ def next_model(evidence: Evidence, counts: Counts, model: NoiseTable) -> NoiseTa
     )
 
 
-def drawn_rates(hits: NDArray[np.float64], trials: NDArray[np.float64]) -> NDArray[np.float64]:
+def drawn_rates(hits: NDArray[np.number], trials: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return the rate of each class; the overall rate counts for `PRIOR_SAMPLES` trials of each."""
     overall = hits.sum() / max(trials.sum(), 1e-9)
     return np.asarray((hits + PRIOR_SAMPLES * overall) / (trials + PRIOR_SAMPLES))
@@ -204,16 +210,6 @@ def _others(size: int) -> NDArray[np.float64]:
     return np.asarray((1.0 - np.eye(size)) / max(size - 1, 1))
 
 
-ALL = "all"
-"""What stands for all classes together."""
-
-
-LEVELS = (90, 95)
-
-
-LEAST_INFORMATION = 0.05
-
-
 def estimated_rates(evidence: Evidence, counts: Counts, model: NoiseTable) -> pd.DataFrame:
     """Return the rates by class and overall with their intervals, as in `NoiseEstimate.rates`.
 
@@ -226,73 +222,46 @@ def estimated_rates(evidence: Evidence, counts: Counts, model: NoiseTable) -> pd
     """
     size = len(evidence.codes)
     detected = counts.named.sum(axis=1)
-    wrong = detected - np.diag(counts.named)
-    kind = evidence.kinds[evidence.pairs.objects]
-    sums = {  # what is counted, of how many, and what the model has
+    squares = np.bincount(evidence.pair_kinds, counts.chances * counts.squares, size)
+    false = np.bincount(evidence.labels, counts.false, size)
+    sums = {  # what is counted, of how many by class and in all, and what the model has
         "detection": (detected, evidence.present, 1.0 - model.missed[0]),
-        "misnamed": (wrong, detected, model.misnamed[0]),
-        "clutter": (
-            np.bincount(evidence.given, counts.false, size),
-            np.full(size, float(evidence.samples)),
-            model.clutter,
-        ),
-        "bearing_sigma": (
-            np.bincount(kind, counts.chances * counts.squares, size),
-            detected,
-            model.sigma,
-        ),
+        "misnamed": (detected - np.diag(counts.named), detected, model.misnamed[0]),
+        "clutter": (false, np.full(size, float(evidence.samples)), model.clutter),
+        "bearing_sigma": (squares, detected, model.sigma),
     }
     scores = _scores(evidence, counts, {name: part[2] for name, part in sums.items()})
     single = _deviations(scores.reshape(evidence.samples, -1)).reshape(len(sums), size)
     pooled = _deviations(scores.sum(axis=2))
     rows = []
     for number, (quantity, (hits, trials, values)) in enumerate(sums.items()):
-        total = float(trials[0] if quantity == "clutter" else trials.sum())
-        own = float(hits.sum()) / max(total, 1e-9)
-        overall = math.sqrt(own) if quantity == "bearing_sigma" else own
-        rows.append(_row(quantity, ALL, overall, own, total, float(pooled[number])))
-        for kind_row, kind_name in enumerate(evidence.names):
-            tried = float(trials[kind_row])
-            own = float(hits[kind_row]) / tried if tried > 0 else 0.0
-            rows.append(
-                _row(
-                    quantity,
-                    kind_name,
-                    float(values[kind_row]),
-                    own,
-                    tried,
-                    float(single[number, kind_row]),
-                )
-            )
+        total = trials[0] if quantity == "clutter" else trials.sum()
+        rows.append(_row(quantity, ALL, hits.sum(), total, pooled[number]))
+        for kind, name in enumerate(evidence.names):
+            own = _row(quantity, name, hits[kind], trials[kind], single[number, kind])
+            rows.append({**own, "value": float(values[kind])})
     return pd.DataFrame(rows)
 
 
-def _row(  # noqa: PLR0917 - one row of a table, in its order
-    quantity: str, kind: str, value: float, own: float, trials: float, deviation: float
-) -> dict[str, Any]:
-    """Return one row of the table: `deviation` is that of a log-odds or logarithm."""
-    row: dict[str, Any] = {"quantity": quantity, "class": kind, "value": value}
-    row["own"] = (
-        math.sqrt(own)
-        if quantity == "bearing_sigma"
-        else min(own, 1.0)
-        if quantity != "clutter"
-        else own
-    )
-    for percent in LEVELS:
-        if quantity == "bearing_sigma":
-            floor = 1.0 / math.sqrt(2.0 * trials) if trials > 0 else math.inf
-            ends = log_interval(max(row["own"], 1e-6), max(deviation, floor), percent=percent)
-        elif quantity == "clutter":
-            worth = min(trials, 1.0 / max(own * deviation**2, 1e-12))
-            ends = poisson_interval(own, worth, percent=percent)
-        else:
-            share = row["own"]
-            worth = min(trials, 1.0 / max(share * (1.0 - share) * deviation**2, 1e-12))
-            ends = wilson_interval(share, worth, percent=percent)
-        row[f"low_{percent}"], row[f"high_{percent}"] = ends
-    row["samples"] = trials
-    return row
+def _row(quantity: str, name: str, hits: float, trials: float, deviation: float) -> dict[str, Any]:
+    """Return what the samples say of a rate: `deviation` is that of its log-odds or logarithm."""
+    rate = hits / trials if trials > 0 else 0.0
+    if quantity == "bearing_sigma":
+        own = math.sqrt(rate)
+        least = 1.0 / math.sqrt(2.0 * trials) if trials > 0 else math.inf
+        interval = partial(log_interval, max(own, 1e-6), max(deviation, least))
+    elif quantity == "clutter":
+        own = rate
+        worth = min(trials, 1.0 / max(own * deviation**2, 1e-12))
+        interval = partial(poisson_interval, own, worth)
+    else:
+        own = min(rate, 1.0)
+        worth = min(trials, 1.0 / max(own * (1.0 - own) * deviation**2, 1e-12))
+        interval = partial(wilson_interval, own, worth)
+    row: dict[str, Any] = {"quantity": quantity, "class": name, "value": own, "own": own}
+    for percent in PERCENTS:
+        row[f"low_{percent}"], row[f"high_{percent}"] = interval(percent=percent)
+    return row | {"samples": trials}
 
 
 def _scores(
@@ -302,9 +271,8 @@ def _scores(
 
     Chances are taken as log-odds, rates and deviations as logarithms.
     """
-    size, pairs = len(evidence.codes), evidence.pairs
-    kind = evidence.kinds[pairs.objects]
-    sample = evidence.owners[pairs.objects]
+    size, kind = len(evidence.codes), evidence.pair_kinds
+    sample = evidence.owners[evidence.pairs.objects]
 
     def by_sample(
         owner: NDArray[np.int64], group: NDArray[np.int64], amount: NDArray[np.float64]
@@ -314,9 +282,9 @@ def _scores(
 
     chances = counts.chances
     detected = by_sample(sample, kind, chances)
-    wrong = by_sample(sample, kind, chances * (kind != evidence.given[pairs.detections]))
+    wrong = by_sample(sample, kind, chances * (kind != evidence.pair_labels))
     present = by_sample(evidence.owners, evidence.kinds, np.ones(len(evidence.kinds)))
-    false = by_sample(evidence.givers, evidence.given, counts.false)
+    false = by_sample(evidence.givers, evidence.labels, counts.false)
     squares = by_sample(sample, kind, chances * counts.squares)
     return np.stack(
         [

@@ -1,9 +1,9 @@
-"""Detections whose true place is known, read from a file: what noise models are learnt from."""
+"""Learn a noise model from detections whose true place is known."""
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, fields, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -33,7 +33,6 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from numpy.typing import NDArray
-    from pyproj import CRS
 
     from semsig_gis.core.taxonomy import Taxonomy
     from semsig_gis.database.occlusion import Footprints
@@ -42,6 +41,9 @@ if TYPE_CHECKING:
     from semsig_gis.likelihood.noise.table import NoiseTable
     from semsig_gis.objects.table import StreetObjects
     from semsig_gis.storage.signature_rows import Row
+
+MOST_ROUNDS = 500
+SETTLED = 1e-4  # largest change of a log-odds or logarithm
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -125,12 +127,6 @@ def _sample(row: Row, taxonomy: Taxonomy) -> Sample:
     return Sample(signature=signature, cell_id=None if cell is None else int(cell))
 
 
-MOST_ROUNDS = 500
-
-
-SETTLED = 1e-4  # largest change of a log-odds or logarithm
-
-
 @dataclass(frozen=True, eq=False, kw_only=True)
 class NoiseEstimate:
     """A noise model that was learnt, and how well it is known.
@@ -158,16 +154,11 @@ class NoiseEstimate:
 
     def to_dict(self) -> dict[str, Any]:
         """Return plain values for JSON; ``confusion`` is by true class, then given class."""
-        return {
+        values = {field.name: getattr(self, field.name) for field in fields(self)}
+        return values | {
             "spec": self.spec.to_dict(),
             "rates": self.rates.to_dict("records"),
             "confusion": self.confusion.to_dict("index"),
-            "samples": self.samples,
-            "objects": self.objects,
-            "detections": self.detections,
-            "skipped": self.skipped,
-            "rounds": self.rounds,
-            "log_likelihood": self.log_likelihood,
         }
 
 
@@ -238,7 +229,7 @@ def learn_noise(
         confusion=pd.DataFrame(counts.named, index=evidence.names, columns=evidence.names),
         samples=len(used),
         objects=len(evidence.kinds),
-        detections=len(evidence.given),
+        detections=len(evidence.labels),
         skipped=len(samples) - len(used),
         rounds=rounds,
         log_likelihood=counts.log_likelihood,
@@ -255,41 +246,35 @@ def _true_views(
     if not samples:
         msg = "there are no samples to learn from; give detections with their true places."
         raise InputError(msg)
-    if not isinstance(city, SignatureDatabase):
-        places = [sample.xy for sample in samples if sample.xy is not None]
-        if len(places) < len(samples):
+    if isinstance(city, SignatureDatabase):
+        true_ids = np.array([_cell_id(sample, city) for sample in samples])
+        cells = np.minimum(np.searchsorted(city.cell_ids, true_ids), len(city) - 1)
+        used = np.flatnonzero(city.cell_ids[cells] == true_ids)
+        views = views_in(city, cells[used])
+    else:
+        xy = np.array([sample.xy for sample in samples if sample.xy is not None])
+        if len(xy) < len(samples):
             msg = "a sample gives its cell alone; give x and y, or a database instead of objects."
             raise InputError(msg)
         index = ObjectIndex(city.xy)
-        xy = np.array(places)
         views = views_at(city, xy, index=index, radius=radius, footprints=footprints)
-        found = np.flatnonzero(views.lengths)
-        if len(found) < len(places):  # as a cell that sees nothing is not in a database
-            _require_some(len(found), len(places), city.crs)
-            views = views_at(city, xy[found], index=index, radius=radius, footprints=footprints)
-        return views, found.tolist()
-    wanted = np.array(
-        [
-            sample.cell_id
-            if sample.cell_id is not None
-            else int(cell_ids(*city.grid.cells_at(np.array([sample.xy])))[0])
-            for sample in samples
-        ]
-    )
-    ids = city.cell_ids
-    cells = np.minimum(np.searchsorted(ids, wanted), len(ids) - 1)
-    found = np.flatnonzero(ids[cells] == wanted)
-    _require_some(len(found), len(samples), city.crs)
-    return views_in(city, cells[found]), found.tolist()
-
-
-def _require_some(found: int, samples: int, crs: CRS) -> None:
-    if found == 0:
+        # Where nothing is seen is left out, as a cell that sees nothing is not in a database.
+        used = np.flatnonzero(views.lengths)
+        views = replace(views, offsets=np.append(0, views.offsets[used + 1]))
+    if len(used) == 0:
         msg = (
-            f"none of the {samples} samples lies where an object of the city is in sight; give "
-            f"places in its coordinate reference system ({crs.to_string()}), or its cell ids."
+            f"none of the {len(samples)} samples lies where an object of the city is in sight; "
+            f"give places in its coordinate reference system ({city.crs.to_string()}), or its "
+            "cell ids."
         )
         raise InputError(msg)
+    return views, used.tolist()
+
+
+def _cell_id(sample: Sample, database: SignatureDatabase) -> int:
+    if sample.cell_id is not None:
+        return sample.cell_id
+    return int(cell_ids(*database.grid.cells_at(np.array([sample.xy])))[0])
 
 
 def _spec(evidence: Evidence, rates: pd.DataFrame, model: NoiseTable, name: str) -> NoiseSpec:
@@ -299,14 +284,14 @@ def _spec(evidence: Evidence, rates: pd.DataFrame, model: NoiseTable, name: str)
     def by_class(values: NDArray[np.float64]) -> dict[str, float]:
         return dict(zip(evidence.names, values.tolist(), strict=True))
 
-    named = model.named[0]
     clutter = float(model.clutter.sum())
     return NoiseSpec(
         detection=overall["detection"],
         detection_by_class=by_class(1.0 - model.missed[0]),
         misnamed=overall["misnamed"],
         confusion={
-            kind: by_class(row / row.sum()) for kind, row in zip(evidence.names, named, strict=True)
+            name: by_class(row / row.sum())
+            for name, row in zip(evidence.names, model.named[0], strict=True)
         },
         clutter=clutter,
         clutter_shares=by_class(model.clutter / clutter),
