@@ -47,7 +47,7 @@ def learn(
     objects: Objects = None,
     as_json: AsJson = False,
 ) -> None:
-    """Learn how a detector fails: what it misses, misnames and makes up, and how far off it is."""
+    """Learn how a detector fails from its detections of known places."""
     from dataclasses import replace
 
     from semsig_gis.database.city import open_city
@@ -56,66 +56,64 @@ def learn(
 
     keep_inputs(out, read=(database, samples, objects))
     city = open_city(database)
-    known = read_samples(samples, taxonomy=city.database.taxonomy)
+    rows = read_samples(samples, taxonomy=city.database.taxonomy)
     with progress("learning"):
-        found = _learnt(city, known, objects)
+        estimate = _estimate(city, rows, objects)
     # How far the places were known is no matter of the detector.
-    found = replace(found, spec=replace(found.spec, position_sigma=0.0, name=out.stem))
-    save_noise(found.spec, out)
+    noise = replace(estimate.spec, position_sigma=0.0, name=out.stem)
+    save_noise(noise, out)
+    estimate = replace(estimate, spec=noise)
     if as_json:
-        print_json(found.to_dict())
+        print_json(estimate.to_dict())
         return
-    _print_estimate(found)
+    _print_estimate(estimate)
     typer.echo(f"noise model: {out}")
 
 
-def _learnt(city: City, samples: Sequence[Sample], objects: Path | None) -> NoiseEstimate:
+def _estimate(city: City, samples: Sequence[Sample], objects: Path | None) -> NoiseEstimate:
     import numpy as np
 
     from semsig_gis.likelihood.noise.learn import Sample, learn_noise
 
-    opened = city.database
-    places = _places(opened, samples)
+    database = city.database
+    places = _places(database, samples)
     store = object_store(city, objects, needed=False)
     if store is None:
-        columns, rows = opened.grid.cells_at(places)
-        away = places - opened.grid.viewpoints(columns, rows)
+        away = places - database.grid.viewpoints(*database.grid.cells_at(places))
         sigma = math.sqrt(float(np.mean(away**2)))
-        return learn_noise(samples, opened, position_sigma=sigma)
-    return learn_noise(
-        [
-            Sample(signature=sample.signature, xy=(x, y))
-            for sample, (x, y) in zip(samples, places.tolist(), strict=True)
-        ],
-        store.objects,
-        radius=opened.spec.radius,
-        footprints=store.buildings_around(places, distance=opened.reach),
-    )
+        return learn_noise(samples, database, position_sigma=sigma)
+    placed = [
+        Sample(signature=sample.signature, xy=(x, y))
+        for sample, (x, y) in zip(samples, places.tolist(), strict=True)
+    ]
+    footprints = store.buildings_around(places, distance=database.reach)
+    radius = database.spec.radius
+    return learn_noise(placed, store.objects, radius=radius, footprints=footprints)
 
 
-def _places(opened: SignatureDatabase, samples: Sequence[Sample]) -> NDArray[Any]:
+def _places(database: SignatureDatabase, samples: Sequence[Sample]) -> NDArray[Any]:
     """Return the true places in metres, shape (samples, 2)."""
     import numpy as np
 
     from semsig_gis.core.grid import split_ids
 
-    return np.array(
-        [
-            opened.grid.viewpoints(*split_ids([sample.cell_id]))[0]
-            if sample.cell_id is not None
-            else sample.xy
-            for sample in samples
-        ]
-    )
+    places = [
+        sample.xy
+        if sample.cell_id is None
+        else database.grid.viewpoints(*split_ids([sample.cell_id]))[0]
+        for sample in samples
+    ]
+    return np.array(places)
 
 
-def _print_estimate(found: NoiseEstimate) -> None:
-    skipped = f"; {found.skipped} samples lie where nothing is in sight" if found.skipped else ""
+def _print_estimate(estimate: NoiseEstimate) -> None:
+    skipped = estimate.skipped
+    nowhere = f"; {skipped} samples lie where nothing is in sight" if skipped else ""
     print_rows(
-        f"Learnt from {found.detections:,} detections at {found.samples:,} places that see "
-        f"{found.objects:,} objects{skipped}",
+        f"Learnt from {estimate.detections:,} detections at {estimate.samples:,} places that see "
+        f"{estimate.objects:,} objects{nowhere}",
         ("quantity", "class", "value", "its own samples say", "95% interval", "samples"),
-        map(_rate, found.rates.to_dict("records")),
+        map(_rate, estimate.rates.to_dict("records")),
     )
 
 
@@ -144,7 +142,7 @@ def calibrate(
     objects: Objects = None,
     as_json: AsJson = False,
 ) -> None:
-    """Choose from which chance on `semsig localize` answers, so that answers can be trusted."""
+    """Choose from which chance on `semsig localize` gives an answer."""
     from dataclasses import asdict
 
     import numpy as np
@@ -155,22 +153,22 @@ def calibrate(
 
     keep_inputs(out, read=(database, samples, noise, objects))
     city = open_city(database)
-    known = read_samples(samples, taxonomy=city.database.taxonomy)
+    rows = read_samples(samples, taxonomy=city.database.taxonomy)
     options = SearchOptions(
         noise=noise, heading=heading, on_grid=on_grid, refine=refine, objects=objects, top=1
     )
     locator = options.locator(city)
     radius = locator.rule.radius
-    masses, errors = np.zeros(len(known)), np.full(len(known), np.inf)
+    masses, errors = np.zeros(len(rows)), np.full(len(rows), np.inf)
+    places = _places(city.database, rows)
     with progress("answering") as advance:
-        for number, (sample, place) in enumerate(
-            zip(known, _places(city.database, known), strict=True)
-        ):
+        for number, sample in enumerate(rows):
             if len(sample.signature):  # what saw nothing cannot be told
-                found = locator.locate(sample.signature)
-                masses[number] = found.answer.mass
-                errors[number] = math.dist((found.estimate.x, found.estimate.y), place)
-            advance(number + 1, len(known))
+                location = locator.locate(sample.signature)
+                masses[number] = location.answer.mass
+                position = location.estimate.x, location.estimate.y
+                errors[number] = math.dist(position, places[number])
+            advance(number + 1, len(rows))
     rule = abstention.calibrate(masses, errors <= radius, precision=precision, radius=radius)
     abstention.save_rule(rule, out)
     if as_json:

@@ -20,11 +20,7 @@ from semsig_gis import __version__
 from semsig_gis.core.errors import InputError
 from semsig_gis.core.geometry import angular_distance
 from semsig_gis.core.grid import cell_ids
-from semsig_gis.evaluation.result import (
-    QUERY_COLUMNS,
-    SUCCESS_METRES,
-    Evaluation,
-)
+from semsig_gis.evaluation.result import QUERY_COLUMNS, SUCCESS_METRES, Evaluation
 from semsig_gis.likelihood.locate import LikelihoodLocator
 from semsig_gis.likelihood.method import LikelihoodMethod
 from semsig_gis.matching.method import DEFAULT_METHOD, Method
@@ -84,11 +80,11 @@ def evaluate(
     queries : int, default 500
         How many cells to draw as queries, without replacement; 1 to the number of cells.
     method : Method or LikelihoodIndex, optional
-        What ranks the cells: measures of distance, or the index of this database for the
-        likelihood method; metric fusion of two edit distances unless given.
+        What ranks the cells: distances, or the likelihood with this index of the database;
+        metric fusion of two edit distances by default.
     distortion : str, distortion or sequence of distortions, default "medium"
-        What happens to the signatures: one of the paper's levels, or any of
-        `queries.chain`, as text or as values.
+        What happens to the signatures: one of the paper's levels, or any of `queries.chain`,
+        as text or as values.
     top : int, default 1
         How many best candidates count (t); 1 to the number of cells.
     seed : int, default 0
@@ -115,12 +111,9 @@ def evaluate(
     best t candidates; the recall looks at the rank of the true cell among all cells. False
     objects have the classes that occur in the database.
 
-    The likelihood method, as `likelihood.locate` has it, answers with the place around which
-    most of the chance lies. That comes first; then follow the other cells, likeliest first. So
-    the best t candidates are the answer and the t - 1 likeliest other cells.
-
-    Queries from anywhere, and several methods on the same queries, are for
-    `evaluation.spec`.
+    The likelihood method answers with the place around which most of the chance lies. That comes
+    first; then follow the other cells, likeliest first. Queries from anywhere, and several
+    methods on the same queries, are for `evaluation.spec`.
 
     Examples
     --------
@@ -169,10 +162,9 @@ def score_queries(
         if len(query.asked):
             ranking = next(rankings)
             pool = _Pool(database, query, ranking, max(*tops, *NEAR_PLACES))
-            shared = _told(database, query, ranking, pool)
-            shared |= _near(pool, judged=ranking.chances is not None)
+            shared = pool.shared()
             for top in tops:
-                outcomes[top].append(shared | _outcome(pool, top))
+                outcomes[top].append(shared | pool.outcome(top))
         else:
             for top in tops:
                 outcomes[top].append(_unlocalized(len(database)))
@@ -194,9 +186,9 @@ def scored_tables(
     about = _query_table(database, queries)
     scored = {}
     for top, rows in outcomes.items():
-        told = pd.DataFrame(list(rows), columns=OUTCOME_COLUMNS)
-        told["best_cell_id"] = told["best_cell_id"].astype("Int64")
-        scored[top] = pd.concat([about, told], axis=1)
+        table = pd.DataFrame(list(rows), columns=OUTCOME_COLUMNS)
+        table["best_cell_id"] = table["best_cell_id"].astype("Int64")
+        scored[top] = pd.concat([about, table], axis=1)
     return scored
 
 
@@ -253,53 +245,13 @@ def _chain(
     return (distortion,) if isinstance(distortion, QueryDistortion) else tuple(distortion)
 
 
-def _told(
-    database: SignatureDatabase, query: Query, ranking: Ranking, pool: _Pool
-) -> dict[str, Any]:
-    """Return the columns that do not depend on how many candidates count."""
-    scores = ranking.scores
-    low, high = rank_range(scores, query.cell) if query.cell >= 0 else (len(scores),) * 2
-    off = math.nan
-    if ranking.heading is not None:
-        off = float(angular_distance(ranking.heading, query.asked.heading))
-    return {
-        "distance": ranking.best_score,
-        "rank_low": low,
-        "rank_high": high,
-        "chance": ranking.chance,
-        "in_region": _in_region(ranking, query.cell),
-        "heading_error": off,
-        "seconds": ranking.seconds,
-        **_shown(database, query, ranking, pool),
-    }
-
-
-def _shown(
-    database: SignatureDatabase, query: Query, ranking: Ranking, pool: _Pool
-) -> dict[str, Any]:
-    """Return the best candidate, or one of equals."""
-    best = pool.cells[pool.scores == pool.scores.min()]
-    shown = best[int(query.pick * len(best))]
-    after = pool.cells[pool.best(NEXT_CELLS + 1)]
-    after = after[after != shown][:NEXT_CELLS]
-    x, y = database.xy[shown].tolist() if ranking.place is None else ranking.place
-    return {
-        "best_cell_id": int(cell_ids(database.columns[shown], database.rows[shown])),
-        "best_x": x,
-        "best_y": y,
-        "tied": len(best),
-        "next_cell_ids": ",".join(
-            map(str, cell_ids(database.columns[after], database.rows[after]).tolist())
-        ),
-    }
-
-
 class _Pool:
     """The best cells of a ranking with all that tie with the last of them, and their errors."""
 
     def __init__(
         self, database: SignatureDatabase, query: Query, ranking: Ranking, count: int
     ) -> None:
+        self.database, self.query, self.ranking = database, query, ranking
         self.cells = best_cells(ranking.scores, min(count, len(database)))
         places = database.xy.take(self.cells, axis=0)
         self.scores = ranking.scores[self.cells]
@@ -310,14 +262,74 @@ class _Pool:
         self.errors = np.round(np.sqrt((places**2).sum(axis=1)), 6)
         self.better = self.tied = np.empty(0)
 
-    def best(self, count: int) -> NDArray[np.intp]:
-        """Return the places here of so many best, equals in the order of the cells."""
-        count = min(count, len(self.scores))
+    def shared(self) -> dict[str, Any]:
+        """Return the columns that do not depend on how many candidates count."""
+        query, ranking = self.query, self.ranking
+        cells = len(ranking.scores)
+        low, high = rank_range(ranking.scores, query.cell) if query.cell >= 0 else (cells, cells)
+        off, right = math.nan, math.nan
+        if ranking.heading is not None:
+            off = float(angular_distance(ranking.heading, query.asked.heading))
+        near = {
+            f"near{count}": chance_within(**self._cut(count), metres=NEAR_METRES)
+            for count in NEAR_PLACES
+        }
+        if ranking.chances is not None:
+            right = chance_within(**self._cut(1), metres=SUCCESS_METRES)
+        return {
+            "distance": ranking.best_score,
+            "rank_low": low,
+            "rank_high": high,
+            "chance": ranking.chance,
+            "in_region": self._in_region(),
+            "heading_error": off,
+            "seconds": ranking.seconds,
+            **self._best(),
+            **near,
+            "right": right,
+        }
+
+    def outcome(self, top: int) -> dict[str, Any]:
+        """Return the columns that depend on how many candidates count."""
+        expected, within = expected_best(**self._cut(top))
+        chances = {f"p{t}": float(p) for t, p in zip(THRESHOLDS, within, strict=True)}
+        return {"error_m": expected, **chances}
+
+    def _best(self) -> dict[str, Any]:
+        """Return the best candidate, or one of equals, and the next ones."""
+        best = self.cells[self.scores == self.scores.min()]
+        shown = best[int(self.query.pick * len(best))]
+        # Equals follow in the order of the cells.
+        count = min(NEXT_CELLS + 1, len(self.scores))
         better, tied = top_candidates(self.scores, count)
         better = better[np.argsort(self.scores[better], kind="stable")]
-        return np.concatenate([better, tied[: count - len(better)]])
+        after = self.cells[np.concatenate([better, tied[: count - len(better)]])]
+        after = after[after != shown][:NEXT_CELLS]
+        database, place = self.database, self.ranking.place
+        x, y = database.xy[shown].tolist() if place is None else place
+        listed = np.append(shown, after)
+        first, *others = cell_ids(database.columns[listed], database.rows[listed]).tolist()
+        return {
+            "best_cell_id": first,
+            "best_x": x,
+            "best_y": y,
+            "tied": len(best),
+            "next_cell_ids": ",".join(map(str, others)),
+        }
 
-    def cut(self, count: int) -> dict[str, Any]:
+    def _in_region(self) -> float:
+        """Return the chance that the true cell is in the region; its last cell is one of equals."""
+        chances, region, cell = self.ranking.chances, self.ranking.region, self.query.cell
+        if chances is None or region is None:
+            return math.nan
+        if cell < 0:
+            return 0.0
+        least, own = chances[region[-1]], chances[cell]
+        if own != least:
+            return float(own > least)
+        return float((chances[region] == least).sum() / (chances == least).sum())
+
+    def _cut(self, count: int) -> dict[str, Any]:
         """Return the errors of those that are surely among so many best, and of the tied."""
         count = min(count, len(self.scores))
         slots = count - len(self.better)
@@ -326,23 +338,6 @@ class _Pool:
             self.better, self.tied = self.errors[better], self.errors[tied]
             slots = count - len(better)
         return {"better": self.better, "tied": self.tied, "slots": slots}
-
-
-def _outcome(pool: _Pool, top: int) -> dict[str, Any]:
-    """Return the columns that depend on how many candidates count."""
-    expected, within = expected_best(**pool.cut(top))
-    chances = {f"p{t}": float(p) for t, p in zip(THRESHOLDS, within, strict=True)}
-    return {"error_m": expected, **chances}
-
-
-def _near(pool: _Pool, *, judged: bool) -> dict[str, float]:
-    """Return the chances that one of the best places is near, and that the answer is right."""
-    near = {
-        f"near{count}": chance_within(**pool.cut(count), metres=NEAR_METRES)
-        for count in NEAR_PLACES
-    }
-    right = chance_within(**pool.cut(1), metres=SUCCESS_METRES) if judged else math.nan
-    return {**near, "right": right}
 
 
 def _unlocalized(cells: int) -> dict[str, Any]:
@@ -360,19 +355,6 @@ def _unlocalized(cells: int) -> dict[str, Any]:
         "rank_high": cells,
         **dict.fromkeys(untold, math.nan),
     }
-
-
-def _in_region(ranking: Ranking, cell: int) -> float:
-    """Return the probability that a cell is in the region, whose last cell is one of equals."""
-    chances, region = ranking.chances, ranking.region
-    if chances is None or region is None:
-        return math.nan
-    if cell < 0:
-        return 0.0
-    least, own = chances[region[-1]], chances[cell]
-    if own != least:
-        return float(own > least)
-    return float((chances[region] == least).sum() / (chances == least).sum())
 
 
 def _query_table(database: SignatureDatabase, queries: Sequence[Query]) -> pd.DataFrame:

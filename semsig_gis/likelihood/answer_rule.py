@@ -98,35 +98,13 @@ class AnswerRule:
         return self.answered / self.queries if self.queries else math.nan
 
     def answers(self, mass: float) -> bool:
-        """Tell whether to answer.
-
-        Parameters
-        ----------
-        mass : float
-            Chance that the place is within `radius` of the best one.
-
-        Returns
-        -------
-        bool
-            Whether it is enough.
-        """
+        """Tell whether to answer, given the chance that the place is near the best one."""
         return bool(mass >= self.threshold)
 
-    def decide(self, found: Posterior) -> Decision:
-        """Return the best place, and whether to give it as the answer.
-
-        Parameters
-        ----------
-        found : Posterior
-            The chances of the cells.
-
-        Returns
-        -------
-        Decision
-            The place, its chance, and the decision.
-        """
-        cell, mass = found.best_place(self.radius)
-        x, y = found.database.xy[cell].tolist()
+    def decide(self, posterior: Posterior) -> Decision:
+        """Return the best place, its chance, and whether to give it as the answer."""
+        cell, mass = posterior.best_place(self.radius)
+        x, y = posterior.database.xy[cell].tolist()
         return Decision(cell=cell, x=x, y=y, mass=mass, given=self.answers(mass))
 
 
@@ -160,16 +138,10 @@ def calibrate(
 
     Parameters
     ----------
-    masses : array_like of float, shape (q,)
-        For each query the chance that the place is near the best one.
-    correct : array_like of bool, shape (q,)
-        Whether it was.
-    precision : float, default 0.98
-        Share of the answers that shall be right.
-    confidence : float, default 0.95
-        Chance, over queries like these, that they are.
-    radius : float, default 50
-        Metres that counted as right.
+    masses, correct : array_like, shape (q,)
+        For each query the chance that the place is near the best one, and whether it was.
+    precision, confidence, radius : float
+        As of `AnswerRule`; the confidence is over queries like these.
 
     Returns
     -------
@@ -243,14 +215,6 @@ def save_rule(rule: AnswerRule, path: str | Path) -> None:
         The rule.
     path : str or Path
         File to write; it appears whole, by rename.
-
-    Examples
-    --------
-    >>> import tempfile
-    >>> with tempfile.TemporaryDirectory() as folder:
-    ...     save_rule(AnswerRule(threshold=0.9), f"{folder}/rule.json")
-    ...     open_rule(f"{folder}/rule.json").threshold
-    0.9
     """
     values = asdict(rule)
     if math.isinf(rule.threshold):
@@ -265,7 +229,7 @@ def open_rule(path: str | Path) -> AnswerRule:
     Parameters
     ----------
     path : str or Path
-        The file.
+        File that `save_rule` wrote.
 
     Returns
     -------
@@ -276,12 +240,20 @@ def open_rule(path: str | Path) -> AnswerRule:
     ------
     InputError
         If the file cannot be read or does not hold a rule.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     save_rule(AnswerRule(threshold=0.9), f"{folder}/rule.json")
+    ...     open_rule(f"{folder}/rule.json").threshold
+    0.9
     """
     try:
         values: Mapping[str, Any] = json.loads(Path(path).read_text(encoding="utf-8"))
-        known = {item.name for item in fields(AnswerRule)}
-        if not isinstance(values, dict) or not {"threshold"} <= set(values) <= known:
-            msg = f"it does not hold just the fields {', '.join(sorted(known))}"
+        names = {field.name for field in fields(AnswerRule)}
+        if not isinstance(values, dict) or not {"threshold"} <= set(values) <= names:
+            msg = f"it does not hold just the fields {', '.join(sorted(names))}"
             raise InputError(msg)
         threshold = values["threshold"]
         return AnswerRule(**{**values, "threshold": math.inf if threshold is None else threshold})

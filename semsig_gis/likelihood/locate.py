@@ -117,22 +117,20 @@ class Location(Answer):
         What was searched for.
     noise : str
         Name of the noise model.
+    cells : int
+        How many cells were searched.
+    crs, taxonomy, licenses
+        Those of the database.
     candidates : DataFrame
         One row a cell, likeliest first: ``rank`` (from 1), ``cell`` (row in the database),
         ``cell_id``, ``x`` and ``y`` (viewpoint, CRS of the database), ``types`` (symbols),
         ``length`` (objects), ``loglik`` (natural logarithm of the likelihood), ``chance`` and,
         where north was not known for sure, ``heading`` (degrees to add to the bearings of the
         query).
-    cells : int
-        How many cells were searched.
-    crs, taxonomy, licenses
-        Those of the database.
     answer : Decision
-        The cell around which the chance is largest, that chance, and whether it is enough for an
-        answer.
+        The cell around which the chance is largest, that chance, and whether it is enough.
     estimate : PlaceEstimate
-        The place around that cell and the heading, each with its uncertainty: what to take for
-        the place if it is there.
+        The place around that cell and the heading, each with its uncertainty.
     rule : AnswerRule
         What the decision rests on.
     region : ndarray of int64
@@ -210,11 +208,7 @@ class Location(Answer):
                 "within_m": self.rule.radius,
             },
             "threshold": threshold if math.isfinite(threshold) else None,
-            "region": {
-                "share": REGION_SHARE,
-                "cells": len(self.region),
-                "km2": self.region_km2,
-            },
+            "region": {"share": REGION_SHARE, "cells": len(self.region), "km2": self.region_km2},
             "entropy_bits": self.posterior.entropy,
             "crs": self.crs.to_string(),
             "licenses": list(self.licenses),
@@ -256,17 +250,13 @@ class LikelihoodLocator:
         self, queries: Sequence[Signature], legs: Sequence[Leg]
     ) -> tuple[Location, ...]:
         """Find where the views of a route were seen from; any of them may have no objects."""
-        scores = [
-            self._scores(query, None if row else self.log_prior)
-            for row, query in enumerate(queries)
-        ]
-        logliks = [one.loglik for one in scores]
-        database, store = self.index.database, self._store_for(queries)
-        chances = route_posteriors(database, logliks, legs, log_prior=self.log_prior)
-        return tuple(
-            self._location(*view, top=self.top, store=store)
-            for view in zip(queries, scores, chances, strict=True)
-        )
+        first = [self._scores(query, self.log_prior) for query in queries[:1]]
+        scores = first + [self._scores(query, None) for query in queries[1:]]
+        logliks = [view.loglik for view in scores]
+        chances = route_posteriors(self.index.database, logliks, legs, log_prior=self.log_prior)
+        store = self._store_for(queries)
+        views = zip(queries, scores, chances, strict=True)
+        return tuple(self._location(*view, top=self.top, store=store) for view in views)
 
     def rankings(
         self,
@@ -300,9 +290,9 @@ class LikelihoodLocator:
         """Return the scores of all cells, the best ones by one-to-one associations."""
         if not len(query):
             return CellScores(loglik=self.index.constants)
-        north_sigma = self.north_sigma
-        scores = self.index.scores(query, north_sigma=north_sigma)
-        return rerank(self.index, query, scores, north_sigma=north_sigma, log_prior=log_prior)
+        sigma = self.north_sigma
+        scores = self.index.scores(query, north_sigma=sigma)
+        return rerank(self.index, query, scores, north_sigma=sigma, log_prior=log_prior)
 
     def _store_for(self, queries: Sequence[Signature]) -> ObjectStore | None:
         """Return the street objects to refine places with, if they are to be refined."""
@@ -324,25 +314,21 @@ class LikelihoodLocator:
             parts = self._parts(query, scores, posterior, store)
             scores, posterior = _with_parts(parts, scores, posterior)
         answer = self.rule.decide(posterior)
-        radius, database = self.rule.radius, self.index.database
+        radius, sigma = self.rule.radius, self.north_sigma
+        database, noise = self.index.database, self.index.noise
         estimate = None
         if parts is not None:
-            turned = self.north_sigma > 0
-            estimate = refined_estimate(parts, (answer.x, answer.y), radius=radius, turned=turned)
+            xy = answer.x, answer.y
+            estimate = refined_estimate(parts, xy, radius=radius, turned=sigma > 0)
         if estimate is None:
             estimate = cell_estimate(
-                query,
-                self.index.noise,
-                posterior,
-                answer.cell,
-                radius=radius,
-                north_sigma=self.north_sigma,
+                query, noise, posterior, answer.cell, radius=radius, north_sigma=sigma
             )
         candidates = _candidates(scores, posterior, min(top, len(database)))
         first = candidates["cell"].to_list()[: self.explained if len(query) else 0]
         return Location(
             query=query,
-            noise=self.index.noise.name,
+            noise=noise.name,
             candidates=candidates,
             cells=len(database),
             crs=database.crs,
@@ -506,26 +492,14 @@ def locate_route(
 
     Parameters
     ----------
-    index : LikelihoodIndex
-        The cells and the noise model.
+    index, north_sigma, rule, top, store, refined, explained
+        As of `locate`, for each view.
     queries : sequence of Signature
         The views. One may have no objects: that nothing was detected tells something, too.
     legs : sequence of Leg
         The ways between them, one fewer.
-    north_sigma : float, default 0
-        Standard deviation in degrees of the north of each view.
     log_prior : ndarray of float64, shape (n,), optional
         What else is known of the place of the first view.
-    rule : AnswerRule, optional
-        When to answer.
-    top : int, default 10
-        How many cells to list for each view.
-    store : ObjectStore, optional
-        The street objects behind the cells.
-    refined : bool, default False
-        Look for each place between the viewpoints, too; see `locate`.
-    explained : int, default 0
-        How many of the candidates of each view to explain.
 
     Returns
     -------
@@ -615,7 +589,7 @@ def _owners(parts: Refinement, database: SignatureDatabase) -> NDArray[np.int64]
 def cell_estimate(
     query: Signature,
     noise: Noise,
-    found: Posterior,
+    posterior: Posterior,
     cell: int,
     *,
     radius: float,
@@ -628,46 +602,47 @@ def cell_estimate(
     the standard deviation in degrees of the query's north: 0 if known, infinite if not known at
     all. Headings are tried every two degrees all round, cell by cell.
     """
-    database = found.database
+    database, chances = posterior.database, posterior.chances
     away = database.xy - database.xy[cell]
-    inside = np.flatnonzero((np.hypot(away[:, 0], away[:, 1]) <= radius) & (found.chances > 0))
-    inside = inside[np.argsort(-found.chances[inside], kind="stable")[:MOST_CELLS]]
+    inside = np.flatnonzero((np.hypot(away[:, 0], away[:, 1]) <= radius) & (chances > 0))
+    inside = inside[np.argsort(-chances[inside], kind="stable")[:MOST_CELLS]]
     headings = sigmas = np.zeros(len(inside))
     turned = north_sigma > 0 and query.bearings is not None and len(query) > 0
     if turned:
-        headings, sigmas = _headings(query, noise, found, inside, north_sigma)
+        headings, sigmas = _headings(database, query, noise, inside, north_sigma)
     parts = Refinement(
         places=database.xy[inside],
         sizes=np.full(len(inside), database.grid.step),
         loglik=np.zeros(len(inside)),
         headings=headings,
         heading_sigmas=sigmas,
-        chances=found.chances[inside],
+        chances=chances[inside],
         near=math.inf,
     )
     return _estimate(parts, turned=turned, refined=False)
 
 
 def refined_estimate(
-    found: Refinement, xy: tuple[float, float], *, radius: float, turned: bool
+    refinement: Refinement, xy: tuple[float, float], *, radius: float, turned: bool
 ) -> PlaceEstimate | None:
     """Return the best place within `radius` metres of another, from the chances of parts of cells.
 
     It is the mean over what is near the best part, or None if no part is in the circle. `turned`
     tells whether the heading was looked for, too.
     """
-    away = found.places - np.asarray(xy)
+    away = refinement.places - np.asarray(xy)
     inside = np.hypot(away[:, 0], away[:, 1]) <= radius
-    if not found.chances[inside].sum() > 0:
+    chances = refinement.chances[inside]
+    if not chances.sum() > 0:
         return None
     parts = replace(
-        found,
-        places=found.places[inside],
-        sizes=found.sizes[inside],
-        loglik=found.loglik[inside],
-        headings=found.headings[inside],
-        heading_sigmas=found.heading_sigmas[inside],
-        chances=found.chances[inside] / found.chances[inside].sum(),
+        refinement,
+        places=refinement.places[inside],
+        sizes=refinement.sizes[inside],
+        loglik=refinement.loglik[inside],
+        headings=refinement.headings[inside],
+        heading_sigmas=refinement.heading_sigmas[inside],
+        chances=chances / chances.sum(),
     )
     return _estimate(parts, turned=turned, refined=True)
 
@@ -679,16 +654,16 @@ def _estimate(parts: Refinement, *, turned: bool, refined: bool) -> PlaceEstimat
 
 
 def _headings(
+    database: SignatureDatabase,
     query: Signature,
     noise: Noise,
-    found: Posterior,
     cells: NDArray[np.int64],
     north_sigma: float,
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Return the mean heading in each cell and its standard deviation, in degrees."""
     turns = np.arange(-180.0, 180.0, TURN)
     each = np.broadcast_to(turns, (len(cells), len(turns)))
-    logs = align_cells(found.database, query, noise, cells, turns=each)
+    logs = align_cells(database, query, noise, cells, turns=each)
     logs -= 0.5 * (turns / north_sigma) ** 2
     shares = np.exp(logs - np.logaddexp.reduce(logs, axis=1)[:, None])
     means = np.degrees(np.angle(shares @ np.exp(1j * np.radians(turns))))

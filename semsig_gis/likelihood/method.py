@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from semsig_gis.core.errors import InputError, UnknownNameError, nearest_name
 from semsig_gis.core.text import plain_number
@@ -65,43 +65,29 @@ class LikelihoodMethod:
     def parse(cls, text: str, *, noises: Mapping[str, Noise] = NOISES) -> LikelihoodMethod:
         """Read a method from the text that `str` writes.
 
-        Parameters
-        ----------
-        text : str
-            ``likelihood``, or ``likelihood:NOISE``, then any of ``:refined``, ``:on_grid`` and
-            ``:heading=DEGREES`` or ``:heading=unknown``. Without a noise model, it is generic.
-        noises : mapping of str to Noise, optional
-            The noise models by name.
-
-        Returns
-        -------
-        LikelihoodMethod
-            The method.
-
-        Raises
-        ------
-        UnknownNameError
-            If there is no noise model of that name.
-        InputError
-            If the text does not have that form.
+        It is ``likelihood``, or ``likelihood:NOISE``, then any of ``:refined``, ``:on_grid`` and
+        ``:heading=DEGREES`` or ``:heading=unknown``; `noises` are the noise models by name. Raises
+        UnknownNameError for another noise model, and InputError if the text has another form.
         """
         _, *options = text.strip().split(":")
-        said = options.pop(0) if options else "generic"
-        if said not in noises:
-            known = ", ".join(noises)
-            hint = nearest_name(said, noises)
-            msg = f"method {text!r} has a noise model that is not known{hint}; give one of {known}."
+        noise = options.pop(0) if options else "generic"
+        if noise not in noises:
+            names = ", ".join(noises)
+            hint = nearest_name(noise, noises)
+            msg = f"method {text!r} has a noise model that is not known{hint}; give one of {names}."
             raise UnknownNameError(msg)
-        values: dict[str, Any] = {}
+        refined, on_grid, north_sigma = False, False, 0.0
         for option in options:
             key, _, value = option.partition("=")
-            if option in {"refined", "on_grid"}:
-                values[option] = True
+            if option == "refined":
+                refined = True
+            elif option == "on_grid":
+                on_grid = True
             elif key == "heading" and value:
-                values["north_sigma"] = _north_sigma(value, text)
+                north_sigma = _north_sigma(value, text)
             else:
                 raise InputError(_misread_likelihood(text))
-        return cls(noise=noises[said], **values)
+        return cls(noise=noises[noise], refined=refined, on_grid=on_grid, north_sigma=north_sigma)
 
     def __str__(self) -> str:
         """Return the text that `parse` reads."""

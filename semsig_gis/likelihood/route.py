@@ -67,22 +67,7 @@ class Leg:
 
     @classmethod
     def towards(cls, bearing: float, distance: float, *, sigma: float = 0.0) -> Leg:
-        """Return the leg of so many metres in a direction.
-
-        Parameters
-        ----------
-        bearing : float
-            Degrees clockwise from grid north.
-        distance : float
-            Metres.
-        sigma : float, default 0
-            Standard deviation of each coordinate, in metres.
-
-        Returns
-        -------
-        Leg
-            The leg.
-        """
+        """Return the leg of so many metres in a direction, in degrees clockwise from grid north."""
         angle = math.radians(bearing)
         return cls(dx=distance * math.sin(angle), dy=distance * math.cos(angle), sigma=sigma)
 
@@ -118,7 +103,7 @@ def route_posteriors(
         both = here * ((1.0 - LOST) * came + LOST / size)
         forward.append(both / both.sum())
     backward = np.ones(size)
-    found = [forward[-1]]
+    chances = [forward[-1]]
     for row in range(len(legs) - 1, -1, -1):
         leg = legs[row]
         ahead = likely[row + 1] * backward
@@ -126,8 +111,8 @@ def route_posteriors(
         back = moved_chances(database, ahead, Leg(dx=-leg.dx, dy=-leg.dy, sigma=leg.sigma))
         backward = (1.0 - LOST) * back + LOST / size
         both = forward[row] * backward
-        found.append(both / both.sum())
-    return tuple(Posterior(database=database, chances=chances) for chances in reversed(found))
+        chances.append(both / both.sum())
+    return tuple(Posterior(database=database, chances=view) for view in reversed(chances))
 
 
 def moved_chances(

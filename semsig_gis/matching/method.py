@@ -55,10 +55,8 @@ class Method:
     Examples
     --------
     >>> method = Method(types="edit", angles="jaccard", keep=5)
-    >>> str(method)
-    'edit+jaccard:5%'
-    >>> Method.parse("edit+jaccard:5%") == method
-    True
+    >>> str(method), Method.parse("edit+jaccard:5%") == method
+    ('edit+jaccard:5%', True)
     """
 
     noise: ClassVar[None] = None  # none is assumed, so no chances are told
@@ -94,31 +92,11 @@ class Method:
     def parse(cls, text: str) -> Method:
         """Read a method from the text that `str` writes.
 
-        Parameters
-        ----------
-        text : str
-            ``types+angles`` (``edit+jaccard``), or one part (``types:edit``,
-            ``angles:histogram``), then any of ``:5%`` (two-stage), ``:alpha=0.7``, ``:raw`` and
-            ``:weights=2/1/1`` (insert, delete, substitute).
-
-        Returns
-        -------
-        Method
-            The method.
-
-        Raises
-        ------
-        InputError
-            If the text does not have that form, or a value is out of range.
-        UnknownNameError
-            If there is no measure of that name.
-
-        Examples
-        --------
-        >>> Method.parse("angles:histogram").types is None
-        True
-        >>> Method.parse("edit+edit:5%:alpha=0.7").alpha
-        0.7
+        It is ``types+angles`` (``edit+jaccard``), or one part (``types:edit``,
+        ``angles:histogram``), then any of ``:5%`` (two-stage), ``:alpha=0.7``, ``:raw`` and
+        ``:weights=2/1/1`` (insert, delete, substitute). Raises UnknownNameError if there is no
+        measure of that name, and InputError if the text has another form or a value is out of
+        range.
         """
         head, *options = text.strip().split(":")
         types: str | None
@@ -161,32 +139,19 @@ class Method:
         return {part: name for part, name in parts.items() if name is not None}
 
     def used(self, query: Signature) -> str:
-        """Return which parts of a query the method compares.
+        """Return which parts of a query the method compares: types, angles or types+angles.
 
-        Parameters
-        ----------
-        query : Signature
-            A query, perhaps without types or without bearings.
-
-        Returns
-        -------
-        str
-            ``"types"``, ``"angles"`` or ``"types+angles"``. A fusion falls back to the part that
-            the query has.
-
-        Raises
-        ------
-        InputError
-            If the query has no part that the method compares.
+        A fusion falls back to the part that the query has. Raises InputError if the query has no
+        part that the method compares.
         """
-        given = {TYPES: query.codes is not None, ANGLES: query.bearings is not None}
-        parts = [part for part in self.measures if given[part]]
+        present = {TYPES: query.codes is not None, ANGLES: query.bearings is not None}
+        parts = [part for part in self.measures if present[part]]
         if not parts:
-            said = {TYPES: "types", ANGLES: "bearings"}
-            wanted, other = (TYPES, ANGLES) if self.angles is None else (ANGLES, TYPES)
+            names = {TYPES: "types", ANGLES: "bearings"}
+            own, other = (TYPES, ANGLES) if self.angles is None else (ANGLES, TYPES)
             msg = (
-                f"method '{self}' compares {said[wanted]}, but the query has only {said[other]}; "
-                f"give its {said[wanted]}, or a method such as '{other}:edit'."
+                f"method '{self}' compares {names[own]}, but the query has only {names[other]}; "
+                f"give its {names[own]}, or a method such as '{other}:edit'."
             )
             raise InputError(msg)
         return "+".join(parts)

@@ -13,6 +13,7 @@ import numpy as np
 import pandas as pd
 
 from semsig_gis.core.taxonomy import WILDCARD
+from semsig_gis.database.answer import DistanceMemo
 from semsig_gis.database.file import PartitionedDatabase
 from semsig_gis.matching.method import ANGLES, BOTH, DEFAULT_METHOD, TYPES
 from semsig_gis.matching.metrics import metric
@@ -24,34 +25,22 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from semsig_gis.core.signature import Signature
-    from semsig_gis.database.answer import DistanceMemo
     from semsig_gis.database.database import SignatureDatabase
     from semsig_gis.database.sequences import SequenceTable
     from semsig_gis.matching.method import Method
 
     _SecondStage = Callable[[NDArray[np.int64]], NDArray[np.float32]]
-    _Known = Callable[[Hashable, Callable[[], NDArray[Any]]], NDArray[Any]]
-
 
 _Value = TypeVar("_Value", bound=np.generic)
-
 
 # Equal scores must come out equal, however they were added up, or ties are broken by rounding.
 # Real differences between scores are far larger than this step, and float32 holds its multiples
 # exactly up to 256.
 _SCORE_STEP = 2.0**-16
-
-
 _BATCH_BYTES = 32 << 20  # distances to distinct sequences held at once
-
-
 # For fewer queries, measuring what the first stage kept beats measuring all sequences at once.
 _MANY_QUERIES = 8
-
-
 _BATCH_QUERIES = 128  # RapidFuzz compares queries of like length together, so it wants many
-
-
 _CELLS_AT_ONCE = 1 << 16  # scores of so many cells stay in a near cache
 
 
@@ -74,22 +63,19 @@ def score_cells(
         How the cells are ranked.
     memo : DistanceMemo, optional
         Distances of these very queries to this database that other methods have needed; what is
-        measured is added. It holds a number for each query and distinct sequence.
+        measured is added, a number for each query and distinct sequence.
 
     Yields
     ------
     ndarray of float32, shape (n,)
         Distances of one query to the cells, in the order of the database; lower is better.
-        Equal scores are exactly equal: all are multiples of 2 ** -16.
+        Equal scores are exactly equal: all are multiples of 2 ** -16. Memory stays bounded
+        whatever the number of queries.
 
     Raises
     ------
     InputError
         If a query has no part that the method compares.
-
-    Notes
-    -----
-    Each distinct sequence is measured once. Memory stays bounded whatever the number of queries.
 
     Examples
     --------
@@ -167,29 +153,13 @@ def _score_both(
     by_angles = _distances(method, ANGLES, levels, angles, memo=memo)
     for place, (first, second) in enumerate(zip(by_types, by_angles, strict=True)):
         if len(codes) >= _MANY_QUERIES:
-            known: _Known = _worked_out
-            if memo is not None:
-                known = _known_of(memo, method, codes[place], levels[place])
-            yield _joined(method, first, types, second, angles, known=known)
+            query = codes[place].tobytes(), levels[place].tobytes()
+            kept = DistanceMemo() if memo is None else memo
+            yield _joined(method, first, types, second, angles, query=query, memo=kept)
         elif method.keep is None:
             yield _fused(method, first, types.inverse, second, angles.inverse)
         else:
             yield _two_stage(method, first, types, angles, second.__getitem__)
-
-
-def _known_of(
-    memo: DistanceMemo, method: Method, codes: NDArray[np.uint8], levels: NDArray[np.uint8]
-) -> _Known:
-    """Return how to ask a memo for what is known of one query, whatever percentage is kept."""
-    kind = method.types, method.angles, method.normalized, method.weights
-    of = (*kind, codes.tobytes(), levels.tobytes())
-    return lambda what, work_out: memo.get((what, *of), work_out)
-
-
-def _worked_out(what: Hashable, work_out: Callable[[], NDArray[Any]]) -> NDArray[Any]:
-    """Return what is not known of a query, because nothing is kept."""
-    del what
-    return work_out()
 
 
 def _table(database: SignatureDatabase, part: str) -> SequenceTable:
@@ -204,10 +174,15 @@ def _joined(
     by_angles: NDArray[np.float32],
     angles: SequenceTable,
     *,
-    known: _Known,
+    query: tuple[bytes, bytes],
+    memo: DistanceMemo,
 ) -> NDArray[np.float32]:
     """Return what `_fused` or `_two_stage` gives, compiled: it pays for many queries."""
     from semsig_gis.matching import kernels  # noqa: PLC0415 - loads a compiler
+
+    def known(what: Hashable, work_out: Callable[[], NDArray[Any]]) -> NDArray[Any]:
+        kind = method.types, method.angles, method.normalized, method.weights
+        return memo.get((what, *kind, *query), work_out)
 
     def fuse() -> NDArray[np.float32]:
         left, right = _shares(method, by_types, by_angles)
@@ -256,14 +231,10 @@ def _two_stage(
     second = second_stage(angles.inverse[kept])
     fused = _fused(method, by_types, types.inverse[kept], second, np.arange(len(kept)))
     worst = fused.max() if gate is None else gate.worst
-    scores = _spread(_behind(first, cut, worst), types)
+    # What is not kept follows in the order of the first stage.
+    scores = _spread(np.maximum(worst + (first - cut), _next(worst)), types)
     scores[kept] = fused
     return scores
-
-
-def _behind(first: NDArray[np.float32], cut: np.float32, worst: np.float32) -> NDArray[np.float32]:
-    """Return the scores of what is not kept, in the order of the first stage."""
-    return np.asarray(np.maximum(worst + (first - cut), _next(worst)))
 
 
 def _next(worst: np.float32) -> np.float32:
@@ -304,7 +275,7 @@ def _cut_at(method: Method, cells: NDArray[Any]) -> np.float32:
 def _gate_of_parts(database: PartitionedDatabase, query: Signature, method: Method) -> _Gate:
     """Find the gate of all parts: of each score of the first stage, how many and the worst."""
     count = _kept(method, len(database))
-    found = pd.DataFrame()
+    groups = pd.DataFrame()
     cut = np.float32(np.inf)
     for part in database.parts():
         by_types, second_stage = _stages(part, query, method)
@@ -315,13 +286,13 @@ def _gate_of_parts(database: PartitionedDatabase, query: Signature, method: Meth
         second = second_stage(part.angle_sequences.inverse[near])
         fused = _fused(method, by_types, types.inverse[near], second, np.arange(len(near)))
         more = pd.DataFrame({"first": first[near], "size": 1, "worst": fused})
-        groups = pd.concat([found, more]).groupby("first", as_index=False)
-        found = groups.agg({"size": "sum", "worst": "max"})
-        enough = np.flatnonzero(found["size"].cumsum() >= count)
+        steps = pd.concat([groups, more]).groupby("first", as_index=False)
+        groups = steps.agg({"size": "sum", "worst": "max"})
+        enough = np.flatnonzero(groups["size"].cumsum() >= count)
         if len(enough):
-            found = found.head(enough[0] + 1)
-            cut = found["first"].to_numpy()[-1]
-    return _Gate(cut, found["worst"].to_numpy().max())
+            groups = groups.head(enough[0] + 1)
+            cut = groups["first"].to_numpy()[-1]
+    return _Gate(cut, groups["worst"].to_numpy().max())
 
 
 def _stages(
@@ -363,8 +334,8 @@ def _distances(
     find = partial(measure.distances, sequences, table, normalized=method.normalized, only=only)
     if memo is None:
         return find()
-    asked = tuple(sequence.tobytes() for sequence in sequences)
-    return memo.get((part, name, method.normalized, method.weights, asked), find)
+    queries = tuple(sequence.tobytes() for sequence in sequences)
+    return memo.get((part, name, method.normalized, method.weights, queries), find)
 
 
 def _fused(
