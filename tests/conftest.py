@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from selenium.webdriver import Chrome
 
     Run = Callable[..., tuple[int, str, str]]
+    Done = Callable[..., str]
 
 # QGIS runs these with its own Python.
 collect_ignore = ["qgis_draw.py", "qgis_session.py"]
@@ -146,6 +147,18 @@ def run(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> 
             main()
         printed = capsys.readouterr()
         return int(end.value.code or 0), printed.out, printed.err
+
+    return call
+
+
+@pytest.fixture
+def done(run: Run) -> Done:
+    """Run the command in this process, which must succeed, and return its standard output."""
+
+    def call(*arguments: object) -> str:
+        code, out, err = run(*arguments)
+        assert code == 0, err
+        return out
 
     return call
 

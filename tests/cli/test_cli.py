@@ -23,7 +23,7 @@ from semsig_gis import __version__
 from semsig_gis.database.file import open_database
 
 if TYPE_CHECKING:
-    from conftest import Run
+    from conftest import Done, Run
 
 CATALOG = """
 name = "tiny"
@@ -72,44 +72,38 @@ def city(tmp_path: Path) -> Path:
 
 
 @pytest.fixture
-def database(city: Path, run: Run) -> Path:
+def database(city: Path, done: Done) -> Path:
     objects, path = city / "objects.parquet", city / "city.parquet"
-    assert run("load", city, "--catalog", city / "tiny.toml", "--out", objects)[0] == 0
-    assert run("build", objects, "--out", path)[0] == 0
+    done("load", city, "--catalog", city / "tiny.toml", "--out", objects)
+    done("build", objects, "--out", path)
     return path
 
 
-def test_the_road_from_files_to_a_place(city: Path, run: Run) -> None:
+def test_the_road_from_files_to_a_place(city: Path, done: Done) -> None:
     objects, database = city / "objects.parquet", city / "city.parquet"
-    code, out, _ = run("load", city, "--catalog", city / "tiny.toml", "--out", objects, "--json")
-    assert code == 0
+    out = done("load", city, "--catalog", city / "tiny.toml", "--out", objects, "--json")
     report = json.loads(out)
     assert report["objects"] == 21
     lights, crossings = report["sources"]
     assert (lights["read"], lights["collapsed"], lights["objects"]) == (21, 1, 20)
     assert (crossings["read"], crossings["filtered"], crossings["objects"]) == (2, 1, 1)
-    code, out, _ = run("load", city, "--catalog", city / "tiny.toml", "--out", objects)
-    assert code == 0
+    out = done("load", city, "--catalog", city / "tiny.toml", "--out", objects)
     assert "per km² of hull" in out
     assert "Nobody (CC0-1.0): lights, crossings" in out
 
-    code, out, _ = run("build", objects, "--out", database)
-    assert code == 0
+    out = done("build", objects, "--out", database)
     assert "cells of mean length" in out
 
-    code, out, _ = run("info", database, "--json")
-    assert code == 0
+    out = done("info", database, "--json")
     facts = json.loads(out)
     assert "Nobody (CC0-1.0)" in str(facts)
 
-    code, out, _ = run("info", database)
-    assert code == 0
+    out = done("info", database)
     assert "Street light (D)" in out
     assert "Nobody (CC0-1.0): lights, crossings" in out
 
     query = ("--types", "DX", "--bearings", "200,20")
-    code, out, _ = run("localize", database, *query, "--top", 3, "--json")
-    assert code == 0
+    out = done("localize", database, *query, "--top", 3, "--json")
     result = json.loads(out)
     assert result["query"]["types"] == "XD"
     assert len(result["candidates"]) == 3
@@ -118,48 +112,42 @@ def test_the_road_from_files_to_a_place(city: Path, run: Run) -> None:
     assert abs(best["x"] - 770010) <= 30
     assert abs(best["y"] - 6280010) <= 30
 
-    code, out, _ = run("localize", database, *query, "--map", city / "query.html")
-    assert code == 0
+    out = done("localize", database, *query, "--map", city / "query.html")
     assert "rank" in out
     assert "leaflet" in (city / "query.html").read_text(encoding="utf-8").lower()
 
 
-def test_evaluate_map_and_export(database: Path, city: Path, run: Run) -> None:
+def test_evaluate_map_and_export(database: Path, city: Path, done: Done) -> None:
     options = ("--queries", 30, "--distortion", "light", "--seed", 5, "--method", "edit+edit:20%")
-    code, out, _ = run("evaluate", database, *options, "--out", city / "eval", "--json")
-    assert code == 0
+    out = done("evaluate", database, *options, "--out", city / "eval", "--json")
     summary = json.loads(out)
     assert summary["settings"]["queries"] == 30
     assert summary["settings"]["method"] == "edit+edit:20%"
     assert summary.pop("timing")["seconds_per_query"] > 0
     assert json.loads((city / "eval" / "evaluation.json").read_text(encoding="utf-8")) == summary
 
-    code, out, _ = run("evaluate", database, *options)
-    assert code == 0
+    out = done("evaluate", database, *options)
     assert "recall" in out
 
-    code, out, _ = run("map", database, "--evaluation", city / "eval", "--out", city / "map.html")
-    assert code == 0
+    out = done("map", database, "--evaluation", city / "eval", "--out", city / "map.html")
     assert "map.html" in out
     assert (city / "map.html").stat().st_size > 1000
 
-    code, out, _ = run(
+    out = done(
         "export", database, "--objects", city / "objects.parquet", "--out", city / "city.gpkg"
     )
-    assert code == 0
     assert set(fiona.listlayers(city / "city.gpkg")) >= {"cells", "objects"}
     assert set(gpd.read_file(city / "city.gpkg", layer="cells").geom_type) == {"Polygon"}
 
-    code, _, _ = run("export", database, "--geometry", "point", "--out", city / "points.gpkg")
-    assert code == 0
+    done("export", database, "--geometry", "point", "--out", city / "points.gpkg")
     assert set(gpd.read_file(city / "points.gpkg", layer="cells").geom_type) == {"Point"}
 
 
-def test_switches_keep_what_filters_and_collapsing_take(city: Path, run: Run) -> None:
+def test_switches_keep_what_filters_and_collapsing_take(city: Path, done: Done) -> None:
     switches = ("--no-filter", "--no-collapse", "--json")
     options = ("--catalog", city / "tiny.toml", "--out", city / "all.parquet")
-    assert json.loads(run("load", city, *options, *switches)[1])["objects"] == 23
-    one = run("load", city, *options, "--layer", "crossings", *switches)[1]
+    assert json.loads(done("load", city, *options, *switches))["objects"] == 23
+    one = done("load", city, *options, "--layer", "crossings", *switches)
     assert json.loads(one)["objects"] == 2
 
 
@@ -170,44 +158,40 @@ def test_a_layer_without_a_file_is_told_and_left_out(city: Path, run: Run) -> No
     assert "layer 'crossings' has no file here" in err
 
 
-def test_origin_moves_the_grid(city: Path, database: Path, run: Run) -> None:
+def test_origin_moves_the_grid(city: Path, database: Path, done: Done) -> None:
     moved = city / "moved.parquet"
-    assert run("build", city / "objects.parquet", "--origin", "5,5", "--out", moved)[0] == 0
+    done("build", city / "objects.parquet", "--origin", "5,5", "--out", moved)
     x = gpd.read_parquet(moved).geometry.x
     assert set(x % 10) == {0.0}
     assert set(gpd.read_parquet(database).geometry.x % 10) == {5.0}
 
 
-def test_sources(run: Run, city: Path) -> None:
-    code, out, _ = run("sources")
-    assert code == 0
+def test_sources(done: Done, city: Path) -> None:
+    out = done("sources")
     assert "montpellier" in out
-    listed = json.loads(run("sources", "--json")[1])
+    listed = json.loads(done("sources", "--json"))
     assert {"montpellier", "opendata_paris", "openstreetmap"} <= {
         item["name"] for item in listed["catalogs"]
     }
     assert "osm_file" in listed["readers"]
-    code, out, _ = run("sources", "openstreetmap")
-    assert code == 0
+    out = done("sources", "openstreetmap")
     assert "highway=street_lamp" in out
     assert "fire_hydrants (optional)" in out
-    assert "les-arbres" in run("sources", "opendata_paris")[1]
-    code, out, _ = run("sources", "montpellier")
-    assert code == 0
+    assert "les-arbres" in done("sources", "opendata_paris")
+    out = done("sources", "montpellier")
     assert "ETAT = en fonction" in out
     assert "taxi_station" in out
-    assert json.loads(run("sources", city / "tiny.toml", "--json")[1])["title"] == "A tiny city"
+    assert json.loads(done("sources", city / "tiny.toml", "--json"))["title"] == "A tiny city"
 
 
-def test_a_draft_is_suggested_and_loads(city: Path, run: Run) -> None:
-    code, draft, _ = run("suggest", city / "lights.gpkg")
-    assert code == 0
+def test_a_draft_is_suggested_and_loads(city: Path, run: Run, done: Done) -> None:
+    draft = done("suggest", city / "lights.gpkg")
     assert "[[layers]]" in draft
     assert 'files = ["lights.gpkg"]' in draft
     sentence(run("suggest", city / "none.shp"), "none.shp")
 
 
-def test_two_catalogues_are_loaded_and_merged(city: Path, run: Run) -> None:
+def test_two_catalogues_are_loaded_and_merged(city: Path, done: Done) -> None:
     (city / "osm.toml").write_text(
         """
 name = "survey"
@@ -223,17 +207,16 @@ street_light = 2
     )
     write_layer(city / "survey.gpkg", [(770001.0, 6280000.0), (771000.0, 6280000.0)])
     catalogs = ("--catalog", city / "tiny.toml", "--catalog", city / "osm.toml")
-    code, out, _ = run("load", city, *catalogs, "--out", city / "both.parquet", "--json")
-    assert code == 0
+    out = done("load", city, *catalogs, "--out", city / "both.parquet", "--json")
     report = json.loads(out)
     assert report["objects"] == 22
     assert [item["count"] for item in report["conflated"]] == [1]
     assert report["conflated"][0]["kept"] == "tiny/lights"
     options = ("--no-merge", "--json", "--out", city / "apart.parquet")
-    assert json.loads(run("load", city, *catalogs, *options)[1])["objects"] == 23
+    assert json.loads(done("load", city, *catalogs, *options))["objects"] == 23
 
 
-def test_openstreetmap_with_its_surroundings(tmp_path: Path, run: Run) -> None:
+def test_openstreetmap_with_its_surroundings(tmp_path: Path, done: Done) -> None:
     path = write_osm(
         tmp_path / "town.osm",
         node(1, 7.42, 43.73, {"amenity": "bench"}),
@@ -243,10 +226,9 @@ def test_openstreetmap_with_its_surroundings(tmp_path: Path, run: Run) -> None:
         way(9, [1, 2, 3, 1], {"building": "yes"}),
     )
     surroundings = ("--buildings", tmp_path / "b.parquet", "--streets", tmp_path / "s.parquet")
-    code, out, _ = run(
+    out = done(
         "load", path, "--catalog", "openstreetmap", "--out", tmp_path / "o.parquet", *surroundings
     )
-    assert code == 0
     assert "EPSG:32632" in out
     assert list(gpd.read_parquet(tmp_path / "b.parquet").geom_type) == ["Polygon"]
     assert list(gpd.read_parquet(tmp_path / "s.parquet").geom_type) == ["LineString"]
@@ -304,9 +286,8 @@ files = ["benches.geojson"]
     sentence(run("fetch", "montpellier", "--area", "3,43,4,44", *options), "semsig load")
 
 
-def test_demo(tmp_path: Path, run: Run) -> None:
-    code, out, _ = run("demo", "--out", tmp_path / "demo", "--queries", 5)
-    assert code == 0
+def test_demo(tmp_path: Path, done: Done) -> None:
+    out = done("demo", "--out", tmp_path / "demo", "--queries", 5)
     for name in ("map.html", "city.gpkg", "city.parquet"):
         assert name in out
         assert (tmp_path / "demo" / name).stat().st_size > 0
@@ -342,7 +323,7 @@ def test_unknown_layer(city: Path, run: Run) -> None:
     assert not (city / "o.parquet").exists()
 
 
-def test_file_without_crs(city: Path, run: Run) -> None:
+def test_file_without_crs(city: Path, run: Run, done: Done) -> None:
     catalog = city / "bare.toml"
     catalog.write_text(
         CATALOG.replace('crs = "EPSG:2154"\n\n[[layers]]', "\n[[layers]]"), encoding="utf-8"
@@ -358,8 +339,7 @@ def test_file_without_crs(city: Path, run: Run) -> None:
         layer.write({"geometry": point, "properties": {"kind": "a"}})
     options = ("--catalog", catalog, "--layer", "lights", "--out", city / "o.parquet")
     sentence(run("load", city, *options), "lights.shp")
-    code, _, _ = run("load", city, *options, "--crs", "EPSG:2154")
-    assert code == 0
+    done("load", city, *options, "--crs", "EPSG:2154")
     sentence(run("load", city, *options, "--crs", "EPSG:0"), "EPSG:0")
 
 
@@ -390,7 +370,7 @@ def test_bad_catalogue(
     sentence(run("load", city, *options), *words)
 
 
-def test_damaged_zip(city: Path, run: Run) -> None:
+def test_damaged_zip(city: Path, run: Run, done: Done) -> None:
     (city / "lights.gpkg").unlink()
     write_layer(city / "s.shp", [(770000.0 + i, 6280000.0) for i in range(500)], kind=["a"] * 500)
     with zipfile.ZipFile(city / "lights.zip", "w", zipfile.ZIP_DEFLATED) as archive:
@@ -398,7 +378,7 @@ def test_damaged_zip(city: Path, run: Run) -> None:
             archive.write(city / f"s.{suffix}", f"s.{suffix}")
     whole = (city / "lights.zip").read_bytes()
     options = ("--catalog", city / "tiny.toml", "--layer", "lights", "--out", city / "o.parquet")
-    assert run("load", city, *options)[0] == 0
+    done("load", city, *options)
     for size in (len(whole) // 2, len(whole) - 10, 0):
         (city / "lights.zip").write_bytes(whole[:size])
         sentence(run("load", city, *options), "lights.zip")
@@ -478,10 +458,11 @@ def test_the_console_script_is_installed() -> None:
     assert done.stdout.strip() == f"semsig {__version__}"
 
 
-def test_the_likelihood_is_evaluated_and_drawn(database: Path, city: Path, run: Run) -> None:
+def test_the_likelihood_is_evaluated_and_drawn(
+    database: Path, city: Path, run: Run, done: Done
+) -> None:
     options = ("--queries", 20, "--method", "likelihood", "--noise", "light")
-    code, out, _ = run("evaluate", database, *options, "--out", city / "by_likelihood", "--json")
-    assert code == 0
+    out = done("evaluate", database, *options, "--out", city / "by_likelihood", "--json")
     summary = json.loads(out)
     assert summary["settings"]["method"] == "likelihood:light:on_grid"
     assert 0 <= summary["results"]["coverage"] <= 1
@@ -489,37 +470,32 @@ def test_the_likelihood_is_evaluated_and_drawn(database: Path, city: Path, run: 
     assert code == 0
     assert "Answered" in out
     assert "index" not in err  # it is kept beside the database
-    code, out, _ = run(
+    out = done(
         "map", database, "--evaluation", city / "by_likelihood", "--out", city / "likelihood.html"
     )
-    assert code == 0
     assert "likelihood:light:on_grid" in (city / "likelihood.html").read_text(encoding="utf-8")
     sentence(run("evaluate", database, "--method", "likelihood", "--noise", "loud"), "'loud'")
 
 
 def test_many_queries_are_answered_line_by_line(
-    city: Path, database: Path, run: Run, monkeypatch: pytest.MonkeyPatch
+    city: Path, database: Path, run: Run, done: Done, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     lines = '{"id": "a", "types": "DD"}\n{"types": "?D", "bearings": [10, 200]}\n'
     (city / "queries.jsonl").write_text(lines)
     for method in ("edit+edit", "likelihood"):
-        code, out, _ = run(
-            "localize", database, "--queries", city / "queries.jsonl", "--method", method
-        )
-        assert code == 0
+        out = done("localize", database, "--queries", city / "queries.jsonl", "--method", method)
         answers = [json.loads(line) for line in out.splitlines()]
         assert [answer["id"] for answer in answers] == ["a", 2]
         assert all(answer["candidates"] for answer in answers)
     monkeypatch.setattr("sys.stdin", io.StringIO(lines))
-    code, out, _ = run("localize", database, "--queries", "-", "--require", "2D")
-    assert code == 0
+    out = done("localize", database, "--queries", "-", "--require", "2D")
     assert len(out.splitlines()) == 2
     sentence(run("localize", database, "--queries", "x.csv", "--types", "D"), "--queries")
     sentence(run("localize", database, "--queries", city / "x.csv"), "x.csv", "cannot be read")
 
 
 def test_buildings_streets_and_an_area_narrow_what_is_built(
-    city: Path, database: Path, run: Run
+    city: Path, database: Path, run: Run, done: Done
 ) -> None:
     objects, out = city / "objects.parquet", city / "narrow.parquet"
     houses, area = city / "houses.gpkg", city / "area.parquet"
@@ -538,8 +514,7 @@ def test_buildings_streets_and_an_area_narrow_what_is_built(
         "wide": ("--streets", streets, "--viewpoints", "streets", "--street-width", 40),
         "area": ("--area", area),
     }.items():
-        code, printed, _ = run("build", objects, "--out", out, *options)
-        assert code == 0
+        printed = done("build", objects, "--out", out, *options)
         assert "cells of mean length" in printed
         opened = open_database(out)
         sizes[name] = len(opened), int(opened.lengths.sum())

@@ -52,7 +52,7 @@ def test_a_map_of_what_has_changed(folder: Path, run: Run, tmp_path: Path) -> No
     lonely = shutil.copy(new, tmp_path / "new.parquet")
     code, _, told = run("map", old, "--drift", lonely, "--out", out)
     assert code == 0
-    assert "not at hand" in told
+    assert "drawing cells only" in told
     assert "Objects removed" not in out.read_text(encoding="utf-8")
 
 

@@ -14,7 +14,7 @@ from semsig_gis.database.store import ObjectStore, save_with_store
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from conftest import Run
+    from conftest import Done, Run
 
 SPEC = """
 database = "city.parquet"
@@ -37,7 +37,7 @@ def spec(tmp_path: Path) -> Path:
     return path
 
 
-def test_an_experiment_is_run_and_compared(spec: Path, run: Run) -> None:
+def test_an_experiment_is_run_and_compared(spec: Path, run: Run, done: Done) -> None:
     out = spec.parent / "results"
     code, shown, err = run("experiment", spec, "--out", out)
     assert code == 0
@@ -50,17 +50,14 @@ def test_an_experiment_is_run_and_compared(spec: Path, run: Run) -> None:
     found = json.loads(again)
     assert list(found) == ["phone/paper-top1", "phone/refined-top1"]
     side_by_side = spec.parent / "side-by-side"
-    code, shown, _ = run("experiment", spec, "--out", side_by_side, "--workers", 2)
-    assert code == 0
+    shown = done("experiment", spec, "--out", side_by_side, "--workers", 2)
     assert (side_by_side / "figures.csv").read_text() == (out / "figures.csv").read_text()
     cases = [out / name for name in found]
-    code, shown, _ = run("compare", *cases)
-    assert code == 0
+    shown = done("compare", *cases)
     assert "P(error" not in shown
     assert "p50" in shown
     assert str(cases[0]) in "".join(shown.split())  # lines are broken at 80 signs
-    code, shown, _ = run("compare", out, out, "--json")
-    assert code == 0
+    shown = done("compare", out, out, "--json")
     same = json.loads(shown)
     assert list(same) == list(found)
     assert {row["difference"] for row in same["phone/paper-top1"]} <= {0.0, None}
@@ -69,7 +66,7 @@ def test_an_experiment_is_run_and_compared(spec: Path, run: Run) -> None:
     assert code == 0
 
 
-def test_what_is_refused(spec: Path, run: Run) -> None:
+def test_what_is_refused(spec: Path, run: Run, done: Done) -> None:
     out = spec.parent / "results"
     assert run("experiment", spec)[0] == 2
     sentence(run("experiment", spec, "--out", out, "--workers", -1), "-1 workers", "from 0 up")
@@ -79,23 +76,22 @@ def test_what_is_refused(spec: Path, run: Run) -> None:
     spec.write_text(SPEC.replace("30", "1000000"), encoding="utf-8")
     sentence(run("experiment", spec, "--out", out), "1000000 queries")
     spec.write_text(SPEC, encoding="utf-8")
-    assert run("experiment", spec, "--out", out)[0] == 0
+    done("experiment", spec, "--out", out)
     spec.write_text(SPEC.replace("compass:5", "compass:6"), encoding="utf-8")
     sentence(run("experiment", spec, "--out", out), "another experiment", "distortions")
     sentence(run("compare", out, spec.parent), "holds no results")
     other = spec.parent / "other"
     spec.write_text(SPEC.replace("paper", "best").replace("30", "20"), encoding="utf-8")
-    assert run("experiment", spec, "--out", other)[0] == 0
+    done("experiment", spec, "--out", other)
     sentence(run("compare", out, other), "other queries")
     pair = (out / "phone" / "paper-top1", other)
     sentence(run("compare", *pair), "a single evaluation", "none in common")
 
 
-def test_distortions_on_the_command_line(spec: Path, run: Run) -> None:
+def test_distortions_on_the_command_line(spec: Path, run: Run, done: Done) -> None:
     database = spec.parent / "city.parquet"
     options = ("--queries", 20, "--distortion", "medium,missing:bench,view:120", "--keep-order")
-    code, shown, _ = run("evaluate", database, *options, "--json")
-    assert code == 0
+    shown = done("evaluate", database, *options, "--json")
     settings = json.loads(shown)["settings"]
     assert settings["distortions"] == ["medium:resort=false", "missing:bench", "view:120"]
     text = "light:resort=false:false_class=frequency"
@@ -105,7 +101,6 @@ def test_distortions_on_the_command_line(spec: Path, run: Run) -> None:
         (("--distortion", "light", "--false-class", "frequency"), "light:false_class=frequency"),
     ):
         few = ("--queries", 5, "--distortion", text, "--json")
-        code, shown, _ = run("evaluate", database, *few, *more)
-        assert code == 0
+        shown = done("evaluate", database, *few, *more)
         assert json.loads(shown)["settings"]["distortions"] == [said]
     sentence(run("evaluate", database, "--distortion", "medium,veiw:120"), "nearest is 'view'")

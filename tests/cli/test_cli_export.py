@@ -24,7 +24,7 @@ from semsig_gis.objects.table import open_objects, save_objects
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from conftest import Run
+    from conftest import Done, Run
 
 
 @pytest.fixture
@@ -65,15 +65,15 @@ def test_a_city_goes_into_a_geopackage_and_back(city: Path, run: Run) -> None:
     ).read_bytes()
 
 
-def test_one_layer(city: Path, run: Run) -> None:
+def test_one_layer(city: Path, done: Done) -> None:
     folder = city.parent
     database = small_city()[0]
-    assert run("export", city, "--out", folder / "cells.csv")[0] == 0
+    done("export", city, "--out", folder / "cells.csv")
     assert "chance_found" in pd.read_csv(folder / "cells.csv").columns
-    assert run("export", city, "--geometry", "point", "--out", folder / "p.parquet")[0] == 0
+    done("export", city, "--geometry", "point", "--out", folder / "p.parquet")
     assert set(gpd.read_parquet(folder / "p.parquet").geom_type) == {"Point"}
     evaluation = ("--evaluation", folder / "evaluation", "--layer", "error")
-    assert run("export", city, *evaluation, "--out", folder / "e.tif")[0] == 0
+    done("export", city, *evaluation, "--out", folder / "e.tif")
     with rasterio.open(folder / "e.tif") as read:
         found = [value[0] for value in read.sample(database.xy)]
     expected = cell_errors(small_evaluation(), database).astype("float32")
@@ -81,14 +81,13 @@ def test_one_layer(city: Path, run: Run) -> None:
 
 
 @pytest.mark.parametrize("method", ["edit+edit", "likelihood"])
-def test_what_must_be_searched_after_a_query(method: str, city: Path, run: Run) -> None:
+def test_what_must_be_searched_after_a_query(method: str, city: Path, done: Done) -> None:
     query = ("--types", small_city()[0].types(7), "--method", method)
     out = city.parent / "answer.gpkg"
-    code, printed, _ = run("localize", city, *query, "--out", out, "--within", 15)
-    assert code == 0
+    printed = done("localize", city, *query, "--out", out, "--within", 15)
     assert "km2" in printed
     assert "% of the city" in printed
-    told = json.loads(run("localize", city, *query, "--out", out, "--json")[1])["searched"]
+    told = json.loads(done("localize", city, *query, "--out", out, "--json"))["searched"]
     regions = gpd.read_file(out, layer="regions")
     assert regions["cells"].sum() == told["cells"]
     assert regions.geometry.area.sum() == pytest.approx(told["km2"] * 1e6)
@@ -132,7 +131,7 @@ def test_a_slip_is_told_before_the_index_is_built(city: Path, run: Run) -> None:
     assert not list(city.parent.glob("*.likelihood"))
 
 
-def test_what_does_not_go_together(city: Path, run: Run) -> None:
+def test_what_does_not_go_together(city: Path, run: Run, done: Done) -> None:
     folder = city.parent
     out = ("--out", folder / "a.gpkg")
     likely = ("--method", "likelihood")
@@ -154,7 +153,7 @@ def test_what_does_not_go_together(city: Path, run: Run) -> None:
     )
     for command, words in refused:
         sentence(run(*command), words)
-    assert run("export", city, *out)[0] == 0
+    done("export", city, *out)
     more = ("--objects", folder / "o.parquet")
     sentence(run("import", folder / "a.gpkg", "--out", folder / "b.parquet", *more), "holds no")
     assert not (folder / "b.parquet").exists()

@@ -22,7 +22,7 @@ from semsig_gis.objects.table import save_objects
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from conftest import Run
+    from conftest import Done, Run
 
 TOWN = random_town()
 # Each class is left out once, which takes its time.
@@ -46,7 +46,7 @@ def city(tmp_path: Path) -> Path:
     return path
 
 
-def test_what_is_found_out_is_told_everywhere(city: Path, run: Run) -> None:
+def test_what_is_found_out_is_told_everywhere(city: Path, run: Run, done: Done) -> None:
     code, out, told = run("identify", city, "--noise", "medium", "--check", 40)
     assert code == 0
     for said in ("Identifiability, medium noise", "What each class adds", "bits left",
@@ -63,21 +63,20 @@ def test_what_is_found_out_is_told_everywhere(city: Path, run: Run) -> None:
     facts = json.loads(out)
     assert facts["chance_found"] == pytest.approx(cells["chance_found"].mean())
     assert facts["classes"][0]["objects"] > 0
-    assert json.loads(run("info", city, "--json")[1])["identifiability"] == facts
-    assert "Identifiability, medium noise" in run("info", city)[1]
+    assert json.loads(done("info", city, "--json"))["identifiability"] == facts
+    assert "Identifiability, medium noise" in done("info", city)
 
     folder = city.parent
-    code, out, _ = run("map", city, "--identifiability", "--out", folder / "map.html")
-    assert code == 0
+    out = done("map", city, "--identifiability", "--out", folder / "map.html")
     assert "Where a query can be placed" in (folder / "map.html").read_text(encoding="utf-8")
-    assert run("export", city, "--out", folder / "city.gpkg")[0] == 0
+    done("export", city, "--out", folder / "city.gpkg")
     exported = gpd.read_file(folder / "city.gpkg", layer="cells")
     assert exported["chance_found"].tolist() == cells["chance_found"].tolist()
 
 
-def test_another_noise_seed_or_radius_is_found_out_anew(city: Path, run: Run) -> None:
+def test_another_noise_seed_or_radius_is_found_out_anew(city: Path, run: Run, done: Done) -> None:
     options = ("--threads", 2, "--json", "--check", 20)
-    one = json.loads(run("identify", city, *QUICK, *options)[1])
+    one = json.loads(done("identify", city, *QUICK, *options))
     assert (one["seed"], one["radius_m"], one["check"]["seed"]) == (0, 50.0, 1)
     for more in (("--seed", 3), ("--radius", 20), ("--noise", "light"), ()):
         code, out, told = run("identify", city, *(QUICK if more else QUICK[1:]), *options, *more)
@@ -86,30 +85,29 @@ def test_another_noise_seed_or_radius_is_found_out_anew(city: Path, run: Run) ->
         assert json.loads(out) != one
 
 
-def test_a_database_in_parts(tmp_path: Path, run: Run) -> None:
+def test_a_database_in_parts(tmp_path: Path, done: Done) -> None:
     save_objects(WORLD.street_objects, tmp_path / "objects.parquet")
     build_tiles(tmp_path / "objects.parquet", tmp_path / "city", tile=TileSpec(100.0))
-    code, out, _ = run("identify", tmp_path / "city", *QUICK, "--json")
-    assert code == 0
-    assert json.loads(run("info", tmp_path / "city", "--json")[1])["identifiability"] == (
+    out = done("identify", tmp_path / "city", *QUICK, "--json")
+    assert json.loads(done("info", tmp_path / "city", "--json"))["identifiability"] == (
         json.loads(out)
     )
 
 
-def test_an_update_takes_the_columns_away_and_says_so(city: Path, run: Run) -> None:
-    assert run("identify", city, *QUICK, "--json")[0] == 0
+def test_an_update_takes_the_columns_away_and_says_so(city: Path, run: Run, done: Done) -> None:
+    done("identify", city, *QUICK, "--json")
     save_objects(WORLD.street_objects, city.parent / "objects.parquet")
     code, _, told = run("update", city, "--objects", city.parent / "objects.parquet")
     assert code == 0
     assert "run semsig identify again" in told
-    assert "Identifiability" not in run("info", city)[1]
+    assert "Identifiability" not in done("info", city)
     code, _, told = run("update", city, "--objects", city.parent / "objects.parquet")
     assert code == 0
     assert "identify" not in told
 
 
-def test_columns_that_do_not_fit_are_told_and_left_out(city: Path, run: Run) -> None:
-    assert run("identify", city, *QUICK, "--json")[0] == 0
+def test_columns_that_do_not_fit_are_told_and_left_out(city: Path, run: Run, done: Done) -> None:
+    done("identify", city, *QUICK, "--json")
     whole = open_database(city)
     save_database(whole.select(slice(9, None)), city.parent / "other.parquet")
     stored = City(city).columns("identifiability")

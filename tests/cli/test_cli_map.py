@@ -19,7 +19,7 @@ from semsig_gis.objects.table import StreetObjects, save_objects
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from conftest import Run
+    from conftest import Done, Run
 
 WORLD = random_town()
 X, Y = CORNER.tolist()
@@ -36,50 +36,49 @@ def city(tmp_path: Path) -> Path:
     return tmp_path / "city.parquet"
 
 
-def drawn(run: Run, city: Path, *options: object) -> str:
+def drawn(done: Done, city: Path, *options: object) -> str:
     page = city.with_name("map.html")
-    code, out, _ = run("map", city, *options, "--out", page)
-    assert code == 0
+    out = done("map", city, *options, "--out", page)
     assert f"map: {page}" in out
     return page.read_text(encoding="utf-8")
 
 
-def test_objects_alone_and_over_an_evaluation(city: Path, run: Run) -> None:
+def test_objects_alone_and_over_an_evaluation(city: Path, done: Done) -> None:
     objects = ("--objects", city.with_name("objects.parquet"))
-    alone = drawn(run, city, *objects)
+    alone = drawn(done, city, *objects)
     assert alone.count(OBJECTS) == 1
     assert GROUND not in alone
     folder = city.with_name("evaluation")
-    assert run("evaluate", city, "--queries", 5, "--out", folder)[0] == 0
-    both = drawn(run, city, "--evaluation", folder, *objects)
+    done("evaluate", city, "--queries", 5, "--out", folder)
+    both = drawn(done, city, "--evaluation", folder, *objects)
     assert both.count(OBJECTS) == 1
     assert "Localization errors" in both
 
 
-def test_streets_and_buildings_of_the_store_or_of_files(city: Path, run: Run) -> None:
+def test_streets_and_buildings_of_the_store_or_of_files(city: Path, done: Done) -> None:
     objects = ("--objects", city.with_name("objects.parquet"))
     store = ObjectStore.of(WORLD.street_objects, footprints=HOUSE, streets=LANE)
     save_with_store(WORLD.database, store, city)
-    page = drawn(run, city, *objects)
+    page = drawn(done, city, *objects)
     assert page.count(GROUND) == 1
     assert '{"buildings":' in page
     assert '"streets":' in page
     query = ("localize", city, "--types", "DD", "--map", city.with_name("query.html"))
-    assert run(*query)[0] == 0
+    done(*query)
     assert GROUND in city.with_name("query.html").read_text(encoding="utf-8")
 
     far = surroundings(shapely.box(X + 9000.0, Y, X + 9010.0, Y + 10.0))
     save_with_store(WORLD.database, ObjectStore.of(WORLD.street_objects, footprints=far), city)
-    assert GROUND not in drawn(run, city, *objects)
+    assert GROUND not in drawn(done, city, *objects)
 
     save_with_store(WORLD.database, ObjectStore.of(WORLD.street_objects), city)
     save_surroundings(LANE, city.with_name("streets.parquet"))
-    page = drawn(run, city, *objects, "--streets", city.with_name("streets.parquet"))
+    page = drawn(done, city, *objects, "--streets", city.with_name("streets.parquet"))
     assert page.count(GROUND) == 1
     assert '{"buildings":' not in page
 
 
-def test_openstreetmap_is_named_for_its_buildings(city: Path, run: Run) -> None:
+def test_openstreetmap_is_named_for_its_buildings(city: Path, done: Done) -> None:
     to_degrees = Transformer.from_crs("EPSG:2154", "EPSG:4326", always_xy=True)
     corners = np.array(to_degrees.transform([X, X + 50.0, X], [Y, Y, Y + 50.0])).T
     file = write_osm(
@@ -88,7 +87,7 @@ def test_openstreetmap_is_named_for_its_buildings(city: Path, run: Run) -> None:
         way(9, [1, 2, 3, 1], {"building": "yes"}),
     )
     objects = ("--objects", city.with_name("objects.parquet"))
-    page = drawn(run, city, *objects, "--buildings", file)
+    page = drawn(done, city, *objects, "--buildings", file)
     assert "OpenStreetMap contributors (ODbL" in page
 
 

@@ -11,20 +11,18 @@ from sentences import sentence
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from conftest import Run
+    from conftest import Done, Run
 
 
-def test_a_finished_run_is_reported_again(reproduced: Path, run: Run) -> None:
+def test_a_finished_run_is_reported_again(reproduced: Path, done: Done) -> None:
     database = reproduced.parent / "city.parquet"
     options = ("--out", reproduced, "--queries", QUERIES)
-    code, shown, _ = run("reproduce", database, *options)
-    assert code == 0
+    shown = done("reproduce", database, *options)
     assert "0.3733" in shown
     assert f"report: {reproduced / 'report.html'}" in shown
     for name in ("report.html", "report.md", "numbers.csv", "report.json"):
         assert (reproduced / name).stat().st_size > 1000
-    code, shown, _ = run("reproduce", database, *options, "--json")
-    assert code == 0
+    shown = done("reproduce", database, *options, "--json")
     rows = json.loads(shown)
     assert {"section", "row", "column", "unit", "ours", "low", "high", "paper"} == set(rows[0])
     assert any(row["paper"] == 0.3861 for row in rows)
