@@ -8,6 +8,7 @@ import numpy as np
 from hypothesis import strategies as st
 from scipy.stats import binom
 
+from semsig_gis.queries.paper_errors import Distortion
 from semsig_gis.queries.sight import CitySights, Sight
 from semsig_gis.sources.catalog import paper_taxonomy
 
@@ -23,6 +24,14 @@ CITY = CitySights(
     reach=REACH,
 )
 seeds = st.integers(0, 2**32)
+paper_errors = st.builds(
+    Distortion,
+    occurrences=st.integers(0, 20),
+    bearing_sigma=st.floats(0, 90),
+    bearing_clip=st.floats(0, 200),
+    resort=st.booleans(),
+    false_class=st.sampled_from(["uniform", "frequency"]),
+)
 
 
 def sight(objects: list[tuple[int, float, float]]) -> Sight:

@@ -36,7 +36,7 @@ from semsig_gis.matching.ties import (
     top_candidates,
 )
 from semsig_gis.queries.chain import QueryDistortion, parse_chain
-from semsig_gis.queries.draw import QuerySpec, draw_queries
+from semsig_gis.queries.draw import QuerySpec, check_count, draw_queries
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
@@ -220,15 +220,6 @@ def make_evaluation(
         database=_database_summary(database, file_bytes),
         versions=versions(),
     )
-
-
-def check_count(what: str, count: int, cells: int) -> None:
-    """Raise InputError unless a number of queries or candidates is from 1 to that of the cells."""
-    if not 1 <= count <= cells:
-        msg = (
-            f"{count} {what} were asked for; give a number from 1 to {cells}, the number of cells."
-        )
-        raise InputError(msg)
 
 
 def versions() -> dict[str, str]:

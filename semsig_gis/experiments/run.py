@@ -26,7 +26,6 @@ from semsig_gis.database.answer import DistanceMemo
 from semsig_gis.database.city import City
 from semsig_gis.database.file import digest
 from semsig_gis.evaluation.evaluate import (
-    check_count,
     make_evaluation,
     score_queries,
     scored_tables,
@@ -37,7 +36,7 @@ from semsig_gis.evaluation.methods import make_locator
 from semsig_gis.evaluation.spec import Case, parse_experiment
 from semsig_gis.experiments.folder import PARTS, RUN, open_results, write_results
 from semsig_gis.likelihood.index import ready_index
-from semsig_gis.queries.draw import draw_queries
+from semsig_gis.queries.draw import check_count, draw_queries
 from semsig_gis.storage.runs import finish, partial_folder
 from semsig_gis.storage.whole import whole_file
 

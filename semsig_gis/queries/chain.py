@@ -20,10 +20,10 @@ from semsig_gis.queries.distortions import (
     MissingClasses,
     Obstacles,
 )
-from semsig_gis.queries.paper_errors import DISTORTIONS, Distortion
+from semsig_gis.queries.paper_errors import DISTORTIONS, Distortion, distortion_of
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Mapping, Sequence
+    from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 
     from semsig_gis.likelihood.noise.model import Noise
     from semsig_gis.queries.sight import CitySights, Sight, Spoiling
@@ -61,6 +61,7 @@ NAMED_DISTORTIONS: Mapping[str, QueryDistortion] = MappingProxyType(
 """What each name stands for, before its settings."""
 
 WORDS = {"true": True, "false": False}
+KINDS: Mapping[type, str] = {bool: "true or false", int: "a whole number", float: "a number"}
 
 
 def parse_chain(
@@ -72,8 +73,8 @@ def parse_chain(
     `NAMED_DISTORTIONS`; then, for all but the paper's levels, ``:VALUE`` for its first setting;
     then any number of ``:SETTING=VALUE``. Lists are written ``bench/bus_stop``, switches ``true``
     and ``false``; a detector names one of `noises`. Blank text gives none. Raises UnknownNameError
-    for an unknown distortion, setting or noise model and for a setting given twice, and InputError
-    for a value of the wrong kind or out of range.
+    for an unknown distortion, setting or noise model, and InputError for a value of the wrong kind
+    or out of range and for a setting given twice.
     """
     parts = text.split(",") if isinstance(text, str) else list(text)
     if isinstance(text, str) and not text.strip():
@@ -87,11 +88,7 @@ def chain_text(distortions: Sequence[QueryDistortion]) -> str:
     Noise models are written by name alone, so `parse_chain` must be given those that the package
     does not have.
     """
-    return ", ".join(
-        # Of the names that may serve, the one that needs the fewest words.
-        min((_text(name, base, one) for name, base in _bases(one)), key=len)
-        for one in distortions
-    )
+    return ", ".join(min(_texts(one), key=len) for one in distortions)
 
 
 def ready_chain(
@@ -99,11 +96,10 @@ def ready_chain(
 ) -> Callable[[Sight, int, int], Sight]:
     """Return the function that applies distortions to a query.
 
-    It takes what is seen, a seed and the number of the query. Each distortion of each query has
-    random numbers of its own, which depend on the seed, the number of the query, the kind of
-    distortion and how many of that kind come before. So a query meets the same compass whatever
-    else happens to it, and experiments that differ in one distortion differ in nothing else. Raises
-    SemsigError if a distortion does not fit the city.
+    It takes what is seen, a seed and the number of the query. The random numbers of a distortion
+    depend on these, its kind and how many of that kind come before: a query meets the same compass
+    whatever else happens to it, and experiments that differ in one distortion differ in nothing
+    else. Raises SemsigError if a distortion does not fit the city.
     """
     repeats: Counter[int] = Counter()
     steps = []
@@ -123,81 +119,62 @@ def ready_chain(
 def _parsed(text: str, noises: Mapping[str, Noise]) -> QueryDistortion:
     """Return the distortion of a text."""
     name, *settings = text.split(":")
-    if name not in NAMED_DISTORTIONS:
-        *most, last = NAMED_DISTORTIONS
-        hint = nearest_name(name, NAMED_DISTORTIONS)
-        msg = f"{name!r} is no distortion{hint}; give {', '.join(most)} or {last}."
-        raise UnknownNameError(msg)
-    base = NAMED_DISTORTIONS[name]
+    base = distortion_of(name, NAMED_DISTORTIONS)
+    keys = [item.name for item in fields(base)]
     values: dict[str, Any] = {}
     for place, setting in enumerate(settings):
-        key, equals, said = setting.partition("=")
-        first = _first(name, base)
-        if not equals and place == 0 and first is not None:
-            key, said = first, setting
-        known = [item.name for item in fields(base)]
-        if key not in known or key in values:
-            fault = "is given twice" if key in values else "means nothing"
+        key, equals, value = setting.partition("=")
+        # The first setting needs no name, but a level of the paper is one number of errors.
+        if not equals and place == 0 and name not in DISTORTIONS:
+            key, value = keys[0], setting
+        if key not in keys:
             msg = (
-                f"distortion {text!r} cannot be read: {key!r} {fault}{nearest_name(key, known)}; "
-                f"the settings of {name} are {', '.join(known)}."
+                f"distortion {text!r} cannot be read: {key!r} means nothing"
+                f"{nearest_name(key, keys)}; the settings of {name} are {', '.join(keys)}."
             )
             raise UnknownNameError(msg)
-        values[key] = _value(said, getattr(base, key), noises, text)
+        if key in values:
+            msg = f"distortion {text!r} cannot be read: {key!r} is given twice; give it once."
+            raise InputError(msg)
+        values[key] = _value(value, getattr(base, key), noises, text)
     return replace(base, **values)
 
 
-def _value(said: str, like: object, noises: Mapping[str, Noise], text: str) -> Any:  # noqa: ANN401
+def _value(word: str, like: object, noises: Mapping[str, Noise], text: str) -> Any:  # noqa: ANN401
     """Return a setting, of the kind that its default has."""
     if isinstance(like, NoiseSpec | NoiseMixture):
-        if said not in noises:
-            known = ", ".join(noises)
-            msg = f"{said!r} is no noise model{nearest_name(said, noises)}; give one of {known}."
+        if word not in noises:
+            names = ", ".join(noises)
+            msg = f"{word!r} is no noise model{nearest_name(word, noises)}; give one of {names}."
             raise UnknownNameError(msg)
-        return noises[said]
+        return noises[word]
     try:
         if isinstance(like, bool):
-            return WORDS[said]
+            return WORDS[word]
         if isinstance(like, int | float):
-            return type(like)(said)
+            return type(like)(word)
     except (LookupError, ValueError) as error:
-        wanted = "true or false" if isinstance(like, bool) else "a number"
-        whole = "a whole number" if type(like) is int else wanted
-        msg = f"distortion {text!r} cannot be read: {said!r} is given for {whole}; give one."
+        kind = KINDS[type(like)]
+        msg = f"distortion {text!r} cannot be read; give {kind} in place of {word!r}."
         raise InputError(msg) from error
-    return tuple(part for part in said.split("/") if part) if isinstance(like, tuple) else said
+    return tuple(part for part in word.split("/") if part) if isinstance(like, tuple) else word
 
 
-def _bases(one: QueryDistortion) -> list[tuple[str, QueryDistortion]]:
-    """Return the names that may stand for a distortion."""
-    return [
-        (name, base)
-        for name, base in NAMED_DISTORTIONS.items()
-        if type(base) is type(one)
+def _texts(one: QueryDistortion) -> Iterator[str]:
+    """Yield what may stand for a distortion: a name and what differs from its settings."""
+    first, *others = [item.name for item in fields(one)]
+    for name, base in NAMED_DISTORTIONS.items():
+        level = name in DISTORTIONS
         # A level of the paper is a number of errors, whatever else differs.
-        and (name not in DISTORTIONS or _errors(base) == _errors(one))
-    ]
-
-
-def _errors(one: QueryDistortion) -> int | None:
-    return one.occurrences if isinstance(one, Distortion) else None
-
-
-def _first(name: str, base: QueryDistortion) -> str | None:
-    """Return the setting that needs no name; a level of the paper has none."""
-    return None if name in DISTORTIONS else fields(base)[0].name
-
-
-def _text(name: str, base: QueryDistortion, one: QueryDistortion) -> str:
-    """Return a distortion as a name and what differs from it."""
-    first = _first(name, base)
-    said = [name] if first is None else [name, _word(getattr(one, first))]
-    said += [
-        f"{item.name}={_word(getattr(one, item.name))}"
-        for item in fields(one)
-        if item.name != first and getattr(one, item.name) != getattr(base, item.name)
-    ]
-    return ":".join(part for part in said if part)
+        if type(base) is not type(one) or (level and getattr(one, first) != getattr(base, first)):
+            continue
+        words = [name, "" if level else _word(getattr(one, first))]
+        words += [
+            f"{key}={_word(getattr(one, key))}"
+            for key in others
+            if getattr(one, key) != getattr(base, key)
+        ]
+        yield ":".join(filter(None, words))
 
 
 def _word(value: Any) -> str:  # noqa: ANN401 - a setting

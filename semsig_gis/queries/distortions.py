@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from abc import ABC, abstractmethod
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, ClassVar
 
@@ -19,9 +20,24 @@ if TYPE_CHECKING:
     from semsig_gis.likelihood.noise.table import NoiseTable
     from semsig_gis.queries.sight import CitySights, Sight, Spoiling
 
+NEAREST_M = 0.01  # that anything stands, so that its width is an angle
+
+
+class _AnyCity(ABC):
+    """A distortion that does the same whatever there is to see in a city."""
+
+    __slots__ = ()
+
+    def ready(self, city: CitySights) -> Spoiling:  # noqa: ARG002 - other distortions need it
+        """Return what it does to a query."""
+        return self._spoil
+
+    @abstractmethod
+    def _spoil(self, sight: Sight, rng: np.random.Generator) -> Sight: ...
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class CompassBias:
+class CompassBias(_AnyCity):
     """A compass that is off by the same angle for all objects of a query.
 
     The angle is normal, with a standard deviation of `sigma` degrees, 0 or more.
@@ -32,16 +48,10 @@ class CompassBias:
     sigma: float = 10.0
 
     def __post_init__(self) -> None:  # noqa: D105
-        if not (math.isfinite(self.sigma) and self.sigma >= 0):
-            msg = (
-                f"a compass that is off by {self.sigma!r} degrees was given; give a standard "
-                "deviation, 0 or more."
-            )
-            raise InputError(msg)
+        _check_amount("standard deviation of the compass", self.sigma)
 
-    def ready(self, city: CitySights) -> Spoiling:  # noqa: ARG002 - all distortions take it
-        """Return the function that distorts a query."""
-        return lambda sight, rng: sight.turned(float(rng.normal(0.0, self.sigma)))
+    def _spoil(self, sight: Sight, rng: np.random.Generator) -> Sight:
+        return sight.turned(float(rng.normal(0.0, self.sigma)))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -57,7 +67,7 @@ class MissingClasses:
     others: bool = False
 
     def ready(self, city: CitySights) -> Spoiling:
-        """Return the function that distorts a query.
+        """Return what it does to a query.
 
         Raises UnknownNameError if the taxonomy of the city has no class of a name.
         """
@@ -70,7 +80,7 @@ class MissingClasses:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class FieldOfView:
+class FieldOfView(_AnyCity):
     """A camera that looks in one direction, drawn at random, and sees part of the turn.
 
     It sees `degrees`, above 0 and at most 360. Bearings are still counted from north; nothing tells
@@ -88,21 +98,13 @@ class FieldOfView:
             )
             raise InputError(msg)
 
-    def ready(self, city: CitySights) -> Spoiling:  # noqa: ARG002 - all distortions take it
-        """Return the function that distorts a query."""
-
-        def spoil(sight: Sight, rng: np.random.Generator) -> Sight:
-            aside = angular_distance(sight.bearings, rng.uniform(0.0, FULL_TURN))
-            return sight.only(aside <= self.degrees / 2.0)
-
-        return spoil
-
-
-NEAREST_M = 0.01  # that anything stands, so that its width is an angle
+    def _spoil(self, sight: Sight, rng: np.random.Generator) -> Sight:
+        aside = angular_distance(sight.bearings, rng.uniform(0.0, FULL_TURN))
+        return sight.only(aside <= self.degrees / 2.0)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class HiddenBehind:
+class HiddenBehind(_AnyCity):
     """Objects that nearer objects hide.
 
     An object is hidden when a nearer one covers its bearing: one of `width` w metres (0 or more) at
@@ -116,14 +118,8 @@ class HiddenBehind:
     def __post_init__(self) -> None:  # noqa: D105
         _check_amount("width of the objects", self.width)
 
-    def ready(self, city: CitySights) -> Spoiling:  # noqa: ARG002 - all distortions take it
-        """Return the function that distorts a query."""
-
-        def spoil(sight: Sight, rng: np.random.Generator) -> Sight:  # noqa: ARG001
-            away = np.full(len(sight), self.width)
-            return sight.only(~_behind(sight, sight.bearings, sight.distances, away))
-
-        return spoil
+    def _spoil(self, sight: Sight, rng: np.random.Generator) -> Sight:  # noqa: ARG002
+        return sight.only(~_behind(sight, sight.bearings, sight.distances, self.width))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -144,20 +140,19 @@ class Obstacles:
         _check_amount("width of the obstacles", self.width)
 
     def ready(self, city: CitySights) -> Spoiling:
-        """Return the function that distorts a query."""
+        """Return what it does to a query."""
 
         def spoil(sight: Sight, rng: np.random.Generator) -> Sight:
             count = int(rng.poisson(self.count))
             bearings = rng.uniform(0.0, FULL_TURN, count)
             distances = city.false_distances(count, rng)
-            widths = np.full(count, self.width)
-            return sight.only(~_behind(sight, bearings, distances, widths))
+            return sight.only(~_behind(sight, bearings, distances, self.width))
 
         return spoil
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class BlockedSectors:
+class BlockedSectors(_AnyCity):
     """Sectors of the view in which nothing is seen, near or far.
 
     There are `count` of them (0 or more), each of `degrees` (0 to 360) anywhere in the turn; they
@@ -177,25 +172,17 @@ class BlockedSectors:
             )
             raise InputError(msg)
 
-    def ready(self, city: CitySights) -> Spoiling:  # noqa: ARG002 - all distortions take it
-        """Return the function that distorts a query."""
-
-        def spoil(sight: Sight, rng: np.random.Generator) -> Sight:
-            middles = rng.uniform(0.0, FULL_TURN, self.count)
-            aside = angular_distance(sight.bearings[:, None], middles)
-            return sight.only((aside > self.degrees / 2.0).all(axis=1))
-
-        return spoil
+    def _spoil(self, sight: Sight, rng: np.random.Generator) -> Sight:
+        middles = rng.uniform(0.0, FULL_TURN, self.count)
+        aside = angular_distance(sight.bearings[:, None], middles)
+        return sight.only((aside > self.degrees / 2.0).all(axis=1))
 
 
 def _behind(
-    sight: Sight,
-    bearings: NDArray[np.float64],
-    distances: NDArray[np.float64],
-    widths: NDArray[np.float64],
+    sight: Sight, bearings: NDArray[np.float64], distances: NDArray[np.float64], width: float
 ) -> NDArray[np.bool_]:
-    """Tell which objects are behind one of some things."""
-    half = np.degrees(np.arctan2(widths / 2.0, np.maximum(distances, NEAREST_M)))
+    """Tell which objects are behind one of some things, all of one width."""
+    half = np.degrees(np.arctan2(width / 2.0, np.maximum(distances, NEAREST_M)))
     farther = sight.distances[:, None] > distances
     return np.asarray(
         (farther & (angular_distance(sight.bearings[:, None], bearings) < half)).any(axis=1)
@@ -204,7 +191,7 @@ def _behind(
 
 def _check_amount(label: str, value: float) -> None:
     if not (math.isfinite(value) and value >= 0):
-        msg = f"{label} is {value!r}; give a number, 0 or more."
+        msg = f"the {label} is {value!r}; give a number, 0 or more."
         raise InputError(msg)
 
 
@@ -213,11 +200,9 @@ class Detector:
     """A detector that fails as a noise model says.
 
     An object at distance d metres is detected with chance ``p * 2 ** -((d / half) ** 2)``, where p
-    is that of the model: at `half` metres (above 0) only half of the objects are left. False
-    objects come as a Poisson number a class. An uncertain place of the model (``position_sigma``)
-    is a step aside of the observer, which turns the bearings of near objects most. Of a mixture,
-    one model is drawn for each query. The chances are those of `likelihood.noise.table`, with which
-    the likelihood method computes: none is quite 0 or 1.
+    is that of the model: at `half` metres (above 0) only half of the objects are left. An uncertain
+    place of the model (``position_sigma``) is a step aside of the observer. Of a mixture, one model
+    is drawn for each query. As in `likelihood.noise.table`, no chance is quite 0 or 1.
     """
 
     stream: ClassVar[int] = 4_129_241_295
@@ -234,7 +219,7 @@ class Detector:
             raise InputError(msg)
 
     def ready(self, city: CitySights) -> Spoiling:
-        """Return the function that distorts a query.
+        """Return what it does to a query.
 
         Raises InputError if the noise model names a class that the city does not have.
         """
@@ -244,8 +229,16 @@ class Detector:
 
         def spoil(sight: Sight, rng: np.random.Generator) -> Sight:
             table = tables[int(rng.choice(len(tables), p=weights))]
-            moved = _from_aside(sight, table.position_sigma, rng)
-            return _with_false(self._detected(moved, table, rng), table, city, rng).clockwise()
+            seen = self._detected(_from_aside(sight, table.position_sigma, rng), table, rng)
+            codes = np.repeat(table.codes, rng.poisson(table.clutter))
+            false = rng.uniform(0.0, FULL_TURN, len(codes))
+            distances = city.false_distances(len(codes), rng)
+            return replace(
+                seen,
+                codes=np.concatenate([seen.codes, codes]),
+                bearings=np.concatenate([seen.bearings, false]),
+                distances=np.concatenate([seen.distances, distances]),
+            ).clockwise()
 
         return spoil
 
@@ -254,12 +247,12 @@ class Detector:
         length = min(len(sight), len(table.missed) - 1)
         chances = 1.0 - table.missed[length, table.row_of[sight.codes]]
         chances *= np.exp2(-((sight.distances / self.half) ** 2))
-        found = sight.only(rng.random(len(sight)) < chances)
-        kinds = table.row_of[found.codes]
+        seen = sight.only(rng.random(len(sight)) < chances)
+        kinds = table.row_of[seen.codes]
         names = np.cumsum(table.named[length, kinds], axis=1)
-        given = (rng.random(len(found))[:, None] * names[:, -1:] >= names).sum(axis=1)
+        labels = (rng.random(len(seen))[:, None] * names[:, -1:] >= names).sum(axis=1)
         off = rng.normal(0.0, table.sigma[kinds])
-        return replace(found, codes=table.codes[given], bearings=wrap_degrees(found.bearings + off))
+        return replace(seen, codes=table.codes[labels], bearings=wrap_degrees(seen.bearings + off))
 
 
 def _from_aside(sight: Sight, sigma: float, rng: np.random.Generator) -> Sight:
@@ -271,16 +264,3 @@ def _from_aside(sight: Sight, sigma: float, rng: np.random.Generator) -> Sight:
     x = sight.distances * np.sin(turned) - dx
     y = sight.distances * np.cos(turned) - dy
     return replace(sight, bearings=bearings(x, y), distances=np.hypot(x, y))
-
-
-def _with_false(
-    sight: Sight, table: NoiseTable, city: CitySights, rng: np.random.Generator
-) -> Sight:
-    """Return the objects and the false ones after them."""
-    codes = np.repeat(table.codes, rng.poisson(table.clutter))
-    return replace(
-        sight,
-        codes=np.concatenate([sight.codes, codes]),
-        bearings=np.concatenate([sight.bearings, rng.uniform(0.0, FULL_TURN, len(codes))]),
-        distances=np.concatenate([sight.distances, city.false_distances(len(codes), rng)]),
-    )

@@ -26,9 +26,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from semsig_gis.database.database import SignatureDatabase
-    from semsig_gis.database.occlusion import Footprints
     from semsig_gis.database.store import ObjectStore
-    from semsig_gis.database.visibility import Views
     from semsig_gis.queries.chain import QueryDistortion
 
 SeenFrom = Literal["cells", "anywhere"]
@@ -62,12 +60,8 @@ class QuerySpec:
 
     Examples
     --------
-    >>> QuerySpec(seen_from="cell")
-    Traceback (most recent call last):
-    ...
-    semsig_gis.core.errors.UnknownNameError: queries are seen from 'cell';
-    the nearest is 'cells'; give
-    cells or anywhere.
+    >>> QuerySpec(number=100, seeds=(1, 2)).seen_from
+    'cells'
     """
 
     number: int = 500
@@ -83,7 +77,7 @@ class QuerySpec:
             msg = f"the seeds are {list(self.seeds)}; give at least one, and none twice."
             raise InputError(msg)
         if min(self.seeds) < 0:
-            msg = f"A seed of {min(self.seeds)} was given; give a whole number, 0 or more."
+            msg = f"a seed of {min(self.seeds)} was given; give a whole number, 0 or more."
             raise InputError(msg)
         if self.seen_from not in get_args(SeenFrom):
             hint = nearest_name(self.seen_from, get_args(SeenFrom))
@@ -150,32 +144,20 @@ def draw_queries(
 
     Examples
     --------
-    >>> from semsig_gis.database.build import build_database
-    >>> from semsig_gis.sources.catalog import paper_taxonomy
-    >>> from semsig_gis.objects.clean import build_objects
-    >>> from semsig_gis.sources.synthetic.city import CitySpec, synthetic_city
-    >>> from semsig_gis.database.store import ObjectStore
-    >>> layers = synthetic_city(CitySpec(size=300.0))
-    >>> objects, _ = build_objects(layers, taxonomy=paper_taxonomy(), crs="EPSG:32631")
-    >>> database = build_database(objects)
+    >>> from semsig_gis import ObjectStore
     >>> spec = QuerySpec(number=3, seen_from="anywhere", distortions=())
-    >>> drawn = draw_queries(database, spec, store=ObjectStore.of(objects))
-    >>> [query.length == len(query.asked) for query in drawn]
+    >>> queries = draw_queries(demo_database, spec, store=ObjectStore.of(demo_objects))
+    >>> [query.length == len(query.asked) for query in queries]
     [True, True, True]
     """
-    looked_at = database if city is None else city
-    if looked_at.crs != database.crs:
+    city = database if city is None else city
+    if city.crs != database.crs:
         msg = (
-            f"queries are seen in {looked_at.crs.to_string()} and searched for in "
+            f"queries are seen in {city.crs.to_string()} and searched for in "
             f"{database.crs.to_string()}; build both databases in one reference system."
         )
         raise CrsError(msg)
-    if spec.number > len(looked_at):
-        msg = (
-            f"{spec.number} queries were asked for; give a number from 1 to {len(looked_at)}, "
-            "the number of cells."
-        )
-        raise InputError(msg)
+    check_count("queries", spec.number, len(city))
     if spec.seen_from == "anywhere" and store is None:
         msg = (
             "queries from anywhere need the street objects of the city; build its database with "
@@ -183,13 +165,13 @@ def draw_queries(
         )
         raise InputError(msg)
     spoil = ready_chain(spec.distortions, CitySights.of(database))
-    known = _known_codes(looked_at, database)
+    codes_there = _codes_there(city, database)
     queries = []
     for seed, numbers in _numbers(spec, part):
-        places, sights = _seen(looked_at, spec, seed, numbers, store)
+        places, sights = _seen(city, spec, seed, numbers, store)
         cells = database.cells_at(places)
         for number, place, cell, sight in zip(numbers, places, cells, sights, strict=True):
-            codes = known[sight.codes]
+            codes = codes_there[sight.codes]
             true = replace(sight, codes=codes).only(codes > 0)
             queries.append(
                 Query(
@@ -203,6 +185,15 @@ def draw_queries(
                 )
             )
     return queries
+
+
+def check_count(what: str, count: int, cells: int) -> None:
+    """Raise InputError unless a number of queries or candidates is from 1 to that of the cells."""
+    if not 1 <= count <= cells:
+        msg = (
+            f"{count} {what} were asked for; give a number from 1 to {cells}, the number of cells."
+        )
+        raise InputError(msg)
 
 
 def _numbers(spec: QuerySpec, part: slice) -> Iterator[tuple[int, range]]:
@@ -226,8 +217,8 @@ def _seen(
     # The first cells of one permutation: more queries keep the first ones.
     cells = np.random.default_rng(np.random.SeedSequence(seed)).permutation(len(city))
     if spec.seen_from == "cells" or store is None:
-        chosen = cells[numbers.start : numbers.stop]
-        return city.xy[chosen], (Sight.of_cell(city, cell) for cell in chosen.tolist())
+        cells = cells[numbers.start : numbers.stop]
+        return city.xy[cells], (Sight.of_cell(city, cell) for cell in cells.tolist())
     places = _places(city, cells, spec.number, seed, store)[numbers.start : numbers.stop]
     views = views_at(
         store.objects,
@@ -236,7 +227,13 @@ def _seen(
         radius=city.spec.radius,
         footprints=store.buildings_around(places, distance=city.reach),
     )
-    return places, _sights(views)
+    parts = (slice(low, high) for low, high in pairwise(views.offsets.tolist()))
+    return places, (
+        Sight(
+            codes=views.codes[part], bearings=views.bearings[part], distances=views.distances[part]
+        )
+        for part in parts
+    )
 
 
 def _places(
@@ -244,7 +241,7 @@ def _places(
 ) -> NDArray[np.float64]:
     """Return a place outside the buildings in each of the first cells that have one."""
     step = city.grid.step
-    found: list[NDArray[np.float64]] = []
+    places: list[NDArray[np.float64]] = []
     for start in range(0, len(cells), number):
         block = cells[start : start + number]
         aside = np.stack(
@@ -255,40 +252,28 @@ def _places(
         )
         tried = city.xy[block][:, None] + step * aside
         buildings = store.buildings_around(city.xy[block], distance=step)
-        free = _outside(tried.reshape(-1, 2), buildings).reshape(tried.shape[:2])
+        free = np.ones(tried.shape[:2], np.bool_)
+        if buildings is not None:
+            free = ~buildings.cover(tried.reshape(-1, 2)).reshape(free.shape)
         stands = free.any(axis=1)
-        found.append(tried[stands, free.argmax(axis=1)[stands]])
-        if sum(map(len, found)) >= number:
-            return np.concatenate(found)[:number]
+        places.append(tried[stands, free.argmax(axis=1)[stands]])
+        if sum(map(len, places)) >= number:
+            return np.concatenate(places)[:number]
     msg = (
-        f"{number} queries were asked for, but only {sum(map(len, found))} of the {len(cells)} "
+        f"{number} queries were asked for, but only {sum(map(len, places))} of the {len(cells)} "
         "cells have a place outside the buildings; give a smaller number."
     )
     raise InputError(msg)
 
 
-def _outside(places: NDArray[np.float64], buildings: Footprints | None) -> NDArray[np.bool_]:
-    return np.ones(len(places), np.bool_) if buildings is None else ~buildings.cover(places)
-
-
-def _sights(views: Views) -> Iterator[Sight]:
-    """Yield what is seen from each place."""
-    for low, high in pairwise(views.offsets.tolist()):
-        part = slice(low, high)
-        yield Sight(
-            codes=views.codes[part], bearings=views.bearings[part], distances=views.distances[part]
-        )
-
-
-def _known_codes(city: SignatureDatabase, database: SignatureDatabase) -> NDArray[np.uint8]:
-    """Return the code that each class of a city has in a database, 0 where it has none."""
-    codes = {item.name: item.code for item in database.taxonomy.classes}
+def _codes_there(city: SignatureDatabase, database: SignatureDatabase) -> NDArray[np.uint8]:
+    """Return the code that each class of a city has in a database, 0 where it is not seen there."""
     present = set(database.present_codes.tolist())
-    known = np.zeros(256, np.uint8)
+    codes = {item.name: item.code for item in database.taxonomy.classes if item.code in present}
+    there = np.zeros(256, np.uint8)
     for item in city.taxonomy.classes:
-        code = codes.get(item.name, 0)
-        known[item.code] = code if code in present else 0
-    return known
+        there[item.code] = codes.get(item.name, 0)
+    return there
 
 
 def _random(seed: int, stream: str, number: int) -> np.random.Generator:

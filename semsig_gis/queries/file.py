@@ -28,7 +28,7 @@ def read_queries(path: str | Path, *, taxonomy: Taxonomy) -> Queries:
     """Read the queries of a CSV file, or of a file of JSON lines.
 
     The columns are ``types`` and ``bearings`` (degrees with blanks, commas or semicolons between
-    them; in JSON perhaps a list), one of which may be missing or empty, and ``id`` if wanted. Each
+    them; in JSON perhaps a list), one of which may be missing or empty, and perhaps ``id``. Each
     query comes with its ``id``, or else the number of its line. Raises InputError if the file
     cannot be read or a line of it is no query.
     """
@@ -36,11 +36,7 @@ def read_queries(path: str | Path, *, taxonomy: Taxonomy) -> Queries:
 
 
 def parse_queries(text: str, source: str, *, taxonomy: Taxonomy) -> Queries:
-    """Read queries from JSON lines, with the names of `read_queries`.
-
-    `source` is what messages call the text. Raises InputError if there is no line, or, with its
-    number, if one is no query.
-    """
+    """Read queries as `read_queries` does, from JSON lines that messages call `source`."""
     return _named(parse_rows(text, source, lambda row: _query(row, taxonomy), what="query"))
 
 
@@ -57,11 +53,7 @@ def read_route(path: str | Path, *, taxonomy: Taxonomy) -> Route:
 
 
 def parse_route(text: str, source: str, *, taxonomy: Taxonomy) -> Route:
-    """Read the views of a route from JSON lines, with the names of `read_route`.
-
-    `source` is what messages call the text. Raises InputError if there is no line, or, with its
-    number, if one is no view of a route.
-    """
+    """Read a route as `read_route` does, from JSON lines that messages call `source`."""
     return _route(parse_rows(text, source, lambda row: _view(row, taxonomy), what="view"), source)
 
 
@@ -80,34 +72,32 @@ def _view(row: Row, taxonomy: Taxonomy) -> tuple[object, Signature, Leg | None]:
 
 
 def _leg(row: Row) -> Leg | None:
-    told = {
+    values = {
         name: float(given(row, name))
         for name in (*PLAIN_LEG, *TOWARDS, "sigma")
         if given(row, name) is not None
     }
-    if not told:
+    if not values:
         return None
-    sigma = told.pop("sigma", 0.0)
-    if set(told) == set(PLAIN_LEG):
-        return Leg(dx=told["dx"], dy=told["dy"], sigma=sigma)
-    if set(told) == set(TOWARDS):
-        return Leg.towards(told["bearing"], told["distance"], sigma=sigma)
+    sigma = values.pop("sigma", 0.0)
+    if values.keys() == set(PLAIN_LEG):
+        return Leg(dx=values["dx"], dy=values["dy"], sigma=sigma)
+    if values.keys() == set(TOWARDS):
+        return Leg.towards(values["bearing"], values["distance"], sigma=sigma)
     msg = "the way to it needs dx and dy, or distance and bearing"
     raise InputError(msg)
 
 
 def _route(rows: list[tuple[int, tuple[object, Signature, Leg | None]]], source: str) -> Route:
-    legs = []
     for number, (line, (_, _, leg)) in enumerate(rows):
         if (leg is None) != (number == 0):
-            does = "does not tell the way from the line before" if number else "tells a way"
+            fault = "does not tell the way from the line before" if number else "tells a way"
             msg = (
-                f"line {line} of {source} {does}; give dx and dy, or distance and bearing, on "
+                f"line {line} of {source} {fault}; give dx and dy, or distance and bearing, on "
                 "every line of a route but the first."
             )
             raise InputError(msg)
-        if leg is not None:
-            legs.append(leg)
+    legs = [leg for _, (_, _, leg) in rows if leg is not None]
     return _named([(line, (name, query)) for line, (name, query, _) in rows]), legs
 
 

@@ -10,7 +10,7 @@ import math
 from bisect import bisect_right
 from dataclasses import dataclass, replace
 from types import MappingProxyType
-from typing import TYPE_CHECKING, ClassVar, Literal, get_args
+from typing import TYPE_CHECKING, ClassVar, Literal, TypeVar, get_args
 
 import numpy as np
 
@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from semsig_gis.queries.sight import CitySights, Sight, Spoiling
 
 FalseClass = Literal["uniform", "frequency"]
+D = TypeVar("D")
 
 _OPERATIONS = 3
 _MISS, _FALSE_DETECTION = 0, 1  # and 2, a false classification
@@ -66,10 +67,6 @@ class Distortion:
     --------
     >>> Distortion(occurrences=2).bearing_clip
     30.0
-    >>> Distortion(occurrences=-1)
-    Traceback (most recent call last):
-    ...
-    semsig_gis.core.errors.InputError: -1 occurrences of distortion were given; give 0 or more.
     """
 
     stream: ClassVar[int] = 795_306_091
@@ -80,42 +77,28 @@ class Distortion:
     resort: bool = True
     false_class: FalseClass = "uniform"
 
-    def __post_init__(self) -> None:
-        """Refuse numbers out of range and unknown names."""
+    def __post_init__(self) -> None:  # noqa: D105
         if self.occurrences < 0:
             msg = f"{self.occurrences} occurrences of distortion were given; give 0 or more."
             raise InputError(msg)
         for label, value in (("sigma", self.bearing_sigma), ("clip", self.bearing_clip)):
             if not math.isfinite(value) or value < 0:
-                msg = f"A bearing {label} of {value!r} was given; give degrees, 0 or more."
+                msg = f"a bearing {label} of {value!r} was given; give degrees, 0 or more."
                 raise InputError(msg)
         if self.false_class not in get_args(FalseClass):
-            names = " or ".join(repr(name) for name in get_args(FalseClass))
             hint = nearest_name(str(self.false_class), get_args(FalseClass))
-            msg = f"{self.false_class!r} is no way to draw a false class; give {names}{hint}."
+            msg = (
+                f"{self.false_class!r} is no way to draw a false class{hint}; give "
+                f"{' or '.join(get_args(FalseClass))}."
+            )
             raise UnknownNameError(msg)
 
     def ready(self, city: CitySights) -> Spoiling:
-        """Return what is done to a query.
-
-        Parameters
-        ----------
-        city : CitySights
-            The classes that a false object may have, and how often each is seen.
-
-        Returns
-        -------
-        callable
-            From what is seen and a generator to what seems to be seen.
-        """
-        chances = _class_chances(
-            city.codes, city.frequencies, by_frequency=self.false_class == "frequency"
-        )
+        """Return what it does to a query of a city, whose classes false objects have."""
+        chances = _class_chances(self, city.codes, city.frequencies)
 
         def spoil(sight: Sight, rng: np.random.Generator) -> Sight:
-            codes, bearings, rows = _spoiled(
-                sight.codes, sight.bearings, self, (city.codes, chances), rng
-            )
+            codes, bearings, rows = _spoiled(sight.signature, self, (city.codes, chances), rng)
             distances = np.empty(len(rows))
             real = rows >= 0
             distances[real] = sight.distances[rows[real]]
@@ -157,18 +140,18 @@ def named_distortion(name: str) -> Distortion:
     --------
     >>> named_distortion("strong").occurrences
     13
-    >>> named_distortion("mdium")
-    Traceback (most recent call last):
-    ...
-    semsig_gis.core.errors.UnknownNameError: 'mdium' is no distortion;
-    give none, light, medium or strong; the nearest is 'medium'.
     """
-    if name not in DISTORTIONS:
-        *most, last = DISTORTIONS
-        hint = nearest_name(name, DISTORTIONS)
-        msg = f"{name!r} is no distortion; give {', '.join(most)} or {last}{hint}."
+    return distortion_of(name, DISTORTIONS)
+
+
+def distortion_of(name: str, distortions: Mapping[str, D]) -> D:
+    """Return a distortion by name; raises UnknownNameError if there is none."""
+    if name not in distortions:
+        *most, last = distortions
+        hint = nearest_name(name, distortions)
+        msg = f"{name!r} is no distortion{hint}; give {', '.join(most)} or {last}."
         raise UnknownNameError(msg)
-    return DISTORTIONS[name]
+    return distortions[name]
 
 
 def distort(
@@ -219,27 +202,24 @@ def distort(
     >>> same.codes.tolist(), same.bearings.tolist()
     ([1, 3], [10.0, 200.0])
     """
-    if signature.codes is None or signature.bearings is None:
-        msg = "A signature without types or without bearings was given; give one with both."
-        raise InputError(msg)
-    known = np.asarray(classes, dtype=np.uint8)
-    chances = _class_chances(known, weights, by_frequency=distortion.false_class == "frequency")
-    codes, bearings, _ = _spoiled(
-        signature.codes, signature.bearings, distortion, (known, chances), rng
-    )
+    false = np.asarray(classes, dtype=np.uint8)
+    chances = _class_chances(distortion, false, weights)
+    codes, bearings, _ = _spoiled(signature, distortion, (false, chances), rng)
     return Signature(codes=codes, bearings=bearings)
 
 
 def _spoiled(
-    true_codes: NDArray[np.uint8],
-    true_bearings: NDArray[np.float64],
+    signature: Signature,
     distortion: Distortion,
     false_classes: tuple[NDArray[np.uint8], NDArray[np.float64]],
     rng: np.random.Generator,
 ) -> tuple[NDArray[np.uint8], NDArray[np.float64], NDArray[np.int64]]:
     """Return codes, bearings, and which object each was; -1 for a false one."""
-    codes: list[int] = true_codes.tolist()
-    bearings: list[float] = true_bearings.tolist()
+    if signature.codes is None or signature.bearings is None:
+        msg = "a signature without types or without bearings was given; give one with both."
+        raise InputError(msg)
+    codes: list[int] = signature.codes.tolist()
+    bearings: list[float] = signature.bearings.tolist()
     rows = list(range(len(codes)))
     for _ in range(distortion.occurrences):
         operation = int(rng.integers(_OPERATIONS))
@@ -264,16 +244,16 @@ def _spoiled(
 
 
 def _class_chances(
-    classes: NDArray[np.uint8], weights: ArrayLike | None, *, by_frequency: bool
+    distortion: Distortion, classes: NDArray[np.uint8], weights: ArrayLike | None
 ) -> NDArray[np.float64]:
     """Return the chance of each class for a false object."""
     if classes.ndim != 1 or classes.size == 0 or len(np.unique(classes)) != classes.size:
-        msg = "The classes of false objects were not a list of distinct codes; give at least one."
+        msg = "the classes of false objects are not a list of distinct codes; give at least one."
         raise InputError(msg)
-    if not by_frequency:
+    if distortion.false_class == "uniform":
         return np.full(classes.size, 1.0 / classes.size)
     if weights is None:
-        msg = "False classes by frequency were asked for without weights; give one a class."
+        msg = "false classes by frequency need weights; give one a class."
         raise InputError(msg)
     values = np.asarray(weights, dtype=np.float64)
     if values.shape != classes.shape or not np.isfinite(values).all() or (values < 0).any():
@@ -282,11 +262,10 @@ def _class_chances(
             "give one a class, 0 or more."
         )
         raise InputError(msg)
-    total = values.sum()
-    if total <= 0:
-        msg = "Class weights that are all zero were given; give at least one above zero."
+    if not values.any():
+        msg = "class weights that are all zero were given; give at least one above zero."
         raise InputError(msg)
-    return np.asarray(values / total)
+    return np.asarray(values / values.sum())
 
 
 def _other_class(

@@ -68,20 +68,7 @@ class Sight:
 
     @classmethod
     def of_cell(cls, database: SignatureDatabase, cell: int) -> Sight:
-        """Return what a database says is seen from a cell.
-
-        Parameters
-        ----------
-        database : SignatureDatabase
-            The cells.
-        cell : int
-            Row number of the cell.
-
-        Returns
-        -------
-        Sight
-            Its objects, clockwise.
-        """
+        """Return the objects of a cell, given by row number, clockwise."""
         part = slice(database.offsets[cell], database.offsets[cell + 1])
         return cls(
             codes=database.codes[part],
@@ -89,20 +76,9 @@ class Sight:
             distances=database.distance_units[part] * np.float64(database.reach / DISTANCE_UNITS),
         )
 
-    def only(self, chosen: ArrayLike) -> Sight:
-        """Return some of the objects.
-
-        Parameters
-        ----------
-        chosen : array_like
-            Which ones: a mask, or numbers in the order wanted.
-
-        Returns
-        -------
-        Sight
-            These.
-        """
-        index = np.asarray(chosen)
+    def only(self, objects: ArrayLike) -> Sight:
+        """Return some of the objects: those of a mask, or of numbers in the order wanted."""
+        index = np.asarray(objects)
         return replace(
             self,
             codes=self.codes[index],
@@ -111,28 +87,11 @@ class Sight:
         )
 
     def clockwise(self) -> Sight:
-        """Return the objects as a clockwise sweep from north tells them.
-
-        Returns
-        -------
-        Sight
-            Sorted by bearing; objects on one bearing stay in the order they are in.
-        """
+        """Return the objects sorted by bearing; those on one bearing stay in their order."""
         return self.only(np.argsort(self.bearings, kind="stable"))
 
     def turned(self, degrees: float) -> Sight:
-        """Return the same by another north.
-
-        Parameters
-        ----------
-        degrees : float
-            How far each bearing grows.
-
-        Returns
-        -------
-        Sight
-            Clockwise from the new north.
-        """
+        """Return the same with bearings so many degrees larger, clockwise from the new north."""
         return replace(
             self,
             bearings=wrap_degrees(self.bearings + degrees),

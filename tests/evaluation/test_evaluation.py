@@ -337,7 +337,7 @@ def test_files_that_are_no_evaluation_are_refused(evaluation: Evaluation, tmp_pa
         ({"queries": 0}, "0 queries were asked for"),
         ({"queries": 5, "top": 121}, "121 candidates were asked for"),
         ({"queries": 5, "top": 0}, "0 candidates were asked for"),
-        ({"queries": 5, "seed": -1}, "A seed of -1 was given"),
+        ({"queries": 5, "seed": -1}, "a seed of -1 was given"),
     ],
 )
 def test_numbers_out_of_range_are_refused(

@@ -3,17 +3,17 @@ from __future__ import annotations
 import json
 from typing import TYPE_CHECKING
 
-import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from sentences import assert_sentence
 
-from semsig_gis.core.errors import InputError
-from semsig_gis.queries.file import parse_queries, read_queries
+from semsig_gis.likelihood.route import Leg
+from semsig_gis.queries.file import parse_queries, parse_route, read_queries, read_route
 from semsig_gis.sources.catalog import paper_taxonomy
 
 if TYPE_CHECKING:
     from pathlib import Path
+
+    import pytest
 
 TAXONOMY = paper_taxonomy()
 ROWS = st.lists(
@@ -55,27 +55,20 @@ def test_a_part_may_be_missing_and_lines_are_numbered() -> None:
     assert found[1][1].codes is None
 
 
-@pytest.mark.parametrize(
-    ("text", "words"),
-    [
-        ("", ("no rows",)),
-        ("{", ("line 1", "not JSON")),
-        ("[1]", ("line 1", "no query")),
-        ('{"types": "Z"}', ("line 1", "'Z'")),
-        ('{"types": "DB", "bearings": [1]}', ("line 1", "2 types and 1 bearings")),
-        ('{"types": "D"}\n{"other": 1}', ("line 2", "needs types, bearings or both")),
-        ('{"types": "D", "bearings": ["north"]}', ("line 1", "not all numbers")),
-    ],
-)
-def test_what_is_no_query_is_named(text: str, words: tuple[str, ...]) -> None:
-    with pytest.raises(InputError) as caught:
-        parse_queries(text, "these lines", taxonomy=TAXONOMY)
-    assert_sentence(caught.value, "these lines", *words)
+def test_a_route_tells_the_way_from_view_to_view() -> None:
+    lines = """
+{"id": "start", "types": "DB", "bearings": [10, 200]}
+{"dx": 3, "dy": -4, "sigma": 2}
+{"types": "D", "bearings": "90", "distance": 20, "bearing": 90}
+"""
+    views, legs = parse_route(lines, "these lines", taxonomy=TAXONOMY)
+    assert [name for name, _ in views] == ["start", 3, 4]
+    assert [len(view) for _, view in views] == [2, 0, 1]
+    assert legs == [Leg(dx=3.0, dy=-4.0, sigma=2.0), Leg.towards(90.0, 20.0, sigma=0.0)]
 
 
-def test_files_that_cannot_be_read_are_named(tmp_path: Path) -> None:
-    (tmp_path / "b.csv").write_bytes(b"\xff\xfe\x00")
-    for name in ("a.csv", "b.csv"):
-        with pytest.raises(InputError) as caught:
-            read_queries(tmp_path / name, taxonomy=TAXONOMY)
-        assert_sentence(caught.value, name, "cannot be read")
+def test_a_route_in_a_table(tmp_path: Path) -> None:
+    (tmp_path / "route.csv").write_text("types,dx,dy\nDB,,\nD,0,5.5\n")
+    views, legs = read_route(tmp_path / "route.csv", taxonomy=TAXONOMY)
+    assert [name for name, _ in views] == [2, 3]
+    assert legs == [Leg(dx=0.0, dy=5.5)]

@@ -22,13 +22,13 @@ from semsig_gis.database.file import open_database, save_database
 from semsig_gis.database.properties import database_summary
 from semsig_gis.database.store import ObjectStore, save_with_store
 from semsig_gis.database.viewpoints import ViewpointSpec
-from semsig_gis.evaluation.evaluate import check_count, versions
+from semsig_gis.evaluation.evaluate import versions
 from semsig_gis.experiments.paper.experiments import QUERIES, RANGES, SCALES, paper_experiments
 from semsig_gis.experiments.run import run_experiments
 from semsig_gis.matching.method import Method
 from semsig_gis.matching.scores import score_cells
 from semsig_gis.objects.clean import build_objects
-from semsig_gis.queries.draw import QuerySpec
+from semsig_gis.queries.draw import QuerySpec, check_count
 from semsig_gis.reports import paris
 from semsig_gis.sources.catalog import paper_taxonomy
 from semsig_gis.sources.synthetic.city import (

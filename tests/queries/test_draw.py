@@ -11,7 +11,7 @@ import shapely
 from sentences import assert_sentence
 from worlds import CORNER, TAXONOMY, World, random_town
 
-from semsig_gis.core.errors import CrsError, InputError, UnknownNameError
+from semsig_gis.core.errors import InputError
 from semsig_gis.core.taxonomy import Taxonomy
 from semsig_gis.database.build import build_database
 from semsig_gis.database.store import ObjectStore
@@ -189,36 +189,6 @@ def seeing(code: int) -> np.ndarray[Any, Any]:
     """Return the rows of the cells that see a class."""
     owners = np.repeat(np.arange(len(DATABASE)), DATABASE.lengths)
     return np.unique(owners[DATABASE.codes == code])
-
-
-def test_inputs_that_are_refused() -> None:
-    with pytest.raises(InputError) as caught:
-        draw_queries(DATABASE, replace(PLAIN, number=10**6))
-    assert_sentence(caught.value, "1000000 queries", f"1 to {len(DATABASE)}")
-    with pytest.raises(InputError) as caught:
-        draw_queries(DATABASE, ANYWHERE)
-    assert_sentence(caught.value, "street objects")
-    with pytest.raises(CrsError) as crs_error:
-        draw_queries(DATABASE, PLAIN, city=replace(DATABASE, crs=gpd.GeoSeries(crs=32631).crs))
-    assert_sentence(crs_error.value, "EPSG:32631", "EPSG:2154")
-
-
-@pytest.mark.parametrize(
-    ("options", "words"),
-    [
-        ({"number": 0}, ["0 queries"]),
-        ({"seeds": ()}, ["seeds are []"]),
-        ({"seeds": (1, 1)}, ["none twice"]),
-        ({"seeds": (2, -1)}, ["seed of -1"]),
-    ],
-)
-def test_specs_that_are_refused(options: dict[str, Any], words: list[str]) -> None:
-    with pytest.raises(InputError) as caught:
-        QuerySpec(**options)
-    assert_sentence(caught.value, *words)
-    wrong: Any = "anywere"
-    with pytest.raises(UnknownNameError, match="nearest is 'anywhere'"):
-        QuerySpec(seen_from=wrong)
 
 
 def monaco(geodata: Path, year: int) -> tuple[SignatureDatabase, ObjectStore]:

@@ -7,10 +7,8 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from sentences import assert_sentence
-from sights import CITY, CLASSES, many, rows, seeds, sights
+from sights import CITY, CLASSES, many, paper_errors, rows, seeds, sights
 
-from semsig_gis.core.errors import SemsigError
 from semsig_gis.likelihood.noise.model import NOISES, NoiseSpec
 from semsig_gis.queries.chain import NAMED_DISTORTIONS, chain_text, parse_chain, ready_chain
 from semsig_gis.queries.distortions import (
@@ -22,7 +20,7 @@ from semsig_gis.queries.distortions import (
     MissingClasses,
     Obstacles,
 )
-from semsig_gis.queries.paper_errors import DISTORTIONS, Distortion
+from semsig_gis.queries.paper_errors import DISTORTIONS
 
 if TYPE_CHECKING:
     from semsig_gis.queries.chain import QueryDistortion
@@ -35,14 +33,7 @@ classes = st.lists(
 ).map(tuple)
 any_distortion: st.SearchStrategy[QueryDistortion] = st.one_of(
     st.sampled_from(list(NAMED_DISTORTIONS.values())),
-    st.builds(
-        Distortion,
-        occurrences=st.integers(0, 20),
-        bearing_sigma=st.floats(0, 90),
-        bearing_clip=st.floats(0, 200),
-        resort=st.booleans(),
-        false_class=st.sampled_from(["uniform", "frequency"]),
-    ),
+    paper_errors,
     st.builds(CompassBias, sigma=st.floats(0, 180)),
     st.builds(MissingClasses, classes=classes, others=st.booleans()),
     st.builds(FieldOfView, degrees=st.floats(0.1, 360)),
@@ -131,28 +122,6 @@ def test_misses_and_clutter_add_up() -> None:
     spoil = ready_chain(chain, CITY)
     kept = np.array([len(spoil(many(1), 0, number)) for number in range(4000)])
     assert kept.mean() == pytest.approx(0.25, abs=0.04)
-
-
-@pytest.mark.parametrize(
-    ("text", "words"),
-    [
-        ("meduim", ["'meduim'", "nearest is 'medium'"]),
-        ("medium:7", ["'7'", "means nothing", "the settings of medium are occurrences"]),
-        ("view:sixty", ["'sixty'", "a number"]),
-        ("errors:2.5", ["'2.5'", "a whole number"]),
-        ("medium:resort=no", ["'no'", "true or false"]),
-        ("compass:5:sigma=6", ["'sigma'", "given twice"]),
-        ("view:90:degree=3", ["'degree'", "nearest is 'degrees'"]),
-        ("view:0", ["0.0 degrees", "above 0"]),
-        ("detector:mime", ["'mime'", "nearest is 'mine'"]),
-        ("medium,,view:90", ["''", "no distortion"]),
-        ("missing:bnech", ["'bnech'", "nearest is 'bench'"]),
-    ],
-)
-def test_texts_that_cannot_be_read(text: str, words: list[str]) -> None:
-    with pytest.raises(SemsigError) as caught:
-        ready_chain(parse_chain(text, noises=KNOWN), CITY)
-    assert_sentence(caught.value, *words)
 
 
 def test_the_streams_of_random_numbers_are_fixed() -> None:
