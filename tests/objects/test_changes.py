@@ -10,6 +10,7 @@ import pytest
 import shapely
 from hypothesis import given
 from hypothesis import strategies as st
+from raw_layers import raw_layer
 from sentences import assert_sentence
 from worlds import CODES, TAXONOMY
 
@@ -18,8 +19,6 @@ from semsig_gis.core.taxonomy import ObjectClass, Taxonomy
 from semsig_gis.objects.changes import compare_objects, replace_layers
 from semsig_gis.objects.clean import build_objects
 from semsig_gis.objects.table import Licence, StreetObjects, open_objects, save_objects
-from semsig_gis.sources import RawLayer, RowCounts
-from semsig_gis.sources.layers import LayerSpec
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -197,22 +196,11 @@ def test_layers_that_were_not_loaded_anew_stay() -> None:
 def test_a_layer_may_have_any_name(tmp_path: Path, name: str, *, has_objects: bool) -> None:
     def saved(file: str, **places: list[tuple[float, float]]) -> StreetObjects:
         """Save a layer for each name, all of one publisher, and open them again."""
-        objects, _ = build_objects(
-            [
-                RawLayer(
-                    spec=LayerSpec(name=layer, class_name="alignment_tree", attribution="City"),
-                    table=gpd.GeoDataFrame(
-                        {"class_name": "alignment_tree", "source_id": list("ab"[: len(points)])},
-                        geometry=[shapely.Point(point) for point in points],
-                        crs="EPSG:2154",
-                    ),
-                    counts=RowCounts(read=len(points)),
-                )
-                for layer, points in places.items()
-            ],
-            taxonomy=TAXONOMY,
-            crs="EPSG:2154",
-        )
+        layers = [
+            raw_layer([shapely.Point(point) for point in points], name=name)
+            for name, points in places.items()
+        ]
+        objects, _ = build_objects(layers, taxonomy=TAXONOMY, crs="EPSG:2154")
         save_objects(objects, tmp_path / file)
         return open_objects(tmp_path / file)
 

@@ -17,62 +17,23 @@ from geopandas.testing import assert_geodataframe_equal
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from pyproj import CRS, Transformer
+from raw_layers import raw_layer
 from sentences import assert_sentence
 
 from semsig_gis.core.errors import CrsError, DatabaseError, EmptyResultError, UnknownNameError
 from semsig_gis.objects.clean import build_objects
 from semsig_gis.objects.table import Licence, objects_specs, open_objects, save_objects
-from semsig_gis.sources import RawLayer, RowCounts
+from semsig_gis.sources import RowCounts
 from semsig_gis.sources.catalog import load_catalog, paper_taxonomy
-from semsig_gis.sources.layers import LayerSpec
 from semsig_gis.storage.geoparquet import geo_metadata, write_geoparquet
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
     from semsig_gis.objects.table import StreetObjects
+    from semsig_gis.sources import RawLayer
 
 LAMBERT = "EPSG:2154"
 TAXONOMY = paper_taxonomy()
 NAN = math.nan
-
-
-def layer(
-    geometries: Sequence[object],
-    *,
-    name: str = "trees",
-    classes: str | Sequence[str] = "alignment_tree",
-    ids: Sequence[str] | None = None,
-    crs: str | None = LAMBERT,
-    attribution: str = "Town",
-    filtered: int = 0,
-    error_count: int = 0,
-    notes: tuple[str, ...] = (),
-) -> RawLayer:
-    """Return a layer as a reader would."""
-    size = len(geometries)
-    names = [classes] * size if isinstance(classes, str) else list(classes)
-    table = gpd.GeoDataFrame(
-        {
-            "class_name": np.array(names, dtype=object),
-            "source_id": np.array(ids or [str(row) for row in range(size)], dtype=object),
-        },
-        geometry=gpd.GeoSeries(list(geometries), crs=crs),
-    )
-    return RawLayer(
-        spec=LayerSpec(
-            name=name,
-            class_name=names[0] if names else "alignment_tree",
-            license="CC0",
-            attribution=attribution,
-        ),
-        table=table,
-        counts=RowCounts(
-            read=size + filtered + error_count, filtered=filtered, unreadable=error_count
-        ),
-        errors=tuple(f"row {row}: broken" for row in range(min(error_count, 10))),
-        notes=notes,
-    )
 
 
 def build(*layers: RawLayer, collapse: bool = True) -> StreetObjects:
@@ -89,7 +50,7 @@ def points(*places: tuple[float, float]) -> list[shapely.Point]:
 
 def test_the_table_has_the_columns_it_promises() -> None:
     objects = build(
-        layer(points((1, 2), (3, 4)), ids=["a7", "é8"], classes=["bench", "street_light"])
+        raw_layer(points((1, 2), (3, 4)), ids=["a7", "é8"], classes=["bench", "street_light"])
     )
     assert len(objects) == 2
     assert list(objects.table.columns) == [
@@ -114,10 +75,10 @@ def test_the_table_has_the_columns_it_promises() -> None:
 def test_every_publisher_is_named_once_with_the_layers_it_gave() -> None:
     place = points((1, 2))
     objects = build(
-        layer(place, name="trees"),
-        layer(place, name="lights", attribution=""),
-        layer(place, name="taps"),
-        layer(place, name="taps"),
+        raw_layer(place, name="trees"),
+        raw_layer(place, name="lights", attribution=""),
+        raw_layer(place, name="taps"),
+        raw_layer(place, name="taps"),
     )
     assert objects.licenses == (
         Licence("Town (CC0)", ("trees", "taps")),
@@ -144,7 +105,7 @@ def test_every_publisher_is_named_once_with_the_layers_it_gave() -> None:
     ],
 )
 def test_an_object_stands_at_its_centroid(wkt: str, centre: tuple[float, float]) -> None:
-    objects = build(layer([shapely.from_wkt(wkt), shapely.Point(100, 100)]))
+    objects = build(raw_layer([shapely.from_wkt(wkt), shapely.Point(100, 100)]))
     assert objects.xy[0] == pytest.approx(centre)
     assert set(objects.table.geom_type) == {"Point"}
     assert not objects.table.has_z.any()
@@ -169,7 +130,7 @@ def test_rows_without_a_place_are_dropped_and_counted() -> None:
     good = points((1, 2), (3, 4))
     mixed = [good[0], *bad, *nowhere, good[1]]
     ids = [str(row) for row in range(len(mixed))]
-    objects, report = build_objects([layer(mixed, ids=ids)], taxonomy=TAXONOMY, crs=LAMBERT)
+    objects, report = build_objects([raw_layer(mixed, ids=ids)], taxonomy=TAXONOMY, crs=LAMBERT)
     assert objects.xy.tolist() == [[1, 2], [3, 4]]
     assert objects.table["source_id"].tolist() == ["0", ids[-1]]
     (told,) = report.layers
@@ -180,21 +141,11 @@ def test_a_place_off_the_earth_is_misplaced() -> None:
     with np.errstate(invalid="ignore"):
         broken = shapely.linestrings([(3.88, 43.61), (NAN, 43.61)])
     places = points((3.88, 43.61), (500, 900), (3.9, 43.6), (1e38, 0))
-    degrees = layer([*places, broken], crs="EPSG:4326")
+    degrees = raw_layer([*places, broken], crs="EPSG:4326")
     objects, report = build_objects([degrees], taxonomy=TAXONOMY, crs=LAMBERT)
     assert len(objects) == 2
     assert report.layers[0].counts.misplaced == 3
     assert objects.table["source_id"].tolist() == ["0", "2"]
-
-
-def test_a_row_keeps_its_class_when_others_are_dropped() -> None:
-    objects = build(
-        layer(
-            [None, shapely.Point(1, 1), shapely.Point(NAN, 1), shapely.Point(2, 2)],
-            classes=["bench", "bus_stop", "bench", "street_light"],
-        )
-    )
-    assert [TAXONOMY.by_code(code).name for code in objects.codes] == ["bus_stop", "street_light"]
 
 
 # --- Collapsing -------------------------------------------------------------------------------
@@ -202,28 +153,17 @@ def test_a_row_keeps_its_class_when_others_are_dropped() -> None:
 
 def test_one_class_at_one_place_is_one_object() -> None:
     places = points((0, 0), (5, 5), (0, 0), (0, 0.001), (0, 1))
-    objects, report = build_objects([layer(places)], taxonomy=TAXONOMY, crs=LAMBERT)
+    objects, report = build_objects([raw_layer(places)], taxonomy=TAXONOMY, crs=LAMBERT)
     assert objects.xy.tolist() == [[0, 0], [5, 5], [0, 1]]
     assert objects.table["count"].tolist() == [3, 1, 1]
     assert objects.table["source_id"].tolist() == ["0", "1", "4"]
     assert report.layers[0].counts.collapsed == 2
 
 
-def test_different_classes_at_one_place_stay_apart() -> None:
-    objects = build(layer(points((0, 0), (0, 0)), classes=["bench", "bus_stop"]))
-    assert objects.codes.tolist() == [10, 11]
-
-
-def test_collapsing_can_be_left_out() -> None:
-    objects = build(layer(points((0, 0), (0, 0))), collapse=False)
-    assert len(objects) == 2
-    assert objects.table["count"].tolist() == [1, 1]
-
-
 def test_layers_of_one_class_collapse_into_the_first() -> None:
     layers = [
-        layer(points((0, 0), (1, 1)), name="north"),
-        layer(points((1, 1), (1, 1), (2, 2)), name="south"),
+        raw_layer(points((0, 0), (1, 1)), name="north"),
+        raw_layer(points((1, 1), (1, 1), (2, 2)), name="south"),
     ]
     objects, report = build_objects(layers, taxonomy=TAXONOMY, crs=LAMBERT)
     assert objects.table["source"].tolist() == ["north", "north", "south"]
@@ -232,7 +172,7 @@ def test_layers_of_one_class_collapse_into_the_first() -> None:
 
 
 def test_two_layers_of_one_name_are_reported_apart() -> None:
-    layers = [layer(points((0, 0))), layer(points((0, 0), (1, 1), (2, 2)))]
+    layers = [raw_layer(points((0, 0))), raw_layer(points((0, 0), (1, 1), (2, 2)))]
     _, report = build_objects(layers, taxonomy=TAXONOMY, crs=LAMBERT)
     assert [(item.name, item.counts) for item in report.layers] == [
         ("trees", RowCounts(read=1)),
@@ -247,9 +187,9 @@ def test_layers_in_several_systems_meet_in_one() -> None:
     lon, lat = 3.876716, 43.610769
     x, y = Transformer.from_crs("EPSG:4171", LAMBERT, always_xy=True).transform(lon, lat)
     layers = [
-        layer(points((lon, lat)), name="degrees", crs="EPSG:4171"),
-        layer(points((x, y + 10)), name="metres"),
-        layer(points((x, y + 20)), name="esri", crs=CRS(LAMBERT).to_wkt("WKT1_ESRI")),
+        raw_layer(points((lon, lat)), name="degrees", crs="EPSG:4171"),
+        raw_layer(points((x, y + 10)), name="metres"),
+        raw_layer(points((x, y + 20)), name="esri", crs=CRS(LAMBERT).to_wkt("WKT1_ESRI")),
     ]
     objects = build(*layers)
     assert objects.xy == pytest.approx(np.array([[x, y], [x, y + 10], [x, y + 20]]), abs=1e-3)
@@ -258,14 +198,14 @@ def test_layers_in_several_systems_meet_in_one() -> None:
 
 def test_a_layer_without_a_system_is_asked_about() -> None:
     with pytest.raises(CrsError) as caught:
-        build(layer(points((1, 2))), layer(points((1, 2)), name="parks", crs=None))
+        build(raw_layer(points((1, 2))), raw_layer(points((1, 2)), name="parks", crs=None))
     assert_sentence(caught.value, "'parks'", "no coordinate reference system", "state its crs")
 
 
 @pytest.mark.parametrize("crs", ["EPSG:4326", "EPSG:3857", "EPSG:2263", "nonsense"])
 def test_a_system_to_work_in_must_be_metric(crs: str) -> None:
     with pytest.raises(CrsError) as caught:
-        build_objects([layer(points((1, 2)))], taxonomy=TAXONOMY, crs=crs)
+        build_objects([raw_layer(points((1, 2)))], taxonomy=TAXONOMY, crs=crs)
     assert_sentence(caught.value, "projected CRS in metres")
 
 
@@ -274,13 +214,13 @@ def test_a_system_to_work_in_must_be_metric(crs: str) -> None:
 
 def test_an_unknown_class_is_named() -> None:
     with pytest.raises(UnknownNameError) as caught:
-        build(layer(points((1, 2)), classes="kiosk"))
+        build(raw_layer(points((1, 2)), classes="kiosk"))
     assert_sentence(caught.value, "'kiosk'")
 
 
 def test_nothing_left_is_an_error() -> None:
-    nothing = layer([None, shapely.Point(NAN, NAN)], filtered=7)
-    for layers in ([], [layer([])], [nothing], [nothing, layer([], crs="EPSG:4326")]):
+    nothing = raw_layer([None, shapely.Point(NAN, NAN)], filtered=7)
+    for layers in ([], [raw_layer([])], [nothing], [nothing, raw_layer([], crs="EPSG:4326")]):
         with pytest.raises(EmptyResultError) as caught:
             build(*layers)
         rows = sum(item.counts.read for item in layers)
@@ -291,9 +231,9 @@ def test_an_empty_layer_beside_a_full_one_is_fine() -> None:
     for crs in ("EPSG:4326", LAMBERT):
         objects, report = build_objects(
             [
-                layer([], name="a", crs=crs),
-                layer(points((1, 2))),
-                layer([None], name="b", crs=crs),
+                raw_layer([], name="a", crs=crs),
+                raw_layer(points((1, 2))),
+                raw_layer([None], name="b", crs=crs),
             ],
             taxonomy=TAXONOMY,
             crs=LAMBERT,
@@ -313,12 +253,12 @@ LINES = st.just(shapely.LineString([(0, 0), (2, 2)]))
 def raw_layers(draw: st.DrawFn) -> RawLayer:
     geometries = draw(st.lists(st.one_of(PLACES, BAD, LINES), max_size=12))
     names = st.sampled_from(["bench", "bus_stop"])
-    return layer(
+    return raw_layer(
         geometries,
         name=draw(st.sampled_from(["a", "b"])),
         classes=draw(st.lists(names, min_size=len(geometries), max_size=len(geometries))),
         filtered=draw(st.integers(0, 5)),
-        error_count=draw(st.integers(0, 15)),
+        unreadable=draw(st.integers(0, 15)),
         notes=draw(st.sampled_from([(), ("odd",)])),
     )
 
@@ -365,7 +305,7 @@ def test_licences_come_back_whatever_layers_are_called(
     licenses: tuple[Licence, ...], sources: set[str]
 ) -> None:
     layers = sources.union(*(licence.layers for licence in licenses)) or {"trees"}
-    objects = build(*(layer(points((1, number)), name=n) for number, n in enumerate(layers)))
+    objects = build(*(raw_layer(points((1, number)), name=n) for number, n in enumerate(layers)))
     objects = dataclasses.replace(objects, licenses=licenses)
     with tempfile.TemporaryDirectory() as folder:
         save_objects(objects, f"{folder}/objects.parquet")
@@ -387,7 +327,9 @@ def test_an_older_file_tells_layers_by_its_objects(
 ) -> None:
     """Files of earlier versions have lines for people, and nothing beside them."""
     names = ("parks, trees", "lamps", "x: y", "b", "b, b")
-    objects = build(*(layer(points((1, number)), name=name) for number, name in enumerate(names)))
+    objects = build(
+        *(raw_layer(points((1, number)), name=name) for number, name in enumerate(names))
+    )
     terms = line.removesuffix(f": {', '.join(layers)}")
     objects = dataclasses.replace(objects, licenses=(Licence(terms, layers),))
     specs = {
@@ -410,9 +352,12 @@ def test_an_older_file_tells_layers_by_its_objects(
 
 
 def test_a_file_says_of_layers_only_what_its_lines_do_not_tell() -> None:
-    lamps, benches = layer(points((1, 2)), name="lamps"), layer(points((3, 4)), name="benches")
+    lamps, benches = (
+        raw_layer(points((1, 2)), name="lamps"),
+        raw_layer(points((3, 4)), name="benches"),
+    )
     assert "license_layers" not in objects_specs(build(lamps, benches))
-    specs = objects_specs(build(lamps, layer([], name="benches")))
+    specs = objects_specs(build(lamps, raw_layer([], name="benches")))
     assert specs["licenses"] == ["Town (CC0): lamps, benches"]
     assert specs["license_layers"] == [["lamps", "benches"]]
 
@@ -423,8 +368,8 @@ def test_a_file_says_of_layers_only_what_its_lines_do_not_tell() -> None:
 def test_saved_objects_come_back(tmp_path: Path) -> None:
     taxonomy = load_catalog("montpellier").taxonomy
     layers = [
-        layer(points((700_000.123456789, 6_600_000.1)), ids=["Écusson n°7 - 東"], name="é"),
-        layer(points((1, 2), (1, 2)), ids=["", "b"], name="meters", classes="parking_meter"),
+        raw_layer(points((700_000.123456789, 6_600_000.1)), ids=["Écusson n°7 - 東"], name="é"),
+        raw_layer(points((1, 2), (1, 2)), ids=["", "b"], name="meters", classes="parking_meter"),
     ]
     objects, _ = build_objects(layers, taxonomy=taxonomy, crs=LAMBERT)
     path = tmp_path / "objects.parquet"
@@ -444,7 +389,7 @@ def test_saved_objects_come_back(tmp_path: Path) -> None:
 def scattered(count: int) -> StreetObjects:
     rng = np.random.default_rng(9)
     places = rng.uniform(0, 5_000, (count, 2)) + np.array([765_000.0, 6_275_000.0])
-    return build(layer(points(*map(tuple, places.tolist()))))
+    return build(raw_layer(points(*map(tuple, places.tolist()))))
 
 
 def test_saved_objects_come_back_in_an_order_that_stays() -> None:
@@ -490,7 +435,7 @@ def test_a_box_holds_exactly_the_objects_in_it(
     west, south = corner[0] * 0.1 + at[0], corner[1] * 0.1 + at[1]
     east, north = (corner[0] + size[0]) * 0.1 + at[0], (corner[1] + size[1]) * 0.1 + at[1]
     objects, _ = build_objects(
-        [layer(points(*placed))], taxonomy=TAXONOMY, crs=LAMBERT, collapse=False
+        [raw_layer(points(*placed))], taxonomy=TAXONOMY, crs=LAMBERT, collapse=False
     )
     with tempfile.TemporaryDirectory() as folder, pytest.MonkeyPatch.context() as patch:
         patch.setattr("semsig_gis.objects.table.GROUP_ROWS", group_rows)
@@ -544,7 +489,7 @@ def test_a_file_of_before_is_read_by_box_too(tmp_path: Path) -> None:
 
 
 def test_positions_cannot_be_changed_by_accident() -> None:
-    objects = build(layer(points((1, 2))))
+    objects = build(raw_layer(points((1, 2))))
     with pytest.raises(ValueError, match="read-only"):
         objects.xy[0, 0] = 9
     with pytest.raises(dataclasses.FrozenInstanceError):
@@ -553,7 +498,7 @@ def test_positions_cannot_be_changed_by_accident() -> None:
 
 def test_a_cut_file_is_an_error(tmp_path: Path) -> None:
     path = tmp_path / "objects.parquet"
-    save_objects(build(layer(points((1, 2), (3, 4)))), path)
+    save_objects(build(raw_layer(points((1, 2), (3, 4)))), path)
     content = path.read_bytes()
     for size in range(0, len(content), 50):
         path.write_bytes(content[:size])
@@ -590,7 +535,7 @@ def test_a_cut_file_is_an_error(tmp_path: Path) -> None:
 def test_a_file_that_does_not_fit_itself_is_an_error(
     tmp_path: Path, column: str, values: object
 ) -> None:
-    objects = build(layer(points((1, 2), (3, 4))))
+    objects = build(raw_layer(points((1, 2), (3, 4))))
     table = pa.table(
         {
             "class_code": pa.array(objects.codes),

@@ -5,21 +5,20 @@ import math
 from statistics import median
 from typing import TYPE_CHECKING
 
-import geopandas as gpd
 import numpy as np
 import pytest
 import shapely
 from hypothesis import given
 from hypothesis import strategies as st
+from raw_layers import raw_layer
 
 from semsig_gis.objects.clean import build_objects
 from semsig_gis.objects.conflate import conflate
 from semsig_gis.objects.load import choose_layers
 from semsig_gis.objects.quality import quality_report
 from semsig_gis.objects.table import StreetObjects
-from semsig_gis.sources import RawLayer, RowCounts, find_files
+from semsig_gis.sources import find_files
 from semsig_gis.sources.catalog import load_catalog, paper_taxonomy
-from semsig_gis.sources.layers import LayerSpec
 from semsig_gis.sources.vector.reader import read_layer
 
 if TYPE_CHECKING:
@@ -28,6 +27,7 @@ if TYPE_CHECKING:
 
     from semsig_gis.objects.clean import LoadReport
     from semsig_gis.objects.quality import QualityReport
+    from semsig_gis.sources import RawLayer
 
 TAXONOMY = paper_taxonomy()
 # Montpellier, in the plane of France.
@@ -42,17 +42,7 @@ def layer(
     notes: tuple[str, ...] = (),
 ) -> RawLayer:
     geometry = [None if place is None else shapely.Point(*place) for place in places]
-    table = gpd.GeoDataFrame(
-        {"class_name": class_name, "source_id": [str(row) for row in range(len(places))]},
-        geometry=gpd.GeoSeries(geometry, crs="EPSG:2154"),
-    )
-    return RawLayer(
-        spec=LayerSpec(name=name, class_name=class_name, license="CC0", attribution="Town"),
-        table=table,
-        counts=RowCounts(read=len(places) + 3, filtered=2, unreadable=1),
-        errors=("row 9: broken",),
-        notes=notes,
-    )
+    return raw_layer(geometry, name=name, classes=class_name, filtered=2, unreadable=1, notes=notes)
 
 
 def built(*layers: RawLayer) -> tuple[StreetObjects, LoadReport]:
@@ -110,7 +100,7 @@ def test_what_was_dropped_is_told_by_layer() -> None:
     assert (first.name, first.counts.read) == ("city", 8)
     assert [getattr(first.counts, reason) for reason in reasons] == [1, 2, 1, 0, 1, 1]
     assert (first.counts.conflated, first.counts.kept) == (0, 2)
-    assert first.notes == ("odd", "row 9: broken")
+    assert first.notes == ("odd", "row 0: broken")
     assert (second.counts.read, second.counts.conflated, second.counts.kept) == (5, 1, 1)
     (pair,) = report.conflated
     assert (pair.kept, pair.merged, pair.count) == ("city", "osm", 1)

@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import dataclasses
 from typing import Any
 
 import pytest
@@ -7,7 +8,7 @@ from sentences import assert_sentence
 
 from semsig_gis.core.errors import CatalogError
 from semsig_gis.sources.catalog import paper_taxonomy
-from semsig_gis.sources.layers import LayerSpec, WidthBy, layer_of, require_class
+from semsig_gis.sources.layers import ClassBy, LayerSpec, WidthBy, layer_of, require_class
 
 SHARED = {"files": ("all.gpkg",), "reader": "vector_file", "license": "CC0", "attribution": "Town"}
 
@@ -58,3 +59,27 @@ def test_an_unknown_class_is_named() -> None:
     with pytest.raises(CatalogError) as caught:
         require_class("bensh", paper_taxonomy(), "town.toml")
     assert_sentence(caught.value, "town.toml", "'bensh'", "the nearest is 'bench'")
+
+
+def test_a_layer_is_a_value() -> None:
+    spec = LayerSpec(
+        name="lamps", class_name="street_light", tags=((("highway", ("street_lamp",)),),)
+    )
+    assert spec == dataclasses.replace(spec)
+    assert len({spec, dataclasses.replace(spec), dataclasses.replace(spec, optional=True)}) == 2
+    with pytest.raises(dataclasses.FrozenInstanceError):
+        spec.name = "other"  # type: ignore[misc]
+
+
+def test_a_layer_asks_for_nothing_unless_it_is_told_to() -> None:
+    spec = LayerSpec(name="a", class_name="bench")
+    assert spec.role == "objects"
+    assert spec.elements == ("node", "way", "relation")
+    assert not spec.optional
+    assert not spec.unique_id
+    assert (spec.where, spec.class_by, spec.rows, spec.crs) == ((), None, None, None)
+
+
+def test_classes_by_field_are_a_value() -> None:
+    by = ClassBy("kind", (("Taxi", "taxi_station"), (2, "bench")))
+    assert {by: 1}[ClassBy("kind", (("Taxi", "taxi_station"), (2, "bench")))] == 1

@@ -1,43 +1,44 @@
-"""From catalogues to street objects."""
-
 from __future__ import annotations
 
+import json
 from typing import TYPE_CHECKING, Any
 
-import geopandas as gpd
 import pytest
 import shapely
 from osm_xml import node, way, write_osm
+from raw_layers import raw_layer
 from sentences import assert_sentence
+from servers import Answer, Server
 
 from semsig_gis.core.crs import MERGED
-from semsig_gis.core.errors import CrsError, EmptyResultError
+from semsig_gis.core.errors import CrsError, EmptyResultError, InputError, SourceError
 from semsig_gis.database.build import build_database
 from semsig_gis.database.file import open_database, save_database
-from semsig_gis.objects.load import assemble, choose_layers, metric_crs_of, read_files
+from semsig_gis.objects.load import (
+    assemble,
+    choose_layers,
+    fetch_layers,
+    find_area,
+    metric_crs_of,
+    open_cache,
+    read_files,
+)
 from semsig_gis.objects.table import open_objects, save_objects
-from semsig_gis.sources import RawLayer, RowCounts
 from semsig_gis.sources.catalog import Catalog, load_catalog, paper_taxonomy
 from semsig_gis.sources.layers import LayerSpec
 from semsig_gis.sources.osm import file as osm_file
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Iterator, Sequence
     from pathlib import Path
 
+    from semsig_gis.sources import RawLayer
 
 BENCH = LayerSpec(name="benches", class_name="bench")
 
 
 def raw(name: str, *places: tuple[float, float], crs: str | None = "EPSG:2154") -> RawLayer:
-    """Return a layer of benches."""
-    table = gpd.GeoDataFrame(
-        {"class_name": ["bench"] * len(places), "source_id": [str(i) for i in range(len(places))]},
-        geometry=shapely.points(places) if places else [],
-        crs=crs,
-    )
-    spec = LayerSpec(name=name, class_name="bench")
-    return RawLayer(spec=spec, table=table, counts=RowCounts(read=len(places)))
+    return raw_layer(shapely.points(places) if places else [], name=name, classes="bench", crs=crs)
 
 
 def catalog_of(**values: object) -> Catalog:
@@ -138,3 +139,56 @@ def test_the_zone_of_the_data() -> None:
     with pytest.raises(CrsError) as bare:
         metric_crs_of([raw("a", (1, 1), crs=None)])
     assert_sentence(bare.value, "'a'")
+
+
+@pytest.fixture
+def server() -> Iterator[Server]:
+    with Server() as running:
+        yield running
+
+
+def test_openstreetmap_is_fetched_cut_to_the_area_and_kept(server: Server, tmp_path: Path) -> None:
+    elements = [
+        {"type": "node", "id": i, "lon": x, "lat": 43.73, "tags": {"amenity": "bench"}}
+        for i, x in enumerate((7.42, 7.49), start=1)
+    ]
+    osm = load_catalog("openstreetmap")
+    here = catalog_of(
+        taxonomy=osm.taxonomy,
+        layers=(osm.layer("benches"),),
+        reader="osm_file",
+        endpoints=(f"{server.url}/api",),
+        geocoder=f"{server.url}/search",
+    )
+    server.on("/api/interpreter", Answer(json.dumps({"elements": elements}).encode()))
+    cache, http = open_cache(tmp_path / "cache")
+    area = find_area("7.41,43.72,7.43,43.74", here, cache=cache, http=http)
+    (layer,) = fetch_layers(here.layers, here, area=area, cache=cache, http=http)
+    assert layer.table["source_id"].tolist() == ["node/1"]
+    assert (layer.counts.read, layer.counts.filtered) == (2, 1)
+    asked = len(server.seen)
+    _, offline = open_cache(tmp_path / "cache", offline=True)
+    (again,) = fetch_layers(here.layers, here, area=area, cache=cache, http=offline)
+    assert again.table["source_id"].tolist() == ["node/1"]
+    assert len(server.seen) == asked
+    far = find_area("1,2,3,4", here, cache=cache, http=offline)
+    with pytest.raises(SourceError) as caught:
+        fetch_layers(here.layers, here, area=far, cache=cache, http=offline)
+    assert_sentence(caught.value, "127.0.0.1")
+
+
+def test_a_place_is_looked_up_only_where_the_catalogue_says(server: Server, tmp_path: Path) -> None:
+    cache, http = open_cache(tmp_path)
+    with pytest.raises(InputError) as caught:
+        find_area("Monaco", catalog_of(), cache=cache, http=http)
+    assert_sentence(caught.value, "'town'", "'Monaco'", "polygon file")
+    with pytest.raises(InputError) as refused:
+        fetch_layers(
+            [BENCH],
+            catalog_of(),
+            area=find_area("1,2,3,4", catalog_of(), cache=cache, http=http),
+            cache=cache,
+            http=http,
+        )
+    assert_sentence(refused.value, "'town'", "semsig load")
+    assert server.seen == []

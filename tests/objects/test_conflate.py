@@ -55,11 +55,6 @@ def content(objects: StreetObjects) -> list[tuple[object, ...]]:
     return [(*row, *place) for row, place in zip(rows, objects.xy.tolist(), strict=True)]
 
 
-def merge(*things: Thing, **radii: float) -> list[tuple[object, ...]]:
-    objects, _ = conflate(world(things), radii or {"bench": 5.0})
-    return [tuple(row[1:5]) for row in content(objects)]
-
-
 def bench(source: str, name: str, x: float, y: float = 0.0) -> Thing:
     return ("bench", source, name, 1, x, y)
 
@@ -102,59 +97,6 @@ def test_the_same_object_in_two_sources_is_one() -> None:
     assert report == ConflationReport((pair,))
     assert report.count == 1
     assert report.to_list() == [dataclasses.asdict(pair)]
-
-
-def test_beyond_the_radius_they_are_two() -> None:
-    assert len(merge(bench("city", "1", 0), bench("osm", "2", 5.001))) == 2
-
-
-def test_objects_of_one_source_are_never_merged() -> None:
-    assert len(merge(bench("city", "1", 0), bench("city", "2", 0.1))) == 2
-    # Not through a third one in another source either.
-    rows = merge(bench("city", "1", 0), bench("city", "2", 2), bench("osm", "3", 1.5))
-    assert rows == [("city", "1", 1, ""), ("city", "2", 2, "osm:3")]
-    rows = merge(bench("city", "1", 0), bench("osm", "2", -1), bench("osm", "3", 2))
-    assert rows == [("city", "1", 2, "osm:2"), ("osm", "3", 1, "")]
-
-
-def test_classes_are_kept_apart_and_only_those_asked_for_are_merged() -> None:
-    things = [
-        bench("city", "1", 0),
-        ("bus_stop", "osm", "2", 1, 0.0, 0.0),
-        ("bus_stop", "city", "3", 1, 1.0, 0.0),
-        ("street_light", "city", "4", 1, 1.0, 0.0),
-        ("street_light", "osm", "5", 1, 1.0, 0.0),
-    ]
-    rows = merge(*things, bench=50.0, bus_stop=2.0)
-    assert rows == [
-        ("city", "1", 1, ""),
-        ("city", "3", 2, "osm:2"),  # the city's rows begin first
-        ("city", "4", 1, ""),
-        ("osm", "5", 1, ""),
-    ]
-
-
-def test_the_nearest_pair_is_merged_first() -> None:
-    # 2 is nearest to b, and a then takes what is left within its reach.
-    rows = merge(
-        bench("city", "a", 0), bench("city", "b", 4), bench("osm", "1", -3), bench("osm", "2", 3)
-    )
-    assert rows == [("city", "a", 2, "osm:1"), ("city", "b", 2, "osm:2")]
-
-
-def test_of_three_sources_each_gives_one_and_all_lie_within_the_radius() -> None:
-    rows = merge(bench("a", "1", 0), bench("b", "2", 4), bench("c", "3", 8))
-    # 3 is near 2, which is no longer there, and not near 1, whose position is kept.
-    assert rows == [("a", "1", 2, "b:2"), ("c", "3", 1, "")]
-    rows = merge(bench("a", "1", 0), bench("b", "2", 4), bench("c", "3", -4))
-    assert rows == [("a", "1", 3, "b:2; c:3")]
-    rows = merge(bench("a", "1", 100), bench("b", "2", 4), bench("c", "3", -1))
-    assert rows == [("a", "1", 1, ""), ("b", "2", 2, "c:3")]
-
-
-def test_counts_are_added() -> None:
-    rows = merge(("bench", "a", "1", 3, 0.0, 0.0), ("bench", "b", "2", 4, 1.0, 0.0))
-    assert rows == [("a", "1", 7, "b:2")]
 
 
 def test_pairs_of_sources_are_reported_apart() -> None:
