@@ -38,7 +38,9 @@ BENCH = LayerSpec(name="benches", class_name="bench")
 
 
 def raw(name: str, *places: tuple[float, float], crs: str | None = "EPSG:2154") -> RawLayer:
-    return raw_layer(shapely.points(places) if places else [], name=name, classes="bench", crs=crs)
+    return raw_layer(
+        [shapely.Point(place) for place in places], name=name, classes="bench", crs=crs
+    )
 
 
 def catalog_of(**values: object) -> Catalog:
