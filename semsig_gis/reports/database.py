@@ -57,55 +57,53 @@ def database_markdown(
 
 
 def _occurrence_table(facts: Mapping[str, Any]) -> Table:
+    items = facts["occurrences"]
     total = sum(paris.OCCURRENCES.values())
-    rows = []
-    for item in facts["occurrences"]:
-        number = paris.OCCURRENCES.get(item["name"])
-        theirs = ("", "") if number is None else (f"{number:,}", percent(number / total))
-        label = f"{item['title']} ({item['symbol']})"
-        rows.append((label, f"{item['number']:,}", percent(item["share"]), *theirs))
+    numbers = [paris.OCCURRENCES.get(item["name"]) for item in items]
     return Table(
-        title="Occurrences by class",
-        columns=("Class (symbol)", "Number", "Share", paris.COLUMN, "Share"),
-        rows=tuple(rows),
-        note="An object counts once in every signature that holds it.",
+        "Occurrences by class",
+        ("Class (symbol)", "Number", "Share", paris.COLUMN, "Share"),
+        tuple(
+            (
+                *(class_label(item), f"{item['number']:,}", percent(item["share"])),
+                *(("", "") if number is None else (f"{number:,}", percent(number / total))),
+            )
+            for item, number in zip(items, numbers, strict=True)
+        ),
+        "An object counts once in every signature that holds it.",
     )
+
+
+def class_label(item: Mapping[str, Any]) -> str:
+    """Return the title and symbol of a class."""
+    return f"{item['title']} ({item['symbol']})"
 
 
 def _property_table(facts: Mapping[str, Any]) -> Table:
-    size, dense = facts["file_mb"], facts["mb_per_km2"]
+    size, dense, hidden = facts["file_mb"], facts["mb_per_km2"], facts["occlusion_m"]
     largest = facts["largest_type_group"]
-    own = sum(
-        item["range_m"] != facts["radius_m"] for item in facts["occurrences"] if item["number"]
-    )
+    seen = [item for item in facts["occurrences"] if item["number"]]
+    own = sum(item["range_m"] != facts["radius_m"] for item in seen)
     others = f" ({own} classes have their own)" if own else ""
-    hidden = facts["occlusion_m"]
-    rows = (
-        ("Visibility range", f"{facts['radius_m']:g} m{others}", "30 m"),
-        (
-            "Occlusion",
-            "none" if hidden is None else f"by buildings, more than {hidden:g} m deep",
-            "",
-        ),
-        ("Viewpoints", _viewpoint_text(facts["viewpoints"]), ""),
-        ("Grid step", f"{facts['step_m']:g} m", "10 m"),
-        ("Angle levels", str(facts["levels"]), "16"),
-        ("Signatures", f"{facts['signatures']:,}", "312,134"),
-        ("Mean length", f"{facts['mean_length']:.3f} objects", "14 objects"),
-        ("Covered area", f"{facts['covered_km2']:.1f} km²", "79 km²"),
-        ("File", "" if size is None else f"{size:.1f} MB", "38.7 MB"),
-        ("File a km²", "" if dense is None else f"{dense:.2f} MB", "1.24 MB"),
-        (
-            "Largest group by type",
-            f"{_shortened(largest['types'])}, {largest['cells']:,} cells",
-            "DDD, 29,958 cells",
-        ),
-    )
+    occlusion = "none" if hidden is None else f"by buildings, more than {hidden:g} m deep"
+    group = f"{_shortened(largest['types'])}, {largest['cells']:,} cells"
     return Table(
-        title="Database",
-        columns=("Property", "Ours", paris.COLUMN),
-        rows=rows,
-        note=(
+        "Database",
+        ("Property", "Ours", paris.COLUMN),
+        (
+            ("Visibility range", f"{facts['radius_m']:g} m{others}", "30 m"),
+            ("Occlusion", occlusion, ""),
+            ("Viewpoints", _viewpoint_text(facts["viewpoints"]), ""),
+            ("Grid step", f"{facts['step_m']:g} m", "10 m"),
+            ("Angle levels", str(facts["levels"]), "16"),
+            ("Signatures", f"{facts['signatures']:,}", "312,134"),
+            ("Mean length", f"{facts['mean_length']:.3f} objects", "14 objects"),
+            ("Covered area", f"{facts['covered_km2']:.1f} km²", "79 km²"),
+            ("File", "" if size is None else f"{size:.1f} MB", "38.7 MB"),
+            ("File a km²", "" if dense is None else f"{dense:.2f} MB", "1.24 MB"),
+            ("Largest group by type", group, "DDD, 29,958 cells"),
+        ),
+        (
             "Our covered area is cells times the area of a cell; by that count "
             "the paper's signatures cover 31.2 km², not 79."
         ),
@@ -127,17 +125,19 @@ def _viewpoint_text(viewpoints: Mapping[str, Any]) -> str:
 
 
 def _group_table(facts: Mapping[str, Any]) -> Table:
-    groups = facts["groups"]
-    kinds = ("type", "angle", "both")
-    rows = []
-    for name, theirs in paris.GROUPS.items():
-        label = GROUP_LABELS.get(name, name)
-        rows.append((label, *(_statistic(name, groups[kind][name]) for kind in kinds), *theirs))
+    groups = [facts["groups"][kind] for kind in ("type", "angle", "both")]
     return Table(
-        title="Sizes of the signature groups, in cells",
-        columns=("", "By type", "By angle", "By both", f"{paris.COLUMN}, by type", "by angle"),
-        rows=tuple(rows),
-        note=(
+        "Sizes of the signature groups, in cells",
+        ("", "By type", "By angle", "By both", f"{paris.COLUMN}, by type", "by angle"),
+        tuple(
+            (
+                GROUP_LABELS.get(name, name),
+                *(_statistic(name, one[name]) for one in groups),
+                *theirs,
+            )
+            for name, theirs in paris.GROUPS.items()
+        ),
+        (
             "The paper counts distinct patterns over its 10,000 queries, not over all cells. "
             f"{facts['cell_bits']:.2f} bits would tell every cell."
         ),
@@ -145,18 +145,8 @@ def _group_table(facts: Mapping[str, Any]) -> Table:
 
 
 def _class_table(facts: Mapping[str, Any]) -> Table:
+    items = [item for item in facts["occurrences"] if item["number"] or item["objects"]]
     counted = facts["density_from"] == "objects"
-    rows = tuple(
-        (
-            f"{item['title']} ({item['symbol']})",
-            f"{item['range_m']:g}",
-            *([f"{item['objects']:,}"] if counted else []),
-            f"{item['objects_per_km2']:,.1f}",
-            f"{item['entropy_bits']:.3f}",
-        )
-        for item in facts["occurrences"]
-        if item["number"] or item["objects"]
-    )
     density = "Objects a km² of the covered area."
     if not counted:
         missed = "" if facts["occlusion_m"] is None else ", without what buildings hide"
@@ -164,17 +154,17 @@ def _class_table(facts: Mapping[str, Any]) -> Table:
             "Objects a km² are estimated: what the mean cell sees by the area within range of it"
             f"{missed}."
         )
-    return Table(
-        title="Classes that occur",
-        columns=(
-            "Class (symbol)",
-            "Range, m",
-            *(["Objects"] if counted else []),
-            "Objects a km²",
-            "Entropy, bits",
-        ),
-        rows=rows,
-        note=f"{density} Entropy: what the number of objects of the class tells of the cell.",
+    objects = {"Objects": [f"{item['objects']:,}" for item in items]} if counted else {}
+    return Table.of_columns(
+        "Classes that occur",
+        {
+            "Class (symbol)": map(class_label, items),
+            "Range, m": [f"{item['range_m']:g}" for item in items],
+            **objects,
+            "Objects a km²": [f"{item['objects_per_km2']:,.1f}" for item in items],
+            "Entropy, bits": [f"{item['entropy_bits']:.3f}" for item in items],
+        },
+        f"{density} Entropy: what the number of objects of the class tells of the cell.",
     )
 
 

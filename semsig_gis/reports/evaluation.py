@@ -16,14 +16,14 @@ from semsig_gis.matching.ties import NEAR_METRES, NEAR_PLACES
 from semsig_gis.queries.chain import chain_text
 from semsig_gis.queries.paper_errors import DISTORTIONS, FalseClass
 from semsig_gis.reports import paris
-from semsig_gis.reports.tables import Table
+from semsig_gis.reports.tables import Table, figure, interval
 
 if TYPE_CHECKING:
     import pandas as pd
 
     from semsig_gis.evaluation.result import Evaluation
 
-_FIGURES = {
+FIGURES = {
     **{f"p{metres}": f"P(error ≤ {metres} m)" for metres in (5, 10, 25, 50, 100)},
     **{f"recall{percent}": f"recall@{percent} %" for percent in (1, 10)},
     **{f"near{count}": f"recall@{count} within {NEAR_METRES} m" for count in NEAR_PLACES},
@@ -31,7 +31,7 @@ _FIGURES = {
     "precision": "Right answers, of these",
     "in_region": "True cell in the region of 90 %",
 }
-_GROUPED = {
+GROUPED = {
     **{f"p{metres}": f"P(≤ {metres} m)" for metres in (10, 25, 50, 100)},
     **{f"recall{percent}": f"recall@{percent} %" for percent in (1, 10)},
     "coverage": "Answered",
@@ -57,14 +57,8 @@ def evaluation_tables(evaluation: Evaluation) -> tuple[Table, ...]:
 
     Examples
     --------
-    >>> from semsig_gis.sources.catalog import paper_taxonomy
-    >>> from semsig_gis.database.build import build_database
-    >>> from semsig_gis.objects.clean import build_objects
-    >>> from semsig_gis.sources.synthetic.city import CitySpec, synthetic_city
-    >>> layers = synthetic_city(CitySpec(size=300.0))
-    >>> objects, _ = build_objects(layers, taxonomy=paper_taxonomy(), crs="EPSG:32631")
-    >>> from semsig_gis.evaluation.evaluate import evaluate
-    >>> evaluation = evaluate(build_database(objects), queries=5)
+    >>> from semsig_gis import evaluate
+    >>> evaluation = evaluate(demo_database, queries=5)
     >>> evaluation_tables(evaluation)[0].rows[0]
     ('Method', 'edit+edit')
     """
@@ -88,25 +82,22 @@ def evaluation_markdown(evaluation: Evaluation) -> str:
 def _setting_table(evaluation: Evaluation) -> Table:
     asked, database = evaluation.asked, evaluation.database
     megabytes = database["mb_per_km2"]
-    rows = (
-        ("Method", str(evaluation.method)),
-        ("Best candidates that count (t)", f"{evaluation.top:,}"),
-        ("Distortions", chain_text(asked.distortions) or "none"),
-        ("Queries", f"{len(evaluation.queries):,}"),
-        ("Seen from", asked.seen_from if evaluation.city is None else _elsewhere(evaluation)),
-        ("Seeds", ", ".join(map(str, asked.seeds))),
-        ("Cells", f"{database['cells']:,}"),
-        ("Mean length", f"{database['mean_length']:.3f} objects"),
-        ("Visibility range", f"{database['radius_m']:g} m"),
-        ("Grid step", f"{database['step_m']:g} m"),
-        ("Angle levels", str(database["levels"])),
-        *((("Size", f"{megabytes:.3f} MB a km²"),) if megabytes is not None else ()),
-    )
-    return Table(title="Settings", columns=("Setting", "Value"), rows=rows)
-
-
-def _elsewhere(evaluation: Evaluation) -> str:
-    return f"{evaluation.asked.seen_from} of {evaluation.city}"
+    elsewhere = "" if evaluation.city is None else f" of {evaluation.city}"
+    settings = {
+        "Method": str(evaluation.method),
+        "Best candidates that count (t)": f"{evaluation.top:,}",
+        "Distortions": chain_text(asked.distortions) or "none",
+        "Queries": f"{len(evaluation.queries):,}",
+        "Seen from": asked.seen_from + elsewhere,
+        "Seeds": ", ".join(map(str, asked.seeds)),
+        "Cells": f"{database['cells']:,}",
+        "Mean length": f"{database['mean_length']:.3f} objects",
+        "Visibility range": f"{database['radius_m']:g} m",
+        "Grid step": f"{database['step_m']:g} m",
+        "Angle levels": str(database["levels"]),
+        **({} if megabytes is None else {"Size": f"{megabytes:.3f} MB a km²"}),
+    }
+    return Table("Settings", ("Setting", "Value"), tuple(settings.items()))
 
 
 def _figure_table(evaluation: Evaluation) -> Table:
@@ -114,105 +105,78 @@ def _figure_table(evaluation: Evaluation) -> Table:
     means = evaluation.means()
     p50, recall10 = _paris_accuracy(evaluation)
     theirs = {"p50": p50, "recall10": recall10}
-    rows = [
-        (said, *_shares(means, name), _share(theirs.get(name)))
-        for name, said in _FIGURES.items()
-        if name in means.index
-    ]
+    rows = []
+    for name in [name for name in FIGURES if name in means.index]:
+        value, low, high = (float(means[part][name]) for part in ("value", "low", "high"))
+        shown = figure(value), interval(low, high), figure(theirs.get(name))
+        rows.append((FIGURES[name], *shown))
     errors = evaluation.queries["error_m"].to_numpy(dtype=np.float64)
     turns = evaluation.queries["heading_error"].to_numpy(dtype=np.float64)
     rows += [
-        ("Median error", *_amounts(percentile(errors, 50), "m"), ""),
-        ("90th percentile of the error", *_amounts(percentile(errors, 90), "m"), ""),
+        ("Median error", *_amounts(percentile(errors, 50), " m"), ""),
+        ("90th percentile of the error", *_amounts(percentile(errors, 90), " m"), ""),
     ]
     if not np.isnan(turns).all():
         rows.append(("Median error of the heading", *_amounts(percentile(turns, 50), "°"), ""))
-    seconds = evaluation.seconds_per_query
     rows += [
         ("Successful queries", f"{evaluation.successful.mean():.4f}", "", ""),
         ("Unlocalized queries", f"{evaluation.unlocalized:,}", "", ""),
-        ("Seconds a query", _share(None if np.isnan(seconds) else seconds), "", ""),
+        ("Seconds a query", figure(evaluation.seconds_per_query), "", ""),
     ]
-    ties = (
+    columns = ("Figure", "Ours", "95 %", paris.COLUMN)
+    note = (
         "Ties are scored by expectation. A query is successful when its error is at most 50 m "
         "with probability 0.5 or more."
     )
-    elsewhere = "" if p50 is None else " The paper's figures are for another city, Paris."
-    columns = ("Figure", "Ours", "95 %")
-    return Table(
-        title="Figures",
-        columns=columns if p50 is None else (*columns, paris.COLUMN),
-        rows=tuple(row[:3] if p50 is None else row for row in rows),
-        note=ties + elsewhere,
-    )
-
-
-def _share(value: float | None) -> str:
-    return "" if value is None or np.isnan(value) else f"{value:.4f}"
-
-
-def _shares(means: pd.DataFrame, name: str) -> tuple[str, str]:
-    """Return a mean and its interval."""
-    value, low, high = (float(means[part][name]) for part in ("value", "low", "high"))
-    return _share(value), "" if np.isnan(value) else f"{low:.4f} to {high:.4f}"
+    if p50 is None:
+        return Table("Figures", columns[:3], tuple(row[:3] for row in rows), note)
+    note += " The paper's figures are for another city, Paris."
+    return Table("Figures", columns, tuple(rows), note)
 
 
 def _amounts(values: tuple[float, float, float], unit: str) -> tuple[str, str]:
     """Return a percentile and its interval."""
-    value, low, high = ("infinite" if np.isinf(one) else f"{one:,.1f}" for one in values)
-    blank = "" if unit == "°" else " "
-    shown = value if value == "infinite" else f"{value}{blank}{unit}"
-    return shown, f"{low} to {high}"
+    value, low, high = values
+    return figure(value, ",.1f") + (unit if np.isfinite(value) else ""), interval(low, high, ",.1f")
 
 
-def _group_table(found: pd.DataFrame, title: str, heading: str) -> Table:
+def _group_table(groups: pd.DataFrame, title: str, heading: str) -> Table:
     """Return figures group by group."""
-    figures = [name for name in _GROUPED if name in found]
-    rows = tuple(
-        (
-            str(row[found.columns[0]]),
-            f"{row['n']:,}",
-            *(_share(row[name]) for name in figures),
-        )
-        for row in found.to_dict("records")
-    )
-    return Table(
-        title=title,
-        columns=(heading, "Queries", *(_GROUPED[name] for name in figures)),
-        rows=rows,
-    )
+    figures = {
+        label: map(figure, groups[name]) for name, label in GROUPED.items() if name in groups
+    }
+    labels, numbers = map(str, groups.iloc[:, 0]), map("{:,}".format, groups["n"])
+    return Table.of_columns(title, {heading: labels, "Queries": numbers, **figures})
 
 
 def _chance_table(evaluation: Evaluation) -> Table:
     """Return what stated chances are worth."""
-    rows = tuple(
-        (
-            f"{row['from']:g} to {row['to']:g}",
-            f"{row['n']:,}",
-            _share(row["stated"]),
-            _share(row["true"]),
-            "" if np.isnan(row["true"]) else f"{row['low']:.4f} to {row['high']:.4f}",
-        )
-        for row in evaluation.calibration().to_dict("records")
+    bins = evaluation.calibration()
+    return Table.of_columns(
+        "Stated chances",
+        {
+            "Chance stated": map("{:g} to {:g}".format, bins["from"], bins["to"]),
+            "Queries": map("{:,}".format, bins["n"]),
+            "Its mean": map(figure, bins["stated"]),
+            "Came true": map(figure, bins["true"]),
+            "95 %": map(interval, bins["low"], bins["high"]),
+        },
     )
-    columns = ("Chance stated", "Queries", "Its mean", "Came true", "95 %")
-    return Table(title="Stated chances", columns=columns, rows=rows)
 
 
 def _rule_table(evaluation: Evaluation) -> Table:
     """Return what each rule of answering gives."""
-    rows = tuple(
-        (
-            f"{row['threshold']:g}",
-            f"{row['answered']:,}",
-            _share(row["coverage"]),
-            _share(row["precision"]),
-            "" if np.isnan(row["precision"]) else f"{row['low']:.4f} to {row['high']:.4f}",
-        )
-        for row in evaluation.coverage_curve().to_dict("records")
+    rules = evaluation.coverage_curve()
+    return Table.of_columns(
+        "Coverage and precision",
+        {
+            "Answered from a chance of": map("{:g}".format, rules["threshold"]),
+            "Answers": map("{:,}".format, rules["answered"]),
+            "Coverage": map(figure, rules["coverage"]),
+            "Right": map(figure, rules["precision"]),
+            "95 %": map(interval, rules["low"], rules["high"]),
+        },
     )
-    columns = ("Answered from a chance of", "Answers", "Coverage", "Right", "95 %")
-    return Table(title="Coverage and precision", columns=columns, rows=rows)
 
 
 def _paris_accuracy(evaluation: Evaluation) -> tuple[float | None, float | None]:

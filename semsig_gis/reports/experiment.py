@@ -9,7 +9,7 @@ import pandas as pd
 
 from semsig_gis.evaluation.figures import percentile
 from semsig_gis.queries.chain import chain_text
-from semsig_gis.reports.tables import Table
+from semsig_gis.reports.tables import Table, figure, interval
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from semsig_gis.evaluation.result import Evaluation
     from semsig_gis.evaluation.spec import ExperimentSpec
 
-METRES = {"error_median": 50, "error_p90": 90}
+PERCENTILES = {"error_median": 50, "error_p90": 90}
 SHOWN = {
     **{f"p{metres}": f"P(≤ {metres} m)" for metres in (5, 10, 25, 50, 100)},
     "near5": "recall@5 at 25 m",
@@ -38,18 +38,17 @@ def experiment_figures(results: Mapping[str, Evaluation]) -> pd.DataFrame:
     """
     parts = []
     for name, evaluation in results.items():
-        table = evaluation.means().reset_index()
         errors = evaluation.queries["error_m"].to_numpy(dtype=np.float64)
         turns = evaluation.queries["heading_error"].to_numpy(dtype=np.float64)
-        more = {figure: (errors, percent) for figure, percent in METRES.items()}
+        values = {label: (errors, percent) for label, percent in PERCENTILES.items()}
         if not np.isnan(turns).all():
-            more["heading_error_median"] = (turns, 50)
-        rows = []
-        for figure, (values, percent) in more.items():
-            value, low, high = percentile(values, percent)
-            told = int((~np.isnan(values)).sum())
-            rows.append({"figure": figure, "value": value, "low": low, "high": high, "n": told})
-        both = pd.concat([table, pd.DataFrame(rows)], ignore_index=True)
+            values["heading_error_median"] = (turns, 50)
+        rows = [
+            (label, *percentile(some, percent), int((~np.isnan(some)).sum()))
+            for label, (some, percent) in values.items()
+        ]
+        more = pd.DataFrame(rows, columns=["figure", "value", "low", "high", "n"])
+        both = pd.concat([evaluation.means().reset_index(), more], ignore_index=True)
         both.insert(0, "case", name)
         parts.append(both)
     return pd.concat(parts, ignore_index=True)
@@ -60,41 +59,37 @@ def experiment_tables(
 ) -> tuple[Table, ...]:
     """Return the settings of an experiment, then for each distortion a table of its main figures.
 
-    A row is a method and number of candidates. ``times`` tells whether to show the seconds of a
+    A row is a method and number of candidates. `times` tells whether to show the seconds of a
     query, which differ from run to run.
     """
-    first = next(iter(results.values()))
-    megabytes = first.database["mb_per_km2"]
-    settings = (
-        ("Database", f"{spec.database}, {first.database['cells']:,} cells"),
-        *((("Size", f"{megabytes:.3f} MB a km²"),) if megabytes is not None else ()),
-        ("Queries", f"{spec.queries:,} of each seed ({', '.join(map(str, spec.seeds))})"),
-        ("Seen from", spec.seen_from if spec.city is None else f"{spec.seen_from} of {spec.city}"),
-        *((f"Method {name}", str(method)) for name, method in spec.methods.items()),
-    )
-    tables = [Table(title="Experiment", columns=("Setting", "Value"), rows=settings)]
+    database = next(iter(results.values())).database
+    megabytes = database["mb_per_km2"]
+    settings = {
+        "Database": f"{spec.database}, {database['cells']:,} cells",
+        **({} if megabytes is None else {"Size": f"{megabytes:.3f} MB a km²"}),
+        "Queries": f"{spec.queries:,} of each seed ({', '.join(map(str, spec.seeds))})",
+        "Seen from": spec.seen_from + ("" if spec.city is None else f" of {spec.city}"),
+        **{f"Method {name}": str(method) for name, method in spec.methods.items()},
+    }
+    tables = [Table("Experiment", ("Setting", "Value"), tuple(settings.items()))]
     for distortion, chain in spec.distortions.items():
-        cases = [case for case in spec.cases if case.distortion == distortion]
-        found = [results[case.name] for case in cases]
-        means = [one.means() for one in found]
-        shown = [name for name in SHOWN if any(name in one.index for one in means)]
-        rows = tuple(
-            (
-                f"{case.method}, t = {case.top}",
-                *(_told(mean, name) for name in shown),
-                *_errors(one),
-                *((f"{one.seconds_per_query:.4f}",) if times else ()),
-            )
-            for case, one, mean in zip(cases, found, means, strict=True)
-        )
-        columns = ("Method", *(SHOWN[name] for name in shown), "Median m", "90th percentile m")
-        tables.append(
-            Table(
-                title=f"{distortion}: {chain_text(chain) or 'no distortion'}",
-                columns=(*columns, "s a query") if times else columns,
-                rows=rows,
-            )
-        )
+        cases = {
+            f"{case.method}, t = {case.top}": results[case.name]
+            for case in spec.cases
+            if case.distortion == distortion
+        }
+        means = [case.means() for case in cases.values()]
+        columns: dict[str, list[str]] = {"Method": list(cases)}
+        for name, label in SHOWN.items():
+            if any(name in one.index for one in means):
+                columns[label] = [_mean(one, name) for one in means]
+        for label, percent in (("Median m", 50), ("90th percentile m", 90)):
+            errors = [case.queries["error_m"].to_numpy(dtype=np.float64) for case in cases.values()]
+            columns[label] = [figure(percentile(one, percent)[0], ",.1f") for one in errors]
+        if times:
+            columns["s a query"] = [f"{case.seconds_per_query:.4f}" for case in cases.values()]
+        title = f"{distortion}: {chain_text(chain) or 'no distortion'}"
+        tables.append(Table.of_columns(title, columns))
     return tuple(tables)
 
 
@@ -104,43 +99,27 @@ def experiment_markdown(spec: ExperimentSpec, results: Mapping[str, Evaluation])
     return "\n".join(["## Experiment\n", *sections])
 
 
-def comparison_table(found: pd.DataFrame, title: str) -> Table:
+def comparison_table(comparison: pd.DataFrame, title: str) -> Table:
     """Return a comparison (see `evaluation.compare.compare_evaluations`), one row a figure."""
-    rows = []
-    for row in found.to_dict("records"):
-        low, high = row["low"], row["high"]
-        verdict = "" if not low * high > 0 else "more" if low > 0 else "less"
-        rows.append(
-            (
-                str(row["figure"]),
-                *(_number(row[name]) for name in ("first", "second")),
-                _number(row["difference"], "+"),
-                "" if np.isnan(low) else f"{_number(low, '+')} to {_number(high, '+')}",
-                verdict,
-            )
-        )
-    columns = ("Figure", "First", "Second", "Difference", "95 %", "Second has")
-    note = "Queries are drawn again in pairs; where the interval holds 0, nothing is proven."
-    return Table(title=title, columns=columns, rows=tuple(rows), note=note)
+    low, high = comparison["low"], comparison["high"]
+    verdicts = np.where(low * high > 0, np.where(low > 0, "more", "less"), "")
+    return Table.of_columns(
+        title,
+        {
+            "Figure": map(str, comparison["figure"]),
+            "First": map(figure, comparison["first"]),
+            "Second": map(figure, comparison["second"]),
+            "Difference": [figure(value, "+.4f") for value in comparison["difference"]],
+            "95 %": [interval(*ends, "+.4f") for ends in zip(low, high, strict=True)],
+            "Second has": verdicts.tolist(),
+        },
+        "Queries are drawn again in pairs; where the interval holds 0, nothing is proven.",
+    )
 
 
-def _number(value: float, sign: str = "") -> str:
-    shown = "infinite" if np.isinf(value) else f"{value:{sign}.4f}"
-    return "" if np.isnan(value) else shown
-
-
-def _told(means: pd.DataFrame, name: str) -> str:
+def _mean(means: pd.DataFrame, name: str) -> str:
     """Return a figure, P(error <= 50 m) with its interval."""
     value = float(means["value"][name]) if name in means.index else np.nan
-    if np.isnan(value):
-        return ""
-    if name != "p50":
-        return f"{value:.4f}"
-    return f"{value:.4f} ({means['low'][name]:.4f} to {means['high'][name]:.4f})"
-
-
-def _errors(evaluation: Evaluation) -> tuple[str, ...]:
-    """Return the median and the 90th percentile of the error."""
-    errors = evaluation.queries["error_m"].to_numpy(dtype=np.float64)
-    found = (percentile(errors, percent)[0] for percent in METRES.values())
-    return tuple("infinite" if np.isinf(one) else f"{one:,.1f}" for one in found)
+    if name != "p50" or np.isnan(value):
+        return figure(value)
+    return f"{value:.4f} ({interval(means['low'][name], means['high'][name])})"

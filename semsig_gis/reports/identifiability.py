@@ -7,15 +7,15 @@ from typing import TYPE_CHECKING, Any
 
 from semsig_gis import __version__
 from semsig_gis.evaluation.result import machine
+from semsig_gis.reports.database import class_label
 from semsig_gis.reports.parts import Curve, Number, Plot, Report, Section
-from semsig_gis.reports.tables import Table, percent
+from semsig_gis.reports.tables import Table, figure, percent
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Iterable, Mapping
 
     from semsig_gis.evaluation.identify.check import IdentifiabilityCheck
     from semsig_gis.evaluation.identify.result import Identifiability
-
 
 SCORES = {
     "found": "chance to be found",
@@ -30,88 +30,62 @@ def identifiability_tables(
 ) -> tuple[Table, ...]:
     """Return the mean cell with the bands of cells, and what each class adds, as tables.
 
-    ``object_counts`` is by class code; without it the columns about objects are left out.
+    `object_counts` is by class code; without it the columns about objects are left out.
     """
     facts = told.summary(object_counts=object_counts)
     within = f"within {facts['radius_m']:g} m"
+    cells = {label: percent(share) for label, share in _cell_chances(facts).items()}
+    bits = {"bits left": f"{facts['bits_left']:.2f} of {facts['cell_bits']:.2f}"}
+    bands = {
+        f"cells found {within} with a chance of {band}": percent(share)
+        for band, share in _band_shares(facts).items()
+    }
     whole = Table(
         title=f"Identifiability, {facts['noise']} noise",
         columns=("A query from the mean cell", ""),
-        rows=(
-            ("chance given to the cell itself", percent(facts["chance_itself"])),
-            (f"chance given to the cells {within}", percent(facts["chance_near"])),
-            (f"chance that the answer is {within}", percent(facts["chance_found"])),
-            ("bits left", f"{facts['bits_left']:.2f} of {facts['cell_bits']:.2f}"),
-            *(
-                (
-                    f"cells found {within} with a chance of {band['from']:g} to {band['to']:g}",
-                    percent(band["share"]),
-                )
-                for band in reversed(facts["bands"])
-            ),
-        ),
+        rows=tuple({**cells, **bits, **bands}.items()),
         note=f"Expected before any query, by {facts['trials']:,} simulated ones.",
     )
-    counted = object_counts is not None
-    classes = Table(
-        title="What each class adds",
-        columns=(
-            "Class (symbol)",
-            f"Chance {within}",
-            "Bits",
-            *(["Objects", "Chance by 1,000 objects"] if counted else []),
-        ),
-        rows=tuple(
-            (
-                f"{item['title']} ({item['symbol']})",
-                f"{100 * item['chance_near']:+.2f} %",
-                f"{item['bits']:+.3f}",
-                *(
-                    [
-                        f"{item['objects']:,}",
-                        ""
-                        if item["chance_near_per_1000"] is None
-                        else f"{100 * item['chance_near_per_1000']:+.3f} %",
-                    ]
-                    if counted
-                    else []
-                ),
-            )
-            for item in facts["classes"]
-        ),
-        note="To the mean cell: beyond what all other classes tell of it.",
-    )
-    return whole, classes
+    items = facts["classes"]
+    classes: dict[str, Iterable[str]] = {
+        "Class (symbol)": map(class_label, items),
+        f"Chance {within}": [f"{100 * item['chance_near']:+.2f} %" for item in items],
+        "Bits": [f"{item['bits']:+.3f}" for item in items],
+    }
+    if object_counts is not None:
+        gains = [item["chance_near_per_1000"] for item in items]
+        classes |= {
+            "Objects": [f"{item['objects']:,}" for item in items],
+            "Chance by 1,000 objects": [
+                "" if gain is None else f"{100 * gain:+.3f} %" for gain in gains
+            ],
+        }
+    note = "To the mean cell: beyond what all other classes tell of it."
+    return whole, Table.of_columns("What each class adds", classes, note)
 
 
 def check_tables(check: IdentifiabilityCheck) -> tuple[Table, ...]:
     """Return the calibration and the rank correlations of a check as tables."""
-    calibration = Table(
-        title="Do the chances come true?",
-        columns=("Chance to be found", "Queries", "Stated", "Found", "Interval (95 %)"),
-        rows=tuple(
-            (
-                f"{one.low:g} to {one.high:g}",
-                f"{one.queries:,}",
-                percent(one.stated),
-                percent(one.true),
-                f"{percent(one.true_low)} to {percent(one.true_high)}",
-            )
-            for one in check.bins
-        ),
-        note=f"Of {check.queries:,} fresh queries, {percent(check.found)} were found.",
+    calibration = Table.of_columns(
+        "Do the chances come true?",
+        {
+            "Chance to be found": [f"{one.low:g} to {one.high:g}" for one in check.bins],
+            "Queries": [f"{one.queries:,}" for one in check.bins],
+            "Stated": [percent(one.stated) for one in check.bins],
+            "Found": [percent(one.true) for one in check.bins],
+            "Interval (95 %)": [
+                f"{percent(one.true_low)} to {percent(one.true_high)}" for one in check.bins
+            ],
+        },
+        f"Of {check.queries:,} fresh queries, {percent(check.found)} were found.",
     )
-    ranks = Table(
-        title="Do cells with a higher score succeed more often?",
-        columns=("Score of a cell", "Rank correlation with success"),
-        rows=tuple(
-            (SCORES[name], "" if math.isnan(value) else f"{value:+.3f}")
-            for name, value in check.correlations.items()
-        ),
-        note=""
-        if math.isnan(check.attainable)
-        else f"Success is yes or no: chances that are just right would have "
-        f"{check.attainable:.3f}.",
+    names = [SCORES[name] for name in check.correlations]
+    values = [figure(value, "+.3f") for value in check.correlations.values()]
+    attainable = "Success is yes or no: chances that are just right would have {:.3f}."
+    ranks = Table.of_columns(
+        "Do cells with a higher score succeed more often?",
+        {"Score of a cell": names, "Rank correlation with success": values},
+        "" if math.isnan(check.attainable) else attainable.format(check.attainable),
     )
     return calibration, ranks
 
@@ -125,7 +99,7 @@ def identifiability_page(
 ) -> Report:
     """Put together what is known of a city's cells, and whether fresh queries bear it out.
 
-    ``name`` is what the database is called; ``object_counts`` is by class code.
+    `name` is what the database is called; `object_counts` is by class code.
     """
     facts = told.summary(object_counts=object_counts)
     return Report(
@@ -146,48 +120,55 @@ def identifiability_page(
             ("semsig_gis", __version__),
         ),
         sections=(
-            _cells(facts),
-            _classes(facts),
-            _calibration(check),
-            _ranks(check),
+            _cell_section(facts),
+            _class_section(facts),
+            _calibration_section(check),
+            _rank_section(check),
         ),
         taxonomy=told.database.taxonomy,
         facts={"identifiability": facts, "check": check.to_dict(), "machine": machine()},
     )
 
 
-def _cells(facts: Mapping[str, Any]) -> Section:
+def _cell_chances(facts: Mapping[str, Any]) -> dict[str, float]:
+    """Return the chances of a query from the mean cell, by label."""
     within = f"within {facts['radius_m']:g} m"
-    rows = (
-        ("chance given to the cell itself", facts["chance_itself"]),
-        (f"chance given to the cells {within}", facts["chance_near"]),
-        (f"chance that the answer is {within}", facts["chance_found"]),
-    )
-    bands = (
-        (f"cells found with a chance of {band['from']:g} to {band['to']:g}", band["share"])
-        for band in reversed(facts["bands"])
-    )
+    return {
+        "chance given to the cell itself": facts["chance_itself"],
+        f"chance given to the cells {within}": facts["chance_near"],
+        f"chance that the answer is {within}": facts["chance_found"],
+    }
+
+
+def _band_shares(facts: Mapping[str, Any]) -> dict[str, float]:
+    """Return the share of cells in each band of the chance to be found, highest first."""
+    bands = reversed(facts["bands"])
+    return {f"{band['from']:g} to {band['to']:g}": band["share"] for band in bands}
+
+
+def _cell_section(facts: Mapping[str, Any]) -> Section:
+    bands = {
+        f"cells found with a chance of {band}": share for band, share in _band_shares(facts).items()
+    }
+    shares = {**_cell_chances(facts), **bands}
     return Section(
         name="cells",
         title="Cells",
         text=("The first three are of a query from the mean cell, the others shares of cells.",),
-        numbers=tuple(
-            Number(row=row, column="share", ours=share) for row, share in (*rows, *bands)
-        ),
+        numbers=tuple(Number(row, "share", share) for row, share in shares.items()),
     )
 
 
-def _classes(facts: Mapping[str, Any]) -> Section:
+def _class_section(facts: Mapping[str, Any]) -> Section:
     numbers = []
     for item in facts["classes"]:
-        row = f"{item['title']} ({item['symbol']})"
-        chance = f"chance within {facts['radius_m']:g} m"
+        row = class_label(item)
         numbers += [
-            Number(row=row, column=chance, ours=item["chance_near"]),
-            Number(row=row, column="bits", ours=item["bits"], decimals=3),
+            Number(row, f"chance within {facts['radius_m']:g} m", item["chance_near"]),
+            Number(row, "bits", item["bits"], decimals=3),
         ]
         if item["objects"] is not None:
-            numbers.append(Number(row=row, column="objects", ours=item["objects"], decimals=0))
+            numbers.append(Number(row, "objects", item["objects"], decimals=0))
     return Section(
         name="classes",
         title="What each class adds",
@@ -196,26 +177,22 @@ def _classes(facts: Mapping[str, Any]) -> Section:
     )
 
 
-def _calibration(check: IdentifiabilityCheck) -> Section:
-    x, y, low, high = (
-        tuple(getattr(one, part) for one in check.bins)
-        for part in ("stated", "true", "true_low", "true_high")
-    )
+def _calibration_section(check: IdentifiabilityCheck) -> Section:
     numbers = []
     for one in check.bins:
         row = f"{one.low:g} to {one.high:g}"
         numbers += [
-            Number(row=row, column="queries", ours=one.queries, decimals=0),
-            Number(row=row, column="stated", ours=one.stated, decimals=3),
-            Number(
-                row=row,
-                column="found",
-                ours=one.true,
-                low=one.true_low,
-                high=one.true_high,
-                decimals=3,
-            ),
+            Number(row, "queries", one.queries, decimals=0),
+            Number(row, "stated", one.stated, decimals=3),
+            Number(row, "found", one.true, low=one.true_low, high=one.true_high, decimals=3),
         ]
+    curve = Curve(
+        label="fresh queries",
+        x=tuple(one.stated for one in check.bins),
+        y=tuple(one.true for one in check.bins),
+        low=tuple(one.true_low for one in check.bins),
+        high=tuple(one.true_high for one in check.bins),
+    )
     return Section(
         name="calibration",
         title="Do the chances come true?",
@@ -227,36 +204,29 @@ def _calibration(check: IdentifiabilityCheck) -> Section:
                 title="Chance to be found: told and true",
                 x_label="chance told of the cell",
                 y_label="share of the queries that were found",
-                curves=(Curve(label="fresh queries", x=x, y=y, low=low, high=high),),
+                curves=(curve,),
                 diagonal=True,
             ),
         ),
     )
 
 
-def _ranks(check: IdentifiabilityCheck) -> Section:
-    numbers = [
-        Number(
-            row=SCORES[name],
-            column="rank correlation with success",
-            ours=None if math.isnan(value) else value,
-            decimals=3,
-        )
-        for name, value in check.correlations.items()
-    ]
-    told = (
-        ()
-        if math.isnan(check.attainable)
-        else (
-            (
-                "Success is yes or no, so that chances that are just right would have "
-                f"{check.attainable:.3f}."
-            ),
-        )
+def _rank_section(check: IdentifiabilityCheck) -> Section:
+    attainable = (
+        "Success is yes or no, so that chances that are just right would have "
+        f"{check.attainable:.3f}."
     )
     return Section(
         name="ranks",
         title="Do cells with a higher score succeed more often?",
-        text=told,
-        numbers=tuple(numbers),
+        text=() if math.isnan(check.attainable) else (attainable,),
+        numbers=tuple(
+            Number(
+                SCORES[name],
+                "rank correlation with success",
+                None if math.isnan(value) else value,
+                decimals=3,
+            )
+            for name, value in check.correlations.items()
+        ),
     )

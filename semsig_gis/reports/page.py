@@ -32,8 +32,6 @@ if TYPE_CHECKING:
 
 # What has a meaning to Markdown anywhere, besides what `escaped` knows, and at the beginning.
 MARKS = re.compile(r"([\\`*_\[\]{}~$])")
-
-
 FIRST_MARKS = re.compile(r"^(\d*)([-+=>#.)])")
 
 
@@ -104,8 +102,6 @@ def _picture_blocks(section: Section, pictures: Mapping[str, Picture]) -> Iterat
 
 
 FIGURES = "figures"
-
-
 NUMBER_COLUMNS = (
     "section",
     "row",
@@ -117,8 +113,6 @@ NUMBER_COLUMNS = (
     "paper",
     "difference",
 )
-
-
 POINT_COLUMNS = ("source", "label", "x", "y", "low", "high")
 
 

@@ -43,13 +43,8 @@ COLOURS = (
 )
 """Colours that colour-blind people tell apart: those of Okabe and Ito, and two of Tol."""
 
-
 INK, WHITE = "#222222", "#ffffff"
-
-
 DOTS_PER_INCH = 200
-
-
 # Text stays text in an SVG: a reader can search it, copy it and read it in any script.
 SETTINGS = {
     "svg.fonttype": "none",
@@ -165,47 +160,21 @@ def draw_legend(
 
 # So many colours, dashes and markers that no two curves of a plot look alike.
 DASHES = ("-", (0, (5, 1.6)), (0, (6, 1.6, 1.2, 1.6)), (0, (1.4, 1.2)))
-
-
 # Each with the size at which it looks as large as the others.
 MARKERS = (("o", 5.2), ("s", 5.0), ("^", 6.4), ("D", 4.8), ("v", 6.4), ("P", 7.0), ("X", 7.0))
-
-
 BAND_SHADE, MANY_BANDS = 0.16, 4
-
-
 FEW_POINTS = 12
-
-
 FEW_TICKS = 6
-
-
 MARKERS_APART = 0.14  # share of the diagonal
-
-
 # Inches.
 WIDTH = 6.2
-
-
 LEFT, RIGHT = 0.72, 0.2
-
-
 AXES_HEIGHT = 3.3
-
-
 TITLE_LINE, LEGEND_LINE = 0.22, 0.2
-
-
 BELOW_AXES = 0.52
-
-
 TITLE_LETTERS = 70
-
-
 # How many columns a legend has by the letters of its longest label.
 COLUMNS = ((9, 4), (16, 3), (30, 2))
-
-
 LONGEST_LABEL = 64
 
 
@@ -351,8 +320,6 @@ _PAPER_LOOK: dict[str, Any] = {
     "markerfacecolor": "none",  # ours is often below
     "markeredgewidth": 1.7,
 }
-
-
 Keys = list[tuple[Line2D | Patch, str]]
 
 

@@ -164,8 +164,6 @@ CROSS = Path(
     ],
     closed=True,
 )
-
-
 # The marker of each shape, and its size where that of a circle is 1.
 MARKERS = {
     "circle": ("o", 1.0),
@@ -176,34 +174,16 @@ MARKERS = {
     "triangle_down": ("v", 1.2),
     "cross": (CROSS, 1.1),
 }
-
-
 UNKNOWN = ClassSign("?", "unknown class", "circle", "#777777")
-
-
 ANSWER = "#cc0000"
-
-
 # In visibility ranges: what is drawn around the viewpoint, and at most.
 AROUND, FARTHEST = 1.25, 2.5
-
-
 # Inches.
 WIDTH, MAP, MARGIN = 4.4, 4.2, 0.1
-
-
 LINE = 0.19
-
-
 TITLE_LETTERS = 46
-
-
 TYPE_LETTERS, TYPE_LINES = 42, 3
-
-
 CLASS_LETTERS = 21
-
-
 MANY_OBJECTS = 40
 
 

@@ -54,6 +54,31 @@ class Table:
     bold: frozenset[tuple[int, int]] = frozenset()
     intervals: Mapping[tuple[int, int], str] = field(default_factory=dict)
 
+    @classmethod
+    def of_columns(cls, title: str, columns: Mapping[str, Iterable[str]], note: str = "") -> Table:
+        """Return a table of columns, which are given by their headings.
+
+        Parameters
+        ----------
+        title : str
+            What it shows.
+        columns : mapping of str to iterable of str
+            The cells of each column.
+        note : str, default ""
+            What a reader must know to read it rightly.
+
+        Returns
+        -------
+        Table
+            The table.
+
+        Examples
+        --------
+        >>> Table.of_columns("Sizes", {"What": ["step", "range"], "m": ["10", "30"]}).rows
+        (('step', '10'), ('range', '30'))
+        """
+        return cls(title, tuple(columns), tuple(zip(*columns.values(), strict=True)), note)
+
     @property
     def group_starts(self) -> frozenset[int]:
         """At which columns a group begins."""
@@ -97,8 +122,8 @@ def markdown_rows(table: Table, escape: Callable[[str], str]) -> str:
     def cell(row: int, column: int) -> str:
         text = escape(table.rows[row][column])
         bold = f"**{text}**" if (row, column) in table.bold else text
-        interval = table.intervals.get((row, column))
-        return f"{bold} ({escape(interval)})" if interval else bold
+        ends = table.intervals.get((row, column))
+        return f"{bold} ({escape(ends)})" if ends else bold
 
     columns = range(len(table.columns))
     lines = [
@@ -112,6 +137,18 @@ def markdown_rows(table: Table, escape: Callable[[str], str]) -> str:
 def percent(share: float) -> str:
     """Return a share from 0 to 1 as percent with one decimal: ``41.8 %``."""
     return f"{100 * share:.1f} %"
+
+
+def figure(value: float | None, form: str = ".4f") -> str:
+    """Return a number as text, empty where it is None or NaN."""
+    if value is None or math.isnan(value):
+        return ""
+    return "infinite" if math.isinf(value) else format(value, form)
+
+
+def interval(low: float, high: float, form: str = ".4f") -> str:
+    """Return the ends of an interval as text, empty where they are NaN."""
+    return "" if math.isnan(low) else f"{figure(low, form)} to {figure(high, form)}"
 
 
 OURS, INTERVAL, PAPER, DIFFERENCE = "ours", "95 %", "paper", "difference"
@@ -253,12 +290,12 @@ def _cells(
         return "" if value is None else _shown(value, number.decimals, sign) + unit
 
     ours = math.nan if number.ours is None else number.ours
-    interval = ""
+    ends = ""
     if number.low is not None and number.high is not None:
-        interval = f"{_shown(number.low, number.decimals)} to {shown(number.high)}"
+        ends = f"{_shown(number.low, number.decimals)} to {shown(number.high)}"
     cells = {
-        OURS: _Cell(shown(ours), "" if own else interval),
-        INTERVAL: _Cell(interval),
+        OURS: _Cell(shown(ours), "" if own else ends),
+        INTERVAL: _Cell(ends),
         PAPER: _Cell(shown(number.paper)),
         DIFFERENCE: _Cell(shown(number.difference, "+"), bold=_is_outside(number)),
     }

@@ -35,21 +35,13 @@ if TYPE_CHECKING:
 
 
 BBOX = "bbox"
-
-
 SIDES = ("xmin", "ymin", "xmax", "ymax")
-
-
 BOUNDS = pa.struct([(side, pa.float32()) for side in SIDES])
-
-
 COVERING = {"bbox": {side: [BBOX, side] for side in SIDES}}
 """What the ``geo`` metadata of a file says of the column `BBOX`."""
 
-
 NOWHERE = (math.inf, math.inf, -math.inf, -math.inf)
 """Meets nothing: of a file, only what it says of itself is read."""
-
 
 GROUP_ROWS = 8192
 """Rows that are read together: the street objects of about two square kilometres of Paris."""
@@ -145,14 +137,8 @@ def each_bounds(path: str | Path) -> Iterator[Bounds]:
 
 
 SPEC_KEY = b"semsig"
-
-
 COMPRESSION = 3
-
-
 BYTE_TYPES = {pa.string(), pa.large_string(), pa.binary()}
-
-
 # Well-known binary of a point: 1 for little-endian, 1 for a point, and where it is.
 WKB_POINT = np.dtype([("order", "u1"), ("type", "<u4"), ("x", "<f8"), ("y", "<f8")])
 
