@@ -180,52 +180,22 @@ class SignatureDatabase:
         return frozen(self.angle_sequences.counts[self.angle_sequences.inverse])
 
     def cells_at(self, xy: ArrayLike) -> NDArray[np.int64]:
-        """Return the cells in which places lie.
+        """Return the rows of the cells in which places lie, -1 where there is none, shape (p,).
 
-        Parameters
-        ----------
-        xy : array_like, shape (p, 2)
-            Places in metres.
-
-        Returns
-        -------
-        ndarray of int64, shape (p,)
-            Row numbers in the database; -1 where it has no cell there.
+        Places, shape (p, 2), are in metres.
         """
         ids = cell_ids(*self.grid.cells_at(xy))
         rows = np.minimum(np.searchsorted(self.cell_ids, ids), len(self) - 1)
         return np.where(self.cell_ids[rows] == ids, rows, -1)
 
     def signature(self, cell: int) -> Signature:
-        """Return the signature of one cell.
-
-        Parameters
-        ----------
-        cell : int
-            Row number in the database, 0 to n - 1.
-
-        Returns
-        -------
-        Signature
-            Its class codes and bearings.
-        """
+        """Return the signature of the cell in a row: its class codes and bearings."""
         part = slice(self.offsets[cell], self.offsets[cell + 1])
         bearings = self.bearing_units[part] * np.float64(360.0 / BEARING_UNITS)
         return Signature(self.codes[part], bearings)
 
     def select(self, cells: slice | NDArray[np.int64] | NDArray[np.bool_]) -> SignatureDatabase:
-        """Return a database of some of the cells.
-
-        Parameters
-        ----------
-        cells : slice or ndarray
-            Row numbers in the database, or True for each cell to keep; their order is kept.
-
-        Returns
-        -------
-        SignatureDatabase
-            Those cells.
-        """
+        """Return a database of some of the cells, by rows in their order or by True for each."""
         kept = np.arange(len(self))[cells]
         lengths = self.lengths[kept]
         entries = consecutive(self.offsets[kept], lengths)
@@ -237,18 +207,7 @@ class SignatureDatabase:
         )
 
     def types(self, cell: int) -> str:
-        """Return the type sequence of one cell.
-
-        Parameters
-        ----------
-        cell : int
-            Row number in the database, 0 to n - 1.
-
-        Returns
-        -------
-        str
-            One symbol an object.
-        """
+        """Return the type sequence of the cell in a row, one symbol an object."""
         return self.taxonomy.decode(self.codes[self.offsets[cell] : self.offsets[cell + 1]])
 
 

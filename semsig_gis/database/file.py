@@ -111,12 +111,12 @@ def database_specs(database: SignatureDatabase) -> dict[str, Any]:
 
 
 def open_database(path: str | Path) -> SignatureDatabase:
-    """Open a file that `save_database` wrote, or a folder of parts.
+    """Open a file that `save_database` wrote, or a folder of parts that `build_tiles` wrote.
 
     Parameters
     ----------
     path : str or Path
-        File to read, or the folder of a database that was built in tiles.
+        File or folder.
 
     Returns
     -------
@@ -415,15 +415,7 @@ class PartitionedDatabase:
     def parts(self) -> Iterator[SignatureDatabase]:
         """Open the parts one after the other.
 
-        Yields
-        ------
-        SignatureDatabase
-            A part.
-
-        Raises
-        ------
-        DatabaseError
-            If a part is damaged, or was made in another way than the first.
+        Raise DatabaseError if a part is damaged, or was made in another way than the first.
         """
         first = None
         for file in self.files:
@@ -439,18 +431,7 @@ class PartitionedDatabase:
         return next(self.parts()).taxonomy
 
     def row_numbers(self, cell_ids: NDArray[np.int64]) -> NDArray[np.int64]:
-        """Return the row that each cell has in the database that `open_database` returns.
-
-        Parameters
-        ----------
-        cell_ids : ndarray of int64, shape (n,)
-            Numbers of cells of the database.
-
-        Returns
-        -------
-        ndarray of int64, shape (n,)
-            Rows from 0.
-        """
+        """Return the rows that cells have in the database that `open_database` returns."""
         rows = np.zeros(len(cell_ids), np.int64)
         for file in self.files:
             table, _, _ = read_geoparquet(file, kind=KIND, columns=["cell_id"])

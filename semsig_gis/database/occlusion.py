@@ -98,18 +98,7 @@ class Footprints:
         return widened
 
     def cores(self, interior: int) -> NDArray[np.object_]:
-        """Return what each footprint has of one of the interiors.
-
-        Parameters
-        ----------
-        interior : int
-            Its number in `interiors`.
-
-        Returns
-        -------
-        ndarray of shapely.Polygon
-            The parts, at least one for each footprint that has any.
-        """
+        """Return what each footprint has of the interior with a number in `interiors`, in parts."""
         if interior not in self._cores:
             whole = self.interiors[interior]
             own = self._tree.query(whole, predicate="intersects")
@@ -121,18 +110,7 @@ class Footprints:
         return shapely.STRtree(self._widened)
 
     def cover(self, xy: ArrayLike) -> NDArray[np.bool_]:
-        """Tell which places are inside a footprint.
-
-        Parameters
-        ----------
-        xy : array_like, shape (n, 2)
-            Places in metres.
-
-        Returns
-        -------
-        ndarray of bool, shape (n,)
-            Whether a place is in a footprint or on its outline.
-        """
+        """Tell which places, shape (n, 2) in metres, are in a footprint or on its outline."""
         places = np.asarray(xy, dtype=np.float64).reshape(-1, 2)
         covered = np.zeros(len(places), bool)
         for part in _parts(len(places)):

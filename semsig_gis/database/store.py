@@ -91,26 +91,10 @@ class ObjectStore:
         footprints: gpd.GeoDataFrame | None = None,
         streets: gpd.GeoDataFrame | None = None,
     ) -> ObjectStore:
-        """Make the store of a database that was built from these.
+        """Make the store of a database that was built from these, with a new R-tree.
 
-        Parameters
-        ----------
-        objects : StreetObjects
-            The objects.
-        footprints : GeoDataFrame, optional
-            The buildings, in any CRS.
-        streets : GeoDataFrame, optional
-            The centre lines, in any CRS, with a column ``half_width`` or without.
-
-        Returns
-        -------
-        ObjectStore
-            The store, with a new R-tree.
-
-        Raises
-        ------
-        CrsError
-            If the buildings or streets have no CRS.
+        `footprints` and `streets` are those that `build_database` got; CrsError if they have no
+        CRS.
         """
         return cls(
             objects=objects,
@@ -122,19 +106,9 @@ class ObjectStore:
     def buildings_around(
         self, places: NDArray[np.float64], *, distance: float
     ) -> Footprints | None:
-        """Return the buildings around some places, ready to be looked at.
+        """Return the buildings at most so many metres from some places, None where there are none.
 
-        Parameters
-        ----------
-        places : ndarray of float64, shape (p, 2)
-            Places in metres.
-        distance : float
-            Metres around each of them.
-
-        Returns
-        -------
-        Footprints or None
-            The buildings with all that they are joined to; None where there are none.
+        All that they are joined to are among them. Places, shape (p, 2), are in metres.
         """
         if self.footprints is None:
             return None

@@ -6,18 +6,18 @@ from dataclasses import asdict, dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import shapely
 
 from semsig_gis import __version__
-from semsig_gis.core.crs import HALF_WIDTH, SOURCE
+from semsig_gis.core.crs import SOURCE
 from semsig_gis.core.errors import DatabaseError, EmptyResultError, InputError
 from semsig_gis.core.grid import cell_ids, cells_near
 from semsig_gis.core.rtree import PackedIndex
 from semsig_gis.database.build import build_cells
-from semsig_gis.database.database import join_databases, require_same
+from semsig_gis.database.database import ENTRY_ARRAYS, join_databases, require_same
 from semsig_gis.database.file import open_database
 from semsig_gis.database.occlusion import TOUCHING_M, buildings_near
 from semsig_gis.database.store import open_store, save_with_store
+from semsig_gis.database.visibility import sightings
 from semsig_gis.objects.changes import compare_objects, replace_layers
 from semsig_gis.objects.surroundings import licenses_of
 
@@ -25,12 +25,11 @@ if TYPE_CHECKING:
     from collections.abc import Callable
     from pathlib import Path
 
-    import geopandas as gpd
     from numpy.typing import NDArray
 
     from semsig_gis.database.database import SignatureDatabase
     from semsig_gis.database.store import ObjectStore
-    from semsig_gis.objects.changes import ClassChange, ObjectChanges
+    from semsig_gis.objects.changes import ClassChange
     from semsig_gis.objects.table import StreetObjects
 
     _Cells = tuple[NDArray[np.int64], NDArray[np.int64]]  # columns and rows
@@ -97,7 +96,7 @@ def compare_cells(before: SignatureDatabase, after: SignatureDatabase) -> CellCh
     alike = np.flatnonzero(~differs)
     one, other = before.select(first[alike]), after.select(second[alike])
     entry_differs = np.zeros(len(one.codes), bool)
-    for name in ("codes", "bearing_units", "distance_units"):
+    for name in ENTRY_ARRAYS:
         entry_differs |= getattr(one, name) != getattr(other, name)
     differs[np.repeat(alike, one.lengths)[entry_differs]] = True
     common = np.stack([first, second], axis=1)
@@ -149,18 +148,11 @@ def update_file(
     Examples
     --------
     >>> import tempfile
-    >>> from semsig_gis.database.build import build_database
-    >>> from semsig_gis.sources.synthetic.city import CitySpec, synthetic_city
-    >>> from semsig_gis.sources.catalog import paper_taxonomy
-    >>> from semsig_gis.objects.table import StreetObjects
-    >>> from semsig_gis.objects.clean import build_objects
-    >>> from semsig_gis.database.store import ObjectStore
-    >>> layers = synthetic_city(CitySpec(size=300.0))
-    >>> objects, _ = build_objects(layers, taxonomy=paper_taxonomy(), crs="EPSG:32631")
-    >>> fewer = StreetObjects(objects.table[1:], objects.taxonomy, objects.licenses)
+    >>> from semsig_gis import ObjectStore
+    >>> fewer = replace(demo_objects, table=demo_objects.table[1:])
     >>> with tempfile.TemporaryDirectory() as folder:
     ...     file = f"{folder}/city.parquet"
-    ...     save_with_store(build_database(objects), ObjectStore.of(objects), file)
+    ...     save_with_store(demo_database, ObjectStore.of(demo_objects), file)
     ...     report = update_file(file, fewer)
     >>> sum(item.removed for item in report.classes), 0 < report.share < 0.5
     (1, True)
@@ -215,15 +207,9 @@ def update_database(
 
     Examples
     --------
-    >>> from semsig_gis.database.build import build_database
-    >>> from semsig_gis.sources.synthetic.city import CitySpec, synthetic_city
-    >>> from semsig_gis.sources.catalog import paper_taxonomy
-    >>> from semsig_gis.objects.clean import build_objects
-    >>> from semsig_gis.database.store import ObjectStore
-    >>> layers = synthetic_city(CitySpec(size=300.0))
-    >>> objects, _ = build_objects(layers, taxonomy=paper_taxonomy(), crs="EPSG:32631")
-    >>> database, store = build_database(objects), ObjectStore.of(objects)
-    >>> _, _, report = update_database(database, store, objects)
+    >>> from semsig_gis import ObjectStore
+    >>> store = ObjectStore.of(demo_objects)
+    >>> _, _, report = update_database(demo_database, store, demo_objects)
     >>> report.recomputed
     0
     """
@@ -234,21 +220,21 @@ def update_database(
     new = replace(database, taxonomy=merged.taxonomy, licenses=licenses, version=__version__)
     _require_reach(database, new)
     changes = compare_objects(store.objects, merged)
-    cells = _cells_in_range(new, store.objects, merged, changes)
+    places = np.concatenate([store.objects.xy[changes.gone], merged.xy[changes.come]])
+    codes = np.concatenate([store.objects.codes[changes.gone], merged.codes[changes.come]])
+    cells = _cells_in_range(new, places, codes)
     old_row = np.full(len(merged), -1)
     old_row[changes.same[:, 1]] = changes.same[:, 0]
     index = store.index.edited(merged.xy, old_row)
     after = replace(store, objects=merged, index=index, notes=())
     stale = np.isin(database.cell_ids, cell_ids(*cells))
-    places = _places(store.objects, merged, changes)
     fresh = _recomputed(new, after, places, cells, progress=progress)
     updated = join_databases([new.select(~stale), fresh])
     if len(updated) == 0:
         msg = f"no cell would see any of the {len(merged):,} objects; look at the new objects."
         raise EmptyResultError(msg)
-    seen_before, seen_now = database.select(stale), fresh
     layers = {*store.objects.table[SOURCE].unique(), *merged.table[SOURCE].unique()}
-    drifted = compare_cells(seen_before, seen_now)
+    drifted = compare_cells(database.select(stale), fresh)
     report = UpdateReport(
         classes=changes.classes,
         replaced=tuple(sorted(layers - set(kept))),
@@ -289,29 +275,18 @@ def _require_reach(old: SignatureDatabase, new: SignatureDatabase) -> None:
         raise InputError(msg)
 
 
-def _places(old: StreetObjects, new: StreetObjects, changes: ObjectChanges) -> NDArray[np.float64]:
-    """Return every place where an object is gone or has come, shape (c, 2)."""
-    return np.concatenate([old.xy[changes.gone], new.xy[changes.come]])
-
-
 def _cells_in_range(
-    database: SignatureDatabase, old: StreetObjects, new: StreetObjects, changes: ObjectChanges
+    database: SignatureDatabase, places: NDArray[np.float64], codes: NDArray[np.uint8]
 ) -> _Cells:
-    """Return the cells that an object which is gone or has come may be seen from."""
-    places = _places(old, new, changes)
-    nothing = np.empty(0, np.int64)
+    """Return the cells that objects of some classes at some places may be seen from."""
     if len(places) == 0:
-        return nothing, nothing
-    codes = np.concatenate([old.codes[changes.gone], new.codes[changes.come]])
+        return np.empty(0, np.int64), np.empty(0, np.int64)
     ranges = database.taxonomy.ranges(database.spec.radius)[codes]
     reach = float(ranges.max())
     columns, rows = cells_near(places, grid=database.grid, radius=reach)
     viewpoints = database.grid.viewpoints(columns, rows)
-    cell, place = PackedIndex(places).pairs_within(viewpoints, radius=reach)
-    if (ranges < reach).any():
-        delta = places[place] - viewpoints[cell]
-        cell = cell[np.hypot(delta[:, 0], delta[:, 1]) <= ranges[place]]
-    near = np.unique(cell)
+    pairs = PackedIndex(places).pairs_within(viewpoints, radius=reach)
+    near = np.unique(sightings(*pairs, viewpoints, places, ranges=ranges).viewpoint)
     return columns[near], rows[near]
 
 
@@ -324,40 +299,23 @@ def _recomputed(
     progress: Callable[[int, int], None] | None,
 ) -> SignatureDatabase:
     """Return some cells around some places as they are now."""
-    if len(places) == 0:
-        return database.select(slice(0))
     # A viewpoint is at most the reach from a place, and all it looks at as far from it again.
     around = 2.0 * database.reach + TOUCHING_M
     near = np.unique(store.index.pairs_within(places, radius=around)[1])
     if len(near) == 0:
         return database.select(slice(0))
-    objects = replace(store.objects, table=store.objects.table.iloc[near])
-    footprints, streets, viewpoints = store.footprints, store.streets, database.viewpoints
+    footprints = store.footprints
     if footprints is not None:
         polygons = footprints.geometry.to_numpy()
         footprints = footprints.iloc[buildings_near(polygons, places, distance=around)]
-    if viewpoints.mode == "streets" and streets is not None:
-        streets = _streets_near(streets, database.grid.viewpoints(*cells), viewpoints.width)
     return build_cells(
-        objects,
+        replace(store.objects, table=store.objects.table.iloc[near]),
         *cells,
         grid=database.grid,
         spec=database.spec,
-        viewpoints=viewpoints,
+        viewpoints=database.viewpoints,
         footprints=footprints,
-        streets=streets,
+        streets=store.streets,
         partial=True,
         progress=progress,
     )
-
-
-def _streets_near(
-    streets: gpd.GeoDataFrame, viewpoints: NDArray[np.float64], width: float
-) -> gpd.GeoDataFrame:
-    """Return the streets that some viewpoints may be in."""
-    widest = max(width, np.nan_to_num(streets.get(HALF_WIDTH, np.array([width]))).max())
-    tree = shapely.STRtree(streets.geometry.to_numpy())
-    found = tree.query(
-        shapely.points(viewpoints), predicate="dwithin", distance=widest + TOUCHING_M
-    )[1]
-    return streets.iloc[np.unique(found)]

@@ -73,40 +73,13 @@ class ViewpointSpec:
             object.__setattr__(self, "area", area)
 
     def to_dict(self) -> dict[str, Any]:
-        """Return the choice as plain values, ready for JSON.
-
-        Returns
-        -------
-        dict
-            ``mode``, ``width`` and ``area`` (WKT or None).
-        """
+        """Return the choice as values for JSON: ``mode``, ``width`` and ``area`` (WKT or None)."""
         area = None if self.area is None else shapely.to_wkt(self.area, rounding_precision=-1)
         return {"mode": self.mode, "width": self.width, "area": area}
 
     @classmethod
     def from_dict(cls, values: dict[str, Any]) -> ViewpointSpec:
-        """Return the choice that `to_dict` wrote.
-
-        Parameters
-        ----------
-        values : dict
-            ``mode``, ``width`` and ``area``.
-
-        Returns
-        -------
-        ViewpointSpec
-            The choice.
-
-        Raises
-        ------
-        InputError
-            If a value cannot be used.
-
-        Examples
-        --------
-        >>> ViewpointSpec.from_dict(ViewpointSpec(mode="outdoor").to_dict()).mode
-        'outdoor'
-        """
+        """Return the choice that `to_dict` wrote; InputError if a value cannot be used."""
         try:
             area = None if values["area"] is None else shapely.from_wkt(values["area"])
         except shapely.errors.GEOSException as error:
