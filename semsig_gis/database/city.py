@@ -47,13 +47,9 @@ class Model(Protocol):
     """A noise model, as far as it names the file of its likelihood index."""
 
     @property
-    def name(self) -> str:
-        """Its name."""
-        ...
+    def name(self) -> str: ...  # noqa: D102
 
-    def to_dict(self) -> dict[str, Any]:
-        """Return what tells it from other models, as plain values for JSON."""
-        ...
+    def to_dict(self) -> dict[str, Any]: ...  # noqa: D102
 
 
 class City:
@@ -65,22 +61,6 @@ class City:
     ----------
     path : str or Path
         File of the database, or folder of its parts.
-
-    Attributes
-    ----------
-    path : Path
-        Where the database is.
-
-    Examples
-    --------
-    >>> from semsig_gis.database.store import ObjectStore, save_with_store
-    >>> import tempfile
-    >>> with tempfile.TemporaryDirectory() as folder:
-    ...     store = ObjectStore.of(demo_objects)
-    ...     save_with_store(demo_database, store, f"{folder}/city.parquet")
-    ...     city = open_city(f"{folder}/city.parquet")
-    ...     len(city.database) == len(demo_database), len(city.store.objects) == len(demo_objects)
-    (True, True)
     """
 
     def __init__(self, path: str | Path) -> None:
@@ -103,13 +83,7 @@ class City:
 
     @property
     def files(self) -> tuple[Path, ...]:
-        """The file of the database, or those of its parts.
-
-        Raises
-        ------
-        DatabaseError
-            If one is missing, or is not the part that was built.
-        """
+        """The file of the database, or those of its parts; DatabaseError if one is missing."""
         if self._is_folder:
             return part_files(self.path)
         require_file(self.path)
@@ -139,13 +113,7 @@ class City:
 
     @cached_property
     def store(self) -> ObjectStore:
-        """The object store.
-
-        Raises
-        ------
-        DatabaseError
-            If it is missing or damaged, or belongs to another database.
-        """
+        """The object store; DatabaseError if there is none that can be used."""
         from semsig_gis.database.store import open_store  # noqa: PLC0415 - its readers load slowly
 
         return open_store(self.path)
@@ -181,12 +149,8 @@ class City:
     def columns(self, name: str) -> tuple[pa.Table, dict[str, Any]] | None:
         """Return columns that were put into the database under a name, and their facts.
 
-        The table has ``cell_id``, ascending, and the columns.
-
-        Raises
-        ------
-        DatabaseError
-            If the database is missing or damaged, or its parts do not agree on the columns.
+        The table has ``cell_id``, ascending, and the columns. Raise DatabaseError if the database
+        is missing or damaged, or its parts do not agree on the columns.
         """
         files = self.files
         entries = [read_specs(file).get(ADDED, {}).get(name) for file in files]
@@ -206,14 +170,8 @@ class City:
 
         `columns` has a row for each of `cell_ids`, which ascend and are all cells of the database.
         `facts` describe the columns, as plain values for JSON. The file, or the folder of parts, is
-        replaced as a whole.
-
-        Raises
-        ------
-        DatabaseError
-            If the database is damaged or has other cells; it is unchanged then.
-        InputError
-            If it cannot be written; it is unchanged then.
+        replaced as a whole. Raise DatabaseError if the database is damaged or has other cells, and
+        InputError if it cannot be written; it is unchanged then.
         """
         added = {name: {"columns": columns.column_names, "facts": facts}}
         if not self._is_folder:
@@ -253,11 +211,13 @@ def open_city(path: str | Path) -> City:
 
     Examples
     --------
-    >>> open_city("nowhere.parquet")
-    Traceback (most recent call last):
-    ...
-    semsig_gis.core.errors.DatabaseError: nowhere.parquet does not exist;
-    give a signature database file.
+    >>> import tempfile
+    >>> from semsig_gis import ObjectStore, save_with_store
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     save_with_store(demo_database, ObjectStore.of(demo_objects), f"{folder}/city.parquet")
+    ...     city = open_city(f"{folder}/city.parquet")
+    ...     len(city.database) == len(demo_database), len(city.store.objects) == len(demo_objects)
+    (True, True)
     """
     if not is_folder(path):
         require_file(path)
@@ -265,11 +225,7 @@ def open_city(path: str | Path) -> City:
 
 
 def _extend(
-    path: Path,
-    out: Path,
-    columns: pa.Table,
-    cell_ids: NDArray[np.int64],
-    added: dict[str, Any],
+    path: Path, out: Path, columns: pa.Table, cell_ids: NDArray[np.int64], added: dict[str, Any]
 ) -> None:
     """Write the file of a database, or of a part of it, with columns put into it."""
     table, specs, _ = read_geoparquet(path, kind=KIND)

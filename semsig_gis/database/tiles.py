@@ -145,20 +145,16 @@ def build_tiles(
     Parameters
     ----------
     objects : str or Path
-        Street objects that `objects.table.save_objects` wrote.
+        Street objects that `save_objects` wrote.
     out : str or Path
         Folder to write. It appears whole, by rename; a database that is there is replaced.
     tile : TileSpec, optional
         Size of a tile; 2000 m by default.
-    grid : GridSpec, optional
-        The cells; 10 m by default.
-    spec : SignatureSpec, optional
-        Visibility range and angle levels; 30 m and 16 by default.
-    viewpoints : ViewpointSpec, optional
-        Which cells are looked from; all by default.
+    grid, spec, viewpoints : optional
+        As in `build_database`.
     buildings, streets : str or Path, optional
-        Files that `objects.surroundings.read_surroundings` reads. Those that cannot be read by
-        box are copied into such a file first.
+        Files that `read_surroundings` reads. Those that cannot be read by box are copied into such
+        a file first.
     workers : int, default 0
         How many processes of this machine build tiles; 0 builds them here, without dask.
     scheduler : str, optional
@@ -275,10 +271,9 @@ def _run(
 class TilePlan:
     """All that is needed to build any tile: paths and specs, so that it travels lightly.
 
-    Part files are written to `folder`. `objects` is a file of `objects.table.save_objects`,
-    `buildings` and `streets` are files of `objects.surroundings.save_surroundings` in the same
-    CRS. `side` is that of a tile in cells; `reach` is the largest visibility range of any class,
-    and `street_reach` how far the widest street reaches from its centre line, both in metres.
+    Part files are written to `folder`; all inputs can be read by box and are in one CRS. `side` is
+    that of a tile in cells; `reach` is the largest visibility range of any class, and
+    `street_reach` how far the widest street reaches from its centre line, both in metres.
     """
 
     folder: Path
@@ -314,11 +309,8 @@ def plan_tiles(
 ) -> TilePlan:
     """Check the inputs of a run, begin it or take it up again, and return the plan of its tiles.
 
-    `objects` is a file of `objects.table.save_objects`; `buildings` and `streets` are files
-    that `objects.surroundings.read_surroundings` reads. Streets are needed by the viewpoints
-    ``"streets"`` and left aside by others. Inputs that cannot be read by box are copied into the
-    folder of the run. Raise SemsigError if an input is missing or cannot be used, or `out` cannot
-    be written.
+    Streets are needed by the viewpoints ``"streets"`` and left aside by others. Raise SemsigError
+    if an input is missing or cannot be used, or `out` cannot be written.
     """
     places = {"objects": objects, "buildings": buildings, "streets": streets}
     if viewpoints.mode != "streets":

@@ -122,7 +122,7 @@ def update_file(
     path : str or Path
         File of the database.
     objects : StreetObjects
-        The layers that were loaded anew, whole (see `objects.changes.replace_layers`).
+        The layers that were loaded anew, whole.
     out : str or Path, optional
         Another file to write to; `path` itself by default.
     progress : callable, optional
@@ -135,15 +135,9 @@ def update_file(
 
     Raises
     ------
-    DatabaseError
-        If the database or its store is missing or damaged.
-    InputError
-        If the new objects do not fit the database, or the files cannot be written; nothing has
-        changed then.
-    CrsError
-        If the new objects are in another CRS.
-    EmptyResultError
-        If no cell would see an object any more.
+    DatabaseError, InputError, CrsError, EmptyResultError
+        As `update_database` does, or if the files cannot be read or written; nothing has changed
+        then.
 
     Examples
     --------
@@ -179,8 +173,7 @@ def update_database(
     store : ObjectStore
         What it was built from.
     objects : StreetObjects
-        The layers that were loaded anew, whole; layers that none of these objects comes from stay
-        as they are (see `objects.changes.replace_layers`).
+        The layers that were loaded anew, whole; other layers stay as they are.
     progress : callable, optional
         Called with the number of cells done and in all.
 
@@ -213,12 +206,28 @@ def update_database(
     >>> report.recomputed
     0
     """
-    _require_surroundings(database, store)
+    lacking = []
+    if store.footprints is None and database.occlusion is not None:
+        lacking.append("buildings")
+    if store.streets is None and database.viewpoints.mode == "streets":
+        lacking.append("streets")
+    if lacking:
+        msg = (
+            f"the object store lacks the {' and '.join(lacking)} that the database was built with; "
+            "build the database again."
+        )
+        raise DatabaseError(msg)
     merged, kept, notes = replace_layers(store.objects, objects)
     along = store.streets if database.viewpoints.mode == "streets" else None
     licenses = (*map(str, merged.licenses), *licenses_of(store.footprints, along))
     new = replace(database, taxonomy=merged.taxonomy, licenses=licenses, version=__version__)
-    _require_reach(database, new)
+    if new.reach > database.reach:  # the unit in which all distances are stored
+        furthest = max(new.taxonomy.classes, key=lambda item: item.range_m or 0.0)
+        msg = (
+            f"class {furthest.name!r} is seen from {new.reach:g} m, further than any class of the "
+            f"database ({database.reach:g} m), which concerns every cell; build the database again."
+        )
+        raise InputError(msg)
     changes = compare_objects(store.objects, merged)
     places = np.concatenate([store.objects.xy[changes.gone], merged.xy[changes.come]])
     codes = np.concatenate([store.objects.codes[changes.gone], merged.codes[changes.come]])
@@ -248,31 +257,6 @@ def update_database(
         notes=(*store.notes, *notes),
     )
     return updated, after, report
-
-
-def _require_surroundings(database: SignatureDatabase, store: ObjectStore) -> None:
-    lacking = []
-    if store.footprints is None and database.occlusion is not None:
-        lacking.append("buildings")
-    if store.streets is None and database.viewpoints.mode == "streets":
-        lacking.append("streets")
-    if lacking:
-        msg = (
-            f"the object store lacks the {' and '.join(lacking)} that the database was built with; "
-            "build the database again."
-        )
-        raise DatabaseError(msg)
-
-
-def _require_reach(old: SignatureDatabase, new: SignatureDatabase) -> None:
-    """Raise where the unit in which all distances are stored would be another one."""
-    if new.reach > old.reach:
-        furthest = max(new.taxonomy.classes, key=lambda item: item.range_m or 0.0)
-        msg = (
-            f"class {furthest.name!r} is seen from {new.reach:g} m, further than any class of the "
-            f"database ({old.reach:g} m), which concerns every cell; build the database again."
-        )
-        raise InputError(msg)
 
 
 def _cells_in_range(
