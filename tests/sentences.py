@@ -3,6 +3,13 @@
 from __future__ import annotations
 
 import re
+from contextlib import contextmanager
+from typing import TYPE_CHECKING
+
+import pytest
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
 
 
 def assert_sentence(error: BaseException, *words: str) -> None:
@@ -14,6 +21,16 @@ def assert_sentence(error: BaseException, *words: str) -> None:
     assert "Traceback" not in message, message
     for word in words:
         assert word in message, f"{word!r} is not in: {message}"
+
+
+@contextmanager
+def refused(
+    kind: type[BaseException] | tuple[type[BaseException], ...], *words: str
+) -> Iterator[None]:
+    """Expect an error whose message is one plain sentence and names the things it should."""
+    with pytest.raises(kind) as caught:
+        yield
+    assert_sentence(caught.value, *words)
 
 
 def sentence(outcome: tuple[int, str, str], *words: str) -> None:

@@ -10,7 +10,7 @@ import pyarrow.parquet as pq
 import pytest
 import shapely
 from hypothesis import given, settings
-from sentences import assert_sentence
+from sentences import refused
 from worlds import (
     CODES,
     World,
@@ -103,9 +103,8 @@ def test_a_cut_file_is_an_error(town: World, tmp_path: Path) -> None:
     sizes = np.linspace(0, len(content) - 1, 80).astype(int).tolist()
     for size in [*sizes, len(content) // 2]:
         path.write_bytes(content[:size])
-        with pytest.raises(DatabaseError) as caught:
+        with refused(DatabaseError, str(path), "signature database"):
             open_database(path)
-        assert_sentence(caught.value, str(path), "signature database")
 
 
 def rewrite(path: Path, table: pa.Table, **specs: Any) -> None:  # noqa: ANN401
@@ -174,9 +173,8 @@ def test_columns_that_do_not_fit_are_an_error(town: World, tmp_path: Path, damag
     rewrite(path, table)
     assert_same(open_database(path), town.database)  # the rewriting itself does no harm
     rewrite(path, damage(table))
-    with pytest.raises(DatabaseError) as caught:
+    with refused(DatabaseError, str(path)):
         open_database(path)
-    assert_sentence(caught.value, str(path))
 
 
 @pytest.mark.parametrize(
@@ -208,9 +206,8 @@ def test_specs_that_do_not_fit_are_an_error(
     path = tmp_path / "city.parquet"
     save_database(town.database, path)
     rewrite(path, pq.read_table(path), **specs)
-    with pytest.raises(DatabaseError) as caught:
+    with refused(DatabaseError, str(path), "is damaged", "build the database again"):
         open_database(path)
-    assert_sentence(caught.value, str(path), "is damaged", "build the database again")
 
 
 def test_a_file_of_street_objects_is_named_as_such(town: World, tmp_path: Path) -> None:
@@ -218,9 +215,8 @@ def test_a_file_of_street_objects_is_named_as_such(town: World, tmp_path: Path) 
 
     path = tmp_path / "objects.parquet"
     save_objects(town.street_objects, path)
-    with pytest.raises(DatabaseError) as caught:
+    with refused(DatabaseError, str(path), "street objects", "signature database"):
         open_database(path)
-    assert_sentence(caught.value, str(path), "street objects", "signature database")
 
 
 def test_columns_of_others_in_the_file_do_no_harm(town: World, tmp_path: Path) -> None:
@@ -240,6 +236,5 @@ def test_a_file_of_another_version_is_named_as_such(
     path = tmp_path / "city.parquet"
     save_database(town.database, path)
     rewrite(path, pq.read_table(path), format=number)
-    with pytest.raises(DatabaseError) as caught:
+    with refused(DatabaseError, str(path), "another version", "build the database again"):
         open_database(path)
-    assert_sentence(caught.value, str(path), "another version", "build the database again")

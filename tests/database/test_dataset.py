@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import geopandas as gpd
 import numpy as np
 import pytest
-from sentences import assert_sentence
+from sentences import assert_sentence, refused
 from worlds import World, assert_same, random_town
 
 from semsig_gis.core.errors import DatabaseError
@@ -133,9 +133,8 @@ def test_parts_of_different_specs_in_one_folder_are_refused(town: Path) -> None:
     save_database(narrow.select(np.isin(narrow.cell_ids, database.cell_ids)), path)
     rewrite(town, (parts[0], describe(parts[1].tile, open_database(path), path), *parts[2:]))
     for tried in (lambda: open_database(town), lambda: list(open_dataset(town).parts())):
-        with pytest.raises(DatabaseError) as caught:
+        with refused(DatabaseError, "differ", "range"):
             tried()
-        assert_sentence(caught.value, "differ", "range")
     assert database.spec == SignatureSpec()
 
 
@@ -144,9 +143,8 @@ def test_a_cell_in_two_parts_is_refused(town: Path) -> None:
     path = town / parts[1].file
     shutil.copy(town / parts[0].file, path)
     rewrite(town, (parts[0], describe(parts[1].tile, open_database(path), path), *parts[2:]))
-    with pytest.raises(DatabaseError) as caught:
+    with refused(DatabaseError, "the same cell"):
         open_database(town)
-    assert_sentence(caught.value, "the same cell")
 
 
 @pytest.mark.parametrize(
@@ -155,24 +153,21 @@ def test_a_cell_in_two_parts_is_refused(town: Path) -> None:
 )
 def test_a_damaged_manifest_is_named(town: Path, content: str) -> None:
     (town / MANIFEST).write_text(content, encoding="utf-8")
-    with pytest.raises(DatabaseError) as caught:
+    with refused(DatabaseError, MANIFEST, "damaged"):
         open_database(town)
-    assert_sentence(caught.value, MANIFEST, "damaged")
 
 
 def test_a_manifest_of_another_kind_is_named(town: Path) -> None:
     content = json.loads((town / MANIFEST).read_text(encoding="utf-8"))
     (town / MANIFEST).write_text(json.dumps({**content, "kind": "album"}), encoding="utf-8")
-    with pytest.raises(DatabaseError) as caught:
+    with refused(DatabaseError, MANIFEST, "another kind"):
         open_database(town)
-    assert_sentence(caught.value, MANIFEST, "another kind")
 
 
 def test_a_folder_without_a_manifest_is_not_a_database(tmp_path: Path) -> None:
     for opened in (open_database, open_dataset):
-        with pytest.raises(DatabaseError) as caught:
+        with refused(DatabaseError, str(tmp_path), "not a signature database in parts"):
             opened(tmp_path)
-        assert_sentence(caught.value, str(tmp_path), "not a signature database in parts")
 
 
 def test_a_digest_is_that_of_the_content(tmp_path: Path) -> None:

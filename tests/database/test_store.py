@@ -14,7 +14,7 @@ import geopandas as gpd
 import numpy as np
 import pytest
 import shapely
-from sentences import assert_sentence
+from sentences import refused
 from worlds import CORNER, assert_same, random_town, surroundings
 
 from semsig_gis.core.errors import CrsError, DatabaseError, InputError
@@ -104,31 +104,26 @@ def test_buildings_and_streets_are_kept_in_the_crs_of_the_objects(tmp_path: Path
     assert licenses == (*map(str, TOWN.licenses), "City (CC0): houses")
     assert again.streets["half_width"].tolist() == [7.5]
     bare = gpd.GeoDataFrame(geometry=[shapely.box(0, 0, 1, 1)])
-    with pytest.raises(CrsError) as caught:
+    with refused(CrsError, "no coordinate reference system"):
         ObjectStore.of(TOWN, footprints=bare)
-    assert_sentence(caught.value, "no coordinate reference system")
 
 
 def test_a_database_without_a_store_is_told(tmp_path: Path) -> None:
     path = tmp_path / "city.parquet"
-    with pytest.raises(DatabaseError) as nothing:
+    with refused(DatabaseError, "does not exist"):
         open_store(path)
-    assert_sentence(nothing.value, "does not exist")
-    with pytest.raises(DatabaseError) as folder:
+    with refused(DatabaseError, "is a folder"):
         open_store(tmp_path)
-    assert_sentence(folder.value, "is a folder")
     save_database(build_database(TOWN), path)
-    with pytest.raises(DatabaseError) as alone:
+    with refused(DatabaseError, "no object store", "city.objects", "build the database again"):
         open_store(path)
-    assert_sentence(alone.value, "no object store", "city.objects", "build the database again")
 
 
 def test_the_store_of_another_database_is_told(tmp_path: Path) -> None:
     path = saved(tmp_path)
     save_database(build_database(fewer(TOWN, 1)), path)
-    with pytest.raises(DatabaseError) as caught:
+    with refused(DatabaseError, "belongs to another database"):
         open_store(path)
-    assert_sentence(caught.value, "belongs to another database")
 
 
 def test_a_store_goes_where_its_database_goes(tmp_path: Path) -> None:
@@ -145,9 +140,8 @@ def test_a_store_may_lie_elsewhere(tmp_path: Path) -> None:
     path = saved(tmp_path)
     store_path(path).rename(tmp_path / "elsewhere")
     assert_fits(open_store(path, tmp_path / "elsewhere"), TOWN)
-    with pytest.raises(DatabaseError) as caught:
+    with refused(DatabaseError, "nowhere"):
         open_store(path, tmp_path / "nowhere")
-    assert_sentence(caught.value, "nowhere")
 
 
 def test_buildings_around_places() -> None:
@@ -162,9 +156,8 @@ def test_buildings_around_places() -> None:
 
 def test_no_database_may_be_called_as_a_store(tmp_path: Path) -> None:
     database = build_database(TOWN)
-    with pytest.raises(InputError) as caught:
+    with refused(InputError, "another ending"):
         save_with_store(database, ObjectStore.of(TOWN), tmp_path / "city.objects")
-    assert_sentence(caught.value, "another ending")
     assert list(tmp_path.iterdir()) == []
 
 
@@ -205,9 +198,8 @@ def test_other_damage_is_told(tmp_path: Path, name: str, how: str) -> None:
     )
     save_with_store(build_database(TOWN), store, path)
     damage(store_path(path) / name, how)
-    with pytest.raises(DatabaseError) as caught:
+    with refused(DatabaseError, name, "damaged", "build the database again"):
         open_store(path)
-    assert_sentence(caught.value, name, "damaged", "build the database again")
 
 
 @pytest.mark.parametrize(
@@ -218,13 +210,11 @@ def test_a_damaged_manifest_is_told(tmp_path: Path, content: str) -> None:
     path = saved(tmp_path)
     manifest = store_path(path) / "manifest.json"
     manifest.write_text(content)
-    with pytest.raises(DatabaseError) as caught:
+    with refused(DatabaseError, "manifest.json", "build the database again"):
         open_store(path)
-    assert_sentence(caught.value, "manifest.json", "build the database again")
     manifest.unlink()
-    with pytest.raises(DatabaseError) as missing:
+    with refused(DatabaseError, "manifest.json"):
         open_store(path)
-    assert_sentence(missing.value, "manifest.json")
 
 
 def rewritten(path: Path, **values: object) -> None:
@@ -235,13 +225,11 @@ def rewritten(path: Path, **values: object) -> None:
 def test_a_manifest_that_names_too_little_is_told(tmp_path: Path) -> None:
     path = saved(tmp_path)
     rewritten(path, format=99, version="9.9")
-    with pytest.raises(DatabaseError) as other:
+    with refused(DatabaseError, "another version of semsig (9.9)"):
         open_store(path)
-    assert_sentence(other.value, "another version of semsig (9.9)")
     rewritten(path, format=1, files={})
-    with pytest.raises(DatabaseError) as empty:
+    with refused(DatabaseError, "objects.parquet", "damaged"):
         open_store(path)
-    assert_sentence(empty.value, "objects.parquet", "damaged")
 
 
 def test_reading_changes_nothing(tmp_path: Path) -> None:
@@ -386,9 +374,8 @@ def test_a_full_disk_leaves_what_was_there(tmp_path: Path, monkeypatch: pytest.M
         raise OSError(28, "No space left on device")
 
     monkeypatch.setattr(store_module, "save_objects", full)
-    with pytest.raises(InputError) as caught:
+    with refused(InputError, "No space left on device", "make room"):
         save_with_store(build_database(fewer(TOWN, 7)), ObjectStore.of(fewer(TOWN, 7)), path)
-    assert_sentence(caught.value, "No space left on device", "make room")
     assert_fits(open_store(path), TOWN)
     assert_same(open_database(path), build_database(TOWN))
     assert len(list(tmp_path.iterdir())) == 2

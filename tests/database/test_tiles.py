@@ -10,7 +10,7 @@ import pytest
 import shapely
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
-from sentences import assert_sentence
+from sentences import refused
 from worlds import CODES, CORNER, TAXONOMY, World, assert_same, random_town, worlds
 
 from semsig_gis.core.errors import EmptyResultError, InputError
@@ -58,9 +58,8 @@ def test_a_tile_is_so_many_whole_cells() -> None:
 
 @pytest.mark.parametrize("side", [0.0, -5.0, float("nan"), float("inf")])
 def test_a_side_that_is_no_length_is_refused(side: float) -> None:
-    with pytest.raises(InputError) as caught:
+    with refused(InputError, "side of a tile", "above 0"):
         TileSpec(side)
-    assert_sentence(caught.value, "side of a tile", "above 0")
 
 
 # --- Which tiles ------------------------------------------------------------------------------
@@ -99,13 +98,11 @@ def test_tiles_that_are_too_small_or_too_many_are_refused(
 ) -> None:
     path = tmp_path / "objects.parquet"
     save_objects(random_town().street_objects, path)
-    with pytest.raises(InputError) as caught:
+    with refused(InputError, "tile of 1 m", "range of 30 m", "at least 1.875 m"):
         touched_tiles(path, grid=GridSpec(step=1.0), side=1, reach=30.0)
-    assert_sentence(caught.value, "tile of 1 m", "range of 30 m", "at least 1.875 m")
     monkeypatch.setattr("semsig_gis.database.tiles.MOST_TILES", 3)
-    with pytest.raises(InputError) as caught:
+    with refused(InputError, "tiles of 20 m", "more than 3"):
         touched_tiles(path, grid=GridSpec(), side=2, reach=30.0)
-    assert_sentence(caught.value, "tiles of 20 m", "more than 3")
 
 
 # --- The same as in one piece -----------------------------------------------------------------
@@ -119,9 +116,8 @@ def test_tiles_are_the_same_as_the_whole(world: World, side: float) -> None:
         try:
             whole = world.database
         except EmptyResultError:
-            with pytest.raises(EmptyResultError) as caught:
+            with refused(EmptyResultError, "no cell sees", "range", "larger"):
                 tiled(world, side, Path(folder))
-            assert_sentence(caught.value, "no cell sees", "range", "larger")
             return
         assert_same(tiled(world, side, Path(folder)), whole)
 
