@@ -20,16 +20,13 @@ from sentences import assert_sentence
 from semsig_gis.core.errors import CatalogError, SourceError
 from semsig_gis.objects.draft import (
     Column,
-    Keywords,
-    Match,
     columns_of,
     guess_class,
     guess_class_by,
     guess_position,
-    keywords,
     suggest_catalog,
-    words_of,
 )
+from semsig_gis.objects.keywords import Keywords, Match, keywords, words_of
 from semsig_gis.sources import reader
 from semsig_gis.sources.catalog import catalog_names, load_catalog, paper_taxonomy
 from semsig_gis.sources.vector.reader import LayerInfo

@@ -223,6 +223,46 @@ def test_a_layer_is_found_by_name(town: Callable[..., Path]) -> None:
     assert_sentence(caught.value, "'town'", "'tree'", "the nearest is 'trees'", "trees, posts")
 
 
+TITLE = 'title = "Town open data"'
+POSTS = 'name = "posts"'
+REST = TOWN[TOWN.index("[[classes]]") :]
+# Lines below the title that are mistakes.
+TOP_MISTAKES = {
+    "conflate = { street_light = 0 }": ["conflate", "street_light = 0", "metres above 0"],
+    "conflate = { street_light = 101 }": ["conflate", "street_light = 101", "up to 100"],
+    "ranges = { bus_stop = 0 }": ["ranges", "bus_stop = 0", "metres above 0 and up to 6000"],
+    "ranges = { bus_stop = nan }": ["ranges", "bus_stop = nan", "metres above 0"],
+    "ranges = { bus_stop = true }": ["ranges", "bus_stop = True", "metres above 0"],
+    'ranges = { bus_stop = "50 m" }': ["ranges", "bus_stop = '50 m'", "metres above 0"],
+    "ranges = { bus_shelter = 50 }": ["ranges", "'bus_shelter'"],
+    "ranges = 50": ["ranges = 50", "write a table"],
+    "conflate = { street_lamp = 5 }": ["conflate", "'street_lamp'", "'street_light'"],
+}
+# Lines of the layer "posts".
+LAYER_MISTAKES = {
+    'role = "buildings"': ["no class"],
+    'role = "building"': ["'buildings'"],
+    'elements = ["nodes"]': ["'node'"],
+    'tags = ["tree"]': ["the tags 'tree'"],
+    "tags = [{ lamps = 2 }]": ["tag 'lamps'", "list of texts"],
+    "optional = 1": ["true or false"],
+    'width_field = "W"': ["'posts'", "width_field", "only streets"],
+}
+# Lines of that layer where it is one of streets.
+STREET_MISTAKES = {
+    'width_by = { field = "F", values = { A = 0 } }': [
+        "'posts', width_by, values",
+        "'A' = 0",
+        "metres above 0 and up to 200",
+    ],
+    'width_by = { field = "F", values = {}, default = "wide" }': [
+        "'posts', width_by",
+        "default = 'wide'",
+        "metres above 0",
+    ],
+    "width_by = { values = { A = 5 } }": ["'posts', width_by", "lacks the key 'field'"],
+}
+# Texts, what they are replaced by, and words of the sentence.
 MISTAKES = {
     "misspelt key": ('title = "Town', 'titel = "Town', ["'titel'", "the nearest is 'title'"]),
     "misspelt table": ("[[classes]]", "[[clases]]", ["'clases'", "the nearest is 'classes'"]),
@@ -238,16 +278,16 @@ MISTAKES = {
     "no name": ('name = "town"', "", ["lacks the key 'name'"]),
     "no title": ('title = "Town open data"', "", ["lacks the key 'title'"]),
     "no layers": (TOWN[TOWN.index("[[layers]]") :], "", ["lacks the key 'layers'"]),
-    "empty layers": (TOWN[TOWN.index("[[classes]]") :], "layers = []", ["no layer", "[[layers]]"]),
-    "layers as text": (TOWN[TOWN.index("[[classes]]") :], 'layers = "a"', ["write a list"]),
-    "layer as text": (TOWN[TOWN.index("[[classes]]") :], 'layers = ["a"]', ["the layer 'a'"]),
+    "empty layers": (REST, "layers = []", ["no layer", "[[layers]]"]),
+    "layers as text": (REST, 'layers = "a"', ["write a list"]),
+    "layer as text": (REST, 'layers = ["a"]', ["the layer 'a'"]),
     "layers as one table": (
-        TOWN[TOWN.index("[[classes]]") :],
+        REST,
         '[layers]\nname = "a"',
         ["layers = {'name': 'a'}", "write a list"],
     ),
     "class as text": (
-        TOWN[TOWN.index("[[classes]]") :],
+        REST,
         'classes = ["a"]\nlayers = []',
         ["class 1 is 'a'", "[[classes]]"],
     ),
@@ -261,60 +301,10 @@ MISTAKES = {
         "",
         ["'posts', class_by", "lacks the key 'values'"],
     ),
-    "class for buildings": ('name = "posts"', 'name = "posts"\nrole = "buildings"', ["no class"]),
-    "unknown role": ('name = "posts"', 'name = "posts"\nrole = "building"', ["'buildings'"]),
-    "unknown element": ('name = "posts"', 'name = "posts"\nelements = ["nodes"]', ["'node'"]),
-    "tags as text": ('name = "posts"', 'name = "posts"\ntags = ["tree"]', ["the tags 'tree'"]),
-    "tag with a number": (
-        'name = "posts"',
-        'name = "posts"\ntags = [{ lamps = 2 }]',
-        ["tag 'lamps'", "list of texts"],
-    ),
     "unique ids without a field": (
         'id_field = "ID"',
         "unique_id = true",
         ["unique_id", "id_field"],
-    ),
-    "number for true": ('name = "posts"', 'name = "posts"\noptional = 1', ["true or false"]),
-    "radius of nothing": (
-        'title = "Town open data"',
-        'title = "T"\nconflate = { street_light = 0 }',
-        ["conflate", "street_light = 0", "metres above 0"],
-    ),
-    "radius of a street": (
-        'title = "Town open data"',
-        'title = "T"\nconflate = { street_light = 101 }',
-        ["conflate", "street_light = 101", "up to 100"],
-    ),
-    "range of nothing": (
-        'title = "Town open data"',
-        'title = "T"\nranges = { bus_stop = 0 }',
-        ["ranges", "bus_stop = 0", "metres above 0 and up to 6000"],
-    ),
-    "range of nobody": (
-        'title = "Town open data"',
-        'title = "T"\nranges = { bus_stop = nan }',
-        ["ranges", "bus_stop = nan", "metres above 0"],
-    ),
-    "range of true": (
-        'title = "Town open data"',
-        'title = "T"\nranges = { bus_stop = true }',
-        ["ranges", "bus_stop = True", "metres above 0"],
-    ),
-    "range as text": (
-        'title = "Town open data"',
-        'title = "T"\nranges = { bus_stop = "50 m" }',
-        ["ranges", "bus_stop = '50 m'", "metres above 0"],
-    ),
-    "range of an unknown class": (
-        'title = "Town open data"',
-        'title = "T"\nranges = { bus_shelter = 50 }',
-        ["ranges", "'bus_shelter'"],
-    ),
-    "ranges as a number": (
-        'title = "Town open data"',
-        'title = "T"\nranges = 50',
-        ["ranges = 50", "write a table"],
     ),
     "range of an own class": (
         'title = "Kiosk"',
@@ -325,34 +315,6 @@ MISTAKES = {
         'attribution = "Town of Ville-Élan"\nmetric_crs = "EPSG:2154"\n\n[[classes]]',
         "ranges = { kiosk = 60 }\n[[classes]]\nrange_m = 50",
         ["a range_m of 'kiosk'", "one in ranges", "remove one"],
-    ),
-    "widths of lamps": (
-        'name = "posts"',
-        'name = "posts"\nwidth_field = "W"',
-        ["'posts'", "width_field", "only streets"],
-    ),
-    "width of nothing": (
-        'name = "posts"\nclass = "street_light"',
-        'name = "posts"\nrole = "streets"\nwidth_by = { field = "F", values = { A = 0 } }',
-        ["'posts', width_by, values", "'A' = 0", "metres above 0 and up to 200"],
-    ),
-    "default width as text": (
-        'name = "posts"\nclass = "street_light"',
-        (
-            'name = "posts"\nrole = "streets"\n'
-            'width_by = { field = "F", values = {}, default = "wide" }'
-        ),
-        ["'posts', width_by", "default = 'wide'", "metres above 0"],
-    ),
-    "width_by without a field": (
-        'name = "posts"\nclass = "street_light"',
-        'name = "posts"\nrole = "streets"\nwidth_by = { values = { A = 5 } }',
-        ["'posts', width_by", "lacks the key 'field'"],
-    ),
-    "radius of an unknown class": (
-        'title = "Town open data"',
-        'title = "T"\nconflate = { street_lamp = 5 }',
-        ["conflate", "'street_lamp'", "'street_light'"],
     ),
     "unknown class": (
         '"street_light"',
@@ -421,6 +383,12 @@ MISTAKES = {
     ),
     "bad TOML": ("rows = [1, 10]", "rows = [1, 10", ["town.toml is not valid TOML", "line 2"]),
     "key given twice": ("rows = [1, 10]", 'rows = []\ncrs = "a"', ["not valid TOML"]),
+    **{line: (TITLE, f"{TITLE}\n{line}", words) for line, words in TOP_MISTAKES.items()},
+    **{line: (POSTS, f"{POSTS}\n{line}", words) for line, words in LAYER_MISTAKES.items()},
+    **{
+        line: (f'{POSTS}\nclass = "street_light"', f'{POSTS}\nrole = "streets"\n{line}', words)
+        for line, words in STREET_MISTAKES.items()
+    },
 }
 
 

@@ -108,30 +108,6 @@ def montpellier(geodata: Path) -> Callable[[str], Path]:
     return lambda name: geodata / "montpellier" / f"VilleMTP_MTP_{name}"
 
 
-@pytest.mark.parametrize(
-    ("name", "rows", "unique", "epsg"),
-    [
-        ("ArbresAlign", 23972, 23972, 2154),
-        ("EclairagePublic", 29969, 29743, 2154),
-        ("PassagesPiet", 3130, 3130, 2154),
-        ("Horodateurs_2011", 823, 701, 2154),
-        ("PlacesReserv", 309, 309, 2154),
-        ("PlacesGIG", 477, 477, 2154),
-        ("Defibrillateurs", 167, 167, 2154),
-        ("Fontaines", 48, 48, 4171),
-    ],
-)
-def test_published_layers(
-    montpellier: Callable[[str], Path], name: str, rows: int, unique: int, epsg: int
-) -> None:
-    layer = read_layer(montpellier(f"{name}.zip"), spec_of())
-    assert (layer.counts.read, len(layer.table)) == (rows, rows)
-    assert (layer.counts.filtered, layer.counts.unreadable, layer.notes) == (0, 0, ())
-    assert list(layer.table.columns) == ["class_name", "source_id", "geometry"]
-    assert layer.table.crs == CRS.from_epsg(epsg)
-    assert len(np.unique(np.round(xy(layer), 6 if epsg == 4171 else 2), axis=0)) == unique
-
-
 def test_published_coordinates_are_not_touched(montpellier: Callable[[str], Path]) -> None:
     path = montpellier("Horodateurs_2011.zip")
     with zipfile.ZipFile(path) as archive:
@@ -139,21 +115,6 @@ def test_published_coordinates_are_not_touched(montpellier: Callable[[str], Path
     # Of a point shapefile: a header of 100 bytes, then 8 + 20 bytes a record, x and y at the end.
     stored = [struct.unpack_from("<2d", shp, 100 + 28 * n + 12) for n in range(823)]
     assert xy(read_layer(path, spec_of())) == [list(pair) for pair in stored]
-
-
-def test_published_fountains_in_service(montpellier: Callable[[str], Path]) -> None:
-    path = montpellier("FontainesPublic.zip")
-    spec = spec_of(where=(("ETAT", ("en fonction",)),), id_field="ID")
-    layer = read_layer(path, spec)
-    assert (layer.counts.read, layer.counts.filtered, len(layer.table)) == (89, 25, 64)
-    assert layer.table["source_id"].iloc[0] == "1"
-    assert len(read_layer(path, spec, filters=False).table) == 89
-
-
-def test_published_bays_have_classes_by_field(montpellier: Callable[[str], Path]) -> None:
-    spec = spec_of(class_by=ClassBy("F01_TYPE_D", (("Taxi", "taxi_station"),)))
-    classes = read_layer(montpellier("PlacesReserv.zip"), spec).table["class_name"]
-    assert classes.value_counts().to_dict() == {"bench": 303, "taxi_station": 6}
 
 
 def test_published_polygons_and_lines_are_kept_as_they_are(
@@ -193,13 +154,6 @@ def test_published_crs_goes_before_what_is_expected(montpellier: Callable[[str],
     assert layer.notes == (
         "the file is in EPSG:4171, not in EPSG:2154 as stated; the file's CRS is used",
     )
-
-
-def test_published_layers_are_listed(montpellier: Callable[[str], Path]) -> None:
-    (layer,) = list_layers(montpellier("EclairagePublic.zip"))
-    assert (layer.name, layer.geometry) == ("VilleMTP_MTP_EclairagePublic", "Point")
-    assert (layer.crs, layer.rows) == ("EPSG:2154", 29969)
-    assert layer.fields == (("type_lante", "str:50"),)
 
 
 def test_published_paris_geopackage_and_csv(geodata: Path) -> None:
