@@ -7,6 +7,7 @@ import subprocess
 import sys
 import tempfile
 from collections import deque
+from concurrent.futures import ThreadPoolExecutor
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -35,6 +36,7 @@ _NOISE = named_noise("generic")
 _PEER = "rapidfuzz.process.cdist([query], cells), edit distance of types"
 _FASTER = 20.0
 _THREADS = 2
+_HELD = 20  # scores of so many queries are held at once
 _IMPORTS = "import numba, numpy, pandas, geopandas, pyarrow.parquet, typer, rich"
 _MOST_COLD_MS, _MOST_HELP_MS = 2500.0, 500.0
 
@@ -73,7 +75,9 @@ def likelihood_rows(
         index = open_index(database, _NOISE, City(city).index_path(_NOISE))
 
         def batch(threads: int, _: int) -> None:
-            deque(index.scores_of(queries, threads=threads), maxlen=0)
+            with ThreadPoolExecutor(threads) as pool:
+                for low in range(0, len(queries), _HELD):
+                    deque(pool.map(index.scores, queries[low : low + _HELD]), maxlen=0)
 
         yield compare(
             f"{len(queries):,} likelihood queries, {cells}",

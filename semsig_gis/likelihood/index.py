@@ -16,7 +16,6 @@ import hashlib
 import json
 import math
 import zlib
-from collections import deque
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
@@ -31,8 +30,7 @@ from semsig_gis.likelihood.noise.table import database_tables, mean_table
 from semsig_gis.storage.whole import whole_file
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Iterator
-    from concurrent.futures import Future
+    from collections.abc import Callable
 
     from numpy.typing import NDArray
 
@@ -149,45 +147,6 @@ class LikelihoodIndex:
         if north_sigma == 0:
             return CellScores(loglik=self._as_seen(rows, bins, base))
         return self._turned(rows, bins, base, north_sigma)
-
-    def scores_of(
-        self, queries: Iterable[Signature], *, north_sigma: float = 0.0, threads: int = 1
-    ) -> Iterator[CellScores]:
-        """Give the log-likelihood of many queries in every cell, one query after the other.
-
-        Parameters
-        ----------
-        queries : iterable of Signature
-            Queries as `scores` takes them.
-        north_sigma : float, default 0
-            Standard deviation in degrees of the north of each query.
-        threads : int, default 1
-            How many queries are worked on at once.
-
-        Yields
-        ------
-        CellScores
-            What `scores` returns for each query, in their order. Few are held at once, whatever
-            the number of queries.
-
-        Raises
-        ------
-        InputError
-            As `scores`, when the query has its turn, or if `threads` is below 1.
-        """
-        # One query after the other: to go over the cells once for many queries gains nothing, as
-        # adding takes longer than fetching.
-        if threads < 1:
-            msg = f"{threads} threads were asked for; give a whole number from 1."
-            raise InputError(msg)
-        with ThreadPoolExecutor(threads) as pool:
-            ahead: deque[Future[CellScores]] = deque()
-            for query in queries:
-                ahead.append(pool.submit(self.scores, query, north_sigma=north_sigma))
-                if len(ahead) > threads:
-                    yield ahead.popleft().result()
-            while ahead:
-                yield ahead.popleft().result()
 
     def _as_seen(
         self, rows: NDArray[np.int64], bins: NDArray[np.int64], base: float

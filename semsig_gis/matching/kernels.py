@@ -16,22 +16,11 @@ from semsig_gis.core.jit import compiled
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-
 _NONE, _ALL = np.uint64(0), np.uint64(0xFFFF_FFFF_FFFF_FFFF)
-
-
 _OCTET, _TOP = np.uint64(0xFF), np.uint64(7)
-
-
 _COPIES = np.uint64(0x0101_0101_0101_0101)  # times an octet: the octet in every byte
-
-
 _OWN_BITS = np.uint64(0x8040_2010_0804_0201)  # bit k of byte k
-
-
 _BELOW_TOP = np.uint64(0x7F7F_7F7F_7F7F_7F7F)
-
-
 _TOP_BITS = np.uint64(0x8080_8080_8080_8080)
 
 
@@ -69,7 +58,7 @@ def scan(  # noqa: PLR0917
     bounds: NDArray[np.int64],
     per_position: int,
     lengths: NDArray[np.int64],
-    wanted: NDArray[np.int64],
+    query_digits: NDArray[np.int64],
     ends: NDArray[np.int64],
     normalized: bool,  # noqa: FBT001
     result: NDArray[np.float32],
@@ -79,9 +68,9 @@ def scan(  # noqa: PLR0917
     """Fill `result`, shape (queries, d), with distances to the sequences of some blocks.
 
     They run from `low` to before `high`. `lengths` are those of the d sequences of the blocks that
-    `bounds` lists; `wanted`, shape (entries, 2), holds the two planes of each value of the queries,
-    one query after the other, and query i begins at ``ends[i]``. `normalized` divides by the longer
-    length.
+    `bounds` lists; `query_digits`, shape (entries, 2), holds the two planes of each value of the
+    queries, one query after the other, and query i begins at ``ends[i]``. `normalized` divides by
+    the longer length.
     """
     stripe = planes.shape[1]
     longest = 0
@@ -99,7 +88,7 @@ def scan(  # noqa: PLR0917
         start = block * 64 * stripe
         own = lengths[start : start + 64 * stripe]
         for query in range(len(ends) - 1):
-            digits = wanted[ends[query] : ends[query + 1]]
+            digits = query_digits[ends[query] : ends[query + 1]]
             _step(
                 planes, bounds[block], bounds[block + 1], per_position, digits, plus, minus, spare
             )
@@ -205,14 +194,14 @@ def _spread(sums: NDArray[np.uint64], spread: NDArray[np.uint64], costs: NDArray
 
 @compiled  # pragma: no cover - coverage does not see machine code
 def count_steps(
-    first: NDArray[np.float32], counts: NDArray[np.int64], step: float, found: NDArray[np.int64]
+    first: NDArray[np.float32], counts: NDArray[np.int64], step: float, cells: NDArray[np.int64]
 ) -> None:
-    """Add to ``found[i]`` the number of cells whose score is i steps.
+    """Add to ``cells[i]`` the number of cells whose score is i steps.
 
     `first` holds the scores, whole steps, of d distinct sequences and `counts` their cells.
     """
     for place in range(len(first)):
-        found[int(np.rint(first[place] / step))] += counts[place]
+        cells[int(np.rint(first[place] / step))] += counts[place]
 
 
 @compiled  # pragma: no cover - coverage does not see machine code

@@ -46,9 +46,9 @@ def best_cells(scores: NDArray[np.float32], count: int) -> NDArray[np.intp]:
     else:
         least = scores[: blocks * BLOCK].reshape(BLOCK, blocks).min(axis=0)
         enough = np.partition(least, count - 1)[count - 1]
-        chosen = np.flatnonzero(least <= enough)
-        if FEW * len(chosen) < blocks:
-            inside = (chosen + np.arange(BLOCK)[:, None] * blocks).ravel()
+        best = np.flatnonzero(least <= enough)
+        if FEW * len(best) < blocks:
+            inside = (best + np.arange(BLOCK)[:, None] * blocks).ravel()
             some = np.concatenate([inside, np.arange(blocks * BLOCK, len(scores))])
             some = some[scores[some] <= enough]
         else:

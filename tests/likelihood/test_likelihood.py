@@ -318,34 +318,3 @@ def test_promising_cells_hold_the_best(scores: list[float], count: int) -> None:
     left = np.delete(array, found)
     if len(left):
         assert np.sort(array[found])[::-1][wanted - 1] > left.max()
-
-
-@settings(max_examples=20)
-@given(SEEDS, st.integers(0, 9), st.sampled_from([0.0, 10.0, math.inf]), st.integers(1, 3))
-def test_many_queries_at_once_are_one_after_the_other(
-    seed: int, count: int, north_sigma: float, threads: int
-) -> None:
-    database = random_database(seed, cells=70)
-    index = build_index(database, named_noise("generic"))
-    whole = [random_query(database, seed + place, size=1 + place) for place in range(count)]
-    bearings_alone = [Signature(None, one.bearings) for one in whole[:2]]
-    queries = [*whole, *bearings_alone, *(Signature(one.codes, None) for one in whole[:2])]
-    together = list(index.scores_of(queries, north_sigma=north_sigma, threads=threads))
-    for query, scores in zip(queries, together, strict=True):
-        alone = index.scores(query, north_sigma=north_sigma)
-        assert np.array_equal(scores.loglik, alone.loglik)
-        assert (scores.heading is None) == (alone.heading is None)
-        if scores.heading is not None and alone.heading is not None:
-            assert np.array_equal(scores.heading, alone.heading)
-
-
-def test_many_queries_with_a_bad_one_among_them() -> None:
-    database = random_database(1)
-    index = build_index(database, named_noise("generic"))
-    nothing = Signature(np.empty(0, np.uint8), np.empty(0))
-    answers = index.scores_of([database.signature(0), nothing])
-    assert np.array_equal(next(answers).loglik, index.scores(database.signature(0)).loglik)
-    with pytest.raises(InputError, match="has no objects"):
-        next(answers)
-    with pytest.raises(InputError, match="0 threads were asked for"):
-        list(index.scores_of([], threads=0))

@@ -1,7 +1,7 @@
 """Pick a measure: how far a query's sequence is from every distinct sequence of a database.
 
 Each measure is a module with one function ``distances(queries, table, *, normalized, only)``.
-A new one is added to `METRICS`; the laws in ``tests/metrics/test_metrics.py`` then hold it too.
+A new one is added to `METRICS`; the laws in ``tests/matching/test_metrics.py`` then hold it too.
 """
 
 from __future__ import annotations
@@ -50,8 +50,8 @@ class Metric:
 
 METRICS: Mapping[str, Metric] = MappingProxyType(
     {
-        known.name: known
-        for known in (
+        measure.name: measure
+        for measure in (
             Metric("jaccard", "Jaccard distance", jaccard.distances),
             Metric("histogram", "histogram distance", histogram.distances),
             Metric("edit", "edit distance", edit.distances),

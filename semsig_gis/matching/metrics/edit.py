@@ -1,7 +1,7 @@
 """Weighted edit distance (Levenshtein) between sequences; the home of RapidFuzz.
 
-Unit weights have a kernel of their own, `matching.metrics.edit`, about fifty times as fast a value
-as RapidFuzz on one query. Both give the same distances.
+Unit weights have a kernel of their own, about fifty times as fast a value as RapidFuzz on one
+query. Both give the same distances.
 """
 
 from __future__ import annotations
@@ -21,21 +21,22 @@ from semsig_gis.database.sequences import checked_sequence
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
-    from types import ModuleType
 
     from numpy.typing import NDArray
 
     from semsig_gis.database.sequences import SequenceTable
 
-
 STRIPE = 64  # words in a plane: enough work for a loop, little enough for the nearest cache
-
-
 BLOCK = 64 * STRIPE
 """Sequences in a block."""
-
-
 _VALUES = 256
+
+_LARGEST_WEIGHT = 100  # costs of any real signature stay exact in float32
+# Loading the compiled kernel takes as long as RapidFuzz takes for this many values (0.7 s).
+_LOADING = 100_000_000
+# A table with as many values, asked again, is likely to be asked often.
+_LARGE = 50_000
+_FEWER = 50  # times: RapidFuzz on so many fewer sequences is as fast as the kernel on all
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,6 +72,8 @@ class BitPlanes:
         Any order gives the same distances, but sequences ordered by length waste no memory and no
         time.
         """
+        from semsig_gis.matching.kernels import pack  # noqa: PLC0415 - loads a compiler
+
         present = np.flatnonzero(np.bincount(values, minlength=_VALUES))
         # At least two, so that two digits of one kind make the value that no sequence has.
         first = max(2, int(np.ceil(np.sqrt(len(present)))))
@@ -83,7 +86,7 @@ class BitPlanes:
         longest = np.maximum.reduceat(lengths, starts) if len(lengths) else lengths
         bounds = np.concatenate([[0], np.cumsum(longest * (1 + first + second))])
         planes = np.zeros((bounds[-1], STRIPE), np.uint64)
-        _kernels().pack(values, offsets, digits, bounds, 1 + first + second, planes)
+        pack(values, offsets, digits, bounds, 1 + first + second, planes)
         for array in (planes, bounds, digits):
             array.setflags(write=False)
         return cls(planes, bounds, digits, lengths)
@@ -101,21 +104,23 @@ class BitPlanes:
         `normalized` divides by the longer of the two lengths, and a `wildcard` in a query equals
         every value.
         """
+        from semsig_gis.matching.kernels import scan  # noqa: PLC0415 - loads a compiler
+
         digits = self.digits
         if wildcard is not None:
             digits = digits.copy()
             digits[wildcard] = 0
         ends = np.cumsum([0, *map(len, queries)])
-        wanted = digits[np.concatenate([*queries, np.empty(0, np.uint8)])]
+        query_digits = digits[np.concatenate([*queries, np.empty(0, np.uint8)])]
         result = np.empty((len(queries), len(self.lengths)), np.float32)
         per_position = int(self.digits.max()) + 1
-        scan = partial(
-            _kernels().scan,
+        scan_blocks = partial(
+            scan,
             self.planes,
             self.bounds,
             per_position,
             self.lengths,
-            wanted,
+            query_digits,
             ends,
             normalized,
             result,
@@ -123,35 +128,14 @@ class BitPlanes:
         cuts = np.linspace(0, len(self.bounds) - 1, max(1, threads) + 1).astype(np.int64).tolist()
         if threads > 1:
             with ThreadPoolExecutor(threads) as pool:
-                list(pool.map(scan, cuts[:-1], cuts[1:]))
+                list(pool.map(scan_blocks, cuts[:-1], cuts[1:]))
         else:
-            scan(*cuts)
+            scan_blocks(*cuts)
         return result
 
 
-def _kernels() -> ModuleType:
-    """Load the compiled loops, which takes about half a second, when they are first needed."""
-    from semsig_gis.matching import kernels as _bit_kernels  # noqa: PLC0415
-
-    return _bit_kernels
-
-
-_LARGEST_WEIGHT = 100  # costs of any real signature stay exact in float32
-
-
-# Loading the compiled kernel takes as long as RapidFuzz takes for this many values (0.7 s).
-_LOADING = 100_000_000
-
-
-# A table with as many values, asked again, is likely to be asked often.
-_LARGE = 50_000
-
-
-_FEWER = 50  # times: RapidFuzz on so many fewer sequences is as fast as the kernel on all
-
-
 _planes: WeakKeyDictionary[SequenceTable, BitPlanes] = WeakKeyDictionary()
-_asked: WeakSet[SequenceTable] = WeakSet()
+_tables_seen: WeakSet[SequenceTable] = WeakSet()
 
 
 @dataclass(frozen=True, slots=True)
@@ -216,7 +200,9 @@ def distances(
     if wildcard is not None or (
         costs == EditWeights() and not few and _pays(len(sequences), table)
     ):
-        everything = bit_planes(table).edit_distances(
+        if table not in _planes:
+            _planes[table] = BitPlanes.build(table.values, table.offsets)
+        everything = _planes[table].edit_distances(
             sequences, normalized=normalized, wildcard=wildcard, threads=threads
         )
         return everything if only is None else everything[:, only]
@@ -232,17 +218,9 @@ def distances(
     return result
 
 
-def bit_planes(table: SequenceTable) -> BitPlanes:
-    """Return the sequences in the form that edit distances are measured fastest in, made once."""
-    planes = _planes.get(table)
-    if planes is None:
-        planes = _planes[table] = BitPlanes.build(table.values, table.offsets)
-    return planes
-
-
 def _pays(queries: int, table: SequenceTable) -> bool:
     """Tell whether to load the kernel; one query of a short-lived process is not worth it."""
-    again = table in _asked
-    _asked.add(table)
+    again = table in _tables_seen
+    _tables_seen.add(table)
     values = len(table.values)
     return queries * values >= _LOADING or (again and values >= _LARGE)

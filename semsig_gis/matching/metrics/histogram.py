@@ -37,7 +37,7 @@ def distances(
     histogram = table.histogram if only is None else table.histogram[only]
     result = np.empty((len(queries), len(histogram)), np.float32)
     most = int(histogram.max(initial=0))
-    found = np.arange(most + 1)
+    numbers = np.arange(most + 1)
     for row, query in zip(result, queries, strict=True):
         values, counts = np.unique(checked_sequence(query), return_counts=True)
         total = np.zeros(len(histogram))
@@ -45,7 +45,7 @@ def distances(
         for value, count in zip(values.tolist(), counts.tolist(), strict=True):
             if value < histogram.shape[1]:
                 # There are few different counts, and so few quotients.
-                quotients = np.minimum(found, count) / np.maximum(found, count)
+                quotients = np.minimum(numbers, count) / np.maximum(numbers, count)
                 add_quotients(histogram[:, value], quotients, total)
         if normalized:
             _, either = table.overlap(query, only=only)
