@@ -6,7 +6,7 @@ import math
 import textwrap
 from collections import Counter
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from matplotlib.collections import LineCollection
@@ -15,7 +15,6 @@ from matplotlib.patches import Circle
 from matplotlib.path import Path
 from pyproj import Transformer
 
-from semsig_gis.core.grid import cell_ids
 from semsig_gis.core.signs import ClassSign, class_signs
 from semsig_gis.core.text import one_line
 from semsig_gis.queries.sight import Sight
@@ -54,14 +53,7 @@ def cell_scene(database: SignatureDatabase, cell: int, *, title: str = "") -> Sc
 
     Examples
     --------
-    >>> from semsig_gis.database.build import build_database
-    >>> from semsig_gis.sources.catalog import paper_taxonomy
-    >>> from semsig_gis.objects.clean import build_objects
-    >>> from semsig_gis.sources.synthetic.city import CitySpec, synthetic_city
-    >>> layers = synthetic_city(CitySpec(size=300.0))
-    >>> objects, _ = build_objects(layers, taxonomy=paper_taxonomy(), crs="EPSG:32631")
-    >>> database = build_database(objects)
-    >>> cell_scene(database, 0, title="A corner").types == database.types(0)
+    >>> cell_scene(demo_database, 0, title="A corner").types == demo_database.types(0)
     True
     """
     x, y = database.xy[cell].tolist()
@@ -75,8 +67,8 @@ def cell_scene(database: SignatureDatabase, cell: int, *, title: str = "") -> Sc
         lat=lat,
         radius=database.spec.radius,
         types=database.types(cell),
-        objects=_drawn(own),
-        others=_drawn(_seen_around(database, cell, own)),
+        objects=own,
+        others=_seen_around(database, cell, own),
     )
 
 
@@ -89,10 +81,10 @@ def example_scenes(
     are those that the cells around it see.
     """
     queries = evaluation.queries
-    chosen = queries[(evaluation.successful == successful) & (queries["cell"] >= 0)].head(count)
+    examples = queries[(evaluation.successful == successful) & (queries["cell"] >= 0)].head(count)
     kind = "found" if successful else "lost"
     scenes = []
-    for place, row in enumerate(chosen.to_dict("records"), start=1):
+    for place, row in enumerate(examples.to_dict("records"), start=1):
         cell = int(row["cell"])
         x, y = database.xy[cell].tolist()
         aside = (float(row["best_x"]) - x, float(row["best_y"]) - y)
@@ -108,49 +100,33 @@ def example_scenes(
     return tuple(scenes)
 
 
-class _Seen(NamedTuple):
-    """A class code, and metres east and north."""
-
-    code: int
-    east: float
-    north: float
-
-
-def _drawn(seen: list[_Seen]) -> tuple[SceneObject, ...]:
-    return tuple(SceneObject(code=one.code, east=one.east, north=one.north) for one in seen)
-
-
-def _seen_from(database: SignatureDatabase, cell: int) -> list[_Seen]:
+def _seen_from(database: SignatureDatabase, cell: int) -> tuple[SceneObject, ...]:
     """Return what is seen from a cell, clockwise from north."""
     sight = Sight.of_cell(database, cell)
     turned = np.radians(sight.bearings)
     east, north = sight.distances * np.sin(turned), sight.distances * np.cos(turned)
     seen = zip(sight.codes.tolist(), east.tolist(), north.tolist(), strict=True)
-    return [_Seen(*one) for one in seen]
+    return tuple(SceneObject(code=code, east=x, north=y) for code, x, y in seen)
 
 
-def _seen_around(database: SignatureDatabase, cell: int, own: list[_Seen]) -> list[_Seen]:
+def _seen_around(
+    database: SignatureDatabase, cell: int, own: tuple[SceneObject, ...]
+) -> tuple[SceneObject, ...]:
     """Return what the cells around see, but not the cell itself, each thing once."""
-    grid = database.grid
-    reach = int(np.ceil(database.spec.radius / grid.step))
-    steps = np.arange(-reach, reach + 1)
-    columns, rows = (
-        one.ravel()
-        for one in np.meshgrid(database.columns[cell] + steps, database.rows[cell] + steps)
-    )
-    wanted = cell_ids(columns, rows)
-    there = np.flatnonzero(np.isin(database.cell_ids, wanted))
-    found: list[_Seen] = []
-    for other in there.tolist():
+    reach = int(np.ceil(database.spec.radius / database.grid.step))
+    columns, rows = database.columns, database.rows
+    near = (abs(columns - columns[cell]) <= reach) & (abs(rows - rows[cell]) <= reach)
+    others: list[SceneObject] = []
+    for other in np.flatnonzero(near).tolist():
         dx, dy = (database.xy[other] - database.xy[cell]).tolist()
         for one in _seen_from(database, other):
-            moved = _Seen(one.code, one.east + dx, one.north + dy)
-            if not any(_same(moved, known) for known in (*own, *found)):
-                found.append(moved)
-    return found
+            moved = SceneObject(code=one.code, east=one.east + dx, north=one.north + dy)
+            if not any(_same(moved, known) for known in (*own, *others)):
+                others.append(moved)
+    return tuple(others)
 
 
-def _same(one: _Seen, other: _Seen) -> bool:
+def _same(one: SceneObject, other: SceneObject) -> bool:
     apart = math.hypot(one.east - other.east, one.north - other.north)
     return one.code == other.code and apart <= SAME_M
 
@@ -218,10 +194,10 @@ def draw_scene(scene: Scene, taxonomy: Taxonomy) -> Picture:
     """
     signs = class_signs(taxonomy)
     titles = textwrap.wrap(label(scene.title, 2 * TITLE_LETTERS), TITLE_LETTERS)
-    told = _told(scene)
+    lines = _lines(scene)
     keys = _keys(scene, signs)
     above = LINE * len(titles) + 0.14
-    below = LINE * (len(told) + math.ceil(len(keys) / 2)) + 0.3
+    below = LINE * (len(lines) + math.ceil(len(keys) / 2)) + 0.3
     height = above + MAP + below
     with blank_figure(WIDTH, height) as figure:
         axes = figure.add_axes((MARGIN / WIDTH, below / height, MAP / WIDTH, MAP / height))
@@ -237,7 +213,7 @@ def draw_scene(scene: Scene, taxonomy: Taxonomy) -> Picture:
         figure.text(
             MARGIN / WIDTH,
             (below - 0.1) / height,
-            "\n".join(told),
+            "\n".join(lines),
             va="top",
             size=9,
             linespacing=1.3,
@@ -245,7 +221,7 @@ def draw_scene(scene: Scene, taxonomy: Taxonomy) -> Picture:
         draw_legend(
             figure,
             keys,
-            place=(MARGIN / WIDTH, (below - 0.2 - LINE * len(told)) / height, 1.0),
+            place=(MARGIN / WIDTH, (below - 0.2 - LINE * len(lines)) / height, 1.0),
             columns=2,
             size=8.5,
             sign_width=1,
@@ -410,7 +386,7 @@ def _round_length(longest: float) -> float:
     return next(float(power * step) for step in (5, 2, 1, 0.5) if power * step <= longest)
 
 
-def _told(scene: Scene) -> list[str]:
+def _lines(scene: Scene) -> list[str]:
     """Return the lines below the map."""
     types = label(scene.types, TYPE_LETTERS * TYPE_LINES)
     signature = textwrap.wrap(types, TYPE_LETTERS) or ["sees nothing"]
@@ -447,5 +423,5 @@ def _described(scene: Scene, signs: dict[int, ClassSign]) -> str:
     )
     types = f"Signature {scene.types}, seen" if scene.types else "Nothing is seen"
     place = f"from {scene.lon:.6f}, {scene.lat:.6f}"
-    told = (scene.title, f"{types} {place}{f': {counts}' if counts else ''}", _error(scene))
-    return " ".join(f"{part[:1].upper()}{part[1:]}." for part in told if part)
+    parts = (scene.title, f"{types} {place}{f': {counts}' if counts else ''}", _error(scene))
+    return " ".join(f"{part[:1].upper()}{part[1:]}." for part in parts if part)

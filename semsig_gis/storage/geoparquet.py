@@ -24,15 +24,11 @@ from semsig_gis.core.errors import DatabaseError
 from semsig_gis.storage.whole import reason, whole_file
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
+    from collections.abc import Iterable, Iterator, Sequence
 
     from numpy.typing import ArrayLike, NDArray
 
     Bounds = NDArray[np.float64]
-    from collections.abc import Iterable
-
-    from numpy.typing import NDArray
-
 
 BBOX = "bbox"
 SIDES = ("xmin", "ymin", "xmax", "ymax")
@@ -77,33 +73,29 @@ def groups_meeting(file: pq.ParquetFile, box: Sequence[float]) -> list[int]:
 
     Without a column of bounds, all of them may.
     """
-    return [
-        group
-        for group in range(file.num_row_groups)
-        if _may_meet(_extremes(file.metadata.row_group(group)), box)
-    ]
+    west, south, east, north = box
+    groups = []
+    for number in range(file.num_row_groups):
+        sides = _extremes(file.metadata.row_group(number))
+        if not sides.keys() >= set(SIDES) or (
+            sides["xmin"].min <= east
+            and sides["ymin"].min <= north
+            and sides["xmax"].max >= west
+            and sides["ymax"].max >= south
+        ):
+            groups.append(number)
+    return groups
 
 
 def _extremes(group: Any) -> dict[str, Any]:  # noqa: ANN401 - pyarrow has no types
     """Return the statistics of the bounds of a row group, by side."""
-    found = {}
+    extremes = {}
     for number in range(group.num_columns):
         name, _, side = group.column(number).path_in_schema.rpartition(".")
         statistics = group.column(number).statistics
         if name == BBOX and statistics is not None and statistics.has_min_max:
-            found[side] = statistics
-    return found
-
-
-def _may_meet(sides: dict[str, Any], box: Sequence[float]) -> bool:
-    if not sides.keys() >= set(SIDES):
-        return True
-    return bool(
-        sides["xmin"].min <= box[2]
-        and sides["ymin"].min <= box[3]
-        and sides["xmax"].max >= box[0]
-        and sides["ymax"].max >= box[1]
-    )
+            extremes[side] = statistics
+    return extremes
 
 
 def rows_meeting(table: pa.Table, box: Sequence[float]) -> pa.Table:
