@@ -1,4 +1,4 @@
-"""Random databases, queries and noise models for the tests of the likelihood method."""
+"""Databases of given or random cells, and random queries and noise models."""
 
 from __future__ import annotations
 
@@ -15,6 +15,8 @@ from semsig_gis.likelihood.noise.model import NoiseMixture, NoiseSpec, named_noi
 from semsig_gis.sources.catalog import paper_taxonomy
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from semsig_gis.likelihood.noise.model import Noise
 
 TAXONOMY = paper_taxonomy()
@@ -43,6 +45,27 @@ def random_database(
         spec=SignatureSpec(),
         taxonomy=TAXONOMY,
         crs=CRS("EPSG:2154"),
+    )
+
+
+def database_of(
+    signatures: Sequence[tuple[str, Sequence[float]]], *, height: int = 1
+) -> SignatureDatabase:
+    """Return cells with these types and bearings, in columns of so many cells."""
+    bearings = np.array([angle for _, angles in signatures for angle in angles], dtype=float)
+    columns, rows = np.divmod(np.arange(len(signatures), dtype=np.int32), np.int32(height))
+    return SignatureDatabase(
+        columns=columns,
+        rows=rows,
+        offsets=np.cumsum([0, *(len(types) for types, _ in signatures)]),
+        codes=TAXONOMY.encode("".join(types for types, _ in signatures)),
+        bearing_units=np.floor(bearings * (BEARING_UNITS / 360)).astype(np.uint16),
+        distance_units=np.full(len(bearings), 100, np.uint8),
+        grid=GridSpec(step=10.0, origin=(765200.3, 6275000.1)),
+        spec=SignatureSpec(),
+        taxonomy=TAXONOMY,
+        crs=CRS("EPSG:2154"),
+        licenses=("trees: the city (CC0)",),
     )
 
 

@@ -121,6 +121,9 @@ def test_a_query_from_the_middle_of_a_cell(city: Path, run: Run) -> None:
     sure, likely = (
         json.loads(run(*query, *more)[1])["candidates"][0] for more in (("--on-grid",), ())
     )
+    explained = json.loads(run(*query, "--on-grid", "--explain")[1])
+    assert explained["candidates"][0].pop("explanation")["counts"]["missed"] == 0
+    assert explained["candidates"][0] == sure
     assert sure["cell_id"] == likely["cell_id"] == CITY.cell_ids[cell]
     assert sure["chance"] > likely["chance"]
 

@@ -10,13 +10,10 @@ import numpy as np
 import pandas as pd
 import pytest
 from geopandas.testing import assert_geodataframe_equal
+from noisy_cells import database_of
 from pandas.testing import assert_frame_equal
-from pyproj import CRS
 
 from semsig_gis.core.errors import DatabaseError, InputError, UnknownNameError
-from semsig_gis.core.grid import GridSpec
-from semsig_gis.core.signature import SignatureSpec
-from semsig_gis.database.database import SignatureDatabase
 from semsig_gis.evaluation.evaluate import evaluate
 from semsig_gis.evaluation.result import Evaluation
 from semsig_gis.likelihood.noise.model import NoiseSpec
@@ -27,44 +24,25 @@ from semsig_gis.matching.ties import NEAR_PLACES, THRESHOLDS
 from semsig_gis.queries.distortions import Detector
 from semsig_gis.queries.draw import QuerySpec
 from semsig_gis.queries.paper_errors import DISTORTIONS, Distortion
-from semsig_gis.sources.catalog import paper_taxonomy
 from semsig_gis.storage.geoparquet import read_geoparquet, write_geoparquet
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
     from pathlib import Path
 
+    from semsig_gis.database.database import SignatureDatabase
+
 ALL_MISSED = Distortion(occurrences=1, bearing_sigma=0.0)
-
-
-def database(signatures: Sequence[tuple[str, Sequence[float]]], width: int) -> SignatureDatabase:
-    """Return cells in columns of `width`, with the given types and bearings."""
-    n = len(signatures)
-    types = "".join(symbols for symbols, _ in signatures)
-    bearings = np.array([angle for _, angles in signatures for angle in angles], dtype=float)
-    return SignatureDatabase(
-        columns=(np.arange(n) // width).astype(np.int32),
-        rows=(np.arange(n) % width).astype(np.int32),
-        offsets=np.cumsum([0, *(len(symbols) for symbols, _ in signatures)]),
-        codes=paper_taxonomy().encode(types),
-        bearing_units=np.floor(bearings * 20).astype(np.uint16),
-        distance_units=np.full(len(types), 100, np.uint8),
-        grid=GridSpec(step=10.0, origin=(765200.3, 6275000.1)),
-        spec=SignatureSpec(),
-        taxonomy=paper_taxonomy(),
-        crs=CRS(2154),
-    )
 
 
 def random_city(cells: int = 120, longest: int = 9) -> SignatureDatabase:
     rng = np.random.default_rng(8)
     lengths = rng.integers(1, longest + 1, cells)
-    return database(
+    return database_of(
         [
             ("".join(rng.choice(list("DDBL"), length)), sorted(rng.uniform(0, 360, length)))
             for length in lengths
         ],
-        width=10,
+        height=10,
     )
 
 
@@ -79,7 +57,7 @@ def evaluation(city: SignatureDatabase) -> Evaluation:
 
 
 def test_hand_computed_row_of_equal_cells() -> None:
-    four = database([("DD", [10, 200])] * 4 + [("B", [300])], width=5)
+    four = database_of([("DD", [10, 200])] * 4 + [("B", [300])], height=5)
     table = evaluate(four, queries=5, distortion="none").queries.set_index("cell").sort_index()
     assert table["error_m"].to_list() == [15, 10, 10, 15, 0]
     assert table["p0"].to_list() == [0.25] * 4 + [1]
@@ -99,7 +77,7 @@ def test_hand_computed_row_of_equal_cells() -> None:
 
 
 def test_hand_computed_curve_and_recall() -> None:
-    four = database([("DD", [10, 200])] * 4 + [("B", [300])], width=5)
+    four = database_of([("DD", [10, 200])] * 4 + [("B", [300])], height=5)
     result = evaluate(four, queries=5, distortion="none")
     assert result.cdf([0, 10, 20, 25, 30]) == pytest.approx([0.4, 0.7, 0.9, 0.9, 1])
     # 20 % is one cell, 39 % still one, 40 % two, 60 % three, 100 % all.
@@ -116,7 +94,7 @@ def test_diagonal_distances_are_exact() -> None:
     # Cells (0, 0) and (3, 4) are alike: 50 m apart, whatever the origin of the grid.
     cells = [("B", [0])] * 25
     cells[0] = cells[19] = ("DDD", [10, 100, 300])
-    result = evaluate(database(cells, width=5), queries=25, distortion="none").queries
+    result = evaluate(database_of(cells, height=5), queries=25, distortion="none").queries
     twins = result[result["types"] == "DDD"]
     assert twins["p40"].to_list() == [0.5, 0.5]
     assert twins["p50"].to_list() == [1, 1]
@@ -124,9 +102,9 @@ def test_diagonal_distances_are_exact() -> None:
 
 @pytest.mark.parametrize("top", [1, 2, 3, 6])
 def test_equals_every_order_of_the_ties(top: int) -> None:
-    six = database(
+    six = database_of(
         [("DD", [10, 99]), ("DD", [10, 99]), ("D", [10]), ("DD", [9, 98]), ("B", [10]), ("D", [9])],
-        width=3,
+        height=3,
     )
     method = Method(types="edit", angles=None)
     table = evaluate(six, queries=6, method=method, top=top, distortion="none").queries
@@ -148,7 +126,7 @@ def test_equals_every_order_of_the_ties(top: int) -> None:
 
 
 def test_the_best_candidate_is_drawn_from_the_ties() -> None:
-    alike = database([("D", [10])] * 40, width=40)
+    alike = database_of([("D", [10])] * 40, height=40)
     shown = evaluate(alike, queries=40, distortion="none").queries
     assert shown["best_cell_id"].nunique() > 15
     one = alike.cell_ids.tolist().index(shown["best_cell_id"].iloc[0])
@@ -186,7 +164,7 @@ def test_a_query_of_which_nothing_is_left(evaluation: Evaluation) -> None:
 
 
 def test_nothing_left_of_any_query() -> None:
-    lamps = database([("D", [10])] * 3, width=3)
+    lamps = database_of([("D", [10])] * 3, height=3)
     for seed in range(200):
         result = evaluate(lamps, queries=1, distortion=ALL_MISSED, seed=seed)
         if result.unlocalized:

@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import json
 import math
 from typing import Any
 
@@ -7,7 +8,10 @@ import geopandas as gpd
 import numpy as np
 import pytest
 import shapely
-from sentences import assert_sentence
+from hypothesis import given
+from hypothesis import strategies as st
+from noisy_cells import random_database
+from sentences import refused
 from worlds import CORNER, random_town
 
 from semsig_gis.core.errors import InputError
@@ -16,9 +20,17 @@ from semsig_gis.database.store import ObjectStore
 from semsig_gis.database.visibility import views_at
 from semsig_gis.likelihood.answer_rule import AnswerRule
 from semsig_gis.likelihood.index import build_index
-from semsig_gis.likelihood.locate import locate, locate_route
-from semsig_gis.likelihood.noise.model import cell_noise, named_noise
+from semsig_gis.likelihood.locate import (
+    PlaceEstimate,
+    cell_estimate,
+    locate,
+    locate_route,
+    refined_estimate,
+)
+from semsig_gis.likelihood.noise.model import NoiseSpec, cell_noise, named_noise
+from semsig_gis.likelihood.posterior import Posterior, posterior
 from semsig_gis.likelihood.priors import position_prior
+from semsig_gis.likelihood.refine import Refinement
 from semsig_gis.likelihood.route import Leg
 
 WORLD = random_town()
@@ -27,6 +39,8 @@ STORE = ObjectStore.of(WORLD.street_objects)
 INDEX = build_index(CITY, named_noise("generic"))
 WIDE = build_index(CITY, cell_noise(named_noise("generic"), 10.0))
 LONG = np.argsort(-CITY.lengths, kind="stable")[:20].tolist()
+CELLS = random_database(3)
+SHARP = NoiseSpec(detection=0.95, misnamed=0.02, clutter=0.5, bearing_sigma=3.0)
 
 
 def seen_from(xy: np.ndarray, *, turn: float = 0.0) -> Signature:
@@ -143,9 +157,8 @@ def test_a_route_settles_what_one_view_leaves_open() -> None:
         assert math.dist((last.estimate.x, last.estimate.y), CITY.xy[start] + 2 * way) < 15.0
         assert [len(one.explanations) for one in (first, last)] == [1, 0]
         assert not last.estimate.refined
-    with pytest.raises(InputError) as caught:
+    with refused(InputError, "3 views", "1 legs"):
         locate_route(WIDE, views, legs[:1])
-    assert_sentence(caught.value, "3 views", "1 legs")
 
 
 def test_one_cell_is_the_answer() -> None:
@@ -179,14 +192,121 @@ def test_what_cannot_be_asked_is_refused() -> None:
         (WIDE, blind, {"explained": 1}, "bearings"),
         (INDEX, query, {"refined": True, "store": STORE}, "middles of cells"),
         (WIDE, query, {"north_sigma": math.nan}, "nan"),
+        (WIDE, query, {"top": 0}, "0 candidates were asked for; give a whole number from 1"),
     ]
     for index, asked, more, word in options:
-        with pytest.raises(InputError) as caught:
+        with refused(InputError, word):
             locate(index, asked, **more)
-        assert_sentence(caught.value, word)
 
 
-def test_no_candidates_are_refused() -> None:
-    with pytest.raises(InputError) as caught:
-        locate(INDEX, CITY.signature(0), top=0)
-    assert_sentence(caught.value, "0 candidates", "from 1")
+def test_an_answer_is_plain_values_and_points() -> None:
+    found = locate(INDEX, CITY.signature(LONG[0]), top=4, explained=2)
+    plain = json.loads(json.dumps(found.to_dict(), allow_nan=False))
+    assert plain["cells"] == len(CITY)
+    assert plain["answered"] == found.answer.given
+    assert len(plain["candidates"]) == 4
+    likely = found.candidates["cell"].to_numpy()
+    assert found.loglik[likely].tolist() == found.candidates["loglik"].to_list()
+    assert ["explanation" in one for one in plain["candidates"]] == [True, True, False, False]
+    place = plain["place"]
+    assert place["within_m"] == 50.0
+    assert [place["x"], place["y"]] == [found.estimate.x, found.estimate.y]
+    assert place["chance"] == found.answer.mass
+    assert place["heading"] is None
+    assert np.shape(place["covariance"]) == (2, 2)
+    assert place["lon"] == pytest.approx(3.8, abs=1.0)
+    assert found.to_geodataframe().crs == CITY.crs
+
+
+def test_a_rule_that_answers_nothing_is_plain_too() -> None:
+    found = locate(INDEX, CITY.signature(LONG[0]), rule=AnswerRule(threshold=float("inf")))
+    plain = json.loads(json.dumps(found.to_dict(), allow_nan=False))
+    assert plain["threshold"] is None
+    assert not plain["answered"]
+
+
+def test_the_region_has_an_area() -> None:
+    found = locate(INDEX, CITY.signature(LONG[0]))
+    assert found.region_km2 == pytest.approx(len(found.region) * 1e-4)
+    assert found.posterior.chances[found.region].sum() >= 0.9 - 1e-9
+
+
+@given(st.integers(0, 99), st.integers(0, 39), st.sampled_from([10.0, 30.0, 500.0]))
+def test_the_mean_is_that_of_drawn_places(seed: int, cell: int, radius: float) -> None:
+    chances = np.random.default_rng(seed).dirichlet(np.full(len(CELLS), 0.3))
+    found = Posterior(database=CELLS, chances=chances)
+    place = cell_estimate(CELLS.signature(0), SHARP, found, cell, radius=radius)
+    inside = [
+        row
+        for row in range(len(CELLS))
+        if math.dist(CELLS.xy[row], CELLS.xy[cell]) <= radius + 1e-9
+    ]
+    weights = chances[inside] / chances[inside].sum()
+    mean = weights @ CELLS.xy[inside]
+    assert (place.x, place.y) == pytest.approx(tuple(mean), abs=1e-6)
+    away = CELLS.xy[inside] - mean
+    spread = (weights[:, None] * away).T @ away + np.eye(2) * 100.0 / 12.0
+    assert place.covariance[:2, :2] == pytest.approx(spread, abs=1e-6)
+    assert place.heading is None
+    assert place.covariance[2].tolist() == [0.0, 0.0, 0.0]
+
+
+@given(st.floats(0.1, 30.0), st.floats(0.1, 30.0), st.floats(0.0, 179.0))
+def test_an_ellipse_holds_its_share(one: float, other: float, bearing: float) -> None:
+    angle = math.radians(bearing)
+    along = np.array([math.sin(angle), math.cos(angle)])
+    across = np.array([along[1], -along[0]])
+    covariance = np.zeros((3, 3))
+    covariance[:2, :2] = one**2 * np.outer(along, along) + other**2 * np.outer(across, across)
+    place = PlaceEstimate(x=0.0, y=0.0, heading=None, covariance=covariance, refined=True)
+    longer, shorter, turned = place.ellipse(0.9)
+    scale = math.sqrt(4.605170186)
+    assert longer == pytest.approx(scale * max(one, other))
+    assert shorter == pytest.approx(scale * min(one, other), rel=1e-5)
+    if one > 1.01 * other:
+        assert abs((turned - bearing + 90.0) % 180.0 - 90.0) < 1e-3
+    assert place.sigma == pytest.approx(math.hypot(one, other) / math.sqrt(2.0))
+
+
+@pytest.mark.parametrize("turn", [-170.0, 0.0, 63.0, 179.0])
+def test_the_heading_is_found_with_its_uncertainty(turn: float) -> None:
+    cell = int(CELLS.lengths.argmax())
+    query = CELLS.signature(cell)
+    assert query.bearings is not None
+    seen = Signature(query.codes, (query.bearings - turn) % 360.0)
+    sure = posterior(CELLS, np.where(np.arange(len(CELLS)) == cell, 0.0, -200.0))
+    place = cell_estimate(seen, SHARP, sure, cell, radius=50.0, north_sigma=math.inf)
+    assert place.heading is not None
+    away = (place.heading - turn + 180.0) % 360.0 - 180.0
+    expected = math.hypot(SHARP.bearing_sigma / math.sqrt(len(query)), 2.0 / math.sqrt(12.0))
+    assert abs(away) < 2.0
+    assert place.heading_sigma == pytest.approx(expected, rel=0.3)
+    plain = place.to_dict()
+    assert len(plain["covariance"]) == 3
+    assert plain["heading_sigma"] == place.heading_sigma
+
+
+def test_without_bearings_north_stays_unknown() -> None:
+    blind = Signature(CELLS.signature(0).codes, None)
+    flat = posterior(CELLS, np.zeros(len(CELLS)))
+    place = cell_estimate(blind, SHARP, flat, 0, radius=50.0, north_sigma=math.inf)
+    assert place.heading is None
+    assert len(place.to_dict()["covariance"]) == 2
+
+
+def test_parts_around_the_answer_count() -> None:
+    parts = Refinement(
+        places=np.array([[0.0, 0.0], [4.0, 0.0], [90.0, 0.0]]),
+        sizes=np.array([2.0, 2.0, 10.0]),
+        loglik=np.zeros(3),
+        headings=np.array([10.0, 14.0, 0.0]),
+        heading_sigmas=np.ones(3),
+        chances=np.array([0.1, 0.1, 0.8]),
+        near=25.0,
+    )
+    place = refined_estimate(parts, (5.0, 5.0), radius=50.0, turned=True)
+    assert place is not None
+    assert (place.x, place.y, place.heading) == pytest.approx((2.0, 0.0, 12.0))
+    assert place.covariance[0] == pytest.approx([4.0 + 4.0 / 12.0, 0.0, 4.0], abs=1e-3)
+    assert place.heading_sigma == pytest.approx(math.sqrt(5.0), abs=1e-3)
+    assert refined_estimate(parts, (500.0, 0.0), radius=50.0, turned=True) is None

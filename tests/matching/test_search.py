@@ -1,0 +1,328 @@
+from __future__ import annotations
+
+import gc
+import json
+import tempfile
+import weakref
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pandas as pd
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from noisy_cells import database_of
+from pyproj import Transformer
+from sentences import refused
+from tying_cells import CITY, METHODS, NOTHING, asked, random_cells
+from worlds import World, random_town
+
+from semsig_gis.core.errors import EmptyResultError, InputError
+from semsig_gis.core.signature import Signature
+from semsig_gis.database.file import PartitionedDatabase, open_database, save_database
+from semsig_gis.database.requirement import PatternIndex, Requirement
+from semsig_gis.matching.method import Method
+from semsig_gis.matching.scores import score_cells
+from semsig_gis.matching.search import DistanceLocator, Shortlist, localize
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from semsig_gis.database.database import SignatureDatabase
+    from semsig_gis.matching.search import Localization
+
+
+TOWN = random_town().database
+
+
+def plain_ranking(scores: NDArray[np.float32], top: int) -> list[tuple[int, int, int, float]]:
+    """Return cell, lowest rank, highest rank and score of the best, by sorting everything."""
+    rows = sorted(range(len(scores)), key=lambda row: (scores[row], row))[:top]
+    return [
+        (
+            row,
+            1 + int((scores < scores[row]).sum()),
+            int((scores <= scores[row]).sum()),
+            float(scores[row]),
+        )
+        for row in rows
+    ]
+
+
+@given(st.data())
+def test_parts_give_the_shortlist_of_the_whole(data: st.DataObject) -> None:
+    size = min(len(TOWN), 60)
+    levels = data.draw(st.lists(st.integers(0, 6), min_size=size, max_size=size))
+    scores = (np.array(levels) / 8).astype(np.float32)
+    top = data.draw(st.integers(1, 70))
+    owner = np.array(data.draw(st.lists(st.integers(0, 2), min_size=size, max_size=size)))
+    city = TOWN.select(slice(size))
+    shortlist = Shortlist(top)
+    for part in range(3):
+        mine = np.flatnonzero(owner == part)
+        if len(mine):
+            shortlist.add(city.select(mine), scores[mine])
+    candidates, beyond = shortlist.ranked()
+    expected = plain_ranking(scores, top)
+    assert candidates["cell_id"].tolist() == city.cell_ids[[row for row, *_ in expected]].tolist()
+    assert candidates["rank_low"].tolist() == [low for _, low, _, _ in expected]
+    assert candidates["rank_high"].tolist() == [high for _, _, high, _ in expected]
+    assert candidates["distance"].tolist() == [score for *_, score in expected]
+    assert beyond == expected[-1][2] - len(expected)
+    assert shortlist.cells == size
+
+
+def test_a_shortlist_of_one_world_counts_its_classes() -> None:
+    lamp = World(((765_205.0, 6_275_005.0, 3),)).database
+    shortlist = Shortlist(5)
+    shortlist.add(lamp, np.zeros(len(lamp), np.float32))
+    assert shortlist.present == {3}
+    assert shortlist.ranked()[1] == len(lamp) - 5
+
+
+@pytest.mark.parametrize("top", [1, 2, 7, 100, 400, 1000])
+def test_candidates_are_the_best_cells_with_their_ranks(top: int) -> None:
+    query = CITY.signature(11)
+    found = localize(CITY, query, top=top)
+    (scores,) = score_cells(CITY, [query])
+    ranked = sorted(range(len(CITY)), key=lambda cell: (scores[cell], cell))[:top]
+    table = found.candidates
+    assert table["cell"].tolist() == ranked
+    for row in table.to_dict(orient="records"):
+        cell, distance = row["cell"], row["distance"]
+        assert distance == scores[cell]
+        assert row["rank_low"] == 1 + (scores < distance).sum()
+        assert row["rank_high"] == (scores <= distance).sum()
+        assert row["tied"] == (scores == distance).sum()
+        assert row["cell_id"] == CITY.cell_ids[cell]
+        assert [row["x"], row["y"]] == CITY.xy[cell].tolist()
+        assert row["types"] == CITY.types(cell)
+        assert row["length"] == CITY.lengths[cell]
+    assert found.cells == len(CITY)
+    last = table["distance"].iloc[-1]
+    assert found.tied_beyond == (scores == last).sum() - (table["distance"] == last).sum()
+
+
+def test_ties_that_are_not_listed_are_told() -> None:
+    database = database_of([("B", [0.0]), *[("D", [0.0])] * 5])
+    found = localize(database, asked("D"), top=2)
+    assert found.candidates["cell"].tolist() == [1, 2]
+    assert found.candidates["rank_low"].tolist() == [1, 1]
+    assert found.candidates["rank_high"].tolist() == [5, 5]
+    assert found.candidates["tied"].tolist() == [5, 5]
+    assert found.tied_beyond == 3
+
+
+@pytest.mark.parametrize(
+    ("types", "bearings", "text", "used"),
+    [
+        ("DB", [10.0, 20.0], "edit+edit:5%", "types+angles"),
+        ("DB", None, "edit+edit:5%", "types"),
+        (None, [10.0, 20.0], "edit+edit:5%", "angles"),
+        ("DB", [10.0, 20.0], "types:jaccard", "types"),
+        ("DB", [10.0, 20.0], "angles:jaccard", "angles"),
+    ],
+)
+def test_a_fusion_falls_back_to_what_the_query_has(
+    types: str | None, bearings: list[float] | None, text: str, used: str
+) -> None:
+    query, method = asked(types, bearings), Method.parse(text)
+    found = localize(CITY, query, method=method)
+    assert found.used == used
+    if used != "types+angles":
+        alone = localize(CITY, query, method=Method.parse(f"{used}:{method.measures[used]}"))
+        assert found.candidates.equals(alone.candidates)
+
+
+@pytest.mark.parametrize(
+    ("query", "top", "words"),
+    [
+        (NOTHING, 1, "no objects; give at least one type or bearing"),
+        (asked("D"), 0, "0 candidates were asked for; give a whole number from 1"),
+        (asked("D"), -1, "give a whole number from 1"),
+    ],
+)
+def test_what_cannot_be_searched_is_refused(query: Signature, top: int, words: str) -> None:
+    with refused(InputError, words):
+        localize(CITY, query, top=top)
+
+
+def test_candidates_as_points_in_the_crs_of_the_database() -> None:
+    found = localize(CITY, asked("DD"), top=5)
+    points = found.to_geodataframe()
+    assert points.crs == CITY.crs
+    assert points.geometry.x.tolist() == found.candidates["x"].tolist()
+    assert points.geometry.y.tolist() == found.candidates["y"].tolist()
+    assert "geometry" not in found.candidates
+
+
+@pytest.mark.parametrize(("types", "bearings"), [("DB", [10.0, 20.0]), ("DB", None), (None, [5.0])])
+def test_everything_fits_into_json(types: str | None, bearings: list[float] | None) -> None:
+    found = localize(CITY, asked(types, bearings), method=Method(keep=5), top=3)
+    told = found.to_dict()
+    assert json.loads(json.dumps(told, allow_nan=False)) == told
+    assert told["query"] == {
+        "types": types,
+        "bearings": bearings,
+        "length": len(types or bearings or ""),
+    }
+    assert told["method"] == "edit+edit:5%"
+    assert told["used"] == found.used
+    assert told["crs"] == "EPSG:2154"
+    assert told["cells"] == 400
+    assert told["tied_beyond"] == found.tied_beyond
+    assert told["licenses"] == ["trees: the city (CC0)"]
+    assert [one["cell"] for one in told["candidates"]] == found.candidates["cell"].tolist()
+    back = Transformer.from_crs("EPSG:4326", "EPSG:2154", always_xy=True)
+    for one in told["candidates"]:
+        assert back.transform(one["lon"], one["lat"]) == pytest.approx(
+            (one["x"], one["y"]), abs=0.02
+        )
+
+
+def in_parts(database: SignatureDatabase, owner: NDArray[np.int64], folder: str) -> Any:  # noqa: ANN401
+    """Save the cells of each owner as a part."""
+    files = []
+    for number in np.unique(owner).tolist():
+        files.append(Path(folder) / f"{number}.parquet")
+        save_database(database.select(owner == number), files[-1])
+    return PartitionedDatabase(tuple(files), len(database))
+
+
+def assert_same_answer(one: Localization, other: Localization) -> None:
+    pd.testing.assert_frame_equal(one.candidates, other.candidates)
+    assert one.to_dict() == other.to_dict()
+
+
+PARTED_METHODS = [
+    *METHODS,
+    *(f"{one}:{keep}%" for one in METHODS if "+" in one for keep in (0.5, 5, 40, 100)),
+]
+
+
+@given(
+    seed=st.integers(0, 10**6),
+    count=st.integers(1, 60),
+    parts=st.integers(1, 5),
+    text=st.sampled_from(PARTED_METHODS),
+    top=st.sampled_from([1, 2, 7, 30, 100]),
+    part=st.sampled_from(["both", "types", "angles"]),
+)
+@settings(max_examples=120)
+def test_a_database_in_parts_answers_as_in_one_piece(
+    *, seed: int, count: int, parts: int, text: str, top: int, part: str
+) -> None:
+    rng = np.random.default_rng(seed)
+    whole = database_of(random_cells(count, seed=seed))
+    # Another one of the cells, or one that a person made up of the classes that there are.
+    query = whole.signature(int(rng.integers(count)))
+    if rng.random() < 0.5:
+        codes = rng.choice(whole.present_codes, int(rng.integers(1, 9)))
+        query = Signature(codes, np.sort(rng.uniform(0, 360, len(codes))))
+    method = Method.parse(text)
+    if part != "both" and part in method.measures:
+        query = Signature(
+            query.codes if part == "types" else None, query.bearings if part == "angles" else None
+        )
+    with tempfile.TemporaryDirectory() as folder:
+        parted = in_parts(whole, rng.integers(0, parts, count), folder)
+        assert_same_answer(
+            localize(parted, query, method=method, top=top),
+            localize(whole, query, method=method, top=top),
+        )
+
+
+def test_the_gate_of_the_second_stage_is_that_of_all_parts(tmp_path: Path) -> None:
+    # More cells are listed than pass, so that the worst that passes shows in the distances.
+    rng = np.random.default_rng(8)
+    for seed in range(12):
+        whole = database_of(random_cells(60, seed=seed))
+        parted = in_parts(whole, rng.integers(0, 4, 60), str(tmp_path))
+        for keep in (1, 10, 50):
+            query, method = whole.signature(seed), Method(keep=keep)
+            assert_same_answer(
+                localize(parted, query, method=method, top=60),
+                localize(whole, query, method=method, top=60),
+            )
+
+
+@pytest.mark.parametrize("text", ["edit+edit:2%:raw:weights=40/50/60", "histogram+edit:2%:raw"])
+def test_on_a_large_raw_scale_parts_rank_the_cells_beyond_the_second_stage_alike(
+    text: str, tmp_path: Path
+) -> None:
+    rng = np.random.default_rng(4)
+    cells = [
+        ("".join(rng.choice(list("DBG"), length)), np.sort(rng.uniform(0, 360, length)).tolist())
+        for length in rng.integers(1, 120, 200)
+    ]
+    whole = database_of(cells)
+    parted = in_parts(whole, rng.integers(0, 3, 200), str(tmp_path))
+    for cell in (0, 100):
+        query, method = whole.signature(cell), Method.parse(text)
+        assert_same_answer(
+            localize(parted, query, method=method, top=200),
+            localize(whole, query, method=method, top=200),
+        )
+
+
+def test_one_part_at_a_time_is_in_memory(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    parted = in_parts(CITY, np.arange(len(CITY)) % 8, str(tmp_path))
+    opened: list[weakref.ref[SignatureDatabase]] = []
+
+    def watched(path: Path) -> SignatureDatabase:
+        gc.collect()
+        assert sum(one() is not None for one in opened) <= 2  # one is taken while one is let go
+        database = open_database(path)
+        opened.append(weakref.ref(database))
+        return database
+
+    monkeypatch.setattr("semsig_gis.database.file.open_database", watched)
+    localize(parted, CITY.signature(3), method=Method(keep=5))
+    assert len(opened) == 16  # twice in two stages
+
+
+def test_cells_in_parts_are_ranked_together(tmp_path: Path) -> None:
+    parted = in_parts(CITY, np.arange(len(CITY)) % 3, str(tmp_path))
+    locators = DistanceLocator(database=parted), DistanceLocator(database=CITY)
+    both = zip(*(locator.rankings([CITY.signature(3)]) for locator in locators), strict=True)
+    for ranking, whole in both:
+        assert ranking.scores.tolist() == whole.scores.tolist()
+
+
+def test_a_class_that_no_part_sees_is_refused(tmp_path: Path) -> None:
+    parted = in_parts(CITY, np.arange(len(CITY)) % 3, str(tmp_path))
+    for method in (Method(), Method(keep=5)):
+        with pytest.raises(InputError) as caught:
+            localize(parted, asked("DM", [1.0, 2.0]), method=method)
+        with pytest.raises(InputError) as whole:
+            localize(CITY, asked("DM", [1.0, 2.0]), method=method)
+        assert str(caught.value) == str(whole.value)
+
+
+@given(st.integers(0, 2**32 - 1), st.sampled_from(["D", "2B", "D>=1,?<=6", "B=0", "?>=3"]))
+@settings(max_examples=25)
+def test_a_requirement_leaves_cells_out_and_changes_nothing_else(seed: int, text: str) -> None:
+    cell = int(np.random.default_rng(seed).integers(len(TOWN)))
+    requirement = Requirement.parse(text, TOWN.taxonomy)
+    everything = localize(TOWN, TOWN.signature(cell), top=len(TOWN)).candidates
+    met = PatternIndex.build(TOWN.type_sequences).meeting(requirement)
+    wanted = everything[met[everything["cell"].to_numpy()]]
+    if wanted.empty:
+        with pytest.raises(EmptyResultError):
+            localize(TOWN, TOWN.signature(cell), requirement=requirement)
+        return
+    found = localize(TOWN, TOWN.signature(cell), requirement=requirement, top=len(TOWN))
+    assert found.candidates["cell"].tolist() == wanted["cell"].tolist()
+    assert found.candidates["distance"].tolist() == wanted["distance"].tolist()
+    assert found.cells == int(met.sum())
+
+
+def test_an_object_of_unknown_class_may_be_any() -> None:
+    cell = int(TOWN.lengths.argmax())
+    types = TOWN.types(cell)
+    query = Signature.parse("?" + types[1:], None, taxonomy=TOWN.taxonomy)
+    best = localize(TOWN, query, method=Method.parse("types:edit"), top=1).candidates
+    assert best["distance"].tolist() == [0.0]
+    with refused(InputError, "unknown class", "jaccard"):
+        localize(TOWN, query, method=Method.parse("types:jaccard"))
