@@ -5,18 +5,23 @@ from __future__ import annotations
 import dataclasses
 import json
 import time
+from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
+from pyproj import Transformer
+from selenium.webdriver.common.actions.action_builder import ActionBuilder
 from selenium.webdriver.common.by import By
 
 from semsig_gis.core.taxonomy import ObjectClass, Taxonomy
 from semsig_gis.maps.page import save_map
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator, Sequence
     from pathlib import Path
 
     import folium
     from selenium.webdriver import Chrome
+    from selenium.webdriver.remote.webelement import WebElement
 
     from semsig_gis.database.database import SignatureDatabase
 
@@ -24,6 +29,8 @@ HOSTILE = (
     "<script>alert(1)</script><img src=x onerror=alert(1)>\"'`${alert(1)}`\\</script>"
     "{{7*7}}{% raw %}{# gone #}&lt;é\u202eabc\u2028]]>"
 )
+IMAGES = "img.leaflet-image-layer"
+LEGEND = ".semsig-legend"
 
 # What the script of a page can be asked about its one map.
 ASK = """
@@ -38,63 +45,147 @@ const circles = (colour) => {
 """
 
 
-def opened(browser: Chrome, map_: folium.Map, folder: Path) -> None:
-    """Save a map as a self-contained page and open it."""
-    file = folder / "map.html"
-    assert save_map(map_, file, self_contained=True)
-    browser.get(file.as_uri())
+@dataclasses.dataclass(frozen=True)
+class MapPage:
+    """A self-contained page with a map, open in a browser."""
 
+    browser: Chrome
+    folder: Path
 
-def asked(browser: Chrome, script: str, *arguments: Any) -> Any:  # noqa: ANN401
-    return browser.execute_script(ASK + script, *arguments)
+    def open(self, map_: folium.Map) -> None:
+        """Save a map as a self-contained page and open it; an alert fails the next command."""
+        file = self.folder / "map.html"
+        assert save_map(map_, file, self_contained=True)
+        self.browser.get(file.as_uri())
 
+    def ask(self, script: str, *arguments: Any) -> Any:  # noqa: ANN401
+        return self.browser.execute_script(ASK + script, *arguments)
 
-def drawn(browser: Chrome, colour: str, canvas: str = ".leaflet-marker-pane canvas") -> int:
-    """Return the number of pixels of about this colour on a canvas, by default the circles'."""
-    time.sleep(0.3)  # canvases are drawn with the next frame
-    script = """
-    const canvas = document.querySelector(arguments[1]);
-    if (canvas === null) return 0;
-    const wanted = [1, 3, 5].map((at) => parseInt(arguments[0].slice(at, at + 2), 16));
-    const data = canvas.getContext("2d").getImageData(0, 0, canvas.width, canvas.height).data;
-    let count = 0;
-    for (let at = 0; at < data.length; at += 4) {
-      if (data[at + 3] > 200 && wanted.every((part, i) => Math.abs(data[at + i] - part) < 12)) {
-        count += 1;
-      }
-    }
-    return count;
-    """
-    count: int = asked(browser, script, colour, canvas)
-    return count
+    def circles(self, colour: str) -> int:
+        """Return the number of circles of a colour."""
+        count: int = self.ask("return circles(arguments[0]).length", colour)
+        return count
 
+    def drawn(self, colour: str, canvas: str = ".leaflet-marker-pane canvas") -> int:
+        """Return the number of pixels of about this colour on a canvas, by default the circles'."""
+        time.sleep(0.3)  # canvases are drawn with the next frame
+        script = """
+        const canvas = document.querySelector(arguments[1]);
+        if (canvas === null) return 0;
+        const wanted = [1, 3, 5].map((at) => parseInt(arguments[0].slice(at, at + 2), 16));
+        const data = canvas.getContext("2d").getImageData(0, 0, canvas.width, canvas.height).data;
+        let count = 0;
+        for (let at = 0; at < data.length; at += 4) {
+          if (data[at + 3] > 200 && wanted.every((part, i) => Math.abs(data[at + i] - part) < 12)) {
+            count += 1;
+          }
+        }
+        return count;
+        """
+        count: int = self.ask(script, colour, canvas)
+        return count
 
-def searched(browser: Chrome, text: str, *keys: str) -> list[str]:
-    """Type something into the search box, then press keys; return what it offered."""
-    box = browser.find_element(By.CSS_SELECTOR, ".semsig-search input")
-    box.clear()
-    box.send_keys(text)
-    offered = [
-        one.text for one in browser.find_elements(By.CSS_SELECTOR, ".semsig-search [role=option]")
-    ]
-    for key in keys:
-        box.send_keys(key)
-    return offered
+    def one(self, selector: str) -> WebElement:
+        return self.browser.find_element(By.CSS_SELECTOR, selector)
 
+    def all(self, selector: str) -> list[WebElement]:
+        return self.browser.find_elements(By.CSS_SELECTOR, selector)
 
-def popup_text(browser: Chrome) -> str:
-    """Return what the newest popup says; one before it may still fade away."""
-    time.sleep(0.3)
-    text: str = browser.execute_script(
-        "return [...document.querySelectorAll('.semsig-details')].pop().innerText"
-    )
-    return text
+    def text(self, selector: str) -> str:
+        """Return the text of the first such element, shown or not."""
+        text: str = self.ask("return document.querySelector(arguments[0]).textContent", selector)
+        return text
 
+    def layers(self) -> list[str]:
+        """Return the names in the layer control."""
+        return [one.text.strip() for one in self.all(".leaflet-control-layers-overlays label")]
 
-def switch(browser: Chrome, name: str) -> None:
-    """Click a layer in the layer control."""
-    labels = browser.find_elements(By.CSS_SELECTOR, ".leaflet-control-layers-overlays label")
-    next(label for label in labels if label.text.strip().startswith(name)).click()
+    def switch(self, name: str) -> None:
+        """Click a layer in the layer control."""
+        labels = self.all(".leaflet-control-layers-overlays label")
+        next(label for label in labels if label.text.strip().startswith(name)).click()
+
+    def search(self, text: str, *keys: str) -> list[str]:
+        """Type something into the search box, then press keys; return what it offered."""
+        box = self.one(".semsig-search input")
+        box.clear()
+        box.send_keys(text)
+        offered = [one.text for one in self.all(".semsig-search [role=option]")]
+        for key in keys:
+            box.send_keys(key)
+        return offered
+
+    def popup(self) -> str:
+        """Return what the newest popup says, if any; one before it may still fade away."""
+        time.sleep(0.4)  # arrays are unpacked once
+        text: str = self.ask(
+            "return [...document.querySelectorAll('.semsig-details')].pop()?.innerText ?? ''"
+        )
+        return text
+
+    def told(self) -> dict[str, str]:
+        """Return what the popup says by its labels, its ``title``, and all of it as ``text``."""
+        text = self.popup()
+        title, *lines = text.splitlines()
+        pairs = (line.split("\t", 1) for line in lines if "\t" in line)
+        labels = {label.strip(): value.strip() for label, value in pairs}
+        return {"text": text, "title": title.strip(), **labels}
+
+    def click(self, database: SignatureDatabase, cell: int) -> dict[str, str]:
+        """Click the middle of a cell; return what its popup says."""
+        to_degrees = Transformer.from_crs(database.crs, "EPSG:4326")
+        self.click_at(to_degrees.transform(*database.xy[cell].tolist()))
+        return self.told()
+
+    def click_at(self, latlon: Sequence[float]) -> None:
+        self.ask("map.fire('click', {latlng: L.latLng(...arguments)})", *latlon)
+
+    def popup_of(self, colour: str) -> str:
+        """Open the popup of the first circle of a colour; return what it says."""
+        self.ask("circles(arguments[0])[0].openPopup()", colour)
+        return self.popup()
+
+    def point_at(self, circle: str, *arguments: object) -> None:
+        """Click a circle, which a script returns, with the mouse, from close to."""
+        script = f"""
+        const place = ({circle}).getLatLng();
+        map.setView(place, 20, {{animate: false}});
+        const point = map.latLngToContainerPoint(place);
+        return [point.x, point.y];
+        """
+        x, y = self.ask(script, *arguments)
+        mouse = ActionBuilder(self.browser)
+        mouse.pointer_action.move_to_location(round(x), round(y)).click()
+        mouse.perform()
+
+    def jumps(self) -> list[str]:
+        """Return the lines with buttons of the popup."""
+        return [line.text.replace("\n", " ").strip() for line in self.all(".semsig-jumps")]
+
+    def press(self, text: str) -> dict[str, str]:
+        """Press the first button of the popup with a text or hint; return what the next says."""
+        for button in self.all(".semsig-jumps button"):
+            if text in f"{button.text} {button.get_attribute('title')}":
+                button.click()
+                return self.told()
+        raise LookupError(text)
+
+    @contextmanager
+    def screen(
+        self, width: int, height: int, *, mobile: bool = True, dots: int = 1
+    ) -> Iterator[None]:
+        """Make the window as large as a screen."""
+        size = {"width": width, "height": height, "deviceScaleFactor": dots, "mobile": mobile}
+        self.browser.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", size)
+        try:
+            yield
+        finally:
+            self.browser.execute_cdp_cmd("Emulation.clearDeviceMetricsOverride", {})
+
+    def assert_text_stays_text(self) -> None:
+        """Check that no text from data became an element of the page."""
+        for element in ("script", "img"):
+            assert self.all(f"{LEGEND} {element}, .semsig-details {element}") == []
 
 
 def assert_quiet(browser: Chrome) -> None:
@@ -107,14 +198,19 @@ def assert_quiet(browser: Chrome) -> None:
     ]
     assert messages == []
     assert browser.execute_script("return performance.getEntriesByType('resource').length") == 0
+    requests = requested(browser)
+    assert [url for url in requests if not url.startswith(("file:", "data:"))] == []
+    assert sum(url.startswith("file:") for url in requests) == 1
+
+
+def requested(browser: Chrome) -> list[str]:
+    """Return the addresses that the browser asked for since its logs were read."""
     events = [json.loads(entry["message"])["message"] for entry in browser.get_log("performance")]
-    asked_for = [
+    return [
         event["params"]["request"]["url"]
         for event in events
         if event["method"] == "Network.requestWillBeSent"
     ]
-    assert [url for url in asked_for if not url.startswith(("file:", "data:"))] == []
-    assert sum(url.startswith("file:") for url in asked_for) == 1
 
 
 def hostile_database(database: SignatureDatabase) -> SignatureDatabase:

@@ -1,17 +1,14 @@
-"""The map of what has changed between two dates, in a real browser."""
+"""The map of what has changed between two dates, in a real page.browser."""
 
 from __future__ import annotations
 
 import dataclasses
 from typing import TYPE_CHECKING
 
-import folium
 import numpy as np
 import pytest
 import shapely
-from cell_clicks import click
-from map_pages import HOSTILE, asked, assert_quiet, hostile_database, opened, searched, switch
-from selenium.webdriver.common.by import By
+from map_pages import HOSTILE, IMAGES, LEGEND, hostile_database
 from sentences import assert_sentence
 from worlds import CODES, TAXONOMY, random_town
 
@@ -23,13 +20,12 @@ from semsig_gis.database.build import build_database
 from semsig_gis.database.update import compare_cells
 from semsig_gis.maps.drift import drift_map
 from semsig_gis.maps.objects import objects_map
+from semsig_gis.maps.parts import layers_of
 from semsig_gis.objects.changes import compare_objects
 from semsig_gis.objects.table import Licence
 
 if TYPE_CHECKING:
-    from pathlib import Path
-
-    from selenium.webdriver import Chrome
+    from map_pages import MapPage
 
     from semsig_gis.database.database import SignatureDatabase
     from semsig_gis.objects.table import StreetObjects
@@ -58,36 +54,35 @@ OTHER = Taxonomy((dataclasses.replace(TAXONOMY.classes[0], name="other"), *TAXON
 TURNED = dataclasses.replace(AFTER, table=AFTER.table.to_crs("EPSG:32631"))
 
 
-@pytest.mark.usefixtures("carried")
-def test_cells_before_and_now(browser: Chrome, tmp_path: Path) -> None:
-    opened(browser, drift_map(OLD, NEW), tmp_path)
-    assert browser.title == "What has changed"
-    assert len(browser.find_elements(By.CSS_SELECTOR, "img.leaflet-image-layer")) == 2
-    asked(browser, "map.setZoom(19, {animate: false})")
+def test_cells_before_and_now(page: MapPage) -> None:
+    page.open(drift_map(OLD, NEW))
+    assert page.browser.title == "What has changed"
+    assert len(page.all(IMAGES)) == 2
+    page.ask("map.setZoom(19, {animate: false})")
     assert min(map(len, (CELLS.same, CELLS.changed, CELLS.appeared, CELLS.vanished))) > 0
     same, changed = CELLS.same[0].tolist(), CELLS.changed[0].tolist()
-    said = click(browser, OLD, same[0])
+    said = page.click(OLD, same[0])
     assert said["title"] == "A cell that sees what it saw"
     assert said["It sees"].startswith(NEW.types(same[1]))
     assert "Before" not in said
-    said = click(browser, OLD, changed[0])
+    said = page.click(OLD, changed[0])
     assert said["title"] == "A cell that sees something else"
     assert said["Before"].startswith(OLD.types(changed[0]))
     assert said["Now"].startswith(NEW.types(changed[1]))
     assert said["Cell"] == str(OLD.cell_ids[changed[0]])
-    said = click(browser, NEW, int(CELLS.appeared[0]))
+    said = page.click(NEW, int(CELLS.appeared[0]))
     assert said["title"] == "A new cell: it saw nothing"
     assert said["Before"] == "nothing"
     assert said["Now"].startswith(NEW.types(int(CELLS.appeared[0])))
     gone = int(CELLS.vanished[0])
-    said = click(browser, OLD, gone)
+    said = page.click(OLD, gone)
     assert said["title"] == "A cell that sees nothing any more"
     assert said["Now"] == "nothing"
     difference = {
         (one[-1], int(one[1:].split("\u00a0")[0])) for one in said["Difference"].split(", ")
     }
     assert difference == {(one, OLD.types(gone).count(one)) for one in set(OLD.types(gone))}
-    legend = browser.find_element(By.CSS_SELECTOR, ".semsig-legend").text
+    legend = page.one(LEGEND).text
     for rows, title in (
         (CELLS.same, "see what they saw"),
         (CELLS.changed, "see something else"),
@@ -96,58 +91,40 @@ def test_cells_before_and_now(browser: Chrome, tmp_path: Path) -> None:
     ):
         assert f"{title} {len(rows):,}" in legend
     assert "Street objects" not in legend
-    assert_quiet(browser)
 
 
-@pytest.mark.usefixtures("carried")
-def test_objects_that_have_changed(browser: Chrome, tmp_path: Path) -> None:
-    map_ = drift_map(OLD, NEW, objects_before=BEFORE, objects_after=AFTER)
-    opened(browser, map_, tmp_path)
-    changes = compare_objects(BEFORE, AFTER)
-    counts = {
-        "removed": len(changes.removed),
-        "added": len(changes.added),
-        "moved": len(changes.moved),
-        "of another class": len(changes.changed),
-    }
-    assert counts == {"removed": 3, "added": 1, "moved": 1, "of another class": 1}
-    legend = browser.find_element(By.CSS_SELECTOR, ".semsig-legend").text
-    assert "3 removed" in legend
+def test_objects_that_have_changed(page: MapPage) -> None:
+    page.open(drift_map(OLD, NEW, objects_before=BEFORE, objects_after=AFTER))
+    assert "3 removed" in page.one(LEGEND).text
     # By kind, by class and by identifier, the best match first.
-    (moved,) = changes.moved[:, 1]
+    (moved,) = compare_objects(BEFORE, AFTER).moved[:, 1]
     title = TAXONOMY.by_code(int(AFTER.codes[moved])).title
     called = f"Object moved\n{title}, {AFTER.table['source_id'].iloc[moved]}"
-    assert searched(browser, "moved")[0] == called
-    assert called in searched(browser, title.upper())
-    assert searched(browser, "new")[0].startswith("Object added\n")
-    asked(browser, "map.closePopup()")
-    last = "return [...document.querySelectorAll('.semsig-details')].pop().innerText"
-    for kind, count in counts.items():
+    assert page.search("moved")[0] == called
+    assert called in page.search(title.upper())
+    assert page.search("new")[0].startswith("Object added\n")
+    page.ask("map.closePopup()")
+    for kind, count in {"removed": 3, "added": 1, "moved": 1, "of another class": 1}.items():
         colour = OBJECT_COLOURS[kind]
-        assert asked(browser, "return circles(arguments[0]).length", colour) == count
-        asked(browser, "circles(arguments[0])[0].openPopup()", colour)
-        said = browser.execute_script(last)
+        assert page.circles(colour) == count
+        said = page.popup_of(colour)
         assert said.startswith(f"Object {kind}")
         assert ("5.0 m" in said) == (kind == "moved")
         assert ("Class before" in said) == (kind in {"moved", "of another class"})
-        switch(browser, f"Objects {kind}")
-        assert asked(browser, "return circles(arguments[0]).length", colour) == 0
-    assert_quiet(browser)
+        page.switch(f"Objects {kind}")
+        assert page.circles(colour) == 0
 
 
-@pytest.mark.usefixtures("carried")
-def test_a_class_is_found_before_its_objects(browser: Chrome, tmp_path: Path) -> None:
+def test_a_class_is_found_before_its_objects(page: MapPage) -> None:
     map_ = drift_map(OLD, NEW, objects_before=BEFORE, objects_after=AFTER)
-    opened(browser, objects_map(AFTER, map_=map_), tmp_path)
+    page.open(objects_map(AFTER, map_=map_))
     title = TAXONOMY.by_code(int(BEFORE.codes[0])).title
-    offered = searched(browser, title)
+    offered = page.search(title)
     assert offered[0].startswith(f"{title}\nall ")
     assert offered[1].startswith("Object removed\n")
-    assert_quiet(browser)
 
 
-@pytest.mark.usefixtures("carried")
-def test_hostile_data_is_shown_and_never_run(browser: Chrome, tmp_path: Path) -> None:
+def test_hostile_data_is_shown_and_never_run(page: MapPage) -> None:
     taxonomy = hostile_database(NEW).taxonomy
     objects = [
         dataclasses.replace(
@@ -159,32 +136,25 @@ def test_hostile_data_is_shown_and_never_run(browser: Chrome, tmp_path: Path) ->
         for one in (BEFORE, AFTER)
     ]
     old, new = map(build_database, objects)
-    map_ = drift_map(old, new, objects_before=objects[0], objects_after=objects[1])
-    opened(browser, map_, tmp_path)  # an alert would fail the next command
-    legend = browser.find_element(By.CSS_SELECTOR, ".semsig-legend")
-    assert HOSTILE in browser.execute_script("return arguments[0].textContent", legend)
-    asked(browser, "circles(arguments[0])[0].openPopup()", OBJECT_COLOURS["removed"])
-    details = browser.execute_script("return document.querySelector('.semsig-details').textContent")
-    assert details.count(HOSTILE) == 2  # class and source
-    click(browser, new, int(CELLS.changed[0, 1]))
-    for element in ("script", "img"):
-        inside = f".semsig-legend {element}, .semsig-details {element}"
-        assert browser.find_elements(By.CSS_SELECTOR, inside) == []
-    assert_quiet(browser)
+    page.open(drift_map(old, new, objects_before=objects[0], objects_after=objects[1]))
+    assert HOSTILE in page.text(LEGEND)
+    page.popup_of(OBJECT_COLOURS["removed"])
+    assert page.text(".semsig-details").count(HOSTILE) == 2  # class and source
+    page.click(new, int(CELLS.changed[0, 1]))
+    page.assert_text_stays_text()
 
 
 def test_nothing_has_changed_or_everything() -> None:
-    page = drift_map(OLD, OLD).get_root().render()
-    assert "Objects removed" not in page
-    half = len(OLD) // 2
-    drift_map(OLD.select(slice(half)), OLD.select(slice(half, None)))
-    own = folium.Map([43.0, 3.0], zoom_start=12, tiles=None)
-    drawn = drift_map(OLD, OLD, objects_before=BEFORE, objects_after=BEFORE, map_=own)
-    assert drawn is own
-    names = [getattr(child, "layer_name", "") for child in own._children.values()]
-    assert {"Cells that are the same", "Tell of a cell when clicked"} <= set(names)
+    same = drift_map(OLD, OLD, objects_before=BEFORE, objects_after=BEFORE)
+    names = [getattr(child, "layer_name", "") for child in layers_of(same).values()]
+    assert "Cells that are the same" in names
     assert "Cells that differ" not in names
     assert not any("Objects" in name for name in names)
+    half = len(OLD) // 2
+    other = drift_map(OLD.select(slice(half)), OLD.select(slice(half, None)))
+    names = [getattr(child, "layer_name", "") for child in layers_of(other).values()]
+    assert "Cells that are the same" not in names
+    assert "Cells that differ" in names
 
 
 @pytest.mark.parametrize(

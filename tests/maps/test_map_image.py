@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import struct
-import zlib
+import io
 from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
+from PIL import Image
 from pyproj import CRS, Transformer
 
 from semsig_gis.core.grid import GridSpec
@@ -20,6 +20,11 @@ from semsig_gis.sources.catalog import paper_taxonomy
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+PLACES = [
+    ("EPSG:2154", (765_200.0, 6_275_000.0)),
+    ("EPSG:32631", (-3.5, 5_400_000.0)),  # west of its zone: much turned
+    ("EPSG:32735", (500_000.0, 7_500_000.0)),  # south of the equator
+]
 SHADES = {1: "#e0e0e0", 5: "#a0a0a0", 10: "#505050"}
 
 
@@ -54,22 +59,11 @@ def scattered(side: int, share: float, seed: int = 1) -> tuple[NDArray[np.int64]
 
 
 def decoded(png: bytes) -> tuple[NDArray[np.uint8], bytes]:
-    """Return the palette indices of a PNG without filters, and its palette."""
-    assert png[:8] == b"\x89PNG\r\n\x1a\n"
-    chunks: dict[bytes, bytes] = {}
-    at = 8
-    while at < len(png):
-        (length,) = struct.unpack_from(">I", png, at)
-        kind, body = png[at + 4 : at + 8], png[at + 8 : at + 8 + length]
-        assert struct.unpack_from(">I", png, at + 8 + length) == (zlib.crc32(kind + body),)
-        chunks[kind] = body
-        at += 12 + length
-    width, height, *rest = struct.unpack(">IIBBBBB", chunks[b"IHDR"])
-    assert rest == [8, 3, 0, 0, 0]
-    assert chunks[b"tRNS"] == b"\0"
-    lines = np.frombuffer(zlib.decompress(chunks[b"IDAT"]), np.uint8).reshape(height, width + 1)
-    assert not lines[:, 0].any()
-    return lines[:, 1:], chunks[b"PLTE"]
+    """Return the palette indices of a PNG, and the palette, of which the first is transparent."""
+    image = Image.open(io.BytesIO(png))
+    assert (image.mode, image.info["transparency"]) == ("P", 0)
+    assert image.palette is not None
+    return np.asarray(image), bytes(image.palette.palette)
 
 
 def seen_at(
@@ -86,19 +80,12 @@ def seen_at(
     height, width = pixels.shape
     across = (np.asarray(x) - south_west[0]) / (north_east[0] - south_west[0]) * width
     down = (north_east[1] - np.asarray(y)) / (north_east[1] - south_west[1]) * height
-    found: NDArray[np.uint8] = pixels[down.astype(int), across.astype(int)]
-    return found
+    indices: NDArray[np.uint8] = pixels[down.astype(int), across.astype(int)]
+    return indices
 
 
 @pytest.mark.parametrize("side", [7, 600])
-@pytest.mark.parametrize(
-    ("crs", "origin"),
-    [
-        ("EPSG:2154", (765_200.0, 6_275_000.0)),
-        ("EPSG:32631", (-3.5, 5_400_000.0)),  # west of its zone: much turned
-        ("EPSG:32735", (500_000.0, 7_500_000.0)),  # south of the equator
-    ],
-)
+@pytest.mark.parametrize(("crs", "origin"), PLACES)
 def test_cells_lie_where_the_map_has_them(side: int, crs: str, origin: tuple[float, float]) -> None:
     database = a_city(*scattered(side, 0.4), crs=crs, grid=GridSpec(10.0, origin))
     image, bounds = city_image(database, SHADES)
@@ -177,14 +164,7 @@ def between(
     return np.array(found)
 
 
-@pytest.mark.parametrize(
-    ("crs", "origin"),
-    [
-        ("EPSG:2154", (765_200.0, 6_275_000.0)),
-        ("EPSG:32631", (-3.5, 5_400_000.0)),
-        ("EPSG:32735", (500_000.0, 7_500_000.0)),
-    ],
-)
+@pytest.mark.parametrize(("crs", "origin"), PLACES)
 def test_lattices_place_cells_to_a_centimetre(crs: str, origin: tuple[float, float]) -> None:
     database = a_city(*scattered(300, 0.01), crs=crs, grid=GridSpec(10.0, origin))
     lattices = place_lattices(database)

@@ -3,16 +3,21 @@
 from __future__ import annotations
 
 import dataclasses
+import functools
 from html.parser import HTMLParser
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
 from cells_told import told_of
+from small_city import small_city
+from snapshots import assert_snapshot
 
+import semsig_gis
 from semsig_gis.core.colours import SHADES
 from semsig_gis.core.signature import Signature
-from semsig_gis.database.build import build_database
+from semsig_gis.core.taxonomy import Taxonomy
 from semsig_gis.database.update import CellChanges
 from semsig_gis.evaluation.evaluate import evaluate
 from semsig_gis.likelihood.answer_rule import AnswerRule
@@ -24,19 +29,67 @@ from semsig_gis.maps.drift import drift_legend
 from semsig_gis.maps.evaluation import evaluation_legend
 from semsig_gis.maps.localization import localization_legend
 from semsig_gis.maps.location import location_legend
+from semsig_gis.maps.objects import objects_legend
 from semsig_gis.matching.search import localize
 from semsig_gis.objects.changes import ClassChange, ObjectChanges
-from semsig_gis.objects.clean import build_objects
+from semsig_gis.objects.table import Licence
 from semsig_gis.queries.distortions import MissingClasses
-from semsig_gis.queries.draw import QuerySpec
-from semsig_gis.sources.catalog import paper_taxonomy
-from semsig_gis.sources.synthetic.city import CitySpec, synthetic_city
 
 if TYPE_CHECKING:
     from semsig_gis.database.database import SignatureDatabase
-    from semsig_gis.evaluation.result import Evaluation
+    from semsig_gis.objects.table import StreetObjects
 
-HOSTILE = "<script>alert(1)</script><img src=x onerror=alert(1)> \"'`${alert(1)} {{7*7}} & \\ é"
+SNAPSHOTS = Path(__file__).parent / "snapshots"
+HOSTILE = (
+    "<script>alert(1)</script><img src=x onerror=alert(1)> \"'`${alert(1)} {{7*7}} & \\ é\u202eabc"
+)
+CITY, OBJECTS = small_city()
+EVALUATION = evaluate(CITY, queries=40, distortion="errors:3, view:200")
+QUERY = Signature.parse("DB", [10, 359.7], taxonomy=CITY.taxonomy)
+TYPES, BEARINGS = Signature(QUERY.codes, None), Signature(None, QUERY.bearings)
+SIZES = np.array([1, 1, 2, 2, 9, 10, 12_345, 12_345])
+ROWS = np.zeros((6, 2), np.int64)
+CELLS = CellChanges(same=ROWS, changed=ROWS[:2], vanished=ROWS[:1, 0], appeared=ROWS[:1, 0])
+BENCH = ClassChange(
+    class_name="bench", before=3, after=4, added=2, removed=1, moved=5, moved_m=1.0, gained=0,
+    lost=0,
+)  # fmt: skip
+STILL = dataclasses.replace(BENCH, class_name="bus_stop", added=0, removed=0, moved=0)
+CHANGES = ObjectChanges(
+    same=ROWS, moved=ROWS[:5], changed=ROWS[:0], removed=ROWS[:1, 0], added=ROWS[:2, 0],
+    classes=(STILL, BENCH),
+)  # fmt: skip
+
+
+def legends(city: SignatureDatabase, objects: StreetObjects, name: str) -> dict[str, str]:
+    """Return every legend, with the texts of a city and the name of a noise model and a class."""
+    noise = dataclasses.replace(named_noise("light"), name=name)
+    exact = evaluate(city, queries=5, distortion="none", top=3)
+    asked = dataclasses.replace(EVALUATION.asked, distortions=(MissingClasses(classes=(name,)),))
+    by_types, by_both = localize(city, TYPES, top=7), localize(city, QUERY, top=7)
+    index = build_index(city, noise)
+    query = city.signature(int(city.lengths.argmax()))
+    drift = functools.partial(
+        drift_legend, cells=CELLS, taxonomy=city.taxonomy, licenses=city.licenses
+    )
+    sizes = {"types": SIZES, "both": SIZES[::-1] // 3 + 1}
+    return {
+        "evaluation": evaluation_legend(EVALUATION, error_limit="9 m", licenses=city.licenses),
+        "evaluation_of_classes": evaluation_legend(
+            dataclasses.replace(EVALUATION, asked=asked), error_limit="9 m", licenses=()
+        ),
+        "evaluation_without_distortion": evaluation_legend(exact, error_limit="1 m", licenses=()),
+        "localization": localization_legend(by_both),
+        "localization_by_types": localization_legend(dataclasses.replace(by_types, tied_beyond=1)),
+        "localization_by_bearings": localization_legend(localize(city, BEARINGS, top=7)),
+        "location": location_legend(locate(index, query, explained=1)),
+        "location_unsure": location_legend(locate(index, query, rule=AnswerRule(threshold=2.0))),
+        "identifiability": identifiability_legend(dataclasses.replace(told_of(city), noise=noise)),
+        "ambiguity": ambiguity_legend(sizes, licenses=city.licenses),
+        "drift": drift(objects=None),
+        "drift_of_objects": drift(objects=CHANGES),
+        "objects": objects_legend(objects),
+    }
 
 
 class Text(HTMLParser):
@@ -52,188 +105,47 @@ class Text(HTMLParser):
     def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:  # noqa: ARG002
         self.tags.add(tag)
         if tag != "bdi":
-            self.shown += "\n" if tag in {"p", "br", "tr"} else " "
+            self.shown += "\n" if tag in {"p", "br", "tr", "table"} else " "
 
     def handle_data(self, data: str) -> None:
         self.shown += data
 
 
-@pytest.fixture(scope="module")
-def database() -> SignatureDatabase:
-    layers = synthetic_city(CitySpec(size=300.0))
-    objects, _ = build_objects(layers, taxonomy=paper_taxonomy(), crs="EPSG:32631")
-    return dataclasses.replace(build_database(objects), licenses=("Town (CC0): trees, lamps",))
+LEGENDS = {name: Text(text) for name, text in legends(CITY, OBJECTS, "light").items()}
 
 
-@pytest.fixture(scope="module")
-def evaluation(database: SignatureDatabase) -> Evaluation:
-    return evaluate(database, queries=40, distortion="errors:3, view:200")
+@pytest.mark.parametrize("name", LEGENDS)
+def test_what_a_legend_says(name: str) -> None:
+    text = LEGENDS[name].shown.replace(semsig_gis.__version__, "VERSION")
+    lines = (" ".join(line.split()) for line in text.splitlines())
+    assert_snapshot("\n".join(line for line in lines if line) + "\n", SNAPSHOTS / f"{name}.txt")
 
 
-def test_what_an_evaluation_says(evaluation: Evaluation, database: SignatureDatabase) -> None:
-    text = Text(
-        evaluation_legend(evaluation, error_limit="150 m", licenses=database.licenses)
-    ).shown
-    successful = int(evaluation.successful.sum())
-    for said in (
-        f"40 queries among {len(database):,} cells",
-        "Method: edit+edit, the best candidate",
-        "Distortion: errors:3, view:200",
-        f"P(error ≤ 50 m) {evaluation.cdf([50])[0]:.1%}",
-        f"{successful} successful: within 50 m with probability 0.5 or more",
-        f"{40 - successful} failed",
-        "150 m, as bad as a guess",
-        "1-4",
-        "20+",
-        "Data: Town (CC0): trees, lamps",
-        "Made with semsig_gis",
+def test_the_numbers_are_those_of_the_results() -> None:
+    facts = told_of(CITY).summary()
+    distances = localize(CITY, QUERY, top=7).candidates["distance"]
+    for name, words in (
+        ("evaluation", f"P(error ≤ 50 m) {EVALUATION.cdf([50])[0]:.1%}"),
+        ("evaluation", f"{int(EVALUATION.successful.sum())} successful"),
+        ("localization", f"{distances.max():.3f}"),
+        ("identifiability", f"{facts['chance_found']:.1%} for the mean cell"),
+        ("identifiability", f"90% to 100%: {facts['bands'][-1]['share']:.1%} of the cells"),
     ):
-        assert said in text
+        assert words in LEGENDS[name].shown
 
 
-def test_variants_of_an_evaluation(database: SignatureDatabase) -> None:
-    exact = evaluate(database, queries=5, distortion="none", top=3)
-    text = Text(evaluation_legend(exact, error_limit="1 m", licenses=())).shown
-    assert "the best of 3" in text
-    assert "Distortion: none" in text
-    assert "Data" not in text
-
-
-@pytest.mark.parametrize(
-    ("query", "said", "unsaid"),
-    [
-        (Signature.parse("DB", [10, 359.7], taxonomy=paper_taxonomy()), "Types: DB", "Types: D\n"),
-        (Signature.parse("DB", None, taxonomy=paper_taxonomy()), "by types", "Bearings"),
-        (Signature.parse(None, [10, 359.7], taxonomy=paper_taxonomy()), "10° 0°", "Types:"),
-    ],
-)
-def test_what_a_localization_says(
-    query: Signature, said: str, unsaid: str, database: SignatureDatabase
-) -> None:
-    localization = localize(database, query, top=7)
-    text = Text(localization_legend(localization)).shown
-    assert said in text
-    assert unsaid not in text
-    assert f"The best 7 of {len(database):,} cells" in text
-    assert ("more cells are as good" in text) == (localization.tied_beyond > 0)
-    assert f"{localization.candidates['distance'].max():.3f}" in text
-    assert "Data: Town (CC0): trees, lamps" in text
-    tied = dataclasses.replace(localization, tied_beyond=1)
-    assert "1 more cell is as good as the last one" in Text(localization_legend(tied)).shown
-
-
-def test_text_from_data_stays_text(evaluation: Evaluation, database: SignatureDatabase) -> None:
-    plain = evaluation_legend(evaluation, error_limit="1 m", licenses=["x"])
-    asked = QuerySpec(distortions=(MissingClasses(classes=(HOSTILE,)),))
-    hostile = dataclasses.replace(evaluation, asked=asked)
-    shown = Text(evaluation_legend(hostile, error_limit="1 m", licenses=[HOSTILE]))
-    assert shown.shown.count(HOSTILE) == 2
-    assert shown.tags == Text(plain).tags
-    localization = localize(database, database.signature(0), top=2)
-    hostile_place = dataclasses.replace(localization, licenses=(HOSTILE,))
-    assert HOSTILE in Text(localization_legend(hostile_place)).shown
-
-
-def test_what_a_location_says(database: SignatureDatabase) -> None:
-    cell = int(database.lengths.argmax())
-    index = build_index(database, named_noise("light"))
-    location = locate(index, database.signature(cell), explained=1)
-    shown = Text(location_legend(location))
-    for said in ("The answer", f"Types: {database.types(cell)}", "light noise", "50% in 1 cell"):
-        assert said in shown.shown
-    assert "misnamed" in shown.shown
-    unsure = locate(index, database.signature(cell), rule=AnswerRule(threshold=2.0))
-    assert "Cannot tell; the best place" in Text(location_legend(unsure)).shown
-    assert "misnamed" not in Text(location_legend(unsure)).shown
-    hostile = Text(location_legend(dataclasses.replace(location, noise=HOSTILE)))
-    assert hostile.shown.count(HOSTILE) == 1
-    assert hostile.tags == shown.tags
+def test_text_from_data_stays_text_and_turns_no_other() -> None:
+    classes = [dataclasses.replace(item, title=HOSTILE) for item in CITY.taxonomy.classes]
+    taxonomy = Taxonomy(tuple(classes))
+    city = dataclasses.replace(CITY, taxonomy=taxonomy, licenses=(HOSTILE,))
+    objects = dataclasses.replace(OBJECTS, taxonomy=taxonomy, licenses=(Licence(HOSTILE),))
+    for name, legend in legends(city, objects, HOSTILE).items():
+        text = Text(legend)
+        assert (HOSTILE in text.shown) == (name != "evaluation_without_distortion")
+        assert text.tags == LEGENDS[name].tags
+        assert legend.count("\u202e") == legend.count("\u202eabc</bdi>")
 
 
 def test_shades_begin_with_one_object() -> None:
     assert min(SHADES) == 1
     assert list(SHADES) == sorted(SHADES)
-
-
-def test_what_identifiability_says(database: SignatureDatabase) -> None:
-    told = told_of(database)
-    facts = told.summary()
-    text = Text(identifiability_legend(told)).shown
-    best = facts["classes"][0]
-    for said in (
-        f"{len(database):,} cells, medium noise",
-        f"within 30 m; {facts['chance_found']:.1%} for the mean cell",
-        f"90% to 100%: {facts['bands'][-1]['share']:.1%} of the cells",
-        f"{best['title']} {100 * best['chance_near']:+.1f} %",
-        "Data: Town (CC0): trees, lamps",
-    ):
-        assert said in text
-    assert text.count("+") <= 6  # classes that are named
-
-
-def test_identifiability_lets_no_data_run(database: SignatureDatabase) -> None:
-    noise = dataclasses.replace(named_noise("medium"), name=HOSTILE)
-    told = dataclasses.replace(told_of(database), noise=noise)
-    read = Text(identifiability_legend(told))
-    assert HOSTILE in read.shown
-    assert not {"script", "img"} & read.tags
-
-
-def test_what_groups_of_cells_say() -> None:
-    sizes = np.array([1, 1, 2, 2, 9, 10, 12_345, 12_345])
-    text = Text(
-        ambiguity_legend({"types": sizes, "both": sizes[::-1] // 3 + 1}, licenses=[HOSTILE])
-    )
-    for said in (
-        "8 cells",
-        "no other 25.0% 50.0%",
-        "2 to 9 37.5% 25.0%",
-        "10 to 99 12.5% 0.0%",
-        "1,000 to 9,999 0.0% 25.0%",
-        "10,000 or more 25.0% 0.0%",
-        HOSTILE,
-    ):
-        assert said in text.shown
-    assert not {"script", "img"} & text.tags
-
-
-def test_what_drift_says() -> None:
-    pairs = np.zeros((6, 2), np.int64)
-    cells = CellChanges(same=pairs, changed=pairs[:2], vanished=pairs[:1, 0], appeared=pairs[:1, 0])
-    text = Text(drift_legend(cells, None, taxonomy=paper_taxonomy(), licenses=[HOSTILE])).shown
-    for said in (
-        "of 10 before or after",
-        "see what they saw 6 60.0%",
-        "see nothing now 1 10.0%",
-        HOSTILE,
-    ):
-        assert said in text
-    assert "Street objects" not in text
-    change = ClassChange(
-        class_name="bench", before=3, after=4, added=2, removed=1, moved=5, moved_m=1.0, gained=0,
-        lost=0,
-    )  # fmt: skip
-    still = dataclasses.replace(change, class_name="bus_stop", added=0, removed=0, moved=0)
-    objects = ObjectChanges(
-        same=pairs, moved=pairs[:5], changed=pairs[:0], removed=pairs[:1, 0], added=pairs[:2, 0],
-        classes=(still, change),
-    )  # fmt: skip
-    text = Text(drift_legend(cells, objects, taxonomy=paper_taxonomy(), licenses=())).shown
-    for said in ("2 added", "1 removed", "5 moved", "0 of another class", "Public bench 2 1 5"):
-        assert said in text
-    assert "Bus stop" not in text
-
-
-def test_signs_of_direction_turn_no_other_text(
-    evaluation: Evaluation, database: SignatureDatabase
-) -> None:
-    turned = "\u202eno ecnecil"
-    for legend in (
-        evaluation_legend(evaluation, error_limit="1 m", licenses=[turned]),
-        localization_legend(
-            dataclasses.replace(
-                localize(database, database.signature(0), top=2), licenses=(turned,)
-            )
-        ),
-    ):
-        assert f"<bdi>{turned}</bdi>" in legend

@@ -1,4 +1,4 @@
-"""The map of street objects in a real browser."""
+"""The maps of street objects, and of streets and buildings below them, in a real browser."""
 
 from __future__ import annotations
 
@@ -7,32 +7,20 @@ import html
 import re
 from typing import TYPE_CHECKING
 
-import folium
 import geopandas as gpd
 import numpy as np
 import pytest
 import shapely
-from map_pages import (
-    HOSTILE,
-    asked,
-    assert_quiet,
-    drawn,
-    opened,
-    popup_text,
-    searched,
-    switch,
-)
+from map_pages import ASK, HOSTILE, LEGEND, MapPage, assert_quiet
 from selenium.webdriver.common.by import By
 from selenium.webdriver.common.keys import Keys
-from sentences import assert_sentence
 from worlds import random_town
 
-from semsig_gis.core.errors import EmptyResultError
 from semsig_gis.core.signs import class_signs
 from semsig_gis.core.taxonomy import ObjectClass, Taxonomy
 from semsig_gis.maps.localization import localization_map
-from semsig_gis.maps.objects import objects_map
-from semsig_gis.maps.page import save_map
+from semsig_gis.maps.objects import ground_map, objects_map
+from semsig_gis.maps.page import page_of_map
 from semsig_gis.maps.parts import to_latlon
 from semsig_gis.matching.search import localize
 from semsig_gis.objects.table import Licence, StreetObjects
@@ -43,9 +31,10 @@ if TYPE_CHECKING:
     from selenium.webdriver import Chrome
 
 BOARD = ".leaflet-overlay-pane canvas.semsig-board"
+GROUND = ".leaflet-tile-pane canvas.semsig-board"
+HOUSE, STREET = "#e4ded3", "#cfd3d8"
 WORLD = random_town()
-CITY = WORLD.database
-OBJECTS = WORLD.street_objects
+CITY, OBJECTS = WORLD.database, WORLD.street_objects
 SIGNS = class_signs(OBJECTS.taxonomy)
 NUMBER = 7  # of the object that is asked for
 CODE = int(OBJECTS.codes[NUMBER])
@@ -58,49 +47,41 @@ def place_of(number: int) -> list[float]:
     return latlon
 
 
-def click(browser: Chrome, place: list[float]) -> None:
-    asked(browser, "map.setView(arguments[0], 20, {animate: false})", place)
-    asked(browser, "map.fire('click', {latlng: L.latLng(arguments[0])})", place)
+def click(page: MapPage, number: int) -> str:
+    """Click an object from close to; return what the popup says."""
+    page.ask("map.setView(arguments[0], 20, {animate: false})", place_of(number))
+    page.click_at(place_of(number))
+    return page.popup()
 
 
-@pytest.mark.usefixtures("carried")
-def test_objects_in_a_browser(browser: Chrome, tmp_path: Path) -> None:
-    opened(browser, objects_map(OBJECTS, database=CITY), tmp_path)
-    assert browser.title == "Street objects"
-    names = [
-        label.text.strip()
-        for label in browser.find_elements(
-            By.CSS_SELECTOR, ".leaflet-control-layers-overlays label"
-        )
-    ]
+def test_objects_in_a_browser(page: MapPage) -> None:
+    page.open(objects_map(OBJECTS, database=CITY))
+    assert page.browser.title == "Street objects"
+    names = page.layers()
     # The letter of the sign, then the title.
     assert any(name.endswith(f"{TITLE} ({COUNT:,})") for name in names)
     assert len(names) == len(OBJECTS.class_counts) + 1
-    legend = browser.find_element(By.CSS_SELECTOR, ".semsig-legend").text
+    legend = page.one(LEGEND).text
     assert f"{len(OBJECTS):,} objects of {len(OBJECTS.class_counts)} classes" in legend
     for signs in (".semsig-legend", ".leaflet-control-layers-overlays"):
         for part, named in (("path", "colour"), ("text", "ink")):
-            shown = browser.find_elements(By.CSS_SELECTOR, f"{signs} .semsig-sign {part}")
+            shown = page.all(f"{signs} .semsig-sign {part}")
             colours = [getattr(SIGNS[code], named) for code in OBJECTS.class_counts]
             assert [one.get_attribute("fill") for one in shown] == colours
-    credit = browser.find_element(By.CSS_SELECTOR, ".leaflet-control-attribution").text
-    assert str(OBJECTS.licenses[0]) in credit
-    assert drawn(browser, SIGNS[CODE].colour, BOARD) > 0
+    assert str(OBJECTS.licenses[0]) in page.one(".leaflet-control-attribution").text
+    assert page.drawn(SIGNS[CODE].colour, BOARD) > 0
     boxes = ".leaflet-control-layers-overlays input:checked"
-    asked(browser, "document.querySelectorAll(arguments[0]).forEach((box) => box.click())", boxes)
-    assert drawn(browser, SIGNS[CODE].colour, BOARD) == 0
-    switch(browser, next(name for name in names if TITLE in name))
-    assert drawn(browser, SIGNS[CODE].colour, BOARD) > 0
-    assert_quiet(browser)
+    page.ask("document.querySelectorAll(arguments[0]).forEach((box) => box.click())", boxes)
+    assert page.drawn(SIGNS[CODE].colour, BOARD) == 0
+    page.switch(next(name for name in names if TITLE in name))
+    assert page.drawn(SIGNS[CODE].colour, BOARD) > 0
 
 
-@pytest.mark.usefixtures("carried")
-def test_a_click_tells_of_the_nearest_object(browser: Chrome, tmp_path: Path) -> None:
+def test_a_click_tells_of_the_nearest_object(page: MapPage) -> None:
     table = OBJECTS.table.assign(count=3, merged="osm:node/9")
     objects = dataclasses.replace(OBJECTS, table=table)
-    opened(browser, objects_map(objects), tmp_path)
-    click(browser, place_of(NUMBER))
-    popup = popup_text(browser)
+    page.open(objects_map(objects))
+    popup = click(page, NUMBER)
     assert popup.startswith(TITLE)
     for said in ("world", "3 rows of its source", "osm:node/9"):
         assert said in popup
@@ -108,52 +89,45 @@ def test_a_click_tells_of_the_nearest_object(browser: Chrome, tmp_path: Path) ->
     there = np.hypot(*(OBJECTS.xy - OBJECTS.xy[NUMBER]).T) < 0.5
     ids = OBJECTS.table["source_id"][there]
     assert any(f"Identifier\t{one}" in popup for one in ids)
-    assert len(browser.find_elements(By.CSS_SELECTOR, ".leaflet-shadow-pane canvas")) == 1
-    asked(browser, "map.closePopup()")
+    assert len(page.all(".leaflet-shadow-pane canvas")) == 1
+    page.ask("map.closePopup()")
     corner = OBJECTS.xy.min(axis=0) - 50.0
-    asked(browser, "map.fire('click', {latlng: L.latLng(arguments[0])})",
-          to_latlon(corner[None], OBJECTS.crs)[0].tolist())  # fmt: skip
-    assert asked(browser, "return map._popup === null || !map._popup.isOpen()")
-    assert_quiet(browser)
+    page.click_at(to_latlon(corner[None], OBJECTS.crs)[0].tolist())
+    assert page.ask("return map._popup === null || !map._popup.isOpen()")
 
 
-@pytest.mark.usefixtures("carried")
-def test_the_script_has_every_object_where_it_is(browser: Chrome, tmp_path: Path) -> None:
-    opened(browser, objects_map(OBJECTS), tmp_path)
-    browser.set_script_timeout(30)
-    known = browser.execute_async_script(
-        """
-        const done = arguments[arguments.length - 1];
-        const map = Object.values(window).find((value) => value instanceof L.Map);
-        const found = [];
-        const look = () => {
-          for (let one = 0; one < arguments[0]; one += 1) {
-            const name = semsig.finders.flatMap((finder) => finder(String(one), 99))
-              .find((other) => other.name === String(one));
-            if (!name) return setTimeout(look, 50);
-            name.show(map);
-            const place = map._popup.getLatLng();
-            found.push([place.lat, place.lng]);
-          }
-          done(found);
-        };
-        look();
-        """,
-        40,
-    )
+def test_the_script_has_every_object_where_it_is(page: MapPage) -> None:
+    page.open(objects_map(OBJECTS))
+    page.browser.set_script_timeout(30)
+    script = """
+    const done = arguments[arguments.length - 1];
+    const places = [];
+    const look = () => {
+      for (let one = 0; one < arguments[0]; one += 1) {
+        const name = semsig.finders.flatMap((finder) => finder(String(one), 99))
+          .find((other) => other.name === String(one));
+        if (!name) return setTimeout(look, 50);
+        name.show(map);
+        const place = map._popup.getLatLng();
+        places.push([place.lat, place.lng]);
+      }
+      done(places);
+    };
+    look();
+    """
+    places = page.browser.execute_async_script(ASK + script, 40)
     expected = np.array([place_of(number) for number in range(40)])
-    assert np.abs(np.array(known) - expected).max() < 4e-6  # a quarter of a metre
+    assert np.abs(np.array(places) - expected).max() < 4e-6  # a quarter of a metre
 
 
-@pytest.mark.usefixtures("carried")
-def test_the_search_finds_names_cells_and_places(browser: Chrome, tmp_path: Path) -> None:
-    opened(browser, objects_map(OBJECTS, database=CITY), tmp_path)
-    offered = searched(browser, TITLE[:4].upper())
+def test_the_search_finds_names_cells_and_places(page: MapPage) -> None:
+    page.open(objects_map(OBJECTS, database=CITY))
+    offered = page.search(TITLE[:4].upper())
     assert f"{TITLE}\nall {COUNT:,}" in offered
-    offered = searched(browser, str(len(OBJECTS) - 1), Keys.ENTER)
+    offered = page.search(str(len(OBJECTS) - 1), Keys.ENTER)
     assert offered[0].startswith(f"{len(OBJECTS) - 1}\n")
-    assert f"Identifier\t{len(OBJECTS) - 1}" in popup_text(browser)
-    assert asked(browser, "return map.getZoom()") >= 18
+    assert f"Identifier\t{len(OBJECTS) - 1}" in page.popup()
+    assert page.ask("return map.getZoom()") >= 18
     middle = len(CITY) // 2
     x, y = CITY.xy[middle].tolist()
     latitude, longitude = to_latlon(CITY.xy[middle : middle + 1], CITY.crs)[0].tolist()
@@ -170,107 +144,97 @@ def test_the_search_finds_names_cells_and_places(browser: Chrome, tmp_path: Path
         (f"{latitude} {longitude}".replace(".", ","), degrees),
         (f"{x} {y}", "x, y in EPSG:2154"),
     ):
-        asked(browser, "map.setZoom(14, {animate: false})")
-        (offer,) = searched(browser, text, Keys.ENTER)
+        page.ask("map.setZoom(14, {animate: false})")
+        (offer,) = page.search(text, Keys.ENTER)
         assert said in offer
-        popup = popup_text(browser)
+        popup = page.popup()
         assert re.findall(r"Cell\D*(\d+)", popup) == [cell]
         for label, place in (("Latitude, longitude", (latitude, longitude)),
                              ("x, y in EPSG:2154", (x, y))):  # fmt: skip
             (numbers,) = re.findall(rf"{label}\t(.*), (.*)", popup)
             assert [float(one) for one in numbers] == pytest.approx(place, abs=0.1, rel=1e-7)
         # Popups near the edge move the map a little.
-        asked(browser, "map.setView(map._popup.getLatLng(), 19, {animate: false})")
-        assert asked(browser, centre) == pytest.approx([latitude, longitude], abs=2e-6)
-    assert_quiet(browser)
+        page.ask("map.setView(map._popup.getLatLng(), 19, {animate: false})")
+        assert page.ask(centre) == pytest.approx([latitude, longitude], abs=2e-6)
 
 
-@pytest.mark.usefixtures("carried")
-def test_the_search_is_used_by_keyboard(browser: Chrome, tmp_path: Path) -> None:
-    opened(browser, objects_map(OBJECTS, database=CITY), tmp_path)
-    box = browser.find_element(By.CSS_SELECTOR, ".semsig-search input")
-    offered = searched(browser, "1")
+def test_the_search_is_used_by_keyboard(page: MapPage) -> None:
+    page.open(objects_map(OBJECTS, database=CITY))
+    box = page.one(".semsig-search input")
+    offered = page.search("1")
     assert len(offered) == 8
-    chosen = "return document.querySelector('[aria-selected=true]').innerText"
-    assert browser.execute_script(chosen) == offered[0]
+    assert page.one("[aria-selected=true]").text == offered[0]
     covered = """
     return [...document.querySelectorAll('[role=option]')].filter((one) => {
       const {left, top, height} = one.getBoundingClientRect();
       return !one.contains(document.elementFromPoint(left + 10, top + height / 2));
     }).length;
     """
-    assert browser.execute_script(covered) == 0  # no button lies on what is offered
+    assert page.ask(covered) == 0  # no button lies on what is offered
     box.send_keys(Keys.ARROW_DOWN, Keys.ARROW_DOWN)
-    assert browser.execute_script(chosen) == offered[2]
+    assert page.one("[aria-selected=true]").text == offered[2]
     active = box.get_attribute("aria-activedescendant")
-    assert browser.find_element(By.ID, str(active)).text == offered[2]
+    assert page.browser.find_element(By.ID, str(active)).text == offered[2]
     box.send_keys(Keys.ARROW_UP, Keys.ESCAPE)
     assert box.get_attribute("aria-expanded") == "false"
     for nothing in ("no such thing", "0, 0", "1e400", "99999999999999999999"):
-        assert searched(browser, nothing, Keys.ENTER) == []
-        said = browser.find_element(By.CSS_SELECTOR, ".semsig-search [role=status]")
+        assert page.search(nothing, Keys.ENTER) == []
+        said = page.one(".semsig-search [role=status]")
         assert said.text == "Nothing on this map is called so, or lies there."
-    assert_quiet(browser)
 
 
 @pytest.mark.usefixtures("carried")
 def test_light_and_dark(browser: Chrome, tmp_path: Path) -> None:
+    page = MapPage(browser, tmp_path)
     dark = {"features": [{"name": "prefers-color-scheme", "value": "dark"}]}
     panel = "return getComputedStyle(document.querySelector('.semsig-legend')).color"
     browser.execute_cdp_cmd("Emulation.setEmulatedMedia", dark)
     try:
-        opened(browser, objects_map(OBJECTS), tmp_path)
-        assert asked(browser, "return semsig.isDark(map)")
-        assert browser.execute_script(panel) == "rgb(233, 233, 230)"
-        button = browser.find_element(By.CSS_SELECTOR, ".semsig-colours")
+        page.open(objects_map(OBJECTS))
+        assert page.ask("return semsig.isDark(map)")
+        assert page.ask(panel) == "rgb(233, 233, 230)"
+        button = page.one(".semsig-colours")
         assert button.get_attribute("aria-label") == "Light colours"
         button.send_keys(Keys.ENTER)
-        assert not asked(browser, "return semsig.isDark(map)")
-        assert browser.execute_script(panel) == "rgb(34, 34, 34)"
-        assert drawn(browser, SIGNS[CODE].colour, BOARD) > 0
+        assert not page.ask("return semsig.isDark(map)")
+        assert page.ask(panel) == "rgb(34, 34, 34)"
+        assert page.drawn(SIGNS[CODE].colour, BOARD) > 0
         assert_quiet(browser)
         browser.refresh()
-        assert not asked(browser, "return semsig.isDark(map)")  # what was chosen is kept
-        browser.execute_script("localStorage.clear()")
+        assert not page.ask("return semsig.isDark(map)")  # what was chosen is kept
+        page.ask("localStorage.clear()")
         # A page that may keep nothing.
-        page = (tmp_path / "map.html").read_text(encoding="utf-8")
-        frame = f'<iframe sandbox="allow-scripts" srcdoc="{html.escape(page)}"></iframe>'
+        text = html.escape((tmp_path / "map.html").read_text(encoding="utf-8"))
+        frame = f'<iframe sandbox="allow-scripts" srcdoc="{text}"></iframe>'
         (tmp_path / "frame.html").write_text(frame, encoding="utf-8")
         browser.get((tmp_path / "frame.html").as_uri())
         browser.switch_to.frame(0)
-        assert len(browser.find_elements(By.CSS_SELECTOR, ".semsig-dark")) == 1
-        browser.find_element(By.CSS_SELECTOR, ".semsig-colours").send_keys(Keys.ENTER)
-        assert browser.find_elements(By.CSS_SELECTOR, ".semsig-dark") == []
+        assert len(page.all(".semsig-dark")) == 1
+        page.one(".semsig-colours").send_keys(Keys.ENTER)
+        assert page.all(".semsig-dark") == []
         browser.switch_to.default_content()
         assert browser.get_log("browser") == []
     finally:
         browser.execute_cdp_cmd("Emulation.setEmulatedMedia", {"features": []})
 
 
-@pytest.mark.usefixtures("carried")
-def test_a_narrow_screen(browser: Chrome, tmp_path: Path) -> None:
-    size = {"width": 390, "height": 844, "deviceScaleFactor": 2, "mobile": True}
-    browser.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", size)
-    try:
-        opened(browser, objects_map(OBJECTS, database=CITY), tmp_path)
-        box = browser.find_element(By.CSS_SELECTOR, ".semsig-search").rect
-        layers = browser.find_element(By.CSS_SELECTOR, ".leaflet-control-layers").rect
+def test_a_narrow_screen(page: MapPage) -> None:
+    with page.screen(390, 844, dots=2):
+        page.open(objects_map(OBJECTS, database=CITY))
+        box = page.one(".semsig-search").rect
+        layers = page.one(".leaflet-control-layers").rect
         assert box["x"] + box["width"] <= layers["x"]
-        assert searched(browser, "3", Keys.ENTER)
-        popup = browser.find_element(By.CSS_SELECTOR, ".leaflet-popup-content-wrapper")
+        assert page.search("3", Keys.ENTER)
+        popup = page.one(".leaflet-popup-content-wrapper")
         assert popup.rect["x"] >= 0
         assert popup.rect["x"] + popup.rect["width"] <= 390
-        for hidden in (".semsig-search", ".semsig-legend"):
-            assert not browser.find_element(By.CSS_SELECTOR, hidden).is_displayed()
-        asked(browser, "map.closePopup()")
-        assert browser.find_element(By.CSS_SELECTOR, ".semsig-search").is_displayed()
-    finally:
-        browser.execute_cdp_cmd("Emulation.clearDeviceMetricsOverride", {})
-    assert_quiet(browser)
+        for hidden in (".semsig-search", LEGEND):
+            assert not page.one(hidden).is_displayed()
+        page.ask("map.closePopup()")
+        assert page.one(".semsig-search").is_displayed()
 
 
-@pytest.mark.usefixtures("carried")
-def test_hostile_data_is_shown_and_never_run(browser: Chrome, tmp_path: Path) -> None:
+def test_hostile_data_is_shown_and_never_run(page: MapPage) -> None:
     harm = HOSTILE + "M" * 10_000
     classes = tuple(
         ObjectClass(item.code, item.symbol, item.name, f"{item.symbol} {harm}")
@@ -278,55 +242,48 @@ def test_hostile_data_is_shown_and_never_run(browser: Chrome, tmp_path: Path) ->
     )
     table = OBJECTS.table.assign(source=harm, source_id=harm, merged=harm)
     harmful = StreetObjects(table, Taxonomy(classes), (Licence(harm, (harm,)),))
-    opened(browser, objects_map(harmful), tmp_path)  # an alert would fail the next command
-    text = "return document.querySelector(arguments[0]).textContent"
+    page.open(objects_map(harmful))
     for selector, times in (
         (".semsig-legend", len(OBJECTS.class_counts) + 2),
         (".leaflet-control-layers-overlays", len(OBJECTS.class_counts)),
         (".leaflet-control-attribution", 2),
     ):
-        assert browser.execute_script(text, selector).count(harm) == times
+        assert page.text(selector).count(harm) == times
     # No sign of direction reaches what stands beside, and no name fills the page.
     for alone in (".leaflet-control-attribution bdi", ".leaflet-control-layers-overlays bdi"):
-        assert browser.execute_script(text, alone).endswith(harm)
+        assert page.text(alone).endswith(harm)
     highest = """
     const parts = [...document.querySelectorAll(arguments[0])];
     return Math.max(...parts.map((one) => one.getBoundingClientRect().height));
     """
-    assert browser.execute_script(highest, ".leaflet-control-layers-overlays label") <= 90
-    assert browser.execute_script(highest, ".semsig-legend tr") <= 90
-    click(browser, place_of(NUMBER))
-    popup_text(browser)
-    assert browser.execute_script(text, ".semsig-details").count(harm) == 5
-    assert browser.execute_script(highest, ".semsig-details > b") <= 90
-    assert browser.execute_script(highest, ".semsig-details tr") <= 200
-    asked(browser, "map.closePopup()")
-    offered = searched(browser, "alert")
+    assert page.ask(highest, ".leaflet-control-layers-overlays label") <= 90
+    assert page.ask(highest, ".semsig-legend tr") <= 90
+    click(page, NUMBER)
+    assert page.text(".semsig-details").count(harm) == 5
+    assert page.ask(highest, ".semsig-details > b") <= 90
+    assert page.ask(highest, ".semsig-details tr") <= 200
+    page.ask("map.closePopup()")
+    offered = page.search("alert")
     assert len(offered) == 8
-    assert browser.execute_script(text, ".semsig-search ul").count(harm) == 8
+    assert page.text(".semsig-search ul").count(harm) == 8
     for element in ("script", "img"):
-        assert browser.find_elements(By.CSS_SELECTOR, f".leaflet-container {element}") == []
-    assert_quiet(browser)
+        assert page.all(f".leaflet-container {element}") == []
 
 
-@pytest.mark.usefixtures("carried")
-def test_objects_over_another_map(browser: Chrome, tmp_path: Path) -> None:
-    chosen = localization_map(localize(CITY, CITY.signature(0), top=3), CITY)
-    assert objects_map(OBJECTS, map_=chosen) is chosen
-    assert objects_map(OBJECTS, map_=chosen) is chosen
-    opened(browser, chosen, tmp_path)
-    assert browser.find_elements(By.CSS_SELECTOR, BOARD) == []  # hidden at first
-    assert len(browser.find_elements(By.CSS_SELECTOR, ".semsig-search")) == 1
-    assert len(browser.find_elements(By.CSS_SELECTOR, ".semsig-legend[open]")) == 1
+def test_objects_over_another_map(page: MapPage) -> None:
+    map_ = localization_map(localize(CITY, CITY.signature(0), top=3), CITY)
+    for _ in range(2):
+        objects_map(OBJECTS, map_=map_)
+    page.open(map_)
+    assert page.all(BOARD) == []  # hidden at first
+    assert len(page.all(".semsig-search")) == 1
+    assert len(page.all(".semsig-legend[open]")) == 1
     # Cells are still found by their number, and the credit is given once.
-    assert searched(browser, str(CITY.cell_ids[0]), Keys.ENTER) == [f"Cell {CITY.cell_ids[0]}"]
-    credit = browser.find_element(By.CSS_SELECTOR, ".leaflet-control-attribution")
-    said = browser.execute_script("return arguments[0].textContent", credit)
-    assert said.count(str(OBJECTS.licenses[0])) == 1
-    assert_quiet(browser)
+    assert page.search(str(CITY.cell_ids[0]), Keys.ENTER) == [f"Cell {CITY.cell_ids[0]}"]
+    assert page.text(".leaflet-control-attribution").count(str(OBJECTS.licenses[0])) == 1
 
 
-def test_a_hundred_thousand_objects_are_a_small_page(tmp_path: Path) -> None:
+def test_a_hundred_thousand_objects_are_a_small_page() -> None:
     rng = np.random.default_rng(0)
     size = 100_000
     table = gpd.GeoDataFrame(
@@ -340,18 +297,70 @@ def test_a_hundred_thousand_objects_are_a_small_page(tmp_path: Path) -> None:
         crs=OBJECTS.crs,
     )
     objects = StreetObjects(table, OBJECTS.taxonomy, OBJECTS.licenses)
-    save_map(objects_map(objects), tmp_path / "map.html", self_contained=False)
-    assert (tmp_path / "map.html").stat().st_size < 1_500_000
+    assert len(page_of_map(objects_map(objects), self_contained=False)) < 1_500_000
 
 
-def test_no_objects() -> None:
-    none = dataclasses.replace(OBJECTS, table=OBJECTS.table.iloc[:0])
-    with pytest.raises(EmptyResultError) as caught:
-        objects_map(none)
-    assert_sentence(caught.value, "no street object")
+def table(*shapes: shapely.Geometry | None, crs: str | None = "EPSG:2154") -> gpd.GeoDataFrame:
+    return gpd.GeoDataFrame(geometry=list(shapes), crs=crs)
 
 
-def test_a_map_of_ones_own_keeps_its_view() -> None:
-    own = folium.Map([43.0, 3.0], zoom_start=12, tiles=None)
-    assert objects_map(OBJECTS, map_=own) is own
-    assert "fitBounds(null" not in own.get_root().render()
+def square(x: float, y: float, side: float) -> shapely.Polygon:
+    return shapely.box(765_300.0 + x, 6_275_100.0 + y, 765_300.0 + x + side, 6_275_100.0 + y + side)
+
+
+def test_buildings_and_streets_in_a_browser(page: MapPage) -> None:
+    court = shapely.difference(square(0, 0, 100), square(25, 25, 50))
+    lane = shapely.LineString([(765_280.0, 6_275_090.0), (765_420.0, 6_275_090.0)])
+    page.open(ground_map(buildings=table(court, None), streets=table(lane)))
+    assert page.browser.title == "Streets and buildings"
+    house, street = page.drawn(HOUSE, GROUND), page.drawn(STREET, GROUND)
+    assert house > 5000
+    # The courtyard is a quarter of the square, the street 140 m by 6 m.
+    assert street / house == pytest.approx(140.0 * 6.0 / 7500.0, rel=0.15)
+    page.one(".semsig-colours").click()
+    assert page.drawn(HOUSE, GROUND) == 0
+    assert page.drawn("#272b30", GROUND) == pytest.approx(house, rel=0.02)
+    page.switch("Streets and buildings")
+    assert page.all(GROUND) == []
+    page.switch("Streets and buildings")
+    assert page.drawn("#272b30", GROUND) > 0
+
+
+def test_the_ground_lies_below_all_else(page: MapPage) -> None:
+    x, y = CITY.xy.mean(axis=0)
+    house = table(shapely.box(x - 50, y - 50, x + 50, y + 50))
+    house.attrs["licenses"] = ["Mapper (CC0)"]
+    map_ = localization_map(localize(CITY, CITY.signature(0), top=3), CITY)
+    ground_map(buildings=house, map_=objects_map(OBJECTS, map_=map_))
+    page.open(map_)
+    assert page.browser.title == "Candidate places"
+    order = """
+    return [...document.querySelectorAll('.leaflet-tile-pane > *')].map(
+      (one) => [one.tagName, Number(getComputedStyle(one).zIndex)]);
+    """
+    layers = dict(page.ask(order))
+    assert layers["CANVAS"] > layers["IMG"]  # of the cells, on which streets are seen
+    credit = page.text(".leaflet-control-attribution")
+    assert "Mapper (CC0)" in credit
+    assert str(OBJECTS.licenses[0]) in credit
+
+
+def test_a_city_of_sixty_thousand_buildings_is_a_small_page() -> None:
+    rng = np.random.default_rng(0)
+    size = 60_000
+    corners = np.array([[0, 0], [12, 0], [12, 6], [9, 6], [9, 14], [3, 14], [3, 9], [0, 9]])
+    turn = rng.random(size) * np.pi
+    turns = np.stack([np.cos(turn), -np.sin(turn), np.sin(turn), np.cos(turn)], axis=1)
+    middles = 765_000.0 + 10_000.0 * rng.random((size, 1, 2))
+    rings = middles + np.einsum("sij,pj->spi", turns.reshape(-1, 2, 2), corners)
+    houses = gpd.GeoDataFrame(geometry=shapely.polygons(rings), crs="EPSG:2154")
+    assert len(page_of_map(ground_map(buildings=houses), self_contained=False)) < 3_000_000
+
+
+def test_only_what_is_in_the_box() -> None:
+    many = table(*(square(30.0 * at, 0.0, 20.0) for at in range(200)))
+    every, some = (
+        len(page_of_map(ground_map(buildings=many, box=box), self_contained=False))
+        for box in (None, (765_300.0, 6_275_100.0, 765_600.0, 6_275_200.0))
+    )
+    assert some < every

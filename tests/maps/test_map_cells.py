@@ -1,0 +1,188 @@
+"""The maps of cells that look the same, and of where a query can be placed, in a real browser."""
+
+from __future__ import annotations
+
+import dataclasses
+import time
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pytest
+from cells_told import told_of
+from map_pages import HOSTILE, IMAGES, LEGEND, hostile_database
+from worlds import random_town
+
+from semsig_gis.likelihood.noise.model import named_noise
+from semsig_gis.maps.cells import ambiguity_map, identifiability_map
+
+if TYPE_CHECKING:
+    from map_pages import MapPage
+
+CITY = random_town().database
+TOLD = told_of(CITY)
+
+
+def group(cell: int, *, angles: bool = False) -> list[int]:
+    """Return the cells with the same types, and angle levels, by comparing one after the other."""
+
+    def look(one: int) -> tuple[str, list[int] | None]:
+        part = slice(CITY.offsets[one], CITY.offsets[one + 1])
+        return CITY.types(one), CITY.levels[part].tolist() if angles else None
+
+    return [one for one in range(len(CITY)) if look(one) == look(cell)]
+
+
+LARGEST = int(CITY.type_group_sizes.argmax())
+ALIKE = group(LARGEST)
+
+
+def test_a_click_tells_of_the_cells_that_look_the_same(page: MapPage) -> None:
+    page.open(ambiguity_map(CITY))
+    assert page.browser.title == "Cells that look the same"
+    assert len(page.all(IMAGES)) == 1
+    page.ask("map.setZoom(19, {animate: false})")
+    chosen = np.random.default_rng(3).choice(len(CITY), 6, replace=False).tolist()
+    for cell in (LARGEST, *chosen):
+        said = page.click(CITY, cell)
+        assert said["title"] == "Cells that look the same"
+        assert said["It sees"].startswith(CITY.types(cell))
+        assert said["Cell"] == str(CITY.cell_ids[cell])
+        text = " ".join(page.jumps())
+        for label, angles in (("Same types", False), ("Types and angle levels", True)):
+            alike = group(cell, angles=angles)
+            if len(alike) == 1:
+                assert said.get(label, "no other cell") == "no other cell"
+                assert f"{label}:" not in text
+            else:
+                at = alike.index(cell) + 1
+                assert f"{label}: {at} of {len(alike)}" in text
+
+
+def test_buttons_go_through_the_group_and_to_its_ends(page: MapPage) -> None:
+    page.open(ambiguity_map(CITY))
+    alike = ALIKE
+    assert len(alike) > 4
+    said = page.click(CITY, alike[0])
+    bearings = CITY.levels[CITY.offsets[alike[0]] : CITY.offsets[alike[0] + 1]]
+    for level in bearings.tolist():
+        assert f"{int((level + 0.5) * 22.5)}°" in said["text"]
+    where = page.ask("return map.latLngToContainerPoint(map._popup.getLatLng())")
+    seen = [alike[0]]
+    for _ in range(3):
+        said = page.press("next")
+        seen.append(int(np.searchsorted(CITY.cell_ids, int(said["Cell"]))))
+    assert seen == alike[:4]
+    # The button stays under the pointer.
+    after = page.ask("return map.latLngToContainerPoint(map._popup.getLatLng())")
+    assert abs(after["x"] - where["x"]) <= 2
+    assert page.ask("return document.activeElement.title").startswith("next")
+    # After the first comes the last, and the other way round.
+    page.click(CITY, alike[0])
+    assert page.press("previous")["Cell"] == str(CITY.cell_ids[alike[-1]])
+    assert page.press("next")["Cell"] == str(CITY.cell_ids[alike[0]])
+    page.click(CITY, alike[-1])
+    away = np.hypot(*(CITY.xy[alike] - CITY.xy[alike[-1]]).T)
+    nearest = page.press(f"{np.sort(away)[1]:.0f} m")["Cell"]
+    cell = alike[[str(one) for one in CITY.cell_ids[alike]].index(nearest)]
+    assert np.hypot(*(CITY.xy[cell] - CITY.xy[alike[-1]])) == pytest.approx(np.sort(away)[1])
+    away = np.hypot(*(CITY.xy[alike] - CITY.xy[cell]).T)
+    farthest = page.press("farthest")["Cell"]
+    ids = [str(one) for one in CITY.cell_ids[alike]]
+    assert away[ids.index(farthest)] == pytest.approx(away.max())
+
+
+def test_a_sign_is_a_jump_away_and_layers_are_switched(page: MapPage) -> None:
+    page.open(ambiguity_map(CITY))
+    page.click(CITY, LARGEST)
+    others = [cell for cell in ALIKE if cell != LARGEST]
+    twins = len(group(LARGEST, angles=True)) - 1
+    assert page.circles("#ffffff") == len(others)
+    assert page.circles("#e69f00") == twins
+    page.ask("circles('#ffffff')[0].fire('click')")
+    other = int(np.searchsorted(CITY.cell_ids, int(page.told()["Cell"])))
+    away = np.hypot(*(CITY.xy[others] - CITY.xy[LARGEST]).T)
+    assert other in np.array(others)[np.isclose(away, away.max())]  # the nearest lie on top
+    page.switch("Same types and angle levels")
+    assert len(page.all(IMAGES)) == 2
+    page.switch("Same types")
+    assert len(page.all(IMAGES)) == 1
+    page.switch("Tell of a cell when clicked")
+    time.sleep(0.5)
+    assert page.circles("#ffffff") == 0
+    page.ask("map.fire('click', {latlng: map.getCenter()})")
+    assert page.popup() == ""
+
+
+def test_what_is_known_of_queries_is_told_too(page: MapPage) -> None:
+    same_cells = dataclasses.replace(TOLD, database=dataclasses.replace(CITY))
+    page.open(ambiguity_map(CITY, identifiability=same_cells))
+    said = page.click(CITY, LARGEST)
+    assert {"It sees", "Found within 30 m", "Taken for 1", "Cell"} <= set(said)
+    assert any(line.startswith("Same types: ") for line in page.jumps())
+    numbers = page.all(".semsig-number")
+    assert len(numbers) == int((TOLD.lookalike_chances[LARGEST] >= 0.01).sum())
+
+
+def test_hostile_classes_are_shown_and_never_run(page: MapPage) -> None:
+    harmful = hostile_database(CITY)
+    page.open(ambiguity_map(harmful))
+    assert HOSTILE in page.text(LEGEND)
+    page.click(harmful, LARGEST)
+    assert HOSTILE in page.text(".semsig-details")
+    page.assert_text_stays_text()
+
+
+def whole_percent(chance: float) -> str:
+    percent = round(chance * 100)
+    if percent < 1:
+        return "below 1 %"
+    return "above 99 %" if percent > 99 else f"{percent} %"
+
+
+def test_a_click_on_any_cell_tells_of_it(page: MapPage) -> None:
+    page.open(identifiability_map(TOLD))
+    assert page.browser.title == "Where a query can be placed"
+    assert len(page.all(IMAGES)) == 1
+    page.ask("map.setZoom(19, {animate: false})")
+    for cell in np.random.default_rng(2).choice(len(CITY), 12, replace=False).tolist():
+        said = page.click(CITY, cell)
+        assert said["title"] == "A query from here"
+        assert said["It sees"].startswith(CITY.types(cell))
+        assert said["Cell"] == str(CITY.cell_ids[cell])
+        assert said["Found within 30 m"] == whole_percent(TOLD.found[cell])
+        assert said["Chance given"].startswith(whole_percent(TOLD.itself[cell]))
+        named = [name for name in said if name.startswith("Taken for")]
+        assert len(named) == int((TOLD.lookalike_chances[cell] >= 0.01).sum())
+    said = page.click(CITY, int(TOLD.bits.argmin()))
+    assert said["Looks like"] == "about 1 cell (0.0 bits are left)"
+
+
+def test_a_lookalike_is_a_jump_away(page: MapPage) -> None:
+    page.open(identifiability_map(TOLD))
+    cell = int(np.flatnonzero((TOLD.lookalike_chances > 0.1).all(axis=1))[0])
+    assert page.click(CITY, cell)["Cell"] == str(CITY.cell_ids[cell])
+    jump = """
+    const numbers = [];
+    map.eachLayer((layer) => { if (layer.getTooltip && layer.getTooltip()) numbers.push(layer); });
+    numbers[1].fire("click");
+    """
+    page.ask(jump)
+    other = int(TOLD.lookalikes[cell, 1])
+    assert page.told()["Cell"] == str(CITY.cell_ids[other])
+    assert page.ask("return map.getBounds().contains(map._popup.getLatLng())")
+    page.switch("Tell of a cell when clicked")
+    time.sleep(0.5)
+    assert page.all(".semsig-number") == []
+    page.ask("map.fire('click', {latlng: map.getCenter()})")
+    assert page.popup() == ""
+
+
+def test_hostile_data_is_shown_and_never_run(page: MapPage) -> None:
+    noise = dataclasses.replace(named_noise("medium"), name=HOSTILE)
+    told = dataclasses.replace(TOLD, database=hostile_database(CITY), noise=noise)
+    page.open(identifiability_map(told))
+    assert HOSTILE in page.text(LEGEND)
+    helped = np.flatnonzero((told.gains > 0.1).any(axis=1))
+    page.click(told.database, int(helped[0]))
+    assert HOSTILE in page.text(".semsig-details")
+    page.assert_text_stays_text()
