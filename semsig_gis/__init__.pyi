@@ -107,6 +107,7 @@ from .queries.paper_errors import (
 from .queries.sight import Sight as Sight
 from .evaluation.compare import compare_evaluations as compare_evaluations
 from .evaluation.evaluate import evaluate as evaluate
+from .evaluation.file import open_evaluation as open_evaluation, save_evaluation as save_evaluation
 from .evaluation.identify.check import (
     IdentifiabilityCheck as IdentifiabilityCheck,
     check_identifiability as check_identifiability,

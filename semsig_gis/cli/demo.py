@@ -24,6 +24,7 @@ def demo(
     from semsig_gis.database.build import build_database
     from semsig_gis.database.file import save_database
     from semsig_gis.evaluation.evaluate import evaluate as run
+    from semsig_gis.evaluation.file import save_evaluation
     from semsig_gis.exports import export_database
     from semsig_gis.maps.evaluation import evaluation_map
     from semsig_gis.maps.objects import objects_map
@@ -43,7 +44,7 @@ def demo(
     remark(f"its signature database: {len(database):,} cells")
     with progress("evaluating") as advance:
         evaluation = run(database, queries=queries, seed=seed, progress=advance)
-    evaluation.save(out / "evaluation")
+    save_evaluation(evaluation, out / "evaluation")
     with progress("drawing the map"):
         drawn = objects_map(objects, map_=evaluation_map(evaluation, database))
         offline = save_map(drawn, out / "map.html")

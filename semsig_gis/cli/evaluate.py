@@ -56,6 +56,7 @@ def evaluate(
 
     from semsig_gis.database.city import open_city
     from semsig_gis.evaluation.evaluate import evaluate as run
+    from semsig_gis.evaluation.file import save_evaluation
     from semsig_gis.matching.method import Method
     from semsig_gis.queries.chain import parse_chain
     from semsig_gis.queries.paper_errors import Distortion
@@ -86,7 +87,7 @@ def evaluate(
             progress=advance,
         )
     if out is not None:
-        evaluation.save(out)
+        save_evaluation(evaluation, out)
     if as_json:
         print_json(evaluation.summary())
         return

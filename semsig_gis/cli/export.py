@@ -55,7 +55,7 @@ def export(
 ) -> None:
     """Export cells, objects and queries for QGIS and other programs."""
     from semsig_gis.database.city import open_city
-    from semsig_gis.evaluation.result import Evaluation
+    from semsig_gis.evaluation.file import open_evaluation
     from semsig_gis.exports import export_database
     from semsig_gis.objects.table import open_objects
 
@@ -63,7 +63,7 @@ def export(
     city = open_city(database)
     cells = city.database
     seen = None if objects is None else open_objects(objects)
-    results = None if evaluation is None else Evaluation.load(evaluation)
+    results = None if evaluation is None else open_evaluation(evaluation)
     with progress(f"writing {out.name}") as advance:
         export_database(
             cells,

@@ -108,7 +108,7 @@ def map_(
 
     from semsig_gis.database.city import open_city
     from semsig_gis.database.database import require_same_place
-    from semsig_gis.evaluation.result import Evaluation
+    from semsig_gis.evaluation.file import open_evaluation
     from semsig_gis.maps.cells import ambiguity_map, identifiability_map
     from semsig_gis.maps.drift import drift_map
     from semsig_gis.maps.evaluation import evaluation_map
@@ -125,7 +125,7 @@ def map_(
         raise InputError(msg)
     keep_inputs(out, read=(database, drift, objects, buildings, streets))
     require_suffix(".html", out)
-    results = None if evaluation is None else Evaluation.load(evaluation)
+    results = None if evaluation is None else open_evaluation(evaluation)
     city = open_city(database)
     opened = city.database
     columns = known_identifiability(city) if identifiability or ambiguity else None

@@ -9,6 +9,7 @@ import numpy as np
 import pandas as pd
 
 from semsig_gis.core.errors import InputError
+from semsig_gis.evaluation.figures import percentiles
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -58,39 +59,31 @@ def compare_evaluations(
 
     Examples
     --------
-    >>> from semsig_gis.database.build import build_database
-    >>> from semsig_gis.sources.catalog import paper_taxonomy
-    >>> from semsig_gis.evaluation.evaluate import evaluate
-    >>> from semsig_gis.matching.method import Method
-    >>> from semsig_gis.objects.clean import build_objects
-    >>> from semsig_gis.sources.synthetic.city import CitySpec, synthetic_city
-    >>> layers = synthetic_city(CitySpec(size=300.0))
-    >>> objects, _ = build_objects(layers, taxonomy=paper_taxonomy(), crs="EPSG:32631")
-    >>> database = build_database(objects)
-    >>> one = evaluate(database, queries=50, method=Method.parse("types:jaccard"))
-    >>> other = evaluate(database, queries=50, method=Method.parse("edit+edit"))
-    >>> found = compare_evaluations(one, other).set_index("figure")
-    >>> bool(found["low"]["p50"] <= found["difference"]["p50"] <= found["high"]["p50"])
+    >>> from semsig_gis import Method, evaluate
+    >>> one = evaluate(demo_database, queries=50, method=Method.parse("types:jaccard"))
+    >>> other = evaluate(demo_database, queries=50, method=Method.parse("edit+edit"))
+    >>> figures = compare_evaluations(one, other).set_index("figure")
+    >>> bool(figures["low"]["p50"] <= figures["difference"]["p50"] <= figures["high"]["p50"])
     True
     """
     _require_pairs(first, second)
     shares = [one.figures for one in (first, second)]
     names = [name for name in shares[0] if name in shares[1]]
-    percentiles = {**PERCENTILES, **(HEADINGS if _turned(first) and _turned(second) else {})}
     values = [figures[names].to_numpy(dtype=np.float64) for figures in shares]
-    errors = {
-        name: [one.queries[column].to_numpy(dtype=np.float64) for one in (first, second)]
-        for name, (column, _) in percentiles.items()
-    }
+    columns = {**PERCENTILES, **(HEADINGS if _turned(first) and _turned(second) else {})}
+    errors = [
+        [one.queries[column].to_numpy(dtype=np.float64) for one in (first, second)]
+        for column, _ in columns.values()
+    ]
 
     def figures_of(rows: NDArray[np.int64]) -> NDArray[np.float64]:
         # Of both, for samples of the queries: shape (2, samples, figures).
-        told = np.stack([_means(one, rows) for one in values])
-        lengths = [
-            np.stack([_percentiles(one[rows], percentiles[name][1]) for one in pair])
-            for name, pair in errors.items()
+        means = np.stack([_means(one, rows) for one in values])
+        ends = [
+            np.stack([percentiles(one[rows], percent) for one in pair])
+            for pair, (_, percent) in zip(errors, columns.values(), strict=True)
         ]
-        return np.concatenate([told, np.stack(lengths, axis=-1)], axis=-1)
+        return np.concatenate([means, np.stack(ends, axis=-1)], axis=-1)
 
     count = len(first.queries)
     rng = np.random.default_rng(seed)
@@ -106,7 +99,7 @@ def compare_evaluations(
     bounds = [_bounds(column) for column in differences.T]
     return pd.DataFrame(
         {
-            "figure": [*names, *percentiles],
+            "figure": [*names, *columns],
             "first": one,
             "second": other,
             "difference": difference,
@@ -162,24 +155,11 @@ def _turned(evaluation: Evaluation) -> bool:
 
 
 def _means(values: NDArray[np.float64], rows: NDArray[np.int64]) -> NDArray[np.float64]:
-    """Return the mean of each column over samples of the rows, of what is told."""
+    """Return the mean of each column over samples of the rows, NaN left out."""
     weights = np.stack([np.bincount(row, minlength=len(values)) for row in rows]).astype(np.float64)
-    told = ~np.isnan(values)
-    with np.errstate(invalid="ignore"):  # nothing is told of a figure in a sample
-        return np.asarray((weights @ np.where(told, values, 0.0)) / (weights @ told))
-
-
-def _percentiles(samples: NDArray[np.float64], percent: float) -> NDArray[np.float64]:
-    """Return a percentile of each row, of what is told."""
-    ordered = np.sort(samples, axis=1)  # NaN comes last
-    told = (~np.isnan(ordered)).sum(axis=1)
-    place = percent / 100.0 * np.maximum(told - 1, 0)
-    rows = np.arange(len(ordered))
-    below, above = (ordered[rows, end(place).astype(np.int64)] for end in (np.floor, np.ceil))
-    part: NDArray[np.float64] = place - np.floor(place)
-    with np.errstate(invalid="ignore"):
-        between = below + part * (above - below)
-    return np.asarray(np.where((part == 0.0) | (below == above), below, between))
+    counted = ~np.isnan(values)
+    with np.errstate(invalid="ignore"):  # a sample may have nothing to count
+        return np.asarray((weights @ np.where(counted, values, 0.0)) / (weights @ counted))
 
 
 def _bounds(values: NDArray[np.float64]) -> tuple[float, float]:

@@ -65,20 +65,18 @@ def figure_means(figures: pd.DataFrame) -> pd.DataFrame:
     values that are not NaN; the others are NaN where there are none. Where ties make a query count
     with a chance, the interval is a little too wide: such values vary less than those of 0 or 1.
     """
-    means = _means(figures.to_numpy(dtype=np.float64))
+    means = [_share(values) for values in figures.to_numpy(dtype=np.float64).T]
     names = pd.Index(figures.columns, name="figure")
     return pd.DataFrame(means, index=names, columns=["value", "low", "high", "n"])
 
 
-def _means(values: NDArray[np.float64]) -> list[tuple[float, float, float, int]]:
-    """Return for each column the mean, its interval, and how many values are told."""
-    found = []
-    for column in values.T:
-        told = column[~np.isnan(column)]
-        value = float(told.mean()) if told.size else math.nan
-        low, high = wilson_interval(value, told.size) if told.size else (math.nan, math.nan)
-        found.append((value, low, high, told.size))
-    return found
+def _share(values: NDArray[np.float64]) -> tuple[float, float, float, int]:
+    """Return the mean of the values that are not NaN, its interval, and how many they are."""
+    chances = values[~np.isnan(values)]
+    if not chances.size:
+        return math.nan, math.nan, math.nan, 0
+    share = float(chances.mean())
+    return share, *wilson_interval(share, chances.size), chances.size
 
 
 def grouped_means(
@@ -93,7 +91,7 @@ def grouped_means(
     rows = []
     for group in order:
         inside = groups == group
-        means = dict(zip(figures, _means(values[inside]), strict=True))
+        means = dict(zip(figures, map(_share, values[inside].T), strict=True))
         row: dict[str, Any] = {by: group, "n": int(inside.sum())}
         row |= {str(name): value for name, (value, *_) in means.items()}
         _, row["p50_low"], row["p50_high"], _ = means["p50"]
@@ -101,20 +99,11 @@ def grouped_means(
     return pd.DataFrame(rows)
 
 
-def length_labels(queries: pd.DataFrame) -> list[str]:
-    """Return for each query the one of `LENGTHS` in which its ``length`` is.
-
-    It is ``"0"`` where nothing is seen.
-    """
-    return _ranges(queries["length"].to_numpy(), LENGTHS)
-
-
-def ambiguity_labels(queries: pd.DataFrame) -> list[str]:
-    """Return for each query the one of `AMBIGUITIES` in which its ``type_group`` is.
-
-    It is ``"0"`` where the true cell is not in the database.
-    """
-    return _ranges(queries["type_group"].to_numpy(), AMBIGUITIES)
+def range_labels(sizes: NDArray[np.int64], ranges: Sequence[str]) -> list[str]:
+    """Return the range that each size is in, such as ``5-9`` or ``20+``; ``"0"`` for none."""
+    starts = [int(label.rstrip("+").split("-")[0]) for label in ranges]
+    places = np.searchsorted(starts, sizes, side="right")
+    return [("0", *ranges)[place] for place in places.tolist()]
 
 
 def district_labels(queries: gpd.GeoDataFrame, districts: gpd.GeoDataFrame, name: str) -> list[str]:
@@ -137,23 +126,33 @@ def district_labels(queries: gpd.GeoDataFrame, districts: gpd.GeoDataFrame, name
 
 
 def percentile(values: NDArray[np.float64], percent: float) -> tuple[float, float, float]:
-    """Return a percentile and the low and high end of its interval of about 95 %.
+    """Return a percentile as `percentiles`, and the ends of its interval of about 95 %.
 
-    NaN is left out; all three are NaN where nothing is left. Values may be infinite. Between
-    neighbours the percentile is interpolated, infinite if the upper one is. The ends are order
-    statistics and suppose nothing of the distribution: how many values are below the true
-    percentile is binomial.
+    The ends are order statistics and suppose nothing of the distribution: how many values are
+    below the true percentile is binomial.
     """
     ordered = np.sort(values[~np.isnan(values)])
     if not ordered.size:
         return math.nan, math.nan, math.nan
-    place = percent / 100.0 * (ordered.size - 1)
-    below, above = ordered[math.floor(place)], ordered[math.ceil(place)]
-    part = place - math.floor(place)
-    # Nothing is interpolated towards infinity.
-    value = below if part == 0.0 or below == above else below + part * (above - below)
     low, high = quantile_ranks(ordered.size, percent / 100.0)
-    return float(value), float(ordered[low - 1]), float(ordered[high - 1])
+    (value,) = percentiles(ordered[None], percent).tolist()
+    return value, float(ordered[low - 1]), float(ordered[high - 1])
+
+
+def percentiles(samples: NDArray[np.float64], percent: float) -> NDArray[np.float64]:
+    """Return a percentile of each row, NaN left out; NaN where nothing is left.
+
+    Between neighbours it is interpolated, infinite if the upper one is.
+    """
+    ordered = np.sort(samples, axis=1)  # NaN comes last
+    last = np.maximum((~np.isnan(ordered)).sum(axis=1) - 1, 0)
+    place = percent / 100.0 * last
+    rows = np.arange(len(ordered))
+    below, above = (ordered[rows, end(place).astype(np.int64)] for end in (np.floor, np.ceil))
+    part: NDArray[np.float64] = place - np.floor(place)
+    with np.errstate(invalid="ignore"):  # of two infinite neighbours
+        between = below + part * (above - below)
+    return np.asarray(np.where((part == 0.0) | (below == above), below, between))
 
 
 def coverage_curve(queries: pd.DataFrame) -> pd.DataFrame:
@@ -167,14 +166,12 @@ def coverage_curve(queries: pd.DataFrame) -> pd.DataFrame:
     rows = []
     for threshold in RULES:
         answered = chance >= threshold
-        told = right[answered]
-        precision = float(told.mean()) if told.size else math.nan
-        low, high = wilson_interval(precision, told.size) if told.size else (math.nan, math.nan)
+        precision, low, high, count = _share(right[answered])
         rows.append(
             {
                 "threshold": threshold,
-                "answered": int(told.size),
-                "coverage": told.size / len(chance),
+                "answered": count,
+                "coverage": count / len(chance),
                 "precision": precision,
                 "low": low,
                 "high": high,
@@ -191,19 +188,15 @@ def calibration_bins(queries: pd.DataFrame) -> pd.DataFrame:
     """
     chance = queries["chance"].to_numpy(dtype=np.float64)
     right = queries["right"].to_numpy(dtype=np.float64)
-    told = ~np.isnan(chance)
     # The last bin holds 1, too. In whole numbers, so that 0.3 is not a rounding below its bin.
-    bins = np.minimum(np.floor(np.round(chance[told] * BINS, 9)), BINS - 1)
+    bins = np.minimum(np.floor(np.round(chance * BINS, 9)), BINS - 1)
     rows = []
     for number in range(BINS):
         inside = bins == number
-        size = int(inside.sum())
-        stated, true = (
-            float(values[told][inside].mean()) if size else math.nan for values in (chance, right)
-        )
-        low, high = wilson_interval(true, size) if size else (math.nan, math.nan)
+        stated, _, _, count = _share(chance[inside])
+        true, low, high, _ = _share(right[inside])
         ends = {"from": number / BINS, "to": (number + 1) / BINS}
-        rows.append({**ends, "n": size, "stated": stated, "true": true, "low": low, "high": high})
+        rows.append({**ends, "n": count, "stated": stated, "true": true, "low": low, "high": high})
     return pd.DataFrame(rows)
 
 
@@ -211,19 +204,13 @@ def plain_records(table: pd.DataFrame) -> list[dict[str, Any]]:
     """Return the rows of a table as values for JSON; None for infinite numbers and NaN."""
     return [
         {
-            str(name): None if isinstance(value, float) and not math.isfinite(value) else value
+            str(name): finite_or_none(value) if isinstance(value, float) else value
             for name, value in row.items()
         }
         for row in table.to_dict("records")
     ]
 
 
-def _ranges(sizes: NDArray[np.int64], labels: Sequence[str]) -> list[str]:
-    """Return the range that each size is in, such as ``5-9`` or ``20+``."""
-    starts = [int(label.rstrip("+").split("-")[0]) for label in labels]
-    return [
-        "0" if size < 1 else labels[int(place)]
-        for size, place in zip(
-            sizes.tolist(), np.searchsorted(starts, sizes, side="right") - 1, strict=True
-        )
-    ]
+def finite_or_none(value: float) -> float | None:
+    """Return a number, or None for what JSON cannot hold."""
+    return value if math.isfinite(value) else None

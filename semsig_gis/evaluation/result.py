@@ -1,55 +1,62 @@
-"""The settings of an evaluation as plain values, and the machine that it ran on."""
+"""The outcome of an evaluation: its queries, how they were answered, and the figures of them."""
 
 from __future__ import annotations
 
 import functools
-import json
 import math
 import os
 import platform
 from dataclasses import dataclass, field
-from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
-import geopandas as gpd
 import numpy as np
-import pandas as pd
-import pyarrow as pa
 
-from semsig_gis.core.errors import DatabaseError, InputError
+from semsig_gis.core.errors import InputError
 from semsig_gis.database.database import rows_of_result
 from semsig_gis.evaluation.figures import (
     AMBIGUITIES,
+    ELSEWHERE,
     LENGTHS,
-    ambiguity_labels,
+    RECALLS,
     calibration_bins,
     coverage_curve,
     district_labels,
     figure_means,
+    finite_or_none,
     grouped_means,
-    length_labels,
     percentile,
     plain_records,
     query_figures,
+    range_labels,
 )
-from semsig_gis.evaluation.methods import parse_method
-from semsig_gis.likelihood.noise.model import noise_from_dict
 from semsig_gis.matching.ties import NEAR_PLACES, THRESHOLDS, expected_recall
-from semsig_gis.queries.chain import chain_text, parse_chain
-from semsig_gis.queries.distortions import Detector
-from semsig_gis.queries.draw import QuerySpec
-from semsig_gis.storage.geoparquet import geo_metadata, read_geoparquet, write_geoparquet
-from semsig_gis.storage.whole import whole_file
+from semsig_gis.queries.chain import chain_text
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Mapping, Sequence
+    from collections.abc import Callable, Iterable, Mapping, Sequence
 
+    import geopandas as gpd
+    import pandas as pd
     from numpy.typing import NDArray
 
     from semsig_gis.database.database import SignatureDatabase
     from semsig_gis.evaluation.methods import AnyMethod
-    from semsig_gis.likelihood.noise.model import Noise
-    from semsig_gis.queries.chain import QueryDistortion
+    from semsig_gis.queries.draw import QuerySpec
+
+N = TypeVar("N", int, float)
+
+SUCCESS_METRES = 50
+SUCCESS_PROBABILITY = 0.5
+
+QUERY_COLUMNS = (
+    *("seed", "number", "cell", "cell_id", "types", "length", "type_group", "angle_group"),
+    *("query_types", "query_bearings", "query_length", "heading"),
+    *("best_cell_id", "best_x", "best_y", "distance", "tied", "next_cell_ids", "error_m"),
+    *(f"p{threshold}" for threshold in THRESHOLDS),
+    *(f"near{count}" for count in NEAR_PLACES),
+    *("rank_low", "rank_high", "chance", "right", "in_region", "heading_error"),
+)
+"""Columns of the table of queries, in their order; ``geometry`` comes last."""
 
 
 def machine() -> dict[str, Any]:
@@ -66,91 +73,6 @@ def machine() -> dict[str, Any]:
         "processors": os.cpu_count() or 1,
         "memory_gb": None if memory is None else round(memory, 1),
     }
-
-
-def used_noises(
-    methods: Iterable[AnyMethod], distortions: Iterable[QueryDistortion]
-) -> dict[str, Noise]:
-    """Return the noise models of likelihood methods and detectors by name.
-
-    Raises InputError if two models have one name, or a name has one of the signs ``, : / =`` that
-    texts of methods and distortions use.
-    """
-    found: dict[str, Noise] = {}
-    models = [one.noise for one in methods if one.noise is not None]
-    models += [one.noise for one in distortions if isinstance(one, Detector)]
-    for noise in models:
-        if set(noise.name) & set(",:/="):
-            msg = f"a noise model is called {noise.name!r}; give it a name without , : / and =."
-            raise InputError(msg)
-        if found.setdefault(noise.name, noise) != noise:
-            msg = f"two noise models are called {noise.name!r}; give each a name of its own."
-            raise InputError(msg)
-    return found
-
-
-def settings_to_dict(method: AnyMethod, asked: QuerySpec) -> dict[str, Any]:
-    """Return a method and what it was asked as plain values for JSON.
-
-    Keys are ``method``, ``asked`` and ``noises``: all noise models in full, so that nothing else is
-    needed to read the texts. Raises InputError as `used_noises` does.
-    """
-    noises = used_noises([method], asked.distortions)
-    return {
-        "method": str(method),
-        "asked": {
-            "number": asked.number,
-            "seeds": list(asked.seeds),
-            "seen_from": asked.seen_from,
-            "distortions": [chain_text([one]) for one in asked.distortions],
-        },
-        "noises": {name: noise.to_dict() for name, noise in noises.items()},
-    }
-
-
-def settings_from_dict(values: Mapping[str, Any]) -> tuple[AnyMethod, QuerySpec]:
-    """Read a method and what it was asked, the inverse of `settings_to_dict`.
-
-    Other values raise AttributeError, LookupError, TypeError or ValueError, which the caller turns
-    into an error that names the file.
-    """
-    noises = {name: noise_from_dict(one) for name, one in values["noises"].items()}
-    asked = dict(values["asked"])
-    asked["seeds"] = tuple(asked["seeds"])
-    asked["distortions"] = parse_chain(asked["distortions"], noises=noises)
-    return parse_method(values["method"], noises=noises), QuerySpec(**asked)
-
-
-SUCCESS_METRES = 50
-
-
-SUCCESS_PROBABILITY = 0.5
-
-
-_RECALLS = (1, 10)
-
-
-_KIND = "localization evaluation"
-
-
-QUERY_COLUMNS = (
-    *("seed", "number", "cell", "cell_id", "types", "length", "type_group", "angle_group"),
-    *("query_types", "query_bearings", "query_length", "heading"),
-    *("best_cell_id", "best_x", "best_y", "distance", "tied", "next_cell_ids", "error_m"),
-    *(f"p{threshold}" for threshold in THRESHOLDS),
-    *(f"near{count}" for count in NEAR_PLACES),
-    *("rank_low", "rank_high", "chance", "right", "in_region", "heading_error"),
-)
-"""Columns of the table of queries, in their order; ``geometry`` comes last."""
-
-
-_QUERIES_FILE = "queries.parquet"
-
-
-_SUMMARY_FILE = "evaluation.json"
-
-
-_TIMING_FILE = "timing.json"
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -208,7 +130,7 @@ class Evaluation:
     versions : mapping
         Versions of the software by name.
     machine : mapping
-        What it ran on (see `evaluation.result.machine`).
+        What it ran on: ``system``, ``processor``, ``processors`` and ``memory_gb``.
 
     Notes
     -----
@@ -216,14 +138,8 @@ class Evaluation:
 
     Examples
     --------
-    >>> from semsig_gis.sources.catalog import paper_taxonomy
-    >>> from semsig_gis.database.build import build_database
-    >>> from semsig_gis.objects.clean import build_objects
-    >>> from semsig_gis.sources.synthetic.city import CitySpec, synthetic_city
-    >>> layers = synthetic_city(CitySpec(size=300.0))
-    >>> objects, _ = build_objects(layers, taxonomy=paper_taxonomy(), crs="EPSG:32631")
-    >>> from semsig_gis.evaluation.evaluate import evaluate
-    >>> evaluation = evaluate(build_database(objects), queries=20, distortion="light")
+    >>> from semsig_gis import evaluate
+    >>> evaluation = evaluate(demo_database, queries=20, distortion="light")
     >>> bool(evaluation.cdf([50])[0] <= evaluation.cdf([100])[0])
     True
     """
@@ -240,24 +156,18 @@ class Evaluation:
 
     @functools.cached_property
     def figures(self) -> pd.DataFrame:
-        """What each query adds to each figure (see `evaluation.figures`)."""
+        """What each query adds to each figure (see `evaluation.figures.query_figures`)."""
         return query_figures(self.queries, cells=self.database["cells"])
 
     @property
     def query_bearings(self) -> list[list[float]]:
         """Bearings of what each query asked for, in degrees."""
-        return [
-            [float(part) for part in text.split(",") if part]
-            for text in self.queries["query_bearings"]
-        ]
+        return _numbers(self.queries["query_bearings"], float)
 
     @property
     def next_cell_ids(self) -> list[list[int]]:
         """Ids of the best cells of each query after the answer."""
-        return [
-            [int(part) for part in text.split(",") if part]
-            for text in self.queries["next_cell_ids"]
-        ]
+        return _numbers(self.queries["next_cell_ids"], int)
 
     @property
     def successful(self) -> NDArray[np.bool_]:
@@ -271,22 +181,10 @@ class Evaluation:
         return int((self.queries["query_length"] == 0).sum())
 
     def rows_in(self, database: SignatureDatabase) -> NDArray[np.int64]:
-        """Return where the true cells of the queries are in the database that was searched.
+        """Return the row of the true cell of each query in the database that was searched.
 
-        Parameters
-        ----------
-        database : SignatureDatabase
-            The database.
-
-        Returns
-        -------
-        ndarray of int64, shape (queries,)
-            Row numbers; -1 where the database has no such cell.
-
-        Raises
-        ------
-        InputError
-            If another database was searched.
+        It is -1 where the database has no such cell. Raises InputError if another database was
+        searched.
         """
         if len(database) != self.database["cells"]:
             msg = (
@@ -294,33 +192,21 @@ class Evaluation:
                 f"{len(database):,}; give the database that it was made with, or evaluate again."
             )
             raise InputError(msg)
-        known = self.queries["cell"].to_numpy() >= 0
-        rows = np.full(len(known), -1)
-        rows[known] = rows_of_result(
+        inside = self.queries["cell"].to_numpy() >= 0
+        rows = np.full(len(inside), -1)
+        rows[inside] = rows_of_result(
             database,
-            self.queries["cell_id"][known],
-            self.queries["types"][known],
+            self.queries["cell_id"][inside],
+            self.queries["types"][inside],
             what="evaluation",
         )
         return rows
 
     def cdf(self, thresholds: Sequence[float] = THRESHOLDS) -> NDArray[np.float64]:
-        """Return the share of queries whose error is at most so many metres.
+        """Return the share of queries whose error is at most each of some thresholds in metres.
 
-        Parameters
-        ----------
-        thresholds : sequence of float, optional
-            Errors in metres, each one of `THRESHOLDS`.
-
-        Returns
-        -------
-        ndarray of float64
-            Mean probability over the queries, one value a threshold.
-
-        Raises
-        ------
-        InputError
-            If a threshold is not one of those kept.
+        It is the mean probability over the queries. Raises InputError for a threshold that is not
+        one of `THRESHOLDS`, for which probabilities are kept.
         """
         for value in thresholds:
             if value not in THRESHOLDS:
@@ -331,97 +217,59 @@ class Evaluation:
         return np.asarray(self.queries[columns].to_numpy(dtype=np.float64).mean(axis=0))
 
     def recall(self, percent: float) -> float:
-        """Return the share of queries whose true cell ranks in the top so many per cent of cells.
+        """Return the share of queries whose true cell ranks in the top per cent of the cells.
 
-        Parameters
-        ----------
-        percent : float
-            Share of the cells kept, above 0 and at most 100. The number kept is rounded down.
-
-        Returns
-        -------
-        float
-            The recall in [0, 1]; the true cell's rank is uniform among the cells it ties with.
-
-        Raises
-        ------
-        InputError
-            If the percentage is out of range.
+        The number of cells kept is rounded down, and the rank of the true cell is uniform among the
+        cells it ties with. Raises InputError unless 0 < percent <= 100.
         """
         ranks = self.queries["rank_low"], self.queries["rank_high"]
         chances = expected_recall(*ranks, cells=self.database["cells"], percent=percent)
         return float(chances.mean())
 
     def means(self) -> pd.DataFrame:
-        """Return all figures that are shares of queries.
-
-        Returns
-        -------
-        DataFrame
-            By figure ``value``, ``low`` and ``high`` (95 %) and ``n`` (see
-            `evaluation.figures.query_figures`).
-        """
+        """Return ``value``, ``low`` and ``high`` (95 %) and ``n`` of each of the `figures`."""
         return figure_means(self.figures)
 
     def by_length(self) -> pd.DataFrame:
         """Return the figures by how many objects are really seen.
 
-        Returns
-        -------
-        DataFrame
-            One row a range: ``length`` (text), ``n``, the figures, ``p50_low`` and ``p50_high``.
-            NaN where there is no query to tell.
+        One row a range: ``length`` (text), ``n``, the figures, ``p50_low`` and ``p50_high``; NaN
+        where there is no query to tell.
         """
-        return self._grouped(length_labels(self.queries), by="length", ranges=LENGTHS)
+        return self._by_range("length", LENGTHS, label="length")
 
     def by_ambiguity(self) -> pd.DataFrame:
         """Return the figures by how many cells have the types of the true one.
 
-        Returns
-        -------
-        DataFrame
-            One row a range: ``cells_alike`` (text), ``n``, the figures, ``p50_low``,
-            ``p50_high``; first comes ``"0"`` where some true cells are not in the database.
+        As `by_length`, with ``cells_alike`` (text), which is ``"0"`` in a first row where some true
+        cells are not in the database.
         """
-        labels = ambiguity_labels(self.queries)
-        return self._grouped(labels, by="cells_alike", ranges=AMBIGUITIES)
+        return self._by_range("type_group", AMBIGUITIES, label="cells_alike")
+
+    def _by_range(self, column: str, ranges: Sequence[str], *, label: str) -> pd.DataFrame:
+        labels = range_labels(self.queries[column].to_numpy(), ranges)
+        order = [*(["0"] if "0" in labels else []), *ranges]
+        return grouped_means(self.figures, labels, by=label, order=order)
 
     def by_district(self, districts: gpd.GeoDataFrame, name: str) -> pd.DataFrame:
         """Return the figures by the district that was seen.
 
-        Parameters
-        ----------
-        districts : GeoDataFrame
-            Polygons in any CRS.
-        name : str
-            Their column that names them.
-
-        Returns
-        -------
-        DataFrame
-            One row a district with queries: ``district``, ``n``, the figures, ``p50_low``,
-            ``p50_high``; ``elsewhere`` for those in none.
+        Districts are polygons in any CRS, named by the column `name`. One row a district with
+        queries: ``district`` (``elsewhere`` for those in none), ``n``, the figures, ``p50_low`` and
+        ``p50_high``. Raises InputError if there is no such column.
         """
         labels = district_labels(self.queries, districts, name)
-        order = [*dict.fromkeys(districts[name].astype(str)), "elsewhere"]
-        found = [one for one in order if one in labels]
-        return grouped_means(self.figures, labels, by="district", order=found)
-
-    def _grouped(self, labels: list[str], *, by: str, ranges: Sequence[str]) -> pd.DataFrame:
-        order = [*(["0"] if "0" in labels else []), *ranges]
-        return grouped_means(self.figures, labels, by=by, order=order)
+        order = [*dict.fromkeys(districts[name].astype(str)), ELSEWHERE]
+        order = [district for district in order if district in labels]
+        return grouped_means(self.figures, labels, by="district", order=order)
 
     def answers(self) -> dict[str, float]:
-        """Return how the likelihood method answers and declines.
+        """Return how the likelihood method answers and declines; nothing for other methods.
 
-        Returns
-        -------
-        dict of str to float
-            ``coverage``, the share of the queries that are answered, those whose answer is right
-            with a chance that `likelihood.answer_rule.DEFAULT_RULE` asks for; ``precision``, the
-            share of these answers that are right; and ``in_region``, the share of the regions of
-            90 % that hold the true cell. NaN where there is no query to tell; empty for other
-            methods.
+        ``coverage`` is the share of the queries that are answered, those whose answer is right with
+        a chance that `likelihood.answer_rule.DEFAULT_RULE` asks for; ``precision`` the share of
+        these answers that are right; and ``in_region`` the share of the regions of 90 % that hold
+        the true cell. NaN where there is no query to tell.
         """
         if self.method.noise is None:
             return {}
@@ -432,34 +280,18 @@ class Evaluation:
         }
 
     def coverage_curve(self) -> pd.DataFrame:
-        """Return how many queries are answered, and answered right, rule by rule.
-
-        Returns
-        -------
-        DataFrame
-            See `evaluation.figures.coverage_curve`.
-        """
+        """Return `evaluation.figures.coverage_curve`: answers, and right ones, rule by rule."""
         return coverage_curve(self.queries)
 
     def calibration(self) -> pd.DataFrame:
-        """Return how often stated chances come true.
-
-        Returns
-        -------
-        DataFrame
-            See `evaluation.figures.calibration_bins`.
-        """
+        """Return `evaluation.figures.calibration_bins`: how often stated chances come true."""
         return calibration_bins(self.queries)
 
     def summary(self) -> dict[str, Any]:
-        """Return settings, figures and versions as plain values for JSON.
+        """Return ``settings``, ``database``, ``results``, ``versions`` and ``timing`` for JSON.
 
-        Returns
-        -------
-        dict
-            ``settings``, ``database``, ``results``, ``versions`` and ``timing``; all but the last
-            are the same whenever it is repeated. No value is infinite or NaN: an error is None
-            where it is infinite, and a figure where there is no query to tell.
+        All but the last are the same whenever it is repeated. None stands for an infinite number,
+        and for a figure where there is no query to tell.
         """
         errors = self.queries["error_m"].to_numpy(dtype=np.float64)
         turns = self.queries["heading_error"].to_numpy(dtype=np.float64)
@@ -479,16 +311,16 @@ class Evaluation:
                 "p_error_within_m": {
                     str(x): float(value) for x, value in zip(THRESHOLDS, self.cdf(), strict=True)
                 },
-                "recall_at_percent": {str(k): self.recall(k) for k in _RECALLS},
+                "recall_at_percent": {str(k): self.recall(k) for k in RECALLS},
                 "recall_of_best_within_25_m": {
                     str(count): float(self.queries[f"near{count}"].mean()) for count in NEAR_PLACES
                 },
-                "median_error_m": _plain(percentile(errors, 50)[0]),
-                "p90_error_m": _plain(percentile(errors, 90)[0]),
-                "median_heading_error": _plain(percentile(turns, 50)[0]),
+                "median_error_m": finite_or_none(percentile(errors, 50)[0]),
+                "p90_error_m": finite_or_none(percentile(errors, 90)[0]),
+                "median_heading_error": finite_or_none(percentile(turns, 50)[0]),
                 "successful": float(self.successful.mean()),
                 "unlocalized": self.unlocalized,
-                **{name: _plain(value) for name, value in self.answers().items()},
+                **{name: finite_or_none(value) for name, value in self.answers().items()},
                 "intervals": plain_records(self.means().reset_index()),
                 "by_length": plain_records(self.by_length()),
                 "by_ambiguity": plain_records(self.by_ambiguity()),
@@ -496,95 +328,13 @@ class Evaluation:
                 "calibration": plain_records(self.calibration()) if by_chance else [],
             },
             "versions": dict(self.versions),
-            "timing": self._timing(),
+            "timing": {
+                "seconds_per_query": finite_or_none(self.seconds_per_query),
+                "machine": dict(self.machine),
+            },
         }
 
-    def _timing(self) -> dict[str, Any]:
-        seconds = _plain(self.seconds_per_query)
-        return {"seconds_per_query": seconds, "machine": dict(self.machine)}
 
-    def save(self, folder: str | Path) -> None:
-        """Write the evaluation to a folder.
-
-        Parameters
-        ----------
-        folder : str or Path
-            Folder to write to, made when missing. It gets ``queries.parquet`` (GeoParquet, with
-            the settings in its metadata, so that it is enough to load and redraw everything),
-            ``evaluation.json`` (`summary`, for reading) and ``timing.json``, the one file that
-            differs when the same is done again.
-
-        Raises
-        ------
-        InputError
-            If the folder cannot be written to.
-        """
-        plain = pd.DataFrame(self.queries.drop(columns="geometry"))
-        table = pa.Table.from_pandas(plain, preserve_index=False)
-        points = self.queries.geometry
-        table = table.append_column("geometry", pa.array(points.to_wkb()))
-        specs = {
-            "kind": _KIND,
-            **settings_to_dict(self.method, self.asked),
-            "city": self.city,
-            "top": self.top,
-            "database": dict(self.database),
-            "versions": dict(self.versions),
-        }
-        geo = geo_metadata(points.crs, geometry_types=["Point"], bounds=points.total_bounds)
-        write_geoparquet(table, Path(folder) / _QUERIES_FILE, geo=geo, specs=specs)
-        values = self.summary()
-        timing = values.pop("timing")
-        for name, content in ((_SUMMARY_FILE, values), (_TIMING_FILE, timing)):
-            with whole_file(Path(folder) / name) as partial:
-                text = json.dumps(content, indent=2, allow_nan=False, ensure_ascii=False)
-                partial.write_text(text + "\n", encoding="utf-8")
-
-    @classmethod
-    def load(cls, folder: str | Path) -> Evaluation:
-        """Read an evaluation that `save` wrote.
-
-        Parameters
-        ----------
-        folder : str or Path
-            Folder with ``queries.parquet``.
-
-        Returns
-        -------
-        Evaluation
-            The same evaluation.
-
-        Raises
-        ------
-        DatabaseError
-            If the file is missing, damaged or of another kind.
-        """
-        file = Path(folder) / _QUERIES_FILE
-        table, specs, crs = read_geoparquet(file, kind=_KIND, columns=[*QUERY_COLUMNS, "geometry"])
-        timing = Path(folder) / _TIMING_FILE
-        try:
-            frame = table.to_pandas()
-            points = gpd.GeoSeries.from_wkb(frame.pop("geometry"), crs=crs)
-            frame["best_cell_id"] = frame["best_cell_id"].astype("Int64")
-            method, asked = settings_from_dict(specs)
-            told = json.loads(timing.read_text("utf-8")) if timing.exists() else {}
-            seconds = told.get("seconds_per_query")
-            return cls(
-                queries=gpd.GeoDataFrame(frame, geometry=points),
-                method=method,
-                asked=asked,
-                city=specs["city"],
-                top=specs["top"],
-                seconds_per_query=math.nan if seconds is None else seconds,
-                database=specs["database"],
-                versions=specs["versions"],
-                machine=told.get("machine", {}),
-            )
-        except (AttributeError, LookupError, TypeError, ValueError) as error:
-            msg = f"{file} is damaged ({error}); evaluate again."
-            raise DatabaseError(msg) from error
-
-
-def _plain(value: float) -> float | None:
-    """Return a number, or None for what JSON cannot hold."""
-    return value if math.isfinite(value) else None
+def _numbers(texts: Iterable[str], number: Callable[[str], N]) -> list[list[N]]:
+    """Read numbers with commas between them, perhaps none."""
+    return [[number(part) for part in text.split(",") if part] for text in texts]

@@ -9,8 +9,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from semsig_gis.core.errors import CatalogError, InputError
+from semsig_gis.evaluation.file import used_noises
 from semsig_gis.evaluation.methods import parse_method
-from semsig_gis.evaluation.result import used_noises
 from semsig_gis.likelihood.noise.model import NOISES, noise_from_dict, open_noise
 from semsig_gis.queries.chain import chain_text, parse_chain
 from semsig_gis.queries.draw import QuerySpec

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from semsig_gis.core.errors import DatabaseError
-from semsig_gis.evaluation.result import Evaluation
+from semsig_gis.evaluation.file import open_evaluation, save_evaluation
 from semsig_gis.evaluation.spec import parse_experiment
 from semsig_gis.reports.experiment import experiment_figures, experiment_markdown
 from semsig_gis.storage.runs import RunKind, read_json, write_json
@@ -18,6 +18,7 @@ if TYPE_CHECKING:
 
     import geopandas as gpd
 
+    from semsig_gis.evaluation.result import Evaluation
     from semsig_gis.evaluation.spec import ExperimentSpec
 
 PARTS = "_parts"
@@ -66,7 +67,7 @@ def write_results(
 ) -> None:
     """Write the results, given by the names of their cases, into the folder of a run."""
     for name, evaluation in results.items():
-        evaluation.save(folder / name)
+        save_evaluation(evaluation, folder / name)
         if districts is not None and spec.districts is not None:
             by_district = evaluation.by_district(districts, spec.districts.name)
             write_whole(folder / name / DISTRICTS, by_district.to_csv(index=False))
@@ -80,7 +81,7 @@ def open_results(folder: str | Path) -> dict[str, Evaluation]:
     Parameters
     ----------
     folder : str or Path
-        What `run_experiment` or `Evaluation.save` wrote.
+        What `run_experiment` or `save_evaluation` wrote.
 
     Returns
     -------
@@ -103,11 +104,11 @@ def open_results(folder: str | Path) -> dict[str, Evaluation]:
     """
     place = Path(folder)
     if (place / "queries.parquet").is_file():
-        return {"": Evaluation.load(place)}
+        return {"": open_evaluation(place)}
     try:
         text = (place / SPEC).read_text(encoding="utf-8")
     except OSError as error:
         msg = f"{place} holds no results; give a folder that `semsig evaluate` wrote."
         raise DatabaseError(msg) from error
     spec = parse_experiment(text, where=str(place / SPEC))
-    return {case.name: Evaluation.load(place / case.name) for case in spec.cases}
+    return {case.name: open_evaluation(place / case.name) for case in spec.cases}

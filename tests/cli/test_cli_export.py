@@ -17,6 +17,7 @@ from small_city import small_city, small_evaluation
 
 from semsig_gis.cli.localize import print_answer
 from semsig_gis.database.file import open_database, save_database
+from semsig_gis.evaluation.file import save_evaluation
 from semsig_gis.evaluation.identify.result import save_identifiability
 from semsig_gis.exports.geotiff import cell_errors
 from semsig_gis.objects.table import open_objects, save_objects
@@ -38,7 +39,7 @@ def city(tmp_path: Path) -> Path:
     save_identifiability(told_of(database), path)
     save_objects(objects, tmp_path / "objects.parquet")
     save_objects(open_objects(tmp_path / "objects.parquet"), tmp_path / "objects.parquet")
-    small_evaluation().save(tmp_path / "evaluation")
+    save_evaluation(small_evaluation(), tmp_path / "evaluation")
     return path
 
 

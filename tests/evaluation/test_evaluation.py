@@ -15,7 +15,7 @@ from pandas.testing import assert_frame_equal
 
 from semsig_gis.core.errors import DatabaseError, InputError, UnknownNameError
 from semsig_gis.evaluation.evaluate import evaluate
-from semsig_gis.evaluation.result import Evaluation
+from semsig_gis.evaluation.file import open_evaluation, save_evaluation
 from semsig_gis.likelihood.noise.model import NoiseSpec
 from semsig_gis.matching.method import Method
 from semsig_gis.matching.metrics.edit import EditWeights
@@ -30,6 +30,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from semsig_gis.database.database import SignatureDatabase
+    from semsig_gis.evaluation.result import Evaluation
 
 ALL_MISSED = Distortion(occurrences=1, bearing_sigma=0.0)
 
@@ -246,8 +247,8 @@ def test_saved_and_loaded_is_the_same(evaluation: Evaluation, tmp_path: Path) ->
     chain = (replace(ALL_MISSED, resort=False), Detector(noise=NoiseSpec(name="mine"), half=9.0))
     asked = QuerySpec(number=9, seeds=(4, 2), seen_from="anywhere", distortions=chain)
     changed = replace(evaluation, method=method, asked=asked, city="other.parquet")
-    changed.save(tmp_path / "made" / "here")
-    loaded = Evaluation.load(tmp_path / "made" / "here")
+    save_evaluation(changed, tmp_path / "made" / "here")
+    loaded = open_evaluation(tmp_path / "made" / "here")
     assert_geodataframe_equal(loaded.queries, changed.queries)
     assert loaded.queries["error_m"].isin([math.inf]).any()
     assert (loaded.method, loaded.asked) == (changed.method, changed.asked)
@@ -260,7 +261,7 @@ def test_the_readable_file_is_strict_json(evaluation: Evaluation, tmp_path: Path
     def refuse(name: str) -> NoReturn:
         raise AssertionError(name)
 
-    evaluation.save(tmp_path)
+    save_evaluation(evaluation, tmp_path)
     text = (tmp_path / "evaluation.json").read_text(encoding="utf-8")
     summary = evaluation.summary()
     timing = summary.pop("timing")
@@ -283,8 +284,8 @@ def test_the_readable_file_is_strict_json(evaluation: Evaluation, tmp_path: Path
 
 def test_files_that_are_no_evaluation_are_refused(evaluation: Evaluation, tmp_path: Path) -> None:
     with pytest.raises(DatabaseError, match="does not exist"):
-        Evaluation.load(tmp_path / "nowhere")
-    evaluation.save(tmp_path)
+        open_evaluation(tmp_path / "nowhere")
+    save_evaluation(evaluation, tmp_path)
     file = tmp_path / "queries.parquet"
     content = file.read_bytes()
     table, specs, crs = read_geoparquet(file, kind="localization evaluation")
@@ -292,7 +293,7 @@ def test_files_that_are_no_evaluation_are_refused(evaluation: Evaluation, tmp_pa
     assert crs == evaluation.queries.crs
     write_geoparquet(table.drop_columns("p50"), file, geo=geo, specs=specs)
     with pytest.raises(DatabaseError, match="lacks the column 'p50'"):
-        Evaluation.load(tmp_path)
+        open_evaluation(tmp_path)
     wrongs: list[dict[str, Any]] = [
         {"method": "hamming+edit"},
         {"asked": {**specs["asked"], "distortions": ["errors:1:unknown=2"]}},
@@ -302,10 +303,10 @@ def test_files_that_are_no_evaluation_are_refused(evaluation: Evaluation, tmp_pa
     for wrong in wrongs:
         write_geoparquet(table, file, geo=geo, specs=specs | wrong)
         with pytest.raises(DatabaseError, match=r"is damaged .* evaluate again"):
-            Evaluation.load(tmp_path)
+            open_evaluation(tmp_path)
     file.write_bytes(content[: len(content) // 2])
     with pytest.raises(DatabaseError, match="damaged"):
-        Evaluation.load(tmp_path)
+        open_evaluation(tmp_path)
 
 
 @pytest.mark.parametrize(

@@ -17,15 +17,16 @@ from sentences import assert_sentence
 from semsig_gis.core.errors import InputError
 from semsig_gis.core.statistics import wilson_interval
 from semsig_gis.evaluation.figures import (
-    ambiguity_labels,
+    AMBIGUITIES,
+    LENGTHS,
     calibration_bins,
     coverage_curve,
     district_labels,
     figure_means,
     grouped_means,
-    length_labels,
     percentile,
     query_figures,
+    range_labels,
 )
 from semsig_gis.matching.ties import THRESHOLDS, expected_best
 
@@ -108,10 +109,10 @@ def test_groups_share_the_queries_out() -> None:
 def test_ranges() -> None:
     sizes = [0, 1, 4, 5, 9, 10, 19, 20, 400]
     expected = ["0", "1-4", "1-4", "5-9", "5-9", "10-19", "10-19", "20+", "20+"]
-    assert length_labels(pd.DataFrame({"length": sizes})) == expected
+    assert range_labels(np.array(sizes), LENGTHS) == expected
     groups = [0, 1, 2, 9, 10, 99, 100, 999, 1000]
     expected = ["0", "1", "2-9", "2-9", "10-99", "10-99", "100-999", "100-999", "1000+"]
-    assert ambiguity_labels(pd.DataFrame({"type_group": groups})) == expected
+    assert range_labels(np.array(groups), AMBIGUITIES) == expected
 
 
 def test_districts() -> None:

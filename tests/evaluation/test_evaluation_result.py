@@ -14,7 +14,7 @@ from six_cells import rows
 
 from semsig_gis.core.errors import DatabaseError, InputError
 from semsig_gis.evaluation.evaluate import evaluate
-from semsig_gis.evaluation.result import Evaluation
+from semsig_gis.evaluation.file import open_evaluation, save_evaluation
 from semsig_gis.likelihood.index import build_index
 from semsig_gis.likelihood.locate import locate
 from semsig_gis.likelihood.method import LikelihoodMethod
@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from semsig_gis.core.signature import Signature
+    from semsig_gis.evaluation.result import Evaluation
     from semsig_gis.likelihood.index import LikelihoodIndex
 
 DATABASE = random_database(5, cells=150)
@@ -192,8 +193,8 @@ def test_saved_and_loaded_is_the_same(
     evaluation: Evaluation, noise: NoiseSpec, tmp_path: Path
 ) -> None:
     changed = replace(evaluation, method=LikelihoodMethod(noise=noise))
-    changed.save(tmp_path)
-    loaded = Evaluation.load(tmp_path)
+    save_evaluation(changed, tmp_path)
+    loaded = open_evaluation(tmp_path)
     assert_geodataframe_equal(loaded.queries, changed.queries)
     assert loaded.method == changed.method
     assert loaded.summary() == changed.summary()
@@ -208,9 +209,9 @@ def test_a_noise_model_that_is_none_is_damage(
 ) -> None:
     with monkeypatch.context() as patch:
         patch.setattr(NoiseSpec, "to_dict", lambda _: {"detection": 7})
-        replace(evaluation, method=LikelihoodMethod(noise=NoiseSpec())).save(tmp_path)
+        save_evaluation(replace(evaluation, method=LikelihoodMethod(noise=NoiseSpec())), tmp_path)
     with pytest.raises(DatabaseError, match=r"is damaged .* evaluate again"):
-        Evaluation.load(tmp_path)
+        open_evaluation(tmp_path)
 
 
 def test_the_index_of_another_database_is_refused() -> None:

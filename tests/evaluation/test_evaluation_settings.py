@@ -9,7 +9,8 @@ from noisy_cells import noise_specs
 from sentences import assert_sentence
 
 from semsig_gis.core.errors import InputError
-from semsig_gis.evaluation.result import machine, settings_from_dict, settings_to_dict, used_noises
+from semsig_gis.evaluation.file import settings_from_dict, settings_to_dict, used_noises
+from semsig_gis.evaluation.result import machine
 from semsig_gis.likelihood.method import LikelihoodMethod
 from semsig_gis.likelihood.noise.model import NOISES, NoiseSpec, named_noise
 from semsig_gis.matching.method import Method

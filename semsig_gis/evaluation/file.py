@@ -1,0 +1,167 @@
+"""Files of evaluations, and their settings as plain values."""
+
+from __future__ import annotations
+
+import json
+import math
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import geopandas as gpd
+import pandas as pd
+import pyarrow as pa
+
+from semsig_gis.core.errors import DatabaseError, InputError
+from semsig_gis.evaluation.methods import parse_method
+from semsig_gis.evaluation.result import QUERY_COLUMNS, Evaluation
+from semsig_gis.likelihood.noise.model import noise_from_dict
+from semsig_gis.queries.chain import chain_text, parse_chain
+from semsig_gis.queries.distortions import Detector
+from semsig_gis.queries.draw import QuerySpec
+from semsig_gis.storage.geoparquet import geo_metadata, read_geoparquet, write_geoparquet
+from semsig_gis.storage.whole import write_whole
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Mapping
+
+    from semsig_gis.evaluation.methods import AnyMethod
+    from semsig_gis.likelihood.noise.model import Noise
+    from semsig_gis.queries.chain import QueryDistortion
+
+KIND = "localization evaluation"
+QUERIES, SUMMARY, TIMING = "queries.parquet", "evaluation.json", "timing.json"
+
+
+def save_evaluation(evaluation: Evaluation, folder: str | Path) -> None:
+    """Write an evaluation to a folder.
+
+    Parameters
+    ----------
+    evaluation : Evaluation
+        What to write.
+    folder : str or Path
+        Folder to write to, made when missing. It gets ``queries.parquet`` (GeoParquet, with the
+        settings in its metadata, so that it is enough to load and redraw everything),
+        ``evaluation.json`` (`Evaluation.summary`, for reading) and ``timing.json``, the one file
+        that differs when the same is done again.
+
+    Raises
+    ------
+    InputError
+        If the folder cannot be written to.
+    """
+    plain = pd.DataFrame(evaluation.queries.drop(columns="geometry"))
+    points = evaluation.queries.geometry
+    table = pa.Table.from_pandas(plain, preserve_index=False)
+    table = table.append_column("geometry", pa.array(points.to_wkb()))
+    specs = {
+        "kind": KIND,
+        **settings_to_dict(evaluation.method, evaluation.asked),
+        "city": evaluation.city,
+        "top": evaluation.top,
+        "database": dict(evaluation.database),
+        "versions": dict(evaluation.versions),
+    }
+    geo = geo_metadata(points.crs, geometry_types=["Point"], bounds=points.total_bounds)
+    write_geoparquet(table, Path(folder) / QUERIES, geo=geo, specs=specs)
+    summary = evaluation.summary()
+    timing = summary.pop("timing")
+    for name, content in ((SUMMARY, summary), (TIMING, timing)):
+        text = json.dumps(content, indent=2, allow_nan=False, ensure_ascii=False)
+        write_whole(Path(folder) / name, text + "\n")
+
+
+def open_evaluation(folder: str | Path) -> Evaluation:
+    """Read an evaluation that `save_evaluation` wrote.
+
+    Parameters
+    ----------
+    folder : str or Path
+        Folder with ``queries.parquet``; without ``timing.json`` the time is not known.
+
+    Returns
+    -------
+    Evaluation
+        The same evaluation.
+
+    Raises
+    ------
+    DatabaseError
+        If the file is missing, damaged or of another kind.
+    """
+    file = Path(folder) / QUERIES
+    table, specs, crs = read_geoparquet(file, kind=KIND, columns=[*QUERY_COLUMNS, "geometry"])
+    times = Path(folder) / TIMING
+    try:
+        frame = table.to_pandas()
+        points = gpd.GeoSeries.from_wkb(frame.pop("geometry"), crs=crs)
+        frame["best_cell_id"] = frame["best_cell_id"].astype("Int64")
+        method, asked = settings_from_dict(specs)
+        timing = json.loads(times.read_text("utf-8")) if times.exists() else {}
+        seconds = timing.get("seconds_per_query")
+        return Evaluation(
+            queries=gpd.GeoDataFrame(frame, geometry=points),
+            method=method,
+            asked=asked,
+            city=specs["city"],
+            top=specs["top"],
+            seconds_per_query=math.nan if seconds is None else seconds,
+            database=specs["database"],
+            versions=specs["versions"],
+            machine=timing.get("machine", {}),
+        )
+    except (AttributeError, LookupError, TypeError, ValueError) as error:
+        msg = f"{file} is damaged ({error}); evaluate again."
+        raise DatabaseError(msg) from error
+
+
+def settings_to_dict(method: AnyMethod, asked: QuerySpec) -> dict[str, Any]:
+    """Return a method and what it was asked as plain values for JSON.
+
+    Keys are ``method``, ``asked`` and ``noises``: all noise models in full, so that nothing else is
+    needed to read the texts. Raises InputError as `used_noises` does.
+    """
+    noises = used_noises([method], asked.distortions)
+    return {
+        "method": str(method),
+        "asked": {
+            "number": asked.number,
+            "seeds": list(asked.seeds),
+            "seen_from": asked.seen_from,
+            "distortions": [chain_text([one]) for one in asked.distortions],
+        },
+        "noises": {name: noise.to_dict() for name, noise in noises.items()},
+    }
+
+
+def settings_from_dict(values: Mapping[str, Any]) -> tuple[AnyMethod, QuerySpec]:
+    """Read a method and what it was asked, the inverse of `settings_to_dict`.
+
+    Other values raise AttributeError, LookupError, TypeError or ValueError.
+    """
+    noises = {name: noise_from_dict(one) for name, one in values["noises"].items()}
+    asked = dict(values["asked"])
+    asked["seeds"] = tuple(asked["seeds"])
+    asked["distortions"] = parse_chain(asked["distortions"], noises=noises)
+    return parse_method(values["method"], noises=noises), QuerySpec(**asked)
+
+
+def used_noises(
+    methods: Iterable[AnyMethod], distortions: Iterable[QueryDistortion]
+) -> dict[str, Noise]:
+    """Return the noise models of likelihood methods and detectors by name.
+
+    Raises InputError if two models have one name, or a name has one of the signs ``, : / =`` that
+    texts of methods and distortions use.
+    """
+    noises: dict[str, Noise] = {}
+    models = [one.noise for one in methods if one.noise is not None]
+    models += [one.noise for one in distortions if isinstance(one, Detector)]
+    for noise in models:
+        if set(noise.name) & set(",:/="):
+            msg = f"a noise model is called {noise.name!r}; give it a name without , : / and =."
+            raise InputError(msg)
+        if noises.setdefault(noise.name, noise) != noise:
+            msg = f"two noise models are called {noise.name!r}; give each a name of its own."
+            raise InputError(msg)
+    return noises
