@@ -17,10 +17,10 @@ from semsig_gis.objects.table import layer_licences
 from semsig_gis.sources import find_files, reader
 from semsig_gis.sources.area import clip_layer, names_place, parse_area
 from semsig_gis.sources.http.cache import Cache
-from semsig_gis.sources.http.nominatim import find_place
-from semsig_gis.sources.http.wire import HttpSpec
+from semsig_gis.sources.http.fetch import HttpSpec
 from semsig_gis.sources.opendatasoft import reader as opendatasoft
 from semsig_gis.sources.osm import overpass, overpass_json
+from semsig_gis.sources.osm.overpass import find_place
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Sequence

@@ -8,7 +8,7 @@ import pytest
 from servers import Server
 
 from semsig_gis.sources.http.cache import Cache
-from semsig_gis.sources.http.wire import HttpSpec
+from semsig_gis.sources.http.fetch import HttpSpec
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

@@ -20,8 +20,14 @@ from semsig_gis import __version__
 from semsig_gis.core.errors import InputError, SourceError
 from semsig_gis.sources.http import cache as _http_cache
 from semsig_gis.sources.http.cache import Cache
-from semsig_gis.sources.http.fetch import NotCachedError, TooLargeError, fetch, read_text
-from semsig_gis.sources.http.wire import HttpError, HttpSpec
+from semsig_gis.sources.http.fetch import (
+    HttpError,
+    HttpSpec,
+    NotCachedError,
+    TooLargeError,
+    fetch,
+    read_text,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -341,7 +347,7 @@ def test_a_redirect_to_nowhere_is_refused(server: Server, get: Get, target: str)
 def test_the_only_way_to_another_scheme_is_the_safer_one(
     source: str, target: str, *, allowed: bool
 ) -> None:
-    from semsig_gis.sources.http.wire import _require_same_host
+    from semsig_gis.sources.http.fetch import _require_same_host
 
     if allowed:
         _require_same_host(source, target)
@@ -441,7 +447,7 @@ def test_an_address_that_leads_nowhere_is_said(cache: Cache) -> None:
 def test_a_certificate_that_is_not_trusted_is_not_tried_again() -> None:
     from requests.exceptions import SSLError
 
-    from semsig_gis.sources.http.wire import _failure
+    from semsig_gis.sources.http.fetch import _failure
 
     error = _failure(SSLError("certificate verify failed"), "https://a.example/x")
     assert isinstance(error, HttpError)

@@ -35,7 +35,7 @@ if TYPE_CHECKING:
 
     from semsig_gis.sources import RawLayer
     from semsig_gis.sources.http.cache import Cache, Fetched
-    from semsig_gis.sources.http.wire import HttpSpec
+    from semsig_gis.sources.http.fetch import HttpSpec
 
     Fetch = Callable[..., Fetched]
 

@@ -11,7 +11,7 @@ import shapely
 from hypothesis import given
 from hypothesis import strategies as st
 
-from semsig_gis.sources.osm.shapes import relation_shape, way_shape
+from semsig_gis.sources.osm.elements import relation_shape, way_shape
 from semsig_gis.sources.raw_layer import BadFeatureError
 
 if TYPE_CHECKING:

@@ -20,12 +20,10 @@ from semsig_gis.core.errors import CatalogError, InputError, SourceError
 from semsig_gis.sources.area import Area, parse_area
 from semsig_gis.sources.catalog import load_catalog
 from semsig_gis.sources.http.cache import Cache
-from semsig_gis.sources.http.fetch import NotCachedError
-from semsig_gis.sources.http.nominatim import find_place
-from semsig_gis.sources.http.wire import HttpError, HttpSpec
+from semsig_gis.sources.http.fetch import HttpError, HttpSpec, NotCachedError
 from semsig_gis.sources.layers import ANY_VALUE, LayerSpec
 from semsig_gis.sources.osm import file as osm_file
-from semsig_gis.sources.osm.overpass import fetch_layers, overpass_query, waiting_time
+from semsig_gis.sources.osm.overpass import fetch_layers, find_place, overpass_query, waiting_time
 from semsig_gis.sources.osm.overpass_json import read_layers
 
 if TYPE_CHECKING:

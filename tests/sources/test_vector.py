@@ -25,8 +25,7 @@ from semsig_gis.core.errors import CatalogError, CrsError, SourceError, UnknownN
 from semsig_gis.sources.layers import ClassBy, LayerSpec
 from semsig_gis.sources.raw_layer import RowRules
 from semsig_gis.sources.vector import reader as vector_file
-from semsig_gis.sources.vector.archive import DRIVERS
-from semsig_gis.sources.vector.reader import list_layers, read_layer
+from semsig_gis.sources.vector.reader import DRIVERS, list_layers, read_layer
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable

@@ -12,8 +12,7 @@ import shapely
 
 from semsig_gis.core.errors import CatalogError, SourceError
 from semsig_gis.sources.crs import WGS84, settle_crs
-from semsig_gis.sources.http.fetch import fetch
-from semsig_gis.sources.http.wire import DEFAULT_HTTP, HttpError
+from semsig_gis.sources.http.fetch import DEFAULT_HTTP, HttpError, fetch
 from semsig_gis.sources.opendatasoft.fields import POINT, Positions, find_field, settle_fields
 from semsig_gis.sources.opendatasoft.table import open_table
 from semsig_gis.sources.raw_layer import (
@@ -33,7 +32,7 @@ if TYPE_CHECKING:
     from semsig_gis.sources import RawLayer
     from semsig_gis.sources.area import Area
     from semsig_gis.sources.http.cache import Cache, Fetched
-    from semsig_gis.sources.http.wire import HttpSpec
+    from semsig_gis.sources.http.fetch import HttpSpec
     from semsig_gis.sources.layers import LayerSpec
     from semsig_gis.sources.opendatasoft.table import Record, Table
     from semsig_gis.sources.raw_layer import Position

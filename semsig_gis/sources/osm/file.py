@@ -14,8 +14,7 @@ from osmium.filter import KeyFilter
 from osmium.osm import NODE, RELATION, WAY, Node, Relation, Way
 
 from semsig_gis.core.errors import CatalogError, SourceError
-from semsig_gis.sources.osm.elements import ElementLayer, TagIndex
-from semsig_gis.sources.osm.shapes import relation_shape, way_shape
+from semsig_gis.sources.osm.elements import ElementLayer, TagIndex, relation_shape, way_shape
 from semsig_gis.sources.raw_layer import BadFeatureError
 
 if TYPE_CHECKING:

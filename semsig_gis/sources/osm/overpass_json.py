@@ -10,8 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from semsig_gis.core.errors import SourceError
-from semsig_gis.sources.osm.elements import ElementLayer, TagIndex
-from semsig_gis.sources.osm.shapes import relation_shape, way_shape
+from semsig_gis.sources.osm.elements import ElementLayer, TagIndex, relation_shape, way_shape
 from semsig_gis.sources.raw_layer import BadFeatureError
 
 if TYPE_CHECKING:

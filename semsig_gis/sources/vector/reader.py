@@ -1,13 +1,16 @@
-"""What GDAL says while a file is read: kept for the report instead of reaching the log."""
+"""Vector files through fiona: one driver a suffix, features streamed, bad ones counted."""
 
 from __future__ import annotations
 
 import contextlib
 import contextvars
+import csv
 import json
 import logging
 import math
 import re
+import zipfile
+import zlib
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -17,21 +20,202 @@ import numpy as np
 import shapely
 import shapely.geometry
 
-from semsig_gis.core.errors import SourceError, UnknownNameError, nearest_name
+from semsig_gis.core.errors import CatalogError, SourceError, UnknownNameError, nearest_name
 from semsig_gis.sources.crs import WGS84, crs_label, fits_the_globe, settle_crs, usable_crs
-from semsig_gis.sources.raw_layer import BadFeatureError, RowRules, Rows, raw_layer
-from semsig_gis.sources.vector.archive import Member, members, unreadable
-from semsig_gis.sources.vector.csv import csv_columns
+from semsig_gis.sources.raw_layer import BadFeatureError, RowRules, Rows, raw_layer, require_field
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator, Sequence
+    from collections.abc import Iterable, Iterator, Mapping, Sequence
 
     from pyproj import CRS
 
     from semsig_gis.sources import RawLayer
     from semsig_gis.sources.layers import LayerSpec
     from semsig_gis.sources.raw_layer import Position
-    from semsig_gis.sources.vector.csv import CsvColumns
+
+# The only drivers that may open a file: GDAL has some eighty, and a few of them follow links.
+DRIVERS = {
+    ".csv": "CSV",
+    ".fgb": "FlatGeobuf",
+    ".geojson": "GeoJSON",
+    ".gpkg": "GPKG",
+    ".json": "GeoJSON",
+    ".shp": "ESRI Shapefile",
+}
+# In an archive beside other data, these hold a legend or metadata.
+SIDE_SUFFIXES = frozenset({".csv", ".json"})
+
+
+@dataclass(frozen=True, slots=True)
+class Member:
+    """One layer of a file, or of a file in an archive, by its name there (`inner`).
+
+    `layer` is None until its name is known.
+    """
+
+    file: Path
+    inner: str | None
+    layer: str | None = None
+
+    @property
+    def driver(self) -> str:
+        """GDAL's name of the one driver that may open it."""
+        return DRIVERS[Path(self.inner or self.file).suffix.lower()]
+
+    @property
+    def address(self) -> str | Path:
+        """What GDAL opens."""
+        if self.inner is None:
+            return self.file
+        # GDAL's own form: fiona parses zip:// as a URL and loses what follows a '#' or a '?'.
+        return f"/vsizip/{{{self.file.resolve().as_posix()}}}/{self.inner}"
+
+    def __str__(self) -> str:
+        """Return the name as messages say it."""
+        return str(self.file) if self.inner is None else f"{self.inner} in {self.file}"
+
+    def content(self, size: int = -1) -> bytes:
+        """Return the bytes of the file, or the first `size` of them."""
+        if self.inner is None:
+            with self.file.open("rb") as stream:
+                return stream.read(size)
+        with zipfile.ZipFile(self.file) as archive, archive.open(self.inner) as stream:
+            return stream.read(size)
+
+
+def unreadable(what: object, error: BaseException) -> SourceError:
+    """Return the plain sentence for what a library raised on opening something."""
+    if isinstance(error, UnicodeDecodeError):
+        return SourceError(f"{what} is not UTF-8 text; save it as UTF-8.")
+    cause = " ".join(str(error.__cause__ or error).split()).rpartition(" failed: ")[2].rstrip(".")
+    if "not recognized" in cause:
+        return SourceError(f"{what} is not the kind of file that its name says; get it again.")
+    return SourceError(f"{what} cannot be read ({cause}); it may be damaged, get it again.")
+
+
+def members(path: Path) -> tuple[Member, ...]:
+    """Return the parts of a file that hold layers: itself, or the vector files in an archive.
+
+    SourceError if it is missing, of another kind, or a damaged or useless archive.
+    """
+    suffix = path.suffix.lower()
+    if not path.is_file():
+        what = "is a folder" if path.is_dir() else "does not exist"
+        msg = f"{path} {what}; give a vector file."
+        raise SourceError(msg)
+    suffixes = {*DRIVERS, ".zip"}
+    if suffix not in suffixes:
+        msg = f"{path} is not a vector file; give one of {', '.join(sorted(suffixes))}."
+        raise SourceError(msg)
+    inner = _archived(path) if suffix == ".zip" else (None,)
+    return tuple(Member(path, name) for name in inner)
+
+
+def _archived(path: Path) -> tuple[str, ...]:
+    """Return the names of the vector files in an archive whose checksums hold."""
+    try:
+        with zipfile.ZipFile(path) as archive:
+            names = [item.filename for item in archive.infolist() if not item.is_dir()]
+            broken = archive.testzip()
+    except (NotImplementedError, OSError, RuntimeError, zipfile.BadZipFile, zlib.error) as error:
+        raise unreadable(path, error) from error
+    if broken is not None:
+        msg = f"archive {path} is damaged at {broken}; get it again."
+        raise SourceError(msg)
+    usable = [
+        name
+        for name in names
+        if Path(name).suffix.lower() in DRIVERS and not name.startswith("__MACOSX/")
+    ]
+    if not usable:
+        msg = (
+            f"archive {path} holds no vector file, only {', '.join(names) or 'nothing'}; "
+            f"one of {', '.join(sorted(DRIVERS))} is needed."
+        )
+        raise SourceError(msg)
+    data = [name for name in usable if Path(name).suffix.lower() not in SIDE_SUFFIXES]
+    return tuple(data or usable)
+
+
+# Separators and what GDAL calls them.
+SEPARATORS = {";": "SEMICOLON", ",": "COMMA", "\t": "TAB"}
+# Degrees go before a plane's coordinates where a file has both.
+KNOWN_NAMES = ((("lon", "longitude"), ("lat", "latitude")), (("x",), ("y",)))
+
+
+@dataclass(frozen=True, slots=True)
+class CsvColumns:
+    """Separator, one character, names, and coordinate columns: x is easting or longitude."""
+
+    separator: str
+    names: tuple[str, ...]
+    x: str | None
+    y: str | None
+
+    @property
+    def options(self) -> dict[str, str]:
+        """GDAL's open options; its own guess of the separator fails on `id;size (a, b);x;y`."""
+        return {"SEPARATOR": SEPARATORS[self.separator], "HEADERS": "YES"}
+
+    def position(self, row: Mapping[str, Any]) -> tuple[float, float] | None:
+        """Return the coordinates of a row, or None where both are blank.
+
+        BadFeatureError if they are not two numbers.
+        """
+        texts = {name: (row[name] or "").strip() for name in (self.x, self.y) if name}
+        if not any(texts.values()):
+            return None
+        x, y = (self._number(name, text) for name, text in texts.items())
+        return x, y
+
+    def _number(self, name: str, text: str) -> float:
+        # Where the comma does not separate columns it is the decimal sign of half of Europe.
+        plain = text if self.separator == "," else text.replace(",", ".")
+        try:
+            value = float(plain)
+        except ValueError:
+            value = math.nan
+        if not math.isfinite(value):
+            msg = f"{name} {text!r} is not a number"
+            raise BadFeatureError(msg)
+        return value
+
+
+def csv_columns(header: str, spec: LayerSpec | None, *, where: str) -> CsvColumns:
+    """Find the separator and the coordinate columns from the first line of a file.
+
+    CatalogError if `spec` names only one column, or one that does not exist; SourceError if none is
+    recognised, but without `spec`.
+    """
+    layouts = {sep: next(csv.reader([header], delimiter=sep), []) for sep in SEPARATORS}
+    widest = max(layouts, key=lambda separator: len(layouts[separator]))
+    if spec is not None and (spec.x_field or spec.y_field):
+        x, y = spec.x_field, spec.y_field
+        if not (x and y):
+            msg = f"{where} has only one of x_field and y_field in the catalogue; state both."
+            raise CatalogError(msg)
+        for separator, names in layouts.items():
+            if x in names and y in names:
+                return CsvColumns(separator, tuple(names), x, y)
+        require_field(x, layouts[widest], where=where, key="x_field")
+        require_field(y, layouts[widest], where=where, key="y_field")
+    for separator, names in layouts.items():
+        for x_names, y_names in KNOWN_NAMES:
+            x, y = _first(names, x_names), _first(names, y_names)
+            if x and y:
+                return CsvColumns(separator, tuple(names), x, y)
+    if spec is None:
+        return CsvColumns(widest, tuple(layouts[widest]), None, None)
+    msg = (
+        f"{where} has no coordinate columns lon and lat, or x and y; name them in x_field and "
+        f"y_field; its columns are {', '.join(layouts[widest])}."
+    )
+    raise SourceError(msg)
+
+
+def _first(names: Sequence[str], wanted: Sequence[str]) -> str | None:
+    return next((name for name in names if name.strip().lower() in wanted), None)
+
 
 # fiona's loggers; a filter acts on the very logger that emits, not on those below it.
 LOGGERS = ("fiona._env", "fiona._err", "fiona.collection", "fiona.ogrext")
