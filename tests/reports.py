@@ -61,10 +61,10 @@ def report(*sections: Section, **options: Any) -> Report:  # noqa: ANN401
 def ordinary_report() -> Report:
     """Return a report with something of every kind."""
     numbers = (
-        Number(row="R = 20 m", column="P", ours=0.21, low=0.2, high=0.22, paper=0.1793),
-        Number(row="R = 20 m", column="recall", ours=0.5, paper=0.511),
-        Number(row="R = 30 m", column="P", ours=None, paper=0.3733),
-        Number(row="R = 30 m", column="median", ours=float("inf"), unit="m", decimals=1),
+        Number("R = 20 m", "P", 0.21, low=0.2, high=0.22, paper=0.1793),
+        Number("R = 20 m", "recall", 0.5, paper=0.511),
+        Number("R = 30 m", "P", None, paper=0.3733),
+        Number("R = 30 m", "median", float("inf"), unit="m", decimals=1),
     )
     return report(
         Section(name="range", title="Range", text=("Words.",), numbers=numbers, plots=(plot(),)),
@@ -87,9 +87,9 @@ def hostile_report(harm: str = HARM) -> Report:
         title=harm,
         text=(harm, f"- {harm}", f"1. {harm}"),
         numbers=(
-            Number(row=harm, column=harm, ours=1.0, paper=2.0, unit=harm),
-            Number(row=harm, column="b", ours=1.0, paper=2.0, unit="m"),
-            Number(row="b", column="b", ours=1.0, paper=2.0, unit=harm),
+            Number(harm, harm, 1.0, paper=2.0, unit=harm),
+            Number(harm, "b", 1.0, paper=2.0, unit="m"),
+            Number("b", "b", 1.0, paper=2.0, unit=harm),
         ),
         plots=(
             Plot(

@@ -1,15 +1,22 @@
-"""Tests of semsig_gis.reports.scenes."""
-
 from __future__ import annotations
 
+import dataclasses
 import math
+import re
 
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from reports import HARM, LONG, hostile_report, scene, texts
 from worlds import random_town
 
+from semsig_gis.core.signs import class_signs
 from semsig_gis.evaluation.evaluate import evaluate
-from semsig_gis.reports.scenes import cell_scene, example_scenes
+from semsig_gis.reports.parts import SceneObject
+from semsig_gis.reports.scenes import _round_length, cell_scene, draw_scene, example_scenes
+from semsig_gis.sources.catalog import paper_taxonomy
 
+CLASSES = paper_taxonomy()
 TOWN = random_town()
 CITY = TOWN.database
 FOUND = evaluate(CITY, queries=40, distortion="strong")
@@ -20,34 +27,34 @@ def test_scenes_show_what_is_there(successful: bool) -> None:  # noqa: FBT001
     scenes = example_scenes(FOUND, CITY, successful=successful, count=3)
     chosen = FOUND.queries[FOUND.successful == successful].head(3)
     assert len(scenes) == 3
-    for scene, row in zip(scenes, chosen.to_dict("records"), strict=True):
+    for shown, row in zip(scenes, chosen.to_dict("records"), strict=True):
         x, y = CITY.xy[row["cell"]]
-        assert scene.types == row["types"]
-        assert scene.error_m == row["error_m"]
-        codes = [CITY.taxonomy.by_code(one.code).symbol for one in scene.objects]
+        assert shown.types == row["types"]
+        assert shown.error_m == row["error_m"]
+        codes = [CITY.taxonomy.by_code(one.code).symbol for one in shown.objects]
         assert "".join(codes) == row["types"]
-        assert (scene.radius, scene.name.split("-")[0]) == (30.0, "found" if successful else "lost")
-        for one in scene.objects:
+        assert (shown.radius, shown.name.split("-")[0]) == (30.0, "found" if successful else "lost")
+        for one in shown.objects:
             assert math.hypot(one.east, one.north) <= 30.1
         # Bearings are kept to 1/20 degree and distances to 1/8 metre: all is within 20 cm.
-        for one in (*scene.objects, *scene.others):
+        for one in (*shown.objects, *shown.others):
             assert nearest(x + one.east, y + one.north, one.code) < 0.2
         there = {
             (code, round(math.hypot(a - x, b - y) * 4))
             for a, b, code in TOWN.objects
             if 30 < math.hypot(a - x, b - y) < 36
         }
-        assert len(scene.others) >= len(there)
-        if scene.answer is not None:
-            east, north = scene.answer
+        assert len(shown.others) >= len(there)
+        if shown.answer is not None:
+            east, north = shown.answer
             assert (x + east, y + north) == pytest.approx((row["best_x"], row["best_y"]))
 
 
 def test_a_scene_of_a_cell() -> None:
-    scene = cell_scene(CITY, 3)
-    assert scene.types == CITY.types(3)
-    assert scene.title == f"Cell {CITY.cell_ids[3]}"
-    assert (scene.answer, scene.error_m) == (None, None)
+    shown = cell_scene(CITY, 3)
+    assert shown.types == CITY.types(3)
+    assert shown.title == f"Cell {CITY.cell_ids[3]}"
+    assert (shown.answer, shown.error_m) == (None, None)
     assert cell_scene(CITY, 3, title="A corner").title == "A corner"
 
 
@@ -57,12 +64,80 @@ def nearest(x: float, y: float, code: int) -> float:
 
 
 def test_degrees() -> None:
-    scene, *_ = example_scenes(FOUND, CITY, successful=True, count=1)
+    shown, *_ = example_scenes(FOUND, CITY, successful=True, count=1)
     # Montpellier
-    assert scene.lon == pytest.approx(3.8, abs=0.1)
-    assert scene.lat == pytest.approx(43.57, abs=0.1)
+    assert shown.lon == pytest.approx(3.8, abs=0.1)
+    assert shown.lat == pytest.approx(43.57, abs=0.1)
 
 
 def test_no_examples() -> None:
     perfect = evaluate(CITY, queries=3, distortion="none", top=len(CITY))
     assert example_scenes(perfect, CITY, successful=False) == ()
+
+
+@pytest.mark.parametrize("objects", [0, 2, 60])
+def test_a_scene_shows_its_objects(objects: int) -> None:
+    made = scene(objects=objects)
+    picture = draw_scene(made, CLASSES)
+    shown = texts(picture.svg)
+    for symbol in set(made.types):
+        assert shown.count(symbol) == made.types.count(symbol)
+        title = CLASSES.by_symbol(symbol).title
+        assert f"{symbol} {title} ({made.types.count(symbol)})" in shown
+    assert {"N", "10 m", "A place", "2.300000°, 48.800000° · error 12.0 m"} <= set(shown)
+    assert (made.types or "Nothing is seen") in picture.description
+    # The one around is in the legend, without a count.
+    assert ("D Street light" in shown) == ("D" not in made.types)
+
+
+def test_the_same_scene_is_the_same_bytes() -> None:
+    made = scene(objects=20, answer=(10.0, 3.0))
+    assert draw_scene(made, CLASSES) == draw_scene(made, CLASSES)
+
+
+def test_an_answer_is_drawn_or_pointed_to() -> None:
+    assert "answer" not in texts(draw_scene(scene(), CLASSES).svg)
+    near = texts(draw_scene(scene(answer=(40.0, -30.0)), CLASSES).svg)
+    assert "answer" in near
+    assert "50 m" not in near
+    assert {"answer", "5,000 m"} <= set(texts(draw_scene(scene(answer=(4e3, 3e3)), CLASSES).svg))
+
+
+def test_a_place_that_was_not_found() -> None:
+    lost = draw_scene(scene(error_m=float("inf")), CLASSES)
+    assert "2.300000°, 48.800000° · not localized" in texts(lost.svg)
+    assert lost.description.endswith("Not localized.")
+
+
+def test_a_place_that_nobody_asked_for() -> None:
+    shown = draw_scene(scene(error_m=None), CLASSES)
+    assert "2.300000°, 48.800000°" in texts(shown.svg)
+    assert "rror" not in shown.description
+
+
+def test_objects_have_the_signs_of_their_classes() -> None:
+    made = draw_scene(scene(objects=11), CLASSES).svg.decode("utf-8")
+    for sign in class_signs(CLASSES).values():
+        assert f"fill: {sign.colour}" in made
+        (style,) = re.findall(rf'<text style="([^"]*)"[^>]*>{sign.symbol}</text>', made)
+        # Black is what an SVG is drawn in unless told otherwise.
+        assert ("fill: #ffffff" in style) == (sign.ink == "#ffffff")
+
+
+def test_an_object_of_no_class() -> None:
+    odd = dataclasses.replace(scene(), objects=(SceneObject(code=0, east=1.0, north=2.0),))
+    assert "? unknown class (1)" in texts(draw_scene(odd, CLASSES).svg)
+
+
+@pytest.mark.parametrize("text", [HARM, LONG, "$", ""])
+def test_text_from_data_breaks_nothing(text: str) -> None:
+    made = draw_scene(scene(title=text, types=text, objects=11), hostile_report(text).taxonomy)
+    assert b"<script>" not in made.svg
+    assert max(map(len, texts(made.svg))) < 80
+
+
+@given(st.floats(0.01, 1e6))
+def test_a_scale_bar_is_round_and_fits(longest: float) -> None:
+    metres = _round_length(longest)
+    assert longest / 2.6 < metres <= longest
+    assert f"{metres:.0e}"[0] in "125"
