@@ -11,13 +11,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pandas as pd
 import pytest
-from full_disk import largest_file
 from hypothesis import example, given
 from hypothesis import strategies as st
-from sentences import assert_sentence
 from small_city import small_city, small_evaluation
 
-from semsig_gis.core.errors import InputError
 from semsig_gis.exports import export_database
 from semsig_gis.exports.csv import as_written, formula_safe
 from semsig_gis.objects.table import StreetObjects
@@ -97,17 +94,3 @@ def test_texts_of_queries_are_safe_too(tmp_path: Path) -> None:
     texts = pd.read_csv(tmp_path / "a.csv")["next_cell_ids"]
     assert set(texts) == {formula_safe("-5,-4;=cmd")}
     assert texts[0].startswith("'-5")
-
-
-@pytest.mark.parametrize("name", ["cells.csv", "cells.parquet", "cells.tif"])
-@pytest.mark.parametrize("share", [0.0, 0.5, 0.97])
-def test_a_full_disk_leaves_the_old_file(name: str, share: float, tmp_path: Path) -> None:
-    database, _ = small_city()
-    file = tmp_path / name
-    export_database(database, file)
-    before = file.read_bytes()
-    with largest_file(round(share * len(before))), pytest.raises(InputError) as caught:
-        export_database(database, file)
-    assert_sentence(caught.value, name, "unchanged")
-    assert file.read_bytes() == before
-    assert list(tmp_path.iterdir()) == [file]

@@ -10,6 +10,7 @@ import pyogrio
 import pytest
 import shapely
 from cells_told import told_of
+from full_disk import largest_file
 from sentences import assert_sentence
 from small_city import small_city, small_evaluation, small_localization, small_location
 
@@ -18,6 +19,7 @@ from semsig_gis.exports import LAYERS, RASTERS, export_answer, export_database
 from semsig_gis.objects.table import StreetObjects
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
     from pathlib import Path
 
     import numpy as np
@@ -123,46 +125,75 @@ def test_what_does_not_fit_is_refused(
     assert not list(tmp_path.iterdir())
 
 
-@pytest.mark.parametrize("suffix", [".gpkg", ".parquet", ".csv", ".tif"])
-def test_what_is_of_another_city_or_of_none_is_refused(suffix: str, tmp_path: Path) -> None:
-    database, objects = small_city()
-    layer = "error" if suffix == ".tif" else "evaluation"
-    given: dict[str, Any] = {"layers": layer, "evaluation": small_evaluation()}
-    with pytest.raises(InputError) as caught:
-        export_database(database.select(slice(1, None)), tmp_path / f"a{suffix}", **given)
-    assert_sentence(caught.value, "give the database that it was made with")
-    with pytest.raises(EmptyResultError) as caught_empty:
-        export_database(database.select(slice(0)), tmp_path / f"a{suffix}")
-    assert_sentence(caught_empty.value, f"a{suffix}", "no cell")
-    if suffix != ".tif":
-        layers = "objects"
-        moved = StreetObjects(objects.table.to_crs("EPSG:32632"), objects.taxonomy, ())
-        with pytest.raises(InputError) as caught:
-            export_database(database, tmp_path / f"a{suffix}", layers=layers, objects=moved)
-        assert_sentence(caught.value, "zone 32N", "zone 31N")
-        table = objects.table.set_geometry(objects.table.translate(9_000.0))
-        far = StreetObjects(table, objects.taxonomy, ())
-        with pytest.raises(InputError) as caught:
-            export_database(database, tmp_path / f"a{suffix}", layers=layers, objects=far)
-        assert_sentence(caught.value, "none of the", "same city")
-        nothing = StreetObjects(objects.table[:0], objects.taxonomy, objects.licenses)
-        with pytest.raises(EmptyResultError) as caught_empty:
-            export_database(database, tmp_path / f"a{suffix}", layers=layers, objects=nothing)
-        assert_sentence(caught_empty.value, f"a{suffix}", "no object")
+def other_objects(kind: str) -> StreetObjects:
+    _, objects = small_city()
+    tables = {
+        "moved": objects.table.to_crs("EPSG:32632"),
+        "far": objects.table.set_geometry(objects.table.translate(9_000.0)),
+        "none": objects.table[:0],
+    }
+    return StreetObjects(tables[kind], objects.taxonomy, ())
+
+
+OF_OTHERS = ("that of other cells",)
+MADE_WITH = ("give the database that it was made with",)
+OTHER_CITY: list[tuple[slice, str, Callable[[], dict[str, Any]], tuple[str, ...]]] = [
+    (slice(0), "cells", dict, ("city.", "no cell")),
+    (slice(3, None), "cells", lambda: {"identifiability": told_of(small_city()[0])}, OF_OTHERS),
+    (slice(3, None), "evaluation", lambda: {"evaluation": small_evaluation()}, MADE_WITH),
+    (slice(None), "objects", lambda: {"objects": other_objects("moved")}, ("zone 32N", "zone 31N")),
+    (slice(None), "objects", lambda: {"objects": other_objects("far")}, ("none of the", "city")),
+    (slice(None), "objects", lambda: {"objects": other_objects("none")}, ("city.", "no object")),
+]
+
+
+@pytest.mark.parametrize("suffix", [".gpkg", ".parquet", ".csv"])
+@pytest.mark.parametrize(("rows", "layer", "given", "words"), OTHER_CITY)
+def test_what_is_of_another_city_or_of_none_is_refused(
+    *,
+    suffix: str,
+    rows: slice,
+    layer: str,
+    given: Callable[[], dict[str, Any]],
+    words: tuple[str, ...],
+    tmp_path: Path,
+) -> None:
+    database = small_city()[0].select(rows)
+    with pytest.raises((InputError, EmptyResultError)) as caught:
+        export_database(database, tmp_path / f"city{suffix}", layers=layer, **given())
+    assert_sentence(caught.value, *words)
     assert not list(tmp_path.iterdir())
 
 
-def test_answers_that_do_not_fit_are_refused(tmp_path: Path) -> None:
-    database = small_city()[0]
+def test_rasters_of_another_city_or_of_none_are_refused(tmp_path: Path) -> None:
+    database, _ = small_city()
+    with pytest.raises(EmptyResultError, match="no cell"):
+        export_database(database.select(slice(0)), tmp_path / "a.tif")
+    other, evaluation = database.select(slice(3, None)), small_evaluation()
+    with pytest.raises(InputError, match="give the database that it was made with"):
+        export_database(other, tmp_path / "a.tif", layers="error", evaluation=evaluation)
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize(
+    ("answer", "name", "options", "words"),
+    [
+        (small_localization, "a.tif", {}, ("a.tif", "likelihood")),
+        (small_location, "a.geojson", {}, ("a.geojson", ".gpkg")),
+        (small_localization, "a.gpkg", {"share": 7}, ("share of 7",)),
+    ],
+)
+def test_answers_that_do_not_fit_are_refused(
+    answer: Callable[[], Any],
+    name: str,
+    options: dict[str, float],
+    words: tuple[str, ...],
+    tmp_path: Path,
+) -> None:
     with pytest.raises(InputError) as caught:
-        export_answer(small_localization(), database, tmp_path / "a.tif")
-    assert_sentence(caught.value, "a.tif", "likelihood")
-    with pytest.raises(InputError) as caught:
-        export_answer(small_location(), database, tmp_path / "a.geojson")
-    assert_sentence(caught.value, "a.geojson", ".gpkg")
-    with pytest.raises(InputError) as caught:
-        export_answer(small_localization(), database, tmp_path / "a.gpkg", share=7)
-    assert_sentence(caught.value, "share of 7")
+        export_answer(answer(), small_city()[0], tmp_path / name, **options)
+    assert_sentence(caught.value, *words)
+    assert not list(tmp_path.iterdir())
 
 
 @pytest.mark.parametrize("suffix", [".gpkg", ".parquet", ".csv", ".tif"])
@@ -176,3 +207,19 @@ def test_a_folder_that_cannot_be_written(suffix: str, tmp_path: Path) -> None:
         export_database(small_city()[0], tmp_path / f"b{suffix}")
     assert_sentence(caught.value, f"b{suffix} is a folder")
     assert (tmp_path / "file").read_text() == "here"
+
+
+# A share just below 1 is too little for the spatial index of a GeoPackage, which comes last.
+@pytest.mark.parametrize("share", [0.0, 0.07, 0.4, 0.95])
+@pytest.mark.parametrize("suffix", [".gpkg", ".parquet", ".csv", ".tif"])
+def test_a_full_disk_leaves_the_old_file(suffix: str, share: float, tmp_path: Path) -> None:
+    database, objects = small_city()
+    file = tmp_path / f"city{suffix}"
+    given: dict[str, Any] = {"objects": objects} if suffix == ".gpkg" else {}
+    export_database(database, file, **given)
+    before = file.read_bytes()
+    with largest_file(round(share * len(before))), pytest.raises(InputError) as caught:
+        export_database(database, file, **given)
+    assert_sentence(caught.value, file.name, "unchanged")
+    assert file.read_bytes() == before
+    assert list(tmp_path.iterdir()) == [file]

@@ -11,7 +11,7 @@ import pyarrow.parquet as pq
 import pytest
 from cells_told import told_of
 from sentences import assert_sentence
-from small_city import small_city, small_evaluation
+from small_city import small_city
 
 from semsig_gis.core.errors import DatabaseError
 from semsig_gis.database.file import open_database
@@ -74,18 +74,6 @@ def test_a_box_is_read_by_its_bounds(tmp_path: Path) -> None:
     wanted = everything.cx[box[0] : box[2], box[1] : box[3]]
     assert set(wanted["cell_id"]) <= set(some["cell_id"])
     assert 9 <= len(some) < len(everything) / 4
-
-
-def test_queries(tmp_path: Path) -> None:
-    database, _ = small_city()
-    evaluation, file = small_evaluation(), tmp_path / "queries.parquet"
-    export_database(database, file, layers=["evaluation"], evaluation=evaluation)
-    read = gpd.read_parquet(file)
-    assert read.geometry.to_wkb().tolist() == evaluation.queries.geometry.to_wkb().tolist()
-    assert read["query_types"].tolist() == evaluation.queries["query_types"].tolist()
-    assert set(read["outcome"]) <= {"found", "missed", "nothing seen"}
-    assert ((read["outcome"] == "found") == evaluation.successful).all()
-    assert read["error_m"].isna().tolist() == np.isinf(evaluation.queries["error_m"]).tolist()
 
 
 def test_it_is_not_taken_for_a_database(tmp_path: Path) -> None:

@@ -20,8 +20,11 @@ from semsig_gis.exports.regions import search_regions
 from semsig_gis.likelihood.posterior import Posterior
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from semsig_gis.database.database import SignatureDatabase
     from semsig_gis.likelihood.locate import Location
+    from semsig_gis.matching.search import Localization
 
 Cell = tuple[int, int]
 PLACES = st.tuples(st.integers(-3, 3), st.integers(-3, 3))
@@ -58,15 +61,9 @@ def flooded(cells: set[Cell]) -> set[frozenset[Cell]]:
         while edge:
             column, row = cell = edge.pop()
             group.add(cell)
-            for near in (
-                (column + 1, row),
-                (column - 1, row),
-                (column, row + 1),
-                (column, row - 1),
-            ):
-                if near in left:
-                    left.remove(near)
-                    edge.append(near)
+            sides = {(column + 1, row), (column - 1, row), (column, row + 1), (column, row - 1)}
+            edge += sides & left
+            left -= sides
         groups.add(frozenset(group))
     return groups
 
@@ -135,19 +132,23 @@ def test_candidates_of_other_methods() -> None:
     assert firsts == sorted(firsts)
 
 
-@pytest.mark.parametrize("within", [-1.0, float("nan"), float("inf")])
-def test_other_distances_are_refused(within: float) -> None:
+@pytest.mark.parametrize(
+    ("rows", "options", "words"),
+    [
+        (slice(None), {"within": -1.0}, "metres, 0 or more"),
+        (slice(None), {"within": float("nan")}, "metres, 0 or more"),
+        (slice(None), {"within": float("inf")}, "metres, 0 or more"),
+        (slice(None), {"share": 1.5}, "1.5"),
+        (slice(1, None), {}, "give the database that"),
+    ],
+)
+@pytest.mark.parametrize("answer", [small_location, small_localization])
+def test_other_numbers_and_databases_are_refused(
+    answer: Callable[[], Location | Localization],
+    rows: slice,
+    options: dict[str, float],
+    words: str,
+) -> None:
     with pytest.raises(InputError) as caught:
-        search_regions(small_localization(), small_city()[0], within=within)
-    assert_sentence(caught.value, "metres, 0 or more")
-
-
-def test_other_shares_and_databases_are_refused() -> None:
-    database = small_city()[0]
-    with pytest.raises(InputError) as caught:
-        search_regions(small_location(), database, share=1.5)
-    assert_sentence(caught.value, "1.5")
-    for answer in (small_location(), small_localization()):
-        with pytest.raises(InputError) as caught:
-            search_regions(answer, database.select(slice(1, None)))
-        assert_sentence(caught.value, "give the database that")
+        search_regions(answer(), small_city()[0].select(rows), **options)
+    assert_sentence(caught.value, words)
