@@ -50,10 +50,8 @@ class AnswerRule:
         Least chance that the place is within `radius` of the best one; above 1 for never.
     radius : float, default 50
         Metres that count as right.
-    precision : float, default 0.98
-        Share of the answers that shall be right.
-    confidence : float, default 0.95
-        How sure it was to be that they are.
+    precision, confidence : float, default 0.98 and 0.95
+        Share of the answers that shall be right, and how sure it was to be that they are.
     queries, answered, wrong : int, default 0
         What it was calibrated on: queries, those that were answered, and wrong answers.
 
@@ -156,11 +154,11 @@ def calibrate(
     Notes
     -----
     A threshold is proven when answers that are wrong as often as allowed would have shown so few
-    errors with a chance of at most ``1 - confidence`` (the bound of Clopper and Pearson). As the
-    best of many thresholds would profit from luck, they are tried in a fixed order, from strict
-    to loose until one fails, from four starting points that share the allowed chance (Angelopoulos
-    et al., "Learn then test", 2021, fixed-sequence testing with several starts). Without errors,
-    98 % at 95 % need 217 answers.
+    errors with a chance of at most ``1 - confidence`` (Clopper and Pearson). So that the best of
+    many thresholds does not profit from luck, they are tried from strict to loose until one fails,
+    from four starting points that share the allowed chance (Angelopoulos et al., "Learn then test",
+    2021, fixed-sequence testing with several starts). Without errors, 98 % at 95 % need 217
+    answers.
 
     Examples
     --------

@@ -113,14 +113,11 @@ class Location(Answer):
 
     Parameters
     ----------
-    query : Signature
-        What was searched for.
+    query, cells, crs, taxonomy, licenses
+        What was searched for, how many cells were searched, and what their database says of its
+        CRS, classes and sources.
     noise : str
         Name of the noise model.
-    cells : int
-        How many cells were searched.
-    crs, taxonomy, licenses
-        Those of the database.
     candidates : DataFrame
         One row a cell, likeliest first: ``rank`` (from 1), ``cell`` (row in the database),
         ``cell_id``, ``x`` and ``y`` (viewpoint, CRS of the database), ``types`` (symbols),
@@ -417,8 +414,7 @@ def locate(
     query : Signature
         At least one object; types or bearings may be unknown.
     north_sigma : float, default 0
-        Standard deviation in degrees of the north of the query: 0 where it is known, infinite
-        where it is not known at all.
+        Standard deviation in degrees of the north of the query; infinite if it is not known.
     log_prior : ndarray of float64, shape (n,), optional
         What else is known of the place (see `likelihood.priors`).
     rule : AnswerRule, optional
@@ -428,11 +424,10 @@ def locate(
     store : ObjectStore, optional
         The street objects behind the cells; what is refined or explained looks at them.
     refined : bool, default False
-        Look for the place between the viewpoints, too, with the street objects of `store`; the
-        chances of the cells are then those of their parts together.
+        Look for the place between the viewpoints, too, with the store; the chances of the cells
+        are then those of their parts together.
     explained : int, default 0
-        How many of the candidates to explain; without a store from the cells alone, which do not
-        know the identifiers of what they see.
+        How many candidates to explain; without a store, street objects have no identifiers.
 
     Returns
     -------
@@ -598,9 +593,8 @@ def cell_estimate(
     """Return the mean place within `radius` metres of a cell, from the chances of the cells.
 
     For a place in two streets at once the mean lies between them, as it has the least mean squared
-    error. The covariance has ``step ** 2 / 12`` each way for the place in a cell. `north_sigma` is
-    the standard deviation in degrees of the query's north: 0 if known, infinite if not known at
-    all. Headings are tried every two degrees all round, cell by cell.
+    error. The covariance has ``step ** 2 / 12`` each way for the place in a cell. `north_sigma`
+    is in degrees. Headings are tried every two degrees all round, cell by cell.
     """
     database, chances = posterior.database, posterior.chances
     away = database.xy - database.xy[cell]

@@ -48,8 +48,9 @@ class Localization(Answer):
 
     Parameters
     ----------
-    query : Signature
-        What was searched for.
+    query, cells, crs, taxonomy, licenses
+        What was searched for, how many cells were searched, and what their database says of its
+        CRS, classes and sources.
     method : Method
         How the cells were ranked.
     used : str
@@ -60,16 +61,8 @@ class Localization(Answer):
         broken either way), ``tied`` (how many cells share its distance), ``cell`` (row in the
         database), ``cell_id``, ``x`` and ``y`` (viewpoint, CRS of the database), ``types``
         (symbols), ``length`` (objects), ``distance``.
-    cells : int
-        How many cells were searched.
     tied_beyond : int
         How many cells are as good as the last candidate but are not listed.
-    crs : pyproj.CRS
-        CRS of ``x`` and ``y``.
-    taxonomy : Taxonomy
-        The classes behind the symbols.
-    licenses : tuple of str
-        Where the street objects of the database come from.
     """
 
     method: Method
@@ -227,8 +220,7 @@ def localize(
     Parameters
     ----------
     database : SignatureDatabase or PartitionedDatabase
-        The cells. Of a database in parts, one part at a time is in memory; the answer is that of
-        the parts together.
+        The cells. Of a database in parts, one part at a time is in memory.
     query : Signature
         What a person or a detector saw; types or bearings may be unknown.
     method : Method
@@ -246,8 +238,8 @@ def localize(
     Raises
     ------
     InputError
-        If the query is empty, has no part that the method compares, or has a class that no cell
-        of the database sees, or `top` is below 1.
+        If the query is empty, has no part that the method compares or a class that no cell sees,
+        or `top` is below 1.
     EmptyResultError
         If no cell meets the requirement.
 
