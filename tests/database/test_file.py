@@ -1,0 +1,344 @@
+from __future__ import annotations
+
+import hashlib
+import json
+import shutil
+from typing import TYPE_CHECKING, Any
+
+import geopandas as gpd
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+import pytest
+import shapely
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from sentences import refused
+from worlds import (
+    CODES,
+    World,
+    assert_same,
+    brute_force,
+    check_against_brute_force,
+    worlds,
+)
+
+from semsig_gis.core.errors import DatabaseError
+from semsig_gis.database.file import (
+    MANIFEST,
+    Manifest,
+    Part,
+    digest,
+    open_database,
+    open_dataset,
+    read_manifest,
+    save_database,
+)
+from semsig_gis.database.tiles import describe
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+    from pathlib import Path
+
+    from semsig_gis.database.database import SignatureDatabase
+
+
+def test_the_largest_range_fits_the_file(tmp_path: Path) -> None:
+    world = World(((0.0, 5999.99, 3), (0.0, 0.0, 1)), step=1000.0, radius=6000.0)
+    database = world.database
+    save_database(database, tmp_path / "a.parquet")
+    assert_same(open_database(tmp_path / "a.parquet"), database)
+    check_against_brute_force(world)
+
+
+@given(world=worlds())
+@settings(max_examples=25)
+def test_a_saved_database_comes_back(
+    world: World, tmp_path_factory: pytest.TempPathFactory
+) -> None:
+    if not brute_force(world):
+        return
+    path = tmp_path_factory.mktemp("database") / "city.parquet"
+    database = world.database
+    save_database(database, str(path))
+    again = open_database(str(path))
+    assert_same(again, database)
+    save_database(again, path)
+    assert_same(open_database(path), database)
+
+
+def test_geopandas_reads_the_columns(database: SignatureDatabase, path: Path) -> None:
+    frame = gpd.read_parquet(path)
+    assert " ".join(frame.columns) == "cell_id types bearings distances length geometry"
+    assert frame.crs == database.crs
+    assert frame["cell_id"].tolist() == database.cell_ids.tolist()
+    assert frame["types"].tolist() == [database.types(cell) for cell in range(len(database))]
+    assert frame["length"].tolist() == database.lengths.tolist()
+    assert shapely.get_coordinates(frame.geometry).tolist() == database.xy.tolist()
+    assert frame.total_bounds.tolist() == [*database.xy.min(axis=0), *database.xy.max(axis=0)]
+    units, distances = (np.concatenate(frame[name]) for name in ("bearings", "distances"))
+    assert (units.dtype, distances.dtype) == (np.uint16, np.uint8)
+    assert units.tolist() == database.bearing_units.tolist()
+    assert distances.tolist() == database.distance_units.tolist()
+    assert [len(row) for row in frame["bearings"]] == database.lengths.tolist()
+    specs = json.loads(pq.read_metadata(path).metadata[b"semsig"])
+    assert specs["grid"] == {"step": 10.0, "origin": [0.0, 0.0]}
+    assert specs["signature"] == {"radius": 30.0, "levels": 16}
+    assert specs["licenses"] == ["World (CC0): world"]
+    assert [item["code"] for item in specs["taxonomy"]] == CODES
+
+
+def test_a_cut_file_is_an_error(path: Path) -> None:
+    content = path.read_bytes()
+    for size in np.linspace(0, len(content) - 1, 80).astype(int).tolist():
+        path.write_bytes(content[:size])
+        with refused(DatabaseError, str(path), "signature database"):
+            open_database(path)
+
+
+def rewrite(path: Path, table: pa.Table, **specs: Any) -> None:  # noqa: ANN401
+    """Write a table in the place of a file, with its metadata but for some of the specs."""
+    metadata = dict(pq.read_metadata(path).metadata)
+    changed = json.loads(metadata[b"semsig"])
+    for key, value in specs.items():
+        changed[key] = value
+        if value is None:
+            del changed[key]
+    kept = {b"geo": metadata[b"geo"], b"semsig": json.dumps(changed).encode()}
+    pq.write_table(table.replace_schema_metadata(kept), path)
+
+
+def swap(table: pa.Table, one: str, other: str) -> pa.Table:
+    names = {one: other, other: one}
+    return table.rename_columns([names.get(name, name) for name in table.column_names])
+
+
+def with_first(table: pa.Table, column: str, value: object) -> pa.Table:
+    values = [value, *table[column].to_pylist()[1:]]
+    place = table.column_names.index(column)
+    return table.set_column(place, column, pa.array(values, table[column].type))
+
+
+def turned_over(table: pa.Table) -> pa.Table:
+    return table.take(list(range(len(table)))[::-1])
+
+
+DAMAGE = {
+    "bearings and distances swapped": lambda t: swap(t, "bearings", "distances"),
+    "types and bearings swapped": lambda t: swap(t, "types", "bearings"),
+    "a missing column": lambda t: t.drop_columns(["bearings"]),
+    "another type of column": lambda t: swap(t, "types", "length"),
+    "large strings": lambda t: t.set_column(1, "types", t["types"].cast(pa.large_string())),
+    "cells as floats": lambda t: t.set_column(0, "cell_id", t["cell_id"].cast(pa.float64())),
+    "a missing cell": lambda t: with_first(t, "cell_id", None),
+    "cells out of order": turned_over,
+    "a cell twice": lambda t: pa.concat_tables([t, t]),
+    "no cells": lambda t: t.slice(0, 0),
+    "a missing value": lambda t: with_first(t, "bearings", None),
+    "an unknown symbol": lambda t: with_first(t, "types", "?" * t["length"][0].as_py()),
+    "one object too many": lambda t: with_first(t, "types", t["types"][0].as_py() + "D"),
+    "an empty signature": lambda t: with_first(
+        with_first(with_first(t, "types", ""), "bearings", []), "distances", []
+    ),
+    "a missing number": lambda t: with_first(t, "distances", [None] * t["length"][0].as_py()),
+    "numbers of another size": lambda t: t.set_column(
+        2, "bearings", t["bearings"].cast(pa.list_(pa.int32()))
+    ),
+    "bytes for numbers": lambda t: t.set_column(
+        3, "distances", pa.array([bytes(row) for row in t["distances"].to_pylist()])
+    ),
+    "a bearing of 360": lambda t: with_first(t, "bearings", [7200] * t["length"][0].as_py()),
+    "bearings in another order": lambda t: t.set_column(
+        2, "bearings", pa.array([b[::-1] for b in t["bearings"].to_pylist()], t["bearings"].type)
+    ),
+}
+
+
+@pytest.mark.parametrize("damage", DAMAGE.values(), ids=DAMAGE)
+def test_columns_that_do_not_fit_are_an_error(
+    database: SignatureDatabase, path: Path, damage: Callable[[pa.Table], pa.Table]
+) -> None:
+    table = pq.read_table(path)
+    rewrite(path, table)
+    assert_same(open_database(path), database)  # the rewriting itself does no harm
+    rewrite(path, damage(table))
+    with refused(DatabaseError, str(path)):
+        open_database(path)
+
+
+@pytest.mark.parametrize(
+    "specs",
+    [
+        {"grid": None},
+        {"grid": {"step": 10.0}},
+        {"grid": {"step": 0.0, "origin": [0.0, 0.0]}},
+        {"grid": {"step": "ten", "origin": [0.0, 0.0]}},
+        {"grid": {"step": 10.0, "origin": None}},
+        {"grid": {"step": 10.0, "origin": ["x", "y"]}},
+        {"signature": None},
+        {"signature": {"radius": -1.0, "levels": 16}},
+        {"signature": {"radius": 30.0, "levels": 16, "shape": "round"}},
+        {"viewpoints": {"mode": "indoors", "width": 8.0, "area": None}},
+        {"viewpoints": None},
+        {"occlusion": None},
+        {"occlusion": "deep"},
+        {"taxonomy": None},
+        {"taxonomy": []},
+        {"taxonomy": [{"code": 1, "symbol": "BB", "name": "b", "title": "B"}]},
+        {"licenses": None},
+        {"version": None},
+    ],
+)
+def test_specs_that_do_not_fit_are_an_error(path: Path, specs: dict[str, Any]) -> None:
+    rewrite(path, pq.read_table(path), **specs)
+    with refused(DatabaseError, str(path), "is damaged", "build the database again"):
+        open_database(path)
+
+
+@pytest.mark.parametrize("number", [None, 1, 99])
+def test_a_file_of_another_version_is_named_as_such(path: Path, number: int | None) -> None:
+    rewrite(path, pq.read_table(path), format=number)
+    with refused(DatabaseError, str(path), "another version", "build the database again"):
+        open_database(path)
+
+
+def test_a_file_of_street_objects_is_named_as_such(objects_file: Path) -> None:
+    with refused(DatabaseError, str(objects_file), "street objects", "signature database"):
+        open_database(objects_file)
+
+
+def test_pieces_and_columns_of_others_do_no_harm(database: SignatureDatabase, path: Path) -> None:
+    table = pq.read_table(path)
+    pq.write_table(table, path, row_group_size=7)
+    assert_same(open_database(path), database)
+    turned = table.select(["geometry", "distances", "length", "bearings", "types", "cell_id"])
+    rewrite(path, turned.append_column("note", [["x"] * len(table)]))
+    assert_same(open_database(path), database)
+
+
+# --- A folder of parts ----------------------------------------------------------------------------
+
+
+def test_the_parts_are_opened_whole_or_one_after_the_other(
+    database: SignatureDatabase, parts: Path
+) -> None:
+    assert_same(open_database(str(parts)), database)
+    dataset = open_dataset(parts)
+    assert len(dataset) == len(database)
+    assert dataset.taxonomy == database.taxonomy
+    seen = [part.cell_ids for part in dataset.parts()]
+    assert len(seen) > 8
+    assert sorted(np.concatenate(seen).tolist()) == database.cell_ids.tolist()
+    rows = [0, 17, 5, len(database) - 1]
+    assert dataset.row_numbers(database.cell_ids[rows]).tolist() == rows
+    table = gpd.read_parquet(parts)
+    assert sorted(table["cell_id"]) == database.cell_ids.tolist()
+    assert table.crs == database.crs
+
+
+def test_the_manifest_tells_what_is_there_and_how_it_was_built(
+    database: SignatureDatabase, parts: Path
+) -> None:
+    manifest = read_manifest(parts)
+    assert manifest.recipe["grid"] == {"step": 10.0, "origin": [0.0, 0.0]}
+    assert manifest.recipe["tile"] == {"cells": 8}
+    assert list(manifest.recipe["inputs"]) == ["objects"]
+    assert {part.file for part in manifest.parts} | {MANIFEST} == {p.name for p in parts.iterdir()}
+    assert manifest.cells == len(database)
+    assert manifest.entries == len(database.codes)
+    for part in manifest.parts:
+        file = parts / part.file
+        assert part == describe(part.tile, open_database(file), file)
+
+
+NUMBERS = st.integers(-(10**6), 10**6)
+SIZES = st.integers(1, 10**9)
+DIGESTS = st.text("0123456789abcdef", min_size=64, max_size=64)
+PARTS = st.builds(Part, st.tuples(NUMBERS, NUMBERS), SIZES, SIZES, SIZES, DIGESTS)
+
+
+@given(st.lists(PARTS, unique_by=lambda part: part.tile))
+def test_a_manifest_is_read_as_it_was_written(
+    tmp_path_factory: pytest.TempPathFactory, parts: list[Part]
+) -> None:
+    folder = tmp_path_factory.mktemp("manifest")
+    manifest = Manifest({"grid": {"step": 10.0}}, tuple(sorted(parts)))
+    manifest.write(folder)
+    assert read_manifest(folder) == manifest
+    assert len({part.file for part in parts}) == len(parts)
+
+
+@pytest.mark.parametrize("opened", [open_database, open_dataset])
+def test_a_folder_that_is_not_whole_is_named(
+    parts: Path, tmp_path: Path, opened: Callable[[Path], object]
+) -> None:
+    with refused(DatabaseError, str(tmp_path), "not a signature database in parts"):
+        opened(tmp_path)
+    manifest = read_manifest(parts)
+    names = [part.file for part in manifest.parts]
+    path = parts / names[2]
+    content = path.read_bytes()
+    path.unlink()
+    with refused(DatabaseError, names[2], "missing"):
+        opened(parts)
+    middle = len(content) // 2
+    flipped = content[:middle] + bytes([content[middle] ^ 1]) + content[middle + 1 :]
+    for other in (content[:-1], flipped, (parts / names[3]).read_bytes()):
+        path.write_bytes(other)
+        with refused(DatabaseError, names[2], "not the part that was built"):
+            opened(parts)
+    path.write_bytes(content)
+    shutil.copy(path, parts / "tile_0_0.parquet")
+    with refused(DatabaseError, "tile_0_0.parquet", "is no part of the database"):
+        opened(parts)
+    (parts / "tile_0_0.parquet").unlink()
+    opened(parts)
+    Manifest(manifest.recipe, ()).write(parts)
+    for name in names:
+        (parts / name).unlink()
+    with refused(DatabaseError, "lists no parts"):
+        opened(parts)
+
+
+def test_parts_that_do_not_fit_each_other_are_refused(town: World, parts: Path) -> None:
+    manifest = read_manifest(parts)
+    first, second, *others = manifest.parts
+    file = parts / second.file
+    narrow = World(town.objects, radius=20.0).database
+    inside = np.isin(narrow.cell_ids, open_database(file).cell_ids)
+    for database, word in (
+        (narrow.select(inside), "differ in their range"),
+        (open_database(parts / first.file), "the same cell"),
+    ):
+        save_database(database, file)
+        replaced = describe(second.tile, database, file)
+        Manifest(manifest.recipe, (first, replaced, *others)).write(parts)
+        with refused(DatabaseError, word):
+            open_database(parts)
+        if word != "the same cell":
+            with refused(DatabaseError, word):
+                list(open_dataset(parts).parts())
+
+
+@pytest.mark.parametrize(
+    ("content", "words"),
+    [
+        *((text, "damaged") for text in ("", "{", "[]", "{}", '{"kind": 3}', '{"parts": 3}')),
+        ('{"kind": "signature database in parts", "recipe": {}, "parts": [{}]}', "damaged"),
+        ('{"kind": "album", "recipe": {}, "parts": []}', "another kind"),
+    ],
+)
+def test_a_damaged_manifest_is_named(tmp_path: Path, content: str, words: str) -> None:
+    (tmp_path / MANIFEST).write_text(content, encoding="utf-8")
+    for opened in (open_database, open_dataset, read_manifest):
+        with refused(DatabaseError, MANIFEST, words):
+            opened(tmp_path)
+
+
+def test_a_digest_is_that_of_the_joined_content(tmp_path: Path) -> None:
+    one, other, empty = (tmp_path / name for name in "abc")
+    one.write_bytes(b"a" * 3_000_000)
+    other.write_bytes(b"b")
+    empty.touch()
+    assert digest(one, other, empty) == hashlib.sha256(b"a" * 3_000_000 + b"b").hexdigest()
+    assert digest(empty) == "e3b0c44298fc1c149afbf4c8996fb92427ae41e4649b934ca495991b7852b855"
