@@ -77,7 +77,8 @@ def test_geopandas_reads_the_columns(database: SignatureDatabase, path: Path) ->
     assert shapely.get_coordinates(frame.geometry).tolist() == database.xy.tolist()
     assert frame.total_bounds.tolist() == [*database.xy.min(axis=0), *database.xy.max(axis=0)]
     units, distances = (np.concatenate(frame[name]) for name in ("bearings", "distances"))
-    assert (units.dtype, distances.dtype) == (np.uint16, np.uint8)
+    assert units.dtype == np.uint16
+    assert distances.dtype == np.uint8
     assert units.tolist() == database.bearing_units.tolist()
     assert distances.tolist() == database.distance_units.tolist()
     assert [len(row) for row in frame["bearings"]] == database.lengths.tolist()

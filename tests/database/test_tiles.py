@@ -1,34 +1,62 @@
+"""Tiles: which there are, what they are built from, how a run goes on, and that all is as whole."""
+
 from __future__ import annotations
 
+import os
 import tempfile
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import geopandas as gpd
 import numpy as np
+import pyarrow.parquet as pq
 import pytest
 import shapely
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from sentences import refused
-from worlds import CODES, CORNER, TAXONOMY, World, assert_same, random_town, worlds
+from worlds import CODES, CORNER, World, assert_same, worlds
 
-from semsig_gis.core.errors import EmptyResultError, InputError
+from semsig_gis.core.errors import (
+    CrsError,
+    DatabaseError,
+    EmptyResultError,
+    InputError,
+    SourceError,
+)
 from semsig_gis.core.grid import GridSpec
 from semsig_gis.core.signature import SignatureSpec
 from semsig_gis.database.build import build_database
-from semsig_gis.database.file import open_database
+from semsig_gis.database.file import MANIFEST, open_database, part_name, save_database
 from semsig_gis.database.occlusion import TOLERANCE_M
-from semsig_gis.database.tiles import TileSpec, build_tiles, touched_tiles
+from semsig_gis.database.tiles import (
+    RUN,
+    TileSpec,
+    begin,
+    build_tiles,
+    describe,
+    finished_tiles,
+    mark_empty,
+    plan_tiles,
+    publish,
+    touched_tiles,
+)
 from semsig_gis.database.viewpoints import ViewpointSpec
 from semsig_gis.objects.surroundings import read_surroundings, save_surroundings
-from semsig_gis.objects.table import save_objects
+from semsig_gis.objects.table import open_objects, save_objects
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
+    from semsig_gis.core.errors import SemsigError
     from semsig_gis.database.database import SignatureDatabase
+    from semsig_gis.database.file import Part
+    from semsig_gis.database.tiles import TilePlan
     from semsig_gis.database.viewpoints import Mode
+
+
+def placed(*shapes: shapely.Geometry, **columns: object) -> gpd.GeoDataFrame:
+    """Return shapes in the town, in its CRS."""
+    moved = [shapely.transform(shape, lambda xy: xy + CORNER) for shape in shapes]
+    return gpd.GeoDataFrame(columns, geometry=moved, crs="EPSG:2154")
 
 
 def tiled(world: World, side: float, folder: Path, **options: Any) -> SignatureDatabase:  # noqa: ANN401
@@ -42,8 +70,7 @@ def tiled(world: World, side: float, folder: Path, **options: Any) -> SignatureD
         spec=SignatureSpec(world.radius, world.levels),
         **options,
     )
-    inputs = {"objects", "houses", "streets"}
-    assert {path.stem for path in folder.iterdir()} <= inputs | {"city"}
+    assert {path.stem for path in folder.iterdir()} <= {"objects", "buildings", "streets", "city"}
     return open_database(folder / "city")
 
 
@@ -54,12 +81,9 @@ def test_a_tile_is_so_many_whole_cells() -> None:
     assert TileSpec().cells(GridSpec()) == 200
     assert TileSpec(104.0).cells(GridSpec(step=10.0)) == 10
     assert TileSpec(1.0).cells(GridSpec(step=10.0)) == 1
-
-
-@pytest.mark.parametrize("side", [0.0, -5.0, float("nan"), float("inf")])
-def test_a_side_that_is_no_length_is_refused(side: float) -> None:
-    with refused(InputError, "side of a tile", "above 0"):
-        TileSpec(side)
+    for side in (0.0, -5.0, float("nan"), float("inf")):
+        with refused(InputError, "side of a tile", "above 0"):
+            TileSpec(side)
 
 
 # --- Which tiles ------------------------------------------------------------------------------
@@ -83,26 +107,20 @@ def test_every_cell_lies_in_a_tile_that_is_touched(world: World, side: int) -> N
 
 def test_the_tiles_with_most_objects_come_first(tmp_path: Path) -> None:
     west, north = CORNER + 50.0
-    objects = [
-        (west, north, CODES[0]),
-        (west + 400, north, CODES[0]),
-        (west + 401, north, CODES[0]),
-    ]
-    save_objects(World(tuple(objects)).street_objects, tmp_path / "objects.parquet")
+    world = World(tuple((west + east, north, CODES[0]) for east in (0, 400, 401)))
+    save_objects(world.street_objects, tmp_path / "objects.parquet")
     tiles = touched_tiles(tmp_path / "objects.parquet", grid=GridSpec(), side=10, reach=30.0)
     assert tiles == [(7656, 62750), (7652, 62750)]
 
 
 def test_tiles_that_are_too_small_or_too_many_are_refused(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    objects_file: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    path = tmp_path / "objects.parquet"
-    save_objects(random_town().street_objects, path)
     with refused(InputError, "tile of 1 m", "range of 30 m", "at least 1.875 m"):
-        touched_tiles(path, grid=GridSpec(step=1.0), side=1, reach=30.0)
+        touched_tiles(objects_file, grid=GridSpec(step=1.0), side=1, reach=30.0)
     monkeypatch.setattr("semsig_gis.database.tiles.MOST_TILES", 3)
     with refused(InputError, "tiles of 20 m", "more than 3"):
-        touched_tiles(path, grid=GridSpec(), side=2, reach=30.0)
+        touched_tiles(objects_file, grid=GridSpec(), side=2, reach=30.0)
 
 
 # --- The same as in one piece -----------------------------------------------------------------
@@ -122,19 +140,16 @@ def test_tiles_are_the_same_as_the_whole(world: World, side: float) -> None:
         assert_same(tiled(world, side, Path(folder)), whole)
 
 
-def test_a_range_larger_than_a_tile_and_a_step_larger_than_the_area_work(tmp_path: Path) -> None:
-    town = random_town()
-    for number, world in enumerate(
-        (
-            World(town.objects, radius=150.0),  # the town is 200 m wide
-            World(town.objects, step=5_000.0, radius=5_000.0),
-        )
-    ):
-        folder = tmp_path / str(number)
-        assert_same(tiled(world, 100.0, folder), world.database)
+def test_a_range_larger_than_a_tile_and_a_step_larger_than_the_area_work(
+    town: World, tmp_path: Path
+) -> None:
+    # The town is 200 m wide.
+    for radius, step in ((150.0, 10.0), (5_000.0, 5_000.0)):
+        world = World(town.objects, step=step, radius=radius)
+        assert_same(tiled(world, 100.0, tmp_path / str(radius)), world.database)
 
 
-def houses_and_streets() -> tuple[gpd.GeoDataFrame, gpd.GeoDataFrame]:
+def houses_and_streets() -> dict[str, gpd.GeoDataFrame]:
     """Return houses wall to wall, in two parts, invalid and flat, and streets of some widths."""
     rng = np.random.default_rng(3)
     shapes: list[shapely.Geometry] = []
@@ -145,54 +160,37 @@ def houses_and_streets() -> tuple[gpd.GeoDataFrame, gpd.GeoDataFrame]:
             shapes.append(shapely.box(west, south, west + width, south + depth))
             west += width + (rng.uniform(0, 6) if rng.random() < 0.3 else 0.04)
     shapes.append(shapely.MultiPolygon([shapely.box(2, 40, 8, 50), shapely.box(150, 40, 160, 52)]))
-    bow = [(100, 40), (110, 50), (110, 40), (100, 50)]
-    shapes.append(shapely.Polygon(bow))
+    shapes.append(shapely.Polygon([(100, 40), (110, 50), (110, 40), (100, 50)]))
     shapes.append(shapely.Polygon([(20, 40), (25, 40), (20, 40)]))  # flat
     lines = [shapely.LineString([(-20, y), (220, y)]) for y in (5, 55, 108, 155)]
-
-    def placed(given: Sequence[shapely.Geometry], **columns: object) -> gpd.GeoDataFrame:
-        moved = [shapely.transform(shape, lambda xy: xy + CORNER) for shape in given]
-        return gpd.GeoDataFrame(columns, geometry=moved, crs="EPSG:2154")
-
-    houses, streets = placed(shapes), placed(lines, half_width=[6.0, np.nan, 17.0, 3.0])
+    houses, streets = placed(*shapes), placed(*lines, half_width=[6.0, np.nan, 17.0, 3.0])
     houses.attrs["licenses"] = ["City (CC0): houses"]
     streets.attrs["licenses"] = ["Roads (OGL): lanes"]
-    return houses, streets
+    return {"buildings": houses, "streets": streets}
 
 
 @pytest.mark.parametrize("mode", ["all", "outdoor", "streets"])
 @pytest.mark.parametrize("suffix", [".parquet", ".gpkg"])
 def test_tiles_with_buildings_and_streets_are_the_same_as_the_whole(
-    tmp_path: Path,
-    mode: Mode,
-    suffix: str,
+    town: World, tmp_path: Path, mode: Mode, suffix: str
 ) -> None:
-    town = random_town()
     # A lamp where there is no building and no street near.
     town = World((*town.objects, (CORNER[0] + 900, CORNER[1] + 900, CODES[0])))
-    houses, streets = houses_and_streets()
     viewpoints = ViewpointSpec(mode=mode, width=5.0)
-    for table, name in ((houses, "houses"), (streets, "streets")):
-        if suffix == ".parquet":
-            save_surroundings(table, tmp_path / f"{name}.parquet")
-        else:
-            table.to_file(tmp_path / f"{name}.gpkg")
-    found = tiled(
-        town,
-        30.0,
-        tmp_path,
-        viewpoints=viewpoints,
-        buildings=tmp_path / f"houses{suffix}",
-        streets=tmp_path / f"streets{suffix}",
-    )
-    # Of other files than Parquet, no widths are read.
+    files, tables = {}, {}
+    for role, table in houses_and_streets().items():
+        files[role] = tmp_path / f"{role}{suffix}"
+        save_surroundings(table, files[role]) if suffix == ".parquet" else table.to_file(
+            files[role]
+        )
+        # Of other files than Parquet, no widths are read.
+        tables[role] = read_surroundings(files[role], role=role, crs="EPSG:2154")  # type: ignore[arg-type]
+    found = tiled(town, 30.0, tmp_path, viewpoints=viewpoints, **files)
     whole = build_database(
         town.street_objects,
         viewpoints=viewpoints,
-        footprints=read_surroundings(
-            tmp_path / f"houses{suffix}", role="buildings", crs="EPSG:2154"
-        ),
-        streets=read_surroundings(tmp_path / f"streets{suffix}", role="streets", crs="EPSG:2154"),
+        footprints=tables["buildings"],
+        streets=tables["streets"],
     )
     assert_same(found, whole)
     assert found.viewpoints == whole.viewpoints == viewpoints
@@ -203,35 +201,219 @@ def test_tiles_with_buildings_and_streets_are_the_same_as_the_whole(
 def test_a_wall_whose_neighbour_is_far_hides_as_in_the_whole(tmp_path: Path) -> None:
     # A long house: its core is one piece only through a neighbour at the other end, three tiles
     # away. From inside its near end, its far side across the yard must not hide.
-    thin, long = 0.8, 130.0
-    house = shapely.Polygon(
-        [
-            (0, 0),
-            (long, 0),
-            (long, 20),
-            (0, 20),
-            (0, 14),
-            (long - thin, 14),
-            (long - thin, 6),
-            (0, 6),
-        ]
-    )
-    neighbour = shapely.box(long, -10, long + 10, 30)
-    lamps = tuple((CORNER[0] + x, CORNER[1] + 25.0, CODES[0]) for x in (5.0, 15.0, 25.0))
-    houses = gpd.GeoDataFrame(
-        geometry=[shapely.transform(one, lambda xy: xy + CORNER) for one in (house, neighbour)],
-        crs="EPSG:2154",
-    )
-    save_surroundings(houses, tmp_path / "houses.parquet")
-    world = World(lamps)
-    found = tiled(world, 30.0, tmp_path, buildings=tmp_path / "houses.parquet")
+    house = shapely.box(0, 0, 130, 20) - shapely.box(0, 6, 129.2, 14)
+    houses = placed(house, shapely.box(130, -10, 140, 30))
+    save_surroundings(houses, tmp_path / "buildings.parquet")
+    world = World(tuple((CORNER[0] + x, CORNER[1] + 25.0, CODES[0]) for x in (5.0, 15.0, 25.0)))
+    found = tiled(world, 30.0, tmp_path, buildings=tmp_path / "buildings.parquet")
     assert_same(found, build_database(world.street_objects, footprints=houses))
     alone = build_database(world.street_objects, footprints=houses.iloc[:1])
     assert len(alone) != len(found)  # or nothing would have been shown
 
 
-def test_ranges_of_classes_are_kept(tmp_path: Path) -> None:
-    ranged = [item for item in TAXONOMY.classes if item.range_m is not None]
-    code = ranged[0].code if ranged else CODES[0]
-    world = World(tuple((x, y, code) for x, y, _ in random_town().objects))
-    assert_same(tiled(world, 40.0, tmp_path), world.database)
+# --- What tiles are built from ----------------------------------------------------------------
+
+HOUSES = placed(shapely.box(0, 0, 9, 9))
+STREETS = placed(
+    *(shapely.LineString([(0, y), (9, y)]) for y in (0, 5, 10)), half_width=[4.0, np.nan, 21.0]
+)
+ALONG = ViewpointSpec(mode="streets", width=5.0)
+
+
+def plan(objects_file: Path, **options: Any) -> TilePlan:  # noqa: ANN401
+    options = {"grid": GridSpec(), "viewpoints": ViewpointSpec(), **options}
+    out = objects_file.with_name("city")
+    return plan_tiles(objects_file, out, tile=TileSpec(50.0), spec=SignatureSpec(), **options)
+
+
+def test_files_that_can_be_read_by_box_are_used_where_they_are(
+    objects_file: Path, tmp_path: Path
+) -> None:
+    houses, streets = tmp_path / "houses.parquet", tmp_path / "streets.parquet"
+    save_surroundings(HOUSES, houses)
+    save_surroundings(STREETS, streets)
+    found = plan(objects_file, buildings=houses, streets=streets, viewpoints=ALONG)
+    assert (found.objects, found.buildings, found.streets) == (objects_file, houses, streets)
+    assert found.folder == tmp_path / "city.partial"
+    assert (found.side, found.reach, found.street_reach) == (5, 30.0, 21.0)
+    assert found.box((15, -2), 3.0) == (747.0, -103.0, 803.0, -47.0)
+
+
+def test_other_files_are_copied_once(objects_file: Path, town: World, tmp_path: Path) -> None:
+    HOUSES.to_parquet(tmp_path / "plain.parquet")  # without bounds
+    save_surroundings(HOUSES.to_crs("EPSG:4326"), tmp_path / "degrees.parquet")
+    STREETS.drop(columns="half_width").to_file(tmp_path / "streets.gpkg")
+    pq.write_table(pq.read_table(objects_file).drop_columns(["bbox"]), objects_file)
+    inputs = tmp_path / "city.partial" / "_inputs"
+    for name in ("plain", "degrees"):
+        options = {"buildings": tmp_path / f"{name}.parquet", "viewpoints": ALONG}
+        found = plan(objects_file, streets=tmp_path / "streets.gpkg", **options)
+        assert found.objects == inputs / "objects.parquet"
+        assert found.buildings == inputs / "buildings.parquet"
+        assert found.streets == inputs / "streets.parquet"
+        assert found.street_reach == 5.0
+        assert len(open_objects(found.objects)) == len(town.objects)
+        times = {path: path.stat().st_mtime_ns for path in inputs.iterdir()}
+        assert plan(objects_file, streets=tmp_path / "streets.gpkg", **options) == found
+        assert {path: path.stat().st_mtime_ns for path in inputs.iterdir()} == times
+
+
+def test_streets_that_no_viewpoint_needs_are_left_aside(objects_file: Path) -> None:
+    assert plan(objects_file, streets="nowhere.parquet").streets is None
+
+
+@pytest.mark.parametrize(
+    ("options", "error", "words"),
+    [
+        ({"viewpoints": ViewpointSpec(mode="outdoor")}, InputError, ["need the buildings"]),
+        ({"viewpoints": ViewpointSpec(mode="streets")}, InputError, ["need the streets"]),
+        ({"grid": GridSpec(step=0.01)}, InputError, ["step of 0.01 m", "too small"]),
+        ({"buildings": "nowhere.gpkg"}, SourceError, ["nowhere.gpkg", "does not exist"]),
+        ({"buildings": "empty.parquet"}, SourceError, ["empty.parquet", "damaged"]),
+        ({"buildings": "bare.parquet"}, SourceError, ["bare.parquet", "coordinate reference"]),
+        ({"buildings": "lines.parquet"}, InputError, ["lines.parquet", "LineString"]),
+        ({"buildings": "houses.geojson"}, (InputError, CrsError), []),  # no CRS is guessed
+    ],
+)
+def test_what_cannot_be_used_is_said_at_once_and_leaves_nothing(
+    objects_file: Path,
+    tmp_path: Path,
+    options: dict[str, Any],
+    error: type[SemsigError],
+    words: list[str],
+) -> None:
+    (tmp_path / "empty.parquet").touch()
+    HOUSES.set_crs(None, allow_override=True).to_parquet(tmp_path / "bare.parquet")
+    STREETS.to_parquet(tmp_path / "lines.parquet")
+    (tmp_path / "houses.geojson").write_text('{"type": "FeatureCollection", "features": []}')
+    if "buildings" in options:
+        options = {"buildings": tmp_path / options["buildings"]}
+    with refused(error, *words):
+        plan(objects_file, **options)
+    with refused(DatabaseError, "none.parquet", "does not exist"):
+        plan(tmp_path / "none.parquet")
+    assert not (tmp_path / "city.partial").exists()
+
+
+def test_a_run_knows_its_inputs_by_their_content(objects_file: Path, tmp_path: Path) -> None:
+    HOUSES.to_file(tmp_path / "houses.shp")
+    options = {"buildings": tmp_path / "houses.shp"}
+    done = plan(objects_file, **options).folder / "tile_0_0.empty"
+    done.touch()
+    for path in tmp_path.glob("houses.*"):
+        path.write_bytes(path.read_bytes())  # later, and the same
+    assert plan(objects_file, **options).folder == done.parent
+    (tmp_path / "houses.prj").write_text((tmp_path / "houses.prj").read_text() + " ")
+    with refused(InputError, "inputs, buildings", "delete that folder"):
+        plan(objects_file, **options)
+
+
+# --- A run that goes on -----------------------------------------------------------------------
+
+RECIPE = {"grid": {"step": 10.0, "origin": (0.0, 0.0)}, "inputs": {"objects": "abc"}}
+
+
+def build(folder: Path, database: SignatureDatabase) -> Part:
+    path = folder / part_name((0, 0))
+    save_database(database, path)
+    mark_empty(folder, (0, 1))
+    return describe((0, 0), database, path)
+
+
+def test_a_run_is_taken_up_by_the_same_recipe(database: SignatureDatabase, tmp_path: Path) -> None:
+    folder = begin(tmp_path / "new" / "city", RECIPE)
+    assert folder == tmp_path / "new" / "city.partial"
+    assert not (tmp_path / "new" / "city").exists()
+    assert finished_tiles(folder, [(0, 0), (0, 1)]) == {}
+    assert RUN.abandon(begin(tmp_path / "new" / "city", {**RECIPE, "version": "9"}))
+    folder = begin(tmp_path / "new" / "city", RECIPE)
+    part = build(folder, database)
+    assert not RUN.abandon(folder)
+    assert begin(tmp_path / "new" / "city", RECIPE) == folder
+    assert finished_tiles(folder, [(0, 0), (0, 1), (7, 7)]) == {(0, 0): part, (0, 1): None}
+    with refused(InputError, str(folder), "differs in version", "delete that folder"):
+        begin(tmp_path / "new" / "city", {**RECIPE, "version": "9"})
+    path = folder / part_name((0, 0))
+    path.write_bytes(path.read_bytes()[:-20])  # which is built again
+    assert finished_tiles(folder, [(0, 0), (0, 1)]) == {(0, 1): None}
+    assert not path.exists()
+
+
+def test_a_database_appears_whole_and_replaces_what_was_there(
+    database: SignatureDatabase, tmp_path: Path
+) -> None:
+    target = tmp_path / "city"
+    save_database(database, target)  # a file
+    for cells in (database, database.select(slice(20))):
+        folder = begin(target, RECIPE)
+        parts = [build(folder, cells)]
+        (folder / "_inputs").mkdir()
+        (folder / "_inputs" / "buildings.parquet").touch()
+        assert publish(folder, parts).cells == len(cells)
+        assert {path.name for path in target.iterdir()} == {MANIFEST, part_name((0, 0))}
+        assert len(open_database(target)) == len(cells)
+        assert [path.name for path in tmp_path.iterdir()] == ["city"]
+
+
+def test_a_link_stays_and_the_folder_that_it_names_is_replaced(
+    database: SignatureDatabase, tmp_path: Path
+) -> None:
+    (tmp_path / "real").mkdir()
+    (tmp_path / "latest").symlink_to(tmp_path / "real")
+    folder = begin(tmp_path / "latest", RECIPE)
+    publish(folder, [build(folder, database)])
+    assert (tmp_path / "latest").is_symlink()
+    assert (tmp_path / "real" / MANIFEST).is_file()
+
+
+def test_other_things_are_never_replaced(database: SignatureDatabase, tmp_path: Path) -> None:
+    target = tmp_path / "home"
+    target.mkdir()
+    (target / "letter.txt").touch()
+    with refused(InputError, "'letter.txt'", "no part of a signature database"):
+        begin(target, RECIPE)
+    (target / "letter.txt").unlink()
+    folder = begin(target, RECIPE)
+    publish(folder, [build(folder, database)])
+    (target / "notes.txt").touch()  # beside the parts
+    with refused(InputError, "'notes.txt'", "move that elsewhere"):
+        begin(target, RECIPE)
+    assert {path.name for path in target.iterdir()} == {MANIFEST, part_name((0, 0)), "notes.txt"}
+    (tmp_path / "city.partial").mkdir()
+    (tmp_path / "city.partial" / "letter.txt").touch()
+    with refused(InputError, "city.partial", "'letter.txt'", "no unfinished run"):
+        begin(tmp_path / "city", RECIPE)
+    if hasattr(os, "mkfifo"):
+        os.mkfifo(tmp_path / "pipe")
+        with refused(InputError, "is a device or a pipe"):
+            begin(tmp_path / "pipe", RECIPE)
+
+
+@pytest.mark.parametrize("fails", [1, 2])
+def test_a_rename_that_fails_leaves_one_whole_database_and_the_run(
+    database: SignatureDatabase, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, fails: int
+) -> None:
+    target = tmp_path / "city"
+    folder = begin(target, RECIPE)
+    publish(folder, [build(folder, database)])
+    folder = begin(target, RECIPE)
+    part = build(folder, database.select(slice(20)))
+    rename, calls = Path.rename, []
+
+    def refuse(self: Path, to: Path) -> Path:
+        calls.append(to)
+        if len(calls) == fails:
+            raise PermissionError(13, "Permission denied", str(self))
+        return rename(self, to)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(Path, "rename", refuse)
+        with refused(InputError, str(target), "Permission denied", "run the same command again"):
+            publish(folder, [part])
+    assert len(open_database(target)) == len(database)
+    # As the same command does.
+    folder = begin(target, RECIPE)
+    assert finished_tiles(folder, [(0, 0)]) == {(0, 0): part}
+    publish(folder, [part])
+    assert len(open_database(target)) == 20
+    assert [path.name for path in tmp_path.iterdir()] == ["city"]

@@ -1,7 +1,8 @@
 from __future__ import annotations
 
 import dataclasses
-import functools
+import json
+from functools import cache
 from typing import TYPE_CHECKING, Any
 
 import geopandas as gpd
@@ -12,17 +13,20 @@ import shapely
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from sentences import refused
-from worlds import CODES, CORNER, TAXONOMY, assert_same, random_town, surroundings
+from worlds import CODES, CORNER, TAXONOMY, assert_same, surroundings
 
 from semsig_gis.core.errors import CrsError, DatabaseError, EmptyResultError, InputError
+from semsig_gis.core.grid import GridSpec
 from semsig_gis.core.rtree import ObjectIndex
 from semsig_gis.core.taxonomy import ObjectClass, Taxonomy
 from semsig_gis.database import store as store_module
 from semsig_gis.database.build import build_database
+from semsig_gis.database.database import ENTRY_ARRAYS
 from semsig_gis.database.file import open_database, store_path
 from semsig_gis.database.store import ObjectStore, open_store, save_with_store
-from semsig_gis.database.update import update_database, update_file
+from semsig_gis.database.update import UpdateReport, compare_cells, update_database, update_file
 from semsig_gis.database.viewpoints import ViewpointSpec
+from semsig_gis.objects.changes import ClassChange
 from semsig_gis.objects.load import assemble, choose_layers, read_files
 from semsig_gis.objects.table import Licence, StreetObjects
 from semsig_gis.sources.catalog import load_catalog
@@ -31,8 +35,9 @@ if TYPE_CHECKING:
     from collections.abc import Callable
     from pathlib import Path
 
+    from worlds import World
+
     from semsig_gis.database.database import SignatureDatabase
-    from semsig_gis.database.update import UpdateReport
     from semsig_gis.database.viewpoints import Mode
     from semsig_gis.objects.load import Loaded
 
@@ -122,11 +127,11 @@ def assert_equal(one: SignatureDatabase, other: SignatureDatabase) -> None:
 
 def assert_index_fits(store: ObjectStore) -> None:
     xy = store.objects.xy
-    answers = [
-        np.stack(index.pairs_within(xy, radius=20.0)).T.tolist()
+    ours, fresh = (
+        sorted(zip(*index.pairs_within(xy, radius=20.0), strict=True))
         for index in (store.index, ObjectIndex(xy))
-    ]
-    assert sorted(answers[0]) == sorted(answers[1])
+    )
+    assert ours == fresh
 
 
 def check_report(report: UpdateReport, before: SignatureDatabase, after: SignatureDatabase) -> None:
@@ -168,7 +173,9 @@ def test_an_update_is_a_rebuild(
         "footprints": HOUSES if houses or mode == "outdoor" else None,
         "streets": STREETS if mode == "streets" else None,
     }
-    build = builder(viewpoints=ViewpointSpec(mode=mode, area=AREA if area else None), **given)
+    build = partial(
+        build_database, viewpoints=ViewpointSpec(mode=mode, area=AREA if area else None), **given
+    )
     try:
         before = build(objects_of(table))
     except EmptyResultError:
@@ -323,19 +330,18 @@ def test_what_does_not_fit_is_refused(city: tuple[Path, pd.DataFrame]) -> None:
     assert {file: file.read_bytes() for file in before} == before
 
 
-def test_a_city_must_not_come_to_nothing() -> None:
-    objects = random_town().street_objects
+def test_a_city_must_not_come_to_nothing(town: World) -> None:
+    objects = town.street_objects
     area = ViewpointSpec(area=shapely.box(*CORNER, *(CORNER + 30)))
-    database = build_database(objects, viewpoints=area)
     away = dataclasses.replace(objects, table=objects.table[(objects.xy > CORNER + 90).all(axis=1)])
     with refused(EmptyResultError, "no cell would see"):
-        update_database(database, ObjectStore.of(objects), away)
+        update_database(build_database(objects, viewpoints=area), ObjectStore.of(objects), away)
 
 
 def test_a_store_without_what_the_database_was_built_with_is_told() -> None:
     objects = objects_of(random_table(np.random.default_rng(5), 60))
-    given: dict[str, Any] = {"footprints": HOUSES, "streets": STREETS}
-    database = build_database(objects, viewpoints=ViewpointSpec(mode="streets"), **given)
+    spec = ViewpointSpec(mode="streets")
+    database = build_database(objects, viewpoints=spec, footprints=HOUSES, streets=STREETS)
     with refused(DatabaseError, "buildings and streets", "build the database again"):
         update_database(database, ObjectStore.of(objects), objects)
     with refused(DatabaseError, "lacks the streets"):
@@ -345,9 +351,8 @@ def test_a_store_without_what_the_database_was_built_with_is_told() -> None:
 def test_a_damaged_r_tree_is_told_and_healed(city: tuple[Path, pd.DataFrame]) -> None:
     path, table = city
     (store_path(path) / "rtree.dat").unlink()
-    report = update_file(path, objects_of(table[2:]))
-    assert len(report.notes) == 1
-    assert "R-tree" in report.notes[0]
+    (note,) = update_file(path, objects_of(table[2:])).notes
+    assert "R-tree" in note
     assert_equal(open_database(path), build_database(objects_of(table[2:])))
     assert update_file(path, objects_of(table[3:])).notes == ()
 
@@ -375,7 +380,74 @@ def test_an_update_that_was_interrupted_is_finished_by_the_next(
     assert_index_fits(open_store(path))
 
 
-@functools.cache
+# --- How far a city has drifted -------------------------------------------------------------------
+
+
+def test_the_share_is_of_all_cells_before_or_after() -> None:
+    numbers: Any = {"added": 1, "removed": 9, "moved": 2, "moved_m": 2.5, "gained": 0, "lost": 1}
+    trees = ClassChange(class_name="tree", before=1200, after=1190, **numbers)
+    report = UpdateReport(
+        classes=(trees,),
+        replaced=("trees",),
+        kept=(),
+        cells_before=9_000,
+        cells=9_900,
+        recomputed=3_000,
+        changed=1_500,
+        appeared=1_000,
+        vanished=100,
+    )
+    assert report.share == 2_600 / 10_000
+    assert dataclasses.replace(report, changed=0, appeared=0, vanished=0).share == 0.0
+    values = json.loads(json.dumps(report.to_dict()))
+    assert values["share"] == 0.26
+    assert values["classes"] == [dataclasses.asdict(trees)]
+    assert values["kept"] == values["notes"] == []
+    assert (values["cells_before"], values["cells"], values["recomputed"]) == (9000, 9900, 3000)
+
+
+def test_cells_differ_in_length_class_bearing_or_distance(database: SignatureDatabase) -> None:
+    long = np.flatnonzero(database.lengths > 1)[:4]
+    entries = database.offsets[long]
+    arrays: Any = {name: getattr(database, name).copy() for name in ENTRY_ARRAYS}
+    codes = arrays["codes"]
+    codes[entries[0]] = next(code for code in CODES if code != codes[entries[0]])
+    arrays["bearing_units"][entries[1]] ^= 1
+    arrays["distance_units"][[entries[2], entries[2] + 1]] ^= 1
+    other = dataclasses.replace(database, **arrays)
+    every = [[row, row] for row in range(len(database))]
+    assert compare_cells(database, database).same.tolist() == every
+    drifted = compare_cells(database, other)
+    assert drifted.changed.tolist() == [[row, row] for row in long[:3].tolist()]
+    assert len(drifted.same) == len(database) - 3
+    drifted = compare_cells(database.select(long), other)
+    assert drifted.changed.tolist() == [[at, row] for at, row in enumerate(long[:3].tolist())]
+    assert drifted.appeared.tolist() == sorted(set(range(len(database))) - set(long.tolist()))
+    # The signature of another cell in the place of the last one, which sees another number.
+    cell = np.flatnonzero(database.lengths != database.lengths[long[3]])[:1]
+    last = long[3:]
+    swapped = dataclasses.replace(
+        database.select(cell), columns=database.columns[last], rows=database.rows[last]
+    )
+    assert compare_cells(database, swapped).changed.tolist() == [[int(long[3]), 0]]
+    drifted = compare_cells(database.select(slice(2)), database.select(slice(2, 5)))
+    assert drifted.same.size == drifted.changed.size == 0
+    assert (drifted.vanished.tolist(), drifted.appeared.tolist()) == ([0, 1], [0, 1, 2])
+
+
+def test_cells_of_different_grids_or_ranges_are_not_compared(database: SignatureDatabase) -> None:
+    with refused(DatabaseError, "grid", "step=5.0", "in the same way"):
+        compare_cells(database, dataclasses.replace(database, grid=GridSpec(5.0)))
+    first, *others = database.taxonomy.classes
+    farther = Taxonomy((dataclasses.replace(first, range_m=99.0), *others))
+    with refused(DatabaseError, "30.0 and 99.0"):
+        compare_cells(database, dataclasses.replace(database, taxonomy=farther))
+
+
+# --- A year of a real city ------------------------------------------------------------------------
+
+
+@cache
 def monaco(geodata: Path, year: int) -> Loaded:
     catalog = load_catalog("openstreetmap")
     specs = choose_layers(catalog, surroundings=True)
