@@ -173,9 +173,7 @@ def test_an_update_is_a_rebuild(
         "footprints": HOUSES if houses or mode == "outdoor" else None,
         "streets": STREETS if mode == "streets" else None,
     }
-    build = partial(
-        build_database, viewpoints=ViewpointSpec(mode=mode, area=AREA if area else None), **given
-    )
+    build = builder(viewpoints=ViewpointSpec(mode=mode, area=AREA if area else None), **given)
     try:
         before = build(objects_of(table))
     except EmptyResultError:
