@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import itertools
+import math
 from typing import TYPE_CHECKING
 
 import numpy as np
 from hypothesis import strategies as st
 from pyproj import CRS
+from worlds import CODES, CORNER, World
 
 from semsig_gis.core.grid import GridSpec
 from semsig_gis.core.signature import Signature, SignatureSpec
@@ -79,6 +82,41 @@ def random_query(database: SignatureDatabase, seed: int, *, size: int) -> Signat
     first = database.bearings[: database.offsets[1]]
     bearings[near] = (rng.choice(first, int(near.sum())) + 3.0) % 360.0
     return Signature(codes, bearings)
+
+
+def turned_query(query: Signature, turn: float) -> Signature:
+    """Return a query with so many degrees added to its bearings."""
+    codes, bearings = parts_of(query)
+    return Signature(codes, (bearings + turn) % 360.0)
+
+
+def parts_of(query: Signature) -> tuple[np.ndarray, np.ndarray]:
+    """Return the class codes and the bearings of a query that has both."""
+    assert query.codes is not None
+    assert query.bearings is not None
+    return query.codes, query.bearings
+
+
+def noisy_town(seed: int) -> World:
+    """Return ninety objects of five classes in a square of 200 m."""
+    rng = np.random.default_rng(seed)
+    places = rng.uniform(0, 200, (90, 2)) + CORNER
+    return World(tuple((x, y, int(rng.choice(CODES[:5]))) for x, y in places.tolist()))
+
+
+def every_association(weights: np.ndarray) -> tuple[float, np.ndarray]:
+    """Sum over all one-to-one associations, one at a time: the logarithm, and chances of pairs."""
+    objects, detections = weights.shape
+    total, chances = 0.0, np.zeros_like(weights)
+    for choice in itertools.product(range(-1, detections), repeat=objects):
+        pairs = [(one, other) for one, other in enumerate(choice) if other >= 0]
+        if len(pairs) > len({other for _, other in pairs}):
+            continue
+        part = math.prod(weights[pair] for pair in pairs)
+        total += part
+        for pair in pairs:
+            chances[pair] += part
+    return math.log(total), chances / total
 
 
 chances = st.floats(0.05, 0.95)

@@ -66,7 +66,7 @@ def area_prior(
         msg = f"the chance of a place outside the area is {outside}; give 0 to below 1."
         raise InputError(msg)
     if not isinstance(area, (shapely.Polygon, shapely.MultiPolygon)) or area.is_empty:
-        msg = f"the area is a {shapely.get_type_id(area)!r} geometry; give a polygon."
+        msg = f"the area is a {type(area).__name__} or empty; give a polygon that is not."
         raise InputError(msg)
     shape = area
     if crs is not None:

@@ -1,34 +1,36 @@
 from __future__ import annotations
 
-import itertools
-import math
+from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from noisy_cells import noise_specs, random_database, random_query
+from noisy_cells import (
+    every_association,
+    mixtures,
+    noise_specs,
+    noisy_town,
+    random_database,
+    random_query,
+)
 
-from semsig_gis.database.visibility import views_in
-from semsig_gis.likelihood.association import Pairs, associate_pairs, near_pairs, pair_weights
+from semsig_gis.core.rtree import ObjectIndex
+from semsig_gis.core.signature import Signature
+from semsig_gis.database.visibility import views_at, views_in
+from semsig_gis.likelihood.association import (
+    Pairs,
+    associate_pairs,
+    near_pairs,
+    pair_weights,
+    place_loglik,
+    query_bearings,
+)
 from semsig_gis.likelihood.noise.table import database_tables
 from semsig_gis.likelihood.rerank import align_cells
 
-
-def every_association(weights: np.ndarray) -> tuple[float, np.ndarray]:
-    """Sum over all one-to-one associations, one at a time."""
-    objects, detections = weights.shape
-    total, chances = 0.0, np.zeros_like(weights)
-    for choice in itertools.product(range(-1, detections), repeat=objects):
-        taken = [other for other in choice if other >= 0]
-        if len(taken) != len(set(taken)):
-            continue
-        part = math.prod(weights[one, other] for one, other in enumerate(choice) if other >= 0)
-        total += part
-        for one, other in enumerate(choice):
-            if other >= 0:
-                chances[one, other] += part
-    return math.log(total), chances / total
+if TYPE_CHECKING:
+    from semsig_gis.likelihood.noise.model import Noise, NoiseSpec
 
 
 def pairs_of(weights: np.ndarray) -> tuple[Pairs, np.ndarray]:
@@ -109,29 +111,45 @@ def test_problems_do_not_touch_each_other() -> None:
 
 
 @given(st.integers(0, 1000), st.integers(1, 12), noise_specs())
-def test_the_sums_are_those_of_the_re_ranking(seed: int, size: int, noise: object) -> None:
+def test_the_sums_are_those_of_the_re_ranking(seed: int, size: int, noise: NoiseSpec) -> None:
     database = random_database(seed)
     query = random_query(database, seed, size=size)
-    (table,), _ = database_tables(database, noise)  # type: ignore[arg-type]
+    (table,), _ = database_tables(database, noise)
     cells = np.arange(len(database))
     views = views_in(database, cells)
     starts = np.arange(len(database) + 1) * size
-    assert query.bearings is not None
-    pairs = near_pairs(views.offsets, views.bearings, starts, np.tile(query.bearings, len(cells)))
+    pairs = near_pairs(
+        views.offsets, views.bearings, starts, np.tile(query_bearings(query), len(cells))
+    )
     names = table.query_rows(query)
+    kinds = table.row_of[views.codes]
     weights = pair_weights(
         table,
         pairs,
-        kinds=table.row_of[views.codes],
+        kinds=kinds,
         distances=views.distances,
         lengths=np.repeat(views.lengths, views.lengths),
         names=np.tile(names, len(cells)),
     )
     # The re-ranking cuts the tails.
-    weights[np.abs(pairs.away) > 4.5 * table.sigma[table.row_of[views.codes]][pairs.objects]] = 0.0
+    weights[np.abs(pairs.away) > 4.5 * table.sigma[kinds][pairs.objects]] = 0.0
     _, sums = associate_pairs(pairs, weights)
-    expected = align_cells(database, query, noise, cells)  # type: ignore[arg-type]
-    constant = (
-        table.nothing_seen(database.offsets, database.codes) + np.log(table.density[names]).sum()
+    unseen = table.nothing_seen(database.offsets, database.codes)
+    expected = align_cells(database, query, noise, cells)
+    assert sums + unseen + np.log(table.density[names]).sum() == pytest.approx(expected, abs=0.05)
+
+
+@given(st.integers(0, 50), mixtures())
+def test_at_the_viewpoints_places_have_the_likelihood_of_the_cells(seed: int, noise: Noise) -> None:
+    world = noisy_town(seed)
+    database, objects = world.database, world.street_objects
+    rng = np.random.default_rng(seed)
+    cells = rng.choice(len(database), 5, replace=False)
+    query = Signature(rng.choice(database.present_codes, 6), rng.uniform(0, 360, 6))
+    turns = rng.uniform(-180, 180, (5, 2))
+    models = database_tables(database, noise)
+    views = views_at(objects, database.xy[cells], index=ObjectIndex(objects.xy), radius=30.0)
+    loglik = place_loglik(query, views, *models, turns=turns, reach=30.0)
+    assert loglik == pytest.approx(
+        align_cells(database, query, noise, cells, turns=turns), abs=1e-6
     )
-    assert sums + constant == pytest.approx(expected, abs=0.05)

@@ -8,7 +8,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 from noisy_cells import random_database
 
-from semsig_gis.core.errors import InputError
 from semsig_gis.likelihood.posterior import posterior
 
 DATABASE = random_database(3, cells=120)
@@ -65,23 +64,3 @@ def test_entropy_counts_in_bits() -> None:
     loglik[[4, 5, 6]] = -700.0
     assert posterior(DATABASE, loglik).entropy == pytest.approx(2.0)
     assert posterior(DATABASE, loglik).credible_cells(1.0).tolist() == [3, 4, 5, 6]
-
-
-def test_what_is_no_likelihood_is_refused() -> None:
-    count = len(DATABASE)
-    with pytest.raises(InputError, match="3 likelihoods or priors were given for 120 cells"):
-        posterior(DATABASE, np.zeros(3))
-    with pytest.raises(InputError, match="2 likelihoods or priors"):
-        posterior(DATABASE, np.zeros(count), log_prior=np.zeros(2))
-    with pytest.raises(InputError, match="excludes every cell"):
-        posterior(DATABASE, np.full(count, -np.inf))
-    for bad in (math.nan, math.inf):
-        with pytest.raises(InputError, match="not a number below infinity"):
-            posterior(DATABASE, np.full(count, bad))
-    found = posterior(DATABASE, np.zeros(count))
-    for share in (0.0, 1.1, math.nan):
-        with pytest.raises(InputError, match="above 0, at most 1"):
-            found.credible_cells(share)
-    for radius in (-1.0, math.nan, math.inf):
-        with pytest.raises(InputError, match="give metres, 0 or more"):
-            found.mass_within(radius)

@@ -11,7 +11,7 @@ import shapely
 from noisy_cells import random_database
 from sentences import assert_sentence
 
-from semsig_gis.core.errors import CrsError, InputError
+from semsig_gis.core.errors import InputError
 from semsig_gis.likelihood.posterior import posterior
 from semsig_gis.likelihood.priors import area_prior, position_prior, raster_prior, weight_prior
 
@@ -60,29 +60,6 @@ def test_weights_and_priors_add_up() -> None:
     chances = posterior(DATABASE, np.zeros(len(DATABASE)), log_prior=both).chances
     inside = (DATABASE.xy <= 100.0).all(axis=1)
     assert chances == pytest.approx(weights * inside / (weights * inside).sum())
-
-
-def test_priors_that_say_nothing_usable_are_refused() -> None:
-    with pytest.raises(InputError, match="excludes every cell of the database; widen it"):
-        area_prior(DATABASE, shapely.box(-9, -9, -8, -8))
-    with pytest.raises(InputError, match="give a polygon"):
-        area_prior(DATABASE, shapely.Point(3, 3))
-    with pytest.raises(InputError, match="give 0 to below 1"):
-        area_prior(DATABASE, BOX, outside=1.0)
-    with pytest.raises(CrsError, match="'EPSG:0' of the area cannot be read"):
-        area_prior(DATABASE, BOX, crs="EPSG:0")
-    for sigma in (0.0, math.nan, math.inf):
-        with pytest.raises(InputError, match="give metres above 0"):
-            position_prior(DATABASE, (0.0, 0.0), sigma=sigma)
-    with pytest.raises(InputError, match="give x and y in metres"):
-        position_prior(DATABASE, (math.nan, 0.0), sigma=1.0)
-    with pytest.raises(InputError, match="3 weights for 120 cells"):
-        weight_prior(DATABASE, [1, 2, 3])
-    for bad in (-1.0, math.nan):
-        with pytest.raises(InputError, match="give 0 or more"):
-            weight_prior(DATABASE, np.full(120, bad))
-    with pytest.raises(InputError, match="excludes every cell"):
-        weight_prior(DATABASE, np.zeros(120))
 
 
 def raster(folder: Path, values: object, *, left: float = 0.0, nodata: float | None = None) -> Path:

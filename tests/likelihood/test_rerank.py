@@ -1,83 +1,69 @@
 from __future__ import annotations
 
 import math
-from itertools import combinations, permutations
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from noisy_cells import mixtures, random_database, random_query
+from noisy_cells import (
+    every_association,
+    mixtures,
+    parts_of,
+    random_database,
+    random_query,
+    turned_query,
+)
 
-from semsig_gis.core.errors import InputError
 from semsig_gis.core.signature import Signature
-from semsig_gis.database.database import SignatureDatabase
-from semsig_gis.likelihood.index import CellScores, build_index
+from semsig_gis.likelihood.association import query_bearings
+from semsig_gis.likelihood.index import build_index
 from semsig_gis.likelihood.noise.model import NoiseSpec, named_noise
 from semsig_gis.likelihood.noise.table import database_tables
 from semsig_gis.likelihood.rerank import align_cells, rerank
 from semsig_gis.queries.paper_errors import distort, named_distortion
 
 if TYPE_CHECKING:
+    from semsig_gis.database.database import SignatureDatabase
     from semsig_gis.likelihood.noise.model import Noise
+    from semsig_gis.likelihood.noise.table import NoiseTable
 
 SEEDS = st.integers(0, 10_000)
 
 
 def pair_weights(
-    database: SignatureDatabase, query: Signature, noise: Noise, cell: int
-) -> list[np.ndarray[tuple[int, int], np.dtype[np.float64]]]:
-    """Return what each pair of an object and a detection adds, for each model of a mixture."""
-    assert query.bearings is not None
+    table: NoiseTable, database: SignatureDatabase, query: Signature, cell: int
+) -> np.ndarray:
+    """Return what each pair of an object and a detection adds."""
     part = slice(database.offsets[cell], database.offsets[cell + 1])
-    found = []
-    for table in database_tables(database, noise)[0]:
-        kinds = table.row_of[database.codes[part]]
-        sigmas = table.sigmas(database.reach)[kinds, database.distance_units[part]]
-        length = len(kinds)
-        names = table.query_rows(query)
-        weights = np.zeros((length, len(query)))
-        for one in range(length):
-            bearing = database.bearings[part][one] + 0.025
-            for other in range(len(query)):
-                away = (query.bearings[other] - bearing + 180.0) % 360.0 - 180.0
-                if abs(away) > 4.5 * sigmas[one]:
-                    continue
-                density = sum(
-                    math.exp(-0.5 * ((away + 360 * lap) / sigmas[one]) ** 2) for lap in range(-4, 5)
-                ) / (sigmas[one] * math.sqrt(2 * math.pi))
-                weights[one, other] = (
-                    table.odds[length, kinds[one]]
-                    * table.naming[length, kinds[one], names[other]]
-                    * density
-                )
-        found.append(weights)
-    return found
-
-
-def associations(weights: np.ndarray[tuple[int, int], np.dtype[np.float64]]) -> float:
-    """Return the sum over all one-to-one associations, one by one."""
-    total = 0.0
-    for size in range(min(weights.shape) + 1):
-        for objects in combinations(range(weights.shape[0]), size):
-            for seen in permutations(range(weights.shape[1]), size):
-                total += math.prod(weights[i, j] for i, j in zip(objects, seen, strict=True))
-    return total
+    kinds = table.row_of[database.codes[part]]
+    sigmas = table.sigmas(database.reach)[kinds, database.distance_units[part]]
+    names, length = table.query_rows(query), len(kinds)
+    weights = np.zeros((length, len(query)))
+    for one, other in np.ndindex(weights.shape):
+        bearing = database.bearings[part][one] + 0.025
+        away = (query_bearings(query)[other] - bearing + 180.0) % 360.0 - 180.0
+        if abs(away) <= 4.5 * sigmas[one]:
+            laps = away + 360.0 * np.arange(-4, 5)
+            weights[one, other] = (
+                table.odds[length, kinds[one]]
+                * table.naming[length, kinds[one], names[other]]
+                * np.exp(-0.5 * (laps / sigmas[one]) ** 2).sum()
+                / (sigmas[one] * math.sqrt(2 * math.pi))
+            )
+    return weights
 
 
 def slow_loglik(database: SignatureDatabase, query: Signature, noise: Noise, cell: int) -> float:
     """Return the likelihood by going through all associations."""
-    tables, shares = database_tables(database, noise)
     total = 0.0
-    for table, share, weights in zip(
-        tables, shares, pair_weights(database, query, noise, cell), strict=True
-    ):
-        alone = (
-            table.nothing_seen(database.offsets, database.codes)[cell]
-            + np.log(table.density[table.query_rows(query)]).sum()
-        )
-        total += share * math.exp(alone) * associations(weights)
+    for table, share in zip(*database_tables(database, noise), strict=True):
+        unseen = table.nothing_seen(database.offsets, database.codes)[cell]
+        clutter = np.log(table.density[table.query_rows(query)]).sum()
+        pairs, _ = every_association(pair_weights(table, database, query, cell))
+        total += share * math.exp(unseen + clutter + pairs)
     return math.log(total)
 
 
@@ -105,17 +91,13 @@ def test_it_is_exact_where_pairs_form_no_loop(seed: int, away: float) -> None:
     rng = np.random.default_rng(seed)
     database = random_database(seed, cells=1, longest=1).select(np.zeros(6, np.int64))
     units = np.arange(6) * 1200
-    database = SignatureDatabase(
+    database = replace(
+        database,
         columns=np.zeros(1, np.int32),
         rows=np.zeros(1, np.int32),
         offsets=np.array([0, 6]),
         codes=rng.integers(1, 4, 6).astype(np.uint8),
         bearing_units=units.astype(np.uint16),
-        distance_units=database.distance_units,
-        grid=database.grid,
-        spec=database.spec,
-        taxonomy=database.taxonomy,
-        crs=database.crs,
     )
     noise = NoiseSpec(bearing_sigma=5.0)
     bearings = (np.repeat(units / 20.0, 2)[:5] + np.array([0.0, 1.0, -2.0, 3.0, away])) % 360.0
@@ -128,28 +110,23 @@ def test_one_object_explains_one_detection_only() -> None:
     database = random_database(1, cells=30, longest=6)
     noise = named_noise("light")
     query = database.signature(0)
-    assert query.codes is not None
-    assert query.bearings is not None
-    doubled = Signature(np.repeat(query.codes, 2), np.repeat(query.bearings, 2))
-    cells = np.zeros(1, np.int64)
-    index = build_index(database, noise)
-    apart = index.scores(doubled).loglik[0] - align_cells(database, doubled, noise, cells)[0]
-    assert apart > 2.0 * len(query)
+    doubled = Signature(*(np.repeat(part, 2) for part in parts_of(query)))
+    (together,) = align_cells(database, doubled, noise, np.zeros(1, np.int64))
+    apart = build_index(database, noise).scores(doubled).loglik[0]
+    assert apart - together > 2.0 * len(query)
 
 
 def test_turns_are_those_of_a_turned_query() -> None:
     database = random_database(4)
     query = random_query(database, 4, size=7)
-    assert query.bearings is not None
     noise = named_noise("generic")
     cells = np.array([3, 8, 0])
     turns = np.array([[0.0, 30.0], [-200.0, 400.0], [7.0, 8.0]])
     found = align_cells(database, query, noise, cells, turns=turns)
-    for place, cell in enumerate(cells):
-        for way in range(2):
-            turned = Signature(query.codes, (query.bearings + turns[place, way]) % 360.0)
-            alone = align_cells(database, turned, noise, np.array([cell]))
-            assert found[place, way] == pytest.approx(alone[0], abs=1e-3)
+    for place, way in np.ndindex(turns.shape):
+        turned = turned_query(query, float(turns[place, way]))
+        alone = align_cells(database, turned, noise, cells[[place]])
+        assert found[place, way] == pytest.approx(alone[0], abs=1e-3)
 
 
 def test_re_ranking_replaces_the_best_and_moves_the_rest_together() -> None:
@@ -189,13 +166,10 @@ def test_a_prior_chooses_what_is_re_ranked() -> None:
 def test_the_heading_is_found_finer_than_the_index_has_it(north_sigma: float) -> None:
     database = random_database(3, cells=100, longest=20)
     cell = int(database.lengths.argmax())
-    true = database.signature(cell)
-    assert true.bearings is not None
-    query = Signature(true.codes, (true.bearings - 7.0) % 360.0)
+    query = turned_query(database.signature(cell), -7.0)
     index = build_index(database, named_noise("light"))
-    found = rerank(
-        index, query, index.scores(query, north_sigma=north_sigma), north_sigma=north_sigma
-    )
+    scores = index.scores(query, north_sigma=north_sigma)
+    found = rerank(index, query, scores, north_sigma=north_sigma)
     assert int(found.loglik.argmax()) == cell
     assert found.heading is not None
     assert abs(found.heading[cell] - 7.0) <= 1.5
@@ -221,14 +195,8 @@ def test_it_finds_more_than_the_index_alone() -> None:
     assert right["re-ranked"] > right["index"]
 
 
-def test_what_cannot_be_aligned_is_refused_or_left() -> None:
-    database = random_database(2)
-    index = build_index(database, named_noise("medium"))
+def test_a_query_without_bearings_keeps_its_scores() -> None:
+    index = build_index(random_database(2), named_noise("medium"))
     types = Signature(np.array([1, 2], np.uint8), None)
     scores = index.scores(types)
     assert rerank(index, types, scores) is scores
-    with pytest.raises(InputError, match="the query has no bearings"):
-        align_cells(database, types, index.noise, np.arange(2))
-    query = random_query(database, 2, size=3)
-    with pytest.raises(InputError, match="0 cells were to be re-ranked"):
-        rerank(index, query, CellScores(loglik=np.zeros(len(database))), count=0)

@@ -4,10 +4,8 @@ import json
 
 import numpy as np
 import pytest
-from sentences import assert_sentence
 from worlds import CODES, World
 
-from semsig_gis.core.errors import InputError
 from semsig_gis.core.rtree import ObjectIndex
 from semsig_gis.core.signature import Signature
 from semsig_gis.likelihood.explain import explain, explain_cell
@@ -78,12 +76,6 @@ def test_where_nothing_is_seen_all_is_false() -> None:
     found = explain(query, (500.0, 500.0), NOISE, objects=OBJECTS, index=INDEX)
     assert found.counts == {"matched": 0, "misnamed": 0, "missed": 0, "false": 1}
     assert found.table["chance"].tolist() == [1.0]
-
-
-def test_bearings_are_needed() -> None:
-    with pytest.raises(InputError) as caught:
-        explain(Signature(np.array([TREE]), None), (0.0, 0.0), NOISE, objects=OBJECTS, index=INDEX)
-    assert_sentence(caught.value, "bearings")
 
 
 def test_a_cell_is_explained_without_the_street_objects() -> None:

@@ -1,21 +1,28 @@
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import pytest
 from hypothesis import given
+from hypothesis import strategies as st
 from noisy_cells import mixtures
 
-from semsig_gis.core.errors import InputError, UnknownNameError
-from semsig_gis.likelihood.noise.model import NoiseMixture, named_noise, noise_from_dict
+from semsig_gis.core.errors import InputError
+from semsig_gis.likelihood.noise.model import (
+    NOISES,
+    NoiseMixture,
+    NoiseSpec,
+    named_noise,
+    noise_from_dict,
+    open_noise,
+    save_noise,
+)
 
 if TYPE_CHECKING:
+    from pathlib import Path
+
     from semsig_gis.likelihood.noise.model import Noise
-
-
-@given(mixtures())
-def test_a_model_survives_being_plain_values(noise: Noise) -> None:
-    assert noise_from_dict(noise.to_dict()) == noise
 
 
 @pytest.mark.parametrize(
@@ -55,12 +62,44 @@ def test_what_cannot_be_a_model_is_refused_in_a_sentence(
     assert said in str(caught.value)
 
 
-def test_an_unknown_name_is_told_with_the_nearest() -> None:
-    with pytest.raises(UnknownNameError, match="the nearest is 'generic'"):
-        named_noise("genric")
-
-
 def test_the_generic_model_is_told_nothing_of_the_level() -> None:
     generic = named_noise("generic")
     assert isinstance(generic, NoiseMixture)
     assert len(set(generic.weights)) == 1
+
+
+@given(
+    mixtures() | st.sampled_from(list(NOISES.values())),
+    st.text(st.characters(codec="utf-8")),
+    st.sampled_from(["json", "toml", "TOML"]),
+)
+def test_any_model_survives_a_file(
+    tmp_path_factory: pytest.TempPathFactory, noise: Noise, name: str, suffix: str
+) -> None:
+    file = tmp_path_factory.mktemp("noise") / f"noise.{suffix}"
+    save_noise(replace(noise, name=name), file)
+    assert open_noise(file) == replace(noise, name=name)
+
+
+def test_a_toml_file_is_read(tmp_path: Path) -> None:
+    file = tmp_path / "noise.toml"
+    file.write_text(
+        "detection = 0.7\n[confusion.bench]\nbench = 0.9\nbus_stop = 0.1\n"
+        "[detection_by_class]\nbench = 0.5\n"
+    )
+    noise = open_noise(file)
+    assert noise == NoiseSpec(
+        detection=0.7,
+        confusion={"bench": {"bench": 0.9, "bus_stop": 0.1}},
+        detection_by_class={"bench": 0.5},
+    )
+
+
+def test_a_file_that_holds_no_model_is_refused(tmp_path: Path) -> None:
+    file = tmp_path / "noise.json"
+    file.write_text("{")
+    with pytest.raises(InputError, match=r"noise\.json cannot be read"):
+        open_noise(file)
+    file.write_text("[1]")
+    with pytest.raises(InputError, match="a table of its fields"):
+        open_noise(file)

@@ -8,26 +8,43 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from noisy_cells import mixtures, noise_specs, random_database, random_query
+from noisy_cells import (
+    mixtures,
+    noise_specs,
+    parts_of,
+    random_database,
+    random_query,
+    turned_query,
+)
+from sentences import refused
 
-from semsig_gis.core.errors import InputError
+from semsig_gis.core.errors import DatabaseError, InputError
 from semsig_gis.core.signature import Signature
+from semsig_gis.database.city import City
+from semsig_gis.database.file import save_database
 from semsig_gis.likelihood.index import (
     BIN_DEGREES,
     BINS,
     LEAST_PRIOR,
     build_index,
     index_fingerprint,
+    open_index,
+    ready_index,
+    save_index,
 )
 from semsig_gis.likelihood.kernels import promising_cells
 from semsig_gis.likelihood.noise.model import NoiseMixture, NoiseSpec, named_noise
 
 if TYPE_CHECKING:
-    from semsig_gis.database.database import SignatureDatabase
+    from collections.abc import Callable
+    from pathlib import Path
+
     from semsig_gis.likelihood.index import LikelihoodIndex
     from semsig_gis.likelihood.noise.model import Noise
 
 SEEDS = st.integers(0, 10_000)
+NOISE = named_noise("generic")
+DATABASE = random_database(12, cells=150)
 
 
 def bin_density(bearing: float, seen: float, sigma: float) -> float:
@@ -154,34 +171,25 @@ def test_turns_are_summed_over_with_their_chances(seed: int, sigma: float) -> No
     database = random_database(seed, cells=20)
     index = build_index(database, named_noise("medium"))
     query = random_query(database, seed, size=6)
-    assert query.bearings is not None
     turns = np.arange(-36, 36) * BIN_DEGREES
     chances = np.exp(-0.5 * (turns / sigma) ** 2)
     chances[chances <= LEAST_PRIOR] = 0.0  # the likeliest has 1
     chances /= chances.sum()
-    each = np.stack(
-        [
-            index.scores(Signature(query.codes, (query.bearings + turn) % 360.0)).loglik
-            for turn in turns
-        ]
-    ).astype(np.float64)
+    logliks = [index.scores(turned_query(query, turn)).loglik for turn in turns.tolist()]
     found = index.scores(query, north_sigma=sigma)
     with np.errstate(divide="ignore"):
-        expected = np.logaddexp.reduce(each + np.log(chances)[:, None], axis=0)
-        best = (each + np.log(chances)[:, None]).max(axis=0)
-    assert found.loglik == pytest.approx(expected, abs=2e-3)
+        each = np.stack(logliks).astype(np.float64) + np.log(chances)[:, None]
+    assert found.loglik == pytest.approx(np.logaddexp.reduce(each, axis=0), abs=2e-3)
     assert found.heading is not None
-    reached = each[((found.heading + 180.0) / BIN_DEGREES).astype(int), np.arange(len(database))]
-    chance = chances[((found.heading + 180.0) / BIN_DEGREES).astype(int)]
-    assert reached + np.log(chance) == pytest.approx(best, abs=2e-3)
+    rows = ((found.heading + 180.0) / BIN_DEGREES).astype(int)
+    reached = each[rows, np.arange(len(database))]
+    assert reached == pytest.approx(each.max(axis=0), abs=2e-3)
 
 
 def test_the_turn_of_a_query_is_found() -> None:
     database = random_database(3, longest=20)
     cell = int(database.lengths.argmax())
-    true = database.signature(cell)
-    assert true.bearings is not None
-    query = Signature(true.codes, (true.bearings - 65.0) % 360.0)
+    query = turned_query(database.signature(cell), -65.0)
     index = build_index(database, named_noise("light"))
     found = index.scores(query, north_sigma=math.inf)
     assert int(found.loglik.argmax()) == cell
@@ -207,12 +215,11 @@ def test_order_and_unknown_classes_do_not_matter() -> None:
     database = random_database(9)
     index = build_index(database, named_noise("medium"))
     query = random_query(database, 9, size=7)
-    assert query.codes is not None
-    assert query.bearings is not None
-    back = Signature(query.codes[::-1], query.bearings[::-1])
+    codes, bearings = parts_of(query)
+    back = Signature(codes[::-1], bearings[::-1])
     assert np.array_equal(index.scores(query).loglik, index.scores(back).loglik)
-    blank = Signature(np.zeros(7, np.uint8), query.bearings)
-    alone = Signature(None, query.bearings)
+    blank = Signature(np.zeros(7, np.uint8), bearings)
+    alone = Signature(None, bearings)
     assert np.array_equal(index.scores(blank).loglik, index.scores(alone).loglik)
 
 
@@ -220,14 +227,10 @@ def test_a_query_longer_than_sixteen_bits_hold_is_scored() -> None:
     database = random_database(2, cells=5)
     index = build_index(database, named_noise("medium"))
     one = random_query(database, 2, size=1)
-    assert one.codes is not None
-    assert one.bearings is not None
-    many = Signature(np.repeat(one.codes, 600), np.repeat(one.bearings, 600))
+    many = Signature(*(np.repeat(part, 600) for part in parts_of(one)))
     single, found = index.scores(one).loglik, index.scores(many).loglik
     constants = index.constants
     assert found - constants == pytest.approx(600 * (single - constants), rel=1e-4)
-    with pytest.raises(InputError, match="at most 257 objects"):
-        index.scores(many, north_sigma=math.inf)
 
 
 @pytest.mark.parametrize("cells", [1, 63, 64, 65])
@@ -283,38 +286,109 @@ def test_the_fingerprint_changes_with_what_the_index_depends_on() -> None:
     assert index_fingerprint(random_database(8), noise) in prints
 
 
-def small() -> SignatureDatabase:
-    return random_database(1, cells=5)
-
-
-@pytest.mark.parametrize(
-    ("query", "north_sigma", "said"),
-    [
-        (Signature(np.empty(0, np.uint8), np.empty(0)), 0.0, "the query has no objects"),
-        (Signature(np.array([11], np.uint8), np.zeros(1)), 0.0, "class code 11, which no cell"),
-        (Signature(np.array([1], np.uint8), np.zeros(1)), -1.0, "north is -1.0 degrees"),
-        (Signature(np.array([1], np.uint8), np.zeros(1)), math.nan, "north is nan degrees"),
-    ],
-)
-def test_queries_that_cannot_be_scored_are_refused(
-    query: Signature, north_sigma: float, said: str
-) -> None:
-    index = build_index(small(), named_noise("medium"))
-    with pytest.raises(InputError) as caught:
-        index.scores(query, north_sigma=north_sigma)
-    assert said in str(caught.value)
-
-
 @given(
     st.lists(st.one_of(st.floats(-500, 0, width=32), st.just(-math.inf)), min_size=1, max_size=60),
     st.integers(1, 60),
 )
 def test_promising_cells_hold_the_best(scores: list[float], count: int) -> None:
     array = np.array(scores, np.float32)
-    wanted = min(count, len(array))
-    found = promising_cells(array, wanted)
-    assert len(found) >= wanted
-    assert (np.diff(found) > 0).all()
-    left = np.delete(array, found)
-    if len(left):
-        assert np.sort(array[found])[::-1][wanted - 1] > left.max()
+    count = min(count, len(array))
+    cells = promising_cells(array, count)
+    assert len(cells) >= count
+    assert (np.diff(cells) > 0).all()
+    worst = np.sort(array[cells])[-count]
+    assert worst > np.delete(array, cells).max(initial=-math.inf) or len(cells) == len(array)
+
+
+def test_an_index_comes_back_from_its_file(tmp_path: Path) -> None:
+    path = tmp_path / "city.likelihood"
+    save_index(DATABASE, NOISE, path)
+    built, opened = build_index(DATABASE, NOISE), open_index(DATABASE, NOISE, path)
+    query = random_query(DATABASE, 1, size=6)
+    assert np.array_equal(built.columns, opened.columns)
+    assert np.array_equal(built.scores(query).loglik, opened.scores(query).loglik)
+    assert opened.fingerprint == built.fingerprint
+    assert not opened.columns.flags.writeable
+    assert [file.name for file in tmp_path.iterdir()] == ["city.likelihood"]
+
+
+def test_each_model_has_a_file_of_its_own(tmp_path: Path) -> None:
+    names = {
+        City(tmp_path / "city.parquet").index_path(noise).name
+        for noise in (NOISE, named_noise("light"), NoiseSpec(), NoiseSpec(clutter=2.0))
+    }
+    assert len(names) == 4
+    assert all(name.startswith("city.parquet.") for name in names)
+    strange = City(tmp_path / "city.parquet").index_path(NoiseSpec(name="a/b c"))
+    assert strange.parent == tmp_path
+
+
+@pytest.mark.parametrize("make", [ready_index, save_index])
+def test_a_database_is_not_replaced(make: Callable[..., object], tmp_path: Path) -> None:
+    path = tmp_path / "city.parquet"
+    save_database(DATABASE, path)
+    content = path.read_bytes()
+    with refused(InputError, str(City(path).index_path(NOISE))):
+        make(DATABASE, NOISE, path)
+    assert path.read_bytes() == content
+
+
+DAMAGE: dict[str, Callable[[bytes], bytes]] = {
+    "cut": lambda content: content[:-1],
+    "empty": lambda _: b"",
+    "header": lambda content: b"\xff" + content[1:],
+    "list": lambda content: b"[]".ljust(len(content)),
+    "constants": lambda content: content[:16385] + bytes([content[16385] ^ 16]) + content[16386:],
+    "step": lambda content: content.replace(b'"step": 0', b'"step":-0', 1),
+}
+
+
+@pytest.mark.parametrize("damage", DAMAGE.values(), ids=DAMAGE)
+def test_a_damaged_file_is_refused_and_then_renewed(
+    damage: Callable[[bytes], bytes], tmp_path: Path
+) -> None:
+    path = tmp_path / "city.likelihood"
+    save_index(DATABASE, NOISE, path)
+    path.write_bytes(damage(path.read_bytes()))
+    with refused(DatabaseError, "damaged", "again"):
+        open_index(DATABASE, NOISE, path)
+    notes: list[str] = []
+    index = ready_index(DATABASE, NOISE, path, note=notes.append)
+    assert np.array_equal(index.columns, build_index(DATABASE, NOISE).columns)
+    ready_index(DATABASE, NOISE, path, note=notes.append)
+    (note,) = notes
+    assert note.startswith("The likelihood index is built again: ")
+
+
+def test_a_stale_file_is_told_and_renewed(tmp_path: Path) -> None:
+    path = tmp_path / "city.likelihood"
+    save_index(random_database(13, cells=150), NOISE, path)
+    with refused(DatabaseError, "another database, noise model or version"):
+        open_index(DATABASE, NOISE, path)
+    notes: list[str] = []
+    done: list[tuple[int, int]] = []
+    ready_index(
+        DATABASE,
+        NOISE,
+        path,
+        note=notes.append,
+        progress=lambda *cells: done.append(cells),
+        threads=2,
+    )
+    assert "belongs to another" in notes[0]
+    assert done[-1] == (150, 150)
+    open_index(DATABASE, NOISE, path)
+
+
+def test_a_missing_file_is_refused(tmp_path: Path) -> None:
+    with refused(DatabaseError, "No such file"):
+        open_index(DATABASE, NOISE, tmp_path / "none.likelihood")
+
+
+def test_where_no_file_can_be_written_the_index_is_kept_in_memory(tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("in the way of a folder")
+    notes: list[str] = []
+    index = ready_index(DATABASE, NOISE, tmp_path / "file" / "x", note=notes.append)
+    assert "kept in memory only" in notes[-1]
+    assert len(index.constants) == 150
+    assert ready_index(DATABASE, NOISE, tmp_path / "file" / "x").step == index.step
