@@ -1,7 +1,8 @@
-"""Laws that every measure keeps."""
+"""Laws that every measure keeps, and what the Jaccard and the histogram distance are."""
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, TypeAlias
 
@@ -21,7 +22,7 @@ if TYPE_CHECKING:
 Sequences: TypeAlias = Sequence[Sequence[int]]
 
 VALUES = st.sampled_from([0, 1, 2, 3, 70])
-ONE = st.lists(VALUES, max_size=7)
+ONE = st.lists(VALUES, max_size=9)
 SOME = st.lists(ONE, min_size=1, max_size=5)
 
 each = pytest.mark.parametrize("measure", METRICS.values(), ids=list(METRICS))
@@ -125,6 +126,30 @@ def test_a_query_that_is_no_array_of_bytes(measure: Metric) -> None:
     table = SequenceTable.from_csr(query, np.array([0, 1]))
     with pytest.raises(InputError, match="int64 values in 1 dimensions"):
         measure.distances([query.astype(np.int64)], table)
+
+
+@pytest.mark.parametrize("normalized", [True, False])
+@given(query=ONE, row=ONE)
+def test_jaccard_is_one_minus_common_over_all(
+    *, normalized: bool, query: Sequence[int], row: Sequence[int]
+) -> None:
+    either = {*query, *row}
+    expected = 1 - len({*query} & {*row}) / len(either) if either else 0
+    found = between(METRICS["jaccard"], [query], [row], normalized=normalized)
+    assert found[0, 0] == np.float32(expected)
+
+
+@given(query=ONE, row=ONE)
+def test_histogram_is_minus_the_sum_or_one_minus_the_mean_of_quotients(
+    query: Sequence[int], row: Sequence[int]
+) -> None:
+    x, y = Counter(query), Counter(row)
+    quotients = [min(x[value], y[value]) / max(x[value], y[value]) for value in {*x, *y}]
+    raw = between(METRICS["histogram"], [query], [row], normalized=False)
+    assert raw[0, 0] == pytest.approx(-sum(quotients), abs=1e-6)
+    mean = 1 - np.mean(quotients) if quotients else 0
+    found = between(METRICS["histogram"], [query], [row])
+    assert found[0, 0] == pytest.approx(mean, abs=1e-6)
 
 
 def test_an_unknown_name_is_answered_with_the_nearest() -> None:
