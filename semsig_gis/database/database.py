@@ -106,15 +106,15 @@ class SignatureDatabase:
 
     def __post_init__(self) -> None:  # noqa: D105
         for name in ("offsets", *CELL_ARRAYS, *ENTRY_ARRAYS):
-            frozen(getattr(self, name))
+            getattr(self, name).setflags(write=False)
 
     def __len__(self) -> int:  # noqa: D105
         return len(self.columns)
 
-    @property
+    @functools.cached_property
     def cell_ids(self) -> NDArray[np.int64]:
         """Number of every cell, ``column * 10**8 + row``, shape (n,)."""
-        return cell_ids(self.columns, self.rows)
+        return frozen(cell_ids(self.columns, self.rows))
 
     @functools.cached_property
     def xy(self) -> NDArray[np.float64]:
@@ -131,7 +131,7 @@ class SignatureDatabase:
         """Bearing of every entry in degrees, to 1/20 degree, shape (m,)."""
         return self.bearing_units * np.float64(360.0 / BEARING_UNITS)
 
-    @property
+    @functools.cached_property
     def reach(self) -> float:
         """The largest visibility range of any class, in metres."""
         return float(self.taxonomy.ranges(self.spec.radius).max())

@@ -293,7 +293,7 @@ class LikelihoodLocator:
 
     def _store_for(self, queries: Sequence[Signature]) -> ObjectStore | None:
         """Return the street objects to refine places with, if they are to be refined."""
-        blind = any(len(query) and query.bearings is None for query in queries)
+        blind = any(query.bearings is None and len(query) for query in queries)
         return self.store if self.refined or (self.refined is None and not blind) else None
 
     def _location(
