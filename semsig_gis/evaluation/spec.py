@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-import tomllib
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -14,10 +13,10 @@ from semsig_gis.evaluation.methods import parse_method
 from semsig_gis.likelihood.noise.model import NOISES, noise_from_dict, open_noise
 from semsig_gis.queries.chain import chain_text, parse_chain
 from semsig_gis.queries.draw import QuerySpec
-from semsig_gis.storage.toml import check_keys, toml_text
+from semsig_gis.storage.toml import check_keys, parse_toml, toml_text
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Mapping
+    from collections.abc import Mapping
 
     from semsig_gis.evaluation.methods import AnyMethod
     from semsig_gis.likelihood.noise.model import Noise
@@ -36,6 +35,7 @@ KEYS = {
     "noises": dict,
     "districts": dict,
 }
+DISTRICT_KEYS = {"file": str, "name": str}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -155,18 +155,7 @@ class ExperimentSpec:
         )
 
     def asked(self, distortion: str) -> QuerySpec:
-        """Return the queries of one of the distortions.
-
-        Parameters
-        ----------
-        distortion : str
-            Its name.
-
-        Returns
-        -------
-        QuerySpec
-            Which queries are asked.
-        """
+        """Return the queries of one of the distortions, given by name."""
         return QuerySpec(
             number=self.queries,
             seeds=self.seeds,
@@ -175,13 +164,9 @@ class ExperimentSpec:
         )
 
     def to_dict(self) -> dict[str, Any]:
-        """Return the experiment as plain values.
+        """Return what `parse_experiment` reads as TOML, as plain values.
 
-        Returns
-        -------
-        dict
-            What `parse_experiment` reads as TOML; noise models that this package does not have by
-            name are written out.
+        Noise models that this package does not have by name are written out.
         """
         noises = {
             name: noise.to_dict()
@@ -205,56 +190,45 @@ class ExperimentSpec:
         }
 
     def to_toml(self) -> str:
-        """Return the experiment as TOML.
-
-        Returns
-        -------
-        str
-            What `parse_experiment` reads.
-        """
+        """Return the experiment as the TOML that `parse_experiment` reads."""
         return toml_text(self.to_dict())
 
 
 def parse_experiment(
     text: str, *, where: str = "the experiment", folder: str | Path = "."
 ) -> ExperimentSpec:
-    """Read an experiment from TOML.
+    """Read an experiment from TOML, which messages call `where`.
 
     It has ``database``; the table ``methods`` with texts such as ``"edit+edit:5%"`` or
     ``"likelihood:generic:refined"``; the table ``distortions`` with texts (or lists of them) such
-    as ``"medium, view:90"``; and, if wanted, ``queries``, ``seeds``, ``seen_from``, ``city``,
-    ``top``, the table ``districts`` (``file``, ``name``) and the table ``noises``, where each is a
-    table or the name of a file in `folder`. `where` is what messages call the text. Raises
-    UnknownNameError for an unknown method, distortion or noise model, and InputError if it is not
-    TOML or a key or value cannot be used.
+    as ``"medium, view:90"``; and perhaps ``queries``, ``seeds``, ``seen_from``, ``city``, ``top``,
+    the table ``districts`` (``file``, ``name``) and the table ``noises``, where each is a table or
+    the name of a file in `folder`. Raises UnknownNameError for an unknown method, distortion or
+    noise model, and InputError if it is not TOML or a key or value cannot be used.
     """
     try:
-        values = _checked(tomllib.loads(text), KEYS, where, ["database", "methods", "distortions"])
-    except tomllib.TOMLDecodeError as error:
-        msg = f"{where} is not valid TOML: {error}."
-        raise InputError(msg) from error
-    given = {
-        name: _noise(name, one, where, Path(folder))
-        for name, one in values.pop("noises", {}).items()
-    }
-    noises = {**NOISES, **given}
+        values = parse_toml(text, where)
+        check_keys(values, KEYS, where, ["database", "methods", "distortions"])
+        methods, districts = values.pop("methods"), values.pop("districts", None)
+        check_keys(methods, dict.fromkeys(methods, str), f"{where}, methods")
+        if districts is not None:
+            check_keys(districts, DISTRICT_KEYS, f"{where}, districts", DISTRICT_KEYS)
+    except CatalogError as error:
+        raise InputError(str(error)) from error
+    noises = {**NOISES}
+    for name, noise in values.pop("noises", {}).items():
+        noises[name] = _noise(name, noise, where, Path(folder))
     for name in ("seeds", "top"):
         if name in values:
             values[name] = _whole_numbers(values[name], name, where)
-    methods = values.pop("methods")
-    _checked(methods, dict.fromkeys(methods, str), f"{where}, methods")
     distortions = {
         name: parse_chain(_chain(chain, name, where), noises=noises)
         for name, chain in values.pop("distortions").items()
     }
-    districts = values.pop("districts", None)
-    if districts is not None:
-        keys = {"file": str, "name": str}
-        districts = Districts(**_checked(districts, keys, f"{where}, districts", keys))
     return ExperimentSpec(
         methods={name: parse_method(text, noises=noises) for name, text in methods.items()},
         distortions=distortions,
-        districts=districts,
+        districts=None if districts is None else Districts(**districts),
         **values,
     )
 
@@ -276,14 +250,6 @@ def open_experiment_spec(path: str | Path) -> ExperimentSpec:
     ------
     InputError
         If the file cannot be read, or does not hold an experiment.
-
-    Examples
-    --------
-    >>> open_experiment_spec("nowhere.toml")
-    Traceback (most recent call last):
-    ...
-    semsig_gis.core.errors.InputError: experiment nowhere.toml cannot be read (No such file or
-    directory); give a TOML file.
     """
     file = Path(path)
     try:
@@ -295,25 +261,14 @@ def open_experiment_spec(path: str | Path) -> ExperimentSpec:
     return parse_experiment(text, where=str(file), folder=file.parent)
 
 
-def _checked(
-    values: dict[str, Any], keys: Mapping[str, type], where: str, needed: Iterable[str] = ()
-) -> dict[str, Any]:
-    """Return values with known keys of the right types."""
-    try:
-        check_keys(values, keys, where, needed)
-    except CatalogError as error:
-        raise InputError(str(error)) from error
-    return values
-
-
-def _noise(name: str, given: object, where: str, folder: Path) -> Noise:
+def _noise(name: str, noise: object, where: str, folder: Path) -> Noise:
     """Return a noise model that is written out, or that of a file, under its name."""
-    if isinstance(given, str):
-        values = open_noise(folder / given).to_dict()
-    elif isinstance(given, dict):
-        values = given
+    if isinstance(noise, str):
+        values = open_noise(folder / noise).to_dict()
+    elif isinstance(noise, dict):
+        values = noise
     else:
-        msg = f"{where} has {name} = {given!r} in noises; write a table or the name of a file."
+        msg = f"{where} has {name} = {noise!r} in noises; write a table or the name of a file."
         raise InputError(msg)
     return noise_from_dict({**values, "name": name})
 

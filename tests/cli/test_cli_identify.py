@@ -130,7 +130,7 @@ def test_columns_that_do_not_fit_are_told_and_left_out(city: Path, run: Run, don
     [
         (("identify", "--check", 0), ("--check", "from 1")),
         (("identify", "--radius", -1), ("radius of -1.0", "0 or more")),
-        (("identify", "--seed", -1), ("seed", "as -1")),
+        (("identify", "--seed", -1), ("seed", "is -1")),
         (("identify", "--threads", 0), ("--threads", "as 0")),
         (("identify", "--noise", "medum"), ("'medum'", "medium")),
         (("map", "--out", "map.html"), ("--identifiability, --ambiguity or --drift",)),

@@ -116,4 +116,4 @@ def test_another_index_is_refused() -> None:
     for index in others:
         with pytest.raises(InputError) as caught:
             check_identifiability(TOLD, index)
-        assert_sentence(caught.value, "another noise")
+        assert_sentence(caught.value, "another database or noise model", "pass the matching one")

@@ -160,10 +160,10 @@ def test_the_same_whatever_the_threads() -> None:
 @pytest.mark.parametrize(
     ("options", "words"),
     [
-        ({"trials": 0}, ("number of trials", "as 0", "from 1")),
+        ({"trials": 0}, ("number of trials", "is 0", "from 1")),
         ({"class_trials": -1}, ("trials without a class", "-1", "from 1")),
-        ({"threads": 0}, ("threads", "as 0", "from 1")),
-        ({"seed": -1}, ("seed", "as -1", "from 0")),
+        ({"threads": 0}, ("threads", "is 0", "from 1")),
+        ({"seed": -1}, ("seed", "is -1", "from 0")),
         ({"radius": -5.0}, ("radius of -5.0", "0 or more")),
         ({"radius": math.nan}, ("radius of nan", "0 or more")),
     ],

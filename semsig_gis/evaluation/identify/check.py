@@ -1,4 +1,4 @@
-"""Whether the chances that are told of cells come true, by queries that they were not learnt from.
+"""Whether the chances of cells come true, by queries that they were not learnt from.
 
 Two questions: do cells with a higher chance succeed more often (a rank correlation), and do as many
 succeed as their chances say (calibration)?
@@ -15,6 +15,7 @@ import pandas as pd
 
 from semsig_gis.core.errors import InputError
 from semsig_gis.core.statistics import wilson_interval
+from semsig_gis.evaluation.figures import finite_or_none
 from semsig_gis.evaluation.identify.trials import trial_cells, try_cells
 
 if TYPE_CHECKING:
@@ -47,7 +48,7 @@ class ChanceBin:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class IdentifiabilityCheck:
-    """How what was told of cells compares with what came of queries.
+    """How the chances of cells compare with what came of queries.
 
     Parameters
     ----------
@@ -76,28 +77,19 @@ class IdentifiabilityCheck:
     bins: tuple[ChanceBin, ...]
 
     def to_dict(self) -> dict[str, Any]:
-        """Return it as plain values for JSON.
-
-        Returns
-        -------
-        dict
-            The fields; None for a correlation that there is not.
-        """
-        plain = {
-            name: None if math.isnan(value) else value for name, value in self.correlations.items()
-        }
+        """Return the fields as plain values for JSON; None for a correlation that there is not."""
         return {
-            "queries": self.queries,
-            "seed": self.seed,
-            "found": self.found,
-            "correlations": plain,
-            "attainable": None if math.isnan(self.attainable) else self.attainable,
+            **asdict(self),
+            "correlations": {
+                name: finite_or_none(value) for name, value in self.correlations.items()
+            },
+            "attainable": finite_or_none(self.attainable),
             "bins": [asdict(one) for one in self.bins],
         }
 
 
 def check_identifiability(
-    told: Identifiability,
+    identifiability: Identifiability,
     index: LikelihoodIndex,
     *,
     queries: int = 2000,
@@ -105,18 +97,18 @@ def check_identifiability(
     threads: int = 1,
     progress: Callable[[int, int], None] | None = None,
 ) -> IdentifiabilityCheck:
-    """Ask fresh queries from random cells, and compare what comes of them with what was told.
+    """Ask fresh queries from random cells, and compare what comes of them with the chances.
 
     Parameters
     ----------
-    told : Identifiability
-        What was told of the cells.
+    identifiability : Identifiability
+        The chances of the cells.
     index : LikelihoodIndex
-        The index that it was found out with.
+        The index that they were found out with.
     queries : int, default 2000
         How many to ask, 1 or more.
     seed : int, optional
-        Seed of the cells and of all chances, another than that of `told`; by default the next.
+        Seed of the cells and of all draws, another than that of the trials; by default the next.
     threads : int, default 1
         How many queries are worked on at once.
     progress : callable, optional
@@ -134,52 +126,46 @@ def check_identifiability(
 
     Examples
     --------
-    >>> from semsig_gis.sources.catalog import paper_taxonomy
-    >>> from semsig_gis.database.build import build_database
-    >>> from semsig_gis.evaluation.identify.identify import identify
-    >>> from semsig_gis.likelihood.index import build_index
-    >>> from semsig_gis.likelihood.noise.model import named_noise
-    >>> from semsig_gis.objects.clean import build_objects
-    >>> from semsig_gis.sources.synthetic.city import CitySpec, synthetic_city
-    >>> layers = synthetic_city(CitySpec(size=300.0))
-    >>> objects, _ = build_objects(layers, taxonomy=paper_taxonomy(), crs="EPSG:32631")
-    >>> index = build_index(build_database(objects), named_noise("medium"))
-    >>> told = identify(index, trials=200, class_trials=10)
-    >>> check = check_identifiability(told, index, queries=200)
+    >>> from semsig_gis import build_index, identify, named_noise
+    >>> index = build_index(demo_database, named_noise("medium"))
+    >>> cells = identify(index, trials=200, class_trials=10)
+    >>> check = check_identifiability(cells, index, queries=200)
     >>> check.correlations["found"] > 0.2, sum(one.queries for one in check.bins)
     (True, 200)
     """
-    chosen = told.seed + 1 if seed is None else seed
+    if seed is None:
+        seed = identifiability.seed + 1
     if queries < 1:
         msg = f"a check by {queries} queries was asked for; give a whole number from 1."
         raise InputError(msg)
-    if chosen < 0 or chosen == told.seed:
+    if seed < 0 or seed == identifiability.seed:
         msg = (
-            f"a check with seed {chosen} was asked for; give a whole number from 0 other than "
-            f"{told.seed}, with which the chances were found out."
+            f"a check with seed {seed} was asked for; give a whole number from 0 other than "
+            f"{identifiability.seed}, with which the chances were found out."
         )
         raise InputError(msg)
-    same = np.array_equal(index.database.cell_ids, told.database.cell_ids)
-    if not same or index.noise != told.noise:
-        msg = "the index is of other cells or another noise than what is to be checked; give its."
+    database = identifiability.database
+    same = np.array_equal(index.database.cell_ids, database.cell_ids)
+    if not same or index.noise != identifiability.noise:
+        msg = "the index belongs to another database or noise model; pass the matching one."
         raise InputError(msg)
-    cells = trial_cells(len(told.database), queries, seed=chosen)
+    cells = trial_cells(len(database), queries, seed=seed)
     tried = try_cells(
-        index, cells, radius=told.radius, seed=chosen, threads=threads, progress=progress
+        index, cells, radius=identifiability.radius, seed=seed, threads=threads, progress=progress
     )
-    stated, success = told.found[cells], tried.found.astype(np.float64)
+    stated, success = identifiability.found[cells], tried.found.astype(np.float64)
     scores = {
         "found": stated,
-        "near": told.near[cells],
-        "length": told.database.lengths[cells],
-        "type_group": -told.database.type_group_sizes[cells],
+        "near": identifiability.near[cells],
+        "length": database.lengths[cells],
+        "type_group": -database.type_group_sizes[cells],
     }
     ranks = _ranks(stated)
     spread = ranks.std() * math.sqrt(stated.mean() * (1.0 - stated.mean()))
     shared = float(((ranks - ranks.mean()) * stated).mean())
     return IdentifiabilityCheck(
         queries=queries,
-        seed=chosen,
+        seed=seed,
         found=float(success.mean()),
         correlations={
             name: _correlation(_ranks(score), _ranks(success)) for name, score in scores.items()

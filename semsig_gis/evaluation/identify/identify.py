@@ -8,8 +8,9 @@ gives the chances of all of them.
 
 from __future__ import annotations
 
-import math
-from typing import TYPE_CHECKING, Any
+from functools import partial
+from itertools import pairwise
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -17,6 +18,7 @@ from semsig_gis.core.errors import InputError
 from semsig_gis.core.statistics import fit_shares
 from semsig_gis.evaluation.identify.lookalikes import (
     LEAST_SUM,
+    check_radius,
     compare_without_classes,
     find_lookalikes,
 )
@@ -28,7 +30,6 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from semsig_gis.database.database import SignatureDatabase
     from semsig_gis.evaluation.identify.lookalikes import Lookalikes
     from semsig_gis.evaluation.identify.trials import Trials
     from semsig_gis.likelihood.index import LikelihoodIndex
@@ -103,19 +104,11 @@ def identify(
 
     Examples
     --------
-    >>> from semsig_gis.sources.catalog import paper_taxonomy
-    >>> from semsig_gis.database.build import build_database
-    >>> from semsig_gis.likelihood.index import build_index
-    >>> from semsig_gis.likelihood.noise.model import named_noise
-    >>> from semsig_gis.objects.clean import build_objects
-    >>> from semsig_gis.sources.synthetic.city import CitySpec, synthetic_city
-    >>> layers = synthetic_city(CitySpec(size=300.0))
-    >>> objects, _ = build_objects(layers, taxonomy=paper_taxonomy(), crs="EPSG:32631")
-    >>> database = build_database(objects)
-    >>> index = build_index(database, named_noise("medium"))
-    >>> told = identify(index, trials=100, class_trials=20)
-    >>> rich, poor = database.lengths >= 15, database.lengths <= 3
-    >>> bool(told.found[rich].mean() > told.found[poor].mean())
+    >>> from semsig_gis import build_index, named_noise
+    >>> index = build_index(demo_database, named_noise("medium"))
+    >>> cells = identify(index, trials=100, class_trials=20)
+    >>> rich, poor = demo_database.lengths >= 15, demo_database.lengths <= 3
+    >>> bool(cells.found[rich].mean() > cells.found[poor].mean())
     True
     """
     for what, count, least in (
@@ -125,28 +118,42 @@ def identify(
         ("seed", seed, 0),
     ):
         if count < least:
-            msg = f"the {what} was given as {count}; give a whole number from {least}."
+            msg = f"the {what} is {count}; give a whole number from {least}."
             raise InputError(msg)
-    if not 0 <= radius < math.inf:
-        msg = f"a radius of {radius} m was given; give metres, 0 or more."
-        raise InputError(msg)
+    check_radius(radius)
     database = index.database
-    cells, kinds = len(database), len(index.table.codes)
-    some = min(class_trials, trials)
-    stages = _Stages(
+    cells, asked = len(database), trial_cells(len(index.database), trials, seed=seed)
+    again = asked[:class_trials]
+    stages = _stages(
         progress,
         trials * TRIAL_S,
         cells**2 * PAIR_S,
         cells * SAMPLED_S,
-        some * kinds * TRIAL_S,
+        len(again) * len(index.table.codes) * TRIAL_S,
     )
-    asked = trial_cells(cells, trials, seed=seed)
-    common: dict[str, Any] = {"radius": radius, "threads": threads}
-    tried = try_cells(index, asked, seed=seed, progress=stages.stage(0), **common)
-    common["temperature"] = _temperature(index, tried, **common)
-    like = find_lookalikes(index, places=PLACES, progress=stages.stage(1), **common)
+    tried = try_cells(index, asked, radius=radius, seed=seed, threads=threads, progress=stages[0])
+    temperature = _temperature(index, tried, radius=radius, threads=threads)
+    like = find_lookalikes(
+        index,
+        temperature=temperature,
+        radius=radius,
+        places=PLACES,
+        threads=threads,
+        progress=stages[1],
+    )
+    rise = compare_without_classes(
+        index,
+        temperature=temperature,
+        radius=radius,
+        seed=seed,
+        threads=threads,
+        progress=stages[2],
+    )
+    without = try_without_classes(
+        index, again, radius=radius, seed=seed, threads=threads, progress=stages[3]
+    )
     shares = _expected(tried, like, database.lengths)
-    gains, classes = _gains(index, asked[:some], tried, like, seed=seed, stages=stages, **common)
+    gains, classes = _gains(index, tried, like, rise=rise, again=again, without=without)
     rest = (1.0 - shares["near"]) / np.maximum(like.far, LEAST_SUM)
     return Identifiability(
         database=database,
@@ -165,24 +172,21 @@ def identify(
     )
 
 
-class _Stages:
-    """Tells how far work of several stages is, in seconds that they are thought to take."""
+def _stages(
+    progress: Callable[[int, int], None] | None, *seconds: float
+) -> list[Callable[[int, int], None] | None]:
+    """Return for each stage of some work what it is to call with its own progress.
 
-    def __init__(self, progress: Callable[[int, int], None] | None, *seconds: float) -> None:
-        self.progress = progress
-        self.ends = np.cumsum([0.0, *seconds])
+    It tells how far the whole work is, in the seconds that the stages are thought to take.
+    """
+    if progress is None:
+        return [None] * len(seconds)
+    ends = np.cumsum([0.0, *seconds]).tolist()
 
-    def stage(self, number: int) -> Callable[[int, int], None] | None:
-        """Return what a stage is to call with its own progress."""
-        if self.progress is None:
-            return None
-        tell, total = self.progress, self.ends[-1]
-        low, high = self.ends[number : number + 2]
+    def tell(low: float, high: float, done: int, count: int) -> None:
+        progress(round(1000.0 * (low + (high - low) * done / count)), round(1000.0 * ends[-1]))
 
-        def told(done: int, whole: int) -> None:
-            tell(round(1000.0 * (low + (high - low) * done / whole)), round(1000.0 * total))
-
-        return told
+    return [partial(tell, low, high) for low, high in pairwise(ends)]
 
 
 def _temperature(index: LikelihoodIndex, tried: Trials, *, radius: float, threads: int) -> float:
@@ -208,6 +212,10 @@ def _log(sums: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.log(np.maximum(sums, LEAST_SUM))
 
 
+def _most_bits(cells: int) -> float:
+    return max(float(np.log2(cells)), LEAST_SUM)
+
+
 def _expected(
     tried: Trials, like: Lookalikes, lengths: NDArray[np.int64]
 ) -> dict[str, NDArray[np.float64]]:
@@ -215,7 +223,7 @@ def _expected(
     objects = np.log(lengths)
     beyond = np.stack([_log(like.far), objects], axis=1)
     others = np.stack([_log(like.far + np.maximum(like.near - 1.0, 0.0)), objects], axis=1)
-    most = max(float(np.log2(len(lengths))), LEAST_SUM)
+    most = _most_bits(len(lengths))
     shares = {
         name: fit_shares(features[tried.cells], values).predict(features)
         for name, features, values in (
@@ -234,54 +242,52 @@ def _expected(
 
 def _gains(
     index: LikelihoodIndex,
-    asked: NDArray[np.int64],
     tried: Trials,
     like: Lookalikes,
     *,
-    radius: float,
-    temperature: float,
-    seed: int,
-    threads: int,
-    stages: _Stages,
+    rise: NDArray[np.float64],
+    again: NDArray[np.int64],
+    without: tuple[NDArray[np.float64], NDArray[np.float64]],
 ) -> tuple[NDArray[np.float64], tuple[ClassGain, ...]]:
-    """Return what each class adds, by cell and for the city."""
-    database = index.database
-    common: dict[str, Any] = {"radius": radius, "seed": seed, "threads": threads}
-    rise = compare_without_classes(
-        index, temperature=temperature, progress=stages.stage(2), **common
-    )
-    near, bits = try_without_classes(index, asked, progress=stages.stage(3), **common)
-    some = slice(len(asked))
-    seen = _seen(database, index.table.codes)
-    left = database.lengths[:, None] - seen
+    """Return what each class adds to the chance of the place, by cell and for the city.
+
+    `again` are the cells of the trials that were asked without each class, `without` what came of
+    that (see `try_without_classes`), and `rise` is that of `compare_without_classes`.
+    """
+    database, codes = index.database, index.table.codes
+    starts = database.offsets[:-1]
+    seen = [np.add.reduceat(database.codes == code, starts, dtype=np.int64) for code in codes]
+    left = database.lengths[:, None] - np.stack(seen, axis=1)
     features = _features(like, database.lengths, rise, left)
     whole = _features(like, database.lengths, np.zeros((len(left), 1)), database.lengths[:, None])
+    whole = whole[:, 0]
     # What is left of cells that see nothing else needs no fit.
-    told = left[asked] > 0
-    examples = np.concatenate([whole[asked][:, 0], features[asked][told]])
-    most = max(float(np.log2(len(database))), LEAST_SUM)
-    found = []
-    for all_, without, blank in (
-        (tried.near[some], near, 0.0),
-        (np.clip(tried.bits[some] / most, 0, 1), np.clip(bits / most, 0, 1), 1.0),
-    ):
-        fit = fit_shares(examples, np.concatenate([all_, without[told]]))
-        before = fit.predict(whole[:, 0])
-        gains = np.empty(left.shape)
-        for number in range(left.shape[1]):
-            after = np.where(left[:, number] > 0, fit.predict(features[:, number]), blank)
-            gains[:, number] = before - after
-        found.append(gains)
-    classes = tuple(
-        ClassGain(code=code, near=float(gain), bits=-float(told_bits))
-        for code, gain, told_bits in zip(
-            index.table.codes.tolist(),
-            found[0].mean(axis=0),
-            most * found[1].mean(axis=0),
-            strict=True,
-        )
+    some = left[again] > 0
+    examples = np.concatenate([whole[again], features[again][some]])
+
+    def gained(
+        with_all: NDArray[np.float64], values: NDArray[np.float64], *, blank: float
+    ) -> NDArray[np.float64]:
+        # `blank` is what comes of a cell that sees nothing.
+        fit = fit_shares(examples, np.concatenate([with_all[: len(again)], values[some]]))
+        before = fit.predict(whole)
+        after = [
+            np.where(left[:, number] > 0, fit.predict(features[:, number]), blank)
+            for number in range(left.shape[1])
+        ]
+        return np.asarray(before[:, None] - np.stack(after, axis=1))
+
+    near, bits = without
+    most = _most_bits(len(database))
+    near_gains = gained(tried.near, near, blank=0.0)
+    bit_gains = gained(np.clip(tried.bits / most, 0, 1), np.clip(bits / most, 0, 1), blank=1.0)
+    of_city = zip(
+        codes.tolist(), near_gains.mean(axis=0), most * bit_gains.mean(axis=0), strict=True
     )
-    return found[0], classes
+    return near_gains, tuple(
+        ClassGain(code=code, near=float(near_gain), bits=-float(bit_gain))
+        for code, near_gain, bit_gain in of_city
+    )
 
 
 def _features(
@@ -297,11 +303,3 @@ def _features(
         np.log(np.maximum(left, 1)),
     )
     return np.stack(parts, axis=2)
-
-
-def _seen(database: SignatureDatabase, codes: NDArray[np.uint8]) -> NDArray[np.int64]:
-    """Return how many objects of each class every cell sees, shape (n, c)."""
-    starts = database.offsets[:-1]
-    return np.stack(
-        [np.add.reduceat(database.codes == code, starts, dtype=np.int64) for code in codes], axis=1
-    )

@@ -113,7 +113,7 @@ def _blot_out(
 
 
 @compiled
-def compare_cells(  # noqa: C901, PLR0915, PLR0917 - a kernel takes no keywords
+def compare_signatures(  # noqa: C901, PLR0915, PLR0917 - a kernel takes no keywords
     cells: NDArray[np.int64],
     offsets: NDArray[np.int64],
     symbols: NDArray[np.int64],
@@ -232,10 +232,10 @@ def compare_without(  # noqa: PLR0917 - a kernel takes no keywords
 ) -> None:
     """Compare cells with a sample of others, with all classes and without each of them.
 
-    As `compare_cells`, but `kinds` (m,) has the class row of each entry, and `constants` (k + 1, n)
-    is for all classes first, then without each. `sample` (d,) are the rising row numbers of the
-    others, `sampled` (s, d) their part of `flat`. It fills `far` (c, k + 1) with the sums of the
-    powers outside the circle.
+    As `compare_signatures`, but `kinds` (m,) has the class row of each entry, and `constants`
+    (k + 1, n) is for all classes first, then without each. `sample` (d,) are the rising row numbers
+    of the others, `sampled` (s, d) their part of `flat`. It fills `far` (c, k + 1) with the sums of
+    the powers outside the circle.
     """
     count = len(sample)
     factor = np.float32(temperature * _OCTAVES_A_NAT)

@@ -91,18 +91,18 @@ def find_lookalikes(
     100, or below its inverse, counts as that. Raises InputError if the temperature or the radius is
     out of range.
     """
-    from semsig_gis.evaluation.identify.kernels import compare_cells  # noqa: PLC0415 - numba loads slowly
+    from semsig_gis.evaluation.identify.kernels import compare_signatures  # noqa: PLC0415 - numba loads slowly
 
     database = index.database
     _check(temperature, radius)
-    asked = _asked(index, cells)
+    asked = np.arange(len(database)) if cells is None else np.asarray(cells, dtype=np.int64)
     step = database.grid.step
     radius = min(radius, city_extent(database))
     where = np.stack([database.columns, database.rows], axis=1).astype(np.int64)
     symbols, _ = _symbols(index)
     ids, flat = database.cell_ids, index.columns.reshape(-1, len(database))
     circle = cell_circle(radius, step)
-    found = Lookalikes(
+    like = Lookalikes(
         near=np.empty(len(asked)),
         far=np.empty(len(asked)),
         cells=np.empty((len(asked), places), np.int64),
@@ -110,7 +110,7 @@ def find_lookalikes(
     )
 
     def compare(part: slice) -> None:
-        compare_cells(
+        compare_signatures(
             asked[part],
             database.offsets,
             symbols,
@@ -122,18 +122,18 @@ def find_lookalikes(
             where,
             circle,
             math.floor((radius / step + 1e-9) ** 2),
-            found.near[part],
-            found.far[part],
-            found.cells[part],
-            found.sums[part],
+            like.near[part],
+            like.far[part],
+            like.cells[part],
+            like.sums[part],
         )
 
     _in_parts(compare, len(asked), threads, progress)
-    order = np.argsort(-found.sums, axis=1, kind="stable")
+    order = np.argsort(-like.sums, axis=1, kind="stable")
     return replace(
-        found,
-        cells=np.take_along_axis(found.cells, order, axis=1),
-        sums=np.take_along_axis(found.sums, order, axis=1),
+        like,
+        cells=np.take_along_axis(like.cells, order, axis=1),
+        sums=np.take_along_axis(like.sums, order, axis=1),
     )
 
 
@@ -159,7 +159,7 @@ def compare_without_classes(
 
     database = index.database
     _check(temperature, radius)
-    asked = _asked(index, cells)
+    asked = np.arange(len(database)) if cells is None else np.asarray(cells, dtype=np.int64)
     symbols, kinds = _symbols(index)
     count, classes = len(database), len(index.table.codes)
     rng = np.random.default_rng([seed, 1])
@@ -199,17 +199,17 @@ def compare_without_classes(
 
 
 def _check(temperature: float, radius: float) -> None:
-    """Refuse numbers out of range."""
     if not 0 < temperature < math.inf:
         msg = f"a temperature of {temperature} was given; give a power above 0."
         raise InputError(msg)
+    check_radius(radius)
+
+
+def check_radius(radius: float) -> None:
+    """Raise InputError unless a radius is a number of metres, 0 or more."""
     if not 0 <= radius < math.inf:
         msg = f"a radius of {radius} m was given; give metres, 0 or more."
         raise InputError(msg)
-
-
-def _asked(index: LikelihoodIndex, cells: NDArray[np.int64] | None) -> NDArray[np.int64]:
-    return np.arange(len(index.database)) if cells is None else np.asarray(cells, dtype=np.int64)
 
 
 def _symbols(index: LikelihoodIndex) -> tuple[NDArray[np.int64], NDArray[np.int64]]:

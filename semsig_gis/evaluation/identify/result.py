@@ -5,7 +5,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -19,13 +19,15 @@ from semsig_gis.likelihood.noise.model import noise_from_dict
 if TYPE_CHECKING:
     from collections.abc import Mapping
     from pathlib import Path
-    from typing import Any
 
     from numpy.typing import NDArray
 
     from semsig_gis.database.database import SignatureDatabase
     from semsig_gis.likelihood.noise.model import Noise
 
+
+NAME = "identifiability"
+FORMAT = 1  # raised whenever the same cells and noise give other numbers, or are written otherwise
 
 BANDS = (0.0, 0.1, 0.5, 0.9)
 """Lower ends of the chances to be found by which cells are counted."""
@@ -94,36 +96,17 @@ class Identifiability:
     seed: int
 
     def require_cells_of(self, database: SignatureDatabase) -> None:
-        """Raise where another database has other cells.
-
-        Parameters
-        ----------
-        database : SignatureDatabase
-            The database.
-
-        Raises
-        ------
-        InputError
-            If its cells are others.
-        """
+        """Raise InputError where another database has other cells."""
         if not np.array_equal(self.database.cell_ids, database.cell_ids):
             msg = "the identifiability is that of other cells; give that of this database."
             raise InputError(msg)
 
     def table(self, rows: slice = slice(None)) -> pa.Table:
-        """Return what is known of the cells as columns.
+        """Return what is known of some of the cells, all by default, as columns.
 
-        Parameters
-        ----------
-        rows : slice, optional
-            Which cells; all by default.
-
-        Returns
-        -------
-        pyarrow.Table
-            ``chance_itself``, ``chance_near``, ``chance_found``, ``bits_left``; for each place
-            from 1 ``lookalike_1`` (cell id, null where there is none) and ``lookalike_1_chance``;
-            for each class that occurs ``gain_NAME``.
+        They are ``chance_itself``, ``chance_near``, ``chance_found``, ``bits_left``; for each place
+        from 1 ``lookalike_1`` (cell id, null where there is none) and ``lookalike_1_chance``; for
+        each class that occurs ``gain_NAME``.
         """
         names = {item.code: item.name for item in self.database.taxonomy.classes}
         columns = {
@@ -145,33 +128,26 @@ class Identifiability:
     def summary(self, *, object_counts: Mapping[int, int] | None = None) -> dict[str, Any]:
         """Return what there is to say of the city as plain values for JSON.
 
-        Parameters
-        ----------
-        object_counts : mapping of int to int, optional
-            How many objects of each class code there are, where they are at hand.
-
-        Returns
-        -------
-        dict
-            ``cells``, ``noise``, ``radius_m``, ``trials``, ``seed``; ``chance_itself``,
-            ``chance_near``, ``chance_found`` and ``bits_left`` of the mean cell; ``cell_bits``;
-            ``bands``: one dict a band of the chance to be found (``from``, ``to``, ``cells``,
-            ``share``); ``classes``: one dict a class (``code``, ``symbol``, ``name``, ``title``,
-            ``chance_near``, ``bits``, ``objects`` and ``chance_near_per_1000``, the last two None
-            where the objects are not at hand), the most useful first.
+        They are ``cells``, ``noise``, ``radius_m``, ``trials``, ``seed``; ``chance_itself``,
+        ``chance_near``, ``chance_found`` and ``bits_left`` of the mean cell; ``cell_bits``;
+        ``bands`` of the chance to be found (``from``, ``to``, ``cells``, ``share``); and
+        ``classes``, the most useful first (``code``, ``symbol``, ``name``, ``title``,
+        ``chance_near``, ``bits``, ``objects`` and ``chance_near_per_1000``). The last two are None
+        unless `object_counts` tells how many objects of each class code there are.
         """
         kinds = {item.code: item for item in self.database.taxonomy.classes}
         cells = len(self.database)
         counts = np.bincount(np.digitize(self.found, BANDS) - 1, minlength=len(BANDS)).tolist()
         classes = []
         for gain in sorted(self.classes, key=lambda one: -one.near):
+            kind = kinds[gain.code]
             objects = None if object_counts is None else int(object_counts.get(gain.code, 0))
             classes.append(
                 {
-                    "code": gain.code,
-                    "symbol": kinds[gain.code].symbol,
-                    "name": kinds[gain.code].name,
-                    "title": kinds[gain.code].title,
+                    "code": kind.code,
+                    "symbol": kind.symbol,
+                    "name": kind.name,
+                    "title": kind.title,
                     "chance_near": gain.near,
                     "bits": gain.bits,
                     "objects": objects,
@@ -197,19 +173,12 @@ class Identifiability:
         }
 
 
-NAME = "identifiability"
-
-
-# Raised whenever the same cells and noise give other numbers, or they are told otherwise.
-FORMAT = 1
-
-
-def save_identifiability(told: Identifiability, path: str | Path) -> None:
+def save_identifiability(identifiability: Identifiability, path: str | Path) -> None:
     """Put what is known of the cells into the files of their database.
 
     Parameters
     ----------
-    told : Identifiability
+    identifiability : Identifiability
         What to save.
     path : str or Path
         File of the database, or folder of its parts; it is replaced whole.
@@ -217,7 +186,7 @@ def save_identifiability(told: Identifiability, path: str | Path) -> None:
     Raises
     ------
     DatabaseError
-        If it is damaged, or is not the database of `told`.
+        If it is damaged, or is another database.
     InputError
         If it cannot be written; it is unchanged then.
 
@@ -228,24 +197,22 @@ def save_identifiability(told: Identifiability, path: str | Path) -> None:
     """
     City(path).put_columns(
         NAME,
-        told.table(),
-        cell_ids=told.database.cell_ids,
-        facts=identifiability_facts(told),
+        identifiability.table(),
+        cell_ids=identifiability.database.cell_ids,
+        facts=identifiability_facts(identifiability),
     )
 
 
-def identifiability_facts(told: Identifiability) -> dict[str, Any]:
+def identifiability_facts(identifiability: Identifiability) -> dict[str, Any]:
     """Return what is needed beside `Identifiability.table` to read it again, as values for JSON."""
     return {
         "format": FORMAT,
-        "belongs_to": index_fingerprint(told.database, told.noise),
-        "noise": told.noise.to_dict(),
-        "radius": told.radius,
-        "trials": told.trials,
-        "seed": told.seed,
-        "classes": [
-            {"code": item.code, "near": item.near, "bits": item.bits} for item in told.classes
-        ],
+        "belongs_to": index_fingerprint(identifiability.database, identifiability.noise),
+        "noise": identifiability.noise.to_dict(),
+        "radius": identifiability.radius,
+        "trials": identifiability.trials,
+        "seed": identifiability.seed,
+        "classes": [asdict(gain) for gain in identifiability.classes],
     }
 
 
@@ -272,25 +239,16 @@ def open_identifiability(database: SignatureDatabase, path: str | Path) -> Ident
     Examples
     --------
     >>> import tempfile
-    >>> from semsig_gis.sources.catalog import paper_taxonomy
-    >>> from semsig_gis.database.build import build_database
-    >>> from semsig_gis.database.file import save_database
-    >>> from semsig_gis.evaluation.identify.identify import identify
-    >>> from semsig_gis.likelihood.index import build_index
-    >>> from semsig_gis.likelihood.noise.model import named_noise
-    >>> from semsig_gis.objects.clean import build_objects
-    >>> from semsig_gis.sources.synthetic.city import CitySpec, synthetic_city
-    >>> layers = synthetic_city(CitySpec(size=200.0))
-    >>> objects, _ = build_objects(layers, taxonomy=paper_taxonomy(), crs="EPSG:32631")
-    >>> database = build_database(objects)
-    >>> told = identify(build_index(database, named_noise("light")), trials=20, class_trials=5)
+    >>> from semsig_gis import build_index, identify, named_noise, save_database
+    >>> index = build_index(demo_database, named_noise("light"))
+    >>> cells = identify(index, trials=20, class_trials=5)
     >>> with tempfile.TemporaryDirectory() as folder:
     ...     path = f"{folder}/city.parquet"
-    ...     save_database(database, path)
-    ...     before = open_identifiability(database, path)
-    ...     save_identifiability(told, path)
-    ...     after = open_identifiability(database, path)
-    >>> before is None, bool((after.found == told.found).all())
+    ...     save_database(demo_database, path)
+    ...     before = open_identifiability(demo_database, path)
+    ...     save_identifiability(cells, path)
+    ...     after = open_identifiability(demo_database, path)
+    >>> before is None, bool((after.found == cells.found).all())
     (True, True)
     """
     columns = City(path).columns(NAME)
@@ -300,33 +258,32 @@ def open_identifiability(database: SignatureDatabase, path: str | Path) -> Ident
 def identifiability_of(
     database: SignatureDatabase, table: pa.Table, facts: dict[str, Any], path: str | Path
 ) -> Identifiability:
-    """Return what columns of `Identifiability.table` and `identifiability_facts` tell.
+    """Return the value of `Identifiability.table` and `identifiability_facts` read from `path`.
 
-    `path`, which they were read from, is named in errors. Raises DatabaseError if they are damaged,
-    or belong to other signatures or another version of the format.
+    Raises DatabaseError if they are damaged, or belong to other signatures or another version of
+    the format.
     """
     try:
         noise = noise_from_dict(facts["noise"])
         fits = facts["format"] == FORMAT and (
             facts["belongs_to"] == index_fingerprint(database, noise)
         )
-        told = _told(database, noise, table, facts) if fits else None
+        identifiability = _parsed(database, noise, table, facts) if fits else None
     except (KeyError, TypeError, ValueError, SemsigError) as error:
         msg = f"the identifiability in {path} is damaged ({error}); run semsig identify again."
         raise DatabaseError(msg) from error
-    if told is None:
+    if identifiability is None:
         msg = (
             f"the identifiability in {path} is that of other signatures, or of another version of "
             "semsig; run semsig identify again."
         )
         raise DatabaseError(msg)
-    return told
+    return identifiability
 
 
-def _told(
+def _parsed(
     database: SignatureDatabase, noise: Noise, table: pa.Table, facts: dict[str, Any]
 ) -> Identifiability:
-    """Return what a table and the facts beside it tell."""
     classes = tuple(ClassGain(**item) for item in facts["classes"])
     names = {item.code: item.name for item in database.taxonomy.classes}
     ids = database.cell_ids
@@ -337,8 +294,8 @@ def _told(
 
     def rows(name: str) -> np.ndarray:
         cells = table[name]
-        found = np.searchsorted(ids, cells.fill_null(ids[0]).to_numpy())
-        return np.where(cells.is_valid().to_numpy(), found, -1)
+        numbers = np.searchsorted(ids, cells.fill_null(ids[0]).to_numpy())
+        return np.where(cells.is_valid().to_numpy(), numbers, -1)
 
     return Identifiability(
         database=database,

@@ -155,21 +155,21 @@ def _outcome(
     kept = loglik > loglik.max() - HOPELESS
     kept[cell] = True
     cells = np.flatnonzero(kept)
-    found = posterior(places.select(cells), loglik[cells])
+    answer = posterior(places.select(cells), loglik[cells])
     true = int(np.searchsorted(cells, cell))
-    best, _ = found.best_place(radius)
-    near = float(found.mass_within(radius, np.array([true]))[0])
+    best, _ = answer.best_place(radius)
+    near = float(answer.mass_within(radius, np.array([true]))[0])
     apart = places.grid.step * math.hypot(
         int(places.columns[cells[best]]) - int(places.columns[cell]),
         int(places.rows[cells[best]]) - int(places.rows[cell]),
     )
     own = index.scores(index.database.signature(cell)).loglik
     return (
-        min(float(found.chances[true]), near),
+        min(float(answer.chances[true]), near),
         near,
         float(apart <= radius + 1e-6),
-        found.entropy,
-        float(found.chances @ own[cells] - own[cell]),
+        answer.entropy,
+        float(answer.chances @ own[cells] - own[cell]),
     )
 
 
@@ -194,14 +194,7 @@ def leave_class_out(
 
     Examples
     --------
-    >>> from semsig_gis.sources.catalog import paper_taxonomy
-    >>> from semsig_gis.database.build import build_database
-    >>> from semsig_gis.objects.clean import build_objects
-    >>> from semsig_gis.sources.synthetic.city import CitySpec, synthetic_city
-    >>> layers = synthetic_city(CitySpec(size=300.0))
-    >>> objects, _ = build_objects(layers, taxonomy=paper_taxonomy(), crs="EPSG:32631")
-    >>> database = build_database(objects)
-    >>> without, rows = leave_class_out(database, 3)
+    >>> without, rows = leave_class_out(demo_database, 3)
     >>> bool((without.codes == 3).any()), len(without) == int((rows >= 0).sum())
     (False, True)
     """
