@@ -87,9 +87,9 @@ def level_image(
     """
 
     def highest(members: NDArray[np.int64]) -> NDArray[np.uint8]:
-        found = np.zeros(int(members.max()) + 1, np.uint8)
-        np.maximum.at(found, members, levels)
-        return found
+        values = np.zeros(int(members.max()) + 1, np.uint8)
+        np.maximum.at(values, members, levels)
+        return values
 
     return _drawn(database, highest, colours)
 
@@ -113,25 +113,16 @@ def _drawn(
     # At least two pixels a block, because the grid is a little turned against the pixels.
     zoom = max(2, min(4, _BLOCKS // (cells // block)))
     width, height = (np.rint((high - low) / side).astype(int) * zoom).tolist()
-    across, corners = _lattice_places(database, low, high, width=width)
+    lattice, (west, south, east, north) = _mercator_lattice(database, low, high)
+    across = lattice[:, ::-1] @ _between(width).T
     pixels = np.empty((height, width), np.uint8)
     for line, weights in enumerate(_between(height)):
-        places = weights @ across
-        wanted = cell_ids(*np.floor((places - origin[:, None]) / side).astype(np.int64))
-        found = np.minimum(np.searchsorted(blocks, wanted), len(blocks) - 1)
-        pixels[line] = np.where(blocks[found] == wanted, values[found], 0)
-    return _png(pixels, colours), corners
-
-
-def _lattice_places(
-    database: SignatureDatabase, low: NDArray[np.float64], high: NDArray[np.float64], *, width: int
-) -> tuple[NDArray[np.float64], list[list[float]]]:
-    """Return x and y of the pixels on the lines of a lattice over an area, and its corners."""
-    metres, (west, south, east, north) = _mercator_lattice(database, low, high)
+        ids = cell_ids(*np.floor((weights @ across - origin[:, None]) / side).astype(np.int64))
+        nearest = np.minimum(np.searchsorted(blocks, ids), len(blocks) - 1)
+        pixels[line] = np.where(blocks[nearest] == ids, values[nearest], 0)
     to_degrees = Transformer.from_crs("EPSG:3857", "EPSG:4326", always_xy=True)
     longitudes, latitudes = to_degrees.transform([west, east], [south, north])
-    corners = np.stack([latitudes, longitudes], axis=1).tolist()
-    return metres[:, ::-1] @ _between(width).T, corners
+    return _png(pixels, colours), np.stack([latitudes, longitudes], axis=1).tolist()
 
 
 def _mercator_lattice(

@@ -41,22 +41,19 @@ OBJECT_FIELDS = (
     *("Chance", "Seen as", "Seen at", "Street object", "It is at", "Off by"),
     *("Source", "Identifier"),
 )
-RAYS = {
-    "matched": {"color": VERDICTS["matched"], "weight": 2, "opacity": 0.9, "dashArray": None},
-    "misnamed": {"color": VERDICTS["misnamed"], "weight": 2, "opacity": 0.9, "dashArray": "9 4"},
-    "missed": {"color": "#808080", "weight": 1, "opacity": 0.9, "dashArray": "3 5"},
-    "false": {"color": VERDICTS["false"], "weight": 2, "opacity": 0.9, "dashArray": "3 5"},
+RAYS: dict[str, tuple[str, dict[str, object]]] = {
+    "matched": ("a street object", {"weight": 2, "opacity": 0.9, "dashArray": None}),
+    "misnamed": ("one of another class", {"weight": 2, "opacity": 0.9, "dashArray": "9 4"}),
+    "missed": (
+        "a street object not in the query",
+        {"color": "#808080", "weight": 1, "opacity": 0.9, "dashArray": "3 5"},
+    ),
+    "false": ("no street object", {"weight": 2, "opacity": 0.9, "dashArray": "3 5"}),
 }
-"""Lines to the objects by what became of them."""
+"""What became of an object, and the look of the line to it, by default in its own colour."""
 BEST_PLACE = (
     "<p>The best place is where most of the chance is around it; ranks are of single cells.</p>"
 )
-RAY_TEXTS = {
-    "matched": "matched: a street object",
-    "misnamed": "misnamed: one of another class",
-    "missed": "missed: a street object not in the query",
-    "false": "false: no street object",
-}
 SURROUNDINGS_M = 45.0  # to see around the answer
 CLOSEST_ZOOM = 20
 ELLIPSE_STEPS = 72
@@ -256,7 +253,10 @@ class _Drawings:
             ]
             name = verdict.capitalize()
             records.append([*self.latlon(place), VERDICTS[verdict], 6, None, name, details])
-        lines = [[look, rays[verdict]] for verdict, look in RAYS.items()]
+        lines = [
+            [{"color": VERDICTS[verdict], **look}, rays[verdict]]
+            for verdict, (_, look) in RAYS.items()
+        ]
         return [["lines", lines], ["points", OBJECT_FIELDS, {}, records]]
 
     def _title(self, name: str | None) -> str | None:
@@ -301,7 +301,9 @@ def location_legend(location: Location) -> str:
         f"<span style='white-space:nowrap'>{swatch(shade, FLIPPING)}{100.0 * least:g}+</span>"
         for least, shade in sorted(CELL_CHANCES.items(), reverse=True)
     )
-    rays = "".join(f"<br>{swatch(VERDICTS[name])}{text}" for name, text in RAY_TEXTS.items())
+    rays = "".join(
+        f"<br>{swatch(VERDICTS[verdict])}{verdict}: {text}" for verdict, (text, _) in RAYS.items()
+    )
     return (
         "<summary>Where it was seen</summary>"
         f"<p>{query_text(location.query, posterior.database.taxonomy)}"

@@ -33,7 +33,6 @@ if TYPE_CHECKING:
     from importlib.resources.abc import Traversable
     from pathlib import Path
 
-
 # Files that every folium page links and that our maps do without: they only serve
 # `folium.Icon`, Font Awesome and Bootstrap widgets.
 UNUSED = frozenset(
@@ -47,33 +46,24 @@ UNUSED = frozenset(
         "leaflet.awesome.rotate.min.css",
     }
 )
-
-
 _REFERENCE = re.compile(
     r"""<script\b[^>]*\bsrc\s*=\s*["'](?P<script>[^"']*)["'][^>]*>\s*</script\s*>"""
     r"""|<link\b[^>]*\bhref\s*=\s*["'](?P<link>[^"']*)["'][^>]*>""",
     re.IGNORECASE,
 )
-
-
 _CSS_IMAGE = re.compile(r"url\(images/(?P<name>[\w-]+\.png)\)")
-
-
 _SOURCE_MAP = re.compile(r"\n?//# sourceMappingURL=\S*\s*$")
+# folium forbids to enlarge a page with two fingers, which is how small text is read on a phone.
+_RIGID = re.compile(r",\s*maximum-scale=1\.0,\s*user-scalable=no")
 
 
 @dataclass(frozen=True, slots=True)
 class Asset:
-    """One third-party file that the package carries.
-
-    ``license`` is an SPDX identifier, ``sha256`` is in hexadecimal, and ``stands_for`` holds the
-    file names, at the end of an address in a page, that this file replaces.
-    """
+    """One third-party file that the package carries, instead of those at the ends of addresses."""
 
     name: str
     package: str
     version: str
-    license: str
     sha256: str
     stands_for: tuple[str, ...]
 
@@ -87,7 +77,6 @@ def assets() -> Mapping[str, Asset]:
             name=file["target"],
             package=package["name"],
             version=package["version"],
-            license=package["license"],
             sha256=file["sha256"],
             stands_for=tuple(file.get("stands_for", ())),
         )
@@ -111,11 +100,11 @@ def asset_text(name: str) -> str:
     in the text can close the element that it is put into. Raises `InputError` if the package was
     built without the file.
     """
-    known = {asset.name: asset for asset in assets().values() if asset.stands_for}
-    if name not in known:
-        msg = f"{name!r} is not a map file{nearest_name(name, known)}."
+    files = {asset.name: asset for asset in assets().values() if asset.stands_for}
+    if name not in files:
+        msg = f"{name!r} is not a map file{nearest_name(name, files)}."
         raise UnknownNameError(msg)
-    text = _required(known[name]).decode("utf-8")
+    text = _required(files[name]).decode("utf-8")
     if name.endswith(".css"):
         text = _CSS_IMAGE.sub(lambda match: f"url({_data_uri(match['name'])})", text)
         return re.sub(r"</(style)", r"<\\/\1", text, flags=re.IGNORECASE)
@@ -176,9 +165,7 @@ def _folder() -> Traversable:
 def _content(asset: Asset) -> bytes | None:
     """Return the file if it is there and is the one that the manifest names."""
     path = _folder() / asset.name
-    if not path.is_file():
-        return None
-    content = path.read_bytes()
+    content = path.read_bytes() if path.is_file() else b""
     return content if hashlib.sha256(content).hexdigest() == asset.sha256 else None
 
 
@@ -205,10 +192,6 @@ def _default_icon() -> str:
         "shadowUrl": _data_uri("marker-shadow.png"),
     }
     return f"\nL.Icon.Default.imagePath='';L.Icon.Default.mergeOptions({json.dumps(images)});"
-
-
-# folium forbids to enlarge a page with two fingers, which is how small text is read on a phone.
-_RIGID = re.compile(r",\s*maximum-scale=1\.0,\s*user-scalable=no")
 
 
 @dataclass(frozen=True, slots=True)
