@@ -253,7 +253,7 @@ class _Drawings:
             ]
             name = verdict.capitalize()
             records.append([*self.latlon(place), VERDICTS[verdict], 6, None, name, details])
-        lines = [
+        lines: list[list[Any]] = [
             [{"color": VERDICTS[verdict], **look}, rays[verdict]]
             for verdict, (_, look) in RAYS.items()
         ]
