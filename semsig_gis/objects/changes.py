@@ -81,8 +81,8 @@ def compare_objects(old: StreetObjects, new: StreetObjects) -> ObjectChanges:
     tables = _keys(old), _keys(new)
     same = _twins(*tables)
     left = [_without(table, same[:, side]) for side, table in enumerate(tables)]
-    known = [_with_own_id(*pair) for pair in zip(left, tables, strict=True)]
-    linked = _pairs(*known)
+    candidates = [_with_own_id(*pair) for pair in zip(left, tables, strict=True)]
+    linked = _pairs(*candidates)
     equal = old.codes[linked[:, 0]] == new.codes[linked[:, 1]]
     moved, changed = linked[equal], linked[~equal]
     removed, added = (
@@ -114,11 +114,11 @@ def _twins(old: pd.DataFrame, new: pd.DataFrame) -> NDArray[np.int64]:
 
 def _lone_twins(old: pd.DataFrame, new: pd.DataFrame) -> NDArray[np.int64]:
     """Return those pairs that nothing else has the x coordinate of: nearly all, and quickly."""
-    found = []
+    lone = []
     for table in (old, new):
         x, row, count = np.unique(table["x"], return_index=True, return_counts=True)
-        found.append((x[count == 1], row[count == 1]))
-    (x, row), (other_x, other_row) = found
+        lone.append((x[count == 1], row[count == 1]))
+    (x, row), (other_x, other_row) = lone
     _, one, other = np.intersect1d(x, other_x, assume_unique=True, return_indices=True)
     pairs: NDArray[np.int64] = np.stack([row[one], other_row[other]], axis=1)
     looks = [table[LOOKS].to_numpy(float)[pairs[:, side]] for side, table in enumerate((old, new))]

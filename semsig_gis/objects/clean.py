@@ -191,9 +191,9 @@ def _positions(layer: RawLayer, taxonomy: Taxonomy, crs: CRS) -> tuple[pd.DataFr
 
 def _same_id(everything: pd.DataFrame, unique: NDArray[np.bool_]) -> NDArray[np.bool_]:
     """Tell the rows whose id an earlier row of the layer has, as in a second file of it."""
-    told = unique & (everything[SOURCE_ID] != "").to_numpy(bool)
+    has_id = unique & (everything[SOURCE_ID] != "").to_numpy(bool)
     again: NDArray[np.bool_] = everything.duplicated([SOURCE, SOURCE_ID]).to_numpy(bool)
-    return told & again
+    return has_id & again
 
 
 def _first_at_place(

@@ -171,8 +171,8 @@ def _nearest_first(
     view: _View, old: NDArray[np.int64], new: NDArray[np.int64], radius: float
 ) -> list[tuple[int, int, float]]:
     """Pair old and new objects one to one, the nearest first."""
-    found, seen = ObjectIndex(view.xy[old]).pairs_within(view.xy[new], radius=radius)
-    new_row, old_row = new[found], old[seen]
+    new_at, old_at = ObjectIndex(view.xy[old]).pairs_within(view.xy[new], radius=radius)
+    new_row, old_row = new[new_at], old[old_at]
     delta = view.xy[old_row] - view.xy[new_row]
     metres = np.hypot(delta[:, 0], delta[:, 1])
     order = np.lexsort((view.rank[new_row], view.rank[old_row], metres))
@@ -206,10 +206,10 @@ def _merged(objects: StreetObjects, view: _View, matches: Sequence[_Match]) -> S
 
 
 def _report(view: _View, matches: Sequence[_Match], radii: Mapping[str, float]) -> ConflationReport:
-    found: dict[tuple[str, int, int], list[float]] = {}
+    metres_of: dict[tuple[str, int, int], list[float]] = {}
     for match in matches:
         sources = int(view.source[match.kept]), int(view.source[match.merged])
-        found.setdefault((match.class_name, *sources), []).append(match.metres)
+        metres_of.setdefault((match.class_name, *sources), []).append(match.metres)
     order = list(radii)
     return ConflationReport(
         tuple(
@@ -223,7 +223,7 @@ def _report(view: _View, matches: Sequence[_Match], radii: Mapping[str, float]) 
                 largest_m=max(metres),
             )
             for (name, kept, merged), metres in sorted(
-                found.items(), key=lambda item: (order.index(item[0][0]), item[0][1:])
+                metres_of.items(), key=lambda item: (order.index(item[0][0]), item[0][1:])
             )
         )
     )

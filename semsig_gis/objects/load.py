@@ -215,13 +215,13 @@ def choose_layers(
     >>> [spec.name for spec in choose_layers(load_catalog("montpellier"), ["cameras"])]
     ['cameras']
     """
-    wanted = {catalog.layer(name).name for name in names}
+    layer_names = {catalog.layer(name).name for name in names}
     return tuple(
         spec
         for spec in catalog.layers
-        if spec.name in wanted
+        if spec.name in layer_names
         or (spec.role != "objects" and surroundings)
-        or (not wanted and not spec.optional and spec.role == "objects")
+        or (not layer_names and not spec.optional and spec.role == "objects")
     )
 
 
@@ -256,13 +256,13 @@ def read_files(
     absent : tuple of LayerSpec
         Layers that have no file among `paths`.
     """
-    found, absent = find_files(specs, paths)
+    pairs, absent = find_files(specs, paths)
     by_file: dict[tuple[Path, str], list[LayerSpec]] = {}
-    for spec, path in found:
+    for spec, path in pairs:
         by_file.setdefault((path, spec.reader), []).append(spec)
     layers: list[RawLayer] = []
-    for done, ((path, name), wanted) in enumerate(by_file.items(), start=1):
-        layers.extend(reader(name)(path, wanted, filters=filters, crs=crs))
+    for done, ((path, name), layers_of_file) in enumerate(by_file.items(), start=1):
+        layers.extend(reader(name)(path, layers_of_file, filters=filters, crs=crs))
         if progress is not None:
             progress(done, len(by_file))
     order = {spec.name: number for number, spec in enumerate(specs)}
@@ -280,9 +280,9 @@ def metric_crs_of(layers: Iterable[RawLayer]) -> tuple[CRS, tuple[str, ...]]:
             msg = f"layer {layer.spec.name!r} has no coordinate reference system; state its crs."
             raise CrsError(msg)
         geometry = layer.table.geometry
-        drawn = geometry[~(geometry.isna() | geometry.is_empty)]
-        if len(drawn):
-            boxes.append(drawn.to_crs("EPSG:4326"))
+        features = geometry[~(geometry.isna() | geometry.is_empty)]
+        if len(features):
+            boxes.append(features.to_crs("EPSG:4326"))
     if not boxes:
         msg = "no layer has a feature with a position; look at the filters and the area."
         raise EmptyResultError(msg)
@@ -360,11 +360,11 @@ def assemble(
 
 
 def _surroundings(layers: Sequence[RawLayer], role: str, crs: CRS) -> gpd.GeoDataFrame | None:
-    chosen = [layer for layer in layers if layer.spec.role == role]
-    if not chosen:
+    of_role = [layer for layer in layers if layer.spec.role == role]
+    if not of_role:
         return None
-    tables = [layer.table.to_crs(crs) for layer in chosen]
+    tables = [layer.table.to_crs(crs) for layer in of_role]
     table = pd.concat(tables, ignore_index=True).drop(columns=CLASS_NAME)
     table = table[~(table.geometry.isna() | table.geometry.is_empty)].reset_index(drop=True)
-    table.attrs[LICENSES] = [str(licence) for licence in layer_licences(chosen)]
+    table.attrs[LICENSES] = [str(licence) for licence in layer_licences(of_role)]
     return table

@@ -166,10 +166,10 @@ def _nearest(xy: NDArray[np.float64]) -> float | None:
     distances = np.zeros(len(xy))
     if alone.any():
         points = np.asarray(shapely.points(places))
-        _, found = shapely.STRtree(points).query_nearest(
+        _, nearest = shapely.STRtree(points).query_nearest(
             points[alone], exclusive=True, all_matches=False, return_distance=True
         )
-        distances[: len(found)] = found
+        distances[: len(nearest)] = nearest
     return float(np.median(distances))
 
 

@@ -124,10 +124,10 @@ def reader(name: str) -> Reader:
     others = installed_readers()
     if name in others:
         return others[name]
-    known = sorted({*READERS, *others})
+    names = sorted({*READERS, *others})
     msg = (
-        f"reader {name!r} is unknown{nearest_name(name, known)}; "
-        f"the readers are {', '.join(known)}."
+        f"reader {name!r} is unknown{nearest_name(name, names)}; "
+        f"the readers are {', '.join(names)}."
     )
     raise UnknownNameError(msg)
 
@@ -161,25 +161,25 @@ def find_files(
     'trees'
     """
     specs = tuple(specs)
-    given: list[Path] = []
-    found: list[Path] = []
+    files: list[Path] = []
+    in_folders: list[Path] = []
     for path in dict.fromkeys(Path(item) for item in paths):
         if path.is_dir():
             inside = [p for p in sorted(path.iterdir()) if p.suffix.lower() in FILE_SUFFIXES]
             _require_match(path, inside, specs)
-            found.extend(inside)
+            in_folders.extend(inside)
         elif path.is_file():
             _require_match(path, [path], specs)
-            given.append(path)
+            files.append(path)
         else:
             msg = f"{path} does not exist; give a file or a folder of files."
             raise SourceError(msg)
     pairs: list[tuple[LayerSpec, Path]] = []
     missing = []
     for spec in specs:
-        by_hand = [path for path in given if _matches(path, spec.files)]
+        by_hand = [path for path in files if _matches(path, spec.files)]
         in_folder = (
-            [path for path in found if _matches(path, (pattern,))] for pattern in spec.files
+            [path for path in in_folders if _matches(path, (pattern,))] for pattern in spec.files
         )
         candidates = by_hand or next(filter(None, in_folder), [])
         if len(candidates) > 1 and not spec.unique_id:

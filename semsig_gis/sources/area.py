@@ -100,8 +100,8 @@ def _box(text: str) -> Area:
 
 
 def _outline(path: Path) -> Area:
-    wanted = LayerSpec(name="area", class_name="", geometry="polygon")
-    layer = vector_file.read_layer(path, wanted)
+    polygons = LayerSpec(name="area", class_name="", geometry="polygon")
+    layer = vector_file.read_layer(path, polygons)
     if layer.errors:
         msg = f"{path} has polygons that cannot be read ({layer.errors[0]}); correct the file."
         raise InputError(msg)

@@ -97,10 +97,10 @@ class Catalog:
         for spec in self.layers:
             if spec.name == name:
                 return spec
-        known = [spec.name for spec in self.layers]
+        names = [spec.name for spec in self.layers]
         msg = (
-            f"catalogue {self.name!r} has no layer {name!r}{nearest_name(name, known)}; "
-            f"its layers are {', '.join(known)}."
+            f"catalogue {self.name!r} has no layer {name!r}{nearest_name(name, names)}; "
+            f"its layers are {', '.join(names)}."
         )
         raise UnknownNameError(msg)
 
@@ -316,12 +316,12 @@ def _classes(items: list[Any], where: str) -> tuple[ObjectClass, ...]:
 
 def _ranges(item: dict[str, Any], taxonomy: Taxonomy, where: str) -> dict[str, float]:
     """Return the ranges that a catalogue gives to classes outside their own tables."""
-    found = _metres_by_class(item, taxonomy, f"{where}, ranges", most=MAX_RANGE_M)
-    double = next((name for name in found if taxonomy.by_name(name).range_m is not None), None)
+    ranges = _metres_by_class(item, taxonomy, f"{where}, ranges", most=MAX_RANGE_M)
+    double = next((name for name in ranges if taxonomy.by_name(name).range_m is not None), None)
     if double is not None:
         msg = f"{where} has a range_m of {double!r} and one in ranges; remove one of them."
         raise CatalogError(msg)
-    return found
+    return ranges
 
 
 def _metres_by_class(

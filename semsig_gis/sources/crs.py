@@ -48,9 +48,9 @@ def usable_crs(wkt: str) -> CRS | None:
         return None  # without a named datum, a transformation is off by up to hundreds of metres
     code = crs.to_epsg()
     if code is not None:
-        known = CRS.from_epsg(code)
-        if known.equals(crs, ignore_axis_order=True):
-            return known
+        epsg = CRS.from_epsg(code)
+        if epsg.equals(crs, ignore_axis_order=True):
+            return epsg
     return crs
 
 

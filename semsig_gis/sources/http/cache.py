@@ -169,8 +169,8 @@ class Entry:
         fetched.path.replace(final)
         meta = {name: getattr(fetched, name) for name in KEPT}
         with whole_file(self.sidecar) as partial:
-            told = {"request": request, "url": fetched.url, "file": final.name, **meta}
-            partial.write_text(json.dumps(told, indent=1), encoding="utf-8")
+            content = {"request": request, "url": fetched.url, "file": final.name, **meta}
+            partial.write_text(json.dumps(content, indent=1), encoding="utf-8")
         self.drop_part()
         # Another process may have been given the path of the former body and has yet to read it.
         for old in self.folder.glob(f"{self.key}-*"):

@@ -202,8 +202,8 @@ def _detail(response: requests.Response, spec: HttpSpec) -> str:
     with contextlib.suppress(ValueError, AttributeError, zlib.error):
         if response.headers.get("Content-Encoding", "") == "gzip":
             body = zlib.decompressobj(wbits=31).decompress(body, BLOCK)
-        said = json.loads(body)
-        text = " ".join(str(said.get("message") or said.get("error") or "").split())
+        reply = json.loads(body)
+        text = " ".join(str(reply.get("message") or reply.get("error") or "").split())
         if text:
             return f" ({text[:200].rstrip('.')})".replace(". ", ", ")
     return ""

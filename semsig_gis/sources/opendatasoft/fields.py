@@ -78,8 +78,8 @@ class Positions:
 
         self._shape, self._point = own(SHAPE), own(POINT)
         self._x, self._y = own(spec.x_field), own(spec.y_field)
-        found = (self._shape, self._point, self._x, self._y)
-        self.fields = tuple(field for field in found if field is not None)
+        columns = (self._shape, self._point, self._x, self._y)
+        self.fields = tuple(field for field in columns if field is not None)
         coordinates = self._x and self._y
         positioned = self._shape or self._point or coordinates or table.has_geometry
         if not (positioned or table.empty):

@@ -110,8 +110,8 @@ def _json(path: Path) -> Table:
 
 def _rest(content: object, rows: int) -> int:
     """Return how many rows more a page says that there are, by version 2.1 or 1 of the API."""
-    told = content if isinstance(content, dict) else {}
-    total = told.get("total_count", told.get("nhits"))
+    page = content if isinstance(content, dict) else {}
+    total = page.get("total_count", page.get("nhits"))
     return max(total - rows, 0) if isinstance(total, int) else 0
 
 
@@ -216,8 +216,8 @@ def _parquet(path: Path) -> Table:
     )
 
 
-def _parquet_records(path: Path, wanted: Sequence[str], primary: str | None) -> Records:
-    columns = list(dict.fromkeys([*wanted, primary] if primary else wanted))
+def _parquet_records(path: Path, fields: Sequence[str], primary: str | None) -> Records:
+    columns = list(dict.fromkeys([*fields, primary] if primary else fields))
     try:
         with pq.ParquetFile(path) as file:
             for batch in file.iter_batches(BATCH, columns=columns):

@@ -94,15 +94,15 @@ def _file(path: Path) -> osmium.io.File:
         msg = f"{path} {what}; give an OpenStreetMap file."
         raise SourceError(msg)
     name = path.name.lower()
-    known = next((kind for suffix, kind in FORMATS.items() if name.endswith(suffix)), None)
-    if known is None:
+    kind = next((kind for suffix, kind in FORMATS.items() if name.endswith(suffix)), None)
+    if kind is None:
         msg = f"{path} is not an OpenStreetMap file; give one of {', '.join(FORMATS)}."
         raise SourceError(msg)
     if path.stat().st_size == 0:
         msg = f"{path} is empty; get it again."
         raise SourceError(msg)
     # The whole path, because libosmium takes "-" for standard input and "http:" for an address.
-    return osmium.io.File(str(path.absolute()), known)
+    return osmium.io.File(str(path.absolute()), kind)
 
 
 @contextlib.contextmanager
@@ -173,14 +173,14 @@ def _lines(file: osmium.io.File, numbers: set[int]) -> dict[int, NDArray[np.floa
             lines[way.id] = _line(_lonlat(node.location) for node in nodes)
     if unsent:
         # Numbers below zero are those of editors and converters, which pyosmium's table refuses.
-        wanted = set(itertools.chain.from_iterable(unsent.values()))
-        found = {
+        numbers_below_zero = set(itertools.chain.from_iterable(unsent.values()))
+        places_below_zero = {
             node.id: _lonlat(node.location)
             for node in osmium.FileProcessor(file, NODE)
-            if isinstance(node, Node) and node.id in wanted
+            if isinstance(node, Node) and node.id in numbers_below_zero
         }
         for number, refs in unsent.items():
-            lines[number] = _line(found.get(ref, NOWHERE) for ref in refs)
+            lines[number] = _line(places_below_zero.get(ref, NOWHERE) for ref in refs)
     return lines
 
 

@@ -412,19 +412,19 @@ def _pick(path: Path, wanted: str | None) -> Member:
     layers = _layers(path)
     if wanted is None and len(layers) > 1:
         # A GeoPackage keeps its styles in a table without geometry, which is never meant.
-        drawn = [item for item in layers if _describe(item).geometry != NO_GEOMETRY]
-        layers = tuple(drawn) or layers
-    known = [str(member.layer) for member in layers]
-    chosen = [item for item in layers if wanted is None or item.layer == wanted]
-    if len(chosen) == 1:
-        return chosen[0]
-    if wanted is not None and not chosen:
+        with_geometry = [item for item in layers if _describe(item).geometry != NO_GEOMETRY]
+        layers = tuple(with_geometry) or layers
+    names = [str(member.layer) for member in layers]
+    matches = [item for item in layers if wanted is None or item.layer == wanted]
+    if len(matches) == 1:
+        return matches[0]
+    if wanted is not None and not matches:
         msg = (
-            f"{path} has no layer {wanted!r}{nearest_name(wanted, known)}; "
-            f"its layers are {', '.join(known)}."
+            f"{path} has no layer {wanted!r}{nearest_name(wanted, names)}; "
+            f"its layers are {', '.join(names)}."
         )
         raise UnknownNameError(msg)
-    msg = f"{path} holds {len(chosen)} layers ({', '.join(known)}); name the one that is meant."
+    msg = f"{path} holds {len(matches)} layers ({', '.join(names)}); name the one that is meant."
     raise SourceError(msg)
 
 
@@ -436,7 +436,7 @@ def _columns(member: Member, spec: LayerSpec | None, *, where: str) -> CsvColumn
     if not head or "\0" in head or "\ufffd" in head:
         with _opened(member):  # which refuses what is no CSV file, or has names that are not UTF-8
             pass
-    return csv_columns(head.splitlines()[0], spec, where=where)
+    return csv_columns(next(iter(head.splitlines()), ""), spec, where=where)
 
 
 def _fields(

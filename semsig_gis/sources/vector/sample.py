@@ -55,14 +55,14 @@ def samples(path: Path, *, limit: int) -> tuple[Sample, ...]:
         msg = f"{path} is OpenStreetMap data; load it with the built-in catalogue 'openstreetmap'."
         raise SourceError(msg)
     try:
-        found = () if suffix == ".parquet" else tuple(_vector(path, limit))
+        layers = () if suffix == ".parquet" else tuple(_vector(path, limit))
     except SourceError:
         if suffix not in TABLE_SUFFIXES:
             raise
-        found = ()
-    if suffix in TABLE_SUFFIXES and all(item.info.geometry == NO_GEOMETRY for item in found):
+        layers = ()
+    if suffix in TABLE_SUFFIXES and all(item.info.geometry == NO_GEOMETRY for item in layers):
         return (_table(path, limit),)
-    return found
+    return layers
 
 
 def _vector(path: Path, limit: int) -> Iterator[Sample]:
