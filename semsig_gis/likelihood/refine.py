@@ -34,6 +34,7 @@ KEPT = (1000, 400, 200, 100)
 LEAST_CHANCE = 1e-6  # of a part, against the likeliest, to be divided
 TURNS = (7.5, 6.0, 4.5, 3.0)  # degrees to each side that are tried, level by level
 TURNS_A_SIDE = 3
+NEAR = 25.0  # metres from the best place that are averaged over
 BEST = 300  # likeliest parts among which the best place is looked for
 CORNERS = np.array([[-1.0, -1.0], [-1.0, 1.0], [1.0, -1.0], [1.0, 1.0]])
 
@@ -106,7 +107,6 @@ def refine(
     index: ObjectIndex | StoredIndex,
     step: float = 10.0,
     radius: float = 30.0,
-    near: float = 25.0,
     north_sigma: float = 0.0,
     headings: NDArray[np.floating] | None = None,
     log_prior: NDArray[np.float64] | None = None,
@@ -116,12 +116,11 @@ def refine(
 
     The query needs bearings; its types may be unknown. `cells`, shape (c, 2), are the middles in
     metres of the likeliest cells, likeliest first, of a ranking with the noise that `cell_noise`
-    gives; some hundred will do. `noise` itself is for a known place. `step`, `near` (see
-    `Refinement`) and `radius`, the visibility range of classes that have none of their own, are in
-    metres. `north_sigma` is the standard deviation in degrees of the query's north, infinite if it
-    is not known at all; then `headings`, the likeliest one in each cell, are needed. `log_prior` is
-    what else is known of the cells, and what `footprints` hide is not seen. The chances are the
-    likelihood of `likelihood.rerank` times area.
+    gives; some hundred will do. `noise` itself is for a known place. `step` and `radius`, the
+    visibility range of classes that have none of their own, are in metres. `north_sigma` is the
+    standard deviation in degrees of the query's north, infinite if it is not known at all; then
+    `headings`, the likeliest one in each cell, are needed. `log_prior` is what else is known of the
+    cells, and what `footprints` hide is not seen. Chances are likelihood times area.
     """
     check_north(north_sigma)
     if len(cells) == 0 or (headings is None and north_sigma > 0):
@@ -175,5 +174,5 @@ def refine(
         headings=signed_degrees(turned),
         heading_sigmas=sigmas,
         chances=chances / chances.sum(),
-        near=near,
+        near=NEAR,
     )

@@ -214,18 +214,18 @@ def noise_from_dict(values: Mapping[str, Any]) -> Noise:
     if kind is NoiseSpec:
         return NoiseSpec(**values)
     try:
-        specs = tuple(map(noise_from_dict, values["specs"]))
+        models = list(map(noise_from_dict, values["specs"]))
         weights = tuple(map(float, values["weights"]))
+    except InputError:
+        raise
     except (KeyError, TypeError, ValueError) as error:
-        if isinstance(error, InputError):
-            raise
         msg = f"a mixture of noise models is not usable ({error}); give lists specs and weights."
         raise InputError(msg) from error
-    plain = tuple(spec for spec in specs if isinstance(spec, NoiseSpec))
-    if len(plain) < len(specs):
+    specs = tuple(model for model in models if isinstance(model, NoiseSpec))
+    if len(specs) < len(models):
         msg = "a mixture of noise models holds another mixture; give plain models."
         raise InputError(msg)
-    return NoiseMixture(specs=plain, weights=weights, name=values.get("name", "custom"))
+    return NoiseMixture(**{**values, "specs": specs, "weights": weights})
 
 
 def cell_noise(noise: Noise, step: float) -> Noise:
@@ -249,11 +249,12 @@ def cell_noise(noise: Noise, step: float) -> Noise:
     >>> round(cell_noise(NoiseSpec(), 10.0).position_sigma, 2)
     2.89
     """
-    return noise.changed(
-        lambda spec: replace(
-            spec, position_sigma=math.hypot(spec.position_sigma, step / math.sqrt(12.0))
-        )
-    )
+
+    def widened(spec: NoiseSpec) -> NoiseSpec:
+        sigma = math.hypot(spec.position_sigma, step / math.sqrt(12.0))
+        return replace(spec, position_sigma=sigma)
+
+    return noise.changed(widened)
 
 
 def place_noise(noise: Noise, step: float) -> Noise:
@@ -262,7 +263,7 @@ def place_noise(noise: Noise, step: float) -> Noise:
     Raises `InputError` if the model has too little uncertainty of the place to take away.
     """
 
-    def without_step(spec: NoiseSpec) -> NoiseSpec:
+    def narrowed(spec: NoiseSpec) -> NoiseSpec:
         variance = spec.position_sigma**2 - step**2 / 12.0
         if variance < -ROUNDING:
             msg = (
@@ -273,7 +274,7 @@ def place_noise(noise: Noise, step: float) -> Noise:
             raise InputError(msg)
         return replace(spec, position_sigma=0.0 if variance < ROUNDING else math.sqrt(variance))
 
-    return noise.changed(without_step)
+    return noise.changed(narrowed)
 
 
 def named_noise(name: str) -> Noise:
@@ -366,19 +367,11 @@ def _plain(value: Any) -> Any:  # noqa: ANN401
 def _level(name: str, occurrences: int) -> NoiseSpec:
     """Return the model of one of the source's levels: each occurrence is one of three kinds."""
     each = occurrences / 3
-    return NoiseSpec(
-        detection=1.0,
-        misnamed=0.0,
-        clutter=each,
-        missed_each=each,
-        misnamed_each=each,
-        name=name,
-    )
+    sure = NoiseSpec(detection=1.0, misnamed=0.0, name=name)
+    return replace(sure, clutter=each, missed_each=each, misnamed_each=each)
 
 
 _LEVELS = (_level("light", 1), _level("medium", 7), _level("strong", 13))
-
-
 NOISES: Mapping[str, Noise] = MappingProxyType(
     {
         **{spec.name: spec for spec in _LEVELS},

@@ -138,8 +138,10 @@ def noise_tables(
     it names a class that the taxonomy does not have, or gives a class no chance at all of being
     named as one that counts.
     """
-    names = {item.name: item.code for item in taxonomy.classes}
-    tables = tuple(_table(spec, names, codes, longest) for spec in noise.specs)
+    # What a model says of classes that do not count goes to a row after the last, and is dropped.
+    rows = {item.name: len(codes) for item in taxonomy.classes}
+    rows |= {taxonomy.by_code(code).name: row for row, code in enumerate(codes.tolist())}
+    tables = tuple(_table(spec, rows, codes, longest) for spec in noise.specs)
     return tables, np.asarray(noise.weights, dtype=np.float64)
 
 
@@ -184,41 +186,45 @@ def mean_table(tables: tuple[NoiseTable, ...], weights: NDArray[np.float64]) -> 
 
 
 def _table(
-    spec: NoiseSpec, names: Mapping[str, int], codes: NDArray[np.uint8], longest: int
+    spec: NoiseSpec, rows: Mapping[str, int], codes: NDArray[np.uint8], longest: int
 ) -> NoiseTable:
-    """Return the table of one model."""
-    rows = {code: row for row, code in enumerate(codes.tolist())}
+    """Return the table of one model, given the row of each class that the taxonomy has."""
     count = len(codes)
 
     def by_class(overall: float, special: Mapping[str, float]) -> NDArray[np.float64]:
-        values = np.full(count, float(overall))
+        values = np.full(count + 1, float(overall))
         for name, value in special.items():
-            code = _code(names, name)
-            if code in rows:
-                values[rows[code]] = value
-        return values
+            values[_row(name, rows)] = value
+        return values[:count]
 
     misnamed = by_class(spec.misnamed, spec.misnamed_by_class)
     others = np.full((count, count), 1.0 / max(count - 1, 1))
     np.fill_diagonal(others, 0.0)
-    for name, shares in spec.confusion.items():
-        row = _confusion_row(name, {_code(names, other): shares[other] for other in shares}, codes)
-        if _code(names, name) in rows:
-            kind = rows[names[name]]
-            misnamed[kind] = 1.0 - row[kind]
-            row[kind] = 0.0
-            if row.sum() > 0:
-                others[kind] = row / row.sum()
+    for name, by_name in spec.confusion.items():
+        shares = by_class(0.0, by_name)
+        if shares.sum() <= 0:
+            msg = (
+                f"confusion row {name!r} of the noise gives no chance to any class that is seen; "
+                "give some chance to the class itself."
+            )
+            raise InputError(msg)
+        shares /= shares.sum()
+        row = _row(name, rows)
+        if row < count:
+            misnamed[row] = 1.0 - shares[row]
+            shares[row] = 0.0
+            if shares.sum() > 0:
+                others[row] = shares / shares.sum()
     clutter = np.full(count, spec.clutter / count)
     if spec.clutter_shares:
         clutter = spec.clutter * by_class(0.0, spec.clutter_shares)
     # A draw among L objects leaves each of them alone with chance 1 - 1/L.
     spared = 1.0 - 1.0 / np.maximum(np.arange(longest + 1), 1)
-    kept = np.outer(spared**spec.missed_each, by_class(spec.detection, spec.detection_by_class))
+    detected = np.outer(spared**spec.missed_each, by_class(spec.detection, spec.detection_by_class))
     right = np.outer(spared**spec.misnamed_each, 1.0 - misnamed)
     return NoiseTable(
         codes=codes,
-        missed=np.clip(1.0 - kept, LEAST_CHANCE, MOST_CHANCE),
+        missed=np.clip(1.0 - detected, LEAST_CHANCE, MOST_CHANCE),
         misnamed=np.clip(1.0 - right, LEAST_CHANCE, MOST_CHANCE) if count > 1 else 0.0 * right,
         others=others,
         clutter=np.maximum(clutter, LEAST_CLUTTER / count),
@@ -227,26 +233,12 @@ def _table(
     )
 
 
-def _confusion_row(
-    name: str, shares: Mapping[int, float], codes: NDArray[np.uint8]
-) -> NDArray[np.float64]:
-    """Return the chance of each class that counts, whatever the others had."""
-    row = np.array([shares.get(code, 0.0) for code in codes.tolist()])
-    if row.sum() <= 0:
-        msg = (
-            f"confusion row {name!r} of the noise gives no chance to any class that is seen; "
-            "give some chance to the class itself."
-        )
-        raise InputError(msg)
-    return np.asarray(row / row.sum())
-
-
-def _code(names: Mapping[str, int], name: str) -> int:
-    """Return the code of a class that a noise model names."""
-    if name not in names:
+def _row(name: str, rows: Mapping[str, int]) -> int:
+    """Return the row of a class that a noise model names."""
+    if name not in rows:
         msg = (
             f"the noise model names a class {name!r} that the database does not know"
-            f"{nearest_name(name, names)}; its classes are {', '.join(names)}."
+            f"{nearest_name(name, rows)}; its classes are {', '.join(rows)}."
         )
         raise InputError(msg)
-    return names[name]
+    return rows[name]
