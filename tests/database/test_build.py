@@ -21,27 +21,158 @@ from worlds import (
     brute_force,
     check_against_brute_force,
     lamps,
-    random_town,
     surroundings,
     worlds,
 )
 
-from semsig_gis.core.errors import CrsError, EmptyResultError
-from semsig_gis.core.grid import GridSpec
+from semsig_gis.core.errors import CrsError, EmptyResultError, InputError
+from semsig_gis.core.geometry import bearings, wrap_degrees
+from semsig_gis.core.grid import GridSpec, cells_near
+from semsig_gis.core.rtree import PackedIndex
 from semsig_gis.core.signature import SignatureSpec
 from semsig_gis.core.taxonomy import Taxonomy
 from semsig_gis.database import build
-from semsig_gis.database.build import build_cells, build_database
+from semsig_gis.database.build import build_cells, build_database, visible_objects
 from semsig_gis.database.file import open_database, save_database
 from semsig_gis.database.viewpoints import ViewpointSpec
+from semsig_gis.database.visibility import Sightings
 
 if TYPE_CHECKING:
     from pathlib import Path
 
+    from numpy.typing import NDArray
 
-@pytest.fixture(scope="module")
-def town() -> World:
-    return random_town()
+
+# --- What the cells see ---------------------------------------------------------------------------
+
+# Cells of 2 m with their centres at whole numbers.
+GRID = GridSpec(2.0, (-1.0, -1.0))
+
+
+def look(
+    cells: list[tuple[int, int]] | NDArray[np.int64],
+    places: object,
+    ranges: float | NDArray[np.float64] = 30.0,
+    grid: GridSpec = GRID,
+) -> Sightings:
+    """Return all that is seen, ordered by cell and object."""
+    objects = np.asarray(places, dtype=float)
+    columns, rows = np.asarray(cells).reshape(-1, 2).T
+    index, reach = PackedIndex(objects), np.broadcast_to(np.float64(ranges), len(objects))
+    end, parts = 0, [Sightings(*(np.empty(0, kind) for kind in (int, int, float, float)))]
+    for block, seen in visible_objects(
+        columns, rows, objects, grid=grid, index=index, ranges=reach
+    ):
+        assert block.start == end
+        end = block.stop
+        assert ((seen.viewpoint >= 0) & (seen.viewpoint < block.stop - block.start)).all()
+        moved = seen.viewpoint + block.start
+        parts.append(Sightings(moved, seen.object, seen.bearing, seen.distance))
+    assert end == len(columns)
+    names = ("viewpoint", "object", "bearing", "distance")
+    whole = Sightings(*(np.concatenate([getattr(p, name) for p in parts]) for name in names))
+    return whole.only(np.lexsort((whole.object, whole.viewpoint)))
+
+
+def slow_look(
+    cells: NDArray[np.int64],
+    objects: NDArray[np.float64],
+    ranges: NDArray[np.float64],
+    grid: GridSpec,
+) -> Sightings:
+    """Measure every pair there is."""
+    delta = objects[None] - grid.viewpoints(*cells.T)[:, None]
+    distance = np.hypot(delta[..., 0], delta[..., 1])
+    bearing = wrap_degrees(np.round(bearings(delta[..., 0], delta[..., 1]), 9))
+    viewpoint, item = np.nonzero(distance <= ranges)
+    return Sightings(viewpoint, item, bearing[viewpoint, item], distance[viewpoint, item])
+
+
+def assert_equal(one: Sightings, other: Sightings) -> None:
+    for name in ("viewpoint", "object", "bearing", "distance"):
+        assert getattr(one, name).tolist() == getattr(other, name).tolist(), name
+
+
+def test_what_is_seen_has_bearing_and_distance() -> None:
+    seen = look([(50, 50)], [[100, 110], [120, 100], [100, 70], [82, 76], [100, 131], [100, 100]])
+    assert seen.object.tolist() == [0, 1, 2, 3, 5]
+    assert seen.bearing == pytest.approx([0, 90, 180, 180 + math.degrees(math.atan2(3, 4)), 0])
+    assert seen.distance.tolist() == [10, 20, 30, 30, 0]
+    # Noise beside north is north.
+    seen = look([(0, 0)], [[-1e-13, 20], [1e-13, 20], [-1e-300, 20], [-5e-7, 20]])
+    assert seen.bearing[:3].tolist() == [0.0, 0.0, 0.0]
+    assert 359.9999 < seen.bearing[3] < 360.0
+    assert look([(450, 450)], [[0, 0]]).viewpoint.size == 0
+    assert look([], [[0, 0]]).viewpoint.size == 0
+
+
+@given(st.integers(-30, 30), st.integers(-30, 30), st.integers(1, 12))
+def test_objects_in_one_direction_have_one_bearing(dx: int, dy: int, times: int) -> None:
+    # The last digits of an arctangent depend on the processor; ties must not.
+    seen = look([(0, 0)], [[dx, dy], [dx * times, dy * times]], 600.0)
+    assert seen.bearing[0] == seen.bearing[1]
+
+
+STEPS = st.sampled_from([0.5, 3.0, 7.3, 10.0, 12.5, 40.0, 1000.0])
+RADII = st.sampled_from([0.25, 5.0, 12.5, 30.0, 61.7])
+
+
+@given(
+    seed=st.integers(0, 2**32 - 1),
+    step=STEPS,
+    radius=RADII,
+    corner=st.sampled_from([(0.0, 0.0), (765_200.0, 6_275_000.0), (-3e6, 1e7)]),
+    mixed=st.sampled_from([0.0, 0.5]),
+    kept=st.sampled_from([1.0, 0.5, 0.02]),
+    exact=st.booleans(),
+    blocks=st.sampled_from([(1 << 14, 1 << 20), (7, 1 << 20), (100, 1), (1 << 14, 60)]),
+)
+@settings(deadline=None)
+def test_what_is_seen_is_what_measuring_every_pair_finds(
+    *,
+    seed: int,
+    step: float,
+    radius: float,
+    corner: tuple[float, float],
+    mixed: float,
+    kept: float,
+    exact: bool,
+    blocks: tuple[int, int],
+) -> None:
+    rng = np.random.default_rng(seed)
+    grid = GridSpec(step, tuple(rng.uniform(-50, 50, 2)))
+    size = max(2.0 * radius, step)
+    objects = rng.uniform(-size, size, (12, 2)) + corner
+    if exact:  # in quarters of a metre, where circles and edges of tiles are met exactly
+        grid, objects = GridSpec(step, (0.25, -4.5)), np.round(objects * 4) / 4
+    ranges = np.where(rng.random(12) < mixed, radius / 5, radius)
+    near = np.stack(cells_near(objects, grid=grid, radius=radius), axis=-1)
+    chosen = np.flatnonzero(rng.random(len(near)) < max(kept, 5 / len(near)))[:3000]
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(build, "CELLS_A_BLOCK", blocks[0])
+        patch.setattr(build, "PAIRS_A_BLOCK", blocks[1])
+        found = look(near[chosen], objects, ranges, grid)
+    assert_equal(found, slow_look(near[chosen], objects, ranges, grid))
+
+
+@pytest.mark.parametrize("most", [1, 50, 10**6])
+def test_a_block_that_sees_very_much_is_halved(most: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(build, "PAIRS_A_BLOCK", most)
+    objects = np.random.default_rng(3).uniform(0, 60, (40, 2))
+    columns, rows = cells_near(objects, grid=GridSpec(), radius=30.0)
+    index = PackedIndex(objects)
+    blocks = [
+        (block.stop - block.start, len(seen.object))
+        for block, seen in visible_objects(
+            columns, rows, objects, grid=GridSpec(), index=index, ranges=np.full(40, 30.0)
+        )
+    ]
+    assert sum(cells for cells, _ in blocks) == len(columns)
+    assert all(pairs <= most or cells == 1 for cells, pairs in blocks)
+    assert (len(blocks) == 1) == (most == 10**6)
+
+
+# --- What is encoded ------------------------------------------------------------------------------
 
 
 @given(worlds())
@@ -141,39 +272,32 @@ def test_only_viewpoints_become_cells(tmp_path: Path) -> None:
     full = build_database(objects)
     street = shapely.LineString([CORNER, CORNER + np.array([100, 0])])
     area = shapely.box(*CORNER, *(CORNER + 50))
-    houses, streets = surroundings(house), surroundings(street)
-    outdoor = build_database(objects, viewpoints=ViewpointSpec(mode="outdoor"), footprints=houses)
+    outdoor = build_database(
+        objects, viewpoints=ViewpointSpec(mode="outdoor"), footprints=surroundings(house)
+    )
     assert not shapely.contains_xy(house.buffer(-0.1), *outdoor.xy.T).any()
     spec = ViewpointSpec(mode="streets", width=12.0, area=area)
-    along = build_database(objects, viewpoints=spec, streets=streets)
-    near = (shapely.distance(street, shapely.points(full.xy)) <= 12.0) & shapely.intersects_xy(
-        area, *full.xy.T
-    )
+    along = build_database(objects, viewpoints=spec, streets=surroundings(street))
+    near = shapely.distance(street, shapely.points(full.xy)) <= 12.0
+    near &= shapely.intersects_xy(area, *full.xy.T)
     assert along.cell_ids.tolist() == full.cell_ids[near].tolist()
     assert along.lengths.tolist() == full.lengths[near].tolist()
-    wide = build_database(
-        objects,
-        viewpoints=spec,
-        streets=surroundings(street, half_width=[25.0]),
-    )
-    assert len(wide) > len(along)
-
+    streets = surroundings(street, half_width=[25.0])
+    assert len(build_database(objects, viewpoints=spec, streets=streets)) > len(along)
     for database in (outdoor, along, full):
         save_database(database, tmp_path / "city.parquet")
         again = open_database(tmp_path / "city.parquet")
         assert (again.viewpoints, again.occlusion) == (database.viewpoints, database.occlusion)
 
 
-def test_no_viewpoint_and_no_crs_are_told() -> None:
-    far = ViewpointSpec(area=shapely.box(0, 0, 10, 10))
+def test_what_sees_nothing_or_cannot_be_placed_is_told() -> None:
     with refused(EmptyResultError, "no cell sees", "area"):
-        build_database(lamps(), viewpoints=far)
+        build_database(lamps(), viewpoints=ViewpointSpec(area=shapely.box(0, 0, 10, 10)))
     bare = gpd.GeoDataFrame(geometry=[shapely.box(0, 0, 10, 10)])
     with refused(CrsError, "no coordinate reference system"):
         build_database(lamps(), footprints=bare)
-
-
-def test_a_city_that_is_hidden_altogether_is_told() -> None:
+    with refused(InputError, "no building footprint"):
+        build_database(lamps(), footprints=bare.set_crs("EPSG:2154")[:0])
     # The lamp stands deep in a building, and so does no viewpoint that would see it.
     world = World(((0.0, 0.0, CODES[0]),), radius=12.0)
     house = gpd.GeoDataFrame(geometry=[shapely.box(-2, -2, 2, 2)], crs="EPSG:2154")
