@@ -11,6 +11,7 @@ import numpy as np
 import pandas as pd
 import pyogrio
 import pytest
+from worlds import assert_same
 
 from semsig_gis.core.grid import GridSpec, cell_ids
 from semsig_gis.database.build import build_database
@@ -76,16 +77,6 @@ def chosen(geodata: Path) -> tuple[StreetObjects, LoadReport]:
 @pytest.fixture(scope="module")
 def city(everything: tuple[StreetObjects, LoadReport]) -> SignatureDatabase:
     return build_database(everything[0])
-
-
-@pytest.fixture(scope="module")
-def shifted_city(everything: tuple[StreetObjects, LoadReport]) -> SignatureDatabase:
-    return build_database(everything[0], grid=GridSpec(origin=(5.0, 5.0)))
-
-
-@pytest.fixture(scope="module")
-def chosen_city(chosen: tuple[StreetObjects, LoadReport]) -> SignatureDatabase:
-    return build_database(chosen[0])
 
 
 # --- Independent recomputations ---------------------------------------------------------------
@@ -154,12 +145,16 @@ def look_around(
 def check_cells(
     database: SignatureDatabase, objects: StreetObjects, *, count: int, seed: int
 ) -> None:
-    """Compare the signatures of random cells with plain loops."""
+    """Compare the lengths of all cells and the signatures of random ones with plain loops."""
+    east, north = database.grid.origin
+    numbers, lengths = seen_by_cells(objects.xy, (east, north))
+    assert database.cell_ids.tolist() == numbers.tolist()
+    assert database.lengths.tolist() == lengths.tolist()
     cells = random.Random(seed).sample(range(len(database)), count)  # noqa: S311
     viewpoints = [
         (
-            database.grid.origin[0] + 10.0 * int(database.columns[cell]) + 5.0,
-            database.grid.origin[1] + 10.0 * int(database.rows[cell]) + 5.0,
+            east + 10.0 * int(database.columns[cell]) + 5.0,
+            north + 10.0 * int(database.rows[cell]) + 5.0,
         )
         for cell in cells
     ]
@@ -170,14 +165,6 @@ def check_cells(
         assert database.levels[part].tolist() == [int(b / 22.5) for b, _, _ in seen]
         units = [round(d * (255 / RADIUS)) for _, d, _ in seen]
         assert database.distance_units[part].tolist() == units
-
-
-def check_counts(
-    database: SignatureDatabase, objects: StreetObjects, origin: tuple[float, float]
-) -> None:
-    numbers, lengths = seen_by_cells(objects.xy, origin)
-    assert database.cell_ids.tolist() == numbers.tolist()
-    assert database.lengths.tolist() == lengths.tolist()
 
 
 # --- All objects ------------------------------------------------------------------------------
@@ -213,44 +200,27 @@ def test_positions_are_those_of_another_reader(
 
 
 def test_the_signatures_are_as_many_and_as_long_as_another_program_found(
-    city: SignatureDatabase,
+    city: SignatureDatabase, everything: tuple[StreetObjects, LoadReport]
 ) -> None:
     assert abs(len(city) - 265_099) <= 20
     assert city.lengths.mean() == pytest.approx(6.344, abs=0.001)
     assert (city.spec.radius, city.grid.step, city.grid.origin) == (30.0, 10.0, (0.0, 0.0))
     # Viewpoints at 765205 + 10 i, 6275005 + 10 j.
     assert set(np.unique(city.xy % 10.0)) == {5.0}
-
-
-def test_every_cell_sees_what_a_search_by_offsets_finds(
-    city: SignatureDatabase, everything: tuple[StreetObjects, LoadReport]
-) -> None:
-    check_counts(city, everything[0], (0.0, 0.0))
-
-
-def test_a_thousand_cells_equal_plain_loops(
-    city: SignatureDatabase, everything: tuple[StreetObjects, LoadReport]
-) -> None:
     check_cells(city, everything[0], count=1000, seed=1)
 
 
-def test_the_grid_may_begin_elsewhere(
-    shifted_city: SignatureDatabase, everything: tuple[StreetObjects, LoadReport]
-) -> None:
-    assert set(np.unique(shifted_city.xy % 10.0)) == {0.0}
-    assert len(shifted_city) == 265_191
-    check_counts(shifted_city, everything[0], (5.0, 5.0))
-    check_cells(shifted_city, everything[0], count=300, seed=2)
+def test_the_grid_may_begin_elsewhere(everything: tuple[StreetObjects, LoadReport]) -> None:
+    shifted = build_database(everything[0], grid=GridSpec(origin=(5.0, 5.0)))
+    assert set(np.unique(shifted.xy % 10.0)) == {0.0}
+    assert len(shifted) == 265_191
+    check_cells(shifted, everything[0], count=300, seed=2)
 
 
 def test_the_database_survives_its_file(city: SignatureDatabase, tmp_path: Path) -> None:
     path = tmp_path / "montpellier.parquet"
     save_database(city, path)
-    again = open_database(path)
-    for name in ("columns", "rows", "offsets", "codes", "bearing_units", "distance_units"):
-        assert np.array_equal(getattr(again, name), getattr(city, name)), name
-    assert (again.grid, again.spec, again.taxonomy) == (city.grid, city.spec, city.taxonomy)
-    assert (again.crs, again.licenses) == (city.crs, city.licenses)
+    assert_same(open_database(path), city)
     # 1,681,844 objects seen, of one, two and two bytes before compression.
     assert path.stat().st_size < 8_000_000
     frame = gpd.read_parquet(path, columns=["cell_id", "length", "geometry"])
@@ -295,12 +265,12 @@ def test_duplicates_at_one_place_are_counted(geodata: Path) -> None:
 
 
 def test_the_figures_with_the_catalogue_as_it_is(
-    chosen_city: SignatureDatabase, chosen: tuple[StreetObjects, LoadReport]
+    chosen: tuple[StreetObjects, LoadReport],
 ) -> None:
-    assert len(chosen_city) == 263_487
-    assert chosen_city.lengths.mean() == pytest.approx(5.97264, abs=5e-6)
-    check_counts(chosen_city, chosen[0], (0.0, 0.0))
-    check_cells(chosen_city, chosen[0], count=300, seed=3)
+    database = build_database(chosen[0])
+    assert len(database) == 263_487
+    assert database.lengths.mean() == pytest.approx(5.97264, abs=5e-6)
+    check_cells(database, chosen[0], count=300, seed=3)
 
 
 def test_streets_are_as_wide_as_their_kind_is(geodata: Path) -> None:

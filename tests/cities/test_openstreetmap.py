@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import functools
+import tomllib
 from collections import Counter
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -25,8 +27,7 @@ from semsig_gis.sources.catalog import load_catalog
 from semsig_gis.sources.osm.file import read_layers
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping
-    from pathlib import Path
+    from collections.abc import Mapping
 
     from semsig_gis.sources import RawLayer
     from semsig_gis.sources.layers import LayerSpec
@@ -40,187 +41,8 @@ EXTRACTS = {
 
 # --- Tags -------------------------------------------------------------------------------------
 
-# Class or role of every layer, whether it is read only when named, the kinds of element that
-# count, and its tags.
-N, NWR, W, WR = "node", "node way relation", "way", "way relation"
-PAPER, FURTHER = False, True
-LAYERS = {
-    "trees": ("alignment_tree", PAPER, N, ["natural=tree"]),
-    "drinking_water": ("water_fountain", PAPER, NWR, ["amenity=drinking_water"]),
-    "fountains": ("water_fountain", PAPER, NWR, ["amenity=fountain"]),
-    "street_lights": ("street_light", PAPER, N, ["highway=street_lamp"]),
-    "signs": (
-        "indicator",
-        PAPER,
-        N,
-        ["traffic_sign=DE:239", "traffic_sign=city_limit", "information=guidepost"],
-    ),
-    "information_boards": ("indicator", PAPER, NWR, ["information=board"]),
-    "traffic_lights": ("traffic_light", PAPER, N, ["highway=traffic_signals"]),
-    "bike_stations": ("bike_station", PAPER, NWR, ["amenity=bicycle_rental"]),
-    "toilets": ("automatic_wc", PAPER, NWR, ["amenity=toilets"]),
-    "car_sharing": ("car_station", PAPER, NWR, ["amenity=car_sharing"]),
-    "taxi_ranks": ("taxi_station", PAPER, NWR, ["amenity=taxi"]),
-    "benches": ("bench", PAPER, NWR, ["amenity=bench"]),
-    "bus_stops": ("bus_stop", PAPER, N, ["highway=bus_stop"]),
-    "bus_platforms": (
-        "bus_stop",
-        PAPER,
-        WR,
-        ["highway=platform bus=yes", "public_transport=platform bus=yes"],
-    ),
-    "fire_hydrants": ("fire_hydrant", FURTHER, N, ["emergency=fire_hydrant"]),
-    "post_boxes": ("post_box", FURTHER, N, ["amenity=post_box"]),
-    "waste_baskets": ("waste_basket", FURTHER, N, ["amenity=waste_basket"]),
-    "bollards": ("bollard", FURTHER, N, ["barrier=bollard"]),
-    "advertising_columns": ("advertising_column", FURTHER, NWR, ["advertising=column"]),
-    "monuments": ("monument", FURTHER, NWR, ["historic=monument"]),
-    "crossings": (
-        "pedestrian_crossing",
-        FURTHER,
-        N,
-        [
-            "highway=crossing crossing=marked",
-            "highway=crossing crossing=traffic_signals",
-            "highway=crossing crossing=uncontrolled",
-            "highway=crossing crossing=zebra",
-            "highway=crossing crossing:markings=yes",
-            "highway=crossing crossing:markings=lines",
-        ],
-    ),
-    "cameras": ("camera", FURTHER, N, ["man_made=surveillance"]),
-    "telephones": ("telephone", FURTHER, N, ["amenity=telephone"]),
-    "parking_meters": (
-        "parking_meter",
-        FURTHER,
-        N,
-        ["amenity=parking_meter", "amenity=vending_machine vending=parking_tickets"],
-    ),
-    "vending_machines": (
-        "vending_machine",
-        FURTHER,
-        N,
-        [
-            f"amenity=vending_machine vending={sold}"
-            for sold in (
-                "beverages",
-                "bicycle_tube",
-                "books",
-                "bread",
-                "chewing_gums",
-                "cigarettes",
-                "coffee",
-                "condoms",
-                "drinks",
-                "eggs",
-                "excrement_bags",
-                "food",
-                "ice_cream",
-                "milk",
-                "newspapers",
-                "parcel_mail_in;parcel_pickup",
-                "parcel_pickup",
-                "parcel_pickup;parcel_mail_in",
-                "photos",
-                "pizza",
-                "public_transport_tickets",
-                "stamps",
-                "sweets",
-                "toys",
-                "water",
-            )
-        ],
-    ),
-    "clocks": ("clock", FURTHER, N, ["amenity=clock"]),
-    "flagpoles": ("flagpole", FURTHER, N, ["man_made=flagpole"]),
-    "street_cabinets": ("street_cabinet", FURTHER, NWR, ["man_made=street_cabinet"]),
-    "buildings": ("buildings", FURTHER, WR, ["building=yes", "building=church"]),
-    "streets": (
-        "streets",
-        FURTHER,
-        W,
-        [
-            f"highway={kind}"
-            for kind in (
-                "living_street",
-                "pedestrian",
-                "primary",
-                "primary_link",
-                "residential",
-                "road",
-                "secondary",
-                "secondary_link",
-                "tertiary",
-                "tertiary_link",
-                "trunk",
-                "trunk_link",
-                "unclassified",
-            )
-        ],
-    ),
-}
-# Tags of no layer, whatever the kind of element.
-NEAR_MISSES = [
-    "amenity=public_bookcase",
-    "natural=tree_row",
-    "natural=tree_stump",
-    "natural=shrub",
-    "man_made=tree",
-    "natural=Tree",
-    "amenity=toilets;bench",
-    "amenity=water_point",
-    "amenity=watering_place",
-    "emergency=drinking_water",
-    "drinking_water=yes",
-    "man_made=water_well",
-    "support=street_lamp",
-    "man_made=utility_pole",
-    "traffic_sign=no",
-    "information=office",
-    "information=map",
-    "tourism=information",
-    "crossing=traffic_signals",
-    "highway=stop",
-    "highway=give_way",
-    "amenity=bicycle_parking",
-    "amenity=car_rental",
-    "amenity=bus_station",
-    "amenity=shelter",
-    "amenity=lounger",
-    "public_transport=stop_position bus=yes",
-    "public_transport=platform",
-    "public_transport=platform tram=yes",
-    "public_transport=platform bus=no",
-    "public_transport=station",
-    "railway=platform",
-    "railway=tram_stop",
-    "disused:highway=bus_stop",
-    "emergency=no",
-    "emergency=phone",
-    "amenity=recycling",
-    "amenity=waste_disposal",
-    "amenity=letter_box",
-    "barrier=block",
-    "advertising=poster_box",
-    "historic=memorial",
-    "highway=crossing",
-    "highway=crossing crossing=no",
-    "highway=crossing crossing=unmarked",
-    "highway=crossing crossing:markings=no",
-    "footway=crossing crossing=marked",
-    "amenity=vending_machine",
-    "vending=parking_tickets",
-    "amenity=parking",
-    "man_made=mast",
-    "man_made=manhole",
-    "building=no",
-    "building:part=yes",
-    "highway=motorway",
-    "highway=footway",
-    "highway=service",
-    "highway=track",
-    "highway=construction",
-]
+TABLE = tomllib.loads(Path(__file__).with_name("openstreetmap.toml").read_text(encoding="utf-8"))
+LAYERS = TABLE["paper"] | TABLE["further"]
 # The corners of what the ways and areas of the tests are drawn with.
 PLACES = [node(1, 0.0, 0.0), node(2, 0.001, 0.0), node(3, 0.001, 0.001)]
 
@@ -252,8 +74,8 @@ def test_the_table_has_every_layer_and_tag_of_the_catalogue() -> None:
         name: meaning for name, (meaning, *_) in LAYERS.items()
     }
     for spec in CATALOG.layers:
-        _, optional, kinds, texts = LAYERS[spec.name]
-        assert spec.optional is optional
+        _, kinds, texts = LAYERS[spec.name]
+        assert spec.optional == (spec.name in TABLE["further"])
         assert spec.elements == tuple(kinds.split(" "))
         listed = {
             (key, value)
@@ -268,14 +90,14 @@ def test_the_table_has_every_layer_and_tag_of_the_catalogue() -> None:
 
 @pytest.mark.parametrize(
     ("name", "text"),
-    [(name, text) for name, (_, _, _, texts) in LAYERS.items() for text in texts],
+    [(name, text) for name, (_, _, texts) in LAYERS.items() for text in texts],
 )
 def test_every_tag_is_of_its_layer_alone(tmp_path: Path, name: str, text: str) -> None:
-    kinds = set(LAYERS[name][2].split(" "))
+    kinds = set(LAYERS[name][1].split(" "))
     assert found(tmp_path / "city.osm", text) == {name: kinds}
 
 
-@pytest.mark.parametrize("text", NEAR_MISSES)
+@pytest.mark.parametrize("text", TABLE["near_misses"])
 def test_near_misses_are_of_no_layer(tmp_path: Path, text: str) -> None:
     assert found(tmp_path / "city.osm", text) == {}
 
@@ -314,72 +136,22 @@ def test_licence_reader_and_files() -> None:
 
 # --- Real extracts ----------------------------------------------------------------------------
 
-# Objects by layer and kind of element.
-EXPECTED = {
-    "helsinki": {
-        "trees node": 649,
-        "street_lights node": 586,
-        "traffic_lights node": 135,
-        "benches node": 162,
-        "bus_stops node": 92,
-        "bike_stations node": 15,
-        "toilets node": 17,
-        "toilets way": 1,
-        "taxi_ranks node": 17,
-        "car_sharing node": 2,
-        "signs node": 1671,
-        "information_boards node": 1,
-        "fountains node": 8,
-    },
-    "monaco": {
-        "trees node": 415,
-        "street_lights node": 17,
-        "traffic_lights node": 15,
-        "benches node": 120,
-        "benches way": 1,
-        "bus_stops node": 104,
-        "bike_stations node": 8,
-        "toilets node": 29,
-        "toilets way": 2,
-        "taxi_ranks node": 4,
-        "drinking_water node": 14,
-        "fountains node": 7,
-        "fountains way": 17,
-        "signs node": 7,
-        "information_boards node": 24,
-    },
-    "neukölln": {
-        "trees node": 145,
-        "street_lights node": 52,
-        "traffic_lights node": 5,
-        "benches node": 22,
-        "bus_stops node": 2,
-        "bike_stations node": 1,
-        "toilets way": 1,
-        "fountains way": 1,
-        "signs node": 8,
-        "information_boards node": 2,
-    },
-}
-# Platforms of buses as ways and areas, which are merged with the stops near them.
-PLATFORMS = {"helsinki": 0, "monaco": 2, "neukölln": 2}
-# Building ways; of them incomplete ones, because the extract is clipped.
-BUILDINGS = {"helsinki": (433, 48), "monaco": (1183, 0), "neukölln": (126, 0)}
-BARE_TAGS: dict[str, Callable[[Mapping[str, str]], bool]] = {
-    "trees": lambda tags: tags.get("natural") == "tree",
-    "drinking_water": lambda tags: tags.get("amenity") == "drinking_water",
-    "fountains": lambda tags: tags.get("amenity") == "fountain",
-    "street_lights": lambda tags: tags.get("highway") == "street_lamp",
-    "signs": lambda tags: "traffic_sign" in tags or tags.get("information") == "guidepost",
-    "information_boards": lambda tags: tags.get("information") == "board",
-    "traffic_lights": lambda tags: tags.get("highway") == "traffic_signals",
-    "bike_stations": lambda tags: tags.get("amenity") == "bicycle_rental",
-    "toilets": lambda tags: tags.get("amenity") == "toilets",
-    "car_sharing": lambda tags: tags.get("amenity") == "car_sharing",
-    "taxi_ranks": lambda tags: tags.get("amenity") == "taxi",
-    "benches": lambda tags: tags.get("amenity") == "bench",
-    "bus_stops": lambda tags: tags.get("highway") == "bus_stop",
-    "buildings": lambda tags: "building" in tags,
+# A tag of each layer, of any value where none is given.
+BARE_TAGS = {
+    "trees": "natural=tree",
+    "drinking_water": "amenity=drinking_water",
+    "fountains": "amenity=fountain",
+    "street_lights": "highway=street_lamp",
+    "signs": "traffic_sign information=guidepost",
+    "information_boards": "information=board",
+    "traffic_lights": "highway=traffic_signals",
+    "bike_stations": "amenity=bicycle_rental",
+    "toilets": "amenity=toilets",
+    "car_sharing": "amenity=car_sharing",
+    "taxi_ranks": "amenity=taxi",
+    "benches": "amenity=bench",
+    "bus_stops": "highway=bus_stop",
+    "buildings": "building",
 }
 
 
@@ -390,9 +162,9 @@ def bare_loop(path: Path) -> tuple[Counter[str], Counter[str]]:
     clipped: Counter[str] = Counter()
     for element in osmium.FileProcessor(str(path)).with_locations():
         assert isinstance(element, Node | Way | Relation)
-        tags = {tag.k: tag.v for tag in element.tags}
-        for name, meant in BARE_TAGS.items():
-            if meant(tags):
+        tags = {text for tag in element.tags for text in (tag.k, f"{tag.k}={tag.v}")}
+        for name, texts in BARE_TAGS.items():
+            if not tags.isdisjoint(texts.split(" ")):
                 key = f"{name} {kinds[element.type_str()]}"
                 seen[key] += 1
                 if isinstance(element, Way) and not all(n.location.valid() for n in element.nodes):
@@ -419,8 +191,10 @@ def test_objects_of_the_classes_of_the_paper(geodata: Path, city: str) -> None:
     layers = read_extract(geodata, city)
     classes = {name: layer for name, layer in layers.items() if not layer.spec.optional}
     platforms = classes.pop("bus_platforms")
-    assert len(platforms.table) == PLATFORMS[city]
-    assert by_kind(classes) == EXPECTED[city]
+    expected = TABLE["cities"][city]
+    assert len(platforms.table) == expected["platforms"]
+    counts = (item.rsplit(" ", 1) for item in expected["objects"].replace("\n", " ").split(", "))
+    assert by_kind(classes) == {kind: int(count) for kind, count in counts}
     assert all(layer.counts.unreadable == 0 for layer in classes.values())
 
 
@@ -429,7 +203,7 @@ def test_a_bare_loop_counts_the_same(geodata: Path, city: str) -> None:
     layers = read_extract(geodata, city)
     kept = by_kind(layers)
     seen, clipped = bare_loop(geodata / "osm" / EXTRACTS[city])
-    assert seen["buildings way"] == BUILDINGS[city][0]
+    assert seen["buildings way"] == TABLE["cities"][city]["buildings"][0]
     for name in BARE_TAGS:
         spec = layers[name].spec
         assert layers[name].counts.read == sum(
@@ -444,7 +218,7 @@ def test_a_bare_loop_counts_the_same(geodata: Path, city: str) -> None:
 def test_buildings_and_streets(geodata: Path, city: str) -> None:
     layers = read_extract(geodata, city)
     buildings, streets = layers["buildings"], layers["streets"]
-    whole, clipped = BUILDINGS[city]
+    whole, clipped = TABLE["cities"][city]["buildings"]
     assert by_kind(layers)["buildings way"] == whole - clipped
     assert buildings.table.geometry.geom_type.isin(["Polygon", "MultiPolygon"]).all()
     assert buildings.table.geometry.is_valid.all()

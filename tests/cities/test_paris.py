@@ -113,10 +113,7 @@ def test_published_files_load_as_they_are(
     objects = build(layer)
     assert len(objects) == places
     assert objects.table["count"].sum() == rows - filtered - duplicates
-
-
-@pytest.mark.parametrize(("file", "name"), [(file, name) for file, name, *_ in FILES])
-def test_filters_can_be_off(paris: Path, file: str, name: str) -> None:
+    # Filters can be off.
     layer = read(paris / file, name, filters=False)
     assert (layer.counts.filtered, layer.counts.unreadable) == (0, 0)
     assert len(layer.table) + layer.counts.duplicates == layer.counts.read
@@ -230,14 +227,12 @@ def test_shapes_of_toilets_are_points_in_a_list(paris: Path) -> None:
 
 
 def test_stations_of_autolib_stand_still(paris: Path) -> None:
-    places: dict[str, set[str]] = {}
-    for row in rows_of(paris / "Autolib_dataset.csv"):
-        places.setdefault(row["ID"], set()).add(row["Geo point"])
-    assert max(map(len, places.values())) == 1
+    rows = rows_of(paris / "Autolib_dataset.csv")
+    places = {row["ID"]: row["Geo point"] for row in rows}
+    assert all(places[row["ID"]] == row["Geo point"] for row in rows)
     layer = read(paris / "Autolib_dataset.csv", "car_stations")
     assert layer.table["source_id"].tolist() == list(places)
-    expected = lat_lon([next(iter(items)) for items in places.values()])
-    assert xy_of(layer).tolist() == expected
+    assert xy_of(layer).tolist() == lat_lon([*places.values()])
 
 
 def test_lamps_of_a_support_are_one_traffic_light(paris: Path) -> None:
@@ -292,17 +287,8 @@ def test_the_catalogue_says_how_sure_it_is_of_each_layer() -> None:
     catalog = load_catalog("opendata_paris")
     assert all(spec.note for spec in catalog.layers)
     plain = {spec.name for spec in catalog.layers if not spec.optional}
-    assert plain == {
-        "trees",
-        "fountains",
-        "street_lights",
-        "traffic_lights",
-        "bike_stations",
-        "toilets",
-        "taxi_ranks",
-        "car_stations",
-        "bus_stops",
-    }
+    classes = "trees fountains street_lights traffic_lights bike_stations toilets taxi_ranks"
+    assert plain == {*classes.split(), "car_stations", "bus_stops"}
     datasets = {spec.name: spec.dataset for spec in catalog.layers if spec.dataset}
     assert datasets == {
         "trees": "les-arbres",
