@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 import time
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypedDict, Unpack
 
 import numpy as np
 import pandas as pd
@@ -392,18 +392,19 @@ class LikelihoodLocator:
         )
 
 
-def locate(
-    index: LikelihoodIndex,
-    query: Signature,
-    *,
-    north_sigma: float = 0.0,
-    log_prior: NDArray[np.float64] | None = None,
-    rule: AnswerRule = DEFAULT_RULE,
-    top: int = 10,
-    store: ObjectStore | None = None,
-    refined: bool = False,
-    explained: int = 0,
-) -> Location:
+class LocateOptions(TypedDict, total=False):
+    """How queries are answered; `locate` describes the options."""
+
+    north_sigma: float
+    log_prior: NDArray[np.float64] | None
+    rule: AnswerRule
+    top: int
+    store: ObjectStore | None
+    refined: bool
+    explained: int
+
+
+def locate(index: LikelihoodIndex, query: Signature, **options: Unpack[LocateOptions]) -> Location:
     """Find where a query was seen from, by likelihood.
 
     Parameters
@@ -457,31 +458,14 @@ def locate(
     >>> location.explanations[0].counts["matched"] == len(query)
     True
     """
-    locator = LikelihoodLocator(
-        index=index,
-        north_sigma=north_sigma,
-        log_prior=log_prior,
-        rule=rule,
-        top=top,
-        store=store,
-        refined=refined,
-        explained=explained,
-    )
-    return locator.locate(query)
+    return LikelihoodLocator(index=index, **options).locate(query)
 
 
 def locate_route(
     index: LikelihoodIndex,
     queries: Sequence[Signature],
     legs: Sequence[Leg],
-    *,
-    north_sigma: float = 0.0,
-    log_prior: NDArray[np.float64] | None = None,
-    rule: AnswerRule = DEFAULT_RULE,
-    top: int = 10,
-    store: ObjectStore | None = None,
-    refined: bool = False,
-    explained: int = 0,
+    **options: Unpack[LocateOptions],
 ) -> tuple[Location, ...]:
     """Find where the views of a route were seen from, each given all of them.
 
@@ -516,17 +500,7 @@ def locate_route(
     >>> int(first.candidates["cell"][0]), int(last.candidates["cell"][0])
     (0, 200)
     """
-    locator = LikelihoodLocator(
-        index=index,
-        north_sigma=north_sigma,
-        log_prior=log_prior,
-        rule=rule,
-        top=top,
-        store=store,
-        refined=refined,
-        explained=explained,
-    )
-    return locator.locate_route(queries, legs)
+    return LikelihoodLocator(index=index, **options).locate_route(queries, legs)
 
 
 def _candidates(scores: CellScores, posterior: Posterior, count: int) -> pd.DataFrame:
