@@ -6,7 +6,7 @@ import geopandas as gpd
 import pytest
 import shapely
 from osm_xml import node, way, write_osm
-from sentences import assert_sentence
+from sentences import refused
 
 from semsig_gis.core.errors import InputError, SourceError
 from semsig_gis.objects.surroundings import (
@@ -58,35 +58,28 @@ def test_a_file_of_something_else_is_refused(tmp_path: Path) -> None:
     line = shapely.LineString([(770_000, 6_280_000), (770_100, 6_280_000)])
     for name in ("x.parquet", "x.gpkg"):
         streets, houses = write(tmp_path / f"s{name}", line), write(tmp_path / f"h{name}", HOUSE)
-        with pytest.raises(InputError) as caught:
+        with refused(InputError, name, "LineString", "polygons"):
             read_surroundings(streets, role="buildings", crs=CRS)
-        assert_sentence(caught.value, name, "LineString", "polygons")
-        with pytest.raises(InputError) as caught:
+        with refused(InputError, name, "Polygon", "lines"):
             read_surroundings(houses, role="streets", crs=CRS)
-        assert_sentence(caught.value, name, "Polygon", "lines")
-    with pytest.raises(InputError) as caught:
+    with refused(InputError, "no polygon", "polygons"):
         read_area(write(tmp_path / "none.parquet", None), crs=CRS)
-    assert_sentence(caught.value, "no polygon", "polygons")
     flat = shapely.Polygon([(770_000, 6_280_000)] * 3)
-    with pytest.raises(InputError) as caught:
+    with refused(InputError, "encloses no area"):
         read_area(write(tmp_path / "flat.parquet", flat), crs=CRS)
-    assert_sentence(caught.value, "encloses no area")
 
 
 def test_a_file_that_cannot_be_used_is_named(tmp_path: Path) -> None:
     for name in ("nowhere.parquet", "nowhere.gpkg"):
-        with pytest.raises(SourceError) as caught:
+        with refused(SourceError, name, "does not exist"):
             read_area(tmp_path / name, crs=CRS)
-        assert_sentence(caught.value, name, "does not exist")
     broken = tmp_path / "broken.parquet"
     broken.write_text("no", encoding="utf-8")
-    with pytest.raises(SourceError) as caught:
+    with refused(SourceError, "broken.parquet", "damaged"):
         read_area(broken, crs=CRS)
-    assert_sentence(caught.value, "broken.parquet", "damaged")
     gpd.GeoDataFrame(geometry=[HOUSE]).to_parquet(tmp_path / "bare.parquet")
-    with pytest.raises(SourceError) as caught:
+    with refused(SourceError, "bare.parquet", "coordinate reference system"):
         read_area(tmp_path / "bare.parquet", crs=CRS)
-    assert_sentence(caught.value, "bare.parquet", "coordinate reference system")
 
 
 def rows_of_houses() -> gpd.GeoDataFrame:
@@ -126,13 +119,11 @@ def test_a_box_without_any_is_empty(tmp_path: Path) -> None:
 def test_a_file_without_bounds_is_not_read_by_box(tmp_path: Path) -> None:
     path = tmp_path / "houses.parquet"
     rows_of_houses().to_parquet(path)
-    with pytest.raises(SourceError) as caught:
+    with refused(SourceError, "houses.parquet"):
         read_surroundings(path, role="buildings", crs=CRS, box=(0, 0, 9, 9))
-    assert_sentence(caught.value, "houses.parquet")
 
 
 def test_no_surroundings_at_all_can_be_saved(tmp_path: Path) -> None:
     save_surroundings(rows_of_houses().iloc[:0], tmp_path / "none.parquet")
-    with pytest.raises(InputError) as caught:
+    with refused(InputError, "holds no polygon"):
         read_surroundings(tmp_path / "none.parquet", role="buildings", crs=CRS)
-    assert_sentence(caught.value, "holds no polygon")
