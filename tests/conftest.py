@@ -164,6 +164,20 @@ def done(run: Run) -> Done:
 
 
 @pytest.fixture
+def snapshot(request: pytest.FixtureRequest) -> Callable[[str, str], None]:
+    """Return a check of a text against a stored one; SEMSIG_SNAPSHOTS=1 stores it anew."""
+    folder = request.path.with_name("snapshots")
+
+    def check(name: str, text: str) -> None:
+        if os.environ.get("SEMSIG_SNAPSHOTS"):
+            folder.mkdir(exist_ok=True)
+            (folder / name).write_bytes(text.encode())
+        assert text == (folder / name).read_bytes().decode()
+
+    return check
+
+
+@pytest.fixture
 def carried() -> None:
     """Need the map files that a package built with npm carries."""
     from semsig_gis.maps import page as map_assets

@@ -234,9 +234,6 @@ def write_layers(
     program.
     """
     target = Path(path)
-    if target.suffix.lower() != ".gpkg":
-        msg = f"{target} does not end in .gpkg; give the name of a GeoPackage file."
-        raise InputError(msg)
     _require_closed(target)
     rows = sum(layer.rows for layer in layers)
     with whole_file(target) as partial:

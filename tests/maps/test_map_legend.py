@@ -5,14 +5,12 @@ from __future__ import annotations
 import dataclasses
 import functools
 from html.parser import HTMLParser
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
 from cells_told import told_of
 from small_city import small_city
-from snapshots import assert_snapshot
 
 import semsig_gis
 from semsig_gis.core.colours import SHADES
@@ -36,10 +34,11 @@ from semsig_gis.objects.table import Licence
 from semsig_gis.queries.distortions import MissingClasses
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from semsig_gis.database.database import SignatureDatabase
     from semsig_gis.objects.table import StreetObjects
 
-SNAPSHOTS = Path(__file__).parent / "snapshots"
 HOSTILE = (
     "<script>alert(1)</script><img src=x onerror=alert(1)> \"'`${alert(1)} {{7*7}} & \\ é\u202eabc"
 )
@@ -115,10 +114,10 @@ LEGENDS = {name: Text(text) for name, text in legends(CITY, OBJECTS, "light").it
 
 
 @pytest.mark.parametrize("name", LEGENDS)
-def test_what_a_legend_says(name: str) -> None:
+def test_what_a_legend_says(name: str, snapshot: Callable[[str, str], None]) -> None:
     text = LEGENDS[name].shown.replace(semsig_gis.__version__, "VERSION")
     lines = (" ".join(line.split()) for line in text.splitlines())
-    assert_snapshot("\n".join(line for line in lines if line) + "\n", SNAPSHOTS / f"{name}.txt")
+    snapshot(f"{name}.txt", "\n".join(line for line in lines if line) + "\n")
 
 
 def test_the_numbers_are_those_of_the_results() -> None:

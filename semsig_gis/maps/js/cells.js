@@ -20,10 +20,10 @@ semsig.City = class {
   constructor(data, grid) {
     Object.assign(this, {data, grid, count: data.rows.length});
   }
-  static firstOf(low, high, wanted) {
+  static firstOf(low, high, holds) {
     while (low < high) {
       const middle = (low + high) >> 1;
-      if (wanted(middle)) high = middle; else low = middle + 1;
+      if (holds(middle)) high = middle; else low = middle + 1;
     }
     return low;
   }
@@ -98,7 +98,7 @@ semsig.City = class {
   }
 };
 semsig.cellFacts = {};
-semsig.cells = (packed, grid, titles, told) => {
+semsig.cells = (packed, grid, titles, names) => {
   const group = L.layerGroup();
   const ready = semsig.arrays(packed).then((data) => new semsig.City(data, grid));
   const buttons = (city, map, cell, box, jumps) => {
@@ -133,7 +133,7 @@ semsig.cells = (packed, grid, titles, told) => {
     const corners = [[0, 0], [1, 0], [1, 1], [0, 1]].map(
       ([across, along]) => city.latlng(column + across, row + along));
     drawn.addLayer(L.polygon(corners, {...look, fill: false}));
-    const parts = told.map((name) => ({
+    const parts = names.map((name) => ({
       rows: [], jumps: [], marks: [], dots: [], ...semsig.cellFacts[name](city, cell)}));
     const sign = (other, options) => {
       const marker = L.circleMarker(city.middle(other), {

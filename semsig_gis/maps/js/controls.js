@@ -8,7 +8,7 @@ semsig.colours = (map) => {
     button.textContent = "\u25d0";
     button.setAttribute("role", "button");
     // What is chosen is kept for the next time, where a page may keep something.
-    const kept = (choice) => {
+    const remembered = (choice) => {
       try {
         if (choice) localStorage.setItem("semsig-colours", choice);
         return localStorage.getItem("semsig-colours");
@@ -16,9 +16,9 @@ semsig.colours = (map) => {
         return choice;
       }
     };
-    let chosen = kept();
+    let choice = remembered();
     const show = () => {
-      const is = chosen ? chosen === "dark" : dark.matches;
+      const is = choice ? choice === "dark" : dark.matches;
       map.getContainer().classList.toggle("semsig-dark", is);
       button.title = is ? "Light colours" : "Dark colours";
       button.setAttribute("aria-label", button.title);
@@ -26,7 +26,7 @@ semsig.colours = (map) => {
     };
     L.DomEvent.on(button, "click", (event) => {
       L.DomEvent.stop(event);
-      chosen = kept(semsig.isDark(map) ? "light" : "dark");
+      choice = remembered(semsig.isDark(map) ? "light" : "dark");
       show();
     });
     L.DomEvent.on(button, "keydown", (event) => {
@@ -90,8 +90,8 @@ semsig.furnish = (map, layers, area, credits) => {
     text.textContent = credit;
     map.attributionControl.addAttribution(text.outerHTML);
   }
-  const told = (is) => () => map.getContainer().classList.toggle("semsig-told", is);
-  map.on("popupopen", told(true)).on("popupclose", told(false));
+  const mark = (is) => () => map.getContainer().classList.toggle("semsig-told", is);
+  map.on("popupopen", mark(true)).on("popupclose", mark(false));
   semsig.colours(map);
   semsig.search(map, area);
   semsig.folding(map, layers);

@@ -40,7 +40,7 @@ semsig.cellFacts.groups = (city, cell) => {
   // The nearest ones, and some from everywhere.
   const drawn = (sorted) => sorted.filter(
     (_, at) => at < grid.near || at % Math.ceil(sorted.length / grid.dots) === 0);
-  const told = {
+  const facts = {
     title: "Cells that look the same",
     rows: [["It sees", city.signature("now", cell)]],
     jumps: [],
@@ -51,12 +51,12 @@ semsig.cellFacts.groups = (city, cell) => {
     ["Types and angle levels", twins, grid.colours[1]],
   ].slice(0, alike.length)) {
     if (cells.length === 1) {
-      told.rows.push([label, "no other cell"]);
+      facts.rows.push([label, "no other cell"]);
     } else {
       const sorted = byDistance(cells);
-      told.jumps.push(...jumps(label, cells, sorted));
-      told.dots.push(...drawn(sorted).reverse().map((one) => [one, colour]));
+      facts.jumps.push(...jumps(label, cells, sorted));
+      facts.dots.push(...drawn(sorted).reverse().map((one) => [one, colour]));
     }
   }
-  return told;
+  return facts;
 };

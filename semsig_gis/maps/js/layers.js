@@ -4,7 +4,7 @@ window.semsig = {
   points(fields, titles, records) {
     const group = L.featureGroup();
     const markers = [];
-    for (const [place, colour, radius, found, name, values, label] of records) {
+    for (const [place, colour, radius, places, name, values, label] of records) {
       const marker = L.circleMarker(place, {
         pane: "markerPane", radius: radius, color: "#222", weight: 1,
         fillColor: colour, fillOpacity: 0.95,
@@ -17,11 +17,11 @@ window.semsig = {
         const look = {permanent: true, direction: "center", className: "semsig-number"};
         marker.bindTooltip(text, look);
       }
-      if (found !== null) {
+      if (places !== null) {
         const look = {pane: "shadowPane", interactive: false, color: "#d55e00", weight: 2};
         const hint = L.layerGroup([
-          L.polyline([place, found[0]], {...look, dashArray: "5 5"}),
-          ...found.map((one, at) => L.circleMarker(one, {
+          L.polyline([place, places[0]], {...look, dashArray: "5 5"}),
+          ...places.map((one, at) => L.circleMarker(one, {
             ...look, radius: at ? 5 : 8, weight: at ? 1 : 2, fill: false,
           })),
         ]);

@@ -50,11 +50,11 @@ semsig.streetObjects = (key, packed, about) => {
       ctx.fillText(symbol, 0, drop + 0.42);
     }
     const colours = new Uint32Array(ctx.getImageData(0, 0, 2 * half, 2 * half).data.buffer);
-    const found = [...colours.keys()].filter((at) => colours[at] >>> 24 > 40);
+    const solid = [...colours.keys()].filter((at) => colours[at] >>> 24 > 40);
     sprites[name] = {
-      right: Int16Array.from(found, (at) => at % (2 * half) - half),
-      down: Int16Array.from(found, (at) => Math.floor(at / (2 * half)) - half),
-      colour: Uint32Array.from(found, (at) => colours[at]),
+      right: Int16Array.from(solid, (at) => at % (2 * half) - half),
+      down: Int16Array.from(solid, (at) => Math.floor(at / (2 * half)) - half),
+      colour: Uint32Array.from(solid, (at) => colours[at]),
     };
     return sprites[name];
   };

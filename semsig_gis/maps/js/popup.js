@@ -13,10 +13,11 @@ semsig.wheel = (size, label, types, bearings) => {
   };
   const places = bearings.map((degrees) => degrees * Math.PI / 180);
   const at = (angle, radius) => [radius * Math.sin(angle), -radius * Math.cos(angle)];
-  const told = bearings.map((degrees, one) => `${types ? `${types[one]} ` : ""}${degrees}\u00b0`);
+  const entries = bearings.map(
+    (degrees, one) => `${types ? `${types[one]} ` : ""}${degrees}\u00b0`);
   drawing.setAttribute("viewBox", "-58 -68 116 126");
   drawing.setAttribute("role", "img");
-  drawing.setAttribute("aria-label", `${label}, clockwise from north: ${told.join(", ")}`);
+  drawing.setAttribute("aria-label", `${label}, clockwise from north: ${entries.join(", ")}`);
   draw("circle", {r: 54, class: "ring"});
   draw("path", {d: "M0,-67L4,-56H-4Z", class: "north"});
   draw("circle", {r: 1.5, class: "north"});
@@ -55,10 +56,10 @@ semsig.details = (name, fields, values, titles) => {
   const fact = (label, value) => {
     L.DomUtil.create("span", "semsig-fact", row(label)).textContent = value;
   };
-  const told = fields.map((label, at) => [label, values[at]]).filter((one) => one[1] !== null);
-  for (const [label, value] of told) if (!Array.isArray(value)) fact(label, value);
+  const facts = fields.map((label, at) => [label, values[at]]).filter((one) => one[1] !== null);
+  for (const [label, value] of facts) if (!Array.isArray(value)) fact(label, value);
   // Signatures come last, as they are long.
-  const signatures = told.filter((one) => Array.isArray(one[1]));
+  const signatures = facts.filter((one) => Array.isArray(one[1]));
   const seen = signatures.filter(([, [, bearings]]) => bearings?.length);
   if (seen.length) {
     // The letters have 9 pixels and more: there is room for three wheels, or for two of many.

@@ -6,13 +6,13 @@ semsig.matches = (names, words, limit) => {
   const quoted = words.replace(/[\\^$.*+?()[\]{}|]/g, "\\$&");
   const line = new RegExp(`^${quoted}$`, "mu");
   const whole = new RegExp(`(?<![\\p{L}\\p{N}])${quoted}(?![\\p{L}\\p{N}])`, "u");
-  const found = [[], [], []];
+  const ranked = [[], [], []];
   names.forEach((name, at) => {
     if (!name.includes(words)) return;
     const rank = line.test(name) ? 0 : whole.test(name) ? 1 : 2;
-    if (found[rank].length < limit) found[rank].push({rank, at});
+    if (ranked[rank].length < limit) ranked[rank].push({rank, at});
   });
-  return found.flat().slice(0, limit);
+  return ranked.flat().slice(0, limit);
 };
 semsig.reveal = (map, layer, place) => {
   let outermost = layer;
@@ -96,10 +96,10 @@ semsig.placesAt = (text, area) => {
   const [first, second] = [[pair[1], pair[2]], [pair[3], pair[4]]].map(
     ([number, letter]) => Number(number.replace(",", ".")) * (/[SW]/i.test(letter) ? -1 : 1));
   const name = `${first}, ${second}`;
-  const found = [];
+  const places = [];
   const offer = (hint, place, xy) => {
     const facts = [...semsig.whereabouts(area, place, xy), ...semsig.cellAround(area, xy)];
-    found.push({rank: 0, name, hint, show: (map) => semsig.point(map, name, place, facts)});
+    places.push({rank: 0, name, hint, show: (map) => semsig.point(map, name, place, facts)});
   };
   const bounds = area && L.latLngBounds([[0, 1], [2, 1], [0, 3], [2, 3]].map(
     ([x, y]) => semsig.latlng(area, area.box[x], area.box[y]))).pad(0.1);
@@ -112,7 +112,7 @@ semsig.placesAt = (text, area) => {
   if (area && west <= first && first <= east && south <= second && second <= north) {
     offer(`x, y in ${area.crs}`, semsig.latlng(area, first, second), [first, second]);
   }
-  return found;
+  return places;
 };
 semsig.search = (map, area) => {
   const most = 8;
@@ -135,14 +135,14 @@ semsig.search = (map, area) => {
     [list, {role: "listbox", "aria-label": "Found"}],
     [message, {role: "status"}],
   ]) for (const [name, value] of Object.entries(values)) part.setAttribute(name, value);
-  let found = [];
-  let chosen = -1;
+  let offers = [];
+  let active = -1;
   const tell = (text) => {
     message.textContent = text;
     message.hidden = !text;
   };
   const choose = (one) => {
-    chosen = one;
+    active = one;
     for (const [at, item] of [...list.children].entries()) {
       item.setAttribute("aria-selected", at === one);
     }
@@ -167,13 +167,13 @@ semsig.search = (map, area) => {
     const text = input.value.trim();
     const words = semsig.plain(text);
     tell("");
-    found = [];
+    offers = [];
     if (words) {
-      found = [...semsig.cellsCalled(text, area), ...semsig.placesAt(text, area)];
-      for (const finder of semsig.finders) found.push(...finder(words, most));
-      found = found.sort((one, other) => one.rank - other.rank).slice(0, most);
+      offers = [...semsig.cellsCalled(text, area), ...semsig.placesAt(text, area)];
+      for (const finder of semsig.finders) offers.push(...finder(words, most));
+      offers = offers.sort((one, other) => one.rank - other.rank).slice(0, most);
     }
-    list.replaceChildren(...found.map((one, at) => {
+    list.replaceChildren(...offers.map((one, at) => {
       const item = L.DomUtil.create("li", "");
       item.id = `${list.id}-${at}`;
       item.setAttribute("role", "option");
@@ -183,24 +183,24 @@ semsig.search = (map, area) => {
       L.DomEvent.on(item, "click", () => take(one));
       return item;
     }));
-    list.hidden = !found.length;
+    list.hidden = !offers.length;
     input.setAttribute("aria-expanded", String(!list.hidden));
-    choose(found.length ? 0 : -1);
+    choose(offers.length ? 0 : -1);
   };
   L.DomEvent.on(input, "input", look);
   L.DomEvent.on(input, "focus", () => { if (input.value) look(); });
   L.DomEvent.on(input, "blur", close);
   L.DomEvent.on(input, "keydown", (event) => {
     const steps = {ArrowDown: 1, ArrowUp: -1}[event.key];
-    if (steps && found.length && !list.hidden) {
-      choose((chosen + steps + found.length) % found.length);
+    if (steps && offers.length && !list.hidden) {
+      choose((active + steps + offers.length) % offers.length);
       event.preventDefault();
     } else if (event.key === "Escape") close();
   });
   L.DomEvent.on(box, "submit", (event) => {
     L.DomEvent.preventDefault(event);
     if (list.hidden) look();
-    if (found.length) take(found[Math.max(chosen, 0)]);
+    if (offers.length) take(offers[Math.max(active, 0)]);
     else if (input.value.trim()) tell("Nothing on this map is called so, or lies there.");
   });
   L.DomEvent.disableClickPropagation(box);
