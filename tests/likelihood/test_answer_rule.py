@@ -88,31 +88,5 @@ def test_damaged_rules(tmp_path: Path, text: str) -> None:
     (tmp_path / "rule.json").write_text(text)
     with refused(InputError, "rule.json", "save_rule"):
         open_rule(tmp_path / "rule.json")
-
-
-def test_a_rule_that_is_not_there(tmp_path: Path) -> None:
     with refused(InputError, "none.json", "No such file"):
         open_rule(tmp_path / "none.json")
-
-
-@pytest.mark.parametrize(
-    ("values", "word"),
-    [
-        ({"threshold": math.nan}, "threshold"),
-        ({"threshold": 0.5, "precision": 1.0}, "precision"),
-        ({"threshold": 0.5, "confidence": 0.0}, "confidence"),
-        ({"threshold": 0.5, "radius": math.inf}, "radius"),
-        ({"threshold": 0.5, "wrong": 1}, "1 wrong"),
-    ],
-)
-def test_numbers_out_of_range(values: dict[str, float], word: str) -> None:
-    with refused(InputError, word):
-        AnswerRule(**values)  # type: ignore[arg-type]
-
-
-def test_calibration_refuses_what_does_not_fit() -> None:
-    for masses, correct in (([0.5], []), ([math.nan], [True]), ([[0.5]], [[True]])):
-        with refused(InputError, "one outcome"):
-            calibrate(masses, correct)
-    with refused(InputError, "precision"):
-        calibrate([0.5], [True], precision=2.0)

@@ -14,6 +14,7 @@ from sentences import refused
 from semsig_gis.core.errors import CrsError, InputError, UnknownNameError
 from semsig_gis.core.rtree import ObjectIndex
 from semsig_gis.core.signature import Signature
+from semsig_gis.likelihood.answer_rule import AnswerRule, calibrate
 from semsig_gis.likelihood.explain import explain
 from semsig_gis.likelihood.index import CellScores, build_index
 from semsig_gis.likelihood.noise.learn import Sample, learn_noise
@@ -23,6 +24,7 @@ from semsig_gis.likelihood.posterior import posterior
 from semsig_gis.likelihood.priors import area_prior, position_prior, weight_prior
 from semsig_gis.likelihood.refine import refine
 from semsig_gis.likelihood.rerank import align_cells, rerank
+from semsig_gis.likelihood.route import Leg, route_posteriors
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -36,6 +38,7 @@ TREE = ObjectIndex(OBJECTS.xy)
 ONE = Signature(np.array([1], np.uint8), np.zeros(1))
 TYPES = Signature(np.array([1], np.uint8), None)
 NOISE = NoiseSpec()
+STAY = Leg(dx=0.0, dy=0.0)
 NOTHING = Signature(np.empty(0, np.uint8), np.empty(0))
 LAMPS = Signature(np.array([11], np.uint8), np.zeros(1))
 MANY = Signature(np.ones(258, np.uint8), np.zeros(258))
@@ -96,6 +99,19 @@ CASES: list[tuple[Callable[[], object], str, str]] = [
     (lambda: weight_prior(DATABASE, FLAT + math.nan), "weights", "0 or more"),
     (lambda: weight_prior(DATABASE, FLAT), "excludes every cell", "widen"),
     (lambda: Sample(signature=TYPES, cell_id=3), "types and the bearings", "give both"),
+    (lambda: route_posteriors(DATABASE, [], []), "0 views", "one leg between"),
+    (lambda: route_posteriors(DATABASE, [FLAT], [STAY]), "1 views", "one leg between"),
+    (lambda: Leg(dx=math.nan, dy=0.0), "nan", "finite"),
+    (lambda: Leg(dx=0.0, dy=0.0, sigma=-1.0), "-1.0", "metres"),
+    (lambda: AnswerRule(threshold=math.nan), "threshold of the answers is nan", "0 or more"),
+    (lambda: AnswerRule(threshold=0.5, precision=1.0), "precision of the answers", "below 1"),
+    (lambda: AnswerRule(threshold=0.5, confidence=0.0), "confidence of the answers", "above 0"),
+    (lambda: AnswerRule(threshold=0.5, radius=math.inf), "radius of the answers", "above 0"),
+    (lambda: AnswerRule(threshold=0.5, wrong=1), "1 wrong", "counts that fit"),
+    (lambda: calibrate([0.5], []), "1 chances and 0 outcomes", "one outcome"),
+    (lambda: calibrate([math.nan], [True]), "1 chances", "one finite chance"),
+    (lambda: calibrate([[0.5]], [[True]]), "1 chances", "one outcome"),
+    (lambda: calibrate([0.5], [True], precision=2.0), "precision of the answers is 2.0", "below 1"),
     (lambda: learn_noise([], DATABASE), "no samples", "true places"),
     (lambda: learn_noise([ELSEWHERE], DATABASE), "none of the 1", "EPSG:2154"),
     (lambda: learn_noise([ELSEWHERE], OBJECTS), "none of the 1", "EPSG:2154"),

@@ -7,9 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from noisy_cells import random_database
-from sentences import refused
 
-from semsig_gis.core.errors import InputError
 from semsig_gis.likelihood.posterior import posterior
 from semsig_gis.likelihood.route import LOST, Leg, moved_chances, route_posteriors
 
@@ -86,14 +84,3 @@ def test_a_route_that_leaves_the_city_still_has_chances() -> None:
 def test_directions() -> None:
     leg = Leg.towards(180.0, 20.0, sigma=1.0)
     assert (leg.dx, leg.dy, leg.sigma) == pytest.approx((0.0, -20.0, 1.0))
-
-
-def test_what_does_not_fit_is_refused() -> None:
-    database = random_database(0)
-    for logliks, ways in (([], []), ([np.zeros(40)], [Leg(dx=0.0, dy=0.0)])):
-        with refused(InputError, f"{len(logliks)} views", "one leg between"):
-            route_posteriors(database, logliks, ways)
-    with refused(InputError, "nan", "finite"):
-        Leg(dx=math.nan, dy=0.0)
-    with refused(InputError, "-1.0", "metres"):
-        Leg(dx=0.0, dy=0.0, sigma=-1.0)
