@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import json
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
@@ -11,17 +12,25 @@ from semsig_gis.core.signature import Signature
 from semsig_gis.likelihood.explain import explain, explain_cell
 from semsig_gis.likelihood.noise.model import NoiseSpec, named_noise
 
+if TYPE_CHECKING:
+    from semsig_gis.likelihood.explain import Explanation
+
 NOISE = NoiseSpec(detection=0.8, misnamed=0.05, clutter=1.0, bearing_sigma=4.0)
 TREE, LAMP = CODES[0], CODES[1]
 # North, east and south of the place, and one out of sight.
 WORLD = World(((0.0, 10.0, TREE), (20.0, 0.0, LAMP), (0.0, -15.0, TREE), (0.0, 99.0, TREE)))
-OBJECTS = WORLD.street_objects
-INDEX = ObjectIndex(OBJECTS.xy)
+
+
+def explained(query: Signature, world: World = WORLD, **options: Any) -> Explanation:  # noqa: ANN401
+    xy, noise = options.pop("xy", (0.0, 0.0)), options.pop("noise", NOISE)
+    objects = world.street_objects
+    index = ObjectIndex(objects.xy)
+    return explain(query, xy, noise, objects=objects, index=index, **options)
 
 
 def test_every_verdict() -> None:
     query = Signature(np.array([TREE, TREE, LAMP]), np.array([357.0, 92.0, 300.0]))
-    found = explain(query, (0.0, 0.0), NOISE, objects=OBJECTS, index=INDEX)
+    found = explained(query)
     rows = found.to_dict()["rows"]
     assert [row["verdict"] for row in rows] == ["matched", "misnamed", "false", "missed"]
     assert [row["object"] for row in rows] == [0, 1, None, 2]
@@ -36,14 +45,12 @@ def test_every_verdict() -> None:
     assert json.loads(json.dumps(found.to_dict()))["x"] == 0.0
     shapes = found.table.geometry
     assert shapes.isna().tolist() == [False, False, True, False]
-    assert found.table.crs == OBJECTS.crs
+    assert found.table.crs == WORLD.street_objects.crs
 
 
 def test_chances_are_those_of_one_pair() -> None:
     world = World(((0.0, 10.0, TREE), (0.0, -500.0, LAMP)))
-    objects = world.street_objects
-    query = Signature(np.array([TREE]), np.array([8.0]))
-    found = explain(query, (0.0, 0.0), NOISE, objects=objects, index=ObjectIndex(objects.xy))
+    found = explained(Signature(np.array([TREE]), np.array([8.0])), world)
     density = np.exp(-0.5 * 4.0) / (4.0 * np.sqrt(2 * np.pi))
     weight = 0.8 / 0.2 * 0.95 * density / (0.5 / 360)
     assert found.table["chance"].iloc[0] == pytest.approx(weight / (1 + weight), rel=1e-6)
@@ -53,18 +60,14 @@ def test_chances_are_those_of_one_pair() -> None:
 
 def test_no_object_is_matched_twice() -> None:
     lamps = World(((0.0, 10.0, LAMP), (1.0, 10.0, LAMP)))
-    objects = lamps.street_objects
     query = Signature(np.array([LAMP, LAMP]), np.array([2.0, 3.0]))
-    found = explain(
-        query, (0.0, 0.0), named_noise("light"), objects=objects, index=ObjectIndex(objects.xy)
-    )
+    found = explained(query, lamps, noise=named_noise("light"))
     assert sorted(found.table["object"].tolist()) == [0, 1]
     assert found.counts["matched"] == 2
 
 
 def test_a_query_of_unknown_classes_that_is_turned() -> None:
-    query = Signature(None, np.array([350.0, 80.0]))
-    found = explain(query, (0.0, 0.0), NOISE, objects=OBJECTS, index=INDEX, heading=10.0)
+    found = explained(Signature(None, np.array([350.0, 80.0])), heading=10.0)
     assert found.table["verdict"].tolist() == ["matched", "matched", "missed"]
     assert found.table["query_class"].tolist()[:2] == ["unknown", "unknown"]
     assert found.table["query_bearing"].tolist()[:2] == [0.0, 90.0]
@@ -72,8 +75,7 @@ def test_a_query_of_unknown_classes_that_is_turned() -> None:
 
 
 def test_where_nothing_is_seen_all_is_false() -> None:
-    query = Signature(np.array([TREE]), np.array([0.0]))
-    found = explain(query, (500.0, 500.0), NOISE, objects=OBJECTS, index=INDEX)
+    found = explained(Signature(np.array([TREE]), np.array([0.0])), xy=(500.0, 500.0))
     assert found.counts == {"matched": 0, "misnamed": 0, "missed": 0, "false": 1}
     assert found.table["chance"].tolist() == [1.0]
 
@@ -83,10 +85,10 @@ def test_a_cell_is_explained_without_the_street_objects() -> None:
     cell = int(np.flatnonzero((database.xy == [5.0, 5.0]).all(axis=1))[0])
     query = database.signature(cell)
     found = explain_cell(query, cell, NOISE, database=database)
-    exact = explain(query, (5.0, 5.0), NOISE, objects=OBJECTS, index=INDEX)
+    exact = explained(query, xy=(5.0, 5.0))
     assert found.counts == exact.counts
     assert found.loglik == pytest.approx(exact.loglik, abs=0.1)
     assert found.table["object"].isna().all()
     apart = found.table.geometry.distance(exact.table.geometry)
     assert apart.max() < 0.2
-    assert found.table.crs == OBJECTS.crs
+    assert found.table.crs == WORLD.street_objects.crs

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from noisy_cells import TAXONOMY, random_database, random_query
+from noisy_cells import TAXONOMY, parts_of, random_database, random_query
 
 from semsig_gis.core.signature import Signature
 from semsig_gis.core.statistics import wilson_interval
@@ -32,10 +32,8 @@ def test_counts_add_up(seed: int) -> None:
     detected = [NOTHING]
     for cell in range(1, 20):
         query = random_query(database, seed + cell, size=cell % 7)
-        kept = query.codes != 0
-        assert query.codes is not None
-        assert query.bearings is not None
-        detected.append(Signature(query.codes[kept], query.bearings[kept]))
+        codes, bearings = parts_of(query)
+        detected.append(Signature(codes[codes > 0], bearings[codes > 0]))
     evidence = gather_evidence(views_in(database, np.arange(20)), detected, taxonomy=TAXONOMY)
     model = starting_model(evidence, position_sigma=2.0)
     counts = expected_counts(evidence, model)
@@ -81,7 +79,7 @@ def test_where_every_association_is_certain_the_intervals_are_the_text_books() -
     seen = [
         Signature(views.codes[[row]], (views.bearings[[row]] + 1.0 - 2.0 * (row % 2)) % 360)
         if row % 10
-        else Signature(np.empty(0, np.uint8), np.empty(0))
+        else NOTHING
         for row in range(300)
     ]
     evidence = gather_evidence(views, seen, taxonomy=TAXONOMY)

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from noisy_cells import TAXONOMY, noise_specs, random_database
 
 from semsig_gis.core.signature import Signature
-from semsig_gis.likelihood.noise.model import NoiseSpec, named_noise
+from semsig_gis.likelihood.noise.model import NoiseMixture, NoiseSpec, named_noise
 from semsig_gis.likelihood.noise.table import database_tables, mean_table, noise_tables
 from semsig_gis.queries.paper_errors import distort, named_distortion
 
@@ -19,17 +19,10 @@ NAMES = ["alignment_tree", "street_light", "indicator"]
 
 def slow_named(spec: NoiseSpec, kind: int, name: int, length: int) -> float:
     """Return the chance of a name, one number at a time."""
-    row = spec.confusion.get(NAMES[kind])
-    shares = (
-        [row.get(one, 0.0) for one in NAMES]
-        if row
-        else [
-            1 - spec.misnamed_by_class.get(NAMES[kind], spec.misnamed)
-            if one == kind
-            else spec.misnamed_by_class.get(NAMES[kind], spec.misnamed) / (len(NAMES) - 1)
-            for one in range(len(NAMES))
-        ]
-    )
+    misnamed = spec.misnamed_by_class.get(NAMES[kind], spec.misnamed)
+    alike = dict.fromkeys(NAMES, misnamed / 2) | {NAMES[kind]: 1 - misnamed}
+    row = spec.confusion.get(NAMES[kind], alike)
+    shares = [row.get(one, 0.0) for one in NAMES]
     wrong = sum(share for one, share in enumerate(shares) if one != kind)
     right = shares[kind] * (1 - 1 / length) ** spec.misnamed_each
     right = 1 - min(max(1 - right, 1e-3), 0.95)
@@ -75,10 +68,9 @@ def test_the_levels_predict_what_the_distortion_does(level: str) -> None:
 
 @given(noise_specs(), noise_specs())
 def test_a_mean_lies_between_its_models(one: NoiseSpec, other: NoiseSpec) -> None:
-    both = [
-        noise_tables(spec, taxonomy=TAXONOMY, codes=CODES, longest=9)[0][0] for spec in (one, other)
-    ]
-    mean = mean_table((both[0], both[1]), np.array([0.25, 0.75]))
+    mixture = NoiseMixture(specs=(one, other), weights=(0.25, 0.75))
+    both, weights = noise_tables(mixture, taxonomy=TAXONOMY, codes=CODES, longest=9)
+    mean = mean_table(both, weights)
     for name in ("missed", "misnamed", "clutter", "sigma", "others"):
         values = [getattr(table, name) for table in both]
         found = getattr(mean, name)
