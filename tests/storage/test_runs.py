@@ -5,7 +5,7 @@ import shutil
 from typing import TYPE_CHECKING, Any
 
 import pytest
-from sentences import assert_sentence
+from sentences import refused
 
 from semsig_gis.core.errors import InputError
 from semsig_gis.storage.runs import RunKind, finish, partial_folder, read_json, write_json
@@ -53,9 +53,8 @@ def test_another_recipe_is_refused_or_replaces_a_run_without_results(
     folder: Path, other: dict[str, Any], difference: str
 ) -> None:
     for refuse in (RUN.begin, RUN.require_same):
-        with pytest.raises(InputError) as caught:
+        with refused(InputError, str(folder), f"differs in {difference};"):
             refuse(folder, other)
-        assert_sentence(caught.value, str(folder), f"differs in {difference};")
     (folder / "part_1").unlink()
     (folder / "letter.txt").touch()  # never thrown away
     with pytest.raises(InputError):
@@ -69,17 +68,15 @@ def test_another_recipe_is_refused_or_replaces_a_run_without_results(
 def test_what_is_not_a_run_is_not_taken_for_one(folder: Path, text: str | None) -> None:
     recipe = folder / "recipe.json"
     recipe.unlink() if text is None else recipe.write_text(text, encoding="utf-8")
-    with pytest.raises(InputError) as caught:
+    with refused(InputError, str(folder), "'part_1'", "no results of a trial"):
         RUN.begin(folder, RECIPE)
-    assert_sentence(caught.value, str(folder), "'part_1'", "no results of a trial")
 
 
 def test_a_folder_that_cannot_be_written_to(tmp_path: Path) -> None:
     (tmp_path / "file").touch()
     for place in (tmp_path / "file", tmp_path / "file" / "out"):
-        with pytest.raises(InputError) as caught:
+        with refused(InputError, str(place), "Not a directory", "choose a"):
             RUN.begin(place, RECIPE)
-        assert_sentence(caught.value, str(place), "Not a directory", "choose a")
 
 
 def test_a_run_is_abandoned_only_without_results(folder: Path) -> None:
@@ -94,9 +91,8 @@ def test_a_finished_run_is_renamed_to_its_place(folder: Path) -> None:
     assert not folder.exists()
     assert {path.name for path in out.iterdir()} == {"recipe.json", "part_1"}
     shutil.copytree(out, folder)
-    with pytest.raises(InputError) as caught:
+    with refused(InputError, str(folder), "run the same command again"):
         finish(folder)
-    assert_sentence(caught.value, str(folder), "run the same command again")
     assert finish(folder, keep={"part_1"}) == out
     assert [path.name for path in out.iterdir()] == ["part_1"]
     assert [path.name for path in out.parent.iterdir()] == ["out"]

@@ -1,0 +1,248 @@
+from __future__ import annotations
+
+import errno
+import json
+import random
+from typing import TYPE_CHECKING, Any, NoReturn
+
+import geopandas as gpd
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+import pytest
+import shapely
+from hypothesis import given
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
+from pyproj import CRS
+from sentences import assert_sentence, refused
+
+from semsig_gis.core.errors import DatabaseError
+from semsig_gis.storage.geoparquet import (
+    bounds_column,
+    each_bounds,
+    geo_metadata,
+    groups_meeting,
+    hilbert_order,
+    points_to_wkb,
+    read_geoparquet,
+    rows_meeting,
+    write_geoparquet,
+)
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from numpy.typing import NDArray
+
+NUMBERS = list(range(0, 900, 3))
+TEXTS = [f"café {number}" for number in NUMBERS]
+LISTS = [[number % 7, 7_199] * (number % 4) for number in NUMBERS]
+SPECS = {"kind": "sample"}
+LAMBERT = CRS(2154).to_json_dict()
+POINTS = [shapely.Point(700_000 + number, 6_600_000 - number) for number in NUMBERS]
+
+
+def write_example(path: Path, *, specs: Any = SPECS, crs: Any = LAMBERT) -> Path:  # noqa: ANN401
+    table = pa.table(
+        {
+            "number": pa.array(NUMBERS, pa.int32()),
+            "text": TEXTS,
+            "list": pa.array(LISTS, pa.list_(pa.uint16())),
+            "geometry": pa.array(shapely.to_wkb(POINTS), pa.binary()),
+        }
+    )
+    bounds = shapely.total_bounds(POINTS).tolist()
+    geo = geo_metadata(CRS(2154), geometry_types=["Point"], bounds=bounds)
+    geo["columns"]["geometry"]["crs"] = crs
+    write_geoparquet(table, path, geo=geo, specs=specs)
+    return path
+
+
+@pytest.fixture
+def example(tmp_path: Path) -> Path:
+    return write_example(tmp_path / "example.parquet")
+
+
+@given(st.lists(st.tuples(*[st.floats(allow_nan=False)] * 2)))
+def test_points_are_the_bytes_that_shapely_writes(places: list[tuple[float, float]]) -> None:
+    xy = np.array(places).reshape(-1, 2)
+    column = points_to_wkb(xy)
+    assert column.type == pa.binary()
+    points = np.asarray(shapely.points(xy))
+    assert column.to_pylist() == [shapely.to_wkb(point, byte_order=1) for point in points]
+
+
+def test_what_is_written_is_read_again(example: Path) -> None:
+    table, specs, crs = read_geoparquet(example, kind="sample")
+    assert table["number"].to_pylist() == NUMBERS
+    assert table["text"].to_pylist() == TEXTS
+    assert table["list"].to_pylist() == LISTS
+    assert specs == {"kind": "sample"}
+    assert crs == CRS(2154)
+    some, _, _ = read_geoparquet(example, kind="sample", columns=["text"])
+    assert some.column_names == ["text"]
+
+
+def test_geopandas_reads_the_file(example: Path) -> None:
+    frame = gpd.read_parquet(example)
+    assert frame.crs == CRS(2154)
+    assert frame.geometry.tolist() == POINTS
+    assert frame["number"].tolist() == NUMBERS
+    assert frame["text"].tolist() == TEXTS
+    assert [row.tolist() for row in frame["list"]] == LISTS
+    metadata = json.loads(pq.read_metadata(example).metadata[b"geo"])
+    assert metadata["version"] == "1.1.0"
+    assert metadata["primary_column"] == "geometry"
+    column = metadata["columns"]["geometry"]
+    assert column["encoding"] == "WKB"
+    assert column["geometry_types"] == ["Point"]
+    assert column["bbox"] == list(shapely.total_bounds(POINTS))
+
+
+def test_pyarrow_alone_reads_a_column(example: Path) -> None:
+    assert pq.read_table(example, columns=["number"])["number"].to_pylist() == NUMBERS
+
+
+def test_a_file_cut_anywhere_is_an_error(example: Path) -> None:
+    content = example.read_bytes()
+    for size in range(0, len(content), 10):
+        example.write_bytes(content[:size])
+        with refused(DatabaseError, str(example), "make the sample file again"):
+            read_geoparquet(example, kind="sample")
+
+
+def test_a_flipped_bit_is_an_error_or_changes_nothing_that_is_read(example: Path) -> None:
+    content = example.read_bytes()
+    whole, _, _ = read_geoparquet(example, kind="sample")
+    chance = random.Random(0)  # noqa: S311
+    for _ in range(300):
+        broken = bytearray(content)
+        broken[chance.randrange(len(content))] ^= 1 << chance.randrange(8)
+        example.write_bytes(broken)
+        try:
+            table, _, _ = read_geoparquet(example, kind="sample", columns=whole.column_names)
+        except DatabaseError as error:
+            assert_sentence(error, str(example))
+        else:
+            assert table.equals(whole)
+
+
+def test_a_file_of_another_kind_is_named(example: Path) -> None:
+    with refused(DatabaseError, "is a sample file", "give a signature database file"):
+        read_geoparquet(example, kind="signature database")
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        *({"specs": specs} for specs in ([], ["kind"], "kind", 3, None, {"name": "x"})),
+        *({"crs": crs} for crs in (None, {}, {"type": "x"}, "EPSG:0", 7.5)),
+    ],
+)
+def test_a_file_with_specs_or_a_crs_of_another_kind_is_not_ours(
+    tmp_path: Path, change: dict[str, Any]
+) -> None:
+    path = write_example(tmp_path / "a.parquet", **change)
+    with refused(DatabaseError, "was not written by semsig"):
+        read_geoparquet(path, kind="sample")
+
+
+def test_a_geoparquet_file_of_another_program_is_not_ours(tmp_path: Path) -> None:
+    path = tmp_path / "a.parquet"
+    gpd.GeoDataFrame(geometry=POINTS, crs=2154).to_parquet(path)
+    with refused(DatabaseError, "was not written by semsig", "give a sample file"):
+        read_geoparquet(path, kind="sample")
+
+
+@pytest.mark.parametrize("content", [b"", b"PAR1", b"name = 'town'\n", b"PK\x03\x04" * 20])
+def test_a_file_that_is_not_parquet_is_an_error(tmp_path: Path, content: bytes) -> None:
+    path = tmp_path / "a.parquet"
+    path.write_bytes(content)
+    with refused(DatabaseError, str(path), "is damaged or is not a Parquet file"):
+        read_geoparquet(path, kind="sample")
+
+
+def test_a_missing_file_and_a_folder_are_told_apart(tmp_path: Path) -> None:
+    missing = (tmp_path / "a.parquet", tmp_path / ("a" * 300))
+    for path in missing:
+        with refused(DatabaseError, str(path), "does not exist"):
+            read_geoparquet(path, kind="sample")
+    with refused(DatabaseError, str(tmp_path), "is a folder"):
+        read_geoparquet(tmp_path, kind="sample")
+
+
+def test_a_file_that_may_not_be_read_is_not_called_damaged(
+    example: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def refuse(*_: object, **__: object) -> NoReturn:
+        raise PermissionError(errno.EACCES, "Failed to open local file")
+
+    monkeypatch.setattr(pq, "ParquetFile", refuse)
+    with refused(DatabaseError, str(example), "cannot be read (Permission denied)"):
+        read_geoparquet(example, kind="sample")
+
+
+def test_a_missing_column_is_named(example: Path) -> None:
+    with refused(DatabaseError, "lacks the column 'types'"):
+        read_geoparquet(example, kind="sample", columns=["number", "types"])
+
+
+def test_a_file_in_use_can_be_replaced(example: Path) -> None:
+    table, _, _ = read_geoparquet(example, kind="sample")
+    write_example(example, specs={"kind": "other"})
+    assert table["number"].to_pylist() == NUMBERS
+    assert read_geoparquet(example, kind="other")[1] == {"kind": "other"}
+
+
+BOUNDS = arrays(np.float64, st.tuples(st.integers(0, 9), st.just(4)), elements=st.floats(-1e8, 1e8))
+
+
+@given(bounds=BOUNDS)
+def test_bounds_are_rounded_outwards_by_less_than_they_are_long(
+    bounds: NDArray[np.float64],
+) -> None:
+    column = bounds_column(bounds)
+    found = np.stack([side.to_numpy() for side in column.flatten()], axis=1).astype(float)
+    assert found.shape == bounds.shape
+    assert (found[:, :2] <= bounds[:, :2]).all()
+    assert (found[:, 2:] >= bounds[:, 2:]).all()
+    assert (np.abs(found - bounds) <= np.spacing(np.abs(bounds).astype(np.float32))).all()
+
+
+def test_neighbours_in_the_order_are_neighbours_in_the_plane() -> None:
+    points = np.asarray(shapely.points(np.random.default_rng(0).uniform(0, 100, (2_000, 2))))
+    order = hilbert_order(points)
+    assert sorted(order.tolist()) == list(range(2_000))
+    steps = shapely.distance(points[order][1:], points[order][:-1])
+    assert np.median(steps) < 3
+    assert np.median(shapely.distance(points[1:], points[:-1])) > 40
+
+
+def test_equal_places_and_none_at_all_have_an_order() -> None:
+    assert hilbert_order(np.asarray(shapely.points([[3.0, 4.0]] * 5))).tolist() == [0, 1, 2, 3, 4]
+    assert hilbert_order(np.asarray(shapely.points(np.empty((0, 2))))).tolist() == []
+
+
+def test_groups_and_rows_that_may_meet_a_box_are_found(tmp_path: Path) -> None:
+    places = np.arange(12.0)[:, None] * [[10.0, 0.0, 10.0, 0.0]] + [[0, 0, 4, 4]]
+    table = pa.table({"bbox": bounds_column(places), "row": np.arange(12)})
+    pq.write_table(table, tmp_path / "a.parquet", row_group_size=3)
+    with pq.ParquetFile(tmp_path / "a.parquet") as file:
+        assert groups_meeting(file, (-9, -9, 999, 999)) == [0, 1, 2, 3]
+        assert groups_meeting(file, (31, 1, 32, 2)) == [1]
+        assert groups_meeting(file, (24, 4, 30, 9)) == [0, 1]  # at a corner and an edge
+        assert groups_meeting(file, (25, 1, 29, 2)) == []
+        assert groups_meeting(file, (31, 5, 32, 9)) == []
+    assert rows_meeting(table, (24, 4, 30, 9))["row"].to_pylist() == [2, 3]
+    assert np.concatenate(list(each_bounds(tmp_path / "a.parquet"))).tolist() == places.tolist()
+
+
+def test_a_file_without_bounds_may_meet_any_box(tmp_path: Path) -> None:
+    for column in (pa.array([1, 2]), pa.array([{"xmin": "a"}, None])):
+        table = pa.table({"bbox": column})
+        pq.write_table(table, tmp_path / "a.parquet")
+        with pq.ParquetFile(tmp_path / "a.parquet") as file:
+            assert groups_meeting(file, (0, 0, 1, 1)) == [0]
+        assert list(each_bounds(tmp_path / "a.parquet")) == []
+        assert rows_meeting(table, (0, 0, 1, 1)) == table
