@@ -34,7 +34,7 @@ SIDE = 200.0
 CHECKOUT = Path(distributed.__file__).parents[2]
 
 
-def some_town() -> World:
+def two_places() -> World:
     """Return two places of different size, some tiles apart."""
     rng = np.random.default_rng(11)
     places = np.concatenate([rng.uniform(0, 700, (1500, 2)), rng.uniform(1500, 1700, (100, 2))])
@@ -44,7 +44,7 @@ def some_town() -> World:
     )
 
 
-TOWN = some_town()
+TOWN = two_places()
 
 
 def build(folder: Path, name: str = "city", **options: object) -> dict[str, bytes]:
@@ -322,9 +322,6 @@ def test_a_full_disk_leaves_the_database_that_was_there(tmp_path: Path) -> None:
     assert "city.parquet" in one
     assert "tile_382_3137.parquet" in two
     assert same == ["True", "True"]
-
-
-# --- Options that cannot be used ---------------------------------------------------------------
 
 
 @pytest.mark.parametrize(

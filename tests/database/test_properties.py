@@ -31,60 +31,39 @@ def database() -> SignatureDatabase:
 
 def test_properties_by_hand(database: SignatureDatabase) -> None:
     facts = database_summary(database, file_bytes=1_500_000)
-    assert facts["signatures"] == 6
+    assert json.loads(json.dumps(facts, allow_nan=False)) == facts
+    assert (facts["signatures"], facts["file_mb"], facts["crs"]) == (6, 1.5, "EPSG:2154")
     assert facts["mean_length"] == pytest.approx(10 / 6)
     assert facts["covered_km2"] == pytest.approx(0.0006)
-    assert facts["file_mb"] == 1.5
     assert (facts["radius_m"], facts["step_m"], facts["levels"]) == (30.0, 10.0, 16)
-    assert facts["crs"] == "EPSG:2154"
     assert facts["largest_type_group"] == {"types": "DD", "cells": 3}
-
-
-def test_occurrences_count_an_object_in_every_signature(database: SignatureDatabase) -> None:
-    facts = {one["symbol"]: one for one in database_summary(database)["occurrences"]}
-    assert len(facts) == 12
-    assert (facts["D"]["number"], facts["B"]["number"], facts["z"]["number"]) == (7, 3, 0)
-    assert facts["D"]["share"] == pytest.approx(0.7)
-    assert sum(one["share"] for one in facts.values()) == pytest.approx(1)
+    assert facts["cell_bits"] == pytest.approx(math.log2(6))
+    # An object counts in every signature.
+    by_symbol = {one["symbol"]: one for one in facts["occurrences"]}
+    assert len(by_symbol) == 12
+    assert [by_symbol[symbol]["number"] for symbol in "DBz"] == [7, 3, 0]
+    assert by_symbol["D"]["share"] == pytest.approx(0.7)
+    assert sum(one["share"] for one in facts["occurrences"]) == pytest.approx(1)
+    # Cells by their number of D: three have 2, one has 1, two have none; of B: three, three.
+    bits = [by_symbol[symbol]["entropy_bits"] for symbol in "DBz"]
+    assert bits == pytest.approx([1 / 2 + math.log2(6) / 6 + math.log2(3) / 3, 1.0, 0.0])
 
 
 def test_group_statistics_by_hand(database: SignatureDatabase) -> None:
     groups = database_summary(database)["groups"]
-    by_type = groups["type"]  # sizes 3, 1, 2
+    by_type, both = groups["type"], groups["both"]  # sizes 3, 1, 2 and 2, 1, 1, 2
     assert (by_type["count"], by_type["min"], by_type["max"]) == (3, 1, 3)
-    assert by_type["mean"] == pytest.approx(2)
-    assert by_type["std"] == pytest.approx(1)  # of a sample
+    assert (by_type["mean"], by_type["std"]) == pytest.approx((2, 1))  # of a sample
     assert (by_type["25%"], by_type["50%"], by_type["75%"]) == (1.5, 2, 2.5)
     assert by_type["alone"] == pytest.approx(1 / 6)
+    bits = 1 / 2 + math.log2(6) / 6 + math.log2(3) / 3
+    assert by_type["entropy_bits"] == pytest.approx(bits)
     assert groups["angle"]["count"] == 3  # sizes 3, 1, 2
-    assert groups["both"]["count"] == 4  # sizes 2, 1, 1, 2
-    assert groups["both"]["alone"] == pytest.approx(2 / 6)
-    assert groups["both"]["max"] == 2
-
-
-def test_the_summary_is_strict_json(database: SignatureDatabase) -> None:
-    facts = database_summary(database)
-    assert json.loads(json.dumps(facts, allow_nan=False)) == facts
-
-
-def test_a_single_group_has_no_deviation(database: SignatureDatabase) -> None:
-    groups = database_summary(database.select(slice(1)))["groups"]
-    assert groups["both"]["std"] is None
-    assert groups["both"]["entropy_bits"] == 0
-
-
-def test_entropy_by_hand(database: SignatureDatabase) -> None:
-    facts = database_summary(database)
-    by_symbol = {one["symbol"]: one["entropy_bits"] for one in facts["occurrences"]}
-    # Cells by their number of D: three have 2, one has 1, two have none.
-    assert by_symbol["D"] == pytest.approx(1 / 2 + math.log2(6) / 6 + math.log2(3) / 3)
-    # By their number of B: three have none, three have one.
-    assert by_symbol["B"] == pytest.approx(1.0)
-    assert by_symbol["z"] == 0
-    assert facts["cell_bits"] == pytest.approx(math.log2(6))
-    groups = facts["groups"]
-    assert groups["type"]["entropy_bits"] == pytest.approx(by_symbol["D"])  # 3, 1, 2 too
-    assert groups["both"]["entropy_bits"] == pytest.approx(2 / 3 * math.log2(3) + math.log2(6) / 3)
+    assert (both["count"], both["max"]) == (4, 2)
+    assert both["alone"] == pytest.approx(2 / 6)
+    assert both["entropy_bits"] == pytest.approx(2 / 3 * math.log2(3) + math.log2(6) / 3)
+    single = database_summary(database.select(slice(1)))["groups"]["both"]
+    assert (single["std"], single["entropy_bits"]) == (None, 0)
 
 
 def test_how_it_was_made_is_told(database: SignatureDatabase) -> None:
