@@ -193,11 +193,11 @@ class SearchOptions:
 
             parts.append(raster_prior(database, self.popularity))
         if self.require is not None:
-            from semsig_gis.database.requirement import PatternIndex, Requirement
+            from semsig_gis.database.requirement import Requirement
             from semsig_gis.likelihood.priors import weight_prior
 
             requirement = Requirement.parse(self.require, database.taxonomy)
-            met = PatternIndex.build(database.type_sequences).meeting(requirement)
+            met = requirement.met(database.type_sequences)
             parts.append(weight_prior(database, met.astype(float)))
         return sum(parts[1:], parts[0]) if parts else None
 

@@ -29,10 +29,9 @@ def database_summary(
     database : SignatureDatabase
         The database.
     file_bytes : int, optional
-        Size of its file in bytes, where it has one.
+        Size of its file in bytes.
     object_counts : mapping of int to int, optional
-        How many objects of each class code it was made of, where they are at hand; a code that
-        is not there has none.
+        How many objects of each class code it was made of.
 
     Returns
     -------
@@ -68,13 +67,7 @@ def database_summary(
 
     Examples
     --------
-    >>> from semsig_gis.sources.catalog import paper_taxonomy
-    >>> from semsig_gis.database.build import build_database
-    >>> from semsig_gis.objects.clean import build_objects
-    >>> from semsig_gis.sources.synthetic.city import CitySpec, synthetic_city
-    >>> layers = synthetic_city(CitySpec(size=300.0))
-    >>> objects, _ = build_objects(layers, taxonomy=paper_taxonomy(), crs="EPSG:32631")
-    >>> facts = database_summary(build_database(objects))
+    >>> facts = database_summary(demo_database)
     >>> facts["groups"]["type"]["count"] <= facts["signatures"]
     True
     """

@@ -1,8 +1,4 @@
-"""What a place must show: cells grouped by the objects they see, whatever their order.
-
-A person often knows a few things for sure, "a bus stop and two trees, and no taxi rank". Cells
-that see the same classes equally often form a group, so such a demand is checked once a group.
-"""
+"""What a place must show: "a bus stop and two trees, and no taxi rank"."""
 
 from __future__ import annotations
 
@@ -15,12 +11,12 @@ import numpy as np
 
 from semsig_gis.core.errors import InputError
 from semsig_gis.core.taxonomy import WILDCARD
-from semsig_gis.database.sequences import SequenceTable
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from semsig_gis.core.taxonomy import Taxonomy
+    from semsig_gis.database.sequences import SequenceTable
 
 _ANY = "?"
 _COMPARISON = re.compile(r"(\S)\s*(>=|<=|=)\s*(\d+)")
@@ -60,51 +56,18 @@ class Requirement:
                 raise InputError(msg)
         return cls(tuple((code, low, high) for code, (low, high) in limits.items()))
 
-
-@dataclass(frozen=True, eq=False)
-class PatternIndex:
-    """Cells grouped by how often they see each class.
-
-    `sequences` has the distinct type sequences of the cells. `groups` has the same sequences as
-    rows, each with its objects in the order of their codes, so that its distinct sequences are the
-    groups.
-    """
-
-    sequences: SequenceTable
-    groups: SequenceTable
-
-    @classmethod
-    def build(cls, sequences: SequenceTable) -> Self:
-        """Group the cells of a table such as `SignatureDatabase.type_sequences`."""
+    def met(self, sequences: SequenceTable) -> NDArray[np.bool_]:
+        """Tell which cells meet it, shape (n,), by their distinct type sequences."""
         counts = sequences.histogram
-        values = np.tile(np.arange(counts.shape[1], dtype=np.uint8), len(sequences))
-        ordered = np.repeat(values, counts.ravel())
-        return cls(sequences, SequenceTable.from_csr(ordered, sequences.offsets))
-
-    def __len__(self) -> int:
-        """Return the number of groups."""
-        return len(self.groups)
-
-    @property
-    def cells(self) -> NDArray[np.int64]:
-        """How many cells each group has, shape (g,)."""
-        sizes = np.zeros(len(self), np.int64)
-        np.add.at(sizes, self.groups.inverse, self.sequences.counts)
-        return sizes
-
-    def meeting(self, requirement: Requirement) -> NDArray[np.bool_]:
-        """Tell which cells meet a requirement, shape (n,)."""
-        counts = self.groups.histogram
-        met = np.ones(len(self), np.bool_)
-        for code, least, most in requirement.limits:
+        met = np.ones(len(sequences), np.bool_)
+        for code, least, most in self.limits:
+            seen = np.zeros(len(sequences), np.int64)
             if code == WILDCARD:
-                seen = self.groups.lengths
+                seen = sequences.lengths
             elif code < counts.shape[1]:
                 seen = counts[:, code].astype(np.int64)
-            else:
-                seen = np.zeros(len(self), np.int64)
             met &= (seen >= least) & (seen <= most)
-        return np.asarray(met[self.groups.inverse][self.sequences.inverse])
+        return np.asarray(met[sequences.inverse])
 
 
 def _read(part: str, text: str) -> tuple[str, int, float]:

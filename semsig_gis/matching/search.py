@@ -24,7 +24,6 @@ from semsig_gis.database.answer import (
 )
 from semsig_gis.database.database import join_databases, rows_of_result
 from semsig_gis.database.file import PartitionedDatabase
-from semsig_gis.database.requirement import PatternIndex
 from semsig_gis.matching.method import DEFAULT_METHOD
 from semsig_gis.matching.scores import score_cells, score_parts
 from semsig_gis.matching.ties import top_candidates
@@ -118,7 +117,7 @@ class DistanceLocator:
             if self.requirement is None:
                 shortlist.add(part, scores)
                 continue
-            met = PatternIndex.build(part.type_sequences).meeting(self.requirement)
+            met = self.requirement.met(part.type_sequences)
             if met.any():
                 shortlist.add(part.select(met), scores[met])
         _require_present(query, shortlist.present, part.taxonomy)

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from semsig_gis.core.errors import InputError, UnknownNameError
 from semsig_gis.core.taxonomy import WILDCARD
-from semsig_gis.database.requirement import PatternIndex, Requirement
+from semsig_gis.database.requirement import Requirement
 from semsig_gis.database.sequences import SequenceTable
 from semsig_gis.matching.metrics import edit
 from semsig_gis.sources.catalog import paper_taxonomy
@@ -24,17 +24,9 @@ LIMIT = st.tuples(
 )
 
 
-def index_of(rows: list[list[int]]) -> PatternIndex:
+def table_of(rows: list[list[int]]) -> SequenceTable:
     flat = np.array([value for row in rows for value in row], np.uint8)
-    return PatternIndex.build(SequenceTable.from_csr(flat, np.cumsum([0, *map(len, rows)])))
-
-
-@given(ROWS)
-def test_groups_see_the_same_objects(rows: list[list[int]]) -> None:
-    index = index_of(rows)
-    sizes = Counter(tuple(sorted(row)) for row in rows)
-    groups = [tuple(index.groups[group].tolist()) for group in range(len(index))]
-    assert dict(zip(groups, index.cells.tolist(), strict=True)) == sizes
+    return SequenceTable.from_csr(flat, np.cumsum([0, *map(len, rows)]))
 
 
 @given(ROWS, st.lists(LIMIT, max_size=3))
@@ -45,7 +37,7 @@ def test_requirement_is_checked_as_if_cell_by_cell(
     for row in rows:
         seen = Counter(row) | Counter({WILDCARD: len(row)})
         expected.append(all(low <= seen[code] <= high for code, low, high in limits))
-    assert index_of(rows).meeting(Requirement(tuple(limits))).tolist() == expected
+    assert Requirement(tuple(limits)).met(table_of(rows)).tolist() == expected
 
 
 @pytest.mark.parametrize(
@@ -81,10 +73,10 @@ def test_parts_that_exclude_each_other_and_unknown_symbols() -> None:
 
 
 def test_a_pattern_finds_the_cells_that_it_may_mean() -> None:
-    index = index_of([[11, 1, 1], [11, 3, 1], [11, 1], [3, 3, 3]])
+    table = table_of([[11, 1, 1], [11, 3, 1], [11, 1], [3, 3, 3]])
     pattern = PAPER.encode("M?B")
-    (distances,) = edit.distances([pattern], index.sequences, wildcard=WILDCARD)
-    fits = distances[index.sequences.inverse] == 0
+    (distances,) = edit.distances([pattern], table, wildcard=WILDCARD)
+    fits = distances[table.inverse] == 0
     assert fits.tolist() == [True, True, False, False]
-    met = index.meeting(Requirement.parse("2B", PAPER))
+    met = Requirement.parse("2B", PAPER).met(table)
     assert (fits & met).tolist() == [True, False, False, False]

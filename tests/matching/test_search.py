@@ -21,7 +21,7 @@ from worlds import random_town
 from semsig_gis.core.errors import EmptyResultError, InputError
 from semsig_gis.core.signature import Signature
 from semsig_gis.database.file import PartitionedDatabase, open_database, save_database
-from semsig_gis.database.requirement import PatternIndex, Requirement
+from semsig_gis.database.requirement import Requirement
 from semsig_gis.matching.method import Method
 from semsig_gis.matching.scores import score_cells
 from semsig_gis.matching.search import DistanceLocator, localize
@@ -261,7 +261,7 @@ def test_a_requirement_leaves_cells_out_and_changes_nothing_else(seed: int, text
     cell = int(np.random.default_rng(seed).integers(len(TOWN)))
     requirement = Requirement.parse(text, TOWN.taxonomy)
     everything = localize(TOWN, TOWN.signature(cell), top=len(TOWN)).candidates
-    met = PatternIndex.build(TOWN.type_sequences).meeting(requirement)
+    met = requirement.met(TOWN.type_sequences)
     wanted = everything[met[everything["cell"].to_numpy()]]
     if wanted.empty:
         with pytest.raises(EmptyResultError):
