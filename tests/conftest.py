@@ -122,6 +122,15 @@ def qgis_process() -> Path:
 
 
 @pytest.fixture
+def qgis_python(qgis_process: Path) -> str:  # noqa: ARG001
+    """Return QGIS's own Python."""
+    python = shutil.which("python3", path=os.defpath)
+    if python is None:
+        unavailable("qgis", "the system has no Python, in which QGIS could run")
+    return python
+
+
+@pytest.fixture
 def qgis_environment(tmp_path: Path) -> dict[str, str]:
     """Return a clean environment for QGIS, without a screen and with a profile of its own."""
     # Nothing is inherited: our PYTHONPATH, GDAL_DATA or PROJ_LIB would crash QGIS's own Python.

@@ -30,14 +30,13 @@ from pyproj import CRS
 from sentences import assert_sentence
 from small_city import small_city, small_evaluation, small_localization, small_location
 
-from conftest import unavailable
 from semsig_gis.core.errors import InputError
 from semsig_gis.core.grid import GridSpec
 from semsig_gis.core.signature import SignatureSpec, quantize
 from semsig_gis.core.signs import class_signs
 from semsig_gis.core.taxonomy import ObjectClass, Taxonomy
 from semsig_gis.database.build import build_database
-from semsig_gis.exports import export_answer, export_database, layers
+from semsig_gis.exports import export_answer, export_database
 from semsig_gis.exports.styles import CLASS_MARKERS, by_class
 from semsig_gis.objects.clean import build_objects
 from semsig_gis.objects.table import Licence, StreetObjects
@@ -81,9 +80,7 @@ def file(
 ) -> Path:
     """Return a GeoPackage with the cells and the objects."""
     path = tmp_path_factory.mktemp("exported") / "city.gpkg"
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(layers, "ROWS_A_BLOCK", 100)
-        export_database(database, path, objects=objects)
+    export_database(database, path, objects=objects)
     return path
 
 
@@ -158,17 +155,11 @@ def test_objects_read_back_as_they_are(objects: StreetObjects, file: Path) -> No
     assert len(read) == len(objects) > 100
     for feature, (_, row) in zip(read, objects.table.iterrows(), strict=True):
         item = objects.taxonomy.by_code(row["class_code"])
-        properties = dict(feature.properties)
-        assert properties.pop("class_code") == item.code
-        assert properties == {
-            "symbol": item.symbol,
-            "class_name": item.name,
-            "title": item.title,
-            "source": row["source"],
-            "source_id": row["source_id"],
-            "count": row["count"],
-        }
-        assert properties["title"].startswith(FORMULA)
+        assert item.title.startswith(FORMULA)
+        assert tuple(feature.properties.values()) == (
+            *(item.code, item.symbol, item.name, item.title),
+            *row[["source", "source_id", "count"]],
+        )
         assert feature.geometry.coordinates == (row.geometry.x, row.geometry.y)
 
 
@@ -222,14 +213,8 @@ def test_points_in_a_crs_of_its_own(database: SignatureDatabase, tmp_path: Path)
     assert np.array_equal(shapely.get_coordinates(cells.geometry.array), database.xy)
 
 
-def test_progress(
-    database: SignatureDatabase,
-    objects: StreetObjects,
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_progress(database: SignatureDatabase, objects: StreetObjects, tmp_path: Path) -> None:
     steps: list[tuple[int, int]] = []
-    monkeypatch.setattr(layers, "ROWS_A_BLOCK", 100)
     export_database(
         database,
         tmp_path / "city.gpkg",
@@ -461,15 +446,6 @@ import sys
 from qgis.core import QgsSimpleMarkerSymbolLayerBase as Markers
 print([name for name in sys.argv[1:] if not Markers.decodeShape(name)[1]])
 """
-
-
-@pytest.fixture
-def qgis_python(qgis_process: Path) -> str:  # noqa: ARG001
-    """Return QGIS's own Python."""
-    python = shutil.which("python3", path=os.defpath)
-    if python is None:
-        unavailable("qgis", "the system has no Python, in which QGIS could run")
-    return python
 
 
 def test_qgis_knows_every_shape(qgis_python: str, qgis_environment: dict[str, str]) -> None:

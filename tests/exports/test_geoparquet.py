@@ -16,15 +16,9 @@ from small_city import small_city
 from semsig_gis.core.errors import DatabaseError
 from semsig_gis.database.file import open_database
 from semsig_gis.exports import export_database
-from semsig_gis.exports import layers as _layers
 
 if TYPE_CHECKING:
     from pathlib import Path
-
-
-@pytest.fixture(autouse=True)
-def _several_blocks(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(_layers, "ROWS_A_BLOCK", 100)
 
 
 def test_cells_read_back_as_they_are(tmp_path: Path) -> None:
