@@ -30,7 +30,6 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from semsig_gis.database.database import SignatureDatabase
-    from semsig_gis.matching.search import Localization
 
 
 TOWN = random_town().database
@@ -145,7 +144,14 @@ def in_parts(database: SignatureDatabase, owner: NDArray[np.int64], folder: str)
     return PartitionedDatabase(tuple(files), len(database))
 
 
-def assert_same_answer(one: Localization, other: Localization) -> None:
+def assert_same_answer(
+    parted: Any,  # noqa: ANN401
+    whole: SignatureDatabase,
+    query: Signature,
+    method: Method,
+    top: int,
+) -> None:
+    one, other = (localize(cells, query, method=method, top=top) for cells in (parted, whole))
     pd.testing.assert_frame_equal(one.candidates, other.candidates)
     assert one.to_dict() == other.to_dict()
 
@@ -182,10 +188,7 @@ def test_a_database_in_parts_answers_as_in_one_piece(
         )
     with tempfile.TemporaryDirectory() as folder:
         parted = in_parts(whole, rng.integers(0, parts, count), folder)
-        assert_same_answer(
-            localize(parted, query, method=method, top=top),
-            localize(whole, query, method=method, top=top),
-        )
+        assert_same_answer(parted, whole, query, method, top=top)
 
 
 def test_the_gate_of_the_second_stage_is_that_of_all_parts(tmp_path: Path) -> None:
@@ -196,10 +199,7 @@ def test_the_gate_of_the_second_stage_is_that_of_all_parts(tmp_path: Path) -> No
         parted = in_parts(whole, rng.integers(0, 4, 60), str(tmp_path))
         for keep in (1, 10, 50):
             query, method = whole.signature(seed), Method(keep=keep)
-            assert_same_answer(
-                localize(parted, query, method=method, top=60),
-                localize(whole, query, method=method, top=60),
-            )
+            assert_same_answer(parted, whole, query, method, top=60)
 
 
 @pytest.mark.parametrize("text", ["edit+edit:2%:raw:weights=40/50/60", "histogram+edit:2%:raw"])
@@ -215,10 +215,7 @@ def test_on_a_large_raw_scale_parts_rank_the_cells_beyond_the_second_stage_alike
     parted = in_parts(whole, rng.integers(0, 3, 200), str(tmp_path))
     for cell in (0, 100):
         query, method = whole.signature(cell), Method.parse(text)
-        assert_same_answer(
-            localize(parted, query, method=method, top=200),
-            localize(whole, query, method=method, top=200),
-        )
+        assert_same_answer(parted, whole, query, method, top=200)
 
 
 def test_one_part_at_a_time_is_in_memory(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
