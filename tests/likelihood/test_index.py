@@ -58,28 +58,26 @@ def bin_density(bearing: float, seen: float, sigma: float) -> float:
     return total / BIN_DEGREES
 
 
-def slow_loglik(index: LikelihoodIndex, query: Signature, cell: int, turn: float = 0.0) -> float:
+def slow_loglik(index: LikelihoodIndex, query: Signature, cell: int) -> float:
     """Return the formula of one cell, one number at a time, without steps."""
     table, database = index.table, index.database
-    assert query.bearings is not None
     part = slice(database.offsets[cell], database.offsets[cell + 1])
     length = min(int(database.lengths[cell]), len(table.missed) - 1)
     kinds = table.row_of[database.codes[part]].tolist()
     sigmas = table.sigmas(database.reach)[kinds, database.distance_units[part]].tolist()
     bearings = (database.bearings[part] + 0.025).tolist()  # the middle of a unit
-    total = -float(table.clutter.sum())
-    for kind in kinds:
-        total += math.log(table.missed[length, kind])
-    for name, seen in zip(table.query_rows(query).tolist(), query.bearings.tolist(), strict=True):
+    total = sum(math.log(table.missed[length, kind]) for kind in kinds) - table.clutter.sum()
+    names, seen_at = table.query_rows(query), parts_of(query)[1]
+    for name, seen in zip(names.tolist(), seen_at.tolist(), strict=True):
         density = alone = table.density[name]
         for kind, bearing, sigma in zip(kinds, bearings, sigmas, strict=True):
             missed = table.missed[length, kind]
             chance = 1.0 if name == len(table.codes) else table.named[length, kind, name]
             odds = (1 - missed) / missed * chance
-            density += odds * bin_density(bearing, (seen + turn) % 360.0, sigma)
+            density += odds * bin_density(bearing, seen, sigma)
         # A byte holds no more than what four objects in one direction add.
         total += min(math.log(density), math.log(alone) + 255 * index.step)
-    return total
+    return float(total)
 
 
 def slack(index: LikelihoodIndex, query: Signature) -> float:
@@ -87,43 +85,36 @@ def slack(index: LikelihoodIndex, query: Signature) -> float:
     return len(query) * (0.5 * index.step + 2.0**-9) + 1e-3
 
 
-def slow_counts(index: LikelihoodIndex, wanted: list[int], cell: int) -> float:
+def binomial(hits: int, number: int, chance: float) -> float:
+    return math.comb(number, hits) * chance**hits * (1 - chance) ** (number - hits)
+
+
+def poisson(number: int, rate: float) -> float:
+    return rate**number * math.exp(-rate) / math.factorial(number)
+
+
+def slow_counts(index: LikelihoodIndex, query: list[int], cell: int) -> float:
     """Return the likelihood of so many objects of each class, by sums over all hits."""
     table, database = index.table, index.database
     length = int(database.lengths[cell])
-    own = np.bincount(
-        table.row_of[database.codes[database.offsets[cell] : database.offsets[cell + 1]]],
-        minlength=len(table.codes),
-    ).tolist()
-    share = sum(wanted[:-1]) / sum(wanted)
-    detected = (1 - table.missed[length]).tolist()
+    codes = database.codes[database.offsets[cell] : database.offsets[cell + 1]]
+    own = np.bincount(table.row_of[codes], minlength=len(table.codes))
+    share = sum(query[:-1]) / sum(query)
+    detected = own * (1 - table.missed[length])
+    named, right = table.named[length], np.diag(table.named[length])
+    strays = share * (table.clutter + detected @ named - detected * right)
+    chances = share * (1 - table.missed[length]) * right
     total = 0.0
-    for name in range(len(own) if share else 0):
-        stray = share * (
-            table.clutter[name]
-            + sum(
-                own[kind] * detected[kind] * table.named[length, kind, name]
-                for kind in range(len(own))
-                if kind != name
+    if share:
+        for number, count, stray, chance in zip(query, own, strays, chances, strict=False):
+            each = (
+                binomial(hits, int(count), chance) * poisson(number - hits, stray)
+                for hits in range(min(count, number) + 1)
             )
-        )
-        hit = share * detected[name] * table.named[length, name, name]
-        total += math.log(
-            sum(
-                math.comb(own[name], hits)
-                * hit**hits
-                * (1 - hit) ** (own[name] - hits)
-                * stray ** (wanted[name] - hits)
-                * math.exp(-stray)
-                / math.factorial(wanted[name] - hits)
-                for hits in range(min(own[name], wanted[name]) + 1)
-            )
-        )
-    if wanted[-1]:
-        rate = (1 - share) * (
-            table.clutter.sum() + sum(n * p for n, p in zip(own, detected, strict=True))
-        )
-        total += wanted[-1] * math.log(rate) - rate - math.lgamma(wanted[-1] + 1)
+            total += math.log(sum(each))
+    if query[-1]:
+        rate = (1 - share) * float(table.clutter.sum() + detected.sum())
+        total += math.log(poisson(query[-1], rate))
     return total
 
 
@@ -142,8 +133,8 @@ def test_scores_are_the_formula_to_within_the_steps(seed: int, noise: Noise, siz
 
 def test_the_steps_hardly_change_the_order() -> None:
     database = random_database(5, cells=300)
-    index = build_index(database, named_noise("generic"))
-    query = Signature(*(getattr(database.signature(17), name) for name in ("codes", "bearings")))
+    index = build_index(database, NOISE)
+    query = database.signature(17)
     exact = [slow_loglik(index, query, cell) for cell in range(len(database))]
     found = index.scores(query).loglik
     first, second = (np.argsort(np.argsort(values)) for values in (exact, found))
@@ -205,10 +196,10 @@ def test_types_alone_are_compared_by_their_numbers(
     database = random_database(seed, cells=30)
     index = build_index(database, spec)
     query = Signature(np.array(codes, np.uint8), None)
-    wanted = np.bincount(index.table.query_rows(query), minlength=5).tolist()
+    counts = np.bincount(index.table.query_rows(query), minlength=5).tolist()
     found = index.scores(query).loglik
     for cell in range(len(database)):
-        assert found[cell] == pytest.approx(slow_counts(index, wanted, cell), rel=1e-4, abs=1e-3)
+        assert found[cell] == pytest.approx(slow_counts(index, counts, cell), rel=1e-4, abs=1e-3)
 
 
 def test_order_and_unknown_classes_do_not_matter() -> None:
