@@ -16,6 +16,7 @@ import numpy as np
 import pandas as pd
 
 from semsig_gis.core.errors import InputError
+from semsig_gis.core.geometry import signed_degrees
 from semsig_gis.core.grid import cell_ids
 from semsig_gis.database.answer import (
     REGION_SHARE,
@@ -635,5 +636,5 @@ def _headings(
     logs -= 0.5 * (turns / north_sigma) ** 2
     shares = np.exp(logs - np.logaddexp.reduce(logs, axis=1)[:, None])
     means = np.degrees(np.angle(shares @ np.exp(1j * np.radians(turns))))
-    away = (turns - means[:, None] + 180.0) % 360.0 - 180.0
+    away = signed_degrees(turns - means[:, None])
     return means, np.sqrt((shares * away**2).sum(axis=1) + TURN**2 / 12.0)

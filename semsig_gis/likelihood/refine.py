@@ -137,7 +137,7 @@ def refine(
     parts = np.asarray(cells[: KEPT[0]], dtype=np.float64)
     prior = np.zeros(len(parts)) if log_prior is None else np.asarray(log_prior)[: KEPT[0]]
     turned = np.zeros(len(parts)) if headings is None else np.asarray(headings)[: KEPT[0]]
-    done: list[tuple[NDArray[np.float64], ...]] = []
+    finished: list[tuple[NDArray[np.float64], ...]] = []
     for level, turn in enumerate(TURNS):
         parts = (parts[:, None] + CORNERS * (size / 4.0)).reshape(-1, 2)
         prior, turned = np.repeat(prior, 4), np.repeat(turned, 4)
@@ -162,9 +162,9 @@ def refine(
             best = np.argsort(-total, kind="stable")[: KEPT[level + 1]]
             divided[best] = total[best] > total[best[0]] + math.log(LEAST_CHANCE)
         columns = parts, np.full(len(parts), size), loglik, prior, turned, sigmas
-        done.append(tuple(column[~divided] for column in columns))
+        finished.append(tuple(column[~divided] for column in columns))
         parts, prior, turned = parts[divided], prior[divided], turned[divided]
-    places, sizes, loglik, prior, turned, sigmas = map(np.concatenate, zip(*done, strict=True))
+    places, sizes, loglik, prior, turned, sigmas = map(np.concatenate, zip(*finished, strict=True))
     weight = loglik + prior + 2.0 * np.log(sizes)
     chances = np.exp(weight - weight.max())
     return Refinement(

@@ -146,7 +146,7 @@ def expected_recall(
         msg = f"A recall at {percent} % was asked for; give a percentage above 0, at most 100."
         raise InputError(msg)
     # The small term keeps 0.07 * 100, which is just below 7, from being rounded down to 6.
-    kept = math.floor(percent * cells / 100 + 1e-9)
+    count = math.floor(percent * cells / 100 + 1e-9)
     low = np.asarray(rank_low, dtype=np.float64)
     high = np.asarray(rank_high, dtype=np.float64)
-    return np.asarray(np.clip((kept - (low - 1)) / (high - low + 1), 0.0, 1.0))
+    return np.asarray(np.clip((count - (low - 1)) / (high - low + 1), 0.0, 1.0))

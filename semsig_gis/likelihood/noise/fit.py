@@ -97,7 +97,7 @@ def gather_evidence(views: Views, detected: Sequence[Signature], *, taxonomy: Ta
     Raises `InputError` if there was nothing to see at all, or nothing was detected.
     """
     codes = np.concatenate([np.asarray(one.codes, dtype=np.uint8) for one in detected])
-    seen = np.concatenate([np.asarray(one.bearings, dtype=np.float64) for one in detected])
+    bearings = np.concatenate([np.asarray(one.bearings, dtype=np.float64) for one in detected])
     if len(views.codes) == 0 or len(codes) == 0:
         msg = (
             f"the {len(detected)} samples have {len(views.codes)} objects to see and {len(codes)} "
@@ -115,7 +115,7 @@ def gather_evidence(views: Views, detected: Sequence[Signature], *, taxonomy: Ta
         distances=views.distances,
         labels=np.searchsorted(classes, codes),
         givers=np.repeat(np.arange(len(detected)), np.diff(starts)),
-        pairs=near_pairs(views.offsets, views.bearings, starts, seen, reach=REACH),
+        pairs=near_pairs(views.offsets, views.bearings, starts, bearings, reach=REACH),
     )
 
 

@@ -10,6 +10,7 @@ import numpy as np
 
 from semsig_gis.core.errors import InputError, nearest_name
 from semsig_gis.core.taxonomy import WILDCARD
+from semsig_gis.database.answer import check_query
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -113,9 +114,7 @@ class NoiseTable:
 
         Raises `InputError` if the query is empty or has a class that the tables do not have.
         """
-        if len(query) == 0:
-            msg = "the query has no objects; give at least one type or bearing."
-            raise InputError(msg)
+        check_query(query)
         if query.codes is None:
             return np.full(len(query), len(self.codes))
         rows = self.row_of[query.codes]
