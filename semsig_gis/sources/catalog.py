@@ -261,12 +261,11 @@ def _catalog(content: dict[str, Any], where: str) -> Catalog:
         msg = f"{where}: {error}"
         raise CatalogError(msg) from error
     taxonomy = taxonomy.with_ranges(_ranges(content.get("ranges", {}), taxonomy, where))
-    shared = {
-        "license": content.get("license", "unknown"),
-        "attribution": content.get("attribution", ""),
-        "files": texts(content.get("files", []), "files", where),
-        "reader": content.get("reader", "vector_file"),
+    plain = {key: value for key, value in content.items() if CATALOG_KEYS[key] is str}
+    shared: dict[str, Any] = {
+        key: plain[key] for key in ("license", "attribution", "reader") if key in plain
     }
+    shared["files"] = texts(content.get("files", []), "files", where)
     layers = tuple(
         layer_of(item, where, taxonomy=taxonomy, shared=shared) for item in content["layers"]
     )
@@ -276,23 +275,15 @@ def _catalog(content: dict[str, Any], where: str) -> Catalog:
         what = f"two layers named {double!r}; rename one" if names else "no layer; add [[layers]]"
         msg = f"{where} has {what}."
         raise CatalogError(msg)
+    radii = _metres_by_class(
+        content.get("conflate", {}), taxonomy, f"{where}, conflate", most=MAX_MERGING_M
+    )
     return Catalog(
-        name=content["name"],
-        title=content["title"],
-        metric_crs=content.get("metric_crs"),
+        **plain,
         taxonomy=taxonomy,
         layers=layers,
-        url=content.get("url", ""),
-        reader=content.get("reader", "vector_file"),
         endpoints=texts(content.get("endpoints", []), "endpoints", where),
-        geocoder=content.get("geocoder"),
-        conflate=tuple(
-            _metres_by_class(
-                content.get("conflate", {}), taxonomy, f"{where}, conflate", most=MAX_MERGING_M
-            ).items()
-        ),
-        license=shared["license"],
-        attribution=shared["attribution"],
+        conflate=tuple(radii.items()),
     )
 
 
