@@ -9,11 +9,12 @@ import shutil
 import socket
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NoReturn
+from typing import TYPE_CHECKING, Any
 
 import hypothesis
 import pytest
 from browser_coverage import BrowserCoverage
+from optional import OPTIONAL, required, unavailable
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -33,17 +34,7 @@ hypothesis.settings.register_profile("semsig", plain)
 hypothesis.settings.register_profile("semsig-ci", plain, derandomize=True, print_blob=True)
 hypothesis.settings.load_profile("semsig-ci" if os.environ.get("CI") else "semsig")
 
-# What a machine may lack. A test that needs one of them skips, with the reason, unless the
-# environment variable SEMSIG_REQUIRE names it: then the missing thing is a failure.
-OPTIONAL = frozenset({"browser", "geodata", "qgis"})
-
 BROWSER_COVERAGE = BrowserCoverage()
-
-
-def required() -> frozenset[str]:
-    """Return the names that SEMSIG_REQUIRE lists, separated by commas."""
-    listed = os.environ.get("SEMSIG_REQUIRE", "").split(",")
-    return frozenset(name.strip() for name in listed if name.strip())
 
 
 def pytest_configure(config: pytest.Config) -> None:
@@ -52,16 +43,6 @@ def pytest_configure(config: pytest.Config) -> None:
     if unknown:
         msg = f"SEMSIG_REQUIRE names {sorted(unknown)}; it may name {sorted(OPTIONAL)}."
         raise pytest.UsageError(msg)
-
-
-def unavailable(name: str, reason: str) -> NoReturn:
-    """Skip the test, or fail it where SEMSIG_REQUIRE names the missing thing."""
-    if name not in OPTIONAL:
-        msg = f"{name!r} is not one of {sorted(OPTIONAL)}"
-        raise LookupError(msg)
-    if name in required():
-        pytest.fail(f"{reason} (SEMSIG_REQUIRE names {name})", pytrace=False)
-    pytest.skip(reason)
 
 
 def is_local(address: object) -> bool:

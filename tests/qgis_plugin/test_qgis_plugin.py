@@ -18,9 +18,9 @@ from xml.etree import ElementTree as ET
 import geopandas as gpd
 import pyogrio
 import pytest
+from optional import unavailable
 
 import semsig_gis
-from conftest import unavailable
 from semsig_gis.database.build import build_database
 from semsig_gis.database.file import open_database
 from semsig_gis.database.store import ObjectStore, save_with_store
