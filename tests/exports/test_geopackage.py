@@ -26,7 +26,6 @@ import rasterio
 import shapely
 from cells_told import told_of
 from map_pages import HOSTILE
-from optional import unavailable
 from pyproj import CRS
 from sentences import assert_sentence
 from small_city import small_city, small_evaluation, small_localization, small_location
