@@ -114,8 +114,8 @@ class NoiseTable:
 
         Raises `InputError` if the query is empty or has a class that the tables do not have.
         """
-        check_query(query)
-        if query.codes is None:
+        if query.codes is None or not query.codes.size:
+            check_query(query)
             return np.full(len(query), len(self.codes))
         rows = self.row_of[query.codes]
         if (rows < 0).any():
