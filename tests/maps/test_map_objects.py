@@ -124,6 +124,10 @@ def test_the_search_finds_names_cells_and_places(page: MapPage) -> None:
     page.open(objects_map(OBJECTS, database=CITY))
     offered = page.search(TITLE[:4].upper())
     assert f"{TITLE}\nall {COUNT:,}" in offered
+    page.ask("map.setZoom(20, {animate: false})")
+    page.search(TITLE, Keys.ENTER)
+    every = [place_of(number) for number in np.flatnonzero(OBJECTS.codes == CODE).tolist()]
+    assert page.ask("return arguments[0].every((at) => map.getBounds().contains(at))", every)
     offered = page.search(str(len(OBJECTS) - 1), Keys.ENTER)
     assert offered[0].startswith(f"{len(OBJECTS) - 1}\n")
     assert f"Identifier\t{len(OBJECTS) - 1}" in page.popup()
@@ -210,7 +214,7 @@ def test_light_and_dark(browser: Chrome, tmp_path: Path) -> None:
         browser.get((tmp_path / "frame.html").as_uri())
         browser.switch_to.frame(0)
         assert len(page.all(".semsig-dark")) == 1
-        page.one(".semsig-colours").send_keys(Keys.ENTER)
+        page.one(".semsig-colours").send_keys(Keys.SPACE)
         assert page.all(".semsig-dark") == []
         browser.switch_to.default_content()
         assert browser.get_log("browser") == []
