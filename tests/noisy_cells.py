@@ -15,6 +15,7 @@ from semsig_gis.core.grid import GridSpec
 from semsig_gis.core.signature import Signature, SignatureSpec
 from semsig_gis.database.database import BEARING_UNITS, SignatureDatabase
 from semsig_gis.likelihood.noise.model import NoiseMixture, NoiseSpec, named_noise
+from semsig_gis.queries.paper_errors import distort, named_distortion
 from semsig_gis.sources.catalog import paper_taxonomy
 
 if TYPE_CHECKING:
@@ -82,6 +83,12 @@ def random_query(database: SignatureDatabase, seed: int, *, size: int) -> Signat
     first = database.bearings[: database.offsets[1]]
     bearings[near] = (rng.choice(first, int(near.sum())) + 3.0) % 360.0
     return Signature(codes, bearings)
+
+
+def distorted(database: SignatureDatabase, cell: int, rng: np.random.Generator) -> Signature:
+    """Return the signature of a cell after the paper's light distortion."""
+    light = named_distortion("light")
+    return distort(database.signature(cell), light, classes=database.present_codes, rng=rng)
 
 
 def turned_query(query: Signature, turn: float) -> Signature:

@@ -97,15 +97,14 @@ class Pairs:
     """The pairs of an object and a detection that may be one thing, for several problems.
 
     The pairs of problem i are ``starts[i]:starts[i + 1]``. `objects` and `detections` are row
-    numbers that run on over all problems, and `counts` says how many of each there are. `away` is
-    the bearing of the detection less that of the object, in degrees in [-180, 180).
+    numbers that run on over all problems. `away` is the bearing of the detection less that of the
+    object, in degrees in [-180, 180).
     """
 
     starts: NDArray[np.int64]
     objects: NDArray[np.int64]
     detections: NDArray[np.int64]
     away: NDArray[np.float64]
-    counts: tuple[int, int]
 
 
 def near_pairs(
@@ -130,13 +129,7 @@ def near_pairs(
     away = signed_degrees(detection_bearings[detections] - object_bearings[objects])
     near = np.abs(away) <= reach
     starts = np.concatenate([[0], np.cumsum(np.bincount(problem[near], minlength=len(here)))])
-    return Pairs(
-        starts=starts,
-        objects=objects[near],
-        detections=detections[near],
-        away=away[near],
-        counts=(len(object_bearings), len(detection_bearings)),
-    )
+    return Pairs(starts=starts, objects=objects[near], detections=detections[near], away=away[near])
 
 
 def associate(
@@ -210,8 +203,8 @@ def associate_pairs(
         pairs.objects,
         pairs.detections,
         np.ascontiguousarray(weights, dtype=np.float64),
-        np.ones(pairs.counts[0]),
-        np.ones(pairs.counts[1]),
+        np.ones(pairs.objects.max(initial=-1) + 1),
+        np.ones(pairs.detections.max(initial=-1) + 1),
         chances,
         log_sums,
     )

@@ -35,13 +35,8 @@ if TYPE_CHECKING:
 
 def pairs_of(weights: np.ndarray) -> tuple[Pairs, np.ndarray]:
     one, other = np.nonzero(weights)
-    pairs = Pairs(
-        starts=np.array([0, len(one)]),
-        objects=one,
-        detections=other,
-        away=np.zeros(len(one)),
-        counts=weights.shape,
-    )
+    starts, away = np.array([0, len(one)]), np.zeros(len(one))
+    pairs = Pairs(starts=starts, objects=one, detections=other, away=away)
     return pairs, weights[one, other]
 
 

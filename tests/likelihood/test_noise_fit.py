@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from noisy_cells import TAXONOMY, parts_of, random_database, random_query
+from noisy_cells import TAXONOMY, distorted, parts_of, random_database, random_query
 
 from semsig_gis.core.signature import Signature
 from semsig_gis.core.statistics import wilson_interval
@@ -21,7 +21,6 @@ from semsig_gis.likelihood.noise.fit import (
     next_model,
     starting_model,
 )
-from semsig_gis.queries.paper_errors import distort, named_distortion
 
 NOTHING = Signature(np.empty(0, np.uint8), np.empty(0))
 
@@ -51,15 +50,7 @@ def test_counts_add_up(seed: int) -> None:
 def test_rounds_raise_the_likelihood() -> None:
     database = random_database(3, cells=60, longest=5)
     rng = np.random.default_rng(0)
-    detected = [
-        distort(
-            database.signature(cell),
-            named_distortion("light"),
-            classes=database.present_codes,
-            rng=rng,
-        )
-        for cell in range(60)
-    ]
+    detected = [distorted(database, cell, rng) for cell in range(60)]
     evidence = gather_evidence(views_in(database, np.arange(60)), detected, taxonomy=TAXONOMY)
     model = starting_model(evidence, position_sigma=0.0)
     before = -math.inf

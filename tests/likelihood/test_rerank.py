@@ -9,6 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from noisy_cells import (
+    distorted,
     every_association,
     mixtures,
     parts_of,
@@ -23,7 +24,6 @@ from semsig_gis.likelihood.index import build_index
 from semsig_gis.likelihood.noise.model import NoiseSpec, named_noise
 from semsig_gis.likelihood.noise.table import database_tables
 from semsig_gis.likelihood.rerank import align_cells, rerank
-from semsig_gis.queries.paper_errors import distort, named_distortion
 
 if TYPE_CHECKING:
     from semsig_gis.database.database import SignatureDatabase
@@ -181,12 +181,7 @@ def test_it_finds_more_than_the_index_alone() -> None:
     right = {"index": 0, "re-ranked": 0}
     for cell in range(60):
         rng = np.random.default_rng([cell, 5])
-        query = distort(
-            database.signature(cell),
-            named_distortion("light"),
-            classes=database.present_codes,
-            rng=rng,
-        )
+        query = distorted(database, cell, rng)
         if len(query) == 0:
             continue
         scores = index.scores(query)
