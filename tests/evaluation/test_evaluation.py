@@ -1,34 +1,22 @@
 from __future__ import annotations
 
 import itertools
-import json
 import math
-from dataclasses import replace
-from typing import TYPE_CHECKING, Any, NoReturn
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import pandas as pd
 import pytest
 from geopandas.testing import assert_geodataframe_equal
 from noisy_cells import database_of
-from pandas.testing import assert_frame_equal
 
-from semsig_gis.core.errors import DatabaseError, InputError, UnknownNameError
+from semsig_gis.core.errors import InputError, UnknownNameError
 from semsig_gis.evaluation.evaluate import evaluate
-from semsig_gis.evaluation.file import open_evaluation, save_evaluation
-from semsig_gis.likelihood.noise.model import NoiseSpec
 from semsig_gis.matching.method import Method
-from semsig_gis.matching.metrics.edit import EditWeights
 from semsig_gis.matching.scores import score_cells
 from semsig_gis.matching.ties import NEAR_PLACES, THRESHOLDS
-from semsig_gis.queries.distortions import Detector
-from semsig_gis.queries.draw import QuerySpec
 from semsig_gis.queries.paper_errors import DISTORTIONS, Distortion
-from semsig_gis.storage.geoparquet import read_geoparquet, write_geoparquet
 
 if TYPE_CHECKING:
-    from pathlib import Path
-
     from semsig_gis.database.database import SignatureDatabase
     from semsig_gis.evaluation.result import Evaluation
 
@@ -240,73 +228,6 @@ def test_progress_counts_every_query(city: SignatureDatabase) -> None:
 
 def test_the_time_is_that_of_the_matching(evaluation: Evaluation) -> None:
     assert 0 < evaluation.seconds_per_query < 1
-
-
-def test_saved_and_loaded_is_the_same(evaluation: Evaluation, tmp_path: Path) -> None:
-    method = Method(types="edit", angles="jaccard", alpha=0.3, weights=EditWeights(insert=2))
-    chain = (replace(ALL_MISSED, resort=False), Detector(noise=NoiseSpec(name="mine"), half=9.0))
-    asked = QuerySpec(number=9, seeds=(4, 2), seen_from="anywhere", distortions=chain)
-    changed = replace(evaluation, method=method, asked=asked, city="other.parquet")
-    save_evaluation(changed, tmp_path / "made" / "here")
-    loaded = open_evaluation(tmp_path / "made" / "here")
-    assert_geodataframe_equal(loaded.queries, changed.queries)
-    assert loaded.queries["error_m"].isin([math.inf]).any()
-    assert (loaded.method, loaded.asked) == (changed.method, changed.asked)
-    assert (loaded.top, loaded.city) == (changed.top, changed.city)
-    assert loaded.summary() == changed.summary()
-    assert_frame_equal(pd.DataFrame(loaded.by_length()), pd.DataFrame(changed.by_length()))
-
-
-def test_the_readable_file_is_strict_json(evaluation: Evaluation, tmp_path: Path) -> None:
-    def refuse(name: str) -> NoReturn:
-        raise AssertionError(name)
-
-    save_evaluation(evaluation, tmp_path)
-    text = (tmp_path / "evaluation.json").read_text(encoding="utf-8")
-    summary = evaluation.summary()
-    timing = summary.pop("timing")
-    assert json.loads(text, parse_constant=refuse) == summary
-    timed = (tmp_path / "timing.json").read_text(encoding="utf-8")
-    assert json.loads(timed, parse_constant=refuse) == timing
-    assert timing["seconds_per_query"] == evaluation.seconds_per_query
-    assert timing["machine"]["processors"] >= 1
-    assert sorted(path.name for path in tmp_path.iterdir()) == [
-        "evaluation.json",
-        "queries.parquet",
-        "timing.json",
-    ]
-    assert summary["settings"]["method"] == "edit+edit:20%"
-    assert summary["settings"]["distortions"] == ["light:bearing_sigma=0"]
-    assert summary["database"]["cells"] == 120
-    assert summary["results"]["recall_at_percent"]["10"] == evaluation.recall(10)
-    assert summary["versions"].keys() == {"semsig_gis", "python", "numpy", "pandas", "rapidfuzz"}
-
-
-def test_files_that_are_no_evaluation_are_refused(evaluation: Evaluation, tmp_path: Path) -> None:
-    with pytest.raises(DatabaseError, match="does not exist"):
-        open_evaluation(tmp_path / "nowhere")
-    save_evaluation(evaluation, tmp_path)
-    file = tmp_path / "queries.parquet"
-    content = file.read_bytes()
-    table, specs, crs = read_geoparquet(file, kind="localization evaluation")
-    geo = json.loads(table.schema.metadata[b"geo"])
-    assert crs == evaluation.queries.crs
-    write_geoparquet(table.drop_columns("p50"), file, geo=geo, specs=specs)
-    with pytest.raises(DatabaseError, match="lacks the column 'p50'"):
-        open_evaluation(tmp_path)
-    wrongs: list[dict[str, Any]] = [
-        {"method": "hamming+edit"},
-        {"asked": {**specs["asked"], "distortions": ["errors:1:unknown=2"]}},
-        {"asked": {"number": 3}},
-        {"method": 7},
-    ]
-    for wrong in wrongs:
-        write_geoparquet(table, file, geo=geo, specs=specs | wrong)
-        with pytest.raises(DatabaseError, match=r"is damaged .* evaluate again"):
-            open_evaluation(tmp_path)
-    file.write_bytes(content[: len(content) // 2])
-    with pytest.raises(DatabaseError, match="damaged"):
-        open_evaluation(tmp_path)
 
 
 @pytest.mark.parametrize(

@@ -1,23 +1,18 @@
 from __future__ import annotations
 
-import json
 import math
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
-import pandas as pd
 import pytest
-from geopandas.testing import assert_geodataframe_equal
 from noisy_cells import random_database
 from six_cells import rows
 
-from semsig_gis.core.errors import DatabaseError, InputError
+from semsig_gis.core.errors import InputError
 from semsig_gis.evaluation.evaluate import evaluate
-from semsig_gis.evaluation.file import open_evaluation, save_evaluation
 from semsig_gis.likelihood.index import build_index
 from semsig_gis.likelihood.locate import locate
-from semsig_gis.likelihood.method import LikelihoodMethod
 from semsig_gis.likelihood.noise.model import NoiseSpec, named_noise
 from semsig_gis.matching.ties import THRESHOLDS, expected_recall
 from semsig_gis.queries.distortions import Detector
@@ -25,8 +20,6 @@ from semsig_gis.queries.draw import QuerySpec, draw_queries
 from semsig_gis.reports.evaluation import evaluation_tables
 
 if TYPE_CHECKING:
-    from pathlib import Path
-
     from semsig_gis.core.signature import Signature
     from semsig_gis.evaluation.result import Evaluation
     from semsig_gis.likelihood.index import LikelihoodIndex
@@ -184,34 +177,6 @@ def test_the_report_tells_of_the_answers(evaluation: Evaluation) -> None:
     silent = replace(evaluation, queries=evaluation.queries.assign(chance=0.0))
     assert rows(evaluation_tables(silent)[1])["Right answers, of these"] == ("", "")
     assert silent.summary()["results"]["precision"] is None
-
-
-@pytest.mark.parametrize(
-    "noise", [named_noise("generic"), NoiseSpec(name="mine", detection_by_class={"bench": 0.5})]
-)
-def test_saved_and_loaded_is_the_same(
-    evaluation: Evaluation, noise: NoiseSpec, tmp_path: Path
-) -> None:
-    changed = replace(evaluation, method=LikelihoodMethod(noise=noise))
-    save_evaluation(changed, tmp_path)
-    loaded = open_evaluation(tmp_path)
-    assert_geodataframe_equal(loaded.queries, changed.queries)
-    assert loaded.method == changed.method
-    assert loaded.summary() == changed.summary()
-    pd.testing.assert_frame_equal(loaded.by_length(), changed.by_length())
-    summary = loaded.summary()
-    assert json.loads((tmp_path / "timing.json").read_text("utf-8")) == summary.pop("timing")
-    assert json.loads((tmp_path / "evaluation.json").read_text("utf-8")) == summary
-
-
-def test_a_noise_model_that_is_none_is_damage(
-    evaluation: Evaluation, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    with monkeypatch.context() as patch:
-        patch.setattr(NoiseSpec, "to_dict", lambda _: {"detection": 7})
-        save_evaluation(replace(evaluation, method=LikelihoodMethod(noise=NoiseSpec())), tmp_path)
-    with pytest.raises(DatabaseError, match=r"is damaged .* evaluate again"):
-        open_evaluation(tmp_path)
 
 
 def test_the_index_of_another_database_is_refused() -> None:

@@ -1,7 +1,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import pytest
 from hypothesis import given
@@ -118,47 +118,42 @@ def test_noise_models_known_by_name_are_not_written_out() -> None:
     assert "noises" not in spec.to_dict()
 
 
+def changed(old: str, new: str) -> str:
+    return SMALL.replace(old, new)
+
+
 @pytest.mark.parametrize(
-    ("change", "words"),
+    ("text", "words"),
     [
-        (("database", "databse"), ["'databse'", "nearest is 'database'"]),
-        (("[distortions]", "[other]"), ["'other'"]),
-        (('"city.parquet"', "3"), ["database = 3", "a string"]),
-        (('"city.parquet"', '"city.parquet"\nqueries = 0'), ["0 queries"]),
-        (('"city.parquet"', '"city.parquet"\nqueries = "many"'), ["queries = 'many'"]),
-        (('"city.parquet"', '"city.parquet"\nseeds = 4'), ["seeds = 4", "a list"]),
-        (('"city.parquet"', '"city.parquet"\nseeds = [1.5]'), ["seeds = [1.5]", "whole numbers"]),
-        (('"city.parquet"', '"city.parquet"\nseeds = []'), ["seeds are []"]),
-        (('"city.parquet"', '"city.parquet"\ntop = [0]'), ["top is [0]"]),
-        (('"city.parquet"', '"city.parquet"\ntop = [true]'), ["top = [True]"]),
-        (('"city.parquet"', '"city.parquet"\nseen_from = "cell"'), ["nearest is 'cells'"]),
-        (("edit+edit:5%", "edit+edti"), ["'edti'"]),
-        (('"edit+edit:5%"', "5"), ["paper = 5", "methods"]),
-        (("paper", '"pa/per"'), ["'pa/per'", "methods", "letters"]),
-        (('"medium"', '"meduim"'), ["'meduim'", "nearest is 'medium'"]),
-        (('"medium"', "7"), ["medium = 7", "distortions", "a list of texts"]),
-        (('"medium"', '["medium", 7]'), ["distortions"]),
-        (('paper = "edit+edit:5%"', ""), ["no methods"]),
-        (('medium = "medium"', ""), ["no distortions"]),
-        (('medium = "medium"', 'medium = "medium"\n[noises]\nmine = 3'), ["mine = 3", "noises"]),
-        (
-            ('medium = "medium"', 'medium = "medium"\n[noises]\nmine = { detection = 3 }'),
-            ["detection", "from 0 to 1"],
-        ),
-        (
-            ('medium = "medium"', 'medium = "medium"\n[noises]\nmine = "nowhere.toml"'),
-            ["nowhere.toml", "cannot be read"],
-        ),
-        (
-            ('medium = "medium"', 'medium = "medium"\n[districts]\nfile = "a.gpkg"'),
-            ["districts", "'name'"],
-        ),
-        (("[methods]", "[methods"), ["not valid TOML"]),
+        (changed("database", "databse"), ["'databse'", "nearest is 'database'"]),
+        (changed("[distortions]", "[other]"), ["'other'"]),
+        (changed("[methods]", "[methods"), ["not valid TOML"]),
+        (changed('"city.parquet"', "3"), ["database = 3", "a string"]),
+        ("queries = 0" + SMALL, ["0 queries"]),
+        ('queries = "many"' + SMALL, ["queries = 'many'", "a whole number"]),
+        ("seeds = 4" + SMALL, ["seeds = 4", "a list"]),
+        ("seeds = [1.5]" + SMALL, ["seeds = [1.5]", "whole numbers"]),
+        ("seeds = []" + SMALL, ["seeds are []"]),
+        ("top = [0]" + SMALL, ["top is [0]"]),
+        ("top = [true]" + SMALL, ["top = [True]"]),
+        ('seen_from = "cell"' + SMALL, ["nearest is 'cells'"]),
+        (changed("edit+edit:5%", "edit+edti"), ["'edti'"]),
+        (changed('"edit+edit:5%"', "5"), ["paper = 5", "methods"]),
+        (changed("paper", '"pa/per"'), ["'pa/per'", "methods", "letters"]),
+        (changed('paper = "edit+edit:5%"', ""), ["no methods"]),
+        (changed('medium = "medium"', ""), ["no distortions"]),
+        (changed('"medium"', '"meduim"'), ["'meduim'", "nearest is 'medium'"]),
+        (changed('"medium"', "7"), ["medium = 7", "distortions", "a list of texts"]),
+        (changed('"medium"', '["medium", 7]'), ["distortions"]),
+        (SMALL + "[noises]\nmine = 3", ["mine = 3", "noises"]),
+        (SMALL + "[noises]\nmine = { detection = 3 }", ["detection", "from 0 to 1"]),
+        (SMALL + '[noises]\nmine = "nowhere.toml"', ["nowhere.toml", "cannot be read"]),
+        (SMALL + '[districts]\nfile = "a.gpkg"', ["districts", "'name'"]),
     ],
 )
-def test_experiments_that_cannot_be_read(change: tuple[str, str], words: list[str]) -> None:
+def test_experiments_that_cannot_be_read(text: str, words: list[str]) -> None:
     with pytest.raises(SemsigError) as caught:
-        parse_experiment(SMALL.replace(*change))
+        parse_experiment(text)
     assert_sentence(caught.value, *words)
 
 
@@ -173,11 +168,8 @@ def test_files_that_cannot_be_read(tmp_path: Path) -> None:
 @pytest.mark.parametrize("name", ["generic", "mine"])
 def test_two_noise_models_of_one_name(name: str) -> None:
     one, other = (NoiseSpec(clutter=value, name=name) for value in (1.0, 2.0))
-    options: dict[str, Any] = {"database": "city.parquet"}
+    methods = {"a": LikelihoodMethod(noise=one)}
+    distortions = {"b": (Detector(noise=other),)}
     with pytest.raises(SemsigError) as caught:
-        ExperimentSpec(
-            methods={"a": LikelihoodMethod(noise=one)},
-            distortions={"b": (Detector(noise=other),)},
-            **options,
-        )
+        ExperimentSpec(database="city.parquet", methods=methods, distortions=distortions)
     assert_sentence(caught.value, name, "a name of its own")

@@ -1,0 +1,145 @@
+from __future__ import annotations
+
+import json
+import math
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any, NoReturn
+
+import pytest
+from geopandas.testing import assert_geodataframe_equal
+from hypothesis import given
+from hypothesis import strategies as st
+from noisy_cells import noise_specs, random_database
+from pandas.testing import assert_frame_equal
+from sentences import assert_sentence
+
+from semsig_gis.core.errors import DatabaseError, InputError
+from semsig_gis.evaluation.evaluate import evaluate
+from semsig_gis.evaluation.file import (
+    open_evaluation,
+    save_evaluation,
+    settings_from_dict,
+    settings_to_dict,
+    used_noises,
+)
+from semsig_gis.evaluation.result import machine
+from semsig_gis.likelihood.method import LikelihoodMethod
+from semsig_gis.likelihood.noise.model import NOISES, NoiseSpec, named_noise
+from semsig_gis.matching.method import Method
+from semsig_gis.matching.metrics.edit import EditWeights
+from semsig_gis.queries.chain import NAMED_DISTORTIONS, parse_chain
+from semsig_gis.queries.distortions import Detector
+from semsig_gis.queries.draw import QuerySpec
+from semsig_gis.storage.geoparquet import read_geoparquet, write_geoparquet
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from semsig_gis.evaluation.methods import AnyMethod
+
+MINE = NoiseSpec(name="mine", detection_by_class={"bench": 0.5})
+EVALUATION = evaluate(
+    random_database(5, cells=150), queries=150, method=Method(keep=20), distortion="light"
+)
+
+
+@given(
+    noise=noise_specs(),
+    kind=st.sampled_from(["distance", "likelihood"]),
+    others=st.lists(st.sampled_from(list(NAMED_DISTORTIONS.values())), max_size=3),
+    number=st.integers(1, 99),
+)
+def test_settings_survive_json(
+    noise: NoiseSpec, kind: str, others: list[Detector], number: int
+) -> None:
+    asked = QuerySpec(number=number, seeds=(3, 0), distortions=(*others, Detector(noise=noise)))
+    by_chance = LikelihoodMethod(noise=noise, refined=True)
+    method = by_chance if kind == "likelihood" else Method(keep=5)
+    values = json.loads(json.dumps(settings_to_dict(method, asked), allow_nan=False))
+    assert settings_from_dict(values) == (method, asked)
+
+
+def test_noise_models_of_methods_and_detectors() -> None:
+    methods: list[AnyMethod] = [Method(), LikelihoodMethod(noise=NOISES["light"])]
+    noises = used_noises(methods, [Detector(noise=NOISES["strong"]), NAMED_DISTORTIONS["view"]])
+    assert noises == {"light": named_noise("light"), "strong": named_noise("strong")}
+
+
+@pytest.mark.parametrize("name", ["a:b", "a/b", "a,b", "a=b"])
+def test_names_that_mean_something_else_are_refused(name: str) -> None:
+    with pytest.raises(InputError) as caught:
+        used_noises([LikelihoodMethod(noise=NoiseSpec(name=name))], [])
+    assert_sentence(caught.value, repr(name), "without")
+
+
+@pytest.mark.parametrize(
+    "method",
+    [
+        Method(types="edit", angles="jaccard", alpha=0.3, weights=EditWeights(insert=2)),
+        LikelihoodMethod(noise=named_noise("generic")),
+        LikelihoodMethod(noise=MINE),
+    ],
+)
+def test_saved_and_loaded_is_the_same(method: AnyMethod, tmp_path: Path) -> None:
+    chain = parse_chain("light:resort=false, detector:mine:half=9", noises={"mine": MINE})
+    asked = QuerySpec(number=9, seeds=(4, 2), seen_from="anywhere", distortions=chain)
+    saved = replace(EVALUATION, method=method, asked=asked, city="other.parquet")
+    save_evaluation(saved, tmp_path / "made" / "here")
+    opened = open_evaluation(tmp_path / "made" / "here")
+    assert_geodataframe_equal(opened.queries, saved.queries)
+    assert opened.queries["error_m"].isin([math.inf]).any()
+    assert (opened.method, opened.asked) == (saved.method, saved.asked)
+    assert (opened.top, opened.city) == (saved.top, saved.city)
+    assert opened.summary() == saved.summary()
+    assert_frame_equal(opened.by_length(), saved.by_length())
+
+
+def test_the_readable_files_are_strict_json(tmp_path: Path) -> None:
+    def refuse(name: str) -> NoReturn:
+        raise AssertionError(name)
+
+    save_evaluation(EVALUATION, tmp_path)
+    names = ["evaluation.json", "queries.parquet", "timing.json"]
+    assert sorted(path.name for path in tmp_path.iterdir()) == names
+    summary, timing = (
+        json.loads((tmp_path / name).read_text(encoding="utf-8"), parse_constant=refuse)
+        for name in ("evaluation.json", "timing.json")
+    )
+    assert summary | {"timing": timing} == EVALUATION.summary()
+    assert timing["seconds_per_query"] == EVALUATION.seconds_per_query
+    assert timing["machine"] == machine()
+    assert timing["machine"]["processors"] >= 1
+    assert timing["machine"]["system"]
+    assert summary["settings"]["method"] == "edit+edit:20%"
+    assert summary["settings"]["distortions"] == ["light"]
+    assert summary["database"]["cells"] == 150
+    assert summary["results"]["recall_at_percent"]["10"] == EVALUATION.recall(10)
+    assert summary["versions"].keys() == {"semsig_gis", "python", "numpy", "pandas", "rapidfuzz"}
+
+
+def test_files_that_are_no_evaluation_are_refused(tmp_path: Path) -> None:
+    with pytest.raises(DatabaseError, match="does not exist"):
+        open_evaluation(tmp_path / "nowhere")
+    save_evaluation(EVALUATION, tmp_path)
+    file = tmp_path / "queries.parquet"
+    content = file.read_bytes()
+    table, specs, crs = read_geoparquet(file, kind="localization evaluation")
+    geo = json.loads(table.schema.metadata[b"geo"])
+    assert crs == EVALUATION.queries.crs
+    write_geoparquet(table.drop_columns("p50"), file, geo=geo, specs=specs)
+    with pytest.raises(DatabaseError, match="lacks the column 'p50'"):
+        open_evaluation(tmp_path)
+    wrongs: list[dict[str, Any]] = [
+        {"method": "hamming+edit"},
+        {"method": 7},
+        {"asked": {**specs["asked"], "distortions": ["errors:1:unknown=2"]}},
+        {"asked": {"number": 3}},
+        {"noises": {"custom": {"detection": 7}}},
+    ]
+    for wrong in wrongs:
+        write_geoparquet(table, file, geo=geo, specs=specs | wrong)
+        with pytest.raises(DatabaseError, match=r"is damaged .* evaluate again"):
+            open_evaluation(tmp_path)
+    file.write_bytes(content[: len(content) // 2])
+    with pytest.raises(DatabaseError, match="damaged"):
+        open_evaluation(tmp_path)
