@@ -14,8 +14,7 @@ import numpy as np
 import pandas as pd
 
 from semsig_gis.core.errors import InputError
-from semsig_gis.core.statistics import wilson_interval
-from semsig_gis.evaluation.figures import finite_or_none
+from semsig_gis.evaluation.figures import calibration_bins, finite_or_none
 from semsig_gis.evaluation.identify.trials import trial_cells, try_cells
 
 if TYPE_CHECKING:
@@ -25,8 +24,6 @@ if TYPE_CHECKING:
 
     from semsig_gis.evaluation.identify.result import Identifiability
     from semsig_gis.likelihood.index import LikelihoodIndex
-
-BINS = 10
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -188,21 +185,16 @@ def _correlation(one: NDArray[np.float64], other: NDArray[np.float64]) -> float:
 
 def _bins(stated: NDArray[np.float64], success: NDArray[np.float64]) -> tuple[ChanceBin, ...]:
     """Return the tenths that have queries."""
-    places = np.minimum((stated * BINS).astype(np.int64), BINS - 1)
-    bins = []
-    for place in np.unique(places).tolist():
-        inside = places == place
-        count, true = int(inside.sum()), float(success[inside].mean())
-        low, high = wilson_interval(true, count)
-        bins.append(
-            ChanceBin(
-                low=place / BINS,
-                high=(place + 1) / BINS,
-                queries=count,
-                stated=float(stated[inside].mean()),
-                true=true,
-                true_low=low,
-                true_high=high,
-            )
+    bins = calibration_bins(pd.DataFrame({"chance": stated, "right": success}))
+    return tuple(
+        ChanceBin(
+            low=row["from"],
+            high=row["to"],
+            queries=row["n"],
+            stated=row["stated"],
+            true=row["true"],
+            true_low=row["low"],
+            true_high=row["high"],
         )
-    return tuple(bins)
+        for row in bins[bins["n"] > 0].to_dict("records")
+    )
