@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from noisy_cells import noise_specs, random_database
 from sentences import assert_sentence
@@ -31,11 +31,6 @@ if TYPE_CHECKING:
 INDEX = build_index(random_database(5, cells=300), named_noise("medium"))
 
 
-def places_of(index: LikelihoodIndex) -> np.ndarray:
-    database = index.database
-    return np.stack([database.columns, database.rows], axis=1).astype(np.int64)
-
-
 def ratios(index: LikelihoodIndex, cell: int, temperature: float) -> np.ndarray:
     """Return the tempered ratios of all cells, from the index as a query asks it."""
     loglik = index.scores(index.database.signature(cell)).loglik.astype(np.float64)
@@ -44,7 +39,7 @@ def ratios(index: LikelihoodIndex, cell: int, temperature: float) -> np.ndarray:
 
 
 def apart(index: LikelihoodIndex, cell: int) -> np.ndarray:
-    return np.asarray(10.0 * np.hypot(*(places_of(index) - places_of(index)[cell]).T))
+    return np.asarray(np.hypot(*(index.database.xy - index.database.xy[cell]).T).round(6))
 
 
 @settings(max_examples=25, deadline=None)
@@ -58,7 +53,10 @@ def apart(index: LikelihoodIndex, cell: int) -> np.ndarray:
 def test_sums_are_those_of_a_plain_loop(
     noise: NoiseSpec, seed: int, cells: int, temperature: float, radius: float
 ) -> None:
-    index = build_index(random_database(seed, cells=cells), noise)
+    database = random_database(seed, cells=cells)
+    # A row of confusion needs a class that is seen.
+    assume(not noise.confusion or np.isin(database.present_codes, [1, 3]).any())
+    index = build_index(database, noise)
     found = find_lookalikes(index, temperature=temperature, radius=radius, places=3)
     for cell in range(0, cells, 7):
         powers, away = ratios(index, cell, temperature), apart(index, cell)
@@ -99,18 +97,15 @@ def test_of_equals_the_nearer_is_named() -> None:
 def test_threads_and_a_choice_of_cells_change_nothing() -> None:
     whole = find_lookalikes(INDEX, temperature=0.4, threads=3)
     seen: list[tuple[int, int]] = []
+    two = np.array([250, 3])
     some = find_lookalikes(
-        INDEX,
-        temperature=0.4,
-        cells=np.array([250, 3]),
-        progress=lambda done, total: seen.append((done, total)),
+        INDEX, temperature=0.4, cells=two, progress=lambda *step: seen.append(step)
     )
     assert seen == [(2, 2)]
     for name in ("near", "far", "cells", "sums"):
-        assert getattr(some, name).tolist() == getattr(whole, name)[[250, 3]].tolist()
+        assert getattr(some, name).tolist() == getattr(whole, name)[two].tolist()
     rise = compare_without_classes(INDEX, temperature=0.4, threads=3)
-    chosen = compare_without_classes(INDEX, temperature=0.4, cells=np.array([250, 3]))
-    assert chosen.tolist() == rise[[250, 3]].tolist()
+    assert compare_without_classes(INDEX, temperature=0.4, cells=two).tolist() == rise[two].tolist()
 
 
 @settings(max_examples=15, deadline=None)

@@ -1,0 +1,373 @@
+from __future__ import annotations
+
+import itertools
+import math
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pytest
+from geopandas.testing import assert_geodataframe_equal
+from noisy_cells import database_of, random_database
+from sentences import assert_sentence
+from six_cells import rows
+
+from semsig_gis.core.errors import SemsigError
+from semsig_gis.evaluation.evaluate import evaluate
+from semsig_gis.likelihood.index import build_index
+from semsig_gis.likelihood.locate import locate
+from semsig_gis.likelihood.noise.model import NoiseSpec, named_noise
+from semsig_gis.matching.method import Method
+from semsig_gis.matching.scores import score_cells
+from semsig_gis.matching.ties import NEAR_PLACES, THRESHOLDS, expected_recall
+from semsig_gis.queries.distortions import Detector
+from semsig_gis.queries.draw import QuerySpec, draw_queries
+from semsig_gis.queries.paper_errors import DISTORTIONS, Distortion
+from semsig_gis.reports.evaluation import evaluation_tables
+
+if TYPE_CHECKING:
+    from semsig_gis.likelihood.index import LikelihoodIndex
+
+ALL_MISSED = Distortion(occurrences=1, bearing_sigma=0.0)
+RNG = np.random.default_rng(8)
+CITY = database_of(
+    [
+        ("".join(RNG.choice(list("DDBL"), length)), sorted(RNG.uniform(0, 360, length)))
+        for length in RNG.integers(1, 10, 120)
+    ],
+    height=10,
+)
+EVALUATION = evaluate(CITY, queries=100, method=Method(keep=20), distortion=ALL_MISSED, seed=3)
+
+DATABASE = random_database(5, cells=150)
+QUERIES = 60
+INDEX = build_index(DATABASE, named_noise("generic"))
+LIKELY = evaluate(DATABASE, queries=QUERIES, method=INDEX, distortion="medium", seed=2)
+ASKED = [
+    query.asked.signature for query in draw_queries(DATABASE, QuerySpec(number=QUERIES, seeds=(2,)))
+]
+
+
+def test_hand_computed_row_of_equal_cells() -> None:
+    four = database_of([("DD", [10, 200])] * 4 + [("B", [300])], height=5)
+    table = evaluate(four, queries=5, distortion="none").queries.set_index("cell").sort_index()
+    assert table["error_m"].to_list() == [15, 10, 10, 15, 0]
+    assert table["p0"].to_list() == [0.25] * 4 + [1]
+    assert table["p10"].to_list() == [0.5, 0.75, 0.75, 0.5, 1]
+    assert table["p20"].to_list() == [0.75, 1, 1, 0.75, 1]
+    assert table["rank_low"].to_list() == [1] * 5
+    assert table["rank_high"].to_list() == [4] * 4 + [1]
+    assert table["tied"].to_list() == [4] * 4 + [1]
+    assert table["type_group"].to_list() == [4] * 4 + [1]
+    assert table["angle_group"].to_list() == [4] * 4 + [1]
+    assert table["distance"].to_list() == [0] * 5
+    ids = [str(one) for one in four.cell_ids]
+    for cell, row in table.iterrows():
+        best = str(row["best_cell_id"])
+        alike = [one for one in ids[:4] if one != best]
+        assert row["next_cell_ids"].split(",") == (alike + ids[4:] if cell != 4 else ids[:4])
+
+
+def test_hand_computed_curve_and_recall() -> None:
+    four = database_of([("DD", [10, 200])] * 4 + [("B", [300])], height=5)
+    result = evaluate(four, queries=5, distortion="none")
+    assert result.cdf([0, 10, 20, 25, 30]) == pytest.approx([0.4, 0.7, 0.9, 0.9, 1])
+    # 20 % is one cell, 39 % still one, 40 % two, 60 % three, 100 % all.
+    recalls = [result.recall(percent) for percent in (19, 20, 39, 40, 60, 80, 100)]
+    assert recalls == pytest.approx([0, 0.4, 0.4, 0.6, 0.8, 1, 1])
+    assert result.successful.all()
+    two = evaluate(four, queries=5, distortion="none", top=2)
+    # Two of the four tied cells are drawn: (0 x 3 + 10 x 2 + 20) / 6 for a cell at the end.
+    errors = two.queries.set_index("cell").sort_index()["error_m"]
+    assert errors.to_list() == pytest.approx([40 / 6, 30 / 6, 30 / 6, 40 / 6, 0])
+
+
+def test_diagonal_distances_are_exact() -> None:
+    # Cells (0, 0) and (3, 4) are alike: 50 m apart, whatever the origin of the grid.
+    cells = [("B", [0])] * 25
+    cells[0] = cells[19] = ("DDD", [10, 100, 300])
+    result = evaluate(database_of(cells, height=5), queries=25, distortion="none").queries
+    twins = result[result["types"] == "DDD"]
+    assert twins["p40"].to_list() == [0.5, 0.5]
+    assert twins["p50"].to_list() == [1, 1]
+
+
+@pytest.mark.parametrize("top", [1, 2, 3, 6])
+def test_equals_every_order_of_the_ties(top: int) -> None:
+    six = database_of(
+        [("DD", [10, 99]), ("DD", [10, 99]), ("D", [10]), ("DD", [9, 98]), ("B", [10]), ("D", [9])],
+        height=3,
+    )
+    method = Method(types="edit", angles=None)
+    table = evaluate(six, queries=6, method=method, top=top, distortion="none").queries
+    for row in table.to_dict("records"):
+        cell = row["cell"]
+        (scores,) = score_cells(six, [six.signature(cell)], method)
+        errors = np.hypot(*(six.xy - six.xy[cell]).T)
+        best, ranks = [], []
+        for order in itertools.permutations(range(6)):
+            ranked = sorted(order, key=scores.__getitem__)
+            best.append(round(min(errors[ranked[:top]]), 6))
+            ranks.append(ranked.index(cell) + 1)
+        assert row["error_m"] == pytest.approx(np.mean(best))
+        assert row["p10"] == pytest.approx(np.mean(np.array(best) <= 10))
+        assert (row["rank_low"], row["rank_high"]) == (min(ranks), max(ranks))
+        assert row["distance"] == scores.min()
+        assert row["tied"] == (scores == scores.min()).sum()
+        assert row["best_cell_id"] in six.cell_ids[scores == scores.min()]
+
+
+def test_the_best_candidate_is_drawn_from_the_ties() -> None:
+    alike = database_of([("D", [10])] * 40, height=40)
+    shown = evaluate(alike, queries=40, distortion="none").queries
+    assert shown["best_cell_id"].nunique() > 15
+    one = alike.cell_ids.tolist().index(shown["best_cell_id"].iloc[0])
+    assert shown[["best_x", "best_y"]].iloc[0].to_list() == alike.xy[one].tolist()
+
+
+def test_columns_tell_the_truth() -> None:
+    table = EVALUATION.queries
+    cells = table["cell"].to_numpy()
+    assert len(set(cells)) == len(table) == 100
+    assert table.crs == CITY.crs
+    assert (table["cell_id"] == CITY.cell_ids[cells]).all()
+    assert np.array_equal(np.column_stack([table.geometry.x, table.geometry.y]), CITY.xy[cells])
+    assert table["types"].to_list() == [CITY.types(cell) for cell in cells]
+    assert (table["length"] == table["types"].str.len()).all()
+    assert (table["query_length"] == table["query_types"].str.len()).all()
+    counts = [len(text.split(",")) if text else 0 for text in table["query_bearings"]]
+    assert (table["query_length"] == counts).all()
+    assert (table["rank_low"] <= table["rank_high"]).all()
+
+
+def test_a_query_of_which_nothing_is_left() -> None:
+    empty = EVALUATION.queries[EVALUATION.queries["query_length"] == 0]
+    assert len(empty) == EVALUATION.unlocalized > 0
+    assert (empty["error_m"] == math.inf).all()
+    assert (empty["distance"] == math.inf).all()
+    assert (empty[["rank_low", "rank_high"]] == 120).all(axis=None)
+    assert (empty[[f"p{x}" for x in THRESHOLDS]] == 0).all(axis=None)
+    assert empty["best_cell_id"].isna().all()
+    assert (empty["tied"] == 0).all()
+    assert EVALUATION.recall(100) == 1
+    assert EVALUATION.recall(99.9) < 1
+    assert EVALUATION.cdf()[-1] == pytest.approx(1 - len(empty) / 100)
+    assert (empty[[f"near{x}" for x in NEAR_PLACES]] == 0).all(axis=None)
+
+
+def test_nothing_left_of_any_query() -> None:
+    lamps = database_of([("D", [10])] * 3, height=3)
+    for seed in range(200):
+        result = evaluate(lamps, queries=1, distortion=ALL_MISSED, seed=seed)
+        if result.unlocalized:
+            break
+    summary = result.summary()["results"]
+    assert summary["unlocalized"] == 1
+    assert summary["median_error_m"] is None
+    assert result.seconds_per_query == 0
+    assert not result.successful.any()
+
+
+def test_a_seed_repeats_everything() -> None:
+    options: dict[str, Any] = {"queries": 30, "distortion": "medium", "top": 2}
+    first, again = (evaluate(CITY, seed=4, **options) for _ in range(2))
+    assert_geodataframe_equal(first.queries, again.queries)
+    other = evaluate(CITY, seed=5, **options)
+    assert first.queries["cell"].to_list() != other.queries["cell"].to_list()
+
+
+def test_no_distortion_ranks_the_true_cell_first() -> None:
+    result = evaluate(CITY, queries=120, distortion="none")
+    assert (result.queries["rank_low"] == 1).all()
+    assert result.queries["query_types"].equals(result.queries["types"])
+    assert result.recall(100) == 1
+
+
+def test_false_objects_have_classes_of_the_database() -> None:
+    rare = Distortion(occurrences=9, false_class="frequency")
+    for distortion in (DISTORTIONS["strong"], rare):
+        asked = evaluate(CITY, queries=60, distortion=distortion).queries["query_types"]
+        assert set("".join(asked)) == set("BDL")
+
+
+def test_the_curve_rises_to_the_share_localized() -> None:
+    curve = EVALUATION.cdf()
+    assert (np.diff(curve) >= 0).all()
+    table = EVALUATION.queries
+    assert EVALUATION.cdf([50, 0]) == pytest.approx([table["p50"].mean(), table["p0"].mean()])
+    assert (EVALUATION.successful == (table["p50"] >= 0.5)).all()
+
+
+def test_by_length() -> None:
+    table = EVALUATION.by_length()
+    assert table["length"].to_list() == ["1-4", "5-9", "10-19", "20+"]
+    lengths = EVALUATION.queries["length"]
+    assert table["n"].to_list() == [(lengths < 5).sum(), (lengths >= 5).sum(), 0, 0]
+    short = EVALUATION.queries[lengths < 5]
+    assert table.loc[0, "p50"] == pytest.approx(short["p50"].mean())
+    assert table.loc[2:, "p10":].isna().all(axis=None)
+    whole = (table["n"] * table["recall10"]).sum() / table["n"].sum()
+    assert whole == pytest.approx(EVALUATION.recall(10))
+
+
+def test_progress_counts_every_query() -> None:
+    seen: list[tuple[int, int]] = []
+    evaluate(CITY, queries=9, progress=lambda done, total: seen.append((done, total)))
+    assert seen == [(done, 9) for done in range(1, 10)]
+
+
+def test_the_time_is_that_of_the_matching() -> None:
+    assert 0 < EVALUATION.seconds_per_query < 1
+
+
+@pytest.mark.parametrize("top", [1, 2, 20, 150])
+def test_the_answer_comes_first_and_the_likeliest_cells_follow(top: int) -> None:
+    found = evaluate(DATABASE, queries=QUERIES, method=INDEX, top=top, seed=2).queries
+    for query, row in zip(ASKED, found.to_dict("records"), strict=True):
+        if row["query_length"] == 0:
+            assert all(math.isnan(row[name]) for name in ("chance", "right", "in_region"))
+            assert (row["error_m"], row["rank_low"]) == (math.inf, 150)
+            continue
+        told = locate(INDEX, query, top=len(DATABASE))
+        answer = told.answer.cell
+        loglik = told.candidates.set_index("cell")["loglik"].sort_index().to_numpy()
+        scores = -loglik.astype(np.float32)
+        assert row["tied"] == 1
+        assert row["best_cell_id"] == DATABASE.cell_ids[answer]
+        assert row["distance"] == pytest.approx(-loglik[answer])
+        assert row["chance"] == told.answer.mass
+        scores[answer] = -np.inf
+        errors = np.hypot(*(DATABASE.xy - DATABASE.xy[row["cell"]]).T).round(6)
+        assert row["right"] == float(errors[answer] <= 50)
+        # Cells may tie behind the answer: one order is the luckiest, one the unluckiest.
+        best, worst = (
+            errors[np.lexsort((sign * errors, scores))[:top]].min() for sign in (1.0, -1.0)
+        )
+        assert best - 1e-6 <= row["error_m"] <= worst + 1e-6
+        for limit in THRESHOLDS:
+            assert float(worst <= limit) <= row[f"p{limit}"] <= float(best <= limit)
+        own = scores[row["cell"]]
+        assert row["rank_low"] == (scores < own).sum() + 1
+        assert row["rank_high"] == (scores <= own).sum()
+        if (told.posterior.chances == told.posterior.chances[row["cell"]]).sum() == 1:
+            assert row["in_region"] == float(row["cell"] in told.region)
+
+
+def test_places_that_tie_are_scored_by_expectation() -> None:
+    # Every signature is there twice, far apart, so that nothing tells the two places apart.
+    twice = random_database(8, cells=30).select(np.tile(np.arange(30), 2))
+    apart = np.repeat(np.array([0, 100], np.int32), 30)
+    twice = replace(twice, columns=twice.columns + apart)
+    index = build_index(twice, named_noise("light"))
+    found = evaluate(twice, queries=60, method=index, distortion="none")
+    table = found.queries
+    assert (table["tied"] == 2).all()
+    assert set(table["right"]) <= {0.0, 0.5}
+    assert (table["right"] == table["p50"]).all()
+    assert (table["rank_high"] > table["rank_low"]).all()
+    assert set(table["in_region"]) <= {0.0, 0.5, 1.0}
+    assert (table["chance"] <= 0.5 + 1e-9).all()
+    assert found.answers()["coverage"] == 0
+    assert math.isnan(found.answers()["precision"])
+
+
+def test_what_the_model_draws_comes_true_as_often_as_it_says() -> None:
+    # In far more cells than a handful, so that some places are hard to tell.
+    cells = random_database(11, cells=300, longest=6, classes=2)
+    noise = NoiseSpec(detection=0.8, misnamed=0.1, clutter=0.7, bearing_sigma=12.0, name="mine")
+    detector = Detector(noise=noise)
+    found = evaluate(cells, queries=300, method=build_index(cells, noise), distortion=detector)
+    told = found.queries.dropna(subset=["chance"])
+    spread = math.sqrt(float((told["chance"] * (1.0 - told["chance"])).sum()))
+    assert abs(float((told["right"] - told["chance"]).sum())) < 4.0 * spread
+    assert 0.2 < told["chance"].mean() < 0.95
+    assert 0.86 < told["in_region"].mean() < 0.99
+    # A detector that is worse than the method believes: its chances are too high.
+    bad = Detector(noise=replace(noise, detection=0.5, clutter=3.0, bearing_sigma=30.0))
+    wrong = evaluate(cells, queries=300, method=build_index(cells, noise), distortion=bad).queries
+    assert wrong["chance"].mean() > wrong["right"].mean() + 0.1
+
+
+@pytest.mark.parametrize("method", [Method(), INDEX], ids=["distance", "likelihood"])
+def test_more_candidates_never_hurt(method: Method | LikelihoodIndex) -> None:
+    one, five = (
+        evaluate(DATABASE, queries=QUERIES, method=method, top=top).queries for top in (1, 5)
+    )
+    assert (five["error_m"] <= one["error_m"] + 1e-9).all()
+    for threshold in THRESHOLDS:
+        assert (five[f"p{threshold}"] >= one[f"p{threshold}"] - 1e-12).all()
+    for column in ("rank_low", "rank_high", "chance", "right", "in_region", "best_cell_id"):
+        assert five[column].equals(one[column])
+
+
+def test_the_queries_are_those_of_the_other_methods() -> None:
+    same = ["cell", "query_types", "query_bearings", "query_length", "geometry"]
+    other = evaluate(DATABASE, queries=QUERIES, seed=2)
+    assert other.queries[same].equals(LIKELY.queries[same])
+    assert other.queries[["chance", "right", "in_region"]].isna().all(axis=None)
+    assert other.answers() == {}
+    assert "coverage" not in other.by_length()
+    assert "coverage" not in other.summary()["results"]
+
+
+def test_how_it_answers_is_counted() -> None:
+    table = LIKELY.queries
+    given = table[table["chance"] >= 0.9]
+    assert 0 < len(given) < QUERIES
+    answers = LIKELY.answers()
+    assert answers["coverage"] == pytest.approx(len(given) / QUERIES)
+    assert answers["precision"] == pytest.approx(given["right"].mean())
+    assert answers["in_region"] == pytest.approx(table["in_region"].mean())
+    by_length = LIKELY.by_length()
+    share = (by_length["n"] * by_length["coverage"]).sum() / QUERIES
+    assert share == pytest.approx(answers["coverage"])
+    results = LIKELY.summary()["results"]
+    assert {name: results[name] for name in answers} == answers
+    ranks = table["rank_low"], table["rank_high"]
+    assert LIKELY.recall(10) == expected_recall(*ranks, cells=150, percent=10).mean()
+
+
+def test_the_report_tells_of_the_answers() -> None:
+    settings, figures, by_length, _, chances, rules = evaluation_tables(LIKELY)
+    assert rows(settings)["Method"] == ("likelihood:generic:on_grid",)
+    told = rows(figures)
+    answers = LIKELY.answers()
+    assert told["Answered, with a chance of 0.9 or more"][0] == f"{answers['coverage']:.4f}"
+    assert told["Right answers, of these"][0] == f"{answers['precision']:.4f}"
+    assert told["True cell in the region of 90 %"][0] == f"{answers['in_region']:.4f}"
+    curve = LIKELY.coverage_curve()
+    (row,) = curve[curve["threshold"] == 0.9].to_dict("records")
+    assert rows(rules)["0.9"][1] == f"{row['coverage']:.4f}"
+    assert row["precision"] == answers["precision"]
+    stated = LIKELY.calibration()
+    assert stated["n"].sum() == QUERIES - LIKELY.unlocalized
+    assert rows(chances)["0.9 to 1"][0] == str(stated["n"].iloc[-1])
+    assert by_length.columns[-3:] == ("Answered", "Right", "In region")
+    assert all(len(row) == len(by_length.columns) for row in by_length.rows)
+    silent = replace(LIKELY, queries=LIKELY.queries.assign(chance=0.0))
+    assert rows(evaluation_tables(silent)[1])["Right answers, of these"] == ("", "")
+    assert silent.summary()["results"]["precision"] is None
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        ({"queries": 121}, ["121 queries", "from 1 to 120"]),
+        ({"queries": 0}, ["0 queries", "from 1"]),
+        ({"queries": 5, "top": 121}, ["121 candidates", "from 1 to 120"]),
+        ({"queries": 5, "top": 0}, ["0 candidates", "from 1"]),
+        ({"queries": 5, "seed": -1}, ["seed of -1", "0 or more"]),
+        ({"queries": 5, "distortion": "strng"}, ["'strng'", "nearest is 'strong'"]),
+        ({"queries": 5, "method": INDEX}, ["another database"]),
+    ],
+)
+def test_what_is_refused(options: dict[str, Any], words: list[str]) -> None:
+    with pytest.raises(SemsigError) as caught:
+        evaluate(CITY, **options)
+    assert_sentence(caught.value, *words)
+
+
+def test_a_threshold_that_was_not_kept_is_refused() -> None:
+    with pytest.raises(SemsigError) as caught:
+        EVALUATION.cdf([10, 12])
+    assert_sentence(caught.value, "error of 12 m", "give some of 0, 5")
