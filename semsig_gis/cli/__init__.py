@@ -26,8 +26,6 @@ from semsig_gis.cli import (  # noqa: F401
     localize,
     learn,
     evaluate,
-    experiment,
-    reproduce,
     identify,
     export,
 )

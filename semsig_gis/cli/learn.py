@@ -47,7 +47,7 @@ def learn(
     objects: Objects = None,
     as_json: AsJson = False,
 ) -> None:
-    """Learn how a detector fails from its detections of known places."""
+    """Learn how a detector fails from detections of known places."""
     from dataclasses import replace
 
     from semsig_gis.database.city import open_city

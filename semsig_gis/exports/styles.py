@@ -6,8 +6,7 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING, NamedTuple
 from xml.etree import ElementTree as ET
 
-from semsig_gis.core.colours import ERROR_RAMP, FAILED, FOUND_RAMP, SUCCESSFUL
-from semsig_gis.core.signs import class_signs
+from semsig_gis.core.signs import ERROR_RAMP, FAILED, FOUND_RAMP, SUCCESSFUL, class_signs
 from semsig_gis.core.text import one_line
 
 if TYPE_CHECKING:

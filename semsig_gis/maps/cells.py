@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from semsig_gis.core.colours import FOUND_RAMP, GROUP_COLOURS, SAME_LEVELS, SAME_TYPES
+from semsig_gis.core.signs import FOUND_RAMP, GROUP_COLOURS, SAME_LEVELS, SAME_TYPES
 from semsig_gis.maps.cell_layer import CellFacts, add_cells, city_view, packed_signatures
 from semsig_gis.maps.image import level_image
 from semsig_gis.maps.legend import LIFTING, NAMED_CLASSES, isolated, ramp_bar, sources, swatch

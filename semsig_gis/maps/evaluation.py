@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from semsig_gis.core.colours import ERROR_RAMP, FAILED, SUCCESSFUL, mixed
+from semsig_gis.core.signs import ERROR_RAMP, FAILED, SUCCESSFUL, mixed
 from semsig_gis.evaluation.result import SUCCESS_METRES, SUCCESS_PROBABILITY
 from semsig_gis.maps.legend import isolated, ramp_bar, shades, sources, swatch
 from semsig_gis.maps.packing import mercator, packed

@@ -7,7 +7,7 @@ from html import escape
 from typing import TYPE_CHECKING
 
 from semsig_gis import __version__
-from semsig_gis.core.colours import SHADES
+from semsig_gis.core.signs import SHADES
 
 if TYPE_CHECKING:
     from collections.abc import Iterable

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from semsig_gis.core.colours import CANDIDATE_RAMP, mixed
+from semsig_gis.core.signs import CANDIDATE_RAMP, mixed
 from semsig_gis.database.database import rows_of_result
 from semsig_gis.maps.legend import query_text, ramp_bar, shades, sources
 from semsig_gis.maps.parts import (

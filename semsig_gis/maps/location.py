@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from semsig_gis.core.colours import CELL_CHANCES, CHANCES, FAILED, SUCCESSFUL, VERDICTS
+from semsig_gis.core.signs import CELL_CHANCES, CHANCES, FAILED, SUCCESSFUL, VERDICTS
 from semsig_gis.maps.image import level_image
 from semsig_gis.maps.legend import FLIPPING, isolated, query_text, shades, sources, swatch
 from semsig_gis.maps.parts import (

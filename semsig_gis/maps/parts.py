@@ -17,8 +17,8 @@ from folium.template import Template
 from folium.utilities import JsCode
 from pyproj import Transformer
 
-from semsig_gis.core.colours import SHADES
 from semsig_gis.core.errors import InputError
+from semsig_gis.core.signs import SHADES
 from semsig_gis.database.database import SignatureDatabase
 from semsig_gis.maps.image import city_image
 from semsig_gis.maps.packing import script_json

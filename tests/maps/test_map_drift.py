@@ -12,9 +12,9 @@ from map_pages import HOSTILE, IMAGES, LEGEND, hostile_database
 from sentences import assert_sentence
 from worlds import CODES, TAXONOMY, random_town
 
-from semsig_gis.core.colours import OBJECT_COLOURS
 from semsig_gis.core.errors import CrsError, DatabaseError, InputError
 from semsig_gis.core.signature import SignatureSpec
+from semsig_gis.core.signs import OBJECT_COLOURS
 from semsig_gis.core.taxonomy import Taxonomy
 from semsig_gis.database.build import build_database
 from semsig_gis.database.update import compare_cells

@@ -12,8 +12,8 @@ from selenium.webdriver.common.by import By
 from selenium.webdriver.common.keys import Keys
 from sentences import assert_sentence
 
-from semsig_gis.core.colours import ERROR_RAMP, FAILED, SUCCESSFUL
 from semsig_gis.core.errors import InputError
+from semsig_gis.core.signs import ERROR_RAMP, FAILED, SUCCESSFUL
 from semsig_gis.evaluation.evaluate import evaluate
 from semsig_gis.maps.evaluation import evaluation_map
 from semsig_gis.maps.page import page_of_map

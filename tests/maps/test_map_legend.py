@@ -13,8 +13,8 @@ from cells_told import told_of
 from small_city import small_city
 
 import semsig_gis
-from semsig_gis.core.colours import SHADES
 from semsig_gis.core.signature import Signature
+from semsig_gis.core.signs import SHADES
 from semsig_gis.core.taxonomy import Taxonomy
 from semsig_gis.database.update import CellChanges
 from semsig_gis.evaluation.evaluate import evaluate

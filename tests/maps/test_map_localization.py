@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from map_pages import LEGEND
 
-from semsig_gis.core.colours import CANDIDATE_RAMP
+from semsig_gis.core.signs import CANDIDATE_RAMP
 from semsig_gis.maps.localization import localization_map
 from semsig_gis.matching.search import localize
 

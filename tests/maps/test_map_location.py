@@ -13,8 +13,8 @@ from map_pages import HOSTILE, IMAGES, LEGEND, hostile_database
 from selenium.webdriver.common.by import By
 from worlds import random_town
 
-from semsig_gis.core.colours import FAILED, SUCCESSFUL, VERDICTS
 from semsig_gis.core.signature import Signature
+from semsig_gis.core.signs import FAILED, SUCCESSFUL, VERDICTS
 from semsig_gis.database.store import ObjectStore
 from semsig_gis.likelihood.index import build_index
 from semsig_gis.likelihood.locate import locate

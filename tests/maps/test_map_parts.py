@@ -21,9 +21,9 @@ from selenium.webdriver.support.ui import WebDriverWait
 from sentences import assert_sentence
 from worlds import random_town
 
-from semsig_gis.core.colours import FAILED, SUCCESSFUL
 from semsig_gis.core.errors import CrsError, EmptyResultError, InputError
 from semsig_gis.core.signature import Signature
+from semsig_gis.core.signs import FAILED, SUCCESSFUL
 from semsig_gis.evaluation.evaluate import evaluate
 from semsig_gis.likelihood.index import build_index
 from semsig_gis.likelihood.locate import locate
