@@ -168,15 +168,15 @@ class ExperimentWork:
         """
         count = self.queries_in(part) * len(self.spec.top)
         files = {name: _part_file(place, part, name) for name in self.spec.methods}
-        left = {name: file for name, file in files.items() if not _is_whole(file, rows=count)}
-        if not left:
+        missing = {name: file for name, file in files.items() if not _is_whole(file, rows=count)}
+        if not missing:
             return
         start = part.number * PART_QUERIES
         queries = self._queries(part.distortion, slice(start, start + PART_QUERIES))
-        by_distance = [name for name in left if self.spec.methods[name].noise is None]
-        for names in (by_distance, *([name] for name in left if name not in by_distance)):
+        by_distance = [name for name in missing if self.spec.methods[name].noise is None]
+        for names in (by_distance, *([name] for name in missing if name not in by_distance)):
             for name, scored in self._scored(names, queries):
-                with whole_file(left[name]) as half:
+                with whole_file(missing[name]) as half:
                     scored.to_parquet(half)
 
     def _scored(
@@ -453,11 +453,11 @@ def _answer(
         for part in work.parts
     }
     if workers or scheduler is not None:
-        given = {
+        places = {
             out: (work.spec.to_toml(), work.folder.resolve(), place.resolve() / PARTS)
             for out, (work, place) in running.items()
         }
-        answer = partial(_answer_apart, given)
+        answer = partial(_answer_apart, places)
     else:
         answer = partial(_answer_here, running)
     outcomes = run_tasks(
@@ -492,8 +492,8 @@ def _answer_here(running: Mapping[Path, _Running], task: _Task) -> None:
     work.answer(place / PARTS, task.part)
 
 
-def _answer_apart(given: Mapping[Path, tuple[str, Path, Path]], task: _Task) -> None:
-    spec, folder, place = given[task.out]
+def _answer_apart(places: Mapping[Path, tuple[str, Path, Path]], task: _Task) -> None:
+    spec, folder, place = places[task.out]
     _opened(spec, folder).answer(place, task.part)
 
 

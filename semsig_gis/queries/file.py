@@ -9,7 +9,7 @@ import numpy as np
 from semsig_gis.core.errors import InputError
 from semsig_gis.core.signature import Signature
 from semsig_gis.likelihood.route import Leg
-from semsig_gis.storage.signature_rows import given, parse_rows, read_rows, row_signature
+from semsig_gis.storage.signature_rows import parse_rows, read_rows, row_signature, row_value
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -62,20 +62,20 @@ def _query(row: Row, taxonomy: Taxonomy) -> tuple[object, Signature]:
     if signature is None:
         msg = "it needs types, bearings or both"
         raise InputError(msg)
-    return given(row, "id"), signature
+    return row_value(row, "id"), signature
 
 
 def _view(row: Row, taxonomy: Taxonomy) -> tuple[object, Signature, Leg | None]:
     signature = row_signature(row, taxonomy)
     nothing = Signature(np.empty(0, np.uint8), np.empty(0))
-    return given(row, "id"), nothing if signature is None else signature, _leg(row)
+    return row_value(row, "id"), nothing if signature is None else signature, _leg(row)
 
 
 def _leg(row: Row) -> Leg | None:
     values = {
-        name: float(given(row, name))
+        name: float(row_value(row, name))
         for name in (*PLAIN_LEG, *TOWARDS, "sigma")
-        if given(row, name) is not None
+        if row_value(row, name) is not None
     }
     if not values:
         return None

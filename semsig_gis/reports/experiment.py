@@ -47,10 +47,10 @@ def experiment_figures(results: Mapping[str, Evaluation]) -> pd.DataFrame:
             (label, *percentile(some, percent), int((~np.isnan(some)).sum()))
             for label, (some, percent) in values.items()
         ]
-        more = pd.DataFrame(rows, columns=["figure", "value", "low", "high", "n"])
-        both = pd.concat([evaluation.means().reset_index(), more], ignore_index=True)
-        both.insert(0, "case", name)
-        parts.append(both)
+        percentiles = pd.DataFrame(rows, columns=["figure", "value", "low", "high", "n"])
+        figures = pd.concat([evaluation.means().reset_index(), percentiles], ignore_index=True)
+        figures.insert(0, "case", name)
+        parts.append(figures)
     return pd.concat(parts, ignore_index=True)
 
 

@@ -26,13 +26,13 @@ SCORES = {
 
 
 def identifiability_tables(
-    told: Identifiability, *, object_counts: Mapping[int, int] | None = None
+    identifiability: Identifiability, *, object_counts: Mapping[int, int] | None = None
 ) -> tuple[Table, ...]:
     """Return the mean cell with the bands of cells, and what each class adds, as tables.
 
     `object_counts` is by class code; without it the columns about objects are left out.
     """
-    facts = told.summary(object_counts=object_counts)
+    facts = identifiability.summary(object_counts=object_counts)
     within = f"within {facts['radius_m']:g} m"
     cells = {label: percent(share) for label, share in _cell_chances(facts).items()}
     bits = {"bits left": f"{facts['bits_left']:.2f} of {facts['cell_bits']:.2f}"}
@@ -91,7 +91,7 @@ def check_tables(check: IdentifiabilityCheck) -> tuple[Table, ...]:
 
 
 def identifiability_page(
-    told: Identifiability,
+    identifiability: Identifiability,
     check: IdentifiabilityCheck,
     *,
     name: str,
@@ -101,7 +101,7 @@ def identifiability_page(
 
     `name` is what the database is called; `object_counts` is by class code.
     """
-    facts = told.summary(object_counts=object_counts)
+    facts = identifiability.summary(object_counts=object_counts)
     return Report(
         title=f"Where a query can be placed in {name}",
         text=(
@@ -125,7 +125,7 @@ def identifiability_page(
             _calibration_section(check),
             _rank_section(check),
         ),
-        taxonomy=told.database.taxonomy,
+        taxonomy=identifiability.database.taxonomy,
         facts={"identifiability": facts, "check": check.to_dict(), "machine": machine()},
     )
 

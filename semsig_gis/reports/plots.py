@@ -101,9 +101,9 @@ def saved(figure: Figure, *, title: str, description: str) -> Picture:
     # Without the document type, which names an address on the web.
     _, opened, rest = svg.getvalue().decode("utf-8").partition("<svg ")
     head, _, body = rest.partition(">")
-    told = f"<title>{escape(one_line(title))}</title>\n<desc>{escape(one_line(description))}</desc>"
-    text = f'<?xml version="1.0" encoding="utf-8"?>\n{opened}role="img" {head}>\n{told}{body}'
-    return Picture(text.encode("utf-8"), png.getvalue(), one_line(description))
+    text = f"<title>{escape(one_line(title))}</title>\n<desc>{escape(one_line(description))}</desc>"
+    page = f'<?xml version="1.0" encoding="utf-8"?>\n{opened}role="img" {head}>\n{text}{body}'
+    return Picture(page.encode("utf-8"), png.getvalue(), one_line(description))
 
 
 def label(text: str, length: int) -> str:
@@ -238,8 +238,8 @@ def draw_plot(plot: Plot) -> Picture:
 
 
 def _draw_frame(axes: Axes, plot: Plot) -> None:
-    known = sorted({x for x in _all_x(plot) if math.isfinite(x)}) or [0.0, 1.0]
-    left, right = known[0], known[-1]
+    values = sorted({x for x in _all_x(plot) if math.isfinite(x)}) or [0.0, 1.0]
+    left, right = values[0], values[-1]
     margin = 0.015 * (right - left) or 0.5
     axes.set_xlim(left - margin, right + margin)
     low, high = plot.y_range
@@ -250,8 +250,8 @@ def _draw_frame(axes: Axes, plot: Plot) -> None:
     axes.grid(visible=True)
     axes.set_axisbelow(True)
     axes.spines[["top", "right"]].set_visible(False)
-    if len(known) <= FEW_TICKS:
-        axes.set_xticks(known, [f"{x:g}" for x in known])
+    if len(values) <= FEW_TICKS:
+        axes.set_xticks(values, [f"{x:g}" for x in values])
     if plot.diagonal:
         axes.axline((0, 0), slope=1, color="#888888", linewidth=1, dashes=(4, 3), zorder=1.5)
 

@@ -231,9 +231,9 @@ def draw_scene(scene: Scene, taxonomy: Taxonomy) -> Picture:
 
 def _draw_map(axes: Axes, scene: Scene, signs: dict[int, ClassSign]) -> None:
     away = math.hypot(*scene.answer) if scene.answer else 0.0
-    drawn = away if away < FARTHEST * scene.radius else 0.0
+    near = away if away < FARTHEST * scene.radius else 0.0
     farthest = max((math.hypot(item.east, item.north) for item in scene.objects), default=0.0)
-    reach = max(AROUND * scene.radius, 1.08 * farthest, 1.12 * drawn)
+    reach = max(AROUND * scene.radius, 1.08 * farthest, 1.12 * near)
     axes.set(xlim=(-reach, reach), ylim=(-reach, reach), xticks=[], yticks=[], aspect="equal")
     axes.set_facecolor("#fafaf8")
     axes.add_patch(

@@ -255,12 +255,12 @@ def read_geoparquet(
     try:
         specs = json.loads(metadata[SPEC_KEY])
         crs = _crs_of(json.dumps(json.loads(metadata[b"geo"])["columns"]["geometry"]["crs"]))
-        found = specs["kind"]
+        stored = specs["kind"]
     except (KeyError, TypeError, ValueError, CRSError) as error:
         msg = f"{file} was not written by semsig; give a {kind} file."
         raise DatabaseError(msg) from error
-    if found != kind:
-        msg = f"{file} is a {found} file; give a {kind} file."
+    if stored != kind:
+        msg = f"{file} is a {stored} file; give a {kind} file."
         raise DatabaseError(msg)
     try:
         if box is None:

@@ -64,7 +64,7 @@ def raster_at_cells(
                     "does, such as a GeoTIFF."
                 )
                 raise CrsError(msg)
-            chosen = _chosen_band(source, str(path), band)
+            number = _chosen_band(source, str(path), band)
             with WarpedVRT(
                 source,
                 crs=crs.to_wkt(),
@@ -75,7 +75,7 @@ def raster_at_cells(
                 nodata=np.nan,
                 dtype="float64",
             ) as warped:
-                values: NDArray[np.float64] = warped.read(chosen)
+                values: NDArray[np.float64] = warped.read(number)
     except (CRSError, CPLE_BaseError) as error:
         msg = (
             f"the coordinate reference system of {path} cannot be turned into that of the cells; "
@@ -97,8 +97,8 @@ def _chosen_band(source: rasterio.DatasetReader, path: str, band: int | None) ->
     if band is None and len(bands) == 1:
         return bands[0]
     if band is None or band not in source.indexes:
-        asked = "none was named" if band is None else f"band {band} was asked for"
-        msg = f"{path} has {len(bands)} bands, but {asked}; name one, or give a raster of one band."
+        which = "none was named" if band is None else f"band {band} was asked for"
+        msg = f"{path} has {len(bands)} bands, but {which}; name one, or give a raster of one band."
         raise InputError(msg)
     return band
 

@@ -47,24 +47,24 @@ def parse_rows(
 
     `source` names the text in messages.
     """
-    found = []
+    rows = []
     for line, values in _csv(text, source) if table else _json_lines(text):
         try:
             row = json.loads(values) if isinstance(values, str) else values
             if not isinstance(row, dict):
                 msg = "it is not a table of names and values"
                 raise InputError(msg)
-            found.append((line, read(row)))
+            rows.append((line, read(row)))
         except (SemsigError, ValueError, TypeError, OverflowError, RecursionError) as error:
             reason = str(error).rstrip(".")
             if isinstance(error, json.JSONDecodeError):
                 reason = f"it is not JSON: {reason}"
             msg = f"line {line} of {source} is no {what} ({reason}); correct it or take it out."
             raise InputError(msg) from error
-    if not found:
+    if not rows:
         msg = f"{source} has no rows; give one {what} on each line."
         raise InputError(msg)
-    return found
+    return rows
 
 
 def row_signature(row: Row, taxonomy: Taxonomy) -> Signature | None:
@@ -74,7 +74,7 @@ def row_signature(row: Row, taxonomy: Taxonomy) -> Signature | None:
     blanks, commas or semicolons between them), each of which may be missing or empty. InputError if
     they cannot be used or do not fit each other.
     """
-    types, bearings = given(row, "types"), given(row, "bearings")
+    types, bearings = row_value(row, "types"), row_value(row, "bearings")
     if isinstance(bearings, str):
         bearings = [float(part) for part in re.split(r"[\s,;]+", bearings.strip()) if part]
     elif isinstance(bearings, (int, float)):
@@ -85,7 +85,7 @@ def row_signature(row: Row, taxonomy: Taxonomy) -> Signature | None:
     return Signature.parse(symbols or None, bearings or None, taxonomy=taxonomy)
 
 
-def given(row: Row, name: str) -> Any:  # noqa: ANN401 - any value of JSON
+def row_value(row: Row, name: str) -> Any:  # noqa: ANN401 - any value of JSON
     """Return a value of a row, None where it is missing or empty; 0 is a value."""
     value = row.get(name)
     return None if isinstance(value, str) and not value.strip() else value

@@ -69,8 +69,8 @@ def one_of(value: str, key: str, choices: tuple[str, ...], where: str) -> Any:  
     The type is left open, so that it may be a `Literal`.
     """
     if value not in choices:
-        known = ", ".join(repr(choice) for choice in choices)
-        msg = f"{where} has {key} = {value!r}{nearest_name(value, choices)}; write one of {known}."
+        names = ", ".join(repr(choice) for choice in choices)
+        msg = f"{where} has {key} = {value!r}{nearest_name(value, choices)}; write one of {names}."
         raise CatalogError(msg)
     return value
 

@@ -63,14 +63,14 @@ MIDDLING_SEEN = f"{COLUMNS[P50]} of queries that see {MIDDLING[0]} to {MIDDLING[
 PARIS_P50, PARIS_RECALL10 = paris.ACCURACY[30.0, 16]
 
 
-def reproduction_report(found: Reproduction) -> Report:
+def reproduction_report(results: Reproduction) -> Report:
     """Put together what the experiments of the paper found, in the order of the paper.
 
     Its tables and plots come first, each with its figures where it prints them; then what it leaves
     open, and the likelihood method.
     """
-    settings = found.settings
-    first = next(iter(found.experiments["none"].values()))
+    settings = results.settings
+    first = next(iter(results.experiments["none"].values()))
     return Report(
         title=f"The paper's experiments on {settings['database']}",
         text=(
@@ -84,30 +84,30 @@ def reproduction_report(found: Reproduction) -> Report:
                 "Shares come with intervals of 95 % (Wilson), which tell how much chance there "
                 "is in the choice of the queries. Ties are scored by their expectation."
             ),
-            *found.missing,
+            *results.missing,
         ),
         settings=(
             ("City", str(settings["database"])),
-            ("Cells", f"{len(found.database):,}"),
+            ("Cells", f"{len(results.database):,}"),
             ("Queries of each experiment", f"{settings['queries']:,}"),
             ("Seed", str(settings["seed"])),
             *first.versions.items(),
         ),
         sections=(
-            _object_section(found),
-            _database_section(found),
-            *_example_sections(found),
-            _distortion_section(found),
-            *(comparison.section(found) for comparison in COMPARISONS),
-            _time_section(found),
-            _level_section(found),
-            _alone_section(found),
-            *_range_sections(found),
-            _scale_section(found),
-            _reading_section(found),
-            _likelihood_section(found),
+            _object_section(results),
+            _database_section(results),
+            *_example_sections(results),
+            _distortion_section(results),
+            *(comparison.section(results) for comparison in COMPARISONS),
+            _time_section(results),
+            _level_section(results),
+            _alone_section(results),
+            *_range_sections(results),
+            _scale_section(results),
+            _reading_section(results),
+            _likelihood_section(results),
         ),
-        taxonomy=found.database.taxonomy,
+        taxonomy=results.database.taxonomy,
         facts={
             "settings": dict(settings),
             "versions": dict(first.versions),
@@ -126,12 +126,12 @@ def _shares(
     ]
 
 
-def _just_5(found: Reproduction, experiment: str, row: str, column: str) -> Number:
+def _just_5(results: Reproduction, experiment: str, row: str, column: str) -> Number:
     """Return the recall at 10 % if just 5 % of the cells are kept, whatever ties with the last.
 
     Then the best 10 % are those of the first stage.
     """
-    case = case_of(found, experiment, FIRST_STAGE, "medium")
+    case = case_of(results, experiment, FIRST_STAGE, "medium")
     radius = case.database["radius_m"]
     paper = paris.ACCURACY.get((radius, case.database["levels"]), (None, None))[1]
     return share_of(case, RECALL10).number(row, column, paper)
@@ -140,10 +140,10 @@ def _just_5(found: Reproduction, experiment: str, row: str, column: str) -> Numb
 # --- The database and the queries ---------------------------------------------------------------
 
 
-def _object_section(found: Reproduction) -> Section:
+def _object_section(results: Reproduction) -> Section:
     total = sum(paris.OCCURRENCES.values())
     numbers = []
-    for one in found.summary["occurrences"]:
+    for one in results.summary["occurrences"]:
         row, paper = one["title"], paris.OCCURRENCES.get(one["name"])
         share = None if paper is None else paper / total
         numbers += [
@@ -163,8 +163,8 @@ def _object_section(found: Reproduction) -> Section:
     )
 
 
-def _database_section(found: Reproduction) -> Section:
-    facts = found.summary
+def _database_section(results: Reproduction) -> Section:
+    facts = results.summary
     numbers = [
         Number(row, "", facts[key], paper=paris.DATABASE[key], unit=unit, decimals=decimals)
         for key, (row, unit, decimals) in FACTS.items()
@@ -193,8 +193,8 @@ def _database_section(found: Reproduction) -> Section:
     )
 
 
-def _example_sections(found: Reproduction) -> Iterator[Section]:
-    evaluation = case_of(found, "medium", BEST)
+def _example_sections(results: Reproduction) -> Iterator[Section]:
+    evaluation = case_of(results, "medium", BEST)
     yield Section(
         name="found",
         title="Places that were found",
@@ -205,20 +205,20 @@ def _example_sections(found: Reproduction) -> Iterator[Section]:
                 "the distortion."
             ),
         ),
-        scenes=example_scenes(evaluation, found.database, successful=True),
+        scenes=example_scenes(evaluation, results.database, successful=True),
     )
     yield Section(
         name="lost",
         title="Places that were not found",
         text=("The first ones whose answer is not. They see few objects, and of common classes.",),
-        scenes=example_scenes(evaluation, found.database, successful=False),
+        scenes=example_scenes(evaluation, results.database, successful=False),
     )
 
 
-def _distortion_section(found: Reproduction) -> Section:
+def _distortion_section(results: Reproduction) -> Section:
     numbers = []
     for name in LEVELS:
-        level, case = DISTORTIONS[name], level_case(found, name)
+        level, case = DISTORTIONS[name], level_case(results, name)
         length = float(case.queries["query_length"].mean())
         empty = case.unlocalized / len(case.queries)
         for column, ours, paper in (
@@ -266,43 +266,43 @@ class Comparison:
     best: tuple[tuple[str, Iterable[str], str, int, float], ...] = ()
     plots: tuple[tuple[str, str, Points], ...]
 
-    def section(self, found: Reproduction) -> Section:
+    def section(self, results: Reproduction) -> Section:
         """Return the section of a reproduction."""
         return Section(
             name=self.name,
             title=self.title,
             text=(self.text,),
-            numbers=(*self._numbers(found), *self._best_numbers(found)),
-            plots=tuple(self._plot(found, *plot) for plot in self.plots),
+            numbers=(*self._numbers(results), *self._best_numbers(results)),
+            plots=tuple(self._plot(results, *plot) for plot in self.plots),
         )
 
-    def _numbers(self, found: Reproduction) -> Iterator[Number]:
+    def _numbers(self, results: Reproduction) -> Iterator[Number]:
         for distortion, metres, percent in self.figures:
-            said = "no distortion" if distortion == "none" else distortion
+            level = "no distortion" if distortion == "none" else distortion
             for method, label in self.labels.items():
-                case = case_of(found, distortion, method, top=self.top)
+                case = case_of(results, distortion, method, top=self.top)
                 error, recall = f"P(error ≤ {metres} m)", f"recall@{percent} %"
-                yield share_of(case, ("error", metres)).number(label, f"{said}: {error}")
-                yield share_of(case, ("recall", percent)).number(label, f"{said}: {recall}")
+                yield share_of(case, ("error", metres)).number(label, f"{level}: {error}")
+                yield share_of(case, ("recall", percent)).number(label, f"{level}: {recall}")
 
-    def _best_numbers(self, found: Reproduction) -> Iterator[Number]:
+    def _best_numbers(self, results: Reproduction) -> Iterator[Number]:
         for row, methods, distortion, metres, paper in self.best:
-            cases = [case_of(found, distortion, method, top=self.top) for method in methods]
+            cases = [case_of(results, distortion, method, top=self.top) for method in methods]
             shares = [share_of(case, ("error", metres)) for case in cases]
             best = max(shares, key=lambda share: share.ours or 0.0)
-            said = "no distortion" if distortion == "none" else distortion
-            yield best.number(row, f"{said}: P(error ≤ {metres} m)", paper)
+            level = "no distortion" if distortion == "none" else distortion
+            yield best.number(row, f"{level}: P(error ≤ {metres} m)", paper)
 
-    def _plot(self, found: Reproduction, distortion: str, kind: str, paper: Points) -> Plot:
+    def _plot(self, results: Reproduction, distortion: str, kind: str, paper: Points) -> Plot:
         top = self.top if kind == "error" else 1
-        said = "no" if distortion == "none" else distortion
+        level = "no" if distortion == "none" else distortion
         which = "first candidate" if top == 1 else f"best of {top} candidates"
         shown = f"error of the {which}" if kind == "error" else "recall"
         curves = (
-            curve_of(case_of(found, distortion, method, top=top), label, kind, band=False)
+            curve_of(case_of(results, distortion, method, top=top), label, kind, band=False)
             for method, label in self.labels.items()
         )
-        title = f"{self.subject}, {said} distortion: {shown}"
+        title = f"{self.subject}, {level} distortion: {shown}"
         return plot_of(f"{self.name}-{distortion}", title, kind, curves, paper)
 
 
@@ -390,12 +390,12 @@ COMPARISONS = (
 )
 
 
-def _time_section(found: Reproduction) -> Section:
+def _time_section(results: Reproduction) -> Section:
     numbers = []
     for measure, name in NAMES.items():
         methods = (f"types:{measure}", f"angles:{measure}", f"{measure}+{measure}:5%")
         for column, method in zip(TIMED_COLUMNS, methods, strict=True):
-            ours, paper = 1000.0 * found.seconds[method], paris.QUERY_MS[method]
+            ours, paper = 1000.0 * results.seconds[method], paris.QUERY_MS[method]
             row = f"{name} distance"
             numbers.append(Number(row, column, ours, paper=paper, unit="ms", decimals=2))
     return Section(
@@ -406,7 +406,7 @@ def _time_section(found: Reproduction) -> Section:
                 "Mean time to compare a query of 14 objects with all cells, of 100 queries, asked "
                 "one by one on one thread. The paper used another computer and another program, so "
                 f"that only orders of magnitude compare; it has 312,134 cells, we "
-                f"{len(found.database):,}."
+                f"{len(results.database):,}."
             ),
         ),
         numbers=tuple(numbers),
@@ -416,8 +416,8 @@ def _time_section(found: Reproduction) -> Section:
 # --- The recommended method and its parameters --------------------------------------------------
 
 
-def _level_section(found: Reproduction) -> Section:
-    cases = {name: level_case(found, name) for name in ("none", *LEVELS)}
+def _level_section(results: Reproduction) -> Section:
+    cases = {name: level_case(results, name) for name in ("none", *LEVELS)}
     read = paris.READ_OFF
     highest = {P10: read["light_small_error"], RECALL10: read["light_recall"]}
     lowest = {P10: read["strong_small_error"], RECALL10: read["strong_recall"]}
@@ -457,7 +457,7 @@ def _level_section(found: Reproduction) -> Section:
                 "that recall is told, too."
             ),
         ),
-        numbers=(*numbers, _just_5(found, "medium", "medium", JUST_5)),
+        numbers=(*numbers, _just_5(results, "medium", "medium", JUST_5)),
         plots=tuple(
             plot_of(
                 "levels",
@@ -471,8 +471,8 @@ def _level_section(found: Reproduction) -> Section:
     )
 
 
-def _alone_section(found: Reproduction) -> Section:
-    cases = {name: level_case(found, name) for name in LEVELS}
+def _alone_section(results: Reproduction) -> Section:
+    cases = {name: level_case(results, name) for name in LEVELS}
     queries = Share.of(is_alone(cases["medium"]).astype(np.float64))
     numbers = [queries.number("queries", "share alone", paris.ALONE)]
     for name, case in cases.items():
@@ -501,22 +501,22 @@ def _alone_section(found: Reproduction) -> Section:
     )
 
 
-def _range_sections(found: Reproduction) -> Iterator[Section]:
+def _range_sections(results: Reproduction) -> Iterator[Section]:
     """Yield the section about visibility ranges, if there are other ones."""
-    if not found.variants:
+    if not results.variants:
         return
-    spec = found.database.spec
-    names = {radius: f"range-{radius:g}" for radius in found.variants} | {spec.radius: "medium"}
-    facts = {**found.variants, spec.radius: found.summary}
+    spec = results.database.spec
+    names = {radius: f"range-{radius:g}" for radius in results.variants} | {spec.radius: "medium"}
+    facts = {**results.variants, spec.radius: results.summary}
     numbers = []
     for radius, name in sorted(names.items()):
-        case = case_of(found, name, BEST, "medium")
+        case = case_of(results, name, BEST, "medium")
         p50, recall10 = paris.ACCURACY.get((radius, spec.levels), (None, None))
         row = f"R = {radius:g} m"
         middling = case.queries["length"].between(*MIDDLING).to_numpy()
         numbers += [
             *_shares(case, row, {P50: p50, RECALL10: recall10}),
-            _just_5(found, name, row, JUST_5),
+            _just_5(results, name, row, JUST_5),
             Number(row, "mean length", facts[radius]["mean_length"], decimals=2),
             share_of(case, P50, middling).number(row, MIDDLING_SEEN),
         ]
@@ -538,12 +538,12 @@ def _range_sections(found: Reproduction) -> Iterator[Section]:
     )
 
 
-def _scale_section(found: Reproduction) -> Section:
-    spec = found.database.spec
-    cases = {spec.levels: level_case(found, "medium")}
-    for name in found.experiments:
+def _scale_section(results: Reproduction) -> Section:
+    spec = results.database.spec
+    cases = {spec.levels: level_case(results, "medium")}
+    for name in results.experiments:
         if name.startswith("levels-"):
-            cases[int(name.removeprefix("levels-"))] = case_of(found, name, BEST, "medium")
+            cases[int(name.removeprefix("levels-"))] = case_of(results, name, BEST, "medium")
     numbers = []
     for levels, case in sorted(cases.items()):
         paper, _ = paris.ACCURACY.get((spec.radius, levels), (None, None))
@@ -559,22 +559,22 @@ def _scale_section(found: Reproduction) -> Section:
 # --- Beyond the paper ---------------------------------------------------------------------------
 
 
-def _reading_section(found: Reproduction) -> Section:
+def _reading_section(results: Reproduction) -> Section:
     paper = {P50: PARIS_P50, RECALL10: PARIS_RECALL10}
     numbers: list[Number] = []
-    for name, said in READINGS.items():
+    for name, level in READINGS.items():
         for method, scale in ((BEST, "distances from 0 to 1"), ("raw", "raw distances")):
-            case = case_of(found, "readings", method, name)
-            numbers += _shares(case, f"{said}, {scale}", paper)
-    medium = level_case(found, "medium")
+            case = case_of(results, "readings", method, name)
+            numbers += _shares(case, f"{level}, {scale}", paper)
+    medium = level_case(results, "medium")
     row = "as the first, with the paper's share of unambiguous queries"
     for figure, theirs in paper.items():
         numbers.append(reweighted(medium, figure).number(row, COLUMNS[figure], theirs))
     row = "as the first, but just 5 % of the cells are kept, not all that tie"
-    numbers.append(_just_5(found, "medium", row, COLUMNS[RECALL10]))
+    numbers.append(_just_5(results, "medium", row, COLUMNS[RECALL10]))
     errors = [one for one in numbers if one.column == COLUMNS[P50] and one.difference is not None]
     nearest = min(errors, key=lambda one: abs(one.difference or 0.0))
-    queries = len(case_of(found, "readings", BEST, next(iter(READINGS))).queries)
+    queries = len(case_of(results, "readings", BEST, next(iter(READINGS))).queries)
     return Section(
         name="readings",
         title="What the paper leaves open",
@@ -595,12 +595,12 @@ def _reading_section(found: Reproduction) -> Section:
     )
 
 
-def _likelihood_section(found: Reproduction) -> Section:
-    cases = {name: case_of(found, "ours", OURS, name) for name in LEVELS}
+def _likelihood_section(results: Reproduction) -> Section:
+    cases = {name: case_of(results, "ours", OURS, name) for name in LEVELS}
     numbers = []
     for name, case in cases.items():
         numbers += _shares(case, f"{name}: likelihood")
-        numbers += _shares(level_case(found, name), f"{name}: edit + edit, 5 %")
+        numbers += _shares(level_case(results, name), f"{name}: edit + edit, 5 %")
     return Section(
         name="likelihood",
         title="The likelihood method",

@@ -68,15 +68,15 @@ class Share(NamedTuple):
 
 
 def case_of(
-    found: Reproduction, experiment: str, method: str, distortion: str = "", *, top: int = 1
+    results: Reproduction, experiment: str, method: str, distortion: str = "", *, top: int = 1
 ) -> Evaluation:
     """Return an evaluation; the distortion is by default that of the experiment's name."""
-    return found.experiments[experiment][f"{distortion or experiment}/{method}-top{top}"]
+    return results.experiments[experiment][f"{distortion or experiment}/{method}-top{top}"]
 
 
-def level_case(found: Reproduction, name: str) -> Evaluation:
+def level_case(results: Reproduction, name: str) -> Evaluation:
     """Return the evaluation of the recommended method at a level of distortion."""
-    return case_of(found, name if name in found.experiments else "levels", BEST, name)
+    return case_of(results, name if name in results.experiments else "levels", BEST, name)
 
 
 def share_of(

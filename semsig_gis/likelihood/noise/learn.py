@@ -26,7 +26,7 @@ from semsig_gis.likelihood.noise.fit import (
     starting_model,
 )
 from semsig_gis.likelihood.noise.model import NoiseSpec
-from semsig_gis.storage.signature_rows import given, read_rows, row_signature
+from semsig_gis.storage.signature_rows import read_rows, row_signature, row_value
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -121,7 +121,7 @@ def _sample(row: Row, taxonomy: Taxonomy) -> Sample:
     signature = row_signature(row, taxonomy)
     if signature is None:
         signature = Signature(np.empty(0, np.uint8), np.empty(0))
-    x, y, cell = (given(row, name) for name in ("x", "y", "cell_id"))
+    x, y, cell = (row_value(row, name) for name in ("x", "y", "cell_id"))
     if x is not None and y is not None:
         return Sample(signature=signature, xy=(float(x), float(y)))
     return Sample(signature=signature, cell_id=None if cell is None else int(cell))
