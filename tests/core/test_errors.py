@@ -18,30 +18,30 @@ def test_one_root_catches_every_error_and_so_does_a_builtin(name: str) -> None:
 
 
 @pytest.mark.parametrize(
-    ("name", "known", "nearest"),
+    ("name", "names", "nearest"),
     [
         ("layrs", ["layer", "layers", "license"], "layers"),
         ("Tree", ["tree", "street"], "tree"),
         ("street_ligth", ["street_light", "traffic_light"], "street_light"),
         ("d", ["B", "C", "D"], "D"),
+        ("zebra", ["layer", "class"], None),
+        ("zebra", [], None),
+        ("", ["layer"], None),
     ],
 )
-def test_a_misspelt_name_is_offered_its_nearest(name: str, known: list[str], nearest: str) -> None:
-    assert errors.nearest_name(name, known) == f"; the nearest is {nearest!r}"
-
-
-def test_nothing_is_offered_when_nothing_is_near() -> None:
-    assert not errors.nearest_name("zebra", ["layer", "class"])
-    assert not errors.nearest_name("zebra", [])
-    assert not errors.nearest_name("", ["layer"])
+def test_a_misspelt_name_is_offered_its_nearest(
+    name: str, names: list[str], nearest: str | None
+) -> None:
+    offer = f"; the nearest is {nearest!r}" if nearest else ""
+    assert errors.nearest_name(name, names) == offer
 
 
 @given(NAMES, st.lists(NAMES, max_size=5))
-def test_what_is_offered_is_a_known_name(name: str, known: list[str]) -> None:
-    offered = errors.nearest_name(name, known)
-    assert not offered or offered in {f"; the nearest is {item!r}" for item in known}
+def test_what_is_offered_is_one_of_the_names(name: str, names: list[str]) -> None:
+    offer = errors.nearest_name(name, names)
+    assert not offer or offer in {f"; the nearest is {item!r}" for item in names}
 
 
 @given(st.lists(NAMES.filter(bool), min_size=1, unique_by=str.lower))
-def test_a_known_name_is_nearest_to_itself(known: list[str]) -> None:
-    assert errors.nearest_name(known[0], known) == f"; the nearest is {known[0]!r}"
+def test_a_name_is_nearest_to_itself(names: list[str]) -> None:
+    assert errors.nearest_name(names[0], names) == f"; the nearest is {names[0]!r}"

@@ -56,7 +56,7 @@ def test_code_is_kept_for_later_processes(tmp_path: Path) -> None:
 
 
 def test_what_is_compiled_equals_the_loops_themselves() -> None:
-    from semsig_gis.matching import kernels as _bit_kernels
+    from semsig_gis.matching import kernels
 
     rng = np.random.default_rng(1)
     values = rng.integers(0, 5, 60).astype(np.uint8)
@@ -64,7 +64,7 @@ def test_what_is_compiled_equals_the_loops_themselves() -> None:
     planes = BitPlanes.build(values, offsets)
     slow = np.zeros_like(planes.planes)
     per_position = int(planes.digits.max()) + 1
-    _bit_kernels.pack.py_func(  # type: ignore[attr-defined]
+    kernels.pack.py_func(  # type: ignore[attr-defined]
         values, offsets, planes.digits, planes.bounds, per_position, slow
     )
     np.testing.assert_array_equal(slow, planes.planes)

@@ -11,10 +11,11 @@ import warnings
 from typing import TYPE_CHECKING
 
 import pytest
-from sentences import assert_sentence
+from sentences import assert_sentence, refused
 
 from semsig_gis.core.errors import CatalogError, SourceError
 from semsig_gis.core.plugins import CATALOGS, READERS, installed_catalogs, installed_readers
+from semsig_gis.objects.table import open_objects
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -79,22 +80,6 @@ def read_layers(path, specs, *, filters=True, crs=None):
 """,
     "semsig_testville/broken.py": "import a_module_that_is_not_there\n",
 }
-SHOW = """
-import sys, warnings
-from pathlib import Path
-from semsig_gis.core.plugins import installed_catalogs, installed_readers
-from semsig_gis.sources.catalog import load_catalog
-with warnings.catch_warnings(record=True) as caught:
-    warnings.simplefilter("always")
-    catalogs, readers = installed_catalogs(), installed_readers()
-print(*catalogs)
-print(*readers)
-catalog = load_catalog(catalogs["testville"])
-layer, = readers[catalog.reader](Path(sys.argv[1]), catalog.layers)
-print(layer.spec.name, layer.counts.read, *layer.table["source_id"])
-for warning in caught:
-    print(warning.message)
-"""
 
 
 @pytest.fixture(scope="module")
@@ -115,43 +100,15 @@ def installed(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return target
 
 
-def test_an_installed_package_is_seen_by_a_fresh_program(installed: Path, tmp_path: Path) -> None:
-    data = tmp_path / "town.benches"
-    data.write_text("a7 1 2\nb8 3 4\n", encoding="utf-8")
-    paths = [str(installed), *os.environ.get("PYTHONPATH", "").split(os.pathsep)]
-    shown = subprocess.run(
-        [sys.executable, "-c", SHOW, str(data)],
-        env={**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, paths))},
-        check=True,
-        capture_output=True,
-        text=True,
-        encoding="utf-8",
-    )
-    catalogs, readers, layer, *warned = shown.stdout.splitlines()
-    # Packages that the machine has beside it do no harm.
-    assert {"testville", "testville_again"} <= set(catalogs.split())
-    assert "testville_lines" in readers.split()
-    assert "lost" not in catalogs
-    assert "broken" not in readers
-    assert layer == "benches 2 a7 b8"
-    assert sorted(line.partition(" ")[0] for line in warned) == [
-        "'testville_broken'",
-        "'testville_lost'",
-    ]
-
-
-def test_the_command_line_shows_and_uses_an_installed_package(
-    installed: Path, tmp_path: Path
-) -> None:
-    data = tmp_path / "town.benches"
+def test_an_installed_package_is_shown_and_used(installed: Path, tmp_path: Path) -> None:
+    data, out = tmp_path / "town.benches", tmp_path / "objects.parquet"
     data.write_text("a7 770000 6280000\nb8 770020 6280000\n", encoding="utf-8")
     paths = [str(installed), *os.environ.get("PYTHONPATH", "").split(os.pathsep)]
-    environment = {**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, paths))}
 
     def semsig(*arguments: str) -> subprocess.CompletedProcess[str]:
         return subprocess.run(
-            [sys.executable, "-m", "semsig_gis.cli", *arguments],
-            env=environment,
+            [sys.executable, "-m", "semsig_gis.cli", *arguments, "--json"],
+            env={**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, paths))},
             check=True,
             capture_output=True,
             text=True,
@@ -159,14 +116,19 @@ def test_the_command_line_shows_and_uses_an_installed_package(
         )
 
     shown = semsig("sources")
-    assert "testville" in shown.stdout
-    assert "testville_lines" in shown.stdout
-    assert "semsig: 'testville_broken' of semsig_gis.readers" in shown.stderr
+    listed = json.loads(shown.stdout)
+    # Packages that the machine has beside it do no harm.
+    catalogs = {item["name"]: item["title"] for item in listed["catalogs"]}
+    assert catalogs["testville"] == catalogs["testville_again"] == "Testville"
+    assert "testville_lines" in listed["readers"]
+    assert not {"testville_lost", "testville_broken"} & {*catalogs, *listed["readers"]}
+    for name, group in (("testville_broken", READERS), ("testville_lost", CATALOGS)):
+        assert f"semsig: '{name}' of {group}" in shown.stderr
     assert "Traceback" not in shown.stderr
     assert ".py:" not in shown.stderr
-    out = tmp_path / "objects.parquet"
-    loaded = semsig("load", str(data), "--catalog", "testville", "--out", str(out), "--json")
+    loaded = semsig("load", str(data), "--catalog", "testville", "--out", str(out))
     assert json.loads(loaded.stdout)["objects"] == 2
+    assert open_objects(out).table["source_id"].tolist() == ["a7", "b8"]
 
 
 # --- Entries without a package around them ----------------------------------------------------
@@ -212,8 +174,8 @@ def test_names_come_sorted_and_paths_are_paths(site: Site, tmp_path: Path) -> No
     city.touch()
     site.module("a_two_cities_module", f"def one(): return {str(city)!r}\nTWO = {str(city)!r}\n")
     site.add("cities", CATALOGS, zz_one="a_two_cities_module:one", aa_two="a_two_cities_module:TWO")
-    found = {name: path for name, path in installed_catalogs().items() if path == city}
-    assert list(found) == ["aa_two", "zz_one"]
+    names = [name for name, path in installed_catalogs().items() if path == city]
+    assert names == ["aa_two", "zz_one"]
 
 
 @pytest.mark.parametrize(
@@ -241,9 +203,9 @@ def test_a_broken_catalogue_is_told_and_skipped(
     site.add("good", CATALOGS, good="a_good_module:value")
     site.add("bad", CATALOGS, bad="a_bad_module:value")
     with pytest.warns(UserWarning, match="'bad' of semsig_gis.catalogs, brought by bad") as caught:
-        found = installed_catalogs()
-    assert found["good"] == good
-    assert "bad" not in found
+        catalogs = installed_catalogs()
+    assert catalogs["good"] == good
+    assert "bad" not in catalogs
     assert [warning.filename for warning in caught] == [__file__]
     (warning,) = caught
     assert isinstance(warning.message, UserWarning)
@@ -254,8 +216,7 @@ def test_a_reader_that_is_no_function_is_told_and_skipped(site: Site) -> None:
     site.module("a_reader_module", "read_layers = 'x'")
     site.add("bad", READERS, bad="a_reader_module:read_layers")
     with pytest.warns(UserWarning, match="it gives 'x', not a function") as caught:
-        found = installed_readers()
-    assert "bad" not in found
+        assert "bad" not in installed_readers()
     assert isinstance(caught[0].message, UserWarning)
     assert_sentence(caught[0].message, "'bad'", READERS, "correct or uninstall")
 
@@ -263,9 +224,8 @@ def test_a_reader_that_is_no_function_is_told_and_skipped(site: Site) -> None:
 def test_two_packages_with_one_name_are_an_error(site: Site) -> None:
     site.add("north", CATALOGS, city="nothing_to_import:value")
     site.add("south", CATALOGS, city="nothing_to_import:other")
-    with pytest.raises(CatalogError) as caught:
+    with refused(CatalogError, "'city'", "by north and by south", "uninstall"):
         installed_catalogs()
-    assert_sentence(caught.value, "'city'", "by north and by south", "uninstall")
 
 
 def test_one_package_may_use_a_name_in_both_groups(site: Site) -> None:
@@ -279,6 +239,5 @@ def test_one_package_may_use_a_name_in_both_groups(site: Site) -> None:
 
 def test_the_name_of_a_built_in_is_an_error(site: Site) -> None:
     site.add("north", READERS, osm_file="nothing_to_import:value")
-    with pytest.raises(SourceError) as caught:
+    with refused(SourceError, "'osm_file'", "semsig_gis itself", "by north"):
         installed_readers(taken=["osm_file"])
-    assert_sentence(caught.value, "'osm_file'", "semsig_gis itself", "by north")

@@ -3,18 +3,22 @@ from __future__ import annotations
 import dataclasses
 import math
 from fractions import Fraction
+from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from sentences import assert_sentence
+from sentences import refused
 
 from semsig_gis.core.errors import InputError, UnknownNameError
 from semsig_gis.core.signature import Signature, SignatureSpec, quantize
 from semsig_gis.database.database import BEARING_UNITS
 from semsig_gis.database.visibility import Sightings, clockwise_order
 from semsig_gis.sources.catalog import paper_taxonomy
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
 
 TAXONOMY = paper_taxonomy()
 LEVELS = st.integers(1, 255)
@@ -60,26 +64,27 @@ def test_a_stored_bearing_falls_into_the_level_of_its_units(levels: int) -> None
 
 
 def test_levels_keep_the_shape_and_fit_a_byte() -> None:
-    assert quantize(np.zeros((2, 3)), 255).shape == (2, 3)
+    levels = quantize(np.full((2, 3), 359.9999), 255)
+    assert (levels.shape, levels.dtype, levels[0, 0]) == ((2, 3), np.uint8, 254)
     assert quantize([], 16).dtype == np.uint8
-    assert quantize(359.9999, 255) == 254
 
 
 # --- SignatureSpec ----------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("radius", [0.0, -30.0, math.nan, math.inf, 6000.1])
-def test_a_range_is_a_number_of_metres(radius: float) -> None:
-    with pytest.raises(InputError) as caught:
-        SignatureSpec(radius=radius)
-    assert_sentence(caught.value, f"{radius} m", "above 0 and up to 6000")
-
-
-@pytest.mark.parametrize("levels", [0, -1, 256, 16.5, math.nan, "16"])
-def test_levels_are_a_whole_number_of_one_byte(levels: object) -> None:
-    with pytest.raises(InputError) as caught:
-        SignatureSpec(levels=levels)  # type: ignore[arg-type]
-    assert_sentence(caught.value, str(levels), "1 to 255")
+@pytest.mark.parametrize(
+    ("name", "value", "words"),
+    [
+        *(
+            ("radius", value, f"{value} m, above 0 and up to 6000")
+            for value in (0.0, -30.0, math.nan, math.inf, 6000.1)
+        ),
+        *(("levels", value, f"{value}, 1 to 255") for value in (0, -1, 256, 16.5, math.nan, "16")),
+    ],
+)
+def test_a_range_is_in_metres_and_levels_fit_a_byte(name: str, value: object, words: str) -> None:
+    with refused(InputError, *words.split(", ")):
+        SignatureSpec(**{name: value})  # type: ignore[arg-type]
 
 
 def test_a_spec_is_a_value() -> None:
@@ -145,83 +150,64 @@ def test_on_one_bearing_the_nearer_comes_first_then_the_lower_code() -> None:
 def test_a_signature_may_lack_one_part_but_not_both() -> None:
     types = Signature(np.array([3, 3, 1], np.uint8), None)
     angles = Signature(None, np.array([0.0, 90.0]))
-    assert (len(types), len(angles)) == (3, 2)
-    assert angles.levels(4).tolist() == [0, 1]
-    with pytest.raises(InputError) as caught:
-        types.levels(16)
-    assert_sentence(caught.value, "no bearings")
-    with pytest.raises(InputError) as caught:
-        Signature(None, None)
-    assert_sentence(caught.value, "types, bearings or both")
-
-
-def test_a_signature_may_be_empty() -> None:
     nothing = Signature(np.empty(0, np.uint8), np.empty(0))
-    assert len(nothing) == 0
-    assert nothing.levels(16).tolist() == []
+    assert (len(types), len(angles), len(nothing)) == (3, 2, 0)
+    assert (angles.levels(4).tolist(), nothing.levels(16).tolist()) == ([0, 1], [])
+    with refused(InputError, "no bearings"):
+        types.levels(16)
 
 
-@pytest.mark.parametrize("bearing", [math.nan, math.inf, -math.inf, -0.1, 360.0, 720.0])
-def test_a_bearing_of_a_signature_is_on_one_turn(bearing: float) -> None:
-    with pytest.raises(InputError) as caught:
-        Signature(np.array([1, 2], np.uint8), np.array([10.0, bearing]))
-    assert_sentence(caught.value, f"bearing {bearing:g}", "[0, 360)")
-
-
-def test_parts_of_different_lengths_are_an_error() -> None:
-    with pytest.raises(InputError) as caught:
-        Signature(np.array([1, 2], np.uint8), np.array([10.0]))
-    assert_sentence(caught.value, "2 types and 1 bearings", "one bearing for each type")
-
-
-def test_a_signature_is_one_row() -> None:
-    with pytest.raises(InputError) as codes:
-        Signature(np.ones((2, 2), np.uint8), None)
-    with pytest.raises(InputError) as bearings:
-        Signature(None, np.ones((2, 2)))
-    assert_sentence(codes.value, "one row")
-    assert_sentence(bearings.value, "one row")
+@pytest.mark.parametrize(
+    ("codes", "bearings", "words"),
+    [
+        *(
+            ([1, 2], [10.0, bearing], (f"bearing {bearing:g}", "[0, 360)"))
+            for bearing in (math.nan, math.inf, -math.inf, -0.1, 360.0, 720.0)
+        ),
+        ([1, 2], [10.0], ("2 types and 1 bearings", "one bearing for each type")),
+        ([[1, 1], [1, 1]], None, ("one row",)),
+        (None, [[1.0, 1.0], [1.0, 1.0]], ("one row",)),
+        (None, None, ("types, bearings or both",)),
+    ],
+)
+def test_what_is_no_signature(
+    codes: list[int] | None, bearings: list[float] | None, words: tuple[str, ...]
+) -> None:
+    with refused(InputError, *words):
+        Signature(
+            None if codes is None else np.array(codes, np.uint8),
+            None if bearings is None else np.array(bearings),
+        )
 
 
 # --- Queries of a person ----------------------------------------------------------------------
 
 
+def parsed(
+    types: str | None, bearings: Sequence[float] | None = None
+) -> tuple[str | None, list[float] | None]:
+    """Return the symbols and the bearings of a query."""
+    query = Signature.parse(types, bearings, taxonomy=TAXONOMY)
+    return (
+        None if query.codes is None else TAXONOMY.decode(query.codes),
+        None if query.bearings is None else query.bearings.tolist(),
+    )
+
+
 @given(st.lists(st.tuples(st.sampled_from("BCDEGHIJKLM"), st.floats(-360, 360)), min_size=1))
 def test_a_query_is_sorted_clockwise(pairs: list[tuple[str, float]]) -> None:
-    types = "".join(symbol for symbol, _ in pairs)
-    query = Signature.parse(types, [bearing for _, bearing in pairs], taxonomy=TAXONOMY)
-    assert query.codes is not None
-    assert query.bearings is not None
     # The outer remainder is for tiny negative bearings, whose inner one rounds to 360.
     turned = [(bearing % 360.0 % 360.0, symbol) for symbol, bearing in pairs]
-    expected = sorted(turned, key=lambda pair: pair[0])
-    found = zip(query.bearings.tolist(), TAXONOMY.decode(query.codes), strict=True)
-    assert list(found) == expected
+    bearings, symbols = zip(*sorted(turned, key=lambda pair: pair[0]), strict=True)
+    types = "".join(symbol for symbol, _ in pairs)
+    assert parsed(types, [bearing for _, bearing in pairs]) == ("".join(symbols), list(bearings))
 
 
-def test_bearings_are_wrapped_and_pairs_kept() -> None:
-    query = Signature.parse("DBLM", [200, -10, 0, 360], taxonomy=TAXONOMY)
-    assert query.codes is not None
-    assert query.bearings is not None
-    assert TAXONOMY.decode(query.codes) == "LMDB"
-    assert query.bearings.tolist() == [0.0, 0.0, 200.0, 350.0]
-
-
-def test_on_one_bearing_the_given_order_stays() -> None:
-    query = Signature.parse("DBL", [90, 90, 90], taxonomy=TAXONOMY)
-    assert query.codes is not None
-    assert TAXONOMY.decode(query.codes) == "DBL"
-
-
-def test_types_alone_stay_in_their_order_and_bearings_alone_are_sorted() -> None:
-    types = Signature.parse("DBD", taxonomy=TAXONOMY)
-    assert types.codes is not None
-    assert types.codes.tolist() == [3, 1, 3]
-    assert types.bearings is None
-    angles = Signature.parse(None, np.array([200.0, 10.0]), taxonomy=TAXONOMY)
-    assert angles.codes is None
-    assert angles.bearings is not None
-    assert angles.bearings.tolist() == [10.0, 200.0]
+def test_queries_in_the_order_of_their_bearings_or_as_they_are() -> None:
+    assert parsed("DBLM", [200, -10, 0, 360]) == ("LMDB", [0.0, 0.0, 200.0, 350.0])
+    assert parsed("DBL", [90, 90, 90]) == ("DBL", [90.0] * 3)
+    assert parsed("DBD") == ("DBD", None)
+    assert parsed(None, [200.0, 10.0]) == (None, [10.0, 200.0])
 
 
 @pytest.mark.parametrize(
@@ -247,14 +233,12 @@ def test_types_alone_stay_in_their_order_and_bearings_alone_are_sorted() -> None
 def test_a_query_that_cannot_be_used_has_its_sentence(
     types: str | None, bearings: list[float] | None, words: list[str]
 ) -> None:
-    with pytest.raises(InputError) as caught:
-        Signature.parse(types, bearings, taxonomy=TAXONOMY)
-    assert_sentence(caught.value, *words)
+    with refused(InputError, *words):
+        parsed(types, bearings)
 
 
 @pytest.mark.parametrize("types", ["DZ", "d", "D D", "DD\n", "D,D", "É"])
 def test_an_unknown_symbol_is_named(types: str) -> None:
-    with pytest.raises(UnknownNameError) as caught:
-        Signature.parse(types, None, taxonomy=TAXONOMY)
     unknown = next(symbol for symbol in types if symbol != "D")
-    assert_sentence(caught.value, f"symbol {unknown!r}", "D street light")
+    with refused(UnknownNameError, f"symbol {unknown!r}", "D street light"):
+        parsed(types)

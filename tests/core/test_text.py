@@ -23,12 +23,7 @@ def test_text_on_one_line(text: str) -> None:
 
 
 def test_text_that_hides_nothing_stays() -> None:
-    woman = "\U0001f469\u200d\U0001f680"
-    for text in (
-        "Arbre d'alignement",
-        "\u0645\u06cc\u200c\u062e",
-        woman,
-        "a  b".replace("  ", " "),
-    ):
+    astronaut = "\U0001f469\u200d\U0001f680"
+    for text in ("Arbre d'alignement", "\u0645\u06cc\u200c\u062e", astronaut):
         assert one_line(text) == text
     assert one_line(json.loads('"\\ud83d"')) == "\ufffd"

@@ -25,7 +25,7 @@ from semsig.command import (
     find_command,
     run_command,
 )
-from sentences import assert_sentence
+from sentences import assert_sentence, refused
 
 from semsig_gis.cli.app import app
 from semsig_gis.cli.console import VARIABLE
@@ -92,14 +92,12 @@ def test_the_usual_places_are_in_the_home(tmp_path: Path, monkeypatch: pytest.Mo
 
 
 def test_a_command_that_is_nowhere(tmp_path: Path) -> None:
-    with pytest.raises(CommandError) as caught:
+    with refused(CommandError, "install semsig_gis", "Settings > Options > Processing"):
         find_command("", {"PATH": str(tmp_path)}, [])
-    assert_sentence(caught.value, "install semsig_gis", "Settings > Options > Processing")
     (tmp_path / "text").write_text("not a program")
     for chosen in ("text", "missing"):
-        with pytest.raises(CommandError) as caught:
+        with refused(CommandError, chosen, "choose the semsig command"):
             find_command(str(tmp_path / chosen), {"PATH": os.defpath})
-        assert_sentence(caught.value, chosen, "choose the semsig command")
 
 
 # --- The environment ----------------------------------------------------------------------------
@@ -207,9 +205,8 @@ def test_a_file_that_was_written_anew(tmp_path: Path) -> None:
 
 def test_a_program_that_cannot_be_run(tmp_path: Path) -> None:
     (tmp_path / "text").write_text("not a program")
-    with pytest.raises(CommandError) as caught:
+    with refused(CommandError, "text cannot be run"):
         run_command([str(tmp_path / "text")], {}, Heard().watcher())
-    assert_sentence(caught.value, "text cannot be run")
 
 
 WAITS = """
@@ -312,9 +309,8 @@ def test_the_lists_are_those_of_the_command() -> None:
 
 def test_what_only_the_likelihood_has() -> None:
     require_likelihood("likelihood", "Place")
-    with pytest.raises(CommandError) as caught:
+    with refused(CommandError, "Place", "types:edit", "choose the method likelihood"):
         require_likelihood("types:edit", "Place")
-    assert_sentence(caught.value, "Place", "types:edit", "choose the method likelihood")
 
 
 def test_outputs_are_checked_before_the_work(
@@ -338,14 +334,12 @@ def test_outputs_are_checked_before_the_work(
         ("text/deep/results", "", "text is not a folder"),
         ("text", "", "text is not a folder"),
     ):
-        with pytest.raises(CommandError) as caught:
+        with refused(CommandError, path, words):
             check_output(path, suffix)
-        assert_sentence(caught.value, path, words)
     monkeypatch.setattr("semsig.arguments.os.access", lambda _path, _mode: False)
     for path, suffix in (("b.gpkg", "gpkg"), ("new/folder", "")):
-        with pytest.raises(CommandError) as caught:
+        with refused(CommandError, path, f"{tmp_path} is read-only"):
             check_output(path, suffix)
-        assert_sentence(caught.value, path, f"{tmp_path} is read-only")
 
 
 # --- Answers ------------------------------------------------------------------------------------
@@ -413,7 +407,6 @@ def test_what_there_is_to_say_of_an_answer() -> None:
 
 @pytest.mark.parametrize("printed", ["", "{}", "[]", "3", '{"crs": 1}', "{"])
 def test_something_else_than_an_answer(printed: str) -> None:
-    with pytest.raises(CommandError) as caught:
+    with refused(CommandError, "same version"):
         parse_answer(printed)
-    assert_sentence(caught.value, "same version")
     assert parse_answer(json.dumps({"crs": "EPSG:2154", "candidates": []}))["crs"] == "EPSG:2154"

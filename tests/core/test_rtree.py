@@ -1,0 +1,295 @@
+"""Points near viewpoints and in boxes: every index against a plain search."""
+
+from __future__ import annotations
+
+import gc
+import math
+import pickle
+import sys
+import tempfile
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pytest
+import shapely
+from full_disk import largest_file
+from hypothesis import given
+from hypothesis import strategies as st
+from sentences import refused
+
+from semsig_gis.core import rtree
+from semsig_gis.core.errors import InputError
+from semsig_gis.core.rtree import INDEX_FILES, ObjectIndex, PackedIndex, StoredIndex
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+    from pathlib import Path
+
+    from numpy.typing import NDArray
+
+    Points = list[tuple[float, float]]
+    Places = NDArray[np.float64]
+    Index = ObjectIndex | PackedIndex | StoredIndex
+
+# Quarters of a metre: sums of their squares are exact, so a circle has an exact edge, and places
+# repeat and lie at exactly the radius.
+QUARTERS = st.integers(-60, 60).map(lambda number: number / 4)
+PLACES = st.tuples(QUARTERS, QUARTERS)
+POINTS = st.lists(PLACES, min_size=1, max_size=40)
+RADII = st.integers(1, 80).map(lambda number: number / 4)
+CORNERS = st.sampled_from([(0.0, 0.0), (765_200.0, 6_275_000.0), (-5e6, 1e7)])
+
+in_memory = pytest.mark.parametrize("kind", [ObjectIndex, PackedIndex])
+
+
+def shifted(places: Points, corner: tuple[float, float]) -> Places:
+    moved: Places = np.array(places, float).reshape(-1, 2) + np.array(corner)
+    return moved
+
+
+def pairs(index: Index, radius: float, xy: Places) -> list[tuple[int, int]]:
+    viewpoint, point = index.pairs_within(xy, radius=radius)
+    assert viewpoint.dtype == point.dtype == np.int64
+    assert (np.diff(viewpoint) >= 0).all()
+    return sorted(zip(viewpoint.tolist(), point.tolist(), strict=True))
+
+
+def pairs_of(points: Points, views: Points, radius: float) -> list[tuple[int, int]]:
+    """Return the pairs of viewpoints and points, on which both indexes in memory agree."""
+    xy, places = shifted(points, (0, 0)), shifted(views, (0, 0))
+    one, other = (pairs(kind(xy), radius, places) for kind in (ObjectIndex, PackedIndex))
+    assert one == other
+    return one
+
+
+@given(POINTS, st.lists(PLACES, max_size=10), RADII, CORNERS)
+def test_pairs_are_those_of_a_plain_search(
+    points: Points, views: Points, radius: float, corner: tuple[float, float]
+) -> None:
+    points = [(x + corner[0], y + corner[1]) for x, y in points]
+    views = [(x + corner[0], y + corner[1]) for x, y in views]
+    expected = [
+        (i, j)
+        for i, (vx, vy) in enumerate(views)
+        for j, (x, y) in enumerate(points)
+        if (x - vx) ** 2 + (y - vy) ** 2 <= radius**2
+    ]
+    assert pairs_of(points, views, radius) == expected
+
+
+@given(st.integers(0, 2**32 - 1), st.floats(0.1, 80.0))
+def test_any_coordinates_will_do(seed: int, radius: float) -> None:
+    rng = np.random.default_rng(seed)
+    corner = np.array([765_200.3, 6_275_000.7])
+    points = (rng.uniform(-100, 100, (50, 2)) + corner).tolist()
+    views = (rng.uniform(-100, 100, (8, 2)) + corner).tolist()
+    expected = [
+        (i, j)
+        for i, view in enumerate(views)
+        for j, point in enumerate(points)
+        if math.dist(point, view) <= radius
+    ]
+    assert pairs_of(points, views, radius) == expected
+
+
+@pytest.mark.parametrize("corner", [(0.0, 0.0), (765_200.0, 6_275_000.0)])
+def test_a_point_at_exactly_the_radius_counts(corner: tuple[float, float]) -> None:
+    ring = [(30, 0), (-30, 0), (0, 30), (0, -30), (18, 24), (-24, 18), (24, -18), (-18, -24)]
+    points = [(corner[0] + dx, corner[1] + dy) for dx, dy in ring]
+    assert len(pairs_of(points, [corner], 30.0)) == len(ring)
+    assert pairs_of(points, [corner], math.nextafter(30.0, 0.0)) == []
+
+
+def test_the_radius_is_compared_with_what_the_subtraction_gives() -> None:
+    points = [(0.1 + dx, 0.7) for dx in (30, -30)]
+    for number, (x, _) in enumerate(points):
+        exact = abs(x - 0.1)
+        assert (0, number) in pairs_of(points, [(0.1, 0.7)], exact)
+        assert (0, number) not in pairs_of(points, [(0.1, 0.7)], math.nextafter(exact, 0.0))
+
+
+def test_all_points_at_one_place_or_none_are_returned() -> None:
+    assert pairs_of([(1, 1)] * 300, [(1, 1)], 0.001) == [(0, j) for j in range(300)]
+    assert pairs_of([(1, 1)], [], 5.0) == pairs_of([(1, 1)], [(9, 9), (8, 8)], 5.0) == []
+
+
+@given(POINTS, st.lists(st.tuples(PLACES, PLACES), max_size=10), CORNERS)
+def test_points_in_boxes_are_those_of_a_plain_search(
+    points: Points,
+    boxes: list[tuple[tuple[float, float], tuple[float, float]]],
+    corner: tuple[float, float],
+) -> None:
+    xy = np.array(points) + corner
+    ends = np.array(boxes, dtype=float).reshape(-1, 2, 2) + corner
+    low, high = ends.min(axis=1), ends.max(axis=1)
+    box, point = PackedIndex(xy).pairs_in(low, high)
+    again = PackedIndex(xy, np.asarray(shapely.points(xy))).pairs_in(low, high)
+    assert np.array_equal(again, (box, point))
+    expected = [
+        (i, j)
+        for i in range(len(low))
+        for j in range(len(xy))
+        if (low[i] <= xy[j]).all() and (xy[j] <= high[i]).all()
+    ]
+    assert (np.diff(box) >= 0).all()
+    assert sorted(zip(box.tolist(), point.tolist(), strict=True)) == expected
+
+
+@in_memory
+def test_a_pickled_copy_and_a_changed_array_make_no_difference(kind: type[ObjectIndex]) -> None:
+    points = np.array([[0.0, 0.0], [3.0, 4.0], [50.0, 0.0]])
+    index = kind(points)
+    copy = pickle.loads(pickle.dumps(index))  # noqa: S301
+    points[:] = 1000.0
+    for one in (index, copy):
+        assert pairs(one, 5.0, np.zeros((1, 2))) == [(0, 0), (0, 1)]
+
+
+@pytest.mark.parametrize("make", [ObjectIndex, PackedIndex, StoredIndex.pack])
+@pytest.mark.parametrize(
+    "xy", [np.empty((0, 2)), [[0.0, math.nan]], [[math.inf, 0.0]], [[0.0, 0.0], [math.nan] * 2]]
+)
+def test_nothing_to_index_is_an_error(xy: object, make: Callable[[object], object]) -> None:
+    with refused(InputError, "at least one point", "finite"):
+        make(np.asarray(xy))
+
+
+# --- In files, and edited ---------------------------------------------------------------------
+
+
+@pytest.fixture
+def town() -> Places:
+    places = np.random.default_rng(3).uniform(0, 500, (400, 2))
+    return places + np.array([765_200.3, 6_275_000.7])
+
+
+@given(st.lists(PLACES, max_size=30), CORNERS, RADII, st.data())
+def test_after_any_edits_it_answers_as_a_fresh_one(
+    start: Points, corner: tuple[float, float], radius: float, data: st.DataObject
+) -> None:
+    xy = shifted([(0.0, 0.0), *start], corner)
+    index = StoredIndex.pack(xy)
+    for _ in range(data.draw(st.integers(0, 3), "rounds")):
+        kept = np.array(data.draw(st.permutations(range(len(xy)))), np.int64)
+        kept = kept[: data.draw(st.integers(0, len(xy)))]
+        new = shifted([(1.0, 1.0), *data.draw(st.lists(PLACES, max_size=30))], corner)
+        shuffled = np.random.default_rng(len(new)).permutation(len(kept) + len(new))
+        rows = np.concatenate([kept, np.full(len(new), -1)])[shuffled]
+        old, xy = xy, np.concatenate([xy[kept], new])[shuffled]
+        before = index
+        index = index.edited(xy, rows)
+        assert pairs(before, radius, old) == pairs(ObjectIndex(old), radius, old)
+        assert pairs(index, radius, xy) == pairs(ObjectIndex(xy), radius, xy)
+    with tempfile.TemporaryDirectory() as folder:
+        index.save(folder)
+        again = StoredIndex.open(folder, xy)
+        assert len(again) == len(xy)
+        for one in (index, again):
+            assert pairs(one, radius, xy) == pairs(ObjectIndex(xy), radius, xy)
+
+
+def test_many_edits_are_packed_anew(town: Places, monkeypatch: pytest.MonkeyPatch) -> None:
+    index = StoredIndex.pack(town)
+    moved = town.copy()
+    moved[:90] += 1.0
+    kept = np.where(np.arange(len(town)) < 90, -1, np.arange(len(town)))
+    one = index.edited(moved, kept)
+    monkeypatch.setattr(rtree, "FEW_EDITS", 100)
+    monkeypatch.setattr(StoredIndex, "open", None)
+    packed = index.edited(moved, kept)
+    for radius in (5.0, 60.0):
+        assert pairs(one, radius, town) == pairs(packed, radius, town)
+    assert (packed._numbers == np.arange(len(town))).all()
+    assert (one._numbers == np.arange(len(town))).all()  # the free ones are taken again
+
+
+def test_numbers_do_not_grow_with_the_edits(town: Places) -> None:
+    index = StoredIndex.pack(town)
+    for _ in range(5):
+        kept = np.concatenate([np.arange(20, len(town)), np.full(20, -1)])
+        town = np.concatenate([town[20:], town[:20] + 3.0])
+        index = index.edited(town, kept)
+    assert sorted(index._numbers.tolist()) == list(range(len(town)))
+    assert pairs(index, 30.0, town) == pairs(ObjectIndex(town), 30.0, town)
+
+
+def test_reading_does_not_change_the_files(town: Places, tmp_path: Path) -> None:
+    StoredIndex.pack(town).save(tmp_path)
+
+    def state() -> dict[str, tuple[bytes, int]]:
+        return {file.name: (file.read_bytes(), file.stat().st_mtime_ns) for file in files}
+
+    files = sorted(tmp_path.iterdir())
+    before = state()
+    assert sorted(before) == sorted(INDEX_FILES)
+    tmp_path.chmod(0o555)
+    try:
+        first, second = StoredIndex.open(tmp_path, town), StoredIndex.open(tmp_path, town)
+        assert pairs(first, 9.0, town) == pairs(second, 9.0, town)
+        edited = first.edited(town[1:], np.arange(1, len(town)))
+        del first, second, edited
+    finally:
+        tmp_path.chmod(0o755)
+    assert (sorted(tmp_path.iterdir()), state()) == (files, before)
+
+
+def test_nothing_is_left_behind(
+    town: Places, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
+    index = StoredIndex.pack(town)
+    other = index.edited(town[:50], np.arange(50))
+    assert len(list(tmp_path.iterdir())) == 2
+    del index, other
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_it_cannot_be_pickled(town: Places) -> None:
+    with refused(InputError, "pickled", "open it"):
+        pickle.dumps(StoredIndex.pack(town))
+
+
+def test_files_that_cannot_be_used_are_named(town: Places, tmp_path: Path) -> None:
+    with refused(InputError, "no R-tree"):
+        StoredIndex.open(tmp_path, town)
+    StoredIndex.pack(town).save(tmp_path)
+    with refused(InputError, "over 400 points, not 399"):
+        StoredIndex.open(tmp_path, town[1:])
+    # The library opens half a tree without a word.
+    with (tmp_path / "rtree.dat").open("r+b") as file:
+        file.truncate(1024)
+    with refused(InputError, "no R-tree can be made"):
+        StoredIndex.open(tmp_path, town)
+    StoredIndex.pack(town[:50]).save(tmp_path)
+    np.save(tmp_path / "rtree.npy", np.arange(len(town)))
+    with refused(InputError, "R-tree over 400 points came out with 50"):
+        StoredIndex.open(tmp_path, town)
+    (tmp_path / "rtree.dat").unlink()
+    with refused(InputError, "no R-tree can be made", "No such file"):
+        StoredIndex.open(tmp_path, town)
+
+
+def test_a_missing_temporary_folder_is_named(
+    town: Places, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path / "nowhere"))
+    with refused(InputError, "temporary folder", "TMPDIR"):
+        StoredIndex.pack(town)
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="no limit of file sizes there")
+def test_a_full_disk_is_named(
+    town: Places, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    index = StoredIndex.pack(town)
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
+    more = np.concatenate([town, town + 1.0])
+    kept = np.concatenate([np.arange(len(town)), np.full(len(town), -1)])
+    size = (index._folder / "rtree.dat").stat().st_size
+    for attempt in (lambda: StoredIndex.pack(more), lambda: index.edited(more, kept)):
+        with largest_file(size):
+            with refused(InputError, "no R-tree can be made", "make room"):
+                attempt()
+            gc.collect()  # a tree that could not be written would end the program here
+    assert list(tmp_path.iterdir()) == []
+    assert pairs(index, 9.0, town) == pairs(ObjectIndex(town), 9.0, town)
