@@ -20,11 +20,11 @@ def test_without_a_folder_for_the_code_it_is_compiled_for_this_process(
 ) -> None:
     njit = numba.njit
 
-    def refuse(*, cache: bool = False, **options: Any) -> Any:  # noqa: ANN401
+    def refuse(*function: Any, cache: bool = False, **options: Any) -> Any:  # noqa: ANN401
         if cache:
             message = "cannot cache function: no locator available"
             raise RuntimeError(message)
-        return njit(**options)
+        return njit(*function, **options)
 
     monkeypatch.setattr(numba, "njit", refuse)
     assert compiled(lambda number: number + 1)(1) == 2
