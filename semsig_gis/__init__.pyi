@@ -24,13 +24,15 @@ from .sources.vector.reader import read_layer as read_layer
 from .objects.clean import build_objects as build_objects
 from .objects.conflate import conflate as conflate
 from .objects.draft import suggest_catalog as suggest_catalog
+from .objects.fetch import (
+    fetch_layers as fetch_layers,
+    find_area as find_area,
+    open_cache as open_cache,
+)
 from .objects.load import (
     Loaded as Loaded,
     assemble as assemble,
     choose_layers as choose_layers,
-    fetch_layers as fetch_layers,
-    find_area as find_area,
-    open_cache as open_cache,
     read_files as read_files,
 )
 from .objects.quality import quality_report as quality_report

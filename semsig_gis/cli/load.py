@@ -108,7 +108,8 @@ def fetch(
     as_json: AsJson = False,
 ) -> None:
     """Download the street objects of an area."""
-    from semsig_gis.objects.load import assemble, choose_layers, fetch_layers, find_area, open_cache
+    from semsig_gis.objects.fetch import fetch_layers, find_area, open_cache
+    from semsig_gis.objects.load import assemble, choose_layers
     from semsig_gis.sources.catalog import load_catalog
 
     keep_inputs(out, buildings, streets, read=(catalog, area))

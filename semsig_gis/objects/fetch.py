@@ -1,0 +1,148 @@
+"""From the service that a catalogue names: layers of an area, through a cache."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from semsig_gis.core.errors import InputError
+from semsig_gis.sources.area import clip_layer, names_place, parse_area
+from semsig_gis.sources.http.cache import Cache
+from semsig_gis.sources.http.fetch import HttpSpec
+from semsig_gis.sources.opendatasoft import reader as opendatasoft
+from semsig_gis.sources.osm import overpass, overpass_json
+from semsig_gis.sources.osm.overpass import find_place
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+
+    from semsig_gis.sources import RawLayer
+    from semsig_gis.sources.area import Area
+    from semsig_gis.sources.catalog import Catalog
+    from semsig_gis.sources.layers import LayerSpec
+
+
+def fetch_layers(
+    specs: Sequence[LayerSpec],
+    catalog: Catalog,
+    *,
+    area: Area,
+    cache: Cache,
+    http: HttpSpec,
+    filters: bool = True,
+    progress: Callable[[int, int], None] | None = None,
+    tell: Callable[[str], None] = lambda _: None,
+) -> tuple[RawLayer, ...]:
+    """Fetch layers of an area from the service that a catalogue names, and read them.
+
+    Parameters
+    ----------
+    specs : sequence of LayerSpec
+        The layers.
+    catalog : Catalog
+        Whose endpoints are asked; nothing else is.
+    area : Area
+        What is fetched.
+    cache : Cache
+        Where files are kept; what has not changed is not sent again.
+    http : HttpSpec
+        How requests are made; offline, everything comes from the cache.
+    filters : bool, default True
+        Whether the filters of the layers apply.
+    progress : callable, optional
+        Takes how much has arrived and how much there is, 0 where nobody knows: bytes of a portal's
+        file, tiles of OpenStreetMap.
+    tell : callable, optional
+        Takes a line about each layer that has arrived: rows, size and date.
+
+    Returns
+    -------
+    tuple of RawLayer
+        The layers, cut to the area. InputError if the catalogue has no service to fetch from,
+        SourceError if a service refuses, fails, or sends something else.
+    """
+    if not catalog.endpoints or catalog.reader not in {"opendatasoft", "osm_file"}:
+        msg = (
+            f"catalogue {catalog.name!r} has no service to fetch from; use `semsig load` on files."
+        )
+        raise InputError(msg)
+    layers: list[RawLayer] = []
+    if catalog.reader == "osm_file":
+        tiles = overpass.fetch_layers(
+            specs, endpoints=catalog.endpoints, area=area, cache=cache, spec=http, progress=progress
+        )
+        for layer in overpass_json.read_layers(tiles, specs, filters=filters):
+            layers.append(clip_layer(layer, area))
+            tell(f"{layer.spec.name}: {len(layers[-1].table):,} rows")
+        return tuple(layers)
+    for spec, file in opendatasoft.fetch_layers(
+        specs, endpoints=catalog.endpoints, area=area, cache=cache, spec=http, progress=progress
+    ):
+        (layer,) = opendatasoft.read_layers(file.path, [spec], filters=filters)
+        layers.append(clip_layer(layer, area))
+        origin = "the cache" if file.from_cache else "the portal"
+        tell(
+            f"{spec.name}: {layer.counts.read:,} rows, {file.bytes / 1e6:.2f} MB, from {origin}, "
+            f"fetched {file.fetched_at}"
+        )
+    return tuple(layers)
+
+
+def open_cache(
+    folder: str | Path | None = None, *, offline: bool = False
+) -> tuple[Cache, HttpSpec]:
+    """Open the cache of downloads.
+
+    Parameters
+    ----------
+    folder : str or Path, optional
+        Where it is; by default ``semsig`` in the user's cache folder (``XDG_CACHE_HOME``, or
+        ``.cache`` in the home folder).
+    offline : bool, default False
+        Whether everything comes from the cache.
+
+    Returns
+    -------
+    tuple of (Cache, HttpSpec)
+        The cache, and how requests are made.
+    """
+    base = os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
+    return Cache(Path(folder or Path(base) / "semsig")), HttpSpec(offline=offline)
+
+
+def find_area(text: str, catalog: Catalog, *, cache: Cache, http: HttpSpec) -> Area:
+    """Return an area from what a user says of it.
+
+    Parameters
+    ----------
+    text : str
+        ``west,south,east,north`` in degrees, the path of a polygon file, or the name of a place.
+    catalog : Catalog
+        Whose geocoder knows places by name.
+    cache, http : Cache, HttpSpec
+        Where the answer about a name is kept, and how it is asked for (see `open_cache`).
+
+    Returns
+    -------
+    Area
+        The area. InputError if the numbers are no box on the Earth, or the catalogue has no
+        geocoder; SourceError if the file cannot be read.
+
+    Examples
+    --------
+    >>> from semsig_gis import find_area, load_catalog, open_cache
+    >>> cache, http = open_cache("unused", offline=True)
+    >>> osm = load_catalog("openstreetmap")
+    >>> find_area("2.3,48.8,2.4,48.9", osm, cache=cache, http=http).bounds
+    (2.3, 48.8, 2.4, 48.9)
+    """
+    if not names_place(text):
+        return parse_area(text)
+    if catalog.geocoder is None:
+        msg = (
+            f"catalogue {catalog.name!r} names no geocoder, so {text!r} cannot be looked up; give "
+            "west,south,east,north in degrees or a polygon file."
+        )
+        raise InputError(msg)
+    return find_place(text, endpoint=catalog.geocoder, cache=cache, spec=http)
