@@ -130,7 +130,7 @@ from .evaluation.spec import (
 from .maps.cells import ambiguity_map as ambiguity_map, identifiability_map as identifiability_map
 from .maps.drift import drift_map as drift_map
 from .maps.evaluation import evaluation_map as evaluation_map
-from .maps.localization import localization_map as localization_map
+from .maps.location import localization_map as localization_map
 from .maps.location import location_map as location_map
 from .maps.objects import ground_map as ground_map, objects_map as objects_map
 from .maps.page import save_map as save_map, show_map as show_map

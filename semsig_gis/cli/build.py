@@ -174,7 +174,7 @@ def update(
     if as_json:
         print_json(report.to_dict())
         return
-    from semsig_gis.reports.update import update_tables
+    from semsig_gis.reports.quality import update_tables
 
     for table in update_tables(report):
         print_table(table)

@@ -267,7 +267,7 @@ def _save_map(out: Path, city: City, draw: Callable[[], Any]) -> None:
 
 
 def _localization_map(localization: Localization, city: City) -> Any:  # noqa: ANN401 - folium's
-    from semsig_gis.maps.localization import localization_map
+    from semsig_gis.maps.location import localization_map
 
     return localization_map(localization, city.database)
 

@@ -3,17 +3,31 @@
 from __future__ import annotations
 
 import itertools
+from dataclasses import dataclass, field
 from html import escape
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from semsig_gis.core.errors import InputError
 from semsig_gis.core.signs import FOUND_RAMP, GROUP_COLOURS, SAME_LEVELS, SAME_TYPES
-from semsig_gis.maps.cell_layer import CellFacts, add_cells, city_view, packed_signatures
-from semsig_gis.maps.image import level_image
-from semsig_gis.maps.legend import LIFTING, NAMED_CLASSES, isolated, ramp_bar, sources, swatch
-from semsig_gis.maps.packing import packed
-from semsig_gis.maps.parts import add_image, finished_map, prepared_map
+from semsig_gis.maps.image import level_image, packed, place_lattices, steps
+from semsig_gis.maps.parts import (
+    LIFTING,
+    NAMED_CLASSES,
+    PAGE_FILES,
+    Drawing,
+    add_image,
+    class_titles,
+    corners_of,
+    finished_map,
+    free_name,
+    isolated,
+    prepared_map,
+    ramp_bar,
+    sources,
+    swatch,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -23,6 +37,77 @@ if TYPE_CHECKING:
 
     from semsig_gis.database.database import SignatureDatabase
     from semsig_gis.evaluation.identify.result import Identifiability
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class CellFacts:
+    """A part of what a click on a cell tells, with numbers and a JavaScript function of its own.
+
+    The file ``NAME.js`` defines the function ``semsig.cellFacts.NAME(city, cell)``, where NAME is
+    ``name``. It returns what there is of ``title``; ``rows``: label and value each, as
+    `semsig.details` shows them; ``jumps``: a label and buttons, each with a text, a cell and a
+    hint; ``marks``: cells to number and to join by lines; ``dots``: cells and colours. ``arrays``
+    are packed numbers of the cells (see `maps.image`); ``settings`` reach the function in
+    ``city.grid``.
+    """
+
+    name: str
+    arrays: Mapping[str, list[str]] = field(default_factory=dict)
+    settings: Mapping[str, Any] = field(default_factory=dict)
+
+
+def add_cells(map_: folium.Map, database: SignatureDatabase, facts: Sequence[CellFacts]) -> None:
+    """Add a layer without signs of its own that tells what is known of a cell when clicked."""
+    arrays, grid = _cells(database)
+    for part in facts:
+        arrays |= part.arrays
+        grid |= part.settings
+    parts = [part.name for part in facts]
+    name = free_name(map_, "Tell of a cell when clicked")
+    layer = Drawing(name, "cells", arrays, grid, class_titles(database), parts)
+    layer.files = (*PAGE_FILES, "cells.css", "cells.js", *(f"{part}.js" for part in parts))
+    layer.add_to(map_)
+
+
+def city_view(database: SignatureDatabase) -> NDArray[np.float64]:
+    """Return the latitudes and longitudes of the corners of all cells."""
+    if len(database) == 0:
+        msg = "the database has no cells to show; give one with at least one cell."
+        raise InputError(msg)
+    return corners_of(database)
+
+
+def packed_signatures(
+    name: str, database: SignatureDatabase, ends: NDArray[np.int64]
+) -> dict[str, list[str]]:
+    """Return signatures, with angle levels for bearings, and where those of each cell end."""
+    return {
+        f"{name}.types": packed(database.taxonomy.symbol_bytes[database.codes]),
+        f"{name}.ends": steps(ends.astype(np.int32)),
+        f"{name}.levels": packed(database.levels),
+    }
+
+
+def _cells(database: SignatureDatabase) -> tuple[dict[str, list[str]], dict[str, Any]]:
+    """Return where the cells are, and how to read it."""
+    lattices = place_lattices(database)
+    columns = database.columns - database.columns[0]
+    arrays = {
+        "rows": steps(database.rows),
+        "columnEnds": steps(np.cumsum(np.bincount(columns)).astype(np.int32)),
+        "metres": packed(lattices.metres),
+        "degrees": packed(lattices.degrees),
+    }
+    grid = {
+        "levels": database.spec.levels,
+        "step": database.grid.step,
+        "origin": list(database.grid.origin),
+        "firstColumn": int(database.columns[0]),
+        "mercatorBox": lattices.mercator_box,
+        "box": lattices.metric_box,
+    }
+    return arrays, grid
+
 
 DOTS = 200  # cells of a group that are drawn, from all over the city
 NEAR = 20  # of the nearest ones all are drawn

@@ -13,18 +13,21 @@ from semsig_gis.core.errors import CrsError
 from semsig_gis.core.signs import DRIFT_COLOURS, OBJECT_COLOURS
 from semsig_gis.database.database import join_databases, require_same_place
 from semsig_gis.database.update import compare_cells
-from semsig_gis.maps.cell_layer import CellFacts, add_cells, city_view, packed_signatures
-from semsig_gis.maps.image import level_image
-from semsig_gis.maps.legend import (
+from semsig_gis.maps.cells import CellFacts, add_cells, city_view, packed_signatures
+from semsig_gis.maps.image import level_image, packed
+from semsig_gis.maps.parts import (
     FLIPPING,
     LIFTING,
     NAMED_CLASSES,
+    add_image,
+    draw,
+    finished_map,
     isolated,
+    prepared_map,
     sources,
     swatch,
+    to_latlon,
 )
-from semsig_gis.maps.packing import packed
-from semsig_gis.maps.parts import add_image, draw, finished_map, prepared_map, to_latlon
 from semsig_gis.objects.changes import compare_objects, joined_taxonomy
 
 if TYPE_CHECKING:

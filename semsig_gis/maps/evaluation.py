@@ -11,8 +11,7 @@ import numpy as np
 
 from semsig_gis.core.signs import ERROR_RAMP, FAILED, SUCCESSFUL, mixed
 from semsig_gis.evaluation.result import SUCCESS_METRES, SUCCESS_PROBABILITY
-from semsig_gis.maps.legend import isolated, ramp_bar, shades, sources, swatch
-from semsig_gis.maps.packing import mercator, packed
+from semsig_gis.maps.image import mercator, packed
 from semsig_gis.maps.parts import (
     add_city,
     cell_signature,
@@ -20,9 +19,14 @@ from semsig_gis.maps.parts import (
     corners_of,
     draw,
     finished_map,
+    isolated,
     popup_signature,
     prepared_map,
+    ramp_bar,
     ranks_text,
+    shades,
+    sources,
+    swatch,
     ties_text,
     to_latlon,
 )

@@ -11,16 +11,19 @@ import shapely
 from semsig_gis.core.crs import COUNT, MERGED, SOURCE, SOURCE_ID
 from semsig_gis.core.errors import CrsError, EmptyResultError
 from semsig_gis.core.signs import class_signs
-from semsig_gis.maps.legend import OUTLINES, isolated, sign_svg, sources
-from semsig_gis.maps.packing import mercator, packed, steps
+from semsig_gis.maps.image import mercator, packed, steps
 from semsig_gis.maps.parts import (
+    OUTLINES,
     Call,
     add_city,
     corners_of,
     draw,
     finished_map,
+    isolated,
     layers_of,
     prepared_map,
+    sign_svg,
+    sources,
     to_latlon,
 )
 from semsig_gis.objects.surroundings import licenses_of

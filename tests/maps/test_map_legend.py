@@ -25,8 +25,7 @@ from semsig_gis.likelihood.noise.model import named_noise
 from semsig_gis.maps.cells import ambiguity_legend, identifiability_legend
 from semsig_gis.maps.drift import drift_legend
 from semsig_gis.maps.evaluation import evaluation_legend
-from semsig_gis.maps.localization import localization_legend
-from semsig_gis.maps.location import location_legend
+from semsig_gis.maps.location import localization_legend, location_legend
 from semsig_gis.maps.objects import objects_legend
 from semsig_gis.matching.search import localize
 from semsig_gis.objects.changes import ClassChange, ObjectChanges

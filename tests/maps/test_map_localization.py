@@ -8,7 +8,7 @@ import numpy as np
 from map_pages import LEGEND
 
 from semsig_gis.core.signs import CANDIDATE_RAMP
-from semsig_gis.maps.localization import localization_map
+from semsig_gis.maps.location import localization_map
 from semsig_gis.matching.search import localize
 
 if TYPE_CHECKING:

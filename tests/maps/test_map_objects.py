@@ -18,7 +18,7 @@ from worlds import random_town
 
 from semsig_gis.core.signs import class_signs
 from semsig_gis.core.taxonomy import ObjectClass, Taxonomy
-from semsig_gis.maps.localization import localization_map
+from semsig_gis.maps.location import localization_map
 from semsig_gis.maps.objects import ground_map, objects_map
 from semsig_gis.maps.page import page_of_map
 from semsig_gis.maps.parts import to_latlon

@@ -31,8 +31,7 @@ from semsig_gis.likelihood.noise.model import named_noise
 from semsig_gis.maps.cells import ambiguity_map, identifiability_map
 from semsig_gis.maps.drift import drift_map
 from semsig_gis.maps.evaluation import evaluation_map
-from semsig_gis.maps.localization import localization_map
-from semsig_gis.maps.location import location_map
+from semsig_gis.maps.location import localization_map, location_map
 from semsig_gis.maps.objects import ground_map, objects_map
 from semsig_gis.maps.parts import _area, layers_of, to_latlon
 from semsig_gis.matching.search import localize

@@ -11,7 +11,7 @@ from folium.template import Template
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from semsig_gis.maps.packing import script_json
+from semsig_gis.maps.image import script_json
 from semsig_gis.maps.parts import page_element
 
 BROWSER_FILES = sorted(

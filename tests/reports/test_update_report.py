@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING
 
 from semsig_gis.database.update import UpdateReport
 from semsig_gis.objects.changes import ClassChange
-from semsig_gis.reports.update import update_tables
+from semsig_gis.reports.quality import update_tables
 
 if TYPE_CHECKING:
     from collections.abc import Callable
