@@ -18,7 +18,28 @@ ROW_COUNTS = tuple(field.name for field in fields(RowCounts))
 
 
 def quality_tables(report: QualityReport) -> tuple[Table, ...]:
-    """Return objects by class, rows by layer, conflated objects if any, place and licences."""
+    """Return objects by class, rows by layer, conflated objects if any, place and licences.
+
+    Parameters
+    ----------
+    report : QualityReport
+        What `quality_report` gives.
+
+    Returns
+    -------
+    tuple of Table
+        Four tables, or five with conflated objects.
+
+    Examples
+    --------
+    >>> from semsig_gis import (
+    ...     CitySpec, build_objects, paper_taxonomy, quality_report, synthetic_city
+    ... )
+    >>> layers = synthetic_city(CitySpec(size=300.0))
+    >>> objects, load = build_objects(layers, taxonomy=paper_taxonomy(), crs="EPSG:32631")
+    >>> [table.title for table in quality_tables(quality_report(objects, load))]
+    ['Objects by class', 'Rows by layer', 'Place', 'Licences']
+    """
     tables = (
         _class_table(report),
         Table(
