@@ -52,13 +52,13 @@ def place_loglik(
     from semsig_gis.likelihood.kernels import align  # noqa: PLC0415 - numba loads slowly
 
     bearings = query_bearings(query)
-    rows = tables[0].query_rows(query)
+    rows, kinds = tables[0].query_rows(query), tables[0].row_of[views.codes]
     bearing_units = np.minimum(views.bearings * (BEARING_UNITS / 360.0), BEARING_UNITS - 1)
     distance_units = np.rint(views.distances * (DISTANCE_UNITS / reach))
     logliks = np.empty((len(tables), *turns.shape))
     align(
         views.offsets,
-        tables[0].row_of[views.codes],
+        kinds,
         bearing_units.astype(np.uint16),
         distance_units.astype(np.uint8),
         360.0 / BEARING_UNITS,
@@ -71,7 +71,7 @@ def place_loglik(
         logliks,
     )
     for model, (table, weight) in enumerate(zip(tables, weights.tolist(), strict=True)):
-        logliks[model] += table.nothing_seen(views.offsets, views.codes)[:, None]
+        logliks[model] += table.nothing_seen(views.offsets, kinds)[:, None]
         logliks[model] += float(np.log(table.density[rows]).sum()) + math.log(weight)
     return np.asarray(np.logaddexp.reduce(logliks, axis=0))
 

@@ -260,12 +260,13 @@ def build_index(
         If the noise model does not fit the classes of the database.
     """
     table = mean_table(*database_tables(database, noise))
+    unseen = table.nothing_seen(database.offsets, table.row_of[database.codes])
     columns = np.empty(_shape(database), np.uint8) if out is None else out
     return LikelihoodIndex(
         database=database,
         noise=noise,
         columns=columns,
-        constants=table.nothing_seen(database.offsets, database.codes).astype(np.float32),
+        constants=unseen.astype(np.float32),
         step=_write_columns(database, table, columns, progress, threads),
         fingerprint=index_fingerprint(database, noise),
     )

@@ -129,7 +129,7 @@ def test_the_sums_are_those_of_the_re_ranking(seed: int, size: int, noise: Noise
     # The re-ranking cuts the tails.
     weights[np.abs(pairs.away) > 4.5 * table.sigma[kinds][pairs.objects]] = 0.0
     _, sums = associate_pairs(pairs, weights)
-    unseen = table.nothing_seen(database.offsets, database.codes)
+    unseen = table.nothing_seen(database.offsets, kinds)
     expected = align_cells(database, query, noise, cells)
     assert sums + unseen + np.log(table.density[names]).sum() == pytest.approx(expected, abs=0.05)
 

@@ -92,7 +92,7 @@ def test_a_position_that_is_not_known_turns_near_objects_most() -> None:
 def test_nothing_seen_is_that_all_are_missed_and_nothing_is_false() -> None:
     database = random_database(4)
     (table,), _ = database_tables(database, named_noise("medium"))
-    every = table.nothing_seen(database.offsets, database.codes)
+    every = table.nothing_seen(database.offsets, table.row_of[database.codes])
     length = int(database.lengths[7])
     rows = table.row_of[database.signature(7).codes]
     slow = sum(math.log(table.missed[length, row]) for row in rows) - table.clutter.sum()

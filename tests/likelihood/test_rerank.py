@@ -60,7 +60,7 @@ def slow_loglik(database: SignatureDatabase, query: Signature, noise: Noise, cel
     """Return the likelihood by going through all associations."""
     total = 0.0
     for table, share in zip(*database_tables(database, noise), strict=True):
-        unseen = table.nothing_seen(database.offsets, database.codes)[cell]
+        unseen = table.nothing_seen(database.offsets, table.row_of[database.codes])[cell]
         clutter = np.log(table.density[table.query_rows(query)]).sum()
         pairs, _ = every_association(pair_weights(table, database, query, cell))
         total += share * math.exp(unseen + clutter + pairs)

@@ -97,16 +97,16 @@ class NoiseTable:
         return np.minimum(lengths, len(self.missed) - 1)
 
     def nothing_seen(
-        self, offsets: NDArray[np.int64], codes: NDArray[np.uint8]
+        self, offsets: NDArray[np.int64], kinds: NDArray[np.int64]
     ) -> NDArray[np.float64]:
         """Return the log-likelihood that nothing is detected of the objects of each place.
 
-        It is ``sum_i log(missed_i) - sum_t clutter_t``; the objects of place i have class codes
-        ``codes[offsets[i]:offsets[i + 1]]``, which must be those of the table.
+        It is ``sum_i log(missed_i) - sum_t clutter_t``; the objects of place i have class rows
+        ``kinds[offsets[i]:offsets[i + 1]]``.
         """
         lengths = np.diff(offsets)
         owners = np.repeat(np.arange(len(lengths)), lengths)
-        each = np.log(self.missed)[self.length_rows(lengths)[owners], self.row_of[codes]]
+        each = np.log(self.missed)[self.length_rows(lengths)[owners], kinds]
         return np.asarray(np.bincount(owners, each, len(lengths)) - self.clutter.sum())
 
     def query_rows(self, query: Signature) -> NDArray[np.int64]:
