@@ -8,7 +8,7 @@ import pytest
 import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from sentences import assert_sentence, refused
+from sentences import refused
 
 from semsig_gis.core.errors import InputError
 from semsig_gis.database import occlusion
@@ -22,16 +22,6 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 HOUSE = shapely.box(0, 0, 10, 10)
-
-
-def blocked(
-    start: tuple[float, float],
-    end: tuple[float, float],
-    *polygons: shapely.Geometry,
-    tolerance: float = 0.5,
-) -> bool:
-    footprints = Footprints(polygons, tolerance=tolerance)
-    return bool(hidden(np.array([start]), np.array([end]), footprints=footprints)[0])
 
 
 def oracle(
@@ -78,82 +68,77 @@ def random_pairs(
     return starts, starts + steps
 
 
-def test_a_house_hides_what_is_behind_it() -> None:
-    assert blocked((5, -8), (5, 12), HOUSE)
-    assert not blocked((5, -8), (20, -8), HOUSE)
+NEIGHBOUR = shapely.box(10, 0, 20, 10)
+ROW = (HOUSE, NEIGHBOUR, shapely.box(0, 20, 10, 30))
+FENCE = shapely.box(0, 4, 10, 4.9)
+BLOCK = shapely.box(0, 0, 40, 40) - shapely.box(9, 9, 31, 31)
+SPIKE = shapely.Polygon([(0, 0), (10, 0), (10, 10), (10, 30), (10, 10), (0, 10)])
 
 
-def test_an_object_in_a_facade_is_seen_from_its_own_side_at_any_slant() -> None:
-    for depth in (-0.2, 0.0, 0.4):
-        assert not blocked((5, -8), (5, depth), HOUSE)
-        assert not blocked((-20, -1), (9, depth), HOUSE)
-        assert blocked((5, 18), (5, depth), HOUSE)
-    assert blocked((5, -8), (5, 0.6), HOUSE)
-    assert blocked((5, -8), (5, 0.1), HOUSE, tolerance=0.05)
+@pytest.mark.parametrize(
+    ("start", "end", "houses", "tolerance", "expected"),
+    [
+        # A house hides what is behind it.
+        ((5, -8), (5, 12), [HOUSE], 0.5, True),
+        ((5, -8), (20, -8), [HOUSE], 0.5, False),
+        # An object in a facade is seen from its own side at any slant.
+        *(((5, -8), (5, depth), [HOUSE], 0.5, False) for depth in (-0.2, 0.0, 0.4)),
+        *(((-20, -1), (9, depth), [HOUSE], 0.5, False) for depth in (-0.2, 0.0, 0.4)),
+        *(((5, 18), (5, depth), [HOUSE], 0.5, True) for depth in (-0.2, 0.0, 0.4)),
+        ((5, -8), (5, 0.6), [HOUSE], 0.5, True),
+        ((5, -8), (5, 0.1), [HOUSE], 0.05, True),
+        # A line may cut a corner by less than the tolerance.
+        ((-5, 5.4), (5.4, -5), [HOUSE], 0.5, False),
+        ((-5, 7), (7, -5), [HOUSE], 0.5, True),
+        # A viewpoint in a footprint sees out of it, but not through the next.
+        ((5, 5), (5, 18), ROW, 0.5, False),
+        ((5, 5), (5, 20.4), ROW, 0.5, False),
+        ((5, 5), (5, 32), ROW, 0.5, True),
+        ((5, 5), (25, 5), ROW, 0.5, True),
+        # Houses that share a wall leave no gap.
+        ((10, -8), (10, 18), [HOUSE, NEIGHBOUR], 0.5, True),
+        ((10.04, -8), (10.04, 18), [HOUSE, shapely.box(10.08, 0, 20, 10)], 0.5, True),
+        ((10.5, -8), (10.5, 18), [HOUSE, shapely.box(11, 0, 20, 10)], 0.5, False),
+        # A wall thinner than twice the tolerance hides nothing.
+        ((5, 0), (5, 9), [FENCE], 0.5, False),
+        ((5, 0), (5, 9), [FENCE], 0.4, True),
+        # A courtyard is open, and a spike of an invalid footprint is nothing.
+        ((12, 12), (28, 28), [BLOCK], 0.5, False),
+        ((12, 12), (12, -3), [BLOCK], 0.5, True),
+        ((5, 20), (15, 20), [SPIKE], 0.5, False),
+        ((5, -8), (5, 12), [SPIKE], 0.5, True),
+        # There may be nothing deep enough, and nothing between.
+        ((-5, 5), (15, 5), [HOUSE], 6.0, False),
+        ((-5, 5), (-5, 5), [HOUSE], 0.5, False),
+    ],
+)
+def test_what_buildings_hide(
+    start: tuple[float, float],
+    end: tuple[float, float],
+    houses: list[shapely.Polygon],
+    tolerance: float,
+    expected: bool,  # noqa: FBT001
+) -> None:
+    footprints = Footprints(houses, tolerance=tolerance)
+    assert hidden(np.array([start]), np.array([end]), footprints=footprints).tolist() == [expected]
 
 
-def test_a_line_may_cut_a_corner_by_less_than_the_tolerance() -> None:
-    assert not blocked((-5, 5.4), (5.4, -5), HOUSE)
-    assert blocked((-5, 7), (7, -5), HOUSE)
-
-
-def test_a_viewpoint_in_a_footprint_sees_out_of_it_but_not_through_the_next() -> None:
-    neighbour, across = shapely.box(10, 0, 20, 10), shapely.box(0, 20, 10, 30)
-    assert not blocked((5, 5), (5, 18), HOUSE, neighbour, across)
-    assert not blocked((5, 5), (5, 20.4), HOUSE, neighbour, across)
-    assert blocked((5, 5), (5, 32), HOUSE, neighbour, across)
-    assert blocked((5, 5), (25, 5), HOUSE, neighbour, across)
-
-
-def test_houses_that_share_a_wall_leave_no_gap() -> None:
-    assert blocked((10, -8), (10, 18), HOUSE, shapely.box(10, 0, 20, 10))
-    assert blocked((10.04, -8), (10.04, 18), HOUSE, shapely.box(10.08, 0, 20, 10))
-    assert not blocked((10.5, -8), (10.5, 18), HOUSE, shapely.box(11, 0, 20, 10))
-
-
-def test_a_wall_thinner_than_twice_the_tolerance_hides_nothing() -> None:
-    fence = shapely.box(0, 4, 10, 4.9)
-    assert not blocked((5, 0), (5, 9), fence)
-    assert blocked((5, 0), (5, 9), fence, tolerance=0.4)
-
-
-def test_a_courtyard_is_open() -> None:
-    block = shapely.Polygon(
-        shapely.box(0, 0, 40, 40).exterior, [shapely.box(9, 9, 31, 31).exterior]
-    )
-    assert not blocked((12, 12), (28, 28), block)
-    assert blocked((12, 12), (12, -3), block)
-
-
-def test_invalid_footprints_are_repaired_and_counted() -> None:
+def test_footprints_are_repaired_or_refused() -> None:
     bow = shapely.Polygon([(0, 0), (10, 10), (10, 0), (0, 10)])
     footprints = Footprints([bow, None, shapely.Polygon(), HOUSE])
-    assert footprints.repaired == 1
-    assert len(footprints) == 3
-    spike = shapely.Polygon([(0, 0), (10, 0), (10, 10), (10, 30), (10, 10), (0, 10)])
-    assert not blocked((5, 20), (15, 20), spike)
-    assert blocked((5, -8), (5, 12), spike)
-
-
-def test_what_is_no_footprint_is_refused() -> None:
+    assert (footprints.repaired, len(footprints)) == (1, 3)
+    nothing = np.empty((0, 2))
+    assert hidden(nothing, nothing, footprints=footprints).size == 0
     with refused(InputError, "1 building footprints", "Point", "give polygons"):
         Footprints([HOUSE, shapely.Point(0, 0)])
-    with pytest.raises(InputError) as caught:
+    with refused(InputError, "not finite", "number 2"):
         Footprints([HOUSE, shapely.Polygon([(0, 0), (np.inf, 0), (1, 1)])])
-    assert_sentence(caught.value, "not finite", "number 2")
-    for nothing in ([], [None, shapely.Polygon()], [shapely.Polygon([(0, 0), (5, 5), (9, 9)])]):
+    for empty in ([], [None, shapely.Polygon()], [shapely.Polygon([(0, 0), (5, 5), (9, 9)])]):
         with refused(InputError, "no building footprint", "give"):
-            Footprints(nothing)
+            Footprints(empty)
     for tolerance in (-1.0, np.nan, np.inf):
         with refused(InputError, str(tolerance), "metres"):
             Footprints([HOUSE], tolerance=tolerance)
-
-
-def test_no_pairs_and_no_cores() -> None:
-    nothing = np.empty((0, 2))
-    assert hidden(nothing, nothing, footprints=Footprints([HOUSE])).size == 0
-    assert not blocked((-5, 5), (15, 5), HOUSE, tolerance=6.0)
-    assert not blocked((-5, 5), (-5, 5), HOUSE)
 
 
 def test_blocks_make_no_difference(monkeypatch: pytest.MonkeyPatch) -> None:
