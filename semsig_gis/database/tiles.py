@@ -66,7 +66,7 @@ if TYPE_CHECKING:
 
     Tile = tuple[int, int]
     Box = tuple[float, float, float, float]
-    Role = Literal["buildings", "streets"]
+    Input = Literal["objects", "buildings", "streets"]
 
 # Beyond the range: for rounding, and for walls as near as occlusion.GAP_M and TOLERANCE_M look.
 MARGIN_M = 2.0
@@ -280,9 +280,9 @@ class TilePlan:
     objects: Path
     buildings: Path | None = None
     streets: Path | None = None
-    grid: GridSpec = GridSpec()  # noqa: RUF009 - it is frozen
-    spec: SignatureSpec = SignatureSpec()  # noqa: RUF009
-    viewpoints: ViewpointSpec = ViewpointSpec()  # noqa: RUF009
+    grid: GridSpec
+    spec: SignatureSpec
+    viewpoints: ViewpointSpec
     side: int
     reach: float
     street_reach: float = 0.0
@@ -312,6 +312,7 @@ def plan_tiles(
     Streets are needed by the viewpoints ``"streets"`` and left aside by others. Raise SemsigError
     if an input is missing or cannot be used, or `out` cannot be written.
     """
+    places: dict[Input, str | Path | None]
     places = {"objects": objects, "buildings": buildings, "streets": streets}
     if viewpoints.mode != "streets":
         del places["streets"]
@@ -331,11 +332,12 @@ def plan_tiles(
     }
     folder = begin(out, recipe)
     try:
-        lines = _by_box(paths, "streets", nothing.crs, folder)
+        files = {name: _by_box(name, path, nothing.crs, folder) for name, path in paths.items()}
+        lines = files.get("streets")
         return TilePlan(
             folder=folder,
-            objects=_objects_by_box(paths["objects"], folder),
-            buildings=_by_box(paths, "buildings", nothing.crs, folder),
+            objects=files["objects"],
+            buildings=files.get("buildings"),
             streets=lines,
             grid=grid,
             spec=spec,
@@ -364,33 +366,28 @@ def _fingerprint(path: Path) -> str:
         raise SourceError(msg) from error
 
 
-def _objects_by_box(path: Path, folder: Path) -> Path:
-    """Return a file of street objects that can be read by box; those of before have no bounds."""
-    if next(each_bounds(path), None) is not None:
+def _by_box(name: Input, path: Path, crs: CRS, folder: Path) -> Path:
+    """Return an input that can be read by box in a CRS: its file, or else a copy."""
+    copy = folder / INPUTS / f"{name}.parquet"
+    if _covered(path, crs):
         return path
-    copy = folder / INPUTS / "objects.parquet"
-    if not copy.exists():
+    if copy.exists():
+        return copy
+    if name == "objects":  # those of before have no bounds
         save_objects(open_objects(path), copy)
-    return copy
-
-
-def _by_box(paths: dict[str, Path], role: Role, crs: CRS, folder: Path) -> Path | None:
-    """Return a file of surroundings that can be read by box in a CRS."""
-    path = paths.get(role)
-    if path is None or _covered(path, crs):
-        return path
-    copy = folder / INPUTS / f"{role}.parquet"
-    if not copy.exists():
-        save_surroundings(read_surroundings(path, role=role, crs=crs), copy)
+    else:
+        save_surroundings(read_surroundings(path, role=name, crs=crs), copy)
     return copy
 
 
 def _covered(path: Path, crs: CRS) -> bool:
     """Tell whether a file is GeoParquet in this CRS with a column of bounds."""
     try:
-        geo = json.loads(pq.read_metadata(path).metadata[b"geo"])
+        schema = pq.read_schema(path)
+        geo = json.loads(schema.metadata[b"geo"])
         column = geo["columns"][geo["primary_column"]]
-        return "covering" in column and CRS.from_user_input(column["crs"]) == crs
+        bounds = column["covering"]["bbox"]["xmin"][0]
+        return bounds in schema.names and CRS.from_user_input(column["crs"]) == crs
     except (pa.ArrowException, OSError, LookupError, TypeError, ValueError, CRSError):
         return False
 
