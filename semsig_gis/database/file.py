@@ -85,8 +85,7 @@ def save_database(database: SignatureDatabase, path: str | Path) -> None:
             "geometry": points_to_wkb(database.xy),
         }
     )
-    corners = [(part.min(), part.max()) for part in (database.columns, database.rows)]
-    bounds = database.grid.viewpoints(*corners).ravel().tolist()
+    bounds = [*database.xy.min(axis=0), *database.xy.max(axis=0)]
     write_geoparquet(
         table,
         path,

@@ -161,14 +161,13 @@ def save_with_store(database: SignatureDatabase, store: ObjectStore, path: str |
     ...     len(open_store(file).objects) == len(demo_objects)
     True
     """
-    final = store_path(path)
     _settle(Path(path))  # what waits there may be needed until the new database is in place
     with whole_file(path) as partial:
         try:
             save_database(database, partial)
         except InputError as error:  # which knows nothing of the place that was asked for
             raise InputError(str(error).replace(str(partial), str(path))) from error
-        _write(store, _waiting(final), fingerprint=digest(partial))
+        _write(store, _waiting(store_path(path)), fingerprint=digest(partial))
     _settle(Path(path))
 
 
