@@ -94,16 +94,13 @@ class Evaluation:
         - ``query_types``, ``query_bearings``, ``query_length``: what was asked: symbols, degrees
           (text, comma-separated) and how many there are; ``heading``: degrees to add to the
           bearings to have them from true north;
-        - ``best_cell_id``, ``best_x``, ``best_y``, ``distance``: the best candidate, drawn from
-          the tied when several share the best score; missing when unlocalized. Of the likelihood
-          method it is the answer, and the distance its negative log-likelihood; where the place
-          was refined, it is the place in the cell;
+        - ``best_cell_id``, ``best_x``, ``best_y``, ``distance``: the best candidate (of the
+          likelihood method its answer, refined or not, and the negative log-likelihood), drawn
+          from the tied; missing when unlocalized;
         - ``tied``: cells that share the best score, 0 when unlocalized; ``next_cell_ids``: the
           four best of the other cells (text, comma-separated), equals in the order of the cells;
         - ``error_m``: expected smallest error among the top t in metres, infinite when
-          unlocalized;
-        - ``p0``, ``p5``, ... (`THRESHOLDS`): probability that this error is at most so many
-          metres;
+          unlocalized; ``p0``, ``p5``, ...: probability that it is at most so many metres;
         - ``near1``, ``near5``, ...: probability that one of the N best cells (the answer first)
           is at most 25 m away;
         - ``rank_low``, ``rank_high``: first and last rank that ties allow for the true cell, from

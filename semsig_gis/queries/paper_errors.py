@@ -1,7 +1,7 @@
-"""Spoil a signature as the paper does: objects missed, invented, misnamed, misplaced.
+"""Spoil a signature as the paper does (section 4.2): objects missed, invented, misnamed, misplaced.
 
-A distortion is a number of occurrences, each a miss, a false detection or a false
-classification with equal chance, followed by noise on every bearing (paper, section 4.2).
+A distortion is a number of occurrences, each a miss, a false detection or a false classification
+with equal chance, followed by noise on every bearing.
 """
 
 from __future__ import annotations
@@ -60,8 +60,7 @@ class Distortion:
 
     Notes
     -----
-    The source (section 4.2) fixes the occurrences, the equal chances and the noise; it leaves
-    open whether the sequence is sorted again and how a false class is drawn, hence the options.
+    The source (section 4.2) leaves `resort` and `false_class` open.
 
     Examples
     --------

@@ -17,7 +17,6 @@ from semsig_gis.evaluation.identify.trials import (
     leave_class_out,
     trial_cells,
     try_cells,
-    try_queries,
     try_without_classes,
 )
 from semsig_gis.likelihood.index import build_index
@@ -57,7 +56,7 @@ def test_nothing_detected_is_not_answered() -> None:
     database = random_database(8, cells=10)
     index = build_index(database, named_noise("light"))
     nothing = Signature(np.zeros(0, np.uint8), np.zeros(0))
-    trials = try_queries(index, np.array([4]), [nothing])
+    trials = try_cells(index, np.array([4]), queries=[nothing])
     assert (trials.itself[0], trials.near[0], trials.found[0]) == (0.0, 0.0, False)
     assert math.isclose(trials.bits[0], math.log2(10))
     assert math.isnan(trials.lean[0])

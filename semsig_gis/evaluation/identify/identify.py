@@ -122,8 +122,8 @@ def identify(
             raise InputError(msg)
     check_radius(radius)
     database = index.database
-    cells, asked = len(database), trial_cells(len(index.database), trials, seed=seed)
-    again = asked[:class_trials]
+    cells, sample = len(database), trial_cells(len(index.database), trials, seed=seed)
+    again = sample[:class_trials]
     stages = _stages(
         progress,
         trials * TRIAL_S,
@@ -131,7 +131,7 @@ def identify(
         cells * SAMPLED_S,
         len(again) * len(index.table.codes) * TRIAL_S,
     )
-    tried = try_cells(index, asked, radius=radius, seed=seed, threads=threads, progress=stages[0])
+    tried = try_cells(index, sample, radius=radius, seed=seed, threads=threads, progress=stages[0])
     temperature = _temperature(index, tried, radius=radius, threads=threads)
     like = find_lookalikes(
         index,

@@ -95,7 +95,7 @@ def find_lookalikes(
 
     database = index.database
     _check(temperature, radius)
-    asked = np.arange(len(database)) if cells is None else np.asarray(cells, dtype=np.int64)
+    rows = np.arange(len(database)) if cells is None else np.asarray(cells, dtype=np.int64)
     step = database.grid.step
     radius = min(radius, city_extent(database))
     where = np.stack([database.columns, database.rows], axis=1).astype(np.int64)
@@ -103,15 +103,15 @@ def find_lookalikes(
     ids, flat = database.cell_ids, index.columns.reshape(-1, len(database))
     circle = cell_circle(radius, step)
     like = Lookalikes(
-        near=np.empty(len(asked)),
-        far=np.empty(len(asked)),
-        cells=np.empty((len(asked), places), np.int64),
-        sums=np.zeros((len(asked), places)),
+        near=np.empty(len(rows)),
+        far=np.empty(len(rows)),
+        cells=np.empty((len(rows), places), np.int64),
+        sums=np.zeros((len(rows), places)),
     )
 
     def compare(part: slice) -> None:
         compare_signatures(
-            asked[part],
+            rows[part],
             database.offsets,
             symbols,
             flat,
@@ -128,7 +128,7 @@ def find_lookalikes(
             like.sums[part],
         )
 
-    _in_parts(compare, len(asked), threads, progress)
+    _in_parts(compare, len(rows), threads, progress)
     order = np.argsort(-like.sums, axis=1, kind="stable")
     return replace(
         like,
@@ -159,7 +159,7 @@ def compare_without_classes(
 
     database = index.database
     _check(temperature, radius)
-    asked = np.arange(len(database)) if cells is None else np.asarray(cells, dtype=np.int64)
+    rows = np.arange(len(database)) if cells is None else np.asarray(cells, dtype=np.int64)
     symbols, kinds = _symbols(index)
     count, classes = len(database), len(index.table.codes)
     rng = np.random.default_rng([seed, 1])
@@ -174,11 +174,11 @@ def compare_without_classes(
     sampled = np.ascontiguousarray(flat[:, sample])
     ids = database.cell_ids
     circle = cell_circle(min(radius, city_extent(database)), database.grid.step)
-    far = np.empty((len(asked), classes + 1))
+    far = np.empty((len(rows), classes + 1))
 
     def compare(part: slice) -> None:
         compare_without(
-            asked[part],
+            rows[part],
             database.offsets,
             symbols,
             kinds,
@@ -193,7 +193,7 @@ def compare_without_classes(
             far[part],
         )
 
-    _in_parts(compare, len(asked), threads, progress)
+    _in_parts(compare, len(rows), threads, progress)
     logs = np.log(np.maximum(far, LEAST_SUM))
     return logs[:, 1:] - logs[:, :1]
 

@@ -78,34 +78,19 @@ def try_cells(
     index: LikelihoodIndex,
     cells: NDArray[np.int64],
     *,
+    queries: Iterable[Signature] | None = None,
     radius: float = 50.0,
     seed: int = 0,
     threads: int = 1,
     progress: Callable[[int, int], None] | None = None,
 ) -> Trials:
-    """Ask one simulated query from each of some cells, given by row number.
+    """Ask one query from each of some cells, given by row number; by default simulated ones.
 
     The noise model of the index is that of the detector and of the answer alike; `radius` is what
-    counts as near, in metres.
+    counts as near, in metres. A query without objects is not answered: its chances are 0.
     """
-    queries = draw_trials(index, cells, seed=seed)
-    return try_queries(index, cells, queries, radius=radius, threads=threads, progress=progress)
-
-
-def try_queries(
-    index: LikelihoodIndex,
-    cells: NDArray[np.int64],
-    queries: Iterable[Signature],
-    *,
-    radius: float = 50.0,
-    threads: int = 1,
-    progress: Callable[[int, int], None] | None = None,
-) -> Trials:
-    """Ask queries of which the true cells are known, one a row number of `cells`.
-
-    `radius` is what counts as near, in metres. A query without objects is not answered: its chances
-    are 0.
-    """
+    if queries is None:
+        queries = draw_trials(index, cells, seed=seed)
     places = _without_signatures(index.database)
     radius = min(radius, city_extent(places))
 
@@ -239,17 +224,17 @@ def try_without_classes(
     names = {item.code: item.name for item in index.database.taxonomy.classes}
     for number, code in enumerate(codes):
         without, rows = leave_class_out(index.database, code)
-        asked = np.flatnonzero(rows[cells] >= 0)
-        if len(asked):
+        left = np.flatnonzero(rows[cells] >= 0)
+        if len(left):
             noise = _without_class(index.noise, names[code], len(codes))
-            trials = try_queries(
+            trials = try_cells(
                 build_index(without, noise, threads=threads),
-                rows[cells[asked]],
-                [_without_code(queries[one], code) for one in asked.tolist()],
+                rows[cells[left]],
+                queries=[_without_code(queries[one], code) for one in left.tolist()],
                 radius=radius,
                 threads=threads,
             )
-            near[asked, number], bits[asked, number] = trials.near, trials.bits
+            near[left, number], bits[left, number] = trials.near, trials.bits
         if progress is not None:
             progress((number + 1) * len(cells), len(codes) * len(cells))
     return near, bits
