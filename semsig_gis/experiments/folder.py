@@ -35,14 +35,16 @@ def _read_recipe(folder: Path) -> dict[str, Any]:
     """Return the experiment as plain values, with ``inputs`` and ``versions``."""
     text = (folder / SPEC).read_text(encoding="utf-8")
     spec = parse_experiment(text, where=str(folder / SPEC))
-    return {**spec.to_dict(), **read_json(folder / INPUTS)}
+    # A process that was killed between the two files has left no inputs, and no results.
+    inputs = read_json(folder / INPUTS) if (folder / INPUTS).exists() else {}
+    return {**spec.to_dict(), **inputs}
 
 
 def _write_recipe(folder: Path, recipe: dict[str, Any]) -> None:
     inputs = {name: recipe[name] for name in ("inputs", "versions")}
-    write_json(folder / INPUTS, inputs)
     spec = {name: value for name, value in recipe.items() if name not in inputs}
     write_whole(folder / SPEC, toml_text(spec))
+    write_json(folder / INPUTS, inputs)
 
 
 RUN = RunKind(

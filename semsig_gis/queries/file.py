@@ -9,13 +9,13 @@ import numpy as np
 from semsig_gis.core.errors import InputError
 from semsig_gis.core.signature import Signature
 from semsig_gis.likelihood.route import Leg
-from semsig_gis.storage.signature_rows import parse_rows, read_rows, row_signature, row_value
+from semsig_gis.storage.geoparquet import parse_rows, read_rows, row_signature, row_value
 
 if TYPE_CHECKING:
     from pathlib import Path
 
     from semsig_gis.core.taxonomy import Taxonomy
-    from semsig_gis.storage.signature_rows import Row
+    from semsig_gis.storage.geoparquet import Row
 
 Queries = list[tuple[str | int, Signature]]
 Route = tuple[Queries, list[Leg]]

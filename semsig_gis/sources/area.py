@@ -12,8 +12,8 @@ import shapely
 
 from semsig_gis.core.errors import InputError
 from semsig_gis.sources import FILE_SUFFIXES
-from semsig_gis.sources.crs import LATITUDE_LIMIT, LONGITUDE_LIMIT, WGS84
 from semsig_gis.sources.layers import LayerSpec
+from semsig_gis.sources.raw_layer import LATITUDE_LIMIT, LONGITUDE_LIMIT, WGS84
 from semsig_gis.sources.vector import reader as vector_file
 
 if TYPE_CHECKING:

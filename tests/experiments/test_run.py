@@ -248,6 +248,13 @@ def test_killed_at_the_very_end(folder: Path, results: Path, tmp_path: Path) -> 
     assert contents(out) == contents(results)
 
 
+def test_killed_at_the_very_beginning(folder: Path, results: Path, tmp_path: Path) -> None:
+    (tmp_path / "out.partial").mkdir()
+    shutil.copy(results / "experiment.toml", tmp_path / "out.partial")
+    run_experiment(SPEC, tmp_path / "out", folder=folder)
+    assert contents(tmp_path / "out") == contents(results)
+
+
 def test_a_part_that_is_damaged_is_done_again(folder: Path, results: Path, tmp_path: Path) -> None:
     out = tmp_path / "out"
     interrupt(SPEC, out, folder, after=520)

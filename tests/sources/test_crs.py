@@ -7,7 +7,7 @@ import pytest
 from pyproj import CRS
 
 from semsig_gis.core.errors import CrsError
-from semsig_gis.sources.crs import crs_label, off_the_globe, settle_crs, usable_crs
+from semsig_gis.sources.raw_layer import crs_label, off_the_globe, settle_crs, usable_crs
 
 LAMBERT = (
     'PROJCS["RGF93_Lambert_93",GEOGCS["GCS_RGF_1993",DATUM["D_RGF_1993",'

@@ -24,8 +24,13 @@ from servers import Answer, published
 from semsig_gis.core.errors import CatalogError, CrsError, SourceError
 from semsig_gis.sources.area import Area
 from semsig_gis.sources.layers import ClassBy, LayerSpec
-from semsig_gis.sources.opendatasoft.fields import find_field, fold
-from semsig_gis.sources.opendatasoft.reader import _outline, fetch_layers, read_layers
+from semsig_gis.sources.opendatasoft.reader import (
+    _outline,
+    fetch_layers,
+    find_field,
+    fold,
+    read_layers,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Callable

@@ -10,7 +10,7 @@ from sentences import refused
 
 from semsig_gis.core.errors import InputError
 from semsig_gis.sources.catalog import paper_taxonomy
-from semsig_gis.storage.signature_rows import parse_rows, read_rows, row_signature
+from semsig_gis.storage.geoparquet import parse_rows, read_rows, row_signature
 
 if TYPE_CHECKING:
     from pathlib import Path

@@ -14,7 +14,7 @@ from pyproj import CRS
 from pyproj.exceptions import CRSError
 
 from semsig_gis.core.errors import CrsError, SourceError
-from semsig_gis.sources.crs import WGS84
+from semsig_gis.sources.raw_layer import WGS84
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence

@@ -7,9 +7,15 @@ from typing import TYPE_CHECKING
 import shapely
 
 from semsig_gis.core.errors import CatalogError
-from semsig_gis.sources.crs import WGS84, settle_crs
 from semsig_gis.sources.layers import ANY_VALUE
-from semsig_gis.sources.raw_layer import BadFeatureError, RowRules, Rows, raw_layer
+from semsig_gis.sources.raw_layer import (
+    WGS84,
+    BadFeatureError,
+    RowRules,
+    Rows,
+    raw_layer,
+    settle_crs,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence

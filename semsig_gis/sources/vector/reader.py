@@ -21,8 +21,18 @@ import shapely
 import shapely.geometry
 
 from semsig_gis.core.errors import CatalogError, SourceError, UnknownNameError, nearest_name
-from semsig_gis.sources.crs import WGS84, crs_label, fits_the_globe, settle_crs, usable_crs
-from semsig_gis.sources.raw_layer import BadFeatureError, RowRules, Rows, raw_layer, require_field
+from semsig_gis.sources.raw_layer import (
+    WGS84,
+    BadFeatureError,
+    RowRules,
+    Rows,
+    crs_label,
+    fits_the_globe,
+    raw_layer,
+    require_field,
+    settle_crs,
+    usable_crs,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping, Sequence

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from semsig_gis.core.errors import SourceError
-from semsig_gis.sources.opendatasoft.fields import POINT, SHAPE, fold
+from semsig_gis.sources.opendatasoft.reader import POINT, SHAPE, fold
 from semsig_gis.sources.opendatasoft.table import Record, open_table
 from semsig_gis.sources.vector.reader import (
     NO_GEOMETRY,
