@@ -48,7 +48,7 @@ _MASKS = (
     (r"(?m:^)times,.*\n", ""),
     (r"(?s)(## |>)Retrieval times\b(?:(?!\n## |<h2).)*", r"\1"),
     # folium makes up the names of what a map has.
-    (r"_[0-9a-f]{32}\b", "_"),
+    (r"_[0-9a-f]{32}(?![0-9a-f])", "_"),
     # Leaflet and jQuery are in a page, or linked where they were not when the package was built.
     (r'[ \t]*(<script src="http[^>]*></script>|<link rel="stylesheet" href="http[^>]*>)\s*', ""),
     (r"(?s)[ \t]*<(script|style)>\n/\*(! jQuery| @preserve| required styles).*?</\1>\s*", ""),
