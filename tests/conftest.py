@@ -127,12 +127,14 @@ def qgis_environment(tmp_path: Path) -> dict[str, str]:
 
 @pytest.fixture
 def run(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> Run:
-    """Run the command in this process: exit code, standard output, standard error."""
+    """Run the command in this process: exit code, standard output, standard error.
 
+    The first argument is a line as it is typed; those after it may contain spaces.
+    """
     from semsig_gis.cli import main
 
-    def call(*arguments: object) -> tuple[int, str, str]:
-        monkeypatch.setattr(sys, "argv", ["semsig", *map(str, arguments)])
+    def call(line: object, *arguments: object) -> tuple[int, str, str]:
+        monkeypatch.setattr(sys, "argv", ["semsig", *str(line).split(), *map(str, arguments)])
         with pytest.raises(SystemExit) as end:
             main()
         printed = capsys.readouterr()

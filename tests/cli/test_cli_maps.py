@@ -1,0 +1,136 @@
+"""Maps as their user asks for them: of objects and streets, of cells alike, of what has changed."""
+
+from __future__ import annotations
+
+import dataclasses
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pytest
+import shapely
+from osm_xml import node, way, write_osm
+from pyproj import Transformer
+from sentences import sentence
+from worlds import CORNER, random_town, surroundings
+
+from semsig_gis.database.build import build_database
+from semsig_gis.database.store import ObjectStore, save_with_store
+from semsig_gis.objects.surroundings import save_surroundings
+from semsig_gis.objects.table import StreetObjects, save_objects
+
+if TYPE_CHECKING:
+    from conftest import Done, Run
+
+OBJECTS = random_town().street_objects
+DATABASE = build_database(OBJECTS)
+FEWER = dataclasses.replace(OBJECTS, table=OBJECTS.table[4:].reset_index(drop=True))
+X, Y = CORNER.tolist()
+HOUSE = surroundings(shapely.box(X, Y, X + 40.0, Y + 30.0))
+LANE = surroundings(shapely.LineString([(X, Y - 5.0), (X + 200.0, Y - 5.0)]))
+DRAWN_OBJECTS, DRAWN_GROUND = "semsig.streetObjects(", "= semsig.ground("
+
+
+def save_city(**ground: object) -> None:
+    save_with_store(DATABASE, ObjectStore.of(OBJECTS, **ground), "city.parquet")  # type: ignore[arg-type]
+
+
+@pytest.fixture(autouse=True)
+def _city(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Run in a folder with a database and its street objects."""
+    monkeypatch.chdir(tmp_path)
+    save_objects(OBJECTS, "objects.parquet")
+    save_city()
+
+
+def drawn(done: Done, options: str) -> str:
+    """Return the page of a map."""
+    assert done(f"map city.parquet {options} --out map.html") == "map: map.html\n"
+    return Path("map.html").read_text(encoding="utf-8")
+
+
+def test_objects_alone_and_over_an_evaluation(done: Done) -> None:
+    alone = drawn(done, "--objects objects.parquet")
+    assert (alone.count(DRAWN_OBJECTS), alone.count(DRAWN_GROUND)) == (1, 0)
+    done("evaluate city.parquet --queries 5 --out evaluation")
+    both = drawn(done, "--evaluation evaluation --objects objects.parquet")
+    assert both.count(DRAWN_OBJECTS) == 1
+    assert "Localization errors" in both
+
+
+def test_streets_and_buildings_of_the_store_or_of_files(done: Done) -> None:
+    objects = "--objects objects.parquet"
+    save_city(footprints=HOUSE, streets=LANE)
+    page = drawn(done, objects)
+    assert page.count(DRAWN_GROUND) == 1
+    assert '{"buildings":' in page
+    assert '"streets":' in page
+    done("localize city.parquet --types DD --map query.html")
+    assert DRAWN_GROUND in Path("query.html").read_text(encoding="utf-8")
+
+    save_city(footprints=surroundings(shapely.box(X + 9000.0, Y, X + 9010.0, Y + 10.0)))
+    assert DRAWN_GROUND not in drawn(done, objects)
+
+    save_city()
+    save_surroundings(LANE, "streets.parquet")
+    page = drawn(done, f"{objects} --streets streets.parquet")
+    assert page.count(DRAWN_GROUND) == 1
+    assert '{"buildings":' not in page
+
+
+def test_openstreetmap_is_named_for_its_buildings(tmp_path: Path, done: Done) -> None:
+    to_degrees = Transformer.from_crs("EPSG:2154", "EPSG:4326", always_xy=True)
+    corners = np.array(to_degrees.transform([X, X + 50.0, X], [Y, Y, Y + 50.0])).T
+    write_osm(
+        tmp_path / "town.osm",
+        *(node(at, lon, lat) for at, (lon, lat) in enumerate(corners.tolist(), start=1)),
+        way(9, [1, 2, 3, 1], {"building": "yes"}),
+    )
+    page = drawn(done, "--objects objects.parquet --buildings town.osm")
+    assert "OpenStreetMap contributors (ODbL" in page
+
+
+def test_a_map_of_cells_that_look_the_same(done: Done) -> None:
+    assert "Cells that look the same" in drawn(done, "--ambiguity")
+
+
+def test_a_map_of_what_has_changed(run: Run) -> None:
+    save_with_store(build_database(FEWER), ObjectStore.of(FEWER), "new.parquet")
+    line = "map city.parquet --drift new.parquet --out drift.html"
+    code, out, err = run(line)
+    assert (code, out, "not at hand" in err) == (0, "map: drift.html\n", False)
+    assert "Objects removed (4)" in Path("drift.html").read_text(encoding="utf-8")
+    # Without its store, a database has cells to compare, but no objects.
+    Path("new.objects").rename("elsewhere")
+    code, _, err = run(line)
+    assert (code, "drawing cells only" in err) == (0, True)
+    assert "Objects removed" not in Path("drift.html").read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        ("", ("--evaluation", "--identifiability", "--objects")),
+        ("--objects nowhere.parquet", ("nowhere.parquet",)),
+        ("--objects objects.parquet --buildings gone.zip", ("gone.zip",)),
+        ("--objects objects.parquet --buildings streets.parquet", ("polygon",)),
+        ("--objects objects.parquet --streets far.parquet", ("in the city",)),
+        ("--ambiguity --objects other.parquet", ("street objects", "same city")),
+        ("--drift gone.parquet", ("gone.parquet does not exist",)),
+        ("--drift city.objects", ("city.objects",)),
+        ("--drift city.parquet --ambiguity", ("give one of them",)),
+        ("--ambiguity --identifiability", ("give one of them",)),
+        ("--ambiguity --out .", ("folder",)),
+    ],
+)
+def test_what_cannot_be_drawn_leaves_the_map_as_it_was(
+    options: str, words: tuple[str, ...], run: Run
+) -> None:
+    save_surroundings(LANE, "streets.parquet")
+    far = surroundings(shapely.LineString([(X + 9000.0, Y), (X + 9100.0, Y)]))
+    save_surroundings(far, "far.parquet")
+    moved = OBJECTS.table.set_geometry(OBJECTS.table.translate(50_000.0)).to_crs("EPSG:32631")
+    save_objects(StreetObjects(moved, OBJECTS.taxonomy, ()), "other.parquet")
+    Path("map.html").write_text("before")
+    sentence(run(f"map city.parquet --out map.html {options}"), *words)
+    assert Path("map.html").read_text() == "before"
