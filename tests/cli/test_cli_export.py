@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import json
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import geopandas as gpd
+import numpy as np
 import pandas as pd
 import pyarrow.parquet as pq
 import pyogrio
@@ -23,167 +25,144 @@ from semsig_gis.exports.geotiff import cell_errors
 from semsig_gis.objects.table import open_objects, save_objects
 
 if TYPE_CHECKING:
-    from pathlib import Path
-
     from conftest import Done, Run
 
 
-@pytest.fixture
-def city(tmp_path: Path) -> Path:
-    """Return a database with its identifiability, and objects and an evaluation beside it."""
+@pytest.fixture(autouse=True)
+def _city(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Run in a folder with a database with its identifiability, objects and an evaluation."""
+    monkeypatch.chdir(tmp_path)
     database, objects = small_city()
-    path = tmp_path / "city.parquet"
-    save_database(database, path)
-    # A coordinate system that was read tells of itself in other words than one that was named.
-    save_database(open_database(path), path)
-    save_identifiability(told_of(database), path)
-    save_objects(objects, tmp_path / "objects.parquet")
-    save_objects(open_objects(tmp_path / "objects.parquet"), tmp_path / "objects.parquet")
-    save_evaluation(small_evaluation(), tmp_path / "evaluation")
-    return path
+    # What was read is saved once more: a coordinate system then has other words than one that was
+    # named.
+    save_database(database, "city.parquet")
+    save_database(open_database("city.parquet"), "city.parquet")
+    save_identifiability(told_of(database), "city.parquet")
+    save_objects(objects, "objects.parquet")
+    save_objects(open_objects("objects.parquet"), "objects.parquet")
+    save_evaluation(small_evaluation(), "evaluation")
 
 
-def test_a_city_goes_into_a_geopackage_and_back(city: Path, run: Run) -> None:
-    folder = city.parent
-    more = ("--objects", folder / "objects.parquet", "--evaluation", folder / "evaluation")
-    code, out, err = run("export", city, *more, "--out", folder / "city.gpkg")
-    assert (code, err) == (0, "")
-    assert "city.gpkg" in out
-    assert set(pyogrio.list_layers(folder / "city.gpkg")[:, 0]) == {
+def test_a_city_goes_into_a_geopackage_and_back(run: Run) -> None:
+    more = "--objects objects.parquet --evaluation evaluation"
+    code, out, err = run(f"export city.parquet --out city.gpkg {more}")
+    assert (code, err, "city.gpkg" in out) == (0, "", True)
+    assert set(pyogrio.list_layers("city.gpkg")[:, 0]) == {
         *("cells", "objects", "evaluation", "evaluation_lines", "layer_styles")
     }
-    back = folder / "back.parquet"
-    objects = ("--objects", folder / "back_objects.parquet")
-    code, out, err = run("import", folder / "city.gpkg", "--out", back, *objects)
-    assert (code, err) == (0, "")
-    assert f"{len(small_city()[0]):,} cells" in out
+    code, out, err = run("import city.gpkg --out back.parquet --objects back_objects.parquet")
+    assert (code, err, f"{len(small_city()[0]):,} cells" in out) == (0, "", True)
     # With the columns that semsig identify put there, of which a -0.0 comes back as 0.0.
-    again, before = pq.read_table(back), pq.read_table(city)
+    again, before = pq.read_table("back.parquet"), pq.read_table("city.parquet")
     assert again.equals(before)
     assert again.schema.metadata == before.schema.metadata
-    assert (folder / "back_objects.parquet").read_bytes() == (
-        folder / "objects.parquet"
-    ).read_bytes()
+    assert Path("back_objects.parquet").read_bytes() == Path("objects.parquet").read_bytes()
 
 
-def test_one_layer(city: Path, done: Done) -> None:
-    folder = city.parent
-    database = small_city()[0]
-    done("export", city, "--out", folder / "cells.csv")
-    assert "chance_found" in pd.read_csv(folder / "cells.csv").columns
-    done("export", city, "--geometry", "point", "--out", folder / "p.parquet")
-    assert set(gpd.read_parquet(folder / "p.parquet").geom_type) == {"Point"}
-    evaluation = ("--evaluation", folder / "evaluation", "--layer", "error")
-    done("export", city, *evaluation, "--out", folder / "e.tif")
-    with rasterio.open(folder / "e.tif") as read:
-        found = [value[0] for value in read.sample(database.xy)]
-    expected = cell_errors(small_evaluation(), database).astype("float32")
-    assert pd.Series(found).equals(pd.Series(expected))
+def test_one_layer(done: Done) -> None:
+    done("export city.parquet --out cells.csv")
+    assert "chance_found" in pd.read_csv("cells.csv").columns
+    done("export city.parquet --geometry point --out p.parquet")
+    assert set(gpd.read_parquet("p.parquet").geom_type) == {"Point"}
+    done("export city.parquet --evaluation evaluation --layer error --out e.tif")
+    expected = cell_errors(small_evaluation(), small_city()[0]).astype("float32")
+    np.testing.assert_array_equal(raster_values("e.tif"), expected)
+
+
+def raster_values(path: str) -> list[float]:
+    """Return the value of a raster at every cell of the city."""
+    with rasterio.open(path) as raster:
+        return [value[0] for value in raster.sample(small_city()[0].xy)]
 
 
 @pytest.mark.parametrize("method", ["edit+edit", "likelihood"])
-def test_what_must_be_searched_after_a_query(method: str, city: Path, done: Done) -> None:
-    query = ("--types", small_city()[0].types(7), "--method", method)
-    out = city.parent / "answer.gpkg"
-    printed = done("localize", city, *query, "--out", out, "--within", 15)
-    assert "km2" in printed
-    assert "% of the city" in printed
-    told = json.loads(done("localize", city, *query, "--out", out, "--json"))["searched"]
-    regions = gpd.read_file(out, layer="regions")
-    assert regions["cells"].sum() == told["cells"]
-    assert regions.geometry.area.sum() == pytest.approx(told["km2"] * 1e6)
+def test_what_must_be_searched_after_a_query(method: str, done: Done) -> None:
+    types = small_city()[0].types(7)
+    line = f"localize city.parquet --types {types} --method {method} --out answer.gpkg"
+    out = done(line, "--within", 15)
+    assert "km2" in out
+    assert "% of the city" in out
+    searched = json.loads(done(line, "--json"))["searched"]
+    regions = gpd.read_file("answer.gpkg", layer="regions")
+    assert regions["cells"].sum() == searched["cells"]
+    assert regions.geometry.area.sum() == pytest.approx(searched["km2"] * 1e6)
 
 
-def test_the_chance_of_every_cell(city: Path, run: Run) -> None:
-    query = ("--types", "DD", "--method", "likelihood")
-    code, out, _ = run("localize", city, *query, "--out", city.parent / "p.tif")
-    assert (code, out.splitlines()[-1]) == (0, f"chances: {city.parent / 'p.tif'}")
-    with rasterio.open(city.parent / "p.tif") as read:
-        values = [value[0] for value in read.sample(small_city()[0].xy)]
-    assert sum(values) == pytest.approx(1.0, abs=1e-4)
+def test_the_chance_of_every_cell(done: Done) -> None:
+    out = done("localize city.parquet --types DD --method likelihood --out p.tif")
+    assert out.splitlines()[-1] == "chances: p.tif"
+    assert sum(raster_values("p.tif")) == pytest.approx(1.0, abs=1e-4)
 
 
-def test_what_is_required_may_be_drawn_and_searched(city: Path, run: Run) -> None:
-    folder = city.parent
-    files = ("--map", folder / "m.html", "--out", folder / "a.gpkg")
-    query = ("--types", "DD", "--require", "D", "--top", 2)
-    code, out, err = run("localize", city, *query, *files, "--json")
+def test_what_is_required_may_be_drawn_and_searched(run: Run) -> None:
+    query = "localize city.parquet --types DD --require D --top 2"
+    code, out, err = run(query, "--map", "m.html", "--out", "a.gpkg", "--json")
     assert (code, err) == (0, "")
-    told = json.loads(out)
-    assert told["tied_beyond"] > 0
+    answer = json.loads(out)
+    assert answer["tied_beyond"] > 0
     # All that are as good as the last candidate are to be searched, and are in the file.
-    candidates = gpd.read_file(folder / "a.gpkg", layer="candidates")
-    assert told["searched"]["cells"] == len(candidates) == 2 + told["tied_beyond"]
+    candidates = gpd.read_file("a.gpkg", layer="candidates")
+    assert answer["searched"]["cells"] == len(candidates) == 2 + answer["tied_beyond"]
     assert len(set(candidates["distance"])) == 1
 
 
-@pytest.mark.parametrize(("tied", "said"), [(1, "1 further cell ties"), (1200, "1,200 further")])
-def test_how_many_cells_tie_is_said(
-    tied: int, said: str, capsys: pytest.CaptureFixture[str]
+@pytest.mark.parametrize(("tied", "words"), [(1, "1 further cell ties"), (1200, "1,200 further")])
+def test_the_number_of_cells_that_tie_is_printed(
+    tied: int, words: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
     print_answer({"used": "types", "cells": 5000, "candidates": [], "tied_beyond": tied})
-    assert f"\n{said}" in capsys.readouterr().out
+    assert f"\n{words}" in capsys.readouterr().out
 
 
-def test_a_slip_is_told_before_the_index_is_built(city: Path, run: Run) -> None:
-    likely = ("--method", "likelihood")
-    sentence(run("localize", city, "--types", "D!", *likely), "'!'")
-    sentence(run("localize", city, *likely), "types, bearings or both")
-    assert not list(city.parent.glob("*.likelihood"))
+OVERWRITES = ("to be written", "also another file")
 
 
-def test_what_does_not_go_together(city: Path, run: Run, done: Done) -> None:
-    folder = city.parent
-    out = ("--out", folder / "a.gpkg")
-    likely = ("--method", "likelihood")
-    refused = (
-        (("export", city, "--layer", "objects", *out), "no objects"),
-        (("export", city, "--out", folder / "a.txt"), ".gpkg, .parquet, .csv or .tif"),
-        (("export", city, "--evaluation", folder / "nowhere", *out), "does not exist"),
-        (("localize", city, "--types", "D", "--within", 5), "--out"),
-        (("localize", city, "--types", "D", "--share", 0.5, *out), "likelihood"),
-        (("localize", city, "--queries", "-", *out), "--out"),
-        (("localize", city, "--types", "D", "--out", folder / "a.tif"), "likelihood"),
-        (("localize", city, "--types", "D", "--within", -1, *out), "metres, 0 or more"),
+@pytest.mark.parametrize(
+    ("line", "words"),
+    [
+        # What does not go together.
+        ("export city.parquet --layer objects --out a.gpkg", ("no objects",)),
+        ("export city.parquet --out a.txt", (".gpkg, .parquet, .csv or .tif",)),
+        ("export city.parquet --evaluation nowhere --out a.gpkg", ("does not exist",)),
+        ("localize city.parquet --types D --within 5", ("--out",)),
+        ("localize city.parquet --types D --share 0.5 --out a.gpkg", ("likelihood",)),
+        ("localize city.parquet --queries - --out a.gpkg", ("--out",)),
+        ("localize city.parquet --types D --out a.tif", ("likelihood",)),
+        ("localize city.parquet --types D --within -1 --out a.gpkg", ("metres, 0 or more",)),
         (
-            ("localize", city, "--types", "D", *likely, "--share", 0.5, "--out", folder / "a.tif"),
-            "chances of all cells",
+            "localize city.parquet --types D --method likelihood --share 0.5 --out a.tif",
+            ("chances of all cells",),
         ),
-        (("import", folder / "nowhere.gpkg", "--out", folder / "b.parquet"), "does not exist"),
-        (("import", city, "--out", folder / "b.parquet"), "not written by semsig export"),
-    )
-    for command, words in refused:
-        sentence(run(*command), words)
-    done("export", city, *out)
-    more = ("--objects", folder / "o.parquet")
-    sentence(run("import", folder / "a.gpkg", "--out", folder / "b.parquet", *more), "holds no")
-    assert not (folder / "b.parquet").exists()
-
-
-def test_nothing_is_written_over_what_is_read(city: Path, run: Run) -> None:
-    folder = city.parent
-    objects = folder / "objects.parquet"
-    refused: tuple[tuple[object, ...], ...] = (
-        ("export", city, "--out", city),
-        ("export", city, "--objects", objects, "--layer", "objects", "--out", objects),
-        ("map", city, "--ambiguity", "--out", folder / "x" / ".." / city.name),
-        ("localize", city, "--types", "D", "--map", city),
-        ("localize", city, "--types", "D", "--map", folder / "m", "--out", folder / "m"),
-        ("build", objects, "--out", objects),
-        ("import", folder / "a.gpkg", "--out", folder / "a.gpkg"),
-        ("learn", city, "--samples", folder / "s.csv", "--out", folder / "s.csv"),
-    )
-    before = city.read_bytes()
-    for command in refused:
-        sentence(run(*command), "to be written", "also another file")
-        assert city.read_bytes() == before
-
-
-def test_a_name_says_what_a_file_will_be(city: Path, run: Run) -> None:
-    folder = city.parent
-    for command in (
-        ("build", folder / "objects.parquet", "--out", folder / "city.gpkg"),
-        ("map", city, "--ambiguity", "--out", folder / "map.png"),
-        ("import", folder / "a.gpkg", "--out", folder / "b.gpkg"),
-    ):
-        sentence(run(*command), "must end in .")
+        ("import nowhere.gpkg --out b.parquet", ("does not exist",)),
+        ("import city.parquet --out b.parquet", ("not written by semsig export",)),
+        ("import cells.gpkg --out b.parquet --objects o.parquet", ("holds no",)),
+        # The index, which takes its time, is not built before.
+        ("localize city.parquet --types D! --method likelihood", ("'!'",)),
+        ("localize city.parquet --method likelihood", ("types, bearings or both",)),
+        # Nothing is written over what is read.
+        ("export city.parquet --out city.parquet", OVERWRITES),
+        (
+            "export city.parquet --objects objects.parquet --layer objects --out objects.parquet",
+            OVERWRITES,
+        ),
+        ("map city.parquet --ambiguity --out x/../city.parquet", OVERWRITES),
+        ("localize city.parquet --types D --map city.parquet", OVERWRITES),
+        ("localize city.parquet --types D --map m --out m", OVERWRITES),
+        ("build objects.parquet --out objects.parquet", OVERWRITES),
+        ("import a.gpkg --out a.gpkg", OVERWRITES),
+        ("learn city.parquet --samples s.csv --out s.csv", OVERWRITES),
+        # A name says what a file will be.
+        ("build objects.parquet --out city.gpkg", ("must end in .",)),
+        ("map city.parquet --ambiguity --out map.png", ("must end in .",)),
+        ("import a.gpkg --out b.gpkg", ("must end in .",)),
+    ],
+)
+def test_what_is_refused_writes_nothing(
+    line: str, words: tuple[str, ...], tmp_path: Path, run: Run, done: Done
+) -> None:
+    if "cells.gpkg" in line:
+        done("export city.parquet --out cells.gpkg")
+    before = {path: path.read_bytes() for path in tmp_path.rglob("*") if path.is_file()}
+    sentence(run(line), *words)
+    after = {path: path.read_bytes() for path in tmp_path.rglob("*") if path.is_file()}
+    assert after == before

@@ -20,10 +20,11 @@ from semsig_gis.objects.surroundings import save_surroundings
 from semsig_gis.objects.table import StreetObjects, save_objects
 
 if TYPE_CHECKING:
+    import geopandas as gpd
+
     from conftest import Done, Run
 
 OBJECTS = random_town().street_objects
-DATABASE = build_database(OBJECTS)
 FEWER = dataclasses.replace(OBJECTS, table=OBJECTS.table[4:].reset_index(drop=True))
 X, Y = CORNER.tolist()
 HOUSE = surroundings(shapely.box(X, Y, X + 40.0, Y + 30.0))
@@ -31,8 +32,9 @@ LANE = surroundings(shapely.LineString([(X, Y - 5.0), (X + 200.0, Y - 5.0)]))
 DRAWN_OBJECTS, DRAWN_GROUND = "semsig.streetObjects(", "= semsig.ground("
 
 
-def save_city(**ground: object) -> None:
-    save_with_store(DATABASE, ObjectStore.of(OBJECTS, **ground), "city.parquet")  # type: ignore[arg-type]
+def save_city(**ground: gpd.GeoDataFrame) -> None:
+    store = ObjectStore.of(OBJECTS, **ground)
+    save_with_store(build_database(OBJECTS), store, "city.parquet")
 
 
 @pytest.fixture(autouse=True)

@@ -1,34 +1,38 @@
-"""What the command line prints."""
+"""What the command line prints, and the command as a part of another program."""
 
 from __future__ import annotations
 
 import json
 import os
 import pty
+import re
 import subprocess
 import sys
 import threading
+from typing import TYPE_CHECKING, Any
 
 import pytest
 
 from semsig_gis.cli import console
+from semsig_gis.cli.console import VARIABLE, progress_line
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+
+# --- What is printed ---------------------------------------------------------------------------
 
 
 def test_rows_are_shown_as_they_are(capsys: pytest.CaptureFixture[str]) -> None:
     rows = [("[red]a[/red]", 1234567, 7652000627500), ("x" * 300, -1, 0)]
     console.print_rows("[b]title[/b]", ("name", "count", "id"), rows)
     out = capsys.readouterr().out
-    assert "[b]title[/b]" in out
-    assert "[red]a[/red]" in out
-    assert "1,234,567" in out
-    assert " 7652000627500 " in out
     # A pipe has no width, so nothing is folded.
-    assert "x" * 300 in out
+    for text in ("[b]title[/b]", "[red]a[/red]", "1,234,567", " 7652000627500 ", "x" * 300):
+        assert text in out
 
 
-def test_json_keeps_letters_and_refuses_what_json_lacks(
-    capsys: pytest.CaptureFixture[str],
-) -> None:
+def test_json_keeps_letters_and_refuses_infinity(capsys: pytest.CaptureFixture[str]) -> None:
     console.print_json({"title": "Défibrillateur"})
     out = capsys.readouterr().out
     assert "Défibrillateur" in out
@@ -40,8 +44,7 @@ def test_json_keeps_letters_and_refuses_what_json_lacks(
 def test_progress_stays_silent_without_a_terminal(capsys: pytest.CaptureFixture[str]) -> None:
     with console.progress("working") as advance:
         advance(1, 2)
-    printed = capsys.readouterr()
-    assert (printed.out, printed.err) == ("", "")
+    assert capsys.readouterr() == ("", "")
     remaining = [thread for thread in threading.enumerate() if isinstance(thread, threading.Timer)]
     for thread in remaining:
         thread.join(timeout=1)
@@ -78,3 +81,88 @@ def test_progress_shows_on_a_terminal_when_work_takes_a_while(work_s: float, sho
     assert done.stdout == "result\n"
     assert (b"digging" in seen) is shown
     assert (b"3/7" in seen) is shown
+
+
+# --- In another program -----------------------------------------------------------------------
+
+WRITES = """
+import signal, sys, time
+from pathlib import Path
+from semsig_gis.cli.console import stop_with_supervisor
+from semsig_gis.storage.whole import whole_file
+stop_with_supervisor()
+with whole_file(sys.argv[1]) as partial:
+    partial.write_text("half")
+    print("begun", flush=True)
+    {work}
+"""
+WORK = {
+    "asleep": "time.sleep(60)",
+    "busy": "while True: pass",
+    "waiting for a thread": "import threading; threading.Event().wait()",
+}
+
+
+def start(*arguments: object, **variables: str) -> Any:  # noqa: ANN401 - its pipes are not None
+    """Start Python with a pipe for its input, its output and its errors."""
+    return subprocess.Popen(
+        [sys.executable, *map(str, arguments)],
+        env=os.environ | variables,
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+
+
+@pytest.mark.parametrize("work", WORK.values(), ids=WORK)
+def test_the_end_of_the_input_ends_the_work_and_cleans_up(work: str, tmp_path: Path) -> None:
+    with start("-c", WRITES.replace("{work}", work), tmp_path / "out.txt") as process:
+        assert process.stdout.readline() == "begun\n"
+        assert list(tmp_path.iterdir()) != []
+        process.stdin.close()
+        assert process.wait(timeout=20) != 0
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="no such signals")
+def test_it_ends_even_where_interrupts_are_ignored(tmp_path: Path) -> None:
+    ignoring = "import signal; signal.signal(signal.SIGINT, signal.SIG_IGN)\n"
+    code = ignoring + WRITES.replace("{work}", WORK["asleep"])
+    with start("-c", code, tmp_path / "out.txt") as process:
+        process.stdout.readline()
+        process.stdin.close()
+        assert process.wait(timeout=20) != 0
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_input_that_stays_open_does_not_keep_the_program(tmp_path: Path) -> None:
+    with start("-c", WRITES.replace("{work}", "pass"), tmp_path / "out.txt") as process:
+        assert process.wait(timeout=20) == 0
+        assert process.stderr.read() == ""
+    assert (tmp_path / "out.txt").read_text() == "half"
+
+
+def test_the_command_tells_its_progress_and_ends(tmp_path: Path) -> None:
+    command = ("-m", "semsig_gis.cli", "synthesize", "--out", tmp_path / "city")
+    with start(*command, **{VARIABLE: "1"}) as process:
+        line = process.stderr.readline()
+        process.stdin.close()
+        assert process.wait(timeout=30) not in {0, 2}
+    assert line == progress_line("making up a city", 0) + "\n"
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_progress_is_a_line_for_every_percent(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setenv(VARIABLE, "1")
+    with console.progress("digging") as advance:
+        for done in range(1, 1001):
+            advance(done, 1000)
+        advance(0, 0)
+    printed = capsys.readouterr()
+    assert printed.out == ""
+    lines = printed.err.splitlines()
+    percents = [int(re.fullmatch(r"semsig progress (\d+)% digging", line)[1]) for line in lines]  # type: ignore[index]
+    assert percents == [*range(101), 0]
