@@ -20,7 +20,7 @@ from .sources.synthetic.city import (
     synthetic_city as synthetic_city,
     synthetic_surroundings as synthetic_surroundings,
 )
-from .sources.vector.reader import read_layer as read_layer
+from .sources.vector import read_layer as read_layer
 from .objects.clean import build_objects as build_objects
 from .objects.conflate import conflate as conflate
 from .objects.draft import suggest_catalog as suggest_catalog

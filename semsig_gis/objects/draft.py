@@ -20,14 +20,17 @@ from semsig_gis.core.errors import CrsError, SourceError
 from semsig_gis.core.taxonomy import MAX_CODE, ObjectClass
 from semsig_gis.objects.keywords import keywords, words_of
 from semsig_gis.sources.catalog import catalog_names, load_catalog, paper_taxonomy
-from semsig_gis.sources.vector.reader import NO_GEOMETRY
-from semsig_gis.sources.vector.sample import VECTOR, samples
+from semsig_gis.sources.opendatasoft.reader import POINT, SHAPE, fold
+from semsig_gis.sources.opendatasoft.table import Record, open_table
+from semsig_gis.sources.vector import NO_GEOMETRY, LayerInfo, first_rows
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator, Sequence
+    from collections.abc import Iterable, Iterator, Mapping, Sequence
 
-    from semsig_gis.sources.vector.sample import Sample
-
+VECTOR = "vector_file"
+OSM_SUFFIXES = frozenset({".osm", ".pbf", ".bz2"})
+# Files that may be a plain table of records, which GDAL takes for nothing or for rows of text.
+TABLE_SUFFIXES = frozenset({".csv", ".json", ".parquet"})
 # Marks what a person must fill in; as a class, it does not load.
 EDIT = "EDIT"
 SAMPLE_ROWS = 100_000
@@ -46,6 +49,57 @@ LEAST_SHARE = 0.1
 MOST_ROWS = 0.5
 DATE = re.compile(r"\d{4}-\d\d-\d\d|\d\d[-/.]\d\d[-/.]\d{4}")
 LAT_LON = re.compile(r"\s*-?\d{1,2}\.\d+\s*,\s*-?\d{1,3}\.\d+\s*")
+
+
+@dataclass(frozen=True, slots=True)
+class Sample:
+    """One layer, the name of its reader, and all fields of its first rows.
+
+    `placed` says whether the reader finds the positions by itself; `coordinates` are the two fields
+    in which it finds them, where they are two.
+    """
+
+    reader: str
+    info: LayerInfo
+    rows: tuple[Mapping[str, Any], ...]
+    placed: bool = True
+    coordinates: tuple[str, ...] = ()
+
+
+def _samples(path: Path) -> tuple[Sample, ...]:
+    """Return the layers of a file that may hold positions; SourceError for one not to describe."""
+    suffix = path.suffix.lower()
+    if suffix in OSM_SUFFIXES:
+        msg = f"{path} is OpenStreetMap data; load it with the built-in catalogue 'openstreetmap'."
+        raise SourceError(msg)
+    layers: tuple[Sample, ...] = ()
+    try:
+        if suffix != ".parquet":
+            layers = tuple(
+                Sample(VECTOR, info, rows, coordinates=coordinates)
+                for info, rows, coordinates in first_rows(path, limit=SAMPLE_ROWS)
+            )
+    except SourceError:
+        if suffix not in TABLE_SUFFIXES:
+            raise
+    if suffix in TABLE_SUFFIXES and all(item.info.geometry == NO_GEOMETRY for item in layers):
+        return (_table(path),)
+    return layers
+
+
+def _table(path: Path) -> Sample:
+    table = open_table(path)
+    records = (item for item in table.records(table.fields) if isinstance(item, Record))
+    rows = tuple(record.values for record in itertools.islice(records, SAMPLE_ROWS))
+    info = LayerInfo(
+        name=path.stem,
+        geometry="Point",
+        crs="EPSG:4326",
+        rows=len(rows) + sum(1 for _ in records),
+        fields=tuple((field, "") for field in table.fields),
+    )
+    named = {fold(field) for field in table.fields} & {fold(SHAPE), fold(POINT)}
+    return Sample("opendatasoft", info, rows, placed=table.has_geometry or bool(named))
 
 
 @dataclass(frozen=True, slots=True)
@@ -253,7 +307,7 @@ def suggest_catalog(path: str | Path) -> str:
     # Fields: id, lon, lat, wood
     """
     path = Path(path)
-    items = samples(path, limit=SAMPLE_ROWS)
+    items = _samples(path)
     layers = [item for item in items if item.info.geometry != NO_GEOMETRY]
     if not layers:
         msg = f"{path} holds no layer with positions; give a file that does."

@@ -11,7 +11,7 @@ from semsig_gis.sources.area import clip_layer, names_place, parse_area
 from semsig_gis.sources.http.cache import Cache
 from semsig_gis.sources.http.fetch import HttpSpec
 from semsig_gis.sources.opendatasoft import reader as opendatasoft
-from semsig_gis.sources.osm import overpass, overpass_json
+from semsig_gis.sources.osm import overpass
 from semsig_gis.sources.osm.overpass import find_place
 
 if TYPE_CHECKING:
@@ -72,7 +72,7 @@ def fetch_layers(
         tiles = overpass.fetch_layers(
             specs, endpoints=catalog.endpoints, area=area, cache=cache, spec=http, progress=progress
         )
-        for layer in overpass_json.read_layers(tiles, specs, filters=filters):
+        for layer in overpass.read_layers(tiles, specs, filters=filters):
             layers.append(clip_layer(layer, area))
             tell(f"{layer.spec.name}: {len(layers[-1].table):,} rows")
         return tuple(layers)

@@ -13,11 +13,11 @@ import shapely
 from semsig_gis.core.crs import LICENSES
 from semsig_gis.core.errors import InputError, SourceError
 from semsig_gis.objects.table import layer_licences
+from semsig_gis.sources import vector as vector_file
 from semsig_gis.sources.area import join_areas
 from semsig_gis.sources.catalog import load_catalog
 from semsig_gis.sources.layers import LayerSpec
 from semsig_gis.sources.osm import file as osm_file
-from semsig_gis.sources.vector import reader as vector_file
 from semsig_gis.storage.geoparquet import GROUP_ROWS, hilbert_order
 from semsig_gis.storage.whole import whole_file
 

@@ -22,8 +22,8 @@ if TYPE_CHECKING:
 READERS = {
     "opendatasoft": "opendatasoft.reader",
     "osm_file": "osm.file",
-    "overpass": "osm.overpass_json",
-    "vector_file": "vector.reader",
+    "overpass": "osm.overpass",
+    "vector_file": "vector",
 }
 
 # Files with another suffix (.dbf, .prj, a README) accompany data and are not opened on their own.

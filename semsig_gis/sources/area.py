@@ -12,9 +12,9 @@ import shapely
 
 from semsig_gis.core.errors import InputError
 from semsig_gis.sources import FILE_SUFFIXES
+from semsig_gis.sources import vector as vector_file
 from semsig_gis.sources.layers import LayerSpec
 from semsig_gis.sources.raw_layer import LATITUDE_LIMIT, LONGITUDE_LIMIT, WGS84
-from semsig_gis.sources.vector import reader as vector_file
 
 if TYPE_CHECKING:
     import numpy as np

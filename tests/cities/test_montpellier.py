@@ -20,7 +20,7 @@ from semsig_gis.objects.clean import build_objects
 from semsig_gis.objects.load import choose_layers
 from semsig_gis.sources import find_files
 from semsig_gis.sources.catalog import load_catalog
-from semsig_gis.sources.vector.reader import read_layer
+from semsig_gis.sources.vector import read_layer
 
 if TYPE_CHECKING:
     from pathlib import Path

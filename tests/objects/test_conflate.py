@@ -18,7 +18,7 @@ from semsig_gis.objects.clean import build_objects
 from semsig_gis.objects.conflate import ConflatedPair, ConflationReport, conflate
 from semsig_gis.objects.table import Licence, StreetObjects, open_objects, save_objects
 from semsig_gis.sources.catalog import load_catalog, paper_taxonomy
-from semsig_gis.sources.vector.reader import read_layer
+from semsig_gis.sources.vector import read_layer
 
 if TYPE_CHECKING:
     import random

@@ -20,6 +20,7 @@ from sentences import refused
 from semsig_gis.core.errors import CatalogError, SourceError
 from semsig_gis.objects.draft import (
     Column,
+    Sample,
     columns_of,
     guess_class,
     guess_class_by,
@@ -29,8 +30,7 @@ from semsig_gis.objects.draft import (
 from semsig_gis.objects.keywords import Keywords, Match, keywords, words_of
 from semsig_gis.sources import reader
 from semsig_gis.sources.catalog import catalog_names, load_catalog, paper_taxonomy
-from semsig_gis.sources.vector.reader import LayerInfo
-from semsig_gis.sources.vector.sample import Sample
+from semsig_gis.sources.vector import LayerInfo
 
 if TYPE_CHECKING:
     from pathlib import Path

@@ -19,7 +19,7 @@ from semsig_gis.objects.quality import quality_report
 from semsig_gis.objects.table import StreetObjects
 from semsig_gis.sources import find_files
 from semsig_gis.sources.catalog import load_catalog, paper_taxonomy
-from semsig_gis.sources.vector.reader import read_layer
+from semsig_gis.sources.vector import read_layer
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

@@ -10,7 +10,7 @@ from semsig_gis.core.errors import SourceError
 from semsig_gis.sources import FILE_SUFFIXES, find_files
 from semsig_gis.sources.catalog import load_catalog
 from semsig_gis.sources.layers import LayerSpec
-from semsig_gis.sources.vector.reader import DRIVERS
+from semsig_gis.sources.vector import DRIVERS
 
 if TYPE_CHECKING:
     from pathlib import Path

@@ -23,8 +23,13 @@ from semsig_gis.sources.http.cache import Cache
 from semsig_gis.sources.http.fetch import HttpError, HttpSpec, NotCachedError
 from semsig_gis.sources.layers import ANY_VALUE, LayerSpec
 from semsig_gis.sources.osm import file as osm_file
-from semsig_gis.sources.osm.overpass import fetch_layers, find_place, overpass_query, waiting_time
-from semsig_gis.sources.osm.overpass_json import read_layers
+from semsig_gis.sources.osm.overpass import (
+    fetch_layers,
+    find_place,
+    overpass_query,
+    read_layers,
+    waiting_time,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator

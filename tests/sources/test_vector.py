@@ -22,10 +22,10 @@ from hypothesis import strategies as st
 from pyproj import CRS
 
 from semsig_gis.core.errors import CatalogError, CrsError, SourceError, UnknownNameError
+from semsig_gis.sources import vector as vector_file
 from semsig_gis.sources.layers import ClassBy, LayerSpec
 from semsig_gis.sources.raw_layer import RowRules
-from semsig_gis.sources.vector import reader as vector_file
-from semsig_gis.sources.vector.reader import DRIVERS, list_layers, read_layer
+from semsig_gis.sources.vector import DRIVERS, list_layers, read_layer
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable

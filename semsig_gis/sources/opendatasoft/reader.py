@@ -15,6 +15,7 @@ import shapely.geometry
 from shapely.errors import ShapelyError
 
 from semsig_gis.core.errors import CatalogError, SourceError
+from semsig_gis.sources import vector as vector_file
 from semsig_gis.sources.http.fetch import DEFAULT_HTTP, HttpError, fetch
 from semsig_gis.sources.layers import ClassBy
 from semsig_gis.sources.opendatasoft.table import open_table
@@ -27,7 +28,6 @@ from semsig_gis.sources.raw_layer import (
     require_field,
     settle_crs,
 )
-from semsig_gis.sources.vector import reader as vector_file
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence

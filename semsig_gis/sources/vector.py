@@ -375,6 +375,34 @@ def read_layers(
     return tuple(read_layer(path, spec, filters=filters, crs=crs) for spec in specs)
 
 
+def first_rows(
+    path: Path, *, limit: int
+) -> Iterator[tuple[LayerInfo, tuple[Mapping[str, Any], ...], tuple[str, ...]]]:
+    """Yield every layer of a file, its first rows, and its two coordinate columns if it has them.
+
+    Rows that cannot be read are passed over.
+    """
+    with listening():
+        for member in _layers(path):
+            columns = _columns(member, None, where=str(member))
+            with _opened(member, columns) as source:
+                rows = tuple(_properties(source, limit))
+            coordinates = (columns.x, columns.y) if columns and columns.x and columns.y else ()
+            yield _describe(member), rows, coordinates
+
+
+def _properties(source: Iterable[fiona.Feature], limit: int) -> Iterator[Mapping[str, Any]]:
+    features = iter(source)
+    for _ in range(limit):
+        try:
+            feature = next(features, None)
+        except Exception:  # noqa: BLE001, S112 - a load reports it; here the other rows will do
+            continue
+        if feature is None:
+            return
+        yield feature.properties
+
+
 # --- Opening ----------------------------------------------------------------------------------
 
 
