@@ -1,6 +1,6 @@
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
 import geopandas as gpd
 import pytest
@@ -18,6 +18,8 @@ from semsig_gis.objects.surroundings import (
 
 if TYPE_CHECKING:
     from pathlib import Path
+
+    Role = Literal["buildings", "streets", ""]
 
 HOUSE = shapely.box(770_000, 6_280_000, 770_010, 6_280_010)
 CRS = "EPSG:2154"
@@ -54,32 +56,39 @@ def test_an_openstreetmap_file_gives_what_it_tags(tmp_path: Path) -> None:
     assert licenses_of(read_surroundings(shouted, role="streets", crs=CRS)) == named[1:]
 
 
-def test_a_file_of_something_else_is_refused(tmp_path: Path) -> None:
-    line = shapely.LineString([(770_000, 6_280_000), (770_100, 6_280_000)])
+LINE = shapely.LineString([(770_000, 6_280_000), (770_100, 6_280_000)])
+FLAT = shapely.Polygon([(770_000, 6_280_000)] * 3)
+
+
+@pytest.mark.parametrize(
+    ("shape", "role", "words"),
+    [
+        (LINE, "buildings", ("LineString", "polygons")),
+        (HOUSE, "streets", ("Polygon", "lines")),
+        (None, "", ("no polygon", "polygons")),
+        (FLAT, "", ("encloses no area",)),
+    ],
+)
+def test_a_file_of_something_else_is_refused(
+    tmp_path: Path, shape: shapely.Geometry | None, role: Role, words: tuple[str, ...]
+) -> None:
     for name in ("x.parquet", "x.gpkg"):
-        streets, houses = write(tmp_path / f"s{name}", line), write(tmp_path / f"h{name}", HOUSE)
-        with refused(InputError, name, "LineString", "polygons"):
-            read_surroundings(streets, role="buildings", crs=CRS)
-        with refused(InputError, name, "Polygon", "lines"):
-            read_surroundings(houses, role="streets", crs=CRS)
-    with refused(InputError, "no polygon", "polygons"):
-        read_area(write(tmp_path / "none.parquet", None), crs=CRS)
-    flat = shapely.Polygon([(770_000, 6_280_000)] * 3)
-    with refused(InputError, "encloses no area"):
-        read_area(write(tmp_path / "flat.parquet", flat), crs=CRS)
+        path = write(tmp_path / name, shape)
+        with refused(InputError, name, *words):
+            read_surroundings(path, role=role, crs=CRS) if role else read_area(path, crs=CRS)
 
 
 def test_a_file_that_cannot_be_used_is_named(tmp_path: Path) -> None:
-    for name in ("nowhere.parquet", "nowhere.gpkg"):
-        with refused(SourceError, name, "does not exist"):
-            read_area(tmp_path / name, crs=CRS)
-    broken = tmp_path / "broken.parquet"
-    broken.write_text("no", encoding="utf-8")
-    with refused(SourceError, "broken.parquet", "damaged"):
-        read_area(broken, crs=CRS)
+    (tmp_path / "broken.parquet").write_text("no", encoding="utf-8")
     gpd.GeoDataFrame(geometry=[HOUSE]).to_parquet(tmp_path / "bare.parquet")
-    with refused(SourceError, "bare.parquet", "coordinate reference system"):
-        read_area(tmp_path / "bare.parquet", crs=CRS)
+    for name, words in (
+        ("nowhere.parquet", "does not exist"),
+        ("nowhere.gpkg", "does not exist"),
+        ("broken.parquet", "damaged"),
+        ("bare.parquet", "coordinate reference system"),
+    ):
+        with refused(SourceError, name, words):
+            read_area(tmp_path / name, crs=CRS)
 
 
 def rows_of_houses() -> gpd.GeoDataFrame:
@@ -108,22 +117,18 @@ def test_saved_surroundings_come_back_by_box(tmp_path: Path) -> None:
 
 
 def test_a_box_without_any_is_empty(tmp_path: Path) -> None:
-    save_surroundings(rows_of_houses(), tmp_path / "houses.parquet")
     path = tmp_path / "houses.parquet"
-    near = read_surroundings(path, role="buildings", crs=CRS, box=(0, 0, 9, 9))
-    assert (len(near), near.crs) == (0, CRS)
-    near = read_surroundings(path, role="buildings", crs="EPSG:32631", box=(0, 0, 9, 9))
-    assert (len(near), near.crs) == (0, "EPSG:32631")
+    save_surroundings(rows_of_houses(), path)
+    for crs in (CRS, "EPSG:32631"):
+        near = read_surroundings(path, role="buildings", crs=crs, box=(0, 0, 9, 9))
+        assert (len(near), near.crs) == (0, crs)
 
 
-def test_a_file_without_bounds_is_not_read_by_box(tmp_path: Path) -> None:
+def test_files_without_bounds_or_buildings_are_refused(tmp_path: Path) -> None:
     path = tmp_path / "houses.parquet"
     rows_of_houses().to_parquet(path)
     with refused(SourceError, "houses.parquet"):
         read_surroundings(path, role="buildings", crs=CRS, box=(0, 0, 9, 9))
-
-
-def test_no_surroundings_at_all_can_be_saved(tmp_path: Path) -> None:
-    save_surroundings(rows_of_houses().iloc[:0], tmp_path / "none.parquet")
+    save_surroundings(rows_of_houses().iloc[:0], path)
     with refused(InputError, "holds no polygon"):
-        read_surroundings(tmp_path / "none.parquet", role="buildings", crs=CRS)
+        read_surroundings(path, role="buildings", crs=CRS)

@@ -5,7 +5,7 @@ import math
 import tempfile
 from collections import Counter
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import geopandas as gpd
 import numpy as np
@@ -45,29 +45,36 @@ def points(*places: tuple[float, float]) -> list[shapely.Point]:
     return [shapely.Point(x, y) for x, y in places]
 
 
-# --- One layer --------------------------------------------------------------------------------
+def objects_columns(objects: StreetObjects) -> pa.Table:
+    """Return what a file of objects holds."""
+    columns = {name: objects.table[name] for name in ("class_code", "source", "source_id", "count")}
+    wkb = pa.array(shapely.to_wkb(objects.table.geometry.array), pa.binary())
+    return pa.table({**columns, "geometry": wkb})
+
+
+def write(columns: pa.Table, path: Path, *, specs: dict[str, Any]) -> None:
+    geo = geo_metadata(CRS(LAMBERT), geometry_types=["Point"], bounds=[1, 0, 3, 4])
+    write_geoparquet(columns, path, geo=geo, specs=specs)
 
 
 def test_the_table_has_the_columns_it_promises() -> None:
     objects = build(
         raw_layer(points((1, 2), (3, 4)), ids=["a7", "é8"], classes=["bench", "street_light"])
     )
+    expected = gpd.GeoDataFrame(
+        {
+            "class_code": np.array([10, 3], np.uint8),
+            "source": "trees",
+            "source_id": ["a7", "é8"],
+            "count": np.ones(2, np.int32),
+        },
+        geometry=shapely.points([[1, 2], [3, 4]]),
+        crs=LAMBERT,
+    )
+    assert_geodataframe_equal(objects.table, expected)
     assert len(objects) == 2
-    assert list(objects.table.columns) == [
-        "class_code",
-        "source",
-        "source_id",
-        "count",
-        "geometry",
-    ]
-    assert objects.table["class_code"].dtype == np.uint8
-    assert objects.table["count"].dtype == np.int32
     assert objects.codes.tolist() == [10, 3]
     assert objects.xy.tolist() == [[1, 2], [3, 4]]
-    assert objects.table["source_id"].tolist() == ["a7", "é8"]
-    assert objects.table["source"].tolist() == ["trees", "trees"]
-    assert objects.table["count"].tolist() == [1, 1]
-    assert objects.table.index.tolist() == [0, 1]
     assert objects.crs == CRS(LAMBERT)
     assert objects.licenses == (Licence("Town (CC0)", ("trees",)),)
 
@@ -143,44 +150,45 @@ def test_a_place_off_the_earth_is_misplaced() -> None:
     places = points((3.88, 43.61), (500, 900), (3.9, 43.6), (1e38, 0))
     degrees = raw_layer([*places, broken], crs="EPSG:4326")
     objects, report = build_objects([degrees], taxonomy=TAXONOMY, crs=LAMBERT)
-    assert len(objects) == 2
     assert report.layers[0].counts.misplaced == 3
     assert objects.table["source_id"].tolist() == ["0", "2"]
 
 
-# --- Collapsing -------------------------------------------------------------------------------
-
-
-def test_one_class_at_one_place_is_one_object() -> None:
-    places = points((0, 0), (5, 5), (0, 0), (0, 0.001), (0, 1))
-    objects, report = build_objects([raw_layer(places)], taxonomy=TAXONOMY, crs=LAMBERT)
-    assert objects.xy.tolist() == [[0, 0], [5, 5], [0, 1]]
-    assert objects.table["count"].tolist() == [3, 1, 1]
-    assert objects.table["source_id"].tolist() == ["0", "1", "4"]
-    assert report.layers[0].counts.collapsed == 2
-
-
-def test_layers_of_one_class_collapse_into_the_first() -> None:
-    layers = [
-        raw_layer(points((0, 0), (1, 1)), name="north"),
-        raw_layer(points((1, 1), (1, 1), (2, 2)), name="south"),
-    ]
-    objects, report = build_objects(layers, taxonomy=TAXONOMY, crs=LAMBERT)
-    assert objects.table["source"].tolist() == ["north", "north", "south"]
-    assert objects.table["count"].tolist() == [1, 3, 1]
-    assert [(item.counts.collapsed, item.counts.kept) for item in report.layers] == [(0, 2), (2, 1)]
-
-
-def test_two_layers_of_one_name_are_reported_apart() -> None:
-    layers = [raw_layer(points((0, 0))), raw_layer(points((0, 0), (1, 1), (2, 2)))]
-    _, report = build_objects(layers, taxonomy=TAXONOMY, crs=LAMBERT)
+@pytest.mark.parametrize(
+    ("layers", "rows", "counts"),
+    [
+        (
+            [("trees", [(0, 0), (5, 5), (0, 0), (0, 0.001), (0, 1)])],
+            [["trees", "0", 3], ["trees", "1", 1], ["trees", "4", 1]],
+            [RowCounts(read=5, collapsed=2)],
+        ),
+        (
+            [("north", [(0, 0), (1, 1)]), ("south", [(1, 1), (1, 1), (2, 2)])],
+            [["north", "0", 1], ["north", "1", 3], ["south", "2", 1]],
+            [RowCounts(read=2), RowCounts(read=3, collapsed=2)],
+        ),
+        (
+            [("trees", [(0, 0)]), ("trees", [(0, 0), (1, 1), (2, 2)])],
+            [["trees", "0", 2], ["trees", "1", 1], ["trees", "2", 1]],
+            [RowCounts(read=1), RowCounts(read=3, collapsed=1)],
+        ),
+    ],
+    ids=["one layer", "two layers", "two of one name"],
+)
+def test_one_class_at_one_place_is_one_object_of_the_first_layer(
+    layers: list[tuple[str, list[tuple[float, float]]]],
+    rows: list[list[object]],
+    counts: list[RowCounts],
+) -> None:
+    raw = [raw_layer(points(*places), name=name) for name, places in layers]
+    objects, report = build_objects(raw, taxonomy=TAXONOMY, crs=LAMBERT)
+    assert objects.table[["source", "source_id", "count"]].to_numpy().tolist() == rows
+    places = {(name, str(row)): place for name, at in layers for row, place in enumerate(at)}
+    assert objects.xy.tolist() == [list(places[str(row[0]), str(row[1])]) for row in rows]
+    names = [name for name, _ in layers]
     assert [(item.name, item.counts) for item in report.layers] == [
-        ("trees", RowCounts(read=1)),
-        ("trees", RowCounts(read=3, collapsed=1)),
+        *zip(names, counts, strict=True)
     ]
-
-
-# --- Coordinate systems -----------------------------------------------------------------------
 
 
 def test_layers_in_several_systems_meet_in_one() -> None:
@@ -205,9 +213,6 @@ def test_a_layer_without_a_system_is_asked_about() -> None:
 def test_a_system_to_work_in_must_be_metric(crs: str) -> None:
     with refused(CrsError, "projected CRS in metres"):
         build_objects([raw_layer(points((1, 2)))], taxonomy=TAXONOMY, crs=crs)
-
-
-# --- Errors -----------------------------------------------------------------------------------
 
 
 def test_an_unknown_class_is_named() -> None:
@@ -238,8 +243,6 @@ def test_an_empty_layer_beside_a_full_one_is_fine() -> None:
         assert objects.xy.tolist() == [[1, 2]]
         assert [item.counts.kept for item in report.layers] == [0, 1, 0]
 
-
-# --- The report -------------------------------------------------------------------------------
 
 PLACES = st.tuples(st.integers(0, 2), st.integers(0, 2)).map(shapely.Point)
 BAD = st.sampled_from([None, shapely.Point(), shapely.Point(NAN, 1), shapely.Point(1, math.inf)])
@@ -333,18 +336,8 @@ def test_an_older_file_tells_layers_by_its_objects(
         name: value for name, value in objects_specs(objects).items() if name != "license_layers"
     }
     assert specs["licenses"] == [line]
-    columns = pa.table(
-        {
-            "class_code": objects.codes,
-            "source": names,
-            "source_id": names,
-            "count": np.ones(5, np.int32),
-            "geometry": shapely.to_wkb(objects.table.geometry.array),
-        }
-    )
     path = tmp_path / "objects.parquet"
-    geo = geo_metadata(objects.crs, geometry_types=["Point"], bounds=[1, 0, 1, 4])
-    write_geoparquet(columns, path, geo=geo, specs=specs)
+    write(objects_columns(objects), path, specs=specs)
     assert open_objects(path).licenses == objects.licenses
 
 
@@ -359,9 +352,6 @@ def test_a_file_says_of_layers_only_what_its_lines_do_not_tell() -> None:
     assert specs["license_layers"] == [["lamps", "benches"]]
 
 
-# --- Files ------------------------------------------------------------------------------------
-
-
 def test_saved_objects_come_back(tmp_path: Path) -> None:
     taxonomy = load_catalog("montpellier").taxonomy
     layers = [
@@ -374,9 +364,8 @@ def test_saved_objects_come_back(tmp_path: Path) -> None:
     again = open_objects(str(path))
     assert_geodataframe_equal(again.table, objects.table)
     assert again.table["count"].tolist() == [1, 2]
-    assert again.taxonomy == taxonomy
-    assert again.licenses == objects.licenses
-    assert again.crs == objects.crs
+    for name in ("taxonomy", "licenses", "crs"):
+        assert getattr(again, name) == getattr(objects, name)
     assert again.xy.tolist() == objects.xy.tolist()
     frame = gpd.read_parquet(path)
     assert frame["source_id"].tolist() == ["Écusson n°7 - 東", ""]
@@ -464,25 +453,17 @@ def test_only_the_groups_near_a_box_are_read(tmp_path: Path) -> None:
     assert [len(groups) for groups in read] == [1]  # of five
 
 
-def test_geopandas_reads_a_box_of_the_file(tmp_path: Path) -> None:
+def test_other_programs_and_files_of_before_read_by_box_too(tmp_path: Path) -> None:
     objects = scattered(500)
     path = tmp_path / "objects.parquet"
     save_objects(objects, path)
     box = (766_000.0, 6_276_000.0, 768_000.0, 6_277_000.0)
     frame = gpd.read_parquet(path, bbox=box)
-    found = open_objects(path, box=box)
-    assert frame["source_id"].tolist() == found.table["source_id"].tolist()
+    ids = open_objects(path, box=box).table["source_id"].tolist()
+    assert frame["source_id"].tolist() == ids
     assert "bbox" not in frame.columns
-
-
-def test_a_file_of_before_is_read_by_box_too(tmp_path: Path) -> None:
-    objects = scattered(50)
-    path = tmp_path / "objects.parquet"
-    save_objects(objects, path)
-    table = pq.read_table(path)
-    pq.write_table(table.drop_columns(["bbox"]), path)
-    box = (*objects.xy[7], *objects.xy[7])
-    assert open_objects(path, box=box).xy.tolist() == [objects.xy[7].tolist()]
+    pq.write_table(pq.read_table(path).drop_columns(["bbox"]), path)
+    assert open_objects(path, box=box).table["source_id"].tolist() == ids
 
 
 def test_positions_cannot_be_changed_by_accident() -> None:
@@ -532,15 +513,7 @@ def test_a_file_that_does_not_fit_itself_is_an_error(
     tmp_path: Path, column: str, values: object
 ) -> None:
     objects = build(raw_layer(points((1, 2), (3, 4))))
-    table = pa.table(
-        {
-            "class_code": pa.array(objects.codes),
-            "source": ["trees", "trees"],
-            "source_id": ["0", "1"],
-            "count": pa.array([1, 1], pa.int32()),
-            "geometry": pa.array(shapely.to_wkb(objects.table.geometry.array), pa.binary()),
-        }
-    )
+    table = objects_columns(objects)
     specs = {"kind": "street objects", "taxonomy": TAXONOMY.to_list(), "licenses": []}
     if column == "specs":
         assert isinstance(values, dict)
@@ -554,7 +527,6 @@ def test_a_file_that_does_not_fit_itself_is_an_error(
     else:
         table = table.set_column(table.column_names.index(column), column, [values])
     path = tmp_path / "objects.parquet"
-    geo = geo_metadata(objects.crs, geometry_types=["Point"], bounds=[1, 2, 3, 4])
-    write_geoparquet(table, path, geo=geo, specs=specs)
+    write(table, path, specs=specs)
     with refused(DatabaseError, str(path), "is damaged", "load the street objects again"):
         open_objects(path)
