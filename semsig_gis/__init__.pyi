@@ -147,7 +147,7 @@ from .reports.quality import quality_tables as quality_tables
 from .reports.plots import draw_plot as draw_plot
 from .reports.scenes import cell_scene as cell_scene, draw_scene as draw_scene
 from .reports.tables import Table as Table
-from .experiments.folder import open_results as open_results
+from .experiments.run import open_results as open_results
 from .experiments.paper.reproduce import Reproduction as Reproduction, reproduce as reproduce
 from .experiments.run import run_experiment as run_experiment, run_experiments as run_experiments
 

@@ -26,13 +26,11 @@ from semsig_gis.cli import (  # noqa: F401
     localize,
     learn,
     evaluate,
-    identify,
     export,
 )
 
 # isort: on
-from semsig_gis.cli.app import app
-from semsig_gis.cli.console import remark
+from semsig_gis.cli.console import app, remark
 from semsig_gis.core.errors import SemsigError
 
 

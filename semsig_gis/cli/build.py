@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from semsig_gis.cli.app import (
+from semsig_gis.cli.console import (
     AsJson,
     Database,
     Scheduler,
@@ -17,10 +17,12 @@ from semsig_gis.cli.app import (
     keep_inputs,
     known_identifiability,
     numbers,
+    print_json,
     print_table,
+    progress,
+    remark,
     require_suffix,
 )
-from semsig_gis.cli.console import print_json, progress, remark
 from semsig_gis.core.errors import InputError
 
 if TYPE_CHECKING:

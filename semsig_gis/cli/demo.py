@@ -7,8 +7,7 @@ from typing import Annotated
 
 import typer
 
-from semsig_gis.cli.app import app, print_evaluation, tell_if_online
-from semsig_gis.cli.console import progress, remark
+from semsig_gis.cli.console import app, print_evaluation, progress, remark, tell_if_online
 
 DEMO_QUERIES = 200
 

@@ -8,8 +8,15 @@ from typing import Annotated
 
 import typer
 
-from semsig_gis.cli.app import Database, app, keep_inputs, known_identifiability, require_suffix
-from semsig_gis.cli.console import progress, remark
+from semsig_gis.cli.console import (
+    Database,
+    app,
+    keep_inputs,
+    known_identifiability,
+    progress,
+    remark,
+    require_suffix,
+)
 from semsig_gis.core.errors import InputError
 
 

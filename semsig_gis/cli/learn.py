@@ -8,8 +8,15 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from semsig_gis.cli.app import AsJson, Database, app, keep_inputs
-from semsig_gis.cli.console import print_json, print_rows, progress
+from semsig_gis.cli.console import (
+    AsJson,
+    Database,
+    app,
+    keep_inputs,
+    print_json,
+    print_rows,
+    progress,
+)
 from semsig_gis.cli.options import (
     Heading,
     NoiseName,

@@ -7,8 +7,17 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
-from semsig_gis.cli.app import AsJson, app, keep_inputs, print_table, require_suffix
-from semsig_gis.cli.console import print_json, print_rows, progress, remark
+from semsig_gis.cli.console import (
+    AsJson,
+    app,
+    keep_inputs,
+    print_json,
+    print_rows,
+    print_table,
+    progress,
+    remark,
+    require_suffix,
+)
 
 if TYPE_CHECKING:
     from semsig_gis.objects.load import Loaded

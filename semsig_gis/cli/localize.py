@@ -9,17 +9,19 @@ from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 
 import typer
 
-from semsig_gis.cli.app import (
+from semsig_gis.cli.console import (
     LIKELIHOOD,
     AsJson,
     Database,
     MethodText,
     keep_inputs,
     numbers,
+    print_json,
+    print_rows,
+    progress,
     require_suffix,
     tell_if_online,
 )
-from semsig_gis.cli.console import print_json, print_rows, progress
 from semsig_gis.cli.maps import draw_ground
 from semsig_gis.cli.options import SearchOptions, command
 from semsig_gis.core.errors import InputError

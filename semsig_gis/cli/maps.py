@@ -8,15 +8,16 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from semsig_gis.cli.app import (
+from semsig_gis.cli.console import (
     Database,
     app,
     keep_inputs,
     known_identifiability,
+    progress,
+    remark,
     require_suffix,
     tell_if_online,
 )
-from semsig_gis.cli.console import progress, remark
 from semsig_gis.core.errors import DatabaseError, EmptyResultError, InputError
 
 if TYPE_CHECKING:

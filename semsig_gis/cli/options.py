@@ -10,8 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any, TypeVar, get_type_hints
 
 import typer
 
-from semsig_gis.cli.app import app, numbers
-from semsig_gis.cli.console import progress, remark
+from semsig_gis.cli.console import app, numbers, progress, remark
 from semsig_gis.core.errors import CrsError, DatabaseError, InputError
 
 if TYPE_CHECKING:

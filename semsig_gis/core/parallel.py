@@ -25,6 +25,7 @@ _Task = TypeVar("_Task")
 _Value = TypeVar("_Value")
 
 ATTEMPTS = 3
+MOST_FAILED = 10  # when so many tasks have failed, the rest would too
 # For a scheduler to answer, in seconds.
 PATIENCE_S = 10
 
@@ -88,6 +89,32 @@ def run_tasks(
                 yield Outcome(task, reason=f"{ATTEMPTS} processes died while they worked on it")
             except CancelledError:
                 yield Outcome(task, reason="the connection to the scheduler was lost")
+
+
+def finish_tasks(
+    work: Callable[[_Task], _Value],
+    tasks: Sequence[_Task],
+    *,
+    done: Callable[[_Task, _Value | None], None],
+    workers: int = 0,
+    scheduler: str | None = None,
+    files: Sequence[Path] = (),
+) -> dict[_Task, str]:
+    """Do tasks as `run_tasks` does until ten have failed, and return why, in the order of failing.
+
+    `done` is called with each task that was done and its value.
+    """
+    failed: dict[_Task, str] = {}
+    outcomes = run_tasks(work, tasks, workers=workers, scheduler=scheduler, files=files)
+    with contextlib.closing(outcomes):
+        for outcome in outcomes:
+            if outcome.reason is None:
+                done(outcome.task, outcome.value)
+            else:
+                failed[outcome.task] = outcome.reason
+            if len(failed) == MOST_FAILED:
+                break
+    return failed
 
 
 def _attempt(work: Callable[[_Task], _Value], task: _Task) -> Outcome[_Task, _Value]:

@@ -6,7 +6,6 @@ left; when all are there, the folder is renamed to ``OUT``.
 
 from __future__ import annotations
 
-import contextlib
 import json
 import math
 import os
@@ -28,7 +27,7 @@ from semsig_gis import __version__
 from semsig_gis.core.crs import HALF_WIDTH
 from semsig_gis.core.errors import DatabaseError, EmptyResultError, InputError, SourceError
 from semsig_gis.core.grid import GridSpec, cell_ids, cells_near, require_step, split_ids
-from semsig_gis.core.parallel import check_workers, run_tasks
+from semsig_gis.core.parallel import check_workers, finish_tasks
 from semsig_gis.core.signature import SignatureSpec
 from semsig_gis.database.build import build_cells
 from semsig_gis.database.file import (
@@ -73,8 +72,6 @@ MARGIN_M = 2.0
 # Tiles that one object may touch in a row, and tiles in all.
 MOST_REACHED = 16
 MOST_TILES = 1_000_000
-# When so many have failed, the rest would too.
-MOST_FAILED = 10
 
 RECIPE = "_recipe.json"
 # Copies of inputs that can be read by box.
@@ -236,25 +233,21 @@ def _run(
     if done and tell is not None:
         tell(f"an unfinished run has left {len(done):,} of {len(tiles):,} tiles; it goes on")
     todo = [one for one in tiles if one not in done]
-    failed: dict[Tile, str] = {}
     paths = [plan.folder, plan.objects, plan.buildings, plan.streets]
-    running = run_tasks(
+
+    def note_part(tile: Tile, part: Part | None) -> None:
+        done[tile] = part
+        if progress is not None:
+            progress(len(done), len(tiles))
+
+    failed = finish_tasks(
         partial(build_tile, plan),
         todo,
+        done=note_part,
         workers=workers,
         scheduler=scheduler,
         files=[path for path in paths if path is not None],
     )
-    with contextlib.closing(running) as outcomes:
-        for outcome in outcomes:
-            if outcome.reason is None:
-                done[outcome.task] = outcome.value
-            else:
-                failed[outcome.task] = outcome.reason
-            if len(failed) == MOST_FAILED:
-                break
-            if progress is not None:
-                progress(len(done), len(tiles))
     if failed:
         first = min(failed)
         others = f" and {len(failed) - 1} more" if len(failed) > 1 else ""

@@ -45,7 +45,7 @@ def compare_evaluations(
     DataFrame
         One row a figure that both have: ``figure``, ``first``, ``second``, ``difference`` (the
         second less the first), ``low`` and ``high`` (its 95 % interval). Figures are those of
-        `reports.experiment.experiment_figures`; NaN where one of them is infinite.
+        `reports.evaluation.experiment_figures`; NaN where one of them is infinite.
 
     Raises
     ------
@@ -115,7 +115,7 @@ def common_cases(
     """Return the evaluations of two results that have the same name.
 
     Of two single evaluations, return these, whatever they are called. Results are those of
-    `experiments.folder.open_results`. Raises InputError if no name is common.
+    `experiments.run.open_results`. Raises InputError if no name is common.
     """
     if len(first) == len(second) == 1:
         (name, one), (other_name, other) = *first.items(), *second.items()

@@ -6,7 +6,6 @@ own, so that little is lost when a run is interrupted, and many processes can sh
 
 from __future__ import annotations
 
-import contextlib
 import math
 import os
 import shutil
@@ -21,7 +20,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from semsig_gis.core.errors import DatabaseError, SourceError
-from semsig_gis.core.parallel import check_workers, run_tasks
+from semsig_gis.core.parallel import check_workers, finish_tasks
 from semsig_gis.database.answer import DistanceMemo
 from semsig_gis.database.city import City
 from semsig_gis.database.file import digest
@@ -32,13 +31,15 @@ from semsig_gis.evaluation.evaluate import (
     versions,
 )
 from semsig_gis.evaluation.figures import district_labels
+from semsig_gis.evaluation.file import open_evaluation, save_evaluation
 from semsig_gis.evaluation.methods import make_locator
 from semsig_gis.evaluation.spec import Case, parse_experiment
-from semsig_gis.experiments.folder import PARTS, RUN, open_results, write_results
 from semsig_gis.likelihood.index import ready_index
 from semsig_gis.queries.draw import check_count, draw_queries
-from semsig_gis.storage.runs import finish, partial_folder
-from semsig_gis.storage.whole import whole_file
+from semsig_gis.reports.evaluation import experiment_figures, experiment_markdown
+from semsig_gis.storage.runs import RunKind, finish, partial_folder, read_json, write_json
+from semsig_gis.storage.toml import toml_text
+from semsig_gis.storage.whole import whole_file, write_whole
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -52,11 +53,105 @@ if TYPE_CHECKING:
     from semsig_gis.queries.draw import Query
 
 
+PARTS = "_parts"
+"""Folder of the answers in a run that is not finished."""
+
+SPEC = "experiment.toml"
+INPUTS = "inputs.json"
+FIGURES = "figures.csv"
+REPORT = "report.md"
+DISTRICTS = "districts.csv"
+
+
+def _read_recipe(folder: Path) -> dict[str, Any]:
+    """Return the experiment as plain values, with ``inputs`` and ``versions``."""
+    text = (folder / SPEC).read_text(encoding="utf-8")
+    spec = parse_experiment(text, where=str(folder / SPEC))
+    # A process that was killed between the two files has left no inputs, and no results.
+    inputs = read_json(folder / INPUTS) if (folder / INPUTS).exists() else {}
+    return {**spec.to_dict(), **inputs}
+
+
+def _write_recipe(folder: Path, recipe: dict[str, Any]) -> None:
+    inputs = {name: recipe[name] for name in ("inputs", "versions")}
+    spec = {name: value for name, value in recipe.items() if name not in inputs}
+    write_whole(folder / SPEC, toml_text(spec))
+    write_json(folder / INPUTS, inputs)
+
+
+RUN = RunKind(
+    content="results of an experiment",
+    another=(
+        "{folder} holds the results of another experiment, which differs in {difference}; choose "
+        "another folder, or delete that one."
+    ),
+    read=_read_recipe,
+    write=_write_recipe,
+    names={SPEC, INPUTS, PARTS},
+    results=f"{PARTS}/*",
+)
+
+
+def write_results(
+    folder: Path,
+    spec: ExperimentSpec,
+    results: Mapping[str, Evaluation],
+    *,
+    districts: gpd.GeoDataFrame | None = None,
+) -> None:
+    """Write the results, given by the names of their cases, into the folder of a run."""
+    for name, evaluation in results.items():
+        save_evaluation(evaluation, folder / name)
+        if districts is not None and spec.districts is not None:
+            by_district = evaluation.by_district(districts, spec.districts.name)
+            write_whole(folder / name / DISTRICTS, by_district.to_csv(index=False))
+    write_whole(folder / FIGURES, experiment_figures(results).to_csv(index=False))
+    write_whole(folder / REPORT, experiment_markdown(spec, results))
+
+
+def open_results(folder: str | Path) -> dict[str, Evaluation]:
+    """Open the results of an experiment, or of one evaluation.
+
+    Parameters
+    ----------
+    folder : str or Path
+        What `run_experiment` or `save_evaluation` wrote.
+
+    Returns
+    -------
+    dict of str to Evaluation
+        The evaluations by the names of their cases; that of one evaluation is ``""``.
+
+    Raises
+    ------
+    DatabaseError
+        If the folder holds neither, or an evaluation is missing or damaged.
+
+    Examples
+    --------
+    >>> open_results("nowhere")
+    Traceback (most recent call last):
+    ...
+    semsig_gis.core.errors.DatabaseError: nowhere holds no results;
+    give a folder that `semsig evaluate`
+    wrote.
+    """
+    place = Path(folder)
+    if (place / "queries.parquet").is_file():
+        return {"": open_evaluation(place)}
+    try:
+        text = (place / SPEC).read_text(encoding="utf-8")
+    except OSError as error:
+        msg = f"{place} holds no results; give a folder that `semsig evaluate` wrote."
+        raise DatabaseError(msg) from error
+    spec = parse_experiment(text, where=str(place / SPEC))
+    return {case.name: open_evaluation(place / case.name) for case in spec.cases}
+
+
 PART_QUERIES = 100
 MEMO_BYTES = 256 << 20  # distances that the methods of an experiment share
 MEASURES = 3  # each of types and of angles
 STAGES = 2
-MOST_FAILED = 10  # when so many parts have failed, the rest would too
 
 
 class Part(NamedTuple):
@@ -460,29 +555,27 @@ def _answer(
         answer = partial(_answer_apart, places)
     else:
         answer = partial(_answer_here, running)
-    outcomes = run_tasks(
+    done, total = 0, sum(sizes.values())
+
+    def count_answers(task: _Task, _value: None) -> None:
+        nonlocal done
+        done += sizes[task]
+        if progress is not None:
+            progress(done, total)
+
+    failed = finish_tasks(
         answer,
         list(sizes),
+        done=count_answers,
         workers=workers,
         scheduler=scheduler,
         files=[work.folder.resolve() / work.spec.database for work, _ in running.values()],
     )
-    done, total, failed = 0, sum(sizes.values()), []
-    with contextlib.closing(outcomes):
-        for outcome in outcomes:
-            if outcome.reason is not None:
-                failed.append(outcome)
-                if len(failed) == MOST_FAILED:
-                    break
-                continue
-            done += sizes[outcome.task]
-            if progress is not None:
-                progress(done, total)
     if failed:
-        out, reason = failed[0].task.out, failed[0].reason
+        task, reason = next(iter(failed.items()))
         msg = (
             f"{len(failed)} of the {len(sizes)} parts of the work failed ({reason}); what is done "
-            f"is kept in {running[out].partial}, so mend that and run the same command again."
+            f"is kept in {running[task.out].partial}, so mend that and run the same command again."
         )
         raise DatabaseError(msg)
 

@@ -1,8 +1,7 @@
 """Files for other programs, by their suffix.
 
-``.gpkg`` (`exports.geopackage`) holds many layers, with styles for QGIS; ``.parquet``
-(`exports.geoparquet`) and ``.csv`` (`exports.csv`) hold one; ``.tif``
-(`exports.geotiff`) holds one number a cell.
+``.gpkg`` (`exports.geopackage`) holds many layers, with styles for QGIS; ``.parquet`` and ``.csv``
+(`exports.files`) hold one; ``.tif`` (`exports.geotiff`) holds one number a cell.
 """
 
 from __future__ import annotations
@@ -16,8 +15,8 @@ import numpy as np
 from semsig_gis.core.errors import EmptyResultError, InputError, UnknownNameError, nearest_name
 from semsig_gis.database.answer import REGION_SHARE
 from semsig_gis.database.database import require_same_place
-from semsig_gis.exports import csv as csv_text
-from semsig_gis.exports import geopackage, geoparquet
+from semsig_gis.exports import geopackage
+from semsig_gis.exports.files import write_csv, write_geoparquet
 from semsig_gis.exports.geotiff import cell_errors, export_geotiff
 from semsig_gis.exports.layers import answer_layers, cells_layer, evaluation_layers, objects_layer
 from semsig_gis.exports.regions import search_regions
@@ -42,7 +41,7 @@ RASTERS = ("ambiguity", "identifiability", "error")
 """What may be written of a database as one number a cell."""
 
 _ONE_LAYER: Mapping[str, Callable[..., None]] = MappingProxyType(
-    {".parquet": geoparquet.write_layer, ".csv": csv_text.write_layer}
+    {".parquet": write_geoparquet, ".csv": write_csv}
 )
 _RASTER = frozenset({".tif", ".tiff"})
 # What a layer or a raster is made from, beside the cells.

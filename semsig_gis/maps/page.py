@@ -26,7 +26,7 @@ from folium.raster_layers import WmsTileLayer
 
 from semsig_gis.core.errors import InputError, UnknownNameError, nearest_name
 from semsig_gis.maps.parts import layers_of
-from semsig_gis.storage.whole import whole_file
+from semsig_gis.storage.whole import write_whole
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -286,8 +286,7 @@ def save_map(map_: folium.Map, path: str | Path, *, self_contained: bool | None 
     False
     """
     page = page_of_map(map_, self_contained=self_contained)
-    with whole_file(path) as partial:
-        partial.write_text(page, encoding="utf-8")
+    write_whole(path, page)
     tiled = any(
         isinstance(child, folium.TileLayer | WmsTileLayer) for child in layers_of(map_).values()
     )

@@ -1,8 +1,8 @@
-"""Tests of semsig_gis.experiments.paper.experiments."""
+"""Tests of semsig_gis.experiments.paper.reproduce."""
 
 from __future__ import annotations
 
-from semsig_gis.experiments.paper.experiments import (
+from semsig_gis.experiments.paper.reproduce import (
     BEST,
     FEWER,
     FUSIONS,

@@ -26,11 +26,11 @@ from semsig_gis.core.errors import DatabaseError, InputError, SemsigError
 from semsig_gis.database.store import ObjectStore, save_with_store
 from semsig_gis.evaluation.evaluate import evaluate, score_queries
 from semsig_gis.evaluation.spec import Districts, parse_experiment
-from semsig_gis.experiments.folder import open_results
 from semsig_gis.experiments.run import (
     PART_QUERIES,
     ExperimentWork,
     Part,
+    open_results,
     run_experiment,
     run_experiments,
 )

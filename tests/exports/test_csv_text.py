@@ -16,7 +16,7 @@ from hypothesis import strategies as st
 from small_city import small_city, small_evaluation
 
 from semsig_gis.exports import export_database
-from semsig_gis.exports.csv import as_written, formula_safe
+from semsig_gis.exports.files import as_written, formula_safe
 from semsig_gis.objects.table import StreetObjects
 
 if TYPE_CHECKING:

@@ -27,8 +27,7 @@ from semsig.command import (
 )
 from sentences import assert_sentence, refused
 
-from semsig_gis.cli.app import app
-from semsig_gis.cli.console import VARIABLE
+from semsig_gis.cli.console import VARIABLE, app
 from semsig_gis.likelihood.noise.model import NOISES
 from semsig_gis.matching.method import Method
 from semsig_gis.queries.chain import parse_chain

@@ -16,7 +16,7 @@ from semsig_gis.likelihood.method import LikelihoodMethod
 from semsig_gis.likelihood.noise.model import named_noise
 from semsig_gis.matching.method import Method
 from semsig_gis.queries.chain import parse_chain
-from semsig_gis.reports.experiment import (
+from semsig_gis.reports.evaluation import (
     comparison_table,
     experiment_figures,
     experiment_markdown,

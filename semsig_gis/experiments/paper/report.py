@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from semsig_gis.evaluation.result import machine
-from semsig_gis.experiments.paper.experiments import (
+from semsig_gis.experiments.paper.reproduce import (
     BEST,
     FIRST_STAGE,
     FUSIONS,

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from semsig_gis.core.statistics import wilson_interval
-from semsig_gis.experiments.paper.experiments import BEST
+from semsig_gis.experiments.paper.reproduce import BEST
 from semsig_gis.matching.ties import THRESHOLDS, expected_recall
 from semsig_gis.reports import paris
 from semsig_gis.reports.parts import Curve, Number, Plot

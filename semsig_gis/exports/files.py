@@ -1,4 +1,4 @@
-"""CSV: one layer a file, safe to open in a spreadsheet.
+"""One layer a file: GeoParquet 1.1, and CSV that is safe to open in a spreadsheet.
 
 Spreadsheets run a cell that begins with ``=``, ``+``, ``-``, ``@``, a tab or a line end as a
 formula. A text from open data may begin so, or have such a part after a sign that the spreadsheet
@@ -16,13 +16,22 @@ import shapely
 from pyarrow import csv
 
 from semsig_gis.core.crs import GEOMETRY
+from semsig_gis.exports.layers import GEOMETRY_TYPES
+from semsig_gis.storage.geoparquet import (
+    BBOX,
+    COVERING,
+    bounds_column,
+    geo_metadata,
+    write_geoparquet_blocks,
+)
 from semsig_gis.storage.whole import whole_file
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Iterator
     from pathlib import Path
 
     from semsig_gis.exports.layers import Layer
+
 
 # What may end a cell, and what may begin a formula; the wide signs of Chinese and Japanese
 # keyboards count in some spreadsheets.
@@ -50,7 +59,7 @@ def as_written(text: str) -> str:
     return _MARK.sub("", text)
 
 
-def write_layer(
+def write_csv(
     layer: Layer, path: str | Path, *, progress: Callable[[int, int], None] | None = None
 ) -> None:
     """Write a layer as one CSV file, which appears whole, by rename.
@@ -90,3 +99,30 @@ def _safe(texts: pa.ChunkedArray) -> pa.ChunkedArray:
         return texts
     safe = [None if text is None else formula_safe(text) for text in texts.to_pylist()]
     return pa.chunked_array([pa.array(safe, pa.string())])
+
+
+def write_geoparquet(
+    layer: Layer, path: str | Path, *, progress: Callable[[int, int], None] | None = None
+) -> None:
+    """Write a layer as one GeoParquet 1.1 file, which appears whole, by rename.
+
+    The column ``bbox`` holds the bounds of every row as float32, rounded outwards, and the metadata
+    names it as the covering of ``geometry``. The metadata key ``semsig`` holds the specs, the
+    classes and the licences as JSON. The rows are in groups of `GROUP_ROWS` and in
+    the order of the database, column by column. ``progress`` is called with the rows written and in
+    all.
+    """
+    geo = geo_metadata(
+        layer.crs, geometry_types=[GEOMETRY_TYPES[layer.geometry]], bounds=layer.bounds
+    )
+    geo["columns"][GEOMETRY]["covering"] = COVERING
+    if not layer.rows:
+        del geo["columns"][GEOMETRY]["bbox"]
+    specs = {**layer.facts, "kind": f"{layer.title} export".lower(), **layer.credits}
+
+    def blocks() -> Iterator[pa.Table]:
+        for block in layer.blocks(progress):
+            shapes = shapely.from_wkb(block[GEOMETRY].to_numpy(zero_copy_only=False))
+            yield block.append_column(BBOX, bounds_column(shapely.bounds(shapes)))
+
+    write_geoparquet_blocks(blocks(), path, geo=geo, specs=specs)
