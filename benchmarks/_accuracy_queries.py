@@ -15,7 +15,7 @@ from semsig_gis.core.grid import cell_ids
 from semsig_gis.core.signature import Signature
 from semsig_gis.database.visibility import views_at
 from semsig_gis.likelihood.route import Leg
-from semsig_gis.queries.paper_errors import distort, named_distortion
+from semsig_gis.queries.distortions import distort, named_distortion
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence

@@ -101,7 +101,7 @@ from .likelihood.priors import (
 )
 from .likelihood.route import Leg as Leg
 from .queries.draw import QuerySpec as QuerySpec, draw_queries as draw_queries
-from .queries.paper_errors import (
+from .queries.distortions import (
     Distortion as Distortion,
     distort as distort,
     named_distortion as named_distortion,

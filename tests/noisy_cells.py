@@ -15,7 +15,7 @@ from semsig_gis.core.grid import GridSpec
 from semsig_gis.core.signature import Signature, SignatureSpec
 from semsig_gis.database.database import BEARING_UNITS, SignatureDatabase
 from semsig_gis.likelihood.noise.model import NoiseMixture, NoiseSpec, named_noise
-from semsig_gis.queries.paper_errors import distort, named_distortion
+from semsig_gis.queries.distortions import distort, named_distortion
 from semsig_gis.sources.catalog import paper_taxonomy
 
 if TYPE_CHECKING:

@@ -8,7 +8,7 @@ import numpy as np
 from hypothesis import strategies as st
 from scipy.stats import binom
 
-from semsig_gis.queries.paper_errors import Distortion
+from semsig_gis.queries.distortions import Distortion
 from semsig_gis.queries.sight import CitySights, Sight
 from semsig_gis.sources.catalog import paper_taxonomy
 

@@ -80,7 +80,7 @@ def evaluate(
     from semsig_gis.evaluation.file import save_evaluation
     from semsig_gis.matching.method import Method
     from semsig_gis.queries.chain import parse_chain
-    from semsig_gis.queries.paper_errors import Distortion
+    from semsig_gis.queries.distortions import Distortion
 
     chain = [
         dataclasses.replace(

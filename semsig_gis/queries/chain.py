@@ -12,15 +12,17 @@ import numpy as np
 from semsig_gis.core.errors import InputError, UnknownNameError, nearest_name
 from semsig_gis.likelihood.noise.model import NOISES, NoiseMixture, NoiseSpec, named_noise
 from semsig_gis.queries.distortions import (
+    DISTORTIONS,
     BlockedSectors,
     CompassBias,
     Detector,
+    Distortion,
     FieldOfView,
     HiddenBehind,
     MissingClasses,
     Obstacles,
+    distortion_of,
 )
-from semsig_gis.queries.paper_errors import DISTORTIONS, Distortion, distortion_of
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence

@@ -17,7 +17,7 @@ import numpy as np
 from semsig_gis.core.errors import CrsError, InputError, UnknownNameError, nearest_name
 from semsig_gis.database.visibility import views_at
 from semsig_gis.queries.chain import ready_chain
-from semsig_gis.queries.paper_errors import DISTORTIONS
+from semsig_gis.queries.distortions import DISTORTIONS
 from semsig_gis.queries.sight import CitySights, Sight
 
 if TYPE_CHECKING:

@@ -15,7 +15,7 @@ from semsig_gis.evaluation.figures import percentile
 from semsig_gis.likelihood.answer_rule import DEFAULT_RULE
 from semsig_gis.matching.ties import NEAR_METRES, NEAR_PLACES
 from semsig_gis.queries.chain import chain_text
-from semsig_gis.queries.paper_errors import DISTORTIONS, FalseClass
+from semsig_gis.queries.distortions import DISTORTIONS, FalseClass
 from semsig_gis.reports import paris
 from semsig_gis.reports.tables import Table, figure, interval
 

@@ -14,7 +14,7 @@ from semsig_gis.evaluation.evaluate import evaluate
 from semsig_gis.likelihood.index import build_index
 from semsig_gis.likelihood.noise.model import named_noise
 from semsig_gis.matching.method import Method
-from semsig_gis.queries.paper_errors import Distortion
+from semsig_gis.queries.distortions import Distortion
 
 DATABASE = random_database(5, cells=150)
 ERRORS = Distortion(occurrences=2)

@@ -20,9 +20,8 @@ from semsig_gis.likelihood.noise.model import NoiseSpec, named_noise
 from semsig_gis.matching.method import Method
 from semsig_gis.matching.scores import score_cells
 from semsig_gis.matching.ties import NEAR_PLACES, THRESHOLDS, expected_recall
-from semsig_gis.queries.distortions import Detector
+from semsig_gis.queries.distortions import DISTORTIONS, Detector, Distortion
 from semsig_gis.queries.draw import QuerySpec, draw_queries
-from semsig_gis.queries.paper_errors import DISTORTIONS, Distortion
 from semsig_gis.reports.evaluation import evaluation_tables
 
 if TYPE_CHECKING:

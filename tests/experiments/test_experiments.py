@@ -15,7 +15,7 @@ from semsig_gis.experiments.paper.reproduce import (
     paper_experiments,
 )
 from semsig_gis.matching.method import Method
-from semsig_gis.queries.paper_errors import DISTORTIONS
+from semsig_gis.queries.distortions import DISTORTIONS
 
 SPECS = paper_experiments(
     "city.parquet",

@@ -11,7 +11,7 @@ from noisy_cells import TAXONOMY, noise_specs, random_database
 from semsig_gis.core.signature import Signature
 from semsig_gis.likelihood.noise.model import NoiseMixture, NoiseSpec, named_noise
 from semsig_gis.likelihood.noise.table import database_tables, mean_table, noise_tables
-from semsig_gis.queries.paper_errors import distort, named_distortion
+from semsig_gis.queries.distortions import distort, named_distortion
 
 CODES = np.array([1, 3, 4], np.uint8)
 NAMES = ["alignment_tree", "street_light", "indicator"]

@@ -12,6 +12,7 @@ from sights import CITY, CLASSES, many, paper_errors, rows, seeds, sights
 from semsig_gis.likelihood.noise.model import NOISES, NoiseSpec
 from semsig_gis.queries.chain import NAMED_DISTORTIONS, chain_text, parse_chain, ready_chain
 from semsig_gis.queries.distortions import (
+    DISTORTIONS,
     BlockedSectors,
     CompassBias,
     Detector,
@@ -20,7 +21,6 @@ from semsig_gis.queries.distortions import (
     MissingClasses,
     Obstacles,
 )
-from semsig_gis.queries.paper_errors import DISTORTIONS
 
 if TYPE_CHECKING:
     from semsig_gis.queries.chain import QueryDistortion

@@ -11,14 +11,14 @@ from hypothesis import given
 from sights import CITY, CLASSES, REACH, paper_errors, seeds, sights
 
 from semsig_gis.core.signature import Signature
-from semsig_gis.queries.paper_errors import DISTORTIONS, Distortion, distort, named_distortion
+from semsig_gis.queries.distortions import DISTORTIONS, Distortion, distort, named_distortion
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from numpy.typing import NDArray
 
-    from semsig_gis.queries.paper_errors import FalseClass
+    from semsig_gis.queries.distortions import FalseClass
     from semsig_gis.queries.sight import Sight
 
 QUIET = Distortion(occurrences=0, bearing_sigma=0.0)

@@ -22,14 +22,16 @@ from semsig_gis.queries.distortions import (
     BlockedSectors,
     CompassBias,
     Detector,
+    Distortion,
     FieldOfView,
     HiddenBehind,
     MissingClasses,
     Obstacles,
+    distort,
+    named_distortion,
 )
 from semsig_gis.queries.draw import QuerySpec, draw_queries
 from semsig_gis.queries.file import parse_queries, parse_route, read_queries, read_route
-from semsig_gis.queries.paper_errors import Distortion, distort, named_distortion
 
 if TYPE_CHECKING:
     from collections.abc import Callable

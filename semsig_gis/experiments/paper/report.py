@@ -34,7 +34,7 @@ from semsig_gis.experiments.paper.shares import (
     reweighted,
     share_of,
 )
-from semsig_gis.queries.paper_errors import DISTORTIONS
+from semsig_gis.queries.distortions import DISTORTIONS
 from semsig_gis.reports import paris
 from semsig_gis.reports.parts import Curve, Number, Plot, Report, Section
 from semsig_gis.reports.scenes import example_scenes
