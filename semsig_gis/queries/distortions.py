@@ -1,4 +1,4 @@
-"""What spoils a query: the paper's errors, weak eyes, a narrow view, things in the way, a detector."""
+"""What spoils a query: the paper's errors, weak eyes, a narrow view, things in the way."""
 
 from __future__ import annotations
 
