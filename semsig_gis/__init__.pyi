@@ -56,7 +56,7 @@ from .database.file import (
 )
 from .database.occlusion import Footprints as Footprints
 from .database.properties import database_summary as database_summary
-from .database.requirement import Requirement as Requirement
+from .database.answer import Requirement as Requirement
 from .database.store import (
     ObjectStore as ObjectStore,
     open_store as open_store,

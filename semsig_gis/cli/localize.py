@@ -180,7 +180,7 @@ def _localize_by_distance(options: LocalizeOptions) -> None:
     city = open_city(options.database)
     taxonomy, requirement = city.dataset.taxonomy, None
     if options.require is not None:
-        from semsig_gis.database.requirement import Requirement
+        from semsig_gis.database.answer import Requirement
 
         requirement = Requirement.parse(options.require, taxonomy)
     locator = DistanceLocator(

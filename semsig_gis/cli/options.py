@@ -192,7 +192,7 @@ class SearchOptions:
 
             parts.append(raster_prior(database, self.popularity))
         if self.require is not None:
-            from semsig_gis.database.requirement import Requirement
+            from semsig_gis.database.answer import Requirement
             from semsig_gis.likelihood.priors import weight_prior
 
             requirement = Requirement.parse(self.require, database.taxonomy)

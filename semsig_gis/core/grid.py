@@ -55,18 +55,7 @@ class GridSpec:
             raise InputError(msg)
 
     def viewpoints(self, columns: ArrayLike, rows: ArrayLike) -> NDArray[np.float64]:
-        """Return the centres of cells.
-
-        Parameters
-        ----------
-        columns, rows : array_like of int, shape (n,)
-            Cells.
-
-        Returns
-        -------
-        ndarray of float64, shape (n, 2)
-            Coordinates in metres.
-        """
+        """Return the centres of n cells in metres, shape (n, 2)."""
         return np.stack(
             [
                 self.origin[0] + (np.asarray(columns) + 0.5) * self.step,
@@ -76,22 +65,10 @@ class GridSpec:
         )
 
     def cells_at(self, xy: ArrayLike) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-        """Return the cells in which points lie.
+        """Return the columns and rows of the cells in which points, shape (n, 2) in metres, lie.
 
-        Parameters
-        ----------
-        xy : array_like, shape (n, 2)
-            Coordinates in metres.
-
-        Returns
-        -------
-        columns, rows : ndarray of int64, shape (n,)
-            Cells; a point on an edge belongs to the cell east or north of it.
-
-        Raises
-        ------
-        InputError
-            If a point is so many cells from the origin that the cell cannot be numbered.
+        A point on an edge belongs to the cell east or north of it. InputError if a point is so far
+        from the origin that its cell cannot be numbered.
         """
         cells = np.floor((np.asarray(xy, dtype=np.float64) - self.origin) / self.step)
         if not (np.abs(cells) <= MAX_CELL).all():

@@ -26,7 +26,6 @@ if TYPE_CHECKING:
 
     from numpy.typing import ArrayLike, NDArray
 
-
 # More than the distance between neighbouring floats anywhere on Earth.
 ROUNDING_M = 1e-6
 
@@ -72,10 +71,7 @@ class PackedIndex:
     def pairs_within(
         self, viewpoints: NDArray[np.float64], *, radius: float
     ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-        """Return the rows of viewpoint and point of every pair within a radius, by viewpoint.
-
-        Viewpoints, shape (v, 2), and radius are in metres; a point at exactly the radius counts.
-        """
+        """Return all pairs within a radius, as `ObjectIndex.pairs_within` does."""
         places = np.ascontiguousarray(viewpoints, dtype=np.float64)
         viewpoint, point = self._tree.query(
             shapely.points(places), predicate="dwithin", distance=_a_touch_more(radius)
@@ -270,10 +266,7 @@ class StoredIndex:
     def pairs_within(
         self, viewpoints: NDArray[np.float64], *, radius: float
     ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-        """Return the rows of viewpoint and point of every pair within a radius, by viewpoint.
-
-        Viewpoints, shape (v, 2), and radius are in metres; a point at exactly the radius counts.
-        """
+        """Return all pairs within a radius, as `ObjectIndex.pairs_within` does."""
         return tree_pairs(self._tree, self._xy, viewpoints, radius=radius, rows=self._rows)
 
 

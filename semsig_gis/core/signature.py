@@ -19,7 +19,6 @@ if TYPE_CHECKING:
 
     from semsig_gis.core.taxonomy import Taxonomy
 
-
 MAX_LEVELS = 255
 
 
@@ -155,33 +154,14 @@ class Signature:
         *,
         taxonomy: Taxonomy,
     ) -> Signature:
-        """Make a query from what a person or a detector says.
+        """Make a query, sorted clockwise from north, from what a person or a detector says.
 
-        Parameters
-        ----------
-        types : str or None
-            Symbols such as ``"DDBL"``, clockwise from north where no bearings are given.
-        bearings : sequence of float, optional
-            Degrees clockwise from north, -360 to 360, in any order, one for each type.
-        taxonomy : Taxonomy
-            Classes that the symbols belong to.
+        `types` are symbols such as ``"DDBL"``, clockwise where no bearings are given; `bearings`
+        are degrees clockwise from north, -360 to 360, one for each type in any order.
+        UnknownNameError if a symbol belongs to no class; InputError if nothing is given, the
+        lengths differ, or a bearing is not a number or out of range.
 
-        Returns
-        -------
-        Signature
-            The query, sorted clockwise from north.
-
-        Raises
-        ------
-        UnknownNameError
-            If a symbol belongs to no class.
-        InputError
-            If nothing is given, the lengths differ, or a bearing is not a number or out of range.
-
-        Examples
-        --------
-        >>> from semsig_gis.sources.catalog import paper_taxonomy
-        >>> query = Signature.parse("DB", [200, -10], taxonomy=paper_taxonomy())
+        >>> query = Signature.parse("DB", [200, -10], taxonomy=demo_database.taxonomy)
         >>> query.codes.tolist(), query.bearings.tolist()
         ([3, 1], [200.0, 350.0])
         """

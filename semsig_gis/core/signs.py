@@ -15,7 +15,6 @@ if TYPE_CHECKING:
 
     from semsig_gis.core.taxonomy import Taxonomy
 
-
 # Those of Okabe and Ito, and two of Tol, which colour-blind people tell apart; then a lighter or
 # darker one of each. Green comes first because trees do.
 COLOURS = (
@@ -69,31 +68,19 @@ class ClassSign:
 
 
 def class_signs(taxonomy: Taxonomy) -> dict[int, ClassSign]:
-    """Return the sign of each class.
+    """Return the sign of each class by its code.
 
-    Parameters
-    ----------
-    taxonomy : Taxonomy
-        The classes, in any order.
-
-    Returns
-    -------
-    dict of int to ClassSign
-        By class code. Up to 18 classes differ in colour, and up to 126 in colour or shape.
+    Up to 18 classes differ in colour, and up to 126 in colour or shape.
 
     Examples
     --------
-    >>> from semsig_gis.sources.catalog import paper_taxonomy
-    >>> class_signs(paper_taxonomy())[3]
+    >>> class_signs(demo_database.taxonomy)[3]
     ClassSign(symbol='D', title='Street light', shape='diamond', colour='#e69f00')
     """
     ordered = sorted(taxonomy.classes, key=lambda item: item.code)
     return {
         item.code: ClassSign(
-            item.symbol,
-            item.title,
-            SHAPES[number % len(SHAPES)],
-            COLOURS[number % len(COLOURS)],
+            item.symbol, item.title, SHAPES[number % len(SHAPES)], COLOURS[number % len(COLOURS)]
         )
         for number, item in enumerate(ordered)
     }
@@ -136,28 +123,23 @@ FOUND_RAMP = (
 )
 """Colour of a cell by tenths of the chance to be found."""
 
-
 SHADES: Mapping[int, str] = MappingProxyType(
     {1: "#dfdfdb", 5: "#c8c8c2", 10: "#aeaea7", 20: "#8f8f88"}
 )
 """Colour of a cell by the smallest number of objects that are seen from it."""
-
 
 CELL_CHANCES: Mapping[float, str] = MappingProxyType(
     {1e-5: "#d9bdf2", 1e-4: "#bd8be8", 1e-3: "#9650d2", 1e-2: "#6a1cb0", 1e-1: "#35006b"}
 )
 """Colour of a cell by the least chance that the place is in it, or near it."""
 
-
 CHANCES: Mapping[float, str] = MappingProxyType({0.5: "#00441b", 0.9: "#41ab5d", 0.99: "#c7e9c0"})
 """Colour of the fewest cells that hold a share of the chance."""
-
 
 VERDICTS: Mapping[str, str] = MappingProxyType(
     {"matched": "#009e73", "misnamed": "#cc79a7", "missed": "#ffffff", "false": "#d55e00"}
 )
 """Colour of what became of an object."""
-
 
 GROUP_COLOURS: Mapping[int, str] = MappingProxyType(
     {
@@ -171,16 +153,13 @@ GROUP_COLOURS: Mapping[int, str] = MappingProxyType(
 )
 """Colour of a cell by the smallest number of cells with its signature, itself among them."""
 
-
 SAME_TYPES, SAME_LEVELS = "#ffffff", "#e69f00"
 """Colours of the cells with the same types, and with the same angle levels, too."""
-
 
 DRIFT_COLOURS: Mapping[str, str] = MappingProxyType(
     {"same": "#b3b3ad", "changed": "#f0bf5c", "appeared": "#5aa5d6", "vanished": "#8a3f66"}
 )
 """Colour of a cell by what became of it."""
-
 
 OBJECT_COLOURS: Mapping[str, str] = MappingProxyType(
     {"added": "#0072b2", "removed": "#6d1a47", "moved": "#e69f00", "of another class": "#ffffff"}

@@ -3,18 +3,20 @@
 from __future__ import annotations
 
 import math
+import re
 import time
 from abc import ABC, abstractmethod
 from dataclasses import dataclass, field
 from functools import cached_property
 from itertools import pairwise
-from typing import TYPE_CHECKING, Any, Protocol, TypeVar
+from typing import TYPE_CHECKING, Any, Protocol, Self, TypeVar
 
 import geopandas as gpd
 import numpy as np
 from pyproj import Transformer
 
 from semsig_gis.core.errors import InputError
+from semsig_gis.core.taxonomy import WILDCARD
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Hashable, Iterator, Sequence
@@ -25,7 +27,8 @@ if TYPE_CHECKING:
 
     from semsig_gis.core.signature import Signature
     from semsig_gis.core.taxonomy import Taxonomy
-    from semsig_gis.database.database import SignatureDatabase
+    from semsig_gis.database.database import SequenceTable, SignatureDatabase
+
 
 REGION_SHARE = 0.9
 """Of the chance, that the region of an answer holds."""
@@ -189,3 +192,71 @@ def check_query(query: Signature) -> None:
     if not len(query):
         msg = "the query has no objects; give at least one type or bearing."
         raise InputError(msg)
+
+
+_ANY = "?"
+_COMPARISON = re.compile(r"(\S)\s*(>=|<=|=)\s*(\d+)")
+_AMOUNT = re.compile(r"(\d*)\s*(\S)")
+
+
+@dataclass(frozen=True, slots=True)
+class Requirement:
+    """How many objects of some classes a cell must see.
+
+    Each limit is a class code, or `WILDCARD` for all objects together, with the fewest and the
+    most.
+    """
+
+    limits: tuple[tuple[int, int, float], ...]
+
+    @classmethod
+    def parse(cls, text: str, taxonomy: Taxonomy) -> Self:
+        """Read a requirement from text, such as ``M,2B,D=0,?<=10``.
+
+        Parts stand between commas: ``M`` for at least one bus stop, ``2B`` for at least two trees,
+        or ``B>=2``, ``B<=5``, ``B=3``. The symbol ``?`` counts all objects. A symbol may stand in
+        several parts. Raise InputError if a part does not have that form or two parts exclude each
+        other, and UnknownNameError if a symbol is not in the taxonomy.
+        """
+        limits: dict[int, tuple[int, float]] = {}
+        for part in map(str.strip, text.split(",")):
+            symbol, least, most = _read(part, text)
+            code = WILDCARD if symbol == _ANY else taxonomy.by_symbol(symbol).code
+            low, high = limits.get(code, (0, math.inf))
+            limits[code] = low, high = max(low, least), min(high, most)
+            if low > high:
+                msg = (
+                    f"requirement {text!r} wants at least {low} and at most {high} of "
+                    f"{symbol!r}; give numbers that a cell can meet."
+                )
+                raise InputError(msg)
+        return cls(tuple((code, low, high) for code, (low, high) in limits.items()))
+
+    def met(self, sequences: SequenceTable) -> NDArray[np.bool_]:
+        """Tell which cells meet it, shape (n,), by their distinct type sequences."""
+        counts = sequences.histogram
+        met = np.ones(len(sequences), np.bool_)
+        for code, least, most in self.limits:
+            seen = np.zeros(len(sequences), np.int64)
+            if code == WILDCARD:
+                seen = sequences.lengths
+            elif code < counts.shape[1]:
+                seen = counts[:, code].astype(np.int64)
+            met &= (seen >= least) & (seen <= most)
+        return np.asarray(met[sequences.inverse])
+
+
+def _read(part: str, text: str) -> tuple[str, int, float]:
+    """Return the symbol, the fewest and the most of one part of a requirement."""
+    if found := _COMPARISON.fullmatch(part):
+        symbol, sign, digits = found.groups()
+        number = int(digits)
+        return symbol, 0 if sign == "<=" else number, math.inf if sign == ">=" else number
+    if found := _AMOUNT.fullmatch(part):
+        digits, symbol = found.groups()
+        return symbol, int(digits or 1), math.inf
+    msg = (
+        f"{part!r} in requirement {text!r} cannot be read; give parts such as 'M', '2B', 'B>=2', "
+        "'B<=5' or 'B=3' with commas between them, '?' for all objects."
+    )
+    raise InputError(msg)

@@ -11,9 +11,13 @@ from semsig_gis.core.errors import CrsError, EmptyResultError
 from semsig_gis.core.grid import GridSpec, cell_ids, cells_near, split_ids
 from semsig_gis.core.rtree import PackedIndex
 from semsig_gis.core.signature import SignatureSpec
-from semsig_gis.database.database import BEARING_UNITS, DISTANCE_UNITS, SignatureDatabase
+from semsig_gis.database.database import (
+    BEARING_UNITS,
+    DISTANCE_UNITS,
+    SignatureDatabase,
+    consecutive,
+)
 from semsig_gis.database.occlusion import TOLERANCE_M, Footprints
-from semsig_gis.database.sequences import consecutive
 from semsig_gis.database.viewpoints import ViewpointSpec, choose_viewpoints
 from semsig_gis.database.visibility import clockwise_order, sightings
 from semsig_gis.objects.surroundings import licenses_of

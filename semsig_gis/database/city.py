@@ -192,17 +192,7 @@ class City:
 
 
 def open_city(path: str | Path) -> City:
-    """Open a signature database with all that lies beside its file.
-
-    Parameters
-    ----------
-    path : str or Path
-        File of the database, or folder of its parts.
-
-    Returns
-    -------
-    City
-        The city; each part of it is read when it is first looked at.
+    """Open a signature database, a file or a folder of parts, with all that lies beside it.
 
     Raises
     ------

@@ -1,20 +1,26 @@
-"""The signature database: the signature of every cell as flat arrays."""
+"""The signature database: the signature of every cell as flat arrays.
+
+Many cells of a city share their signature. Every measure therefore looks at each distinct
+sequence once, and `SequenceTable.inverse` spreads the results over the cells.
+"""
 
 from __future__ import annotations
 
-import functools
 import operator
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from functools import cached_property
+from itertools import pairwise
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
+import pyarrow as pa
+import pyarrow.compute as pc
 from pyproj import CRS
 
 from semsig_gis import __version__
 from semsig_gis.core.errors import DatabaseError, InputError
 from semsig_gis.core.grid import cell_ids
 from semsig_gis.core.signature import Signature, quantize
-from semsig_gis.database.sequences import SequenceTable, consecutive, frozen
 from semsig_gis.database.viewpoints import ViewpointSpec
 
 if TYPE_CHECKING:
@@ -26,6 +32,10 @@ if TYPE_CHECKING:
     from semsig_gis.core.signature import SignatureSpec
     from semsig_gis.core.taxonomy import Taxonomy
 
+    _Array = TypeVar("_Array", bound="NDArray[Any]")
+
+WORD_BITS = 64
+HISTOGRAM_BLOCK = 1 << 22  # counters in one step of the histogram: 32 MB of temporaries
 # Divisible by 8, 16, 24, 32 and 72, so that the usual angle levels come out exactly. A unit is a
 # hundredth of the noise of a good detector.
 BEARING_UNITS = 7200
@@ -111,17 +121,17 @@ class SignatureDatabase:
     def __len__(self) -> int:  # noqa: D105
         return len(self.columns)
 
-    @functools.cached_property
+    @cached_property
     def cell_ids(self) -> NDArray[np.int64]:
         """Number of every cell, ``column * 10**8 + row``, shape (n,)."""
         return frozen(cell_ids(self.columns, self.rows))
 
-    @functools.cached_property
+    @cached_property
     def xy(self) -> NDArray[np.float64]:
         """Viewpoint of every cell in metres, shape (n, 2)."""
         return frozen(self.grid.viewpoints(self.columns, self.rows))
 
-    @functools.cached_property
+    @cached_property
     def lengths(self) -> NDArray[np.int64]:
         """Number of objects that every cell sees, shape (n,)."""
         return frozen(np.diff(self.offsets))
@@ -131,7 +141,7 @@ class SignatureDatabase:
         """Bearing of every entry in degrees, to 1/20 degree, shape (m,)."""
         return self.bearing_units * np.float64(360.0 / BEARING_UNITS)
 
-    @functools.cached_property
+    @cached_property
     def reach(self) -> float:
         """The largest visibility range of any class, in metres."""
         return float(self.taxonomy.ranges(self.spec.radius).max())
@@ -141,7 +151,7 @@ class SignatureDatabase:
         """Distance of every entry in metres, to 1/255 of `reach`, shape (m,)."""
         return self.distance_units * np.float64(self.reach / DISTANCE_UNITS)
 
-    @functools.cached_property
+    @cached_property
     def levels(self) -> NDArray[np.uint8]:
         """Angle level of every entry, shape (m,)."""
         if BEARING_UNITS % self.spec.levels == 0:
@@ -149,32 +159,32 @@ class SignatureDatabase:
             return frozen(levels.astype(np.uint8))
         return frozen(quantize(self.bearings, self.spec.levels))
 
-    @functools.cached_property
+    @cached_property
     def occurrences(self) -> NDArray[np.int64]:
         """How often each class code occurs over all signatures, shape (256,)."""
         return frozen(np.bincount(self.codes, minlength=256))
 
-    @functools.cached_property
+    @cached_property
     def present_codes(self) -> NDArray[np.uint8]:
         """Class codes that occur, ascending."""
         return frozen(np.flatnonzero(self.occurrences).astype(np.uint8))
 
-    @functools.cached_property
+    @cached_property
     def type_sequences(self) -> SequenceTable:
         """The distinct type sequences, and which of them every cell has."""
         return SequenceTable.from_csr(self.codes, self.offsets)
 
-    @functools.cached_property
+    @cached_property
     def angle_sequences(self) -> SequenceTable:
         """The distinct angle-level sequences, and which of them every cell has."""
         return SequenceTable.from_csr(self.levels, self.offsets)
 
-    @functools.cached_property
+    @cached_property
     def type_group_sizes(self) -> NDArray[np.int64]:
         """For every cell, how many cells have its type sequence, shape (n,)."""
         return frozen(self.type_sequences.counts[self.type_sequences.inverse])
 
-    @functools.cached_property
+    @cached_property
     def angle_group_sizes(self) -> NDArray[np.int64]:
         """For every cell, how many cells have its angle-level sequence, shape (n,)."""
         return frozen(self.angle_sequences.counts[self.angle_sequences.inverse])
@@ -299,3 +309,169 @@ def rows_of_result(
 def _brief(value: object) -> str:
     text = value.to_string() if isinstance(value, CRS) else str(value)
     return text if len(text) <= LONGEST_VALUE else f"{text[: LONGEST_VALUE - 3]}..."
+
+
+@dataclass(frozen=True, eq=False)
+class SequenceTable:
+    """The distinct sequences of a list of n sequences, short ones first; made by `from_csr`.
+
+    Sequences of one length stand in order of first appearance. Of the d distinct sequences, number
+    ``i`` is ``values[offsets[i]:offsets[i + 1]]``, which may be empty. `inverse`, shape (n,), tells
+    which one each row of the list holds; `counts`, shape (d,), how many rows hold each one (the
+    sizes of the signature groups). All arrays are read-only.
+    """
+
+    values: NDArray[np.uint8]
+    offsets: NDArray[np.int64]
+    inverse: NDArray[np.int64]
+    counts: NDArray[np.int64]
+
+    @classmethod
+    def from_csr(cls, values: NDArray[np.uint8], offsets: NDArray[np.int64]) -> SequenceTable:
+        """Find the distinct sequences of a list given as flat values and offsets.
+
+        Row ``i`` is ``values[offsets[i]:offsets[i + 1]]``; the arrays are copied. Raise InputError
+        if the values are not bytes, or the offsets do not divide them.
+        """
+        flat, ends = _checked_csr(values, offsets)
+        rows = pa.LargeBinaryArray.from_buffers(
+            pa.large_binary(), len(ends) - 1, [None, pa.py_buffer(ends), pa.py_buffer(flat)]
+        )
+        encoded = rows.dictionary_encode()
+        distinct = len(encoded.dictionary)
+        order = np.argsort(pc.binary_length(encoded.dictionary).to_numpy(), kind="stable")
+        rank = np.empty(distinct, np.int64)
+        rank[order] = np.arange(distinct)
+        _, offset_buffer, value_buffer = encoded.dictionary.take(order).buffers()
+        # An Arrow array without values may come without buffers.
+        distinct_offsets = (
+            np.frombuffer(offset_buffer, np.int64)[: distinct + 1].copy()
+            if distinct
+            else np.zeros(1, np.int64)
+        )
+        size = int(distinct_offsets[-1])
+        distinct_values = (
+            np.frombuffer(value_buffer, np.uint8)[:size].copy() if size else np.empty(0, np.uint8)
+        )
+        # int64: NumPy gathers with a native index without converting it at every query.
+        inverse = rank[encoded.indices.to_numpy()]
+        counts = np.bincount(inverse, minlength=distinct).astype(np.int64, copy=False)
+        return cls(*map(frozen, (distinct_values, distinct_offsets, inverse, counts)))
+
+    def __len__(self) -> int:
+        """Return the number of distinct sequences."""
+        return len(self.counts)
+
+    def __getitem__(self, index: int) -> NDArray[np.uint8]:
+        """Return one distinct sequence."""
+        return self.values[self.offsets[index] : self.offsets[index + 1]]
+
+    @cached_property
+    def lengths(self) -> NDArray[np.int64]:
+        """Length of each distinct sequence, shape (d,)."""
+        return frozen(np.diff(self.offsets))
+
+    @cached_property
+    def strings(self) -> list[str]:
+        """Each distinct sequence as text, one character of that code point a value."""
+        text = self.values.tobytes().decode("latin-1")
+        bounds = self.offsets.tolist()
+        return [text[low:high] for low, high in pairwise(bounds)]
+
+    @cached_property
+    def histogram(self) -> NDArray[np.uint16 | np.uint32]:
+        """How often each value occurs in each distinct sequence, shape (d, largest value + 1).
+
+        A column is contiguous in memory, because the measures read it value by value.
+        """
+        size = int(self.values.max()) + 1 if len(self.values) else 0
+        longest = int(self.lengths.max()) if len(self) else 0
+        kind = np.uint16 if longest <= np.iinfo(np.uint16).max else np.uint32
+        counts: NDArray[np.uint16 | np.uint32] = np.zeros((len(self), size), kind, order="F")
+        step = max(1, HISTOGRAM_BLOCK // max(1, size))
+        for low in range(0, len(self), step):
+            high = min(low + step, len(self))
+            rows = np.repeat(np.arange(high - low), self.lengths[low:high])
+            values = self.values[self.offsets[low] : self.offsets[high]]
+            bins = np.bincount(rows * size + values, minlength=(high - low) * size)
+            counts[low:high] = bins.reshape(high - low, size)
+        return frozen(counts)
+
+    @cached_property
+    def value_sets(self) -> NDArray[np.uint64]:
+        """The set of values of each distinct sequence as bits, shape (d, ceil(k / 64))."""
+        present = self.histogram > 0
+        words = -(-present.shape[1] // WORD_BITS)
+        sets = np.zeros((len(self), words), np.uint64)
+        for value in range(present.shape[1]):
+            word, bit = divmod(value, WORD_BITS)
+            sets[:, word] |= present[:, value].astype(np.uint64) << np.uint64(bit)
+        return frozen(sets)
+
+    @cached_property
+    def value_set_sizes(self) -> NDArray[np.int16]:
+        """How many different values each distinct sequence has, shape (d,)."""
+        return frozen(np.bitwise_count(self.value_sets).sum(axis=1, dtype=np.int16))
+
+    def overlap(
+        self, query: NDArray[np.uint8], *, only: NDArray[np.int64] | None = None
+    ) -> tuple[NDArray[np.int16], NDArray[np.int16]]:
+        """Count the different values that a query and each distinct sequence share, in any order.
+
+        Return how many are in both and how many in at least one of them, for the distinct sequences
+        `only`, or for all.
+        """
+        sets = self.value_sets if only is None else self.value_sets[only]
+        values = np.unique(query)
+        wanted = [0] * sets.shape[1]
+        for value in values.tolist():
+            word, bit = divmod(value, WORD_BITS)
+            if word < len(wanted):  # a value past the last word is in no sequence of the table
+                wanted[word] |= 1 << bit
+        both = np.zeros(len(sets), np.int16)
+        for word, bits in enumerate(wanted):
+            both += np.bitwise_count(sets[:, word] & np.uint64(bits))
+        sizes = self.value_set_sizes if only is None else self.value_set_sizes[only]
+        return both, sizes + np.int16(len(values)) - both
+
+
+def checked_sequence(values: NDArray[np.uint8]) -> NDArray[np.uint8]:
+    """Return a sequence as it is, or raise InputError if it is not a flat uint8 array."""
+    array = np.asarray(values)
+    if array.dtype != np.uint8 or array.ndim != 1:
+        msg = (
+            f"a sequence holds {array.dtype} values in {array.ndim} dimensions; give its "
+            "class codes or angle levels (0 to 255) as a one-dimensional uint8 array."
+        )
+        raise InputError(msg)
+    return array
+
+
+def _checked_csr(
+    values: NDArray[np.uint8], offsets: NDArray[np.int64]
+) -> tuple[NDArray[np.uint8], NDArray[np.int64]]:
+    """Return values and offsets as contiguous arrays that Arrow can read in place."""
+    flat = np.ascontiguousarray(checked_sequence(values))
+    ends = np.ascontiguousarray(offsets, dtype=np.int64)
+    whole = ends.ndim == 1 and len(ends) > 0 and ends[0] == 0 and ends[-1] == len(flat)
+    # Arrow trusts the offsets: decreasing ones would read outside the values.
+    if not whole or bool((np.diff(ends) < 0).any()):
+        msg = (
+            f"the offsets of the sequences do not divide their {len(flat)} values; give one "
+            "offset more than there are sequences, from 0 up to the number of values, none "
+            "smaller than the one before."
+        )
+        raise InputError(msg)
+    return flat, ends
+
+
+def consecutive(first: NDArray[np.int64], size: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Return the whole numbers of some ranges, one range after the other."""
+    ends = np.cumsum(size)
+    return np.repeat(first - ends + size, size) + np.arange(size.sum())
+
+
+def frozen(array: _Array) -> _Array:
+    """Return the array, made read-only."""
+    array.setflags(write=False)
+    return array

@@ -32,7 +32,7 @@ from semsig_gis.storage.geoparquet import (
 from semsig_gis.storage.whole import write_whole
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Iterator, Mapping
 
     from numpy.typing import NDArray
     from pyproj import CRS
@@ -49,21 +49,14 @@ CHUNK = 1 << 20
 
 
 def save_database(database: SignatureDatabase, path: str | Path) -> None:
-    """Save a database as one GeoParquet file: a row a cell, the specs in its metadata.
-
-    Parameters
-    ----------
-    database : SignatureDatabase
-        What to save.
-    path : str or Path
-        File to write; it appears whole, by rename.
+    """Save a database as one GeoParquet file, which appears whole, by rename.
 
     Notes
     -----
-    Columns: ``cell_id`` (int64), ``types`` (symbols), ``bearings`` (list of uint16, in 1/20
-    degree), ``distances`` (list of uint8, in 1/255 of the largest visibility range), ``length``
-    (int32) and ``geometry`` (the viewpoint as WKB). The metadata key ``semsig`` holds
-    the specs, the classes and the licences as JSON.
+    A row is a cell. Columns: ``cell_id`` (int64), ``types`` (symbols), ``bearings`` (list of
+    uint16, in 1/20 degree), ``distances`` (list of uint8, in 1/255 of the largest visibility
+    range), ``length`` (int32) and ``geometry`` (the viewpoint as WKB). The metadata key ``semsig``
+    holds the specs, the classes and the licences as JSON.
 
     Examples
     --------
@@ -111,16 +104,6 @@ def database_specs(database: SignatureDatabase) -> dict[str, Any]:
 
 def open_database(path: str | Path) -> SignatureDatabase:
     """Open a file that `save_database` wrote, or a folder of parts that `build_tiles` wrote.
-
-    Parameters
-    ----------
-    path : str or Path
-        File or folder.
-
-    Returns
-    -------
-    SignatureDatabase
-        The database.
 
     Raises
     ------
@@ -236,6 +219,19 @@ def digest(*paths: Path) -> str:
             while chunk := file.read(CHUNK):
                 total.update(chunk)
     return total.hexdigest()
+
+
+def damaged_files(folder: Path, digests: Mapping[str, str]) -> list[str]:
+    """Return the names of the files that are not in a folder with such a digest."""
+    damaged = []
+    for name, expected in digests.items():
+        try:
+            whole = digest(folder / name) == expected
+        except OSError:
+            whole = False
+        if not whole:
+            damaged.append(name)
+    return damaged
 
 
 def built_digest(path: str | Path) -> str:
@@ -440,16 +436,6 @@ class PartitionedDatabase:
 
 def open_dataset(folder: str | Path) -> PartitionedDatabase:
     """Open a folder that holds a database in parts, without reading the parts into memory.
-
-    Parameters
-    ----------
-    folder : str or Path
-        Folder of the database.
-
-    Returns
-    -------
-    PartitionedDatabase
-        The parts. For all cells at once, use `open_database`.
 
     Raises
     ------

@@ -131,14 +131,9 @@ def hidden(
     """Tell which objects a building hides from the viewpoint they are looked at from.
 
     Row by row, `viewpoints` and `objects` are the two ends of a sight line, shape (p, 2) in metres
-    in the CRS of the footprints.
-
-    The rule: an object is hidden when the sight line comes deeper into the buildings than the
-    tolerance. So an object on a facade, or in it no deeper than the tolerance, is seen from its
-    side of the building at any slant and hidden from the other sides; a line that cuts a corner by
-    less than the tolerance is free, and a wall thinner than twice the tolerance hides nothing. A
-    footprint that has the viewpoint in it deeper than the tolerance (an arcade, a passage, a roof
-    on posts) does not hide; all other footprints do, its neighbours too.
+    in the CRS of the footprints. An object is hidden when the line comes deeper into the buildings
+    than the tolerance; a footprint that has the viewpoint in it deeper than that (an arcade, a
+    passage, a roof on posts) does not hide.
     """
     starts = np.asarray(viewpoints, dtype=np.float64).reshape(-1, 2)
     ends = np.asarray(objects, dtype=np.float64).reshape(-1, 2)

@@ -27,7 +27,7 @@ def database_summary(
     Parameters
     ----------
     database : SignatureDatabase
-        The database.
+        Of which.
     file_bytes : int, optional
         Size of its file in bytes.
     object_counts : mapping of int to int, optional
@@ -51,19 +51,15 @@ def database_summary(
 
     Notes
     -----
-    Paper, Tables 1 and 2. An occurrence is an object in a signature: an object counts once in
-    every cell that sees it. The covered area is the number n of cells times that of a cell, and
-    MB a km2 are of it.
+    Paper, Tables 1 and 2. An object occurs once in every cell that sees it. The covered area is the
+    number n of cells times that of a cell.
 
     Objects a km2 of a class: with `object_counts`, their number by the covered area. Without,
-    occurrences / (n pi R^2), where R is the range of the class: what the mean cell sees by the
-    area that it looks at. Where every cell is a viewpoint and nothing is hidden both estimate the
-    same; occlusion makes the second too small.
+    occurrences / (n pi R^2), where R is the range of the class, which occlusion makes too small.
 
     Entropy of a class, in bits: -sum over k of p_k log2 p_k, where p_k is the share of the cells
-    that see exactly k objects of it. It is what counting these objects, without a mistake, tells
-    of the cell that one is in; log2 n (``cell_bits``) would tell the cell. Entropy of groups: the
-    same of the shares of the cells in each group, which is what the whole sequence tells.
+    that see exactly k objects of it; log2 n (``cell_bits``) would tell the cell. Entropy of groups:
+    the same of the shares of the cells in each group.
 
     Examples
     --------

@@ -22,6 +22,7 @@ from semsig_gis.core.rtree import INDEX_FILES, StoredIndex
 from semsig_gis.database.build import moved
 from semsig_gis.database.file import (
     built_digest,
+    damaged_files,
     digest,
     is_folder,
     require_file,
@@ -130,6 +131,8 @@ def _stored(table: gpd.GeoDataFrame, crs: CRS) -> gpd.GeoDataFrame:
 def save_with_store(database: SignatureDatabase, store: ObjectStore, path: str | Path) -> None:
     """Save a database and the store that belongs to it.
 
+    Any number of programs may read meanwhile; of two that write at once, the later one wins.
+
     Parameters
     ----------
     database : SignatureDatabase
@@ -144,14 +147,6 @@ def save_with_store(database: SignatureDatabase, store: ObjectStore, path: str |
     InputError
         If the files cannot be written; those that were there are unchanged then.
 
-    Notes
-    -----
-    The new store is written whole under another name, then the database is renamed into its
-    place, and at last the store into its own. The store names the digest of its database, so
-    whoever opens the two sees how far an interrupted run came: `open_store` takes the new store
-    as soon as the new database is there, and the old one until then. Any number of programs may
-    read meanwhile; of two that write at once, the later one wins.
-
     Examples
     --------
     >>> import tempfile
@@ -162,6 +157,9 @@ def save_with_store(database: SignatureDatabase, store: ObjectStore, path: str |
     True
     """
     _settle(Path(path))  # what waits there may be needed until the new database is in place
+    # The new store is written whole under another name, then the database is renamed into its
+    # place, and at last the store into its own. It names the digest of its database, so that
+    # whoever opens the two after an interrupted run takes the store that belongs to the database.
     with whole_file(path) as partial:
         try:
             save_database(database, partial)
@@ -174,6 +172,9 @@ def save_with_store(database: SignatureDatabase, store: ObjectStore, path: str |
 def open_store(database: str | Path, folder: str | Path | None = None) -> ObjectStore:
     """Open the object store of a database.
 
+    What an interrupted `save_with_store` left half done is finished, if the folder can be written
+    to. Notes of the store say so where its R-tree had to be made again.
+
     Parameters
     ----------
     database : str or Path
@@ -181,20 +182,10 @@ def open_store(database: str | Path, folder: str | Path | None = None) -> Object
     folder : str or Path, optional
         The store, where it does not lie beside the database.
 
-    Returns
-    -------
-    ObjectStore
-        The store; its notes say so where the R-tree had to be made again.
-
     Raises
     ------
     DatabaseError
         If there is no database or no store, the store is damaged, or belongs to another database.
-
-    Notes
-    -----
-    What an interrupted `save_with_store` left half done is finished, if the folder can be written
-    to. The files of a store are not changed by reading.
 
     Examples
     --------
@@ -247,7 +238,7 @@ def _read(folder: Path, database: Path) -> ObjectStore:
         msg = f"{folder} belongs to another database than {database}; build the database again."
         raise DatabaseError(msg)
     files = manifest["files"]
-    damaged = [name for name, wanted in files.items() if not _is_whole(folder / name, wanted)]
+    damaged = damaged_files(folder, files)
     lost = [name for name in damaged if name not in INDEX_FILES]
     if lost or OBJECTS not in files:
         msg = f"{folder / min(lost, default=OBJECTS)} is damaged; build the database again."
@@ -309,10 +300,3 @@ def _settle(database: Path) -> Path:
 
 def _waiting(final: Path) -> Path:
     return final.with_name(final.name + NEXT)
-
-
-def _is_whole(path: Path, wanted: str) -> bool:
-    try:
-        return digest(path) == wanted
-    except OSError:
-        return False

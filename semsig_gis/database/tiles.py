@@ -30,6 +30,7 @@ from semsig_gis.core.grid import GridSpec, cell_ids, cells_near, require_step, s
 from semsig_gis.core.parallel import check_workers, finish_tasks
 from semsig_gis.core.signature import SignatureSpec
 from semsig_gis.database.build import build_cells
+from semsig_gis.database.database import consecutive
 from semsig_gis.database.file import (
     MANIFEST,
     Manifest,
@@ -41,7 +42,6 @@ from semsig_gis.database.file import (
     save_database,
 )
 from semsig_gis.database.occlusion import TOLERANCE_M
-from semsig_gis.database.sequences import consecutive
 from semsig_gis.database.viewpoints import ViewpointSpec, require_surroundings
 from semsig_gis.objects.surroundings import read_surroundings, save_surroundings
 from semsig_gis.objects.table import open_objects, save_objects
@@ -139,6 +139,9 @@ def build_tiles(
 ) -> Manifest:
     """Build a signature database in tiles: a folder that is opened like a single file.
 
+    An interrupted run leaves its tiles in ``OUT.partial``, and the same command goes on from there,
+    if the specs are the same and the input files have the same content (by SHA-256).
+
     Parameters
     ----------
     objects : str or Path
@@ -150,13 +153,13 @@ def build_tiles(
     grid, spec, viewpoints : optional
         As in `build_database`.
     buildings, streets : str or Path, optional
-        Files that `read_surroundings` reads. Those that cannot be read by box are copied into such
-        a file first.
+        Files that `read_surroundings` reads; copied first where they cannot be read by box.
     workers : int, default 0
-        How many processes of this machine build tiles; 0 builds them here, without dask.
+        How many processes of this machine build tiles; 0 builds them here, without dask. A script
+        that gives it needs the guard ``if __name__ == "__main__":``, because workers import it.
     scheduler : str, optional
-        Address of a dask scheduler, such as ``tcp://10.0.0.5:8786``, whose workers see the same
-        files under the same paths; then `workers` stays 0.
+        Address of a dask scheduler instead, such as ``tcp://10.0.0.5:8786``, whose workers see the
+        same files under the same paths.
     progress : callable, optional
         Called with the number of tiles done and in all.
     tell : callable, optional
@@ -165,7 +168,7 @@ def build_tiles(
     Returns
     -------
     Manifest
-        What the database consists of.
+        The parts; their files are the same whatever the number of workers.
 
     Raises
     ------
@@ -173,17 +176,9 @@ def build_tiles(
         If an option cannot be used, the scheduler cannot be reached, or `out` holds something
         else or an unfinished run with other inputs or specs.
     DatabaseError
-        If the street objects cannot be read, or a tile cannot be built; the other tiles are kept
-        for the next run.
+        If the objects cannot be read, or a tile cannot be built; the next run keeps the others.
     EmptyResultError
         If no cell sees an object.
-
-    Notes
-    -----
-    The files are the same byte for byte whatever the number of workers. An interrupted run leaves
-    its tiles in ``OUT.partial``, and the same command goes on from there, if the specs are the same
-    and the input files have the same content (by SHA-256). A script that gives `workers` needs the
-    guard ``if __name__ == "__main__":``, because the workers import it.
 
     Examples
     --------

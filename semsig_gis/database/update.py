@@ -115,7 +115,7 @@ def update_file(
     out: str | Path | None = None,
     progress: Callable[[int, int], None] | None = None,
 ) -> UpdateReport:
-    """Update the file of a database, and the object store beside it.
+    """Update the file of a database, and the object store beside it, by `update_database`.
 
     Parameters
     ----------
@@ -128,15 +128,10 @@ def update_file(
     progress : callable, optional
         Called with the number of cells done and in all.
 
-    Returns
-    -------
-    UpdateReport
-        What changed.
-
     Raises
     ------
-    DatabaseError, InputError, CrsError, EmptyResultError
-        As `update_database` does, or if the files cannot be read or written; nothing has changed
+    SemsigError
+        As in `update_database`, or if the files cannot be read or written, which do not change
         then.
 
     Examples
@@ -168,10 +163,8 @@ def update_database(
 
     Parameters
     ----------
-    database : SignatureDatabase
-        The database.
-    store : ObjectStore
-        What it was built from.
+    database, store : SignatureDatabase, ObjectStore
+        The database, and what it was built from.
     objects : StreetObjects
         The layers that were loaded anew, whole; other layers stay as they are.
     progress : callable, optional
@@ -179,10 +172,8 @@ def update_database(
 
     Returns
     -------
-    database : SignatureDatabase
-        What `database.build.build_database` would make of the new store.
-    store : ObjectStore
-        All objects as they are now.
+    database, store : SignatureDatabase, ObjectStore
+        All objects as they are now, and what `build_database` would make of them.
     report : UpdateReport
         What changed.
 

@@ -157,7 +157,7 @@ class Method:
         return "+".join(parts)
 
 
-DEFAULT_METHOD = Method()
+DEFAULT_METHOD: Method = Method()
 """Metric fusion of two edit distances in equal shares."""
 
 

@@ -35,9 +35,8 @@ if TYPE_CHECKING:
 
     from semsig_gis.core.signature import Signature
     from semsig_gis.core.taxonomy import Taxonomy
-    from semsig_gis.database.answer import DistanceMemo
+    from semsig_gis.database.answer import DistanceMemo, Requirement
     from semsig_gis.database.database import SignatureDatabase
-    from semsig_gis.database.requirement import Requirement
     from semsig_gis.matching.method import Method
 
 

@@ -1,14 +1,22 @@
-"""Tests of semsig_gis.database.answer."""
-
 from __future__ import annotations
 
+import math
 import time
+from collections import Counter
 from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
-from semsig_gis.database.answer import DistanceMemo
+from semsig_gis.core.errors import InputError, UnknownNameError
+from semsig_gis.core.taxonomy import WILDCARD
+from semsig_gis.database.answer import DistanceMemo, Requirement
+from semsig_gis.database.database import SequenceTable
+from semsig_gis.matching.metrics import edit
+from semsig_gis.sources.catalog import paper_taxonomy
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -28,3 +36,70 @@ def test_distances_are_measured_once_and_the_time_is_told() -> None:
     assert asked == ["a", "b"]
     # Three times a distance was known that takes a hundredth of a second to measure.
     assert memo.spared >= 0.03
+
+
+PAPER = paper_taxonomy()
+ROWS = st.lists(st.lists(st.integers(1, 4), max_size=6), max_size=20)
+LIMIT = st.tuples(
+    st.sampled_from([WILDCARD, 1, 2, 3, 11]),
+    st.integers(0, 3),
+    st.integers(3, 5) | st.just(math.inf),
+)
+
+
+def table_of(rows: list[list[int]]) -> SequenceTable:
+    flat = np.array([value for row in rows for value in row], np.uint8)
+    return SequenceTable.from_csr(flat, np.cumsum([0, *map(len, rows)]))
+
+
+@given(ROWS, st.lists(LIMIT, max_size=3))
+def test_requirement_is_checked_as_if_cell_by_cell(
+    rows: list[list[int]], limits: list[tuple[int, int, float]]
+) -> None:
+    expected = []
+    for row in rows:
+        seen = Counter(row) | Counter({WILDCARD: len(row)})
+        expected.append(all(low <= seen[code] <= high for code, low, high in limits))
+    assert Requirement(tuple(limits)).met(table_of(rows)).tolist() == expected
+
+
+@pytest.mark.parametrize(
+    ("text", "limits"),
+    [
+        ("M", {11: (1, math.inf)}),
+        ("2B", {1: (2, math.inf)}),
+        ("B>=2", {1: (2, math.inf)}),
+        (" B <= 5 ", {1: (0, 5)}),
+        ("B=0", {1: (0, 0)}),
+        ("?=12", {WILDCARD: (12, 12)}),
+        ("2B,B<=5,M", {1: (2, 5), 11: (1, math.inf)}),
+    ],
+)
+def test_parse(text: str, limits: dict[int, tuple[int, float]]) -> None:
+    read = Requirement.parse(text, PAPER).limits
+    assert {code: (low, high) for code, low, high in read} == limits
+
+
+@pytest.mark.parametrize("text", ["", "M,", "M;B", "B>2", "B>=", "B>=-1", "B=x", "MB", "2"])
+def test_text_that_cannot_be_read(text: str) -> None:
+    with pytest.raises((InputError, UnknownNameError), match=r"cannot be read|symbol '2'"):
+        Requirement.parse(text, PAPER)
+
+
+def test_parts_that_exclude_each_other_and_unknown_symbols() -> None:
+    with pytest.raises(InputError, match="at least 3 and at most 2 of 'B'"):
+        Requirement.parse("3B,B<=2", PAPER)
+    with pytest.raises(UnknownNameError, match="'Z'"):
+        Requirement.parse("Z", PAPER)
+    with pytest.raises(UnknownNameError, match="'Z'"):
+        PAPER.encode("M?Z")
+
+
+def test_a_pattern_finds_the_cells_that_it_may_mean() -> None:
+    table = table_of([[11, 1, 1], [11, 3, 1], [11, 1], [3, 3, 3]])
+    pattern = PAPER.encode("M?B")
+    (distances,) = edit.distances([pattern], table, wildcard=WILDCARD)
+    fits = distances[table.inverse] == 0
+    assert fits.tolist() == [True, True, False, False]
+    met = Requirement.parse("2B", PAPER).met(table)
+    assert (fits & met).tolist() == [True, False, False, False]

@@ -12,7 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from semsig_gis.core.errors import InputError, UnknownNameError
-from semsig_gis.database.sequences import SequenceTable
+from semsig_gis.database.database import SequenceTable
 from semsig_gis.matching.metrics import METRICS, metric
 from semsig_gis.matching.metrics.edit import EditWeights
 

@@ -20,8 +20,8 @@ from worlds import random_town
 
 from semsig_gis.core.errors import EmptyResultError, InputError
 from semsig_gis.core.signature import Signature
+from semsig_gis.database.answer import Requirement
 from semsig_gis.database.file import PartitionedDatabase, open_database, save_database
-from semsig_gis.database.requirement import Requirement
 from semsig_gis.matching.method import Method
 from semsig_gis.matching.scores import score_cells
 from semsig_gis.matching.search import DistanceLocator, localize
