@@ -264,18 +264,18 @@ def test_a_class_may_hang_on_a_field(read_as: Read) -> None:
 
 
 @pytest.mark.parametrize(
-    ("key", "value"),
+    "change",
     [
-        ("id_field", "idbaze"),
-        ("where", (("DOMAIN", ("Alignement",)),)),
-        ("class_by", ClassBy("KIND", (("x", "bench"),))),
+        {"id_field": "idbaze"},
+        {"where": (("DOMAIN", ("Alignement",)),)},
+        {"class_by": ClassBy("KIND", (("x", "bench"),))},
     ],
 )
 def test_a_field_that_is_not_there_is_named(
-    read_as: Read, tmp_path: Path, key: str, value: object
+    read_as: Read, tmp_path: Path, change: dict[str, Any]
 ) -> None:
-    with refused(CatalogError, key, "trees", str(tmp_path / "a.csv"), "IDBASE"):
-        read_as("a.csv", trees_csv(), replace(TREES, **{key: value}))
+    with refused(CatalogError, *change, "trees", str(tmp_path / "a.csv"), "IDBASE"):
+        read_as("a.csv", trees_csv(), replace(TREES, **change))
 
 
 def test_a_shape_goes_before_a_point_and_a_point_before_coordinates(read_as: Read) -> None:
