@@ -8,9 +8,8 @@ from typing import TYPE_CHECKING
 import geopandas as gpd
 import numpy as np
 import pyarrow.parquet as pq
-import pytest
 from cells_told import told_of
-from sentences import assert_sentence
+from sentences import refused
 from small_city import small_city
 
 from semsig_gis.core.errors import DatabaseError
@@ -73,6 +72,5 @@ def test_a_box_is_read_by_its_bounds(tmp_path: Path) -> None:
 def test_it_is_not_taken_for_a_database(tmp_path: Path) -> None:
     file = tmp_path / "cells.parquet"
     export_database(small_city()[0], file)
-    with pytest.raises(DatabaseError) as caught:
+    with refused(DatabaseError, "signature cells export", "signature database"):
         open_database(file)
-    assert_sentence(caught.value, "signature cells export", "signature database")

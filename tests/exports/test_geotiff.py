@@ -10,7 +10,7 @@ import pytest
 import rasterio
 from cells_told import told_of
 from rio_cogeo.cogeo import cog_validate
-from sentences import assert_sentence
+from sentences import refused
 from small_city import small_city, small_evaluation, small_location
 
 from semsig_gis.core.errors import InputError
@@ -101,13 +101,11 @@ def test_errors_of_a_cell_are_means() -> None:
 
 def test_what_cannot_be_a_raster_is_refused(tmp_path: Path) -> None:
     database, _ = small_city()
-    with pytest.raises(InputError) as caught:
+    with refused(InputError, "2 numbers", f"{len(database)} cells"):
         export_geotiff(database, [1.0, 2.0], tmp_path / "a.tif", name="a")
-    assert_sentence(caught.value, "2 numbers", f"{len(database)} cells")
     columns = database.columns.copy()
     columns[-1] += 10**9
     far = dataclasses.replace(database, columns=columns)
-    with pytest.raises(InputError) as caught:
+    with refused(InputError, "too wide"):
         export_geotiff(far, far.lengths, tmp_path / "a.tif", name="a")
-    assert_sentence(caught.value, "too wide")
     assert not list(tmp_path.iterdir())
