@@ -1,12 +1,17 @@
-"""The picture of the cells: every cell is where the map has it."""
+"""Pictures of cells, in which every cell is where the map has it; and data in scripts."""
 
 from __future__ import annotations
 
 import io
+import json
+import re
 from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
+from folium.template import Template
+from hypothesis import example, given
+from hypothesis import strategies as st
 from PIL import Image
 from pyproj import CRS, Transformer
 
@@ -14,7 +19,7 @@ from semsig_gis.core.grid import GridSpec
 from semsig_gis.core.signature import SignatureSpec
 from semsig_gis.database.database import SignatureDatabase
 from semsig_gis.maps import image as map_image
-from semsig_gis.maps.image import city_image, level_image, place_lattices
+from semsig_gis.maps.image import city_image, level_image, place_lattices, script_json
 from semsig_gis.sources.catalog import paper_taxonomy
 
 if TYPE_CHECKING:
@@ -176,3 +181,35 @@ def test_lattices_place_cells_to_a_centimetre(crs: str, origin: tuple[float, flo
     web = np.stack(to_mercator.transform(*database.xy.T), axis=1)
     back = between(lattices.metres, lattices.mercator_box, web)
     assert np.abs(back - database.xy).max() < 0.01
+
+
+nasty = st.text(st.sampled_from(list("{}%#<>&'\"`$\\/-! 7*é\u2028\ud7ff")), max_size=12)
+values = st.recursive(
+    st.none() | st.integers() | st.text() | nasty,
+    lambda children: st.lists(children, max_size=4) | st.dictionaries(nasty, children, max_size=4),
+    max_leaves=12,
+)
+
+
+@given(values)
+@example("{{7*7}}")
+@example("{{ this._parent }}{% raw %}{# gone #}")
+@example({"{": {"{{": "{%"}, "": {}})
+@example("</script><!--<script>")
+def test_two_renderings_leave_the_value_as_it_was(value: object) -> None:
+    written = script_json(value)
+    once = Template(written).render()
+    assert json.loads(Template(once).render()) == value
+
+
+@given(values)
+def test_nothing_in_it_is_markup(value: object) -> None:
+    written = script_json(value)
+    assert written.isascii()
+    assert not re.search(r"[<>&]|\{[{%#]", written)
+
+
+@pytest.mark.parametrize("number", [float("nan"), float("inf")])
+def test_numbers_that_json_does_not_have_are_refused(number: float) -> None:
+    with pytest.raises(ValueError, match="not JSON compliant"):
+        script_json([number])

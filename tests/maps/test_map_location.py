@@ -1,4 +1,4 @@
-"""The map of a location in a real page.browser."""
+"""The maps of a location, and of a ranking by distance, in a real browser."""
 
 from __future__ import annotations
 
@@ -14,12 +14,13 @@ from selenium.webdriver.common.by import By
 from worlds import random_town
 
 from semsig_gis.core.signature import Signature
-from semsig_gis.core.signs import FAILED, SUCCESSFUL, VERDICTS
+from semsig_gis.core.signs import CANDIDATE_RAMP, FAILED, SUCCESSFUL, VERDICTS
 from semsig_gis.database.store import ObjectStore
 from semsig_gis.likelihood.index import build_index
 from semsig_gis.likelihood.locate import locate
 from semsig_gis.likelihood.noise.model import cell_noise, named_noise
-from semsig_gis.maps.location import location_map
+from semsig_gis.maps.location import localization_map, location_map
+from semsig_gis.matching.search import localize
 
 if TYPE_CHECKING:
     from map_pages import MapPage
@@ -136,3 +137,31 @@ def test_hostile_data_is_shown_and_never_run(page: MapPage) -> None:
     # Both classes, source and identifier.
     assert page.text(".semsig-details").count(HOSTILE) == 4
     page.assert_text_stays_text()
+
+
+def test_a_localization_in_a_browser(page: MapPage, database: SignatureDatabase) -> None:
+    cell = int(np.argmax(database.lengths))
+    localization = localize(database, database.signature(cell), top=50)
+    page.open(localization_map(localization, database))
+    texts = """
+    const texts = [];
+    map.eachLayer((one) => {
+      if (one instanceof L.CircleMarker) texts.push(one.getPopup().getContent()(one).textContent);
+    });
+    return texts;
+    """
+    popups = page.ask(texts)
+    assert len(popups) == 50
+    best = popups[-1]  # drawn last, on top
+    assert best.startswith("Rank 1")
+    assert "Rank1 of " in best
+    assert str(database.cell_ids[cell]) in best
+    assert database.types(cell) in best
+    # The query and what the cell sees, side by side.
+    page.ask("circles(arguments[0])[0].openPopup()", CANDIDATE_RAMP[0])
+    captions = [one.get_property("innerText") for one in page.all("figcaption")]
+    assert captions == ["Query", "Signature"]
+    page.ask("map.closePopup()")
+    assert f"Types: {database.types(cell)}" in page.one(LEGEND).text
+    page.switch("Candidates")
+    assert page.ask(texts) == []

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import dataclasses
-from typing import TYPE_CHECKING, Any
+from functools import partial
+from importlib import resources
+from typing import TYPE_CHECKING
 
 import folium
 import geopandas as gpd
@@ -11,6 +13,7 @@ import numpy as np
 import pytest
 import shapely
 from cells_told import told_of
+from folium.template import Template
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from map_pages import HOSTILE, LEGEND, hostile_database
@@ -33,7 +36,7 @@ from semsig_gis.maps.drift import drift_map
 from semsig_gis.maps.evaluation import evaluation_map
 from semsig_gis.maps.location import localization_map, location_map
 from semsig_gis.maps.objects import ground_map, objects_map
-from semsig_gis.maps.parts import _area, layers_of, to_latlon
+from semsig_gis.maps.parts import _area, layers_of, page_element, to_latlon
 from semsig_gis.matching.search import localize
 from semsig_gis.objects.table import StreetObjects
 from semsig_gis.queries.distortions import MissingClasses
@@ -55,40 +58,41 @@ NO_PLACE = gpd.GeoDataFrame(geometry=[None], crs=2154)
 LANE = gpd.GeoDataFrame(geometry=[shapely.LineString([(3.0, 43.0), (3.1, 43.0)])], crs=4326)
 EVALUATION = evaluate(CITY, queries=5)
 LOCALIZATION = localize(CITY, CITY.signature(0), top=5)
-TOLD = told_of(CITY)
+LOCATION = locate(build_index(CITY, named_noise("light")), CITY.signature(0), top=5)
+TOLD, OTHER_TOLD = told_of(CITY), told_of(CITY.select(slice(1, None)))
 OTHER_CITY = dataclasses.replace(CITY, rows=CITY.rows + 10_000)
 OTHER_SIGHT = dataclasses.replace(CITY, codes=CITY.codes[::-1].copy())
-
-
-def location(**options: Any) -> folium.Map:  # noqa: ANN401
-    index = build_index(CITY, named_noise("light"))
-    return location_map(locate(index, CITY.signature(0), top=5), **options)
+NO_OBJECTS = dataclasses.replace(OBJECTS, table=OBJECTS.table.iloc[:0])
+NOWHERE, FAR = LANE.set_crs(None, allow_override=True), (0.0, 0.0, 1.0, 1.0)
+BROWSER_FILES = sorted(
+    one.name for one in resources.files("semsig_gis.maps").joinpath("js").iterdir()
+)
 
 
 MAPS: dict[str, tuple[Callable[..., folium.Map], set[str]]] = {
     "evaluation": (
-        lambda **options: evaluation_map(EVALUATION, CITY, **options),
+        partial(evaluation_map, EVALUATION, CITY),
         {"Expected errors", "Lines from true to estimated places"},
     ),
-    "localization": (
-        lambda **options: localization_map(LOCALIZATION, CITY, **options),
-        {"Candidates (5)"},
+    "localization": (partial(localization_map, LOCALIZATION, CITY), {"Candidates (5)"}),
+    "location": (
+        partial(location_map, LOCATION),
+        {"Best place", "Chance of a cell", "Candidates (5)"},
     ),
-    "location": (location, {"Best place", "Chance of a cell", "Candidates (5)"}),
     "ambiguity": (
-        lambda **options: ambiguity_map(CITY, **options),
+        partial(ambiguity_map, CITY),
         {"Same types", "Same types and angle levels", "Tell of a cell when clicked"},
     ),
     "identifiability": (
-        lambda **options: identifiability_map(TOLD, **options),
+        partial(identifiability_map, TOLD),
         {"Chance to be found", "Tell of a cell when clicked"},
     ),
     "drift": (
-        lambda **options: drift_map(CITY, CITY, **options),
+        partial(drift_map, CITY, CITY),
         {"Cells that are the same", "Tell of a cell when clicked"},
     ),
-    "objects": (lambda **options: objects_map(OBJECTS, **options), set()),
-    "ground": (lambda **options: ground_map(buildings=HOUSE, **options), {"Streets and buildings"}),
+    "objects": (partial(objects_map, OBJECTS), set()),
+    "ground": (partial(ground_map, buildings=HOUSE), {"Streets and buildings"}),
 }
 
 
@@ -119,33 +123,17 @@ def test_tiles_are_those_of_folium_and_of_a_new_map(name: str) -> None:
 @pytest.mark.parametrize(
     ("draw", "error", "words"),
     [
-        (lambda: evaluation_map(EVALUATION, CITY.select(slice(9))), InputError, "evaluat"),
-        (lambda: localization_map(LOCALIZATION, OTHER_CITY), InputError, "localization"),
-        (lambda: localization_map(LOCALIZATION, OTHER_SIGHT), InputError, "localization"),
-        (lambda: ambiguity_map(CITY.select(slice(0))), InputError, "no cells"),
-        (
-            lambda: ambiguity_map(CITY, identifiability=told_of(CITY.select(slice(1, None)))),
-            InputError,
-            "other cells",
-        ),
-        (
-            lambda: objects_map(dataclasses.replace(OBJECTS, table=OBJECTS.table.iloc[:0])),
-            EmptyResultError,
-            "no street object",
-        ),
+        (partial(evaluation_map, EVALUATION, CITY.select(slice(9))), InputError, "evaluat"),
+        (partial(localization_map, LOCALIZATION, OTHER_CITY), InputError, "localization"),
+        (partial(localization_map, LOCALIZATION, OTHER_SIGHT), InputError, "localization"),
+        (partial(ambiguity_map, CITY.select(slice(0))), InputError, "no cells"),
+        (partial(ambiguity_map, CITY, identifiability=OTHER_TOLD), InputError, "other cells"),
+        (partial(objects_map, NO_OBJECTS), EmptyResultError, "no street object"),
         (ground_map, EmptyResultError, "streets or buildings"),
-        (lambda: ground_map(buildings=NO_PLACE), EmptyResultError, "streets or buildings"),
-        (
-            lambda: ground_map(buildings=HOUSE, box=(0.0, 0.0, 1.0, 1.0)),
-            EmptyResultError,
-            "streets or buildings",
-        ),
-        (lambda: ground_map(buildings=HOUSE, streets=LANE), CrsError, "one CRS"),
-        (
-            lambda: ground_map(buildings=HOUSE, streets=LANE.set_crs(None, allow_override=True)),
-            CrsError,
-            "one CRS",
-        ),
+        (partial(ground_map, buildings=NO_PLACE), EmptyResultError, "streets or buildings"),
+        (partial(ground_map, buildings=HOUSE, box=FAR), EmptyResultError, "streets or buildings"),
+        (partial(ground_map, buildings=HOUSE, streets=LANE), CrsError, "one CRS"),
+        (partial(ground_map, buildings=HOUSE, streets=NOWHERE), CrsError, "one CRS"),
     ],
 )
 def test_what_cannot_be_drawn(
@@ -153,6 +141,13 @@ def test_what_cannot_be_drawn(
 ) -> None:
     with refused(error, words):
         draw()
+
+
+@pytest.mark.parametrize("file", BROWSER_FILES)
+def test_style_and_script_are_no_templates_themselves(file: str) -> None:
+    element = page_element(file)
+    assert Template(element).render() == element
+    assert element.count("</") == 1
 
 
 def test_hostile_data_is_shown_word_for_word_and_never_run(
