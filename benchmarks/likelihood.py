@@ -17,10 +17,10 @@ import numpy as np
 from benchmarks.comparison import Comparison, compare
 from semsig_gis.database.city import City
 from semsig_gis.database.file import save_database
+from semsig_gis.likelihood.association import rerank
 from semsig_gis.likelihood.index import build_index, open_index, save_index
 from semsig_gis.likelihood.locate import locate
 from semsig_gis.likelihood.noise.model import named_noise
-from semsig_gis.likelihood.rerank import rerank
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence

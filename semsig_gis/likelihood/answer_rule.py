@@ -132,7 +132,7 @@ def calibrate(
     confidence: float = 0.95,
     radius: float = 50.0,
 ) -> AnswerRule:
-    """Choose the threshold that answers most queries and is right often enough.
+    """Choose the threshold, perhaps infinite, that answers most queries and is right often enough.
 
     Parameters
     ----------
@@ -140,11 +140,6 @@ def calibrate(
         For each query the chance that the place is near the best one, and whether it was.
     precision, confidence, radius : float
         As of `AnswerRule`; the confidence is over queries like these.
-
-    Returns
-    -------
-    AnswerRule
-        The rule; its threshold is infinite where the queries do not prove any to be good enough.
 
     Raises
     ------
@@ -205,15 +200,7 @@ def calibrate(
 
 
 def save_rule(rule: AnswerRule, path: str | Path) -> None:
-    """Write a rule to a JSON file.
-
-    Parameters
-    ----------
-    rule : AnswerRule
-        The rule.
-    path : str or Path
-        File to write; it appears whole, by rename.
-    """
+    """Write a rule to a JSON file, which appears whole, by rename."""
     values = asdict(rule)
     if math.isinf(rule.threshold):
         values["threshold"] = None  # JSON has no infinity
@@ -222,22 +209,7 @@ def save_rule(rule: AnswerRule, path: str | Path) -> None:
 
 
 def open_rule(path: str | Path) -> AnswerRule:
-    """Read a rule from a JSON file.
-
-    Parameters
-    ----------
-    path : str or Path
-        File that `save_rule` wrote.
-
-    Returns
-    -------
-    AnswerRule
-        The rule.
-
-    Raises
-    ------
-    InputError
-        If the file cannot be read or does not hold a rule.
+    """Read a rule from a JSON file that `save_rule` wrote; raises `InputError` if it holds none.
 
     Examples
     --------

@@ -116,27 +116,13 @@ class LikelihoodIndex:
         return mean_table(*self.models)
 
     def scores(self, query: Signature, *, north_sigma: float = 0.0) -> CellScores:
-        """Return the log-likelihood of a query in every cell.
+        """Return the log-likelihood of a query in every cell, and the likeliest turn for each.
 
-        Parameters
-        ----------
-        query : Signature
-            At least one object. Types may be unknown, all or those of code 0; bearings
-            may be unknown, and then the order of the types plays no part.
-        north_sigma : float, default 0
-            Standard deviation in degrees of the north of the query: 0 where it is known,
-            infinite where it is not known at all. The likelihood is summed over the turns of the
-            query in steps of five degrees.
-
-        Returns
-        -------
-        CellScores
-            Log-likelihoods, and the likeliest turn for each cell.
-
-        Raises
-        ------
-        InputError
-            If the query is empty or has a class that no cell sees, or `north_sigma` is negative.
+        Types may be unknown, all or those of code 0; bearings may be unknown, and then the order of
+        the types plays no part. `north_sigma` is the standard deviation in degrees of the north of
+        the query, infinite where it is not known at all; the likelihood is summed over its turns in
+        steps of five degrees. Raises `InputError` if the query is empty or has a class that no cell
+        sees, or `north_sigma` is negative.
         """
         check_north(north_sigma)
         rows = self.table.query_rows(query)
@@ -248,11 +234,6 @@ def build_index(
         Called with the number of cells done and in all.
     threads : int, default 1
         How many blocks of cells are worked out at once.
-
-    Returns
-    -------
-    LikelihoodIndex
-        The index.
 
     Raises
     ------
@@ -384,23 +365,13 @@ def ready_index(
 
     Parameters
     ----------
-    database : SignatureDatabase
-        The cells.
-    noise : NoiseSpec or NoiseMixture
-        The noise model.
+    database, noise, progress, threads
+        As of `build_index`.
     path : str or Path
-        File of the index, such as `City.index_path` gives.
+        File of the index, such as `City.index_path` gives. It is mapped into memory; where it
+        cannot be written, the index is in memory only.
     note : callable, optional
         Called with a sentence where the index is built or cannot be saved.
-    progress : callable, optional
-        Called with the number of cells done and in all while it is built.
-    threads : int, default 1
-        How many blocks of cells are worked out at once.
-
-    Returns
-    -------
-    LikelihoodIndex
-        The index; mapped from the file, or in memory where no file can be written.
 
     Raises
     ------

@@ -27,12 +27,12 @@ from semsig_gis.database.answer import (
     check_top,
 )
 from semsig_gis.likelihood.answer_rule import DEFAULT_RULE
+from semsig_gis.likelihood.association import align_cells, rerank
 from semsig_gis.likelihood.explain import explain, explain_cell
 from semsig_gis.likelihood.index import CellScores
 from semsig_gis.likelihood.noise.model import cell_noise, place_noise
 from semsig_gis.likelihood.posterior import Posterior, posterior
 from semsig_gis.likelihood.refine import KEPT, Refinement, refine
-from semsig_gis.likelihood.rerank import align_cells, rerank
 from semsig_gis.likelihood.route import route_posteriors
 
 if TYPE_CHECKING:
@@ -177,15 +177,10 @@ class Location(Answer):
     def to_dict(self) -> dict[str, Any]:
         """Return everything but the chances of all cells as plain values that JSON can hold.
 
-        Returns
-        -------
-        dict
-            ``query``, ``noise``, ``cells``, ``answered``, ``place`` (what
-            `PlaceEstimate.to_dict` gives, its ``cell_id``, ``lon``, ``lat``, ``chance`` and
-            ``within_m``), ``threshold`` (None where nothing is answered), ``region`` (``share``,
-            ``cells``, ``km2``), ``entropy_bits``, ``crs``, ``licenses``, and ``candidates``, a
-            list with the columns of `candidates`, ``lon``, ``lat`` (degrees, WGS 84) and, of the
-            first ones, ``explanation``.
+        ``place`` is what `PlaceEstimate.to_dict` gives with its ``cell_id``, ``lon``, ``lat``,
+        ``chance`` and ``within_m``. ``threshold`` is None where nothing is answered. ``candidates``
+        lists the columns of `candidates`, ``lon``, ``lat`` (degrees, WGS 84) and, of the first
+        ones, ``explanation``.
         """
         lon, lat = self._to_degrees.transform(self.estimate.x, self.estimate.y)
         candidates = self._candidate_records()
@@ -431,11 +426,6 @@ def locate(index: LikelihoodIndex, query: Signature, **options: Unpack[LocateOpt
     explained : int, default 0
         How many candidates to explain; without a store, street objects have no identifiers.
 
-    Returns
-    -------
-    Location
-        The answer.
-
     Raises
     ------
     InputError
@@ -480,11 +470,6 @@ def locate_route(
         The ways between them, one fewer.
     log_prior : ndarray of float64, shape (n,), optional
         What else is known of the place of the first view.
-
-    Returns
-    -------
-    tuple of Location
-        One for each view.
 
     Raises
     ------

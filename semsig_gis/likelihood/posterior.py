@@ -48,23 +48,10 @@ class Posterior:
         return float(-(chances * np.log2(chances)).sum())
 
     def credible_cells(self, share: float = 0.9) -> NDArray[np.int64]:
-        """Return the fewest cells that hold a share of the chance.
+        """Return the row numbers of the fewest cells that hold a share of the chance.
 
-        Parameters
-        ----------
-        share : float, default 0.9
-            Above 0, at most 1.
-
-        Returns
-        -------
-        ndarray of int64
-            Row numbers in the database, likeliest first; equal chances in the order of the
-            database. Cells without any chance are never among them.
-
-        Raises
-        ------
-        InputError
-            If the share is out of range.
+        The share is above 0 and at most 1, or raises `InputError`. Likeliest first, equal chances
+        in the order of the database; cells without any chance are never among them.
         """
         if not 0 < share <= 1:
             msg = f"a region of a share of {share} was asked for; give a number above 0, at most 1."
@@ -81,24 +68,10 @@ class Posterior:
     def mass_within(
         self, radius: float, cells: NDArray[np.int64] | None = None
     ) -> NDArray[np.float64]:
-        """Return the chance that the place is at most so far from a cell.
+        """Return the chance that the place is at most `radius` metres from a cell, shape (c,).
 
-        Parameters
-        ----------
-        radius : float
-            Metres between viewpoints, 0 or more.
-        cells : ndarray of int, shape (c,), optional
-            Row numbers of the cells to be near to; all by default.
-
-        Returns
-        -------
-        ndarray of float64, shape (c,)
-            Sum of the chances of the cells in the circle, the cell itself among them.
-
-        Raises
-        ------
-        InputError
-            If the radius is negative or not finite.
+        It is the sum over the viewpoints in the circle, for some cells (row numbers) or all. A
+        radius that is negative or not finite raises `InputError`.
         """
         if not (math.isfinite(radius) and radius >= 0):
             msg = f"a radius of {radius} m was given; give metres, 0 or more."
@@ -120,20 +93,10 @@ class Posterior:
         return np.clip(total, 0.0, 1.0)
 
     def best_place(self, radius: float = 50.0) -> tuple[int, float]:
-        """Return the cell around which the place most probably lies.
+        """Return the cell around which the place most probably lies, and the chance that it does.
 
-        Parameters
-        ----------
-        radius : float, default 50
-            Metres that count as near.
-
-        Returns
-        -------
-        cell : int
-            Row number of the cell, one of the thousand likeliest, around which most of the
-            chance lies; of equals the likeliest.
-        mass : float
-            The chance that the place is within `radius` of it.
+        Of the thousand likeliest cells it is the one with most of the chance within `radius`
+        metres, of equals the likeliest.
         """
         count = min(PLACES, len(self.chances))
         cells = np.sort(np.argpartition(-self.chances, count - 1)[:count])

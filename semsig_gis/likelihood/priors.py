@@ -1,4 +1,4 @@
-"""What is known of the place before a query is looked at: log-priors by cell.
+"""What is known of the place before a query is looked at: log-priors by cell, shape (n,).
 
 A prior is one number a cell, the logarithm of a chance up to a constant; minus infinity excludes
 a cell. Priors that do not depend on each other are added.
@@ -31,7 +31,7 @@ def area_prior(
     crs: CRS | str | None = None,
     outside: float = 0.0,
 ) -> NDArray[np.float64]:
-    """Return the prior that the place lies in an area.
+    """Return the log-prior by cell that the place lies in an area, alike inside and outside.
 
     Parameters
     ----------
@@ -43,11 +43,6 @@ def area_prior(
         Coordinate reference system of the area; that of the database by default.
     outside : float, default 0
         Chance, 0 to below 1, that the place lies outside all the same.
-
-    Returns
-    -------
-    ndarray of float64, shape (n,)
-        Log-prior by cell; every cell inside is as likely as every other, and so outside.
 
     Raises
     ------
@@ -90,7 +85,7 @@ def area_prior(
 def position_prior(
     database: SignatureDatabase, position: tuple[float, float], *, sigma: float
 ) -> NDArray[np.float64]:
-    """Return the prior that the place is near a position, such as the last one known.
+    """Return the log-prior by cell that the place is near a position, as the last one known.
 
     Parameters
     ----------
@@ -100,11 +95,6 @@ def position_prior(
         x and y in the CRS of the database.
     sigma : float
         Standard deviation each way in metres, above 0.
-
-    Returns
-    -------
-    ndarray of float64, shape (n,)
-        Log-prior by cell.
 
     Raises
     ------
@@ -132,7 +122,7 @@ def position_prior(
 def raster_prior(
     database: SignatureDatabase, path: str | Path, *, band: int | None = None
 ) -> NDArray[np.float64]:
-    """Return the prior of a raster, such as how many people pass or how many photos were taken.
+    """Return the log-prior by cell of a raster, such as how many people pass or take photos.
 
     Parameters
     ----------
@@ -145,11 +135,6 @@ def raster_prior(
         as the least of the others that has any weight.
     band : int, optional
         Which band to read, from 1; needed only where there are several.
-
-    Returns
-    -------
-    ndarray of float64, shape (n,)
-        Log-prior by cell.
 
     Raises
     ------
@@ -199,7 +184,7 @@ def raster_prior(
 
 
 def weight_prior(database: SignatureDatabase, weights: ArrayLike) -> NDArray[np.float64]:
-    """Return the prior of a weight for each cell, such as how many people pass it.
+    """Return the log-prior of a weight for each cell, such as how many people pass it.
 
     Parameters
     ----------
@@ -207,11 +192,6 @@ def weight_prior(database: SignatureDatabase, weights: ArrayLike) -> NDArray[np.
         The cells.
     weights : array_like of float, shape (n,)
         Weights, 0 or more; 0 excludes a cell.
-
-    Returns
-    -------
-    ndarray of float64, shape (n,)
-        Log-prior by cell.
 
     Raises
     ------

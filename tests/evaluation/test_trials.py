@@ -19,10 +19,10 @@ from semsig_gis.evaluation.identify.trials import (
     try_cells,
     try_without_classes,
 )
+from semsig_gis.likelihood.association import rerank
 from semsig_gis.likelihood.index import build_index
 from semsig_gis.likelihood.noise.model import NoiseMixture, NoiseSpec, named_noise
 from semsig_gis.likelihood.posterior import posterior
-from semsig_gis.likelihood.rerank import rerank
 
 if TYPE_CHECKING:
     from semsig_gis.likelihood.noise.model import Noise

@@ -20,6 +20,7 @@ from semsig_gis.core.signature import Signature
 from semsig_gis.database.visibility import views_at, views_in
 from semsig_gis.likelihood.association import (
     Pairs,
+    align_cells,
     associate_pairs,
     near_pairs,
     pair_weights,
@@ -27,7 +28,6 @@ from semsig_gis.likelihood.association import (
     query_bearings,
 )
 from semsig_gis.likelihood.noise.table import database_tables
-from semsig_gis.likelihood.rerank import align_cells
 
 if TYPE_CHECKING:
     from semsig_gis.likelihood.noise.model import Noise, NoiseSpec

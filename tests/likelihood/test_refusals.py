@@ -15,6 +15,7 @@ from semsig_gis.core.errors import CrsError, InputError, UnknownNameError
 from semsig_gis.core.rtree import ObjectIndex
 from semsig_gis.core.signature import Signature
 from semsig_gis.likelihood.answer_rule import AnswerRule, calibrate
+from semsig_gis.likelihood.association import align_cells, rerank
 from semsig_gis.likelihood.explain import explain
 from semsig_gis.likelihood.index import CellScores, build_index
 from semsig_gis.likelihood.noise.learn import Sample, learn_noise
@@ -23,7 +24,6 @@ from semsig_gis.likelihood.noise.table import noise_tables
 from semsig_gis.likelihood.posterior import posterior
 from semsig_gis.likelihood.priors import area_prior, position_prior, weight_prior
 from semsig_gis.likelihood.refine import refine
-from semsig_gis.likelihood.rerank import align_cells, rerank
 from semsig_gis.likelihood.route import Leg, route_posteriors
 
 if TYPE_CHECKING:

@@ -11,9 +11,9 @@ import numpy as np
 
 from semsig_gis.core.signature import Signature
 from semsig_gis.evaluation.identify.lookalikes import city_extent
+from semsig_gis.likelihood.association import rerank
 from semsig_gis.likelihood.index import build_index
 from semsig_gis.likelihood.posterior import posterior
-from semsig_gis.likelihood.rerank import rerank
 from semsig_gis.queries.chain import ready_chain
 from semsig_gis.queries.distortions import Detector
 from semsig_gis.queries.sight import CitySights, Sight

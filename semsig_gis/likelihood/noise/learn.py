@@ -87,11 +87,6 @@ def read_samples(path: str | Path, *, taxonomy: Taxonomy) -> list[Sample]:
     taxonomy : Taxonomy
         Classes that the symbols belong to.
 
-    Returns
-    -------
-    list of Sample
-        One a row.
-
     Raises
     ------
     InputError
@@ -190,11 +185,6 @@ def learn_noise(
         Buildings, with street objects; what they hide is not seen.
     name : str, default "learned"
         Name of the model.
-
-    Returns
-    -------
-    NoiseEstimate
-        The model with intervals.
 
     Raises
     ------

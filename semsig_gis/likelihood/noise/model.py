@@ -231,18 +231,8 @@ def noise_from_dict(values: Mapping[str, Any]) -> Noise:
 def cell_noise(noise: Noise, step: float) -> Noise:
     """Return a noise model for queries from anywhere in a cell, not from its middle alone.
 
-    Parameters
-    ----------
-    noise : NoiseSpec or NoiseMixture
-        The model for a known place.
-    step : float
-        Side of the cells in metres.
-
-    Returns
-    -------
-    NoiseSpec or NoiseMixture
-        The model with ``step / 12 ** 0.5`` metres more of uncertainty of the place, each way, in
-        quadrature.
+    With cells of `step` metres, the place has ``step / 12 ** 0.5`` metres more of uncertainty, each
+    way, in quadrature.
 
     Examples
     --------
@@ -278,22 +268,12 @@ def place_noise(noise: Noise, step: float) -> Noise:
 
 
 def named_noise(name: str) -> Noise:
-    """Return a noise model by name.
+    """Return a noise model by name, or raise `UnknownNameError`.
 
     Parameters
     ----------
     name : {"light", "medium", "strong", "generic"}
         A level of the source's distortion, or ``"generic"`` where the level is not known.
-
-    Returns
-    -------
-    NoiseSpec or NoiseMixture
-        The model.
-
-    Raises
-    ------
-    UnknownNameError
-        If there is no such model.
 
     Examples
     --------
