@@ -130,14 +130,8 @@ class LikelihoodIndex:
             return CellScores(loglik=self._by_counts(rows))
         base = float(np.log(self.table.density[rows]).sum())
         bins = np.floor(query.bearings / BIN_DEGREES).astype(np.int64)
-        if north_sigma == 0:
-            return CellScores(loglik=self._as_seen(rows, bins, base))
-        return self._turned(rows, bins, base, north_sigma)
-
-    def _as_seen(
-        self, rows: NDArray[np.int64], bins: NDArray[np.int64], base: float
-    ) -> NDArray[np.float32]:
-        """Return the scores of a query whose north is known."""
+        if north_sigma > 0:
+            return self._turned(rows, bins, base, north_sigma)
         from semsig_gis.likelihood.kernels import scan  # noqa: PLC0415 - numba loads slowly
 
         flat = self.columns.reshape(-1, len(self.constants))
@@ -147,7 +141,7 @@ class LikelihoodIndex:
         for low in range(0, len(symbols), MOST_OBJECTS):
             scan(flat, symbols[low : low + MOST_OBJECTS], constants, base, self.step, scores)
             constants, base = scores, 0.0
-        return scores
+        return CellScores(loglik=scores)
 
     def _turned(
         self, rows: NDArray[np.int64], bins: NDArray[np.int64], base: float, north_sigma: float
@@ -365,13 +359,17 @@ def ready_index(
 
     Parameters
     ----------
-    database, noise, progress, threads
-        As of `build_index`.
+    database : SignatureDatabase
+        The cells.
+    noise : NoiseSpec or NoiseMixture
+        The noise model.
     path : str or Path
-        File of the index, such as `City.index_path` gives. It is mapped into memory; where it
+        File of the index, such as `City.index_path` gives, to be mapped into memory; where it
         cannot be written, the index is in memory only.
     note : callable, optional
         Called with a sentence where the index is built or cannot be saved.
+    progress, threads : callable, optional, and int, default 1
+        As of `build_index`.
 
     Raises
     ------

@@ -115,8 +115,7 @@ class Location(Answer):
     Parameters
     ----------
     query, cells, crs, taxonomy, licenses
-        What was searched for, how many cells were searched, and what their database says of its
-        CRS, classes and sources.
+        What was searched for, how many cells were searched, and what their database says.
     noise : str
         Name of the noise model.
     candidates : DataFrame
@@ -126,17 +125,13 @@ class Location(Answer):
         where north was not known for sure, ``heading`` (degrees to add to the bearings of the
         query).
     answer : Decision
-        The cell around which the chance is largest, that chance, and whether it is enough.
+        The cell around which the chance is largest, that chance, and whether the `rule` is met.
     estimate : PlaceEstimate
         The place around that cell and the heading, each with its uncertainty.
-    rule : AnswerRule
-        What the decision rests on.
     region : ndarray of int64
         Row numbers of the fewest cells that hold 90 % of the chance, likeliest first.
-    posterior : Posterior
-        The chance of every cell.
-    loglik : ndarray of float, shape (n,)
-        Natural logarithm of the likelihood of every cell.
+    posterior, loglik : Posterior, and ndarray of float, shape (n,)
+        Chance and natural logarithm of the likelihood of every cell.
     explanations : tuple of Explanation
         Of the first candidates, in their order: which detections are which street objects.
     """
@@ -406,25 +401,18 @@ def locate(index: LikelihoodIndex, query: Signature, **options: Unpack[LocateOpt
     Parameters
     ----------
     index : LikelihoodIndex
-        The cells and the noise model. For queries from anywhere, not from the middles of cells
-        alone, that is ``cell_noise(noise, step)`` (see `likelihood.noise.model`).
+        The cells and the noise model; for queries from anywhere, not from the middles of cells
+        alone, that is ``cell_noise(noise, step)``.
     query : Signature
         At least one object; types or bearings may be unknown.
-    north_sigma : float, default 0
-        Standard deviation in degrees of the north of the query; infinite if it is not known.
-    log_prior : ndarray of float64, shape (n,), optional
-        What else is known of the place (see `likelihood.priors`).
-    rule : AnswerRule, optional
-        When to answer; from a chance of 0.9 by default.
-    top : int, default 10
-        How many cells to list, at least 1.
-    store : ObjectStore, optional
-        The street objects behind the cells; what is refined or explained looks at them.
-    refined : bool, default False
-        Look for the place between the viewpoints, too, with the store; the chances of the cells
-        are then those of their parts together.
-    explained : int, default 0
-        How many candidates to explain; without a store, street objects have no identifiers.
+    **options : LocateOptions
+        ``north_sigma`` is the standard deviation in degrees of the north of the query, 0 by
+        default and infinite if it is not known; ``log_prior``, shape (n,), what else is known of
+        the place (see `likelihood.priors`). The ``rule`` says when to answer, from a chance of 0.9
+        by default, and ``top`` (10) how many cells to list. The ``store`` holds the street objects
+        behind the cells: with ``refined`` the place is looked for between the viewpoints, too, and
+        the chances of the cells are those of their parts together. ``explained`` (0) candidates
+        are explained; without a store, street objects have no identifiers.
 
     Raises
     ------
@@ -462,19 +450,14 @@ def locate_route(
 
     Parameters
     ----------
-    index, north_sigma, rule, top, store, refined, explained
-        As of `locate`, for each view.
+    index : LikelihoodIndex
+        As of `locate`.
     queries : sequence of Signature
         The views. One may have no objects: that nothing was detected tells something, too.
     legs : sequence of Leg
-        The ways between them, one fewer.
-    log_prior : ndarray of float64, shape (n,), optional
-        What else is known of the place of the first view.
-
-    Raises
-    ------
-    InputError
-        As `locate`, and if the numbers of views and legs do not fit.
+        The ways between them, one fewer; InputError if the numbers do not fit.
+    **options : LocateOptions
+        As of `locate`, for each view; ``log_prior`` is of the place of the first view.
 
     Examples
     --------
@@ -560,16 +543,23 @@ def cell_estimate(
     away = database.xy - database.xy[cell]
     inside = np.flatnonzero((np.hypot(away[:, 0], away[:, 1]) <= radius) & (chances > 0))
     inside = inside[np.argsort(-chances[inside], kind="stable")[:MOST_CELLS]]
-    headings = sigmas = np.zeros(len(inside))
+    headings = heading_sigmas = np.zeros(len(inside))
     turned = north_sigma > 0 and query.bearings is not None and len(query) > 0
     if turned:
-        headings, sigmas = _headings(database, query, noise, inside, north_sigma)
+        turns = np.arange(-180.0, 180.0, TURN)
+        each = np.broadcast_to(turns, (len(inside), len(turns)))
+        logs = align_cells(database, query, noise, inside, turns=each)
+        logs -= 0.5 * (turns / north_sigma) ** 2
+        shares = np.exp(logs - np.logaddexp.reduce(logs, axis=1)[:, None])
+        headings = np.degrees(np.angle(shares @ np.exp(1j * np.radians(turns))))
+        off = signed_degrees(turns - headings[:, None])
+        heading_sigmas = np.sqrt((shares * off**2).sum(axis=1) + TURN**2 / 12.0)
     parts = Refinement(
         places=database.xy[inside],
         sizes=np.full(len(inside), database.grid.step),
         loglik=np.zeros(len(inside)),
         headings=headings,
-        heading_sigmas=sigmas,
+        heading_sigmas=heading_sigmas,
         chances=chances[inside],
         near=math.inf,
     )
@@ -579,10 +569,9 @@ def cell_estimate(
 def refined_estimate(
     refinement: Refinement, xy: tuple[float, float], *, radius: float, turned: bool
 ) -> PlaceEstimate | None:
-    """Return the best place within `radius` metres of another, from the chances of parts of cells.
+    """Return the mean place within `radius` metres of another, around the best part of a cell.
 
-    It is the mean over what is near the best part, or None if no part is in the circle. `turned`
-    tells whether the heading was looked for, too.
+    It is None if no part is in the circle. `turned` tells whether the heading was looked for, too.
     """
     away = refinement.places - np.asarray(xy)
     inside = np.hypot(away[:, 0], away[:, 1]) <= radius
@@ -605,21 +594,3 @@ def _estimate(parts: Refinement, *, turned: bool, refined: bool) -> PlaceEstimat
     x, y = parts.xy
     heading = parts.heading if turned else None
     return PlaceEstimate(x=x, y=y, heading=heading, covariance=parts.covariance, refined=refined)
-
-
-def _headings(
-    database: SignatureDatabase,
-    query: Signature,
-    noise: Noise,
-    cells: NDArray[np.int64],
-    north_sigma: float,
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return the mean heading in each cell and its standard deviation, in degrees."""
-    turns = np.arange(-180.0, 180.0, TURN)
-    each = np.broadcast_to(turns, (len(cells), len(turns)))
-    logs = align_cells(database, query, noise, cells, turns=each)
-    logs -= 0.5 * (turns / north_sigma) ** 2
-    shares = np.exp(logs - np.logaddexp.reduce(logs, axis=1)[:, None])
-    means = np.degrees(np.angle(shares @ np.exp(1j * np.radians(turns))))
-    away = signed_degrees(turns - means[:, None])
-    return means, np.sqrt((shares * away**2).sum(axis=1) + TURN**2 / 12.0)

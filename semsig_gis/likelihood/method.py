@@ -76,6 +76,10 @@ class LikelihoodMethod:
             hint = nearest_name(noise, noises)
             msg = f"method {text!r} has a noise model that is not known{hint}; give one of {names}."
             raise UnknownNameError(msg)
+        misread = (
+            f"method {text!r} cannot be read; give 'likelihood:NOISE' and, if wanted, ':refined', "
+            "':on_grid', ':heading=10' (degrees) or ':heading=unknown'."
+        )
         refined, on_grid, north_sigma = False, False, 0.0
         for option in options:
             key, _, value = option.partition("=")
@@ -84,9 +88,12 @@ class LikelihoodMethod:
             elif option == "on_grid":
                 on_grid = True
             elif key == "heading" and value:
-                north_sigma = _north_sigma(value, text)
+                try:
+                    north_sigma = math.inf if value == "unknown" else float(value)
+                except ValueError as error:
+                    raise InputError(misread) from error
             else:
-                raise InputError(_misread_likelihood(text))
+                raise InputError(misread)
         return cls(noise=noises[noise], refined=refined, on_grid=on_grid, north_sigma=north_sigma)
 
     def __str__(self) -> str:
@@ -97,20 +104,3 @@ class LikelihoodMethod:
             known = math.isfinite(self.north_sigma)
             parts.append(f"heading={plain_number(self.north_sigma) if known else 'unknown'}")
         return ":".join(parts)
-
-
-def _north_sigma(value: str, text: str) -> float:
-    """Return the deviation of north that a method says."""
-    if value == "unknown":
-        return math.inf
-    try:
-        return float(value)
-    except ValueError as error:
-        raise InputError(_misread_likelihood(text)) from error
-
-
-def _misread_likelihood(text: str) -> str:
-    return (
-        f"method {text!r} cannot be read; give 'likelihood:NOISE' and, if wanted, ':refined', "
-        "':on_grid', ':heading=10' (degrees) or ':heading=unknown'."
-    )

@@ -62,14 +62,14 @@ class Refinement:
         """Chance that the place is within `near` of the best one."""
         return float(self.chances[self._inside].sum())
 
-    @property
+    @cached_property
     def xy(self) -> tuple[float, float]:
         """The mean place around the best one, in metres."""
         inside = self._inside
         x, y = np.average(self.places[inside], axis=0, weights=self.chances[inside]).tolist()
         return x, y
 
-    @property
+    @cached_property
     def heading(self) -> float:
         """Degrees to add to the bearings of the query there, in [-180, 180)."""
         angles = np.radians(self.headings[self._inside])

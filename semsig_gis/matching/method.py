@@ -22,12 +22,16 @@ TYPES, ANGLES, BOTH = "types", "angles", "types+angles"
 class Method:
     """How the cells are ranked: a single metric, metric fusion or two-stage fusion.
 
+    Fusion is ``alpha * D_types + (1 - alpha) * D_angles``. Two-stage fusion ranks by the types,
+    keeps the best `keep` percent and every cell that ties with the last of them, and ranks those by
+    the fusion; the rest follows in the order of the first stage (paper, section "Retrieval
+    schemes").
+
     Parameters
     ----------
-    types : str, optional
-        The measure for the type sequences (see `matching.metrics.METRICS`); None for none.
-    angles : str, optional
-        The measure for the sequences of angle levels; None for none.
+    types, angles : str, optional
+        The measures for the sequences of types and of angle levels (see
+        `matching.metrics.METRICS`); None for none.
     alpha : float
         Share of the types in a fusion, 0 to 1; the angles get the rest.
     keep : float, optional
@@ -44,13 +48,6 @@ class Method:
         If a value is out of range, or the parts do not fit together.
     UnknownNameError
         If there is no measure of that name.
-
-    Notes
-    -----
-    Fusion: ``alpha * D_types + (1 - alpha) * D_angles``. Two-stage fusion ranks by the types,
-    keeps the best `keep` percent and every cell that ties with the last of them, and ranks those
-    by the fusion; the rest follows in the order of the first stage (paper, section
-    "Retrieval schemes").
 
     Examples
     --------
@@ -98,6 +95,11 @@ class Method:
         measure of that name, and InputError if the text has another form or a value is out of
         range.
         """
+        misread = (
+            f"method {text!r} cannot be read; give two measures as 'edit+jaccard' (types, angles) "
+            "or one as 'types:edit' or 'angles:histogram', then, if wanted, ':5%' for two stages, "
+            "':alpha=0.7', ':raw' or ':weights=2/1/1'."
+        )
         head, *options = text.strip().split(":")
         types: str | None
         angles: str | None
@@ -107,12 +109,17 @@ class Method:
         elif head.count("+") == 1:
             types, angles = head.split("+")
         else:
-            raise InputError(_misread(text))
+            raise InputError(misread)
         values: dict[str, Any] = {}
         for option in options:
-            key, value = _parse_option(option, text)
+            try:
+                key, value = _parse_option(option)
+            except SemsigError:
+                raise
+            except (TypeError, ValueError) as error:
+                raise InputError(misread) from error
             if key in values:
-                raise InputError(_misread(text))
+                raise InputError(misread)
             values[key] = value
         return cls(types=types, angles=angles, **values)
 
@@ -161,29 +168,15 @@ DEFAULT_METHOD: Method = Method()
 """Metric fusion of two edit distances in equal shares."""
 
 
-def _parse_option(option: str, text: str) -> tuple[str, Any]:
+def _parse_option(option: str) -> tuple[str, Any]:
     """Return the field of a method that an option of its text sets, and the value."""
     key, _, value = option.partition("=")
-    try:
-        if option == "raw":
-            return "normalized", False
-        if option.endswith("%"):
-            return "keep", float(option[:-1])
-        if key == "alpha":
-            return "alpha", float(value)
-        if key == "weights":
-            return "weights", EditWeights(*(int(one) for one in value.split("/")))
-    except (TypeError, ValueError) as error:
-        if isinstance(error, SemsigError):
-            raise
-        raise InputError(_misread(text)) from error
-    raise InputError(_misread(text))
-
-
-def _misread(text: str) -> str:
-    """Return what to say of a method that cannot be read."""
-    return (
-        f"method {text!r} cannot be read; give two measures as 'edit+jaccard' (types, angles) or "
-        "one as 'types:edit' or 'angles:histogram', then, if wanted, ':5%' for two stages, "
-        "':alpha=0.7', ':raw' or ':weights=2/1/1'."
-    )
+    if option == "raw":
+        return "normalized", False
+    if option.endswith("%"):
+        return "keep", float(option[:-1])
+    if key == "alpha":
+        return "alpha", float(value)
+    if key == "weights":
+        return "weights", EditWeights(*(int(one) for one in value.split("/")))
+    raise ValueError(option)

@@ -47,8 +47,7 @@ class Localization(Answer):
     Parameters
     ----------
     query, cells, crs, taxonomy, licenses
-        What was searched for, how many cells were searched, and what their database says of its
-        CRS, classes and sources.
+        What was searched for, how many cells were searched, and what their database says.
     method : Method
         How the cells were ranked.
     used : str
@@ -72,14 +71,9 @@ class Localization(Answer):
         return rows_of_result(database, ids, types, what="localization")
 
     def to_dict(self) -> dict[str, Any]:
-        """Return everything as plain values that JSON can hold.
+        """Return everything as plain values that JSON can hold, candidates as a list of records.
 
-        Returns
-        -------
-        dict
-            ``query``, ``method``, ``used``, ``cells``, ``tied_beyond``, ``crs``, ``licenses``
-            and ``candidates``, a list with the columns of `candidates` and ``lon``, ``lat``
-            (degrees, WGS 84).
+        They have the columns of `candidates` and ``lon``, ``lat`` (degrees, WGS 84).
         """
         return {
             "query": self.query.to_dict(self.taxonomy),
@@ -213,7 +207,7 @@ def localize(
     requirement: Requirement | None = None,
     top: int = 100,
 ) -> Localization:
-    """Find the cells whose signature is most like a query.
+    """Find the cells whose signature is most like a query, with ties told.
 
     Parameters
     ----------
@@ -227,11 +221,6 @@ def localize(
         What a cell must see to be a candidate; nothing by default.
     top : int
         How many cells to list, at least 1.
-
-    Returns
-    -------
-    Localization
-        The best cells, with ties told.
 
     Raises
     ------

@@ -74,7 +74,7 @@ class Sample:
 
 
 def read_samples(path: str | Path, *, taxonomy: Taxonomy) -> list[Sample]:
-    r"""Read detections with their true places.
+    r"""Read detections with their true places, one sample a row.
 
     Parameters
     ----------
@@ -82,8 +82,7 @@ def read_samples(path: str | Path, *, taxonomy: Taxonomy) -> list[Sample]:
         A CSV file with the columns ``types`` (symbols such as ``DDB``), ``bearings`` (degrees,
         with blanks, commas or semicolons between them) and either ``x`` and ``y`` or
         ``cell_id``; or JSON lines with the same names (suffix ``.jsonl``, ``.ndjson`` or
-        ``.json``), where bearings may be a list. Other columns are left alone; a row without
-        detections is a sample too.
+        ``.json``), where bearings may be a list. A row without detections is a sample too.
     taxonomy : Taxonomy
         Classes that the symbols belong to.
 
@@ -96,7 +95,7 @@ def read_samples(path: str | Path, *, taxonomy: Taxonomy) -> list[Sample]:
     --------
     >>> import tempfile
     >>> from pathlib import Path
-    >>> from semsig_gis.sources.catalog import paper_taxonomy
+    >>> from semsig_gis import paper_taxonomy
     >>> with tempfile.TemporaryDirectory() as folder:
     ...     path = Path(folder, "seen.csv")
     ...     _ = path.write_text("x,y,types,bearings\n500000,5400000,DB,200 -10\n")
@@ -193,11 +192,9 @@ def learn_noise(
 
     Notes
     -----
-    A class with n samples and the rate r of its own is given
-    ``(n * r + 8 * overall) / (n + 8)``, that is, the overall rate counts for eight samples; the
-    squares of deviations likewise, and a row of the confusion is filled up with eight samples
-    that are misnamed as often as all are, each other class alike. See
-    `likelihood.noise.fit` for the intervals.
+    For a class, the overall rate counts for eight samples of its own; the squares of deviations
+    likewise, and in a row of the confusion eight samples are misnamed as often as all are, each
+    other class alike. See `likelihood.noise.fit` for the intervals.
     """
     if not (math.isfinite(position_sigma) and position_sigma >= 0):
         msg = f"the deviation of the places is {position_sigma} m; give metres, 0 or more."

@@ -34,13 +34,9 @@ class NoiseSpec:
     ----------
     detection : float, default 0.9
         Chance that an object in range is detected, 0 to 1.
-    detection_by_class : mapping of str to float, optional
-        The same for single classes, by the name of the class.
     misnamed : float, default 0.05
         Share of the detected objects that are given another class, each other class with equal
         chance; 0 to 1.
-    misnamed_by_class : mapping of str to float, optional
-        The same for single classes.
     confusion : mapping of str to mapping of str to float, optional
         For some or all classes the chance of each class that a detected object is given, the
         right one among them; each row sums to one. It goes before `misnamed`.
@@ -50,15 +46,15 @@ class NoiseSpec:
         Share of each class in the false objects; sums to one. Equal shares by default.
     bearing_sigma : float, default 5.0
         Standard deviation of a bearing in degrees, above 0 and up to 180.
-    bearing_sigma_by_class : mapping of str to float, optional
-        The same for single classes.
+    detection_by_class, misnamed_by_class, bearing_sigma_by_class : mapping of str to float
+        The same for single classes, by the name of the class; optional.
     position_sigma : float, default 0.0
         Standard deviation in metres of where in its cell the observer stands, each way; it turns
         the bearings of near objects more than those of far ones.
-    missed_each : float, default 0.0
-        Expected number of further objects that are missed in every signature, few or many.
-    misnamed_each : float, default 0.0
-        Expected number of further objects that are misnamed in every signature.
+    missed_each, misnamed_each : float, default 0.0
+        Expected number of further objects that are missed or misnamed in every signature, few or
+        many: an object among L survives m draws with chance ``(1 - 1/L) ** m`` (the source's
+        distortion, section 4.2).
     name : str, default "custom"
         Name to print.
 
@@ -66,12 +62,6 @@ class NoiseSpec:
     ------
     InputError
         If a number is out of its range or a row of shares does not sum to one.
-
-    Notes
-    -----
-    The two numbers `missed_each` and `misnamed_each` describe the source's distortion (section
-    4.2), which spoils a number of objects however long the signature is: an object among L
-    survives m draws with chance ``(1 - 1/L) ** m``.
 
     Examples
     --------
@@ -136,12 +126,13 @@ class NoiseSpec:
 class NoiseMixture:
     """Noise of which only is known that it follows one of several models.
 
+    The likelihood of a cell is the weighted sum over the models: the level is as unknown as the
+    place.
+
     Parameters
     ----------
-    specs : tuple of NoiseSpec
-        The models; at least one.
-    weights : tuple of float
-        Chance of each, above 0; they sum to one.
+    specs, weights : tuple of NoiseSpec, and tuple of float
+        The models, at least one, and the chance of each, above 0; chances sum to one.
     name : str, default "custom"
         Name to print.
 
@@ -149,11 +140,6 @@ class NoiseMixture:
     ------
     InputError
         If there is no model, or the weights do not fit.
-
-    Notes
-    -----
-    The likelihood is the weighted sum of the likelihoods, for every cell by itself: the level is
-    as unknown as the place.
 
     Examples
     --------
