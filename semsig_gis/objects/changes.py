@@ -182,17 +182,17 @@ def _by_class(
 def replace_layers(
     old: StreetObjects, new: StreetObjects
 ) -> tuple[StreetObjects, tuple[str, ...], tuple[str, ...]]:
-    """Replace the layers of a city that were loaded anew; the others stay.
+    """Return the objects of layers that were not loaded anew, then the new ones.
 
-    Return the objects of the other layers followed by the new ones, with the licences of both; the
-    names of the layers that stay; and notes for the user. A layer was loaded anew if a new object
-    comes from it or a new licence is about it, so that one that is empty now leaves no object
-    behind. A different CRS is a CrsError, and classes that do not fit are an InputError.
+    With them come the names of the layers that stay, and notes for the user. A layer was loaded
+    anew if a new object comes from it or a new licence is about it: it may be empty now. CrsError
+    for a different CRS, InputError for classes that do not fit.
     """
     if new.crs != old.crs:
+        own = old.crs.to_string()
         msg = (
-            f"the new objects are in {_crs_name(new)} and those of the database in "
-            f"{_crs_name(old)}; load the new ones with --metric-crs {_crs_name(old)}."
+            f"the new objects are in {new.crs.to_string()} and those of the database in {own}; "
+            f"load the new ones with --metric-crs {own}."
         )
         raise CrsError(msg)
     taxonomy = joined_taxonomy(old.taxonomy, new.taxonomy)
@@ -212,7 +212,13 @@ def replace_layers(
     licenses = join_licences([*staying, *new.licenses])
     objects = StreetObjects(table.astype({CLASS_CODE: np.uint8}), taxonomy, licenses)
     kept = tuple(sorted(remaining[SOURCE].unique()))
-    notes = [*_doubts(objects, len(remaining), renewed), *_unclear(new.licenses)]
+    notes = [*_doubts(objects, len(remaining), renewed)]
+    notes += [
+        f"the new objects do not say which layers {licence.terms!r} is about, so what a layer had "
+        "that is empty now stays; load them again"
+        for licence in new.licenses
+        if not licence.layers  # as in files of earlier versions
+    ]
     return objects, kept, tuple(notes)
 
 
@@ -244,10 +250,6 @@ def joined_taxonomy(old: Taxonomy, new: Taxonomy) -> Taxonomy:
         raise InputError(msg) from error
 
 
-def _crs_name(objects: StreetObjects) -> str:
-    return objects.crs.to_string()
-
-
 def _brief(item: ObjectClass) -> str:
     reach = "" if item.range_m is None else f", seen from {item.range_m:g} m"
     return f"{item.name!r} (symbol {item.symbol}{reach})"
@@ -272,13 +274,3 @@ def _doubts(objects: StreetObjects, kept: int, renewed: set[str]) -> Iterable[st
             f"{len(twice):,} new objects stand exactly where an object of a layer that stays does; "
             "load layers that overlap together"
         )
-
-
-def _unclear(licences: Iterable[Licence]) -> Iterable[str]:
-    """Yield which licences do not say what was loaded: those of files of earlier versions."""
-    for licence in licences:
-        if not licence.layers:
-            yield (
-                f"the new objects do not say which layers {licence.terms!r} is about, so what a "
-                "layer had that is empty now stays; load them again"
-            )

@@ -10,14 +10,7 @@ import numpy as np
 import pandas as pd
 import shapely
 
-from semsig_gis.core.crs import (
-    CLASS_CODE,
-    CLASS_NAME,
-    COUNT,
-    SOURCE,
-    SOURCE_ID,
-    require_metric_crs,
-)
+from semsig_gis.core.crs import CLASS_CODE, CLASS_NAME, COUNT, SOURCE, SOURCE_ID, require_metric_crs
 from semsig_gis.core.errors import CrsError, EmptyResultError
 from semsig_gis.objects.table import StreetObjects, layer_licences
 
@@ -38,10 +31,7 @@ BEYOND_EARTH_M = 1e8
 
 @dataclass(frozen=True, slots=True)
 class LayerReport:
-    """What became of the rows of one layer.
-
-    `notes` are warnings and the first messages about unreadable rows.
-    """
+    """What became of one layer's rows; `notes` are warnings and messages on unreadable rows."""
 
     name: str
     counts: RowCounts
@@ -63,10 +53,11 @@ def build_objects(
     collapse: bool = True,
     apart: Collection[str] = (),
 ) -> tuple[StreetObjects, LoadReport]:
-    """Turn raw layers into one table of street objects.
+    """Turn raw layers into one table of street objects, in their order, and report on every row.
 
     A geometry that is not a point is represented by its centroid (paper, section on semantic
-    signatures). Rows without a usable position are dropped and counted.
+    signatures). Rows without a usable position are dropped and counted. EmptyResultError if no
+    object remains.
 
     Parameters
     ----------
@@ -77,18 +68,10 @@ def build_objects(
     crs : pyproj.CRS or str
         Metric coordinate reference system to work in.
     collapse : bool, default True
-        Whether objects of one class at the same place (within the same centimetre) become one,
-        with their number in ``count``.
+        Whether objects of one class within the same centimetre become one, with their number in
+        ``count``.
     apart : collection of str
-        Classes that are collapsed within each layer only, because they will be conflated (see
-        `conflate`), which keeps account of where objects came from.
-
-    Returns
-    -------
-    objects : StreetObjects
-        The objects, in the order of the layers; EmptyResultError if there is none.
-    report : LoadReport
-        What became of every row.
+        Classes that are collapsed within each layer only, because `conflate` will merge them.
 
     Examples
     --------
@@ -101,18 +84,13 @@ def build_objects(
     system = require_metric_crs(crs)
     layers = tuple(layers)
     parts = [_positions(layer, taxonomy, system) for layer in layers]
-    columns = [SOURCE, SOURCE_ID, CLASS_CODE, "x", "y"]
-    everything = (
-        pd.concat([part for part, _, _ in parts], ignore_index=True)
-        if parts
-        else pd.DataFrame(columns=columns)
-    )
-    if everything.empty:
+    if not any(len(part) for part, _, _ in parts):
         msg = (
             f"no object remains of {sum(layer.counts.read for layer in layers)} rows in "
             f"{len(layers)} layers; look at the filters, the geometries and the coordinate systems."
         )
         raise EmptyResultError(msg)
+    everything = pd.concat([part for part, _, _ in parts], ignore_index=True)
     # By number, because two layers may bear one name.
     owner = np.repeat(np.arange(len(parts)), [len(part) for part, _, _ in parts])
     again = _same_id(everything, np.array([layer.spec.unique_id for layer in layers])[owner])

@@ -6,8 +6,8 @@ dealt with rows that stand twice in a source.
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass, replace
-from typing import TYPE_CHECKING, Any, NamedTuple
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 import pandas as pd
@@ -58,20 +58,18 @@ class ConflationReport:
         """Number of objects that were merged into others."""
         return sum(pair.count for pair in self.pairs)
 
-    def to_list(self) -> list[dict[str, Any]]:
-        """Return the entries as plain mappings, ready for JSON."""
-        return [asdict(pair) for pair in self.pairs]
-
 
 def conflate(
     objects: StreetObjects, radii: Mapping[str, float]
 ) -> tuple[StreetObjects, ConflationReport]:
-    """Merge objects that stand in several sources.
+    """Merge objects that stand in several sources, and report how many.
 
     Source after source is compared with what remains of those before it. Of all pairs of a
     remaining and a new object within the radius, the nearest is merged first, and each object takes
-    part once. Pairs of equal distance go by source, position and identifier, so that the order of
-    the rows in a source does not matter.
+    part once. The order of the rows in a source does not matter: equal distances go by source,
+    position and identifier. An object that others were merged into keeps its source and position;
+    its ``count`` is the sum of theirs, and its column ``merged`` lists them as ``"source:id;
+    source:id"``. The licences of all sources still hold.
 
     Parameters
     ----------
@@ -80,17 +78,7 @@ def conflate(
         earlier is trusted more. InputError if they were conflated before.
     radii : mapping of str to float
         Classes, and the metres (above 0, below 100) within which two objects of different sources
-        are the same. Other classes are left as they are. UnknownNameError if there is no such
-        class.
-
-    Returns
-    -------
-    objects : StreetObjects
-        The remaining objects in their order. An object that others were merged into keeps its
-        source and position, its ``count`` is the sum of theirs, and its column ``merged`` lists
-        them as ``"source:id; source:id"``. The licences of all sources still hold.
-    report : ConflationReport
-        How many were merged, a class and pair of sources.
+        are the same. UnknownNameError if there is no such class.
 
     Examples
     --------

@@ -34,19 +34,11 @@ ZONE_DEGREES = 6.0
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Loaded:
-    """What came of a load.
+    """What came of a load: objects, what became of every row, and what was merged between layers.
 
-    Parameters
-    ----------
-    objects : StreetObjects
-        The street objects.
-    report, conflation : LoadReport, ConflationReport
-        What became of every row, and what was merged between layers.
-    buildings, streets : GeoDataFrame, optional
-        Footprints (polygons) and centre lines in the CRS of the objects, where layers hold them;
-        of streets whose widths a layer knows, ``half_width`` in metres.
-    notes : tuple of str
-        Remarks for the user.
+    Where layers hold them, `buildings` are footprints (polygons) and `streets` centre lines, in the
+    CRS of the objects; of streets whose widths a layer knows, with ``half_width`` in metres.
+    `notes` are for the user.
     """
 
     objects: StreetObjects
@@ -65,16 +57,11 @@ def choose_layers(
     Parameters
     ----------
     catalog : Catalog
-        The catalogue.
+        Where they are described.
     names : sequence of str
         Layers by name; by default all that are not optional. UnknownNameError if there is none.
     surroundings : bool, default False
         Whether buildings and streets are wanted too.
-
-    Returns
-    -------
-    tuple of LayerSpec
-        The layers.
 
     Examples
     --------
@@ -100,28 +87,21 @@ def read_files(
     crs: str | None = None,
     progress: Callable[[int, int], None] | None = None,
 ) -> tuple[tuple[RawLayer, ...], tuple[LayerSpec, ...]]:
-    """Read layers from local files, each file once.
+    """Read layers from local files; return them in the order of `specs`, and those without a file.
 
     Parameters
     ----------
     specs : sequence of LayerSpec
         The layers to look for.
     paths : iterable of str or Path
-        Files, and folders that hold them. SourceError if one does not exist, matches no layer, or
-        cannot be read.
+        Files, and folders that hold them; each file is read once. SourceError if one does not
+        exist, matches no layer, or cannot be read.
     filters : bool, default True
         Whether the filters of the layers apply.
     crs : str, optional
         CRS of files that state none.
     progress : callable, optional
         Takes the number of files done and in all.
-
-    Returns
-    -------
-    layers : tuple of RawLayer
-        What was read, in the order of `specs`.
-    absent : tuple of LayerSpec
-        Layers that have no file among `paths`.
     """
     pairs, absent = find_files(specs, paths)
     by_file: dict[tuple[Path, str], list[LayerSpec]] = {}
@@ -155,15 +135,11 @@ def metric_crs_of(layers: Iterable[RawLayer]) -> tuple[CRS, tuple[str, ...]]:
         raise EmptyResultError(msg)
     everything = pd.concat(boxes)
     west, _, east, _ = everything.total_bounds
-    notes: tuple[str, ...] = ()
-    if east - west > ZONE_DEGREES:
-        notes = (
-            (
-                f"the data is {east - west:.1f} degrees wide, more than a UTM zone, so distances "
-                "far from its middle are off; give a metric CRS of the region"
-            ),
-        )
-    return everything.estimate_utm_crs(), notes
+    note = (
+        f"the data is {east - west:.1f} degrees wide, more than a UTM zone, so distances "
+        "far from its middle are off; give a metric CRS of the region"
+    )
+    return everything.estimate_utm_crs(), (note,) if east - west > ZONE_DEGREES else ()
 
 
 def assemble(
@@ -175,6 +151,8 @@ def assemble(
     merge: bool = True,
 ) -> Loaded:
     """Place raw layers in one metric CRS and merge what stands in several of them.
+
+    CrsError if the CRS is not metric or a layer has none, EmptyResultError if no object remains.
 
     Parameters
     ----------
@@ -188,12 +166,6 @@ def assemble(
         Whether objects of one class at the same place become one.
     merge : bool, default True
         Whether objects of different layers are merged by the catalogue's radii.
-
-    Returns
-    -------
-    Loaded
-        The objects and what became of every row. CrsError if the CRS is not metric or a layer has
-        none, EmptyResultError if no object remains.
 
     Examples
     --------

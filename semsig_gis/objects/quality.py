@@ -90,21 +90,9 @@ class QualityReport:
 def quality_report(
     objects: StreetObjects, load: LoadReport, conflation: ConflationReport | None = None
 ) -> QualityReport:
-    """Report on the quality of a load.
+    """Report on the quality of a load, by what `build_objects` and `conflate` say of it.
 
-    Parameters
-    ----------
-    objects : StreetObjects
-        What was loaded, after conflation if there was one.
-    load : LoadReport
-        What `build_objects` says of the layers.
-    conflation : ConflationReport, optional
-        What `conflate` says, if it was used.
-
-    Returns
-    -------
-    QualityReport
-        The report.
+    The objects are those after conflation, if there was one.
 
     Examples
     --------

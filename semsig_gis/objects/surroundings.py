@@ -35,13 +35,8 @@ DIMENSIONS: dict[GeometryKind, int] = {"line": 1, "polygon": 2}
 def save_surroundings(table: gpd.GeoDataFrame, path: str | Path) -> None:
     """Save buildings or streets as one GeoParquet file that can be read by box.
 
-    Parameters
-    ----------
-    table : GeoDataFrame
-        Features, each with a geometry; all columns and the `attrs` are kept. The file holds them in
-        a spatial order, with their bounds in the column ``bbox``.
-    path : str or Path
-        File to write; it appears whole, by rename.
+    Each feature has a geometry; all columns and the `attrs` are kept. The file holds them in a
+    spatial order, with their bounds in the column ``bbox``. It appears whole, by rename.
 
     Examples
     --------
@@ -74,7 +69,10 @@ def read_surroundings(
     crs: CRS | str,
     box: Sequence[float] | None = None,
 ) -> gpd.GeoDataFrame:
-    """Read the buildings or the streets of a city.
+    """Read the buildings or the streets of a city, one row a feature that has a geometry.
+
+    Of a ``.parquet`` file all columns are kept. ``attrs["licenses"]`` says whom to name, where that
+    is known.
 
     Parameters
     ----------
@@ -88,15 +86,9 @@ def read_surroundings(
         CRS to move it to. CrsError if nobody knows its own.
     box : sequence of float, optional
         ``xmin, ymin, xmax, ymax`` in the CRS of the file, which `save_surroundings` wrote: only
-        features whose bounds meet it.
-
-    Returns
-    -------
-    GeoDataFrame
-        One row a feature that has a geometry; in a box there may be none. Of a ``.parquet`` file
-        all columns are kept. ``attrs["licenses"]`` says whom to name for it, where that is known.
+        features whose bounds meet it, of which there may be none.
     """
-    return _read(Path(path), role, "polygon" if role == "buildings" else "line", crs, box)
+    return _read(Path(path), role, crs, box)
 
 
 def licenses_of(*tables: gpd.GeoDataFrame | None) -> tuple[str, ...]:
@@ -113,7 +105,7 @@ def read_area(path: str | Path, *, crs: CRS | str) -> shapely.Polygon | shapely.
 
     Errors are as of `read_surroundings`.
     """
-    area = join_areas(_read(Path(path), "area", "polygon", crs).geometry.to_numpy())
+    area = join_areas(_read(Path(path), "area", crs).geometry.to_numpy())
     if area is None:
         msg = f"{path} encloses no area; give a file of polygons."
         raise InputError(msg)
@@ -121,12 +113,9 @@ def read_area(path: str | Path, *, crs: CRS | str) -> shapely.Polygon | shapely.
 
 
 def _read(
-    path: Path,
-    role: str,
-    kind: GeometryKind,
-    crs: CRS | str,
-    box: Sequence[float] | None = None,
+    path: Path, role: str, crs: CRS | str, box: Sequence[float] | None = None
 ) -> gpd.GeoDataFrame:
+    kind: GeometryKind = "line" if role == "streets" else "polygon"
     if path.suffix.lower() == ".parquet":
         table = _read_parquet(path, kind, box)
     elif path.name.lower().endswith(OSM_SUFFIXES) and role != "area":

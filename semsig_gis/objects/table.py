@@ -13,14 +13,7 @@ import pyarrow.compute as pc
 import shapely
 
 from semsig_gis import __version__
-from semsig_gis.core.crs import (
-    CLASS_CODE,
-    COUNT,
-    GEOMETRY,
-    MERGED,
-    SOURCE,
-    SOURCE_ID,
-)
+from semsig_gis.core.crs import CLASS_CODE, COUNT, GEOMETRY, MERGED, SOURCE, SOURCE_ID
 from semsig_gis.core.errors import DatabaseError
 from semsig_gis.core.taxonomy import Taxonomy
 from semsig_gis.storage.geoparquet import (
@@ -88,9 +81,8 @@ class StreetObjects:
     ----------
     table : GeoDataFrame
         One row an object: ``class_code`` (uint8), ``source`` (layer name), ``source_id``,
-        ``count`` (rows of the sources that were collapsed into it) and ``geometry`` (point in a
-        metric CRS). After `conflate` also ``merged``: what other sources say of the same object, as
-        ``"source:id; source:id"``, or empty.
+        ``count`` (rows that were collapsed into it) and ``geometry`` (point in a metric CRS); after
+        `conflate` also ``merged``, the same object in other sources: ``"source:id; source:id"``.
     taxonomy : Taxonomy
         The classes that the codes belong to.
     licenses : tuple of Licence
@@ -138,16 +130,9 @@ class StreetObjects:
 def save_objects(objects: StreetObjects, path: str | Path, *, keep_order: bool = False) -> None:
     """Save street objects as one GeoParquet file that can be read by box.
 
-    Parameters
-    ----------
-    objects : StreetObjects
-        What to save.
-    path : str or Path
-        File to write; it appears whole, by rename.
-    keep_order : bool, default False
-        Whether the objects stay in their order, for whoever knows them by row number. Else the
-        file holds them in a spatial order, in groups of rows, of which a box is read faster; saving
-        that again does not change the order.
+    The file appears whole, by rename. It holds the objects in a spatial order, in groups of rows,
+    of which a box is read faster; with `keep_order` they stay in theirs, for whoever knows them by
+    row number.
 
     Examples
     --------
@@ -175,27 +160,21 @@ def save_objects(objects: StreetObjects, path: str | Path, *, keep_order: bool =
     geo = geo_metadata(objects.crs, geometry_types=["Point"], bounds=bounds)
     geo["columns"]["geometry"]["covering"] = COVERING
     write_geoparquet(
-        pa.table(columns),
-        path,
-        geo=geo,
-        group_rows=GROUP_ROWS,
-        specs=objects_specs(objects),
+        pa.table(columns), path, geo=geo, group_rows=GROUP_ROWS, specs=objects_specs(objects)
     )
 
 
 def objects_specs(objects: StreetObjects) -> dict[str, Any]:
-    """Return all but the table of street objects, as plain values for JSON."""
-    return {
+    """Return all but the table of street objects, as plain values for JSON.
+
+    The layers of licences are among them only where the lines of the licences do not tell.
+    """
+    specs: dict[str, Any] = {
         "kind": KIND,
         "version": __version__,
         "taxonomy": objects.taxonomy.to_list(),
-        **_licence_specs(objects),
+        "licenses": [str(licence) for licence in objects.licenses],
     }
-
-
-def _licence_specs(objects: StreetObjects) -> dict[str, Any]:
-    """Return the lines of the licences, and their layers where the lines do not tell."""
-    specs: dict[str, Any] = {"licenses": [str(licence) for licence in objects.licenses]}
     if _licences(specs, objects.table[SOURCE]) != objects.licenses:
         specs[LICENSE_LAYERS] = [list(licence.layers) for licence in objects.licenses]
     return specs
@@ -242,19 +221,10 @@ def _names_in(text: str, sources: Collection[str]) -> list[tuple[str, ...]]:
 
 
 def open_objects(path: str | Path, *, box: Sequence[float] | None = None) -> StreetObjects:
-    """Open a file that `save_objects` wrote, or a part of it.
+    """Open a file that `save_objects` wrote, or only the objects in a box or on its edge.
 
-    Parameters
-    ----------
-    path : str or Path
-        File to read. DatabaseError if it is missing, damaged, or holds something else.
-    box : sequence of float, optional
-        ``xmin, ymin, xmax, ymax`` in metres: only objects in it or on its edge.
-
-    Returns
-    -------
-    StreetObjects
-        The objects; there is at least one, but in a box there may be none.
+    The box is ``xmin, ymin, xmax, ymax`` in metres; there may be no object in it. DatabaseError if
+    the file is missing, damaged, or holds something else.
     """
     arrow, specs, crs = read_geoparquet(path, kind=KIND, box=box)
     if box is not None:

@@ -28,20 +28,9 @@ READERS = {
 
 # Files with another suffix (.dbf, .prj, a README) accompany data and are not opened on their own.
 FILE_SUFFIXES = frozenset(
-    {
-        ".bz2",
-        ".csv",
-        ".fgb",
-        ".geojson",
-        ".gpkg",
-        ".json",
-        ".osm",
-        ".parquet",
-        ".pbf",
-        ".shp",
-        ".zip",
-    }
-)
+    {".bz2", ".csv", ".fgb", ".geojson", ".gpkg", ".json",
+     ".osm", ".parquet", ".pbf", ".shp", ".zip"}
+)  # fmt: skip
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -73,22 +62,19 @@ class RowCounts:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class RawLayer:
-    """One layer as its reader found it.
+    """One layer as its reader found it, and what the catalogue says of it.
 
     Parameters
     ----------
-    spec : LayerSpec
-        What the catalogue says of the layer.
     table : GeoDataFrame
         One row a feature: ``class_name``, ``source_id`` and ``geometry`` (of any type, empty, or
         None), in the CRS of the source; ``half_width`` (metres from the centre line, or NaN)
         where the catalogue says something about the widths of streets.
     counts : RowCounts
         Features in the source, and those that are not in the table; ``counts.kept == len(table)``.
-    errors : tuple of str
-        What was wrong with features that could not be read, the first ten of them.
-    notes : tuple of str
-        Where the source differs from what the catalogue expects of it.
+    errors, notes : tuple of str
+        What was wrong with the first ten features that could not be read, and where the source
+        differs from what the catalogue expects.
     """
 
     spec: LayerSpec
@@ -132,10 +118,21 @@ def reader(name: str) -> Reader:
     raise UnknownNameError(msg)
 
 
+def require_file(path: Path, kind: str) -> None:
+    """Refuse a path that is not a file, with a SourceError that says which kind is needed."""
+    if not path.is_file():
+        what = "is a folder" if path.is_dir() else "does not exist"
+        msg = f"{path} {what}; give {kind}."
+        raise SourceError(msg)
+
+
 def find_files(
     specs: Iterable[LayerSpec], paths: Iterable[str | Path]
 ) -> tuple[tuple[tuple[LayerSpec, Path], ...], tuple[LayerSpec, ...]]:
-    """Pair the layers of a catalogue with the files that hold them.
+    """Pair layers with the files that hold them, in their order; return also those without a file.
+
+    SourceError if a path does not exist or matches no layer, or several files match a layer whose
+    ids are not unique.
 
     Parameters
     ----------
@@ -145,14 +142,6 @@ def find_files(
         Files, and folders to look in (not in the folders below them). A file given by itself goes
         before one found in a folder. Of a folder's files, a layer takes those that match the
         first of its patterns that any matches.
-
-    Returns
-    -------
-    pairs : tuple of (LayerSpec, Path)
-        Layers and their files, in the order of `specs`. One file may hold several layers.
-    missing : tuple of LayerSpec
-        Layers that no file matches. SourceError if a path does not exist or matches no layer, or
-        several files match a layer whose ids are not unique.
 
     Examples
     --------

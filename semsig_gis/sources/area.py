@@ -118,9 +118,7 @@ def _outline(path: Path) -> Area:
     return Area(polygon, path.stem)
 
 
-def join_areas(
-    geometry: NDArray[np.object_],
-) -> shapely.Polygon | shapely.MultiPolygon | None:
+def join_areas(geometry: NDArray[np.object_]) -> shapely.Polygon | shapely.MultiPolygon | None:
     """Return the union of what geometries enclose, in valid form; None where that is nothing."""
     parts = shapely.get_parts(shapely.make_valid(geometry))
     polygons = shapely.get_parts(parts[shapely.get_dimensions(parts) == 2])  # noqa: PLR2004

@@ -29,10 +29,7 @@ MAX_WIDTH_M = 200.0
 
 @dataclass(frozen=True, slots=True)
 class ClassBy:
-    """A field whose value decides the class of a row.
-
-    A row with a value that is not among `classes` keeps the class of its layer.
-    """
+    """A field whose value decides the class of a row; for others, the layer's class holds."""
 
     field: str
     classes: tuple[tuple[Value, str], ...]
@@ -70,16 +67,12 @@ class LayerSpec:
     width_by, width_field : WidthBy, str, optional
         Of streets: the field that says how wide they are by its class of street, and the one that
         holds their width in metres, which goes first.
-    id_field : str, optional
-        Field that identifies a row in its source; else the feature's number.
-    unique_id : bool
-        Whether rows of the same id are the same object, also across several files.
-    geometry : {"point", "line", "polygon"}
-        Geometry that is expected.
-    crs : str, optional
-        Coordinate reference system that is expected; it is used where the file states none.
-    rows : tuple of (int, int), optional
-        Least and largest number of rows that are plausible.
+    id_field, unique_id : str, bool, optional
+        Field that identifies a row in its source (else the feature's number does), and whether rows
+        of the same id are the same object, also across several files.
+    geometry, crs, rows : {"point", "line", "polygon"}, str, tuple of (int, int), optional
+        What is expected: geometry, CRS (used where the file states none), and the least and largest
+        number of rows.
     x_field, y_field : str, optional
         Coordinate columns of a CSV file.
     aliases : tuple of (str, tuple of str)
@@ -87,20 +80,14 @@ class LayerSpec:
     dataset, server_where, select : str, str, tuple of str, optional
         Name of the dataset on its portal, filter in the portal's own language, and fields to ask
         for.
-    tags : tuple of tuple of (str, tuple of str)
-        OpenStreetMap tags: alternatives, each of keys and accepted values that must all hold;
-        the value ``"*"`` accepts every value but ``"no"``.
-    elements : tuple of {"node", "way", "relation"}
-        OpenStreetMap elements that count.
+    tags, elements : tuple of tuple of (str, tuple of str), tuple of {"node", "way", "relation"}
+        OpenStreetMap elements that count, and their tags: alternatives, each of keys and accepted
+        values that must all hold; the value ``"*"`` accepts every value but ``"no"``.
     role : {"objects", "buildings", "streets"}
-        What the layer is for: street objects, footprints that hide them, or centre lines of
-        streets. Only street objects have a class.
-    optional : bool
-        Whether the layer is read only when it is named.
-    reader : str
-        Reader of `sources` for its file.
-    note : str
-        Remark for people, such as how sure a dataset name is.
+        Street objects, footprints that hide them, or centre lines. Only objects have a class.
+    optional, reader, note : bool, str, str
+        Whether the layer is read only when it is named, the reader of its file, and a remark for
+        people.
     license, attribution : str
         Licence of the data and the line that its publisher asks for.
     """

@@ -164,13 +164,7 @@ class Rows:
 
 
 def raw_layer(
-    rows: Rows,
-    rules: RowRules,
-    crs: CRS,
-    *,
-    by_file: bool,
-    where: str,
-    notes: tuple[str, ...] = (),
+    rows: Rows, rules: RowRules, crs: CRS, *, by_file: bool, where: str, notes: tuple[str, ...] = ()
 ) -> RawLayer:
     """Filter and classify the rows, build their geometries and check these against the CRS.
 

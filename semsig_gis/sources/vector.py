@@ -21,6 +21,7 @@ import shapely
 import shapely.geometry
 
 from semsig_gis.core.errors import CatalogError, SourceError, UnknownNameError, nearest_name
+from semsig_gis.sources import require_file
 from semsig_gis.sources.raw_layer import (
     WGS84,
     BadFeatureError,
@@ -109,10 +110,7 @@ def members(path: Path) -> tuple[Member, ...]:
     SourceError if it is missing, of another kind, or a damaged or useless archive.
     """
     suffix = path.suffix.lower()
-    if not path.is_file():
-        what = "is a folder" if path.is_dir() else "does not exist"
-        msg = f"{path} {what}; give a vector file."
-        raise SourceError(msg)
+    require_file(path, "a vector file")
     suffixes = {*DRIVERS, ".zip"}
     if suffix not in suffixes:
         msg = f"{path} is not a vector file; give one of {', '.join(sorted(suffixes))}."
@@ -259,14 +257,6 @@ def listening() -> Iterator[list[logging.LogRecord]]:
         _heard.reset(token)
 
 
-def first_error(heard: list[logging.LogRecord]) -> str:
-    """Return the first message that is an error, or an empty string."""
-    for record in heard:
-        if record.levelno >= logging.ERROR:
-            return record.getMessage().rstrip(".")
-    return ""
-
-
 NO_GEOMETRY = "None"
 CONTAINER = "GPKG"  # the one driver whose files hold several layers
 HEADER_BYTES = 65_536  # enough for the first line of a CSV file
@@ -304,33 +294,21 @@ def read_layer(
     Features are streamed. One that cannot be read is counted and reported, and the rest are read.
     The file's own CRS holds; what `spec` and `crs` say is for a file without one. GeoJSON without a
     ``crs`` member counts as such: it is WGS 84 only if nothing else is said and the coordinates
-    fit.
+    fit. The features stay in the CRS of the file.
 
     Parameters
     ----------
     path : str or Path
-        A shapefile, GeoJSON, GeoPackage, FlatGeobuf or CSV file, or an archive of such.
+        A shapefile, GeoJSON, GeoPackage, FlatGeobuf or CSV file, or an archive of such. SourceError
+        if it is missing, damaged or of another kind, or has several layers and `spec` names none.
     spec : LayerSpec
-        Which layer and rows are wanted, and what they are.
+        Which layer and rows are wanted, and what they are. UnknownNameError or CatalogError if the
+        file lacks the layer, or a field, that it names.
     filters : bool, default True
         Whether the specification's ``where`` holds.
     crs : str, optional
-        CRS of a file that states none; it goes before the specification's.
-
-    Returns
-    -------
-    RawLayer
-        The features in the CRS of the file, and notes where the file is not as expected.
-
-    Raises
-    ------
-    SourceError
-        If the file is missing, damaged or of another kind, or has several layers and `spec` names
-        none.
-    UnknownNameError, CatalogError
-        If the file does not have the layer, or a field, that `spec` names.
-    CrsError
-        If nobody states the CRS, or it is in degrees and most coordinates cannot be.
+        CRS of a file that states none; it goes before the specification's. CrsError if nobody
+        states it, or it is in degrees and most coordinates cannot be.
 
     Examples
     --------
@@ -365,11 +343,7 @@ def read_layer(
 
 
 def read_layers(
-    path: str | Path,
-    specs: Iterable[LayerSpec],
-    *,
-    filters: bool = True,
-    crs: str | None = None,
+    path: str | Path, specs: Iterable[LayerSpec], *, filters: bool = True, crs: str | None = None
 ) -> tuple[RawLayer, ...]:
     """Read several layers of one file, as `read_layer` reads one."""
     return tuple(read_layer(path, spec, filters=filters, crs=crs) for spec in specs)
@@ -551,7 +525,8 @@ def _read_rows(
             continue
         failures = 0
         if by_row and not damage:
-            damage = first_error(heard[said:])
+            errors = (record for record in heard[said:] if record.levelno >= logging.ERROR)
+            damage = next((record.getMessage().rstrip(".") for record in errors), "")
         if feature is None:
             break
         rows.read += 1

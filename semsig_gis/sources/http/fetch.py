@@ -292,15 +292,12 @@ def fetch(
 ) -> Fetched:
     """Fetch a file into the cache, or find it there; with `data`, post a form.
 
-    `accept` are the content types that may come, all by default; `suffix` is that of the file in
-    the cache. The cache knows the request by `identity` instead of the
-    address where services mirror one another. `check` takes the path of what was sent and raises
-    SourceError if it is not to be kept; `before` is called before each request; `progress` takes
-    the bytes that have arrived and those there are, 0 where nobody knows.
-
-    A cached copy is confirmed by a conditional request where the server gave an ETag or a date;
-    else it is taken as it is for ``spec.fresh_s``. A connection that is cut goes on where it was
-    cut (RFC 9110, If-Range), also in a later run, if the server can do that.
+    `accept` are the content types that may come, all by default. The cache knows the request by
+    `identity` instead of the address where services mirror one another. `check` raises SourceError
+    for a file that is not to be kept; `progress` takes the bytes that have arrived and those there
+    are, 0 where nobody knows. A cached copy is confirmed by a conditional request where the server
+    gave an ETag or a date; else it is taken as it is for ``spec.fresh_s``. A connection that is cut
+    goes on where it was cut (RFC 9110, If-Range), also in a later run, if the server can do that.
 
     HttpError if the server refuses or fails until the attempts are used up; TooLargeError above
     ``spec.max_bytes``; NotCachedError if offline without a sound copy; SourceError if something

@@ -195,11 +195,7 @@ GEOJSON = ("application/geo+json", "application/vnd.geo+json", "application/json
 
 
 def read_layers(
-    path: str | Path,
-    specs: Sequence[LayerSpec],
-    *,
-    filters: bool = True,
-    crs: str | None = None,
+    path: str | Path, specs: Sequence[LayerSpec], *, filters: bool = True, crs: str | None = None
 ) -> tuple[RawLayer, ...]:
     """Read layers, in one pass, from a file that a portal exports, as it is.
 

@@ -14,6 +14,7 @@ from pyproj import CRS
 from pyproj.exceptions import CRSError
 
 from semsig_gis.core.errors import CrsError, SourceError
+from semsig_gis.sources import require_file
 from semsig_gis.sources.raw_layer import WGS84
 
 if TYPE_CHECKING:
@@ -57,10 +58,7 @@ class Table:
 
 def open_table(path: Path) -> Table:
     """Open a file by what is in it, whatever its name; SourceError if it cannot be used."""
-    if not path.is_file():
-        what = "is a folder" if path.is_dir() else "does not exist"
-        msg = f"{path} {what}; give a file that a portal exports."
-        raise SourceError(msg)
+    require_file(path, "a file that a portal exports")
     with path.open("rb") as stream:
         begin = stream.read(256).removeprefix(b"\xef\xbb\xbf").lstrip()
     if begin.startswith(b"PAR1"):
@@ -72,9 +70,6 @@ def open_table(path: Path) -> Table:
         msg = f"{path} {what}; give a JSON, GeoJSON, CSV or Parquet file that a portal exports."
         raise SourceError(msg)
     return _csv(path)
-
-
-# --- JSON -------------------------------------------------------------------------------------
 
 
 def _json(path: Path) -> Table:
@@ -149,9 +144,6 @@ def _stated_crs(definition: object, path: Path) -> CRS:
     return WGS84 if system.equals(WGS84, ignore_axis_order=True) else system
 
 
-# --- CSV --------------------------------------------------------------------------------------
-
-
 def _csv(path: Path) -> Table:
     try:
         with path.open(encoding="utf-8-sig", newline="") as stream:
@@ -193,9 +185,6 @@ def _csv_records(path: Path, separator: str, fields: tuple[str, ...]) -> Records
 
 def _not_utf8(path: Path) -> SourceError:
     return SourceError(f"{path} is not UTF-8 text; save it as UTF-8.")
-
-
-# --- Parquet ----------------------------------------------------------------------------------
 
 
 def _parquet(path: Path) -> Table:

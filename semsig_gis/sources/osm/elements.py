@@ -131,6 +131,14 @@ def has_shape(kind: ElementKind, tags: Mapping[str, str], spec: LayerSpec) -> bo
     return spec.role != "streets" or tags.get("area", "no") == "no"
 
 
+def require_tags(spec: LayerSpec) -> tuple[tuple[tuple[str, tuple[str, ...]], ...], ...]:
+    """Return the tags of a layer; CatalogError if it says none."""
+    if not spec.tags:
+        msg = f'layer {spec.name!r} has no tags; write tags = [{{ key = "value" }}].'
+        raise CatalogError(msg)
+    return spec.tags
+
+
 class TagIndex:
     """The layers of a catalogue by tag, to find those of an element without trying each.
 
@@ -141,10 +149,7 @@ class TagIndex:
         self._specs = specs
         self._by_tag: dict[tuple[str, str], set[int]] = {}
         for number, spec in enumerate(specs):
-            if not spec.tags:
-                msg = f'layer {spec.name!r} has no tags; write tags = [{{ key = "value" }}].'
-                raise CatalogError(msg)
-            for alternative in spec.tags:
+            for alternative in require_tags(spec):
                 # An element that lacks the first of the tags need not be looked at.
                 key, accepted = alternative[0]
                 for value in accepted:

@@ -14,6 +14,7 @@ from osmium.filter import KeyFilter
 from osmium.osm import NODE, RELATION, WAY, Node, Relation, Way
 
 from semsig_gis.core.errors import CatalogError, SourceError
+from semsig_gis.sources import require_file
 from semsig_gis.sources.osm.elements import ElementLayer, TagIndex, relation_shape, way_shape
 from semsig_gis.sources.raw_layer import BadFeatureError
 
@@ -42,16 +43,12 @@ class _Outline(NamedTuple):
     row: int  # of the layer
     name: str
     outer: tuple[int, ...]  # ways; of a way, itself
-    inner: tuple[int, ...] = ()
-    is_way: bool = True
+    inner: tuple[int, ...]
+    is_way: bool
 
 
 def read_layers(
-    path: str | Path,
-    specs: Sequence[LayerSpec],
-    *,
-    filters: bool = True,
-    crs: str | None = None,
+    path: str | Path, specs: Sequence[LayerSpec], *, filters: bool = True, crs: str | None = None
 ) -> tuple[RawLayer, ...]:
     """Read layers of a ``.osm``, ``.osm.pbf`` or ``.osm.bz2`` file, one for each of `specs`.
 
@@ -84,15 +81,9 @@ def read_layers(
     return tuple(layer.raw(crs) for layer in layers)
 
 
-# --- The file ---------------------------------------------------------------------------------
-
-
 def _file(path: Path) -> osmium.io.File:
     """Return a file, once it is seen to exist and to be of a known kind."""
-    if not path.is_file():
-        what = "is a folder" if path.is_dir() else "does not exist"
-        msg = f"{path} {what}; give an OpenStreetMap file."
-        raise SourceError(msg)
+    require_file(path, "an OpenStreetMap file")
     name = path.name.lower()
     kind = next((kind for suffix, kind in FORMATS.items() if name.endswith(suffix)), None)
     if kind is None:
@@ -117,9 +108,6 @@ def _plainly(path: Path) -> Iterator[None]:
             "it is damaged or not the kind of file that its name says, get it again."
         )
         raise SourceError(msg) from error
-
-
-# --- Reading ----------------------------------------------------------------------------------
 
 
 def _scan(file: osmium.io.File, layers: Sequence[ElementLayer], index: TagIndex) -> list[_Outline]:

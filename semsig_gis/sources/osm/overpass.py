@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import shapely
 
-from semsig_gis.core.errors import CatalogError, InputError, SourceError
+from semsig_gis.core.errors import InputError, SourceError
 from semsig_gis.sources.area import Area, join_areas
 from semsig_gis.sources.http.fetch import (
     DEFAULT_HTTP,
@@ -27,7 +27,13 @@ from semsig_gis.sources.http.fetch import (
     read_text,
 )
 from semsig_gis.sources.layers import ANY_VALUE
-from semsig_gis.sources.osm.elements import ElementLayer, TagIndex, relation_shape, way_shape
+from semsig_gis.sources.osm.elements import (
+    ElementLayer,
+    TagIndex,
+    relation_shape,
+    require_tags,
+    way_shape,
+)
 from semsig_gis.sources.raw_layer import BadFeatureError
 
 if TYPE_CHECKING:
@@ -218,16 +224,13 @@ def find_place(name: str, *, endpoint: str, cache: Cache, spec: HttpSpec = DEFAU
         raise InputError(msg)
     host = host_of(endpoint)
 
-    def check(path: Path) -> None:
-        _places(path, host)
-
     fetched = fetch(
         f"{endpoint.rstrip('/')}/search",
         params={"q": name, "format": "jsonv2", "polygon_geojson": 1, "limit": 10},
         cache=cache,
         spec=spec,
         accept=JSON,
-        check=check,
+        check=lambda path: _places(path, host),
     )
     places = _places(fetched.path, host)
     for place in places:
@@ -280,10 +283,7 @@ def overpass_query(
 
 
 def _statements(spec: LayerSpec) -> Iterator[str]:
-    if not spec.tags:
-        msg = f'layer {spec.name!r} has no tags; write tags = [{{ key = "value" }}].'
-        raise CatalogError(msg)
-    for alternative in spec.tags:
+    for alternative in require_tags(spec):
         filters = "".join(_filter(key, values) for key, values in alternative)
         for kind in spec.elements:
             # of the relations, readers take multipolygons only
@@ -303,9 +303,6 @@ def _filter(key: str, values: tuple[str, ...]) -> str:
 def _quoted(text: str) -> str:
     escaped = text.replace("\\", "\\\\").replace('"', '\\"').replace("\n", "\\n")
     return f'"{escaped}"'
-
-
-# --- Tiles --------------------------------------------------------------------------------------
 
 
 @dataclass(frozen=True, slots=True)
@@ -350,7 +347,8 @@ def fetch_layers(
         raise InputError(msg)
     if not specs:
         return []
-    servers = _Servers([_base(address) for address in endpoints], cache, spec)
+    addresses = [address.rstrip("/").removesuffix("/interpreter") for address in endpoints]
+    servers = _Servers(addresses, cache, spec)
     shapely.prepare(area.polygon)
     west, south, east, north = area.bounds
     columns, rows = (math.ceil(side / tile_deg - 1e-9) for side in (east - west, north - south))
@@ -409,7 +407,11 @@ class _Servers:
             document = load_document(path, where=str(path))
             if not document.exhausted:
                 return path
-            failures = [_too_much(address, document.remark)]
+            msg = (
+                f"{host_of(address)} cannot answer even for the smallest tile ({document.remark}); "
+                "ask for fewer layers or try again later."
+            )
+            failures = [TooLargeError(msg)]
             break
         if not last and any(_may_be_size(failure) for failure in failures):
             return None
@@ -467,19 +469,8 @@ def waiting_time(status: str) -> float:
     return max(0.0, min(map(float, later), default=0.0))
 
 
-def _too_much(address: str, remark: str) -> SourceError:
-    return TooLargeError(
-        f"{host_of(address)} cannot answer even for the smallest tile ({remark}); "
-        "ask for fewer layers or try again later."
-    )
-
-
 def _may_be_size(failure: SourceError) -> bool:
     # Offline, the parts of a tile that was split are there, and the tile may not be.
     return isinstance(failure, TooLargeError | NotCachedError) or (
         isinstance(failure, HttpError) and failure.status == TOO_SLOW
     )
-
-
-def _base(address: str) -> str:
-    return address.rstrip("/").removesuffix("/interpreter")

@@ -19,8 +19,7 @@ from semsig_gis.core.crs import CLASS_NAME, SOURCE_ID
 from semsig_gis.core.errors import InputError
 from semsig_gis.sources import RawLayer, RowCounts
 from semsig_gis.sources.layers import LayerSpec
-from semsig_gis.sources.synthetic.furniture import CLASSES, furnish
-from semsig_gis.sources.synthetic.streets import lay_streets
+from semsig_gis.sources.synthetic.streets import CLASSES, furnish, lay_streets
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -110,16 +109,10 @@ SURROUNDINGS: dict[str, tuple[Role, GeometryKind]] = {
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CitySpec:
-    """Size, place and seed of a synthetic city; InputError if a value is out of its range.
+    """Side of a square synthetic city in metres, its seed, and its middle in metres of EPSG:32631.
 
-    Parameters
-    ----------
-    size : float, default 2000
-        Side of the square city in metres, 100 to 20,000.
-    seed : int, default 0
-        Seed of the random numbers; the same specification gives the same city.
-    centre : tuple of (float, float), default (500000, 5400000)
-        Middle of the city in metres of EPSG:32631.
+    The same specification gives the same city. InputError for a size that is not from 100 to
+    20,000, a negative seed, or a middle that is not finite.
     """
 
     size: float = 2000.0
@@ -144,23 +137,13 @@ PARIS_LIKE = CitySpec(size=9690.0)
 
 
 def synthetic_city(spec: CitySpec | None = None) -> tuple[RawLayer, ...]:
-    """Make up the street objects of a city, of the paper's eleven classes.
+    """Make up the street objects of a city, a layer for each of the paper's eleven classes.
 
     Lights and trees are even along a street, trees with gaps, the rhythm of each street its own.
     Junctions where avenues meet have signals, and some where streets join an avenue. All other
-    classes are scattered at a rate that is ten times higher on avenues.
-
-    Parameters
-    ----------
-    spec : CitySpec, optional
-        Size, place and seed; by default a city of 2 km by 2 km.
-
-    Returns
-    -------
-    tuple of RawLayer
-        One layer a class, in EPSG:32631. A class that is rarer than the city is large has an
-        empty layer. ``source_id`` is edge, side and number along it, such as ``"57R4"`` (``RR``
-        in a second row of trees), or ground and number there, such as ``"p3-41"``.
+    classes are scattered at a rate that is ten times higher on avenues. A class that is rarer than
+    the city is large has an empty layer. ``source_id`` is edge, side and number along it, such as
+    ``"57R4"`` (``RR`` in a second row of trees), or ground and number there, such as ``"p3-41"``.
 
     Examples
     --------
@@ -186,19 +169,10 @@ def synthetic_city(spec: CitySpec | None = None) -> tuple[RawLayer, ...]:
 
 
 def synthetic_surroundings(spec: CitySpec | None = None) -> tuple[RawLayer, RawLayer]:
-    """Make up the buildings and the streets of a city.
+    """Make up the footprints and the centre lines of what `synthetic_city` makes of `spec`.
 
-    Parameters
-    ----------
-    spec : CitySpec, optional
-        Size, place and seed; by default a city of 2 km by 2 km.
-
-    Returns
-    -------
-    buildings, streets : RawLayer
-        Footprints (polygons) and centre lines of the city that `synthetic_city` makes of the same
-        specification, in EPSG:32631. The streets have one more column, ``half_width``: metres
-        from the centre line to the houses. Their ``source_id`` is the edge that objects name.
+    The streets have one more column, ``half_width``: metres from the centre line to the houses.
+    Their ``source_id`` is the edge that objects name.
     """
     spec = spec or CitySpec()
     network = lay_streets(spec.size, _random(spec, "streets"))
