@@ -123,7 +123,7 @@ def _stored(table: gpd.GeoDataFrame, crs: CRS) -> gpd.GeoDataFrame:
     geometry = table.geometry
     kept = moved(table[~(geometry.isna() | geometry.is_empty)], crs)
     columns = {HALF_WIDTH: kept[HALF_WIDTH].to_numpy(float)} if HALF_WIDTH in kept else {}
-    stored = gpd.GeoDataFrame(columns, geometry=kept.geometry.to_numpy(), crs=crs)
+    stored = gpd.GeoDataFrame(columns, geometry=kept.geometry.to_numpy(), crs=kept.crs)
     stored.attrs[LICENSES] = list(licenses_of(table))
     return stored
 
