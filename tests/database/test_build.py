@@ -8,7 +8,7 @@ import geopandas as gpd
 import numpy as np
 import pytest
 import shapely
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from sentences import refused
 from worlds import (
@@ -42,8 +42,6 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-
-# --- What the cells see ---------------------------------------------------------------------------
 
 # Cells of 2 m with their centres at whole numbers.
 GRID = GridSpec(2.0, (-1.0, -1.0))
@@ -172,10 +170,9 @@ def test_a_block_that_sees_very_much_is_halved(most: int, monkeypatch: pytest.Mo
     assert (len(blocks) == 1) == (most == 10**6)
 
 
-# --- What is encoded ------------------------------------------------------------------------------
-
-
 @given(worlds())
+@example(World(((0.0, 0.0, 3),), step=100.0, radius=10.0))  # which sees nothing
+@example(World(((0.0, 5999.99, 3), (0.0, 0.0, 1)), step=1000.0, radius=6000.0))
 def test_a_database_is_what_a_plain_loop_finds(world: World) -> None:
     check_against_brute_force(world)
 
@@ -224,12 +221,6 @@ def test_the_range_is_kept_to_the_last_bit() -> None:
     assert database.lengths[cell] == 3
     part = slice(database.offsets[cell], database.offsets[cell + 1])
     assert database.distances[part].tolist() == [30.0, 30.0, 30.0]
-
-
-def test_nothing_seen_is_an_error() -> None:
-    world = World(((0.0, 0.0, 3),), step=100.0, radius=10.0)
-    assert brute_force(world) == {}
-    check_against_brute_force(world)
 
 
 @pytest.mark.parametrize("size", [1, 7, 100, 10**6])

@@ -41,9 +41,6 @@ def city(request: pytest.FixtureRequest) -> City:
     return City(request.getfixturevalue(request.param))
 
 
-# --- What lies beside a database ------------------------------------------------------------------
-
-
 def test_a_city_is_the_database_and_what_lies_beside_it(
     town: World, database: SignatureDatabase, stored: Path
 ) -> None:
@@ -89,9 +86,6 @@ def test_what_is_no_database_is_told(tmp_path: Path) -> None:
     text = tmp_path / "text.parquet"
     text.write_text("no database")
     assert built_digest(text) == digest(text)
-
-
-# --- Columns that are put into a database ---------------------------------------------------------
 
 
 def columns(size: int, *, times: float = 1.0) -> pa.Table:

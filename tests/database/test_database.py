@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from pyproj import CRS
 from sentences import refused
-from worlds import ARRAYS, CODES, TAXONOMY, assert_same, random_town
+from worlds import ARRAYS, CODES, TAXONOMY, assert_same
 
 import semsig_gis
 from semsig_gis.core.errors import DatabaseError, InputError
@@ -24,16 +24,11 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from numpy.typing import NDArray
-    from worlds import World
+
+    from semsig_gis.database.database import SignatureDatabase
 
 
-@pytest.fixture(scope="module")
-def town() -> World:
-    return random_town()
-
-
-def test_cells_are_ordered_and_numbered(town: World) -> None:
-    database = town.database
+def test_cells_are_ordered_and_numbered(database: SignatureDatabase) -> None:
     assert (np.diff(database.cell_ids) > 0).all()
     assert len(database) == len(database.columns) == len(database.offsets) - 1
     assert (database.lengths > 0).all()
@@ -47,16 +42,15 @@ def test_cells_are_ordered_and_numbered(town: World) -> None:
     assert set(database.present_codes) <= set(CODES)
 
 
-def test_places_are_in_their_cells(town: World) -> None:
-    cells = np.arange(len(town.database))
+def test_places_are_in_their_cells(database: SignatureDatabase) -> None:
+    cells = np.arange(len(database))
     aside = np.random.default_rng(1).uniform(-4.9, 4.9, (len(cells), 2))
-    assert (town.database.cells_at(town.database.xy + aside) == cells).all()
-    far = town.database.xy.min(axis=0) - 1000.0
-    assert town.database.cells_at([far, town.database.xy[2]]).tolist() == [-1, 2]
+    assert (database.cells_at(database.xy + aside) == cells).all()
+    far = database.xy.min(axis=0) - 1000.0
+    assert database.cells_at([far, database.xy[2]]).tolist() == [-1, 2]
 
 
-def test_a_signature_is_a_part_of_the_arrays(town: World) -> None:
-    database = town.database
+def test_a_signature_is_a_part_of_the_arrays(database: SignatureDatabase) -> None:
     for cell in range(0, len(database), 37):
         part = slice(database.offsets[cell], database.offsets[cell + 1])
         signature = database.signature(cell)
@@ -71,42 +65,40 @@ def test_a_signature_is_a_part_of_the_arrays(town: World) -> None:
     assert ((database.bearings >= 0) & (database.bearings < 360)).all()
 
 
-def test_a_database_cannot_be_changed_by_accident(town: World, tmp_path: Path) -> None:
-    built = town.database
-    save_database(built, tmp_path / "a.parquet")
-    for database in (built, open_database(tmp_path / "a.parquet")):
+def test_a_database_cannot_be_changed_by_accident(
+    database: SignatureDatabase, tmp_path: Path
+) -> None:
+    save_database(database, tmp_path / "a.parquet")
+    for one in (database, open_database(tmp_path / "a.parquet")):
         for name in (*ARRAYS, "xy", "lengths", "levels", "present_codes"):
             with pytest.raises(ValueError, match="read-only"):
-                getattr(database, name)[0] = 0
-        signature = database.signature(0)
+                getattr(one, name)[0] = 0
+        signature = one.signature(0)
         assert signature.codes is not None
         with pytest.raises(ValueError, match="read-only"):
             signature.codes[0] = 0
         with pytest.raises(dataclasses.FrozenInstanceError):
-            database.spec = SignatureSpec()  # type: ignore[misc]
+            one.spec = SignatureSpec()  # type: ignore[misc]
 
 
 @given(st.lists(st.integers(0, 3), min_size=1))
-def test_parts_join_into_the_whole(town: World, owners: list[int]) -> None:
-    whole = town.database
-    owner = np.resize(owners, len(whole))
-    parts = [whole.select(owner == number) for number in range(4)]
+def test_parts_join_into_the_whole(database: SignatureDatabase, owners: list[int]) -> None:
+    owner = np.resize(owners, len(database))
+    parts = [database.select(owner == number) for number in range(4)]
     joined = join_databases(parts[::-1])
-    assert_same(joined, whole)
-    assert joined.licenses == whole.licenses
+    assert_same(joined, database)
+    assert joined.licenses == database.licenses
 
 
-def test_selected_cells_keep_their_signatures(town: World) -> None:
-    whole = town.database
-    some = whole.select(np.array([5, 2, 9]))
-    assert [some.types(i) for i in range(3)] == [whole.types(i) for i in (5, 2, 9)]
-    assert some.cell_ids.tolist() == whole.cell_ids[[5, 2, 9]].tolist()
-    assert len(whole.select(slice(0, 0))) == 0
+def test_selected_cells_keep_their_signatures(database: SignatureDatabase) -> None:
+    some = database.select(np.array([5, 2, 9]))
+    assert [some.types(i) for i in range(3)] == [database.types(i) for i in (5, 2, 9)]
+    assert some.cell_ids.tolist() == database.cell_ids[[5, 2, 9]].tolist()
+    assert len(database.select(slice(0, 0))) == 0
 
 
-def test_databases_that_do_not_fit_are_not_joined(town: World) -> None:
-    whole = town.database
-    half = whole.select(slice(10))
+def test_databases_that_do_not_fit_are_not_joined(database: SignatureDatabase) -> None:
+    half = database.select(slice(10))
     for change, word in (
         ({"grid": GridSpec(20.0)}, "grid"),
         ({"spec": SignatureSpec(25.0)}, "range"),
@@ -115,9 +107,9 @@ def test_databases_that_do_not_fit_are_not_joined(town: World) -> None:
         ({"occlusion": 0.5}, "occlusion"),
     ):
         with refused(DatabaseError, word, "build both in the same way"):
-            join_databases([half, dataclasses.replace(whole, **change)])
+            join_databases([half, dataclasses.replace(database, **change)])
     with refused(DatabaseError, "same cell"):
-        join_databases([half, whole])
+        join_databases([half, database])
     with refused(DatabaseError, "no database"):
         join_databases([])
 

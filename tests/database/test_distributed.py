@@ -66,8 +66,7 @@ def script(folder: Path, body: str) -> list[str]:
     head = f"""
         import sys
         sys.path.insert(0, {str(CHECKOUT)!r})
-        from semsig_gis.database.tiles import build_tiles
-        from semsig_gis.database.tiles import TileSpec
+        from semsig_gis.database.tiles import TileSpec, build_tiles
         paths = {str(folder / "objects.parquet")!r}, {str(folder / "city")!r}
         tile = TileSpec({SIDE})
     """
@@ -75,14 +74,9 @@ def script(folder: Path, body: str) -> list[str]:
     return [sys.executable, "-W", "error", str(path)]
 
 
-# --- The same, whoever builds -----------------------------------------------------------------
-
-
 def test_the_parts_are_the_whole(serial: dict[str, bytes], tmp_path: Path) -> None:
     assert len(serial) > 15
-    (tmp_path / "city").mkdir()
-    for name, content in serial.items():
-        (tmp_path / "city" / name).write_bytes(content)
+    assert build(tmp_path) == serial
     assert_same(open_database(tmp_path / "city"), TOWN.database)
 
 
@@ -116,9 +110,6 @@ def test_one_process_does_not_load_dask(tmp_path: Path) -> None:
     """
     done = subprocess.run(script(tmp_path, body), check=True, capture_output=True, text=True)
     assert (done.stdout, done.stderr) == ("[]\n", "")
-
-
-# --- Processes that die -----------------------------------------------------------------------
 
 
 def test_a_worker_killed_in_the_middle_does_not_matter(
@@ -194,9 +185,6 @@ def test_an_interrupted_run_keeps_its_tiles(
     seen: list[int] = []
     assert build(tmp_path, progress=lambda done, _: seen.append(done)) == serial
     assert seen[0] > 4
-
-
-# --- Tiles that fail --------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("where", ["here", "cluster"])

@@ -11,17 +11,10 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 import shapely
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from sentences import refused
-from worlds import (
-    CODES,
-    World,
-    assert_same,
-    brute_force,
-    check_against_brute_force,
-    worlds,
-)
+from worlds import CODES, World, assert_same, brute_force, worlds
 
 from semsig_gis.core.errors import DatabaseError
 from semsig_gis.database.file import (
@@ -43,15 +36,11 @@ if TYPE_CHECKING:
     from semsig_gis.database.database import SignatureDatabase
 
 
-def test_the_largest_range_fits_the_file(tmp_path: Path) -> None:
-    world = World(((0.0, 5999.99, 3), (0.0, 0.0, 1)), step=1000.0, radius=6000.0)
-    database = world.database
-    save_database(database, tmp_path / "a.parquet")
-    assert_same(open_database(tmp_path / "a.parquet"), database)
-    check_against_brute_force(world)
+LARGEST_RANGE = World(((0.0, 5999.99, 3), (0.0, 0.0, 1)), step=1000.0, radius=6000.0)
 
 
 @given(world=worlds())
+@example(world=LARGEST_RANGE)
 @settings(max_examples=25)
 def test_a_saved_database_comes_back(
     world: World, tmp_path_factory: pytest.TempPathFactory
@@ -215,9 +204,6 @@ def test_pieces_and_columns_of_others_do_no_harm(database: SignatureDatabase, pa
     turned = table.select(["geometry", "distances", "length", "bearings", "types", "cell_id"])
     rewrite(path, turned.append_column("note", [["x"] * len(table)]))
     assert_same(open_database(path), database)
-
-
-# --- A folder of parts ----------------------------------------------------------------------------
 
 
 def test_the_parts_are_opened_whole_or_one_after_the_other(

@@ -4,9 +4,8 @@ import dataclasses
 import json
 import os
 import shutil
-import subprocess
-import sys
 import tempfile
+from multiprocessing import get_context
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -354,36 +353,26 @@ def test_a_full_disk_leaves_what_was_there(stored: Path, monkeypatch: pytest.Mon
         assert len(names_in(stored.parent)) == 2
 
 
-SCRIPT = """
-import os, sys
-from pathlib import Path
-from semsig_gis.database import store
-from test_store import fewer, save
+def save_and_die(path: Path, scratch: str) -> None:
+    tempfile.tempdir = scratch
+    settle, calls = store_module._settle, []
 
-original, calls = store._settle, []
+    def dying(database: Path) -> Path:
+        calls.append(database)
+        if len(calls) == 2:
+            os._exit(9)
+        return settle(database)
 
-def settle(path):
-    calls.append(path)
-    if len(calls) == 2:
-        os._exit(9)
-    return original(path)
-
-store._settle = settle
-save(Path(sys.argv[1]), fewer(7))
-"""
+    store_module._settle = dying
+    save(path, fewer(7))
 
 
 def test_a_process_that_is_killed_leaves_a_pair_that_fits(stored: Path) -> None:
     """Without any tidying up, between the rename of the database and that of the store."""
-    here = Path(__file__).parent
-    places = [here.parents[1], here.parent, here]
-    environment = {
-        **os.environ,
-        "PYTHONPATH": os.pathsep.join(map(str, places)),
-        "TMPDIR": tempfile.gettempdir(),
-    }
-    command = [sys.executable, "-c", SCRIPT, str(stored)]
-    assert subprocess.run(command, env=environment, check=False).returncode == 9
+    other = get_context("spawn").Process(target=save_and_die, args=(stored, tempfile.gettempdir()))
+    other.start()
+    other.join()
+    assert other.exitcode == 9
     assert stored.with_name("city.objects.next").is_dir()
     assert len(open_database(stored)) == len(build_database(fewer(7)))
     assert_fits(open_store(stored), fewer(7))

@@ -74,9 +74,6 @@ def tiled(world: World, side: float, folder: Path, **options: Any) -> SignatureD
     return open_database(folder / "city")
 
 
-# --- The sides of tiles -----------------------------------------------------------------------
-
-
 def test_a_tile_is_so_many_whole_cells() -> None:
     assert TileSpec().cells(GridSpec()) == 200
     assert TileSpec(104.0).cells(GridSpec(step=10.0)) == 10
@@ -84,9 +81,6 @@ def test_a_tile_is_so_many_whole_cells() -> None:
     for side in (0.0, -5.0, float("nan"), float("inf")):
         with refused(InputError, "side of a tile", "above 0"):
             TileSpec(side)
-
-
-# --- Which tiles ------------------------------------------------------------------------------
 
 
 @given(world=worlds(), side=st.integers(1, 12))
@@ -121,9 +115,6 @@ def test_tiles_that_are_too_small_or_too_many_are_refused(
     monkeypatch.setattr("semsig_gis.database.tiles.MOST_TILES", 3)
     with refused(InputError, "tiles of 20 m", "more than 3"):
         touched_tiles(objects_file, grid=GridSpec(), side=2, reach=30.0)
-
-
-# --- The same as in one piece -----------------------------------------------------------------
 
 
 @given(world=worlds(), side=st.sampled_from([5.0, 30.0, 77.0, 1000.0]))
@@ -211,8 +202,6 @@ def test_a_wall_whose_neighbour_is_far_hides_as_in_the_whole(tmp_path: Path) -> 
     assert len(alone) != len(found)  # or nothing would have been shown
 
 
-# --- What tiles are built from ----------------------------------------------------------------
-
 HOUSES = placed(shapely.box(0, 0, 9, 9))
 STREETS = placed(
     *(shapely.LineString([(0, y), (9, y)]) for y in (0, 5, 10)), half_width=[4.0, np.nan, 21.0]
@@ -237,6 +226,8 @@ def test_files_that_can_be_read_by_box_are_used_where_they_are(
     assert found.folder == tmp_path / "city.partial"
     assert (found.side, found.reach, found.street_reach) == (5, 30.0, 21.0)
     assert found.box((15, -2), 3.0) == (747.0, -103.0, 803.0, -47.0)
+    # Streets that no viewpoint needs are left aside.
+    assert plan(objects_file, streets="nowhere.parquet").streets is None
 
 
 def test_other_files_are_copied_once(objects_file: Path, town: World, tmp_path: Path) -> None:
@@ -256,10 +247,6 @@ def test_other_files_are_copied_once(objects_file: Path, town: World, tmp_path: 
         times = {path: path.stat().st_mtime_ns for path in inputs.iterdir()}
         assert plan(objects_file, streets=tmp_path / "streets.gpkg", **options) == found
         assert {path: path.stat().st_mtime_ns for path in inputs.iterdir()} == times
-
-
-def test_streets_that_no_viewpoint_needs_are_left_aside(objects_file: Path) -> None:
-    assert plan(objects_file, streets="nowhere.parquet").streets is None
 
 
 @pytest.mark.parametrize(
@@ -308,8 +295,6 @@ def test_a_run_knows_its_inputs_by_their_content(objects_file: Path, tmp_path: P
         plan(objects_file, **options)
 
 
-# --- A run that goes on -----------------------------------------------------------------------
-
 RECIPE = {"grid": {"step": 10.0, "origin": (0.0, 0.0)}, "inputs": {"objects": "abc"}}
 
 
@@ -342,28 +327,23 @@ def test_a_run_is_taken_up_by_the_same_recipe(database: SignatureDatabase, tmp_p
 def test_a_database_appears_whole_and_replaces_what_was_there(
     database: SignatureDatabase, tmp_path: Path
 ) -> None:
-    target = tmp_path / "city"
+    target, link = tmp_path / "city", tmp_path / "latest"
     save_database(database, target)  # a file
-    for cells in (database, database.select(slice(20))):
-        folder = begin(target, RECIPE)
+    link.symlink_to(target)
+    for place, cells in (
+        (target, database),
+        (target, database.select(slice(20))),
+        (link, database),
+    ):
+        folder = begin(place, RECIPE)
         parts = [build(folder, cells)]
         (folder / "_inputs").mkdir()
         (folder / "_inputs" / "buildings.parquet").touch()
         assert publish(folder, parts).cells == len(cells)
         assert {path.name for path in target.iterdir()} == {MANIFEST, part_name((0, 0))}
         assert len(open_database(target)) == len(cells)
-        assert [path.name for path in tmp_path.iterdir()] == ["city"]
-
-
-def test_a_link_stays_and_the_folder_that_it_names_is_replaced(
-    database: SignatureDatabase, tmp_path: Path
-) -> None:
-    (tmp_path / "real").mkdir()
-    (tmp_path / "latest").symlink_to(tmp_path / "real")
-    folder = begin(tmp_path / "latest", RECIPE)
-    publish(folder, [build(folder, database)])
-    assert (tmp_path / "latest").is_symlink()
-    assert (tmp_path / "real" / MANIFEST).is_file()
+        assert {path.name for path in tmp_path.iterdir()} == {"city", "latest"}
+    assert link.is_symlink()
 
 
 def test_other_things_are_never_replaced(database: SignatureDatabase, tmp_path: Path) -> None:

@@ -236,16 +236,18 @@ def test_far_from_buildings_and_streets(mode: Mode) -> None:
 
 
 @pytest.fixture
-def city(tmp_path: Path) -> tuple[Path, pd.DataFrame]:
-    table = random_table(np.random.default_rng(5), 120)
-    path = tmp_path / "city.parquet"
+def table() -> pd.DataFrame:
+    return random_table(np.random.default_rng(5), 120)
+
+
+@pytest.fixture
+def path(table: pd.DataFrame, tmp_path: Path) -> Path:
     objects = objects_of(table)
-    save_with_store(build_database(objects), ObjectStore.of(objects), path)
-    return path, table
+    save_with_store(build_database(objects), ObjectStore.of(objects), tmp_path / "city.parquet")
+    return tmp_path / "city.parquet"
 
 
-def test_only_what_is_in_range_is_computed(city: tuple[Path, pd.DataFrame]) -> None:
-    path, table = city
+def test_only_what_is_in_range_is_computed(path: Path, table: pd.DataFrame) -> None:
     database = open_database(path)
     x, y = at(100.25, 120.5)
     columns, rows = np.meshgrid(np.arange(76520, 76550), np.arange(627500, 627530))
@@ -262,8 +264,7 @@ def test_only_what_is_in_range_is_computed(city: tuple[Path, pd.DataFrame]) -> N
         assert (item.class_name, item.added) == (CLASSES.by_code(code).name, 1)
 
 
-def test_nothing_new_changes_nothing(city: tuple[Path, pd.DataFrame]) -> None:
-    path, table = city
+def test_nothing_new_changes_nothing(path: Path, table: pd.DataFrame) -> None:
     content = path.read_bytes()
     report = update_file(path, objects_of(table.sample(frac=1.0, random_state=1)))
     assert path.read_bytes() == content
@@ -271,8 +272,7 @@ def test_nothing_new_changes_nothing(city: tuple[Path, pd.DataFrame]) -> None:
     assert_index_fits(open_store(path))
 
 
-def test_the_update_may_go_to_another_file(city: tuple[Path, pd.DataFrame]) -> None:
-    path, table = city
+def test_the_update_may_go_to_another_file(path: Path, table: pd.DataFrame) -> None:
     content = path.read_bytes()
     other = path.with_name("later.parquet")
     update_file(path, objects_of(table[3:]), out=other)
@@ -281,8 +281,7 @@ def test_the_update_may_go_to_another_file(city: tuple[Path, pd.DataFrame]) -> N
     assert (len(open_store(path).objects), len(open_store(other).objects)) == (120, 117)
 
 
-def test_layers_that_were_not_loaded_stay(city: tuple[Path, pd.DataFrame]) -> None:
-    path, table = city
+def test_layers_that_were_not_loaded_stay(path: Path, table: pd.DataFrame) -> None:
     trees = table[table["source"] == "trees"][5:]
     report = update_file(path, objects_of(trees))
     expected = pd.concat([table[table["source"] != "trees"], trees])
@@ -294,8 +293,7 @@ def test_layers_that_were_not_loaded_stay(city: tuple[Path, pd.DataFrame]) -> No
     assert sum(item.removed for item in report.classes) == 5
 
 
-def test_a_new_class_is_taken_up(city: tuple[Path, pd.DataFrame]) -> None:
-    path, table = city
+def test_a_new_class_is_taken_up(path: Path, table: pd.DataFrame) -> None:
     drain = ObjectClass(250, "9", "drain", "Drain", 20.0)
     extended = CLASSES.extended([drain])
     more = pd.concat([table, table[:4].assign(class_code=250, source="drains")])
@@ -310,8 +308,7 @@ def test_a_new_class_is_taken_up(city: tuple[Path, pd.DataFrame]) -> None:
     assert (report.classes[-1].before, report.classes[-1].added) == (0, 4)
 
 
-def test_what_does_not_fit_is_refused(city: tuple[Path, pd.DataFrame]) -> None:
-    path, table = city
+def test_what_does_not_fit_is_refused(path: Path, table: pd.DataFrame) -> None:
     before = {file: file.read_bytes() for file in (path, *store_path(path).iterdir())}
     far = CLASSES.extended([ObjectClass(250, "9", "tower", "Tower", 90.0)])
     with refused(InputError, "'tower'", "90 m", "45 m", "build the database again"):
@@ -346,8 +343,7 @@ def test_a_store_without_what_the_database_was_built_with_is_told() -> None:
         update_database(database, ObjectStore.of(objects, footprints=HOUSES), objects)
 
 
-def test_a_damaged_r_tree_is_told_and_healed(city: tuple[Path, pd.DataFrame]) -> None:
-    path, table = city
+def test_a_damaged_r_tree_is_told_and_healed(path: Path, table: pd.DataFrame) -> None:
     (store_path(path) / "rtree.dat").unlink()
     (note,) = update_file(path, objects_of(table[2:])).notes
     assert "R-tree" in note
@@ -356,9 +352,8 @@ def test_a_damaged_r_tree_is_told_and_healed(city: tuple[Path, pd.DataFrame]) ->
 
 
 def test_an_update_that_was_interrupted_is_finished_by_the_next(
-    city: tuple[Path, pd.DataFrame], monkeypatch: pytest.MonkeyPatch
+    path: Path, table: pd.DataFrame, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    path, table = city
     settle, calls = store_module._settle, []
 
     def interrupted(file: Path) -> Path:
@@ -378,30 +373,17 @@ def test_an_update_that_was_interrupted_is_finished_by_the_next(
     assert_index_fits(open_store(path))
 
 
-# --- How far a city has drifted -------------------------------------------------------------------
-
-
 def test_the_share_is_of_all_cells_before_or_after() -> None:
     numbers: Any = {"added": 1, "removed": 9, "moved": 2, "moved_m": 2.5, "gained": 0, "lost": 1}
     trees = ClassChange(class_name="tree", before=1200, after=1190, **numbers)
-    report = UpdateReport(
-        classes=(trees,),
-        replaced=("trees",),
-        kept=(),
-        cells_before=9_000,
-        cells=9_900,
-        recomputed=3_000,
-        changed=1_500,
-        appeared=1_000,
-        vanished=100,
-    )
+    cells: Any = {"cells_before": 9_000, "cells": 9_900, "recomputed": 3_000}
+    drift: Any = {"changed": 1_500, "appeared": 1_000, "vanished": 100}
+    report = UpdateReport(classes=(trees,), replaced=("trees",), kept=(), **cells, **drift)
     assert report.share == 2_600 / 10_000
     assert dataclasses.replace(report, changed=0, appeared=0, vanished=0).share == 0.0
     values = json.loads(json.dumps(report.to_dict()))
-    assert values["share"] == 0.26
-    assert values["classes"] == [dataclasses.asdict(trees)]
-    assert values["kept"] == values["notes"] == []
-    assert (values["cells_before"], values["cells"], values["recomputed"]) == (9000, 9900, 3000)
+    shown = {"share": 0.26, "classes": [dataclasses.asdict(trees)], "kept": [], "notes": []}
+    assert values == {**values, **shown, **cells}
 
 
 def test_cells_differ_in_length_class_bearing_or_distance(database: SignatureDatabase) -> None:
@@ -440,9 +422,6 @@ def test_cells_of_different_grids_or_ranges_are_not_compared(database: Signature
     farther = Taxonomy((dataclasses.replace(first, range_m=99.0), *others))
     with refused(DatabaseError, "30.0 and 99.0"):
         compare_cells(database, dataclasses.replace(database, taxonomy=farther))
-
-
-# --- A year of a real city ------------------------------------------------------------------------
 
 
 @cache

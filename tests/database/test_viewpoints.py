@@ -1,7 +1,7 @@
 from __future__ import annotations
 
 import json
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
@@ -16,8 +16,12 @@ from semsig_gis.database import viewpoints
 from semsig_gis.database.occlusion import Footprints
 from semsig_gis.database.viewpoints import ViewpointSpec, choose_viewpoints
 
+if TYPE_CHECKING:
+    from semsig_gis.database.viewpoints import Mode
+
 GRID = GridSpec(step=10.0)
 CELLS = tuple(part.ravel() for part in np.meshgrid(np.arange(10), np.arange(10), indexing="ij"))
+LINE = shapely.LineString([(0, 5), (100, 5)])
 CENTRES = [shapely.Point(xy) for xy in GRID.viewpoints(*CELLS)]
 
 
@@ -43,8 +47,7 @@ def test_outdoor_is_outside_the_footprints() -> None:
 def test_an_area_holds_in_every_mode() -> None:
     area = shapely.Polygon([(0, 0), (100, 0), (0, 100)])
     assert choose(ViewpointSpec(area=area)) == [area.intersects(centre) for centre in CENTRES]
-    street = shapely.LineString([(0, 5), (100, 5)])
-    chosen = choose(ViewpointSpec(mode="streets", area=shapely.box(0, 0, 30, 30)), streets=[street])
+    chosen = choose(ViewpointSpec(mode="streets", area=shapely.box(0, 0, 30, 30)), streets=[LINE])
     assert [index for index, kept in enumerate(chosen) if kept] == [0, 10, 20]
 
 
@@ -68,21 +71,21 @@ def test_streets_equal_a_plain_loop(seed: int, block: int) -> None:
     ]
 
 
-def test_what_a_mode_needs_is_asked_for() -> None:
-    with refused(InputError, "outdoor", "footprints"):
-        choose(ViewpointSpec(mode="outdoor"))
-    with refused(InputError, "streets", "centre lines"):
-        choose(ViewpointSpec(mode="streets"))
-
-
-def test_streets_that_are_none_are_refused() -> None:
-    spec = ViewpointSpec(mode="streets")
-    with refused(InputError, "Point", "centre lines"):
-        choose(spec, streets=[shapely.Point(0, 0)])
-    with refused(InputError, "no street", "centre lines"):
-        choose(spec, streets=[None])
-    with refused(InputError, "half-widths", "above 0"):
-        choose(spec, streets=[shapely.LineString([(0, 0), (1, 1)])], widths=[0.0])
+@pytest.mark.parametrize(
+    ("mode", "surroundings", "words"),
+    [
+        ("outdoor", {}, ["outdoor", "footprints"]),
+        ("streets", {}, ["streets", "centre lines"]),
+        ("streets", {"streets": [shapely.Point(0, 0)]}, ["Point", "centre lines"]),
+        ("streets", {"streets": [None]}, ["no street", "centre lines"]),
+        ("streets", {"streets": [LINE], "widths": [0.0]}, ["half-widths", "above 0"]),
+    ],
+)
+def test_what_does_not_serve_a_mode_is_refused(
+    mode: Mode, surroundings: dict[str, Any], words: list[str]
+) -> None:
+    with refused(InputError, *words):
+        choose(ViewpointSpec(mode=mode), **surroundings)
 
 
 def test_a_wrong_choice_is_refused() -> None:

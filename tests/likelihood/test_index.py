@@ -8,14 +8,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from noisy_cells import (
-    mixtures,
-    noise_specs,
-    parts_of,
-    random_database,
-    random_query,
-    turned_query,
-)
+from noisy_cells import mixtures, noise_specs, parts_of, random_database, random_query, turned_query
 from sentences import refused
 
 from semsig_gis.core.errors import DatabaseError, InputError

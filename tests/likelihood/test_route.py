@@ -12,10 +12,7 @@ from semsig_gis.likelihood.posterior import posterior
 from semsig_gis.likelihood.route import LOST, Leg, moved_chances, route_posteriors
 
 legs = st.builds(
-    Leg,
-    dx=st.floats(-40, 40),
-    dy=st.floats(-40, 40),
-    sigma=st.sampled_from([0.0, 0.5, 4.0, 15.0]),
+    Leg, dx=st.floats(-40, 40), dy=st.floats(-40, 40), sigma=st.sampled_from([0.0, 0.5, 4.0, 15.0])
 )
 
 
