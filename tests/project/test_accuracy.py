@@ -7,18 +7,8 @@ import sys
 from pathlib import Path
 
 FIGURES = [
-    "city",
-    "cells",
-    "queries",
-    "distortion",
-    "method",
-    "setting",
-    "p25",
-    "p50",
-    "p50_low",
-    "p50_high",
-    "recall10pct",
-    "ms_per_query",
+    *("city", "cells", "queries", "distortion", "method", "setting"),
+    *("p25", "p50", "p50_low", "p50_high", "recall10pct", "ms_per_query"),
 ]
 SHARES = [
     *("p5", "p25", "p50", "p50_low", "p50_high", "recall10pct", "chance"),
@@ -46,10 +36,7 @@ def test_every_figure_is_measured_and_written(tmp_path: Path) -> None:
     out = tmp_path / "accuracy.json"
     environment = {name: value for name, value in os.environ.items() if name != "SEMSIG_GEODATA"}
     done = subprocess.run(
-        [
-            *(sys.executable, "-W", "error", "-m", "benchmarks.accuracy"),
-            *("--size", "small", "--out", str(out)),
-        ],
+        f"{sys.executable} -W error -m benchmarks.accuracy --size small --out {out}".split(),
         cwd=Path(__file__).parents[2],
         env=environment,
         check=True,
@@ -71,7 +58,6 @@ def test_every_figure_is_measured_and_written(tmp_path: Path) -> None:
         assert one["ms_per_query"] > 0.0
     bars = [bar for one in rows for bar in one["bars"]]
     assert f"of {len(bars)} bars met" in done.stdout
-    for bar in bars:
-        if bar["met"]:
-            assert bar["low"] is None or bar["value"] >= bar["low"]
-            assert bar["high"] is None or bar["value"] <= bar["high"]
+    for bar in (bar for bar in bars if bar["met"]):
+        assert bar["low"] is None or bar["value"] >= bar["low"]
+        assert bar["high"] is None or bar["value"] <= bar["high"]

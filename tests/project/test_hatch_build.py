@@ -3,17 +3,15 @@
 from __future__ import annotations
 
 import hashlib
-import importlib.util
 import io
+import runpy
 import sys
 import tarfile
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from types import SimpleNamespace
+from typing import Any
 
 import pytest
-
-if TYPE_CHECKING:
-    from types import ModuleType
 
 ROOT = Path(__file__).parents[2]
 SCRIPT = b"window.thing = 1;\n"
@@ -28,13 +26,9 @@ pytestmark = [
 
 
 @pytest.fixture(scope="module")
-def hook() -> ModuleType:
-    spec = importlib.util.spec_from_file_location("hatch_build", ROOT / "hatch_build.py")
-    assert spec is not None
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
+def hook() -> SimpleNamespace:
+    """Return what the build hook defines."""
+    return SimpleNamespace(**runpy.run_path(str(ROOT / "hatch_build.py")))
 
 
 def write_manifest(folder: Path, **sums: str) -> None:
@@ -85,7 +79,7 @@ def npm(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return tmp_path / "calls"
 
 
-def run_hook(hook: ModuleType, project: Path) -> list[str]:
+def run_hook(hook: SimpleNamespace, project: Path) -> list[str]:
     """Run the hook as hatchling does and return the warnings it shows."""
     warnings: list[str] = []
 
@@ -102,31 +96,23 @@ def names(folder: Path) -> set[str]:
     return {path.name for path in folder.iterdir()}
 
 
-@pytest.mark.usefixtures("npm")
-def test_files_are_brought(hook: ModuleType, folder: Path) -> None:
+def test_files_are_brought_once_and_again_when_they_change(
+    hook: SimpleNamespace, folder: Path, npm: Path
+) -> None:
     assert hook.bring_assets(folder) == ("thing.js", "picture.png")
     assert (folder / "thing.js").read_bytes() == SCRIPT
     assert (folder / "picture.png").read_bytes() == PICTURE
     assert names(folder) == {"manifest.toml", "thing.js", "picture.png"}
-
-
-def test_nothing_is_asked_for_when_all_is_there(hook: ModuleType, folder: Path, npm: Path) -> None:
-    hook.bring_assets(folder)
     npm.unlink()
     assert hook.bring_assets(folder) == ()
-    assert not npm.exists()
-
-
-@pytest.mark.usefixtures("npm")
-def test_a_changed_file_is_brought_again(hook: ModuleType, folder: Path) -> None:
-    hook.bring_assets(folder)
+    assert not npm.exists()  # nothing was asked for
     (folder / "thing.js").write_bytes(b"something else")
     assert hook.bring_assets(folder) == ("thing.js",)
     assert (folder / "thing.js").read_bytes() == SCRIPT
 
 
 @pytest.mark.usefixtures("npm")
-def test_a_wrong_sum_is_refused_and_nothing_is_written(hook: ModuleType, folder: Path) -> None:
+def test_a_wrong_sum_is_refused_and_nothing_is_written(hook: SimpleNamespace, folder: Path) -> None:
     write_manifest(folder, picture="0" * 64)
     with pytest.raises(hook.AssetsError, match=r"dist/picture\.png of thing@1\.2\.3 .* refused"):
         hook.bring_assets(folder)
@@ -137,7 +123,7 @@ def test_a_wrong_sum_is_refused_and_nothing_is_written(hook: ModuleType, folder:
 
 
 @pytest.mark.usefixtures("npm")
-def test_a_file_that_its_package_lacks(hook: ModuleType, folder: Path) -> None:
+def test_a_file_that_its_package_lacks(hook: SimpleNamespace, folder: Path) -> None:
     manifest = folder / "manifest.toml"
     manifest.write_text(manifest.read_text(encoding="utf-8").replace("dist/thing", "lib/thing"))
     with pytest.raises(hook.AssetsError, match=r"lib/thing\.js cannot be read from thing@1\.2\.3"):
@@ -145,7 +131,7 @@ def test_a_file_that_its_package_lacks(hook: ModuleType, folder: Path) -> None:
 
 
 @pytest.mark.usefixtures("npm")
-def test_a_failing_download_is_one_line(hook: ModuleType, folder: Path) -> None:
+def test_a_failing_download_is_one_line(hook: SimpleNamespace, folder: Path) -> None:
     manifest = folder / "manifest.toml"
     manifest.write_text(manifest.read_text(encoding="utf-8").replace("1.2.3", "9.9.9"))
     (warning,) = run_hook(hook, folder.parents[1])
@@ -156,7 +142,7 @@ def test_a_failing_download_is_one_line(hook: ModuleType, folder: Path) -> None:
 
 
 def test_without_npm(
-    hook: ModuleType, folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    hook: SimpleNamespace, folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("PATH", str(tmp_path))
     (warning,) = run_hook(hook, folder.parents[1])

@@ -62,8 +62,7 @@ def test_a_notebook_is_kept_clean(path: Path) -> None:
         assert re.fullmatch(r"[a-z][a-z0-9-]{1,63}", cell["id"])  # a name, not a random number
         assert cell["metadata"] == {}
         if cell["cell_type"] == "code":
-            assert cell["outputs"] == []
-            assert cell["execution_count"] is None
+            assert (cell["outputs"], cell["execution_count"]) == ([], None)
     title, *_ = notebook["cells"][0]["source"]
     assert title == f"# {int(path.name[:2])}. {title[5:]}"
     # The same bytes, whichever program has saved it.
@@ -75,28 +74,28 @@ def test_a_notebook_is_kept_clean(path: Path) -> None:
 def test_a_notebook_uses_what_everybody_has(path: Path) -> None:
     for _, text in code_of(path):
         for node in ast.walk(ast.parse(text)):
-            modules: list[str] = []
-            if isinstance(node, ast.Import):
-                modules = [alias.name for alias in node.names]
-            elif isinstance(node, ast.ImportFrom):
-                modules = [node.module or "", *(alias.name for alias in node.names)]
+            if not isinstance(node, ast.Import | ast.ImportFrom):
+                continue
+            names = [alias.name for alias in node.names]
+            modules = names
+            if isinstance(node, ast.ImportFrom):
                 assert node.level == 0
+                modules = [node.module or ""]
             for module in modules:
-                assert not any(part.startswith("_") for part in module.split("."))
-            for module in modules[:1]:
                 package = module.split(".")[0]
                 assert package in IMPORTED | sys.stdlib_module_names
                 assert package != "semsig_gis" or module == package  # no inner module
+            for name in (*modules, *names):
+                assert not any(part.startswith("_") for part in name.split("."))
 
 
 @pytest.fixture
 def elsewhere(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
     """Give an empty folder to run in, and take temporary files to another one in it."""
-    work, temporary = tmp_path / "work", tmp_path / "temporary"
-    for folder in (work, temporary):
-        folder.mkdir()
-    monkeypatch.chdir(work)
-    monkeypatch.setattr(tempfile, "tempdir", str(temporary))
+    (tmp_path / "work").mkdir()
+    (tmp_path / "temporary").mkdir()
+    monkeypatch.chdir(tmp_path / "work")
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path / "temporary"))
     with mpl.rc_context({"backend": "agg"}):
         yield tmp_path
     plt.close("all")
@@ -123,7 +122,7 @@ def test_a_notebook_runs(path: Path, elsewhere: Path) -> None:
     shown.clear()
     gc.collect()
     assert sorted(FOLDER.rglob("*")) == beside
-    assert [found for found in elsewhere.rglob("*") if found.is_file()] == []
+    assert [file for file in elsewhere.rglob("*") if file.is_file()] == []
 
 
 def run_cell(text: str, names: dict[str, Any], *, where: str) -> object:

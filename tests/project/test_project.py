@@ -10,7 +10,6 @@ import sys
 import tomllib
 import zipfile
 from pathlib import Path
-from typing import Any
 
 import pytest
 from packaging.requirements import Requirement
@@ -29,11 +28,6 @@ pytestmark = pytest.mark.skipif(
 # Written so that this file does not contain what it looks for.
 REGISTRY_HOST = re.compile(r"py(?:pi[.]org|thonhosted[.])|npm(?:js)[.]|proxy[.]golang|crates[.]io")
 MACHINE_PATH = re.compile(r"(?<![\w.~:/-])/(?:home|root|work|tmp|opt|mnt|Users)[/]\w")
-
-
-@pytest.fixture(scope="module")
-def pyproject() -> dict[str, Any]:
-    return tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
 
 
 @pytest.fixture(scope="module")
@@ -76,13 +70,13 @@ def modules() -> set[str]:
 
 @pytest.mark.parametrize("pattern", [REGISTRY_HOST, MACHINE_PATH], ids=["host", "path"])
 def test_no_tracked_file_names_a_registry_or_a_machine(pattern: re.Pattern[str]) -> None:
-    found = []
+    matches = []
     for path in tracked_files():
         content = path.read_bytes()
         if b"\0" not in content:
             lines = content.decode("utf-8", errors="replace").splitlines()
-            found += [f"{path.name}: {line.strip()}" for line in lines if pattern.search(line)]
-    assert found == []
+            matches += [f"{path.name}: {line.strip()}" for line in lines if pattern.search(line)]
+    assert matches == []
 
 
 def test_the_patterns_find_what_they_look_for() -> None:
@@ -102,10 +96,8 @@ def test_the_wheel_is_complete(wheel: dict[str, str]) -> None:
     data = {f"semsig_gis/{path.relative_to(ROOT)}" for path in ROOT.glob("data_sources/*")}
     suffixes = {".css", ".js", ".py"}
     code = {str(path.relative_to(ROOT)) for path in PACKAGE.rglob("*") if path.suffix in suffixes}
-    assert data | code <= wheel.keys()
-    assert "semsig_gis/py.typed" in wheel
-    assert "semsig_gis/assets/manifest.toml" in wheel
-    assert "semsig_gis/templates/report.html" in wheel
+    others = {"py.typed", "assets/manifest.toml", "templates/report.html"}
+    assert data | code | {f"semsig_gis/{name}" for name in others} <= wheel.keys()
     if map_assets.available():
         assert {f"semsig_gis/assets/{name}" for name in map_assets.assets()} <= wheel.keys()
     assert {name.partition("/")[0] for name in wheel} == {
@@ -121,14 +113,17 @@ def test_the_wheel_says_what_it_is(wheel: dict[str, str]) -> None:
     assert "BSD 3-Clause License" in wheel[f"{info}/licenses/LICENSE"]
 
 
-def test_every_dependency_is_pinned(pyproject: dict[str, Any]) -> None:
-    extras = pyproject["project"]["optional-dependencies"].values()
-    wanted = [*pyproject["project"]["dependencies"], *(name for extra in extras for name in extra)]
+def test_every_dependency_is_pinned() -> None:
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    extras = project["optional-dependencies"].values()
+    required = [*project["dependencies"], *(name for extra in extras for name in extra)]
     lines = (ROOT / "constraints.txt").read_text(encoding="utf-8").splitlines()
     pins = [Requirement(line) for line in lines if line and not line.startswith("#")]
     assert all(str(pin.specifier).startswith("==") and pin.url is None for pin in pins)
     names = {canonicalize_name(pin.name) for pin in pins}
-    assert {canonicalize_name(Requirement(name).name) for name in wanted} - names == {"semsig-gis"}
+    assert {canonicalize_name(Requirement(name).name) for name in required} - names == {
+        "semsig-gis"
+    }
 
 
 def test_the_version_is_the_same_everywhere() -> None:
