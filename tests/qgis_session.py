@@ -22,6 +22,8 @@ from qgis.core import (
 )
 
 PLACE = Path(sys.argv[1])
+DATABASE = str(PLACE / "session.parquet")
+TEMPORARY = "TEMPORARY_OUTPUT"
 EVERYWHERE = QgsRenderContext()
 
 application = QgsApplication([], True)  # noqa: FBT003 - with a screen, which need not be real
@@ -87,64 +89,56 @@ def run(name: str, feedback: Feedback, **parameters: object) -> bool:
     return ended[0]
 
 
-def shown(place: str = "TEMPORARY_OUTPUT") -> QgsProcessingOutputLayerDefinition:
+def run_well(name: str, **parameters: object) -> Feedback:
+    """Run an algorithm on the database, which must succeed."""
+    feedback = Feedback()
+    if not run(name, feedback, DATABASE=DATABASE, **parameters):
+        raise RuntimeError(feedback.errors)
+    return feedback
+
+
+def shown(place: str = TEMPORARY) -> QgsProcessingOutputLayerDefinition:
     """Return an output that is loaded, a temporary one by default."""
     return QgsProcessingOutputLayerDefinition(place, QgsProject.instance())
 
 
 def held() -> dict[str, Any]:
     """Return what the layers hold that are shown, by name: rows, extent and columns."""
-    found: dict[str, Any] = {}
+    layers: dict[str, Any] = {}
     for layer in QgsProject.instance().mapLayers().values():
         rows = len(list(layer.getFeatures()))
-        told = [rows, layer.extent().toString(), layer.fields().names()]
-        found.setdefault(layer.name(), []).append(told)
-    return found
+        facts = [rows, layer.extent().toString(), layer.fields().names()]
+        layers.setdefault(layer.name(), []).append(facts)
+    return layers
 
 
 def show_twice() -> dict[str, Any]:
     """Write the same files twice while their layers are shown, and return what each time held."""
-    told = {}
+    layers = {}
     regions = str(PLACE / "regions.gpkg")
-    for time_, parameters in (
+    # The layer is called like its file, which holds another one.
+    area = f"{regions}|layername=regions"
+    files = {
+        "CANDIDATES": shown(str(PLACE / "new" / "candidates.gpkg")),
+        "PLACE": shown(),
+        "REGIONS": shown(regions),
+    }
+    for time_, query in (
         ("first", {"TYPES": "D", "TOP": 20, "METHOD": "edit+edit"}),
-        # The layer is called like its file, which holds another one.
-        (
-            "second",
-            {"TYPES": "DDB", "TOP": 3, "SHARE": 0.5, "AREA": f"{regions}|layername=regions"},
-        ),
+        ("second", {"TYPES": "DDB", "TOP": 3, "SHARE": 0.5, "AREA": area}),
     ):
-        feedback = Feedback()
-        ended = run(
-            "localize",
-            feedback,
-            DATABASE=str(PLACE / "session.parquet"),
-            CANDIDATES=shown(str(PLACE / "new" / "candidates.gpkg")),
-            PLACE=shown(),
-            REGIONS=shown(regions),
-            **parameters,
-        )
-        if not ended:
-            raise RuntimeError(feedback.errors)
-        told[time_] = {**held(), "infos": feedback.infos}
+        feedback = run_well("localize", **files, **query)
+        layers[time_] = {**held(), "infos": feedback.infos}
     QgsProject.instance().clear()
-    return told
+    return layers
 
 
 def show() -> dict[str, Any]:
     """Run what gives layers, and return how each is drawn."""
-    for name, parameters in (
-        (
-            "localize",
-            {"TYPES": "DDB", "CANDIDATES": shown(), "PLACE": shown(), "REGIONS": shown()},
-        ),
-        ("evaluate", {"QUERIES": 20, "OUTPUT": "TEMPORARY_OUTPUT", "LAYERS": shown()}),
-        ("identify", {"NOISE": "light"}),
-        ("export", {"OBJECTS": str(PLACE / "objects.parquet"), "OUTPUT": shown()}),
-    ):
-        feedback = Feedback()
-        if not run(name, feedback, DATABASE=str(PLACE / "session.parquet"), **parameters):
-            raise RuntimeError(feedback.errors)
+    run_well("localize", TYPES="DDB", CANDIDATES=shown(), PLACE=shown(), REGIONS=shown())
+    run_well("evaluate", QUERIES=20, OUTPUT=TEMPORARY, LAYERS=shown())
+    run_well("identify", NOISE="light")
+    run_well("export", OBJECTS=str(PLACE / "objects.parquet"), OUTPUT=shown())
     layers = QgsProject.instance().mapLayers().values()
     return {
         layer.name(): [layer.renderer().type(), *layer.renderer().usedAttributes(EVERYWHERE)]
@@ -153,53 +147,27 @@ def show() -> dict[str, Any]:
 
 
 def refuse() -> list[list[str]]:
-    """Return what is told of what cannot be."""
-    database, objects = str(PLACE / "session.parquet"), str(PLACE / "objects.parquet")
-    query = {"DATABASE": database, "TYPES": "DDB", "METHOD": "types:edit", "CANDIDATES": shown()}
-    told = []
+    """Return the errors of what cannot be."""
+    objects, later = str(PLACE / "objects.parquet"), str(PLACE / "later.parquet")
+    area = f"{PLACE / 'regions.gpkg'}|layername=regions"
+    query = {"TYPES": "DDB", "METHOD": "types:edit", "CANDIDATES": shown()}
+    errors = []
     for name, parameters in (
-        (
-            "localize",
-            {**query, "HEADING": "unknown", "AREA": f"{PLACE / 'regions.gpkg'}|layername=regions"},
-        ),
+        ("localize", {**query, "HEADING": "unknown", "AREA": area}),
         ("localize", {**query, "PLACE": str(PLACE / "place.gpkg")}),
-        (
-            "evaluate",
-            {
-                "DATABASE": database,
-                "METHOD": "edit+edit",
-                "NOISE": "light",
-                "OUTPUT": "TEMPORARY_OUTPUT",
-            },
-        ),
-        (
-            "build",
-            {
-                "OBJECTS": objects,
-                "OUTPUT": str(PLACE / "later.parquet"),
-                "CELLS": str(PLACE / "b.shp"),
-            },
-        ),
-        (
-            "identify",
-            {"DATABASE": database, "CELLS": shown(), "MAP": str(PLACE / "told.json")},
-        ),
-        (
-            "evaluate",
-            {
-                "DATABASE": database,
-                "OUTPUT": "TEMPORARY_OUTPUT",
-                "LAYERS": str(PLACE / "lamps.geojson" / "b.gpkg"),
-            },
-        ),
+        ("evaluate", {"METHOD": "edit+edit", "NOISE": "light", "OUTPUT": TEMPORARY}),
+        ("build", {"OBJECTS": objects, "OUTPUT": later, "CELLS": str(PLACE / "b.shp")}),
+        ("identify", {"CELLS": shown(), "MAP": str(PLACE / "map.json")}),
+        ("evaluate", {"OUTPUT": TEMPORARY, "LAYERS": str(PLACE / "lamps.geojson" / "b.gpkg")}),
     ):
         feedback = Feedback()
-        run(name, feedback, **parameters)
-        told.append(feedback.errors)
+        database = {} if name == "build" else {"DATABASE": DATABASE}
+        run(name, feedback, **database, **parameters)
+        errors.append(feedback.errors)
     ProcessingConfig.setSettingValue("SEMSIG_COMMAND", "/bin/true")
     feedback = Feedback()
-    run("build", feedback, OBJECTS=objects, OUTPUT=str(PLACE / "later.parquet"))
-    return [*told, feedback.errors]
+    run("build", feedback, OBJECTS=objects, OUTPUT=later)
+    return [*errors, feedback.errors]
 
 
 def stop(name: str, *, cancelling: bool = False, **parameters: object) -> dict[str, Any]:
@@ -218,12 +186,12 @@ def stop(name: str, *, cancelling: bool = False, **parameters: object) -> dict[s
 
 
 def play() -> dict[str, Any]:
-    """Play all scenes, and return what each told."""
+    """Play all scenes, and return what each happened."""
     registry = QgsApplication.processingRegistry()
     provider = registry.providerById("semsig")
     listed = sorted((one.displayName(), one.name()) for one in provider.algorithms())
     objects = str(PLACE / "objects.parquet")
-    told = {
+    happened = {
         "listed": [name for _, name in listed],
         "help": algorithm("localize").shortHelpString(),
         "loaded": run(
@@ -247,10 +215,10 @@ def play() -> dict[str, Any]:
             CELLS=shown(),
         ),
     }
-    told["refused"] = refuse()
+    happened["refused"] = refuse()
     ProcessingConfig.setSettingValue("SEMSIG_COMMAND", "")
-    _, told["lost"] = algorithm("build").canExecute()
-    return told
+    _, happened["lost"] = algorithm("build").canExecute()
+    return happened
 
 
 Processing.initialize()

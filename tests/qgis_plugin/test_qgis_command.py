@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 import json
 import math
 import os
@@ -25,7 +24,7 @@ from semsig.command import (
     find_command,
     run_command,
 )
-from sentences import assert_sentence, refused
+from sentences import refused
 
 from semsig_gis.cli.console import VARIABLE, app
 from semsig_gis.likelihood.noise.model import NOISES
@@ -36,24 +35,36 @@ from semsig_gis.sources.catalog import catalog_names
 unix = pytest.mark.skipif(sys.platform == "win32", reason="the stand-ins are shell scripts")
 
 
-@dataclasses.dataclass
-class Heard:
-    """What a watcher heard; it cancels when there are so many of something."""
+# A program begins with this.
+SAY = "import sys\nsay = lambda text: print(text, file=sys.stderr, flush=True)\n"
 
-    percents: list[tuple[int, str]] = dataclasses.field(default_factory=list)
-    remarks: list[str] = dataclasses.field(default_factory=list)
-    cancel_at: float = math.inf
 
-    def watcher(self) -> Watcher:
-        return Watcher(
-            lambda percent, label: self.percents.append((percent, label)),
-            self.remarks.append,
-            lambda: len(self.percents) >= self.cancel_at,
+class Log:
+    """What a watcher hears, in order; it cancels at the first percentage if it shall."""
+
+    def __init__(self, *, cancelling: bool = False) -> None:
+        self.percents: list[tuple[int, str]] = []
+        self.remarks: list[str] = []
+        self.labels: list[str] = []
+        self.cancelling = cancelling
+
+    def progress(self, percent: int, label: str) -> None:
+        self.percents.append((percent, label))
+        self.labels.append(label)
+
+    def remark(self, text: str) -> None:
+        self.remarks.append(text)
+        self.labels.append(text)
+
+    def run(self, *command: object, written: str | None = None) -> str:
+        watcher = Watcher(
+            self.progress, self.remark, lambda: self.cancelling and bool(self.percents)
         )
+        arguments = [str(part) for part in command]
+        return run_command(arguments, clean_environment(os.environ), watcher, written=written)
 
-
-def run_code(code: str, heard: Heard) -> str:
-    return run_command([sys.executable, "-c", code], clean_environment(os.environ), heard.watcher())
+    def run_code(self, code: str, *arguments: object, written: str | None = None) -> str:
+        return self.run(sys.executable, "-c", SAY + code, *arguments, written=written)
 
 
 # --- Where the command is -----------------------------------------------------------------------
@@ -120,34 +131,21 @@ def test_nothing_of_qgis_is_handed_on() -> None:
 
 
 def test_results_progress_and_remarks_are_told_apart() -> None:
-    heard = Heard()
-    code = (
-        "import sys\n"
-        "say = lambda text: print(text, file=sys.stderr)\n"
+    log = Log()
+    printed = log.run_code(
         "say('semsig: a remark')\n"
         "say('semsig progress 0% digging')\n"
-        "say('semsig progress 40% digging')\n"
+        "say('semsig progress 40% filling')\n"
         "say('')\n"
         "say('a bare line about 40%')\n"
         "print('Défibrillateur ┃ 1')\n"
         "print('x' * 300_000)\n"
     )
-    printed = run_code(code, heard)
     assert printed == "Défibrillateur ┃ 1\n" + "x" * 300_000 + "\n"
-    assert heard.percents == [(0, "digging"), (40, "digging")]
-    assert heard.remarks == ["a remark", "a bare line about 40%"]
-
-
-def test_a_remark_is_not_held_back_until_the_end() -> None:
-    heard: list[str] = []
-    watcher = Watcher(lambda _percent, label: heard.append(label), heard.append, lambda: False)
-    code = (
-        "import sys\n"
-        "for line in ('semsig: a remark', 'semsig progress 0% digging', 'semsig: the last'):\n"
-        "    print(line, file=sys.stderr)\n"
-    )
-    run_command([sys.executable, "-c", code], clean_environment(os.environ), watcher)
-    assert heard == ["a remark", "digging", "the last"]
+    assert log.percents == [(0, "digging"), (40, "filling")]
+    assert log.remarks == ["a remark", "a bare line about 40%"]
+    # A remark is not held back until the end.
+    assert log.labels == ["a remark", "digging", "filling", "a bare line about 40%"]
 
 
 FAILED = "The semsig command failed with exit code"
@@ -161,13 +159,12 @@ FAILED = "The semsig command failed with exit code"
         ("say('semsig progress 0% a'); exit(9)", f"{FAILED} 9 and did not say why.", 0),
     ],
 )
-def test_a_failure_is_told_once(code: str, message: str, remarks: int) -> None:
-    heard = Heard()
-    begin = "import sys\nsay = lambda text: print(text, file=sys.stderr)\n"
+def test_a_failure_is_reported_once(code: str, message: str, remarks: int) -> None:
+    log = Log()
     with pytest.raises(CommandError) as caught:
-        run_code(begin + code, heard)
+        log.run_code(code)
     assert str(caught.value) == message
-    assert heard.remarks == ["a"] * remarks
+    assert log.remarks == ["a"] * remarks
 
 
 @pytest.mark.parametrize(
@@ -183,48 +180,37 @@ def test_another_program_than_the_command(tmp_path: Path, code: str, why: str, o
     place = tmp_path / "city.parquet"
     if old:
         place.write_text("from an earlier run")
-    command = [sys.executable, "-c", f"import sys\n{code}"]
-    with pytest.raises(CommandError) as caught:
-        run_command(command, clean_environment(os.environ), Heard().watcher(), written=str(place))
     why = why.replace("{place}", str(place))
-    assert_sentence(caught.value, f"{sys.executable} is not the semsig command", why, "Settings > ")
+    words = (f"{sys.executable} is not the semsig command", why, "Settings > ")
+    with refused(CommandError, *words):
+        Log().run_code(code, written=str(place))
 
 
 def test_a_file_that_was_written_anew(tmp_path: Path) -> None:
     place = tmp_path / "city.parquet"
     code = (
-        f"import os; from pathlib import Path; part = Path({str(tmp_path / 'part')!r}); "
-        f"part.write_text('city'); os.replace(part, {str(place)!r})"
+        "from pathlib import Path; part, place = map(Path, sys.argv[1:]); "
+        "part.write_text('city'); part.replace(place)"
     )
-    command = [sys.executable, "-c", code]
     for _ in range(2):
-        run_command(command, clean_environment(os.environ), Heard().watcher(), written=str(place))
+        Log().run_code(code, tmp_path / "part", place, written=str(place))
     assert place.read_text() == "city"
 
 
 def test_a_program_that_cannot_be_run(tmp_path: Path) -> None:
     (tmp_path / "text").write_text("not a program")
     with refused(CommandError, "text cannot be run"):
-        run_command([str(tmp_path / "text")], {}, Heard().watcher())
-
-
-WAITS = """
-import sys, threading, _thread
-from pathlib import Path
-print("semsig progress 0% waiting", file=sys.stderr, flush=True)
-try:
-    {wait}
-finally:
-    Path(sys.argv[1]).write_text("cleaned up")
-"""
+        Log().run(tmp_path / "text")
 
 
 def test_a_cancel_ends_the_command_by_the_end_of_its_input(tmp_path: Path) -> None:
-    heard = Heard(cancel_at=1)
-    code = WAITS.replace("{wait}", "sys.stdin.read()")
-    command = [sys.executable, "-c", code, str(tmp_path / "log")]
+    code = (
+        "say('semsig progress 0% waiting')\n"
+        "try: sys.stdin.read()\n"
+        "finally: open(sys.argv[1], 'w').write('cleaned up')\n"
+    )
     with pytest.raises(Cancelled):
-        run_command(command, clean_environment(os.environ), heard.watcher())
+        Log(cancelling=True).run_code(code, tmp_path / "log")
     assert (tmp_path / "log").read_text() == "cleaned up"
 
 
@@ -243,7 +229,7 @@ def test_a_command_that_does_not_end_is_ended_with_all_it_started(
     script.chmod(0o755)
     begin = time.monotonic()
     with pytest.raises(Cancelled):
-        run_command([str(script)], {"PATH": os.defpath}, Heard(cancel_at=1).watcher())
+        Log(cancelling=True).run(script)
     assert time.monotonic() - begin < 20
     for name in ("parent", "child"):
         assert_ended(int((tmp_path / name).read_text()))
@@ -267,15 +253,9 @@ def test_a_watcher_that_fails_ends_the_command_too() -> None:
     def fail(_percent: int, _label: str) -> None:
         raise ZeroDivisionError
 
-    code = (
-        "import sys; print('semsig progress 1% a', file=sys.stderr, flush=True); sys.stdin.read()"
-    )
+    command = [sys.executable, "-c", SAY + "say('semsig progress 1% a'); sys.stdin.read()"]
     with pytest.raises(ZeroDivisionError):
-        run_command(
-            [sys.executable, "-c", code],
-            clean_environment(os.environ),
-            Watcher(fail, print, lambda: False),
-        )
+        run_command(command, clean_environment(os.environ), Watcher(fail, print, lambda: False))
 
 
 # --- Arguments ----------------------------------------------------------------------------------
@@ -318,13 +298,10 @@ def test_outputs_are_checked_before_the_work(
     monkeypatch.chdir(tmp_path)
     (tmp_path / "text").write_text("a file")
     (tmp_path / "folder.gpkg").mkdir()
-    for path, suffix in (
-        ("a.gpkg", "gpkg"),
-        (str(tmp_path / "new" / "folder" / "A.GPKG"), "gpkg"),
-        ("new/folder", ""),
-        (str(tmp_path), ""),
-    ):
-        check_output(path, suffix)
+    check_output("a.gpkg", "gpkg")
+    check_output(str(tmp_path / "new" / "folder" / "A.GPKG"), "gpkg")
+    check_output("new/folder", "")
+    check_output(str(tmp_path), "")
     for path, suffix, words in (
         ("b.shp", "gpkg", "does not end in .gpkg"),
         ("gpkg", "gpkg", "does not end in .gpkg"),
@@ -368,14 +345,12 @@ def test_rows_have_the_fields_that_they_say() -> None:
     ranked = {"rank_low": 1, "rank_high": 20, "distance": 0.3}
     likely = {"rank": 2, "chance": 0.5}
     common = {"cell_id": 7, "types": "DD", "length": 2, "x": 1.0, "y": 2.0}
-    told = [
-        dict(zip(answers.CANDIDATE_FIELDS, values, strict=True))
-        for _, _, values in candidate_rows({"candidates": [common | ranked, common | likely]})
-    ]
-    assert [one["rank"] for one in told] == [1, 2]
-    assert [one["rank_high"] for one in told] == [20, 2]
-    assert [one["chance"] for one in told] == [None, 0.5]
-    assert [one["distance"] for one in told] == [0.3, None]
+    rows = candidate_rows({"candidates": [common | ranked, common | likely]})
+    columns = dict(
+        zip(answers.CANDIDATE_FIELDS, zip(*(row[2] for row in rows), strict=True), strict=True)
+    )
+    assert (columns["rank"], columns["rank_high"]) == ((1, 2), (20, 2))
+    assert (columns["chance"], columns["distance"]) == ((None, 0.5), (0.3, None))
     assert place_row({"candidates": []}) is None
 
 
@@ -386,12 +361,8 @@ def test_what_there_is_to_say_of_an_answer() -> None:
         "1 further cell ties with the last candidate.",
     ]
     searched = {"regions": 1, "cells": 13, "km2": 0.0013, "percent": 0.00493, "chance": 0.951}
-    placed = {
-        "answered": False,
-        "place": {"within_m": 50.0, "chance": 0.05},
-        "candidates": [],
-        "searched": searched,
-    }
+    place = {"within_m": 50.0, "chance": 0.05}
+    placed = {"answered": False, "place": place, "candidates": [], "searched": searched}
     assert answer_lines(placed) == [
         "Cannot tell: the best place is within 50 m of the ellipse's middle with a chance of 5.0%.",
         "To search: 1 region, 0.0013 km2, 0.00493 % of the city, with 95.1% of the chance.",

@@ -4,15 +4,16 @@ from __future__ import annotations
 
 import ast
 import configparser
-import importlib.util
 import json
 import os
+import runpy
 import shutil
 import subprocess
 import sys
 import zipfile
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from types import SimpleNamespace
+from typing import Any
 from xml.etree import ElementTree as ET
 
 import geopandas as gpd
@@ -28,9 +29,6 @@ from semsig_gis.objects.clean import build_objects
 from semsig_gis.objects.table import open_objects, save_objects
 from semsig_gis.sources.catalog import paper_taxonomy
 from semsig_gis.sources.synthetic.city import CitySpec, synthetic_city
-
-if TYPE_CHECKING:
-    from types import ModuleType
 
 ROOT = Path(__file__).parents[2]
 PLUGIN = ROOT / "qgis_plugin" / "semsig"
@@ -49,26 +47,21 @@ pytestmark = pytest.mark.skipif(not PLUGIN.is_dir(), reason="the tests do not ru
 
 
 @pytest.fixture(scope="module")
-def package() -> ModuleType:
-    spec = importlib.util.spec_from_file_location("package", ROOT / "qgis_plugin" / "package.py")
-    assert spec is not None
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
+def package() -> SimpleNamespace:
+    """Return what the program defines that makes the zip file."""
+    return SimpleNamespace(**runpy.run_path(str(ROOT / "qgis_plugin" / "package.py")))
 
 
 # --- The zip file -------------------------------------------------------------------------------
 
 
-def test_the_zip_file_is_the_same_every_time(package: ModuleType, tmp_path: Path) -> None:
+def test_the_zip_file_is_always_the_same_and_holds_what_a_plugin_needs(
+    package: SimpleNamespace, tmp_path: Path
+) -> None:
     first, second = package.write_zip(tmp_path / "a"), package.write_zip(tmp_path / "b")
     assert first.name == second.name == f"semsig-qgis-{semsig_gis.__version__}.zip"
     assert first.read_bytes() == second.read_bytes()
-
-
-def test_the_zip_file_holds_what_a_plugin_needs(package: ModuleType, tmp_path: Path) -> None:
-    with zipfile.ZipFile(package.write_zip(tmp_path)) as archive:
+    with zipfile.ZipFile(first) as archive:
         names = archive.namelist()
         assert names == sorted(names)
         assert {name.partition("/")[0] for name in names} == {"semsig"}
@@ -126,15 +119,17 @@ class Qgis:
 
     def run(self, algorithm: str, **parameters: object) -> dict[str, str]:
         """Run an algorithm with `qgis_process`, and return its outputs."""
-        given = [f"{name}={value}" for name, value in parameters.items()]
-        done = self.process(self.program, "run", f"semsig:{algorithm}", "--", *given)
+        values = [f"{name}={value}" for name, value in parameters.items()]
+        done = self.process(self.program, "run", f"semsig:{algorithm}", "--", *values)
         assert done.returncode == 0, done.stdout + done.stderr
         results = done.stdout.rpartition("Results\n")[2].splitlines()
         return dict(line.split(":\t", 1) for line in results if ":\t" in line)
 
 
 @pytest.fixture(scope="module")
-def qgis(qgis_process: Path, package: ModuleType, tmp_path_factory: pytest.TempPathFactory) -> Qgis:
+def qgis(
+    qgis_process: Path, package: SimpleNamespace, tmp_path_factory: pytest.TempPathFactory
+) -> Qgis:
     place = tmp_path_factory.mktemp("qgis")
     layers = synthetic_city(CitySpec(size=300.0))
     objects, _ = build_objects(layers, taxonomy=paper_taxonomy(), crs=layers[0].table.crs)
@@ -186,26 +181,17 @@ def lamps(qgis: Qgis) -> Path:
 
 
 def test_load_and_build(qgis: Qgis, lamps: Path) -> None:
-    done = qgis.run(
-        "load",
-        FOLDER=qgis.place,
-        CATALOG_FILE=lamps,
-        OUTPUT=qgis.place / "lamps.parquet",
-        BUILDINGS=qgis.place / "no_buildings.parquet",
-    )
-    assert done == {"OUTPUT": str(qgis.place / "lamps.parquet")}
-    assert len(open_objects(done["OUTPUT"])) == 3
-    done = qgis.run(
-        "build",
-        OBJECTS=done["OUTPUT"],
-        RADIUS=20,
-        OUTPUT=qgis.place / "lamps_city.parquet",
-        CELLS=qgis.place / "lamps.gpkg",
-    )
+    objects = qgis.place / "lamps.parquet"
+    files = {"OUTPUT": objects, "BUILDINGS": qgis.place / "no_buildings.parquet"}
+    done = qgis.run("load", FOLDER=qgis.place, CATALOG_FILE=lamps, **files)
+    assert done == {"OUTPUT": str(objects)}
+    assert len(open_objects(objects)) == 3
+    files = {"OUTPUT": qgis.place / "lamps_city.parquet", "CELLS": qgis.place / "lamps.gpkg"}
+    done = qgis.run("build", OBJECTS=objects, RADIUS=20, **files)
     database = open_database(done["OUTPUT"])
     assert database.spec.radius == 20.0
-    assert done["CELLS"] == f"{qgis.place}/lamps.gpkg|layername=cells"
-    assert len(gpd.read_file(qgis.place / "lamps.gpkg", layer="cells")) == len(database)
+    assert done["CELLS"] == f"{files['CELLS']}|layername=cells"
+    assert len(gpd.read_file(files["CELLS"], layer="cells")) == len(database)
 
 
 def test_localize(qgis: Qgis) -> None:
@@ -213,34 +199,30 @@ def test_localize(qgis: Qgis) -> None:
     cell = int(database.lengths.argmax())
     seen = database.signature(cell)
     assert seen.bearings is not None
-    outputs = ("CANDIDATES", "PLACE", "REGIONS")
-    written = {name: qgis.place / f"{name}.gpkg" for name in outputs}
-    qgis.run(
-        "localize",
-        DATABASE=qgis.place / "city.parquet",
-        TYPES=database.types(cell),
-        BEARINGS=",".join(f"{bearing:.1f}" for bearing in seen.bearings),
-        METHOD="likelihood",
-        TOP=3,
-        MAP=qgis.place / "place.html",
-        **written,
-    )
-    candidates = gpd.read_file(written["CANDIDATES"], layer="CANDIDATES")
+    files = {name: qgis.place / f"{name}.gpkg" for name in ("CANDIDATES", "PLACE", "REGIONS")}
+    query = {
+        "TYPES": database.types(cell),
+        "BEARINGS": ",".join(f"{bearing:.1f}" for bearing in seen.bearings),
+    }
+    files["MAP"] = qgis.place / "place.html"
+    source = qgis.place / "city.parquet"
+    qgis.run("localize", DATABASE=source, METHOD="likelihood", TOP=3, **query, **files)
+    candidates = gpd.read_file(files["CANDIDATES"], layer="CANDIDATES")
     assert candidates["rank"].tolist() == [1, 2, 3]
     assert candidates["cell_id"][0] == database.cell_ids[cell]
     assert candidates["chance"].is_monotonic_decreasing
     assert candidates["distance"].isna().all()
     assert candidates.crs == database.crs
     for name in ("CANDIDATES", "PLACE"):
-        styles = gpd.read_file(written[name], layer="layer_styles")
+        styles = gpd.read_file(files[name], layer="layer_styles")
         assert styles["styleName"].tolist() == [name.lower()]
         assert styles["useAsDefault"].all()
-    place = gpd.read_file(written["PLACE"], layer="PLACE")
+    place = gpd.read_file(files["PLACE"], layer="PLACE")
     assert place["answered"].tolist() == ["yes"]
-    regions = gpd.read_file(written["REGIONS"], layer="regions")
+    regions = gpd.read_file(files["REGIONS"], layer="regions")
     assert regions.geometry[0].distance(candidates.geometry[0]) == 0
     assert place.geometry[0].centroid.distance(candidates.geometry[0]) < 10
-    assert "<html" in (qgis.place / "place.html").read_text(encoding="utf-8")[:200].lower()
+    assert "<html" in files["MAP"].read_text(encoding="utf-8")[:200].lower()
 
 
 def test_evaluate(qgis: Qgis) -> None:
@@ -273,15 +255,15 @@ def session(qgis: Qgis, lamps: Path) -> dict[str, Any]:
     if "No module named 'qgis'" in done.stderr:
         unavailable("qgis", f"{python} does not have QGIS's modules")
     assert done.returncode == 0, done.stdout + done.stderr
-    told: dict[str, Any] = json.loads(done.stdout.splitlines()[-1])
-    return told
+    happened: dict[str, Any] = json.loads(done.stdout.splitlines()[-1])
+    return happened
 
 
 def test_qgis_lists_the_algorithms_in_their_order(session: dict[str, Any]) -> None:
     assert session["listed"] == ["load", "build", "localize", "evaluate", "identify", "export"]
-    told = session["help"]
-    assert "<p>Tells where in the city a view was taken from: what is seen, clockwise" in told
-    assert "?&lt;=10" in told
+    text = session["help"]
+    assert "<p>Tells where in the city a view was taken from: what is seen, clockwise" in text
+    assert "?&lt;=10" in text
 
 
 def test_layers_are_shown_with_their_styles(session: dict[str, Any]) -> None:
@@ -304,10 +286,9 @@ def test_a_second_run_into_the_same_files_is_shown(session: dict[str, Any]) -> N
         ((rows, extent, _),), ((new_rows, new_extent, _),) = first[name], second[name]
         assert new_rows < rows
         assert new_extent != extent
-    told, new_told = first["Regions to search"][0][2], second["Regions to search"][0][2]
-    assert "chance" in set(new_told) - set(told)
-    assert "Place" not in first
-    assert "Place" in second
+    columns, new_columns = first["Regions to search"][0][2], second["Regions to search"][0][2]
+    assert "chance" in set(new_columns) - set(columns)
+    assert ("Place" in first, "Place" in second) == (False, True)
     shared, tied, searched = first["infos"]
     assert shared.startswith("The best ")
     assert tied.endswith("further cells tie with the last candidate.")
@@ -318,43 +299,30 @@ def test_a_second_run_into_the_same_files_is_shown(session: dict[str, Any]) -> N
 
 
 def test_what_cannot_be_is_refused_before_the_work(session: dict[str, Any]) -> None:
-    refused = iter(session["refused"])
-    for words in (
+    expected = (
         ("--heading and --area are for --method likelihood",),
         ("Place was given with the method types:edit",),
         ("Detector was given with the method edit+edit",),
         ("b.shp does not end in .gpkg",),
-        ("told.json does not end in .html",),
+        ("map.json does not end in .html",),
         ("lamps.geojson is not a folder",),
         ("/bin/true is not the semsig command", "later.parquet"),
-    ):
-        (sentence,) = next(refused)
-        for word in words:
-            assert word in sentence
-    assert list(refused) == []
+    )
+    for (sentence,), words in zip(session["refused"], expected, strict=True):
+        assert all(word in sentence for word in words), sentence
 
 
 @pytest.mark.usefixtures("session")
 def test_identify_and_export(qgis: Qgis) -> None:
     source = qgis.place / "session.parquet"  # of which everything is known by now
-    done = qgis.run(
-        "identify",
-        DATABASE=source,
-        NOISE="light",
-        CELLS=qgis.place / "told.gpkg",
-        MAP=qgis.place / "told.html",
-    )
+    files = {"CELLS": qgis.place / "cells.gpkg", "MAP": qgis.place / "cells.html"}
+    done = qgis.run("identify", DATABASE=source, NOISE="light", **files)
     assert set(done) == {"CELLS", "MAP"}
-    cells = gpd.read_file(qgis.place / "told.gpkg", layer="cells")
+    cells = gpd.read_file(files["CELLS"], layer="cells")
     assert cells["chance_found"].between(0, 1).all()
-    qgis.run(
-        "export",
-        DATABASE=source,
-        OBJECTS=qgis.place / "objects.parquet",
-        GEOMETRY="point",
-        OUTPUT=qgis.place / "export.gpkg",
-    )
-    layers = dict(pyogrio.list_layers(qgis.place / "export.gpkg").tolist())
+    objects, out = qgis.place / "objects.parquet", qgis.place / "export.gpkg"
+    qgis.run("export", DATABASE=source, OBJECTS=objects, GEOMETRY="point", OUTPUT=out)
+    layers = dict(pyogrio.list_layers(out).tolist())
     assert layers["cells"] == layers["objects"] == "Point"
 
 
@@ -364,23 +332,19 @@ def test_files_one_by_one(session: dict[str, Any], qgis: Qgis) -> None:
 
 
 def test_a_failing_run_shows_the_sentence_and_leaves_nothing(session: dict[str, Any]) -> None:
-    told = session["failed"]
-    (sentence,) = told["errors"]
-    assert sentence.endswith(
-        "objects.parquet is a street objects file; give a signature database file."
-    )
-    assert told["successful"] is False
-    assert told["left"] == []
+    run = session["failed"]
+    (sentence,) = run["errors"]
+    assert "objects.parquet is a street objects file; give a signature database file." in sentence
+    assert (run["successful"], run["left"]) == (False, [])
 
 
 def test_a_cancel_leaves_no_process_and_no_file(session: dict[str, Any]) -> None:
-    told = session["cancelled"]
-    assert told["errors"] == ["Cancelled; no file is half-written."]
-    assert told["successful"] is False
-    assert told["left"] == []
-    assert told["percents"] != []
+    run = session["cancelled"]
+    assert run["errors"] == ["Cancelled; no file is half-written."]
+    assert (run["successful"], run["left"]) == (False, [])
+    assert run["percents"] != []
     with pytest.raises(ProcessLookupError):
-        os.kill(told["process"], 0)
+        os.kill(run["process"], 0)
 
 
 def test_without_the_command_it_is_told_how_to_get_it(session: dict[str, Any]) -> None:
