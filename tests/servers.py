@@ -13,12 +13,7 @@ answer is an `Answer`, or a function from what was `Seen` to one. What was asked
     assert server.seen[0].headers["user-agent"].startswith("semsig")
 
 `server.other_host` is the same server under another name, for redirects that leave the host. A path
-without a script is answered with 404. In a test file::
-
-    @pytest.fixture
-    def server() -> Iterator[Server]:
-        with Server() as running:
-            yield running
+without a script is answered with 404.
 """
 
 from __future__ import annotations
@@ -41,33 +36,15 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class Answer:
-    """What the server says.
-
-    Parameters
-    ----------
-    body : bytes
-        The whole body.
-    status : int
-        Status code.
-    type : str
-        Content type; none is sent where it is empty.
-    headers : mapping of str to str
-        Further headers.
-    chunked : bool
-        Whether the length is left unsaid and the body sent in chunks.
-    cut : int, optional
-        Number of bytes of the body after which the connection is closed, as if it had failed.
-    drip : tuple of (int, float), optional
-        Bytes to send at a time, and the seconds to wait after each.
-    """
+    """What the server says."""
 
     body: bytes = b""
     status: int = 200
-    type: str = "application/json"
-    headers: Mapping[str, str] = field(default_factory=dict)
-    chunked: bool = False
-    cut: int | None = None
-    drip: tuple[int, float] | None = None
+    type: str = "application/json"  # none is sent where it is empty
+    headers: Mapping[str, str] = field(default_factory=dict)  # further ones
+    chunked: bool = False  # the length is left unsaid and the body sent in chunks
+    cut: int | None = None  # bytes after which the connection is closed, as if it had failed
+    drip: tuple[int, float] | None = None  # bytes to send at a time, seconds to wait after each
 
 
 @dataclass(frozen=True, slots=True)
@@ -103,25 +80,10 @@ def published(
     ranges: bool = True,
     cuts: Sequence[int | None] = (),
 ) -> Callable[[Seen], Answer]:
-    """Play a file as a good web server does: with conditional requests, and ranges if wanted.
+    """Play a file as a good web server does: with conditional requests, and parts of it on request.
 
-    Parameters
-    ----------
-    body : bytes
-        The file.
-    type : str
-        Its content type.
-    etag, modified : str
-        Its entity tag, quoted, and the date of its last change.
-    ranges : bool
-        Whether a part of it can be asked for.
-    cuts : sequence of int or None
-        Of the first answers that have a body, the number of bytes after which each is cut.
-
-    Returns
-    -------
-    callable
-        A script for `Server.on`.
+    `etag` is quoted; `modified` is the date of the last change. `cuts` are, of the first answers
+    that have a body, the bytes after which each is cut.
     """
     left = list(cuts)
 
@@ -133,12 +95,12 @@ def published(
         same_date = modified and seen.headers.get("if-modified-since") == modified
         if same_tag or same_date:
             return Answer(status=304, type="", headers=headers)
-        wanted = seen.headers.get("range", "") if ranges else ""
+        part = seen.headers.get("range", "") if ranges else ""
         condition = seen.headers.get("if-range")
         cut = left.pop(0) if left else None
-        if not wanted or condition not in {None, etag, modified}:
+        if not part or condition not in {None, etag, modified}:
             return Answer(body, type=type, headers=headers, cut=cut)
-        start = int(wanted.removeprefix("bytes=").partition("-")[0])
+        start = int(part.removeprefix("bytes=").partition("-")[0])
         if start >= len(body):
             return Answer(status=416, headers={"Content-Range": f"bytes */{len(body)}"})
         headers["Content-Range"] = f"bytes {start}-{len(body) - 1}/{len(body)}"
@@ -197,8 +159,8 @@ class Server:
         web.daemon_threads = False  # so that closing waits for the answers under way
         self.port = web.server_address[1]
         patch = self._stack.enter_context(pytest.MonkeyPatch.context())
-        for name in ("NO_PROXY", "no_proxy"):
-            patch.setenv(name, "127.0.0.1,localhost")
+        patch.setenv("NO_PROXY", "127.0.0.1,localhost")
+        patch.setenv("no_proxy", "127.0.0.1,localhost")
         thread = threading.Thread(target=web.serve_forever, kwargs={"poll_interval": 0.01})
         thread.start()
         self._stack.callback(thread.join)
@@ -221,19 +183,10 @@ class _Handler(http.server.BaseHTTPRequestHandler):
     timeout = 10.0  # for a client that connects and says nothing
     playing: Server
 
-    def do_GET(self) -> None:
-        self._respond()
-
-    def do_POST(self) -> None:
-        self._respond()
-
-    def do_HEAD(self) -> None:
-        self._respond()
-
     def log_message(self, format: str, *args: object) -> None:  # noqa: A002 - the base class's name
         """Say nothing: the tests look at what was seen."""
 
-    def _respond(self) -> None:
+    def do_GET(self) -> None:
         self.close_connection = True
         parts = urlsplit(self.path)
         body = self.rfile.read(int(self.headers.get("Content-Length", 0)))
@@ -243,6 +196,8 @@ class _Handler(http.server.BaseHTTPRequestHandler):
         # A client that has had enough closes the connection, which is no fault.
         with contextlib.suppress(OSError):
             self._send(answer)
+
+    do_POST = do_HEAD = do_GET  # noqa: N815
 
     def _send(self, answer: Answer) -> None:
         self.send_response(answer.status)

@@ -13,7 +13,7 @@ import pyarrow.parquet as pq
 import pyogrio
 import pytest
 import rasterio
-from cells_told import told_of
+from cell_chances import chances_of
 from sentences import sentence
 from small_city import small_city, small_evaluation
 
@@ -37,7 +37,7 @@ def _city(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     # named.
     save_database(database, "city.parquet")
     save_database(open_database("city.parquet"), "city.parquet")
-    save_identifiability(told_of(database), "city.parquet")
+    save_identifiability(chances_of(database), "city.parquet")
     save_objects(objects, "objects.parquet")
     save_objects(open_objects("objects.parquet"), "objects.parquet")
     save_evaluation(small_evaluation(), "evaluation")

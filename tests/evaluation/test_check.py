@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
-from cells_told import told_of
+from cell_chances import chances_of
 from noisy_cells import random_database
 from scipy.stats import spearmanr
 from sentences import assert_sentence
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
 DATABASE = random_database(5, cells=90, longest=8)
 INDEX = build_index(DATABASE, named_noise("medium"))
-TOLD = told_of(DATABASE)
+TOLD = chances_of(DATABASE)
 
 
 def test_figures_are_those_of_plain_loops() -> None:
@@ -80,7 +80,7 @@ def test_the_default_seed_is_fresh_and_threads_change_nothing() -> None:
 def alone() -> tuple[Identifiability, LikelihoodIndex]:
     """Return a city of one cell, in which there is nothing to be mistaken for."""
     database = random_database(5, cells=1)
-    told = dataclasses.replace(told_of(database), found=np.ones(1))
+    told = dataclasses.replace(chances_of(database), found=np.ones(1))
     return told, build_index(database, told.noise)
 
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pyarrow as pa
 import pytest
-from cells_told import told_of
+from cell_chances import chances_of
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from noisy_cells import mixtures, random_database
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from semsig_gis.likelihood.noise.model import Noise
 
 DATABASE = random_database(3, cells=40, classes=3)
-TOLD = told_of(DATABASE)
+TOLD = chances_of(DATABASE)
 NAMES = ["alignment_tree", "water_fountain", "street_light"]
 ARRAYS = ("itself", "near", "found", "bits", "lookalikes", "lookalike_chances", "gains")
 
@@ -83,7 +83,7 @@ def test_all_comes_back(
     database = random_database(seed, cells=30, classes=3)
     save_database(database, path)
     assert open_identifiability(database, path) is None
-    told = dataclasses.replace(told_of(database, seed=seed), noise=noise, radius=radius)
+    told = dataclasses.replace(chances_of(database, seed=seed), noise=noise, radius=radius)
     save_identifiability(told, path)
     opened = open_database(path)
     found = open_identifiability(opened, path)

@@ -9,7 +9,7 @@ import pandas as pd
 import pyogrio
 import pytest
 import shapely
-from cells_told import told_of
+from cell_chances import chances_of
 from full_disk import largest_file
 from sentences import refused
 from small_city import small_city, small_evaluation, small_localization, small_location
@@ -28,7 +28,7 @@ def contents() -> dict[str, Any]:
     return {
         "objects": objects,
         "evaluation": small_evaluation(),
-        "identifiability": told_of(database),
+        "identifiability": chances_of(database),
     }
 
 
@@ -129,7 +129,7 @@ MADE_WITH = "give the database that it was made with"
 TABLES, ALL = (".gpkg", ".parquet", ".csv"), (".gpkg", ".parquet", ".csv", ".tif")
 OTHERS: list[tuple[tuple[str, ...], slice, str, Callable[[], object], tuple[str, ...]]] = [
     (ALL, slice(0), "", dict, ("city.", "no cell")),
-    (TABLES, slice(3, None), "identifiability", lambda: told_of(small_city()[0]), ("other cells",)),
+    (TABLES, slice(3, None), "identifiability", lambda: chances_of(small_city()[0]), ("other cells",)),
     (ALL, slice(3, None), "evaluation", small_evaluation, (MADE_WITH,)),
     (TABLES, slice(None), "objects", lambda: other_objects("moved"), ("zone 32N", "zone 31N")),
     (TABLES, slice(None), "objects", lambda: other_objects("far"), ("none of the", "city")),

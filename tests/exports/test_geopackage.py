@@ -24,7 +24,7 @@ import pyogrio
 import pytest
 import rasterio
 import shapely
-from cells_told import told_of
+from cell_chances import chances_of
 from map_pages import HOSTILE
 from pyproj import CRS
 from sentences import refused
@@ -104,7 +104,7 @@ def town(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Return a GeoPackage with all that there is of a city."""
     path = tmp_path_factory.mktemp("town") / "town.gpkg"
     city, seen = small_city()
-    results, told = small_evaluation(), told_of(city)
+    results, told = small_evaluation(), chances_of(city)
     export_database(city, path, objects=seen, identifiability=told, evaluation=results)
     return path
 
@@ -467,7 +467,7 @@ def test_qgis_colours_the_layers_at_once(qgis_draw: Draw, tmp_path: Path) -> Non
     hostile = StreetObjects(seen.table, Taxonomy(tuple(classes)), (Licence(nasty),))
     file = tmp_path / "city.gpkg"
     harmful = dataclasses.replace(city, taxonomy=hostile.taxonomy, licenses=(nasty,))
-    results, told = small_evaluation(), told_of(city)
+    results, told = small_evaluation(), chances_of(city)
     export_database(harmful, file, objects=hostile, identifiability=told, evaluation=results)
     answer = tmp_path / "answer.gpkg"
     export_answer(small_localization(), city, answer)
@@ -503,7 +503,7 @@ def test_qgis_colours_the_layers_at_once(qgis_draw: Draw, tmp_path: Path) -> Non
 
 
 def test_identifiability_goes_with_the_cells(town: Path) -> None:
-    told, cells = told_of(small_city()[0]), gpd.read_file(town, layer="cells")
+    told, cells = chances_of(small_city()[0]), gpd.read_file(town, layer="cells")
     table = told.table()
     assert set(table.column_names) <= set(cells.columns)
     assert cells["lookalike_3"].isna().tolist() == (told.lookalikes[:, 2] < 0).tolist()

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 import shapely
 import worlds
-from cells_told import told_of
+from cell_chances import chances_of
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from map_pages import HOSTILE, hostile_database
@@ -92,7 +92,7 @@ def test_all_else_comes_back_too(tmp_path: Path) -> None:
     texts = [HOSTILE, "", "\u202eright\u0001'\"); DROP TABLE cells; --" + "é" * 10_000]
     table = seen.table.assign(merged=[texts[row % 3] for row in range(len(seen))])
     seen = StreetObjects(table, seen.taxonomy, (*seen.licenses, Licence(HOSTILE)))
-    told, file = told_of(database), tmp_path / "city.gpkg"
+    told, file = chances_of(database), tmp_path / "city.gpkg"
     export_database(database, file, objects=seen, identifiability=told)
     found = read_geopackage(file)
     assert_same(database, found.database)
@@ -125,7 +125,7 @@ def changed(file: Path, sql: str) -> None:
 
 def test_cells_that_were_deleted_are_gone(tmp_path: Path) -> None:
     database, file = small_city()[0], tmp_path / "city.gpkg"
-    export_database(database, file, identifiability=told_of(database))
+    export_database(database, file, identifiability=chances_of(database))
     changed(file, "DELETE FROM cells WHERE length < 3")
     found = read_geopackage(file)
     assert_same(database.select(database.lengths >= 3), found.database)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import geopandas as gpd
 import numpy as np
 import pyarrow.parquet as pq
-from cells_told import told_of
+from cell_chances import chances_of
 from sentences import refused
 from small_city import small_city
 
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 def test_cells_read_back_as_they_are(tmp_path: Path) -> None:
     database, _ = small_city()
-    told, file = told_of(database), tmp_path / "cells.parquet"
+    told, file = chances_of(database), tmp_path / "cells.parquet"
     steps: list[tuple[int, int]] = []
     export_database(
         database,

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pytest
 import rasterio
-from cells_told import told_of
+from cell_chances import chances_of
 from rio_cogeo.cogeo import cog_validate
 from sentences import refused
 from small_city import small_city, small_evaluation, small_location
@@ -60,7 +60,7 @@ def test_pixels_are_cells(grid: GridSpec, monkeypatch: pytest.MonkeyPatch, tmp_p
 
 def test_layers_of_a_city(tmp_path: Path) -> None:
     database, _ = small_city()
-    told, evaluation = told_of(database), small_evaluation()
+    told, evaluation = chances_of(database), small_evaluation()
     export_database(database, tmp_path / "a.tif", identifiability=told)
     assert_holds(tmp_path / "a.tif", database, database.type_group_sizes)
     export_database(database, tmp_path / "i.tiff", layers=["identifiability"], identifiability=told)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
-from cells_told import told_of
+from cell_chances import chances_of
 from map_pages import HOSTILE, IMAGES, LEGEND, hostile_database
 from worlds import random_town
 
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from map_pages import MapPage
 
 CITY = random_town().database
-TOLD = told_of(CITY)
+TOLD = chances_of(CITY)
 
 
 def group(cell: int, *, angles: bool = False) -> list[int]:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
-from cells_told import told_of
+from cell_chances import chances_of
 from small_city import small_city
 
 import semsig_gis
@@ -82,7 +82,7 @@ def legends(city: SignatureDatabase, objects: StreetObjects, name: str) -> dict[
         "localization_by_bearings": localization_legend(localize(city, BEARINGS, top=7)),
         "location": location_legend(locate(index, query, explained=1)),
         "location_unsure": location_legend(locate(index, query, rule=AnswerRule(threshold=2.0))),
-        "identifiability": identifiability_legend(dataclasses.replace(told_of(city), noise=noise)),
+        "identifiability": identifiability_legend(dataclasses.replace(chances_of(city), noise=noise)),
         "ambiguity": ambiguity_legend(sizes, licenses=city.licenses),
         "drift": drift(objects=None),
         "drift_of_objects": drift(objects=CHANGES),
@@ -120,7 +120,7 @@ def test_what_a_legend_says(name: str, snapshot: Callable[[str, str], None]) -> 
 
 
 def test_the_numbers_are_those_of_the_results() -> None:
-    facts = told_of(CITY).summary()
+    facts = chances_of(CITY).summary()
     distances = localize(CITY, QUERY, top=7).candidates["distance"]
     for name, words in (
         ("evaluation", f"P(error ≤ 50 m) {EVALUATION.cdf([50])[0]:.1%}"),

@@ -12,7 +12,7 @@ import geopandas as gpd
 import numpy as np
 import pytest
 import shapely
-from cells_told import told_of
+from cell_chances import chances_of
 from folium.template import Template
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -59,7 +59,7 @@ LANE = gpd.GeoDataFrame(geometry=[shapely.LineString([(3.0, 43.0), (3.1, 43.0)])
 EVALUATION = evaluate(CITY, queries=5)
 LOCALIZATION = localize(CITY, CITY.signature(0), top=5)
 LOCATION = locate(build_index(CITY, named_noise("light")), CITY.signature(0), top=5)
-TOLD, OTHER_TOLD = told_of(CITY), told_of(CITY.select(slice(1, None)))
+TOLD, OTHER_TOLD = chances_of(CITY), chances_of(CITY.select(slice(1, None)))
 OTHER_CITY = dataclasses.replace(CITY, rows=CITY.rows + 10_000)
 OTHER_SIGHT = dataclasses.replace(CITY, codes=CITY.codes[::-1].copy())
 NO_OBJECTS = dataclasses.replace(OBJECTS, table=OBJECTS.table.iloc[:0])

@@ -32,7 +32,7 @@ from semsig_gis.sources.synthetic.city import CitySpec, synthetic_city
 
 ROOT = Path(__file__).parents[2]
 PLUGIN = ROOT / "qgis_plugin" / "semsig"
-SCRIPT = Path(__file__).parents[1] / "qgis_session.py"
+SCRIPT = Path(__file__).with_name("qgis_session.py")
 
 # The command with few simulated queries.
 QUICK = """

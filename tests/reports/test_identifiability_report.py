@@ -4,7 +4,7 @@ import math
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from cells_told import told_of
+from cell_chances import chances_of
 from noisy_cells import random_database
 from worlds import random_town
 
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable
     from pathlib import Path
 
-TOLD = told_of(random_database(3, cells=40, classes=3))
+TOLD = chances_of(random_database(3, cells=40, classes=3))
 TENTH = ChanceBin(
     low=0.2, high=0.3, queries=1234, stated=0.25, true=0.3, true_low=0.2, true_high=0.4
 )

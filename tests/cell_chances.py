@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 PLACES = 3
 
 
-def told_of(database: SignatureDatabase, *, seed: int = 0) -> Identifiability:
+def chances_of(database: SignatureDatabase, *, seed: int = 0) -> Identifiability:
     """Return any numbers for the cells of a database."""
     rng = np.random.default_rng(seed)
     cells, codes = len(database), database.present_codes.tolist()
