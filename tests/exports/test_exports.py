@@ -129,7 +129,13 @@ MADE_WITH = "give the database that it was made with"
 TABLES, ALL = (".gpkg", ".parquet", ".csv"), (".gpkg", ".parquet", ".csv", ".tif")
 OTHERS: list[tuple[tuple[str, ...], slice, str, Callable[[], object], tuple[str, ...]]] = [
     (ALL, slice(0), "", dict, ("city.", "no cell")),
-    (TABLES, slice(3, None), "identifiability", lambda: chances_of(small_city()[0]), ("other cells",)),
+    (
+        TABLES,
+        slice(3, None),
+        "identifiability",
+        lambda: chances_of(small_city()[0]),
+        ("other cells",),
+    ),
     (ALL, slice(3, None), "evaluation", small_evaluation, (MADE_WITH,)),
     (TABLES, slice(None), "objects", lambda: other_objects("moved"), ("zone 32N", "zone 31N")),
     (TABLES, slice(None), "objects", lambda: other_objects("far"), ("none of the", "city")),

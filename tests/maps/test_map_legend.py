@@ -82,7 +82,9 @@ def legends(city: SignatureDatabase, objects: StreetObjects, name: str) -> dict[
         "localization_by_bearings": localization_legend(localize(city, BEARINGS, top=7)),
         "location": location_legend(locate(index, query, explained=1)),
         "location_unsure": location_legend(locate(index, query, rule=AnswerRule(threshold=2.0))),
-        "identifiability": identifiability_legend(dataclasses.replace(chances_of(city), noise=noise)),
+        "identifiability": identifiability_legend(
+            dataclasses.replace(chances_of(city), noise=noise)
+        ),
         "ambiguity": ambiguity_legend(sizes, licenses=city.licenses),
         "drift": drift(objects=None),
         "drift_of_objects": drift(objects=CHANGES),
