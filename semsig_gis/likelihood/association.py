@@ -26,19 +26,15 @@ import numpy as np
 
 from semsig_gis.core.errors import InputError
 from semsig_gis.core.geometry import signed_degrees
-from semsig_gis.database.database import BEARING_UNITS, DISTANCE_UNITS
 from semsig_gis.database.visibility import views_in
 from semsig_gis.likelihood.index import CellScores
-from semsig_gis.likelihood.noise.table import database_tables
+from semsig_gis.likelihood.noise.table import database_tables, place_loglik
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
     from numpy.typing import NDArray
 
     from semsig_gis.core.signature import Signature
     from semsig_gis.database.database import SignatureDatabase
-    from semsig_gis.database.visibility import Views
     from semsig_gis.likelihood.index import LikelihoodIndex
     from semsig_gis.likelihood.noise.model import Noise
     from semsig_gis.likelihood.noise.table import NoiseTable
@@ -46,56 +42,6 @@ if TYPE_CHECKING:
 
 WIDE = 45.0  # degrees of deviation from which on the tails meet behind the observer
 LAPS = 360.0 * np.arange(-3, 4)
-
-
-def place_loglik(
-    query: Signature,
-    views: Views,
-    tables: Sequence[NoiseTable],
-    weights: NDArray[np.float64],
-    *,
-    turns: NDArray[np.float64],
-    reach: float,
-) -> NDArray[np.float64]:
-    """Return the log-likelihood of a query by place and turn, shape (v, r).
-
-    The query needs bearings; its types may be unknown. `weights` are the chances of the tables,
-    `turns` the degrees to turn the query by at each place, and `reach` the largest visibility range
-    of any class in metres. The scale is that of `likelihood.index`.
-    """
-    from semsig_gis.likelihood.kernels import align  # noqa: PLC0415 - numba loads slowly
-
-    bearings = query_bearings(query)
-    rows, kinds = tables[0].query_rows(query), tables[0].row_of[views.codes]
-    bearing_units = np.minimum(views.bearings * (BEARING_UNITS / 360.0), BEARING_UNITS - 1)
-    distance_units = np.rint(views.distances * (DISTANCE_UNITS / reach))
-    logliks = np.empty((len(tables), *turns.shape))
-    align(
-        views.offsets,
-        kinds,
-        bearing_units.astype(np.uint16),
-        distance_units.astype(np.uint8),
-        360.0 / BEARING_UNITS,
-        rows,
-        bearings,
-        turns,
-        np.stack([table.odds for table in tables]),
-        np.stack([table.naming for table in tables]),
-        np.stack([table.sigmas(reach) for table in tables]),
-        logliks,
-    )
-    for model, (table, weight) in enumerate(zip(tables, weights.tolist(), strict=True)):
-        logliks[model] += table.nothing_seen(views.offsets, kinds)[:, None]
-        logliks[model] += float(np.log(table.density[rows]).sum()) + math.log(weight)
-    return np.asarray(np.logaddexp.reduce(logliks, axis=0))
-
-
-def query_bearings(query: Signature) -> NDArray[np.float64]:
-    """Return the bearings of a query, or refuse a query without."""
-    if query.bearings is None:
-        msg = "the query has no bearings, on which its place rests; give them."
-        raise InputError(msg)
-    return query.bearings
 
 
 def turn_logs(turns: NDArray[np.float64], step: float, north_sigma: float) -> NDArray[np.float64]:
@@ -243,7 +189,7 @@ def align_cells(
 ) -> NDArray[np.float64]:
     """Return the log-likelihood of a query in some cells, summed over one-to-one associations.
 
-    As `association.place_loglik`: the shape is (c,), or (c, r) if `turns`, the degrees to turn the
+    As `place_loglik`: the shape is (c,), or (c, r) if `turns`, the degrees to turn the
     query by for each cell, are given.
     """
     models = database_tables(database, noise)

@@ -14,8 +14,8 @@ from semsig_gis.core.crs import SOURCE, SOURCE_ID
 from semsig_gis.core.geometry import signed_degrees
 from semsig_gis.core.taxonomy import WILDCARD
 from semsig_gis.database.visibility import views_at, views_in
-from semsig_gis.likelihood.association import associate, near_pairs, query_bearings
-from semsig_gis.likelihood.noise.table import LONGEST_TABLE, noise_tables
+from semsig_gis.likelihood.association import associate, near_pairs
+from semsig_gis.likelihood.noise.table import LONGEST_TABLE, noise_tables, query_bearings
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

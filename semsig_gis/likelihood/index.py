@@ -76,10 +76,8 @@ class LikelihoodIndex:
 
     Parameters
     ----------
-    database : SignatureDatabase
-        The cells.
-    noise : NoiseSpec or NoiseMixture
-        The noise model; the columns hold the mean of a mixture.
+    database, noise : SignatureDatabase, and NoiseSpec or NoiseMixture
+        The cells and the noise model; the columns hold the mean of a mixture.
     columns : ndarray of uint8, shape (k + 1, 72, n)
         Inner logarithms in steps, by class and bearing; the last class is "not known".
     constants : ndarray of float32, shape (n,)
@@ -221,18 +219,13 @@ def build_index(
     database : SignatureDatabase
         The cells.
     noise : NoiseSpec or NoiseMixture
-        The noise model.
+        The noise model; InputError if it does not fit the classes of the database.
     out : ndarray of uint8, shape (k + 1, 72, n), optional
         Where to put the columns, such as a mapped file.
     progress : callable, optional
         Called with the number of cells done and in all.
     threads : int, default 1
         How many blocks of cells are worked out at once.
-
-    Raises
-    ------
-    InputError
-        If the noise model does not fit the classes of the database.
     """
     table = mean_table(*database_tables(database, noise))
     unseen = table.nothing_seen(database.offsets, table.row_of[database.codes])

@@ -30,20 +30,12 @@ class LikelihoodMethod:
     refined : bool, default False
         Whether the place is looked for between the viewpoints, too, with the street objects.
     on_grid : bool, default False
-        Whether queries are from the very viewpoints, as in the paper, not from anywhere in a cell.
+        Whether queries are from the very viewpoints, as in the paper, and then not `refined`.
     north_sigma : float, default 0
-        Standard deviation in degrees of the north of a query; infinite where it is not known.
-
-    Raises
-    ------
-    InputError
-        If the deviation is negative, or a place on the grid is to be refined.
+        Standard deviation in degrees of the north of a query, 0 or more; infinite if not known.
 
     Examples
     --------
-    >>> from semsig_gis.likelihood.noise.model import named_noise
-    >>> str(LikelihoodMethod(noise=named_noise("medium"), refined=True))
-    'likelihood:medium:refined'
     >>> LikelihoodMethod.parse("likelihood:generic:heading=10").north_sigma
     10.0
     """

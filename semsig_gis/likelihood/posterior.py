@@ -26,10 +26,8 @@ class Posterior:
 
     Parameters
     ----------
-    database : SignatureDatabase
-        The cells.
-    chances : ndarray of float64, shape (n,)
-        Chances; they sum to one.
+    database, chances : SignatureDatabase, and ndarray of float64, shape (n,)
+        The cells, and their chances, which sum to one.
 
     Examples
     --------

@@ -38,7 +38,7 @@ def area_prior(
     database : SignatureDatabase
         The cells.
     area : shapely.Geometry
-        A polygon or several.
+        A polygon or several, with a cell inside.
     crs : pyproj.CRS or str, optional
         Coordinate reference system of the area; that of the database by default.
     outside : float, default 0
@@ -46,10 +46,8 @@ def area_prior(
 
     Raises
     ------
-    InputError
-        If the area is no polygon, or no cell is left.
-    CrsError
-        If the coordinate reference system cannot be read.
+    InputError, CrsError
+        If the area is no polygon or no cell is left; if the CRS cannot be read.
 
     Examples
     --------
@@ -92,14 +90,9 @@ def position_prior(
     database : SignatureDatabase
         The cells.
     position : tuple of (float, float)
-        x and y in the CRS of the database.
+        x and y in the CRS of the database; finite, or InputError.
     sigma : float
-        Standard deviation each way in metres, above 0.
-
-    Raises
-    ------
-    InputError
-        If a number is not finite, or `sigma` is not above 0.
+        Standard deviation each way in metres, above 0, or InputError.
 
     Examples
     --------
@@ -138,10 +131,8 @@ def raster_prior(
 
     Raises
     ------
-    SourceError
-        If the file cannot be read as a raster.
-    CrsError
-        If the raster does not say its coordinate reference system.
+    SourceError, CrsError
+        If the file cannot be read as a raster, or does not say its CRS.
     InputError
         If the raster covers no cell, a value is negative or infinite, all are 0, or the band is
         not there or not named.
@@ -191,12 +182,7 @@ def weight_prior(database: SignatureDatabase, weights: ArrayLike) -> NDArray[np.
     database : SignatureDatabase
         The cells.
     weights : array_like of float, shape (n,)
-        Weights, 0 or more; 0 excludes a cell.
-
-    Raises
-    ------
-    InputError
-        If there is not one weight a cell, one is negative or not finite, or all are 0.
+        Finite weights, 0 or more and not all 0, or InputError; 0 excludes a cell.
 
     Examples
     --------

@@ -16,9 +16,9 @@ import numpy as np
 from semsig_gis.core.errors import InputError
 from semsig_gis.core.geometry import signed_degrees
 from semsig_gis.database.visibility import views_at
-from semsig_gis.likelihood.association import place_loglik, turn_logs
+from semsig_gis.likelihood.association import turn_logs
 from semsig_gis.likelihood.index import check_north
-from semsig_gis.likelihood.noise.table import LONGEST_TABLE, noise_tables
+from semsig_gis.likelihood.noise.table import LONGEST_TABLE, noise_tables, place_loglik
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

@@ -38,14 +38,9 @@ class Leg:
     Parameters
     ----------
     dx, dy : float
-        Metres to grid east and grid north.
+        Metres to grid east and grid north; finite, or InputError.
     sigma : float, default 0
-        Standard deviation of each of them, in metres; 0 to 1000.
-
-    Raises
-    ------
-    InputError
-        If a number is not finite or out of its range.
+        Standard deviation of each of them, in metres; 0 to 1000, or InputError.
 
     Examples
     --------

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import astuple, dataclass, field
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from semsig_gis.core.errors import InputError, SemsigError
@@ -136,7 +136,7 @@ class Method:
         if not self.normalized:
             parts.append("raw")
         if self.weights != EditWeights():
-            parts.append("weights=" + "/".join(map(str, self.weights.as_tuple())))
+            parts.append("weights=" + "/".join(map(str, astuple(self.weights))))
         return ":".join(parts)
 
     @property

@@ -24,10 +24,8 @@ from semsig_gis.likelihood.association import (
     associate_pairs,
     near_pairs,
     pair_weights,
-    place_loglik,
-    query_bearings,
 )
-from semsig_gis.likelihood.noise.table import database_tables
+from semsig_gis.likelihood.noise.table import database_tables, place_loglik, query_bearings
 
 if TYPE_CHECKING:
     from semsig_gis.likelihood.noise.model import Noise, NoiseSpec

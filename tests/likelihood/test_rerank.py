@@ -19,10 +19,10 @@ from noisy_cells import (
 )
 
 from semsig_gis.core.signature import Signature
-from semsig_gis.likelihood.association import align_cells, query_bearings, rerank
+from semsig_gis.likelihood.association import align_cells, rerank
 from semsig_gis.likelihood.index import build_index
 from semsig_gis.likelihood.noise.model import NoiseSpec, named_noise
-from semsig_gis.likelihood.noise.table import database_tables
+from semsig_gis.likelihood.noise.table import database_tables, query_bearings
 
 if TYPE_CHECKING:
     from semsig_gis.database.database import SignatureDatabase

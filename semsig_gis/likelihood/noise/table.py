@@ -1,7 +1,11 @@
-"""A noise model as tables of numbers, for the classes and lengths of one database."""
+"""A noise model as tables of numbers, for the classes and lengths of one database.
+
+By these tables a query is compared with what is seen from some places.
+"""
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING
@@ -11,15 +15,17 @@ import numpy as np
 from semsig_gis.core.errors import InputError, nearest_name
 from semsig_gis.core.taxonomy import WILDCARD
 from semsig_gis.database.answer import check_query
+from semsig_gis.database.database import BEARING_UNITS, DISTANCE_UNITS
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Mapping, Sequence
 
     from numpy.typing import NDArray
 
     from semsig_gis.core.signature import Signature
     from semsig_gis.core.taxonomy import Taxonomy
     from semsig_gis.database.database import SignatureDatabase
+    from semsig_gis.database.visibility import Views
     from semsig_gis.likelihood.noise.model import Noise, NoiseSpec
 
 # No chance is quite nought or one: a model that excludes something is wrong one day, and then
@@ -182,6 +188,56 @@ def mean_table(tables: tuple[NoiseTable, ...], weights: NDArray[np.float64]) -> 
         sigma=mean("sigma", 2),
         position_sigma=float(position) ** 0.5,
     )
+
+
+def place_loglik(
+    query: Signature,
+    views: Views,
+    tables: Sequence[NoiseTable],
+    weights: NDArray[np.float64],
+    *,
+    turns: NDArray[np.float64],
+    reach: float,
+) -> NDArray[np.float64]:
+    """Return the log-likelihood of a query by place and turn, shape (v, r).
+
+    The query needs bearings; its types may be unknown. `weights` are the chances of the tables,
+    `turns` the degrees to turn the query by at each place, and `reach` the largest visibility range
+    of any class in metres. The scale is that of `likelihood.index`.
+    """
+    from semsig_gis.likelihood.kernels import align  # noqa: PLC0415 - numba loads slowly
+
+    bearings = query_bearings(query)
+    rows, kinds = tables[0].query_rows(query), tables[0].row_of[views.codes]
+    bearing_units = np.minimum(views.bearings * (BEARING_UNITS / 360.0), BEARING_UNITS - 1)
+    distance_units = np.rint(views.distances * (DISTANCE_UNITS / reach))
+    logliks = np.empty((len(tables), *turns.shape))
+    align(
+        views.offsets,
+        kinds,
+        bearing_units.astype(np.uint16),
+        distance_units.astype(np.uint8),
+        360.0 / BEARING_UNITS,
+        rows,
+        bearings,
+        turns,
+        np.stack([table.odds for table in tables]),
+        np.stack([table.naming for table in tables]),
+        np.stack([table.sigmas(reach) for table in tables]),
+        logliks,
+    )
+    for model, (table, weight) in enumerate(zip(tables, weights.tolist(), strict=True)):
+        logliks[model] += table.nothing_seen(views.offsets, kinds)[:, None]
+        logliks[model] += float(np.log(table.density[rows]).sum()) + math.log(weight)
+    return np.asarray(np.logaddexp.reduce(logliks, axis=0))
+
+
+def query_bearings(query: Signature) -> NDArray[np.float64]:
+    """Return the bearings of a query, or refuse a query without."""
+    if query.bearings is None:
+        msg = "the query has no bearings, on which its place rests; give them."
+        raise InputError(msg)
+    return query.bearings
 
 
 def _table(

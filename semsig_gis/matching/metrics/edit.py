@@ -7,7 +7,7 @@ query. Both give the same distances.
 from __future__ import annotations
 
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, fields
+from dataclasses import astuple, dataclass, fields
 from functools import partial
 from typing import TYPE_CHECKING
 from weakref import WeakKeyDictionary, WeakSet
@@ -161,10 +161,6 @@ class EditWeights:
                 )
                 raise InputError(msg)
 
-    def as_tuple(self) -> tuple[int, int, int]:
-        """Return the weights as (insert, delete, substitute)."""
-        return self.insert, self.delete, self.substitute
-
 
 def distances(
     queries: Sequence[NDArray[np.uint8]],
@@ -192,7 +188,7 @@ def distances(
     costs = weights or EditWeights()
     if wildcard is not None and costs != EditWeights():
         msg = (
-            f"a wildcard was given with edit weights {'/'.join(map(str, costs.as_tuple()))}; "
+            f"a wildcard was given with edit weights {'/'.join(map(str, astuple(costs)))}; "
             "wildcards are compared with weights of 1 only."
         )
         raise InputError(msg)
@@ -211,7 +207,7 @@ def distances(
         [sequence.tobytes().decode("latin-1") for sequence in sequences],
         choices,
         scorer=Levenshtein.normalized_distance if normalized else Levenshtein.distance,
-        scorer_kwargs={"weights": costs.as_tuple()},
+        scorer_kwargs={"weights": astuple(costs)},
         dtype=np.float32,
         workers=threads,
     )

@@ -29,8 +29,6 @@ def distances(
     sequence: ``S = sum of min(x_c, y_c) / max(x_c, y_c)``. Normalised, the distance is ``1 - S /
     (number of such values)``: 0 for equal counts, also for two empty sequences, and 1 if no value
     is shared. Otherwise it is ``-S``, which has no lower bound.
-
-    The shape is (queries, d), or (queries, len(only)) if only some sequences are measured.
     """
     from semsig_gis.matching.kernels import add_quotients  # noqa: PLC0415 - loads a compiler
 

@@ -28,8 +28,6 @@ def distances(
     The distance is ``1 - |X & Y| / |X | Y|``, 0 for two empty sequences. The paper (section
     "Signature comparison") calls the quotient itself a distance, although it grows with likeness.
     `normalized` has no effect, as the measure lies on [0, 1] anyway.
-
-    The shape is (queries, d), or (queries, len(only)) if only some sequences are measured.
     """
     del normalized
     rows = len(table) if only is None else len(only)
