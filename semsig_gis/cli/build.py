@@ -18,7 +18,7 @@ from semsig_gis.cli.console import (
     known_identifiability,
     numbers,
     print_json,
-    print_table,
+    print_tables,
     progress,
     remark,
     require_suffix,
@@ -178,8 +178,7 @@ def update(
         return
     from semsig_gis.reports.quality import update_tables
 
-    for table in update_tables(report):
-        print_table(table)
+    print_tables(update_tables(report))
 
 
 @app.command()
@@ -192,12 +191,10 @@ def info(database: Database, *, as_json: AsJson = False) -> None:
     from semsig_gis.reports.identifiability import identifiability_tables
 
     city, facts = _opened(database)
-    for table in database_tables(city.database, **facts):
-        print_table(table)
+    print_tables(database_tables(city.database, **facts))
     columns = known_identifiability(city)
     if columns is not None:
-        for table in identifiability_tables(columns, object_counts=facts["object_counts"]):
-            print_table(table)
+        print_tables(identifiability_tables(columns, object_counts=facts["object_counts"]))
     for line in city.licenses:
         typer.echo(line)
 

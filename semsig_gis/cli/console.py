@@ -20,7 +20,6 @@ if TYPE_CHECKING:
 
     from semsig_gis.database.city import City
     from semsig_gis.evaluation.identify.result import Identifiability
-    from semsig_gis.evaluation.result import Evaluation
     from semsig_gis.reports.tables import Table
 
 
@@ -102,9 +101,7 @@ def print_rows(title: str, header: Iterable[str], rows: Iterable[Iterable[object
 
 
 def _cell_text(cell: object) -> str:
-    if isinstance(cell, int) and abs(cell) < LARGEST_COUNT:
-        return f"{cell:,}"
-    return str(cell)
+    return f"{cell:,}" if isinstance(cell, int) and abs(cell) < LARGEST_COUNT else str(cell)
 
 
 @contextlib.contextmanager
@@ -248,16 +245,9 @@ def tell_if_online(offline: bool) -> None:  # noqa: FBT001
         remark("the map takes Leaflet from the web, so it needs a network to be seen")
 
 
-def print_evaluation(evaluation: Evaluation) -> None:
-    """Print the tables of an evaluation."""
-    from semsig_gis.reports.evaluation import evaluation_tables
-
-    for table in evaluation_tables(evaluation):
-        print_table(table)
-
-
-def print_table(table: Table) -> None:
-    """Print a table with its note."""
-    print_rows(table.title, table.columns, table.rows)
-    if table.note:
-        typer.echo(table.note)
+def print_tables(tables: Iterable[Table]) -> None:
+    """Print tables with their notes."""
+    for table in tables:
+        print_rows(table.title, table.columns, table.rows)
+        if table.note:
+            typer.echo(table.note)

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from semsig_gis.cli.console import app, print_evaluation, progress, remark, tell_if_online
+from semsig_gis.cli.console import app, print_tables, progress, remark, tell_if_online
 
 DEMO_QUERIES = 200
 
@@ -30,6 +30,7 @@ def demo(
     from semsig_gis.maps.page import save_map
     from semsig_gis.objects.clean import build_objects
     from semsig_gis.objects.table import save_objects
+    from semsig_gis.reports.evaluation import evaluation_tables
     from semsig_gis.sources.catalog import paper_taxonomy
     from semsig_gis.sources.synthetic.city import CitySpec, synthetic_city
 
@@ -55,7 +56,7 @@ def demo(
             evaluation=evaluation,
             progress=advance,
         )
-    print_evaluation(evaluation)
+    print_tables(evaluation_tables(evaluation))
     typer.echo(f"map:        {out / 'map.html'}  (open it in a browser)")
     typer.echo(f"GeoPackage: {out / 'city.gpkg'}  (open it in QGIS)")
     typer.echo(f"database:   {out / 'city.parquet'}")

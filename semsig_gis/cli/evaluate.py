@@ -18,10 +18,9 @@ from semsig_gis.cli.console import (
     Workers,
     app,
     known_identifiability,
-    print_evaluation,
     print_json,
     print_rows,
-    print_table,
+    print_tables,
     progress,
     remark,
 )
@@ -29,10 +28,7 @@ from semsig_gis.cli.options import NoiseName, OnGrid, prepared_index, read_noise
 from semsig_gis.core.errors import InputError
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping
-
-    from semsig_gis.evaluation.identify.check import IdentifiabilityCheck
-    from semsig_gis.evaluation.identify.result import Identifiability
+    from collections.abc import Callable
 
 
 class FalseClass(enum.StrEnum):
@@ -81,6 +77,7 @@ def evaluate(
     from semsig_gis.matching.method import Method
     from semsig_gis.queries.chain import parse_chain
     from semsig_gis.queries.distortions import Distortion
+    from semsig_gis.reports.evaluation import evaluation_tables
 
     chain = [
         dataclasses.replace(
@@ -93,15 +90,14 @@ def evaluate(
         for one in parse_chain(distortion)
     ]
     city = open_city(database)
-    cells = city.database
-    chosen = (
+    measured = (
         prepared_index(city, read_noise(noise)) if method == LIKELIHOOD else Method.parse(method)
     )
     with progress("evaluating") as advance:
         evaluation = run(
-            cells,
+            city.database,
             queries=queries,
-            method=chosen,
+            method=measured,
             distortion=chain,
             top=top,
             seed=seed,
@@ -112,7 +108,7 @@ def evaluate(
     if as_json:
         print_json(evaluation.summary())
         return
-    print_evaluation(evaluation)
+    print_tables(evaluation_tables(evaluation))
     if out is not None:
         typer.echo(f"results: {out}")
 
@@ -148,8 +144,7 @@ def experiment(
     if as_json:
         print_json({name: evaluation.summary() for name, evaluation in results.items()})
         return
-    for table in experiment_tables(opened, results):
-        print_table(table)
+    print_tables(experiment_tables(opened, results))
     typer.echo(f"results: {out}")
 
 
@@ -166,8 +161,13 @@ def compare(first: Results, second: Results, *, as_json: AsJson = False) -> None
     if as_json:
         print_json({name: plain_records(table) for name, table in tables.items()})
         return
-    for name, table in tables.items():
-        print_table(comparison_table(table, f"{name}: " * bool(name) + f"{first} and {second}"))
+    print_tables(
+        comparison_table(table, f"{name}: " * bool(name) + f"{first} and {second}")
+        for name, table in tables.items()
+    )
+
+
+NUMBER_KEYS = ("row", "column", "unit", "ours", "low", "high", "paper")
 
 
 class Size(enum.StrEnum):
@@ -241,16 +241,7 @@ def reproduce(
     if as_json:
         print_json(
             [
-                {
-                    "section": section.name,
-                    "row": one.row,
-                    "column": one.column,
-                    "unit": one.unit,
-                    "ours": one.ours,
-                    "low": one.low,
-                    "high": one.high,
-                    "paper": one.paper,
-                }
+                {"section": section.name, **{key: getattr(one, key) for key in NUMBER_KEYS}}
                 for section, one in numbers
             ]
         )
@@ -307,7 +298,11 @@ def identify(
     from semsig_gis.evaluation.identify.identify import identify as run
     from semsig_gis.evaluation.identify.result import save_identifiability
     from semsig_gis.likelihood.noise.model import cell_noise
-    from semsig_gis.reports.identifiability import check_tables, identifiability_tables
+    from semsig_gis.reports.identifiability import (
+        check_tables,
+        identifiability_page,
+        identifiability_tables,
+    )
 
     _require_numbers(check, threads, out)
     model = read_noise(noise)
@@ -315,11 +310,8 @@ def identify(
     if not on_grid:
         model = cell_noise(model, city.database.grid.step)
     columns = known_identifiability(city)
-    if columns is not None and (columns.noise, columns.radius, columns.seed) != (
-        model,
-        radius,
-        seed,
-    ):
+    settings = (model, radius, seed)
+    if columns is not None and (columns.noise, columns.radius, columns.seed) != settings:
         columns = None
     workers = (os.cpu_count() or 1) if threads is None else threads
     if columns is None or check is not None:
@@ -338,31 +330,20 @@ def identify(
             )
     counts = city.object_counts
     if out is not None and verification is not None:
-        _write_page(columns, verification, database, counts, out)
+        from semsig_gis.reports.page import write_report  # it loads what draws
+
+        page = identifiability_page(columns, verification, name=database.name, object_counts=counts)
+        write_report(page, out)
     if as_json:
         more = {} if verification is None else {"check": verification.to_dict()}
         print_json(columns.summary(object_counts=counts) | more)
         return
-    tables = identifiability_tables(columns, object_counts=counts)
-    for part in tables if verification is None else (*tables, *check_tables(verification)):
-        print_table(part)
+    print_tables(identifiability_tables(columns, object_counts=counts))
+    if verification is not None:
+        print_tables(check_tables(verification))
     typer.echo(f"columns: {database}")
     if out is not None:
         typer.echo(f"report: {out / 'report.html'}")
-
-
-def _write_page(
-    columns: Identifiability,
-    verification: IdentifiabilityCheck,
-    database: Path,
-    counts: Mapping[int, int] | None,
-    out: Path,
-) -> None:
-    from semsig_gis.reports.identifiability import identifiability_page
-    from semsig_gis.reports.page import write_report
-
-    page = identifiability_page(columns, verification, name=database.name, object_counts=counts)
-    write_report(page, out)
 
 
 def _require_numbers(check: int | None, threads: int | None, out: Path | None) -> None:

@@ -13,7 +13,7 @@ from semsig_gis.cli.console import (
     keep_inputs,
     print_json,
     print_rows,
-    print_table,
+    print_tables,
     progress,
     remark,
     require_suffix,
@@ -167,8 +167,7 @@ def _save_loaded(
         return
     from semsig_gis.reports.quality import quality_tables
 
-    for table in quality_tables(report):
-        print_table(table)
+    print_tables(quality_tables(report))
     typer.echo(f"street objects: {out}")
 
 

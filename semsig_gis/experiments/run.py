@@ -120,7 +120,7 @@ def open_results(folder: str | Path) -> dict[str, Evaluation]:
     Returns
     -------
     dict of str to Evaluation
-        The evaluations by the names of their cases; that of one evaluation is ``""``.
+        By the names of the cases; that of one evaluation is ``""``.
 
     Raises
     ------
@@ -155,11 +155,7 @@ STAGES = 2
 
 
 class Part(NamedTuple):
-    """Some queries of an experiment, to be answered by all its methods.
-
-    ``distortion`` is its name in the experiment, and ``number`` tells which hundred of its queries,
-    from 0.
-    """
+    """A hundred queries of a distortion (its name), counted from 0, for all methods."""
 
     distortion: str
     number: int
@@ -425,9 +421,8 @@ def run_experiment(
     Notes
     -----
     The folder gets ``experiment.toml``, ``inputs.json`` (digests of the files, and versions),
-    ``figures.csv`` and ``report.md`` for people, and for each case a folder with what
-    `Evaluation.save` writes. A script that gives `workers` needs the guard
-    ``if __name__ == "__main__":``, because the workers import it.
+    ``figures.csv``, ``report.md`` and a folder for each case. A script that gives `workers` needs
+    the guard ``if __name__ == "__main__":``, because the workers import it.
 
     Examples
     --------
@@ -472,16 +467,8 @@ def run_experiments(
     ----------
     specs : mapping of Path to ExperimentSpec
         The experiments by the folders for their results.
-    folder : str or Path, default "."
-        Where the files that the experiments name are looked for.
-    workers : int, default 0
-        How many processes of this machine answer; 0 answers here, without dask.
-    scheduler : str, optional
-        Address of a dask scheduler; then `workers` stays 0.
-    note : callable, optional
-        Called with a sentence where an index is built.
-    progress : callable, optional
-        Called with the number of answers done and in all, of all experiments.
+    folder, workers, scheduler, note, progress : optional
+        As in `run_experiment`.
 
     Returns
     -------

@@ -7,7 +7,6 @@
 from __future__ import annotations
 
 from pathlib import Path
-from types import MappingProxyType
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -40,20 +39,14 @@ LAYERS = ("cells", "objects", "evaluation", "evaluation_lines")
 RASTERS = ("ambiguity", "identifiability", "error")
 """What may be written of a database as one number a cell."""
 
-_ONE_LAYER: Mapping[str, Callable[..., None]] = MappingProxyType(
-    {".parquet": write_geoparquet, ".csv": write_csv}
-)
+_ONE_LAYER: Mapping[str, Callable[..., None]] = {".parquet": write_geoparquet, ".csv": write_csv}
 _RASTER = frozenset({".tif", ".tiff"})
 # What a layer or a raster is made from, beside the cells.
-_NEEDS = MappingProxyType(
-    {
-        "objects": "objects",
-        "evaluation": "evaluation",
-        "evaluation_lines": "evaluation",
-        "error": "evaluation",
-        "identifiability": "identifiability",
-    }
-)
+_NEEDS = {
+    "objects": "objects",
+    **dict.fromkeys(("evaluation", "evaluation_lines", "error"), "evaluation"),
+    "identifiability": "identifiability",
+}
 
 
 def export_database(
@@ -106,19 +99,17 @@ def export_database(
     Layer ``cells``, in the CRS of the database: ``cell_id``, ``x`` and ``y`` (viewpoint, metres),
     ``length`` (objects seen), ``types`` (symbols), ``bearings`` (degrees to 0.01), ``levels``
     (angle levels) and ``distances`` (metres to 0.01), each of these four clockwise from north and
-    the numbers separated by spaces; ``type_group_size`` and ``angle_group_size`` (cells that have
-    the same types or the same angle levels, 1 where the cell is alone); and, where given, the
-    columns of `evaluation.identify.result.Identifiability.table`. Nothing is lost by rounding:
-    `exports.geopackage.read_geopackage` gives the database back.
+    the numbers separated by spaces; ``type_group_size`` and ``angle_group_size`` (cells with the
+    same types or angle levels, 1 where the cell is alone); and, where given, the columns of
+    `evaluation.identify.result.Identifiability.table`. `read_geopackage` gives the database back.
 
     Layer ``objects``, in the CRS of the objects: ``class_code``, ``symbol``, ``class_name``,
     ``title``, ``source``, ``source_id``, ``merged`` where sources were merged, and ``count``.
 
     Layers ``evaluation``, the queries at their true places, and ``evaluation_lines``, from there
-    to the best place where that is another one: the columns of
-    `evaluation.result.Evaluation.queries` and
-    ``outcome``: ``found`` (with a probability of 0.5 or more the best place is within 50 m; there
-    may be several that are as good), ``missed`` or ``nothing seen``.
+    to the best place where that is another one: the columns of `Evaluation.queries` and
+    ``outcome``: ``found`` (the best place is within 50 m with a probability of 0.5 or more),
+    ``missed`` or ``nothing seen``.
 
     Examples
     --------
@@ -243,8 +234,7 @@ def export_answer(
         The database that was searched.
     path : str or Path
         File to write: ``.gpkg`` holds the regions to search and the candidates, ``.parquet`` and
-        ``.csv`` the regions, ``.tif`` the chance of every cell, of the likelihood method only; it
-        appears whole, by rename.
+        ``.csv`` the regions, ``.tif`` the chance of every cell, of the likelihood method only.
     share, within : float, optional
         Which cells the regions hold (see `exports.regions.search_regions`).
 

@@ -66,7 +66,7 @@ def write_csv(
 
     UTF-8 with commas; texts stand in quotes and are `formula_safe`, what is missing is empty.
     Numbers have all their digits. A point is ``x`` and ``y``, another geometry ``WKT``, in the CRS
-    of the layer. ``progress`` is called with the rows written and in all.
+    of the layer.
     """
     with whole_file(path) as partial, partial.open("wb") as file:
         writer = None
@@ -106,11 +106,9 @@ def write_geoparquet(
 ) -> None:
     """Write a layer as one GeoParquet 1.1 file, which appears whole, by rename.
 
-    The column ``bbox`` holds the bounds of every row as float32, rounded outwards, and the metadata
-    names it as the covering of ``geometry``. The metadata key ``semsig`` holds the specs, the
-    classes and the licences as JSON. The rows are in groups of `GROUP_ROWS` and in
-    the order of the database, column by column. ``progress`` is called with the rows written and in
-    all.
+    The column ``bbox`` holds the bounds of every row as float32, rounded outwards, the covering of
+    ``geometry``. The metadata key ``semsig`` holds the specs, the classes and the licences as JSON.
+    The rows are in the order of the database, column by column.
     """
     geo = geo_metadata(
         layer.crs, geometry_types=[GEOMETRY_TYPES[layer.geometry]], bounds=layer.bounds

@@ -77,9 +77,9 @@ class GeopackageContents:
     database : SignatureDatabase
         The cells.
     objects : StreetObjects or None
-        The street objects, where they were exported too.
+        Where they were exported too.
     identifiability : Identifiability or None
-        What is known of the cells before any query, where that was exported too and still fits.
+        Where that was exported too and still fits.
     notes : tuple of str
         What was left out, and why, a sentence each.
     """
@@ -227,11 +227,9 @@ def write_layers(
 ) -> None:
     """Write at least one layer as one GeoPackage 1.2, which appears whole, by rename.
 
-    The table ``layer_styles`` holds the styles with which QGIS draws the layers. The metadata of
-    each layer holds the specs, the classes and the licences as JSON; its description holds the
-    licences as text. The rows are written in blocks, so that memory stays flat; ``progress`` is
-    called with the rows written and in all. Raises `InputError` if the file is open in another
-    program.
+    The table ``layer_styles`` holds the styles of QGIS; the metadata of each layer hold the specs,
+    the classes and the licences as JSON. The rows are written in blocks, so that memory stays flat.
+    Raises `InputError` if the file is open in another program.
     """
     target = Path(path)
     _require_closed(target)

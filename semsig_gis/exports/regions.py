@@ -42,13 +42,9 @@ class SearchRegions:
     table: gpd.GeoDataFrame
 
     def to_dict(self) -> dict[str, Any]:
-        """Return what is to be searched in all as plain values for JSON.
+        """Return what is to be searched in all as plain values for JSON: ``regions``, ``cells``...
 
-        Returns
-        -------
-        dict
-            ``regions``, ``cells``, ``km2``, ``percent`` (of the area of all cells) and, of the
-            likelihood method, ``chance``.
+        ``percent`` is of the area of all cells; ``chance`` is of the likelihood method only.
         """
         last = self.table.iloc[-1]
         summary = {

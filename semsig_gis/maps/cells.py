@@ -131,11 +131,9 @@ def ambiguity_map(
     database : SignatureDatabase
         The cells.
     identifiability : Identifiability, optional
-        What is known of queries from these cells, to be told by a click as well.
-    map_ : folium.Map, optional
-        Map to add the layers to; a new one by default.
-    tiles : str, optional
-        Online background of a new map, by a name that folium knows; none by default.
+        What a click tells of queries from these cells, too.
+    map_, tiles : optional
+        As in `evaluation_map`.
 
     Returns
     -------
@@ -147,8 +145,7 @@ def ambiguity_map(
     Raises
     ------
     InputError
-        If there is no cell, `identifiability` is of another database, `tiles` is not known to
-        folium, or both `tiles` and `map_` are given.
+        If there is no cell, `identifiability` is of another database, or as in `evaluation_map`.
 
     Examples
     --------
@@ -184,10 +181,8 @@ def identifiability_map(
     ----------
     identifiability : Identifiability
         What to show.
-    map_ : folium.Map, optional
-        Map to add the layers to; a new one by default.
-    tiles : str, optional
-        Online background of a new map, by a name that folium knows; none by default.
+    map_, tiles : optional
+        As in `evaluation_map`.
 
     Returns
     -------
@@ -195,11 +190,6 @@ def identifiability_map(
         The map, with these layers: the chance to be found of all cells as an image, and a layer
         without signs of its own; while it is on, a click tells of the cell, and draws the places
         that it is most often taken for.
-
-    Raises
-    ------
-    InputError
-        If `tiles` is not known to folium, or both `tiles` and `map_` are given.
 
     Examples
     --------

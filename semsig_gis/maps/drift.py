@@ -64,10 +64,8 @@ def drift_map(
         Databases of one city at two dates, made in the same way.
     objects_before, objects_after : StreetObjects, optional
         The street objects that they were built from, in the same CRS; give both or none.
-    map_ : folium.Map, optional
-        Map to add the layers to; a new one by default.
-    tiles : str, optional
-        Online background of a new map, by a name that folium knows; none by default.
+    map_, tiles : optional
+        As in `evaluation_map`.
 
     Returns
     -------
@@ -84,8 +82,8 @@ def drift_map(
     CrsError
         If the objects are in another CRS than the databases.
     InputError
-        If they are of different places or use a class code for different classes, `tiles` is not
-        known to folium, or both `tiles` and `map_` are given.
+        If they are of different places or use a class code for different classes, or as in
+        `evaluation_map`.
 
     Examples
     --------
@@ -124,7 +122,12 @@ def drift_map(
     objects = None
     if objects_before is not None and objects_after is not None:
         for some in (objects_before, objects_after):
-            _require_crs(some, city)
+            if some.crs != city.crs:
+                msg = (
+                    f"the objects are in {some.crs.to_string()} and the database is in "
+                    f"{city.crs.to_string()}; give the objects that it was built from."
+                )
+                raise CrsError(msg)
         objects = compare_objects(objects_before, objects_after)
         for name, drawings in _object_drawings(objects_before, objects_after, objects):
             draw(page, name, "drawings", drawings)
@@ -155,15 +158,6 @@ def _signatures(
     lengths = np.zeros(len(city), np.int32)
     lengths[np.searchsorted(city.cell_ids, database.cell_ids)] = database.lengths
     return packed_signatures(name, database, np.cumsum(lengths))
-
-
-def _require_crs(objects: StreetObjects, city: SignatureDatabase) -> None:
-    if objects.crs != city.crs:
-        msg = (
-            f"the objects are in {objects.crs.to_string()} and the database is in "
-            f"{city.crs.to_string()}; give the objects that it was built from."
-        )
-        raise CrsError(msg)
 
 
 def _object_drawings(

@@ -69,7 +69,7 @@ def evaluation_map(
         Map to add the layers to; a new one by default.
     tiles : str, optional
         Online background of a new map, by a name that folium knows, such as
-        ``"OpenStreetMap"``; none by default, so that the map needs no network.
+        ``"OpenStreetMap"``; none by default.
 
     Returns
     -------

@@ -89,10 +89,8 @@ def location_map(
     ----------
     location : Location
         What to show.
-    map_ : folium.Map, optional
-        Map to add the layers to; a new one by default.
-    tiles : str, optional
-        Online background of a new map, by a name that folium knows; none by default.
+    map_, tiles : optional
+        As in `evaluation_map`.
 
     Returns
     -------
@@ -102,11 +100,6 @@ def location_map(
         telling is shown at first; the candidates with their ranks, the best place with its
         ellipse of 90 %, and for each candidate that was explained the rays of the query and the
         street objects; all with popups.
-
-    Raises
-    ------
-    InputError
-        If `tiles` is not known to folium, or both `tiles` and `map_` are given.
 
     Examples
     --------
@@ -128,13 +121,8 @@ def location_map(
     # The best last, so that they lie on top.
     draw(page, name, "points", CANDIDATE_FIELDS, class_titles(database), candidates[::-1])
     draw(page, "Best place", "drawings", drawings.place())
-    return finished_map(
-        page,
-        database,
-        legend=location_legend(location),
-        view=drawings.view() if map_ is None else None,
-        zoom=CLOSEST_ZOOM,
-    )
+    legend, view = location_legend(location), drawings.view() if map_ is None else None
+    return finished_map(page, database, legend=legend, view=view, zoom=CLOSEST_ZOOM)
 
 
 def _add_chances(map_: folium.Map, location: Location) -> None:
@@ -307,11 +295,7 @@ def location_legend(location: Location) -> str:
     colour, verdict, note = (
         (SUCCESSFUL, "The answer", "")
         if answer.given
-        else (
-            FAILED,
-            "Cannot tell; the best place",
-            BEST_PLACE,
-        )
+        else (FAILED, "Cannot tell; the best place", BEST_PLACE)
     )
     counts = {share: len(posterior.credible_cells(share)) for share in CHANCES}
     regions = "<br>".join(
@@ -322,9 +306,10 @@ def location_legend(location: Location) -> str:
         f"<span style='white-space:nowrap'>{swatch(shade, FLIPPING)}{100.0 * least:g}+</span>"
         for least, shade in sorted(CELL_CHANCES.items(), reverse=True)
     )
-    rays = "".join(
+    kinds = "".join(
         f"<br>{swatch(VERDICTS[verdict])}{verdict}: {text}" for verdict, (text, _) in RAYS.items()
     )
+    rays = f"<p>Objects of the query, as rays where they were seen{kinds}</p>"
     return (
         "<summary>Where it was seen</summary>"
         f"<p>{query_text(location.query, posterior.database.taxonomy)}"
@@ -335,12 +320,8 @@ def location_legend(location: Location) -> str:
         f"<p>Chance of a cell, or around it, in percent<br>{chances}</p>"
         f"<p>Regions, the fewest cells that hold<br>{regions}</p>"
         f"<p>{swatch('#ffffff')}Candidates by rank</p>"
-        + (
-            f"<p>Objects of the query, as rays where they were seen{rays}</p>"
-            if location.explanations
-            else ""
-        )
-        + f"{shades()}{sources(posterior.database.licenses)}"
+        f"{rays if location.explanations else ''}"
+        f"{shades()}{sources(posterior.database.licenses)}"
     )
 
 
@@ -362,10 +343,8 @@ def localization_map(
         What to show.
     database : SignatureDatabase
         The database that was searched.
-    map_ : folium.Map, optional
-        Map to add the layers to; a new one by default.
-    tiles : str, optional
-        Online background of a new map, by a name that folium knows; none by default.
+    map_, tiles : optional
+        As in `evaluation_map`.
 
     Returns
     -------
@@ -376,8 +355,7 @@ def localization_map(
     Raises
     ------
     InputError
-        If another database was searched, `tiles` is not known to folium, or both `tiles` and
-        `map_` are given.
+        If another database was searched, or as in `evaluation_map`.
 
     Examples
     --------
@@ -411,17 +389,16 @@ def _candidate_records(
     records = []
     for number, candidate in enumerate(candidates.to_dict("records")):
         rank = ranks_text(candidate["rank_low"], candidate["rank_high"])
-        latitude, longitude = places[number].tolist()
+        place = places[number].tolist()
         details = [
             query,
             cell_signature(database, int(rows[number])),
             f"{rank} of {len(database):,}{ties_text(candidate['tied'])}",
             f"{candidate['distance']:.4f}",
             str(candidate["cell_id"]),
-            f"{latitude:.6f}, {longitude:.6f}",
+            _position(place),
         ]
         radius = 9 if candidate["rank_low"] == 1 else 6
-        place = [latitude, longitude]
         records.append([place, colours[number], radius, None, f"Rank {rank}", details])
     return records
 

@@ -68,8 +68,7 @@ def ground_map(
     Returns
     -------
     folium.Map
-        The map, which names whom to name for them (see `objects.surroundings.licenses_of`). It
-        needs no network.
+        The map, which credits their sources (see `objects.surroundings.licenses_of`).
 
     Raises
     ------
@@ -90,11 +89,8 @@ def ground_map(
     >>> ground_map(buildings=house).options["maxZoom"]
     20
     """
-    tables = {
-        kind: table
-        for kind, table in (("buildings", buildings), ("streets", streets))
-        if table is not None
-    }
+    both = {"buildings": buildings, "streets": streets}
+    tables = {kind: table for kind, table in both.items() if table is not None}
     systems = [table.crs for table in tables.values()]
     if None in systems or len(set(systems)) > 1:
         names = " and ".join("no CRS" if crs is None else crs.name for crs in systems)
@@ -176,10 +172,8 @@ def objects_map(
     database : SignatureDatabase, optional
         The cells from which they are seen: a layer that is hidden at first, and to be found by
         number.
-    map_ : folium.Map, optional
-        Map to add the layers to, where they are hidden at first; a new one by default.
-    tiles : str, optional
-        Online background of a new map, by a name that folium knows; none by default.
+    map_, tiles : optional
+        As in `evaluation_map`; on a map of your own the layers are hidden at first.
 
     Returns
     -------
@@ -193,7 +187,7 @@ def objects_map(
     EmptyResultError
         If there is no object.
     InputError
-        If `tiles` is not known to folium, or both `tiles` and `map_` are given.
+        As in `evaluation_map`.
 
     Examples
     --------

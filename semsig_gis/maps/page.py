@@ -35,17 +35,11 @@ if TYPE_CHECKING:
 
 # Files that every folium page links and that our maps do without: they only serve
 # `folium.Icon`, Font Awesome and Bootstrap widgets.
-UNUSED = frozenset(
-    {
-        "bootstrap.bundle.min.js",
-        "bootstrap.min.css",
-        "bootstrap-glyphicons.css",
-        "all.min.css",
-        "leaflet.awesome-markers.js",
-        "leaflet.awesome-markers.css",
-        "leaflet.awesome.rotate.min.css",
-    }
-)
+UNUSED = {
+    *("bootstrap.bundle.min.js", "bootstrap.min.css", "bootstrap-glyphicons.css", "all.min.css"),
+    *("leaflet.awesome-markers.js", "leaflet.awesome-markers.css"),
+    "leaflet.awesome.rotate.min.css",
+}
 _REFERENCE = re.compile(
     r"""<script\b[^>]*\bsrc\s*=\s*["'](?P<script>[^"']*)["'][^>]*>\s*</script\s*>"""
     r"""|<link\b[^>]*\bhref\s*=\s*["'](?P<link>[^"']*)["'][^>]*>""",
@@ -86,10 +80,7 @@ def assets() -> Mapping[str, Asset]:
 
 
 def available() -> bool:
-    """Tell whether every file is there, unchanged, so that a map can be self-contained.
-
-    False when the package was built without ``npm``.
-    """
+    """Tell whether every file is there, unchanged, so that a map can be self-contained."""
     return all(_content(asset) is not None for asset in assets().values())
 
 
@@ -127,10 +118,9 @@ def external_files(page: str) -> tuple[str, ...]:
 def inline_assets(page: str) -> str:
     """Return a page of folium's with every external script and style sheet put into it.
 
-    Those that our maps do not use (Bootstrap, Font Awesome, awesome-markers) are dropped. The
-    result is about 250 kB longer and asks for nothing but the tiles of a tile layer, if the map has
-    one. Raises `InputError` if the package was built without the files, or the page needs one that
-    is not among them (a plugin, `folium.Icon`, a colour map drawn by branca).
+    Those that our maps do not use are dropped; the result is about 250 kB longer. Raises
+    `InputError` if the package was built without the files, or the page needs one that is not among
+    them (a plugin, `folium.Icon`, a colour map drawn by branca).
     """
     replacements = {
         file: asset.name for asset in assets().values() for file in asset.stands_for
@@ -210,12 +200,7 @@ class MapFrame:
 
 
 def page_of_map(map_: folium.Map, *, self_contained: bool | None = None) -> str:
-    """Return a map as one HTML page.
-
-    By default Leaflet and all else are put into the page where the package carries them and the map
-    needs no others; ``self_contained=False`` links them, and True raises `InputError` where they
-    cannot be put into it.
-    """
+    """Return a map as one HTML page (see `save_map`)."""
     page = map_.get_root().render().replace("<html>", '<html lang="en">', 1)
     page = _RIGID.sub("", page, count=1)
     if self_contained or (self_contained is None and available()):
@@ -242,8 +227,7 @@ def show_map(map_: folium.Map, *, height: int = 520) -> MapFrame:
     Returns
     -------
     MapFrame
-        What a notebook shows. Its page makes no request, but for the tiles of a map that has some;
-        where the package was built without the map files, or the map needs others, it links them.
+        A page as `save_map` writes it by default, in a frame.
 
     Examples
     --------
@@ -270,13 +254,12 @@ def save_map(map_: folium.Map, path: str | Path, *, self_contained: bool | None 
     Returns
     -------
     bool
-        Whether the page makes no request at all: it holds all scripts and has no online tiles.
+        Whether the page makes no request at all, not even for tiles.
 
     Raises
     ------
     InputError
-        If the file cannot be written, or a self-contained page was asked for and is not to be
-        had.
+        If the file cannot be written, or a self-contained page is not to be had.
 
     Examples
     --------

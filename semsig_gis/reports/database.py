@@ -14,10 +14,7 @@ if TYPE_CHECKING:
 
     from semsig_gis.database.database import SignatureDatabase
 
-GROUP_LABELS = {
-    "alone": "cells alone in their group",
-    "entropy_bits": "entropy, in bits",
-}
+GROUP_LABELS = {"alone": "cells alone in their group", "entropy_bits": "entropy, in bits"}
 
 
 def database_tables(
@@ -28,17 +25,11 @@ def database_tables(
 ) -> tuple[Table, ...]:
     """Return the paper's Tables 1, 2a and 2b for a database, and a table of its classes.
 
-    They are: occurrences by class, basic properties and sizes of the signature groups, each with
-    the paper's figures beside ours; then range, density and entropy by class. ``object_counts`` is
-    by class code.
+    ``object_counts`` is by class code.
     """
     facts = database_summary(database, file_bytes=file_bytes, object_counts=object_counts)
-    return (
-        _occurrence_table(facts),
-        _property_table(facts),
-        _group_table(facts),
-        _class_table(facts),
-    )
+    tables = (_occurrence_table, _property_table, _group_table, _class_table)
+    return tuple(table(facts) for table in tables)
 
 
 def database_markdown(
@@ -147,13 +138,13 @@ def _group_table(facts: Mapping[str, Any]) -> Table:
 def _class_table(facts: Mapping[str, Any]) -> Table:
     items = [item for item in facts["occurrences"] if item["number"] or item["objects"]]
     counted = facts["density_from"] == "objects"
-    density = "Objects a km² of the covered area."
-    if not counted:
-        missed = "" if facts["occlusion_m"] is None else ", without what buildings hide"
-        density = (
-            "Objects a km² are estimated: what the mean cell sees by the area within range of it"
-            f"{missed}."
-        )
+    missed = "" if facts["occlusion_m"] is None else ", without what buildings hide"
+    density = (
+        "Objects a km² of the covered area."
+        if counted
+        else "Objects a km² are estimated: what the mean cell sees by the area within range of it"
+        f"{missed}."
+    )
     objects = {"Objects": [f"{item['objects']:,}" for item in items]} if counted else {}
     return Table.of_columns(
         "Classes that occur",

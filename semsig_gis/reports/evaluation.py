@@ -55,8 +55,7 @@ def evaluation_tables(evaluation: Evaluation) -> tuple[Table, ...]:
     -------
     tuple of Table
         Settings, figures, figures by length and by ambiguity; of the likelihood method, also
-        what stated chances are worth. The paper's figures stand beside ours only where it
-        published them for these settings.
+        what stated chances are worth.
 
     Examples
     --------
@@ -73,7 +72,30 @@ def evaluation_tables(evaluation: Evaluation) -> tuple[Table, ...]:
     )
     if evaluation.queries["chance"].isna().all():
         return tables
-    return (*tables, _chance_table(evaluation), _rule_table(evaluation))
+    bins, rules = evaluation.calibration(), evaluation.coverage_curve()
+    return (
+        *tables,
+        Table.of_columns(
+            "Stated chances",
+            {
+                "Chance stated": map("{:g} to {:g}".format, bins["from"], bins["to"]),
+                "Queries": map("{:,}".format, bins["n"]),
+                "Its mean": map(figure, bins["stated"]),
+                "Came true": map(figure, bins["true"]),
+                "95 %": map(interval, bins["low"], bins["high"]),
+            },
+        ),
+        Table.of_columns(
+            "Coverage and precision",
+            {
+                "Answered from a chance of": map("{:g}".format, rules["threshold"]),
+                "Answers": map("{:,}".format, rules["answered"]),
+                "Coverage": map(figure, rules["coverage"]),
+                "Right": map(figure, rules["precision"]),
+                "95 %": map(interval, rules["low"], rules["high"]),
+            },
+        ),
+    )
 
 
 def evaluation_markdown(evaluation: Evaluation) -> str:
@@ -115,10 +137,8 @@ def _figure_table(evaluation: Evaluation) -> Table:
         rows.append((FIGURES[name], *shown))
     errors = evaluation.queries["error_m"].to_numpy(dtype=np.float64)
     turns = evaluation.queries["heading_error"].to_numpy(dtype=np.float64)
-    rows += [
-        ("Median error", *_amounts(percentile(errors, 50), " m"), ""),
-        ("90th percentile of the error", *_amounts(percentile(errors, 90), " m"), ""),
-    ]
+    rows.append(("Median error", *_amounts(percentile(errors, 50), " m"), ""))
+    rows.append(("90th percentile of the error", *_amounts(percentile(errors, 90), " m"), ""))
     if not np.isnan(turns).all():
         rows.append(("Median error of the heading", *_amounts(percentile(turns, 50), "°"), ""))
     rows += [
@@ -150,36 +170,6 @@ def _group_table(groups: pd.DataFrame, title: str, heading: str) -> Table:
     }
     labels, numbers = map(str, groups.iloc[:, 0]), map("{:,}".format, groups["n"])
     return Table.of_columns(title, {heading: labels, "Queries": numbers, **figures})
-
-
-def _chance_table(evaluation: Evaluation) -> Table:
-    """Return what stated chances are worth."""
-    bins = evaluation.calibration()
-    return Table.of_columns(
-        "Stated chances",
-        {
-            "Chance stated": map("{:g} to {:g}".format, bins["from"], bins["to"]),
-            "Queries": map("{:,}".format, bins["n"]),
-            "Its mean": map(figure, bins["stated"]),
-            "Came true": map(figure, bins["true"]),
-            "95 %": map(interval, bins["low"], bins["high"]),
-        },
-    )
-
-
-def _rule_table(evaluation: Evaluation) -> Table:
-    """Return what each rule of answering gives."""
-    rules = evaluation.coverage_curve()
-    return Table.of_columns(
-        "Coverage and precision",
-        {
-            "Answered from a chance of": map("{:g}".format, rules["threshold"]),
-            "Answers": map("{:,}".format, rules["answered"]),
-            "Coverage": map(figure, rules["coverage"]),
-            "Right": map(figure, rules["precision"]),
-            "95 %": map(interval, rules["low"], rules["high"]),
-        },
-    )
 
 
 def _paris_accuracy(evaluation: Evaluation) -> tuple[float | None, float | None]:
@@ -215,9 +205,9 @@ def experiment_figures(results: Mapping[str, Evaluation]) -> pd.DataFrame:
     """Return all figures of the evaluations, given by the names of their cases.
 
     One row a case and figure: ``case``, ``figure``, ``value``, ``low`` and ``high`` (95 %) and
-    ``n``, how many queries have a say. The figures are shares (see
-    `evaluation.figures.query_figures`), ``error_median`` and ``error_p90`` in metres,
-    and ``heading_error_median`` in degrees where a heading was looked for.
+    ``n`` (queries). The figures are shares (see `evaluation.figures.query_figures`),
+    ``error_median`` and ``error_p90`` in metres and, where there is one, ``heading_error_median``
+    in degrees.
     """
     parts = []
     for name, evaluation in results.items():

@@ -147,10 +147,9 @@ def _band_shares(facts: Mapping[str, Any]) -> dict[str, float]:
 
 
 def _cell_section(facts: Mapping[str, Any]) -> Section:
-    bands = {
-        f"cells found with a chance of {band}": share for band, share in _band_shares(facts).items()
-    }
-    shares = {**_cell_chances(facts), **bands}
+    shares = _cell_chances(facts)
+    for band, share in _band_shares(facts).items():
+        shares[f"cells found with a chance of {band}"] = share
     return Section(
         name="cells",
         title="Cells",
@@ -193,21 +192,20 @@ def _calibration_section(check: IdentifiabilityCheck) -> Section:
         low=tuple(one.true_low for one in check.bins),
         high=tuple(one.true_high for one in check.bins),
     )
+    plot = Plot(
+        name="identifiability-calibration",
+        title="Chance to be found: told and true",
+        x_label="chance told of the cell",
+        y_label="share of the queries that were found",
+        curves=(curve,),
+        diagonal=True,
+    )
     return Section(
         name="calibration",
         title="Do the chances come true?",
-        text=(f"Of {check.queries:,} fresh queries, {100 * check.found:.1f} % were found.",),
+        text=(f"Of {check.queries:,} fresh queries, {percent(check.found)} were found.",),
         numbers=tuple(numbers),
-        plots=(
-            Plot(
-                name="identifiability-calibration",
-                title="Chance to be found: told and true",
-                x_label="chance told of the cell",
-                y_label="share of the queries that were found",
-                curves=(curve,),
-                diagonal=True,
-            ),
-        ),
+        plots=(plot,),
     )
 
 
@@ -216,17 +214,14 @@ def _rank_section(check: IdentifiabilityCheck) -> Section:
         "Success is yes or no, so that chances that are just right would have "
         f"{check.attainable:.3f}."
     )
+    scores = {
+        SCORES[name]: None if math.isnan(value) else value
+        for name, value in check.correlations.items()
+    }
+    column = "rank correlation with success"
     return Section(
         name="ranks",
         title="Do cells with a higher score succeed more often?",
         text=() if math.isnan(check.attainable) else (attainable,),
-        numbers=tuple(
-            Number(
-                SCORES[name],
-                "rank correlation with success",
-                None if math.isnan(value) else value,
-                decimals=3,
-            )
-            for name, value in check.correlations.items()
-        ),
+        numbers=tuple(Number(row, column, value, decimals=3) for row, value in scores.items()),
     )

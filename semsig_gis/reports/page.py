@@ -26,7 +26,7 @@ from semsig_gis.storage.whole import write_whole
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Sequence
 
-    from semsig_gis.reports.parts import Number, Plot, Report, Section
+    from semsig_gis.reports.parts import Plot, Report
     from semsig_gis.reports.plots import Picture
 
 
@@ -49,10 +49,7 @@ def html_page(report: Report, pictures: Mapping[str, Picture]) -> str:
     return environment.get_template("report.html").render(
         report=report,
         tables=_tables(report),
-        images={
-            name: base64.b64encode(picture.svg).decode("ascii")
-            for name, picture in pictures.items()
-        },
+        images={name: base64.b64encode(one.svg).decode("ascii") for name, one in pictures.items()},
         alts={name: picture.description for name, picture in pictures.items()},
         version=__version__,
     )
@@ -71,7 +68,10 @@ def markdown_page(report: Report, pictures: Mapping[str, Picture]) -> str:
             table = tables[section.name]
             blocks.append(markdown_rows(table, _inline))
             blocks += [_paragraph(table.note)] if table.note else []
-        blocks += _picture_blocks(section, pictures)
+        blocks += [
+            f"![{_inline(pictures[part.name].description)}](figures/{part.name}.svg)"
+            for part in section.drawn
+        ]
     return "\n\n".join(blocks) + "\n"
 
 
@@ -96,23 +96,8 @@ def _paragraph(text: str) -> str:
     return FIRST_MARKS.sub(r"\1\\\2", _inline(text))
 
 
-def _picture_blocks(section: Section, pictures: Mapping[str, Picture]) -> Iterator[str]:
-    for part in section.drawn:
-        yield f"![{_inline(pictures[part.name].description)}](figures/{part.name}.svg)"
-
-
 FIGURES = "figures"
-NUMBER_COLUMNS = (
-    "section",
-    "row",
-    "column",
-    "unit",
-    "ours",
-    "low",
-    "high",
-    "paper",
-    "difference",
-)
+NUMBER_COLUMNS = ("section", "row", "column", "unit", "ours", "low", "high", "paper", "difference")
 POINT_COLUMNS = ("source", "label", "x", "y", "low", "high")
 
 
@@ -122,11 +107,8 @@ def write_report(report: Report, folder: str | Path) -> None:
     ``report.html`` is one page that asks the network for nothing, ``report.md`` is the same as
     Markdown. ``figures`` holds each plot and scene as SVG and PNG, and the points of each plot as
     CSV. ``numbers.csv`` holds every number of the tables, and ``report.json`` all there is, with
-    null for what is infinite or not a number. A text in a CSV file that a spreadsheet would run as
-    a formula begins with an apostrophe.
-
-    Raises `InputError` if a name in the report cannot be that of a file or stands twice, or the
-    folder cannot be written to.
+    null for what is infinite or not a number. Raises `InputError` if a name in the report cannot be
+    that of a file or stands twice, or the folder cannot be written to.
     """
     _require_names([section.name for section in report.sections])
     _require_names([part.name for section in report.sections for part in section.drawn])
@@ -173,7 +155,7 @@ def _csv(columns: Iterable[str], rows: Iterable[Sequence[str | float | None]]) -
 
 
 def _defused(text: str) -> str:
-    """Return text that no spreadsheet takes for a formula."""
+    """Return text that no spreadsheet takes for a formula, by an apostrophe before it."""
     plain = one_line(text)
     return f"'{plain}" if plain.startswith(("=", "+", "-", "@")) else plain
 
@@ -204,7 +186,13 @@ def _json(report: Report) -> str:
         "text": report.text,
         "settings": [{"name": name, "value": value} for name, value in report.settings],
         "sections": [
-            {**asdict(section), "numbers": [_number(number) for number in section.numbers]}
+            {
+                **asdict(section),
+                "numbers": [
+                    {**asdict(number), "difference": number.difference}
+                    for number in section.numbers
+                ],
+            }
             for section in report.sections
         ],
         "classes": report.taxonomy.to_list(),
@@ -212,10 +200,6 @@ def _json(report: Report) -> str:
         "version": __version__,
     }
     return json.dumps(_finite(content), indent=1, allow_nan=False) + "\n"
-
-
-def _number(number: Number) -> dict[str, Any]:
-    return {**asdict(number), "difference": number.difference}
 
 
 def _finite(value: Any) -> Any:  # noqa: ANN401 - whatever JSON holds

@@ -48,8 +48,8 @@ class Curve:
         What the legend says.
     x, y : tuple of float
         Points, x ascending.
-    low, high : tuple of float
-        Ends of the intervals of 95 % of each y; empty where there are none.
+    low, high : tuple of float, optional
+        Ends of the intervals of 95 % of each y.
     """
 
     label: str

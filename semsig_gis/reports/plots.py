@@ -23,7 +23,7 @@ from matplotlib.patches import Patch
 from semsig_gis.core.text import one_line
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator, Sequence
+    from collections.abc import Iterator, Sequence
 
     from matplotlib.axes import Axes
 
@@ -31,15 +31,8 @@ if TYPE_CHECKING:
 
 
 COLOURS = (
-    "#0072b2",
-    "#d55e00",
-    "#009e73",
-    "#cc79a7",
-    "#e69f00",
-    "#56b4e9",
-    "#333333",
-    "#882255",
-    "#999933",
+    *("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9"),
+    *("#333333", "#882255", "#999933"),
 )
 """Colours that colour-blind people tell apart: those of Okabe and Ito, and two of Tol."""
 
@@ -112,15 +105,11 @@ def label(text: str, length: int) -> str:
     ``length`` is the most letters; a Chinese one, say, counts as two.
     """
     plain = one_line(text)
-    ends = list(itertools.accumulate(map(_letter_width, plain)))
+    wide = (unicodedata.east_asian_width(letter) in "WF" for letter in plain)
+    ends = list(itertools.accumulate(1 + is_wide for is_wide in wide))
     if not ends or ends[-1] <= length:
         return plain
     return plain[: bisect.bisect_right(ends, length - 1)].rstrip() + "…"
-
-
-def _letter_width(letter: str) -> int:
-    """Return 2 for a letter as wide as the Chinese, else 1."""
-    return 2 if unicodedata.east_asian_width(letter) in "WF" else 1
 
 
 def draw_legend(
@@ -191,11 +180,6 @@ def draw_plot(plot: Plot) -> Picture:
     Picture
         The same bytes for the same plot.
 
-    Notes
-    -----
-    The legend stands below, where it hides nothing. The points that the paper tells are black
-    diamonds, numbered where there are several.
-
     Examples
     --------
     >>> from semsig_gis.reports.parts import Curve, Plot
@@ -211,14 +195,8 @@ def draw_plot(plot: Plot) -> Picture:
     above = TITLE_LINE * len(titles) + 0.16
     height = above + AXES_HEIGHT + below
     with blank_figure(WIDTH, height) as figure:
-        axes = figure.add_axes(
-            (
-                LEFT / WIDTH,
-                below / height,
-                (WIDTH - LEFT - RIGHT) / WIDTH,
-                AXES_HEIGHT / height,
-            )
-        )
+        across = (WIDTH - LEFT - RIGHT) / WIDTH
+        axes = figure.add_axes((LEFT / WIDTH, below / height, across, AXES_HEIGHT / height))
         _draw_frame(axes, plot)
         for number, curve in enumerate(plot.curves):
             _draw_curve(axes, curve, number, len(plot.curves))
@@ -238,7 +216,8 @@ def draw_plot(plot: Plot) -> Picture:
 
 
 def _draw_frame(axes: Axes, plot: Plot) -> None:
-    values = sorted({x for x in _all_x(plot) if math.isfinite(x)}) or [0.0, 1.0]
+    xs = itertools.chain(*(curve.x for curve in plot.curves), (x for x, _, _ in plot.paper))
+    values = sorted({x for x in xs if math.isfinite(x)}) or [0.0, 1.0]
     left, right = values[0], values[-1]
     margin = 0.015 * (right - left) or 0.5
     axes.set_xlim(left - margin, right + margin)
@@ -254,11 +233,6 @@ def _draw_frame(axes: Axes, plot: Plot) -> None:
         axes.set_xticks(values, [f"{x:g}" for x in values])
     if plot.diagonal:
         axes.axline((0, 0), slope=1, color="#888888", linewidth=1, dashes=(4, 3), zorder=1.5)
-
-
-def _all_x(plot: Plot) -> Iterable[float]:
-    yield from itertools.chain.from_iterable(curve.x for curve in plot.curves)
-    yield from (x for x, _, _ in plot.paper)
 
 
 def _draw_curve(axes: Axes, curve: Curve, number: int, curves: int) -> None:

@@ -169,7 +169,7 @@ def draw_scene(scene: Scene, taxonomy: Taxonomy) -> Picture:
     Parameters
     ----------
     scene : Scene
-        A viewpoint and what is around.
+        A viewpoint and what is around. The answer is a cross, or an arrow to it at the edge.
     taxonomy : Taxonomy
         The classes of its objects; a class looks the same in all scenes.
 
@@ -177,10 +177,6 @@ def draw_scene(scene: Scene, taxonomy: Taxonomy) -> Picture:
     -------
     Picture
         The same bytes for the same scene.
-
-    Notes
-    -----
-    The answer is a cross; an arrow at the edge points to one that is farther away.
 
     Examples
     --------

@@ -32,8 +32,7 @@ class Table:
     labels : int, default 1
         How many columns from the left are text; the others are numbers.
     groups : tuple of (str, tuple of str), optional
-        The headings after the labels once more, for where they can be shown in two rows: each group
-        with its columns.
+        The headings after the labels in two rows: each group with its columns.
     bold : frozenset of (int, int), optional
         Row and column of the cells in bold.
     intervals : mapping of (int, int) to str, optional
@@ -41,8 +40,12 @@ class Table:
 
     Examples
     --------
-    >>> Table("Sizes", ("What", "m"), (("step", "10"),)).note
-    ''
+    >>> print(Table("Sizes", ("What", "m"), (("step", "10"),)).markdown(), end="")
+    ### Sizes
+    <BLANKLINE>
+    | What | m |
+    | --- | ---: |
+    | step | 10 |
     """
 
     title: str
@@ -56,27 +59,7 @@ class Table:
 
     @classmethod
     def of_columns(cls, title: str, columns: Mapping[str, Iterable[str]], note: str = "") -> Table:
-        """Return a table of columns, which are given by their headings.
-
-        Parameters
-        ----------
-        title : str
-            What it shows.
-        columns : mapping of str to iterable of str
-            The cells of each column.
-        note : str, default ""
-            What a reader must know to read it rightly.
-
-        Returns
-        -------
-        Table
-            The table.
-
-        Examples
-        --------
-        >>> Table.of_columns("Sizes", {"What": ["step", "range"], "m": ["10", "30"]}).rows
-        (('step', '10'), ('range', '30'))
-        """
+        """Return a table of columns, which are given by their headings."""
         return cls(title, tuple(columns), tuple(zip(*columns.values(), strict=True)), note)
 
     @property
@@ -96,22 +79,7 @@ class Table:
         return self.markdown()
 
     def markdown(self) -> str:
-        """Return the table as a Markdown section.
-
-        Returns
-        -------
-        str
-            A heading of the third level, the table and the note, ending in a newline.
-
-        Examples
-        --------
-        >>> print(Table("Sizes", ("What", "m"), (("step", "10"),)).markdown(), end="")
-        ### Sizes
-        <BLANKLINE>
-        | What | m |
-        | --- | ---: |
-        | step | 10 |
-        """
+        """Return the table as a Markdown section: its heading, rows and note."""
         note = f"\n{escaped(self.note)}\n" if self.note else ""
         return f"### {escaped(self.title)}\n\n{markdown_rows(self, escaped)}\n{note}"
 

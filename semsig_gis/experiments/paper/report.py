@@ -36,6 +36,7 @@ from semsig_gis.experiments.paper.shares import (
 )
 from semsig_gis.queries.distortions import DISTORTIONS
 from semsig_gis.reports import paris
+from semsig_gis.reports.paris import READ_OFF
 from semsig_gis.reports.parts import Curve, Number, Plot, Report, Section
 from semsig_gis.reports.scenes import example_scenes
 
@@ -108,11 +109,7 @@ def reproduction_report(results: Reproduction) -> Report:
             _likelihood_section(results),
         ),
         taxonomy=results.database.taxonomy,
-        facts={
-            "settings": dict(settings),
-            "versions": dict(first.versions),
-            "machine": machine(),
-        },
+        facts={"settings": dict(settings), "versions": dict(first.versions), "machine": machine()},
     )
 
 
@@ -323,26 +320,14 @@ COMPARISONS = (
         labels={name: f"{NAMES[name.split('-')[1]]}, {name.split('-')[0]}" for name in SINGLES},
         figures=(("none", 10, 10), ("medium", 0, 20)),
         best=(
-            ("best of these", SINGLES, "none", 10, paris.READ_OFF["single_none_p10"]),
-            ("best of these", SINGLES, "medium", 0, paris.READ_OFF["single_medium_p0"]),
+            ("best of these", SINGLES, "none", 10, READ_OFF["single_none_p10"]),
+            ("best of these", SINGLES, "medium", 0, READ_OFF["single_medium_p0"]),
         ),
         plots=(
-            (
-                "none",
-                "error",
-                ((10.0, paris.READ_OFF["single_none_p10"], "more than 0.90 (text)"),),
-            ),
-            (
-                "medium",
-                "error",
-                ((0.0, paris.READ_OFF["single_medium_p0"], "at most 0.50 (text)"),),
-            ),
+            ("none", "error", ((10.0, READ_OFF["single_none_p10"], "more than 0.90 (text)"),)),
+            ("medium", "error", ((0.0, READ_OFF["single_medium_p0"], "at most 0.50 (text)"),)),
             ("none", "recall", ((10.0, 1.0, "all but Jaccard of types (text)"),)),
-            (
-                "medium",
-                "recall",
-                ((20.0, paris.READ_OFF["single_medium_recall20"], "good ones (text)"),),
-            ),
+            ("medium", "recall", ((20.0, READ_OFF["single_medium_recall20"], "good ones (text)"),)),
         ),
     ),
     Comparison(
@@ -356,8 +341,8 @@ COMPARISONS = (
         labels={**FUSION_LABELS, **EDIT_LABELS},
         figures=(("none", 0, 10), ("medium", 0, 10)),
         best=(
-            ("best of one part", EDIT_LABELS, "none", 0, paris.READ_OFF["single_none_p0"]),
-            ("best fusion", FUSION_LABELS, "none", 0, paris.READ_OFF["fusion_none_p0"]),
+            ("best of one part", EDIT_LABELS, "none", 0, READ_OFF["single_none_p0"]),
+            ("best fusion", FUSION_LABELS, "none", 0, READ_OFF["fusion_none_p0"]),
         ),
         plots=(("none", "error", ()), ("medium", "error", ()), ("medium", "recall", ())),
     ),
@@ -418,16 +403,11 @@ def _time_section(results: Reproduction) -> Section:
 
 def _level_section(results: Reproduction) -> Section:
     cases = {name: level_case(results, name) for name in ("none", *LEVELS)}
-    read = paris.READ_OFF
-    highest = {P10: read["light_small_error"], RECALL10: read["light_recall"]}
-    lowest = {P10: read["strong_small_error"], RECALL10: read["strong_recall"]}
+    highest = {P10: READ_OFF["light_small_error"], RECALL10: READ_OFF["light_recall"]}
+    lowest = {P10: READ_OFF["strong_small_error"], RECALL10: READ_OFF["strong_recall"]}
     medium = {P50: PARIS_P50, RECALL10: PARIS_RECALL10}
-    paper: dict[str, Mapping[Figure, float | None]] = {
-        "none": highest,
-        "light": highest,
-        "medium": medium,
-        "strong": lowest,
-    }
+    paper: dict[str, Mapping[Figure, float | None]]
+    paper = {"none": highest, "light": highest, "medium": medium, "strong": lowest}
     numbers = [
         share_of(case, figure).number(name, COLUMNS[figure], paper[name].get(figure))
         for name, case in cases.items()
@@ -436,8 +416,8 @@ def _level_section(results: Reproduction) -> Section:
     points: dict[str, Points] = {
         "error": (
             (50.0, PARIS_P50, "medium (table)"),
-            (10.0, read["light_small_error"], "highest at small errors (text)"),
-            (10.0, read["strong_small_error"], "lowest at small errors (text)"),
+            (10.0, READ_OFF["light_small_error"], "highest at small errors (text)"),
+            (10.0, READ_OFF["strong_small_error"], "lowest at small errors (text)"),
         ),
         "recall": ((10.0, PARIS_RECALL10 or 0.0, "medium (table)"),),
     }

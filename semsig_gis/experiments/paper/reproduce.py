@@ -191,7 +191,7 @@ class Reproduction:
     summary : mapping
         Its properties (see `database.properties.database_summary`).
     variants : mapping of float to mapping
-        Properties of the databases of other visibility ranges, by the range in metres.
+        The same of databases of other visibility ranges, by the range in metres.
     experiments : mapping of str to mapping
         By the names of `experiments.paper.reproduce.paper_experiments`, their evaluations by the
         names of their cases.
@@ -230,7 +230,8 @@ def reproduce(
     out : str or Path
         Folder for the results; made if it is not there.
     database : str or Path, optional
-        File of a signature database; a city like the paper's Paris is made up by default.
+        File of a signature database; a city like the paper's Paris is made up by default. Without
+        street objects beside it, there are no other visibility ranges.
     size : {"full", "small"}, default "full"
         As many queries as the paper asks, and a city of its size; or few of a small one.
     queries : int, optional
@@ -255,11 +256,6 @@ def reproduce(
         If a setting cannot be used, or the folder holds results of other settings.
     DatabaseError
         If the database cannot be read.
-
-    Notes
-    -----
-    Other visibility ranges need the street objects of the database, which `semsig build` puts
-    beside it; without them, that part is left out.
 
     Examples
     --------
@@ -398,10 +394,9 @@ def time_queries(
 ) -> dict[str, float]:
     """Return the mean seconds that each method takes to compare one query with all cells.
 
-    Paper, table of retrieval times: the mean of 100 repetitions with a query of mean length, asked
-    one at a time, on one thread. The queries are cells with `length` objects, or of the nearest
-    length; what is worked out once for a database does not count. `progress` is called with the
-    methods done and in all.
+    As in the paper's table: queries of mean length, asked one at a time, on one thread. They are
+    cells with `length` objects, or of the nearest length; what is worked out once for a database
+    does not count.
     """
     if repetitions < 1:
         msg = f"{repetitions} repetitions were asked for; give a whole number from 1."
