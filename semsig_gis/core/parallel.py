@@ -60,13 +60,10 @@ def run_tasks(
     """Do tasks, and yield the outcome of each when it is done or has failed three times.
 
     `workers` is the number of processes of this machine, 0 to work here, in the order of the tasks
-    and without dask; `scheduler` is the address of a dask scheduler instead, such as
-    ``tcp://10.0.0.5:8786``. Workers import `work` (a `functools.partial` will do), so a script that
-    gives them needs the guard ``if __name__ == "__main__":``, and they must see `files` under the
-    same paths. Tasks are distinct, and all hashable or none.
-
-    InputError if `workers` and `scheduler` do not go together, the scheduler cannot be reached, or
-    its workers have another version of the package or other files.
+    and without dask; `scheduler` is the address of a dask scheduler instead. Workers import `work`
+    (a `functools.partial` will do), so a script that gives them needs the guard ``if __name__ ==
+    "__main__":``, and they must see `files` under the same paths. Tasks are distinct, and all
+    hashable or none. InputError if no worker can be used.
     """
     check_workers(workers, scheduler)
     if not tasks:

@@ -69,13 +69,7 @@ class Answer(ABC):
         """Return what was found as plain values that JSON can hold."""
 
     def to_geodataframe(self) -> gpd.GeoDataFrame:
-        """Return the candidates with their viewpoints as points in the CRS of the database.
-
-        Returns
-        -------
-        GeoDataFrame
-            The columns of `candidates` and ``geometry``.
-        """
+        """Return the candidates with their viewpoints as points in the CRS of the database."""
         points = gpd.points_from_xy(self.candidates["x"], self.candidates["y"])
         return gpd.GeoDataFrame(self.candidates.copy(), geometry=points, crs=self.crs)
 
@@ -136,12 +130,8 @@ class DistanceMemo:
     """
 
     _known: dict[Hashable, tuple[NDArray[Any], float]] = field(default_factory=dict)
-    _spared: float = 0.0
-
-    @property
-    def spared(self) -> float:
-        """Seconds that it would have taken to measure again what was known."""
-        return self._spared
+    spared: float = field(default=0.0, init=False)
+    """Seconds that it would have taken to measure again what was known."""
 
     def get(self, key: Hashable, measure: Callable[[], NDArray[Any]]) -> NDArray[Any]:
         """Return the distances under a key, calling `measure` only if they are not known yet.
@@ -150,7 +140,7 @@ class DistanceMemo:
         """
         if key in self._known:
             distances, seconds = self._known[key]
-            self._spared += seconds
+            self.spared += seconds
             return distances
         start = time.perf_counter()
         distances = measure()
@@ -194,7 +184,6 @@ def check_query(query: Signature) -> None:
         raise InputError(msg)
 
 
-_ANY = "?"
 _COMPARISON = re.compile(r"(\S)\s*(>=|<=|=)\s*(\d+)")
 _AMOUNT = re.compile(r"(\d*)\s*(\S)")
 
@@ -203,8 +192,7 @@ _AMOUNT = re.compile(r"(\d*)\s*(\S)")
 class Requirement:
     """How many objects of some classes a cell must see.
 
-    Each limit is a class code, or `WILDCARD` for all objects together, with the fewest and the
-    most.
+    Each limit is a class code, or `WILDCARD` for all objects together, the fewest and the most.
     """
 
     limits: tuple[tuple[int, int, float], ...]
@@ -221,7 +209,7 @@ class Requirement:
         limits: dict[int, tuple[int, float]] = {}
         for part in map(str.strip, text.split(",")):
             symbol, least, most = _read(part, text)
-            code = WILDCARD if symbol == _ANY else taxonomy.by_symbol(symbol).code
+            code = WILDCARD if symbol == "?" else taxonomy.by_symbol(symbol).code
             low, high = limits.get(code, (0, math.inf))
             limits[code] = low, high = max(low, least), min(high, most)
             if low > high:

@@ -56,11 +56,6 @@ class City:
     """A signature database with what lies beside its file; made by `open_city`.
 
     Each part is opened when it is first looked at, and then kept.
-
-    Parameters
-    ----------
-    path : str or Path
-        File of the database, or folder of its parts.
     """
 
     def __init__(self, path: str | Path) -> None:
@@ -74,7 +69,7 @@ class City:
     @cached_property
     def dataset(self) -> SignatureDatabase | PartitionedDatabase:
         """The database; in parts, where it lies in parts (see `open_dataset`)."""
-        return open_dataset(self.path) if self._is_folder else self.database
+        return open_dataset(self.path) if is_folder(self.path) else self.database
 
     @property
     def licenses(self) -> tuple[str, ...]:
@@ -84,7 +79,7 @@ class City:
     @property
     def files(self) -> tuple[Path, ...]:
         """The file of the database, or those of its parts; DatabaseError if one is missing."""
-        if self._is_folder:
+        if is_folder(self.path):
             return part_files(self.path)
         require_file(self.path)
         return (self.path,)
@@ -92,7 +87,7 @@ class City:
     @property
     def bytes(self) -> int:
         """Size of the file, or of all files in the folder."""
-        files = self.path.iterdir() if self._is_folder else [self.path]
+        files = self.path.iterdir() if is_folder(self.path) else [self.path]
         return sum(file.stat().st_size for file in files)
 
     @property
@@ -174,7 +169,7 @@ class City:
         InputError if it cannot be written; it is unchanged then.
         """
         added = {name: {"columns": columns.column_names, "facts": facts}}
-        if not self._is_folder:
+        if not is_folder(self.path):
             _extend(self.path, self.path, columns, cell_ids, added)
             return
         files, manifest = self.files, read_manifest(self.path)
@@ -185,10 +180,6 @@ class City:
                 _extend(file, new, columns, cell_ids, added)
                 parts.append(replace(part, bytes=new.stat().st_size, sha256=digest(new)))
             Manifest(manifest.recipe, tuple(parts)).write(partial)
-
-    @property
-    def _is_folder(self) -> bool:
-        return is_folder(self.path)
 
 
 def open_city(path: str | Path) -> City:

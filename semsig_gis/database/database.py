@@ -144,7 +144,8 @@ class SignatureDatabase:
     @cached_property
     def reach(self) -> float:
         """The largest visibility range of any class, in metres."""
-        return float(self.taxonomy.ranges(self.spec.radius).max())
+        ranges = (item.range_m or 0.0 for item in self.taxonomy.classes)
+        return float(max([self.spec.radius, *ranges]))
 
     @property
     def distances(self) -> NDArray[np.float64]:
@@ -333,26 +334,30 @@ class SequenceTable:
         Row ``i`` is ``values[offsets[i]:offsets[i + 1]]``; the arrays are copied. Raise InputError
         if the values are not bytes, or the offsets do not divide them.
         """
-        flat, ends = _checked_csr(values, offsets)
+        flat = np.ascontiguousarray(checked_sequence(values))
+        ends = np.ascontiguousarray(offsets, dtype=np.int64)
+        whole = ends.ndim == 1 and len(ends) > 0 and ends[0] == 0 and ends[-1] == len(flat)
+        # Arrow trusts the offsets: decreasing ones would read outside the values.
+        if not whole or bool((np.diff(ends) < 0).any()):
+            msg = (
+                f"the offsets of the sequences do not divide their {len(flat)} values; give one "
+                "offset more than there are sequences, from 0 up to the number of values, none "
+                "smaller than the one before."
+            )
+            raise InputError(msg)
         rows = pa.LargeBinaryArray.from_buffers(
             pa.large_binary(), len(ends) - 1, [None, pa.py_buffer(ends), pa.py_buffer(flat)]
         )
         encoded = rows.dictionary_encode()
         distinct = len(encoded.dictionary)
-        order = np.argsort(pc.binary_length(encoded.dictionary).to_numpy(), kind="stable")
+        lengths = pc.binary_length(encoded.dictionary).to_numpy()
+        order = np.argsort(lengths, kind="stable")
         rank = np.empty(distinct, np.int64)
         rank[order] = np.arange(distinct)
-        _, offset_buffer, value_buffer = encoded.dictionary.take(order).buffers()
+        distinct_offsets = np.append(0, np.cumsum(lengths[order]))
         # An Arrow array without values may come without buffers.
-        distinct_offsets = (
-            np.frombuffer(offset_buffer, np.int64)[: distinct + 1].copy()
-            if distinct
-            else np.zeros(1, np.int64)
-        )
-        size = int(distinct_offsets[-1])
-        distinct_values = (
-            np.frombuffer(value_buffer, np.uint8)[:size].copy() if size else np.empty(0, np.uint8)
-        )
+        buffer = encoded.dictionary.take(order).buffers()[2] or b""
+        distinct_values = np.frombuffer(buffer, np.uint8)[: distinct_offsets[-1]].copy()
         # int64: NumPy gathers with a native index without converting it at every query.
         inverse = rank[encoded.indices.to_numpy()]
         counts = np.bincount(inverse, minlength=distinct).astype(np.int64, copy=False)
@@ -445,24 +450,6 @@ def checked_sequence(values: NDArray[np.uint8]) -> NDArray[np.uint8]:
         )
         raise InputError(msg)
     return array
-
-
-def _checked_csr(
-    values: NDArray[np.uint8], offsets: NDArray[np.int64]
-) -> tuple[NDArray[np.uint8], NDArray[np.int64]]:
-    """Return values and offsets as contiguous arrays that Arrow can read in place."""
-    flat = np.ascontiguousarray(checked_sequence(values))
-    ends = np.ascontiguousarray(offsets, dtype=np.int64)
-    whole = ends.ndim == 1 and len(ends) > 0 and ends[0] == 0 and ends[-1] == len(flat)
-    # Arrow trusts the offsets: decreasing ones would read outside the values.
-    if not whole or bool((np.diff(ends) < 0).any()):
-        msg = (
-            f"the offsets of the sequences do not divide their {len(flat)} values; give one "
-            "offset more than there are sequences, from 0 up to the number of values, none "
-            "smaller than the one before."
-        )
-        raise InputError(msg)
-    return flat, ends
 
 
 def consecutive(first: NDArray[np.int64], size: NDArray[np.int64]) -> NDArray[np.int64]:

@@ -298,7 +298,7 @@ class Part:
 class Manifest:
     """A signature database in parts, ordered by tile.
 
-    `recipe` says how it was built, as plain JSON values: the specs and the digests of the inputs.
+    `recipe` says how it was built: the specs and the digests of the inputs, as JSON values.
     """
 
     recipe: dict[str, Any]
@@ -391,14 +391,9 @@ def part_files(folder: str | Path) -> tuple[Path, ...]:
 
 @dataclass(frozen=True, slots=True)
 class PartitionedDatabase:
-    """A signature database of which one part at a time is in memory.
+    """A signature database of which one part at a time is in memory, made by `open_dataset`.
 
-    Parameters
-    ----------
-    files : tuple of Path
-        The part files; no cell is in two of them.
-    cells : int
-        Number of cells in all parts.
+    `files` are the part files, no cell in two of them, and `cells` is their number of cells.
     """
 
     files: tuple[Path, ...]

@@ -19,8 +19,8 @@ if TYPE_CHECKING:
 TOLERANCE_M = 0.5
 # Houses nearer to each other than twice this share a wall.
 GAP_M = 0.05
+# More than the tolerance, and than what counts as a gap between buildings.
 TOUCHING_M = 1.0
-"""Metres; more than the tolerance, and than what counts as a gap between buildings."""
 PAIRS_A_BLOCK = 1 << 17
 POLYGONAL = 2  # dimensions
 
@@ -38,16 +38,14 @@ class Footprints:
 
     Attributes
     ----------
-    tolerance : float
-        The tolerance in metres.
     repaired : int
         How many footprints were invalid and have been repaired.
 
     Raises
     ------
     InputError
-        If the tolerance is not a number of metres from 0 up, if a geometry is not a polygon or
-        has coordinates that are not finite, or if no footprint remains.
+        If the tolerance is not from 0 up, a geometry is not a polygon or not finite, or no
+        footprint remains.
 
     Examples
     --------
@@ -113,16 +111,12 @@ class Footprints:
         """Tell which places, shape (n, 2) in metres, are in a footprint or on its outline."""
         places = np.asarray(xy, dtype=np.float64).reshape(-1, 2)
         covered = np.zeros(len(places), bool)
+        shapely.prepare(self._polygons)
         for part in _parts(len(places)):
             points = np.asarray(shapely.points(places[part]))
-            inside = shapely.STRtree(points).query(self._prepared, predicate="intersects")[1]
+            inside = shapely.STRtree(points).query(self._polygons, predicate="intersects")[1]
             covered[part.start + inside] = True
         return covered
-
-    @functools.cached_property
-    def _prepared(self) -> NDArray[np.object_]:
-        shapely.prepare(self._polygons)
-        return self._polygons
 
 
 def hidden(

@@ -63,10 +63,8 @@ class ObjectStore:
         The objects.
     index : StoredIndex
         R-tree over them, in the same order.
-    footprints : GeoDataFrame, optional
-        The buildings, in the CRS of the objects, where the database was built with buildings.
-    streets : GeoDataFrame, optional
-        The centre lines, in the CRS of the objects, where it was built with streets.
+    footprints, streets : GeoDataFrame, optional
+        Buildings and centre lines in the CRS of the objects, where it was built with them.
     notes : tuple of str
         What was wrong with the files and has been put right.
 
@@ -129,18 +127,9 @@ def _stored(table: gpd.GeoDataFrame, crs: CRS) -> gpd.GeoDataFrame:
 
 
 def save_with_store(database: SignatureDatabase, store: ObjectStore, path: str | Path) -> None:
-    """Save a database and the store that belongs to it.
+    """Save a database as a file, and beside it the store of what it was built from.
 
     Any number of programs may read meanwhile; of two that write at once, the later one wins.
-
-    Parameters
-    ----------
-    database : SignatureDatabase
-        What to save.
-    store : ObjectStore
-        What it was built from.
-    path : str or Path
-        File of the database; the store is put beside it (see `store_path`).
 
     Raises
     ------
@@ -170,17 +159,10 @@ def save_with_store(database: SignatureDatabase, store: ObjectStore, path: str |
 
 
 def open_store(database: str | Path, folder: str | Path | None = None) -> ObjectStore:
-    """Open the object store of a database.
+    """Open the object store beside the file of a database, or in another `folder`.
 
     What an interrupted `save_with_store` left half done is finished, if the folder can be written
     to. Notes of the store say so where its R-tree had to be made again.
-
-    Parameters
-    ----------
-    database : str or Path
-        File of the database.
-    folder : str or Path, optional
-        The store, where it does not lie beside the database.
 
     Raises
     ------
@@ -203,13 +185,6 @@ def open_store(database: str | Path, folder: str | Path | None = None) -> Object
         raise DatabaseError(msg)
     require_file(database)
     return _read(_settle(Path(database)) if folder is None else Path(folder), Path(database))
-
-
-def _belongs(folder: Path, fingerprint: str) -> bool:
-    try:
-        return bool(_manifest(folder)["database"] == fingerprint)
-    except DatabaseError:
-        return False
 
 
 def _manifest(folder: Path) -> dict[str, Any]:
@@ -290,9 +265,12 @@ def _settle(database: Path) -> Path:
     """Finish what an interrupted run left half done; return where the store is to be read."""
     final = store_path(database)
     waiting = _waiting(final)
-    if waiting.exists() and database.exists() and _belongs(waiting, built_digest(database)):
+    if waiting.exists() and database.exists():
         try:
-            move_folder(waiting, final)
+            if _manifest(waiting)["database"] == built_digest(database):
+                move_folder(waiting, final)
+        except DatabaseError:  # what waits is damaged
+            return final
         except InputError:  # nothing may be written here, or another program was quicker
             return waiting if waiting.exists() else final
     return final

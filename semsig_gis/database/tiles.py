@@ -278,9 +278,7 @@ class TilePlan:
     def box(self, tile: Tile, margin: float) -> Box:
         """Return ``xmin, ymin, xmax, ymax`` of a tile, widened by `margin` metres on each side."""
         side = self.side * self.grid.step
-        west, south = (
-            start + place * side for start, place in zip(self.grid.origin, tile, strict=True)
-        )
+        west, south = self.grid.origin[0] + tile[0] * side, self.grid.origin[1] + tile[1] * side
         return west - margin, south - margin, west + side + margin, south + side + margin
 
 
@@ -297,8 +295,7 @@ def plan_tiles(
 ) -> TilePlan:
     """Check the inputs of a run, begin it or take it up again, and return the plan of its tiles.
 
-    Streets are needed by the viewpoints ``"streets"`` and left aside by others. Raise SemsigError
-    if an input is missing or cannot be used, or `out` cannot be written.
+    Streets are needed by the viewpoints ``"streets"`` and left aside by others.
     """
     places: dict[Input, str | Path | None]
     places = {"objects": objects, "buildings": buildings, "streets": streets}
@@ -393,8 +390,7 @@ def touched_tiles(path: str | Path, *, grid: GridSpec, side: int, reach: float) 
     """Return the tiles that may have a cell from which some object is seen, fullest first.
 
     Only the bounds in the file of objects are read. `side` is that of a tile in cells, `reach` the
-    largest visibility range of any class in metres. Raise InputError if tiles are so small that an
-    object would touch very many, or if there are too many.
+    largest visibility range of any class in metres. Tiles that are too small are refused.
     """
     metres = side * grid.step
     if reach > MOST_REACHED * metres:
@@ -479,9 +475,8 @@ def _footprints(path: Path, box: Box, crs: CRS) -> gpd.GeoDataFrame:
 def begin(out: str | Path, recipe: dict[str, Any]) -> Path:
     """Begin a run, or take up an unfinished one, and return its folder: `out` with ``.partial``.
 
-    `recipe` says how the database is built. Raise InputError if `out` holds something that may not
-    be replaced, the folder cannot be written to, or it holds tiles of an unfinished run by another
-    recipe, which are never thrown away unasked.
+    Raise InputError if `out` holds something that may not be replaced, or the folder tiles of an
+    unfinished run by another recipe, which are never thrown away unasked.
     """
     _require_replaceable(Path(os.path.realpath(out)))
     folder = partial_folder(out)
@@ -536,11 +531,7 @@ def finished_tiles(folder: Path, tiles: Iterable[Tile]) -> dict[Tile, Part | Non
 
 
 def publish(folder: Path, parts: Sequence[Part]) -> Manifest:
-    """Put a database whose tiles are all done in its place; one that was there is replaced.
-
-    The parts are ordered by tile. Raise InputError if the folder cannot be renamed; the parts then
-    stay in it.
-    """
+    """Put a database whose tiles are all done, ordered by tile, in the place of another."""
     manifest = Manifest(read_json(folder / RECIPE), tuple(parts))
     _require_replaceable(folder.with_name(folder.name.removesuffix(PARTIAL)))
     manifest.write(folder)

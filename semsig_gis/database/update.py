@@ -117,22 +117,8 @@ def update_file(
 ) -> UpdateReport:
     """Update the file of a database, and the object store beside it, by `update_database`.
 
-    Parameters
-    ----------
-    path : str or Path
-        File of the database.
-    objects : StreetObjects
-        The layers that were loaded anew, whole.
-    out : str or Path, optional
-        Another file to write to; `path` itself by default.
-    progress : callable, optional
-        Called with the number of cells done and in all.
-
-    Raises
-    ------
-    SemsigError
-        As in `update_database`, or if the files cannot be read or written, which do not change
-        then.
+    They are written to `path` again, or to another file `out`; where anything goes wrong, they stay
+    as they are.
 
     Examples
     --------
