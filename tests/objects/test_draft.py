@@ -35,6 +35,7 @@ from semsig_gis.sources.vector import LayerInfo
 if TYPE_CHECKING:
     from pathlib import Path
 
+    from semsig_gis.core.taxonomy import ObjectClass
     from semsig_gis.sources import RawLayer
     from semsig_gis.sources.catalog import Catalog
 
@@ -75,21 +76,15 @@ def write(
 
 
 def test_a_sure_draft_loads_as_it_is(tmp_path: Path) -> None:
-    file = write(
-        tmp_path / "Bancs_publics.gpkg",
-        {
-            "Numéro": [f"b{row}" for row in range(6)],
-            "etat": ["neuf", "usé", "neuf", None, "neuf", "usé"],
-        },
-    )
+    states: list[object] = ["neuf", "usé", "neuf", None, "neuf", "usé"]
+    numbers: list[object] = [f"b{row}" for row in range(6)]
+    file = write(tmp_path / "Bancs_publics.gpkg", {"Numéro": numbers, "etat": states})
     draft = suggest_catalog(file)
     (layer,) = read(draft, file, tmp_path)
-    assert layer.spec.name == "bancs_publics"
-    assert layer.spec.class_name == "bench"
-    assert layer.spec.files == ("Bancs_publics.gpkg",)
-    assert layer.spec.id_field == "Numéro"
-    assert layer.spec.crs == load(draft, tmp_path).metric_crs == "EPSG:2154"
-    assert layer.spec.rows == (3, 12)
+    spec = layer.spec
+    assert (spec.name, spec.class_name, spec.id_field) == ("bancs_publics", "bench", "Numéro")
+    assert (spec.files, spec.rows) == (("Bancs_publics.gpkg",), (3, 12))
+    assert spec.crs == load(draft, tmp_path).metric_crs == "EPSG:2154"
     assert (layer.counts.read, len(layer.table), layer.notes) == (6, 6, ())
     assert '# where = { etat = ["neuf", "usé"] }  # rows: 3, 2; without: 1' in draft
     assert "# Fields: Numéro, etat" in draft
@@ -128,41 +123,29 @@ def test_a_doubtful_class_is_marked(
     assert load(draft, tmp_path).layers[0].class_name == line.split('"')[1]
 
 
-def test_a_class_of_its_own_has_the_code_of_the_shipped_catalogues(tmp_path: Path) -> None:
-    catalog = load(suggest_catalog(write(tmp_path / "horodateurs.gpkg", {"a": [1]})), tmp_path)
-    assert catalog.taxonomy.by_name("parking_meter") == load_catalog(
-        "montpellier"
-    ).taxonomy.by_name("parking_meter")
+def test_classes_that_the_paper_has_not_keep_their_code_or_get_a_free_one(tmp_path: Path) -> None:
+    def drafted(file: str, name: str) -> ObjectClass:
+        path = write(tmp_path / file, {"a": [1]})
+        return load(suggest_catalog(path), tmp_path).taxonomy.by_name(name)
+
+    montpellier = load_catalog("montpellier").taxonomy
+    assert drafted("horodateurs.gpkg", "parking_meter") == montpellier.by_name("parking_meter")
+    own = drafted("defibrillateurs.gpkg", "defibrillator")
+    shipped = [item for name in catalog_names() for item in load_catalog(name).taxonomy.classes]
+    assert own.code not in {item.code for item in shipped}
+    assert own.symbol not in {item.symbol for item in shipped}
 
 
-def test_a_class_that_no_shipped_catalogue_has_takes_what_is_free(tmp_path: Path) -> None:
-    catalog = load(suggest_catalog(write(tmp_path / "defibrillateurs.gpkg", {"a": [1]})), tmp_path)
-    own = catalog.taxonomy.by_name("defibrillator")
-    for name in catalog_names():
-        for item in load_catalog(name).taxonomy.classes:
-            assert own.code != item.code
-            assert own.symbol != item.symbol
-
-
-def test_every_layer_of_a_file_is_drafted(tmp_path: Path) -> None:
+def test_every_layer_with_geometry_is_drafted(tmp_path: Path) -> None:
     file = tmp_path / "town.gpkg"
     for layer in ("Arbres", "arbres!", "Bancs"):
         write(file, {"a": [1]}, layer=layer)
-    draft = suggest_catalog(file)
-    assert [(item["name"], item["layer"]) for item in layers(draft)] == [
-        ("arbres", "Arbres"),
-        ("arbres_2", "arbres!"),
-        ("bancs", "Bancs"),
-    ]
-    assert [layer.counts.read for layer in read(draft, file, tmp_path)] == [1, 1, 1]
-
-
-def test_tables_without_geometry_are_named_and_left_out(tmp_path: Path) -> None:
-    file = write(tmp_path / "town.gpkg", {"a": [1]}, layer="benches")
     pyogrio.write_dataframe(pd.DataFrame({"text": ["x"]}), file, layer="legend", append=True)
     draft = suggest_catalog(file)
     assert '# Left out, because they have no geometry: "legend"' in draft
-    assert [item["name"] for item in layers(draft)] == ["benches"]
+    names = [(item["name"], item["layer"]) for item in layers(draft)]
+    assert names == [("arbres", "Arbres"), ("arbres_2", "arbres!"), ("bancs", "Bancs")]
+    assert [layer.counts.read for layer in read(draft, file, tmp_path)] == [1, 1, 1]
 
 
 def test_buildings_and_streets_get_their_role(tmp_path: Path) -> None:

@@ -204,20 +204,26 @@ def test_layers_in_several_systems_meet_in_one() -> None:
     assert objects.crs == CRS(LAMBERT)
 
 
-def test_a_layer_without_a_system_is_asked_about() -> None:
-    with refused(CrsError, "'parks'", "no coordinate reference system", "state its crs"):
-        build(raw_layer(points((1, 2))), raw_layer(points((1, 2)), name="parks", crs=None))
+HERE = [shapely.Point(1, 2)]
+NOWHERE = raw_layer(HERE, name="parks", crs=None)
 
 
-@pytest.mark.parametrize("crs", ["EPSG:4326", "EPSG:3857", "EPSG:2263", "nonsense"])
-def test_a_system_to_work_in_must_be_metric(crs: str) -> None:
-    with refused(CrsError, "projected CRS in metres"):
-        build_objects([raw_layer(points((1, 2)))], taxonomy=TAXONOMY, crs=crs)
-
-
-def test_an_unknown_class_is_named() -> None:
-    with refused(UnknownNameError, "'kiosk'"):
-        build(raw_layer(points((1, 2)), classes="kiosk"))
+@pytest.mark.parametrize(
+    ("layer", "crs", "error", "words"),
+    [
+        (NOWHERE, LAMBERT, CrsError, ("'parks'", "no coordinate reference", "state its crs")),
+        (raw_layer(HERE, classes="kiosk"), LAMBERT, UnknownNameError, ("'kiosk'",)),
+        *(
+            (raw_layer(HERE), crs, CrsError, ("projected CRS in metres",))
+            for crs in ("EPSG:4326", "EPSG:3857", "EPSG:2263", "nonsense")
+        ),
+    ],
+)
+def test_unknown_classes_and_other_systems_are_refused(
+    layer: RawLayer, crs: str, error: type[Exception], words: tuple[str, ...]
+) -> None:
+    with refused(error, *words):
+        build_objects([raw_layer(HERE), layer], taxonomy=TAXONOMY, crs=crs)
 
 
 def test_nothing_left_is_an_error() -> None:
@@ -231,15 +237,9 @@ def test_nothing_left_is_an_error() -> None:
 
 def test_an_empty_layer_beside_a_full_one_is_fine() -> None:
     for crs in ("EPSG:4326", LAMBERT):
-        objects, report = build_objects(
-            [
-                raw_layer([], name="a", crs=crs),
-                raw_layer(points((1, 2))),
-                raw_layer([None], name="b", crs=crs),
-            ],
-            taxonomy=TAXONOMY,
-            crs=LAMBERT,
-        )
+        empty, bad = raw_layer([], name="a", crs=crs), raw_layer([None], name="b", crs=crs)
+        layers = [empty, raw_layer(HERE), bad]
+        objects, report = build_objects(layers, taxonomy=TAXONOMY, crs=LAMBERT)
         assert objects.xy.tolist() == [[1, 2]]
         assert [item.counts.kept for item in report.layers] == [0, 1, 0]
 
@@ -342,11 +342,8 @@ def test_an_older_file_tells_layers_by_its_objects(
 
 
 def test_a_file_says_of_layers_only_what_its_lines_do_not_tell() -> None:
-    lamps, benches = (
-        raw_layer(points((1, 2)), name="lamps"),
-        raw_layer(points((3, 4)), name="benches"),
-    )
-    assert "license_layers" not in objects_specs(build(lamps, benches))
+    lamps, benches = (raw_layer(HERE, name=name) for name in ("lamps", "benches"))
+    assert "license_layers" not in objects_specs(build(lamps, benches, collapse=False))
     specs = objects_specs(build(lamps, raw_layer([], name="benches")))
     assert specs["licenses"] == ["Town (CC0): lamps, benches"]
     assert specs["license_layers"] == [["lamps", "benches"]]
