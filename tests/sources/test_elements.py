@@ -1,7 +1,8 @@
 from __future__ import annotations
 
 import itertools
-from typing import TYPE_CHECKING
+from functools import partial
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
@@ -17,6 +18,9 @@ from semsig_gis.sources.raw_layer import BadFeatureError
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
+    from shapely.geometry.base import BaseGeometry
+
+    from semsig_gis.sources.layers import ElementKind
 
 KEYS = st.sampled_from("abc")
 VALUES = st.sampled_from(["x", "y", "no", "*"])
@@ -27,14 +31,6 @@ SPECS = st.lists(ALTERNATIVES, min_size=1, max_size=3).map(
     lambda tags: LayerSpec(name="things", class_name="bench", tags=tuple(tags))
 )
 TAGS = st.dictionaries(KEYS, st.sampled_from(["x", "y", "z", "no"]), max_size=3)
-
-
-def spec_of(*alternatives: dict[str, str]) -> LayerSpec:
-    tags = tuple(
-        tuple((key, tuple(values.split("|"))) for key, values in alternative.items())
-        for alternative in alternatives
-    )
-    return LayerSpec(name="things", class_name="bench", tags=tags)
 
 
 @pytest.mark.parametrize(
@@ -48,6 +44,7 @@ def spec_of(*alternatives: dict[str, str]) -> LayerSpec:
         ({"denotation": "tree"}, False),
         ({"sign": "stop"}, True),
         ({"sign": "no"}, False),
+        ({"building": "no"}, True),
         ({"public_transport": "platform", "bus": "yes"}, True),
         ({"public_transport": "platform", "bus": "designated"}, True),
         ({"public_transport": "platform", "bus": "no"}, False),
@@ -57,17 +54,11 @@ def spec_of(*alternatives: dict[str, str]) -> LayerSpec:
     ],
 )
 def test_values_are_compared_exactly(tags: dict[str, str], *, expected: bool) -> None:
-    spec = spec_of(
-        {"natural": "tree"},
-        {"sign": "*"},
-        {"public_transport": "platform", "bus": "yes|designated"},
-    )
+    tree, sign, building = (("natural", ("tree",)),), (("sign", ("*",)),), (("building", ("no",)),)
+    stop = (("public_transport", ("platform",)), ("bus", ("yes", "designated")))
+    spec = LayerSpec(name="things", class_name="bench", tags=(tree, sign, stop, building))
     assert has_tags(tags, spec) is expected
     assert TagIndex([spec]).layers(tags) == [0] * expected
-
-
-def test_no_can_be_asked_for_by_name() -> None:
-    assert has_tags({"building": "no"}, spec_of({"building": "no"}))
 
 
 @given(st.lists(SPECS, min_size=1, max_size=4), TAGS)
@@ -86,21 +77,32 @@ def test_a_layer_without_tags_is_refused() -> None:
         TagIndex([LayerSpec(name="things", class_name="bench")])
 
 
-def test_kinds_of_element() -> None:
-    points = LayerSpec(name="points", class_name="bench", elements=("node",))
-    anything = LayerSpec(name="anything", class_name="bench")
-    streets = LayerSpec(name="streets", class_name="", role="streets", elements=("way",))
-    assert has_shape("node", {}, points)
-    assert not has_shape("way", {}, points)
-    assert has_shape("way", {}, anything)
-    assert has_shape("relation", {"type": "multipolygon"}, anything)
-    for kind in ("site", "building", "boundary"):
-        assert not has_shape("relation", {"type": kind}, anything)
-    assert not has_shape("relation", {}, anything)
-    assert has_shape("way", {"highway": "pedestrian"}, streets)
-    assert has_shape("way", {"highway": "pedestrian", "area": "no"}, streets)
-    assert not has_shape("way", {"highway": "pedestrian", "area": "yes"}, streets)
-    assert has_shape("way", {"area": "yes"}, anything)
+POINTS = LayerSpec(name="points", class_name="bench", elements=("node",))
+ANYTHING = LayerSpec(name="anything", class_name="bench")
+STREETS = LayerSpec(name="streets", class_name="", role="streets", elements=("way",))
+
+
+@pytest.mark.parametrize(
+    ("kind", "tags", "spec", "expected"),
+    [
+        ("node", {}, POINTS, True),
+        ("way", {}, POINTS, False),
+        ("way", {}, ANYTHING, True),
+        ("relation", {"type": "multipolygon"}, ANYTHING, True),
+        ("relation", {"type": "site"}, ANYTHING, False),
+        ("relation", {"type": "building"}, ANYTHING, False),
+        ("relation", {"type": "boundary"}, ANYTHING, False),
+        ("relation", {}, ANYTHING, False),
+        ("way", {"highway": "pedestrian"}, STREETS, True),
+        ("way", {"highway": "pedestrian", "area": "no"}, STREETS, True),
+        ("way", {"highway": "pedestrian", "area": "yes"}, STREETS, False),
+        ("way", {"area": "yes"}, ANYTHING, True),
+    ],
+)
+def test_kinds_of_element(
+    kind: ElementKind, tags: dict[str, str], spec: LayerSpec, *, expected: bool
+) -> None:
+    assert has_shape(kind, tags, spec) == expected
 
 
 def xy(*places: tuple[float, float]) -> NDArray[np.float64]:
@@ -111,45 +113,17 @@ def square(size: float, x: float = 0.0, y: float = 0.0) -> NDArray[np.float64]:
     return xy((x, y), (x + size, y), (x + size, y + size), (x, y + size), (x, y))
 
 
-def test_a_line_of_a_street_object_is_its_middle() -> None:
-    assert way_shape(xy((0, 0), (4, 0)), "objects") == (2.0, 0.0)
-
-
-def test_a_closed_street_object_is_the_middle_of_its_area() -> None:
-    outline = xy((0, 0), (3, 0), (3, 0.5), (3, 1), (3, 1.5), (3, 3), (0, 3), (0, 0))
-    assert way_shape(outline, "objects") == pytest.approx((1.5, 1.5))
-
-
-def test_a_closed_street_object_without_area_is_the_middle_of_its_line() -> None:
-    assert way_shape(xy((0, 0), (2, 0), (4, 0), (0, 0)), "objects") == pytest.approx((2.0, 0.0))
-
-
-def test_a_building_is_the_polygon_of_its_outline() -> None:
-    shape = way_shape(square(2), "buildings")
-    assert isinstance(shape, shapely.Polygon)
-    assert shape.equals(shapely.box(0, 0, 2, 2))
-
-
-def test_a_crossed_outline_is_made_valid() -> None:
-    shape = way_shape(xy((0, 0), (2, 2), (2, 0), (0, 2), (0, 0)), "buildings")
-    assert isinstance(shape, shapely.MultiPolygon)
-    assert shape.is_valid
-    assert shape.area == pytest.approx(2.0)
-
-
 @pytest.mark.parametrize(
-    ("line", "reason"),
+    ("line", "middle"),
     [
-        (xy((0, 0), (1, 0), (1, 1)), "not closed"),
-        (xy((0, 0), (1, 0), (0, 0)), "not closed"),
-        (xy((0, 0), (1, 0), (2, 0), (0, 0)), "no area"),
-        (xy((0, 0)), "two nodes"),
-        (xy(), "two nodes"),
+        (xy((0, 0), (4, 0)), (2, 0)),
+        (xy((0, 0), (3, 0), (3, 0.5), (3, 1), (3, 1.5), (3, 3), (0, 3), (0, 0)), (1.5, 1.5)),
+        (xy((0, 0), (2, 0), (4, 0), (0, 0)), (2, 0)),
     ],
+    ids=["open", "area", "closed without area"],
 )
-def test_what_is_no_building(line: NDArray[np.float64], reason: str) -> None:
-    with pytest.raises(BadFeatureError, match=reason):
-        way_shape(line, "buildings")
+def test_an_object_is_the_middle(line: NDArray[np.float64], middle: tuple[float, float]) -> None:
+    assert way_shape(line, "objects") == pytest.approx(middle)
 
 
 def test_a_street_is_a_line_even_if_closed() -> None:
@@ -158,22 +132,29 @@ def test_a_street_is_a_line_even_if_closed() -> None:
     assert len(shape.coords) == 5
 
 
-def test_a_hole_is_left_out_and_an_island_in_it_is_not() -> None:
-    shape = relation_shape([square(10), square(2, 4, 4)], [square(6, 2, 2)], "buildings")
-    assert isinstance(shape, shapely.MultiPolygon)
-    assert shape.area == 100 - 36 + 4
+BOW = xy((0, 0), (2, 2), (2, 0), (0, 2), (0, 0))
 
 
-def test_adjoining_outlines_are_one_area() -> None:
-    shape = relation_shape([square(2), square(2, 2)], [], "buildings")
-    assert isinstance(shape, shapely.Polygon)
-    assert shape.area == 8.0
-
-
-def test_a_hole_at_the_edge_is_left_out() -> None:
-    shape = relation_shape([square(4)], [square(2)], "buildings")
-    assert isinstance(shape, shapely.Polygon)
-    assert shape.area == 12.0
+@pytest.mark.parametrize(
+    ("shape", "kind", "area"),
+    [
+        (way_shape(square(2), "buildings"), "Polygon", 4),
+        (way_shape(BOW, "buildings"), "MultiPolygon", 2),
+        (
+            relation_shape([square(10), square(2, 4, 4)], [square(6, 2, 2)], "buildings"),
+            "MultiPolygon",
+            100 - 36 + 4,
+        ),
+        (relation_shape([square(2), square(2, 2)], [], "buildings"), "Polygon", 8),
+        (relation_shape([square(4)], [square(2)], "buildings"), "Polygon", 12),
+    ],
+    ids=["outline", "crossed", "island in a hole", "adjoining", "hole at the edge"],
+)
+def test_a_building_is_the_area_of_its_outlines(
+    shape: BaseGeometry, kind: str, area: float
+) -> None:
+    assert (shape.geom_type, shape.is_valid) == (kind, True)
+    assert shape.area == pytest.approx(area)
 
 
 def test_an_area_of_a_street_object_is_its_middle() -> None:
@@ -198,14 +179,22 @@ def test_pieces_of_a_ring_join_in_any_order_and_direction(cuts: list[int], rando
 
 
 @pytest.mark.parametrize(
-    ("outer", "reason"),
+    ("line", "reason"),
     [
+        (xy((0, 0), (1, 0), (1, 1)), "not closed"),
+        (xy((0, 0), (1, 0), (0, 0)), "not closed"),
+        (xy((0, 0), (1, 0), (2, 0), (0, 0)), "no area"),
+        (xy((0, 0)), "two nodes"),
+        (xy(), "two nodes"),
         ([xy((0, 0), (1, 0), (1, 1))], "join"),
         ([square(2), xy((5, 5), (6, 6))], "join"),
         ([], "no area"),
         ([xy((0, 0))], "no area"),
     ],
 )
-def test_what_is_no_area(outer: list[NDArray[np.float64]], reason: str) -> None:
+def test_what_is_no_building(line: Any, reason: str) -> None:  # noqa: ANN401 - of a way, or several
+    shape = (
+        partial(relation_shape, line, []) if isinstance(line, list) else partial(way_shape, line)
+    )
     with pytest.raises(BadFeatureError, match=reason):
-        relation_shape(outer, [], "buildings")
+        shape("buildings")

@@ -9,10 +9,13 @@ import json
 import multiprocessing
 import socket
 import time
+from contextlib import nullcontext
 from datetime import UTC, datetime, timedelta
 from typing import TYPE_CHECKING, Any
+from unittest.mock import Mock
 
 import pytest
+from requests.exceptions import SSLError
 from sentences import assert_sentence, refused
 from servers import Answer, published, zipped
 
@@ -25,6 +28,8 @@ from semsig_gis.sources.http.fetch import (
     HttpSpec,
     NotCachedError,
     TooLargeError,
+    _failure,
+    _require_same_host,
     fetch,
     read_text,
 )
@@ -33,7 +38,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable
     from pathlib import Path
 
-    from servers import Seen, Server
+    from servers import Script, Seen, Server
 
     from semsig_gis.sources.http.cache import Fetched
 
@@ -41,6 +46,7 @@ if TYPE_CHECKING:
 
 CONTENT = json.dumps({"trees": list(range(5_000))}).encode()
 JSON = ("application/json",)
+FULL = Answer(CONTENT)
 
 
 @pytest.fixture
@@ -73,13 +79,16 @@ def failure_of(call: Callable[..., object], *words: str, **what: Any) -> SourceE
     return caught.value
 
 
+def answers(body: bytes = CONTENT, status: int = 200, **headers: str) -> Answer:
+    """Return an answer with headers, which are written with underscores here."""
+    named = {name.replace("_", "-"): value for name, value in headers.items()}
+    return Answer(body, status=status, headers=named)
+
+
 def leftovers(cache: Cache) -> set[str]:
     """Return the suffixes of what the cache holds beside locks."""
     names = (path.name for path in cache.folder.iterdir())
     return {name.partition(".")[2] for name in names} - {"lock"}
-
-
-# --- What works ---------------------------------------------------------------------------------
 
 
 def test_a_file_arrives_whole_and_described(server: Server, get: Get) -> None:
@@ -91,12 +100,10 @@ def test_a_file_arrives_whole_and_described(server: Server, get: Get) -> None:
         progress=lambda *step: seen.append(step),
     )
     assert fetched.path.read_bytes() == CONTENT
-    assert fetched.path.suffix == ".json"
-    assert fetched.bytes == len(CONTENT)
+    assert (fetched.path.suffix, fetched.content_type) == (".json", "application/json")
+    assert (fetched.bytes, fetched.from_cache) == (len(CONTENT), False)
     assert fetched.sha256 == _http_cache.checksum(fetched.path)
     assert fetched.url == f"{server.url}/trees?limit=-1&where=a%3D1"
-    assert fetched.content_type == "application/json"
-    assert not fetched.from_cache
     assert datetime.fromisoformat(fetched.fetched_at).tzinfo is not None
     assert seen[-1] == (len(CONTENT), len(CONTENT))
     assert seen == sorted(seen)
@@ -107,10 +114,7 @@ def test_a_file_arrives_whole_and_described(server: Server, get: Get) -> None:
 
 
 def test_no_password_is_taken_from_the_users_files(
-    server: Server,
-    get: Get,
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
+    server: Server, get: Get, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     netrc = tmp_path / "netrc"
     netrc.write_text("machine 127.0.0.1 login me password secret\n")
@@ -121,26 +125,11 @@ def test_no_password_is_taken_from_the_users_files(
     assert "authorization" not in server.seen[0].headers
 
 
-@pytest.mark.parametrize("chunked", [False, True])
-def test_a_packed_body_is_unpacked(server: Server, get: Get, *, chunked: bool) -> None:
-    server.on("/trees", dataclasses.replace(zipped(CONTENT), chunked=chunked))
-    assert get().path.read_bytes() == CONTENT
-    assert server.seen[0].headers["accept-encoding"] == "gzip"
-
-
-def test_a_packed_body_may_have_several_members(server: Server, get: Get) -> None:
-    body = gzip.compress(CONTENT[:9]) + gzip.compress(CONTENT[9:])
-    server.on("/trees", Answer(body, headers={"Content-Encoding": "gzip"}))
-    assert get().path.read_bytes() == CONTENT
-
-
 def test_a_form_is_posted(server: Server, get: Get) -> None:
     server.on("/trees", lambda seen: Answer(json.dumps(seen.form).encode()))
-    assert json.loads(get(data={"data": "node;out é;"}).path.read_bytes()) == {
-        "data": "node;out é;"
-    }
+    for form in ({"data": "node;out é;"}, {"data": "way;out;"}):
+        assert json.loads(get(data=form).path.read_bytes()) == form
     assert server.seen[0].method == "POST"
-    assert json.loads(get(data={"data": "way;out;"}).path.read_bytes()) == {"data": "way;out;"}
 
 
 def test_a_redirect_within_the_host_is_followed(server: Server, get: Get) -> None:
@@ -156,9 +145,6 @@ def test_a_short_text_is_read(server: Server, spec: HttpSpec) -> None:
     server.on("/long", Answer(b"x" * 200_000))
     assert read_text(f"{server.url}/status", spec=spec) == "2 slots available now.\n"
     assert len(read_text(f"{server.url}/long", spec=spec)) == 2**16
-
-
-# --- What fails and then works ------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("status", [429, 500, 502, 503, 504])
@@ -195,9 +181,11 @@ def test_a_cut_download_goes_on_where_it_was_cut(
     assert server.seen[1].headers["if-range"] in validators.values()
 
 
-def test_a_cut_download_of_a_packed_body_goes_on(server: Server, get: Get) -> None:
-    packed = gzip.compress(CONTENT)
-    plain = published(packed, etag='"7"', cuts=[500])
+PACKED = gzip.compress(CONTENT)
+
+
+def packed_and_cut() -> Callable[[Seen], Answer]:
+    plain = published(PACKED, etag='"7"', cuts=[500])
 
     def script(seen: Seen) -> Answer:
         answer = plain(seen)
@@ -205,9 +193,48 @@ def test_a_cut_download_of_a_packed_body_goes_on(server: Server, get: Get) -> No
             return answer
         return dataclasses.replace(answer, headers={**answer.headers, "Content-Encoding": "gzip"})
 
-    server.on("/trees", script)
+    return script
+
+
+def recoveries() -> dict[str, tuple[list[str | None], list[Script]]]:
+    """Return answers that become the whole file, and what is asked for after the first of them."""
+
+    def cut(**what: Any) -> Callable[[Seen], Answer]:  # noqa: ANN401 - as of `published`
+        return published(CONTENT, cuts=[1_000], **what)
+
+    def gzipped(body: bytes) -> Answer:
+        return answers(body, Content_Encoding="gzip")
+
+    tag = {"etag": '"7"'}
+    elsewhere = answers(CONTENT[5:], 206, Content_Range="bytes 5-9/10")
+    other = answers(CONTENT[9:], 206, Content_Range="bytes 1000-", ETag='"8"')
+    members = gzip.compress(CONTENT[:9]) + gzip.compress(CONTENT[9:])
+    return {
+        "packed": ([], [zipped(CONTENT)]),
+        "packed chunked": ([], [dataclasses.replace(zipped(CONTENT), chunked=True)]),
+        "packed members": ([], [gzipped(members)]),
+        "packed short": ([None], [gzipped(PACKED[:-20]), FULL]),
+        "packed bad": ([None], [gzipped(b"\0" + PACKED[1:]), FULL]),
+        "packed cut": (["bytes=500-"], [packed_and_cut()]),
+        "cut": ([None], [Answer(CONTENT, cut=9_999), FULL]),
+        "cut chunked": ([None], [Answer(CONTENT, cut=9_999, chunked=True), FULL]),
+        "cut without ranges": (["bytes=1000-"], [cut(**tag, ranges=False)]),
+        "cut without tag": ([None], [cut()]),
+        "cut with weak tag": ([None], [cut(etag='W/"7"')]),
+        "part unasked": ([None], [Answer(CONTENT[:50], status=206), FULL]),
+        "part elsewhere": (["bytes=1000-", None], [cut(**tag), elsewhere, FULL]),
+        "part of other edition": (["bytes=1000-", None], [cut(**tag), other, FULL]),
+        "part beyond": (["bytes=1000-", None], [cut(**tag), Answer(status=416), FULL]),
+    }
+
+
+@pytest.mark.parametrize("case", recoveries())
+def test_what_is_packed_cut_or_wrong_arrives_whole(server: Server, get: Get, case: str) -> None:
+    ranges, script = recoveries()[case]
+    server.on("/trees", *script)
     assert get().path.read_bytes() == CONTENT
-    assert server.seen[1].headers["range"] == "bytes=500-"
+    assert [seen.headers.get("range") for seen in server.seen] == [None, *ranges]
+    assert server.seen[0].headers["accept-encoding"] == "gzip"
 
 
 def test_a_cut_download_goes_on_in_a_later_run(server: Server, get: Get) -> None:
@@ -219,26 +246,6 @@ def test_a_cut_download_goes_on_in_a_later_run(server: Server, get: Get) -> None
     assert seen[0] > 1_000
 
 
-@pytest.mark.parametrize(
-    "what", [{"etag": '"7"', "ranges": False}, {}, {"etag": 'W/"7"'}], ids=["ranges", "tag", "weak"]
-)
-def test_a_cut_download_starts_again_where_it_cannot_go_on(
-    server: Server, get: Get, what: dict[str, Any]
-) -> None:
-    server.on("/trees", published(CONTENT, cuts=[1_000], **what))
-    assert get().path.read_bytes() == CONTENT
-    assert len(server.seen) == 2
-
-
-@pytest.mark.parametrize("chunked", [False, True])
-def test_a_cut_is_noticed_however_the_length_is_said(
-    server: Server, get: Get, *, chunked: bool
-) -> None:
-    server.on("/trees", Answer(CONTENT, cut=70_000 // 3, chunked=chunked), Answer(CONTENT))
-    assert get().path.read_bytes() == CONTENT
-    assert len(server.seen) == 2
-
-
 def test_a_file_that_changed_meanwhile_starts_again(server: Server, get: Get) -> None:
     newer = b'{"trees": []}'
     server.on("/trees", published(CONTENT, etag='"7"', cuts=[1_000]), published(newer, etag='"8"'))
@@ -246,91 +253,68 @@ def test_a_file_that_changed_meanwhile_starts_again(server: Server, get: Get) ->
     assert server.seen[1].headers["if-range"] == '"7"'
 
 
-@pytest.mark.parametrize(
-    "wrong",
-    [
-        Answer(CONTENT[5:], status=206, headers={"Content-Range": "bytes 5-9/10"}),
-        Answer(CONTENT[9:], status=206, headers={"Content-Range": "bytes 1000-", "ETag": '"8"'}),
-        Answer(status=416),
-    ],
-    ids=["elsewhere", "other edition", "beyond"],
-)
-def test_a_wrong_part_is_not_glued_on(server: Server, get: Get, wrong: Answer) -> None:
-    server.on("/trees", published(CONTENT, etag='"7"', cuts=[1_000]), wrong, Answer(CONTENT))
-    assert get().path.read_bytes() == CONTENT
-    assert "range" not in server.seen[2].headers
+BOMB = zipped(b"\0" * 50_000_000)
+UNKNOWN = json.dumps({"message": "Unknown field: a. Write\nanother one."}).encode()
+EXPLAINED = dataclasses.replace(zipped(UNKNOWN), status=400)
+REASON = " (Unknown field: a, Write another one)"
+HTML = Answer(b"<html>", status=403, type="text/html")
+SORRY = "sent text/html where application/json was expected"
+SMALL, MEGABYTE = {"max_bytes": 9_999}, {"max_bytes": 1_000_000}
+# The answer, what is asked with, words, and how often it is asked.
+REFUSALS: dict[str, tuple[Answer, dict[str, Any], str, int]] = {
+    "busy": (Answer(status=504), {}, "HOST answered 504 Gateway Timeout, 3 times", 3),
+    "long wait": (answers(b"", 429, Retry_After="3600"), {}, "asks to wait 3600 s", 1),
+    "not there": (answers(UNKNOWN, 404), {}, "404 Not Found to http://HOST/trees" + REASON, 1),
+    "explained": (EXPLAINED, {}, "400 Bad Request to http://HOST/trees" + REASON, 1),
+    "unexplained": (HTML, {}, "403 Forbidden to http://HOST/trees;", 1),
+    "kind": (dataclasses.replace(HTML, status=200), {"accept": JSON}, SORRY, 1),
+    "packing": (answers(Content_Encoding="br"), {}, "unsupported Content-Encoding br", 1),
+    "large": (FULL, SMALL, "more than the 9,999 bytes", 1),
+    "large chunked": (dataclasses.replace(FULL, chunked=True), SMALL, "more than the 9,999", 1),
+    "bomb": (BOMB, MEGABYTE, "more than the 1,000,000 bytes", 1),
+    "bomb chunked": (dataclasses.replace(BOMB, chunked=True), MEGABYTE, "the 1,000,000 bytes", 1),
+    "circle": (answers(b"", 302, Location="/trees"), {}, "redirects too often", 6),
+}
 
 
-def test_a_part_that_nobody_asked_for_is_not_the_file(server: Server, get: Get) -> None:
-    server.on("/trees", Answer(CONTENT[:50], status=206), Answer(CONTENT))
-    assert get().path.read_bytes() == CONTENT
-
-
-@pytest.mark.parametrize("damage", [lambda body: body[:-20], lambda body: b"\0" + body[1:]])
-def test_a_damaged_gzip_body_is_fetched_again(
-    server: Server, get: Get, damage: Callable[[bytes], bytes]
+@pytest.mark.parametrize("case", REFUSALS)
+def test_what_is_no_good_answer_ends_in_a_sentence(
+    server: Server, cache: Cache, get: Get, slept: list[float], case: str
 ) -> None:
-    bad = Answer(damage(gzip.compress(CONTENT)), headers={"Content-Encoding": "gzip"})
-    server.on("/trees", bad, zipped(CONTENT))
-    assert get().path.read_bytes() == CONTENT
-
-
-# --- What ends in a sentence --------------------------------------------------------------------
-
-
-def test_a_server_that_stays_busy_is_given_up(server: Server, get: Get, slept: list[float]) -> None:
-    server.on("/trees", Answer(status=504))
-    error = failure_of(get, f"127.0.0.1:{server.port} answered 504 Gateway Timeout, 3 times")
-    assert isinstance(error, HttpError)
-    assert error.status == 504
-    assert slept == [1.0, 2.0]
-
-
-def test_a_server_that_asks_to_wait_too_long_is_not_waited_for(
-    server: Server, get: Get, slept: list[float]
-) -> None:
-    server.on("/trees", Answer(status=429, headers={"Retry-After": "3600"}))
-    failure_of(get, "429 Too Many Requests", "asks to wait 3600 s")
-    assert slept == []
-    assert len(server.seen) == 1
-
-
-def test_something_that_is_not_there_is_not_asked_for_twice(server: Server, get: Get) -> None:
-    error = failure_of(get, "404 Not Found", "/trees (there is no such thing)")
-    assert isinstance(error, HttpError)
-    assert error.status == 404
-    assert len(server.seen) == 1
-
-
-def test_what_a_server_says_of_an_error_is_told_in_short(server: Server, get: Get) -> None:
-    said = json.dumps({"message": "Unknown field: a. Write\nanother one."}).encode()
-    server.on("/trees", dataclasses.replace(zipped(said), status=400))
-    failure_of(get, "400 Bad Request", "(Unknown field: a, Write another one)")
-    server.on("/trees", Answer(b"<html>", status=403, type="text/html"))
-    failure_of(get, "403 Forbidden to", "/trees;")
-
-
-def test_another_kind_of_content_is_refused(server: Server, cache: Cache, get: Get) -> None:
-    server.on("/trees", Answer(b"<html>Sorry</html>", type="text/html"))
-    failure_of(get, "sent text/html where application/json was expected", accept=JSON)
+    answer, what, words, times = REFUSALS[case]
+    server.on("/trees", answer)
+    error = failure_of(get, words.replace("HOST", f"127.0.0.1:{server.port}"), **what)
+    assert len(server.seen) == times
+    assert slept == [1.0, 2.0] * (case == "busy")
+    assert isinstance(error, TooLargeError) == ("max_bytes" in what)
+    if answer.status >= 400:
+        assert isinstance(error, HttpError)
+        assert error.status == answer.status
     assert leftovers(cache) == set()
 
 
+def test_a_bomb_is_small_before_it_goes_off() -> None:
+    assert len(BOMB.body) < 100_000
+
+
 @pytest.mark.parametrize(
-    "target",
-    ["http://localhost:{port}/trees", "http://127.0.0.1:1/trees", "//localhost:{port}/trees"],
+    ("status", "target", "words"),
+    [
+        (301, "http://localhost:{port}/trees", " redirects to localhost:{port}, which neither"),
+        (301, "//localhost:{port}/trees", " redirects to localhost:{port}, which neither"),
+        (301, "http://127.0.0.1:1/trees", " redirects to 127.0.0.1:1, which neither"),
+        (308, "file:///etc/hostname", ""),
+        (308, "http://127.0.0.1:port/", ""),
+        (308, "", ""),
+    ],
 )
-def test_a_redirect_to_another_host_is_refused(server: Server, get: Get, target: str) -> None:
+def test_a_redirect_to_another_host_or_nowhere_is_refused(
+    server: Server, get: Get, status: int, target: str, words: str
+) -> None:
     location = target.format(port=server.port)
-    server.on("/trees", Answer(status=301, headers={"Location": location}))
-    failure_of(get, f"127.0.0.1:{server.port} redirects to {location.split('/')[2]}, which neither")
-    assert len(server.seen) == 1
-
-
-@pytest.mark.parametrize("target", ["file:///etc/hostname", "http://127.0.0.1:port/", ""])
-def test_a_redirect_to_nowhere_is_refused(server: Server, get: Get, target: str) -> None:
-    server.on("/trees", Answer(status=308, headers={"Location": target}))
-    failure_of(get, f"127.0.0.1:{server.port}")
+    server.on("/trees", answers(b"", status, Location=location))
+    failure_of(get, f"127.0.0.1:{{port}}{words}".format(port=server.port))
+    assert len(server.seen) == 1 or not target  # the empty address is the same one again
 
 
 @pytest.mark.parametrize(
@@ -347,18 +331,8 @@ def test_a_redirect_to_nowhere_is_refused(server: Server, get: Get, target: str)
 def test_the_only_way_to_another_scheme_is_the_safer_one(
     source: str, target: str, *, allowed: bool
 ) -> None:
-    from semsig_gis.sources.http.fetch import _require_same_host
-
-    if allowed:
+    with nullcontext() if allowed else refused(SourceError, "redirects to"):
         _require_same_host(source, target)
-    else:
-        failure_of(lambda: _require_same_host(source, target), "redirects to")
-
-
-def test_redirects_in_circles_end(server: Server, get: Get) -> None:
-    server.on("/trees", Answer(status=302, headers={"Location": "/trees"}))
-    failure_of(get, "redirects too often")
-    assert len(server.seen) < 10
 
 
 @pytest.mark.parametrize(("drip", "words"), [((1, 0.02), "too slowly"), ((1, 30.0), "stopped")])
@@ -382,56 +356,18 @@ def test_a_server_that_says_nothing_is_not_waited_for() -> None:
         read_text(address)
 
 
-@pytest.mark.parametrize("chunked", [False, True])
-def test_a_gzip_bomb_does_not_go_off(
-    server: Server, cache: Cache, get: Get, *, chunked: bool
-) -> None:
-    bomb = zipped(b"\0" * 50_000_000)
-    assert len(bomb.body) < 100_000
-    server.on("/trees", dataclasses.replace(bomb, chunked=chunked))
-    error = failure_of(get, "more than the 1,000,000 bytes", max_bytes=1_000_000)
-    assert isinstance(error, TooLargeError)
-    assert leftovers(cache) == set()
-
-
-@pytest.mark.parametrize("chunked", [False, True])
-def test_a_body_that_is_too_large_is_refused(
-    server: Server, cache: Cache, get: Get, *, chunked: bool
-) -> None:
-    server.on("/trees", Answer(CONTENT, chunked=chunked))
-    failure_of(get, "more than the 9,999 bytes", max_bytes=9_999)
-    assert leftovers(cache) == set()
-
-
-def test_a_packing_that_was_not_asked_for_is_refused(server: Server, get: Get) -> None:
-    server.on("/trees", Answer(CONTENT, headers={"Content-Encoding": "br"}))
-    failure_of(get, "unsupported Content-Encoding br")
-
-
 def test_what_the_caller_does_not_want_is_not_kept(server: Server, cache: Cache, get: Get) -> None:
-    def check(path: Path) -> None:
-        try:
-            json.loads(path.read_bytes())
-        except ValueError as error:
-            msg = "this is not JSON."
-            raise SourceError(msg) from error
-
+    checks = Mock(side_effect=[SourceError("this is not JSON."), None])
     server.on("/trees", Answer(CONTENT[:-9]), Answer(CONTENT))
-    failure_of(get, "this is not JSON.", check=check)
+    failure_of(get, "this is not JSON.", check=checks)
     assert leftovers(cache) == set()
-    assert get(check=check).path.read_bytes() == CONTENT
+    assert get(check=checks).path.read_bytes() == CONTENT
+    assert checks.call_count == 2
 
 
 @pytest.mark.parametrize(
     "url",
-    [
-        "ftp://a.example/x",
-        "file:///etc/hostname",
-        "a.example",
-        "https://me:word@a.example/",
-        "http://[::1",
-        "",
-    ],
+    ["ftp://a.example/x", "file:///a", "a.example", "https://a:b@c.example/", "http://[::1", ""],
 )
 def test_only_http_addresses_are_taken(cache: Cache, url: str) -> None:
     with refused(InputError, "is not an address"):
@@ -439,16 +375,11 @@ def test_only_http_addresses_are_taken(cache: Cache, url: str) -> None:
 
 
 def test_an_address_that_leads_nowhere_is_said(cache: Cache) -> None:
-    failure_of(
-        lambda: fetch("http://127.0.0.1:port/x", cache=cache), "127.0.0.1:port", "correct it"
-    )
+    with refused(SourceError, "127.0.0.1:port", "correct it"):
+        fetch("http://127.0.0.1:port/x", cache=cache)
 
 
 def test_a_certificate_that_is_not_trusted_is_not_tried_again() -> None:
-    from requests.exceptions import SSLError
-
-    from semsig_gis.sources.http.fetch import _failure
-
     error = _failure(SSLError("certificate verify failed"), "https://a.example/x")
     assert isinstance(error, HttpError)
     assert_sentence(error, "a.example has no certificate that this machine trusts")
@@ -466,16 +397,11 @@ def test_a_cache_that_cannot_be_written_is_said(server: Server, tmp_path: Path) 
 
 
 def test_a_full_disk_is_said(server: Server, get: Get, monkeypatch: pytest.MonkeyPatch) -> None:
-    def full(*_: object) -> None:
-        raise OSError(28, "No space left on device")
-
     server.on("/trees", Answer(CONTENT))
+    full = Mock(side_effect=OSError(28, "No space left on device"))
     monkeypatch.setattr(_http_cache.Entry, "store", full)
     with refused(InputError, "No space left", "make room"):
         get()
-
-
-# --- The second run -----------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(
@@ -576,9 +502,6 @@ def test_an_unchanged_file_needs_no_part(server: Server, get: Get) -> None:
     assert get().from_cache
     get()
     assert "range" not in server.seen[3].headers
-
-
-# --- Several processes --------------------------------------------------------------------------
 
 
 def fetch_and_check(url: str, folder: Path, times: int) -> None:
