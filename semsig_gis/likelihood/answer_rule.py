@@ -55,11 +55,6 @@ class AnswerRule:
     queries, answered, wrong : int, default 0
         What it was calibrated on: queries, those that were answered, and wrong answers.
 
-    Raises
-    ------
-    InputError
-        If a number is out of its range.
-
     Examples
     --------
     >>> AnswerRule(threshold=0.9).answers(0.95)

@@ -213,8 +213,7 @@ def rerank(
     Up to `count` cells are re-ranked; after the first hundred, only those that may still matter.
     The others are moved by as much as the likelihood of the worse half of these moved, so that the
     masses of both fit each other. `log_prior` helps to choose the cells and is not part of the
-    result. `north_sigma` is in degrees, as for the scores. Without bearings the scores are returned
-    as they are.
+    result. Without bearings the scores are returned as they are.
     """
     from semsig_gis.likelihood.kernels import promising_cells  # noqa: PLC0415 - numba loads slowly
 

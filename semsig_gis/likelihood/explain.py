@@ -46,12 +46,10 @@ class Explanation:
     `table` has one row for each object of the query, then one for each street object that none of
     them is likely to be, with the street object as geometry. `verdict` is ``"matched"`` (more
     likely an object than not), ``"misnamed"`` (the same, but of another class), ``"false"`` or
-    ``"missed"``; `chance` is that it holds. `query` is the number of the object in the query,
-    `object` the row in the table of objects, `distance` is in metres, and `bearing_error` in
-    degrees clockwise from object to detection. What does not apply is missing.
-
-    `xy` is the place in metres, `heading` the degrees that were added to the bearings of the query,
-    and `loglik` the log-likelihood of the query at the place.
+    ``"missed"``; `chance` is that it holds. `query` and `object` are row numbers, `distance` is in
+    metres, and `bearing_error` in degrees clockwise from object to detection. What does not apply
+    is missing. `xy` is the place in metres, `heading` the degrees added to the bearings of the
+    query.
     """
 
     table: gpd.GeoDataFrame
@@ -92,14 +90,10 @@ def explain(
 ) -> Explanation:
     """Say which objects of a query are which street objects, if it was seen from a place.
 
-    The query needs bearings; its types may be unknown. `xy` and `radius`, the visibility range of
-    classes that have none of their own, are in metres; `heading` is in degrees to add to the
-    bearings. What `footprints` hide is not seen.
-
-    Chances are those of all one-to-one associations together (see `likelihood.association`), each
-    model of a mixture counting as much as the query speaks for it here. An object of the query is
-    paired with the street object that it most likely is. An empty query and a class that the city
-    does not have raise `InputError`.
+    The query needs bearings; its types may be unknown. `xy` and `radius` are in metres, `heading`
+    is in degrees to add to the bearings, and what `footprints` hide is not seen. Chances are those
+    of all one-to-one associations together, each model of a mixture counting as much as the query
+    speaks for it here. An empty query and a class that the city does not have raise `InputError`.
     """
     x, y = map(float, xy)
     place = np.array([[x, y]])

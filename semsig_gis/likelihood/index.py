@@ -445,7 +445,7 @@ def open_index(
     """Map a file that `save_index` wrote; its columns are read when a query needs them.
 
     Raises `DatabaseError` if the file is missing or damaged, or belongs to another database, noise
-    model or version. `fingerprint` is that of the database and the noise model, if it is at hand.
+    model or version, which the `fingerprint` tells.
     """
     fingerprint = fingerprint or index_fingerprint(database, noise)
     shape = _shape(database)

@@ -49,14 +49,11 @@ def align(  # noqa: C901, PLR0912, PLR0915, PLR0917 - a kernel takes no keywords
     """Sum over the one-to-one associations of a query with what is seen from some places.
 
     Fills `totals`, shape (models, places, turns), with logarithms; the empty association counts as
-    one. The objects seen have class rows `kinds` in the tables and bearings of `unit` degrees a
-    unit. The query has class rows `names` and `bearings` in degrees, and is turned by `turns`
-    degrees, shape (places, turns).
-
-    Tables are by model, signature length (0 to longest) and class: `odds` of detection over a miss,
-    and `naming`, with a fourth axis of k + 1 names, the chance of each name over the density of
-    such clutter. `sigma`, shape (models, k, 256), is the deviation of a bearing in degrees by
-    distance.
+    one. Objects seen have class rows `kinds` and bearings of `unit` degrees a unit, those of the
+    query class rows `names` and `bearings` in degrees, turned by `turns`, shape (places, turns). By
+    model, signature length and class, `odds` are of detection over a miss and `naming`, by name,
+    the chance of the name over the density of such clutter; `sigma`, shape (models, k, 256), is the
+    deviation of a bearing in degrees by distance.
     """
     models, longest = odds.shape[0], odds.shape[1] - 1
     size = len(names)
@@ -212,11 +209,10 @@ def fill_columns(  # noqa: C901, PLR0912, PLR0917 - a kernel takes no keywords
     """Write the columns of some cells: the log of what each symbol adds, in whole steps.
 
     Fills the cells of ``lines[0]`` to ``lines[1] - 1``, each `LINE` cells, in `columns`, shape
-    (symbols, bins, n). `rows` are the class rows of the entries of the database and `spread_of`
-    their rows of `spread`, shape (levels, units, bins): the density per degree in each bin for an
-    object at a unit of bin 0. `odds` are of detection over a miss by length and class; `naming`,
-    with a third axis of symbols, is the chance of a name over the density of such clutter; `logs`
-    is the logarithm in steps, by the leading bits of a float32 from 1.
+    (symbols, bins, n). `rows` are the class rows of the entries and `spread_of` their rows of
+    `spread`, shape (levels, units, bins): the density per degree in each bin for an object at a
+    unit of bin 0. `odds` and `naming` are as in `align`, without models; `logs` is the logarithm in
+    steps, by the leading bits of a float32 from 1.
     """
     cells = len(offsets) - 1
     kinds = odds.shape[1]

@@ -112,15 +112,13 @@ def refine(
     log_prior: NDArray[np.float64] | None = None,
     footprints: Footprints | None = None,
 ) -> Refinement:
-    """Look for the place of a query within some cells.
+    """Look for the place of a query within some cells; chances are likelihood times area.
 
     The query needs bearings; its types may be unknown. `cells`, shape (c, 2), are the middles in
-    metres of the likeliest cells, likeliest first, of a ranking with the noise that `cell_noise`
-    gives; some hundred will do. `noise` itself is for a known place. `step` and `radius`, the
-    visibility range of classes that have none of their own, are in metres. `north_sigma` is the
-    standard deviation in degrees of the query's north, infinite if it is not known at all; then
+    metres of the likeliest cells, likeliest first; some hundred will do. `noise` is for a known
+    place. `step` and `radius` are in metres, `north_sigma` in degrees; where it is not 0,
     `headings`, the likeliest one in each cell, are needed. `log_prior` is what else is known of the
-    cells, and what `footprints` hide is not seen. Chances are likelihood times area.
+    cells.
     """
     check_north(north_sigma)
     if len(cells) == 0 or (headings is None and north_sigma > 0):

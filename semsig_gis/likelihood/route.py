@@ -77,11 +77,9 @@ def route_posteriors(
     """Return where each view of a route was taken, given all of them.
 
     Each view has its log-likelihood in every cell, and there is one leg fewer; `log_prior` is for
-    the first view. All places of a route are cells of the database.
-
-    The forward-backward recursion of a hidden Markov model over the cells: with likelihoods l and
-    transitions T, ``a_k = l_k * (T_k' a_(k-1))`` and ``b_k = T_(k+1) (l_(k+1) * b_(k+1))``; the
-    chances are proportional to ``a_k * b_k``.
+    the first view. This is the forward-backward recursion of a hidden Markov model over the cells:
+    with likelihoods l and transitions T, ``a_k = l_k * (T_k' a_(k-1))`` and ``b_k = T_(k+1)
+    (l_(k+1) * b_(k+1))``; the chances are proportional to ``a_k * b_k``.
     """
     if not logliks or len(legs) != len(logliks) - 1:
         msg = (

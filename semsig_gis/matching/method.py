@@ -91,9 +91,8 @@ class Method:
 
         It is ``types+angles`` (``edit+jaccard``), or one part (``types:edit``,
         ``angles:histogram``), then any of ``:5%`` (two-stage), ``:alpha=0.7``, ``:raw`` and
-        ``:weights=2/1/1`` (insert, delete, substitute). Raises UnknownNameError if there is no
-        measure of that name, and InputError if the text has another form or a value is out of
-        range.
+        ``:weights=2/1/1`` (insert, delete, substitute). Raises UnknownNameError or InputError if it
+        cannot be read.
         """
         misread = (
             f"method {text!r} cannot be read; give two measures as 'edit+jaccard' (types, angles) "

@@ -214,11 +214,10 @@ def estimated_rates(evidence: Evidence, counts: Counts, model: NoiseTable) -> pd
     """Return the rates by class and overall with their intervals, as in `NoiseEstimate.rates`.
 
     Intervals are Wilson's for chances, the equivalent for Poisson rates, and symmetric in the
-    logarithm for deviations. They allow for uncertain association: the effective number of samples
-    follows from the information matrix, the sum over the samples of the outer products of the
-    scores (derivatives of the log-likelihood of one sample, by Fisher's identity the expected
-    scores given the detections). Where many objects stand close together, the chances of the
-    associations are approximate, and the clutter comes out some per cent too large.
+    logarithm for deviations. For uncertain association, the effective number of samples follows
+    from the information matrix: the sum over the samples of the outer products of their expected
+    scores (Fisher's identity). Where many objects stand close together, the clutter comes out some
+    per cent too large.
     """
     size = len(evidence.codes)
     detected = counts.named.sum(axis=1)

@@ -127,13 +127,10 @@ class NoiseEstimate:
 
     `rates` has one row for each quantity (``detection``, ``misnamed``, ``clutter`` in false objects
     per signature, ``bearing_sigma`` in degrees) and each class, and ``"all"`` together: ``value``
-    as in the model; ``own``, what the samples of the class alone say, with its intervals
-    ``low_90``, ``high_90``, ``low_95``, ``high_95``; and ``samples``, how many objects, detected
-    objects, signatures or detected objects it rests on.
-
-    `confusion` holds the expected number of detected objects by true class (rows) and given class
-    (columns). `skipped` samples were left out, as nothing is in sight of their place. `rounds` says
-    how many it took to settle, and `log_likelihood` is of all detections under the model.
+    as in the model, ``own``, what the samples of the class alone say, with the intervals ``low_90``
+    to ``high_95``, and how many ``samples`` it rests on. `confusion` holds the expected number of
+    detected objects by true class (rows) and given class (columns). Nothing is in sight of the
+    places of `skipped` samples. `log_likelihood` is of all detections under the model.
     """
 
     spec: NoiseSpec
@@ -172,8 +169,8 @@ def learn_noise(
     samples : sequence of Sample
         The detections; some hundred signatures serve well.
     city : SignatureDatabase or StreetObjects
-        What there is to see. With a database a sample is looked up by its cell, and seen from
-        the middle of it; with street objects it is seen from where it was.
+        What there is to see: from the middles of the cells of a database, or, with street objects,
+        from where a sample was.
     radius : float, default 30
         Visibility range in metres, with street objects; a database has its own.
     position_sigma : float, default 0

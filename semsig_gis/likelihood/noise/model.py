@@ -117,7 +117,7 @@ class NoiseSpec:
         return change(self)
 
     def to_dict(self) -> dict[str, Any]:
-        """Return the model as plain values, ready for JSON, that `noise_from_dict` reads."""
+        """Return plain values, ready for JSON, that `noise_from_dict` reads."""
         values: dict[str, Any] = _plain(asdict(self))
         return values
 
@@ -184,8 +184,7 @@ Noise = NoiseSpec | NoiseMixture
 def noise_from_dict(values: Mapping[str, Any]) -> Noise:
     """Read a noise model from plain values, the inverse of ``to_dict``.
 
-    Values are the fields of `NoiseSpec`, each optional, or ``specs``, ``weights`` and ``name`` of a
-    mixture, which must not hold another mixture.
+    Values are the fields of `NoiseSpec`, each optional, or those of a mixture of plain models.
     """
     if not isinstance(values, Mapping):
         msg = f"a noise model is {values!r}; give a table of its fields."
@@ -254,12 +253,10 @@ def place_noise(noise: Noise, step: float) -> Noise:
 
 
 def named_noise(name: str) -> Noise:
-    """Return a noise model by name, or raise `UnknownNameError`.
+    """Return the noise model of a level of the source's distortion, or raise `UnknownNameError`.
 
-    Parameters
-    ----------
-    name : {"light", "medium", "strong", "generic"}
-        A level of the source's distortion, or ``"generic"`` where the level is not known.
+    The levels are ``"light"``, ``"medium"`` and ``"strong"``, or ``"generic"`` where it is not
+    known.
 
     Examples
     --------

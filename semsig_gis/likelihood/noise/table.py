@@ -116,10 +116,7 @@ class NoiseTable:
         return np.asarray(np.bincount(owners, each, len(lengths)) - self.clutter.sum())
 
     def query_rows(self, query: Signature) -> NDArray[np.int64]:
-        """Return the class row of each object of a query, k if the class is unknown.
-
-        Raises `InputError` if the query is empty or has a class that the tables do not have.
-        """
+        """Return the class row of each object of a query, k if unknown; InputError without any."""
         if query.codes is None or not query.codes.size:
             check_query(query)
             return np.full(len(query), len(self.codes))
@@ -139,9 +136,8 @@ def noise_tables(
 ) -> tuple[tuple[NoiseTable, ...], NDArray[np.float64]]:
     """Return one table for each model of a mixture, or for the only model, and the chance of each.
 
-    Only classes in `codes` count; what the model says of others is left out. Raises `InputError` if
-    it names a class that the taxonomy does not have, or gives a class no chance at all of being
-    named as one that counts.
+    Only classes in `codes` count. Raises `InputError` if the model names a class that the taxonomy
+    does not have, or gives a class no chance at all of being named as one that counts.
     """
     # What a model says of classes that do not count goes to a row after the last, and is dropped.
     rows = {item.name: len(codes) for item in taxonomy.classes}

@@ -47,17 +47,15 @@ class BitPlanes:
     tells which sequences reach that far and then, for each first and each second digit of a value,
     which have it there. All sequences end at the last position. Block ``b`` owns the rows
     ``bounds[b]:bounds[b + 1]``. `digits`, shape (256, 2), gives the two planes that are both set
-    where a value stands; never both for a value that no sequence has.
-
-    Two digits, of about the square root of the number of values each, need fewer planes than one
-    plane a value: 8 bits an object for eleven classes, 9 for sixteen levels, 33 at most.
+    where a value stands; never both for a value that no sequence has. Two digits, of about the
+    square root of the number of values each, need fewer planes than one plane a value.
 
     Hyyrö (2004) gives the steps with bits along one sequence; here they lie across sequences. With
     the steps ``v`` down the left side of an entry and ``h`` along its top, and ``e`` set where the
     two values are equal, the diagonal step is 0 where ``d = e | (v < 0) | (h < 0)``. Then the right
     side is +1 where ``(h < 0) | ~(d | (h > 0))`` and -1 where ``(h > 0) & d``, and the bottom is
-    the same of ``v``. A sequence that does not reach a position has steps of 0 along its top, which
-    leaves its column of steps as it was.
+    the same of ``v``. Where a sequence does not reach, steps of 0 along the top leave its column as
+    it was.
     """
 
     planes: NDArray[np.uint64]
@@ -175,14 +173,12 @@ def distances(
     """Measure the cheapest way to turn each query into each distinct sequence.
 
     Levenshtein's distance with weights (paper, section "Signature comparison"). `normalized`
-    divides by the largest cost that two sequences of these lengths can have, so that the distance
-    is 1 if just one of them is empty. That cost is the cheaper of two ways that always work: delete
-    everything and insert everything; or substitute along the shorter length, then insert or delete
-    the rest. With weights of 1 it is the longer length.
+    divides by the largest cost that two sequences of these lengths can have: that of deleting
+    everything and inserting everything, or, if cheaper, of substituting along the shorter length
+    and inserting or deleting the rest. With weights of 1 it is the longer length.
 
     A `wildcard` in a query, for an object of unknown class, equals every value; it needs weights of
-    1. Threads share the sequences, which does not pay for a single query. The shape is (queries,
-    d), or (queries, len(only)) if only some sequences are measured.
+    1. Threads share the sequences, which does not pay for a single query.
     """
     sequences = [checked_sequence(query) for query in queries]
     costs = weights or EditWeights()
