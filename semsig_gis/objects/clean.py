@@ -93,7 +93,10 @@ def build_objects(
     everything = pd.concat([part for part, _, _ in parts], ignore_index=True)
     # By number, because two layers may bear one name.
     owner = np.repeat(np.arange(len(parts)), [len(part) for part, _, _ in parts])
-    again = _same_id(everything, np.array([layer.spec.unique_id for layer in layers])[owner])
+    unique = np.array([layer.spec.unique_id for layer in layers])[owner]
+    has_id = (everything[SOURCE_ID] != "") & unique
+    # Of the id of an earlier row of the layer, as in a second file of it.
+    again = (has_id & everything.duplicated([SOURCE, SOURCE_ID])).to_numpy(bool)
     repeated = np.bincount(owner[again], minlength=len(parts)).tolist()
     everything, owner = everything[~again].reset_index(drop=True), owner[~again]
     if collapse:
@@ -167,26 +170,12 @@ def _positions(layer: RawLayer, taxonomy: Taxonomy, crs: CRS) -> tuple[pd.DataFr
     return part, int((~usable).sum()), int((~placed).sum())
 
 
-def _same_id(everything: pd.DataFrame, unique: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """Tell the rows whose id an earlier row of the layer has, as in a second file of it."""
-    has_id = unique & (everything[SOURCE_ID] != "").to_numpy(bool)
-    again: NDArray[np.bool_] = everything.duplicated([SOURCE, SOURCE_ID]).to_numpy(bool)
-    return has_id & again
-
-
 def _first_at_place(
     everything: pd.DataFrame, group: NDArray[np.int64]
 ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     """Return the first row of every group, class and place, in order, and how many share it."""
-    keys = np.stack(
-        [
-            group,
-            everything[CLASS_CODE].to_numpy(np.int64),
-            np.rint(everything["x"].to_numpy() / SAME_PLACE_M).astype(np.int64),
-            np.rint(everything["y"].to_numpy() / SAME_PLACE_M).astype(np.int64),
-        ],
-        axis=1,
-    )
+    places = np.rint(everything[["x", "y"]].to_numpy() / SAME_PLACE_M).astype(np.int64)
+    keys = np.column_stack([group, everything[CLASS_CODE].to_numpy(np.int64), places])
     _, first, counts = np.unique(keys, axis=0, return_index=True, return_counts=True)
     order = np.argsort(first)
     return first[order], counts[order]

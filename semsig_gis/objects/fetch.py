@@ -94,17 +94,11 @@ def open_cache(
 
 
 def find_area(text: str, catalog: Catalog, *, cache: Cache, http: HttpSpec) -> Area:
-    """Return the area of a box, a polygon file or a place.
+    """Return the area of ``west,south,east,north`` in degrees, a polygon file, or a place by name.
 
-    Parameters
-    ----------
-    text : str
-        ``west,south,east,north`` in degrees, the path of a file, or the name of a place. InputError
-        if the numbers are no box on the Earth, SourceError if the file cannot be read.
-    catalog : Catalog
-        Whose geocoder knows places by name; InputError if it has none.
-    cache, http : Cache, HttpSpec
-        Where the answer about a name is kept, and how it is asked for (see `open_cache`).
+    The geocoder of the catalogue knows places; `cache` and `http` are those of `open_cache`.
+    InputError if the numbers are no box on the Earth or there is no geocoder, SourceError if the
+    file cannot be read.
 
     Examples
     --------

@@ -52,16 +52,9 @@ class Loaded:
 def choose_layers(
     catalog: Catalog, names: Sequence[str] = (), *, surroundings: bool = False
 ) -> tuple[LayerSpec, ...]:
-    """Return the layers to load, in the order of the catalogue.
+    """Return the named layers of a catalogue, in its order; by default all that are not optional.
 
-    Parameters
-    ----------
-    catalog : Catalog
-        Where they are described.
-    names : sequence of str
-        Layers by name; by default all that are not optional. UnknownNameError if there is none.
-    surroundings : bool, default False
-        Whether buildings and streets are wanted too.
+    `surroundings` adds buildings and streets. UnknownNameError if there is no layer of a name.
 
     Examples
     --------
@@ -89,19 +82,9 @@ def read_files(
 ) -> tuple[tuple[RawLayer, ...], tuple[LayerSpec, ...]]:
     """Read layers from local files; return them in the order of `specs`, and those without a file.
 
-    Parameters
-    ----------
-    specs : sequence of LayerSpec
-        The layers to look for.
-    paths : iterable of str or Path
-        Files, and folders that hold them; each file is read once. SourceError if one does not
-        exist, matches no layer, or cannot be read.
-    filters : bool, default True
-        Whether the filters of the layers apply.
-    crs : str, optional
-        CRS of files that state none.
-    progress : callable, optional
-        Takes the number of files done and in all.
+    Paths are files, and folders that hold them; each file is read once. SourceError if one does not
+    exist, matches no layer, or cannot be read. `filters` says whether the filters of the layers
+    apply; `crs` is for files that state none; `progress` takes the files done and in all.
     """
     pairs, absent = find_files(specs, paths)
     by_file: dict[tuple[Path, str], list[LayerSpec]] = {}
@@ -152,20 +135,17 @@ def assemble(
 ) -> Loaded:
     """Place raw layers in one metric CRS and merge what stands in several of them.
 
-    CrsError if the CRS is not metric or a layer has none, EmptyResultError if no object remains.
+    The catalogue's classes, metric CRS (by default the UTM zone of the data) and merging radii
+    hold. CrsError if the CRS is not metric or a layer has none, EmptyResultError if no object
+    remains.
 
     Parameters
     ----------
-    layers : sequence of RawLayer
-        What was read or fetched.
-    catalog : Catalog
-        Whose classes, metric CRS and merging radii hold.
     metric_crs : str, optional
-        CRS to work in; the catalogue's by default, or the UTM zone of the data where it has none.
-    collapse : bool, default True
-        Whether objects of one class at the same place become one.
-    merge : bool, default True
-        Whether objects of different layers are merged by the catalogue's radii.
+        CRS to work in instead of the catalogue's.
+    collapse, merge : bool, default True
+        Whether objects of one class at the same place become one, and whether those of different
+        layers are merged.
 
     Examples
     --------

@@ -131,17 +131,11 @@ def find_files(
 ) -> tuple[tuple[tuple[LayerSpec, Path], ...], tuple[LayerSpec, ...]]:
     """Pair layers with the files that hold them, in their order; return also those without a file.
 
-    SourceError if a path does not exist or matches no layer, or several files match a layer whose
-    ids are not unique.
-
-    Parameters
-    ----------
-    specs : iterable of LayerSpec
-        Layers to look for, by the file-name patterns in ``files`` (in upper or lower case).
-    paths : iterable of str or Path
-        Files, and folders to look in (not in the folders below them). A file given by itself goes
-        before one found in a folder. Of a folder's files, a layer takes those that match the
-        first of its patterns that any matches.
+    Layers are looked for by the file-name patterns in ``files`` (in upper or lower case). Paths are
+    files, and folders to look in (not in those below them). A file given by itself goes before one
+    found in a folder; of a folder's files, a layer takes those that match the first of its patterns
+    that any matches. SourceError if a path does not exist or matches no layer, or several files
+    match a layer whose ids are not unique.
 
     Examples
     --------

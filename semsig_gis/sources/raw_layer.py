@@ -164,7 +164,7 @@ class Rows:
 
 
 def raw_layer(
-    rows: Rows, rules: RowRules, crs: CRS, *, by_file: bool, where: str, notes: tuple[str, ...] = ()
+    rows: Rows, rules: RowRules, crs: CRS, *, by_file: bool, notes: tuple[str, ...] = ()
 ) -> RawLayer:
     """Filter and classify the rows, build their geometries and check these against the CRS.
 
@@ -178,7 +178,8 @@ def raw_layer(
     errors: dict[int, str] = {**rows.errors, **dict(zip(broken.index, broken, strict=True))}
     table = table.drop(index=broken.index)
     table[GEOMETRY] = pd.Series(_geometries(table[GEOMETRY]), table.index, dtype=object)
-    for check in (_not_finite, functools.partial(_off_globe, crs=crs, by_file=by_file, file=where)):
+    off_globe = functools.partial(_off_globe, crs=crs, by_file=by_file, file=rules.file)
+    for check in (_not_finite, off_globe):
         bad = check(table)
         errors |= bad
         table = table.drop(index=list(bad))
@@ -324,13 +325,19 @@ class RowRules:
         self, spec: LayerSpec, fields: Sequence[str], *, filters: bool, where: str
     ) -> None:
         self.spec = spec
+        self.file = where  # for messages
         self._where = spec.where if filters else ()
         values = [wanted for _, accepted in self._where for wanted in accepted]
         if spec.class_by is not None:
             values.extend(wanted for wanted, _ in spec.class_by.classes)
         if spec.width_by is not None:
             values.extend(wanted for wanted, _ in spec.width_by.widths)
-        _require_patterns(values, where=where)
+        for value in values:
+            try:
+                _pattern(str(value))
+            except re.error as error:
+                msg = f"{where}: pattern {value} is not a regular expression ({error}); correct it."
+                raise CatalogError(msg) from error
         uses = [use for use in spec.fields if filters or use[0] != "where"]
         for key, column in uses:
             require_field(column, fields, where=where, key=key)
@@ -397,15 +404,6 @@ def _metres(value: object) -> float:
     except ValueError:
         return math.nan
     return width if MIN_WIDTH_M <= width <= MAX_WIDTH_M else math.nan
-
-
-def _require_patterns(values: Iterable[Value], *, where: str) -> None:
-    for wanted in values:
-        try:
-            _pattern(str(wanted))
-        except re.error as error:
-            msg = f"{where}: pattern {wanted} is not a regular expression ({error}); correct it."
-            raise CatalogError(msg) from error
 
 
 def require_field(field: str, fields: Sequence[str], *, where: str, key: str) -> None:

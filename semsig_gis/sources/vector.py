@@ -339,7 +339,7 @@ def read_layer(
         if any(record.getMessage().startswith("Failed to decode") for record in heard):
             notes += ("some text is not UTF-8 and was read as missing",)
     by_file = own is not None and not implicit
-    return raw_layer(rows, rules, system, by_file=by_file, where=where, notes=notes)
+    return raw_layer(rows, rules, system, by_file=by_file, notes=notes)
 
 
 def read_layers(
@@ -405,15 +405,14 @@ def _opened(
 
 def _layers(path: Path) -> tuple[Member, ...]:
     """Return the layers of a file, or of all the files in an archive."""
-    return tuple(layer for member in members(path) for layer in _layers_in(member))
-
-
-def _layers_in(member: Member) -> Iterator[Member]:
-    # Opened under the allow-list first, because listing would try every driver of GDAL.
-    with _opened(member):
-        pass
-    for name in fiona.listlayers(member.address):
-        yield Member(member.file, member.inner, name)
+    layers: list[Member] = []
+    for member in members(path):
+        # Opened under the allow-list first, because listing would try every driver of GDAL.
+        with _opened(member):
+            pass
+        names = fiona.listlayers(member.address)
+        layers += [Member(member.file, member.inner, name) for name in names]
+    return tuple(layers)
 
 
 def _pick(path: Path, wanted: str | None) -> Member:

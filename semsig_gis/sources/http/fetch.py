@@ -308,7 +308,13 @@ def fetch(
     what = json.dumps([request.method, identity or url, request.params, request.data])
     key = hashlib.sha256(what.encode()).hexdigest()[:32]
     if spec.offline:
-        return _from_cache(cache.entry(key), cache, url)
+        entry = cache.entry(key)
+        held = entry.copy()
+        if held is None:
+            state = "is damaged in" if entry.sidecar.exists() else "is not in"
+            msg = f"{url} {state} the cache {cache.folder}; run once without --offline to fetch it."
+            raise NotCachedError(msg)
+        return held
     with cache.locked(key) as entry:
         held = entry.copy()
         if held is not None and not held.condition:
@@ -505,12 +511,3 @@ def _require_room(size: int, job: _Job) -> None:
 
 def _pairs(items: Mapping[str, str | float] | None) -> tuple[tuple[str, str], ...]:
     return tuple(sorted((name, str(value)) for name, value in (items or {}).items()))
-
-
-def _from_cache(entry: Entry, cache: Cache, url: str) -> Fetched:
-    held = entry.copy()
-    if held is None:
-        state = "is damaged in" if entry.sidecar.exists() else "is not in"
-        msg = f"{url} {state} the cache {cache.folder}; run once without --offline to fetch it."
-        raise NotCachedError(msg)
-    return held

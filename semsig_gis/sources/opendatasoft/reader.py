@@ -187,7 +187,6 @@ def _shown(value: object) -> str:
 VECTOR_SUFFIXES = frozenset({".fgb", ".gpkg", ".shp", ".zip"})
 # Longer addresses are refused by some servers.
 LONGEST_OUTLINE = 2_000
-GEO_TYPES = ("geo_point_2d", "geo_shape")
 GEOJSON = ("application/geo+json", "application/vnd.geo+json", "application/json")
 
 
@@ -230,15 +229,12 @@ class _TableLayer:
         self, spec: LayerSpec, table: Table, path: Path, *, filters: bool, crs: str | None
     ) -> None:
         self._spec = spec
-        self._where = f"layer {spec.name!r} ({path})"
-        self._by_file = table.crs is not None
+        where = f"layer {spec.name!r} ({path})"
+        own, implicit = table.crs or WGS84, table.crs is None
         self._crs, self._notes = settle_crs(
-            table.crs or WGS84,
-            implicit=table.crs is None,
-            expected=spec.crs,
-            given=crs,
-            where=self._where,
+            own, implicit=implicit, expected=spec.crs, given=crs, where=where
         )
+        self._by_file = not implicit
         if table.rest:
             rest = (
                 f"the file is one page of a longer answer, which has {table.rest:,} records more; "
@@ -247,9 +243,9 @@ class _TableLayer:
             self._notes += (rest,)
         # A table without rows has no fields to look at.
         fields = [field for _, field in spec.fields] if table.empty else table.fields
-        own = settle_fields(spec, fields)
-        self._rules = RowRules(own, fields, filters=filters, where=self._where)
-        self._positions = Positions(spec, table, where=self._where)
+        named = settle_fields(spec, fields)
+        self._rules = RowRules(named, fields, filters=filters, where=where)
+        self._positions = Positions(spec, table, where=where)
         self._rows = Rows()
         self.fields = (*self._rules.fields, *self._positions.fields)
 
@@ -269,12 +265,7 @@ class _TableLayer:
     def raw(self) -> RawLayer:
         """Return what was read."""
         layer = raw_layer(
-            self._rows,
-            self._rules,
-            self._crs,
-            by_file=self._by_file,
-            where=self._where,
-            notes=self._notes,
+            self._rows, self._rules, self._crs, by_file=self._by_file, notes=self._notes
         )
         return dataclasses.replace(layer, spec=self._spec)
 
@@ -304,7 +295,8 @@ def fetch_layers(
     for layer in specs:
         if layer.dataset is None:
             continue
-        address = _address(portal, layer.dataset)
+        dataset = quote(layer.dataset, safe="")
+        address = f"{portal.rstrip('/')}/api/explore/v2.1/catalog/datasets/{dataset}"
         try:
             types = _field_types(address, layer, portal, cache=cache, spec=spec)
             file = fetch(
@@ -322,10 +314,6 @@ def fetch_layers(
             raise HttpError(msg, error.status) from error
         files.append((layer, file))
     return files
-
-
-def _address(portal: str, dataset: str) -> str:
-    return f"{portal.rstrip('/')}/api/explore/v2.1/catalog/datasets/{quote(dataset, safe='')}"
 
 
 def _field_types(
@@ -365,7 +353,7 @@ def _query(
 ) -> dict[str, str | float]:
     """Return the parameters of an export."""
     fields = list(types)
-    places = [name for name, kind in types.items() if kind in GEO_TYPES]
+    places = [name for name, kind in types.items() if kind in {POINT, SHAPE}]
     query: dict[str, str | float] = {"limit": -1}
     conditions = [layer.server_where] if layer.server_where else []
     if area is not None:

@@ -179,9 +179,9 @@ class ElementLayer:
     def __init__(self, spec: LayerSpec, *, filters: bool, where: str) -> None:
         self.spec = spec
         self.rows = Rows()
-        self._where = f"layer {spec.name!r} of {where}"
         fields = [field for _, field in spec.fields]  # any key of a tag may be one
-        self._rules = RowRules(spec, fields, filters=filters, where=self._where)
+        where = f"layer {spec.name!r} of {where}"
+        self._rules = RowRules(spec, fields, filters=filters, where=where)
 
     def add(
         self, kind: ElementKind, number: int, tags: Mapping[str, str], position: Position | str
@@ -199,8 +199,6 @@ class ElementLayer:
     def raw(self, crs: str | None) -> RawLayer:
         """Return the layer; elements are in WGS 84, whatever CRS the user states."""
         system, notes = settle_crs(
-            WGS84, implicit=False, expected=self.spec.crs, given=crs, where=self._where
+            WGS84, implicit=False, expected=self.spec.crs, given=crs, where=self._rules.file
         )
-        return raw_layer(
-            self.rows, self._rules, system, by_file=True, where=self._where, notes=notes
-        )
+        return raw_layer(self.rows, self._rules, system, by_file=True, notes=notes)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
 import itertools
 import math
 from pathlib import Path
@@ -19,7 +18,7 @@ from semsig_gis.sources.osm.elements import ElementLayer, TagIndex, relation_sha
 from semsig_gis.sources.raw_layer import BadFeatureError
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator, Mapping, Sequence
+    from collections.abc import Iterable, Mapping, Sequence
 
     from numpy.typing import NDArray
     from osmium.osm import Location
@@ -72,10 +71,17 @@ def read_layers(
             )
             raise CatalogError(msg)
     index = TagIndex(specs)
-    with _plainly(path):
+    try:
         outlines = _scan(file, layers, index)
         ways = {way for outline in outlines for way in (*outline.outer, *outline.inner)}
         lines = _lines(file, ways) if ways else {}
+    except (osmium.InvalidLocationError, RuntimeError, ValueError) as error:
+        cause = " ".join(str(error).split()).rstrip(".")
+        msg = (
+            f"{path} cannot be read ({cause}); "
+            "it is damaged or not the kind of file that its name says, get it again."
+        )
+        raise SourceError(msg) from error
     for outline in outlines:
         outline.layer.rows.positions[outline.row] = _position(outline, lines)
     return tuple(layer.raw(crs) for layer in layers)
@@ -94,20 +100,6 @@ def _file(path: Path) -> osmium.io.File:
         raise SourceError(msg)
     # The whole path, because libosmium takes "-" for standard input and "http:" for an address.
     return osmium.io.File(str(path.absolute()), kind)
-
-
-@contextlib.contextmanager
-def _plainly(path: Path) -> Iterator[None]:
-    """Turn what goes wrong in pyosmium's reading into a `SourceError`."""
-    try:
-        yield
-    except (osmium.InvalidLocationError, RuntimeError, ValueError) as error:
-        cause = " ".join(str(error).split()).rstrip(".")
-        msg = (
-            f"{path} cannot be read ({cause}); "
-            "it is damaged or not the kind of file that its name says, get it again."
-        )
-        raise SourceError(msg) from error
 
 
 def _scan(file: osmium.io.File, layers: Sequence[ElementLayer], index: TagIndex) -> list[_Outline]:

@@ -243,11 +243,7 @@ SECOND_ROW_M = 3.0
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Furniture:
-    """The objects of one class: metres from the middle of the city, shape (k, 2), and identifiers.
-
-    An identifier is edge, side and number along it such as ``"57R4"``, or ground and number such as
-    ``"p3-41"``.
-    """
+    """Objects of one class: metres from the middle of the city, shape (k, 2), and identifiers."""
 
     xy: Floats
     ids: NDArray[np.str_]
