@@ -76,8 +76,8 @@ def database_of(
 def random_query(database: SignatureDatabase, seed: int, *, size: int) -> Signature:
     """Return a query of random objects, one in four near an object of the first cell."""
     rng = np.random.default_rng([seed, 7])
-    known = np.append(database.present_codes, 0)
-    codes = rng.choice(known, size)
+    possible = np.append(database.present_codes, 0)
+    codes = rng.choice(possible, size)
     bearings = rng.uniform(0, 360, size)
     near = rng.random(size) < 0.25
     first = database.bearings[: database.offsets[1]]

@@ -38,8 +38,8 @@ def main(out: str, size: str, extent: str, *sources: str) -> None:
     for layer in layers:
         renderer = layer.renderer()
         labels = [item.label() for item in renderer.legendSymbolItems()]
-        told = {"valid": layer.isValid(), "renderer": renderer.type(), "labels": labels}
-        print(json.dumps({**told, "features": layer.featureCount()}))
+        facts = {"valid": layer.isValid(), "renderer": renderer.type(), "labels": labels}
+        print(json.dumps({**facts, "features": layer.featureCount()}))
     # QGIS and Python do not agree on who takes the layers down.
     sys.stdout.flush()
     os._exit(0)

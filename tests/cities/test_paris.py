@@ -124,8 +124,8 @@ def test_published_files_load_as_they_are(
 
 def test_trees_of_all_files_are_one_list_of_ids(paris: Path) -> None:
     layers = [read(paris / file, "trees", filters=False) for file in TREES]
-    found: set[str] = set().union(*(layer.table["source_id"] for layer in layers))
-    assert len(found) == 16_328
+    ids: set[str] = set().union(*(layer.table["source_id"] for layer in layers))
+    assert len(ids) == 16_328
     expected = set()
     for file in TREES:
         if file.endswith(".csv"):
@@ -133,7 +133,7 @@ def test_trees_of_all_files_are_one_list_of_ids(paris: Path) -> None:
         else:
             content = json.loads((paris / file).read_text())
             expected |= {str(item["properties"]["idbase"]) for item in content["features"]}
-    assert found == expected
+    assert ids == expected
 
 
 @pytest.mark.parametrize(
@@ -156,10 +156,10 @@ def test_objects_in_several_files_are_taken_once(
 
 
 def test_trees_of_streets_are_kept_whatever_the_header(paris: Path) -> None:
-    found: set[str] = set()
+    ids: set[str] = set()
     expected = set()
     for file in TREES:
-        found |= set(read(paris / file, "trees").table["source_id"])
+        ids |= set(read(paris / file, "trees").table["source_id"])
         if file.endswith(".csv"):
             rows = rows_of(paris / file)
             expected |= {row["IDBASE"] for row in rows if row["DOMANIALITE"] == "Alignement"}
@@ -167,8 +167,8 @@ def test_trees_of_streets_are_kept_whatever_the_header(paris: Path) -> None:
             features = json.loads((paris / file).read_text())["features"]
             values = [item["properties"] for item in features]
             expected |= {str(v["idbase"]) for v in values if v["domanialite"] == "Alignement"}
-    assert found == {identifier.removesuffix(".0") for identifier in expected}
-    assert len(found) == 7_055
+    assert ids == {identifier.removesuffix(".0") for identifier in expected}
+    assert len(ids) == 7_055
 
 
 def test_the_extract_of_trees_has_no_ids_at_all(paris: Path) -> None:

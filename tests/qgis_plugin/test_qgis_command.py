@@ -80,11 +80,11 @@ def program(folder: Path, name: str = "semsig") -> str:
 
 @unix
 def test_what_was_chosen_comes_first_then_the_path_then_the_usual_places(tmp_path: Path) -> None:
-    chosen = program(tmp_path / "chosen", "semsig-of-mine")
+    preferred = program(tmp_path / "chosen", "semsig-of-mine")
     on_path, usual = program(tmp_path / "path"), program(tmp_path / "py3.12" / "bin")
     path = {"PATH": str(tmp_path / "path")}
     places = (str(tmp_path / "nowhere"), str(tmp_path / "py3.*" / "bin"))
-    assert find_command(chosen, path, places) == chosen
+    assert find_command(preferred, path, places) == preferred
     assert find_command("", path, places) == on_path
     assert find_command("", {"PATH": str(tmp_path)}, places) == usual
     assert find_command("", {}, places) == usual
@@ -105,9 +105,9 @@ def test_a_command_that_is_nowhere(tmp_path: Path) -> None:
     with refused(CommandError, "install semsig_gis", "Settings > Options > Processing"):
         find_command("", {"PATH": str(tmp_path)}, [])
     (tmp_path / "text").write_text("not a program")
-    for chosen in ("text", "missing"):
-        with refused(CommandError, chosen, "choose the semsig command"):
-            find_command(str(tmp_path / chosen), {"PATH": os.defpath})
+    for name in ("text", "missing"):
+        with refused(CommandError, name, "choose the semsig command"):
+            find_command(str(tmp_path / name), {"PATH": os.defpath})
 
 
 # --- The environment ----------------------------------------------------------------------------
