@@ -95,11 +95,7 @@ class Reader(Protocol):
         filters: bool = True,
         crs: str | None = None,
     ) -> tuple[RawLayer, ...]:
-        """Return one layer for each of `specs`, in their order.
-
-        `filters` says whether the filters of the layers apply; `crs` is for a file that states
-        none.
-        """
+        """Return one layer for each of `specs`; `crs` is for a file that states none."""
 
 
 def reader(name: str) -> Reader:

@@ -190,9 +190,6 @@ LONGEST_OUTLINE = 2_000
 GEOJSON = ("application/geo+json", "application/vnd.geo+json", "application/json")
 
 
-# --- Files ------------------------------------------------------------------------------------
-
-
 def read_layers(
     path: str | Path, specs: Sequence[LayerSpec], *, filters: bool = True, crs: str | None = None
 ) -> tuple[RawLayer, ...]:

@@ -63,9 +63,6 @@ LONGEST_REMARK = 300
 EXHAUSTED = ("timed out", "out of memory")
 
 
-# --- Files -------------------------------------------------------------------------------------
-
-
 @dataclass(frozen=True, slots=True)
 class Document:
     """The elements of one answer, and what the server remarks on it: as a rule, nothing."""
@@ -210,9 +207,6 @@ def _point(place: dict[str, Any]) -> tuple[float, float]:
         raise BadFeatureError(msg) from error
 
 
-# --- Places and queries ------------------------------------------------------------------------
-
-
 def find_place(name: str, *, endpoint: str, cache: Cache, spec: HttpSpec = DEFAULT_HTTP) -> Area:
     """Return the first place of that name that has an outline, from a Nominatim server.
 
@@ -334,10 +328,9 @@ def fetch_layers(
 
     There is a file for each tile of at most `tile_deg` degrees; one that is too much for the
     servers is split into four. Endpoints are such as ``"https://overpass-api.de/api"``; one that
-    fails is asked last from then on. Before each query the server is asked for its free slots, and
-    waited for. In the cache the answers of all servers count as the same, so that a run that was
-    interrupted goes on where it stopped. `progress` takes the tiles done and those there are, which
-    may grow. SourceError if no server gives a tile.
+    fails is asked last from then on. The answers of all servers count as the same, so that a run
+    that was interrupted goes on from the cache. `progress` takes the tiles done and those there
+    are, which may grow. SourceError if no server gives a tile.
     """
     if not endpoints:
         msg = "there is no Overpass server to ask; name one in endpoints."
