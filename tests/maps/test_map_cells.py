@@ -78,17 +78,14 @@ def test_buttons_go_through_the_group_and_to_its_ends(page: MapPage) -> None:
     assert page.ask("return document.activeElement.title").startswith("next")
     # After the first comes the last, and the other way round.
     page.click(CITY, alike[0])
-    assert page.press("previous")["Cell"] == str(CITY.cell_ids[alike[-1]])
-    assert page.press("next")["Cell"] == str(CITY.cell_ids[alike[0]])
+    ids = CITY.cell_ids[alike].tolist()
+    assert [int(page.press(where)["Cell"]) for where in ("previous", "next")] == [ids[-1], ids[0]]
     page.click(CITY, alike[-1])
     away = np.hypot(*(CITY.xy[alike] - CITY.xy[alike[-1]]).T)
-    nearest = page.press(f"{np.sort(away)[1]:.0f} m")["Cell"]
-    cell = alike[[str(one) for one in CITY.cell_ids[alike]].index(nearest)]
-    assert np.hypot(*(CITY.xy[cell] - CITY.xy[alike[-1]])) == pytest.approx(np.sort(away)[1])
-    away = np.hypot(*(CITY.xy[alike] - CITY.xy[cell]).T)
-    farthest = page.press("farthest")["Cell"]
-    ids = [str(one) for one in CITY.cell_ids[alike]]
-    assert away[ids.index(farthest)] == pytest.approx(away.max())
+    nearest = ids.index(int(page.press(f"{np.sort(away)[1]:.0f} m")["Cell"]))
+    assert away[nearest] == pytest.approx(np.sort(away)[1])
+    away = np.hypot(*(CITY.xy[alike] - CITY.xy[alike[nearest]]).T)
+    assert away[ids.index(int(page.press("farthest")["Cell"]))] == pytest.approx(away.max())
 
 
 def test_a_sign_is_a_jump_away_and_layers_are_switched(page: MapPage) -> None:

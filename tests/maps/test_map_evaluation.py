@@ -25,6 +25,14 @@ if TYPE_CHECKING:
     from semsig_gis.evaluation.result import Evaluation
 
 
+# Counts layers, or the lines in them.
+COUNT = """
+let count = 0;
+map.eachLayer((one) => {{ count += Number({}) || 0; }});
+return count;
+"""
+
+
 def test_an_evaluation_in_a_browser(evaluated: MapPage, evaluation: Evaluation) -> None:
     successes = int(evaluation.successful.sum())
     assert 0 < successes < len(evaluation.queries)
@@ -49,11 +57,7 @@ def test_an_evaluation_in_a_browser(evaluated: MapPage, evaluation: Evaluation) 
     evaluated.switch("Objects seen")
     assert evaluated.all(IMAGES) == []
     evaluated.switch("Lines")
-    lines = """
-    let count = 0;
-    map.eachLayer((one) => { count += one.getLatLngs ? one.getLatLngs().length : 0; });
-    return count;
-    """
+    lines = COUNT.format("one.getLatLngs && one.getLatLngs().length")
     assert evaluated.ask(lines) == int((evaluation.queries["tied"] > 0).sum())
 
 
@@ -121,17 +125,9 @@ def test_a_click_shows_the_signature_and_the_place_found(
     for said in (row["types"], row["query_types"], first, legend, str(row["cell_id"])):
         assert said in popup
     assert f"of {len(database):,}" in popup
-    dashed = """
-    let count = 0;
-    map.eachLayer((one) => { count += !!(one.options.dashArray && one.getLatLngs); });
-    return count;
-    """
+    dashed = COUNT.format("one.options.dashArray && !!one.getLatLngs")
     assert evaluated.ask(dashed) == 1  # to the best place
-    empty = """
-    let count = 0;
-    map.eachLayer((one) => { count += one instanceof L.CircleMarker && !one.options.fill; });
-    return count;
-    """
+    empty = COUNT.format("one instanceof L.CircleMarker && !one.options.fill")
     assert evaluated.ask(empty) == 1 + len(evaluation.next_cell_ids[-1])
     evaluated.ask("map.closePopup()")
     assert evaluated.ask(dashed) == 0
