@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 from pyproj import CRS
 from sentences import refused
@@ -141,15 +141,16 @@ def test_distinct_sequences_by_length_then_first_appearance(rows: list[list[int]
     assert table.strings == ["".join(map(chr, one)) for one in distinct]
 
 
-@given(ROWS)
-def test_histogram_counts_every_value(rows: list[list[int]]) -> None:
+@given(ROWS, st.sampled_from([1, 130, 600, 1 << 20]))
+@example([[number] * number for number in range(9)], 27)
+def test_histogram_counts_every_value_block_by_block(rows: list[list[int]], block: int) -> None:
     table = table_of(rows)
-    histogram = table.histogram
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("semsig_gis.database.database.HISTOGRAM_BLOCK", block)
+        histogram = table.histogram
     assert histogram.dtype == np.uint16
-    assert histogram.shape == (
-        len(table),
-        max((max(row, default=-1) for row in rows), default=-1) + 1,
-    )
+    width = max((value + 1 for row in rows for value in row), default=0)
+    assert histogram.shape == (len(table), width)
     for index in range(len(table)):
         counts = Counter(table[index].tolist())
         assert histogram[index].tolist() == [counts[value] for value in range(histogram.shape[1])]
@@ -167,14 +168,6 @@ def test_overlap_is_that_of_sets(rows: list[list[int]], query: list[int]) -> Non
         both[some].tolist(),
         either[some].tolist(),
     ]
-
-
-def test_histogram_in_blocks_equals_one_block(monkeypatch: pytest.MonkeyPatch) -> None:
-    rng = np.random.default_rng(0)
-    rows = [rng.integers(0, 9, length).tolist() for length in rng.integers(0, 9, 50)]
-    whole = table_of(rows).histogram
-    monkeypatch.setattr("semsig_gis.database.database.HISTOGRAM_BLOCK", 30)
-    assert np.array_equal(table_of(rows).histogram, whole)
 
 
 def test_counts_of_a_very_long_sequence_do_not_wrap() -> None:

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from geopandas.testing import assert_geodataframe_equal
 from noisy_cells import database_of, random_database
-from sentences import assert_sentence
+from sentences import refused
 from six_cells import rows
 
 from semsig_gis.core.errors import SemsigError
@@ -47,35 +47,34 @@ ASKED = [
 ]
 
 
-def test_hand_computed_row_of_equal_cells() -> None:
-    four = database_of([("DD", [10, 200])] * 4 + [("B", [300])], height=5)
-    table = evaluate(four, queries=5, distortion="none").queries.set_index("cell").sort_index()
-    assert table["error_m"].to_list() == [15, 10, 10, 15, 0]
-    assert table["p0"].to_list() == [0.25] * 4 + [1]
-    assert table["p10"].to_list() == [0.5, 0.75, 0.75, 0.5, 1]
-    assert table["p20"].to_list() == [0.75, 1, 1, 0.75, 1]
-    assert table["rank_low"].to_list() == [1] * 5
-    assert table["rank_high"].to_list() == [4] * 4 + [1]
-    assert table["tied"].to_list() == [4] * 4 + [1]
-    assert table["type_group"].to_list() == [4] * 4 + [1]
-    assert table["angle_group"].to_list() == [4] * 4 + [1]
-    assert table["distance"].to_list() == [0] * 5
-    ids = [str(one) for one in four.cell_ids]
+FOUR_ALIKE = database_of([("DD", [10, 200])] * 4 + [("B", [300])], height=5)
+
+
+def test_hand_computed_rows_curve_and_recall_of_equal_cells() -> None:
+    result = evaluate(FOUR_ALIKE, queries=5, distortion="none")
+    table = result.queries.set_index("cell").sort_index()
+    expected: dict[str, Any] = {
+        "error_m": [15, 10, 10, 15, 0],
+        "p0": [0.25] * 4 + [1],
+        "p10": [0.5, 0.75, 0.75, 0.5, 1],
+        "p20": [0.75, 1, 1, 0.75, 1],
+        "rank_low": [1] * 5,
+        "distance": [0] * 5,
+    }
+    groups = ("rank_high", "tied", "type_group", "angle_group")
+    expected |= dict.fromkeys(groups, [4] * 4 + [1])
+    assert table[list(expected)].to_dict("list") == expected
+    ids = [str(one) for one in FOUR_ALIKE.cell_ids]
     for cell, row in table.iterrows():
         best = str(row["best_cell_id"])
         alike = [one for one in ids[:4] if one != best]
         assert row["next_cell_ids"].split(",") == (alike + ids[4:] if cell != 4 else ids[:4])
-
-
-def test_hand_computed_curve_and_recall() -> None:
-    four = database_of([("DD", [10, 200])] * 4 + [("B", [300])], height=5)
-    result = evaluate(four, queries=5, distortion="none")
     assert result.cdf([0, 10, 20, 25, 30]) == pytest.approx([0.4, 0.7, 0.9, 0.9, 1])
     # 20 % is one cell, 39 % still one, 40 % two, 60 % three, 100 % all.
     recalls = [result.recall(percent) for percent in (19, 20, 39, 40, 60, 80, 100)]
     assert recalls == pytest.approx([0, 0.4, 0.4, 0.6, 0.8, 1, 1])
     assert result.successful.all()
-    two = evaluate(four, queries=5, distortion="none", top=2)
+    two = evaluate(FOUR_ALIKE, queries=5, distortion="none", top=2)
     # Two of the four tied cells are drawn: (0 x 3 + 10 x 2 + 20) / 6 for a cell at the end.
     errors = two.queries.set_index("cell").sort_index()["error_m"]
     assert errors.to_list() == pytest.approx([40 / 6, 30 / 6, 30 / 6, 40 / 6, 0])
@@ -209,13 +208,10 @@ def test_by_length() -> None:
     assert whole == pytest.approx(EVALUATION.recall(10))
 
 
-def test_progress_counts_every_query() -> None:
+def test_progress_counts_every_query_and_the_time_is_that_of_the_matching() -> None:
     seen: list[tuple[int, int]] = []
     evaluate(CITY, queries=9, progress=lambda done, total: seen.append((done, total)))
     assert seen == [(done, 9) for done in range(1, 10)]
-
-
-def test_the_time_is_that_of_the_matching() -> None:
     assert 0 < EVALUATION.seconds_per_query < 1
 
 
@@ -361,12 +357,10 @@ def test_the_report_tells_of_the_answers() -> None:
     ],
 )
 def test_what_is_refused(options: dict[str, Any], words: list[str]) -> None:
-    with pytest.raises(SemsigError) as caught:
+    with refused(SemsigError, *words):
         evaluate(CITY, **options)
-    assert_sentence(caught.value, *words)
 
 
 def test_a_threshold_that_was_not_kept_is_refused() -> None:
-    with pytest.raises(SemsigError) as caught:
+    with refused(SemsigError, "error of 12 m", "give some of 0, 5"):
         EVALUATION.cdf([10, 12])
-    assert_sentence(caught.value, "error of 12 m", "give some of 0, 5")

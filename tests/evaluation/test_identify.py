@@ -13,7 +13,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from noisy_cells import random_database
 from scipy.stats import spearmanr
-from sentences import assert_sentence
+from sentences import refused
 
 from semsig_gis.core.errors import InputError
 from semsig_gis.evaluation.identify.identify import identify
@@ -146,6 +146,5 @@ def test_the_same_whatever_the_threads() -> None:
 )
 def test_numbers_out_of_range(options: dict[str, int], words: tuple[str, ...]) -> None:
     index = build_index(random_database(3), named_noise("medium"))
-    with pytest.raises(InputError) as caught:
+    with refused(InputError, *words):
         identify(index, **options)  # type: ignore[arg-type]
-    assert_sentence(caught.value, *words)

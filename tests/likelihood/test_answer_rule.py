@@ -38,11 +38,9 @@ def test_counts_are_those_of_the_threshold() -> None:
     masses, correct = queries(0, 2000)
     rule = calibrate(masses, correct, precision=0.9, radius=25.0)
     answered = masses >= rule.threshold
-    assert rule.queries == 2000
-    assert rule.answered == answered.sum()
-    assert rule.wrong == (~correct[answered]).sum()
-    assert rule.radius == 25.0
-    assert rule.coverage == answered.mean()
+    counts = (2000, answered.sum(), (~correct[answered]).sum())
+    assert (rule.queries, rule.answered, rule.wrong) == counts
+    assert (rule.radius, rule.coverage) == (25.0, answered.mean())
 
 
 def test_too_few_queries_prove_nothing() -> None:
@@ -53,12 +51,8 @@ def test_too_few_queries_prove_nothing() -> None:
     assert calibrate(np.ones(217), np.ones(217, bool)).threshold == 1.0
     assert calibrate([], []).threshold == math.inf
     assert calibrate(np.ones(500), np.zeros(500, bool)).threshold == math.inf
-
-
-def test_equal_chances_are_answered_together() -> None:
-    correct = np.arange(1000) < 600
-    rule = calibrate(np.full(1000, 0.9), correct)
-    assert rule.threshold == math.inf
+    # Equal chances are answered together.
+    assert calibrate(np.full(1000, 0.9), np.arange(1000) < 600).threshold == math.inf
 
 
 def test_a_posterior_is_decided_on() -> None:

@@ -32,10 +32,12 @@ def test_every_verdict() -> None:
     query = Signature(np.array([TREE, TREE, LAMP]), np.array([357.0, 92.0, 300.0]))
     found = explained(query)
     rows = found.to_dict()["rows"]
-    assert [row["verdict"] for row in rows] == ["matched", "misnamed", "false", "missed"]
-    assert [row["object"] for row in rows] == [0, 1, None, 2]
-    assert [row["source_id"] for row in rows] == ["0", "1", None, "2"]
-    assert [row["query"] for row in rows] == [0, 1, 2, None]
+    assert [(row["verdict"], row["object"], row["source_id"], row["query"]) for row in rows] == [
+        ("matched", 0, "0", 0),
+        ("misnamed", 1, "1", 1),
+        ("false", None, None, 2),
+        ("missed", 2, "2", None),
+    ]
     assert rows[0]["bearing_error"] == pytest.approx(-3.0)
     assert rows[0]["distance"] == pytest.approx(10.0)
     assert rows[1]["object_bearing"] == pytest.approx(90.0)

@@ -344,8 +344,10 @@ def test_a_damaged_file_is_refused_and_then_renewed(
     assert note.startswith("The likelihood index is built again: ")
 
 
-def test_a_stale_file_is_told_and_renewed(tmp_path: Path) -> None:
+def test_a_file_that_is_missing_or_stale_is_told_and_renewed(tmp_path: Path) -> None:
     path = tmp_path / "city.likelihood"
+    with refused(DatabaseError, "No such file"):
+        open_index(DATABASE, NOISE, path)
     save_index(random_database(13, cells=150), NOISE, path)
     with refused(DatabaseError, "another database, noise model or version"):
         open_index(DATABASE, NOISE, path)
@@ -362,11 +364,6 @@ def test_a_stale_file_is_told_and_renewed(tmp_path: Path) -> None:
     assert "belongs to another" in notes[0]
     assert done[-1] == (150, 150)
     open_index(DATABASE, NOISE, path)
-
-
-def test_a_missing_file_is_refused(tmp_path: Path) -> None:
-    with refused(DatabaseError, "No such file"):
-        open_index(DATABASE, NOISE, tmp_path / "none.likelihood")
 
 
 def test_where_no_file_can_be_written_the_index_is_kept_in_memory(tmp_path: Path) -> None:

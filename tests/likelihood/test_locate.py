@@ -216,19 +216,13 @@ def test_an_answer_is_plain_values_and_points() -> None:
     assert np.shape(place["covariance"]) == (2, 2)
     assert place["lon"] == pytest.approx(3.8, abs=1.0)
     assert found.to_geodataframe().crs == CITY.crs
-
-
-def test_a_rule_that_answers_nothing_is_plain_too() -> None:
+    assert found.region_km2 == pytest.approx(len(found.region) * 1e-4)
+    assert found.posterior.chances[found.region].sum() >= 0.9 - 1e-9
+    # A rule that answers nothing is plain, too.
     found = locate(INDEX, CITY.signature(LONG[0]), rule=AnswerRule(threshold=float("inf")))
     plain = json.loads(json.dumps(found.to_dict(), allow_nan=False))
     assert plain["threshold"] is None
     assert not plain["answered"]
-
-
-def test_the_region_has_an_area() -> None:
-    found = locate(INDEX, CITY.signature(LONG[0]))
-    assert found.region_km2 == pytest.approx(len(found.region) * 1e-4)
-    assert found.posterior.chances[found.region].sum() >= 0.9 - 1e-9
 
 
 @given(st.integers(0, 99), st.integers(0, 39), st.sampled_from([10.0, 30.0, 500.0]))

@@ -9,18 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from noisy_cells import mixtures, noise_specs
 from scipy.stats import poisson
-from sights import (
-    CITY,
-    CLASSES,
-    REACH,
-    all_round,
-    assert_rate,
-    away,
-    many,
-    rows,
-    seeds,
-    sights,
-)
+from sights import CITY, CLASSES, REACH, all_round, assert_rate, away, many, rows, seeds, sights
 
 from semsig_gis.core.geometry import angular_distance
 from semsig_gis.likelihood.noise.model import NoiseMixture, NoiseSpec, named_noise
