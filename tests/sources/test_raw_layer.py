@@ -62,25 +62,6 @@ def test_text_compares_as_text(a: str, b: str) -> None:
     assert matches(a, b) == (a == b)
 
 
-@pytest.mark.parametrize(
-    ("value", "wanted"),
-    [
-        (1, True),
-        (True, 1),
-        (0, False),
-        (math.nan, 0),
-        ("", 0),
-        ("x", 1),
-        ("1.0", "1"),
-        ("en fonction ", "en fonction"),
-        ("En fonction", "en fonction"),
-        (["en fonction"], 3),
-    ],
-)
-def test_near_is_not_equal(value: object, wanted: Any) -> None:  # noqa: ANN401
-    assert not matches(value, wanted)
-
-
 @given(st.integers(-(2**53), 2**53))
 def test_whole_identifiers_have_no_decimals(number: int) -> None:
     spec = LayerSpec(name="things", class_name="bench", id_field="n")
@@ -90,8 +71,18 @@ def test_whole_identifiers_have_no_decimals(number: int) -> None:
 
 
 @pytest.mark.parametrize(
-    ("value", "pattern", "expected"),
+    ("value", "wanted", "expected"),
     [
+        (1, True, False),
+        (True, 1, False),
+        (0, False, False),
+        (math.nan, 0, False),
+        ("", 0, False),
+        ("x", 1, False),
+        ("1.0", "1", False),
+        ("en fonction ", "en fonction", False),
+        ("En fonction", "en fonction", False),
+        (["en fonction"], 3, False),
         ("BASTILLE", "/[^a-z]+/", True),
         ("Bastille", "/[^a-z]+/", False),
         ("Taxi (nuit)", "/Taxi.*/", True),
@@ -104,10 +95,13 @@ def test_whole_identifiers_have_no_decimals(number: int) -> None:
         ("a/b", "a/b", True),
     ],
 )
-def test_a_text_between_slashes_is_a_pattern(
-    value: object, pattern: str, *, expected: bool
+def test_near_is_not_equal_and_a_text_between_slashes_is_a_pattern(
+    value: object,
+    wanted: Any,  # noqa: ANN401
+    *,
+    expected: bool,
 ) -> None:
-    assert matches(value, pattern) == expected
+    assert matches(value, wanted) == expected
 
 
 def test_a_pattern_that_is_none() -> None:
@@ -120,8 +114,6 @@ def test_only_true_ids_may_be_unique() -> None:
     spec = LayerSpec(name="things", class_name="bench", id_field="n", unique_id=True)
     assert table(spec, n=[3.0, "3.0", None, " "])["source_id"].tolist() == ["3", "3", "", ""]
 
-
-# --- Widths of streets --------------------------------------------------------------------------
 
 BY_CLASS = WidthBy("highway", (("primary", 24.0), ("/.*_link/", 14.0)), 12.0)
 
@@ -136,17 +128,20 @@ def half_width(spec: LayerSpec, **row: object) -> float:
 
 
 @pytest.mark.parametrize(
-    ("value", "expected"),
-    [("primary", 12.0), ("trunk_link", 7.0), ("road", 6.0), (None, 6.0)],
+    ("by", "value", "expected"),
+    [
+        (BY_CLASS, "primary", 12.0),
+        (BY_CLASS, "trunk_link", 7.0),
+        (BY_CLASS, "road", 6.0),
+        (BY_CLASS, None, 6.0),
+        (WidthBy("highway", (("primary", 24.0),)), "road", math.nan),
+        (None, "primary", math.nan),
+    ],
 )
-def test_the_class_of_a_street_says_its_width(value: str | None, expected: float) -> None:
-    assert half_width(street(width_by=BY_CLASS), highway=value) == expected
-
-
-def test_a_street_of_an_unknown_class_has_no_width() -> None:
-    spec = street(width_by=WidthBy("highway", (("primary", 24.0),)))
-    assert math.isnan(half_width(spec, highway="road"))
-    assert math.isnan(half_width(street(), highway="primary"))
+def test_the_class_of_a_street_says_its_width(
+    by: WidthBy | None, value: str | None, expected: float
+) -> None:
+    assert half_width(street(width_by=by), highway=value) == pytest.approx(expected, nan_ok=True)
 
 
 @pytest.mark.parametrize(
@@ -187,22 +182,14 @@ def test_every_reader_gives_the_widths(tmp_path: Path) -> None:
     nodes = [node(number, *place) for number, place in enumerate(places, start=1)]
     ways = [way(10 + n, [1 + n, 2 + n], tags[n]) for n in range(2)]
     write_osm(tmp_path / "streets.osm", *nodes, *ways)
+    lines = [[{"lon": x, "lat": y} for x, y in places[n : n + 2]] for n in range(2)]
     elements = [
-        {
-            "type": "way",
-            "id": 10 + n,
-            "tags": tags[n],
-            "geometry": [{"lon": x, "lat": y} for x, y in places[n : n + 2]],
-        }
-        for n in range(2)
+        {"type": "way", "id": 10 + n, "tags": tags[n], "geometry": lines[n]} for n in range(2)
     ]
     (tmp_path / "tile.json").write_text(json.dumps({"elements": elements}), encoding="utf-8")
-    spec = street(
-        geometry="line",
-        tags=((("highway", ("*",)),),),
-        width_by=BY_CLASS,
-        width_field="width",
-    )
+    bare = street(geometry="line", tags=((("highway", ("*",)),),))
+    unknown = dataclasses.replace(bare, width_field="width")
+    spec = dataclasses.replace(unknown, width_by=BY_CLASS)
     for name, file in (
         ("vector_file", "streets.gpkg"),
         ("vector_file", "streets.geojson"),
@@ -210,15 +197,11 @@ def test_every_reader_gives_the_widths(tmp_path: Path) -> None:
         ("overpass", "tile.json"),
         ("opendatasoft", "streets.geojson"),
     ):
-        (layer,) = reader(name)(tmp_path / file, [spec])
-        assert layer.table["half_width"].tolist() == [12.0, 4.0], name
-        assert layer.notes == ()
-        assert layer.table["half_width"].dtype == "float64"
-        bare = dataclasses.replace(spec, width_by=None, width_field=None)
-        assert "half_width" not in reader(name)(tmp_path / file, [bare])[0].table
-        unknown = dataclasses.replace(spec, width_by=None)
-        (layer,) = reader(name)(tmp_path / file, [unknown])
-        assert layer.notes == ("1 of 2 streets have no known width",)
+        whole, half, none = (reader(name)(tmp_path / file, [s])[0] for s in (spec, unknown, bare))
+        assert whole.table["half_width"].tolist() == [12.0, 4.0], name
+        assert (whole.notes, whole.table["half_width"].dtype) == ((), "float64")
+        assert half.notes == ("1 of 2 streets have no known width",)
+        assert "half_width" not in none.table
 
 
 def test_a_portal_may_spell_the_fields_otherwise(tmp_path: Path) -> None:
@@ -228,10 +211,7 @@ def test_a_portal_may_spell_the_fields_otherwise(tmp_path: Path) -> None:
         '""coordinates"": [[2.3, 48.8], [2.4, 48.8]]}"\n',
         encoding="utf-8",
     )
-    spec = street(
-        geometry="line",
-        width_field="largeur_m",
-        width_by=WidthBy("type_voie", (("Rue", 13.0),)),
-    )
+    by = WidthBy("type_voie", (("Rue", 13.0),))
+    spec = street(geometry="line", width_field="largeur_m", width_by=by)
     (layer,) = reader("opendatasoft")(path, [spec])
     assert layer.table["half_width"].tolist() == [6.5]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 import re
 from typing import TYPE_CHECKING, Any
@@ -34,6 +35,8 @@ if TYPE_CHECKING:
     from semsig_gis.sources import RawLayer
     from semsig_gis.sources.synthetic.streets import Network
 
+    City = tuple[RawLayer, ...]
+
 # How often the paper's 312,134 signatures of Paris hold each class.
 CELLS = 312_134
 PARIS = {
@@ -59,7 +62,7 @@ cities = st.builds(
 )
 
 
-def of_class(layers: tuple[RawLayer, ...], name: str) -> RawLayer:
+def of_class(layers: City, name: str) -> RawLayer:
     return next(layer for layer in layers if layer.spec.class_name == name)
 
 
@@ -67,11 +70,10 @@ def places(layer: RawLayer) -> NDArray[np.float64]:
     return shapely.get_coordinates(layer.table.geometry.array)
 
 
-def network_of(spec: CitySpec) -> Network:
-    return _city_streets.lay_streets(spec.size, synthetic._random(spec, "streets"))
+SPEC = CitySpec()
 
 
-def along_streets(layer: RawLayer, network: Network, spec: CitySpec) -> pd.DataFrame:
+def along_streets(layer: RawLayer, network: Network) -> pd.DataFrame:
     """Return edge, side, number, metres along and metres from the centre line of every object.
 
     Objects on open ground are left out.
@@ -82,7 +84,7 @@ def along_streets(layer: RawLayer, network: Network, spec: CitySpec) -> pd.DataF
     ).astype({"edge": int, "number": int})
     edge = frame["edge"].to_numpy()
     kept = np.array([part is not None for part in parts], bool)
-    away = places(layer)[kept] - spec.centre - network.start[edge]
+    away = places(layer)[kept] - SPEC.centre - network.start[edge]
     along = network.along[edge]
     across = away[:, 0] * along[:, 1] - away[:, 1] * along[:, 0]
     assert ((across > 0) == frame["side"].str.startswith("R")).all()
@@ -96,23 +98,18 @@ def rows_of(frame: pd.DataFrame) -> list[pd.DataFrame]:
 
 
 @pytest.fixture(scope="module")
-def spec() -> CitySpec:
-    return CitySpec()
+def network() -> Network:
+    return _city_streets.lay_streets(SPEC.size, synthetic._random(SPEC, "streets"))
 
 
 @pytest.fixture(scope="module")
-def network(spec: CitySpec) -> Network:
-    return network_of(spec)
+def city() -> City:
+    return synthetic_city(SPEC)
 
 
 @pytest.fixture(scope="module")
-def city(spec: CitySpec) -> tuple[RawLayer, ...]:
-    return synthetic_city(spec)
-
-
-@pytest.fixture(scope="module")
-def surroundings(spec: CitySpec) -> tuple[RawLayer, RawLayer]:
-    return synthetic_surroundings(spec)
+def surroundings() -> tuple[RawLayer, RawLayer]:
+    return synthetic_surroundings(SPEC)
 
 
 @settings(max_examples=20, deadline=None)
@@ -149,39 +146,33 @@ def test_houses_leave_the_streets_free(spec: CitySpec) -> None:
     assert not houses.cover(anywhere[np.unique(point[within])]).any()
 
 
-def test_layers_are_the_classes_of_the_paper() -> None:
-    layers = synthetic_city(CitySpec(size=200.0))
+def test_layers_are_the_classes_of_the_paper_in_no_real_place() -> None:
+    spec = CitySpec(size=200.0, seed=7)
+    layers, (buildings, streets) = synthetic_city(spec), synthetic_surroundings(spec)
     names = [item.name for item in paper_taxonomy().classes]
     assert [layer.spec.class_name for layer in layers] == names
     assert [layer.spec.name for layer in layers] == [f"synthetic_{name}" for name in names]
     assert {(layer.spec.role, layer.spec.geometry) for layer in layers} == {("objects", "point")}
-
-
-def test_every_layer_says_that_it_is_no_real_place() -> None:
-    spec = CitySpec(size=200.0, seed=7)
-    for layer in (*synthetic_city(spec), *synthetic_surroundings(spec)):
+    for layer in (*layers, buildings, streets):
         assert layer.spec.license == "CC0-1.0"
         assert layer.spec.attribution == "synthetic city of semsig_gis, seed 7: no real place"
         assert layer.spec.name.startswith("synthetic_")
-
-
-def test_surroundings_are_polygons_and_lines(surroundings: tuple[RawLayer, RawLayer]) -> None:
-    buildings, streets = surroundings
     assert (buildings.spec.role, buildings.spec.geometry) == ("buildings", "polygon")
     assert (streets.spec.role, streets.spec.geometry) == ("streets", "line")
     assert set(buildings.table.geometry.geom_type) == {"Polygon"}
     assert set(streets.table.geometry.geom_type) == {"LineString"}
     assert list(streets.table.columns) == ["class_name", "source_id", "geometry", "half_width"]
     assert streets.table["half_width"].dtype == np.float64
-    assert streets.table["half_width"].between(5.0, 21.0).all()
+
+
+def test_streets_are_of_plausible_width(surroundings: tuple[RawLayer, RawLayer]) -> None:
+    assert surroundings[1].table["half_width"].between(5.0, 21.0).all()
 
 
 def test_other_seeds_are_other_cities() -> None:
     cities = [synthetic_city(CitySpec(size=500.0, seed=seed)) for seed in range(4)]
-    lights = [of_class(city, "street_light").table.geometry for city in cities]
-    for number, one in enumerate(lights):
-        for other in lights[number + 1 :]:
-            assert len(np.intersect1d(one.to_wkb(), other.to_wkb())) == 0
+    lights = [of_class(city, "street_light").table.geometry.to_wkb() for city in cities]
+    assert all(not np.intersect1d(*pair).size for pair in itertools.combinations(lights, 2))
 
 
 def test_the_centre_moves_the_city_and_no_more() -> None:
@@ -228,10 +219,8 @@ def test_avenues_lead_on(network: Network) -> None:
         assert (of_street.min() == of_street.max()).all()
 
 
-def test_lights_are_even_along_a_street(
-    city: tuple[RawLayer, ...], network: Network, spec: CitySpec
-) -> None:
-    rows = rows_of(along_streets(of_class(city, "street_light"), network, spec))
+def test_lights_are_even_along_a_street(city: City, network: Network) -> None:
+    rows = rows_of(along_streets(of_class(city, "street_light"), network))
     assert len(rows) > 400
     rhythms = []
     for row in rows:
@@ -243,10 +232,8 @@ def test_lights_are_even_along_a_street(
     assert np.std(rhythms) > 3.0  # each street has its own
 
 
-def test_trees_are_in_rows_with_gaps(
-    city: tuple[RawLayer, ...], network: Network, spec: CitySpec
-) -> None:
-    trees = along_streets(of_class(city, "alignment_tree"), network, spec)
+def test_trees_are_in_rows_with_gaps(city: City, network: Network) -> None:
+    trees = along_streets(of_class(city, "alignment_tree"), network)
     assert network.avenue[trees["edge"]].mean() > 0.9
     rows = rows_of(trees)
     steps = pd.concat([row["number"].diff().dropna() for row in rows])
@@ -256,11 +243,9 @@ def test_trees_are_in_rows_with_gaps(
     assert {"R", "L", "RR", "LL"} == set(trees["side"])
 
 
-def test_objects_stand_on_the_pavement(
-    city: tuple[RawLayer, ...], network: Network, spec: CitySpec
-) -> None:
+def test_objects_stand_on_the_pavement(city: City, network: Network) -> None:
     for layer in city:
-        frame = along_streets(layer, network, spec)
+        frame = along_streets(layer, network)
         edge = frame["edge"].to_numpy()
         assert (frame["across"] > network.kerb[edge]).all()
         assert (frame["across"] < network.half_width[edge]).all()
@@ -270,7 +255,7 @@ def test_objects_stand_on_the_pavement(
 
 
 def test_objects_name_the_street_they_stand_in(
-    city: tuple[RawLayer, ...], surroundings: tuple[RawLayer, RawLayer]
+    city: City, surroundings: tuple[RawLayer, RawLayer]
 ) -> None:
     streets = surroundings[1].table.set_index("source_id")
     for layer in city:
@@ -284,10 +269,8 @@ def test_objects_name_the_street_they_stand_in(
         assert inside.mean() > 0.99 or len(inside) == 0
 
 
-def test_signals_stand_at_corners_of_avenues(
-    city: tuple[RawLayer, ...], network: Network, spec: CitySpec
-) -> None:
-    signals = along_streets(of_class(city, "traffic_light"), network, spec)
+def test_signals_stand_at_corners_of_avenues(city: City, network: Network) -> None:
+    signals = along_streets(of_class(city, "traffic_light"), network)
     meeting = np.bincount(network.junction[network.avenue].ravel())
     corner = network.junction[signals["edge"], signals["number"]]
     assert (meeting[corner] >= 2).all()
@@ -296,11 +279,9 @@ def test_signals_stand_at_corners_of_avenues(
     assert not signals.duplicated(["edge", "number"]).any()
 
 
-def test_other_classes_are_ten_times_as_frequent_on_avenues(
-    city: tuple[RawLayer, ...], network: Network, spec: CitySpec
-) -> None:
+def test_other_classes_are_ten_times_as_frequent_on_avenues(city: City, network: Network) -> None:
     scattered = set(PARIS) - {"alignment_tree", "street_light", "traffic_light"}
-    frames = [along_streets(of_class(city, name), network, spec) for name in scattered]
+    frames = [along_streets(of_class(city, name), network) for name in scattered]
     on_avenue = network.avenue[pd.concat(frames)["edge"]]
     free = np.maximum(network.length - network.clear.sum(axis=1), 0.0)
     avenues, others = free[network.avenue].sum(), free[~network.avenue].sum()
@@ -309,7 +290,7 @@ def test_other_classes_are_ten_times_as_frequent_on_avenues(
 
 
 def test_parks_have_trees_and_squares_lights_but_no_houses(
-    city: tuple[RawLayer, ...], surroundings: tuple[RawLayer, RawLayer]
+    city: City, surroundings: tuple[RawLayer, RawLayer]
 ) -> None:
     houses = surroundings[0].table.geometry.to_numpy()
     for name in ("alignment_tree", "street_light"):
