@@ -95,9 +95,7 @@ def test_a_file_arrives_whole_and_described(server: Server, get: Get) -> None:
     server.on("/trees", Answer(CONTENT, type="application/json; charset=utf-8"))
     seen: list[tuple[int, int]] = []
     fetched = get(
-        params={"limit": -1, "where": "a=1"},
-        accept=JSON,
-        progress=lambda *step: seen.append(step),
+        params={"limit": -1, "where": "a=1"}, accept=JSON, progress=lambda *step: seen.append(step)
     )
     assert fetched.path.read_bytes() == CONTENT
     assert (fetched.path.suffix, fetched.content_type) == (".json", "application/json")
