@@ -27,5 +27,10 @@ def cache(tmp_path: Path) -> Cache:
 
 
 @pytest.fixture
+def slept() -> list[float]:
+    return []
+
+
+@pytest.fixture
 def quick() -> HttpSpec:
     return HttpSpec(timeout=(2.0, 2.0), attempts=3, backoff_s=0.0, sleep=lambda _: None)

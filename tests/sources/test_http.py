@@ -50,11 +50,6 @@ FULL = Answer(CONTENT)
 
 
 @pytest.fixture
-def slept() -> list[float]:
-    return []
-
-
-@pytest.fixture
 def spec(slept: list[float]) -> HttpSpec:
     return HttpSpec(timeout=(2.0, 2.0), attempts=3, backoff_s=1.0, sleep=slept.append)
 

@@ -56,7 +56,7 @@ STREETS = LayerSpec(
     role="streets",
     geometry="line",
     elements=("way",),
-    tags=tagged("highway", "residential", "pedestrian"),
+    tags=tagged("highway", "residential"),
 )
 
 
@@ -137,17 +137,6 @@ def test_elements_of_another_kind_are_filtered(read: Read) -> None:
     assert (points.counts, list(found(points))) == (RowCounts(read=3, filtered=2), ["node/5"])
     assert anything.counts == RowCounts(read=3, filtered=1)
     assert list(found(anything)) == ["node/5", "way/6"]
-
-
-def test_squares_are_no_streets(read: Read) -> None:
-    streets = read(
-        STREETS,
-        *CORNERS,
-        way(5, [1, 2, 3, 1], {"highway": "pedestrian"}),
-        way(6, [1, 2, 3, 1], {"highway": "pedestrian", "area": "yes"}),
-    )
-    assert found(streets) == {"way/5": "LINESTRING (0 0, 1 0, 1 1, 0 0)"}
-    assert streets.counts.filtered == 1
 
 
 def test_multipolygons_with_untagged_members(read: Read) -> None:

@@ -111,11 +111,6 @@ def server(server: Server) -> Server:
 
 
 @pytest.fixture
-def slept() -> list[float]:
-    return []
-
-
-@pytest.fixture
 def get(server: Server, cache: Cache, slept: list[float]) -> Get:
     """Fetch the benches of the area; keywords change the specification or those of the call."""
     fields = {field.name for field in dataclasses.fields(HttpSpec)}
