@@ -25,36 +25,24 @@ if TYPE_CHECKING:
 
 
 Catalogs = Annotated[
-    list[str],
-    typer.Option(help="Catalogue, by name or .toml file; repeat to merge, best first."),
+    list[str], typer.Option(help="Catalogue, by name or .toml file; repeat to merge, best first.")
 ]
-
 Objects = Annotated[Path, typer.Option(help="Street objects to write (.parquet).")]
-
-Layers = Annotated[
-    list[str] | None,
-    typer.Option(help="Read only this layer; may be repeated."),
-]
-
+Layers = Annotated[list[str] | None, typer.Option(help="Read only this layer; may be repeated.")]
 MetricCrs = Annotated[
     str | None,
     typer.Option(help="CRS in metres to work in; default: the catalogue's or the UTM zone."),
 ]
-
 Filters = Annotated[
     bool, typer.Option("--filter/--no-filter", help="Apply the catalogue's filters.")
 ]
-
 Collapse = Annotated[bool, typer.Option(help="Collapse objects of a class at the same place.")]
-
 Merge = Annotated[
     bool, typer.Option(help="Merge objects of different layers within the catalogue's radii.")
 ]
-
 Buildings = Annotated[
     Path | None, typer.Option(help="Building footprints to write too (.parquet).")
 ]
-
 Streets = Annotated[
     Path | None, typer.Option(help="Centre lines of streets to write too (.parquet).")
 ]

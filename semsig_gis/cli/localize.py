@@ -223,7 +223,12 @@ def _answer(
     ((_, query),) = queries
     answer = locator.locate(query)
     if options.map_ is not None:
-        _save_map(options.map_, city, lambda: draw(answer, city))
+        from semsig_gis.maps.page import save_map
+
+        with progress("drawing the map"):
+            map_ = draw(answer, city)
+            draw_ground(map_, city)
+            tell_if_online(save_map(map_, options.map_))
     result = answer.to_dict()
     if options.out is not None:
         searched = _write(options, options.out, city, answer, locator)
@@ -257,15 +262,6 @@ def _write(
     share = REGION_SHARE if options.share is None else options.share
     regions = export_answer(answer, city.database, out, share=share, within=options.within)
     return regions.to_dict()
-
-
-def _save_map(out: Path, city: City, draw: Callable[[], Any]) -> None:
-    from semsig_gis.maps.page import save_map
-
-    with progress("drawing the map"):
-        drawn = draw()
-        draw_ground(drawn, city)
-        tell_if_online(save_map(drawn, out))
 
 
 def _localization_map(localization: Localization, city: City) -> Any:  # noqa: ANN401 - folium's

@@ -41,21 +41,15 @@ Streets = Annotated[
 
 
 def draw_ground(
-    drawn: folium.Map,
-    city: City,
-    *,
-    buildings: Path | None = None,
-    streets: Path | None = None,
+    drawn: folium.Map, city: City, *, buildings: Path | None = None, streets: Path | None = None
 ) -> None:
     """Add streets and buildings to a map: those of files, else of the store of the database."""
     from semsig_gis.maps.objects import ground_map
     from semsig_gis.objects.surroundings import read_surroundings
 
-    houses = lines = None
-    if buildings is not None:
-        houses = read_surroundings(buildings, role="buildings", crs=city.database.crs)
-    if streets is not None:
-        lines = read_surroundings(streets, role="streets", crs=city.database.crs)
+    crs = city.database.crs
+    houses = None if buildings is None else read_surroundings(buildings, role="buildings", crs=crs)
+    lines = None if streets is None else read_surroundings(streets, role="streets", crs=crs)
     if houses is None or lines is None:
         with contextlib.suppress(DatabaseError):  # a map may do without
             houses = city.store.footprints if houses is None else houses
@@ -65,12 +59,8 @@ def draw_ground(
     xy = city.database.xy
     low, high = xy.min(axis=0) - AROUND_M, xy.max(axis=0) + AROUND_M
     try:
-        ground_map(
-            buildings=houses,
-            streets=lines,
-            box=(*low.tolist(), *high.tolist()),
-            map_=drawn,
-        )
+        box = (*low.tolist(), *high.tolist())
+        ground_map(buildings=houses, streets=lines, box=box, map_=drawn)
     except EmptyResultError:
         if buildings is not None or streets is not None:
             raise
@@ -86,16 +76,14 @@ def map_(
     identifiability: Annotated[
         bool,
         typer.Option(
-            "--identifiability",
-            help="Draw how well cells can be found (after `semsig identify`).",
+            "--identifiability", help="Draw how well cells can be found (after `semsig identify`)."
         ),
     ] = False,
     ambiguity: Annotated[
         bool, typer.Option("--ambiguity", help="Draw how many cells look the same.")
     ] = False,
     drift: Annotated[
-        Path | None,
-        typer.Option(help="Draw the changes up to this newer database."),
+        Path | None, typer.Option(help="Draw the changes up to this newer database.")
     ] = None,
     objects: Annotated[
         Path | None, typer.Option(help="Draw street objects written by `semsig load`.")

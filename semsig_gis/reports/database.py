@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from semsig_gis.core.text import escaped
 from semsig_gis.database.properties import database_summary
 from semsig_gis.reports import paris
 from semsig_gis.reports.tables import Table, percent
@@ -14,6 +13,7 @@ if TYPE_CHECKING:
 
     from semsig_gis.database.database import SignatureDatabase
 
+LONGEST_TYPES = 20  # symbols that fit into a table
 GROUP_LABELS = {"alone": "cells alone in their group", "entropy_bits": "entropy, in bits"}
 
 
@@ -30,21 +30,6 @@ def database_tables(
     facts = database_summary(database, file_bytes=file_bytes, object_counts=object_counts)
     tables = (_occurrence_table, _property_table, _group_table, _class_table)
     return tuple(table(facts) for table in tables)
-
-
-def database_markdown(
-    database: SignatureDatabase,
-    *,
-    file_bytes: int | None = None,
-    object_counts: Mapping[int, int] | None = None,
-) -> str:
-    """Return the tables of a database (see `database_tables`) and its sources as Markdown."""
-    tables = database_tables(database, file_bytes=file_bytes, object_counts=object_counts)
-    sections = [table.markdown() for table in tables]
-    if database.licenses:
-        lines = "\n".join(f"- {escaped(line)}" for line in database.licenses)
-        sections.append(f"### Sources\n\n{lines}\n")
-    return "\n".join(["## Signature database\n", *sections])
 
 
 def _occurrence_table(facts: Mapping[str, Any]) -> Table:
@@ -77,7 +62,9 @@ def _property_table(facts: Mapping[str, Any]) -> Table:
     own = sum(item["range_m"] != facts["radius_m"] for item in seen)
     others = f" ({own} classes have their own)" if own else ""
     occlusion = "none" if hidden is None else f"by buildings, more than {hidden:g} m deep"
-    group = f"{_shortened(largest['types'])}, {largest['cells']:,} cells"
+    types = largest["types"]
+    if len(types) > LONGEST_TYPES:
+        types = f"{types[:LONGEST_TYPES]}… ({len(types)} objects)"
     return Table(
         "Database",
         ("Property", "Ours", paris.COLUMN),
@@ -92,7 +79,7 @@ def _property_table(facts: Mapping[str, Any]) -> Table:
             ("Covered area", f"{facts['covered_km2']:.1f} km²", "79 km²"),
             ("File", "" if size is None else f"{size:.1f} MB", "38.7 MB"),
             ("File a km²", "" if dense is None else f"{dense:.2f} MB", "1.24 MB"),
-            ("Largest group by type", group, "DDD, 29,958 cells"),
+            ("Largest group by type", f"{types}, {largest['cells']:,} cells", "DDD, 29,958 cells"),
         ),
         (
             "Our covered area is cells times the area of a cell; by that count "
@@ -168,8 +155,3 @@ def _statistic(name: str, value: float | None) -> str:
     if name == "entropy_bits":
         return f"{value:.2f}"
     return f"{value:,.1f}" if name in {"mean", "std"} else f"{value:,g}"
-
-
-def _shortened(symbols: str, limit: int = 20) -> str:
-    """Return a type sequence that fits a table."""
-    return symbols if len(symbols) <= limit else f"{symbols[:limit]}… ({len(symbols)} objects)"

@@ -98,12 +98,6 @@ def evaluation_tables(evaluation: Evaluation) -> tuple[Table, ...]:
     )
 
 
-def evaluation_markdown(evaluation: Evaluation) -> str:
-    """Return the tables of an evaluation as Markdown."""
-    sections = [table.markdown() for table in evaluation_tables(evaluation)]
-    return "\n".join(["## Evaluation\n", *sections])
-
-
 def _setting_table(evaluation: Evaluation) -> Table:
     asked, database = evaluation.asked, evaluation.database
     megabytes = database["mb_per_km2"]

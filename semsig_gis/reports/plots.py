@@ -201,15 +201,8 @@ def draw_plot(plot: Plot) -> Picture:
         for number, curve in enumerate(plot.curves):
             _draw_curve(axes, curve, number, len(plot.curves))
         _draw_paper(axes, plot.paper)
-        figure.text(
-            0.1 / WIDTH,
-            1 - 0.08 / height,
-            "\n".join(titles),
-            va="top",
-            weight="bold",
-            size=10.5,
-            linespacing=1.25,
-        )
+        look: dict[str, Any] = {"va": "top", "weight": "bold", "size": 10.5, "linespacing": 1.25}
+        figure.text(0.1 / WIDTH, 1 - 0.08 / height, "\n".join(titles), **look)
         _legend(figure, curves, top=(sum(heights) + 0.04) / height)
         _legend(figure, others, top=(heights[1] + 0.04) / height)
         return saved(figure, title=plot.title, description=_described(plot))

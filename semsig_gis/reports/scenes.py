@@ -161,6 +161,7 @@ TITLE_LETTERS = 46
 TYPE_LETTERS, TYPE_LINES = 42, 3
 CLASS_LETTERS = 21
 MANY_OBJECTS = 40
+HALO = {"facecolor": WHITE, "alpha": 0.85, "edgecolor": "none", "pad": 1}  # behind letters
 
 
 def draw_scene(scene: Scene, taxonomy: Taxonomy) -> Picture:
@@ -198,30 +199,12 @@ def draw_scene(scene: Scene, taxonomy: Taxonomy) -> Picture:
     with blank_figure(WIDTH, height) as figure:
         axes = figure.add_axes((MARGIN / WIDTH, below / height, MAP / WIDTH, MAP / height))
         _draw_map(axes, scene, signs)
-        figure.text(
-            MARGIN / WIDTH,
-            1 - 0.07 / height,
-            "\n".join(titles),
-            va="top",
-            weight="bold",
-            size=10,
-        )
-        figure.text(
-            MARGIN / WIDTH,
-            (below - 0.1) / height,
-            "\n".join(lines),
-            va="top",
-            size=9,
-            linespacing=1.3,
-        )
-        draw_legend(
-            figure,
-            keys,
-            place=(MARGIN / WIDTH, (below - 0.2 - LINE * len(lines)) / height, 1.0),
-            columns=2,
-            size=8.5,
-            sign_width=1,
-        )
+        left, top = MARGIN / WIDTH, 1 - 0.07 / height
+        figure.text(left, top, "\n".join(titles), va="top", weight="bold", size=10)
+        top = (below - 0.1) / height
+        figure.text(left, top, "\n".join(lines), va="top", size=9, linespacing=1.3)
+        place = (left, (below - 0.2 - LINE * len(lines)) / height, 1.0)
+        draw_legend(figure, keys, place=place, columns=2, size=8.5, sign_width=1)
         return saved(figure, title=scene.title, description=_described(scene, signs))
 
 
@@ -238,28 +221,13 @@ def _draw_map(axes: Axes, scene: Scene, signs: dict[int, ClassSign]) -> None:
     lines = [[(0.0, 0.0), (item.east, item.north)] for item in scene.objects]
     axes.add_collection(LineCollection(lines, colors="#999999", linewidths=0.5, zorder=2))
     for item in scene.others:
-        axes.plot(
-            [item.east],
-            [item.north],
-            **_shape(signs.get(item.code, UNKNOWN), 5),
-            alpha=0.25,
-            markeredgewidth=0,
-            zorder=1.5,
-        )
+        look = _shape(signs.get(item.code, UNKNOWN), 5)
+        axes.plot(item.east, item.north, **look, alpha=0.25, markeredgewidth=0, zorder=1.5)
     size = 8 if len(scene.objects) > MANY_OBJECTS else 10
     # The nearest last, so that they lie on top.
     for item in sorted(scene.objects, key=lambda one: -math.hypot(one.east, one.north)):
         _draw_object(axes, item, signs.get(item.code, UNKNOWN), size)
-    axes.plot(
-        [0],
-        [0],
-        marker="o",
-        markersize=7,
-        color=INK,
-        markeredgecolor=WHITE,
-        markeredgewidth=1.5,
-        zorder=6,
-    )
+    axes.plot(0, 0, **_VIEWPOINT_LOOK, zorder=6)
     if scene.answer:
         _draw_answer(axes, scene.answer, away, reach)
     _draw_north(axes)
@@ -272,14 +240,8 @@ def _shape(sign: ClassSign, size: float) -> dict[str, Any]:
 
 
 def _draw_object(axes: Axes, item: SceneObject, sign: ClassSign, size: float) -> None:
-    axes.plot(
-        [item.east],
-        [item.north],
-        **_shape(sign, size),
-        markeredgecolor=WHITE,
-        markeredgewidth=0.7,
-        zorder=4,
-    )
+    edge: dict[str, Any] = {"markeredgecolor": WHITE, "markeredgewidth": 0.7}
+    axes.plot(item.east, item.north, **_shape(sign, size), **edge, zorder=4)
     axes.annotate(
         sign.symbol,
         (item.east, item.north),
@@ -299,7 +261,7 @@ def _draw_answer(axes: Axes, answer: tuple[float, float], away: float, reach: fl
     east, north = answer
     if max(abs(east), abs(north)) < reach:
         axes.plot([0, east], [0, north], color=ANSWER, linewidth=1, linestyle=":", zorder=3)
-        axes.plot([east], [north], **_ANSWER_LOOK, zorder=7)
+        axes.plot(east, north, **_ANSWER_LOOK, zorder=7)
         return
     share = 0.96 * reach / max(abs(east), abs(north))
     tip = (share * east, share * north)
@@ -319,10 +281,17 @@ def _draw_answer(axes: Axes, answer: tuple[float, float], away: float, reach: fl
         ha="center",
         va="center",
         zorder=7,
-        bbox={"facecolor": WHITE, "alpha": 0.85, "edgecolor": "none", "pad": 1},
+        bbox=HALO,
     )
 
 
+_VIEWPOINT_LOOK: dict[str, Any] = {
+    "color": INK,
+    "marker": "o",
+    "markersize": 7,
+    "markeredgecolor": WHITE,
+    "markeredgewidth": 1.5,
+}
 _ANSWER_LOOK: dict[str, Any] = {
     "color": ANSWER,
     "linestyle": "",
@@ -345,7 +314,7 @@ def _draw_north(axes: Axes) -> None:
         weight="bold",
         size=9,
         arrowprops={"arrowstyle": "-|>", "color": INK, "linewidth": 1.2, "shrinkB": 0},
-        bbox={"facecolor": WHITE, "alpha": 0.85, "edgecolor": "none", "pad": 1},
+        bbox=HALO,
         zorder=8,
     )
 
@@ -354,15 +323,9 @@ def _draw_scale(axes: Axes, reach: float) -> None:
     metres = _round_length(0.5 * reach)
     start = 0.03
     end = start + metres / (2 * reach)
-    axes.plot(
-        [start, start, end, end],
-        [0.045, 0.03, 0.03, 0.045],
-        transform=axes.transAxes,
-        color=INK,
-        linewidth=1.4,
-        solid_capstyle="butt",
-        zorder=8,
-    )
+    look: dict[str, Any] = {"color": INK, "linewidth": 1.4, "solid_capstyle": "butt", "zorder": 8}
+    ends = [start, start, end, end], [0.045, 0.03, 0.03, 0.045]
+    axes.plot(*ends, transform=axes.transAxes, **look)
     axes.text(
         (start + end) / 2,
         0.045,
@@ -371,7 +334,7 @@ def _draw_scale(axes: Axes, reach: float) -> None:
         ha="center",
         va="bottom",
         size=8.5,
-        bbox={"facecolor": WHITE, "alpha": 0.85, "edgecolor": "none", "pad": 1},
+        bbox=HALO,
         zorder=8,
     )
 

@@ -12,7 +12,7 @@ from semsig_gis.evaluation.evaluate import evaluate
 from semsig_gis.matching.method import Method
 from semsig_gis.queries.chain import parse_chain
 from semsig_gis.queries.draw import QuerySpec
-from semsig_gis.reports.evaluation import evaluation_markdown, evaluation_tables
+from semsig_gis.reports.evaluation import evaluation_tables
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -37,8 +37,8 @@ def test_settings_and_figures(snapshot: Callable[[str, str], None]) -> None:
         "none": replace(EVALUATION, asked=QuerySpec(distortions=()), queries=lost),
     }
     for name, one in others.items():
-        text = evaluation_markdown(replace(one, seconds_per_query=0.0125))
-        snapshot(f"evaluation-{name}.md", text)
+        tables = evaluation_tables(replace(one, seconds_per_query=0.0125))
+        snapshot(f"evaluation-{name}.md", "\n".join(table.markdown() for table in tables))
 
 
 @pytest.mark.parametrize(
