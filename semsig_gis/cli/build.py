@@ -203,11 +203,11 @@ def _info(path: Path) -> dict[str, Any]:
     from semsig_gis.database.properties import database_summary
 
     city, facts = _opened(path)
+    summary = database_summary(city.database, **facts)
     columns = known_identifiability(city)
-    more = {}
     if columns is not None:
-        more["identifiability"] = columns.summary(object_counts=facts["object_counts"])
-    return database_summary(city.database, **facts) | more
+        summary["identifiability"] = columns.summary(object_counts=facts["object_counts"])
+    return summary
 
 
 def _opened(path: Path) -> tuple[City, dict[str, Any]]:

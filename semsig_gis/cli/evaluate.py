@@ -250,7 +250,11 @@ def reproduce(
         report.title,
         ("Section", "What", "", "Ours", "95 %", "Paper"),
         [
-            (section.title, one.row, one.column, *_shown(one.ours, one.low, one.high, one.paper))
+            (
+                *(section.title, one.row, one.column, _number(one.ours)),
+                "" if one.low is None or one.high is None else f"{one.low:.4g} to {one.high:.4g}",
+                _number(one.paper),
+            )
             for section, one in numbers
         ],
     )
@@ -258,14 +262,9 @@ def reproduce(
     typer.echo(f"numbers: {out / 'numbers.csv'}")
 
 
-def _shown(
-    ours: float | None, low: float | None, high: float | None, paper: float | None
-) -> tuple[str, str, str]:
-    interval = "" if low is None or high is None else f"{low:.4g} to {high:.4g}"
-    return "" if ours is None else _number(ours), interval, "" if paper is None else _number(paper)
-
-
-def _number(value: float) -> str:
+def _number(value: float | None) -> str:
+    if value is None:
+        return ""
     return f"{value:,.0f}" if abs(value) >= 1000 else f"{value:.4g}"  # noqa: PLR2004
 
 

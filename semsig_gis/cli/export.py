@@ -68,16 +68,13 @@ def export(
 
     keep_inputs(out, read=(database, objects))
     city = open_city(database)
-    cells = city.database
-    seen = None if objects is None else open_objects(objects)
-    results = None if evaluation is None else open_evaluation(evaluation)
     with progress(f"writing {out.name}") as advance:
         export_database(
-            cells,
+            city.database,
             out,
             layers=layer or (),
-            objects=seen,
-            evaluation=results,
+            objects=None if objects is None else open_objects(objects),
+            evaluation=None if evaluation is None else open_evaluation(evaluation),
             identifiability=known_identifiability(city),
             geometry=None if geometry is None else geometry.value,
             progress=advance,

@@ -73,7 +73,14 @@ def learn(
     if as_json:
         print_json(estimate.to_dict())
         return
-    _print_estimate(estimate)
+    skipped = estimate.skipped
+    nowhere = f"; {skipped} samples lie where nothing is in sight" if skipped else ""
+    print_rows(
+        f"Learnt from {estimate.detections:,} detections at {estimate.samples:,} places that see "
+        f"{estimate.objects:,} objects{nowhere}",
+        ("quantity", "class", "value", "its own samples say", "95% interval", "samples"),
+        map(_rate, estimate.rates.to_dict("records")),
+    )
     typer.echo(f"noise model: {out}")
 
 
@@ -111,17 +118,6 @@ def _places(database: SignatureDatabase, samples: Sequence[Sample]) -> NDArray[A
         for sample in samples
     ]
     return np.array(places)
-
-
-def _print_estimate(estimate: NoiseEstimate) -> None:
-    skipped = estimate.skipped
-    nowhere = f"; {skipped} samples lie where nothing is in sight" if skipped else ""
-    print_rows(
-        f"Learnt from {estimate.detections:,} detections at {estimate.samples:,} places that see "
-        f"{estimate.objects:,} objects{nowhere}",
-        ("quantity", "class", "value", "its own samples say", "95% interval", "samples"),
-        map(_rate, estimate.rates.to_dict("records")),
-    )
 
 
 def _rate(row: dict[Hashable, Any]) -> list[str]:

@@ -221,9 +221,8 @@ def sources(
         ),
     )
     used = {spec.class_name for spec in catalog.layers}
-    used |= {
-        value for spec in catalog.layers if spec.class_by for _, value in spec.class_by.classes
-    }
+    for spec in catalog.layers:
+        used |= {value for _, value in spec.class_by.classes} if spec.class_by else set()
     print_rows(
         "Classes",
         ("symbol", "code", "class", "title"),

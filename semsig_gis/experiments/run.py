@@ -24,12 +24,7 @@ from semsig_gis.core.parallel import check_workers, finish_tasks
 from semsig_gis.database.answer import DistanceMemo
 from semsig_gis.database.city import City
 from semsig_gis.database.file import digest
-from semsig_gis.evaluation.evaluate import (
-    make_evaluation,
-    score_queries,
-    scored_tables,
-    versions,
-)
+from semsig_gis.evaluation.evaluate import make_evaluation, score_queries, scored_tables, versions
 from semsig_gis.evaluation.figures import district_labels
 from semsig_gis.evaluation.file import open_evaluation, save_evaluation
 from semsig_gis.evaluation.methods import make_locator
@@ -441,15 +436,15 @@ def run_experiment(
     >>> list(results), len(results["phone/paper-top1"].queries)
     (['phone/paper-top1'], 10)
     """
-    (results,) = run_experiments(
-        {Path(out): spec},
+    place = Path(out)
+    return run_experiments(
+        {place: spec},
         folder=folder,
         workers=workers,
         scheduler=scheduler,
         note=note,
         progress=progress,
-    ).values()
-    return results
+    )[place]
 
 
 def run_experiments(

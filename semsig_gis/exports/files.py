@@ -51,11 +51,7 @@ def formula_safe(text: str) -> str:
 
 
 def as_written(text: str) -> str:
-    """Return the text that `formula_safe` made safe.
-
-    It loses the apostrophes at its beginning and after ``;``, ``,``, ``|``, ``"``, tabs and line
-    ends.
-    """
+    """Return the text that `formula_safe` made safe, without its apostrophes."""
     return _MARK.sub("", text)
 
 

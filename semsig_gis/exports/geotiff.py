@@ -28,8 +28,8 @@ def export_geotiff(
     database : SignatureDatabase
         The cells.
     values : array_like of float, shape (n,)
-        Numbers such as ``database.type_group_sizes``, ``identifiability.found``,
-        ``location.posterior.chances`` or `cell_errors`; NaN where there is none.
+        Numbers such as ``database.type_group_sizes`` or ``identifiability.found``; NaN where there
+        is none.
     path : str or Path
         File to write; it appears whole, by rename.
     name : str

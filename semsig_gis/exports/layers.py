@@ -126,11 +126,8 @@ def cells_layer(
         return pa.table({**columns, GEOMETRY: shapely.to_wkb(shapes)})
 
     step = database.grid.step
-    facts = {
-        **database_specs(database),
-        "crs": database.crs.to_json_dict(),
-        "identifiability": None,
-    }
+    crs = database.crs.to_json_dict()
+    facts = {**database_specs(database), "crs": crs, "identifiability": None}
     draw = functools.partial(by_amount, geometry=geometry, size=step)
     styles = [draw("Ambiguity", "type_group_size", AMBIGUITY)]
     if identifiability is not None:
@@ -221,7 +218,7 @@ def evaluation_layers(evaluation: Evaluation, licenses: tuple[str, ...]) -> list
                 f"{SUCCESS_METRES} m with a probability of {SUCCESS_PROBABILITY:g} or more."
             ),
             geometry="point",
-            style=by_outcome(geometry="point"),
+            styles=(by_outcome(geometry="point"),),
         ),
         layer(
             lines,
@@ -229,7 +226,7 @@ def evaluation_layers(evaluation: Evaluation, licenses: tuple[str, ...]) -> list
             title="From the true to the best place",
             description="Each query's true place, joined to the best place that was found for it.",
             geometry="line",
-            style=by_outcome(geometry="line"),
+            styles=(by_outcome(geometry="line"),),
         ),
     ]
 
@@ -248,7 +245,7 @@ def answer_layers(answer: Answer, regions: SearchRegions) -> list[Layer]:
             title="Regions to search",
             description="Where the query may have been seen from, the best first.",
             geometry="polygon",
-            style=by_rank("rank", geometry="polygon"),
+            styles=(by_rank("rank", geometry="polygon"),),
         ),
         layer(
             answer.to_geodataframe(),
@@ -256,22 +253,12 @@ def answer_layers(answer: Answer, regions: SearchRegions) -> list[Layer]:
             title="Candidates",
             description="The best cells for the query.",
             geometry="point",
-            style=by_rank(str(answer.candidates.columns[0]), geometry="point"),
+            styles=(by_rank(str(answer.candidates.columns[0]), geometry="point"),),
         ),
     ]
 
 
-def _table_layer(
-    frame: gpd.GeoDataFrame,
-    *,
-    name: str,
-    title: str,
-    description: str,
-    geometry: str,
-    licenses: tuple[str, ...],
-    facts: Mapping[str, Any],
-    style: Style,
-) -> Layer:
+def _table_layer(frame: gpd.GeoDataFrame, **about: Any) -> Layer:  # noqa: ANN401 - as `Layer` has
     """Return a layer of a table that is in memory; what is not finite is missing in it."""
     shapes = frame.geometry
     columns = {}
@@ -285,17 +272,11 @@ def _table_layer(
             columns[column] = pa.Array.from_pandas(values, type=pa.string() if texts else None)
     table = pa.table({**columns, GEOMETRY: pa.array(shapely.to_wkb(shapes.array), pa.binary())})
     return Layer(
-        name=name,
-        title=title,
-        description=description,
-        geometry=geometry,
+        **about,
         crs=shapes.crs,
         rows=len(table),
         bounds=tuple(shapes.total_bounds.tolist()),
         read=lambda rows: table.slice(rows.start, rows.stop - rows.start),
-        licenses=licenses,
-        facts=facts,
-        styles=(style,),
     )
 
 

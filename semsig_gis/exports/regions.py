@@ -143,14 +143,8 @@ def _runs(database: SignatureDatabase, cells: NDArray[np.int64]) -> NDArray[np.o
     breaks = np.diff(database.cell_ids[cells]) != 1
     first, last = cells[np.append(True, breaks)], cells[np.append(breaks, True)]
     columns, bottom, top = database.columns[first], database.rows[first], database.rows[last]
-    return np.asarray(
-        shapely.box(
-            west + columns * step,
-            south + bottom * step,
-            west + (columns + 1) * step,
-            south + (top + 1) * step,
-        )
-    )
+    left, right = west + columns * step, west + (columns + 1) * step
+    return np.asarray(shapely.box(left, south + bottom * step, right, south + (top + 1) * step))
 
 
 def _around(

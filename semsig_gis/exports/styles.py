@@ -195,13 +195,8 @@ def _area(colour: str, geometry: str, size: float) -> SymbolLayer:
     """Return a cell as its square, whether it is a polygon or a point."""
     if geometry == "polygon":
         # An outline as thin as can be, lest hairs of the background show between the cells.
-        return "SimpleFill", {
-            "color": _rgba(colour),
-            "style": "solid",
-            "outline_color": _rgba(colour),
-            "outline_style": "solid",
-            "outline_width": 0,
-        }
+        fill = {"color": _rgba(colour), "style": "solid", "outline_color": _rgba(colour)}
+        return "SimpleFill", {**fill, "outline_style": "solid", "outline_width": 0}
     return "SimpleMarker", {
         "name": "square",
         "color": _rgba(colour),

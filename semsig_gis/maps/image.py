@@ -33,8 +33,8 @@ _LATTICE = 64
 class PlaceLattices:
     """The places of a city on a web map, and back, at the crossings of two lattices.
 
-    To interpolate in a lattice is far faster than to project every place, needs no projection where
-    the map is shown, and is exact to a centimetre in a city. ``metres`` (65, 65, 2) holds x and y
+    To interpolate is fast, needs no projection where the map is shown, and is exact to a centimetre
+    in a city. ``metres`` (65, 65, 2) holds x and y
     in the CRS of the database over ``mercator_box`` (Web Mercator), rows from south to north and
     columns from west to east; ``degrees`` (65, 65, 2) holds latitude and longitude over
     ``metric_box``. Boxes are west, south, east, north.

@@ -188,31 +188,25 @@ class _Drawings:
         longer, shorter, bearing = place.ellipse()
         turn, angle = np.radians(bearing), np.linspace(0.0, 2.0 * np.pi, ELLIPSE_STEPS + 1)
         along, across = longer * np.cos(angle), shorter * np.sin(angle)
-        ring = np.column_stack(
-            [
-                place.x + along * np.sin(turn) + across * np.cos(turn),
-                place.y + along * np.cos(turn) - across * np.sin(turn),
-            ]
-        )
+        x = place.x + along * np.sin(turn) + across * np.cos(turn)
+        y = place.y + along * np.cos(turn) - across * np.sin(turn)
         (centre,) = self.latlon([place.x, place.y])
         name, colour = (
             ("The answer", SUCCESSFUL)
             if location.answer.given
             else ("Cannot tell: the best place", FAILED)
         )
+        ellipse = f"{longer:.1f} m along {bearing:.0f}°, {shorter:.1f} m across"
         details = [
             f"{location.answer.mass:.1%} within {location.rule.radius:g} m",
             _position(centre),
-            (
-                f"{place.sigma:.1f} m each way; 90 %: {longer:.1f} m along {bearing:.0f}°, "
-                f"{shorter:.1f} m across"
-            ),
+            f"{place.sigma:.1f} m each way; 90 %: {ellipse}",
             _north(place.heading, place.heading_sigma),
             str(location.cell_id),
         ]
         outline = {"color": colour, "weight": 3, "opacity": 0.9}
         return [
-            ["lines", [[outline, [self.latlon(ring)]]]],
+            ["lines", [[outline, [self.latlon(np.column_stack([x, y]))]]]],
             ["points", PLACE_FIELDS, {}, [[centre, colour, 6, None, name, details]]],
         ]
 

@@ -1,8 +1,7 @@
 """Leaflet and its companions, put into a page so that a map opens without any request.
 
-folium's pages load eleven files from content networks and are blank where there is none. The
-few of them that our maps use are brought when the package is built (``hatch_build.py``, which
-needs ``npm``) into the folder ``assets``; here they replace the links of a finished page. Where
+The files that our maps need are brought into the folder ``assets`` when the package is built
+(``hatch_build.py``, which needs ``npm``); here they replace the links of a finished page. Where
 they were not brought, `available` is false and a map keeps its links.
 """
 
@@ -87,9 +86,8 @@ def available() -> bool:
 def asset_text(name: str) -> str:
     """Return a script or style sheet as it may stand inside a page, without the element around it.
 
-    Images of a style sheet become data URIs, the address of the source map is dropped, and nothing
-    in the text can close the element that it is put into. Raises `InputError` if the package was
-    built without the file.
+    Images of a style sheet become data URIs, and nothing in the text can close the element that it
+    is put into. Raises `InputError` if the package was built without the file.
     """
     files = {asset.name: asset for asset in assets().values() if asset.stands_for}
     if name not in files:

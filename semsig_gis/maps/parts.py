@@ -154,8 +154,7 @@ def finished_map(
     """Add what every map has, last, where the layer control knows all layers.
 
     ``view`` holds places to show at first, at most as close as ``zoom``. The source of what was
-    drawn names whom to credit and what a search finds: cells by number, places by x and y in its
-    CRS.
+    drawn names whom to credit, and the cells and CRS of what a search finds.
     """
     if legend:
         corners = None if view is None else [view.min(axis=0).tolist(), view.max(axis=0).tolist()]
@@ -179,8 +178,7 @@ def finished_map(
 def _area(source: SignatureDatabase | StreetObjects) -> dict[str, Any]:
     """Return where the places of a source are, for the search of the page."""
     low, high = source.xy.min(axis=0), source.xy.max(axis=0)
-    grid = None
-    edge = 0.0
+    grid, edge = None, 0.0
     if isinstance(source, SignatureDatabase):
         edge = source.grid.step
         grid = {

@@ -40,6 +40,7 @@ def quality_tables(report: QualityReport) -> tuple[Table, ...]:
     >>> [table.title for table in quality_tables(quality_report(objects, load))]
     ['Objects by class', 'Rows by layer', 'Place', 'Licences']
     """
+    sides = "west, south, east, north"
     tables = (
         _class_table(report),
         Table(
@@ -70,11 +71,8 @@ def quality_tables(report: QualityReport) -> tuple[Table, ...]:
             ("what", "value"),
             (
                 ("coordinate system", report.crs),
-                ("west, south, east, north, m", ", ".join(f"{edge:.0f}" for edge in report.extent)),
-                (
-                    "west, south, east, north, degrees",
-                    ", ".join(f"{edge:.5f}" for edge in report.extent_degrees),
-                ),
+                (f"{sides}, m", ", ".join(f"{edge:.0f}" for edge in report.extent)),
+                (f"{sides}, degrees", ", ".join(f"{edge:.5f}" for edge in report.extent_degrees)),
             ),
         ),
         Table("Licences", ("licence",), tuple((line,) for line in report.licenses)),

@@ -356,16 +356,10 @@ def _variants(
     """
     folder.mkdir(parents=True, exist_ok=True)
     database = city.database
-    ranges = {
-        radius: folder / f"range-{radius:g}.parquet"
-        for radius in RANGES
-        if radius != database.spec.radius and city.has_store
-    }
-    scales = {
-        levels: folder / f"levels-{levels}.parquet"
-        for levels in SCALES
-        if levels != database.spec.levels
-    }
+    ranges = {one: folder / f"range-{one:g}.parquet" for one in RANGES if city.has_store}
+    scales = {one: folder / f"levels-{one}.parquet" for one in SCALES}
+    ranges.pop(database.spec.radius, None)
+    scales.pop(database.spec.levels, None)
     for radius, path in ranges.items():
         if not path.is_file():
             variant = build_database(
