@@ -101,8 +101,7 @@ def cells_near(
     """Return the columns and rows of every cell whose centre may be within `radius` of a point.
 
     Points, shape (n, 2), and radius are in metres. Cells are distinct, ordered by column, then row.
-    The square around a point is taken, so that some cells see nothing in the end. Raises InputError
-    if the step is so small that there would be too many cells, or they cannot be numbered.
+    The square around a point is taken, so that some cells see nothing in the end.
     """
     require_step(grid, radius)
     reach = math.ceil(radius / grid.step + 0.5)

@@ -97,7 +97,7 @@ def finish_tasks(
     scheduler: str | None = None,
     files: Sequence[Path] = (),
 ) -> dict[_Task, str]:
-    """Do tasks as `run_tasks` does until ten have failed, and return why, in the order of failing.
+    """Do tasks as `run_tasks` does until ten have failed; return why, in the order of failing.
 
     `done` is called with each task that was done and its value.
     """

@@ -36,8 +36,7 @@ def installed_catalogs(*, taken: Collection[str] = ()) -> Mapping[str, Path]:
 def installed_readers(*, taken: Collection[str] = ()) -> Mapping[str, Callable[..., Any]]:
     """Return the names and functions of other packages' readers, sorted by name.
 
-    `taken` are names that are no longer free. Raises SourceError if a name is taken or stands
-    twice. An entry that fails to load or is not a function is left out with a warning.
+    As `installed_catalogs`, but SourceError, and an entry that is not a function is left out.
     """
     return _installed(READERS, _function, taken, SourceError)
 

@@ -34,8 +34,7 @@ class ObjectIndex:
     """An R-tree over points in metres, shape (n, 2).
 
     InputError if there is no point, or one is not finite. The tree is packed in one go and asked
-    for many boxes at once. It belongs to the process and thread that made it: an R-tree of this
-    library pickles to an empty one.
+    for many boxes at once. It belongs to the process and thread that made it.
     """
 
     def __init__(self, xy: NDArray[np.float64]) -> None:
@@ -147,14 +146,11 @@ INDEX_FILES = (*TREE_FILES, NUMBERS_FILE)
 NODE_CAPACITY = 32
 NODE_FILL = 0.5
 PAGE_BYTES = 1024
-
 # An edit takes as long as packing this many points anew.
 POINTS_AN_EDIT = 256
-
 # Three times what an edit makes a tree grow by, and what any edit may.
 EDIT_BYTES = 256
 EDITS_BYTES = 1 << 16
-
 # So few edits are quick in any case.
 FEW_EDITS = 1000
 
@@ -167,9 +163,8 @@ class StoredIndex:
     come and go.
 
     The library writes to the files of a tree even when it only reads from it, and two programs that
-    do so at once destroy it. So the tree is worked on in a copy in the temporary folder of the
-    system, and `save` alone puts it elsewhere. It belongs to the process and thread that opened it,
-    and cannot be pickled: the library would make an empty tree of it without an error.
+    do so at once destroy it. So the tree is worked on in a temporary copy, and `save` alone puts it
+    elsewhere. It belongs to the process and thread that opened it, and cannot be pickled.
     """
 
     def __init__(self, folder: Path, xy: NDArray[np.float64], numbers: NDArray[np.int64]) -> None:
@@ -196,10 +191,7 @@ class StoredIndex:
 
     @classmethod
     def pack(cls, xy: ArrayLike) -> StoredIndex:
-        """Make a tree of finite points in metres, shape (n, 2), in one go.
-
-        InputError if there is no point, or one is not finite, or the temporary folder is full.
-        """
+        """Make a tree of at least one finite point in metres, shape (n, 2), in one go."""
         points = checked_points(xy)
         numbers = np.arange(len(points))
         with _new_folder() as folder:
@@ -212,8 +204,7 @@ class StoredIndex:
         """Open a tree that `save` wrote, over the points in the order in which they were saved.
 
         Whoever keeps the files sees to it that they are whole: the library takes a damaged tree for
-        a small one. InputError if the number of points differs, or the files cannot be read or
-        copied.
+        a small one.
         """
         points = checked_points(xy)
         try:

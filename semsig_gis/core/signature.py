@@ -113,13 +113,9 @@ class Signature:
                 "a signature is one row of types and one of bearings; give lists of one dimension."
             )
             raise InputError(msg)
-        if (
-            self.codes is not None
-            and self.bearings is not None
-            and len(self.codes) != len(self.bearings)
-        ):
+        if len(set(map(len, parts))) > 1:
             msg = (
-                f"{len(self.codes)} types and {len(self.bearings)} bearings were given; "
+                f"{len(parts[0])} types and {len(parts[1])} bearings were given; "
                 "give one bearing for each type, or leave one of the two out."
             )
             raise InputError(msg)

@@ -134,8 +134,7 @@ def fit_shares(features: ArrayLike, shares: ArrayLike) -> ShareFit:
 
     Logistic regression on the products of the features up to the third degree, by Newton's method
     on the log-likelihood less a small penalty on all weights but the constant. So the mean of the
-    curve over the examples is that of the shares. InputError if there is no example, or a number is
-    not finite or out of its range.
+    curve over the examples is that of the shares.
     """
     given = np.asarray(features, dtype=np.float64)
     wanted = np.asarray(shares, dtype=np.float64)

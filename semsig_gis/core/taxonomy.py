@@ -139,8 +139,7 @@ class Taxonomy:
     def with_ranges(self, ranges: Mapping[str, float]) -> Taxonomy:
         """Return a taxonomy in which some classes, by name, are seen from so many metres.
 
-        The others keep the range they have, if any. UnknownNameError where there is no class of a
-        name, CatalogError where a range is not above 0 or too large.
+        The others keep the range they have, if any.
         """
         for name in ranges:
             self.by_name(name)
@@ -179,10 +178,7 @@ class Taxonomy:
         raise self._unknown_symbol(symbol)
 
     def encode(self, symbols: str) -> NDArray[np.uint8]:
-        """Turn symbols such as ``"DDBL"`` into class codes, shape (n,), with `WILDCARD` for ``?``.
-
-        UnknownNameError if a symbol belongs to no class.
-        """
+        """Turn symbols such as ``"DDBL"`` into class codes, shape (n,); ``?`` is `WILDCARD`."""
         codes = {item.symbol: item.code for item in self.classes}
         codes["?"] = WILDCARD
         unknown = next((symbol for symbol in symbols if symbol not in codes), None)

@@ -102,13 +102,12 @@ def candidate_columns(database: SignatureDatabase, cells: NDArray[np.int64]) -> 
 class Ranking:
     """How all cells rank for a query.
 
-    `scores` (n,) has one value a cell, lower is better: distances; or, of the likelihood method,
-    negative log-likelihoods, with the cells of its answer before all others. `best_score` is the
-    distance or negative log-likelihood of the answer. `place` (metres) and `heading` (degrees to
-    add to the bearings of the query) are None where they were not looked for. `chance` is the
-    method's own probability that the answer is within 50 m, `chances` (n,) that of every cell and
-    `region` the rows that hold 90 % of it: NaN and None where it tells none. `seconds` is how long
-    the answer took.
+    `scores` (n,) has one value a cell, lower is better: distances, or negative log-likelihoods,
+    with the cells of the answer before all others; `best_score` is that of the answer. `place`
+    (metres) and `heading` (degrees to add to the bearings of the query) are None where they were
+    not looked for. `chance` is the method's own probability that the answer is within 50 m,
+    `chances` (n,) that of every cell and `region` the rows that hold 90 % of it: NaN and None where
+    it tells none. `seconds` is how long the answer took.
     """
 
     scores: NDArray[np.float32]

@@ -216,10 +216,8 @@ def visible_objects(
     """Yield what is seen from the centres of grid cells, block by block.
 
     The cells are distinct and ordered by column and row. `index` is an R-tree over `objects`,
-    positions in metres; `ranges` tells from how far each object is seen: its visibility range R in
-    metres. Each block is a slice of the cells and the pairs within range (paper, section on
-    semantic signatures) that no building hides, viewpoints counted from the first cell of the
-    block, in any order.
+    positions in metres; `ranges` tells from how far each object is seen, in metres. Each block is a
+    slice of the cells and what is seen from these, viewpoints counted from the first, in any order.
     """
     starts = range(0, len(columns), CELLS_A_BLOCK)
     blocks = [slice(start, min(start + CELLS_A_BLOCK, len(columns))) for start in reversed(starts)]
@@ -247,9 +245,8 @@ def _runs(
 ) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]:
     """Return objects, and the first and the number of the cells of a column that may see each.
 
-    The R-tree is asked which objects are near each tile of cells. Around such an object, the cells
-    of one column that see it follow each other, so that two searches in the list of cells find them
-    all.
+    The R-tree tells which objects are near each tile of cells. The cells of one column that see an
+    object follow each other, so that two searches in the list of cells find them all.
     """
     ids = cell_ids(columns, rows)
     # Tiles, and the corners of the part of them that is in this block.

@@ -144,8 +144,7 @@ class City:
     def columns(self, name: str) -> tuple[pa.Table, dict[str, Any]] | None:
         """Return columns that were put into the database under a name, and their facts.
 
-        The table has ``cell_id``, ascending, and the columns. Raise DatabaseError if the database
-        is missing or damaged, or its parts do not agree on the columns.
+        The table has ``cell_id``, ascending, and the columns; the parts must agree on them.
         """
         files = self.files
         entries = [read_specs(file).get(ADDED, {}).get(name) for file in files]
@@ -163,10 +162,9 @@ class City:
     ) -> None:
         """Put columns into the database, in the place of those that bear this name.
 
-        `columns` has a row for each of `cell_ids`, which ascend and are all cells of the database.
-        `facts` describe the columns, as plain values for JSON. The file, or the folder of parts, is
-        replaced as a whole. Raise DatabaseError if the database is damaged or has other cells, and
-        InputError if it cannot be written; it is unchanged then.
+        `columns` has a row for each of `cell_ids`, which ascend and are all cells of the database;
+        `facts` describe them, as plain values for JSON. The file, or the folder of parts, is
+        replaced as a whole. DatabaseError if it has other cells.
         """
         added = {name: {"columns": columns.column_names, "facts": facts}}
         if not is_folder(self.path):

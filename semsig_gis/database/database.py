@@ -223,11 +223,9 @@ class SignatureDatabase:
 
 
 def join_databases(parts: Sequence[SignatureDatabase]) -> SignatureDatabase:
-    """Join databases of different cells that were made in the same way.
+    """Join databases of different cells that were made in the same way; DatabaseError otherwise.
 
     The cells are ordered by column and row, and licences that stand in several parts appear once.
-    Raise DatabaseError if there is no part, the parts differ in how they were made, or they share a
-    cell.
     """
     if not parts:
         msg = "there is no database to join; give at least one."
@@ -288,8 +286,7 @@ def rows_of_result(
 ) -> NDArray[np.int64]:
     """Return the rows of the cells that a result names, and refuse one of another database.
 
-    Raise InputError if the database lacks one of the cell ids, or if the types seen from a cell are
-    not those of the result. `what` names the kind of result in the message.
+    It has other cell ids or types seen from a cell. `what` names the kind of result.
     """
     cells = np.asarray(ids, np.int64)
     rows = np.searchsorted(database.cell_ids, cells)

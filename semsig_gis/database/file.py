@@ -127,9 +127,8 @@ def open_database(path: str | Path) -> SignatureDatabase:
 def database_of(
     table: pa.Table, specs: dict[str, Any], crs: CRS, *, path: str | Path
 ) -> SignatureDatabase:
-    """Return the database that columns and the values of `database_specs` hold.
+    """Return the database that columns (see `save_database`) and `database_specs` hold.
 
-    The columns are ``cell_id``, ``types``, ``bearings`` and ``distances`` (see `save_database`).
     Raise DatabaseError, which names `path`, if they are damaged or from another version.
     """
     if specs.get("format") != FORMAT:
@@ -330,10 +329,7 @@ def part_name(tile: tuple[int, int]) -> str:
 
 
 def read_manifest(folder: str | Path) -> Manifest:
-    """Read what a database in parts consists of.
-
-    Raise DatabaseError if the folder has no manifest, or it is damaged.
-    """
+    """Read what a database in parts consists of; DatabaseError without a whole manifest."""
     path = Path(folder) / MANIFEST
     try:
         content = json.loads(path.read_text(encoding="utf-8"))
@@ -365,10 +361,7 @@ def read_manifest(folder: str | Path) -> Manifest:
 
 
 def part_files(folder: str | Path) -> tuple[Path, ...]:
-    """Return the part files of a database, ordered by tile, after checking that it is whole.
-
-    Raise DatabaseError if a part is missing or damaged, or a Parquet file is there that is no part.
-    """
+    """Return the part files of a database, ordered by tile; DatabaseError if it is not whole."""
     manifest = read_manifest(folder)
     folder = Path(folder)
     for part in manifest.parts:
@@ -403,10 +396,7 @@ class PartitionedDatabase:
         return self.cells
 
     def parts(self) -> Iterator[SignatureDatabase]:
-        """Open the parts one after the other.
-
-        Raise DatabaseError if a part is damaged, or was made in another way than the first.
-        """
+        """Open the parts one after the other; DatabaseError where they were made differently."""
         first = None
         for file in self.files:
             part = open_database(file)

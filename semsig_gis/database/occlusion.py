@@ -77,8 +77,8 @@ class Footprints:
     def interiors(self) -> NDArray[np.object_]:
         """What is deeper inside the buildings than the tolerance, block by block of houses.
 
-        The depth is counted from the outline of the buildings together, so that there is no gap
-        to look through where two of them share a wall, or are less than ten centimetres apart.
+        The depth is from their common outline, so that there is no gap to look through where two of
+        them share a wall, or are less than ten centimetres apart.
         """
         first, second = self._tree.query(self._widened, predicate="intersects")
         block = _joined(first, second, len(self._widened))
@@ -227,10 +227,9 @@ def _joined(first: NDArray[np.int64], second: NDArray[np.int64], size: int) -> N
 def buildings_near(
     polygons: NDArray[np.object_], places: NDArray[np.float64], *, distance: float
 ) -> NDArray[np.int64]:
-    """Return the rows of the buildings around some places, with all that they are joined to.
+    """Return the rows of the buildings around some places, ascending; `distance` is in metres.
 
-    The rows ascend; `distance` is in metres. Joined buildings are needed because occlusion treats a
-    block of houses as one shape, which comes out the same only from all of them.
+    All that they are joined to are among them: occlusion treats a block of houses as one shape.
     """
     tree = shapely.STRtree(polygons)
     chosen = np.zeros(len(polygons), bool)

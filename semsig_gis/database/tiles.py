@@ -139,8 +139,9 @@ def build_tiles(
 ) -> Manifest:
     """Build a signature database in tiles: a folder that is opened like a single file.
 
-    An interrupted run leaves its tiles in ``OUT.partial``, and the same command goes on from there,
-    if the specs are the same and the input files have the same content (by SHA-256).
+    The part files are the same whatever the number of workers. An interrupted run leaves its tiles
+    in ``OUT.partial``, and the same command goes on from there, if the specs are the same and the
+    input files have the same content (by SHA-256).
 
     Parameters
     ----------
@@ -164,11 +165,6 @@ def build_tiles(
         Called with the number of tiles done and in all.
     tell : callable, optional
         Called with a remark for the user, as about a run that is taken up again.
-
-    Returns
-    -------
-    Manifest
-        The parts; their files are the same whatever the number of workers.
 
     Raises
     ------
@@ -200,49 +196,28 @@ def build_tiles(
         buildings=buildings,
         streets=streets,
     )
+    paths = [plan.folder, plan.objects, plan.buildings, plan.streets]
     try:
-        parts = _run(plan, workers, scheduler, progress, tell)
+        tiles = touched_tiles(plan.objects, grid=plan.grid, side=plan.side, reach=plan.reach)
+        done = finished_tiles(plan.folder, tiles)
+        if done and tell is not None:
+            tell(f"an unfinished run has left {len(done):,} of {len(tiles):,} tiles; it goes on")
+
+        def note_part(tile: Tile, part: Part | None) -> None:
+            done[tile] = part
+            if progress is not None:
+                progress(len(done), len(tiles))
+
+        failed = finish_tasks(
+            partial(build_tile, plan),
+            [one for one in tiles if one not in done],
+            done=note_part,
+            workers=workers,
+            scheduler=scheduler,
+            files=[path for path in paths if path is not None],
+        )
     finally:
         RUN.abandon(plan.folder)
-    if not parts:
-        shutil.rmtree(plan.folder, ignore_errors=True)
-        msg = (
-            f"no cell sees an object of {objects}; make the step ({plan.grid.step:g} m) smaller or "
-            f"the visibility range ({plan.spec.radius:g} m) larger, or look at the area, the "
-            "streets and the buildings."
-        )
-        raise EmptyResultError(msg)
-    return publish(plan.folder, parts)
-
-
-def _run(
-    plan: TilePlan,
-    workers: int,
-    scheduler: str | None,
-    progress: Callable[[int, int], None] | None,
-    tell: Callable[[str], None] | None,
-) -> list[Part]:
-    """Build the tiles that are not done yet, and return the parts of all."""
-    tiles = touched_tiles(plan.objects, grid=plan.grid, side=plan.side, reach=plan.reach)
-    done = finished_tiles(plan.folder, tiles)
-    if done and tell is not None:
-        tell(f"an unfinished run has left {len(done):,} of {len(tiles):,} tiles; it goes on")
-    todo = [one for one in tiles if one not in done]
-    paths = [plan.folder, plan.objects, plan.buildings, plan.streets]
-
-    def note_part(tile: Tile, part: Part | None) -> None:
-        done[tile] = part
-        if progress is not None:
-            progress(len(done), len(tiles))
-
-    failed = finish_tasks(
-        partial(build_tile, plan),
-        todo,
-        done=note_part,
-        workers=workers,
-        scheduler=scheduler,
-        files=[path for path in paths if path is not None],
-    )
     if failed:
         first = min(failed)
         others = f" and {len(failed) - 1} more" if len(failed) > 1 else ""
@@ -252,7 +227,16 @@ def _run(
             "again."
         )
         raise DatabaseError(msg)
-    return sorted(part for part in done.values() if part is not None)
+    parts = sorted(part for part in done.values() if part is not None)
+    if not parts:
+        shutil.rmtree(plan.folder, ignore_errors=True)
+        msg = (
+            f"no cell sees an object of {objects}; make the step ({plan.grid.step:g} m) smaller or "
+            f"the visibility range ({plan.spec.radius:g} m) larger, or look at the area, the "
+            "streets and the buildings."
+        )
+        raise EmptyResultError(msg)
+    return publish(plan.folder, parts)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -39,10 +39,9 @@ if TYPE_CHECKING:
 class UpdateReport:
     """How far a city has drifted.
 
-    `replaced` layers were loaded anew, `kept` ones were not. The other numbers count cells:
-    `recomputed` ones lie within range of a change, whether they see it or not; `changed` ones have
-    another signature; `appeared` ones see something for the first time, and `vanished` ones nothing
-    any more.
+    `replaced` layers were loaded anew, `kept` ones were not. Of the cells, `recomputed` ones lie
+    within range of a change, seen or not; `changed` ones have another signature; `appeared` ones
+    see something for the first time, and `vanished` ones nothing any more.
     """
 
     classes: tuple[ClassChange, ...]
@@ -85,8 +84,7 @@ class CellChanges:
 def compare_cells(before: SignatureDatabase, after: SignatureDatabase) -> CellChanges:
     """Compare the cells of two databases of one city, those of each kind in their order.
 
-    Raise DatabaseError if the databases were not made in the same way, or differ in their longest
-    visibility range.
+    Raise DatabaseError if the databases were not made in the same way.
     """
     require_same(before, after, classes=False)
     _, first, second = np.intersect1d(

@@ -36,8 +36,7 @@ class ViewpointSpec:
         Every cell, those whose centre is outside the building footprints, or those whose centre
         is near the centre line of a street.
     width : float, default 8
-        With ``"streets"``, how far from a centre line is near, in metres: half the width of a
-        street.
+        How far from a centre line is near, in metres: half the width of a street.
     area : shapely.Polygon or shapely.MultiPolygon, optional
         In the CRS of the objects; only cells whose centre is in it count, in every mode.
 
@@ -107,8 +106,7 @@ def choose_viewpoints(
     A centre on the outline of a building is none; one on the edge of a street or of the area is.
     The footprints are needed for ``"outdoor"``, and the centre lines in metres for ``"streets"``;
     missing and empty lines are left out. `widths` holds half the width of each street in metres,
-    not finite where ``spec.width`` holds. Raise InputError if what the mode needs is missing, or
-    the streets are not lines.
+    not finite where ``spec.width`` holds.
     """
     require_surroundings(spec, footprints, streets)
     places = grid.viewpoints(columns, rows)

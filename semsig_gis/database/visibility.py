@@ -76,11 +76,9 @@ def sightings(
 
 
 def clockwise_order(seen: Sightings, codes: NDArray[np.uint8]) -> NDArray[np.int64]:
-    """Return the order in which a clockwise sweep from north meets the objects.
+    """Return the order of sightings by viewpoint, then bearing, distance and class code.
 
-    The permutation sorts p sightings by viewpoint, then bearing; on the same bearing the nearer
-    object comes first, then the lower class code. `codes` holds the class of every object, not
-    sighting.
+    `codes` holds the class of every object, not sighting.
     """
     viewpoint, bearing = seen.viewpoint, seen.bearing
     # One number for each pair, the viewpoint in front and the pair itself behind; plain numbers
