@@ -204,8 +204,8 @@ def test_truncated_shapefile_loses_only_its_end(
     assert counts(layer) == (89, kept, 89 - kept)
     assert len(layer.errors) == 10
     assert layer.errors[0].startswith(error)
-    zipped = read(pack(fountains.parent, tmp_path / "cut.zip"), id_field="ID")
-    assert counts(zipped) == counts(layer)
+    if suffix == ".shp":
+        assert counts(read(pack(fountains.parent, tmp_path / "cut.zip"))) == counts(layer)
 
 
 def test_corrupt_records_are_counted(fountains: Path) -> None:
