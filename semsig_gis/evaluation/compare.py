@@ -33,8 +33,7 @@ def compare_evaluations(
     Parameters
     ----------
     first, second : Evaluation
-        Evaluations with queries from the same places, number by number. The methods may differ,
-        the databases, or what happened to the queries.
+        Evaluations with queries from the same places, number by number.
     resamples : int, default 2000
         How often the queries are drawn again.
     seed : int, default 0
@@ -43,19 +42,15 @@ def compare_evaluations(
     Returns
     -------
     DataFrame
-        One row a figure that both have: ``figure``, ``first``, ``second``, ``difference`` (the
-        second less the first), ``low`` and ``high`` (its 95 % interval). Figures are those of
-        `reports.evaluation.experiment_figures`; NaN where one of them is infinite.
+        One row a figure of `reports.evaluation.experiment_figures` that both have: ``figure``,
+        ``first``, ``second``, ``difference`` (the second less the first), ``low`` and ``high`` (its
+        95 % interval); NaN where one of them is infinite. The bootstrap is by pairs, so that what
+        is hard for both methods does not blur the difference.
 
     Raises
     ------
     InputError
         If the queries are not from the same places.
-
-    Notes
-    -----
-    The bootstrap by percentiles, in pairs: whole queries are drawn with replacement, with both of
-    their answers, so that what is hard for both methods does not blur the difference.
 
     Examples
     --------
@@ -114,8 +109,8 @@ def common_cases(
 ) -> dict[str, tuple[Evaluation, Evaluation]]:
     """Return the evaluations of two results that have the same name.
 
-    Of two single evaluations, return these, whatever they are called. Results are those of
-    `experiments.run.open_results`. Raises InputError if no name is common.
+    Of two single evaluations, return these, whatever they are called. Raises InputError if no name
+    is common.
     """
     if len(first) == len(second) == 1:
         (name, one), (other_name, other) = *first.items(), *second.items()

@@ -80,11 +80,10 @@ def evaluate(
     queries : int, default 500
         How many cells to draw as queries, without replacement; 1 to the number of cells.
     method : Method or LikelihoodIndex, optional
-        What ranks the cells: distances, or the likelihood with this index of the database;
-        metric fusion of two edit distances by default.
+        What ranks the cells: distances (metric fusion of two edit distances by default), or the
+        likelihood with this index of the database.
     distortion : str, distortion or sequence of distortions, default "medium"
-        What happens to the signatures: one of the paper's levels, or any of `queries.chain`,
-        as text or as values.
+        What happens to the signatures: one of the paper's levels, or any of `queries.chain`.
     top : int, default 1
         How many best candidates count (t); 1 to the number of cells.
     seed : int, default 0
@@ -92,11 +91,6 @@ def evaluate(
         the number of queries.
     progress : callable, optional
         Called with the number of queries done and the number of queries.
-
-    Returns
-    -------
-    Evaluation
-        One row a query, the settings and the mean time a query.
 
     Raises
     ------
@@ -108,12 +102,9 @@ def evaluate(
     Notes
     -----
     Paper, section 4.2: the error is the distance from the true viewpoint to the nearest of the
-    best t candidates; the recall looks at the rank of the true cell among all cells. False
-    objects have the classes that occur in the database.
-
-    The likelihood method answers with the place around which most of the chance lies. That comes
-    first; then follow the other cells, likeliest first. Queries from anywhere, and several
-    methods on the same queries, are for `evaluation.spec`.
+    best t candidates; the recall looks at the rank of the true cell among all cells. The
+    likelihood method's first candidate is the place around which most of the chance lies; the
+    other cells follow, likeliest first.
 
     Examples
     --------
@@ -151,9 +142,9 @@ def score_queries(
 ) -> dict[int, list[dict[str, Any]]]:
     """Let a method answer queries of known places, and score the answers.
 
-    The result has, for each of `tops` (how many best candidates count), one row of outcomes a
-    query, for `scored_tables`. `memo` keeps distances of these queries that other methods have
-    needed; `progress` is called with the number of queries done and in all.
+    Return, for each of `tops` (how many best candidates count), one row of outcomes a query. `memo`
+    keeps distances of these queries that other methods have needed; `progress` is called with the
+    number of queries done and in all.
     """
     views = [query.asked.signature for query in queries if len(query.asked)]
     rankings = locator.rankings(views, memo=memo)
@@ -180,8 +171,8 @@ def scored_tables(
 ) -> dict[int, pd.DataFrame]:
     """Return for each number of best candidates a table of what was asked and found.
 
-    Each has one row a query: the columns of `Evaluation.queries` without ``geometry``, but with
-    ``x``, ``y`` and ``seconds``, which is NaN where nothing was asked.
+    One row a query: the columns of `Evaluation.queries`, but for ``geometry``, and ``x``, ``y`` and
+    ``seconds``, which is NaN where nothing was asked.
     """
     about = _query_table(database, queries)
     scored = {}
@@ -204,8 +195,8 @@ def make_evaluation(
 ) -> Evaluation:
     """Return the evaluation of all queries that `scored_tables` gave.
 
-    `top` is how many best candidates counted; `city` the city that was looked at, if not the one
-    that was searched; `file_bytes` the size of the files of the database.
+    `city` is the city that was looked at, if not the one that was searched; `file_bytes` the size
+    of the files of the database.
     """
     points = gpd.points_from_xy(scored["x"], scored["y"], crs=database.crs)
     seconds = scored["seconds"].to_numpy(dtype=np.float64)

@@ -33,22 +33,12 @@ QUERIES, SUMMARY, TIMING = "queries.parquet", "evaluation.json", "timing.json"
 
 
 def save_evaluation(evaluation: Evaluation, folder: str | Path) -> None:
-    """Write an evaluation to a folder.
+    """Write an evaluation to a folder, made when missing.
 
-    Parameters
-    ----------
-    evaluation : Evaluation
-        What to write.
-    folder : str or Path
-        Folder to write to, made when missing. It gets ``queries.parquet`` (GeoParquet, with the
-        settings in its metadata, so that it is enough to load and redraw everything),
-        ``evaluation.json`` (`Evaluation.summary`, for reading) and ``timing.json``, the one file
-        that differs when the same is done again.
-
-    Raises
-    ------
-    InputError
-        If the folder cannot be written to.
+    It gets ``queries.parquet`` (GeoParquet with the settings in its metadata, enough to load and
+    redraw everything), ``evaluation.json`` (`Evaluation.summary`, for reading) and ``timing.json``,
+    the one file that differs when the same is done again. Raises InputError if the folder cannot be
+    written to.
     """
     plain = pd.DataFrame(evaluation.queries.drop(columns="geometry"))
     points = evaluation.queries.geometry
@@ -72,22 +62,10 @@ def save_evaluation(evaluation: Evaluation, folder: str | Path) -> None:
 
 
 def open_evaluation(folder: str | Path) -> Evaluation:
-    """Read an evaluation that `save_evaluation` wrote.
+    """Read an evaluation that `save_evaluation` wrote to a folder.
 
-    Parameters
-    ----------
-    folder : str or Path
-        Folder with ``queries.parquet``; without ``timing.json`` the time is not known.
-
-    Returns
-    -------
-    Evaluation
-        The same evaluation.
-
-    Raises
-    ------
-    DatabaseError
-        If the file is missing, damaged or of another kind.
+    Without ``timing.json`` the time is not known. Raises DatabaseError if ``queries.parquet`` is
+    missing, damaged or of another kind.
     """
     file = Path(folder) / QUERIES
     table, specs, crs = read_geoparquet(file, kind=KIND, columns=[*QUERY_COLUMNS, "geometry"])
@@ -118,8 +96,7 @@ def open_evaluation(folder: str | Path) -> Evaluation:
 def settings_to_dict(method: AnyMethod, asked: QuerySpec) -> dict[str, Any]:
     """Return a method and what it was asked as plain values for JSON.
 
-    Keys are ``method``, ``asked`` and ``noises``: all noise models in full, so that nothing else is
-    needed to read the texts. Raises InputError as `used_noises` does.
+    The noise models are among them in full. Raises InputError as `used_noises` does.
     """
     noises = used_noises([method], asked.distortions)
     return {

@@ -23,24 +23,9 @@ AnyMethod = Method | LikelihoodMethod
 
 
 def parse_method(text: str, *, noises: Mapping[str, Noise] = NOISES) -> AnyMethod:
-    """Read a method of either kind from text.
+    """Read a method of either kind from text, as `Method.parse` or `LikelihoodMethod.parse` does.
 
-    Parameters
-    ----------
-    text : str
-        What `Method.parse` or `LikelihoodMethod.parse` reads.
-    noises : mapping of str to Noise, optional
-        The noise models by name.
-
-    Returns
-    -------
-    Method or LikelihoodMethod
-        The method.
-
-    Raises
-    ------
-    SemsigError
-        If the text cannot be read.
+    `noises` are the noise models by name. Raises SemsigError if the text cannot be read.
 
     Examples
     --------

@@ -60,11 +60,7 @@ QUERY_COLUMNS = (
 
 
 def machine() -> dict[str, Any]:
-    """Return what decides how long things take here.
-
-    Keys are ``system``, ``processor``, ``processors`` (how many there are) and ``memory_gb`` (None
-    where the system does not tell).
-    """
+    """Return what decides how long things take here; ``memory_gb`` may be None."""
     pages = "SC_PHYS_PAGES" in getattr(os, "sysconf_names", ())
     memory = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES") / 1e9 if pages else None
     return {
@@ -85,18 +81,17 @@ class Evaluation:
         One row a query, in the database's CRS; `geometry` is the true place.
 
         - ``seed``, ``number``: its seed, and its number from 0;
-        - ``cell``, ``cell_id``: row number in the database and id of the cell of that place; the
-          row number is -1 where the database has no such cell;
-        - ``types``: the symbols that the database says are seen there; ``length``: how many
-          objects really are;
+        - ``cell``, ``cell_id``: row number in the database (-1 where it has no such cell) and id of
+          the cell of that place;
+        - ``types``, ``length``: symbols that the database says are seen there, and how many objects
+          really are;
         - ``type_group``, ``angle_group``: cells with its type and with its angle sequence, 0
           where the database has no such cell;
         - ``query_types``, ``query_bearings``, ``query_length``: what was asked: symbols, degrees
-          (text, comma-separated) and how many there are; ``heading``: degrees to add to the
-          bearings to have them from true north;
-        - ``best_cell_id``, ``best_x``, ``best_y``, ``distance``: the best candidate (of the
-          likelihood method its answer, refined or not, and the negative log-likelihood), drawn
-          from the tied; missing when unlocalized;
+          (text, comma-separated) and how many there are (none: the query is *unlocalized*);
+          ``heading``: degrees to add to the bearings to have them from true north;
+        - ``best_cell_id``, ``best_x``, ``best_y``, ``distance``: the best candidate, drawn from the
+          tied, and its distance or negative log-likelihood; missing when unlocalized;
         - ``tied``: cells that share the best score, 0 when unlocalized; ``next_cell_ids``: the
           four best of the other cells (text, comma-separated), equals in the order of the cells;
         - ``error_m``: expected smallest error among the top t in metres, infinite when
@@ -106,10 +101,8 @@ class Evaluation:
         - ``rank_low``, ``rank_high``: first and last rank that ties allow for the true cell, from
           1; both the number of cells when unlocalized or when the database has no such cell;
         - ``chance``: by the likelihood method's own account, that its answer is right, within
-          50 m; missing for other methods and when unlocalized, as the next two;
-        - ``right``: probability that its answer was right;
-        - ``in_region``: probability that its region of 90 % held the true cell; between 0 and 1
-          only where the true cell ties with the last of the region;
+          50 m; ``right``: probability that it was; ``in_region``: probability that its region of
+          90 % held the true cell. Missing for other methods and when unlocalized;
         - ``heading_error``: by how many degrees the heading was off, where it was looked for.
     method : Method or LikelihoodMethod
         What ranked the cells.
@@ -122,16 +115,12 @@ class Evaluation:
     seconds_per_query : float
         Mean time of an answer, without distortion and statistics; NaN where it is not known.
     database : mapping
-        What was searched, as plain values: ``cells``, ``mean_length``, ``step_m``, ``origin``,
-        ``radius_m``, ``levels``, ``crs``, ``version``, ``mb_per_km2`` (or None).
+        What was searched: ``cells``, ``mean_length``, ``step_m``, ``origin``, ``radius_m``,
+        ``levels``, ``crs``, ``version``, ``mb_per_km2`` (or None).
     versions : mapping
         Versions of the software by name.
     machine : mapping
-        What it ran on: ``system``, ``processor``, ``processors`` and ``memory_gb``.
-
-    Notes
-    -----
-    A query is unlocalized when the distortion left nothing of it.
+        What it ran on: ``system``, ``processor``, ``processors`` and ``memory_gb`` (or None).
 
     Examples
     --------
@@ -178,10 +167,9 @@ class Evaluation:
         return int((self.queries["query_length"] == 0).sum())
 
     def rows_in(self, database: SignatureDatabase) -> NDArray[np.int64]:
-        """Return the row of the true cell of each query in the database that was searched.
+        """Return the row of each query's true cell in the database that was searched, or -1.
 
-        It is -1 where the database has no such cell. Raises InputError if another database was
-        searched.
+        Raises InputError if another database was searched.
         """
         if len(database) != self.database["cells"]:
             msg = (
@@ -200,10 +188,9 @@ class Evaluation:
         return rows
 
     def cdf(self, thresholds: Sequence[float] = THRESHOLDS) -> NDArray[np.float64]:
-        """Return the share of queries whose error is at most each of some thresholds in metres.
+        """Return the share of queries with an error of at most each of some `THRESHOLDS` in metres.
 
-        It is the mean probability over the queries. Raises InputError for a threshold that is not
-        one of `THRESHOLDS`, for which probabilities are kept.
+        It is the mean probability over the queries. Raises InputError for another threshold.
         """
         for value in thresholds:
             if value not in THRESHOLDS:
@@ -216,8 +203,8 @@ class Evaluation:
     def recall(self, percent: float) -> float:
         """Return the share of queries whose true cell ranks in the top per cent of the cells.
 
-        The number of cells kept is rounded down, and the rank of the true cell is uniform among the
-        cells it ties with. Raises InputError unless 0 < percent <= 100.
+        Rounded down, and of tied cells each rank is equally likely. Raises InputError unless
+        0 < percent <= 100.
         """
         ranks = self.queries["rank_low"], self.queries["rank_high"]
         chances = expected_recall(*ranks, cells=self.database["cells"], percent=percent)
@@ -236,10 +223,9 @@ class Evaluation:
         return self._by_range("length", LENGTHS, label="length")
 
     def by_ambiguity(self) -> pd.DataFrame:
-        """Return the figures by how many cells have the types of the true one.
+        """Return the figures by how many cells have the types of the true one, as `by_length`.
 
-        As `by_length`, with ``cells_alike`` (text), which is ``"0"`` in a first row where some true
-        cells are not in the database.
+        ``cells_alike`` is ``"0"`` in a first row where some true cells are not in the database.
         """
         return self._by_range("type_group", AMBIGUITIES, label="cells_alike")
 
@@ -249,11 +235,10 @@ class Evaluation:
         return grouped_means(self.figures, labels, by=label, order=order)
 
     def by_district(self, districts: gpd.GeoDataFrame, name: str) -> pd.DataFrame:
-        """Return the figures by the district that was seen.
+        """Return the figures, as `by_length`, by the ``district`` that was seen.
 
-        Districts are polygons in any CRS, named by the column `name`. One row a district with
-        queries: ``district`` (``elsewhere`` for those in none), ``n``, the figures, ``p50_low`` and
-        ``p50_high``. Raises InputError if there is no such column.
+        Districts are polygons in any CRS, named by the column `name`; those without queries are
+        left out, and places in none are ``elsewhere``. InputError if there is no such column.
         """
         labels = district_labels(self.queries, districts, name)
         order = [*dict.fromkeys(districts[name].astype(str)), ELSEWHERE]
@@ -263,10 +248,9 @@ class Evaluation:
     def answers(self) -> dict[str, float]:
         """Return how the likelihood method answers and declines; nothing for other methods.
 
-        ``coverage`` is the share of the queries that are answered, those whose answer is right with
-        a chance that `likelihood.answer_rule.DEFAULT_RULE` asks for; ``precision`` the share of
-        these answers that are right; and ``in_region`` the share of the regions of 90 % that hold
-        the true cell. NaN where there is no query to tell.
+        ``coverage`` is the share of queries that `likelihood.answer_rule.DEFAULT_RULE` answers,
+        ``precision`` the share of answers that are right, ``in_region`` the share of regions of
+        90 % that hold the true cell; NaN where there is no query to tell.
         """
         if self.method.noise is None:
             return {}
@@ -287,8 +271,7 @@ class Evaluation:
     def summary(self) -> dict[str, Any]:
         """Return ``settings``, ``database``, ``results``, ``versions`` and ``timing`` for JSON.
 
-        All but the last are the same whenever it is repeated. None stands for an infinite number,
-        and for a figure where there is no query to tell.
+        All but the last are the same whenever it is repeated. None stands for infinity and NaN.
         """
         errors = self.queries["error_m"].to_numpy(dtype=np.float64)
         turns = self.queries["heading_error"].to_numpy(dtype=np.float64)

@@ -40,7 +40,7 @@ DISTRICT_KEYS = {"file": str, "name": str}
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Districts:
-    """Polygons of any vector `file` by which figures are told; the field `name` names them."""
+    """Polygons of a vector `file` by which figures are told; the field `name` names them."""
 
     file: str
     name: str
@@ -80,10 +80,9 @@ class ExperimentSpec:
     seeds : tuple of int, default (0,)
         Seeds of all chances.
     seen_from : {"cells", "anywhere"}, default "cells"
-        Where queries are seen from (see `queries.draw`).
+        Where queries are seen from (see `QuerySpec`).
     city : str, optional
-        File of the database of the city that is looked at, if it is another one than that which
-        is searched: the same city at another date, say.
+        File of the database of the city that is looked at, if another than is searched.
     top : tuple of int, default (1,)
         Numbers of best candidates that count (t).
     districts : Districts, optional
@@ -234,22 +233,9 @@ def parse_experiment(
 
 
 def open_experiment_spec(path: str | Path) -> ExperimentSpec:
-    """Read an experiment from a TOML file.
+    """Read an experiment from a TOML file; files that it names are looked for beside it.
 
-    Parameters
-    ----------
-    path : str or Path
-        The file; files that it names are looked for beside it.
-
-    Returns
-    -------
-    ExperimentSpec
-        The experiment.
-
-    Raises
-    ------
-    InputError
-        If the file cannot be read, or does not hold an experiment.
+    Raises InputError if the file cannot be read, or does not hold an experiment.
     """
     file = Path(path)
     try:

@@ -56,12 +56,12 @@ class IdentifiabilityCheck:
     found : float
         Share of them whose best place was within the radius.
     correlations : mapping of str to float
-        Rank correlation (Spearman's) of a score of the cells with success, by score: ``found``
-        and ``near`` are chances of `Identifiability`; for comparison ``length``, the number of
-        objects, and ``type_group``, how few cells have the same types. NaN where there is none.
+        Rank correlation (Spearman's) with success by score of the cell: ``found`` and ``near`` of
+        `Identifiability`; for comparison ``length``, the number of objects, and ``type_group``, how
+        few cells have the same types. NaN where there is none.
     attainable : float
-        What the correlation of ``found`` would be if it were every cell's true chance. Success
-        is yes or no, so that it is below 1.
+        The correlation of ``found`` if it were every cell's true chance; below 1, as success is yes
+        or no.
     bins : tuple of ChanceBin
         The tenths of ``found`` that have queries.
     """
@@ -110,11 +110,6 @@ def check_identifiability(
         How many queries are worked on at once.
     progress : callable, optional
         Called with the number of queries done and in all.
-
-    Returns
-    -------
-    IdentifiabilityCheck
-        Correlations and calibration.
 
     Raises
     ------

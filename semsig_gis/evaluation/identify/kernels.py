@@ -137,12 +137,7 @@ def compare_signatures(  # noqa: C901, PLR0915, PLR0917 - a kernel takes no keyw
     `constants` (n,) is what each cell adds whatever the signature. Ratios of likelihoods are taken
     to the power `temperature`. `ids` (n,) are the rising numbers of the cells, `places` (n, 2)
     their columns and rows, `circle` (a, 2) that of `cell_circle`, and `limit` its squared radius in
-    cells.
-
-    It fills `near` and `far` (c,) with the sums of these powers inside and outside the circle;
-    `like` (c, k) with the likest cells outside it whose own circles do not overlap, -1 where there
-    are no more; and `share` (c, k) with the sums in their circles, without what is also in the
-    cell's own.
+    cells. It fills `near`, `far` (c,), `like` and `share` (c, k), which is `Lookalikes`, unsorted.
     """
     count = len(constants)
     scores = np.empty(count, np.float32)
@@ -234,8 +229,7 @@ def compare_without(  # noqa: PLR0917 - a kernel takes no keywords
 
     As `compare_signatures`, but `kinds` (m,) has the class row of each entry, and `constants`
     (k + 1, n) is for all classes first, then without each. `sample` (d,) are the rising row numbers
-    of the others, `sampled` (s, d) their part of `flat`. It fills `far` (c, k + 1) with the sums of
-    the powers outside the circle.
+    of the others, `sampled` (s, d) their part of `flat`. It fills `far` (c, k + 1).
     """
     count = len(sample)
     factor = np.float32(temperature * _OCTAVES_A_NAT)

@@ -38,11 +38,10 @@ class Lookalikes:
     """How like other cells are to each of c cells.
 
     `near` (c,) is the sum, over the cells in the circle around each cell, of the likelihood of its
-    signature there over that in the cell itself, to the power of the temperature; the cell itself
-    counts 1. `far` (c,) is the same for all other cells. `cells` (c, k) are row numbers of the
-    likest cells outside the circle whose own circles do not overlap, by falling sum, -1 where there
-    are no more; `sums` (c, k) is the sum over the circle of each, without what is also in the
-    circle of the compared cell.
+    signature there over that in the cell itself, to the power of the temperature; `far` (c,) is the
+    same for all other cells. `cells` (c, k) are row numbers of the likest cells outside the circle
+    whose own circles do not overlap, by falling sum, -1 where there are no more; `sums` (c, k) is
+    the sum over the circle of each, without what is also in the circle of the compared cell.
     """
 
     near: NDArray[np.float64]
@@ -64,10 +63,7 @@ def cell_circle(radius: float, step: float) -> NDArray[np.int64]:
 
 
 def city_extent(database: SignatureDatabase) -> float:
-    """Return a distance in metres within which all cells are from each other.
-
-    A larger radius finds nothing more, but takes longer.
-    """
+    """Return metres within which all cells are from each other; a larger radius only costs time."""
     sides = np.ptp(database.columns), np.ptp(database.rows)
     return database.grid.step * math.ceil(math.hypot(*sides))
 
@@ -82,14 +78,12 @@ def find_lookalikes(
     threads: int = 1,
     progress: Callable[[int, int], None] | None = None,
 ) -> Lookalikes:
-    """Compare cells with all others.
+    """Compare cells (row numbers, all by default) with all others, and name the likest `places`.
 
-    `cells` are row numbers, all by default; `places` is how many lookalikes to name for each.
     `temperature` (above 0) is the power of the ratios of likelihoods: 1 for a query that is just
     the signature of the cell, less for one that is spoiled. `radius` is what counts as near, in
-    metres. The time grows with the square of the number of cells. A ratio beyond 2 to the power of
-    100, or below its inverse, counts as that. Raises InputError if the temperature or the radius is
-    out of range.
+    metres. A ratio beyond 2 to the power of 100, or below its inverse, counts as that. Raises
+    InputError if the temperature or the radius is out of range.
     """
     from semsig_gis.evaluation.identify.kernels import compare_signatures  # noqa: PLC0415 - numba loads slowly
 
@@ -149,11 +143,10 @@ def compare_without_classes(
 ) -> NDArray[np.float64]:
     """Compare cells with a sample of the others as if a class were not published.
 
-    Parameters are as in `find_lookalikes`; `seed` draws the sample of `SAMPLE` cells. The result
-    (c, k) is by how much the natural logarithm of `Lookalikes.far` would rise without each class
-    that occurs, in the order of ``index.table.codes``. The objects of the class and the detections
-    that bear its name are left out; that some of the objects are detected under another name is
-    neglected.
+    Parameters are as in `find_lookalikes`; `seed` draws the sample. The result (c, k) is by how
+    much the natural logarithm of `Lookalikes.far` would rise without each class that occurs, in the
+    order of ``index.table.codes``: without its objects and the detections that bear its name. That
+    some of the objects are detected under another name is neglected.
     """
     from semsig_gis.evaluation.identify.kernels import compare_without  # noqa: PLC0415
 

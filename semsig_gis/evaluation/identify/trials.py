@@ -36,10 +36,10 @@ class Trials:
     """What came of simulated queries, arrays of one item a query.
 
     `cells` has row numbers of the true cells. The answer gave the chance `itself` to the true cell
-    and `near` to all cells near it, itself among them; `found` tells whether the best place is
-    near, `bits` the entropy of the chances of all cells. `lean` is the mean, by these chances, of
-    the logarithm of the likelihood of the true cell's own signature in a cell over that in the true
-    one; NaN where nothing was detected.
+    and `near` to all cells near it; `found` tells whether the best place is near, `bits` the
+    entropy of the chances of all cells. `lean` is the mean, by these chances, of the logarithm of
+    the likelihood of the true cell's own signature in a cell over that in the true one; NaN where
+    nothing was detected.
     """
 
     cells: NDArray[np.int64]
@@ -161,21 +161,9 @@ def _outcome(
 def leave_class_out(
     database: SignatureDatabase, code: int
 ) -> tuple[SignatureDatabase, NDArray[np.int64]]:
-    """Return a database without the objects of a class.
+    """Return a database without the objects of a class, given by code, and rows of the cells in it.
 
-    Parameters
-    ----------
-    database : SignatureDatabase
-        The cells.
-    code : int
-        Code of the class.
-
-    Returns
-    -------
-    database : SignatureDatabase
-        The cells that see other objects, too, and these objects; perhaps none.
-    rows : ndarray of int64, shape (n,)
-        For each cell of the given database, its row in the new one; -1 where it is not there.
+    Cells that see nothing else are left out, and their rows are -1.
 
     Examples
     --------
@@ -210,12 +198,10 @@ def try_without_classes(
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Ask simulated queries once more for each class, as if it had not been published.
 
-    `cells` (m,) are row numbers of the true cells, and the queries those of
-    `try_cells` with the same seed. The results (m, k) are the chance given to the
-    cells within `radius` metres of the true one, and the entropy in bits that is left, without each
-    class, in the order of ``index.table.codes``. Detector and street stay the same: the database
-    has no objects of the class, and detections of its name are dropped. A cell that sees nothing
-    else cannot be found: no chance, and all bits are left.
+    The queries are those of `try_cells` with the same `cells` (m,) and seed. The results (m, k) are
+    `Trials.near` and `Trials.bits` without each class, in the order of ``index.table.codes``. The
+    database has no objects of the class, and detections of its name are dropped. A cell that sees
+    nothing else cannot be found: no chance, and all bits are left.
     """
     codes = index.table.codes.tolist()
     queries = list(draw_trials(index, cells, seed=seed))
