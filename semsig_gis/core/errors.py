@@ -10,7 +10,17 @@ if TYPE_CHECKING:
 
 
 class SemsigError(Exception):
-    """Root of the package's errors: the message is one plain sentence for the user."""
+    """Root of the package's errors: the message is one plain sentence for the user.
+
+    Examples
+    --------
+    >>> from semsig_gis import load_catalog
+    >>> try:
+    ...     load_catalog("montpelier")
+    ... except SemsigError as error:
+    ...     print("montpellier" in str(error))
+    True
+    """
 
 
 class InputError(SemsigError, ValueError):

@@ -68,9 +68,17 @@ class ClassSign:
 
 
 def class_signs(taxonomy: Taxonomy) -> dict[int, ClassSign]:
-    """Return the sign of each class by its code.
+    """Return the sign of each class.
 
-    Up to 18 classes differ in colour, and up to 126 in colour or shape.
+    Parameters
+    ----------
+    taxonomy : Taxonomy
+        The classes, in any order.
+
+    Returns
+    -------
+    dict of int to ClassSign
+        By class code. Up to 18 classes differ in colour, and up to 126 in colour or shape.
 
     Examples
     --------

@@ -24,9 +24,14 @@ def wilson_interval(share: float, trials: float, *, percent: float = 95.0) -> tu
     share : float
         Share of the trials that went well, 0 to 1.
     trials : float
-        Number of trials, not necessarily whole; without any, the interval is 0 to 1.
+        Number of trials, 0 or more, not necessarily whole.
     percent : float, default 95
         How often the interval shall hold the true chance, above 0 and below 100.
+
+    Returns
+    -------
+    low, high : float
+        The interval; all of 0 to 1 where there was no trial.
 
     Examples
     --------

@@ -192,6 +192,11 @@ class Requirement:
     """How many objects of some classes a cell must see.
 
     Each limit is a class code, or `WILDCARD` for all objects together, the fewest and the most.
+
+    Examples
+    --------
+    >>> from semsig_gis import paper_taxonomy
+    >>> requirement = Requirement.parse("M,2B", paper_taxonomy())
     """
 
     limits: tuple[tuple[int, int, float], ...]

@@ -52,9 +52,6 @@ def build_database(
 ) -> SignatureDatabase:
     """Compute the signature of every cell that sees at least one object.
 
-    Objects at most R away are sorted clockwise from north, ties nearer first (paper, section on
-    semantic signatures).
-
     Parameters
     ----------
     objects : StreetObjects
@@ -65,20 +62,32 @@ def build_database(
         Visibility range and angle levels; 30 m and 16 by default.
     viewpoints : ViewpointSpec, optional
         Which cells are looked from; all by default.
-    footprints, streets : GeoDataFrame, optional
-        Buildings (polygons), which hide what is behind them, and centre lines, whose column
-        ``half_width``, where there is one, is in metres; in any CRS.
+    footprints : GeoDataFrame, optional
+        Buildings (polygons) in any CRS; what they hide is not seen.
+    streets : GeoDataFrame, optional
+        Centre lines in any CRS; a column ``half_width`` holds metres where it is there.
     progress : callable, optional
         Called with the number of cells done and in all.
+
+    Returns
+    -------
+    SignatureDatabase
+        Cells ordered by column and row.
 
     Raises
     ------
     EmptyResultError
-        If no cell is a viewpoint that sees an object.
+        If no cell sees an object, as when the step is much larger than the range, or no cell is
+        a viewpoint.
     InputError
         If footprints, streets or viewpoints cannot be used, or those that are needed are missing.
     CrsError
         If footprints or streets have no CRS.
+
+    Notes
+    -----
+    Objects at most R away are sorted clockwise from north, ties nearer first (paper, section on
+    semantic signatures).
 
     Examples
     --------

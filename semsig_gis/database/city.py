@@ -56,6 +56,21 @@ class City:
     """A signature database with what lies beside its file; made by `open_city`.
 
     Each part is opened when it is first looked at, and then kept.
+
+    Parameters
+    ----------
+    path : str or Path
+        File of the database, or folder of its parts.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> from semsig_gis import open_city, save_database
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     save_database(demo_database, f"{folder}/city.parquet")
+    ...     city = open_city(f"{folder}/city.parquet")
+    ...     len(city.database) == len(demo_database)
+    True
     """
 
     def __init__(self, path: str | Path) -> None:
@@ -181,7 +196,17 @@ class City:
 
 
 def open_city(path: str | Path) -> City:
-    """Open a signature database, a file or a folder of parts, with all that lies beside it.
+    """Open a signature database with all that lies beside its file.
+
+    Parameters
+    ----------
+    path : str or Path
+        File of the database, or folder of its parts.
+
+    Returns
+    -------
+    City
+        The city; each part of it is read when it is first looked at.
 
     Raises
     ------

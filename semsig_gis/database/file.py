@@ -49,14 +49,21 @@ CHUNK = 1 << 20
 
 
 def save_database(database: SignatureDatabase, path: str | Path) -> None:
-    """Save a database as one GeoParquet file, which appears whole, by rename.
+    """Save a database as one GeoParquet file: a row a cell, the specs in its metadata.
+
+    Parameters
+    ----------
+    database : SignatureDatabase
+        What to save.
+    path : str or Path
+        File to write; it appears whole, by rename.
 
     Notes
     -----
-    A row is a cell. Columns: ``cell_id`` (int64), ``types`` (symbols), ``bearings`` (list of
-    uint16, in 1/20 degree), ``distances`` (list of uint8, in 1/255 of the largest visibility
-    range), ``length`` (int32) and ``geometry`` (the viewpoint as WKB). The metadata key ``semsig``
-    holds the specs, the classes and the licences as JSON.
+    Columns: ``cell_id`` (int64), ``types`` (symbols), ``bearings`` (list of uint16, in 1/20
+    degree), ``distances`` (list of uint8, in 1/255 of the largest visibility range), ``length``
+    (int32) and ``geometry`` (the viewpoint as WKB). The metadata key ``semsig`` holds
+    the specs, the classes and the licences as JSON.
 
     Examples
     --------
@@ -104,6 +111,16 @@ def database_specs(database: SignatureDatabase) -> dict[str, Any]:
 
 def open_database(path: str | Path) -> SignatureDatabase:
     """Open a file that `save_database` wrote, or a folder of parts that `build_tiles` wrote.
+
+    Parameters
+    ----------
+    path : str or Path
+        File or folder.
+
+    Returns
+    -------
+    SignatureDatabase
+        The database.
 
     Raises
     ------
@@ -384,9 +401,14 @@ def part_files(folder: str | Path) -> tuple[Path, ...]:
 
 @dataclass(frozen=True, slots=True)
 class PartitionedDatabase:
-    """A signature database of which one part at a time is in memory, made by `open_dataset`.
+    """A signature database of which one part at a time is in memory.
 
-    `files` are the part files, no cell in two of them, and `cells` is their number of cells.
+    Parameters
+    ----------
+    files : tuple of Path
+        The part files; no cell is in two of them.
+    cells : int
+        Number of cells in all parts.
     """
 
     files: tuple[Path, ...]
@@ -422,6 +444,16 @@ class PartitionedDatabase:
 def open_dataset(folder: str | Path) -> PartitionedDatabase:
     """Open a folder that holds a database in parts, without reading the parts into memory.
 
+    Parameters
+    ----------
+    folder : str or Path
+        Folder of the database.
+
+    Returns
+    -------
+    PartitionedDatabase
+        The parts. For all cells at once, use `open_database`.
+
     Raises
     ------
     DatabaseError
@@ -433,6 +465,6 @@ def open_dataset(folder: str | Path) -> PartitionedDatabase:
     Traceback (most recent call last):
     ...
     semsig_gis.core.errors.DatabaseError: nowhere is not a signature database in parts (it has no \
-_manifest.json); give a folder that `semsig build --tile` wrote.
+    _manifest.json); give a folder that `semsig build --tile` wrote.
     """
     return PartitionedDatabase(part_files(folder), read_manifest(folder).cells)

@@ -127,14 +127,29 @@ def _stored(table: gpd.GeoDataFrame, crs: CRS) -> gpd.GeoDataFrame:
 
 
 def save_with_store(database: SignatureDatabase, store: ObjectStore, path: str | Path) -> None:
-    """Save a database as a file, and beside it the store of what it was built from.
+    """Save a database and the store that belongs to it.
 
-    Any number of programs may read meanwhile; of two that write at once, the later one wins.
+    Parameters
+    ----------
+    database : SignatureDatabase
+        What to save.
+    store : ObjectStore
+        What it was built from.
+    path : str or Path
+        File of the database; the store is put beside it (see `store_path`).
 
     Raises
     ------
     InputError
         If the files cannot be written; those that were there are unchanged then.
+
+    Notes
+    -----
+    The new store is written whole under another name, then the database is renamed into its
+    place, and at last the store into its own. The store names the digest of its database, so
+    whoever opens the two sees how far an interrupted run came: `open_store` takes the new store
+    as soon as the new database is there, and the old one until then. Any number of programs may
+    read meanwhile; of two that write at once, the later one wins.
 
     Examples
     --------
@@ -159,15 +174,29 @@ def save_with_store(database: SignatureDatabase, store: ObjectStore, path: str |
 
 
 def open_store(database: str | Path, folder: str | Path | None = None) -> ObjectStore:
-    """Open the object store beside the file of a database, or in another `folder`.
+    """Open the object store of a database.
 
-    What an interrupted `save_with_store` left half done is finished, if the folder can be written
-    to. Notes of the store say so where its R-tree had to be made again.
+    Parameters
+    ----------
+    database : str or Path
+        File of the database.
+    folder : str or Path, optional
+        The store, where it does not lie beside the database.
+
+    Returns
+    -------
+    ObjectStore
+        The store; its notes say so where the R-tree had to be made again.
 
     Raises
     ------
     DatabaseError
         If there is no database or no store, the store is damaged, or belongs to another database.
+
+    Notes
+    -----
+    What an interrupted `save_with_store` left half done is finished, if the folder can be written
+    to. The files of a store are not changed by reading.
 
     Examples
     --------

@@ -139,10 +139,6 @@ def build_tiles(
 ) -> Manifest:
     """Build a signature database in tiles: a folder that is opened like a single file.
 
-    The part files are the same whatever the number of workers. An interrupted run leaves its tiles
-    in ``OUT.partial``, and the same command goes on from there, if the specs are the same and the
-    input files have the same content (by SHA-256).
-
     Parameters
     ----------
     objects : str or Path
@@ -154,17 +150,22 @@ def build_tiles(
     grid, spec, viewpoints : optional
         As in `build_database`.
     buildings, streets : str or Path, optional
-        Files that `read_surroundings` reads; copied first where they cannot be read by box.
+        Files that `read_surroundings` reads. Those that cannot be read by box are copied into such
+        a file first.
     workers : int, default 0
-        How many processes of this machine build tiles; 0 builds them here, without dask. A script
-        that gives it needs the guard ``if __name__ == "__main__":``, because workers import it.
+        How many processes of this machine build tiles; 0 builds them here, without dask.
     scheduler : str, optional
-        Address of a dask scheduler instead, such as ``tcp://10.0.0.5:8786``, whose workers see the
-        same files under the same paths.
+        Address of a dask scheduler, such as ``tcp://10.0.0.5:8786``, whose workers see the same
+        files under the same paths; then `workers` stays 0.
     progress : callable, optional
         Called with the number of tiles done and in all.
     tell : callable, optional
         Called with a remark for the user, as about a run that is taken up again.
+
+    Returns
+    -------
+    Manifest
+        What the database consists of.
 
     Raises
     ------
@@ -172,9 +173,17 @@ def build_tiles(
         If an option cannot be used, the scheduler cannot be reached, or `out` holds something
         else or an unfinished run with other inputs or specs.
     DatabaseError
-        If the objects cannot be read, or a tile cannot be built; the next run keeps the others.
+        If the street objects cannot be read, or a tile cannot be built; the other tiles are kept
+        for the next run.
     EmptyResultError
         If no cell sees an object.
+
+    Notes
+    -----
+    The files are the same byte for byte whatever the number of workers. An interrupted run leaves
+    its tiles in ``OUT.partial``, and the same command goes on from there, if the specs are the same
+    and the input files have the same content (by SHA-256). A script that gives `workers` needs the
+    guard ``if __name__ == "__main__":``, because the workers import it.
 
     Examples
     --------

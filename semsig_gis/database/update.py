@@ -113,10 +113,29 @@ def update_file(
     out: str | Path | None = None,
     progress: Callable[[int, int], None] | None = None,
 ) -> UpdateReport:
-    """Update the file of a database, and the object store beside it, by `update_database`.
+    """Update the file of a database, and the object store beside it.
 
-    They are written to `path` again, or to another file `out`; where anything goes wrong, they stay
-    as they are.
+    Parameters
+    ----------
+    path : str or Path
+        File of the database.
+    objects : StreetObjects
+        The layers that were loaded anew, whole.
+    out : str or Path, optional
+        Another file to write to; `path` itself by default.
+    progress : callable, optional
+        Called with the number of cells done and in all.
+
+    Returns
+    -------
+    UpdateReport
+        What changed.
+
+    Raises
+    ------
+    DatabaseError, InputError, CrsError, EmptyResultError
+        As `update_database` does, or if the files cannot be read or written; nothing has changed
+        then.
 
     Examples
     --------

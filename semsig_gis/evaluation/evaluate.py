@@ -80,10 +80,11 @@ def evaluate(
     queries : int, default 500
         How many cells to draw as queries, without replacement; 1 to the number of cells.
     method : Method or LikelihoodIndex, optional
-        What ranks the cells: distances (metric fusion of two edit distances by default), or the
-        likelihood with this index of the database.
+        What ranks the cells: distances, or the likelihood with this index of the database;
+        metric fusion of two edit distances by default.
     distortion : str, distortion or sequence of distortions, default "medium"
-        What happens to the signatures: one of the paper's levels, or any of `queries.chain`.
+        What happens to the signatures: one of the paper's levels, or any of `queries.chain`,
+        as text or as values.
     top : int, default 1
         How many best candidates count (t); 1 to the number of cells.
     seed : int, default 0
@@ -91,6 +92,11 @@ def evaluate(
         the number of queries.
     progress : callable, optional
         Called with the number of queries done and the number of queries.
+
+    Returns
+    -------
+    Evaluation
+        One row a query, the settings and the mean time a query.
 
     Raises
     ------
@@ -102,9 +108,12 @@ def evaluate(
     Notes
     -----
     Paper, section 4.2: the error is the distance from the true viewpoint to the nearest of the
-    best t candidates; the recall looks at the rank of the true cell among all cells. The
-    likelihood method's first candidate is the place around which most of the chance lies; the
-    other cells follow, likeliest first.
+    best t candidates; the recall looks at the rank of the true cell among all cells. False
+    objects have the classes that occur in the database.
+
+    The likelihood method answers with the place around which most of the chance lies. That comes
+    first; then follow the other cells, likeliest first. Queries from anywhere, and several
+    methods on the same queries, are for `evaluation.spec`.
 
     Examples
     --------

@@ -33,12 +33,31 @@ QUERIES, SUMMARY, TIMING = "queries.parquet", "evaluation.json", "timing.json"
 
 
 def save_evaluation(evaluation: Evaluation, folder: str | Path) -> None:
-    """Write an evaluation to a folder, made when missing.
+    """Write an evaluation to a folder.
 
-    It gets ``queries.parquet`` (GeoParquet with the settings in its metadata, enough to load and
-    redraw everything), ``evaluation.json`` (`Evaluation.summary`, for reading) and ``timing.json``,
-    the one file that differs when the same is done again. Raises InputError if the folder cannot be
-    written to.
+    Parameters
+    ----------
+    evaluation : Evaluation
+        What to write.
+    folder : str or Path
+        Folder to write to, made when missing. It gets ``queries.parquet`` (GeoParquet, with the
+        settings in its metadata, so that it is enough to load and redraw everything),
+        ``evaluation.json`` (`Evaluation.summary`, for reading) and ``timing.json``, the one file
+        that differs when the same is done again.
+
+    Raises
+    ------
+    InputError
+        If the folder cannot be written to.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> from semsig_gis import evaluate
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     save_evaluation(evaluate(demo_database, queries=5), f"{folder}/results")
+    ...     len(open_evaluation(f"{folder}/results").queries)
+    5
     """
     plain = pd.DataFrame(evaluation.queries.drop(columns="geometry"))
     points = evaluation.queries.geometry
@@ -62,10 +81,31 @@ def save_evaluation(evaluation: Evaluation, folder: str | Path) -> None:
 
 
 def open_evaluation(folder: str | Path) -> Evaluation:
-    """Read an evaluation that `save_evaluation` wrote to a folder.
+    """Read an evaluation that `save_evaluation` wrote.
 
-    Without ``timing.json`` the time is not known. Raises DatabaseError if ``queries.parquet`` is
-    missing, damaged or of another kind.
+    Parameters
+    ----------
+    folder : str or Path
+        Folder with ``queries.parquet``; without ``timing.json`` the time is not known.
+
+    Returns
+    -------
+    Evaluation
+        The same evaluation.
+
+    Raises
+    ------
+    DatabaseError
+        If the file is missing, damaged or of another kind.
+
+    Examples
+    --------
+    >>> from semsig_gis import SemsigError
+    >>> try:
+    ...     open_evaluation("nowhere")
+    ... except SemsigError as error:
+    ...     print("nowhere" in str(error))
+    True
     """
     file = Path(folder) / QUERIES
     table, specs, crs = read_geoparquet(file, kind=KIND, columns=[*QUERY_COLUMNS, "geometry"])

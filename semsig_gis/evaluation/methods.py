@@ -23,9 +23,24 @@ AnyMethod = Method | LikelihoodMethod
 
 
 def parse_method(text: str, *, noises: Mapping[str, Noise] = NOISES) -> AnyMethod:
-    """Read a method of either kind from text, as `Method.parse` or `LikelihoodMethod.parse` does.
+    """Read a method of either kind from text.
 
-    `noises` are the noise models by name. Raises SemsigError if the text cannot be read.
+    Parameters
+    ----------
+    text : str
+        What `Method.parse` or `LikelihoodMethod.parse` reads.
+    noises : mapping of str to Noise, optional
+        The noise models by name.
+
+    Returns
+    -------
+    Method or LikelihoodMethod
+        The method.
+
+    Raises
+    ------
+    SemsigError
+        If the text cannot be read.
 
     Examples
     --------

@@ -233,9 +233,36 @@ def parse_experiment(
 
 
 def open_experiment_spec(path: str | Path) -> ExperimentSpec:
-    """Read an experiment from a TOML file; files that it names are looked for beside it.
+    """Read an experiment from a TOML file.
 
-    Raises InputError if the file cannot be read, or does not hold an experiment.
+    Parameters
+    ----------
+    path : str or Path
+        The file; files that it names are looked for beside it.
+
+    Returns
+    -------
+    ExperimentSpec
+        The experiment.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be read, or does not hold an experiment.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> from pathlib import Path
+    >>> text = '''
+    ... database = "city.parquet"
+    ... methods = {paper = "edit+edit"}
+    ... distortions = {phone = ["light"]}
+    ... '''
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     written = Path(folder, "phone.toml").write_text(text)
+    ...     list(open_experiment_spec(f"{folder}/phone.toml").methods)
+    ['paper']
     """
     file = Path(path)
     try:

@@ -127,7 +127,7 @@ def calibrate(
     confidence: float = 0.95,
     radius: float = 50.0,
 ) -> AnswerRule:
-    """Choose the threshold, perhaps infinite, that answers most queries and is right often enough.
+    """Choose the threshold that answers most queries and is right often enough.
 
     Parameters
     ----------
@@ -135,6 +135,11 @@ def calibrate(
         For each query the chance that the place is near the best one, and whether it was.
     precision, confidence, radius : float
         As of `AnswerRule`; the confidence is over queries like these.
+
+    Returns
+    -------
+    AnswerRule
+        The rule; its threshold is infinite where the queries do not prove any to be good enough.
 
     Raises
     ------
@@ -144,9 +149,11 @@ def calibrate(
     Notes
     -----
     A threshold is proven when answers that are wrong as often as allowed would have shown so few
-    errors with a chance of at most ``1 - confidence`` (Clopper and Pearson). Thresholds are tried
-    from strict to loose until one fails, from four starting points that share the allowed chance
-    (Angelopoulos et al., "Learn then test", 2021). Without errors, 98 % at 95 % need 217 answers.
+    errors with a chance of at most ``1 - confidence`` (Clopper and Pearson). So that the best of
+    many thresholds does not profit from luck, they are tried from strict to loose until one fails,
+    from four starting points that share the allowed chance (Angelopoulos et al., "Learn then test",
+    2021, fixed-sequence testing with several starts). Without errors, 98 % at 95 % need 217
+    answers.
 
     Examples
     --------
@@ -192,7 +199,23 @@ def calibrate(
 
 
 def save_rule(rule: AnswerRule, path: str | Path) -> None:
-    """Write a rule to a JSON file, which appears whole, by rename."""
+    """Write a rule to a JSON file.
+
+    Parameters
+    ----------
+    rule : AnswerRule
+        The rule.
+    path : str or Path
+        File to write; it appears whole, by rename.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     save_rule(AnswerRule(threshold=0.9), f"{folder}/rule.json")
+    ...     open_rule(f"{folder}/rule.json").threshold
+    0.9
+    """
     values = asdict(rule)
     if math.isinf(rule.threshold):
         values["threshold"] = None  # JSON has no infinity
@@ -201,7 +224,22 @@ def save_rule(rule: AnswerRule, path: str | Path) -> None:
 
 
 def open_rule(path: str | Path) -> AnswerRule:
-    """Read a rule from a JSON file that `save_rule` wrote; raises `InputError` if it holds none.
+    """Read a rule from a JSON file.
+
+    Parameters
+    ----------
+    path : str or Path
+        File that `save_rule` wrote.
+
+    Returns
+    -------
+    AnswerRule
+        The rule.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be read or does not hold a rule.
 
     Examples
     --------

@@ -219,13 +219,30 @@ def build_index(
     database : SignatureDatabase
         The cells.
     noise : NoiseSpec or NoiseMixture
-        The noise model; InputError if it does not fit the classes of the database.
+        The noise model.
     out : ndarray of uint8, shape (k + 1, 72, n), optional
         Where to put the columns, such as a mapped file.
     progress : callable, optional
         Called with the number of cells done and in all.
     threads : int, default 1
         How many blocks of cells are worked out at once.
+
+    Returns
+    -------
+    LikelihoodIndex
+        The index.
+
+    Raises
+    ------
+    InputError
+        If the noise model does not fit the classes of the database.
+
+    Examples
+    --------
+    >>> from semsig_gis import named_noise
+    >>> index = build_index(demo_database, named_noise("generic"))
+    >>> len(index.database) == len(demo_database)
+    True
     """
     table = mean_table(*database_tables(database, noise))
     unseen = table.nothing_seen(database.offsets, table.row_of[database.codes])
@@ -357,12 +374,18 @@ def ready_index(
     noise : NoiseSpec or NoiseMixture
         The noise model.
     path : str or Path
-        File of the index, such as `City.index_path` gives, to be mapped into memory; where it
-        cannot be written, the index is in memory only.
+        File of the index, such as `City.index_path` gives.
     note : callable, optional
         Called with a sentence where the index is built or cannot be saved.
-    progress, threads : callable, optional, and int, default 1
-        As of `build_index`.
+    progress : callable, optional
+        Called with the number of cells done and in all while it is built.
+    threads : int, default 1
+        How many blocks of cells are worked out at once.
+
+    Returns
+    -------
+    LikelihoodIndex
+        The index; mapped from the file, or in memory where no file can be written.
 
     Raises
     ------

@@ -115,7 +115,8 @@ class Location(Answer):
     Parameters
     ----------
     query, cells, crs, taxonomy, licenses
-        What was searched for, how many cells were searched, and what their database says.
+        What was searched for, how many cells were searched, and what their database says of its
+        CRS, classes and sources.
     noise : str
         Name of the noise model.
     candidates : DataFrame
@@ -125,15 +126,27 @@ class Location(Answer):
         where north was not known for sure, ``heading`` (degrees to add to the bearings of the
         query).
     answer : Decision
-        The cell around which the chance is largest, that chance, and whether the `rule` is met.
+        The cell around which the chance is largest, that chance, and whether it is enough.
     estimate : PlaceEstimate
         The place around that cell and the heading, each with its uncertainty.
+    rule : AnswerRule
+        What the decision rests on.
     region : ndarray of int64
         Row numbers of the fewest cells that hold 90 % of the chance, likeliest first.
-    posterior, loglik : Posterior, and ndarray of float, shape (n,)
-        Chance and natural logarithm of the likelihood of every cell.
+    posterior : Posterior
+        The chance of every cell.
+    loglik : ndarray of float, shape (n,)
+        Natural logarithm of the likelihood of every cell.
     explanations : tuple of Explanation
         Of the first candidates, in their order: which detections are which street objects.
+
+    Examples
+    --------
+    >>> from semsig_gis import build_index, locate, named_noise
+    >>> index = build_index(demo_database, named_noise("generic"))
+    >>> location = locate(index, demo_database.signature(0), top=3)
+    >>> len(location.candidates)
+    3
     """
 
     noise: str
@@ -401,18 +414,30 @@ def locate(index: LikelihoodIndex, query: Signature, **options: Unpack[LocateOpt
     Parameters
     ----------
     index : LikelihoodIndex
-        The cells and the noise model; for queries from anywhere, not from the middles of cells
-        alone, that is ``cell_noise(noise, step)``.
+        The cells and the noise model. For queries from anywhere, not from the middles of cells
+        alone, that is ``cell_noise(noise, step)`` (see `likelihood.noise.model`).
     query : Signature
         At least one object; types or bearings may be unknown.
-    **options : LocateOptions
-        ``north_sigma`` is the standard deviation in degrees of the north of the query, 0 by
-        default and infinite if it is not known; ``log_prior``, shape (n,), what else is known of
-        the place (see `likelihood.priors`). The ``rule`` says when to answer, from a chance of 0.9
-        by default, and ``top`` (10) how many cells to list. The ``store`` holds the street objects
-        behind the cells: with ``refined`` the place is looked for between the viewpoints, too, and
-        the chances of the cells are those of their parts together. ``explained`` (0) candidates
-        are explained; without a store, street objects have no identifiers.
+    north_sigma : float, default 0
+        Standard deviation in degrees of the north of the query; infinite if it is not known.
+    log_prior : ndarray of float64, shape (n,), optional
+        What else is known of the place (see `likelihood.priors`).
+    rule : AnswerRule, optional
+        When to answer; from a chance of 0.9 by default.
+    top : int, default 10
+        How many cells to list, at least 1.
+    store : ObjectStore, optional
+        The street objects behind the cells; what is refined or explained looks at them.
+    refined : bool, default False
+        Look for the place between the viewpoints, too, with the store; the chances of the cells
+        are then those of their parts together.
+    explained : int, default 0
+        How many candidates to explain; without a store, street objects have no identifiers.
+
+    Returns
+    -------
+    Location
+        The answer.
 
     Raises
     ------
@@ -450,14 +475,24 @@ def locate_route(
 
     Parameters
     ----------
-    index : LikelihoodIndex
-        As of `locate`.
+    index, north_sigma, rule, top, store, refined, explained
+        As of `locate`, for each view.
     queries : sequence of Signature
         The views. One may have no objects: that nothing was detected tells something, too.
     legs : sequence of Leg
-        The ways between them, one fewer; InputError if the numbers do not fit.
-    **options : LocateOptions
-        As of `locate`, for each view; ``log_prior`` is of the place of the first view.
+        The ways between them, one fewer.
+    log_prior : ndarray of float64, shape (n,), optional
+        What else is known of the place of the first view.
+
+    Returns
+    -------
+    tuple of Location
+        One for each view.
+
+    Raises
+    ------
+    InputError
+        As `locate`, and if the numbers of views and legs do not fit.
 
     Examples
     --------

@@ -31,23 +31,30 @@ def area_prior(
     crs: CRS | str | None = None,
     outside: float = 0.0,
 ) -> NDArray[np.float64]:
-    """Return the log-prior by cell that the place lies in an area, alike inside and outside.
+    """Return the prior that the place lies in an area.
 
     Parameters
     ----------
     database : SignatureDatabase
         The cells.
     area : shapely.Geometry
-        A polygon or several, with a cell inside.
+        A polygon or several.
     crs : pyproj.CRS or str, optional
         Coordinate reference system of the area; that of the database by default.
     outside : float, default 0
         Chance, 0 to below 1, that the place lies outside all the same.
 
+    Returns
+    -------
+    ndarray of float64, shape (n,)
+        Log-prior by cell; every cell inside is as likely as every other, and so outside.
+
     Raises
     ------
-    InputError, CrsError
-        If the area is no polygon or no cell is left; if the CRS cannot be read.
+    InputError
+        If the area is no polygon, or no cell is left.
+    CrsError
+        If the coordinate reference system cannot be read.
 
     Examples
     --------
@@ -83,16 +90,26 @@ def area_prior(
 def position_prior(
     database: SignatureDatabase, position: tuple[float, float], *, sigma: float
 ) -> NDArray[np.float64]:
-    """Return the log-prior by cell that the place is near a position, as the last one known.
+    """Return the prior that the place is near a position, such as the last one known.
 
     Parameters
     ----------
     database : SignatureDatabase
         The cells.
     position : tuple of (float, float)
-        x and y in the CRS of the database; finite, or InputError.
+        x and y in the CRS of the database.
     sigma : float
-        Standard deviation each way in metres, above 0, or InputError.
+        Standard deviation each way in metres, above 0.
+
+    Returns
+    -------
+    ndarray of float64, shape (n,)
+        Log-prior by cell.
+
+    Raises
+    ------
+    InputError
+        If a number is not finite, or `sigma` is not above 0.
 
     Examples
     --------
@@ -115,7 +132,7 @@ def position_prior(
 def raster_prior(
     database: SignatureDatabase, path: str | Path, *, band: int | None = None
 ) -> NDArray[np.float64]:
-    """Return the log-prior by cell of a raster, such as how many people pass or take photos.
+    """Return the prior of a raster, such as how many people pass or how many photos were taken.
 
     Parameters
     ----------
@@ -129,10 +146,17 @@ def raster_prior(
     band : int, optional
         Which band to read, from 1; needed only where there are several.
 
+    Returns
+    -------
+    ndarray of float64, shape (n,)
+        Log-prior by cell.
+
     Raises
     ------
-    SourceError, CrsError
-        If the file cannot be read as a raster, or does not say its CRS.
+    SourceError
+        If the file cannot be read as a raster.
+    CrsError
+        If the raster does not say its coordinate reference system.
     InputError
         If the raster covers no cell, a value is negative or infinite, all are 0, or the band is
         not there or not named.
@@ -175,14 +199,24 @@ def raster_prior(
 
 
 def weight_prior(database: SignatureDatabase, weights: ArrayLike) -> NDArray[np.float64]:
-    """Return the log-prior of a weight for each cell, such as how many people pass it.
+    """Return the prior of a weight for each cell, such as how many people pass it.
 
     Parameters
     ----------
     database : SignatureDatabase
         The cells.
     weights : array_like of float, shape (n,)
-        Finite weights, 0 or more and not all 0, or InputError; 0 excludes a cell.
+        Weights, 0 or more; 0 excludes a cell.
+
+    Returns
+    -------
+    ndarray of float64, shape (n,)
+        Log-prior by cell.
+
+    Raises
+    ------
+    InputError
+        If there is not one weight a cell, one is negative or not finite, or all are 0.
 
     Examples
     --------

@@ -52,9 +52,17 @@ def score_cells(
 ) -> Iterator[NDArray[np.float32]]:
     """Give the distance of each query to every cell, one query after the other.
 
-    The queries may be empty. `memo` holds distances of these very queries to this database that
-    other methods have needed; what is measured is added, a number for each query and distinct
-    sequence. Raises InputError if a query has no part that the method compares.
+    Parameters
+    ----------
+    database : SignatureDatabase
+        The cells.
+    queries : sequence of Signature
+        What to search for. An empty query is compared like any other.
+    method : Method
+        How the cells are ranked.
+    memo : DistanceMemo, optional
+        Distances of these very queries to this database that other methods have needed; what is
+        measured is added, a number for each query and distinct sequence.
 
     Yields
     ------
@@ -62,6 +70,11 @@ def score_cells(
         Distances of one query to the cells, in the order of the database; lower is better.
         Equal scores are exactly equal: all are multiples of 2 ** -16. Memory stays bounded
         whatever the number of queries.
+
+    Raises
+    ------
+    InputError
+        If a query has no part that the method compares.
 
     Examples
     --------

@@ -60,6 +60,13 @@ class Localization(Answer):
         (symbols), ``length`` (objects), ``distance``.
     tied_beyond : int
         How many cells are as good as the last candidate but are not listed.
+
+    Examples
+    --------
+    >>> from semsig_gis import localize
+    >>> localization = localize(demo_database, demo_database.signature(0), top=3)
+    >>> len(localization.candidates)
+    3
     """
 
     method: Method
@@ -207,7 +214,7 @@ def localize(
     requirement: Requirement | None = None,
     top: int = 100,
 ) -> Localization:
-    """Find the cells whose signature is most like a query, with ties told.
+    """Find the cells whose signature is most like a query.
 
     Parameters
     ----------
@@ -221,6 +228,11 @@ def localize(
         What a cell must see to be a candidate; nothing by default.
     top : int
         How many cells to list, at least 1.
+
+    Returns
+    -------
+    Localization
+        The best cells, with ties told.
 
     Raises
     ------

@@ -53,11 +53,10 @@ def build_objects(
     collapse: bool = True,
     apart: Collection[str] = (),
 ) -> tuple[StreetObjects, LoadReport]:
-    """Turn raw layers into one table of street objects, in their order, and report on every row.
+    """Turn raw layers into one table of street objects.
 
     A geometry that is not a point is represented by its centroid (paper, section on semantic
-    signatures). Rows without a usable position are dropped and counted. EmptyResultError if no
-    object remains.
+    signatures). Rows without a usable position are dropped and counted.
 
     Parameters
     ----------
@@ -68,10 +67,18 @@ def build_objects(
     crs : pyproj.CRS or str
         Metric coordinate reference system to work in.
     collapse : bool, default True
-        Whether objects of one class within the same centimetre become one, with their number in
-        ``count``.
+        Whether objects of one class at the same place (within the same centimetre) become one,
+        with their number in ``count``.
     apart : collection of str
-        Classes that are collapsed within each layer only, because `conflate` will merge them.
+        Classes that are collapsed within each layer only, because they will be conflated (see
+        `conflate`), which keeps account of where objects came from.
+
+    Returns
+    -------
+    objects : StreetObjects
+        The objects, in the order of the layers; EmptyResultError if there is none.
+    report : LoadReport
+        What became of every row.
 
     Examples
     --------

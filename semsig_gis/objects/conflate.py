@@ -62,14 +62,12 @@ class ConflationReport:
 def conflate(
     objects: StreetObjects, radii: Mapping[str, float]
 ) -> tuple[StreetObjects, ConflationReport]:
-    """Merge objects that stand in several sources, and report how many.
+    """Merge objects that stand in several sources.
 
     Source after source is compared with what remains of those before it. Of all pairs of a
     remaining and a new object within the radius, the nearest is merged first, and each object takes
-    part once. The order of the rows in a source does not matter: equal distances go by source,
-    position and identifier. An object that others were merged into keeps its source and position;
-    its ``count`` is the sum of theirs, and its column ``merged`` lists them as ``"source:id;
-    source:id"``. The licences of all sources still hold.
+    part once. Pairs of equal distance go by source, position and identifier, so that the order of
+    the rows in a source does not matter.
 
     Parameters
     ----------
@@ -78,7 +76,17 @@ def conflate(
         earlier is trusted more. InputError if they were conflated before.
     radii : mapping of str to float
         Classes, and the metres (above 0, below 100) within which two objects of different sources
-        are the same. UnknownNameError if there is no such class.
+        are the same. Other classes are left as they are. UnknownNameError if there is no such
+        class.
+
+    Returns
+    -------
+    objects : StreetObjects
+        The remaining objects in their order. An object that others were merged into keeps its
+        source and position, its ``count`` is the sum of theirs, and its column ``merged`` lists
+        them as ``"source:id; source:id"``. The licences of all sources still hold.
+    report : ConflationReport
+        How many were merged, a class and pair of sources.
 
     Examples
     --------

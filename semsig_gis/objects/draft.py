@@ -266,13 +266,24 @@ class _Draft:
 
 
 def suggest_catalog(path: str | Path) -> str:
-    r"""Draft a catalogue in TOML for a file, from its names, its fields and its values.
+    r"""Draft a catalogue for a file from its names, its fields and its values.
 
-    The file is a vector file, an archive with such files, or a table of a portal (JSON, CSV,
-    Parquet); SourceError if it is missing, damaged, of another kind, or holds no positions. What
-    only a person can know is marked ``EDIT`` in a comment; where not even the class could be
-    guessed, ``EDIT`` stands for it, which `load_catalog` refuses. Filters, classes by the value of
-    a field and the like are offered in comments.
+    Parameters
+    ----------
+    path : str or Path
+        A vector file, an archive with such files, or a table of a portal (JSON, CSV, Parquet).
+
+    Returns
+    -------
+    str
+        TOML text. What only a person can know is marked ``EDIT`` in a comment; where not even
+        the class could be guessed, ``EDIT`` stands for it, which `load_catalog` refuses. Filters,
+        classes by the value of a field and the like are offered in comments.
+
+    Raises
+    ------
+    SourceError
+        If the file is missing, damaged, of another kind, or holds no positions.
 
     Examples
     --------

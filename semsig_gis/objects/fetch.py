@@ -34,18 +34,20 @@ def fetch_layers(
     progress: Callable[[int, int], None] | None = None,
     tell: Callable[[str], None] = lambda _: None,
 ) -> tuple[RawLayer, ...]:
-    """Fetch layers from the service that a catalogue names, and return them, cut to the area.
-
-    InputError if the catalogue has no service to fetch from, SourceError if a service refuses,
-    fails, or sends something else.
+    """Fetch layers of an area from the service that a catalogue names, and read them.
 
     Parameters
     ----------
-    specs, catalog, area : sequence of LayerSpec, Catalog, Area
-        What is fetched, and whose endpoints are asked; nothing else is.
-    cache, http : Cache, HttpSpec
-        Where files are kept and how requests are made (see `open_cache`). What has not changed is
-        not sent again.
+    specs : sequence of LayerSpec
+        The layers.
+    catalog : Catalog
+        Whose endpoints are asked; nothing else is.
+    area : Area
+        What is fetched.
+    cache : Cache
+        Where files are kept; what has not changed is not sent again.
+    http : HttpSpec
+        How requests are made; offline, everything comes from the cache.
     filters : bool, default True
         Whether the filters of the layers apply.
     progress : callable, optional
@@ -53,6 +55,12 @@ def fetch_layers(
         file, tiles of OpenStreetMap.
     tell : callable, optional
         Takes a line about each layer that has arrived: rows, size and date.
+
+    Returns
+    -------
+    tuple of RawLayer
+        The layers, cut to the area. InputError if the catalogue has no service to fetch from,
+        SourceError if a service refuses, fails, or sends something else.
     """
     if not catalog.endpoints or catalog.reader not in {"opendatasoft", "osm_file"}:
         msg = (
@@ -84,21 +92,42 @@ def fetch_layers(
 def open_cache(
     folder: str | Path | None = None, *, offline: bool = False
 ) -> tuple[Cache, HttpSpec]:
-    """Return the cache of downloads and how requests are made; offline, all comes from the cache.
+    """Open the cache of downloads.
 
-    Its folder is by default ``semsig`` in the user's cache folder (``XDG_CACHE_HOME``, or
-    ``.cache`` in the home folder).
+    Parameters
+    ----------
+    folder : str or Path, optional
+        Where it is; by default ``semsig`` in the user's cache folder (``XDG_CACHE_HOME``, or
+        ``.cache`` in the home folder).
+    offline : bool, default False
+        Whether everything comes from the cache.
+
+    Returns
+    -------
+    tuple of (Cache, HttpSpec)
+        The cache, and how requests are made.
     """
     base = os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
     return Cache(Path(folder or Path(base) / "semsig")), HttpSpec(offline=offline)
 
 
 def find_area(text: str, catalog: Catalog, *, cache: Cache, http: HttpSpec) -> Area:
-    """Return the area of ``west,south,east,north`` in degrees, a polygon file, or a place by name.
+    """Return an area from what a user says of it.
 
-    The geocoder of the catalogue knows places; `cache` and `http` are those of `open_cache`.
-    InputError if the numbers are no box on the Earth or there is no geocoder, SourceError if the
-    file cannot be read.
+    Parameters
+    ----------
+    text : str
+        ``west,south,east,north`` in degrees, the path of a polygon file, or the name of a place.
+    catalog : Catalog
+        Whose geocoder knows places by name.
+    cache, http : Cache, HttpSpec
+        Where the answer about a name is kept, and how it is asked for (see `open_cache`).
+
+    Returns
+    -------
+    Area
+        The area. InputError if the numbers are no box on the Earth, or the catalogue has no
+        geocoder; SourceError if the file cannot be read.
 
     Examples
     --------

@@ -34,11 +34,19 @@ ZONE_DEGREES = 6.0
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Loaded:
-    """What came of a load: objects, what became of every row, and what was merged between layers.
+    """What came of a load.
 
-    Where layers hold them, `buildings` are footprints (polygons) and `streets` centre lines, in the
-    CRS of the objects; of streets whose widths a layer knows, with ``half_width`` in metres.
-    `notes` are for the user.
+    Parameters
+    ----------
+    objects : StreetObjects
+        The street objects.
+    report, conflation : LoadReport, ConflationReport
+        What became of every row, and what was merged between layers.
+    buildings, streets : GeoDataFrame, optional
+        Footprints (polygons) and centre lines in the CRS of the objects, where layers hold them;
+        of streets whose widths a layer knows, ``half_width`` in metres.
+    notes : tuple of str
+        Remarks for the user.
     """
 
     objects: StreetObjects
@@ -52,9 +60,21 @@ class Loaded:
 def choose_layers(
     catalog: Catalog, names: Sequence[str] = (), *, surroundings: bool = False
 ) -> tuple[LayerSpec, ...]:
-    """Return the named layers of a catalogue, in its order; by default all that are not optional.
+    """Return the layers to load, in the order of the catalogue.
 
-    `surroundings` adds buildings and streets. UnknownNameError if there is no layer of a name.
+    Parameters
+    ----------
+    catalog : Catalog
+        The catalogue.
+    names : sequence of str
+        Layers by name; by default all that are not optional. UnknownNameError if there is none.
+    surroundings : bool, default False
+        Whether buildings and streets are wanted too.
+
+    Returns
+    -------
+    tuple of LayerSpec
+        The layers.
 
     Examples
     --------
@@ -80,11 +100,37 @@ def read_files(
     crs: str | None = None,
     progress: Callable[[int, int], None] | None = None,
 ) -> tuple[tuple[RawLayer, ...], tuple[LayerSpec, ...]]:
-    """Read layers from local files; return them in the order of `specs`, and those without a file.
+    """Read layers from local files, each file once.
 
-    Paths are files, and folders that hold them; each file is read once. SourceError if one does not
-    exist, matches no layer, or cannot be read. `filters` says whether the filters of the layers
-    apply; `crs` is for files that state none; `progress` takes the files done and in all.
+    Parameters
+    ----------
+    specs : sequence of LayerSpec
+        The layers to look for.
+    paths : iterable of str or Path
+        Files, and folders that hold them. SourceError if one does not exist, matches no layer, or
+        cannot be read.
+    filters : bool, default True
+        Whether the filters of the layers apply.
+    crs : str, optional
+        CRS of files that state none.
+    progress : callable, optional
+        Takes the number of files done and in all.
+
+    Returns
+    -------
+    layers : tuple of RawLayer
+        What was read, in the order of `specs`.
+    absent : tuple of LayerSpec
+        Layers that have no file among `paths`.
+
+    Examples
+    --------
+    >>> from semsig_gis import SemsigError, choose_layers, load_catalog
+    >>> try:
+    ...     read_files(choose_layers(load_catalog("montpellier")), ["nowhere/"])
+    ... except SemsigError as error:
+    ...     print(error)
+    nowhere does not exist; give a file or a folder of files.
     """
     pairs, absent = find_files(specs, paths)
     by_file: dict[tuple[Path, str], list[LayerSpec]] = {}
@@ -135,17 +181,24 @@ def assemble(
 ) -> Loaded:
     """Place raw layers in one metric CRS and merge what stands in several of them.
 
-    The catalogue's classes, metric CRS (by default the UTM zone of the data) and merging radii
-    hold. CrsError if the CRS is not metric or a layer has none, EmptyResultError if no object
-    remains.
-
     Parameters
     ----------
+    layers : sequence of RawLayer
+        What was read or fetched.
+    catalog : Catalog
+        Whose classes, metric CRS and merging radii hold.
     metric_crs : str, optional
-        CRS to work in instead of the catalogue's.
-    collapse, merge : bool, default True
-        Whether objects of one class at the same place become one, and whether those of different
-        layers are merged.
+        CRS to work in; the catalogue's by default, or the UTM zone of the data where it has none.
+    collapse : bool, default True
+        Whether objects of one class at the same place become one.
+    merge : bool, default True
+        Whether objects of different layers are merged by the catalogue's radii.
+
+    Returns
+    -------
+    Loaded
+        The objects and what became of every row. CrsError if the CRS is not metric or a layer has
+        none, EmptyResultError if no object remains.
 
     Examples
     --------

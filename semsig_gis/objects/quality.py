@@ -90,9 +90,21 @@ class QualityReport:
 def quality_report(
     objects: StreetObjects, load: LoadReport, conflation: ConflationReport | None = None
 ) -> QualityReport:
-    """Report on the quality of a load, by what `build_objects` and `conflate` say of it.
+    """Report on the quality of a load.
 
-    The objects are those after conflation, if there was one.
+    Parameters
+    ----------
+    objects : StreetObjects
+        What was loaded, after conflation if there was one.
+    load : LoadReport
+        What `build_objects` says of the layers.
+    conflation : ConflationReport, optional
+        What `conflate` says, if it was used.
+
+    Returns
+    -------
+    QualityReport
+        The report.
 
     Examples
     --------

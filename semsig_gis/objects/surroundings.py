@@ -35,8 +35,13 @@ DIMENSIONS: dict[GeometryKind, int] = {"line": 1, "polygon": 2}
 def save_surroundings(table: gpd.GeoDataFrame, path: str | Path) -> None:
     """Save buildings or streets as one GeoParquet file that can be read by box.
 
-    Each feature has a geometry; all columns and the `attrs` are kept. The file holds them in a
-    spatial order, with their bounds in the column ``bbox``. It appears whole, by rename.
+    Parameters
+    ----------
+    table : GeoDataFrame
+        Features, each with a geometry; all columns and the `attrs` are kept. The file holds them in
+        a spatial order, with their bounds in the column ``bbox``.
+    path : str or Path
+        File to write; it appears whole, by rename.
 
     Examples
     --------
@@ -69,10 +74,7 @@ def read_surroundings(
     crs: CRS | str,
     box: Sequence[float] | None = None,
 ) -> gpd.GeoDataFrame:
-    """Read the buildings or the streets of a city, one row a feature that has a geometry.
-
-    Of a ``.parquet`` file all columns are kept. ``attrs["licenses"]`` says whom to name, where that
-    is known.
+    """Read the buildings or the streets of a city.
 
     Parameters
     ----------
@@ -86,7 +88,13 @@ def read_surroundings(
         CRS to move it to. CrsError if nobody knows its own.
     box : sequence of float, optional
         ``xmin, ymin, xmax, ymax`` in the CRS of the file, which `save_surroundings` wrote: only
-        features whose bounds meet it, of which there may be none.
+        features whose bounds meet it.
+
+    Returns
+    -------
+    GeoDataFrame
+        One row a feature that has a geometry; in a box there may be none. Of a ``.parquet`` file
+        all columns are kept. ``attrs["licenses"]`` says whom to name for it, where that is known.
     """
     return _read(Path(path), role, crs, box)
 

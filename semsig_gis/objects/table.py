@@ -130,9 +130,16 @@ class StreetObjects:
 def save_objects(objects: StreetObjects, path: str | Path, *, keep_order: bool = False) -> None:
     """Save street objects as one GeoParquet file that can be read by box.
 
-    The file appears whole, by rename. It holds the objects in a spatial order, in groups of rows,
-    of which a box is read faster; with `keep_order` they stay in theirs, for whoever knows them by
-    row number.
+    Parameters
+    ----------
+    objects : StreetObjects
+        What to save.
+    path : str or Path
+        File to write; it appears whole, by rename.
+    keep_order : bool, default False
+        Whether the objects stay in their order, for whoever knows them by row number. Else the
+        file holds them in a spatial order, in groups of rows, of which a box is read faster; saving
+        that again does not change the order.
 
     Examples
     --------
@@ -221,10 +228,28 @@ def _names_in(text: str, sources: Collection[str]) -> list[tuple[str, ...]]:
 
 
 def open_objects(path: str | Path, *, box: Sequence[float] | None = None) -> StreetObjects:
-    """Open a file that `save_objects` wrote, or only the objects in a box or on its edge.
+    """Open a file that `save_objects` wrote, or a part of it.
 
-    The box is ``xmin, ymin, xmax, ymax`` in metres; there may be no object in it. DatabaseError if
-    the file is missing, damaged, or holds something else.
+    Parameters
+    ----------
+    path : str or Path
+        File to read. DatabaseError if it is missing, damaged, or holds something else.
+    box : sequence of float, optional
+        ``xmin, ymin, xmax, ymax`` in metres: only objects in it or on its edge.
+
+    Returns
+    -------
+    StreetObjects
+        The objects; there is at least one, but in a box there may be none.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> from semsig_gis import save_objects
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     save_objects(demo_objects, f"{folder}/objects.parquet")
+    ...     len(open_objects(f"{folder}/objects.parquet")) == len(demo_objects)
+    True
     """
     arrow, specs, crs = read_geoparquet(path, kind=KIND, box=box)
     if box is not None:

@@ -50,6 +50,11 @@ class Curve:
         Points, x ascending.
     low, high : tuple of float, optional
         Ends of the intervals of 95 % of each y.
+
+    Examples
+    --------
+    >>> Curve(label="ours", x=(1.0, 2.0), y=(0.5, 0.75)).label
+    'ours'
     """
 
     label: str
@@ -79,6 +84,12 @@ class Plot:
         Ends of the y axis.
     diagonal : bool, default False
         Whether the line y = x is drawn, on which chances come true.
+
+    Examples
+    --------
+    >>> curve = Curve(label="ours", x=(1.0, 2.0), y=(0.5, 0.75))
+    >>> Plot(name="error", title="Error", x_label="m", y_label="share", curves=(curve,)).name
+    'error'
     """
 
     name: str

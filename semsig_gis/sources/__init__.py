@@ -62,19 +62,22 @@ class RowCounts:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class RawLayer:
-    """One layer as its reader found it, and what the catalogue says of it.
+    """One layer as its reader found it.
 
     Parameters
     ----------
+    spec : LayerSpec
+        What the catalogue says of the layer.
     table : GeoDataFrame
         One row a feature: ``class_name``, ``source_id`` and ``geometry`` (of any type, empty, or
         None), in the CRS of the source; ``half_width`` (metres from the centre line, or NaN)
         where the catalogue says something about the widths of streets.
     counts : RowCounts
         Features in the source, and those that are not in the table; ``counts.kept == len(table)``.
-    errors, notes : tuple of str
-        What was wrong with the first ten features that could not be read, and where the source
-        differs from what the catalogue expects.
+    errors : tuple of str
+        What was wrong with features that could not be read, the first ten of them.
+    notes : tuple of str
+        Where the source differs from what the catalogue expects of it.
     """
 
     spec: LayerSpec
@@ -125,13 +128,24 @@ def require_file(path: Path, kind: str) -> None:
 def find_files(
     specs: Iterable[LayerSpec], paths: Iterable[str | Path]
 ) -> tuple[tuple[tuple[LayerSpec, Path], ...], tuple[LayerSpec, ...]]:
-    """Pair layers with the files that hold them, in their order; return also those without a file.
+    """Pair the layers of a catalogue with the files that hold them.
 
-    Layers are looked for by the file-name patterns in ``files`` (in upper or lower case). Paths are
-    files, and folders to look in (not in those below them). A file given by itself goes before one
-    found in a folder; of a folder's files, a layer takes those that match the first of its patterns
-    that any matches. SourceError if a path does not exist or matches no layer, or several files
-    match a layer whose ids are not unique.
+    Parameters
+    ----------
+    specs : iterable of LayerSpec
+        Layers to look for, by the file-name patterns in ``files`` (in upper or lower case).
+    paths : iterable of str or Path
+        Files, and folders to look in (not in the folders below them). A file given by itself goes
+        before one found in a folder. Of a folder's files, a layer takes those that match the
+        first of its patterns that any matches.
+
+    Returns
+    -------
+    pairs : tuple of (LayerSpec, Path)
+        Layers and their files, in the order of `specs`. One file may hold several layers.
+    missing : tuple of LayerSpec
+        Layers that no file matches. SourceError if a path does not exist or matches no layer, or
+        several files match a layer whose ids are not unique.
 
     Examples
     --------

@@ -56,20 +56,27 @@ class Catalog:
 
     Parameters
     ----------
-    name, title, url : str
-        Short name, the one to show to people, and where the data is published.
+    name, title : str
+        Short name, and the one to show to people.
     taxonomy : Taxonomy
         The paper's classes and the catalogue's own.
+    layers : tuple of LayerSpec
+        The layers.
     metric_crs : str, optional
-        CRS in which distances are taken; by default the UTM zone of the data.
-    reader, license, attribution : str
-        What holds for every layer that does not say otherwise.
+        Coordinate reference system in metres in which distances are taken; by default the UTM zone
+        of the data.
+    url : str
+        Where the data is published.
+    reader : str
+        Reader of `sources` for its files.
     endpoints : tuple of str
         Base addresses of the services that send the data, best first.
     geocoder : str, optional
         Base address of the Nominatim service that knows places by name.
     conflate : tuple of (str, float)
         Classes whose objects from different layers are the same thing within so many metres.
+    license, attribution : str
+        What holds for every layer that does not say otherwise.
     """
 
     name: str
@@ -99,7 +106,18 @@ class Catalog:
 
 
 def paper_taxonomy() -> Taxonomy:
-    """Return the eleven classes of the paper (table of semantic objects), of codes 1 to 11."""
+    """Return the eleven classes of the paper, with its identifiers as codes and its symbols.
+
+    Returns
+    -------
+    Taxonomy
+        Codes 1 to 11 (paper, table of semantic objects).
+
+    Examples
+    --------
+    >>> paper_taxonomy().by_symbol("D").name
+    'street_light'
+    """
     source = data_folder() / "taxonomy.toml"
     content = parse_toml(source.read_text(encoding="utf-8"), "taxonomy.toml")
     check_keys(content, {"classes": list}, "taxonomy.toml")
@@ -122,11 +140,20 @@ def _sources() -> dict[str, Path | Traversable]:
 
 
 def load_catalog(name: str | Path) -> Catalog:
-    """Read and check a built-in or installed catalogue, or a file whose name ends in ``.toml``.
+    """Read and check a catalogue.
 
-    Its taxonomy is the paper's classes followed by its own. UnknownNameError if there is no
-    catalogue of that name; CatalogError if the file is missing or not TOML, has a key that means
-    nothing, lacks one that is needed, or names a class or CRS that does not exist.
+    Parameters
+    ----------
+    name : str or Path
+        Name of a built-in or installed catalogue, or path of a TOML file (it ends in ``.toml``).
+        UnknownNameError if there is none of that name.
+
+    Returns
+    -------
+    Catalog
+        The catalogue; its taxonomy is the paper's classes followed by its own. CatalogError if the
+        file is missing or not TOML, has a key that means nothing, lacks one that is needed, or
+        names a class or CRS that does not exist.
 
     Examples
     --------
@@ -164,10 +191,18 @@ def load_catalog(name: str | Path) -> Catalog:
 def combine_catalogs(catalogs: Sequence[Catalog]) -> Catalog:
     """Make one catalogue of several, so that their layers can be loaded and merged together.
 
-    With several, each layer's name begins with its catalogue's. The first of them that says a
-    metric CRS, how far a class is seen, or within how many metres it is merged, decides that, and
-    the first is trusted most when objects are merged. InputError for none, or one given twice;
-    CatalogError if they mean different classes by one name, code or symbol.
+    Parameters
+    ----------
+    catalogs : sequence of Catalog
+        At least one, each once (else InputError); the first is trusted most when objects are
+        merged.
+
+    Returns
+    -------
+    Catalog
+        With several, each layer's name begins with its catalogue's. The first of them that says
+        a metric CRS, how far a class is seen, or within how many metres it is merged, decides
+        that. CatalogError if they mean different classes by one name, code or symbol.
 
     Examples
     --------

@@ -90,6 +90,11 @@ class LayerSpec:
         people.
     license, attribution : str
         Licence of the data and the line that its publisher asks for.
+
+    Examples
+    --------
+    >>> LayerSpec(name="trees", class_name="alignment_tree", files=("trees.*",)).geometry
+    'point'
     """
 
     name: str

@@ -294,21 +294,33 @@ def read_layer(
     Features are streamed. One that cannot be read is counted and reported, and the rest are read.
     The file's own CRS holds; what `spec` and `crs` say is for a file without one. GeoJSON without a
     ``crs`` member counts as such: it is WGS 84 only if nothing else is said and the coordinates
-    fit. The features stay in the CRS of the file.
+    fit.
 
     Parameters
     ----------
     path : str or Path
-        A shapefile, GeoJSON, GeoPackage, FlatGeobuf or CSV file, or an archive of such. SourceError
-        if it is missing, damaged or of another kind, or has several layers and `spec` names none.
+        A shapefile, GeoJSON, GeoPackage, FlatGeobuf or CSV file, or an archive of such.
     spec : LayerSpec
-        Which layer and rows are wanted, and what they are. UnknownNameError or CatalogError if the
-        file lacks the layer, or a field, that it names.
+        Which layer and rows are wanted, and what they are.
     filters : bool, default True
         Whether the specification's ``where`` holds.
     crs : str, optional
-        CRS of a file that states none; it goes before the specification's. CrsError if nobody
-        states it, or it is in degrees and most coordinates cannot be.
+        CRS of a file that states none; it goes before the specification's.
+
+    Returns
+    -------
+    RawLayer
+        The features in the CRS of the file, and notes where the file is not as expected.
+
+    Raises
+    ------
+    SourceError
+        If the file is missing, damaged or of another kind, or has several layers and `spec` names
+        none.
+    UnknownNameError, CatalogError
+        If the file does not have the layer, or a field, that `spec` names.
+    CrsError
+        If nobody states the CRS, or it is in degrees and most coordinates cannot be.
 
     Examples
     --------

@@ -111,6 +111,11 @@ def check_identifiability(
     progress : callable, optional
         Called with the number of queries done and in all.
 
+    Returns
+    -------
+    IdentifiabilityCheck
+        Correlations and calibration.
+
     Raises
     ------
     InputError

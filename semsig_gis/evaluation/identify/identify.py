@@ -77,6 +77,11 @@ def identify(
     progress : callable, optional
         Called with how much is done and how much there is in all.
 
+    Returns
+    -------
+    Identifiability
+        Chances, lookalikes and gains of all cells.
+
     Raises
     ------
     InputError
@@ -84,15 +89,18 @@ def identify(
 
     Notes
     -----
-    Queries are seen from the middles of the cells, or as far from them as the position_sigma of the
-    noise says. Let l_d(c) be the log-likelihood of the signature of cell c, as a query, in cell d,
+    Queries are seen from the middles of the cells; a noise model with a position_sigma has them
+    elsewhere. Let l_d(c) be the log-likelihood of the signature of cell c, as a query, in cell d,
     and F(c) the logarithm of the sum over the cells d beyond the radius of
     ``exp(T (l_d(c) - l_c(c)))``, with the temperature T at which ``exp(T l_d(c))``, made to sum to
     one, is nearest to the chances that the answers to the trials gave (least cross-entropy). What
     came of the trials is fitted as a share that depends on F and on the logarithm of the number
-    of objects (`core.statistics`); for the gains, also on that of the objects that are left without
-    a class. The rest of the chance is divided by the same powers. The time grows with the square of
-    the number of cells.
+    of objects (`core.statistics`). The rest of the chance is divided by the same powers.
+
+    For the gains, trials are asked again without each class, and the fit takes the logarithm of
+    the number of objects that are left as a third feature.
+
+    The time grows with the square of the number of cells.
 
     Examples
     --------

@@ -171,9 +171,36 @@ class Identifiability:
 def save_identifiability(identifiability: Identifiability, path: str | Path) -> None:
     """Put what is known of the cells into the files of their database.
 
-    `path` is its file or the folder of its parts, which is replaced whole and gets the columns of
-    `Identifiability.table`; whoever builds or updates the database gets one without them. Raises
-    DatabaseError if it is damaged or another database, and InputError if it cannot be written.
+    Parameters
+    ----------
+    identifiability : Identifiability
+        What to save.
+    path : str or Path
+        File of the database, or folder of its parts; it is replaced whole.
+
+    Raises
+    ------
+    DatabaseError
+        If it is damaged, or is another database.
+    InputError
+        If it cannot be written; it is unchanged then.
+
+    Notes
+    -----
+    The columns are those of `Identifiability.table`. Whoever builds or updates the database gets
+    one without them.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> from semsig_gis import build_index, identify, named_noise, save_database
+    >>> index = build_index(demo_database, named_noise("medium"))
+    >>> columns = identify(index, trials=5, class_trials=2)
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     save_database(demo_database, f"{folder}/city.parquet")
+    ...     save_identifiability(columns, f"{folder}/city.parquet")
+    ...     open_identifiability(demo_database, f"{folder}/city.parquet").radius
+    50.0
     """
     City(path).put_columns(
         NAME,
@@ -197,10 +224,24 @@ def identifiability_facts(identifiability: Identifiability) -> dict[str, Any]:
 
 
 def open_identifiability(database: SignatureDatabase, path: str | Path) -> Identifiability | None:
-    """Read what `save_identifiability` put into the files of a database, opened from `path`.
+    """Read what `save_identifiability` put into the files of a database.
 
-    Returns None where nothing was found out yet. Raises DatabaseError if the files are damaged, or
-    what they tell belongs to other signatures.
+    Parameters
+    ----------
+    database : SignatureDatabase
+        The database, opened.
+    path : str or Path
+        Its file, or the folder of its parts.
+
+    Returns
+    -------
+    Identifiability or None
+        What is known of the cells; None where nothing was found out yet.
+
+    Raises
+    ------
+    DatabaseError
+        If the files are damaged, or what they tell belongs to other signatures.
 
     Examples
     --------

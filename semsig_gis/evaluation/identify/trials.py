@@ -161,9 +161,21 @@ def _outcome(
 def leave_class_out(
     database: SignatureDatabase, code: int
 ) -> tuple[SignatureDatabase, NDArray[np.int64]]:
-    """Return a database without the objects of a class, given by code, and rows of the cells in it.
+    """Return a database without the objects of a class.
 
-    Cells that see nothing else are left out, and their rows are -1.
+    Parameters
+    ----------
+    database : SignatureDatabase
+        The cells.
+    code : int
+        Code of the class.
+
+    Returns
+    -------
+    database : SignatureDatabase
+        The cells that see other objects, too, and these objects; perhaps none.
+    rows : ndarray of int64, shape (n,)
+        For each cell of the given database, its row in the new one; -1 where it is not there.
 
     Examples
     --------

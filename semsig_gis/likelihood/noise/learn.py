@@ -74,7 +74,7 @@ class Sample:
 
 
 def read_samples(path: str | Path, *, taxonomy: Taxonomy) -> list[Sample]:
-    r"""Read detections with their true places, one sample a row.
+    r"""Read detections with their true places.
 
     Parameters
     ----------
@@ -82,9 +82,15 @@ def read_samples(path: str | Path, *, taxonomy: Taxonomy) -> list[Sample]:
         A CSV file with the columns ``types`` (symbols such as ``DDB``), ``bearings`` (degrees,
         with blanks, commas or semicolons between them) and either ``x`` and ``y`` or
         ``cell_id``; or JSON lines with the same names (suffix ``.jsonl``, ``.ndjson`` or
-        ``.json``), where bearings may be a list. A row without detections is a sample too.
+        ``.json``), where bearings may be a list. Other columns are left alone; a row without
+        detections is a sample too.
     taxonomy : Taxonomy
         Classes that the symbols belong to.
+
+    Returns
+    -------
+    list of Sample
+        One a row.
 
     Raises
     ------
@@ -169,8 +175,8 @@ def learn_noise(
     samples : sequence of Sample
         The detections; some hundred signatures serve well.
     city : SignatureDatabase or StreetObjects
-        What there is to see: from the middles of the cells of a database, or, with street objects,
-        from where a sample was.
+        What there is to see. With a database a sample is looked up by its cell, and seen from
+        the middle of it; with street objects it is seen from where it was.
     radius : float, default 30
         Visibility range in metres, with street objects; a database has its own.
     position_sigma : float, default 0
@@ -182,6 +188,11 @@ def learn_noise(
     name : str, default "learned"
         Name of the model.
 
+    Returns
+    -------
+    NoiseEstimate
+        The model with intervals.
+
     Raises
     ------
     InputError
@@ -189,9 +200,11 @@ def learn_noise(
 
     Notes
     -----
-    For a class, the overall rate counts for eight samples of its own; the squares of deviations
-    likewise, and in a row of the confusion eight samples are misnamed as often as all are, each
-    other class alike. See `likelihood.noise.fit` for the intervals.
+    A class with n samples and the rate r of its own is given
+    ``(n * r + 8 * overall) / (n + 8)``, that is, the overall rate counts for eight samples; the
+    squares of deviations likewise, and a row of the confusion is filled up with eight samples
+    that are misnamed as often as all are, each other class alike. See
+    `likelihood.noise.fit` for the intervals.
     """
     if not (math.isfinite(position_sigma) and position_sigma >= 0):
         msg = f"the deviation of the places is {position_sigma} m; give metres, 0 or more."

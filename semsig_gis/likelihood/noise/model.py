@@ -216,8 +216,18 @@ def noise_from_dict(values: Mapping[str, Any]) -> Noise:
 def cell_noise(noise: Noise, step: float) -> Noise:
     """Return a noise model for queries from anywhere in a cell, not from its middle alone.
 
-    With cells of `step` metres, the place has ``step / 12 ** 0.5`` metres more of uncertainty, each
-    way, in quadrature.
+    Parameters
+    ----------
+    noise : NoiseSpec or NoiseMixture
+        The model for a known place.
+    step : float
+        Side of the cells in metres.
+
+    Returns
+    -------
+    NoiseSpec or NoiseMixture
+        The model with ``step / 12 ** 0.5`` metres more of uncertainty of the place, each way, in
+        quadrature.
 
     Examples
     --------
@@ -253,10 +263,22 @@ def place_noise(noise: Noise, step: float) -> Noise:
 
 
 def named_noise(name: str) -> Noise:
-    """Return the noise model of a level of the source's distortion, or raise `UnknownNameError`.
+    """Return a noise model by name.
 
-    The levels are ``"light"``, ``"medium"`` and ``"strong"``, or ``"generic"`` where it is not
-    known.
+    Parameters
+    ----------
+    name : {"light", "medium", "strong", "generic"}
+        A level of the source's distortion, or ``"generic"`` where the level is not known.
+
+    Returns
+    -------
+    NoiseSpec or NoiseMixture
+        The model.
+
+    Raises
+    ------
+    UnknownNameError
+        If there is no such model.
 
     Examples
     --------

@@ -109,10 +109,21 @@ SURROUNDINGS: dict[str, tuple[Role, GeometryKind]] = {
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CitySpec:
-    """Side of a square synthetic city in metres, its seed, and its middle in metres of EPSG:32631.
+    """Size, place and seed of a synthetic city; InputError if a value is out of its range.
 
-    The same specification gives the same city. InputError for a size that is not from 100 to
-    20,000, a negative seed, or a middle that is not finite.
+    Parameters
+    ----------
+    size : float, default 2000
+        Side of the square city in metres, 100 to 20,000.
+    seed : int, default 0
+        Seed of the random numbers; the same specification gives the same city.
+    centre : tuple of (float, float), default (500000, 5400000)
+        Middle of the city in metres of EPSG:32631.
+
+    Examples
+    --------
+    >>> CitySpec(size=300.0).seed
+    0
     """
 
     size: float = 2000.0
@@ -137,13 +148,23 @@ PARIS_LIKE = CitySpec(size=9690.0)
 
 
 def synthetic_city(spec: CitySpec | None = None) -> tuple[RawLayer, ...]:
-    """Make up the street objects of a city, a layer for each of the paper's eleven classes.
+    """Make up the street objects of a city, of the paper's eleven classes.
 
     Lights and trees are even along a street, trees with gaps, the rhythm of each street its own.
     Junctions where avenues meet have signals, and some where streets join an avenue. All other
-    classes are scattered at a rate that is ten times higher on avenues. A class that is rarer than
-    the city is large has an empty layer. ``source_id`` is edge, side and number along it, such as
-    ``"57R4"`` (``RR`` in a second row of trees), or ground and number there, such as ``"p3-41"``.
+    classes are scattered at a rate that is ten times higher on avenues.
+
+    Parameters
+    ----------
+    spec : CitySpec, optional
+        Size, place and seed; by default a city of 2 km by 2 km.
+
+    Returns
+    -------
+    tuple of RawLayer
+        One layer a class, in EPSG:32631. A class that is rarer than the city is large has an
+        empty layer. ``source_id`` is edge, side and number along it, such as ``"57R4"`` (``RR``
+        in a second row of trees), or ground and number there, such as ``"p3-41"``.
 
     Examples
     --------
@@ -169,10 +190,25 @@ def synthetic_city(spec: CitySpec | None = None) -> tuple[RawLayer, ...]:
 
 
 def synthetic_surroundings(spec: CitySpec | None = None) -> tuple[RawLayer, RawLayer]:
-    """Make up the footprints and the centre lines of what `synthetic_city` makes of `spec`.
+    """Make up the buildings and the streets of a city.
 
-    The streets have one more column, ``half_width``: metres from the centre line to the houses.
-    Their ``source_id`` is the edge that objects name.
+    Parameters
+    ----------
+    spec : CitySpec, optional
+        Size, place and seed; by default a city of 2 km by 2 km.
+
+    Returns
+    -------
+    buildings, streets : RawLayer
+        Footprints (polygons) and centre lines of the city that `synthetic_city` makes of the same
+        specification, in EPSG:32631. The streets have one more column, ``half_width``: metres
+        from the centre line to the houses. Their ``source_id`` is the edge that objects name.
+
+    Examples
+    --------
+    >>> buildings, streets = synthetic_surroundings(CitySpec(size=300.0))
+    >>> buildings.spec.role, streets.spec.role
+    ('buildings', 'streets')
     """
     spec = spec or CitySpec()
     network = lay_streets(spec.size, _random(spec, "streets"))
