@@ -167,17 +167,9 @@ def coverage_curve(queries: pd.DataFrame) -> pd.DataFrame:
     for threshold in RULES:
         answered = chance >= threshold
         precision, low, high, count = _share(right[answered])
-        rows.append(
-            {
-                "threshold": threshold,
-                "answered": count,
-                "coverage": count / len(chance),
-                "precision": precision,
-                "low": low,
-                "high": high,
-            }
-        )
-    return pd.DataFrame(rows)
+        rows.append((threshold, count, count / len(chance), precision, low, high))
+    columns = ["threshold", "answered", "coverage", "precision", "low", "high"]
+    return pd.DataFrame(rows, columns=columns)
 
 
 def calibration_bins(queries: pd.DataFrame) -> pd.DataFrame:

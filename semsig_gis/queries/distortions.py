@@ -292,8 +292,8 @@ class Distortion:
     bearing_clip : float, default 30.0
         Largest absolute value of that noise, in degrees; 0 or more.
     resort : bool, default True
-        Whether the objects are put in clockwise order again after the noise, as a sweep would
-        see them. Otherwise they keep the order they had before it.
+        Whether the objects are put in clockwise order again after the noise, as a sweep would see
+        them (left open in the source, section 4.2, as the next).
     false_class : {"uniform", "frequency"}, default "uniform"
         Whether the class of a false object is drawn with equal chances or by how often each
         class is seen in the database.
@@ -304,10 +304,6 @@ class Distortion:
         If a number is out of its range.
     UnknownNameError
         If `false_class` is not one of the two.
-
-    Notes
-    -----
-    The source (section 4.2) leaves `resort` and `false_class` open.
 
     Examples
     --------
@@ -365,22 +361,10 @@ DISTORTIONS: Mapping[str, Distortion] = MappingProxyType(
 
 
 def named_distortion(name: str) -> Distortion:
-    """Return one of the paper's levels of distortion.
+    """Return one of the paper's levels: ``"none"``, ``"light"``, ``"medium"`` or ``"strong"``.
 
-    Parameters
-    ----------
-    name : {"none", "light", "medium", "strong"}
-        Its name.
-
-    Returns
-    -------
-    Distortion
-        0, 1, 7 or 13 occurrences; all but ``"none"`` with bearing noise.
-
-    Raises
-    ------
-    UnknownNameError
-        If there is no such level.
+    They have 0, 1, 7 and 13 occurrences; all but the first have noise on the bearings. Raises
+    UnknownNameError if there is no such level.
 
     Examples
     --------
@@ -408,7 +392,7 @@ def distort(
     weights: ArrayLike | None = None,
     rng: np.random.Generator,
 ) -> Signature:
-    """Return a signature as a faulty detector would have given it.
+    """Return a signature as a faulty detector would have given it, possibly empty.
 
     Parameters
     ----------
@@ -419,15 +403,9 @@ def distort(
     classes : array_like of int, shape (k,)
         Distinct class codes that a false object may have; at least one.
     weights : array_like of float, shape (k,), optional
-        How often each class is seen, not all zero. Needed for, and used by, the false class
-        ``"frequency"`` only.
+        How often each class is seen, not all zero; for the false class ``"frequency"`` only.
     rng : numpy.random.Generator
         Source of the chances.
-
-    Returns
-    -------
-    Signature
-        The distorted signature, possibly empty, with bearings in [0, 360).
 
     Raises
     ------
@@ -436,17 +414,15 @@ def distort(
 
     Notes
     -----
-    Paper, section 4.2. A false object is placed where its bearing belongs before the noise. A
-    miss or a false classification that finds no object, and a false classification that finds
-    no other class, change nothing but count as an occurrence.
+    Paper, section 4.2. A false object is placed where its bearing belongs before the noise. An
+    occurrence that finds no object, or no other class, changes nothing but counts.
 
     Examples
     --------
     >>> seen = Signature(codes=np.array([1, 3], np.uint8), bearings=np.array([10.0, 200.0]))
     >>> rng = np.random.default_rng(0)
-    >>> same = distort(seen, named_distortion("none"), classes=[1, 3], rng=rng)
-    >>> same.codes.tolist(), same.bearings.tolist()
-    ([1, 3], [10.0, 200.0])
+    >>> distort(seen, named_distortion("none"), classes=[1, 3], rng=rng).bearings.tolist()
+    [10.0, 200.0]
     """
     false = np.asarray(classes, dtype=np.uint8)
     chances = _class_chances(distortion, false, weights)

@@ -27,10 +27,9 @@ TOWARDS = ("distance", "bearing")
 def read_queries(path: str | Path, *, taxonomy: Taxonomy) -> Queries:
     """Read the queries of a CSV file, or of a file of JSON lines.
 
-    The columns are ``types`` and ``bearings`` (degrees with blanks, commas or semicolons between
-    them; in JSON perhaps a list), one of which may be missing or empty, and perhaps ``id``. Each
-    query comes with its ``id``, or else the number of its line. Raises InputError if the file
-    cannot be read or a line of it is no query.
+    The columns are those of `row_signature` and perhaps ``id``. Each query comes with its ``id``,
+    or else the number of its line. Raises InputError if the file cannot be read or a line of it is
+    no query.
     """
     return _named(read_rows(path, lambda row: _query(row, taxonomy), what="query"))
 

@@ -29,12 +29,9 @@ from semsig_gis.core.signature import Signature
 from semsig_gis.storage.whole import reason, whole_file
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator, Sequence
+    from collections.abc import Callable, Iterable, Iterator, Sequence
 
     from numpy.typing import ArrayLike, NDArray
-
-    Bounds = NDArray[np.float64]
-    from collections.abc import Callable
 
     from semsig_gis.core.taxonomy import Taxonomy
 
@@ -66,8 +63,7 @@ def hilbert_order(geometries: NDArray[np.object_] | gpd.array.GeometryArray) -> 
 def bounds_column(bounds: ArrayLike) -> pa.StructArray:
     """Return the column by which readers choose the rows within a box.
 
-    ``xmin, ymin, xmax, ymax`` of every row, shape (n, 4), become float32, rounded outwards: half
-    the bytes, and no row is missed.
+    Bounds, shape (n, 4), become float32, rounded outwards: half the bytes, and no row is missed.
     """
     exact = np.asarray(bounds, dtype=np.float64).reshape(-1, len(SIDES))
     rounded = exact.astype(np.float32)
@@ -108,9 +104,9 @@ def _extremes(group: Any) -> dict[str, Any]:  # noqa: ANN401 - pyarrow has no ty
 
 
 def rows_meeting(table: pa.Table, box: Sequence[float]) -> pa.Table:
-    """Return the rows of a table that meet the box ``xmin, ymin, xmax, ymax``.
+    """Return the rows of a table that meet the box ``xmin, ymin, xmax, ymax``, or nearly so.
 
-    Some may miss the box by less than a metre. Without a column of bounds, all rows are returned.
+    Without a column of bounds, all rows are returned.
     """
     if BBOX not in table.column_names or table.schema.field(BBOX).type != BOUNDS:
         return table
@@ -124,7 +120,7 @@ def _sides(column: pa.ChunkedArray) -> list[NDArray[np.float32]]:
     return [side.to_numpy(zero_copy_only=False) for side in fields]
 
 
-def each_bounds(path: str | Path) -> Iterator[Bounds]:
+def each_bounds(path: str | Path) -> Iterator[NDArray[np.float64]]:
     """Yield ``xmin, ymin, xmax, ymax`` of a Parquet file's rows, shape (n, 4), group by group.
 
     Nothing else is read; nothing is yielded where the file has no column of bounds.
@@ -180,8 +176,7 @@ def write_geoparquet(
     """Write an Arrow table as one whole GeoParquet file with specs in its metadata.
 
     The column ``geometry`` holds WKB, which `geo` describes (see `geo_metadata`). Specs are plain
-    JSON values, stored under the key ``semsig``. `group_rows` is how many rows are read together,
-    in a file that is read by box.
+    JSON values. `group_rows` is how many rows are read together, in a file that is read by box.
     """
     with whole_file(path) as partial:
         pq.write_table(
@@ -242,7 +237,7 @@ def read_geoparquet(
     """Return the table, the specs and the CRS of a file that `write_geoparquet` wrote.
 
     DatabaseError if it is missing, damaged, or not of that kind (``specs["kind"]``). Rows that do
-    not meet the box ``xmin, ymin, xmax, ymax`` may be left out (see `storage.geoparquet`).
+    not meet the box ``xmin, ymin, xmax, ymax`` may be left out.
     """
     file = Path(path)
     if not os.path.isfile(file):  # noqa: PTH113 - it answers where Path.is_file raises
@@ -299,11 +294,10 @@ _T = TypeVar("_T")
 
 
 def read_rows(path: str | Path, read: Callable[[Row], _T], *, what: str) -> list[tuple[int, _T]]:
-    """Return the line number of each row of a file, and what `read` made of the row.
+    """Return the line number of each row of a file (CSV or JSON lines), and what `read` made of it.
 
-    The file is CSV (suffix ``.csv``) or JSON lines. `read` raises an error that says what is wrong
-    with a row; `what` names a row in messages, such as ``"query"``. InputError if the file cannot
-    be read, has no rows, or a row cannot be used.
+    `read` raises an error that says what is wrong with a row; `what` names a row in messages.
+    InputError if the file cannot be read, has no rows, or a row cannot be used.
     """
     file = Path(path)
     try:
@@ -318,10 +312,7 @@ def read_rows(path: str | Path, read: Callable[[Row], _T], *, what: str) -> list
 def parse_rows(
     text: str, source: str, read: Callable[[Row], _T], *, what: str, table: bool = False
 ) -> list[tuple[int, _T]]:
-    """Return what `read_rows` does, from text: CSV if `table`, else JSON lines.
-
-    `source` names the text in messages.
-    """
+    """Return what `read_rows` does, from text that messages call `source`: CSV, or JSON lines."""
     rows = []
     for line, values in _csv(text, source) if table else _json_lines(text):
         try:

@@ -45,9 +45,8 @@ def raster_at_cells(
 
     The raster may be in any format that GDAL reads and in any CRS; `crs` is that of the grid. NaN
     stands where the raster has no data; a cell that touches its edge from outside may get the value
-    there. `band` counts from 1 and is needed only where there are several. SourceError if the file
-    is not a raster, CrsError if its CRS is missing or does not fit the grid's, InputError for the
-    band.
+    there. `band` counts from 1. SourceError if the file is no raster, CrsError if its CRS does not
+    fit the grid's or is missing, InputError if `band` is wrong, or missing where there are several.
     """
     across, up = np.asarray(columns, dtype=np.int64), np.asarray(rows, dtype=np.int64)
     left, top = int(across.min()), int(up.max())
@@ -115,11 +114,10 @@ def write_cells(
     unit: str = "",
     notes: Mapping[str, str],
 ) -> None:
-    """Write one number a cell as a Cloud-Optimised GeoTIFF; NaN where there is none.
+    """Write one number a cell as a Cloud-Optimised GeoTIFF, whole; NaN where there is none.
 
-    Cells, at least one, are ordered by column. The raster is written in strips, so that memory
-    stays flat, and appears whole, by rename. InputError if the cells span too wide an area, or the
-    file cannot be written.
+    Cells, at least one, are ordered by column, and written in strips, so that memory stays flat.
+    InputError if the cells span too wide an area, or the file cannot be written.
     """
     left, top = int(columns[0]), int(rows.max())
     width, height = int(columns[-1]) - left + 1, top - int(rows.min()) + 1

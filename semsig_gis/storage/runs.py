@@ -45,8 +45,7 @@ class RunKind:
     def begin(self, folder: Path, recipe: Recipe) -> None:
         """Begin a run in a folder, or take up the one in it; one without results is replaced.
 
-        Raise InputError if the folder holds results of another recipe or something else, or cannot
-        be written.
+        InputError if the folder holds something else or cannot be written.
         """
         recipe = _plain(recipe)
         entries = self._entries(folder)

@@ -40,8 +40,7 @@ def check_keys(
 ) -> None:
     """Refuse a table with an unknown key, a value of another type, or a key too few.
 
-    `allowed` gives the type of each key's value, ``object`` for one that is checked elsewhere. The
-    CatalogError offers the nearest known key.
+    `allowed` gives the type of each key's value, ``object`` for one that is checked elsewhere.
     """
     for key, value in table.items():
         if key not in allowed:
@@ -93,10 +92,9 @@ def metres(value: object, key: str, where: str, *, most: float) -> float:
 
 
 def toml_text(values: Mapping[str, Any]) -> str:
-    """Write values as TOML: numbers, texts and lists first, then a section for each table.
+    """Write values, without None, NaN or infinity, as TOML: a section for each table comes last.
 
-    There is no None, NaN or infinity among them. A parser reads back the same values, but for
-    tables that are empty.
+    A parser reads back the same values, but for tables that are empty.
     """
     return _section(values).lstrip("\n")
 

@@ -7,7 +7,7 @@ succeed as their chances say (calibration)?
 from __future__ import annotations
 
 import math
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, fields
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -49,10 +49,8 @@ class IdentifiabilityCheck:
 
     Parameters
     ----------
-    queries : int
-        How many were asked.
-    seed : int
-        Seed of their cells and of all chances.
+    queries, seed : int
+        How many were asked, and the seed of their cells and of all chances.
     found : float
         Share of them whose best place was within the radius.
     correlations : mapping of str to float
@@ -186,15 +184,6 @@ def _correlation(one: NDArray[np.float64], other: NDArray[np.float64]) -> float:
 def _bins(stated: NDArray[np.float64], success: NDArray[np.float64]) -> tuple[ChanceBin, ...]:
     """Return the tenths that have queries."""
     bins = calibration_bins(pd.DataFrame({"chance": stated, "right": success}))
-    return tuple(
-        ChanceBin(
-            low=row["from"],
-            high=row["to"],
-            queries=row["n"],
-            stated=row["stated"],
-            true=row["true"],
-            true_low=row["low"],
-            true_high=row["high"],
-        )
-        for row in bins[bins["n"] > 0].to_dict("records")
-    )
+    names = [field.name for field in fields(ChanceBin)]  # in the order of these columns
+    rows = bins[bins["n"] > 0].to_dict("split")["data"]
+    return tuple(ChanceBin(**dict(zip(names, row, strict=True))) for row in rows)

@@ -74,10 +74,8 @@ class Identifiability:
         What `near` gains by each class that occurs, in the order of `classes`.
     classes : tuple of ClassGain
         The same for the city as a whole.
-    trials : int
-        Number of simulated queries.
-    seed : int
-        Seed of all chances.
+    trials, seed : int
+        Number of simulated queries, and the seed of all chances.
     """
 
     database: SignatureDatabase
