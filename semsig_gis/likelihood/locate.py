@@ -414,30 +414,18 @@ def locate(index: LikelihoodIndex, query: Signature, **options: Unpack[LocateOpt
     Parameters
     ----------
     index : LikelihoodIndex
-        The cells and the noise model. For queries from anywhere, not from the middles of cells
-        alone, that is ``cell_noise(noise, step)`` (see `likelihood.noise.model`).
+        The cells and the noise model; for queries from anywhere, not from the middles of cells
+        alone, that is ``cell_noise(noise, step)``.
     query : Signature
         At least one object; types or bearings may be unknown.
-    north_sigma : float, default 0
-        Standard deviation in degrees of the north of the query; infinite if it is not known.
-    log_prior : ndarray of float64, shape (n,), optional
-        What else is known of the place (see `likelihood.priors`).
-    rule : AnswerRule, optional
-        When to answer; from a chance of 0.9 by default.
-    top : int, default 10
-        How many cells to list, at least 1.
-    store : ObjectStore, optional
-        The street objects behind the cells; what is refined or explained looks at them.
-    refined : bool, default False
-        Look for the place between the viewpoints, too, with the store; the chances of the cells
-        are then those of their parts together.
-    explained : int, default 0
-        How many candidates to explain; without a store, street objects have no identifiers.
-
-    Returns
-    -------
-    Location
-        The answer.
+    **options : LocateOptions
+        ``north_sigma`` is the standard deviation in degrees of the north of the query, 0 by
+        default and infinite if it is not known; ``log_prior``, shape (n,), what else is known of
+        the place (see `likelihood.priors`). The ``rule`` says when to answer, from a chance of 0.9
+        by default, and ``top`` (10) how many cells to list. The ``store`` holds the street objects
+        behind the cells: with ``refined`` the place is looked for between the viewpoints, too, and
+        the chances of the cells are those of their parts together. ``explained`` (0) candidates
+        are explained; without a store, street objects have no identifiers.
 
     Raises
     ------
@@ -475,24 +463,14 @@ def locate_route(
 
     Parameters
     ----------
-    index, north_sigma, rule, top, store, refined, explained
-        As of `locate`, for each view.
+    index : LikelihoodIndex
+        As of `locate`.
     queries : sequence of Signature
         The views. One may have no objects: that nothing was detected tells something, too.
     legs : sequence of Leg
-        The ways between them, one fewer.
-    log_prior : ndarray of float64, shape (n,), optional
-        What else is known of the place of the first view.
-
-    Returns
-    -------
-    tuple of Location
-        One for each view.
-
-    Raises
-    ------
-    InputError
-        As `locate`, and if the numbers of views and legs do not fit.
+        The ways between them, one fewer; InputError if the numbers do not fit.
+    **options : LocateOptions
+        As of `locate`, for each view; ``log_prior`` is of the place of the first view.
 
     Examples
     --------

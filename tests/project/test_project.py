@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import inspect
 import re
 import shutil
 import socket
@@ -12,6 +13,7 @@ import zipfile
 from pathlib import Path
 
 import pytest
+from numpydoc.validate import validate
 from packaging.requirements import Requirement
 from packaging.utils import canonicalize_name
 
@@ -139,6 +141,18 @@ def test_the_api_page_lists_the_public_names() -> None:
 def test_the_picture_of_the_architecture_is_current() -> None:
     check = [sys.executable, str(ROOT / "docs/architecture.py"), "--check"]
     assert subprocess.run(check, check=False, cwd=ROOT).returncode == 0
+
+
+@pytest.mark.parametrize(
+    "name", [name for name in dir(semsig_gis) if inspect.isfunction(getattr(semsig_gis, name))]
+)
+def test_exported_functions_say_what_they_take_and_give(name: str) -> None:
+    function = getattr(semsig_gis, name)
+    wanted = {"PR01", "PR02", "GL08"}
+    if not inspect.isgeneratorfunction(function):
+        wanted |= {"RT01", "RT03"}
+    faults = validate(f"semsig_gis.{name}")["errors"]
+    assert [fault for fault in faults if fault[0] in wanted] == []
 
 
 def test_no_public_name_is_also_a_module() -> None:
