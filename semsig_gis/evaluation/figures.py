@@ -61,9 +61,8 @@ def query_figures(queries: pd.DataFrame, *, cells: int) -> pd.DataFrame:
 def figure_means(figures: pd.DataFrame) -> pd.DataFrame:
     """Return the mean of each figure of `query_figures`, with an interval.
 
-    Columns are ``value``, ``low`` and ``high`` (Wilson's 95 % interval) and ``n``, the number of
-    values that are not NaN; the others are NaN where there are none. Where ties make a query count
-    with a chance, the interval is a little too wide: such values vary less than those of 0 or 1.
+    Columns are ``value``, ``low`` and ``high`` (Wilson's 95 % interval; a little wide where ties
+    make a query count with a chance) and ``n``, the number of values that are not NaN.
     """
     means = [_share(values) for values in figures.to_numpy(dtype=np.float64).T]
     names = pd.Index(figures.columns, name="figure")
@@ -107,10 +106,9 @@ def range_labels(sizes: NDArray[np.int64], ranges: Sequence[str]) -> list[str]:
 
 
 def district_labels(queries: gpd.GeoDataFrame, districts: gpd.GeoDataFrame, name: str) -> list[str]:
-    """Return the district in which each query was seen.
+    """Return the name of the first district around each query, ``"elsewhere"`` in none.
 
-    Districts are polygons in any CRS with their names in the column `name`. The label is that of
-    the first of several, and ``"elsewhere"`` in none. Raises InputError if there is no such column.
+    Districts are polygons in any CRS, named by the column `name`; InputError if there is none.
     """
     if name not in districts:
         columns = ", ".join(str(one) for one in districts if one != "geometry")

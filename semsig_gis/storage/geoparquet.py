@@ -74,10 +74,7 @@ def bounds_column(bounds: ArrayLike) -> pa.StructArray:
 
 
 def groups_meeting(file: pq.ParquetFile, box: Sequence[float]) -> list[int]:
-    """Return the numbers of the row groups that may meet the box ``xmin, ymin, xmax, ymax``.
-
-    Without a column of bounds, all of them may.
-    """
+    """Return the numbers of the row groups that may meet a box; all without a column of bounds."""
     west, south, east, north = box
     groups = []
     for number in range(file.num_row_groups):
@@ -121,10 +118,7 @@ def _sides(column: pa.ChunkedArray) -> list[NDArray[np.float32]]:
 
 
 def each_bounds(path: str | Path) -> Iterator[NDArray[np.float64]]:
-    """Yield ``xmin, ymin, xmax, ymax`` of a Parquet file's rows, shape (n, 4), group by group.
-
-    Nothing else is read; nothing is yielded where the file has no column of bounds.
-    """
+    """Yield bounds of a Parquet file's rows, shape (n, 4), by group; none without such a column."""
     with pq.ParquetFile(path) as file:
         if BBOX not in file.schema_arrow.names or file.schema_arrow.field(BBOX).type != BOUNDS:
             return

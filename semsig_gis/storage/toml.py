@@ -63,10 +63,7 @@ def check_keys(
 
 
 def one_of(value: str, key: str, choices: tuple[str, ...], where: str) -> Any:  # noqa: ANN401
-    """Return a value that is one of `choices`; otherwise CatalogError offers the nearest.
-
-    The type is left open, so that it may be a `Literal`.
-    """
+    """Return a value that is one of `choices` (or a `Literal`); CatalogError offers the nearest."""
     if value not in choices:
         names = ", ".join(repr(choice) for choice in choices)
         msg = f"{where} has {key} = {value!r}{nearest_name(value, choices)}; write one of {names}."
