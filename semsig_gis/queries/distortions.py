@@ -361,10 +361,22 @@ DISTORTIONS: Mapping[str, Distortion] = MappingProxyType(
 
 
 def named_distortion(name: str) -> Distortion:
-    """Return one of the paper's levels: ``"none"``, ``"light"``, ``"medium"`` or ``"strong"``.
+    """Return one of the paper's levels of distortion.
 
-    They have 0, 1, 7 and 13 occurrences; all but the first have noise on the bearings. Raises
-    UnknownNameError if there is no such level.
+    Parameters
+    ----------
+    name : {"none", "light", "medium", "strong"}
+        Its name.
+
+    Returns
+    -------
+    Distortion
+        0, 1, 7 or 13 occurrences; all but ``"none"`` with bearing noise.
+
+    Raises
+    ------
+    UnknownNameError
+        If there is no such level.
 
     Examples
     --------
@@ -392,7 +404,7 @@ def distort(
     weights: ArrayLike | None = None,
     rng: np.random.Generator,
 ) -> Signature:
-    """Return a signature as a faulty detector would have given it, possibly empty.
+    """Return a signature as a faulty detector would have given it.
 
     Parameters
     ----------
@@ -407,6 +419,11 @@ def distort(
     rng : numpy.random.Generator
         Source of the chances.
 
+    Returns
+    -------
+    Signature
+        The distorted signature, possibly empty, with bearings in [0, 360).
+
     Raises
     ------
     InputError
@@ -414,15 +431,17 @@ def distort(
 
     Notes
     -----
-    Paper, section 4.2. A false object is placed where its bearing belongs before the noise. An
-    occurrence that finds no object, or no other class, changes nothing but counts.
+    Paper, section 4.2. A false object is placed where its bearing belongs before the noise. A
+    miss or a false classification that finds no object, and a false classification that finds
+    no other class, change nothing but count as an occurrence.
 
     Examples
     --------
     >>> seen = Signature(codes=np.array([1, 3], np.uint8), bearings=np.array([10.0, 200.0]))
     >>> rng = np.random.default_rng(0)
-    >>> distort(seen, named_distortion("none"), classes=[1, 3], rng=rng).bearings.tolist()
-    [10.0, 200.0]
+    >>> same = distort(seen, named_distortion("none"), classes=[1, 3], rng=rng)
+    >>> same.codes.tolist(), same.bearings.tolist()
+    ([1, 3], [10.0, 200.0])
     """
     false = np.asarray(classes, dtype=np.uint8)
     chances = _class_chances(distortion, false, weights)

@@ -46,7 +46,8 @@ class QuerySpec:
     seeds : tuple of int, default (0,)
         Seeds of all chances; different ones, each 0 or more.
     seen_from : {"cells", "anywhere"}, default "cells"
-        The viewpoints of cells, as in the paper, or anywhere in cells, outside of buildings.
+        The viewpoints of cells, as in the paper, or places anywhere in cells, outside of
+        buildings.
     distortions : tuple, default the paper's medium level
         What happens to a query, in this order (see `queries.chain`).
 
@@ -56,6 +57,11 @@ class QuerySpec:
         If a number is out of range.
     UnknownNameError
         If there is no such place to see from.
+
+    Examples
+    --------
+    >>> QuerySpec(number=100, seeds=(1, 2)).seen_from
+    'cells'
     """
 
     number: int = 500
@@ -106,22 +112,28 @@ def draw_queries(
     city: SignatureDatabase | None = None,
     part: slice = slice(None),
 ) -> list[Query]:
-    """Draw queries of known places, for each seed as many as the spec says.
+    """Draw queries of known places.
 
     Parameters
     ----------
     database : SignatureDatabase
-        What is to be searched; objects of classes that it has nowhere are not asked.
+        What is to be searched.
     spec : QuerySpec
         Which queries.
     store : ObjectStore, optional
         The street objects, and buildings if any, of the city that is looked at; needed for places
         anywhere.
     city : SignatureDatabase, optional
-        The city that is looked at, if it is not the one that is searched: the same city at
-        another date, say, in the same coordinate reference system. Places are in its cells.
+        The city that is looked at, if it is not the one that the database tells of: the same city
+        at another date, say, in the same coordinate reference system. Places are in its cells.
     part : slice, optional
         Which of the queries to draw, those of the first seed first; all by default.
+
+    Returns
+    -------
+    list of Query
+        For each seed so many queries. A detector knows the classes that the database has
+        somewhere; objects of others are not asked.
 
     Raises
     ------

@@ -41,6 +41,16 @@ class Sight:
         Metres; of a false object, how far away it seems to be.
     heading : float, default 0
         Degrees to add to the bearings to have them from true north, in [0, 360).
+
+    Examples
+    --------
+    >>> seen = Sight(
+    ...     codes=np.array([1, 3], np.uint8),
+    ...     bearings=np.array([350.0, 90.0]),
+    ...     distances=np.array([5.0, 20.0]),
+    ... )
+    >>> seen.clockwise().codes.tolist(), len(seen.only(seen.distances < 10.0))
+    ([3, 1], 1)
     """
 
     codes: NDArray[np.uint8]
