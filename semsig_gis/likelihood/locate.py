@@ -427,11 +427,21 @@ def locate(index: LikelihoodIndex, query: Signature, **options: Unpack[LocateOpt
         the chances of the cells are those of their parts together. ``explained`` (0) candidates
         are explained; without a store, street objects have no identifiers.
 
+    Returns
+    -------
+    Location
+        The answer.
+
     Raises
     ------
     InputError
         If the query is empty or has a class that no cell sees, a number is out of its range, or
         what is asked for needs bearings, a store, or another index.
+
+    Returns
+    -------
+    tuple of Location
+        One for each view, in their order.
 
     Examples
     --------
