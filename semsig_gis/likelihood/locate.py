@@ -438,11 +438,6 @@ def locate(index: LikelihoodIndex, query: Signature, **options: Unpack[LocateOpt
         If the query is empty or has a class that no cell sees, a number is out of its range, or
         what is asked for needs bearings, a store, or another index.
 
-    Returns
-    -------
-    tuple of Location
-        One for each view, in their order.
-
     Examples
     --------
     >>> from semsig_gis import ObjectStore, build_index, named_noise
@@ -481,6 +476,11 @@ def locate_route(
         The ways between them, one fewer; InputError if the numbers do not fit.
     **options : LocateOptions
         As of `locate`, for each view; ``log_prior`` is of the place of the first view.
+
+    Returns
+    -------
+    tuple of Location
+        One for each view, in their order.
 
     Examples
     --------
