@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import contextlib
+import gc
 import logging
 import signal
 import tempfile
 import threading
+import warnings
 from concurrent.futures import CancelledError
 from dataclasses import dataclass
 from functools import partial
@@ -147,28 +149,35 @@ def _client(workers: int, scheduler: str | None) -> Iterator[Client]:
             },
         }
         stack.enter_context(dask.config.set(settings))
-        where: str | LocalCluster = scheduler or ""
-        if scheduler is None:
-            with _interrupts_ignored():
-                where = LocalCluster(
-                    n_workers=workers,
-                    threads_per_worker=1,
-                    host="127.0.0.1",
-                    memory_limit=0,
-                    dashboard_address="127.0.0.1:0",
-                    silence_logs=logging.CRITICAL,
-                )
-            stack.enter_context(where)
-        try:
-            client = Client(where, timeout=PATIENCE_S, set_as_default=False)
-        except Exception as error:  # on a loaded machine, dask fails in ways of its own
-            msg = (
-                f"{workers} processes could not be started; ask for fewer, or try again."
-                if scheduler is None
-                else f"the scheduler {scheduler} cannot be reached; give the address that `dask "
-                "scheduler` printed, such as tcp://10.0.0.5:8786."
-            )
-            raise InputError(msg) from error
+        msg = (
+            f"{workers} processes could not be started; ask for fewer, or try again."
+            if scheduler is None
+            else f"the scheduler {scheduler} cannot be reached; give the address that `dask "
+            "scheduler` printed, such as tcp://10.0.0.5:8786."
+        )
+        # On a loaded machine, dask fails in ways of its own, and warns of what it leaves.
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", ResourceWarning)
+            try:
+                where: str | LocalCluster = scheduler or ""
+                if scheduler is None:
+                    with _interrupts_ignored():
+                        where = LocalCluster(
+                            n_workers=workers,
+                            threads_per_worker=1,
+                            host="127.0.0.1",
+                            memory_limit=0,
+                            dashboard_address="127.0.0.1:0",
+                            silence_logs=logging.CRITICAL,
+                        )
+                    stack.enter_context(where)
+                client = Client(where, timeout=PATIENCE_S, set_as_default=False)
+            except Exception:  # noqa: BLE001 - whatever it is, nothing was begun
+                client = None
+            if client is None:
+                gc.collect()
+        if client is None:
+            raise InputError(msg)
         yield stack.enter_context(client)
 
 

@@ -78,19 +78,20 @@ def test_a_scheduler_that_does_not_answer_is_named(
 
 
 @pytest.mark.parametrize(
-    ("where", "words"),
+    ("part", "where", "words"),
     [
-        ({"scheduler": "tcp://127.0.0.1:9"}, ("tcp://127.0.0.1:9", "cannot be reached")),
-        ({"workers": 2}, ("2 processes", "could not be started", "fewer")),
+        ("Client", {"scheduler": "tcp://127.0.0.1:9"}, ("127.0.0.1:9", "cannot be reached")),
+        ("Client", {"workers": 2}, ("2 processes", "could not be started", "fewer")),
+        ("LocalCluster", {"workers": 2}, ("2 processes", "could not be started", "fewer")),
     ],
 )
 def test_whatever_dask_raises_is_one_sentence(
-    monkeypatch: pytest.MonkeyPatch, where: dict[str, Any], words: tuple[str, ...]
+    monkeypatch: pytest.MonkeyPatch, part: str, where: dict[str, Any], words: tuple[str, ...]
 ) -> None:
     def fail(*_: object, **__: object) -> None:
         raise AssertionError
 
-    monkeypatch.setattr("distributed.Client", fail)
+    monkeypatch.setattr(f"distributed.{part}", fail)
     with refused(InputError, *words):
         list(run_tasks(abs, [1], **where))
 
