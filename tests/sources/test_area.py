@@ -73,21 +73,18 @@ def test_a_place_is_told_from_a_file(tmp_path: Path) -> None:
 
 def test_the_polygons_of_a_file_are_joined(tmp_path: Path) -> None:
     east = shapely.box(3.9, 43.5, 4.0, 43.7)
-    path = write(tmp_path, shapely.box(*BOX), east, shapely.box(5, 5, 6, 6), None)
-    area = parse_area(path)
+    area = parse_area(write(tmp_path, shapely.box(*BOX), east, shapely.box(5, 5, 6, 6), None))
     assert area.name == "quarter"
     assert isinstance(area.polygon, shapely.MultiPolygon)
     assert len(area.polygon.geoms) == 2
     assert area.bounds == (3.8, 5, 6, 43.7)
+    assert join_areas(np.array([shapely.Point(1, 2)])) is None
 
 
-def test_a_file_in_metres_becomes_degrees(tmp_path: Path) -> None:
+def test_a_polygon_is_put_in_degrees_and_mended(tmp_path: Path) -> None:
     box = gpd.GeoSeries([shapely.box(*BOX)], crs="EPSG:4326").to_crs(2154)
     area = parse_area(write(tmp_path, box.iloc[0], crs="EPSG:2154"))
     assert area.bounds == pytest.approx(BOX, abs=1e-6)
-
-
-def test_a_polygon_that_crosses_itself_is_mended(tmp_path: Path) -> None:
     bow = shapely.Polygon([(0, 0), (1, 1), (1, 0), (0, 1)])
     area = parse_area(write(tmp_path, bow))
     assert area.polygon.is_valid
@@ -110,25 +107,18 @@ def test_a_file_without_area_is_said(
         parse_area(write(tmp_path, geometry))
 
 
-def test_a_polygon_that_cannot_be_read_is_said(tmp_path: Path) -> None:
+def test_a_file_that_cannot_be_read_is_said(tmp_path: Path) -> None:
     path = tmp_path / "quarter.geojson"
-    broken = {
-        "type": "Feature",
-        "properties": {},
-        "geometry": {"type": "Polygon", "coordinates": 5},
-    }
+    with refused(SemsigError, "does not exist"):
+        parse_area(str(path))
+    broken = {"type": "Feature", "geometry": {"type": "Polygon", "coordinates": 5}}
     path.write_text(json.dumps({"type": "FeatureCollection", "features": [broken]}))
     with refused(InputError, "polygons that cannot be read", "correct the file"):
         parse_area(str(path))
-
-
-def test_a_file_that_cannot_be_read_is_said(tmp_path: Path) -> None:
-    with refused(SemsigError, "does not exist"):
-        parse_area(str(tmp_path / "nowhere.geojson"))
     with pytest.warns(UserWarning, match="'crs' was not provided"):
-        path = write(tmp_path, shapely.box(*BOX), crs=None)
+        nowhere = write(tmp_path, shapely.box(*BOX), crs=None)
     with refused(SemsigError, "CRS"):
-        parse_area(path)
+        parse_area(nowhere)
 
 
 @pytest.mark.parametrize(
@@ -151,7 +141,3 @@ def test_a_layer_is_clipped(role: str, kept: list[str], crs: str) -> None:
     assert clipped.table.index.tolist() == list(range(len(kept)))
     assert clipped.table.crs == table.crs
     assert clipped.counts.read == len(clipped.table) + clipped.counts.filtered
-
-
-def test_nothing_has_no_outline() -> None:
-    assert join_areas(np.array([shapely.Point(1, 2)])) is None

@@ -1,4 +1,4 @@
-"""How values of fields compare with what a catalogue says, and what follows from them."""
+"""From rows to a layer: which CRS, what values of fields say, and how wide streets are."""
 
 from __future__ import annotations
 
@@ -8,22 +8,97 @@ import math
 from typing import TYPE_CHECKING, Any
 
 import geopandas as gpd
+import numpy as np
 import pytest
 import shapely
 from hypothesis import given
 from hypothesis import strategies as st
 from osm_xml import node, way, write_osm
+from pyproj import CRS
 from sentences import refused
 
 from semsig_gis.core.errors import CatalogError
 from semsig_gis.sources import reader
 from semsig_gis.sources.layers import LayerSpec, WidthBy
-from semsig_gis.sources.raw_layer import BETWEEN_SLASHES, RowRules, Rows, as_text, matches
+from semsig_gis.sources.raw_layer import (
+    BETWEEN_SLASHES,
+    RowRules,
+    Rows,
+    as_text,
+    crs_label,
+    matches,
+    off_the_globe,
+    settle_crs,
+    usable_crs,
+)
 
 if TYPE_CHECKING:
     from pathlib import Path
 
     import pandas as pd
+
+
+LAMBERT = (
+    'PROJCS["RGF93_Lambert_93",GEOGCS["GCS_RGF_1993",DATUM["D_RGF_1993",'
+    'SPHEROID["GRS_1980",6378137.0,298.257222101]],PRIMEM["Greenwich",0.0],'
+    'UNIT["Degree",0.0174532925199433]],PROJECTION["Lambert_Conformal_Conic"],'
+    'PARAMETER["False_Easting",700000.0],PARAMETER["False_Northing",6600000.0],'
+    'PARAMETER["Central_Meridian",3.0],PARAMETER["Standard_Parallel_1",44.0],'
+    'PARAMETER["Standard_Parallel_2",49.0],PARAMETER["Latitude_Of_Origin",46.5],'
+    'UNIT["Meter",1.0]]'
+)
+SHIFTED = LAMBERT.replace("700000.0", "700001.0")
+PLANE = 'LOCAL_CS["Undefined Cartesian SRS",UNIT["metre",1],AXIS["X",EAST],AXIS["Y",NORTH]]'
+UNDEFINED = (
+    'GEOGCS["Undefined geographic SRS",DATUM["unknown",SPHEROID["unknown",6378137,298.25]],'
+    'PRIMEM["Greenwich",0],UNIT["degree",0.0174532925199433]]'
+)
+
+
+def test_wkt_of_esri_becomes_the_code_that_it_means() -> None:
+    crs, near = usable_crs(LAMBERT), usable_crs(SHIFTED)
+    assert crs == CRS.from_epsg(2154)
+    assert near == CRS.from_wkt(SHIFTED)  # which only resembles a code
+    assert crs is not None
+    assert near is not None
+    assert (crs_label(crs), crs_label(near)) == ("EPSG:2154", "RGF93_Lambert_93")
+
+
+@pytest.mark.parametrize(
+    "wkt", ["", " ", "nonsense", PLANE, UNDEFINED, LAMBERT.replace("GCS_RGF_1993", "")]
+)
+def test_wkt_that_places_nothing(wkt: str) -> None:
+    assert usable_crs(wkt) is None
+
+
+@pytest.mark.parametrize(
+    ("own", "expected", "given", "settled", "notes"),
+    [
+        (2154, None, None, 2154, 0),
+        (2154, "EPSG:2154", None, 2154, 0),
+        (2154, "EPSG:2154", "EPSG:4326", 2154, 1),
+        (2154, "EPSG:4326", None, 2154, 1),
+        (4326, None, None, 4326, 0),  # GeoJSON that says nothing
+        (4326, "EPSG:2154", None, 2154, 0),
+        (None, "EPSG:2154", None, 2154, 0),
+        (None, "EPSG:4326", "EPSG:2154", 2154, 0),
+    ],
+)
+def test_statements_in_their_order(
+    own: int | None, expected: str | None, given: str | None, settled: int, notes: int
+) -> None:
+    stated = None if own is None else CRS.from_epsg(own)
+    crs, said = settle_crs(
+        stated, implicit=own == 4326, expected=expected, given=given, where="here"
+    )
+    assert (crs.to_epsg(), len(said)) == (settled, notes)
+
+
+def test_only_degrees_have_limits() -> None:
+    xy = np.array([[180.0, 90.0], [-180.0, -90.0], [180.1, 0.0], [0.0, -90.1], [4e5, 6e6]])
+    assert off_the_globe(xy, CRS.from_epsg(4326)).tolist() == [False, False, True, True, True]
+    for limitless in (2154, 4807):  # in metres, and in gons
+        assert not off_the_globe(xy, CRS.from_epsg(limitless)).any()
 
 
 def table(spec: LayerSpec, **columns: list[object]) -> pd.DataFrame:
