@@ -8,6 +8,7 @@ import logging
 import signal
 import tempfile
 import threading
+import time
 import warnings
 from concurrent.futures import CancelledError
 from dataclasses import dataclass
@@ -19,9 +20,10 @@ from semsig_gis.core.errors import InputError, SemsigError
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Generator, Iterator, Sequence
+    from contextlib import ExitStack
     from pathlib import Path
 
-    from distributed import Client
+    from distributed import Client, LocalCluster
 
 _Task = TypeVar("_Task")
 _Value = TypeVar("_Value")
@@ -133,7 +135,6 @@ def _attempt(work: Callable[[_Task], _Value], task: _Task) -> Outcome[_Task, _Va
 def _client(workers: int, scheduler: str | None) -> Iterator[Client]:
     """Give a client of the scheduler, or of processes that end with the block."""
     import dask  # noqa: PLC0415 - only where it is used
-    from distributed import Client, LocalCluster  # noqa: PLC0415
 
     with contextlib.ExitStack() as stack:
         scratch = stack.enter_context(tempfile.TemporaryDirectory(prefix="semsig-"))
@@ -149,36 +150,62 @@ def _client(workers: int, scheduler: str | None) -> Iterator[Client]:
             },
         }
         stack.enter_context(dask.config.set(settings))
-        msg = (
-            f"{workers} processes could not be started; ask for fewer, or try again."
-            if scheduler is None
-            else f"the scheduler {scheduler} cannot be reached; give the address that `dask "
-            "scheduler` printed, such as tcp://10.0.0.5:8786."
-        )
-        # On a loaded machine, dask fails in ways of its own, and warns of what it leaves.
         with warnings.catch_warnings():
-            warnings.simplefilter("ignore", ResourceWarning)
-            try:
-                where: str | LocalCluster = scheduler or ""
-                if scheduler is None:
-                    with _interrupts_ignored():
-                        where = LocalCluster(
-                            n_workers=workers,
-                            threads_per_worker=1,
-                            host="127.0.0.1",
-                            memory_limit=0,
-                            dashboard_address="127.0.0.1:0",
-                            silence_logs=logging.CRITICAL,
-                        )
-                    stack.enter_context(where)
-                client = Client(where, timeout=PATIENCE_S, set_as_default=False)
-            except Exception:  # noqa: BLE001 - whatever it is, nothing was begun
-                client = None
+            warnings.simplefilter("ignore", ResourceWarning)  # of what dask leaves half made
+            client = _connect(workers, scheduler, stack)
             if client is None:
                 gc.collect()
         if client is None:
+            msg = (
+                f"{workers} processes could not be started; ask for fewer, or try again."
+                if scheduler is None
+                else f"the scheduler {scheduler} cannot be reached; give the address that `dask "
+                "scheduler` printed, such as tcp://10.0.0.5:8786."
+            )
             raise InputError(msg)
-        yield stack.enter_context(client)
+        try:
+            yield stack.enter_context(client)
+        finally:
+            _await_processes(client, workers)
+
+
+def _connect(workers: int, scheduler: str | None, stack: ExitStack) -> Client | None:
+    """Return a client of the scheduler, or of processes that end with the stack; else None.
+
+    On a loaded machine, dask fails in ways of its own.
+    """
+    from distributed import Client, LocalCluster  # noqa: PLC0415 - only where it is used
+
+    try:
+        if scheduler is not None:
+            return Client(scheduler, timeout=PATIENCE_S, set_as_default=False)
+        with _interrupts_ignored():
+            cluster = LocalCluster(
+                n_workers=workers,
+                threads_per_worker=1,
+                host="127.0.0.1",
+                memory_limit=0,
+                dashboard_address="127.0.0.1:0",
+                silence_logs=logging.CRITICAL,
+            )
+        stack.callback(_end, cluster)
+        return Client(cluster, timeout=PATIENCE_S, set_as_default=False)
+    except Exception:  # noqa: BLE001 - whatever it is, nothing was begun
+        return None
+
+
+def _end(cluster: LocalCluster) -> None:
+    """End processes; where dask fails at it, what they did stands."""
+    with contextlib.suppress(Exception):
+        cluster.close(timeout=PATIENCE_S)
+
+
+def _await_processes(client: Client, workers: int) -> None:
+    """Wait for processes that are being started again: dask cannot end them before."""
+    until = time.monotonic() + PATIENCE_S
+    with contextlib.suppress(OSError):
+        while len(client.nthreads()) < workers and time.monotonic() < until:
+            time.sleep(0.05)
 
 
 @contextlib.contextmanager

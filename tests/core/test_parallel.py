@@ -7,6 +7,7 @@ import signal
 from typing import TYPE_CHECKING, Any
 
 import pytest
+from distributed import LocalCluster
 from sentences import refused
 
 from semsig_gis import __version__
@@ -16,8 +17,6 @@ from semsig_gis.core.parallel import Outcome, check_workers, run_tasks
 
 if TYPE_CHECKING:
     from pathlib import Path
-
-    from distributed import LocalCluster
 
 
 def test_tasks_here_are_done_in_their_order() -> None:
@@ -96,9 +95,18 @@ def test_whatever_dask_raises_is_one_sentence(
         list(run_tasks(abs, [1], **where))
 
 
-def test_a_scheduler_without_workers_is_named() -> None:
-    from distributed import LocalCluster
+def test_processes_that_cannot_be_ended_take_nothing_back(monkeypatch: pytest.MonkeyPatch) -> None:
+    close = LocalCluster.close
 
+    def fail(cluster: LocalCluster, timeout: float) -> None:
+        close(cluster, timeout)
+        raise AssertionError
+
+    monkeypatch.setattr(LocalCluster, "close", fail)
+    assert [*run_tasks(abs, [-1], workers=1)] == [Outcome(-1, 1)]
+
+
+def test_a_scheduler_without_workers_is_named() -> None:
     empty = LocalCluster(n_workers=0, host="127.0.0.1", dashboard_address="127.0.0.1:0")
     with empty, refused(InputError, "no workers", "dask worker"):
         list(run_tasks(abs, [1], scheduler=empty.scheduler_address))
