@@ -9,12 +9,12 @@ import shutil
 import socket
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, get_args
 
 import hypothesis
 import pytest
 from browser_coverage import BrowserCoverage
-from optional import OPTIONAL, required, unavailable
+from machine import Part, required, unavailable
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -39,9 +39,9 @@ BROWSER_COVERAGE = BrowserCoverage()
 
 def pytest_configure(config: pytest.Config) -> None:
     config.pluginmanager.register(BROWSER_COVERAGE)
-    unknown = required() - OPTIONAL
+    unknown = required() - {*get_args(Part)}
     if unknown:
-        msg = f"SEMSIG_REQUIRE names {sorted(unknown)}; it may name {sorted(OPTIONAL)}."
+        msg = f"SEMSIG_REQUIRE names {sorted(unknown)}; it may name {get_args(Part)}."
         raise pytest.UsageError(msg)
 
 
@@ -192,11 +192,7 @@ def _chromium(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Chrome]:
         "--disable-dev-shm-usage",
         "--disable-gpu",
         "--disable-quic",
-        "--disable-background-networking",
         "--disable-component-update",
-        "--disable-sync",
-        "--no-first-run",
-        "--no-default-browser-check",
         "--host-resolver-rules=MAP * ~NOTFOUND",
         "--window-size=1200,900",
         f"--user-data-dir={tmp_path_factory.mktemp('chromium')}",

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from hypothesis import strategies as st
 from pyproj import CRS
-from worlds import CODES, CORNER, World
+from worlds import CODES, random_town
 
 from semsig_gis.core.grid import GridSpec
 from semsig_gis.core.signature import Signature, SignatureSpec
@@ -20,6 +20,8 @@ from semsig_gis.sources.catalog import paper_taxonomy
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
+
+    from worlds import World
 
     from semsig_gis.likelihood.noise.model import Noise
 
@@ -105,10 +107,7 @@ def parts_of(query: Signature) -> tuple[np.ndarray, np.ndarray]:
 
 
 def noisy_town(seed: int) -> World:
-    """Return ninety objects of five classes in a square of 200 m."""
-    rng = np.random.default_rng(seed)
-    places = rng.uniform(0, 200, (90, 2)) + CORNER
-    return World(tuple((x, y, int(rng.choice(CODES[:5]))) for x, y in places.tolist()))
+    return random_town(seed, count=90, codes=CODES[:5])
 
 
 def every_association(weights: np.ndarray) -> tuple[float, np.ndarray]:
@@ -133,19 +132,15 @@ chances = st.floats(0.05, 0.95)
 def noise_specs(draw: st.DrawFn) -> NoiseSpec:
     """Draw a noise model that uses every kind of field."""
     wrong = draw(st.floats(0.05, 0.5))
+    names = {"street_light": 1 - wrong, "alignment_tree": wrong}
+    shares = {"street_light": 0.5, "alignment_tree": 0.25, "indicator": 0.25}
     return NoiseSpec(
         detection=draw(chances),
         detection_by_class=draw(st.dictionaries(st.just("street_light"), chances)),
         misnamed=draw(st.floats(0.0, 0.5)),
-        confusion=draw(
-            st.sampled_from(
-                [{}, {"street_light": {"street_light": 1 - wrong, "alignment_tree": wrong}}]
-            )
-        ),
+        confusion=draw(st.sampled_from([{}, {"street_light": names}])),
         clutter=draw(st.floats(0.05, 8.0)),
-        clutter_shares=draw(
-            st.sampled_from([{}, {"street_light": 0.5, "alignment_tree": 0.25, "indicator": 0.25}])
-        ),
+        clutter_shares=draw(st.sampled_from([{}, shares])),
         bearing_sigma=draw(st.floats(1.0, 60.0)),
         bearing_sigma_by_class=draw(st.dictionaries(st.just("indicator"), st.floats(1.0, 30.0))),
         missed_each=draw(st.sampled_from([0.0, 1.5])),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import xml.etree.ElementTree as ET
 from typing import Any
 
@@ -24,19 +25,14 @@ def texts(svg: bytes) -> list[str]:
 
 def plot(name: str = "errors", *, curves: int = 2, points: int = 30, **options: Any) -> Plot:  # noqa: ANN401
     """Return a plot of curves that rise."""
-    steps = range(points)
-    made = tuple(
-        Curve(
-            label=f"curve {number}",
-            x=tuple(float(step) for step in steps),
-            y=tuple((step / points) ** (1 + number) for step in steps),
-            low=tuple((step / points) ** (1 + number) * 0.9 for step in steps),
-            high=tuple((step / points) ** (1 + number) * 1.1 for step in steps),
-        )
-        for number in range(curves)
-    )
+    made = []
+    for number in range(curves):
+        rise = [(step / points) ** (1 + number) for step in range(points)]
+        low, high = (tuple(y * share for y in rise) for share in (0.9, 1.1))
+        x = tuple(map(float, range(points)))
+        made.append(Curve(label=f"curve {number}", x=x, y=tuple(rise), low=low, high=high))
     given = {"title": "Errors", "x_label": "error (m)", "y_label": "share", **options}
-    return Plot(name=name, curves=made, **given)
+    return Plot(name=name, curves=tuple(made), **given)
 
 
 def scene(name: str = "place", *, objects: int = 3, **options: Any) -> Scene:  # noqa: ANN401
@@ -53,9 +49,8 @@ def scene(name: str = "place", *, objects: int = 3, **options: Any) -> Scene:  #
 
 
 def report(*sections: Section, **options: Any) -> Report:  # noqa: ANN401
-    return Report(
-        **{"title": "Report", "taxonomy": paper_taxonomy(), "sections": sections, **options}
-    )
+    given = {"title": "Report", "taxonomy": paper_taxonomy(), "sections": sections}
+    return Report(**{**given, **options})
 
 
 def ordinary_report() -> Report:
@@ -82,6 +77,7 @@ def hostile_report(harm: str = HARM) -> Report:
         for item in paper_taxonomy().classes
     )
     curve = Curve(label=harm, x=(0.0, 1.0), y=(0.5, float("nan")))
+    shown = plot(title=harm, x_label=harm, y_label=harm)
     section = Section(
         name="all",
         title=harm,
@@ -91,16 +87,7 @@ def hostile_report(harm: str = HARM) -> Report:
             Number(harm, "b", 1.0, paper=2.0, unit="m"),
             Number("b", "b", 1.0, paper=2.0, unit=harm),
         ),
-        plots=(
-            Plot(
-                name="errors",
-                title=harm,
-                x_label=harm,
-                y_label=harm,
-                curves=(curve,),
-                paper=((0.5, 0.5, harm),),
-            ),
-        ),
+        plots=(dataclasses.replace(shown, curves=(curve,), paper=((0.5, 0.5, harm),)),),
         scenes=(scene(title=harm, types=harm, objects=11, error_m=float("inf")),),
     )
     return report(

@@ -51,20 +51,13 @@ sights = st.lists(
 
 def many(count: int, *, code: int = 3, distance: float = 10.0, bearing: float = 90.0) -> Sight:
     """Return equal objects."""
-    return Sight(
-        codes=np.full(count, code, np.uint8),
-        bearings=np.full(count, bearing),
-        distances=np.full(count, distance),
-    )
+    return sight([(code, bearing, distance)] * count)
 
 
-def all_round(count: int, *, distance: float = 10.0) -> Sight:
+def all_round(count: int) -> Sight:
     """Return objects all round, evenly."""
-    return Sight(
-        codes=np.full(count, 3, np.uint8),
-        bearings=np.linspace(0.0, 360.0, count, endpoint=False),
-        distances=np.full(count, distance),
-    )
+    turns = np.linspace(0.0, 360.0, count, endpoint=False)
+    return sight([(3, turn, 10.0) for turn in turns.tolist()])
 
 
 def rows(one: Sight) -> list[tuple[int, float, float]]:

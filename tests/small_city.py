@@ -1,4 +1,4 @@
-"""A city of a few hundred cells, an evaluation of it and answers in it, for tests of exports."""
+"""A city of a few hundred cells, an evaluation of it, answers in it and chances of its cells."""
 
 from __future__ import annotations
 
@@ -6,8 +6,11 @@ import dataclasses
 import functools
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from semsig_gis.database.build import build_database
 from semsig_gis.evaluation.evaluate import evaluate
+from semsig_gis.evaluation.identify.result import BANDS, ClassGain, Identifiability
 from semsig_gis.likelihood.index import build_index
 from semsig_gis.likelihood.locate import locate
 from semsig_gis.likelihood.noise.model import named_noise
@@ -49,3 +52,31 @@ def small_location() -> Location:
 def small_localization() -> Localization:
     database, _ = small_city()
     return localize(database, database.signature(7), top=20)
+
+
+def chances_of(database: SignatureDatabase, *, seed: int = 0) -> Identifiability:
+    """Return an identifiability out of nowhere for the cells of a database."""
+    rng = np.random.default_rng(seed)
+    places = 3
+    cells, codes = len(database), database.present_codes.tolist()
+    lookalikes = rng.integers(0, cells, (cells, places))
+    lookalikes[rng.random(cells) < 0.2, places - 1] = -1
+    chances = rng.random((4, cells)).round(3)
+    return Identifiability(
+        database=database,
+        noise=named_noise("medium"),
+        radius=30.0,
+        itself=chances[0],
+        near=chances[1],
+        found=np.where(rng.random(cells) < 0.5, rng.choice([*BANDS, 1.0], cells), chances[2]),
+        bits=(chances[3] * np.log2(cells)).round(3),
+        lookalikes=lookalikes,
+        lookalike_chances=np.where(lookalikes < 0, 0.0, rng.random((cells, places)).round(3)),
+        gains=rng.uniform(-0.1, 0.9, (cells, len(codes))).round(3),
+        classes=tuple(
+            ClassGain(code=code, near=float(near), bits=float(bits))
+            for code, near, bits in zip(codes, *rng.random((2, len(codes))), strict=True)
+        ),
+        trials=60,
+        seed=4,
+    )

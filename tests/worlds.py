@@ -23,6 +23,8 @@ from semsig_gis.objects.table import Licence, StreetObjects
 from semsig_gis.sources.catalog import load_catalog
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from semsig_gis.database.database import SignatureDatabase
 
 TAXONOMY = load_catalog("montpellier").taxonomy
@@ -148,19 +150,19 @@ def worlds(draw: st.DrawFn) -> World:
     )
 
 
-def random_town() -> World:
-    """Return some hundred objects in a square."""
-    rng = np.random.default_rng(7)
-    places = rng.uniform(0, 200, (60, 2)) + CORNER
-    return World(tuple((x, y, int(rng.choice(CODES))) for x, y in places.tolist()))
+def random_town(
+    seed: int = 7, *, count: int = 60, side: float = 200.0, codes: Sequence[int] = CODES
+) -> World:
+    """Return so many objects in a square."""
+    rng = np.random.default_rng(seed)
+    places = rng.uniform(0, side, (count, 2)) + CORNER
+    return World(tuple((x, y, int(rng.choice(codes))) for x, y in places.tolist()))
+
+
+def lamps() -> StreetObjects:
+    return random_town(5, side=100.0, codes=CODES[:1]).street_objects
 
 
 def surroundings(*shapes: shapely.Geometry, **columns: list[float]) -> gpd.GeoDataFrame:
     # In degrees, so that they have to be moved.
     return gpd.GeoDataFrame(columns, geometry=list(shapes), crs="EPSG:2154").to_crs("EPSG:4326")
-
-
-def lamps() -> StreetObjects:
-    rng = np.random.default_rng(5)
-    places = rng.uniform(0, 100, (60, 2)) + CORNER
-    return World(tuple((x, y, CODES[0]) for x, y in places)).street_objects

@@ -13,9 +13,8 @@ import pyarrow.parquet as pq
 import pyogrio
 import pytest
 import rasterio
-from cell_chances import chances_of
 from sentences import sentence
-from small_city import small_city, small_evaluation
+from small_city import chances_of, small_city, small_evaluation
 
 from semsig_gis.cli.localize import print_answer
 from semsig_gis.database.file import open_database, save_database

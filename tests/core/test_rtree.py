@@ -12,9 +12,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pytest
 import shapely
-from full_disk import largest_file
 from hypothesis import given
 from hypothesis import strategies as st
+from machine import largest_file
 from sentences import refused
 
 from semsig_gis.core import rtree

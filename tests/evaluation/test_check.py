@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
-from cell_chances import chances_of
 from noisy_cells import random_database
 from scipy.stats import spearmanr
 from sentences import refused
+from small_city import chances_of
 
 from semsig_gis.core.errors import InputError
 from semsig_gis.core.statistics import wilson_interval

@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pyarrow as pa
 import pytest
-from cell_chances import chances_of
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from noisy_cells import mixtures, random_database
 from sentences import refused
+from small_city import chances_of
 
 from semsig_gis.core.errors import DatabaseError
 from semsig_gis.database.city import City

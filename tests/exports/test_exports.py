@@ -9,10 +9,9 @@ import pandas as pd
 import pyogrio
 import pytest
 import shapely
-from cell_chances import chances_of
-from full_disk import largest_file
+from machine import largest_file
 from sentences import refused
-from small_city import small_city, small_evaluation, small_localization, small_location
+from small_city import chances_of, small_city, small_evaluation, small_localization, small_location
 
 from semsig_gis.core.errors import EmptyResultError, InputError, SemsigError, UnknownNameError
 from semsig_gis.exports import LAYERS, RASTERS, export_answer, export_database

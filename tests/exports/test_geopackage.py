@@ -25,13 +25,12 @@ import pyogrio
 import pytest
 import rasterio
 import shapely
-from cell_chances import chances_of
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from map_pages import HOSTILE, hostile_database
 from pyproj import CRS
 from sentences import refused
-from small_city import small_city, small_evaluation, small_localization, small_location
+from small_city import chances_of, small_city, small_evaluation, small_localization, small_location
 from worlds import CORNER, World, assert_same
 
 from semsig_gis.core.errors import DatabaseError, EmptyResultError, InputError

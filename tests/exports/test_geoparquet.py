@@ -8,9 +8,8 @@ from typing import TYPE_CHECKING
 import geopandas as gpd
 import numpy as np
 import pyarrow.parquet as pq
-from cell_chances import chances_of
 from sentences import refused
-from small_city import small_city
+from small_city import chances_of, small_city
 
 from semsig_gis.core.errors import DatabaseError
 from semsig_gis.database.file import open_database

@@ -8,10 +8,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pytest
 import rasterio
-from cell_chances import chances_of
 from rio_cogeo.cogeo import cog_validate
 from sentences import refused
-from small_city import small_city, small_evaluation, small_location
+from small_city import chances_of, small_city, small_evaluation, small_location
 
 from semsig_gis.core.errors import InputError
 from semsig_gis.core.grid import GridSpec

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
-from cell_chances import chances_of
 from map_pages import HOSTILE, IMAGES, LEGEND, hostile_database
+from small_city import chances_of
 from worlds import random_town
 
 from semsig_gis.likelihood.noise.model import named_noise

@@ -9,8 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
-from cell_chances import chances_of
-from small_city import small_city
+from small_city import chances_of, small_city
 
 import semsig_gis
 from semsig_gis.core.signature import Signature

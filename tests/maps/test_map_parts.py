@@ -12,7 +12,6 @@ import geopandas as gpd
 import numpy as np
 import pytest
 import shapely
-from cell_chances import chances_of
 from folium.template import Template
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -22,6 +21,7 @@ from selenium.webdriver.common.by import By
 from selenium.webdriver.common.keys import Keys
 from selenium.webdriver.support.ui import WebDriverWait
 from sentences import refused
+from small_city import chances_of
 from worlds import random_town
 
 from semsig_gis.core.errors import CrsError, EmptyResultError, InputError

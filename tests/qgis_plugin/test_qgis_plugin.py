@@ -19,7 +19,7 @@ from xml.etree import ElementTree as ET
 import geopandas as gpd
 import pyogrio
 import pytest
-from optional import unavailable
+from machine import unavailable
 
 import semsig_gis
 from semsig_gis.database.build import build_database

@@ -4,8 +4,8 @@ import math
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from cell_chances import chances_of
 from noisy_cells import random_database
+from small_city import chances_of
 from worlds import random_town
 
 from semsig_gis.evaluation.identify.check import (

@@ -1,0 +1,40 @@
+"""What a machine may lack: programs and data, and room on its disk."""
+
+from __future__ import annotations
+
+import os
+import resource
+from contextlib import contextmanager
+from typing import TYPE_CHECKING, Literal, NoReturn
+
+import pytest
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+Part = Literal["browser", "geodata", "qgis"]
+"""A test that needs one of them skips where it is missing, unless SEMSIG_REQUIRE names it."""
+
+
+def required() -> frozenset[str]:
+    """Return the names that SEMSIG_REQUIRE lists, separated by commas."""
+    listed = os.environ.get("SEMSIG_REQUIRE", "").split(",")
+    return frozenset(name.strip() for name in listed) - {""}
+
+
+def unavailable(name: Part, reason: str) -> NoReturn:
+    """Skip the test, or fail it where SEMSIG_REQUIRE names the missing thing."""
+    if name in required():
+        pytest.fail(f"{reason} (SEMSIG_REQUIRE names {name})", pytrace=False)
+    pytest.skip(reason)
+
+
+@contextmanager
+def largest_file(size: int) -> Iterator[None]:
+    """Let this process write no file beyond a size, as on a full disk."""
+    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (size, hard))
+    try:
+        yield
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
