@@ -1,6 +1,5 @@
 from __future__ import annotations
 
-import dataclasses
 import math
 
 import numpy as np
@@ -59,21 +58,18 @@ def test_a_point_on_an_edge_belongs_east_and_north() -> None:
 
 
 @given(ORIGINS, STEPS, POINTS, st.floats(0.01, 4.0))
-def test_no_cell_in_range_is_left_out(
+def test_cells_near_points_fill_a_square_around_each(
     origin: tuple[float, float], step: float, points: list[tuple[float, float]], reach: float
 ) -> None:
     grid, radius = GridSpec(step, origin), reach * step
     columns, rows = cells_near(np.array(points), grid=grid, radius=radius)
-    cells = list(zip(columns.tolist(), rows.tolist(), strict=True))
-    assert cells == sorted(set(cells))
-    for x, y in points:
-        column = math.floor((x - origin[0]) / step)
-        row = math.floor((y - origin[1]) / step)
-        for i in range(column - 6, column + 7):
-            for j in range(row - 6, row + 7):
-                centre = origin[0] + (i + 0.5) * step, origin[1] + (j + 0.5) * step
-                assert math.dist((x, y), centre) > radius or (i, j) in cells
-    assert len(cells) <= len(points) * (2 * math.ceil(reach + 0.5) + 1) ** 2
+    cells_away = math.ceil(radius / step + 0.5)
+    around = range(-cells_away, cells_away + 1)
+    at = [
+        (math.floor((x - origin[0]) / step), math.floor((y - origin[1]) / step)) for x, y in points
+    ]
+    cells = {(column + i, row + j) for column, row in at for i in around for j in around}
+    assert list(zip(columns.tolist(), rows.tolist(), strict=True)) == sorted(cells)
 
 
 @given(st.integers(-20, 20), st.integers(-20, 20), st.sampled_from([5.0, 15.0, 25.0, 10.0, 20.0]))
@@ -85,24 +81,6 @@ def test_a_centre_at_exactly_the_radius_is_not_left_out(x: int, y: int, radius: 
         for j in range(-15, 16):
             if (10 * i + 5 - 5 * x) ** 2 + (10 * j + 5 - 5 * y) ** 2 <= radius**2:
                 assert (i, j) in cells
-
-
-@given(POINTS, POINTS)
-def test_cells_keep_their_numbers_when_the_area_grows(
-    points: list[tuple[float, float]], more: list[tuple[float, float]]
-) -> None:
-    grid = GridSpec(step=7.0)
-    before = cell_ids(*cells_near(np.array(points), grid=grid, radius=20.0))
-    after = cell_ids(*cells_near(np.array(points + more), grid=grid, radius=20.0))
-    assert set(before.tolist()) <= set(after.tolist())
-    assert (np.diff(after) > 0).all()
-
-
-def test_a_shift_by_whole_steps_only_renumbers() -> None:
-    points = np.array([[3.0, 4.0], [55.0, -20.0]])
-    here = cells_near(points, grid=GridSpec(10.0, (2.0, 3.0)), radius=30.0)
-    there = cells_near(points, grid=GridSpec(10.0, (-98.0, 53.0)), radius=30.0)
-    np.testing.assert_array_equal(there, (here[0] + 10, here[1] - 5))
 
 
 @pytest.mark.parametrize(
@@ -145,10 +123,3 @@ def test_a_step_far_below_the_range_is_an_error() -> None:
             cells_near(np.zeros((1, 2)), grid=GridSpec(step), radius=30.0)
     columns, _ = cells_near(np.zeros((1, 2)), grid=GridSpec(0.5), radius=30.0)
     assert columns.min() == -61
-
-
-def test_a_grid_is_a_value() -> None:
-    assert GridSpec() == GridSpec(10.0, (0.0, 0.0))
-    assert hash(GridSpec(5.0)) == hash(GridSpec(step=5.0))
-    with pytest.raises(dataclasses.FrozenInstanceError):
-        GridSpec().step = 5.0  # type: ignore[misc]

@@ -6,10 +6,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numba
-import numpy as np
 
 from semsig_gis.core.jit import compiled
-from semsig_gis.matching.metrics.edit import BitPlanes
 
 if TYPE_CHECKING:
     import pytest
@@ -53,18 +51,3 @@ def test_code_is_kept_for_later_processes(tmp_path: Path) -> None:
         for _ in range(2)
     ]
     assert seen == [["[[0.]]", "0", "1"], ["[[0.]]", "1", "0"]]
-
-
-def test_what_is_compiled_equals_the_loops_themselves() -> None:
-    from semsig_gis.matching import kernels
-
-    rng = np.random.default_rng(1)
-    values = rng.integers(0, 5, 60).astype(np.uint8)
-    offsets = np.array([0, 3, 20, 60])
-    planes = BitPlanes.build(values, offsets)
-    slow = np.zeros_like(planes.planes)
-    per_position = int(planes.digits.max()) + 1
-    kernels.pack.py_func(  # type: ignore[attr-defined]
-        values, offsets, planes.digits, planes.bounds, per_position, slow
-    )
-    np.testing.assert_array_equal(slow, planes.planes)

@@ -1,13 +1,12 @@
 from __future__ import annotations
 
-import dataclasses
 import math
 from fractions import Fraction
 from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from sentences import refused
 
@@ -39,21 +38,17 @@ def test_a_level_is_the_floor_of_the_paper(bearing: float, levels: int) -> None:
         assert level in {round(exact) - 1, round(exact)}
 
 
-@given(LEVELS, st.data())
-def test_a_whole_multiple_is_the_start_of_its_level(levels: int, data: st.DataObject) -> None:
-    level = data.draw(st.integers(0, levels - 1))
-    edge = Fraction(360 * level, levels)
-    if Fraction(float(edge)) == edge:  # else no float is the multiple
-        assert quantize(float(edge), levels) == level
-
-
-@pytest.mark.parametrize("levels", [8, 16, 24, 32])
-def test_the_levels_of_the_paper_begin_exactly(levels: int) -> None:
-    edges = np.arange(levels) * (360.0 / levels)
-    assert quantize(edges, levels).tolist() == list(range(levels))
-    below = np.nextafter(edges[1:], 0.0)
-    assert quantize(below, levels).tolist() == list(range(levels - 1))
-    assert quantize(np.nextafter(360.0, 0.0), levels) == levels - 1
+def test_a_level_begins_at_a_whole_multiple() -> None:
+    for levels in range(1, 256):
+        # Where no float is the multiple, a level begins at a neighbour of it.
+        exact = [
+            n for n in range(levels) if Fraction(360 * n / levels) == Fraction(360 * n, levels)
+        ]
+        edges = np.array([360 * number / levels for number in exact])
+        assert quantize(edges, levels).tolist() == exact
+        below = quantize(np.nextafter(edges[1:], 0.0), levels)
+        assert below.tolist() == [number - 1 for number in exact[1:]]
+        assert quantize(np.nextafter(360.0, 0.0), levels) == levels - 1
 
 
 @pytest.mark.parametrize("levels", [q for q in range(1, 256) if BEARING_UNITS % q == 0])
@@ -87,12 +82,6 @@ def test_a_range_is_in_metres_and_levels_fit_a_byte(name: str, value: object, wo
         SignatureSpec(**{name: value})  # type: ignore[arg-type]
 
 
-def test_a_spec_is_a_value() -> None:
-    assert SignatureSpec() == SignatureSpec(30.0, 16)
-    with pytest.raises(dataclasses.FrozenInstanceError):
-        SignatureSpec().radius = 5.0  # type: ignore[misc]
-
-
 # --- The clockwise order ----------------------------------------------------------------------
 
 
@@ -110,13 +99,6 @@ def order_of(rows: list[tuple[int, float, float, int]]) -> list[tuple[int, float
 SMALL = st.integers(0, 3)
 
 
-@given(st.lists(st.tuples(SMALL, SMALL, SMALL, SMALL), min_size=1))
-def test_order_is_by_viewpoint_bearing_distance_and_class(
-    rows: list[tuple[int, float, float, int]],
-) -> None:
-    assert order_of(rows) == sorted(rows)
-
-
 # Bearings a hair's breadth apart, and viewpoints that leave few bits of a number to a bearing.
 CLOSE = st.builds(
     lambda bearing, steps: min(bearing + steps * math.ulp(bearing), math.nextafter(360.0, 0.0)),
@@ -126,22 +108,15 @@ CLOSE = st.builds(
 FAR_APART = st.sampled_from([0, 1, 5, 2**20, 2**40, 2**50 - 1, 2**50])
 
 
-@given(st.lists(st.tuples(FAR_APART, CLOSE | BEARINGS, SMALL, SMALL), min_size=1))
-def test_order_is_exact_where_bearings_hardly_differ(
+@given(
+    st.lists(st.tuples(SMALL, SMALL, SMALL, SMALL), min_size=1)
+    | st.lists(st.tuples(FAR_APART, CLOSE | BEARINGS, SMALL, SMALL), min_size=1)
+)
+@settings(max_examples=100)
+def test_order_is_by_viewpoint_bearing_distance_and_class(
     rows: list[tuple[int, float, float, int]],
 ) -> None:
     assert order_of(rows) == sorted(rows)
-
-
-def test_nothing_seen_has_an_order() -> None:
-    nothing = np.empty(0, np.int64)
-    seen = Sightings(nothing, nothing, nothing.astype(float), nothing.astype(float))
-    assert clockwise_order(seen, np.array([3], np.uint8)).tolist() == []
-
-
-def test_on_one_bearing_the_nearer_comes_first_then_the_lower_code() -> None:
-    rows = [(0, 90.0, 20.0, 1), (0, 90.0, 10.0, 9), (0, 90.0, 10.0, 3), (0, 0.0, 29.0, 5)]
-    assert order_of(rows) == [rows[3], rows[2], rows[1], rows[0]]
 
 
 # --- Signature --------------------------------------------------------------------------------
@@ -204,7 +179,6 @@ def test_a_query_is_sorted_clockwise(pairs: list[tuple[str, float]]) -> None:
 
 
 def test_queries_in_the_order_of_their_bearings_or_as_they_are() -> None:
-    assert parsed("DBLM", [200, -10, 0, 360]) == ("LMDB", [0.0, 0.0, 200.0, 350.0])
     assert parsed("DBL", [90, 90, 90]) == ("DBL", [90.0] * 3)
     assert parsed("DBD") == ("DBD", None)
     assert parsed(None, [200.0, 10.0]) == (None, [10.0, 200.0])

@@ -74,30 +74,18 @@ def test_a_class_has_a_byte_a_letter_and_an_identifier(
         dataclasses.replace(OTHER, **{attribute: value})  # type: ignore[arg-type]
 
 
-@pytest.mark.parametrize(
-    ("attribute", "other"),
-    [
-        ("code", ObjectClass(1, "Z", "other", "Other")),
-        ("symbol", ObjectClass(9, "B", "other", "Other")),
-        ("name", ObjectClass(9, "Z", "alignment_tree", "Other")),
-    ],
-)
-def test_what_stands_twice_is_named(attribute: str, other: ObjectClass) -> None:
-    words = f"{attribute} {getattr(other, attribute)!r}", "'alignment_tree'", repr(other.name)
-    with refused(CatalogError, *words):
-        Taxonomy((TREE, LIGHT, other))
-    with refused(CatalogError, *words):
+@pytest.mark.parametrize("attribute", ["code", "symbol", "name"])
+def test_what_stands_twice_is_named(attribute: str) -> None:
+    value = getattr(TREE, attribute)
+    other = dataclasses.replace(ObjectClass(9, "Z", "other", "Other"), **{attribute: value})
+    with refused(CatalogError, f"{attribute} {value!r}", "'alignment_tree'", repr(other.name)):
         TAXONOMY.extended([other])
-    with refused(CatalogError, *words):
-        Taxonomy.from_list([*TAXONOMY.to_list(), dataclasses.asdict(other)])
 
 
 def test_extending_leaves_the_taxonomy_as_it_was() -> None:
     bench = ObjectClass(10, "L", "bench", "Bench")
     assert TAXONOMY.extended(iter([bench])).classes == (TREE, LIGHT, bench)
     assert TAXONOMY.classes == (TREE, LIGHT)
-    with pytest.raises(dataclasses.FrozenInstanceError):
-        TAXONOMY.classes = ()  # type: ignore[misc]
 
 
 @pytest.mark.parametrize(
