@@ -172,15 +172,17 @@ class MapPage:
 
     @contextmanager
     def screen(
-        self, width: int, height: int, *, mobile: bool = True, dots: int = 1
+        self, width: int, height: int, *, mobile: bool = True, dots: int = 1, media: str = ""
     ) -> Iterator[None]:
-        """Make the window as large as a screen."""
+        """Make the window as large as a screen, or as a sheet of a printer."""
         size = {"width": width, "height": height, "deviceScaleFactor": dots, "mobile": mobile}
         self.browser.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", size)
+        self.browser.execute_cdp_cmd("Emulation.setEmulatedMedia", {"media": media})
         try:
             yield
         finally:
             self.browser.execute_cdp_cmd("Emulation.clearDeviceMetricsOverride", {})
+            self.browser.execute_cdp_cmd("Emulation.setEmulatedMedia", {"media": ""})
 
     def assert_text_stays_text(self) -> None:
         """Check that no text from data became an element of the page."""

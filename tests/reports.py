@@ -61,8 +61,9 @@ def ordinary_report() -> Report:
         Number("R = 30 m", "P", None, paper=0.3733),
         Number("R = 30 m", "median", float("inf"), unit="m", decimals=1),
     )
+    drawn = plot(points=3, paper=((2.0, 0.5, "Table 5"),))
     return report(
-        Section(name="range", title="Range", text=("Words.",), numbers=numbers, plots=(plot(),)),
+        Section(name="range", title="Range", text=("Words.",), numbers=numbers, plots=(drawn,)),
         Section(name="places", title="Places", scenes=(scene(), scene("other", answer=(9.0, 2.0)))),
         text=("What it is.",),
         settings=(("Database", "city.parquet"),),

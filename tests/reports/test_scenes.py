@@ -26,7 +26,7 @@ FOUND = evaluate(CITY, queries=40, distortion="strong")
 def test_scenes_show_what_is_there(successful: bool) -> None:  # noqa: FBT001
     scenes = example_scenes(FOUND, CITY, successful=successful, count=3)
     chosen = FOUND.queries[FOUND.successful == successful].head(3)
-    assert len(scenes) == 3
+    assert len(scenes) == len(chosen) == 3
     for shown, row in zip(scenes, chosen.to_dict("records"), strict=True):
         x, y = CITY.xy[row["cell"]]
         assert shown.types == row["types"]
@@ -56,18 +56,7 @@ def test_a_scene_of_a_cell() -> None:
     assert shown.title == f"Cell {CITY.cell_ids[3]}"
     assert (shown.answer, shown.error_m) == (None, None)
     assert cell_scene(CITY, 3, title="A corner").title == "A corner"
-
-
-def nearest(x: float, y: float, code: int) -> float:
-    """Return how far the nearest object of a class is."""
-    return min(math.hypot(a - x, b - y) for a, b, kind in TOWN.objects if kind == code)
-
-
-def test_degrees() -> None:
-    shown, *_ = example_scenes(FOUND, CITY, successful=True, count=1)
-    # Montpellier
-    assert shown.lon == pytest.approx(3.8, abs=0.1)
-    assert shown.lat == pytest.approx(43.57, abs=0.1)
+    assert (shown.lon, shown.lat) == pytest.approx((3.8, 43.57), abs=0.1)  # Montpellier
 
 
 def test_no_examples() -> None:
@@ -75,10 +64,16 @@ def test_no_examples() -> None:
     assert example_scenes(perfect, CITY, successful=False) == ()
 
 
+def nearest(x: float, y: float, code: int) -> float:
+    """Return how far the nearest object of a class is."""
+    return min(math.hypot(a - x, b - y) for a, b, kind in TOWN.objects if kind == code)
+
+
 @pytest.mark.parametrize("objects", [0, 2, 60])
 def test_a_scene_shows_its_objects(objects: int) -> None:
     made = scene(objects=objects)
     picture = draw_scene(made, CLASSES)
+    assert draw_scene(made, CLASSES) == picture  # to the byte
     shown = texts(picture.svg)
     for symbol in set(made.types):
         assert shown.count(symbol) == made.types.count(symbol)
@@ -90,11 +85,6 @@ def test_a_scene_shows_its_objects(objects: int) -> None:
     assert ("D Street light" in shown) == ("D" not in made.types)
 
 
-def test_the_same_scene_is_the_same_bytes() -> None:
-    made = scene(objects=20, answer=(10.0, 3.0))
-    assert draw_scene(made, CLASSES) == draw_scene(made, CLASSES)
-
-
 def test_an_answer_is_drawn_or_pointed_to() -> None:
     assert "answer" not in texts(draw_scene(scene(), CLASSES).svg)
     near = texts(draw_scene(scene(answer=(40.0, -30.0)), CLASSES).svg)
@@ -103,13 +93,10 @@ def test_an_answer_is_drawn_or_pointed_to() -> None:
     assert {"answer", "5,000 m"} <= set(texts(draw_scene(scene(answer=(4e3, 3e3)), CLASSES).svg))
 
 
-def test_a_place_that_was_not_found() -> None:
+def test_places_that_were_not_found_and_that_nobody_asked_for() -> None:
     lost = draw_scene(scene(error_m=float("inf")), CLASSES)
     assert "2.300000°, 48.800000° · not localized" in texts(lost.svg)
     assert lost.description.endswith("Not localized.")
-
-
-def test_a_place_that_nobody_asked_for() -> None:
     shown = draw_scene(scene(error_m=None), CLASSES)
     assert "2.300000°, 48.800000°" in texts(shown.svg)
     assert "rror" not in shown.description
