@@ -1,41 +1,61 @@
+"""Which detection is which object: sums over associations, re-ranked cells, and explanations."""
+
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+import json
+import math
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from noisy_cells import (
+    database_of,
+    distorted,
     every_association,
     mixtures,
     noise_specs,
-    noisy_town,
+    parts_of,
     random_database,
     random_query,
+    turned_query,
 )
+from worlds import CODES, World
 
 from semsig_gis.core.rtree import ObjectIndex
 from semsig_gis.core.signature import Signature
-from semsig_gis.database.visibility import views_at, views_in
+from semsig_gis.database.visibility import views_in
 from semsig_gis.likelihood.association import (
     Pairs,
     align_cells,
     associate_pairs,
     near_pairs,
     pair_weights,
+    rerank,
 )
-from semsig_gis.likelihood.noise.table import database_tables, place_loglik, query_bearings
+from semsig_gis.likelihood.explain import explain, explain_cell
+from semsig_gis.likelihood.index import build_index
+from semsig_gis.likelihood.noise.model import NoiseSpec, named_noise
+from semsig_gis.likelihood.noise.table import database_tables, query_bearings
 
 if TYPE_CHECKING:
-    from semsig_gis.likelihood.noise.model import Noise, NoiseSpec
+    from semsig_gis.database.database import SignatureDatabase
+    from semsig_gis.likelihood.explain import Explanation
+    from semsig_gis.likelihood.noise.model import Noise
+    from semsig_gis.likelihood.noise.table import NoiseTable
+
+SEEDS = st.integers(0, 10_000)
+GENERIC = named_noise("generic")
 
 
-def pairs_of(weights: np.ndarray) -> tuple[Pairs, np.ndarray]:
+def associated(weights: np.ndarray) -> tuple[Pairs, np.ndarray, float]:
+    """Associate the objects in rows with the detections in columns; 0 is no pair."""
     one, other = np.nonzero(weights)
     starts, away = np.array([0, len(one)]), np.zeros(len(one))
     pairs = Pairs(starts=starts, objects=one, detections=other, away=away)
-    return pairs, weights[one, other]
+    chances, (total,) = associate_pairs(pairs, weights[one, other])
+    return pairs, chances, float(total)
 
 
 @given(
@@ -60,9 +80,8 @@ def test_belief_propagation_is_exact_without_loops(
             if step:
                 weights[step, step - 1] = values[step + 4]
     total, chances = every_association(weights)
-    pairs, flat = pairs_of(weights)
-    near, sums = associate_pairs(pairs, flat)
-    assert sums[0] == pytest.approx(total, abs=1e-3)
+    pairs, near, found = associated(weights)
+    assert found == pytest.approx(total, abs=1e-3)
     assert near == pytest.approx(chances[pairs.objects, pairs.detections], abs=2e-3)
 
 
@@ -71,50 +90,73 @@ def test_belief_propagation_is_near_the_sum_over_everything(seed: int) -> None:
     rng = np.random.default_rng(seed)
     weights = np.exp(rng.normal(0.0, 2.0, (4, 4)))
     total, chances = every_association(weights)
-    pairs, flat = pairs_of(weights)
-    near, sums = associate_pairs(pairs, flat)
-    assert sums[0] == pytest.approx(total, abs=0.35)
-    assert sums[0] <= total + 1e-3  # the Bethe approximation is a lower bound
+    _, near, found = associated(weights)
+    assert total - 0.35 <= found <= total + 1e-3  # the Bethe approximation is a lower bound
     assert np.abs(near.reshape(4, 4) - chances).max() < 0.2
     assert (near.reshape(4, 4).sum(axis=0) <= 1 + 1e-3).all()
 
 
 def test_problems_do_not_touch_each_other() -> None:
     rng = np.random.default_rng(1)
-    starts = np.array([0, 3, 3, 8]), np.array([0, 2, 4, 9])
-    bearings = rng.uniform(0, 360, 8), rng.uniform(0, 360, 9)
+    starts = np.array([[0, 3, 3, 8], [0, 2, 4, 9]])
+    bearings = rng.uniform(0, 360, (2, 9))
     pairs = near_pairs(starts[0], bearings[0], starts[1], bearings[1], reach=120.0)
     weights = rng.uniform(0, 3, len(pairs.away))
     chances, sums = associate_pairs(pairs, weights)
     for row in range(3):
-        here = [slice(*part[row : row + 2]) for part in starts]
-        alone = near_pairs(
-            np.array([0, here[0].stop - here[0].start]),
-            bearings[0][here[0]],
-            np.array([0, here[1].stop - here[1].start]),
-            bearings[1][here[1]],
-            reach=120.0,
-        )
+        first, seen = starts[:, row]
+        own = starts[:, row : row + 2] - starts[:, [row]]
+        alone = near_pairs(own[0], bearings[0, first:], own[1], bearings[1, seen:], reach=120.0)
         part = slice(*pairs.starts[row : row + 2])
-        assert pairs.objects[part].tolist() == (alone.objects + here[0].start).tolist()
+        assert pairs.objects[part].tolist() == (alone.objects + first).tolist()
         own_chances, own_sums = associate_pairs(alone, weights[part])
         assert own_chances == pytest.approx(chances[part])
         assert own_sums[0] == pytest.approx(sums[row])
     assert sums[1] == 0.0
 
 
-@given(st.integers(0, 1000), st.integers(1, 12), noise_specs())
-def test_the_sums_are_those_of_the_re_ranking(seed: int, size: int, noise: NoiseSpec) -> None:
+def slow_weights(
+    table: NoiseTable, database: SignatureDatabase, query: Signature, cell: int
+) -> np.ndarray:
+    """Return what each pair of an object and a detection adds."""
+    part = slice(database.offsets[cell], database.offsets[cell + 1])
+    kinds = table.row_of[database.codes[part]]
+    sigmas = table.sigmas(database.reach)[kinds, database.distance_units[part]]
+    names, length = table.query_rows(query), len(kinds)
+    weights = np.zeros((length, len(query)))
+    for one, other in np.ndindex(weights.shape):
+        bearing = database.bearings[part][one] + 0.025
+        away = (query_bearings(query)[other] - bearing + 180.0) % 360.0 - 180.0
+        if abs(away) <= 4.5 * sigmas[one]:
+            laps = away + 360.0 * np.arange(-4, 5)
+            weights[one, other] = (
+                table.odds[length, kinds[one]]
+                * table.naming[length, kinds[one], names[other]]
+                * np.exp(-0.5 * (laps / sigmas[one]) ** 2).sum()
+                / (sigmas[one] * math.sqrt(2 * math.pi))
+            )
+    return weights
+
+
+def slow_loglik(database: SignatureDatabase, query: Signature, noise: Noise, cell: int) -> float:
+    """Return the likelihood by going through all associations."""
+    total = 0.0
+    for table, share in zip(*database_tables(database, noise), strict=True):
+        unseen = table.nothing_seen(database.offsets, table.row_of[database.codes])[cell]
+        clutter = np.log(table.density[table.query_rows(query)]).sum()
+        pairs, _ = every_association(slow_weights(table, database, query, cell))
+        total += share * math.exp(unseen + clutter + pairs)
+    return math.log(total)
+
+
+@given(SEEDS, st.integers(1, 12), noise_specs())
+def test_weights_are_those_of_one_pair_at_a_time(seed: int, size: int, noise: NoiseSpec) -> None:
     database = random_database(seed)
     query = random_query(database, seed, size=size)
     (table,), _ = database_tables(database, noise)
-    cells = np.arange(len(database))
-    views = views_in(database, cells)
-    starts = np.arange(len(database) + 1) * size
-    pairs = near_pairs(
-        views.offsets, views.bearings, starts, np.tile(query_bearings(query), len(cells))
-    )
-    names = table.query_rows(query)
+    views = views_in(database, np.array([0]))
+    bearings = query_bearings(query)
+    pairs = near_pairs(views.offsets, views.bearings, np.array([0, size]), bearings)
     kinds = table.row_of[views.codes]
     weights = pair_weights(
         table,
@@ -122,27 +164,183 @@ def test_the_sums_are_those_of_the_re_ranking(seed: int, size: int, noise: Noise
         kinds=kinds,
         distances=views.distances,
         lengths=np.repeat(views.lengths, views.lengths),
-        names=np.tile(names, len(cells)),
+        names=table.query_rows(query),
     )
-    # The re-ranking cuts the tails.
-    weights[np.abs(pairs.away) > 4.5 * table.sigma[kinds][pairs.objects]] = 0.0
-    _, sums = associate_pairs(pairs, weights)
-    unseen = table.nothing_seen(database.offsets, kinds)
-    expected = align_cells(database, query, noise, cells)
-    assert sums + unseen + np.log(table.density[names]).sum() == pytest.approx(expected, abs=0.05)
+    slow = slow_weights(table, database, query, 0)
+    # The re-ranking cuts tails, and of narrow ones those that meet behind the observer are left.
+    near = (table.sigma[kinds] > 45.0)[pairs.objects] | (np.abs(pairs.away) < 90.0)
+    near = near.reshape(slow.shape) & (slow > 0)
+    assert weights.reshape(slow.shape)[near] == pytest.approx(slow[near], rel=1e-6)
 
 
-@given(st.integers(0, 50), mixtures())
-def test_at_the_viewpoints_places_have_the_likelihood_of_the_cells(seed: int, noise: Noise) -> None:
-    world = noisy_town(seed)
-    database, objects = world.database, world.street_objects
+@settings(max_examples=40)
+@given(SEEDS, mixtures(), st.integers(1, 5))
+def test_the_sum_over_associations_is_close_and_never_too_large(
+    seed: int, noise: Noise, size: int
+) -> None:
+    database = random_database(seed, cells=6, longest=5)
+    query = random_query(database, seed, size=size)
+    cells = np.arange(len(database))
+    found = align_cells(database, query, noise, cells)
+    for cell in cells.tolist():
+        exact = slow_loglik(database, query, noise, cell)
+        assert found[cell] <= exact + 1e-3
+        # Half the logarithm of two for each object is the most that loops can cost.
+        loops = min(len(query), int(database.lengths[cell]))
+        assert found[cell] >= exact - 0.35 * loops - 1e-3
+
+
+@settings(max_examples=30)
+@given(SEEDS, st.floats(0.0, 20.0))
+def test_it_is_exact_where_pairs_form_no_loop(seed: int, away: float) -> None:
+    # Objects far apart: no detection can be two of them, though two may be one.
     rng = np.random.default_rng(seed)
-    cells = rng.choice(len(database), 5, replace=False)
-    query = Signature(rng.choice(database.present_codes, 6), rng.uniform(0, 360, 6))
-    turns = rng.uniform(-180, 180, (5, 2))
-    models = database_tables(database, noise)
-    views = views_at(objects, database.xy[cells], index=ObjectIndex(objects.xy), radius=30.0)
-    loglik = place_loglik(query, views, *models, turns=turns, reach=30.0)
-    assert loglik == pytest.approx(
-        align_cells(database, query, noise, cells, turns=turns), abs=1e-6
-    )
+    places = np.arange(6) * 60.0
+    database = database_of([("".join(rng.choice(list("BDG"), 6)), places.tolist())])
+    noise = NoiseSpec(bearing_sigma=5.0)
+    bearings = (np.repeat(places, 2)[:5] + np.array([0.0, 1.0, -2.0, 3.0, away])) % 360.0
+    query = Signature(rng.choice(database.present_codes, 5), bearings)
+    found = align_cells(database, query, noise, np.zeros(1, np.int64))[0]
+    assert found == pytest.approx(slow_loglik(database, query, noise, 0), abs=1e-3)
+
+
+def test_turns_are_those_of_a_turned_query() -> None:
+    database = random_database(4)
+    query = random_query(database, 4, size=7)
+    cells, turns = np.array([3, 8]), np.array([[0.0, 30.0], [-200.0, 400.0]])
+    found = align_cells(database, query, GENERIC, cells, turns=turns)
+    for place, way in np.ndindex(turns.shape):
+        turned = turned_query(query, float(turns[place, way]))
+        alone = align_cells(database, turned, GENERIC, cells[[place]])
+        assert found[place, way] == pytest.approx(alone[0], abs=1e-3)
+
+
+def test_re_ranking_replaces_the_best_and_moves_the_rest_together() -> None:
+    database = random_database(2, cells=300)
+    index = build_index(database, GENERIC)
+    query = random_query(database, 2, size=8)
+    exact = align_cells(database, query, GENERIC, np.arange(300))
+    scores = index.scores(query)
+    found = rerank(index, query, scores, count=40).loglik
+    best = np.argsort(-scores.loglik, kind="stable")
+    inside, worse, outside = best[:40], best[20:40], best[40:]
+    assert found[inside] == pytest.approx(exact[inside])
+    moved = np.logaddexp.reduce(found[worse]) - np.logaddexp.reduce(scores.loglik[worse])
+    assert found[outside] - scores.loglik[outside] == pytest.approx(moved, abs=1e-4)
+    assert rerank(index, query, scores, count=10_000).loglik == pytest.approx(exact)
+    # A prior chooses what is re-ranked; without bearings nothing is.
+    prior = np.where(np.arange(300) < 5, 0.0, -np.inf)
+    found = rerank(index, query, scores, count=40, log_prior=prior).loglik
+    assert found[:5] == pytest.approx(exact[:5])
+    types = Signature(parts_of(query)[0], None)
+    scores = index.scores(types)
+    assert rerank(index, types, scores) is scores
+
+
+@pytest.mark.parametrize("north_sigma", [10.0, math.inf])
+def test_the_heading_is_found_finer_than_the_index_has_it(north_sigma: float) -> None:
+    database = random_database(3, cells=100, longest=20)
+    cell = int(database.lengths.argmax())
+    query = turned_query(database.signature(cell), -7.0)
+    index = build_index(database, named_noise("light"))
+    scores = index.scores(query, north_sigma=north_sigma)
+    found = rerank(index, query, scores, north_sigma=north_sigma)
+    assert int(found.loglik.argmax()) == cell
+    assert found.heading is not None
+    assert abs(found.heading[cell] - 7.0) <= 1.5
+
+
+def test_it_finds_more_than_the_index_alone() -> None:
+    database = random_database(7, cells=400, longest=10, classes=2)
+    index = build_index(database, GENERIC)
+    right = np.zeros(2, int)
+    for cell in range(60):
+        query = distorted(database, cell, np.random.default_rng([cell, 5]))
+        if len(query) > 0:
+            scores = index.scores(query)
+            both = scores.loglik, rerank(index, query, scores).loglik
+            right += [int(loglik.argmax()) == cell for loglik in both]
+    assert right[1] > right[0]
+
+
+# --- Explanations -----------------------------------------------------------------------------
+
+NOISE = NoiseSpec(detection=0.8, misnamed=0.05, clutter=1.0, bearing_sigma=4.0)
+TREE, LAMP = CODES[0], CODES[1]
+# North, east and south of the place, and one out of sight.
+WORLD = World(((0.0, 10.0, TREE), (20.0, 0.0, LAMP), (0.0, -15.0, TREE), (0.0, 99.0, TREE)))
+
+
+def explained(query: Signature, world: World = WORLD, **options: Any) -> Explanation:  # noqa: ANN401
+    xy, noise = options.pop("xy", (0.0, 0.0)), options.pop("noise", NOISE)
+    objects = world.street_objects
+    index = ObjectIndex(objects.xy)
+    return explain(query, xy, noise, objects=objects, index=index, **options)
+
+
+def test_every_verdict() -> None:
+    query = Signature(np.array([TREE, TREE, LAMP]), np.array([357.0, 92.0, 300.0]))
+    found = explained(query)
+    rows = found.to_dict()["rows"]
+    assert [(row["verdict"], row["object"], row["source_id"], row["query"]) for row in rows] == [
+        ("matched", 0, "0", 0),
+        ("misnamed", 1, "1", 1),
+        ("false", None, None, 2),
+        ("missed", 2, "2", None),
+    ]
+    assert rows[0]["bearing_error"] == pytest.approx(-3.0)
+    assert rows[0]["distance"] == pytest.approx(10.0)
+    assert rows[1]["object_bearing"] == pytest.approx(90.0)
+    assert rows[1]["object_class"] != rows[1]["query_class"]
+    assert all(0.5 < row["chance"] <= 1.0 for row in rows)
+    assert found.counts == {"matched": 1, "misnamed": 1, "missed": 1, "false": 1}
+    assert json.loads(json.dumps(found.to_dict()))["x"] == 0.0
+    shapes = found.table.geometry
+    assert shapes.isna().tolist() == [False, False, True, False]
+    assert found.table.crs == WORLD.street_objects.crs
+
+
+def test_chances_are_those_of_one_pair() -> None:
+    world = World(((0.0, 10.0, TREE), (0.0, -500.0, LAMP)))
+    found = explained(Signature(np.array([TREE]), np.array([8.0])), world)
+    density = np.exp(-0.5 * 4.0) / (4.0 * np.sqrt(2 * np.pi))
+    weight = 0.8 / 0.2 * 0.95 * density / (0.5 / 360)
+    assert found.table["chance"].iloc[0] == pytest.approx(weight / (1 + weight), rel=1e-6)
+    expected = np.log(0.2 * (0.5 / 360) * (1 + weight)) - 1.0
+    assert found.loglik == pytest.approx(expected, rel=1e-6)
+
+
+def test_no_object_is_matched_twice() -> None:
+    lamps = World(((0.0, 10.0, LAMP), (1.0, 10.0, LAMP)))
+    query = Signature(np.array([LAMP, LAMP]), np.array([2.0, 3.0]))
+    found = explained(query, lamps, noise=named_noise("light"))
+    assert sorted(found.table["object"].tolist()) == [0, 1]
+    assert found.counts["matched"] == 2
+
+
+def test_a_query_of_unknown_classes_that_is_turned() -> None:
+    found = explained(Signature(None, np.array([350.0, 80.0])), heading=10.0)
+    assert found.table["verdict"].tolist() == ["matched", "matched", "missed"]
+    assert found.table["query_class"].tolist()[:2] == ["unknown", "unknown"]
+    assert found.table["query_bearing"].tolist()[:2] == [0.0, 90.0]
+    assert found.heading == 10.0
+
+
+def test_where_nothing_is_seen_all_is_false() -> None:
+    found = explained(Signature(np.array([TREE]), np.array([0.0])), xy=(500.0, 500.0))
+    assert found.counts == {"matched": 0, "misnamed": 0, "missed": 0, "false": 1}
+    assert found.table["chance"].tolist() == [1.0]
+
+
+def test_a_cell_is_explained_without_the_street_objects() -> None:
+    database = WORLD.database
+    cell = int(np.flatnonzero((database.xy == [5.0, 5.0]).all(axis=1))[0])
+    query = database.signature(cell)
+    found = explain_cell(query, cell, NOISE, database=database)
+    exact = explained(query, xy=(5.0, 5.0))
+    assert found.counts == exact.counts
+    assert found.loglik == pytest.approx(exact.loglik, abs=0.1)
+    assert found.table["object"].isna().all()
+    apart = found.table.geometry.distance(exact.table.geometry)
+    assert apart.max() < 0.2
+    assert found.table.crs == WORLD.street_objects.crs

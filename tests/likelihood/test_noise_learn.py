@@ -8,13 +8,26 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
-from noisy_cells import TAXONOMY, random_database
+from hypothesis import given
+from hypothesis import strategies as st
+from noisy_cells import TAXONOMY, distorted, parts_of, random_database, random_query
 from sentences import refused
 from worlds import CODES, World
 
 from semsig_gis.core.errors import InputError
 from semsig_gis.core.signature import Signature
+from semsig_gis.core.statistics import wilson_interval
 from semsig_gis.database.visibility import views_in
+from semsig_gis.likelihood.noise.fit import (
+    ALL,
+    drawn_rates,
+    estimated_rates,
+    expected_counts,
+    gather_evidence,
+    model_change,
+    next_model,
+    starting_model,
+)
 from semsig_gis.likelihood.noise.learn import Sample, learn_noise, read_samples
 from semsig_gis.likelihood.noise.model import noise_from_dict
 
@@ -30,6 +43,7 @@ MISNAMED = {1: 0.05, 2: 0.1, 3: 0.02, 4: 0.2}
 SIGMA = {1: 3.0, 2: 6.0, 3: 4.0, 4: 5.0}
 CLUTTER = {1: 0.5, 2: 0.1, 3: 0.3, 4: 0.2}
 TRUTH = {"detection": DETECTION, "misnamed": MISNAMED, "clutter": CLUTTER, "bearing_sigma": SIGMA}
+DATABASE = random_database(1, cells=200)
 
 
 def detector(seed: int, seen: list[tuple[int, float]]) -> Signature:
@@ -77,7 +91,7 @@ def truths(estimate: NoiseEstimate) -> list[tuple[float, float, float]]:
 
 @pytest.fixture(scope="module")
 def estimate() -> NoiseEstimate:
-    return learn_noise(simulated(random_database(1, cells=200), 500), random_database(1, cells=200))
+    return learn_noise(simulated(DATABASE, 500), DATABASE)
 
 
 def test_the_true_rates_are_recovered_within_their_intervals(estimate: NoiseEstimate) -> None:
@@ -95,6 +109,7 @@ def test_the_true_rates_are_recovered_within_their_intervals(estimate: NoiseEsti
     plain = json.loads(json.dumps(estimate.to_dict()))
     assert noise_from_dict(plain["spec"]) == spec
     assert (plain["samples"], plain["skipped"]) == (500, 0)
+    assert estimate.objects == np.resize(DATABASE.lengths, 500).sum()
     detected = estimate.rates["samples"][estimate.rates.index[5]]  # what misnamed is a share of
     assert estimate.confusion.to_numpy().sum() == pytest.approx(detected, rel=1e-6)
 
@@ -108,21 +123,11 @@ def test_intervals_hold_the_truth_as_often_as_they_say() -> None:
     assert 0.88 <= np.mean(inside) <= 0.995
 
 
-def test_more_samples_make_narrower_intervals(estimate: NoiseEstimate) -> None:
-    database = random_database(1, cells=200)
-    few = learn_noise(simulated(database, 100), database)
-    width = few.rates["high_95"] - few.rates["low_95"]
-    assert (width > (estimate.rates["high_95"] - estimate.rates["low_95"])).mean() > 0.9
-    assert few.samples == 100
-    assert few.objects < estimate.objects
-
-
 def test_a_class_of_few_samples_is_drawn_to_the_whole() -> None:
-    database = random_database(1, cells=200)
     rare = 5
-    codes = database.codes.copy()
+    codes = DATABASE.codes.copy()
     codes[np.flatnonzero(codes == 1)[:2]] = rare  # which is never detected below
-    found = learn_noise(simulated(database, 200), replace(database, codes=codes))
+    found = learn_noise(simulated(DATABASE, 200), replace(DATABASE, codes=codes))
     name = TAXONOMY.by_code(rare).name
     row = found.rates[(found.rates["quantity"] == "detection") & (found.rates["class"] == name)]
     overall = found.spec.detection
@@ -160,10 +165,8 @@ def test_places_in_cells_turn_bearings() -> None:
 
 def test_one_class_alone() -> None:
     database = random_database(4, classes=1)
-    samples = [
-        Sample(signature=database.signature(cell), cell_id=int(database.cell_ids[cell]))
-        for cell in range(len(database))
-    ]
+    ids = enumerate(database.cell_ids.tolist())
+    samples = [Sample(signature=database.signature(cell), cell_id=number) for cell, number in ids]
     found = learn_noise(samples, database)
     assert found.spec.detection > 0.98
     assert found.spec.confusion == {"alignment_tree": {"alignment_tree": 1.0}}
@@ -180,13 +183,15 @@ def test_csv_and_json_lines_say_the_same(tmp_path: Path) -> None:
     ]
     (tmp_path / "seen.jsonl").write_text("\n\n".join(map(json.dumps, lines)))
     for name in ("seen.CSV", "seen.jsonl"):
-        found = read_samples(tmp_path / name, taxonomy=TAXONOMY)
-        assert [sample.cell_id for sample in found] == [7, 8, None]
-        assert [sample.xy for sample in found] == [None, None, (1.5, 2.0)]
-        bearings = [np.asarray(sample.signature.bearings).tolist() for sample in found]
-        assert bearings == [[10.0, 350.0], [], [350.0]]
-        codes = [np.asarray(sample.signature.codes).tolist() for sample in found]
-        assert codes == [[3, 1], [], [3]]
+        found = [
+            (one.cell_id, one.xy, *(part.tolist() for part in parts_of(one.signature)))
+            for one in read_samples(tmp_path / name, taxonomy=TAXONOMY)
+        ]
+        assert found == [
+            (7, None, [3, 1], [10.0, 350.0]),
+            (8, None, [], []),
+            (None, (1.5, 2.0), [3], [350.0]),
+        ]
 
 
 @pytest.mark.parametrize(
@@ -215,6 +220,82 @@ def test_what_is_wrong_is_said(tmp_path: Path, text: str, words: list[str]) -> N
         read_samples(path, taxonomy=TAXONOMY)
 
 
-def test_a_file_that_is_not_there(tmp_path: Path) -> None:
-    with refused(InputError, "none.csv", "CSV"):
-        read_samples(tmp_path / "none.csv", taxonomy=TAXONOMY)
+# --- One round of the fit ---------------------------------------------------------------------
+
+NOTHING = Signature(np.empty(0, np.uint8), np.empty(0))
+
+
+@given(st.integers(0, 500))
+def test_counts_add_up(seed: int) -> None:
+    database = random_database(seed, cells=20)
+    detected = [NOTHING]
+    for cell in range(1, 20):
+        query = random_query(database, seed + cell, size=cell % 7)
+        codes, bearings = parts_of(query)
+        detected.append(Signature(codes[codes > 0], bearings[codes > 0]))
+    evidence = gather_evidence(views_in(database, np.arange(20)), detected, taxonomy=TAXONOMY)
+    model = starting_model(evidence, position_sigma=2.0)
+    counts = expected_counts(evidence, model)
+    assert evidence.present.sum() == len(database.codes)
+    hits = counts.named.sum()
+    assert hits == pytest.approx(counts.chances.sum())
+    assert hits + counts.false.sum() == pytest.approx(len(evidence.labels), abs=0.05)
+    assert (counts.named.sum(axis=1) <= evidence.present + 0.05).all()
+    assert (counts.squares >= 0).all()
+    new = next_model(evidence, counts, model)
+    assert new.clutter.sum() * 20 == pytest.approx(counts.false.sum(), rel=0.02)
+    assert new.named.sum(axis=2) == pytest.approx(1.0)
+
+
+def test_rounds_raise_the_likelihood() -> None:
+    database = random_database(3, cells=60, longest=5)
+    rng = np.random.default_rng(0)
+    detected = [distorted(database, cell, rng) for cell in range(60)]
+    evidence = gather_evidence(views_in(database, np.arange(60)), detected, taxonomy=TAXONOMY)
+    model = starting_model(evidence, position_sigma=0.0)
+    before = -math.inf
+    for _ in range(8):
+        counts = expected_counts(evidence, model)
+        assert counts.log_likelihood > before - 0.1  # classes are drawn to the whole, too
+        before = counts.log_likelihood
+        new = next_model(evidence, counts, model)
+        assert model_change(model, model) == 0.0
+        assert model_change(model, new) > 0
+        model = new
+
+
+def test_where_every_association_is_certain_the_intervals_are_the_text_books() -> None:
+    database = random_database(0, cells=300, longest=1, classes=1)
+    views = views_in(database, np.arange(300))
+    seen = [
+        Signature(views.codes[[row]], (views.bearings[[row]] + 1.0 - 2.0 * (row % 2)) % 360)
+        if row % 10
+        else NOTHING
+        for row in range(300)
+    ]
+    evidence = gather_evidence(views, seen, taxonomy=TAXONOMY)
+    model = replace(
+        starting_model(evidence, position_sigma=0.0),
+        missed=np.array([[0.1]]),
+        clutter=np.array([1e-6]),
+        sigma=np.array([1.0]),
+    )
+    rates = estimated_rates(evidence, expected_counts(evidence, model), model)
+    rows = rates[rates["class"] == ALL].set_index("quantity").to_dict("index")
+    found = rows["detection"]
+    assert found["own"] == pytest.approx(0.9, abs=1e-4)
+    assert found["samples"] == 300
+    expected = wilson_interval(0.9, 300)
+    assert (found["low_95"], found["high_95"]) == pytest.approx(expected, abs=0.003)
+    sigma = rows["bearing_sigma"]
+    assert sigma["own"] == pytest.approx(1.0, abs=0.03)  # half a unit of bearing is noise too
+    assert math.log(sigma["high_95"] / sigma["own"]) >= 1.96 / math.sqrt(2 * 270) - 1e-6
+    assert len(rates) == 8
+
+
+def test_rates_are_drawn_as_the_overall_rate_with_eight_samples() -> None:
+    found = drawn_rates(np.array([1.0, 99.0]), np.array([2.0, 198.0]))
+    assert found.tolist() == [0.5, 0.5]
+    found = drawn_rates(np.array([0.0, 90.0]), np.array([10.0, 90.0]))
+    assert found == pytest.approx([8 * 0.9 / 18, (90 + 8 * 0.9) / 98])
+    assert drawn_rates(np.zeros(2), np.zeros(2)).tolist() == [0.0, 0.0]

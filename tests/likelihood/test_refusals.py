@@ -11,15 +11,16 @@ import shapely
 from noisy_cells import TAXONOMY, noisy_town, random_database
 from sentences import refused
 
-from semsig_gis.core.errors import CrsError, InputError, UnknownNameError
-from semsig_gis.core.rtree import ObjectIndex
+from semsig_gis.core.errors import InputError
 from semsig_gis.core.signature import Signature
+from semsig_gis.database.store import ObjectStore
 from semsig_gis.likelihood.answer_rule import AnswerRule, calibrate
 from semsig_gis.likelihood.association import align_cells, rerank
-from semsig_gis.likelihood.explain import explain
+from semsig_gis.likelihood.explain import explain_cell
 from semsig_gis.likelihood.index import CellScores, build_index
+from semsig_gis.likelihood.locate import locate
 from semsig_gis.likelihood.noise.learn import Sample, learn_noise
-from semsig_gis.likelihood.noise.model import NoiseSpec, named_noise, place_noise
+from semsig_gis.likelihood.noise.model import NoiseSpec, cell_noise, named_noise, place_noise
 from semsig_gis.likelihood.noise.table import noise_tables
 from semsig_gis.likelihood.posterior import posterior
 from semsig_gis.likelihood.priors import area_prior, position_prior, weight_prior
@@ -31,10 +32,10 @@ if TYPE_CHECKING:
 
 DATABASE = random_database(3, cells=120)
 FLAT = np.zeros(120)
-INDEX = build_index(DATABASE, named_noise("medium"))
+INDEX = build_index(DATABASE, cell_noise(named_noise("medium"), 10.0))
 EVEN = posterior(DATABASE, FLAT)
 OBJECTS = noisy_town(0).street_objects
-TREE = ObjectIndex(OBJECTS.xy)
+STORE = ObjectStore.of(OBJECTS)
 ONE = Signature(np.array([1], np.uint8), np.zeros(1))
 TYPES = Signature(np.array([1], np.uint8), None)
 NOISE = NoiseSpec()
@@ -48,7 +49,7 @@ ELSEWHERE = Sample(signature=ONE, xy=(5e6, 5e6))
 
 
 def refined(query: Signature, cells: np.ndarray, **options: Any) -> None:  # noqa: ANN401
-    refine(query, cells, NOISE, objects=OBJECTS, index=TREE, **options)
+    refine(query, cells, NOISE, objects=OBJECTS, index=STORE.index, **options)
 
 
 def table(**fields: Any) -> Any:  # noqa: ANN401
@@ -64,7 +65,12 @@ CASES: list[tuple[Callable[[], object], str, str]] = [
     (lambda: INDEX.scores(MANY, north_sigma=math.inf), "258 objects", "at most 257"),
     (lambda: rerank(INDEX, ONE, CellScores(loglik=FLAT), count=0), "0 cells", "from 1"),
     (lambda: align_cells(DATABASE, TYPES, NOISE, np.arange(2)), "no bearings", "give them"),
-    (lambda: explain(TYPES, (0, 0), NOISE, objects=OBJECTS, index=TREE), "no bearings", "give"),
+    (lambda: explain_cell(TYPES, 0, NOISE, database=DATABASE), "no bearings", "give them"),
+    (lambda: locate(INDEX, NOTHING), "no objects", "at least one"),
+    (lambda: locate(INDEX, ONE, refined=True), "between the viewpoints", "give the store"),
+    (lambda: locate(INDEX, TYPES, refined=True, store=STORE), "no bearings", "give them"),
+    (lambda: locate(INDEX, TYPES, explained=1), "no bearings", "give them"),
+    (lambda: locate(INDEX, ONE, top=0), "0 candidates", "a whole number from 1"),
     (lambda: refined(TYPES, OBJECTS.xy[:3]), "no bearings", "give them"),
     (lambda: refined(ONE, OBJECTS.xy[:0]), "0 cells", "at least one"),
     (lambda: refined(ONE, OBJECTS.xy[:1], north_sigma=math.inf), "no headings", "give"),
@@ -127,10 +133,3 @@ def test_what_cannot_be_used_is_refused(
 ) -> None:
     with refused(InputError, fault, remedy):
         call()
-
-
-def test_names_and_coordinate_systems_that_are_not_known() -> None:
-    with refused(UnknownNameError, "'genric'", "the nearest is 'generic'"):
-        named_noise("genric")
-    with refused(CrsError, "'EPSG:0' of the area"):
-        area_prior(DATABASE, SQUARE, crs="EPSG:0")
