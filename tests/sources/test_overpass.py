@@ -154,9 +154,6 @@ def test_the_query_asks_for_exact_tags() -> None:
         ");",
         "out body geom;",
     ]
-
-
-def test_the_query_of_a_layer_without_tags_is_refused() -> None:
     with refused(CatalogError, "has no tags"):
         overpass_query([replace(BENCH, tags=())], (1, 2, 3, 4))
 
@@ -209,10 +206,9 @@ def test_a_second_run_needs_no_server(server: Server, get: Get) -> None:
 
 
 def test_an_interrupted_run_goes_on(server: Server, get: Get) -> None:
-    server.on("/api/interpreter", in_box, Answer(b"bad", status=400))
+    server.on("/api/interpreter", in_box, Answer(b"bad", status=400), in_box)
     with pytest.raises(SourceError):
         get()
-    server.on("/api/interpreter", in_box)
     assert ids(get()) == ALL
     assert asked(server) == 3
 
@@ -263,20 +259,14 @@ def test_a_remark_that_is_no_error_is_no_error(server: Server, get: Get) -> None
     assert ids(get()) == ALL
 
 
-def test_slots_are_waited_for(server: Server, get: Get, slept: list[float]) -> None:
-    server.on("/api/status", Answer(BUSY.encode(), type="text/plain"), FREE)
-    assert ids(get()) == ALL
-    assert slept == [8.0]
-
-
-def test_slots_that_are_far_away_are_not_waited_for(
-    server: Server, get: Get, slept: list[float]
-) -> None:
+def test_slots_are_waited_for_unless_far_away(server: Server, get: Get, slept: list[float]) -> None:
     later = BUSY.replace("in 7 s", "in 700 s").replace("in 60 s", "in 900 s")
-    server.on("/api/status", Answer(later.encode(), type="text/plain"))
+    server.on("/api/status", *(Answer(text.encode(), type="text/plain") for text in (later, BUSY)))
     with refused(HttpError, "no free slot for 700 s"):
         get()
     assert (slept, asked(server)) == ([], 0)
+    assert ids(get()) == ALL
+    assert slept == [8.0, 8.0]  # before each of the tiles
 
 
 def test_a_server_without_status_is_asked_all_the_same(
@@ -330,9 +320,6 @@ def test_where_all_servers_fail_each_is_told(server: Server, get: Get) -> None:
     server.on("/a/interpreter", Answer(status=503))
     with refused(SourceError, "no Overpass server", "503", "localhost", "404"):
         get(endpoints=[f"{server.url}/a", f"{server.other_host}/b"])
-
-
-def test_what_cannot_be_asked_is_said(get: Get) -> None:
     with refused(InputError, "tile_deg is 0"):
         get(tile_deg=0)
 
@@ -371,6 +358,11 @@ def test_nodes_and_ways_become_objects(tmp_path: Path) -> None:
     assert places == pytest.approx(np.array(expected))
     assert list(layer.table.columns) == ["class_name", "source_id", "geometry"]
     assert layer.table.crs == "EPSG:4326"
+    nodes = replace(BENCH, elements=("node",), where=(("user", ("nobody",)),))
+    (layer,) = read_layers(tmp_path / "tile.json", [nodes])
+    assert (layer.counts.read, layer.counts.filtered) == (5, 5)
+    (layer,) = read_layers(tmp_path / "tile.json", [nodes], filters=False)
+    assert layer.table["source_id"].tolist() == ["node/1"]
 
 
 def test_buildings_and_streets_keep_their_shape(tmp_path: Path) -> None:
@@ -425,20 +417,6 @@ def test_an_incomplete_element_is_counted(
     assert layer.counts.unreadable == 1
     assert len(layer.table) == 1
     assert words.replace("/1 ", "/99 ") in layer.errors[0]
-
-
-def test_the_kinds_and_filters_of_a_layer_hold(tmp_path: Path) -> None:
-    stops = replace(BENCH, elements=("node",), where=(("shelter", ("yes",)),))
-    elements = [
-        node(1, 2, 48, amenity="bench", shelter="yes"),
-        node(2, 2, 48, amenity="bench"),
-        way(3, *SQUARE, amenity="bench"),
-    ]
-    layer = read(tmp_path, elements, stops)
-    assert layer.table["source_id"].tolist() == ["node/1"]
-    assert (layer.counts.read, layer.counts.filtered) == (3, 2)
-    (unfiltered,) = read_layers(tmp_path / "tile.json", [stops], filters=False)
-    assert unfiltered.table["source_id"].tolist() == ["node/1", "node/2"]
 
 
 @pytest.mark.parametrize(
