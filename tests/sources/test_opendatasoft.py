@@ -9,6 +9,7 @@ import math
 import re
 from contextlib import nullcontext
 from dataclasses import replace
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import geopandas as gpd
@@ -35,7 +36,6 @@ from semsig_gis.sources.opendatasoft.reader import (
 
 if TYPE_CHECKING:
     from collections.abc import Callable
-    from pathlib import Path
 
     from servers import Seen, Server
 
@@ -55,13 +55,15 @@ TREES = LayerSpec(
     id_field="IDBASE",
     unique_id=True,
 )
-ALIGNED = replace(TREES, where=(("DOMANIALITE", ("Alignement",)),))
-# Longitude, latitude, id and domain of some trees.
-PLACES = [
-    (2.35, 48.85, 11, "Alignement"),
-    (2.36, 48.86, 12, "Jardin"),
-    (2.37, 48.87, 13, "Alignement"),
-]
+ALIGNED = replace(
+    TREES,
+    where=(("DOMANIALITE", ("Alignement",)),),
+    class_by=ClassBy("DOMANIALITE", (("/Jard.*/", "bench"),)),
+)
+# Three trees in every spelling of a portal.
+DATA = Path(__file__).with_name("data") / "les-arbres"
+IDS, DOMAINS = [11, 12, 13], ["Alignement", "Jardin", "Alignement"]
+XY = [(2.35, 48.85), (2.36, 48.86), (2.37, 48.87)]
 
 
 def read(path: Path, spec: LayerSpec = TREES, **options: Any) -> RawLayer:  # noqa: ANN401
@@ -102,78 +104,16 @@ def shape(lon: float, lat: float, kind: str = "Point") -> dict[str, Any]:
     return {"type": kind, "coordinates": [lon, lat] if kind == "Point" else [[lon, lat]]}
 
 
-def v1(lon: float, lat: float, number: int, domain: str) -> dict[str, Any]:
-    return {
-        "datasetid": "les-arbres",
-        "recordid": f"{number:040x}",
-        "fields": {"idbase": number, "domanialite": domain, "geo_point_2d": [lat, lon]},
-        "geometry": shape(lon, lat),
-    }
-
-
-def v21(lon: float, lat: float, number: int, domain: str) -> dict[str, Any]:
-    return {
-        "idbase": number,
-        "domanialite": domain,
-        "geo_shape": {"type": "Feature", "geometry": shape(lon, lat), "properties": {}},
-        "geo_point_2d": {"lon": lon, "lat": lat},
-    }
-
-
-def feature(lon: float, lat: float, number: int, domain: str) -> dict[str, Any]:
-    properties = {"idbase": number, "domanialite": domain, "geo_point_2d": [lat, lon]}
-    return {"type": "Feature", "geometry": shape(lon, lat), "properties": properties}
-
-
-def as_csv(header: list[str], rows: list[list[Any]], separator: str = ";") -> str:
-    stream = io.StringIO()
-    csv.writer(stream, delimiter=separator, lineterminator="\r\n").writerows([header, *rows])
-    return stream.getvalue()
-
-
-def trees_csv(
-    point: str = "{0}, {1}",
-    number: str = "{}",
-    separator: str = ";",
-    header: tuple[str, ...] = ("IDBASE", "DOMANIALITE", "geo_point_2d"),
-) -> str:
-    rows = [[number.format(n), d, point.format(lat, lon)] for lon, lat, n, d in PLACES]
-    return as_csv([*header], rows, separator)
-
-
 def parquet(ids: list[Any], **columns: Any) -> bytes:  # noqa: ANN401
     stream = io.BytesIO()
     pq.write_table(pa.table({"idbase": ids, "domanialite": DOMAINS, **columns}), stream)
     return stream.getvalue()
 
 
-IDS = [number for _, _, number, _ in PLACES]
-DOMAINS = [domain for *_, domain in PLACES]
-XY = [place[:2] for place in PLACES]
 WKB = [shapely.to_wkb(shapely.Point(*place)) for place in XY]
-V1, V21, FEATURES = ([kind(*place) for place in PLACES] for kind in (v1, v21, feature))
-FILES: dict[str, object] = {
-    "v1.json": V1,
-    "v1_search.json": {"nhits": 3, "records": V1},
-    "v20.json": {"total_count": 3, "records": [{"links": [], "record": row} for row in V1]},
-    "v21.json": V21,
-    "v21_records.json": {"total_count": 3, "results": V21},
-    "v21.geojson": {"type": "FeatureCollection", "features": FEATURES},
-    "labels.csv": trees_csv(),
-    "tight.csv": trees_csv("{0},{1}"),
-    "commas.csv": trees_csv("{0},{1}", separator=","),
-    "tabs.csv": trees_csv(separator="\t"),
-    "mark.csv": "\ufeff" + trees_csv(),
-    "floats.csv": trees_csv(number="{}.0"),
-    "accents.csv": trees_csv(header=("Id Base", "Domanialité", "Géo point 2D")),
-    "shapes.csv": as_csv(
-        ["idbase", "domanialite", "geo_shape", "geopoint_datagouv"],
-        [
-            [n, d, json.dumps(shape(lon, lat, "MultiPoint")), f"{lon}, {lat}"]
-            for lon, lat, n, d in PLACES
-        ],
-    ),
-    "wkb.parquet": parquet([float(n) for n in IDS], geo_point_2d=WKB, geo_shape=WKB),
+WHOLE = parquet([float(n) for n in IDS], geo_point_2d=WKB, geo_shape=WKB)
+FILES: dict[str, bytes] = {path.name: path.read_bytes() for path in sorted(DATA.iterdir())} | {
+    "wkb.parquet": WHOLE,
     "struct.parquet": parquet(IDS, geo_point_2d=[{"lon": lon, "lat": lat} for lon, lat in XY]),
     "text.parquet": parquet(
         IDS,
@@ -181,11 +121,13 @@ FILES: dict[str, object] = {
         geo_shape=[json.dumps(shape(lon, lat)) for lon, lat in XY],
     ),
 }
+PUBLISHED = FILES["v21.geojson"]
 
 
 @pytest.mark.parametrize("name", FILES)
 def test_every_kind_of_file_says_the_same(read_as: Read, tmp_path: Path, name: str) -> None:
-    assert len(read_as(name, FILES[name], ALIGNED, filters=False).table) == 3
+    unfiltered = read_as(name, FILES[name], ALIGNED, filters=False)
+    assert [*unfiltered.table["class_name"]] == ["alignment_tree", "bench", "alignment_tree"]
     everything, some = read_layers(tmp_path / name, [TREES, ALIGNED])
     assert (ids(everything), xy(everything)) == (["11", "12", "13"], XY)
     assert everything.table.crs == "EPSG:4326"
@@ -255,14 +197,6 @@ def test_the_nearest_spelling_goes_first(fields: list[str], expected: str | None
     assert find_field("gid", spec, fields) == expected
 
 
-def test_a_class_may_hang_on_a_field(read_as: Read) -> None:
-    spec = replace(PLAIN, class_by=ClassBy("type", (("/SANISETTES?/", "automatic_wc"),)))
-    text = "TYPE;geo_point_2d\nSANISETTES;48.85,2.35\nURINOIR;48.86,2.36\n"
-    layer = read_as("toilets.csv", text, spec)
-    assert layer.table["class_name"].tolist() == ["automatic_wc", "bench"]
-    assert ids(layer) == ["1", "2"]
-
-
 @pytest.mark.parametrize(
     "change",
     [
@@ -275,7 +209,7 @@ def test_a_field_that_is_not_there_is_named(
     read_as: Read, tmp_path: Path, change: dict[str, Any]
 ) -> None:
     with refused(CatalogError, *change, "trees", str(tmp_path / "a.csv"), "IDBASE"):
-        read_as("a.csv", trees_csv(), replace(TREES, **change))
+        read_as("a.csv", FILES["labels.csv"], replace(TREES, **change))
 
 
 def test_a_shape_goes_before_a_point_and_a_point_before_coordinates(read_as: Read) -> None:
@@ -360,7 +294,8 @@ def test_a_shape_may_be_longer_than_python_expects(read_as: Read) -> None:
     text = shapely.to_geojson(circle)
     before = csv.field_size_limit()
     assert len(text) > before
-    layer = read_as("a.csv", as_csv(["geo_shape"], [[text]]), replace(PLAIN, geometry="polygon"))
+    quoted = text.replace('"', '""')
+    layer = read_as("a.csv", f'geo_shape\n"{quoted}"\n', replace(PLAIN, geometry="polygon"))
     assert xy(layer)[0] == pytest.approx((2.35, 48.85))
     assert csv.field_size_limit() == before
 
@@ -382,20 +317,14 @@ def test_rows_of_one_id_are_one_object(read_as: Read) -> None:
 
 
 def test_rows_of_one_id_that_are_apart_are_told(read_as: Read) -> None:
-    text = "IDBASE;geo_point_2d\n1;48.1,2.1\n1;48.1,2.1000001\n1;48.1,2.2\n2;48,2\n"
-    layer = read_as("a.csv", text, TREES)
+    rows = "1;new;48.1,2.1\n1;new;48.1,2.1000001\n1;new;48.1,2.2\n2;new;48,2\n"
+    text = f"IDBASE;state;geo_point_2d\n2;old;48,1\n{rows}"  # the filter comes before the ids
+    layer = read_as("a.csv", text, replace(TREES, where=(("state", ("new",)),)))
     assert xy(layer) == [(2.1, 48.1), (2.0, 48.0)]
-    assert layer.counts.duplicates == 2
+    assert (layer.counts.filtered, layer.counts.duplicates) == (1, 2)
     assert layer.notes == (
         "1 rows have the id of a row that stands elsewhere; the first one's place is used",
     )
-
-
-def test_the_filter_comes_before_the_ids(read_as: Read) -> None:
-    text = "IDBASE;state;geo_point_2d\n1;old;48.1,2.1\n1;new;48.2,2.2\n"
-    layer = read_as("a.csv", text, replace(TREES, where=(("state", ("new",)),)))
-    assert xy(layer) == [(2.2, 48.2)]
-    assert (layer.counts.filtered, layer.counts.duplicates) == (1, 0)
 
 
 def test_a_stated_crs_goes_before_the_default(read_as: Read) -> None:
@@ -420,12 +349,9 @@ def test_a_stated_crs_goes_before_the_default(read_as: Read) -> None:
 def test_an_old_geojson_file_may_state_its_crs(
     read_as: Read, member: object, expected: str | None
 ) -> None:
-    content = {"type": "FeatureCollection", "crs": member, "features": FEATURES}
+    content = {"crs": member, **json.loads(PUBLISHED)}
     with nullcontext() if expected else refused(CrsError, "a.geojson", "CRS"):
         assert read_as("a.geojson", content, TREES).table.crs == expected
-
-
-WHOLE = bytes(FILES["wkb.parquet"])  # type: ignore[call-overload]
 
 
 @pytest.mark.parametrize(
@@ -547,7 +473,7 @@ class Portal:
         names = seen.query.get("select", ",".join(TYPES)).split(",")
         assert set(names) <= set(TYPES)
         features = []
-        for row in V21:
+        for row in json.loads(FILES["v21.json"]):
             if all(self._holds(text, row) for text in conditions):
                 properties = {name: row[name] for name in names}
                 geometry = properties.pop("geo_shape")["geometry"]
@@ -640,9 +566,6 @@ def test_a_long_outline_is_shortened_and_loses_nothing(
     assert len(text) <= 2_000
     # Rounding to 7 decimals moves a corner by less than a centimetre.
     assert shapely.from_wkt(text).buffer(1e-7).covers(area)
-
-
-PUBLISHED = json.dumps(FILES["v21.geojson"]).encode()
 
 
 def test_a_second_run_is_answered_from_the_cache(

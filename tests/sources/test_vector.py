@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import json
 import math
 import shutil
@@ -20,6 +21,7 @@ import shapely
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from pyproj import CRS
+from sentences import refused
 
 from semsig_gis.core.errors import CatalogError, CrsError, SourceError, UnknownNameError
 from semsig_gis.sources import vector as vector_file
@@ -56,24 +58,17 @@ def write(table: gpd.GeoDataFrame, folder: Path, suffix: str) -> Path:
         inner = folder / "inner"
         inner.mkdir()
         write(table, inner, "shp")
-        pack(inner, path)
+        pack(path, *inner.iterdir())
     else:
         table.to_file(path)
     return path
 
 
-def pack(folder: Path, archive: Path, inside: str = "") -> Path:
+def pack(archive: Path, *files: Path, inside: str = "") -> Path:
     with zipfile.ZipFile(archive, "w", zipfile.ZIP_DEFLATED) as target:
-        for file in sorted(folder.iterdir()):
+        for file in sorted(files):
             target.write(file, inside + file.name)
     return archive
-
-
-def zipped(folder: Path, texts: dict[str, str]) -> Path:
-    with zipfile.ZipFile(folder / "texts.zip", "w") as archive:
-        for name, text in texts.items():
-            archive.writestr(name, text)
-    return folder / "texts.zip"
 
 
 def text_file(folder: Path, name: str, text: str, encoding: str = "utf-8") -> Path:
@@ -142,7 +137,7 @@ def test_published_polygons_and_lines_are_kept_as_they_are(montpellier: Publicat
 
 def test_published_geojson_that_is_not_in_degrees(montpellier: Publication) -> None:
     path = montpellier("Signalisation.geojson")
-    with pytest.raises(CrsError, match=r"\(767686\.3955, 6279032\.6454\).*state the crs"):
+    with refused(CrsError, "(767686.3955, 6279032.6454)", "state the crs"):
         read(path)
     by_user = read_layer(path, spec_of(), crs="EPSG:2154")
     by_catalogue = read(path, crs="EPSG:2154")
@@ -151,30 +146,6 @@ def test_published_geojson_that_is_not_in_degrees(montpellier: Publication) -> N
     assert by_user.notes == by_catalogue.notes == ()
     np.testing.assert_allclose(xy(by_user), xy(twin), atol=1e-6)
     assert list_layers(path)[0].crs is None
-
-
-def test_published_crs_without_a_name_is_none(montpellier: Publication) -> None:
-    path = montpellier("EspacesVertsGlobal.zip")
-    assert list_layers(path)[0].crs is None
-    with pytest.raises(CrsError, match="does not say which CRS"):
-        read(path)
-    assert read_layer(path, spec_of(), crs="EPSG:2154").table.crs == CRS.from_epsg(2154)
-
-
-def test_published_crs_goes_before_what_is_expected(montpellier: Publication) -> None:
-    layer = read(montpellier("Fontaines.zip"), crs="EPSG:2154")
-    assert layer.table.crs == CRS.from_epsg(4171)
-    assert layer.notes == (
-        "the file is in EPSG:4171, not in EPSG:2154 as stated; the file's CRS is used",
-    )
-
-
-def test_published_paris_geopackage_and_csv(geodata: Path) -> None:
-    layer = read(geodata / "paris" / "gpdtut_paris_trees.gpkg")
-    assert (layer.counts.unreadable, layer.notes) == (0, ())
-    assert len(layer.table) == layer.counts.read > 1000
-    with pytest.raises(SourceError, match=r"no coordinate columns.*its columns are IDBASE, TYPE"):
-        read(geodata / "paris" / "les-arbres_julien2019.csv")
 
 
 @pytest.fixture
@@ -205,7 +176,8 @@ def test_truncated_shapefile_loses_only_its_end(
     assert len(layer.errors) == 10
     assert layer.errors[0].startswith(error)
     if suffix == ".shp":
-        assert counts(read(pack(fountains.parent, tmp_path / "cut.zip"))) == counts(layer)
+        archive = pack(tmp_path / "cut.zip", *fountains.parent.iterdir())
+        assert counts(read(archive)) == counts(layer)
 
 
 def test_corrupt_records_are_counted(fountains: Path) -> None:
@@ -226,18 +198,18 @@ def test_corrupt_records_are_counted(fountains: Path) -> None:
 )
 def test_useless_shapefile(fountains: Path, suffix: str, message: str) -> None:
     cut(fountains.with_suffix(suffix), 50)
-    with pytest.raises(SourceError, match=f"{message}.*get it again"):
+    with refused(SourceError, message, "get it again"):
         read(fountains)
 
 
 def test_damaged_archives(montpellier: Publication, tmp_path: Path) -> None:
     path = Path(shutil.copy(montpellier("FontainesPublic.zip"), tmp_path / "copy.zip"))
     content = path.read_bytes()
-    path.write_bytes(content[: len(content) // 2])
-    with pytest.raises(SourceError, match=r"copy\.zip cannot be read \(File is not a zip file\)"):
+    cut(path, len(content) // 2)
+    with refused(SourceError, "copy.zip cannot be read (File is not a zip file)"):
         list_layers(path)
     path.write_bytes(content[:3000] + bytes(100) + content[3100:])
-    with pytest.raises(SourceError, match=r"copy\.zip is damaged at VilleMTP_MTP_Fontaines.*shx"):
+    with refused(SourceError, "copy.zip is damaged at VilleMTP_MTP_Fontaines", "shx"):
         read(path)
 
 
@@ -274,6 +246,10 @@ def test_round_trip(suffix: str, rows: list[tuple[float, float, str]]) -> None:
     assert numbered.table["source_id"].is_unique
 
 
+TEXT = pd.Series(dtype="str").dtype
+TYPES = {"class_name": TEXT, "source_id": TEXT, "geometry": "geometry"}
+
+
 @pytest.mark.parametrize("suffix", FORMATS)
 def test_names_that_a_url_would_cut(suffix: str, tmp_path: Path) -> None:
     plain = tmp_path / "plain"
@@ -283,7 +259,7 @@ def test_names_that_a_url_would_cut(suffix: str, tmp_path: Path) -> None:
     path = folder / path.name
     if suffix != "shp":
         path = path.rename(folder / f"x#y?z! %20.{suffix}")
-    assert read(path, crs="EPSG:2154").counts.read == 1
+    assert read(path, crs="EPSG:2154").table.dtypes.to_dict() == TYPES
     assert list_layers(path)[0].rows == 1
 
 
@@ -307,7 +283,7 @@ def test_empty_layer_is_read(suffix: str, tmp_path: Path) -> None:
     fiona.open(path, "w", driver=DRIVERS[path.suffix], crs="EPSG:2154", schema=schema).close()
     layer = read(path, rows=(1, 5))
     assert (counts(layer), layer.notes) == ((0, 0, 0), ("the layer has no rows",))
-    assert list(layer.table.columns) == ["class_name", "source_id", "geometry"]
+    assert layer.table.dtypes.to_dict() == TYPES
     assert list_layers(path)[0].rows == 0
 
 
@@ -352,54 +328,50 @@ def test_broken_geojson_geometries_are_told_from_null_ones(tmp_path: Path) -> No
     assert [message.split(":")[0] for message in layer.errors] == [f"row {n}" for n in range(1, 9)]
     assert layer.errors[0] == "row 1: its geometry is not valid GeoJSON"
     assert layer.errors[6].startswith("row 7: its LineString is not valid")
-    archive = zipped(tmp_path, {"below/things.geojson": path.read_text()})
+    archive = pack(tmp_path / "things.zip", path, inside="below/")
     assert read(archive).errors == layer.errors
-
-
-def test_geojson_that_is_one_geometry(tmp_path: Path) -> None:
-    path = text_file(tmp_path, "things.geojson", json.dumps(point(3, 43)))
+    path.write_text(json.dumps(point(3, 43)))  # without features
     assert xy(read(path)) == [[3.0, 43.0]]
 
 
-class Failing:
-    """A source of points of which some raise, as GDAL may; `stuck` is where it stops moving."""
+class Source:
+    """A source of so many features, of which some raise, as GDAL may."""
 
     driver = "GPKG"
 
-    def __init__(self, size: int, *, bad: frozenset[int] = frozenset(), stuck: int = -1) -> None:
-        self.size, self.bad, self.stuck, self.at = size, bad, stuck, 0
+    def __init__(self, size: int, features: Iterable[fiona.Feature | Exception]) -> None:
+        self.size, self.features = size, iter(features)
 
     def __len__(self) -> int:
         return self.size
 
-    def __iter__(self) -> Failing:
+    def __iter__(self) -> Source:
         return self
 
     def __next__(self) -> fiona.Feature:
-        if self.at == self.stuck:
-            raise OSError(5, "no more")
-        if self.at == self.size:
-            raise StopIteration
-        self.at += 1
-        if self.at - 1 in self.bad:
-            msg = "unlucky"
-            raise ValueError(msg)
-        geometry = fiona.Geometry(coordinates=(self.at, 0.0), type="Point")
-        return fiona.Feature(geometry=geometry, id=str(self.at), properties=fiona.Properties())
+        feature = next(self.features)
+        if isinstance(feature, Exception):
+            raise feature
+        return feature
 
 
 RULES = RowRules(spec_of(), [], filters=True, where="here")
+GEOMETRY = fiona.Geometry(coordinates=(1.0, 0.0), type="Point")
+GOOD = fiona.Feature(geometry=GEOMETRY, id="1", properties=fiona.Properties())
 
 
 def test_features_that_raise_do_not_stop_the_rest() -> None:
-    rows = vector_file._read_rows(Failing(9, bad=frozenset({0, 4, 8})), RULES, None, [])
+    bad = ValueError("unlucky")
+    source = Source(9, [bad, *[GOOD] * 3, bad, *[GOOD] * 3, bad])
+    rows = vector_file._read_rows(source, RULES, None, [])
     assert (rows.read, rows.numbers) == (9, [2, 3, 4, 6, 7, 8])
     assert rows.errors == dict.fromkeys((1, 5, 9), "cannot be read (unlucky)")
 
 
 @pytest.mark.parametrize("size", [5, 5000])
 def test_reader_that_is_stuck_comes_to_an_end(size: int) -> None:
-    rows = vector_file._read_rows(Failing(size, stuck=3), RULES, None, [])
+    features = itertools.chain([GOOD] * 3, itertools.repeat(OSError(5, "no more")))
+    rows = vector_file._read_rows(Source(size, features), RULES, None, [])
     assert rows.numbers == [1, 2, 3]
     assert rows.read == len(rows.numbers) + len(rows.errors) == max(size, 1003)
 
@@ -428,7 +400,7 @@ def test_other_truncated_files(suffix: str, tmp_path: Path) -> None:
         assert (rows, len(layer.errors)) == (2000, 10)
         assert 0 < kept < 2000
     else:
-        with pytest.raises(SourceError, match=r"things.* cannot be read \(.*get it again"):
+        with refused(SourceError, f"{path.name} cannot be read (", "get it again"):
             read(path)
 
 
@@ -466,17 +438,25 @@ def test_csv_dialects(tmp_path: Path, separator: str, header: str, encoding: str
     assert [name for name, _ in info.fields] == ["ident", *names]
 
 
-def test_csv_columns_by_name_go_first(tmp_path: Path) -> None:
-    text = "x;y;size (a, b, c, d);east;north\n1;2;9,5;765277,5;6275109,25\n"
+EAST = "x;y;size (a, b, c, d);east;north\n1;2;9,5;765277,5;6275109,25\n"
+
+
+@pytest.mark.parametrize(
+    ("text", "what", "places"),
+    [
+        (EAST, {"x_field": "east", "y_field": "north"}, [[765277.5, 6275109.25]]),
+        (EAST, {}, [[1.0, 2.0]]),
+        ("\ufeffx,y,2014\n1,2,3\n1,3,4\n", {"where": (("2014", (3,)),)}, [[1.0, 2.0]]),
+        # Degrees go before a plane.
+        ("x,y,lat,lon\n765277,6275109,43.5,3.25\n", {"crs": "EPSG:4326"}, [[3.25, 43.5]]),
+    ],
+)
+def test_csv_coordinates(
+    tmp_path: Path, text: str, what: dict[str, Any], places: list[list[float]]
+) -> None:
     path = text_file(tmp_path, "things.csv", text)
-    named = spec_of(crs="EPSG:2154", x_field="east", y_field="north")
-    assert xy(read_layer(path, named)) == [[765277.5, 6275109.25]]
-    assert xy(read(path, crs="EPSG:2154")) == [[1.0, 2.0]]
-
-
-def test_csv_degrees_go_before_a_plane(tmp_path: Path) -> None:
-    path = text_file(tmp_path, "things.csv", "x,y,lat,lon\n765277,6275109,43.5,3.25\n")
-    assert xy(read(path, crs="EPSG:4326")) == [[3.25, 43.5]]
+    for file in (path, pack(tmp_path / "things.zip", path)):
+        assert xy(read(file, **{"crs": "EPSG:2154", **what})) == places
 
 
 def test_csv_rows_without_numbers_are_errors(tmp_path: Path) -> None:
@@ -495,25 +475,20 @@ def test_csv_rows_without_numbers_are_errors(tmp_path: Path) -> None:
     assert xy(layer) == [[1.0, 2.0], [1.5, 2.0], [1.0, 2.0]]
 
 
-def test_csv_numeric_headers_are_headers(tmp_path: Path) -> None:
-    path = text_file(tmp_path, "things.csv", "x,y,2014\n1,2,3\n")
-    assert read_layer(path, spec_of(crs="EPSG:2154", where=(("2014", (3,)),))).counts.read == 1
-
-
 @pytest.mark.parametrize(
-    ("what", "error", "message"),
+    ("what", "error", "words"),
     [
-        ({}, SourceError, r"x_field and y_field; its columns are ident, place"),
-        ({"x_field": "plase", "y_field": "place"}, CatalogError, r"'plase'.*x_field.*is 'place'"),
-        ({"x_field": "place", "y_field": "placed"}, CatalogError, r"'placed'.*y_field.*is 'place'"),
-        ({"x_field": "place"}, CatalogError, "only one of x_field and y_field"),
+        ({}, SourceError, ["x_field and y_field; its columns are ident, place"]),
+        ({"x_field": "plase", "y_field": "place"}, CatalogError, ["'plase'", "is 'place'"]),
+        ({"x_field": "place", "y_field": "placed"}, CatalogError, ["'placed'", "is 'place'"]),
+        ({"x_field": "place"}, CatalogError, ["only one of x_field and y_field"]),
     ],
 )
 def test_csv_needs_coordinates(
-    tmp_path: Path, what: dict[str, str], error: type[Exception], message: str
+    tmp_path: Path, what: dict[str, str], error: type[Exception], words: list[str]
 ) -> None:
     path = text_file(tmp_path, "things.csv", "ident;place\n1;here\n")
-    with pytest.raises(error, match=message):
+    with refused(error, *words):
         read(path, **what)
     assert list_layers(path)[0].geometry == "None"
 
@@ -522,11 +497,11 @@ def test_csv_in_another_encoding(tmp_path: Path) -> None:
     path = text_file(tmp_path, "things.csv", "nom;x;y\nété;1;2\n", "latin-1")
     layer = read_layer(path, spec_of(crs="EPSG:2154", where=(("nom", ("hiver",)),)))
     assert layer.notes == ("some text is not UTF-8 and was read as missing",)
-    path = text_file(tmp_path, "things.csv", "prénom;x;y\na;1;2\n", "latin-1")
-    with pytest.raises(SourceError, match="is not UTF-8 text; save it as UTF-8"):
-        read(path, crs="EPSG:2154")
-    with pytest.raises(SourceError, match="is not UTF-8 text"):
-        list_layers(text_file(tmp_path, "things.csv", "n;x;y\na;1;2\n", "utf-16"))
+    for text, encoding in (("prénom;x;y\na;1;2\n", "latin-1"), ("n;x;y\na;1;2\n", "utf-16")):
+        path = text_file(tmp_path, "things.csv", text, encoding)
+        for use in (list_layers, read):
+            with refused(SourceError, "is not UTF-8 text; save it as UTF-8"):
+                use(path)
 
 
 @pytest.mark.parametrize("suffix", ["csv", "fgb", "gpkg", "shp"])
@@ -535,12 +510,12 @@ def test_missing_crs_is_asked_for(suffix: str, tmp_path: Path) -> None:
     table = frame([(765277, 6275109)], n=[1]).set_crs(None, allow_override=True)
     path = write(table, tmp_path, suffix)
     assert list_layers(path)[0].crs is None
-    with pytest.raises(CrsError, match=r"'things'.*does not say which CRS.*state its crs"):
+    with refused(CrsError, "'things'", "does not say which CRS", "state its crs"):
         read(path)
     assert read(path, crs="EPSG:2154").table.crs == CRS.from_epsg(2154)
     layer = read_layer(path, spec_of(crs="EPSG:4326"), crs="EPSG:2154")  # the user knows better
     assert layer.table.crs == CRS.from_epsg(2154)
-    with pytest.raises(CrsError, match="CRS 'EPSG:99' is unknown"):
+    with refused(CrsError, "CRS 'EPSG:99' is unknown"):
         read_layer(path, spec_of(), crs="EPSG:99")
 
 
@@ -567,7 +542,8 @@ def test_geojson_is_in_degrees_unless_said_otherwise(  # noqa: PLR0917
     crs: str,
     notes: tuple[str, ...],
 ) -> None:
-    path = geojson(tmp_path, point(*place), **members)
+    # A property of that name says nothing.
+    path = geojson(tmp_path, point(*place), rows=[{"crs": "EPSG:2154"}], **members)
     layer = read(path, crs=stated)
     assert (layer.table.crs, layer.notes) == (crs, notes)
     assert list_layers(path)[0].crs == ("EPSG:2154" if members is LAMBERT else "EPSG:4326")
@@ -576,20 +552,15 @@ def test_geojson_is_in_degrees_unless_said_otherwise(  # noqa: PLR0917
 @pytest.mark.parametrize("member", [None, crs_member("urn:nobody:knows")])
 def test_geojson_crs_member_that_says_nothing(tmp_path: Path, member: object) -> None:
     path = geojson(tmp_path, point(3, 43), crs=member)
-    with pytest.raises(CrsError, match="does not say which CRS"):
+    with refused(CrsError, "does not say which CRS"):
         read(path)
     assert list_layers(path)[0].crs is None
-
-
-def test_a_property_named_crs_is_no_crs(tmp_path: Path) -> None:
-    path = geojson(tmp_path, point(3, 43), rows=[{"crs": "EPSG:2154"}])
-    assert read(path).table.crs == CRS.from_epsg(4326)
 
 
 def test_a_file_that_contradicts_itself(tmp_path: Path) -> None:
     member = crs_member("urn:ogc:def:crs:EPSG::4326")
     path = geojson(tmp_path, point(765277, 6275109), crs=member)
-    with pytest.raises(CrsError, match="correct the file"):
+    with refused(CrsError, "correct the file"):
         read_layer(path, spec_of(), crs="EPSG:2154")
 
 
@@ -643,27 +614,21 @@ def test_where_on_logical_and_missing_values(tmp_path: Path, value: Any, filtere
 def test_missing_fields_are_named(suffix: str, what: dict[str, Any], tmp_path: Path) -> None:
     path = write(frame([(1, 2)], kind=["a"], size=[1]), tmp_path, suffix)
     (key,) = what
-    message = rf"layer 'things' \(.*\) has no field 'kinds'.*in {key}; the nearest is 'kind'.*size"
-    with pytest.raises(CatalogError, match=message):
-        read(path, crs="EPSG:2154", **what)
+    spec = spec_of(crs="EPSG:2154", **what)
+    nearest = f"has no field 'kinds', which the catalogue names in {key}; the nearest is 'kind'"
+    with refused(CatalogError, f"layer 'things' ({path})", nearest, "size"):
+        read_layer(path, spec)
+    if key == "where":  # which needs no field if it is not applied
+        assert read_layer(path, spec, filters=False).counts.kept == 1
 
 
-def test_filter_that_is_not_applied_needs_no_field(tmp_path: Path) -> None:
-    path = write(frame([(1, 2)], kind=["a"]), tmp_path, "gpkg")
-    assert len(read_layer(path, spec_of(where=(("kinds", ("a",)),)), filters=False).table) == 1
-
-
-def test_class_by_value(tmp_path: Path) -> None:
-    path = write(frame([(n, 0) for n in range(4)], kind=[1.0, 2.0, 3.0, None]), tmp_path, "gpkg")
-    by = ClassBy("kind", (("1", "bus_stop"), (2, "taxi_station")))
-    classes = read(path, class_by=by).table["class_name"]
-    assert classes.tolist() == ["bus_stop", "taxi_station", "bench", "bench"]
-
-
-def test_identifiers(tmp_path: Path) -> None:
-    path = write(frame([(n, 0) for n in range(3)], n=[123704.0, 1.5, None]), tmp_path, "gpkg")
+def test_classes_and_identifiers(tmp_path: Path) -> None:
+    table = frame([(n, 0) for n in range(4)], n=[123704.0, 2.0, 1.5, None])
+    by = ClassBy("n", (("123704", "bus_stop"), (2, "taxi_station")))
+    layer = read(write(table, tmp_path, "gpkg"), id_field="n", class_by=by)
+    assert layer.table["class_name"].tolist() == ["bus_stop", "taxi_station", "bench", "bench"]
     # A feature without a value has its number.
-    assert read(path, id_field="n").table["source_id"].tolist() == ["123704", "1.5", "3"]
+    assert layer.table["source_id"].tolist() == ["123704", "2", "1.5", "4"]
     text = "n;x;y\n123704.0;1;2\n 007 ;1;2\n1.50;1;2\nA1.0;1;2\n;1;2\n"
     layer = read(text_file(tmp_path, "t.csv", text), id_field="n", crs="EPSG:2154")
     assert layer.table["source_id"].tolist() == ["123704", "007", "1.50", "A1.0", "5"]
@@ -681,9 +646,9 @@ def test_layers_of_a_container(container: Path) -> None:
     layers = {layer.name: layer.rows for layer in list_layers(container)}
     assert layers == {"trees": 1, "lights": 2}
     assert read(container, layer="lights").counts.read == 2
-    with pytest.raises(SourceError, match=r"holds 2 layers \(trees, lights\); name the one"):
+    with refused(SourceError, "holds 2 layers (trees, lights); name the one"):
         read(container)
-    with pytest.raises(UnknownNameError, match=r"no layer 'light'; the nearest is 'lights'"):
+    with refused(UnknownNameError, "no layer 'light'; the nearest is 'lights'"):
         read(container, layer="light")
 
 
@@ -695,9 +660,9 @@ def test_tables_without_geometry_are_not_meant(container: Path, tmp_path: Path) 
         with fiona.open(path, "w", driver="GPKG", layer="layer_styles", schema=schema) as table:
             table.write({"geometry": None, "properties": {"styleName": "red"}})
     assert read(alone).counts.read == 1
-    with pytest.raises(SourceError, match=r"holds 2 layers \(trees, lights\)"):
+    with refused(SourceError, "holds 2 layers (trees, lights)"):
         read(container)
-    with pytest.raises(SourceError, match="has no geometry"):
+    with refused(SourceError, "has no geometry"):
         read(alone, layer="layer_styles")
     assert list_layers(alone)[1].geometry == "None"
 
@@ -708,40 +673,37 @@ def test_archive_with_folders_and_companions(tmp_path: Path) -> None:
     write(frame([(1, 2)], n=[1]), inner, "shp")
     text_file(inner, "legend.csv", "code;meaning\n1;oak\n")
     text_file(inner, "metadata.json", "{}")
-    path = pack(inner, tmp_path / "city.zip", inside="data/2014/")
+    path = pack(tmp_path / "city.zip", *inner.iterdir(), inside="data/2014/")
     assert [layer.name for layer in list_layers(path)] == ["things"]
     assert read(path).counts.read == 1
     geojson(inner, point(3, 43))
-    with pytest.raises(SourceError, match="holds 2 layers"):
-        read(pack(inner, tmp_path / "two.zip"))
-
-
-def test_archive_of_a_csv(tmp_path: Path) -> None:
-    path = zipped(tmp_path, {"things.csv": "\ufeffx;y\n1;2\n"})
-    assert xy(read(path, crs="EPSG:2154")) == [[1.0, 2.0]]
-
-
-def test_archive_without_a_layer(tmp_path: Path) -> None:
-    with pytest.raises(SourceError, match=r"holds no vector file, only readme\.txt; one of \.csv"):
-        read(zipped(tmp_path, {"readme.txt": "nothing"}))
-    with pytest.raises(SourceError, match="only nothing"):
-        read(zipped(tmp_path, {}))
+    with refused(SourceError, "holds 2 layers"):
+        read(pack(tmp_path / "two.zip", *inner.iterdir()))
 
 
 def test_files_that_are_none(tmp_path: Path) -> None:
-    with pytest.raises(SourceError, match=r"none\.shp does not exist; give a vector file"):
-        read(tmp_path / "none.shp")
-    with pytest.raises(SourceError, match="is a folder"):
-        list_layers(tmp_path)
-    with pytest.raises(SourceError, match=r"a\.txt is not a vector file; give one of \.csv"):
-        list_layers(text_file(tmp_path, "a.txt", "x,y\n1,2\n"))
+    text = text_file(tmp_path, "readme.txt", "x,y\n1,2\n")
+    empty = tmp_path / "empty.gpkg"
+    frame([(1, 2)], n=[1]).to_file(empty)
+    fiona.remove(str(empty), driver="GPKG", layer="empty")
+    for path, words in (
+        (tmp_path / "none.shp", "none.shp does not exist; give a vector file"),
+        (tmp_path, "is a folder"),
+        (text, "readme.txt is not a vector file; give one of .csv"),
+        (pack(tmp_path / "a.zip", text), "holds no vector file, only readme.txt; one of .csv"),
+        (pack(tmp_path / "b.zip"), "only nothing"),
+        (empty, "empty.gpkg"),
+    ):
+        for use in (read, list_layers):
+            with refused(SourceError, words):
+                use(path)
 
 
 @pytest.mark.parametrize("suffix", ["csv", "fgb", "geojson", "gpkg", "json", "shp"])
 @pytest.mark.parametrize("text", ["", '[{"a": 1}]'])
 def test_content_that_belies_its_name(suffix: str, text: str, tmp_path: Path) -> None:
     path = text_file(tmp_path, f"things.{suffix}", text)
-    with pytest.raises(SourceError, match=rf"things\.{suffix}"):
+    with refused(SourceError, path.name):
         read(path, crs="EPSG:4326")
 
 
@@ -755,22 +717,5 @@ def test_drivers_are_limited(tmp_path: Path) -> None:
     path = text_file(tmp_path, "link.geojson", link)
     with fiona.open(path, allow_unsupported_drivers=True) as followed:  # GDAL not held back
         assert followed.driver == "OGR_VRT"
-    with pytest.raises(SourceError, match="not the kind of file that its name says"):
+    with refused(SourceError, "not the kind of file that its name says"):
         list_layers(path)
-
-
-def test_empty_geopackage(tmp_path: Path) -> None:
-    path = tmp_path / "empty.gpkg"
-    frame([(1, 2)], n=[1]).to_file(path)
-    fiona.remove(str(path), driver="GPKG", layer="empty")
-    with pytest.raises(SourceError, match=r"empty\.gpkg"):
-        read(path)
-
-
-def test_table_has_text_columns(tmp_path: Path) -> None:
-    for rows in ([], [(1, 2)]):
-        table = frame(rows, n=list(range(len(rows))))
-        layer = read(write(table, tmp_path, "gpkg"))
-        assert pd.api.types.is_string_dtype(layer.table["class_name"])
-        assert pd.api.types.is_string_dtype(layer.table["source_id"])
-        assert layer.table.geometry.name == "geometry"
