@@ -24,7 +24,7 @@ from semsig_gis.evaluation.file import (
 )
 from semsig_gis.evaluation.result import machine
 from semsig_gis.likelihood.method import LikelihoodMethod
-from semsig_gis.likelihood.noise.model import NOISES, NoiseSpec, named_noise
+from semsig_gis.likelihood.noise.model import NoiseSpec
 from semsig_gis.matching.method import Method
 from semsig_gis.matching.metrics.edit import EditWeights
 from semsig_gis.queries.chain import NAMED_DISTORTIONS, parse_chain
@@ -35,7 +35,6 @@ from semsig_gis.storage.geoparquet import read_geoparquet, write_geoparquet
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from semsig_gis.evaluation.methods import AnyMethod
 
 MINE = NoiseSpec(name="mine", detection_by_class={"bench": 0.5})
 EVALUATION = evaluate(
@@ -54,15 +53,9 @@ def test_settings_survive_json(
 ) -> None:
     asked = QuerySpec(number=number, seeds=(3, 0), distortions=(*others, Detector(noise=noise)))
     by_chance = LikelihoodMethod(noise=noise, refined=True)
-    method = by_chance if kind == "likelihood" else Method(keep=5)
+    method = by_chance if kind == "likelihood" else Method(keep=5, weights=EditWeights(insert=2))
     values = json.loads(json.dumps(settings_to_dict(method, asked), allow_nan=False))
     assert settings_from_dict(values) == (method, asked)
-
-
-def test_noise_models_of_methods_and_detectors() -> None:
-    methods: list[AnyMethod] = [Method(), LikelihoodMethod(noise=NOISES["light"])]
-    noises = used_noises(methods, [Detector(noise=NOISES["strong"]), NAMED_DISTORTIONS["view"]])
-    assert noises == {"light": named_noise("light"), "strong": named_noise("strong")}
 
 
 @pytest.mark.parametrize("name", ["a:b", "a/b", "a,b", "a=b"])
@@ -71,18 +64,12 @@ def test_names_that_mean_something_else_are_refused(name: str) -> None:
         used_noises([LikelihoodMethod(noise=NoiseSpec(name=name))], [])
 
 
-@pytest.mark.parametrize(
-    "method",
-    [
-        Method(types="edit", angles="jaccard", alpha=0.3, weights=EditWeights(insert=2)),
-        LikelihoodMethod(noise=named_noise("generic")),
-        LikelihoodMethod(noise=MINE),
-    ],
-)
-def test_saved_and_loaded_is_the_same(method: AnyMethod, tmp_path: Path) -> None:
+def test_saved_and_loaded_is_the_same(tmp_path: Path) -> None:
     chain = parse_chain("light:resort=false, detector:mine:half=9", noises={"mine": MINE})
     asked = QuerySpec(number=9, seeds=(4, 2), seen_from="anywhere", distortions=chain)
-    saved = replace(EVALUATION, method=method, asked=asked, city="other.parquet")
+    saved = replace(
+        EVALUATION, method=LikelihoodMethod(noise=MINE), asked=asked, city="other.parquet"
+    )
     save_evaluation(saved, tmp_path / "made" / "here")
     opened = open_evaluation(tmp_path / "made" / "here")
     assert_geodataframe_equal(opened.queries, saved.queries)
@@ -108,7 +95,6 @@ def test_the_readable_files_are_strict_json(tmp_path: Path) -> None:
     assert timing["seconds_per_query"] == EVALUATION.seconds_per_query
     assert timing["machine"] == machine()
     assert timing["machine"]["processors"] >= 1
-    assert timing["machine"]["system"]
     assert summary["settings"]["method"] == "edit+edit:20%"
     assert summary["settings"]["distortions"] == ["light"]
     assert summary["database"]["cells"] == 150
@@ -117,7 +103,7 @@ def test_the_readable_files_are_strict_json(tmp_path: Path) -> None:
 
 
 def test_files_that_are_no_evaluation_are_refused(tmp_path: Path) -> None:
-    with pytest.raises(DatabaseError, match="does not exist"):
+    with refused(DatabaseError, "does not exist"):
         open_evaluation(tmp_path / "nowhere")
     save_evaluation(EVALUATION, tmp_path)
     file = tmp_path / "queries.parquet"

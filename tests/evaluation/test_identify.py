@@ -1,11 +1,15 @@
-"""How well cells can be found: the fast way against very many simulated queries."""
+"""How well cells can be found: the fast way against very many simulated queries.
+
+And whether the chances come true: against plain loops, and against chances that are known.
+"""
 
 from __future__ import annotations
 
 import dataclasses
 import functools
+import json
 import math
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
@@ -14,16 +18,25 @@ from hypothesis import strategies as st
 from noisy_cells import random_database
 from scipy.stats import spearmanr
 from sentences import refused
+from small_city import chances_of
 
 from semsig_gis.core.errors import InputError
+from semsig_gis.core.statistics import wilson_interval
+from semsig_gis.evaluation.identify.check import check_identifiability
 from semsig_gis.evaluation.identify.identify import identify
-from semsig_gis.evaluation.identify.trials import try_cells
+from semsig_gis.evaluation.identify.lookalikes import compare_without_classes, find_lookalikes
+from semsig_gis.evaluation.identify.trials import trial_cells, try_cells
 from semsig_gis.likelihood.index import build_index
 from semsig_gis.likelihood.noise.model import NoiseSpec, named_noise
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from semsig_gis.evaluation.identify.result import Identifiability
 
+DATABASE = random_database(5, cells=90, longest=8)
+INDEX = build_index(DATABASE, named_noise("medium"))
+TOLD = chances_of(DATABASE)
 REPEATS = 40
 SHARP = NoiseSpec(detection=0.9, misnamed=0.05, clutter=0.5, bearing_sigma=4.0)
 
@@ -54,7 +67,7 @@ def test_chances_are_those_of_very_many_queries(
         assert np.std(truth) < 0.2 or spearmanr(ours, truth).statistic > 0.7
 
 
-def check(told: Identifiability, cells: int, classes: int) -> None:
+def check_ranges(told: Identifiability, cells: int, classes: int) -> None:
     for chances in (told.itself, told.near, told.found):
         assert chances.shape == (cells,)
         assert ((chances >= 0) & (chances <= 1)).all()
@@ -73,7 +86,7 @@ def test_cities_of_any_size(cells: int, classes: int, radius: float) -> None:
     database = random_database(3, cells=cells, classes=classes)
     index = build_index(database, named_noise("light"))
     told = identify(index, radius=radius, trials=40, class_trials=10)
-    check(told, cells, len(database.present_codes))
+    check_ranges(told, cells, len(database.present_codes))
     if radius == 1e6:
         assert (told.lookalikes == -1).all()
 
@@ -82,7 +95,7 @@ def test_a_noise_that_leaves_nothing() -> None:
     noise = NoiseSpec(detection=0.0, clutter=0.0)
     index = build_index(random_database(3, cells=20, longest=2), noise)
     told = identify(index, trials=10, class_trials=2)
-    check(told, 20, len(index.table.codes))
+    check_ranges(told, 20, len(index.table.codes))
     assert told.found.max() < 0.6
 
 
@@ -127,24 +140,97 @@ def test_the_same_whatever_the_threads() -> None:
     many = few(seed=4, threads=3, progress=lambda *step: steps.append(step))
     assert one.table().equals(many.table())
     assert one.classes == many.classes
-    dones = [done for done, _ in steps]
-    assert dones == sorted(dones)
+    assert steps == sorted(steps)
     assert steps[-1][0] == steps[-1][1] == steps[0][1]
     assert not one.table().equals(few(seed=5).table())
 
 
+def test_a_check_is_that_of_plain_loops() -> None:
+    check = check_identifiability(TOLD, INDEX, queries=300, seed=9)
+    cells = trial_cells(len(DATABASE), 300, seed=9)
+    tried = try_cells(INDEX, cells, radius=TOLD.radius, seed=9)
+    assert check.found == pytest.approx(tried.found.mean())
+    scores = {
+        "found": TOLD.found,
+        "near": TOLD.near,
+        "length": DATABASE.lengths,
+        "type_group": -DATABASE.type_group_sizes,
+    }
+    assert set(check.correlations) == set(scores)
+    for name, score in scores.items():
+        expected = spearmanr(score[cells], tried.found).statistic
+        assert check.correlations[name] == pytest.approx(expected)
+    assert sum(one.queries for one in check.bins) == 300
+    stated = TOLD.found[cells]
+    for one in check.bins:
+        inside = (one.low <= stated) & ((stated < one.high) | (one.high == 1.0))
+        assert one.queries == inside.sum()
+        assert one.stated == pytest.approx(stated[inside].mean())
+        assert one.true == pytest.approx(tried.found[inside].mean())
+        assert (one.true_low, one.true_high) == wilson_interval(one.true, one.queries)
+
+
+def test_attainable_is_what_true_chances_would_have() -> None:
+    check = check_identifiability(TOLD, INDEX, queries=400, seed=9)
+    stated = TOLD.found[trial_cells(len(DATABASE), 400, seed=9)]
+    rng = np.random.default_rng(0)
+    drawn = [spearmanr(stated, rng.random(400) < stated).statistic for _ in range(300)]
+    assert check.attainable == pytest.approx(np.mean(drawn), abs=0.01)
+
+
+def test_the_default_seed_is_fresh_and_threads_change_nothing() -> None:
+    steps: list[tuple[int, int]] = []
+    one = check_identifiability(TOLD, INDEX, queries=60)
+    two = check_identifiability(
+        TOLD, INDEX, queries=60, seed=TOLD.seed + 1, threads=3,
+        progress=lambda done, all_: steps.append((done, all_)),
+    )  # fmt: skip
+    assert one == two
+    assert steps[-1] == (60, 60)
+
+
+def test_where_all_succeed_there_is_no_correlation() -> None:
+    database = random_database(5, cells=1)  # with nothing to be mistaken for
+    told = dataclasses.replace(chances_of(database), found=np.ones(1))
+    check = check_identifiability(told, build_index(database, told.noise), queries=20)
+    assert check.found == 1.0
+    plain = check.to_dict()
+    assert json.loads(json.dumps(plain)) == plain
+    assert {plain["attainable"], *plain["correlations"].values()} == {None}
+
+
+LIGHT = build_index(DATABASE, named_noise("light"))
+ELSEWHERE = build_index(random_database(6, cells=90), TOLD.noise)
+ask = functools.partial(identify, INDEX)
+check = functools.partial(check_identifiability, TOLD, index=INDEX)
+alike = functools.partial(find_lookalikes, INDEX)
+without = functools.partial(compare_without_classes, INDEX)
+
+
 @pytest.mark.parametrize(
-    ("options", "words"),
+    ("call", "options", "words"),
     [
-        ({"trials": 0}, ("number of trials", "is 0", "from 1")),
-        ({"class_trials": -1}, ("trials without a class", "-1", "from 1")),
-        ({"threads": 0}, ("threads", "is 0", "from 1")),
-        ({"seed": -1}, ("seed", "is -1", "from 0")),
-        ({"radius": -5.0}, ("radius of -5.0", "0 or more")),
-        ({"radius": math.nan}, ("radius of nan", "0 or more")),
+        (ask, {"trials": 0}, ["number of trials", "is 0", "from 1"]),
+        (ask, {"class_trials": -1}, ["trials without a class", "-1", "from 1"]),
+        (ask, {"threads": 0}, ["threads", "is 0", "from 1"]),
+        (ask, {"seed": -1}, ["seed", "is -1", "from 0"]),
+        (ask, {"radius": -5.0}, ["radius of -5.0", "0 or more"]),
+        (ask, {"radius": math.nan}, ["radius of nan", "0 or more"]),
+        (check, {"queries": 0}, ["0 queries", "from 1"]),
+        (check, {"seed": TOLD.seed}, [f"other than {TOLD.seed}", "found out"]),
+        (check, {"seed": -1}, ["seed -1", "from 0"]),
+        (check, {"index": LIGHT}, ["another database or noise model", "matching one"]),
+        (check, {"index": ELSEWHERE}, ["another database or noise model", "matching one"]),
+        (alike, {"temperature": 0.0}, ["temperature of 0.0", "above 0"]),
+        (alike, {"temperature": math.nan}, ["temperature", "above 0"]),
+        (alike, {"temperature": 0.4, "radius": -1.0}, ["radius of -1.0", "0 or more"]),
+        (without, {"temperature": 0.0}, ["temperature of 0.0", "above 0"]),
+        (without, {"temperature": math.nan}, ["temperature", "above 0"]),
+        (without, {"temperature": 0.4, "radius": -1.0}, ["radius of -1.0", "0 or more"]),
     ],
 )
-def test_numbers_out_of_range(options: dict[str, int], words: tuple[str, ...]) -> None:
-    index = build_index(random_database(3), named_noise("medium"))
+def test_what_is_refused(
+    call: Callable[..., object], options: dict[str, Any], words: list[str]
+) -> None:
     with refused(InputError, *words):
-        identify(index, **options)  # type: ignore[arg-type]
+        call(**options)

@@ -4,20 +4,15 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
-import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from noisy_cells import noise_specs, random_database
-from sentences import refused
 
-from semsig_gis.core.errors import InputError
 from semsig_gis.evaluation.identify import lookalikes
 from semsig_gis.evaluation.identify.lookalikes import (
-    cell_circle,
-    city_extent,
     compare_without_classes,
     find_lookalikes,
 )
@@ -25,6 +20,8 @@ from semsig_gis.likelihood.index import build_index
 from semsig_gis.likelihood.noise.model import named_noise
 
 if TYPE_CHECKING:
+    import pytest
+
     from semsig_gis.likelihood.index import LikelihoodIndex
     from semsig_gis.likelihood.noise.model import NoiseSpec
 
@@ -149,33 +146,3 @@ def test_a_signature_longer_than_the_sums_of_bytes() -> None:
     for cell in range(6):
         powers = ratios(index, cell, 0.2)
         assert math.isclose(found.near[cell] + found.far[cell], powers.sum(), rel_tol=2e-3)
-
-
-def test_the_circle() -> None:
-    circle = cell_circle(50.0, 10.0)
-    assert len(circle) == 11
-    assert (circle[5] == [-5, 5]).all()
-    assert cell_circle(0.0, 10.0).tolist() == [[0, 0]]
-
-
-@pytest.mark.parametrize(
-    ("options", "words"),
-    [
-        ({"temperature": 0.0}, ("temperature of 0.0", "above 0")),
-        ({"temperature": math.nan}, ("temperature", "above 0")),
-        ({"temperature": 0.4, "radius": -1.0}, ("radius of -1.0", "0 or more")),
-    ],
-)
-def test_numbers_out_of_range(options: dict[str, Any], words: tuple[str, ...]) -> None:
-    for compare in (find_lookalikes, compare_without_classes):
-        with refused(InputError, *words):
-            compare(INDEX, **options)
-
-
-@given(st.integers(0, 30), st.sampled_from([1, 2, 40]))
-def test_no_two_cells_are_farther_apart_than_the_extent(seed: int, cells: int) -> None:
-    database = random_database(seed, cells=cells)
-    between = np.hypot(*(database.xy[:, None] - database.xy).reshape(-1, 2).T)
-    # Rounding aside, which tells apart nothing on a grid.
-    assert between.max() - 1e-6 <= city_extent(database)
-    assert city_extent(database) <= math.sqrt(2.0) * between.max() + 10.0

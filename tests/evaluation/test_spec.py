@@ -67,15 +67,12 @@ def experiments(draw: st.DrawFn) -> ExperimentSpec:
 @given(experiments())
 def test_written_and_read_is_the_same(spec: ExperimentSpec) -> None:
     assert parse_experiment(spec.to_toml()) == spec
+    # Noise models that the package has by name are not written out.
+    assert spec.to_dict().get("noises", {}).keys() <= {"own"}
 
 
 def test_defaults_and_cases() -> None:
     spec = parse_experiment(SMALL)
-    assert spec == ExperimentSpec(
-        database="city.parquet",
-        methods={"paper": Method.parse("edit+edit:5%")},
-        distortions={"medium": parse_chain("medium")},
-    )
     assert (spec.queries, spec.seeds, spec.seen_from, spec.top) == (500, (0,), "cells", (1,))
     more = replace(
         spec,
@@ -84,10 +81,8 @@ def test_defaults_and_cases() -> None:
         top=(1, 100),
     )
     assert [case.name for case in more.cases] == [
-        f"{distortion}/{method}-top{top}"
-        for distortion in "xy"
-        for method in "ab"
-        for top in (1, 100)
+        *("x/a-top1", "x/a-top100", "x/b-top1", "x/b-top100"),
+        *("y/a-top1", "y/a-top100", "y/b-top1", "y/b-top100"),
     ]
     asked = replace(more, queries=7, seeds=(3,)).asked("y")
     assert (asked.number, asked.seeds, asked.distortions) == (7, (3,), parse_chain("light"))
@@ -111,11 +106,6 @@ def test_noise_models_come_from_tables_and_files(tmp_path: Path) -> None:
     assert sorted(spec.noises) == ["learnt", "mine"]
     # Written out, it needs the file no more.
     assert parse_experiment(spec.to_toml()) == spec
-
-
-def test_noise_models_known_by_name_are_not_written_out() -> None:
-    spec = parse_experiment(SMALL.replace("edit+edit:5%", "likelihood:light"))
-    assert "noises" not in spec.to_dict()
 
 
 def changed(old: str, new: str) -> str:
