@@ -13,8 +13,7 @@ import numpy as np
 
 from semsig_gis.core.rtree import ObjectIndex
 from semsig_gis.likelihood.association import rerank
-from semsig_gis.likelihood.posterior import posterior
-from semsig_gis.likelihood.refine import KEPT, refine
+from semsig_gis.likelihood.posterior import KEPT, posterior, refine
 from semsig_gis.likelihood.route import route_posteriors
 from semsig_gis.matching.scores import score_cells
 from semsig_gis.matching.ties import expected_best, rank_range, top_candidates

@@ -10,10 +10,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from semsig_gis.core.geometry import wrap_degrees
-from semsig_gis.core.grid import cell_ids
+from semsig_gis.core.geometry import cell_ids, wrap_degrees
 from semsig_gis.core.signature import Signature
-from semsig_gis.database.visibility import views_at
+from semsig_gis.database.views import views_at
 from semsig_gis.likelihood.route import Leg
 from semsig_gis.queries.distortions import distort, named_distortion
 

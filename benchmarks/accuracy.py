@@ -29,13 +29,12 @@ from benchmarks._accuracy_queries import City, off_grid, on_grid, turned, walks
 from benchmarks._accuracy_rows import Bar, Row
 from semsig_gis.core.rtree import ObjectIndex
 from semsig_gis.database.build import build_database
-from semsig_gis.database.viewpoints import ViewpointSpec
-from semsig_gis.likelihood.answer_rule import calibrate
+from semsig_gis.database.views import ViewpointSpec
 from semsig_gis.likelihood.index import build_index
 from semsig_gis.likelihood.noise.model import cell_noise, named_noise
+from semsig_gis.likelihood.posterior import calibrate
 from semsig_gis.matching.method import Method
-from semsig_gis.objects.clean import build_objects
-from semsig_gis.objects.load import choose_layers, read_files
+from semsig_gis.objects.load import build_objects, choose_layers, read_files
 from semsig_gis.sources.catalog import load_catalog, paper_taxonomy
 from semsig_gis.sources.synthetic.city import (
     PARIS_LIKE,

@@ -13,8 +13,8 @@ from scipy.spatial import cKDTree
 from benchmarks.comparison import Comparison, compare
 from semsig_gis.database.build import build_database
 from semsig_gis.database.file import open_database, save_database
-from semsig_gis.database.viewpoints import ViewpointSpec
-from semsig_gis.objects.clean import build_objects
+from semsig_gis.database.views import ViewpointSpec
+from semsig_gis.objects.load import build_objects
 from semsig_gis.sources.catalog import paper_taxonomy
 from semsig_gis.sources.synthetic.city import (
     PARIS_LIKE,

@@ -14,11 +14,11 @@ from distributed import Client, LocalCluster
 
 from benchmarks.comparison import Comparison
 from benchmarks.memory import own_peak
-from semsig_gis.core.grid import GridSpec
+from semsig_gis.core.geometry import GridSpec
 from semsig_gis.core.signature import SignatureSpec
 from semsig_gis.database.tiles import TileSpec, build_tile, build_tiles, plan_tiles
-from semsig_gis.database.viewpoints import ViewpointSpec
-from semsig_gis.objects.clean import build_objects
+from semsig_gis.database.views import ViewpointSpec
+from semsig_gis.objects.load import build_objects
 from semsig_gis.objects.table import save_objects
 from semsig_gis.sources.catalog import paper_taxonomy
 from semsig_gis.sources.synthetic.city import CitySpec, synthetic_city

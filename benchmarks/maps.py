@@ -12,7 +12,7 @@ import numpy as np
 
 from benchmarks.comparison import Comparison
 from semsig_gis.database.build import build_database
-from semsig_gis.database.viewpoints import ViewpointSpec
+from semsig_gis.database.views import ViewpointSpec
 from semsig_gis.evaluation.evaluate import evaluate
 from semsig_gis.maps import page as map_assets
 from semsig_gis.maps.cells import ambiguity_map
@@ -20,7 +20,7 @@ from semsig_gis.maps.drift import drift_map
 from semsig_gis.maps.evaluation import evaluation_map
 from semsig_gis.maps.page import save_map
 from semsig_gis.matching.method import Method
-from semsig_gis.objects.clean import build_objects
+from semsig_gis.objects.load import build_objects
 from semsig_gis.objects.table import StreetObjects
 from semsig_gis.sources.catalog import paper_taxonomy
 from semsig_gis.sources.synthetic.city import (

@@ -15,9 +15,9 @@ from rapidfuzz.process import cdist
 
 from benchmarks.comparison import compare
 from benchmarks.likelihood import growth_of_likelihood, likelihood_rows
-from semsig_gis.core.grid import GridSpec
-from semsig_gis.core.signature import SignatureSpec
-from semsig_gis.database.database import BEARING_UNITS, SignatureDatabase
+from semsig_gis.core.geometry import GridSpec
+from semsig_gis.core.signature import BEARING_UNITS, SignatureSpec
+from semsig_gis.database.database import SignatureDatabase
 from semsig_gis.matching.method import Method
 from semsig_gis.matching.scores import score_cells
 from semsig_gis.reports import paris

@@ -8,9 +8,9 @@ import numpy as np
 import shapely
 
 from benchmarks.comparison import Comparison, compare
-from semsig_gis.core.grid import GridSpec, cells_near
+from semsig_gis.core.geometry import GridSpec, cells_near
 from semsig_gis.database.occlusion import GAP_M, TOLERANCE_M, Footprints, hidden
-from semsig_gis.objects.clean import build_objects
+from semsig_gis.objects.load import build_objects
 from semsig_gis.sources.catalog import paper_taxonomy
 from semsig_gis.sources.synthetic.city import CitySpec, synthetic_city, synthetic_surroundings
 

@@ -1,7 +1,7 @@
 """The public names and where each lives: the one table, read by `__init__` and by type checkers."""
 
 from .core.errors import SemsigError as SemsigError
-from .core.grid import GridSpec as GridSpec
+from .core.geometry import GridSpec as GridSpec
 from .core.signature import Signature as Signature, SignatureSpec as SignatureSpec
 from .core.signs import class_signs as class_signs
 from .core.statistics import wilson_interval as wilson_interval
@@ -13,7 +13,7 @@ from .sources.catalog import (
     load_catalog as load_catalog,
     paper_taxonomy as paper_taxonomy,
 )
-from .sources.layers import LayerSpec as LayerSpec
+from .sources.catalog import LayerSpec as LayerSpec
 from .sources.synthetic.city import (
     CitySpec as CitySpec,
     PARIS_LIKE as PARIS_LIKE,
@@ -21,7 +21,7 @@ from .sources.synthetic.city import (
     synthetic_surroundings as synthetic_surroundings,
 )
 from .sources.vector import read_layer as read_layer
-from .objects.clean import build_objects as build_objects
+from .objects.load import build_objects as build_objects
 from .objects.conflate import conflate as conflate
 from .objects.draft import suggest_catalog as suggest_catalog
 from .objects.fetch import (
@@ -35,8 +35,8 @@ from .objects.load import (
     choose_layers as choose_layers,
     read_files as read_files,
 )
-from .objects.quality import quality_report as quality_report
-from .objects.surroundings import (
+from .reports.quality import quality_report as quality_report
+from .objects.load import (
     read_surroundings as read_surroundings,
     save_surroundings as save_surroundings,
 )
@@ -57,18 +57,18 @@ from .database.file import (
 from .database.occlusion import Footprints as Footprints
 from .database.properties import database_summary as database_summary
 from .database.answer import Requirement as Requirement
-from .database.store import (
+from .database.city import (
     ObjectStore as ObjectStore,
     open_store as open_store,
     save_with_store as save_with_store,
 )
 from .database.tiles import TileSpec as TileSpec, build_tiles as build_tiles
 from .database.update import update_database as update_database, update_file as update_file
-from .database.viewpoints import ViewpointSpec as ViewpointSpec
+from .database.views import ViewpointSpec as ViewpointSpec
 from .matching.method import Method as Method
 from .matching.scores import score_cells as score_cells
 from .matching.search import Localization as Localization, localize as localize
-from .likelihood.answer_rule import (
+from .likelihood.posterior import (
     AnswerRule as AnswerRule,
     calibrate as calibrate,
     open_rule as open_rule,

@@ -11,9 +11,9 @@ from hypothesis import strategies as st
 from pyproj import CRS
 from worlds import CODES, random_town
 
-from semsig_gis.core.grid import GridSpec
-from semsig_gis.core.signature import Signature, SignatureSpec
-from semsig_gis.database.database import BEARING_UNITS, SignatureDatabase
+from semsig_gis.core.geometry import GridSpec
+from semsig_gis.core.signature import BEARING_UNITS, Signature, SignatureSpec
+from semsig_gis.database.database import SignatureDatabase
 from semsig_gis.likelihood.noise.model import NoiseMixture, NoiseSpec, named_noise
 from semsig_gis.queries.distortions import distort, named_distortion
 from semsig_gis.sources.catalog import paper_taxonomy

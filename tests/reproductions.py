@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 from worlds import random_town
 
-from semsig_gis.database.store import ObjectStore, save_with_store
+from semsig_gis.database.city import ObjectStore, save_with_store
 
 if TYPE_CHECKING:
     from pathlib import Path

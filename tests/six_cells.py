@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from noisy_cells import TAXONOMY, database_of
 
-from semsig_gis.core.grid import GridSpec
+from semsig_gis.core.geometry import GridSpec
 from semsig_gis.core.taxonomy import ObjectClass
 
 if TYPE_CHECKING:

@@ -15,7 +15,7 @@ from semsig_gis.likelihood.index import build_index
 from semsig_gis.likelihood.locate import locate
 from semsig_gis.likelihood.noise.model import named_noise
 from semsig_gis.matching.search import localize
-from semsig_gis.objects.clean import build_objects
+from semsig_gis.objects.load import build_objects
 from semsig_gis.objects.table import Licence
 from semsig_gis.sources.catalog import paper_taxonomy
 from semsig_gis.sources.synthetic.city import CitySpec, synthetic_city

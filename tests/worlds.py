@@ -15,10 +15,9 @@ from hypothesis import strategies as st
 from sentences import refused
 
 from semsig_gis.core.errors import EmptyResultError
-from semsig_gis.core.grid import GridSpec
-from semsig_gis.core.signature import SignatureSpec
+from semsig_gis.core.geometry import GridSpec
+from semsig_gis.core.signature import BEARING_UNITS, DISTANCE_UNITS, SignatureSpec
 from semsig_gis.database.build import build_database
-from semsig_gis.database.database import BEARING_UNITS, DISTANCE_UNITS
 from semsig_gis.objects.table import Licence, StreetObjects
 from semsig_gis.sources.catalog import load_catalog
 

@@ -28,7 +28,7 @@ def demo(
     from semsig_gis.maps.evaluation import evaluation_map
     from semsig_gis.maps.objects import objects_map
     from semsig_gis.maps.page import save_map
-    from semsig_gis.objects.clean import build_objects
+    from semsig_gis.objects.load import build_objects
     from semsig_gis.objects.table import save_objects
     from semsig_gis.reports.evaluation import evaluation_tables
     from semsig_gis.sources.catalog import paper_taxonomy
@@ -74,8 +74,7 @@ def synthesize(
     seed: Annotated[int, typer.Option(help="Seed of the random numbers.")] = 0,
 ) -> None:
     """Make up a city: street objects, buildings and streets."""
-    from semsig_gis.objects.clean import build_objects
-    from semsig_gis.objects.surroundings import save_surroundings
+    from semsig_gis.objects.load import build_objects, save_surroundings
     from semsig_gis.objects.table import save_objects
     from semsig_gis.sources.catalog import paper_taxonomy
     from semsig_gis.sources.synthetic.city import (

@@ -109,7 +109,7 @@ def _places(database: SignatureDatabase, samples: Sequence[Sample]) -> NDArray[A
     """Return the true places in metres, shape (samples, 2)."""
     import numpy as np
 
-    from semsig_gis.core.grid import split_ids
+    from semsig_gis.core.geometry import split_ids
 
     places = [
         sample.xy
@@ -151,7 +151,7 @@ def calibrate(
     import numpy as np
 
     from semsig_gis.database.city import open_city
-    from semsig_gis.likelihood import answer_rule as abstention
+    from semsig_gis.likelihood import posterior as abstention
     from semsig_gis.likelihood.noise.learn import read_samples
 
     keep_inputs(out, read=(database, samples, noise, objects))

@@ -21,7 +21,7 @@ from semsig_gis.cli.console import (
 
 if TYPE_CHECKING:
     from semsig_gis.objects.load import Loaded
-    from semsig_gis.sources.layers import LayerSpec
+    from semsig_gis.sources.catalog import LayerSpec
 
 
 Catalogs = Annotated[
@@ -134,9 +134,9 @@ def fetch(
 def _save_loaded(
     loaded: Loaded, out: Path, buildings: Path | None, streets: Path | None, *, as_json: bool
 ) -> None:
-    from semsig_gis.objects.quality import quality_report
-    from semsig_gis.objects.surroundings import save_surroundings
+    from semsig_gis.objects.load import save_surroundings
     from semsig_gis.objects.table import save_objects
+    from semsig_gis.reports.quality import quality_report
 
     report = quality_report(loaded.objects, loaded.report, loaded.conflation)
     save_objects(loaded.objects, out)

@@ -18,9 +18,8 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from semsig_gis.database.city import City
+    from semsig_gis.database.city import City, ObjectStore
     from semsig_gis.database.database import SignatureDatabase
-    from semsig_gis.database.store import ObjectStore
     from semsig_gis.likelihood.index import LikelihoodIndex
     from semsig_gis.likelihood.locate import LikelihoodLocator
     from semsig_gis.likelihood.noise.model import Noise
@@ -136,9 +135,9 @@ class SearchOptions:
 
     def locator(self, city: City) -> LikelihoodLocator:
         """Return what answers queries by likelihood."""
-        from semsig_gis.likelihood.answer_rule import DEFAULT_RULE, open_rule
         from semsig_gis.likelihood.locate import LikelihoodLocator
         from semsig_gis.likelihood.noise.model import cell_noise
+        from semsig_gis.likelihood.posterior import DEFAULT_RULE, open_rule
 
         if self.on_grid and self.refine:
             msg = "--on-grid and --refine were given; a place on the grid is not to be refined, "
@@ -184,7 +183,7 @@ class SearchOptions:
             parts.append(position_prior(database, (place[0], place[1]), sigma=place[2]))
         if self.area is not None:
             from semsig_gis.likelihood.priors import area_prior
-            from semsig_gis.objects.surroundings import read_area
+            from semsig_gis.objects.load import read_area
 
             parts.append(area_prior(database, read_area(self.area, crs=database.crs)))
         if self.popularity is not None:
@@ -219,7 +218,7 @@ def read_noise(noise: str) -> Noise:
 
 def object_store(city: City, objects: Path | None, *, needed: bool) -> ObjectStore | None:
     """Return the street objects of a database; None where there are none, unless needed."""
-    from semsig_gis.database.store import ObjectStore, open_store
+    from semsig_gis.database.city import ObjectStore, open_store
     from semsig_gis.objects.table import open_objects
 
     if objects is not None and not objects.is_dir():

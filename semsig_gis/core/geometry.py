@@ -1,13 +1,21 @@
-"""Array maths of directions: bearings, wrapping and angular distance, all in degrees."""
+"""The metric plane: coordinate system, names of columns, bearings, and the grid of cells."""
 
 from __future__ import annotations
 
+import math
+import re
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
+from pyproj import CRS
+from pyproj.exceptions import CRSError
+
+from semsig_gis.core.errors import CrsError, InputError
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
+
 
 FULL_TURN, HALF_TURN = 360.0, 180.0
 
@@ -39,3 +47,178 @@ def angular_distance(a: ArrayLike, b: ArrayLike) -> NDArray[np.float64]:
     """Return the smaller angle between directions in degrees, from 0 to 180."""
     difference = wrap_degrees(np.asarray(a, dtype=np.float64) - np.asarray(b, dtype=np.float64))
     return np.minimum(difference, FULL_TURN - difference)
+
+
+CLASS_CODE = "class_code"
+CLASS_NAME = "class_name"
+SOURCE = "source"
+SOURCE_ID = "source_id"
+COUNT = "count"
+MERGED = "merged"
+GEOMETRY = "geometry"
+HALF_WIDTH = "half_width"
+
+LICENSES = "licenses"
+"""Whom to name for a table of buildings or streets: a key of its `attrs`."""
+
+
+def require_metric_crs(crs: CRS | str | int | None) -> CRS:
+    """Return a coordinate system, without its height, if distances in metres can be taken in it.
+
+    Raises CrsError if it is missing, unknown, in degrees or feet, a Mercator or cylindrical
+    projection, where lengths grow with the latitude (1.5 times at Paris), or if its axes do not
+    point east and north, from which bearings are counted.
+    """
+    advice = (
+        "give a projected CRS in metres, such as 'EPSG:2154' for France or the UTM zone of the city"
+    )
+    if crs is None:
+        msg = f"no coordinate reference system was given; {advice}."
+        raise CrsError(msg)
+    try:
+        system = CRS.from_user_input(crs).to_2d()
+    except CRSError as error:
+        msg = f"coordinate reference system {crs!r} is unknown; {advice}."
+        raise CrsError(msg) from error
+    fault = _fault(system)
+    if fault:
+        msg = f"{system.name} {fault}; {advice}."
+        raise CrsError(msg)
+    return system
+
+
+def _fault(system: CRS) -> str:
+    """Return why distances and bearings cannot be taken in a system, or nothing."""
+    if system.is_geographic:
+        return "is in degrees"
+    if not system.is_projected:
+        return f"is {system.type_name.removesuffix(' CRS').lower()}, not projected"
+    # The operation of a bound system is its datum shift; the projection is its source's.
+    plane = system.source_crs if system.is_bound else system
+    operation = plane.coordinate_operation if plane else None
+    method = operation.method_name.lower() if operation else ""
+    # Transverse and oblique ones (UTM, the Swiss and Hungarian grids) are true near their line.
+    if re.search("mercator|cylindrical", method) and not re.search("transverse|oblique", method):
+        return "is a Mercator or cylindrical projection, whose lengths grow with latitude"
+    if any(axis.unit_conversion_factor != 1.0 for axis in system.axis_info):
+        return "is not in metres"
+    if {axis.direction for axis in system.axis_info} != {"east", "north"}:
+        return "has axes that do not point east and north"
+    return ""
+
+
+ROW_SPAN = 10**8
+# More cells on each side of a point than this would fill the memory.
+MAX_REACH = 1000
+# Rows that a cell number can hold, with room for the cells around a point.
+MAX_CELL = ROW_SPAN // 2 - MAX_REACH - 1
+
+
+@dataclass(frozen=True, slots=True)
+class GridSpec:
+    """A grid of square cells over a metric CRS.
+
+    Parameters
+    ----------
+    step : float, default 10
+        Side of a cell in metres (the paper's s).
+    origin : tuple of (float, float), default (0, 0)
+        Lower-left corner of the cell in column 0 and row 0, in metres. Only its remainder by
+        `step` matters for where cells lie; it also sets where columns and rows count from.
+
+    Raises
+    ------
+    InputError
+        If the step is not a positive number or the origin is not finite.
+
+    Examples
+    --------
+    >>> GridSpec().viewpoints([76520], [627500]).tolist()
+    [[765205.0, 6275005.0]]
+    """
+
+    step: float = 10.0
+    origin: tuple[float, float] = (0.0, 0.0)
+
+    def __post_init__(self) -> None:  # noqa: D105
+        if not (math.isfinite(self.step) and self.step > 0):
+            msg = f"grid step is {self.step} m; give a number of metres above 0."
+            raise InputError(msg)
+        if np.shape(self.origin) != (2,) or not np.isfinite(self.origin).all():
+            msg = f"grid origin is {self.origin}; give two finite coordinates in metres."
+            raise InputError(msg)
+
+    def viewpoints(self, columns: ArrayLike, rows: ArrayLike) -> NDArray[np.float64]:
+        """Return the centres of n cells in metres, shape (n, 2)."""
+        return np.stack(
+            [
+                self.origin[0] + (np.asarray(columns) + 0.5) * self.step,
+                self.origin[1] + (np.asarray(rows) + 0.5) * self.step,
+            ],
+            axis=-1,
+        )
+
+    def cells_at(self, xy: ArrayLike) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+        """Return the columns and rows of the cells in which points, shape (n, 2) in metres, lie.
+
+        A point on an edge belongs to the cell east or north of it. InputError if a point is so far
+        from the origin that its cell cannot be numbered.
+        """
+        cells = np.floor((np.asarray(xy, dtype=np.float64) - self.origin) / self.step)
+        if not (np.abs(cells) <= MAX_CELL).all():
+            msg = (
+                f"a point lies more than {MAX_CELL:,} cells from the grid origin; make the step "
+                f"({self.step:g} m) larger, or put the origin {self.origin} nearer."
+            )
+            raise InputError(msg)
+        return cells[:, 0].astype(np.int64), cells[:, 1].astype(np.int64)
+
+
+def cell_ids(columns: ArrayLike, rows: ArrayLike) -> NDArray[np.int64]:
+    """Return ``column * 10**8 + row``, a cell's number that stays the same when the area grows.
+
+    Rows must be within 50 million of 0.
+    """
+    return np.asarray(columns, np.int64) * ROW_SPAN + np.asarray(rows, np.int64)
+
+
+def split_ids(ids: ArrayLike) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Return the columns and rows of cell numbers, the inverse of `cell_ids`."""
+    numbers = np.asarray(ids, np.int64)
+    columns = (numbers + ROW_SPAN // 2) // ROW_SPAN
+    return columns, numbers - columns * ROW_SPAN
+
+
+def cells_near(
+    xy: NDArray[np.float64], *, grid: GridSpec, radius: float
+) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Return the columns and rows of every cell whose centre may be within `radius` of a point.
+
+    Points, shape (n, 2), and radius are in metres. Cells are distinct, ordered by column, then row.
+    The square around a point is taken, so that some cells see nothing in the end.
+    """
+    require_step(grid, radius)
+    reach = math.ceil(radius / grid.step + 0.5)
+    columns, rows = grid.cells_at(xy)
+    rows, columns = split_ids(_widened(cell_ids(rows, columns), reach))
+    return split_ids(_widened(cell_ids(columns, rows), reach))
+
+
+def require_step(grid: GridSpec, radius: float) -> None:
+    """Raise InputError if the step is so small that a range would hold too many cells."""
+    if radius > (MAX_REACH - 1) * grid.step:
+        msg = (
+            f"a step of {grid.step:g} m is too small for a range of {radius:g} m; make the step "
+            f"larger, at least {radius / (MAX_REACH - 1):.3g} m."
+        )
+        raise InputError(msg)
+
+
+def _widened(ids: NDArray[np.int64], reach: int) -> NDArray[np.int64]:
+    """Return all numbers at most `reach` from some of the given ones, ascending."""
+    ids = np.sort(ids)
+    new = np.append(True, np.diff(ids) > 2 * reach + 1)
+    first = ids[new] - reach
+    lengths = ids[np.append(new[1:], True)] + reach + 1 - first
+    ends = np.cumsum(lengths)
+    return np.repeat(first - ends + lengths, lengths) + np.arange(ends[-1])

@@ -20,6 +20,11 @@ if TYPE_CHECKING:
     from semsig_gis.core.taxonomy import Taxonomy
 
 MAX_LEVELS = 255
+# Steps of a full turn that are stored. Divisible by 8, 16, 24, 32 and 72, so that the usual angle
+# levels come out exactly. A unit is a hundredth of the noise of a good detector.
+BEARING_UNITS = 7200
+# In the range that is seen furthest; a unit is 12 cm where that is 30 m.
+DISTANCE_UNITS = 255
 
 
 @dataclass(frozen=True, slots=True)

@@ -8,19 +8,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from semsig_gis.core.errors import CrsError, EmptyResultError
-from semsig_gis.core.grid import GridSpec, cell_ids, cells_near, split_ids
+from semsig_gis.core.geometry import GridSpec, cell_ids, cells_near, split_ids
 from semsig_gis.core.rtree import PackedIndex
-from semsig_gis.core.signature import SignatureSpec
-from semsig_gis.database.database import (
-    BEARING_UNITS,
-    DISTANCE_UNITS,
-    SignatureDatabase,
-    consecutive,
-)
+from semsig_gis.core.signature import BEARING_UNITS, DISTANCE_UNITS, SignatureSpec
+from semsig_gis.database.database import SignatureDatabase, consecutive
 from semsig_gis.database.occlusion import TOLERANCE_M, Footprints
-from semsig_gis.database.viewpoints import ViewpointSpec, choose_viewpoints
-from semsig_gis.database.visibility import clockwise_order, sightings
-from semsig_gis.objects.surroundings import licenses_of
+from semsig_gis.database.views import ViewpointSpec, choose_viewpoints, clockwise_order, sightings
+from semsig_gis.objects.load import licenses_of
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -29,7 +23,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
     from pyproj import CRS
 
-    from semsig_gis.database.visibility import Sightings
+    from semsig_gis.database.views import Sightings
     from semsig_gis.objects.table import StreetObjects
 
 # So many that the arrays of a block stay in the cache of a processor.

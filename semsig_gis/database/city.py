@@ -1,23 +1,34 @@
-"""A city: a signature database with what lies beside its file, opened as one thing."""
+"""A city: a signature database with what lies beside its file, opened as one thing.
+
+A database does not say which objects its cells see, where these stand exactly, or what they are
+called in their source. The object store does: ``city.objects`` beside ``city.parquet``. An update
+needs it, and so does whatever looks at objects from a place off the grid.
+"""
 
 from __future__ import annotations
 
 import json
 import zlib
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol
 
+import geopandas as gpd
 import numpy as np
 import pyarrow as pa
 
-from semsig_gis.core.errors import DatabaseError
+from semsig_gis import __version__
+from semsig_gis.core.errors import DatabaseError, InputError
+from semsig_gis.core.geometry import HALF_WIDTH, LICENSES
+from semsig_gis.core.rtree import INDEX_FILES, StoredIndex
+from semsig_gis.database.build import moved
 from semsig_gis.database.file import (
     BUILT_DIGEST,
     KIND,
     Manifest,
     built_digest,
+    damaged_files,
     digest,
     is_folder,
     open_database,
@@ -26,18 +37,290 @@ from semsig_gis.database.file import (
     read_manifest,
     read_specs,
     require_file,
+    save_database,
     store_path,
 )
+from semsig_gis.database.occlusion import Footprints, buildings_near
+from semsig_gis.objects.load import licenses_of
+from semsig_gis.objects.table import open_objects, save_objects
 from semsig_gis.storage.geoparquet import read_geoparquet, write_geoparquet
-from semsig_gis.storage.whole import whole_folder
+from semsig_gis.storage.whole import move_folder, whole_file, whole_folder
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
+    from pyproj import CRS
 
     from semsig_gis.database.database import SignatureDatabase
     from semsig_gis.database.file import PartitionedDatabase
-    from semsig_gis.database.store import ObjectStore
     from semsig_gis.objects.table import StreetObjects
+
+
+STORE_KIND = "object store"
+# Raised whenever a store of before would be read wrongly.
+FORMAT = 1
+MANIFEST = "manifest.json"
+OBJECTS = "objects.parquet"
+FOOTPRINTS = "footprints.parquet"
+STREETS = "streets.parquet"
+# What a new store is called until its database is in place.
+NEXT = ".next"
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class ObjectStore:
+    """What a signature database was built from.
+
+    Parameters
+    ----------
+    objects : StreetObjects
+        The objects.
+    index : StoredIndex
+        R-tree over them, in the same order.
+    footprints, streets : GeoDataFrame, optional
+        Buildings and centre lines in the CRS of the objects, where it was built with them.
+    notes : tuple of str
+        What was wrong with the files and has been put right.
+
+    Examples
+    --------
+    >>> store = ObjectStore.of(demo_objects)
+    >>> _, near = store.index.pairs_within(demo_objects.xy[:1], radius=0.0)
+    >>> near.tolist()
+    [0]
+    """
+
+    objects: StreetObjects
+    index: StoredIndex
+    footprints: gpd.GeoDataFrame | None = None
+    streets: gpd.GeoDataFrame | None = None
+    notes: tuple[str, ...] = ()
+
+    @classmethod
+    def of(
+        cls,
+        objects: StreetObjects,
+        *,
+        footprints: gpd.GeoDataFrame | None = None,
+        streets: gpd.GeoDataFrame | None = None,
+    ) -> ObjectStore:
+        """Make the store of a database that was built from these, with a new R-tree.
+
+        `footprints` and `streets` are those that `build_database` got; CrsError if they have no
+        CRS.
+        """
+        return cls(
+            objects=objects,
+            index=StoredIndex.pack(objects.xy),
+            footprints=None if footprints is None else _stored(footprints, objects.crs),
+            streets=None if streets is None else _stored(streets, objects.crs),
+        )
+
+    def buildings_around(
+        self, places: NDArray[np.float64], *, distance: float
+    ) -> Footprints | None:
+        """Return the buildings at most so many metres from some places, None where there are none.
+
+        All that they are joined to are among them. Places, shape (p, 2), are in metres.
+        """
+        if self.footprints is None:
+            return None
+        polygons = self.footprints.geometry.to_numpy()
+        near = buildings_near(polygons, places, distance=distance)
+        return Footprints(polygons[near]) if len(near) else None
+
+
+def _stored(table: gpd.GeoDataFrame, crs: CRS) -> gpd.GeoDataFrame:
+    """Return what the building of a database takes of a table, in a CRS."""
+    geometry = table.geometry
+    kept = moved(table[~(geometry.isna() | geometry.is_empty)], crs)
+    columns = {HALF_WIDTH: kept[HALF_WIDTH].to_numpy(float)} if HALF_WIDTH in kept else {}
+    stored = gpd.GeoDataFrame(columns, geometry=kept.geometry.to_numpy(), crs=kept.crs)
+    stored.attrs[LICENSES] = list(licenses_of(table))
+    return stored
+
+
+def save_with_store(database: SignatureDatabase, store: ObjectStore, path: str | Path) -> None:
+    """Save a database and the store that belongs to it.
+
+    Parameters
+    ----------
+    database : SignatureDatabase
+        What to save.
+    store : ObjectStore
+        What it was built from.
+    path : str or Path
+        File of the database; the store is put beside it (see `store_path`).
+
+    Raises
+    ------
+    InputError
+        If the files cannot be written; those that were there are unchanged then.
+
+    Notes
+    -----
+    The new store is written whole under another name, then the database is renamed into its
+    place, and at last the store into its own. The store names the digest of its database, so
+    whoever opens the two sees how far an interrupted run came: `open_store` takes the new store
+    as soon as the new database is there, and the old one until then. Any number of programs may
+    read meanwhile; of two that write at once, the later one wins.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     file = Path(folder, "city.parquet")
+    ...     save_with_store(demo_database, ObjectStore.of(demo_objects), file)
+    ...     len(open_store(file).objects) == len(demo_objects)
+    True
+    """
+    _settle(Path(path))  # what waits there may be needed until the new database is in place
+    # The new store is written whole under another name, then the database is renamed into its
+    # place, and at last the store into its own. It names the digest of its database, so that
+    # whoever opens the two after an interrupted run takes the store that belongs to the database.
+    with whole_file(path) as partial:
+        try:
+            save_database(database, partial)
+        except InputError as error:  # which knows nothing of the place that was asked for
+            raise InputError(str(error).replace(str(partial), str(path))) from error
+        _write(store, _waiting(store_path(path)), fingerprint=digest(partial))
+    _settle(Path(path))
+
+
+def open_store(database: str | Path, folder: str | Path | None = None) -> ObjectStore:
+    """Open the object store of a database.
+
+    Parameters
+    ----------
+    database : str or Path
+        File of the database.
+    folder : str or Path, optional
+        The store, where it does not lie beside the database.
+
+    Returns
+    -------
+    ObjectStore
+        The store; its notes say so where the R-tree had to be made again.
+
+    Raises
+    ------
+    DatabaseError
+        If there is no database or no store, the store is damaged, or belongs to another database.
+
+    Notes
+    -----
+    What an interrupted `save_with_store` left half done is finished, if the folder can be written
+    to. The files of a store are not changed by reading.
+
+    Examples
+    --------
+    >>> open_store("nowhere.parquet")
+    Traceback (most recent call last):
+    ...
+    semsig_gis.core.errors.DatabaseError: nowhere.parquet does not exist;
+    give a signature database file.
+    """
+    if is_folder(database):
+        msg = (
+            f"{database} is a folder, and only a database in one file has an object store; give a "
+            "signature database file."
+        )
+        raise DatabaseError(msg)
+    require_file(database)
+    return _read(_settle(Path(database)) if folder is None else Path(folder), Path(database))
+
+
+def _manifest(folder: Path) -> dict[str, Any]:
+    path = folder / MANIFEST
+    try:
+        manifest = json.loads(path.read_bytes())
+        if manifest["kind"] != STORE_KIND or not isinstance(manifest["files"], dict):
+            raise ValueError(manifest["kind"])  # noqa: TRY301
+        known: bool = manifest["format"] == FORMAT
+        version, _ = manifest["version"], manifest["database"]
+    except (OSError, ValueError, KeyError, TypeError) as error:
+        msg = f"{path} is missing or damaged; build the database again."
+        raise DatabaseError(msg) from error
+    if not known:
+        msg = f"{folder} is of another version of semsig ({version}); build the database again."
+        raise DatabaseError(msg)
+    return dict(manifest)
+
+
+def _read(folder: Path, database: Path) -> ObjectStore:
+    if not is_folder(folder):
+        msg = f"{database} has no object store ({folder.name} beside it); build the database again."
+        raise DatabaseError(msg)
+    manifest = _manifest(folder)
+    if manifest["database"] != built_digest(database):
+        msg = f"{folder} belongs to another database than {database}; build the database again."
+        raise DatabaseError(msg)
+    files = manifest["files"]
+    damaged = damaged_files(folder, files)
+    lost = [name for name in damaged if name not in INDEX_FILES]
+    if lost or OBJECTS not in files:
+        msg = f"{folder / min(lost, default=OBJECTS)} is damaged; build the database again."
+        raise DatabaseError(msg)
+    objects = open_objects(folder / OBJECTS)
+    notes: tuple[str, ...] = ()
+    if damaged or not set(INDEX_FILES) <= set(files):
+        index = StoredIndex.pack(objects.xy)
+        notes = (f"the R-tree in {folder} is damaged; it was made again from the objects",)
+    else:
+        index = StoredIndex.open(folder, objects.xy)
+    return ObjectStore(
+        objects=objects,
+        index=index,
+        footprints=_table(folder / FOOTPRINTS) if FOOTPRINTS in files else None,
+        streets=_table(folder / STREETS) if STREETS in files else None,
+        notes=notes,
+    )
+
+
+def _table(path: Path) -> gpd.GeoDataFrame:
+    try:
+        return gpd.read_parquet(path)
+    except (pa.ArrowException, ValueError, OSError) as error:
+        msg = f"{path} is damaged ({error}); build the database again."
+        raise DatabaseError(msg) from error
+
+
+def _write(store: ObjectStore, folder: Path, *, fingerprint: str) -> None:
+    """Write a whole store of that name, in the place of another."""
+    with whole_folder(folder) as partial:
+        save_objects(store.objects, partial / OBJECTS, keep_order=True)  # as in the R-tree
+        store.index.save(partial)
+        for name, table in ((FOOTPRINTS, store.footprints), (STREETS, store.streets)):
+            if table is not None:
+                table.to_parquet(partial / name, compression="zstd")
+        manifest = {
+            "kind": STORE_KIND,
+            "format": FORMAT,
+            "version": __version__,
+            "database": fingerprint,
+            "objects": len(store.objects),
+            "files": {file.name: digest(file) for file in sorted(partial.iterdir())},
+        }
+        (partial / MANIFEST).write_text(json.dumps(manifest, indent=2) + "\n", encoding="utf-8")
+
+
+def _settle(database: Path) -> Path:
+    """Finish what an interrupted run left half done; return where the store is to be read."""
+    final = store_path(database)
+    waiting = _waiting(final)
+    if waiting.exists() and database.exists():
+        try:
+            if _manifest(waiting)["database"] == built_digest(database):
+                move_folder(waiting, final)
+        except DatabaseError:  # what waits is damaged
+            return final
+        except InputError:  # nothing may be written here, or another program was quicker
+            return waiting if waiting.exists() else final
+    return final
+
+
+def _waiting(final: Path) -> Path:
+    return final.with_name(final.name + NEXT)
+
 
 ADDED = "added"
 GEOMETRY = "geometry"
@@ -124,8 +407,6 @@ class City:
     @cached_property
     def store(self) -> ObjectStore:
         """The object store; DatabaseError if there is none that can be used."""
-        from semsig_gis.database.store import open_store  # noqa: PLC0415 - its readers load slowly
-
         return open_store(self.path)
 
     @property

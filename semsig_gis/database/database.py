@@ -19,16 +19,16 @@ from pyproj import CRS
 
 from semsig_gis import __version__
 from semsig_gis.core.errors import DatabaseError, InputError
-from semsig_gis.core.grid import cell_ids
-from semsig_gis.core.signature import Signature, quantize
-from semsig_gis.database.viewpoints import ViewpointSpec
+from semsig_gis.core.geometry import cell_ids
+from semsig_gis.core.signature import BEARING_UNITS, DISTANCE_UNITS, Signature, quantize
+from semsig_gis.database.views import ViewpointSpec, Views
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
 
     from numpy.typing import ArrayLike, NDArray
 
-    from semsig_gis.core.grid import GridSpec
+    from semsig_gis.core.geometry import GridSpec
     from semsig_gis.core.signature import SignatureSpec
     from semsig_gis.core.taxonomy import Taxonomy
 
@@ -36,11 +36,6 @@ if TYPE_CHECKING:
 
 WORD_BITS = 64
 HISTOGRAM_BLOCK = 1 << 22  # counters in one step of the histogram: 32 MB of temporaries
-# Divisible by 8, 16, 24, 32 and 72, so that the usual angle levels come out exactly. A unit is a
-# hundredth of the noise of a good detector.
-BEARING_UNITS = 7200
-# In the range that is seen furthest; a unit is 12 cm where that is 30 m.
-DISTANCE_UNITS = 255
 LONGEST_VALUE = 80
 
 # What two databases that were made in the same way have in common, and what it is called.
@@ -459,3 +454,18 @@ def frozen(array: _Array) -> _Array:
     """Return the array, made read-only."""
     array.setflags(write=False)
     return array
+
+
+def views_in(database: SignatureDatabase, cells: NDArray[np.int64]) -> Views:
+    """Return what a database says is seen from some of its cells; one may stand there twice.
+
+    Bearings are in the middle of their units, and the rows of the objects are not known.
+    """
+    part = database.select(cells)
+    return Views(
+        offsets=part.offsets,
+        objects=np.full(len(part.codes), -1),
+        codes=part.codes,
+        bearings=part.bearings + 180.0 / BEARING_UNITS,
+        distances=part.distances,
+    )

@@ -13,16 +13,11 @@ import numpy as np
 import pyarrow as pa
 
 from semsig_gis.core.errors import DatabaseError, InputError, SemsigError
-from semsig_gis.core.grid import GridSpec, split_ids
-from semsig_gis.core.signature import SignatureSpec
+from semsig_gis.core.geometry import GridSpec, split_ids
+from semsig_gis.core.signature import BEARING_UNITS, SignatureSpec
 from semsig_gis.core.taxonomy import Taxonomy
-from semsig_gis.database.database import (
-    BEARING_UNITS,
-    SignatureDatabase,
-    join_databases,
-    require_same,
-)
-from semsig_gis.database.viewpoints import ViewpointSpec
+from semsig_gis.database.database import SignatureDatabase, join_databases, require_same
+from semsig_gis.database.views import ViewpointSpec
 from semsig_gis.storage.geoparquet import (
     geo_metadata,
     points_to_wkb,

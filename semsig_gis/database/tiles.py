@@ -24,9 +24,15 @@ from pyproj import CRS
 from pyproj.exceptions import CRSError
 
 from semsig_gis import __version__
-from semsig_gis.core.crs import HALF_WIDTH
 from semsig_gis.core.errors import DatabaseError, EmptyResultError, InputError, SourceError
-from semsig_gis.core.grid import GridSpec, cell_ids, cells_near, require_step, split_ids
+from semsig_gis.core.geometry import (
+    HALF_WIDTH,
+    GridSpec,
+    cell_ids,
+    cells_near,
+    require_step,
+    split_ids,
+)
 from semsig_gis.core.parallel import check_workers, finish_tasks
 from semsig_gis.core.signature import SignatureSpec
 from semsig_gis.database.build import build_cells
@@ -42,8 +48,8 @@ from semsig_gis.database.file import (
     save_database,
 )
 from semsig_gis.database.occlusion import TOLERANCE_M
-from semsig_gis.database.viewpoints import ViewpointSpec, require_surroundings
-from semsig_gis.objects.surroundings import read_surroundings, save_surroundings
+from semsig_gis.database.views import ViewpointSpec, require_surroundings
+from semsig_gis.objects.load import read_surroundings, save_surroundings
 from semsig_gis.objects.table import open_objects, save_objects
 from semsig_gis.storage.geoparquet import NOWHERE, each_bounds
 from semsig_gis.storage.runs import (

@@ -8,18 +8,17 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from semsig_gis import __version__
-from semsig_gis.core.crs import SOURCE
 from semsig_gis.core.errors import DatabaseError, EmptyResultError, InputError
-from semsig_gis.core.grid import cell_ids, cells_near
+from semsig_gis.core.geometry import SOURCE, cell_ids, cells_near
 from semsig_gis.core.rtree import PackedIndex
 from semsig_gis.database.build import build_cells
+from semsig_gis.database.city import open_store, save_with_store
 from semsig_gis.database.database import ENTRY_ARRAYS, join_databases, require_same
 from semsig_gis.database.file import open_database
 from semsig_gis.database.occlusion import TOUCHING_M, buildings_near
-from semsig_gis.database.store import open_store, save_with_store
-from semsig_gis.database.visibility import sightings
+from semsig_gis.database.views import sightings
 from semsig_gis.objects.changes import compare_objects, replace_layers
-from semsig_gis.objects.surroundings import licenses_of
+from semsig_gis.objects.load import licenses_of
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -27,8 +26,8 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+    from semsig_gis.database.city import ObjectStore
     from semsig_gis.database.database import SignatureDatabase
-    from semsig_gis.database.store import ObjectStore
     from semsig_gis.objects.changes import ClassChange
     from semsig_gis.objects.table import StreetObjects
 

@@ -18,8 +18,7 @@ import pandas as pd
 
 from semsig_gis import __version__
 from semsig_gis.core.errors import InputError
-from semsig_gis.core.geometry import angular_distance
-from semsig_gis.core.grid import cell_ids
+from semsig_gis.core.geometry import angular_distance, cell_ids
 from semsig_gis.evaluation.result import QUERY_COLUMNS, SUCCESS_METRES, Evaluation
 from semsig_gis.likelihood.locate import LikelihoodLocator
 from semsig_gis.likelihood.method import LikelihoodMethod

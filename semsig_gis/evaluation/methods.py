@@ -14,8 +14,8 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
 
     from semsig_gis.database.answer import Answer, Locator
+    from semsig_gis.database.city import ObjectStore
     from semsig_gis.database.database import SignatureDatabase
-    from semsig_gis.database.store import ObjectStore
     from semsig_gis.likelihood.index import LikelihoodIndex
     from semsig_gis.likelihood.noise.model import Noise
 

@@ -248,7 +248,7 @@ class Evaluation:
     def answers(self) -> dict[str, float]:
         """Return how the likelihood method answers and declines; nothing for other methods.
 
-        ``coverage`` is the share of queries that `likelihood.answer_rule.DEFAULT_RULE` answers,
+        ``coverage`` is the share of queries that `likelihood.posterior.DEFAULT_RULE` answers,
         ``precision`` the share of answers that are right, ``in_region`` the share of regions of
         90 % that hold the true cell; NaN where there is no query to tell.
         """

@@ -15,7 +15,7 @@ import pyarrow.compute as pc
 import shapely
 from pyarrow import csv
 
-from semsig_gis.core.crs import GEOMETRY
+from semsig_gis.core.geometry import GEOMETRY
 from semsig_gis.exports.layers import GEOMETRY_TYPES
 from semsig_gis.storage.geoparquet import (
     BBOX,

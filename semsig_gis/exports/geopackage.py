@@ -19,10 +19,10 @@ from pyogrio.errors import DataLayerError, DataSourceError, FeatureError
 from pyproj import CRS
 from pyproj.exceptions import CRSError
 
-from semsig_gis.core.crs import CLASS_CODE, COUNT, GEOMETRY, MERGED, SOURCE, SOURCE_ID
 from semsig_gis.core.errors import DatabaseError, InputError
+from semsig_gis.core.geometry import CLASS_CODE, COUNT, GEOMETRY, MERGED, SOURCE, SOURCE_ID
+from semsig_gis.core.signature import BEARING_UNITS, DISTANCE_UNITS
 from semsig_gis.core.taxonomy import Taxonomy
-from semsig_gis.database.database import BEARING_UNITS, DISTANCE_UNITS
 from semsig_gis.database.file import database_of
 from semsig_gis.evaluation.identify.result import identifiability_of
 from semsig_gis.exports.layers import GEOMETRY_TYPES

@@ -26,7 +26,7 @@ import numpy as np
 
 from semsig_gis.core.errors import InputError
 from semsig_gis.core.geometry import signed_degrees
-from semsig_gis.database.visibility import views_in
+from semsig_gis.database.database import views_in
 from semsig_gis.likelihood.index import CellScores
 from semsig_gis.likelihood.noise.table import database_tables, place_loglik
 

@@ -10,10 +10,10 @@ import numpy as np
 import pandas as pd
 import shapely
 
-from semsig_gis.core.crs import SOURCE, SOURCE_ID
-from semsig_gis.core.geometry import signed_degrees
+from semsig_gis.core.geometry import SOURCE, SOURCE_ID, signed_degrees
 from semsig_gis.core.taxonomy import WILDCARD
-from semsig_gis.database.visibility import views_at, views_in
+from semsig_gis.database.database import views_in
+from semsig_gis.database.views import views_at
 from semsig_gis.likelihood.association import associate, near_pairs
 from semsig_gis.likelihood.noise.table import LONGEST_TABLE, noise_tables, query_bearings
 
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from semsig_gis.core.taxonomy import Taxonomy
     from semsig_gis.database.database import SignatureDatabase
     from semsig_gis.database.occlusion import Footprints
-    from semsig_gis.database.visibility import Views
+    from semsig_gis.database.views import Views
     from semsig_gis.likelihood.noise.model import Noise
     from semsig_gis.objects.table import StreetObjects
 

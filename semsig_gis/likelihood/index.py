@@ -24,8 +24,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from semsig_gis.core.errors import DatabaseError, InputError
+from semsig_gis.core.signature import BEARING_UNITS
 from semsig_gis.database.city import City
-from semsig_gis.database.database import BEARING_UNITS
 from semsig_gis.likelihood.noise.table import database_tables, mean_table
 from semsig_gis.storage.whole import whole_file
 

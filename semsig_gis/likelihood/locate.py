@@ -16,8 +16,7 @@ import numpy as np
 import pandas as pd
 
 from semsig_gis.core.errors import InputError
-from semsig_gis.core.geometry import signed_degrees
-from semsig_gis.core.grid import cell_ids
+from semsig_gis.core.geometry import cell_ids, signed_degrees
 from semsig_gis.database.answer import (
     REGION_SHARE,
     Answer,
@@ -26,13 +25,18 @@ from semsig_gis.database.answer import (
     check_query,
     check_top,
 )
-from semsig_gis.likelihood.answer_rule import DEFAULT_RULE
 from semsig_gis.likelihood.association import align_cells, rerank
 from semsig_gis.likelihood.explain import explain, explain_cell
 from semsig_gis.likelihood.index import CellScores
 from semsig_gis.likelihood.noise.model import cell_noise, place_noise
-from semsig_gis.likelihood.posterior import Posterior, posterior
-from semsig_gis.likelihood.refine import KEPT, Refinement, refine
+from semsig_gis.likelihood.posterior import (
+    DEFAULT_RULE,
+    KEPT,
+    Posterior,
+    Refinement,
+    posterior,
+    refine,
+)
 from semsig_gis.likelihood.route import route_posteriors
 
 if TYPE_CHECKING:
@@ -42,12 +46,12 @@ if TYPE_CHECKING:
 
     from semsig_gis.core.signature import Signature
     from semsig_gis.database.answer import DistanceMemo
+    from semsig_gis.database.city import ObjectStore
     from semsig_gis.database.database import SignatureDatabase
-    from semsig_gis.database.store import ObjectStore
-    from semsig_gis.likelihood.answer_rule import AnswerRule, Decision
     from semsig_gis.likelihood.explain import Explanation
     from semsig_gis.likelihood.index import LikelihoodIndex
     from semsig_gis.likelihood.noise.model import Noise
+    from semsig_gis.likelihood.posterior import AnswerRule, Decision
     from semsig_gis.likelihood.route import Leg
 
 MOST_CELLS = 200

@@ -1,20 +1,43 @@
-"""Where a query was seen: the chance of every cell, and what follows from it."""
+"""The chance of every cell, the place between the cells, and when to answer with it at all.
+
+A place is sought part by part of the likeliest cells: a part of side s counts with an uncertainty
+of ``s / 12 ** 0.5`` each way, the deviation of places anywhere in it, so that its likelihood stands
+for the mean over the part. It is the answer where the chance that the true place lies near reaches
+a least value, which is calibrated on queries whose true place is known.
+"""
 
 from __future__ import annotations
 
+import json
 import math
-from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from dataclasses import asdict, dataclass, fields, replace
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, TypeGuard
 
 import numpy as np
 
 from semsig_gis.core.errors import InputError
-from semsig_gis.core.grid import cell_ids
+from semsig_gis.core.geometry import cell_ids, signed_degrees
+from semsig_gis.core.statistics import binomial_tail
+from semsig_gis.database.views import views_at
+from semsig_gis.likelihood.association import turn_logs
+from semsig_gis.likelihood.index import check_north
+from semsig_gis.likelihood.noise.table import LONGEST_TABLE, noise_tables, place_loglik
+from semsig_gis.storage.whole import whole_file
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
+
     from numpy.typing import ArrayLike, NDArray
 
+    from semsig_gis.core.rtree import ObjectIndex, StoredIndex
+    from semsig_gis.core.signature import Signature
     from semsig_gis.database.database import SignatureDatabase
+    from semsig_gis.database.occlusion import Footprints
+    from semsig_gis.likelihood.noise.model import Noise
+    from semsig_gis.objects.table import StreetObjects
+
 
 PLACES = 1000
 """Likeliest cells among which the best place is looked for."""
@@ -135,3 +158,388 @@ def posterior(
         raise InputError(msg)
     chances = np.exp(total - top)
     return Posterior(database=database, chances=chances / chances.sum())
+
+
+STARTS = 4
+"""Shares of answers from which looser thresholds are tried in turn."""
+STEPS = 100
+
+
+def _is_number(value: object) -> TypeGuard[float]:
+    return isinstance(value, (int, float))
+
+
+def _check_share(name: str, value: object) -> None:
+    if not (_is_number(value) and 0 < value < 1):
+        msg = f"{name} of the answers is {value!r}; give a share above 0 and below 1."
+        raise InputError(msg)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class AnswerRule:
+    """When to answer.
+
+    Parameters
+    ----------
+    threshold : float
+        Least chance that the place is within `radius` of the best one; above 1 for never.
+    radius : float, default 50
+        Metres that count as right.
+    precision, confidence : float, default 0.98 and 0.95
+        Share of the answers that shall be right, and how sure it was to be that they are.
+    queries, answered, wrong : int, default 0
+        What it was calibrated on: queries, those that were answered, and wrong answers.
+
+    Examples
+    --------
+    >>> AnswerRule(threshold=0.9).answers(0.95)
+    True
+    """
+
+    threshold: float
+    radius: float = 50.0
+    precision: float = 0.98
+    confidence: float = 0.95
+    queries: int = 0
+    answered: int = 0
+    wrong: int = 0
+
+    def __post_init__(self) -> None:  # noqa: D105
+        for name in ("precision", "confidence"):
+            _check_share(name, getattr(self, name))
+        if not (_is_number(self.threshold) and self.threshold >= 0):
+            msg = f"threshold of the answers is {self.threshold!r}; give a chance, 0 or more."
+            raise InputError(msg)
+        if not (_is_number(self.radius) and 0 < self.radius < math.inf):
+            msg = f"radius of the answers is {self.radius!r}; give metres above 0."
+            raise InputError(msg)
+        if not 0 <= self.wrong <= self.answered <= self.queries:
+            msg = (
+                f"{self.wrong} wrong of {self.answered} answers to {self.queries} queries were "
+                "given; give counts that fit each other."
+            )
+            raise InputError(msg)
+
+    @property
+    def coverage(self) -> float:
+        """Share of the queries it was calibrated on that were answered; NaN without any."""
+        return self.answered / self.queries if self.queries else math.nan
+
+    def answers(self, mass: float) -> bool:
+        """Tell whether to answer, given the chance that the place is near the best one."""
+        return bool(mass >= self.threshold)
+
+    def decide(self, posterior: Posterior) -> Decision:
+        """Return the best place, its chance, and whether to give it as the answer."""
+        cell, mass = posterior.best_place(self.radius)
+        x, y = posterior.database.xy[cell].tolist()
+        return Decision(cell=cell, x=x, y=y, mass=mass, given=self.answers(mass))
+
+
+DEFAULT_RULE: AnswerRule = AnswerRule(threshold=0.9)
+"""Answer where the place is within 50 m of the best one with a chance of 0.9 by the model."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Decision:
+    """A cell (row number) with its viewpoint in metres, and whether it is given as the answer.
+
+    `mass` is the chance that the place is near it; `given` is False for "cannot tell".
+    """
+
+    cell: int
+    x: float
+    y: float
+    mass: float
+    given: bool
+
+
+def calibrate(
+    masses: ArrayLike,
+    correct: ArrayLike,
+    *,
+    precision: float = 0.98,
+    confidence: float = 0.95,
+    radius: float = 50.0,
+) -> AnswerRule:
+    """Choose the threshold that answers most queries and is right often enough.
+
+    Parameters
+    ----------
+    masses, correct : array_like, shape (q,)
+        For each query the chance that the place is near the best one, and whether it was.
+    precision, confidence, radius : float
+        As of `AnswerRule`; the confidence is over queries like these.
+
+    Returns
+    -------
+    AnswerRule
+        The rule; its threshold is infinite where the queries do not prove any to be good enough.
+
+    Raises
+    ------
+    InputError
+        If the numbers do not fit or are out of range.
+
+    Notes
+    -----
+    A threshold is proven when answers that are wrong as often as allowed would have shown so few
+    errors with a chance of at most ``1 - confidence`` (Clopper and Pearson). So that the best of
+    many thresholds does not profit from luck, they are tried from strict to loose until one fails,
+    from four starting points that share the allowed chance (Angelopoulos et al., "Learn then test",
+    2021, fixed-sequence testing with several starts). Without errors, 98 % at 95 % need 217
+    answers.
+
+    Examples
+    --------
+    >>> masses = np.linspace(0.0, 1.0, 1001)
+    >>> 0.38 < calibrate(masses, masses > 0.4).threshold < 0.42
+    True
+    """
+    for name, value in (("precision", precision), ("confidence", confidence)):
+        _check_share(name, value)
+    chances = np.asarray(masses, dtype=np.float64)
+    right = np.asarray(correct)
+    if chances.shape != right.shape or chances.ndim != 1 or not np.isfinite(chances).all():
+        msg = (
+            f"{chances.size} chances and {right.size} outcomes were given; give one finite chance "
+            "and one outcome for each query."
+        )
+        raise InputError(msg)
+    order = np.argsort(-chances, kind="stable")
+    ranked = chances[order]
+    errors = np.cumsum(~right[order].astype(bool))
+    # Equal chances are answered together or not at all.
+    ends = np.flatnonzero(np.append(ranked[1:] != ranked[:-1], True))
+    allowed = (1.0 - confidence) / STARTS
+    fewest = math.log(allowed) / math.log(precision)
+    ends = ends[ends + 1 >= fewest]
+    if len(ends):
+        ends = ends[np.unique(np.linspace(0, len(ends) - 1, STEPS).astype(int))]
+    best = -1
+    for start in range(STARTS):
+        for end in ends[start * len(ends) // (2 * STARTS) :].tolist():
+            if binomial_tail(int(errors[end]), end + 1, 1.0 - precision) > allowed:
+                break
+            best = max(best, end)
+    return AnswerRule(
+        threshold=float(ranked[best]) if best >= 0 else math.inf,
+        radius=radius,
+        precision=precision,
+        confidence=confidence,
+        queries=len(ranked),
+        answered=best + 1,
+        wrong=int(errors[best]) if best >= 0 else 0,
+    )
+
+
+def save_rule(rule: AnswerRule, path: str | Path) -> None:
+    """Write a rule to a JSON file.
+
+    Parameters
+    ----------
+    rule : AnswerRule
+        The rule.
+    path : str or Path
+        File to write; it appears whole, by rename.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     save_rule(AnswerRule(threshold=0.9), f"{folder}/rule.json")
+    ...     open_rule(f"{folder}/rule.json").threshold
+    0.9
+    """
+    values = asdict(rule)
+    if math.isinf(rule.threshold):
+        values["threshold"] = None  # JSON has no infinity
+    with whole_file(path) as partial:
+        partial.write_text(json.dumps(values, indent=2, allow_nan=False) + "\n", encoding="utf-8")
+
+
+def open_rule(path: str | Path) -> AnswerRule:
+    """Read a rule from a JSON file.
+
+    Parameters
+    ----------
+    path : str or Path
+        File that `save_rule` wrote.
+
+    Returns
+    -------
+    AnswerRule
+        The rule.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be read or does not hold a rule.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     save_rule(AnswerRule(threshold=0.9), f"{folder}/rule.json")
+    ...     open_rule(f"{folder}/rule.json").threshold
+    0.9
+    """
+    try:
+        values: Mapping[str, Any] = json.loads(Path(path).read_text(encoding="utf-8"))
+        names = {field.name for field in fields(AnswerRule)}
+        if not isinstance(values, dict) or not {"threshold"} <= set(values) <= names:
+            msg = f"it does not hold just the fields {', '.join(sorted(names))}"
+            raise InputError(msg)
+        threshold = values["threshold"]
+        return AnswerRule(**{**values, "threshold": math.inf if threshold is None else threshold})
+    except (OSError, TypeError, ValueError) as error:
+        reason = error.strerror if isinstance(error, OSError) else str(error).rstrip(".")
+        msg = f"answer rule {path} cannot be used ({reason}); give a file that save_rule wrote."
+        raise InputError(msg) from error
+
+
+KEPT = (1000, 400, 200, 100)
+"""How many parts are divided, level by level: cells, their quarters, and so on."""
+LEAST_CHANCE = 1e-6  # of a part, against the likeliest, to be divided
+TURNS = (7.5, 6.0, 4.5, 3.0)  # degrees to each side that are tried, level by level
+TURNS_A_SIDE = 3
+NEAR = 25.0  # metres from the best place that are averaged over
+BEST = 300  # likeliest parts among which the best place is looked for
+CORNERS = np.array([[-1.0, -1.0], [-1.0, 1.0], [1.0, -1.0], [1.0, 1.0]])
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Refinement:
+    """The chances of places on and off the grid.
+
+    By square part of a cell: `places`, shape (p, 2), its middle in metres; `sizes`, the length of
+    its sides; `loglik`, the mean over the part; `headings`, the mean degrees to add to the bearings
+    of the query (0 if north is known), with `heading_sigmas`; and `chances`, which sum to one. The
+    best place is averaged over `near` metres around it.
+    """
+
+    places: NDArray[np.float64]
+    sizes: NDArray[np.float64]
+    loglik: NDArray[np.float64]
+    headings: NDArray[np.float64]
+    heading_sigmas: NDArray[np.float64]
+    chances: NDArray[np.float64]
+    near: float
+
+    @property
+    def mass(self) -> float:
+        """Chance that the place is within `near` of the best one."""
+        return float(self.chances[self._inside].sum())
+
+    @cached_property
+    def xy(self) -> tuple[float, float]:
+        """The mean place around the best one, in metres."""
+        inside = self._inside
+        x, y = np.average(self.places[inside], axis=0, weights=self.chances[inside]).tolist()
+        return x, y
+
+    @cached_property
+    def heading(self) -> float:
+        """Degrees to add to the bearings of the query there, in [-180, 180)."""
+        angles = np.radians(self.headings[self._inside])
+        mean = np.exp(1j * angles) @ self.chances[self._inside]
+        return float(signed_degrees(math.degrees(float(np.angle(mean)))))
+
+    @property
+    def covariance(self) -> NDArray[np.float64]:
+        """Of x, y (metres) and heading (degrees) around the best place, shape (3, 3)."""
+        inside = self._inside
+        weights = self.chances[inside] / self.chances[inside].sum()
+        turned = signed_degrees(self.headings[inside] - self.heading)
+        away = np.column_stack([self.places[inside] - self.xy, turned])
+        covariance = (weights[:, None] * away).T @ away
+        # The place may be anywhere in a part.
+        covariance[[0, 1], [0, 1]] += weights @ self.sizes[inside] ** 2 / 12.0
+        covariance[2, 2] += weights @ self.heading_sigmas[inside] ** 2
+        return np.asarray(covariance)
+
+    @cached_property
+    def _inside(self) -> NDArray[np.bool_]:
+        """Which parts are near the one around which most of the chance lies."""
+        order = np.argsort(-self.chances, kind="stable")[:BEST]
+        away = self.places[order, None] - self.places[None]
+        inside = np.hypot(away[..., 0], away[..., 1]) <= self.near
+        return np.asarray(inside[np.round(inside @ self.chances, 9).argmax()])
+
+
+def refine(
+    query: Signature,
+    cells: NDArray[np.float64],
+    noise: Noise,
+    *,
+    objects: StreetObjects,
+    index: ObjectIndex | StoredIndex,
+    step: float = 10.0,
+    radius: float = 30.0,
+    north_sigma: float = 0.0,
+    headings: NDArray[np.floating] | None = None,
+    log_prior: NDArray[np.float64] | None = None,
+    footprints: Footprints | None = None,
+) -> Refinement:
+    """Look for the place of a query within some cells; chances are likelihood times area.
+
+    The query needs bearings; its types may be unknown. `cells`, shape (c, 2), are the middles in
+    metres of the likeliest cells, likeliest first; some hundred will do. `noise` is for a known
+    place. `step` and `radius` are in metres, `north_sigma` in degrees; where it is not 0,
+    `headings`, the likeliest one in each cell, are needed. `log_prior` is what else is known of the
+    cells.
+    """
+    check_north(north_sigma)
+    if len(cells) == 0 or (headings is None and north_sigma > 0):
+        msg = (
+            f"{len(cells)} cells and {'no' if headings is None else 'some'} headings were given; "
+            "give at least one cell, and headings where north is not known."
+        )
+        raise InputError(msg)
+    tables, weights = noise_tables(
+        noise, taxonomy=objects.taxonomy, codes=np.unique(objects.codes), longest=LONGEST_TABLE
+    )
+    reach = float(objects.taxonomy.ranges(radius).max())
+    size = float(step)
+    parts = np.asarray(cells[: KEPT[0]], dtype=np.float64)
+    prior = np.zeros(len(parts)) if log_prior is None else np.asarray(log_prior)[: KEPT[0]]
+    turned = np.zeros(len(parts)) if headings is None else np.asarray(headings)[: KEPT[0]]
+    finished: list[tuple[NDArray[np.float64], ...]] = []
+    for level, turn in enumerate(TURNS):
+        parts = (parts[:, None] + CORNERS * (size / 4.0)).reshape(-1, 2)
+        prior, turned = np.repeat(prior, 4), np.repeat(turned, 4)
+        size /= 2.0
+        views = views_at(objects, parts, index=index, radius=radius, footprints=footprints)
+        wide = [
+            replace(table, position_sigma=math.hypot(table.position_sigma, size / math.sqrt(12.0)))
+            for table in tables
+        ]
+        steps = np.linspace(-turn, turn, 2 * TURNS_A_SIDE + 1) if north_sigma > 0 else np.zeros(1)
+        turns = turned[:, None] + steps
+        by_turn = place_loglik(query, views, wide, weights, turns=turns, reach=reach)
+        if north_sigma > 0:
+            by_turn += turn_logs(turns, steps[1] - steps[0], north_sigma)
+        loglik = np.logaddexp.reduce(by_turn, axis=1)
+        shares = np.exp(by_turn - loglik[:, None])
+        turned = (shares * turns).sum(axis=1)
+        sigmas = np.sqrt((shares * (turns - turned[:, None]) ** 2).sum(axis=1))
+        total = loglik + prior
+        divided = np.zeros(len(parts), np.bool_)
+        if level + 1 < len(TURNS):
+            best = np.argsort(-total, kind="stable")[: KEPT[level + 1]]
+            divided[best] = total[best] > total[best[0]] + math.log(LEAST_CHANCE)
+        columns = parts, np.full(len(parts), size), loglik, prior, turned, sigmas
+        finished.append(tuple(column[~divided] for column in columns))
+        parts, prior, turned = parts[divided], prior[divided], turned[divided]
+    places, sizes, loglik, prior, turned, sigmas = map(np.concatenate, zip(*finished, strict=True))
+    weight = loglik + prior + 2.0 * np.log(sizes)
+    chances = np.exp(weight - weight.max())
+    return Refinement(
+        places=places,
+        sizes=sizes,
+        loglik=loglik,
+        headings=signed_degrees(turned),
+        heading_sigmas=sigmas,
+        chances=chances / chances.sum(),
+        near=NEAR,
+    )

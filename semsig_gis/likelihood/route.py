@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from semsig_gis.core.errors import InputError
-from semsig_gis.core.grid import ROW_SPAN
+from semsig_gis.core.geometry import ROW_SPAN
 from semsig_gis.likelihood.posterior import Posterior, posterior
 
 if TYPE_CHECKING:

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pandas as pd
 
-from semsig_gis.core.crs import SOURCE, SOURCE_ID
 from semsig_gis.core.errors import CrsError
+from semsig_gis.core.geometry import SOURCE, SOURCE_ID
 from semsig_gis.core.signs import DRIFT_COLOURS, OBJECT_COLOURS
 from semsig_gis.database.database import join_databases, require_same_place
 from semsig_gis.database.update import compare_cells

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from pyproj import Transformer
 
-from semsig_gis.core.grid import cell_ids
+from semsig_gis.core.geometry import cell_ids
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence

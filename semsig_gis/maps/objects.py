@@ -8,8 +8,8 @@ import numpy as np
 import pandas as pd
 import shapely
 
-from semsig_gis.core.crs import COUNT, MERGED, SOURCE, SOURCE_ID
 from semsig_gis.core.errors import CrsError, EmptyResultError
+from semsig_gis.core.geometry import COUNT, MERGED, SOURCE, SOURCE_ID
 from semsig_gis.core.signs import class_signs
 from semsig_gis.maps.image import mercator, packed, steps
 from semsig_gis.maps.parts import (
@@ -26,7 +26,7 @@ from semsig_gis.maps.parts import (
     sources,
     to_latlon,
 )
-from semsig_gis.objects.surroundings import licenses_of
+from semsig_gis.objects.load import licenses_of
 from semsig_gis.storage.geoparquet import hilbert_order
 
 if TYPE_CHECKING:
@@ -68,7 +68,7 @@ def ground_map(
     Returns
     -------
     folium.Map
-        The map, which credits their sources (see `objects.surroundings.licenses_of`).
+        The map, which credits their sources (see `objects.load.licenses_of`).
 
     Raises
     ------

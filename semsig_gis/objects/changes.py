@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pandas as pd
 
-from semsig_gis.core.crs import CLASS_CODE, MERGED, SOURCE, SOURCE_ID
 from semsig_gis.core.errors import CatalogError, CrsError, InputError
+from semsig_gis.core.geometry import CLASS_CODE, MERGED, SOURCE, SOURCE_ID
 from semsig_gis.objects.table import Licence, StreetObjects, join_licences
 
 if TYPE_CHECKING:

@@ -1,6 +1,6 @@
 """One object in two sources is one object: merge by class within a radius, and say what was done.
 
-Objects of one source are never merged with each other; `objects.clean.build_objects` has
+Objects of one source are never merged with each other; `objects.load.build_objects` has
 dealt with rows that stand twice in a source.
 """
 
@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 import pandas as pd
 
-from semsig_gis.core.crs import COUNT, GEOMETRY, MERGED, SOURCE, SOURCE_ID
 from semsig_gis.core.errors import InputError
+from semsig_gis.core.geometry import COUNT, GEOMETRY, MERGED, SOURCE, SOURCE_ID
 from semsig_gis.core.rtree import ObjectIndex
 
 if TYPE_CHECKING:

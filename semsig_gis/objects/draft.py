@@ -15,8 +15,8 @@ from typing import TYPE_CHECKING, Any
 from pyproj import CRS
 from pyproj.exceptions import CRSError
 
-from semsig_gis.core.crs import require_metric_crs
 from semsig_gis.core.errors import CrsError, SourceError
+from semsig_gis.core.geometry import require_metric_crs
 from semsig_gis.core.taxonomy import MAX_CODE, ObjectClass
 from semsig_gis.objects.keywords import keywords, words_of
 from semsig_gis.sources.catalog import catalog_names, load_catalog, paper_taxonomy

@@ -19,8 +19,7 @@ if TYPE_CHECKING:
 
     from semsig_gis.sources import RawLayer
     from semsig_gis.sources.area import Area
-    from semsig_gis.sources.catalog import Catalog
-    from semsig_gis.sources.layers import LayerSpec
+    from semsig_gis.sources.catalog import Catalog, LayerSpec
 
 
 def fetch_layers(

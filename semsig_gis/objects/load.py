@@ -1,31 +1,212 @@
-"""From files to street objects: layers read, placed in one metric CRS, and merged."""
+"""From files to street objects, and what surrounds them: read, in one metric CRS, merged."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import TYPE_CHECKING
+import itertools
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Literal
 
+import geopandas as gpd
+import numpy as np
 import pandas as pd
+import pyarrow as pa
+import shapely
 
-from semsig_gis.core.crs import CLASS_NAME, LICENSES
-from semsig_gis.core.errors import CrsError, EmptyResultError
-from semsig_gis.objects.clean import build_objects
+from semsig_gis.core.errors import CrsError, EmptyResultError, InputError, SourceError
+from semsig_gis.core.geometry import (
+    CLASS_CODE,
+    CLASS_NAME,
+    COUNT,
+    LICENSES,
+    SOURCE,
+    SOURCE_ID,
+    require_metric_crs,
+)
 from semsig_gis.objects.conflate import ConflationReport, conflate
-from semsig_gis.objects.table import layer_licences
+from semsig_gis.objects.table import StreetObjects, layer_licences
 from semsig_gis.sources import find_files, reader
+from semsig_gis.sources import vector as vector_file
+from semsig_gis.sources.area import join_areas
+from semsig_gis.sources.catalog import LayerSpec, load_catalog
+from semsig_gis.sources.osm import file as osm_file
+from semsig_gis.storage.geoparquet import GROUP_ROWS, hilbert_order
+from semsig_gis.storage.whole import whole_file
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Sequence
-    from pathlib import Path
+    from collections.abc import Callable, Collection, Iterable, Sequence
 
-    import geopandas as gpd
+    from numpy.typing import NDArray
     from pyproj import CRS
 
-    from semsig_gis.objects.clean import LoadReport
-    from semsig_gis.objects.table import StreetObjects
-    from semsig_gis.sources import RawLayer
-    from semsig_gis.sources.catalog import Catalog
-    from semsig_gis.sources.layers import LayerSpec
+    from semsig_gis.core.taxonomy import Taxonomy
+    from semsig_gis.sources import RawLayer, RowCounts
+    from semsig_gis.sources.catalog import Catalog, GeometryKind
+
+
+# Two objects of a class within the same centimetre are one object listed twice.
+SAME_PLACE_M = 0.01
+# Larger than any projected coordinate; files write -1.8e308 and the like for "no value".
+BEYOND_EARTH_M = 1e8
+
+
+@dataclass(frozen=True, slots=True)
+class LayerReport:
+    """What became of one layer's rows; `notes` are warnings and messages on unreadable rows."""
+
+    name: str
+    counts: RowCounts
+    notes: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class LoadReport:
+    """What became of every layer, in the order they were given."""
+
+    layers: tuple[LayerReport, ...]
+
+
+def build_objects(
+    layers: Iterable[RawLayer],
+    *,
+    taxonomy: Taxonomy,
+    crs: CRS | str,
+    collapse: bool = True,
+    apart: Collection[str] = (),
+) -> tuple[StreetObjects, LoadReport]:
+    """Turn raw layers into one table of street objects.
+
+    A geometry that is not a point is represented by its centroid (paper, section on semantic
+    signatures). Rows without a usable position are dropped and counted.
+
+    Parameters
+    ----------
+    layers : iterable of RawLayer
+        What readers return. CrsError if one has no coordinate reference system.
+    taxonomy : Taxonomy
+        Classes that the layers name. UnknownNameError if it lacks one.
+    crs : pyproj.CRS or str
+        Metric coordinate reference system to work in.
+    collapse : bool, default True
+        Whether objects of one class at the same place (within the same centimetre) become one,
+        with their number in ``count``.
+    apart : collection of str
+        Classes that are collapsed within each layer only, because they will be conflated (see
+        `conflate`), which keeps account of where objects came from.
+
+    Returns
+    -------
+    objects : StreetObjects
+        The objects, in the order of the layers; EmptyResultError if there is none.
+    report : LoadReport
+        What became of every row.
+
+    Examples
+    --------
+    >>> from semsig_gis import CitySpec, build_objects, paper_taxonomy, synthetic_city
+    >>> layers = synthetic_city(CitySpec(size=300.0))
+    >>> _, report = build_objects(layers, taxonomy=paper_taxonomy(), crs="EPSG:32631")
+    >>> all(layer.counts.kept == layer.counts.read for layer in report.layers)
+    True
+    """
+    system = require_metric_crs(crs)
+    layers = tuple(layers)
+    parts = [_positions(layer, taxonomy, system) for layer in layers]
+    if not any(len(part) for part, _, _ in parts):
+        msg = (
+            f"no object remains of {sum(layer.counts.read for layer in layers)} rows in "
+            f"{len(layers)} layers; look at the filters, the geometries and the coordinate systems."
+        )
+        raise EmptyResultError(msg)
+    everything = pd.concat([part for part, _, _ in parts], ignore_index=True)
+    # By number, because two layers may bear one name.
+    owner = np.repeat(np.arange(len(parts)), [len(part) for part, _, _ in parts])
+    unique = np.array([layer.spec.unique_id for layer in layers])[owner]
+    has_id = (everything[SOURCE_ID] != "") & unique
+    # Of the id of an earlier row of the layer, as in a second file of it.
+    again = (has_id & everything.duplicated([SOURCE, SOURCE_ID])).to_numpy(bool)
+    repeated = np.bincount(owner[again], minlength=len(parts)).tolist()
+    everything, owner = everything[~again].reset_index(drop=True), owner[~again]
+    if collapse:
+        codes = [taxonomy.by_name(name).code for name in apart]
+        first, counts = _first_at_place(
+            everything, np.where(everything[CLASS_CODE].isin(codes), owner, -1)
+        )
+    else:
+        first, counts = np.arange(len(everything)), np.ones(len(everything), np.int64)
+    kept = everything.iloc[first].reset_index(drop=True)
+    table = gpd.GeoDataFrame(
+        {
+            CLASS_CODE: kept[CLASS_CODE].to_numpy(np.uint8),
+            SOURCE: kept[SOURCE].to_numpy(str).astype(object),
+            SOURCE_ID: kept[SOURCE_ID].to_numpy(str).astype(object),
+            COUNT: counts.astype(np.int32),
+        },
+        geometry=shapely.points(kept["x"].to_numpy(), kept["y"].to_numpy()),
+        crs=system,
+    )
+    remaining = np.bincount(owner[first], minlength=len(parts)).tolist()
+    reports = []
+    for layer, (part, missing, misplaced), twice, kept_here in zip(
+        layers, parts, repeated, remaining, strict=True
+    ):
+        dropped = replace(
+            layer.counts,
+            missing=missing,
+            duplicates=layer.counts.duplicates + twice,
+            misplaced=misplaced,
+            collapsed=len(part) - twice - kept_here,
+        )
+        reports.append(LayerReport(layer.spec.name, dropped, (*layer.notes, *layer.errors)))
+    return StreetObjects(table, taxonomy, layer_licences(layers)), LoadReport(tuple(reports))
+
+
+def _positions(layer: RawLayer, taxonomy: Taxonomy, crs: CRS) -> tuple[pd.DataFrame, int, int]:
+    """Return the usable rows of a layer, and how many are missing and misplaced."""
+    table = layer.table
+    if table.crs is None:
+        msg = (
+            f"layer {layer.spec.name!r} has no coordinate reference system; "
+            "state its crs in the catalogue."
+        )
+        raise CrsError(msg)
+    geometry = table.geometry
+    usable = ~(geometry.isna() | geometry.is_empty).to_numpy(bool)
+    points = geometry[usable]
+    if not (points.geom_type == "Point").all():
+        # In the layer's own plane: a street object is small, so the CRS makes no difference.
+        with np.errstate(invalid="ignore", over="ignore"):  # such rows are dropped below
+            centroids = shapely.centroid(points.array)
+        points = gpd.GeoSeries(centroids, index=points.index, crs=table.crs)
+    moved = points if points.crs == crs else points.to_crs(crs)
+    # A broken geometry may have an empty centroid, which has no coordinates at all.
+    xy = np.full((len(moved), 2), np.nan)
+    coordinates, row = shapely.get_coordinates(moved.array, return_index=True)
+    xy[row] = coordinates
+    placed = (np.abs(xy) < BEYOND_EARTH_M).all(axis=1)  # false for NaN too
+    codes = {name: taxonomy.by_name(name).code for name in table[CLASS_NAME].unique()}
+    rows = table[usable][placed]
+    part = pd.DataFrame(
+        {
+            SOURCE: layer.spec.name,
+            SOURCE_ID: rows[SOURCE_ID].to_numpy(),
+            CLASS_CODE: rows[CLASS_NAME].map(codes).to_numpy(),
+            "x": xy[placed, 0],
+            "y": xy[placed, 1],
+        }
+    )
+    return part, int((~usable).sum()), int((~placed).sum())
+
+
+def _first_at_place(
+    everything: pd.DataFrame, group: NDArray[np.int64]
+) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Return the first row of every group, class and place, in order, and how many share it."""
+    places = np.rint(everything[["x", "y"]].to_numpy() / SAME_PLACE_M).astype(np.int64)
+    keys = np.column_stack([group, everything[CLASS_CODE].to_numpy(np.int64), places])
+    _, first, counts = np.unique(keys, axis=0, return_index=True, return_counts=True)
+    order = np.argsort(first)
+    return first[order], counts[order]
 
 
 # A UTM zone is six degrees wide; across more than one, lengths are off by more than a thousandth.
@@ -240,3 +421,140 @@ def _surroundings(layers: Sequence[RawLayer], role: str, crs: CRS) -> gpd.GeoDat
     table = table[~(table.geometry.isna() | table.geometry.is_empty)].reset_index(drop=True)
     table.attrs[LICENSES] = [str(licence) for licence in layer_licences(of_role)]
     return table
+
+
+OSM_SUFFIXES = (".osm", ".osm.pbf", ".osm.bz2")
+DIMENSIONS: dict[GeometryKind, int] = {"line": 1, "polygon": 2}
+
+
+def save_surroundings(table: gpd.GeoDataFrame, path: str | Path) -> None:
+    """Save buildings or streets as one GeoParquet file that can be read by box.
+
+    Parameters
+    ----------
+    table : GeoDataFrame
+        Features, each with a geometry; all columns and the `attrs` are kept. The file holds them in
+        a spatial order, with their bounds in the column ``bbox``.
+    path : str or Path
+        File to write; it appears whole, by rename.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> houses = gpd.GeoDataFrame(
+    ...     geometry=[shapely.box(0, 0, 5, 5), shapely.box(90, 0, 95, 5)], crs="EPSG:2154"
+    ... )
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     file = f"{folder}/houses.parquet"
+    ...     save_surroundings(houses, file)
+    ...     len(read_surroundings(file, role="buildings", crs="EPSG:2154", box=(0, 0, 9, 9)))
+    1
+    """
+    ordered = table.iloc[hilbert_order(table.geometry.array)]
+    with whole_file(path) as partial:
+        ordered.to_parquet(
+            partial,
+            index=False,
+            compression="zstd",
+            schema_version="1.1.0",
+            write_covering_bbox=True,
+            row_group_size=GROUP_ROWS,
+        )
+
+
+def read_surroundings(
+    path: str | Path,
+    *,
+    role: Literal["buildings", "streets"],
+    crs: CRS | str,
+    box: Sequence[float] | None = None,
+) -> gpd.GeoDataFrame:
+    """Read the buildings or the streets of a city.
+
+    Parameters
+    ----------
+    path : str or Path
+        Any vector file that `read_layer` reads, an OpenStreetMap file, or a ``.parquet`` file such
+        as ``semsig load --buildings`` writes. SourceError if it is missing, damaged, or of another
+        kind.
+    role : {"buildings", "streets"}
+        What the file holds: polygons or lines. InputError if it has none, or something else too.
+    crs : pyproj.CRS or str
+        CRS to move it to. CrsError if nobody knows its own.
+    box : sequence of float, optional
+        ``xmin, ymin, xmax, ymax`` in the CRS of the file, which `save_surroundings` wrote: only
+        features whose bounds meet it.
+
+    Returns
+    -------
+    GeoDataFrame
+        One row a feature that has a geometry; in a box there may be none. Of a ``.parquet`` file
+        all columns are kept. ``attrs["licenses"]`` says whom to name for it, where that is known.
+    """
+    return _read(Path(path), role, crs, box)
+
+
+def licenses_of(*tables: gpd.GeoDataFrame | None) -> tuple[str, ...]:
+    """Return whom to name for buildings and streets, a line for every publisher and licence.
+
+    The tables are those of `read_surroundings` or `objects.load.assemble`.
+    """
+    lines = [table.attrs.get(LICENSES, ()) for table in tables if table is not None]
+    return tuple(dict.fromkeys(itertools.chain.from_iterable(lines)))
+
+
+def read_area(path: str | Path, *, crs: CRS | str) -> shapely.Polygon | shapely.MultiPolygon:
+    """Read what all polygons of a file enclose together, moved to a CRS.
+
+    Errors are as of `read_surroundings`.
+    """
+    area = join_areas(_read(Path(path), "area", crs).geometry.to_numpy())
+    if area is None:
+        msg = f"{path} encloses no area; give a file of polygons."
+        raise InputError(msg)
+    return area
+
+
+def _read(
+    path: Path, role: str, crs: CRS | str, box: Sequence[float] | None = None
+) -> gpd.GeoDataFrame:
+    kind: GeometryKind = "line" if role == "streets" else "polygon"
+    if path.suffix.lower() == ".parquet":
+        table = _read_parquet(path, kind, box)
+    elif path.name.lower().endswith(OSM_SUFFIXES) and role != "area":
+        spec = load_catalog("openstreetmap").layer(role)
+        (layer,) = osm_file.read_layers(path, [spec])
+        table = layer.table
+        table.attrs[LICENSES] = [str(licence) for licence in layer_licences([layer])]
+    else:
+        layer = vector_file.read_layer(path, LayerSpec(name=role, class_name="", geometry=kind))
+        if layer.errors:
+            msg = (
+                f"{path} has {layer.counts.unreadable} features that cannot be read "
+                f"({layer.errors[0]}); correct the file."
+            )
+            raise SourceError(msg)
+        table = layer.table
+    if table.crs is None:
+        msg = f"{path} states no coordinate reference system; write it with one."
+        raise SourceError(msg)
+    geometry = table.geometry
+    table = table[~(geometry.isna() | geometry.is_empty)].reset_index(drop=True)
+    dimensions = shapely.get_dimensions(table.geometry.to_numpy())
+    others = table.geometry[dimensions != DIMENSIONS[kind]]
+    if (len(table) == 0 and box is None) or len(others):
+        found = f"holds a {others.iloc[0].geom_type}" if len(others) else f"holds no {kind}"
+        msg = f"{path} {found}; give a file of {kind}s."
+        raise InputError(msg)
+    return table.to_crs(crs)
+
+
+def _read_parquet(path: Path, kind: GeometryKind, box: Sequence[float] | None) -> gpd.GeoDataFrame:
+    if not path.is_file():
+        msg = f"{path} does not exist; give a file of {kind}s."
+        raise SourceError(msg)
+    try:
+        return gpd.read_parquet(path, bbox=None if box is None else tuple(box))
+    except (pa.ArrowException, ValueError, OSError) as error:
+        msg = f"{path} is damaged or is not GeoParquet; give a file of {kind}s."
+        raise SourceError(msg) from error

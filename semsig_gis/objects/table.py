@@ -13,8 +13,8 @@ import pyarrow.compute as pc
 import shapely
 
 from semsig_gis import __version__
-from semsig_gis.core.crs import CLASS_CODE, COUNT, GEOMETRY, MERGED, SOURCE, SOURCE_ID
 from semsig_gis.core.errors import DatabaseError
+from semsig_gis.core.geometry import CLASS_CODE, COUNT, GEOMETRY, MERGED, SOURCE, SOURCE_ID
 from semsig_gis.core.taxonomy import Taxonomy
 from semsig_gis.storage.geoparquet import (
     BBOX,

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Literal, get_args
 import numpy as np
 
 from semsig_gis.core.errors import CrsError, InputError, UnknownNameError, nearest_name
-from semsig_gis.database.visibility import views_at
+from semsig_gis.database.views import views_at
 from semsig_gis.queries.chain import ready_chain
 from semsig_gis.queries.distortions import DISTORTIONS
 from semsig_gis.queries.sight import CitySights, Sight
@@ -25,8 +25,8 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+    from semsig_gis.database.city import ObjectStore
     from semsig_gis.database.database import SignatureDatabase
-    from semsig_gis.database.store import ObjectStore
     from semsig_gis.queries.chain import QueryDistortion
 
 SeenFrom = Literal["cells", "anywhere"]

@@ -12,8 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from semsig_gis.core.geometry import FULL_TURN, wrap_degrees
-from semsig_gis.core.signature import Signature
-from semsig_gis.database.database import BEARING_UNITS, DISTANCE_UNITS
+from semsig_gis.core.signature import BEARING_UNITS, DISTANCE_UNITS, Signature
 
 if TYPE_CHECKING:
     from collections.abc import Callable

@@ -13,7 +13,7 @@ import shapely
 from semsig_gis.core.errors import InputError
 from semsig_gis.sources import FILE_SUFFIXES
 from semsig_gis.sources import vector as vector_file
-from semsig_gis.sources.layers import LayerSpec
+from semsig_gis.sources.catalog import LayerSpec
 from semsig_gis.sources.raw_layer import LATITUDE_LIMIT, LONGITUDE_LIMIT, WGS84
 
 if TYPE_CHECKING:

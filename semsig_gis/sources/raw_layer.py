@@ -15,17 +15,17 @@ import shapely
 from pyproj import CRS
 from pyproj.exceptions import CRSError
 
-from semsig_gis.core.crs import CLASS_NAME, GEOMETRY, HALF_WIDTH, SOURCE_ID
 from semsig_gis.core.errors import CatalogError, CrsError, nearest_name
+from semsig_gis.core.geometry import CLASS_NAME, GEOMETRY, HALF_WIDTH, SOURCE_ID
 from semsig_gis.sources import RawLayer, RowCounts
-from semsig_gis.sources.layers import MAX_WIDTH_M, MIN_WIDTH_M
+from semsig_gis.sources.catalog import MAX_WIDTH_M, MIN_WIDTH_M
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence
 
     from numpy.typing import NDArray
 
-    from semsig_gis.sources.layers import LayerSpec, Value
+    from semsig_gis.sources.catalog import LayerSpec, Value
 
 
 WGS84 = CRS.from_epsg(4326)

@@ -41,7 +41,7 @@ if TYPE_CHECKING:
     from pyproj import CRS
 
     from semsig_gis.sources import RawLayer
-    from semsig_gis.sources.layers import LayerSpec
+    from semsig_gis.sources.catalog import LayerSpec
     from semsig_gis.sources.raw_layer import Position
 
 # The only drivers that may open a file: GDAL has some eighty, and a few of them follow links.

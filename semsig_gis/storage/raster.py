@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
     from pyproj import CRS
 
-    from semsig_gis.core.grid import GridSpec
+    from semsig_gis.core.geometry import GridSpec
 
 TILE = 512
 # 330 km by 330 km at a step of 10 m; a file of more is a mistake in the data.

@@ -13,11 +13,10 @@ import pyogrio
 import pytest
 from worlds import assert_same
 
-from semsig_gis.core.grid import GridSpec, cell_ids
+from semsig_gis.core.geometry import GridSpec, cell_ids
 from semsig_gis.database.build import build_database
 from semsig_gis.database.file import open_database, save_database
-from semsig_gis.objects.clean import build_objects
-from semsig_gis.objects.load import choose_layers
+from semsig_gis.objects.load import build_objects, choose_layers
 from semsig_gis.sources import find_files
 from semsig_gis.sources.catalog import load_catalog
 from semsig_gis.sources.vector import read_layer
@@ -28,7 +27,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from semsig_gis.database.database import SignatureDatabase
-    from semsig_gis.objects.clean import LoadReport
+    from semsig_gis.objects.load import LoadReport
     from semsig_gis.objects.table import StreetObjects
 
 RADIUS = 30.0

@@ -16,12 +16,11 @@ import shapely
 from osm_xml import node, relation, way, write_osm
 from osmium.osm import WAY, Area, Node, Relation, Way
 
-from semsig_gis.core.grid import GridSpec
+from semsig_gis.core.geometry import GridSpec
 from semsig_gis.database.build import build_database
-from semsig_gis.database.viewpoints import ViewpointSpec, choose_viewpoints
+from semsig_gis.database.views import ViewpointSpec, choose_viewpoints
 from semsig_gis.evaluation.evaluate import evaluate
-from semsig_gis.objects.clean import build_objects
-from semsig_gis.objects.surroundings import read_surroundings
+from semsig_gis.objects.load import build_objects, read_surroundings
 from semsig_gis.sources import find_files, reader
 from semsig_gis.sources.catalog import load_catalog
 from semsig_gis.sources.osm.file import read_layers
@@ -30,7 +29,7 @@ if TYPE_CHECKING:
     from collections.abc import Mapping
 
     from semsig_gis.sources import RawLayer
-    from semsig_gis.sources.layers import LayerSpec
+    from semsig_gis.sources.catalog import LayerSpec
 
 CATALOG = load_catalog("openstreetmap")
 EXTRACTS = {

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 import shapely
 
-from semsig_gis.objects.clean import build_objects
+from semsig_gis.objects.load import build_objects
 from semsig_gis.sources import RowCounts
 from semsig_gis.sources.catalog import load_catalog, paper_taxonomy
 from semsig_gis.sources.opendatasoft.reader import read_layers

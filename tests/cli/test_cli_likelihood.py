@@ -15,11 +15,11 @@ import shapely
 from sentences import sentence
 from worlds import CORNER, World, random_town
 
+from semsig_gis.database.city import ObjectStore, save_with_store
 from semsig_gis.database.file import save_database
-from semsig_gis.database.store import ObjectStore, save_with_store
-from semsig_gis.database.visibility import views_at
-from semsig_gis.likelihood.answer_rule import open_rule
+from semsig_gis.database.views import views_at
 from semsig_gis.likelihood.noise.model import open_noise
+from semsig_gis.likelihood.posterior import open_rule
 from semsig_gis.objects.table import save_objects
 
 if TYPE_CHECKING:

@@ -15,8 +15,8 @@ from sentences import sentence
 from worlds import CORNER, random_town, surroundings
 
 from semsig_gis.database.build import build_database
-from semsig_gis.database.store import ObjectStore, save_with_store
-from semsig_gis.objects.surroundings import save_surroundings
+from semsig_gis.database.city import ObjectStore, save_with_store
+from semsig_gis.objects.load import save_surroundings
 from semsig_gis.objects.table import StreetObjects, save_objects
 
 if TYPE_CHECKING:

@@ -4,8 +4,8 @@ import pytest
 from pyproj import CRS, Proj
 from sentences import refused
 
-from semsig_gis.core.crs import require_metric_crs
 from semsig_gis.core.errors import CrsError
+from semsig_gis.core.geometry import require_metric_crs
 
 METRIC = {
     "Lambert-93": 2154,

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from sentences import refused
 
 from semsig_gis.core.errors import InputError
-from semsig_gis.core.grid import GridSpec, cell_ids, cells_near, split_ids
+from semsig_gis.core.geometry import GridSpec, cell_ids, cells_near, split_ids
 
 CELLS = st.integers(-40_000_000, 40_000_000)
 ORIGINS = st.tuples(st.floats(-1e6, 1e6), st.floats(-1e6, 1e6))

@@ -26,16 +26,14 @@ from worlds import (
 )
 
 from semsig_gis.core.errors import CrsError, EmptyResultError, InputError
-from semsig_gis.core.geometry import bearings, wrap_degrees
-from semsig_gis.core.grid import GridSpec, cells_near
+from semsig_gis.core.geometry import GridSpec, bearings, cells_near, wrap_degrees
 from semsig_gis.core.rtree import PackedIndex
 from semsig_gis.core.signature import SignatureSpec
 from semsig_gis.core.taxonomy import Taxonomy
 from semsig_gis.database import build
 from semsig_gis.database.build import build_cells, build_database, visible_objects
 from semsig_gis.database.file import open_database, save_database
-from semsig_gis.database.viewpoints import ViewpointSpec
-from semsig_gis.database.visibility import Sightings
+from semsig_gis.database.views import Sightings, ViewpointSpec
 
 if TYPE_CHECKING:
     from pathlib import Path

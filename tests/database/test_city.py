@@ -15,7 +15,7 @@ from sentences import assert_sentence, refused
 from worlds import assert_same
 
 from semsig_gis.core.errors import DatabaseError, InputError
-from semsig_gis.database.city import City, open_city
+from semsig_gis.database.city import City, ObjectStore, open_city, open_store, save_with_store
 from semsig_gis.database.file import (
     PartitionedDatabase,
     built_digest,
@@ -25,7 +25,6 @@ from semsig_gis.database.file import (
     read_manifest,
     save_database,
 )
-from semsig_gis.database.store import ObjectStore, open_store, save_with_store
 
 if TYPE_CHECKING:
     from pathlib import Path

@@ -14,11 +14,11 @@ from worlds import ARRAYS, CODES, TAXONOMY, assert_same
 
 import semsig_gis
 from semsig_gis.core.errors import DatabaseError, InputError
-from semsig_gis.core.grid import GridSpec
+from semsig_gis.core.geometry import GridSpec
 from semsig_gis.core.signature import SignatureSpec
 from semsig_gis.database.database import SequenceTable, checked_sequence, join_databases
 from semsig_gis.database.file import open_database, save_database
-from semsig_gis.database.viewpoints import ViewpointSpec
+from semsig_gis.database.views import ViewpointSpec
 
 if TYPE_CHECKING:
     from pathlib import Path

@@ -16,7 +16,7 @@ from worlds import CORNER, lamps, surroundings, worlds
 from semsig_gis.core.errors import EmptyResultError
 from semsig_gis.database.build import build_database
 from semsig_gis.database.properties import database_summary
-from semsig_gis.database.viewpoints import ViewpointSpec
+from semsig_gis.database.views import ViewpointSpec
 
 if TYPE_CHECKING:
     from worlds import World

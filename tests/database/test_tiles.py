@@ -24,7 +24,7 @@ from semsig_gis.core.errors import (
     InputError,
     SourceError,
 )
-from semsig_gis.core.grid import GridSpec
+from semsig_gis.core.geometry import GridSpec
 from semsig_gis.core.signature import SignatureSpec
 from semsig_gis.database.build import build_database
 from semsig_gis.database.file import MANIFEST, open_database, part_name, save_database
@@ -41,8 +41,8 @@ from semsig_gis.database.tiles import (
     publish,
     touched_tiles,
 )
-from semsig_gis.database.viewpoints import ViewpointSpec
-from semsig_gis.objects.surroundings import read_surroundings, save_surroundings
+from semsig_gis.database.views import ViewpointSpec
+from semsig_gis.objects.load import read_surroundings, save_surroundings
 from semsig_gis.objects.table import open_objects, save_objects
 
 if TYPE_CHECKING:
@@ -50,7 +50,7 @@ if TYPE_CHECKING:
     from semsig_gis.database.database import SignatureDatabase
     from semsig_gis.database.file import Part
     from semsig_gis.database.tiles import TilePlan
-    from semsig_gis.database.viewpoints import Mode
+    from semsig_gis.database.views import Mode
 
 
 def placed(*shapes: shapely.Geometry, **columns: object) -> gpd.GeoDataFrame:

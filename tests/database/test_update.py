@@ -16,16 +16,16 @@ from sentences import refused
 from worlds import CODES, CORNER, TAXONOMY, assert_same, surroundings
 
 from semsig_gis.core.errors import CrsError, DatabaseError, EmptyResultError, InputError
-from semsig_gis.core.grid import GridSpec
+from semsig_gis.core.geometry import GridSpec
 from semsig_gis.core.rtree import ObjectIndex
 from semsig_gis.core.taxonomy import ObjectClass, Taxonomy
-from semsig_gis.database import store as store_module
+from semsig_gis.database import city as store_module
 from semsig_gis.database.build import build_database
+from semsig_gis.database.city import ObjectStore, open_store, save_with_store
 from semsig_gis.database.database import ENTRY_ARRAYS
 from semsig_gis.database.file import open_database, store_path
-from semsig_gis.database.store import ObjectStore, open_store, save_with_store
 from semsig_gis.database.update import UpdateReport, compare_cells, update_database, update_file
-from semsig_gis.database.viewpoints import ViewpointSpec
+from semsig_gis.database.views import ViewpointSpec
 from semsig_gis.objects.changes import ClassChange
 from semsig_gis.objects.load import assemble, choose_layers, read_files
 from semsig_gis.objects.table import Licence, StreetObjects
@@ -38,7 +38,7 @@ if TYPE_CHECKING:
     from worlds import World
 
     from semsig_gis.database.database import SignatureDatabase
-    from semsig_gis.database.viewpoints import Mode
+    from semsig_gis.database.views import Mode
     from semsig_gis.objects.load import Loaded
 
 # Two classes that are seen from further than the others, and one from nearer.

@@ -11,13 +11,13 @@ from hypothesis import strategies as st
 from sentences import refused
 
 from semsig_gis.core.errors import InputError
-from semsig_gis.core.grid import GridSpec
-from semsig_gis.database import viewpoints
+from semsig_gis.core.geometry import GridSpec
+from semsig_gis.database import views as viewpoints
 from semsig_gis.database.occlusion import Footprints
-from semsig_gis.database.viewpoints import ViewpointSpec, choose_viewpoints
+from semsig_gis.database.views import ViewpointSpec, choose_viewpoints
 
 if TYPE_CHECKING:
-    from semsig_gis.database.viewpoints import Mode
+    from semsig_gis.database.views import Mode
 
 GRID = GridSpec(step=10.0)
 CELLS = tuple(part.ravel() for part in np.meshgrid(np.arange(10), np.arange(10), indexing="ij"))

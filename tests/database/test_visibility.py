@@ -7,8 +7,9 @@ from worlds import CODES, CORNER, World, lamps, worlds
 
 from semsig_gis.core.errors import EmptyResultError
 from semsig_gis.core.rtree import ObjectIndex, StoredIndex
+from semsig_gis.database.database import views_in
 from semsig_gis.database.occlusion import Footprints
-from semsig_gis.database.visibility import views_at, views_in
+from semsig_gis.database.views import views_at
 
 
 @given(worlds())

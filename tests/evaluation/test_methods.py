@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from worlds import random_town
 
-from semsig_gis.database.store import ObjectStore
+from semsig_gis.database.city import ObjectStore
 from semsig_gis.evaluation.methods import make_locator, parse_method
 from semsig_gis.likelihood.index import build_index
 from semsig_gis.likelihood.locate import locate

@@ -23,7 +23,7 @@ from sentences import refused
 from worlds import CORNER, World, random_town
 
 from semsig_gis.core.errors import DatabaseError, InputError, SemsigError
-from semsig_gis.database.store import ObjectStore, save_with_store
+from semsig_gis.database.city import ObjectStore, save_with_store
 from semsig_gis.evaluation.evaluate import evaluate, score_queries
 from semsig_gis.evaluation.spec import Districts, parse_experiment
 from semsig_gis.experiments.run import (

@@ -34,17 +34,17 @@ from small_city import chances_of, small_city, small_evaluation, small_localizat
 from worlds import CORNER, World, assert_same
 
 from semsig_gis.core.errors import DatabaseError, EmptyResultError, InputError
-from semsig_gis.core.grid import GridSpec
+from semsig_gis.core.geometry import GridSpec
 from semsig_gis.core.signature import SignatureSpec, quantize
 from semsig_gis.core.signs import class_signs
 from semsig_gis.core.taxonomy import ObjectClass, Taxonomy
 from semsig_gis.database.build import build_database
-from semsig_gis.database.viewpoints import ViewpointSpec
+from semsig_gis.database.views import ViewpointSpec
 from semsig_gis.evaluation.identify.result import Identifiability
 from semsig_gis.exports import export_answer, export_database
 from semsig_gis.exports.geopackage import read_geopackage
-from semsig_gis.exports.styles import CLASS_MARKERS, by_class
-from semsig_gis.objects.clean import build_objects
+from semsig_gis.exports.layers import CLASS_MARKERS, by_class
+from semsig_gis.objects.load import build_objects
 from semsig_gis.objects.table import Licence, StreetObjects, open_objects, save_objects
 from semsig_gis.sources.catalog import paper_taxonomy
 from semsig_gis.sources.synthetic.city import CitySpec, synthetic_city

@@ -15,7 +15,7 @@ from six_cells import six_cells
 from small_city import small_city, small_localization, small_location
 
 from semsig_gis.core.errors import InputError
-from semsig_gis.core.grid import GridSpec
+from semsig_gis.core.geometry import GridSpec
 from semsig_gis.exports.regions import search_regions
 from semsig_gis.likelihood.posterior import Posterior
 

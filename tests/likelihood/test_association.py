@@ -25,7 +25,7 @@ from worlds import CODES, World
 
 from semsig_gis.core.rtree import ObjectIndex
 from semsig_gis.core.signature import Signature
-from semsig_gis.database.visibility import views_in
+from semsig_gis.database.database import views_in
 from semsig_gis.likelihood.association import (
     Pairs,
     align_cells,

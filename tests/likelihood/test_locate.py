@@ -16,10 +16,9 @@ from worlds import CODES, CORNER, World, random_town
 
 from semsig_gis.core.rtree import ObjectIndex
 from semsig_gis.core.signature import Signature
+from semsig_gis.database.city import ObjectStore
 from semsig_gis.database.occlusion import Footprints
-from semsig_gis.database.store import ObjectStore
-from semsig_gis.database.visibility import views_at
-from semsig_gis.likelihood.answer_rule import AnswerRule
+from semsig_gis.database.views import views_at
 from semsig_gis.likelihood.index import build_index
 from semsig_gis.likelihood.locate import (
     PlaceEstimate,
@@ -29,9 +28,8 @@ from semsig_gis.likelihood.locate import (
     refined_estimate,
 )
 from semsig_gis.likelihood.noise.model import NoiseSpec, cell_noise, named_noise
-from semsig_gis.likelihood.posterior import Posterior, posterior
+from semsig_gis.likelihood.posterior import AnswerRule, Posterior, Refinement, posterior, refine
 from semsig_gis.likelihood.priors import position_prior
-from semsig_gis.likelihood.refine import Refinement, refine
 from semsig_gis.likelihood.route import Leg
 
 if TYPE_CHECKING:

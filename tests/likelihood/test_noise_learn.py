@@ -17,7 +17,7 @@ from worlds import CODES, World
 from semsig_gis.core.errors import InputError
 from semsig_gis.core.signature import Signature
 from semsig_gis.core.statistics import wilson_interval
-from semsig_gis.database.visibility import views_in
+from semsig_gis.database.database import views_in
 from semsig_gis.likelihood.noise.fit import (
     ALL,
     drawn_rates,

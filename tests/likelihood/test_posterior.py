@@ -16,8 +16,7 @@ from noisy_cells import random_database
 from sentences import refused
 
 from semsig_gis.core.errors import CrsError, InputError
-from semsig_gis.likelihood.answer_rule import AnswerRule, calibrate, open_rule, save_rule
-from semsig_gis.likelihood.posterior import posterior
+from semsig_gis.likelihood.posterior import AnswerRule, calibrate, open_rule, posterior, save_rule
 from semsig_gis.likelihood.priors import area_prior, position_prior, raster_prior, weight_prior
 from semsig_gis.likelihood.route import LOST, Leg, moved_chances, route_posteriors
 

@@ -13,8 +13,7 @@ from sentences import refused
 
 from semsig_gis.core.errors import InputError
 from semsig_gis.core.signature import Signature
-from semsig_gis.database.store import ObjectStore
-from semsig_gis.likelihood.answer_rule import AnswerRule, calibrate
+from semsig_gis.database.city import ObjectStore
 from semsig_gis.likelihood.association import align_cells, rerank
 from semsig_gis.likelihood.explain import explain_cell
 from semsig_gis.likelihood.index import CellScores, build_index
@@ -22,9 +21,8 @@ from semsig_gis.likelihood.locate import locate
 from semsig_gis.likelihood.noise.learn import Sample, learn_noise
 from semsig_gis.likelihood.noise.model import NoiseSpec, cell_noise, named_noise, place_noise
 from semsig_gis.likelihood.noise.table import noise_tables
-from semsig_gis.likelihood.posterior import posterior
+from semsig_gis.likelihood.posterior import AnswerRule, calibrate, posterior, refine
 from semsig_gis.likelihood.priors import area_prior, position_prior, weight_prior
-from semsig_gis.likelihood.refine import refine
 from semsig_gis.likelihood.route import Leg, route_posteriors
 
 if TYPE_CHECKING:

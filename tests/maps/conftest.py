@@ -10,7 +10,7 @@ from map_pages import MapPage, assert_quiet
 from semsig_gis.database.build import build_database
 from semsig_gis.evaluation.evaluate import evaluate
 from semsig_gis.maps.evaluation import evaluation_map
-from semsig_gis.objects.clean import build_objects
+from semsig_gis.objects.load import build_objects
 from semsig_gis.sources.catalog import paper_taxonomy
 from semsig_gis.sources.synthetic.city import CitySpec, synthetic_city
 

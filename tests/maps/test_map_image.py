@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 from PIL import Image
 from pyproj import CRS, Transformer
 
-from semsig_gis.core.grid import GridSpec
+from semsig_gis.core.geometry import GridSpec
 from semsig_gis.core.signature import SignatureSpec
 from semsig_gis.database.database import SignatureDatabase
 from semsig_gis.maps import image as map_image

@@ -15,7 +15,7 @@ from worlds import random_town
 
 from semsig_gis.core.signature import Signature
 from semsig_gis.core.signs import CANDIDATE_RAMP, FAILED, SUCCESSFUL, VERDICTS
-from semsig_gis.database.store import ObjectStore
+from semsig_gis.database.city import ObjectStore
 from semsig_gis.likelihood.index import build_index
 from semsig_gis.likelihood.locate import locate
 from semsig_gis.likelihood.noise.model import cell_noise, named_noise

@@ -17,7 +17,7 @@ from worlds import CODES, TAXONOMY
 from semsig_gis.core.errors import CrsError, InputError
 from semsig_gis.core.taxonomy import ObjectClass, Taxonomy
 from semsig_gis.objects.changes import compare_objects, replace_layers
-from semsig_gis.objects.clean import build_objects
+from semsig_gis.objects.load import build_objects
 from semsig_gis.objects.table import Licence, StreetObjects, open_objects, save_objects
 
 if TYPE_CHECKING:

@@ -15,8 +15,8 @@ from hypothesis import strategies as st
 from sentences import refused
 
 from semsig_gis.core.errors import InputError, UnknownNameError
-from semsig_gis.objects.clean import build_objects
 from semsig_gis.objects.conflate import ConflatedPair, ConflationReport, conflate
+from semsig_gis.objects.load import build_objects
 from semsig_gis.objects.table import Licence, StreetObjects, open_objects, save_objects
 from semsig_gis.sources.catalog import load_catalog, paper_taxonomy
 from semsig_gis.sources.vector import read_layer

@@ -10,15 +10,14 @@ from raw_layers import raw_layer
 from sentences import refused
 from servers import Answer, Server
 
-from semsig_gis.core.crs import MERGED
 from semsig_gis.core.errors import CrsError, EmptyResultError, InputError, SourceError
+from semsig_gis.core.geometry import MERGED
 from semsig_gis.database.build import build_database
 from semsig_gis.database.file import open_database, save_database
 from semsig_gis.objects.fetch import fetch_layers, find_area, open_cache
 from semsig_gis.objects.load import assemble, choose_layers, metric_crs_of, read_files
 from semsig_gis.objects.table import open_objects, save_objects
-from semsig_gis.sources.catalog import Catalog, load_catalog, paper_taxonomy
-from semsig_gis.sources.layers import LayerSpec
+from semsig_gis.sources.catalog import Catalog, LayerSpec, load_catalog, paper_taxonomy
 from semsig_gis.sources.osm import file as osm_file
 
 if TYPE_CHECKING:

@@ -13,11 +13,10 @@ from hypothesis import strategies as st
 from pyproj import CRS
 from raw_layers import raw_layer
 
-from semsig_gis.objects.clean import build_objects
 from semsig_gis.objects.conflate import conflate
-from semsig_gis.objects.load import choose_layers
-from semsig_gis.objects.quality import quality_report
+from semsig_gis.objects.load import build_objects, choose_layers
 from semsig_gis.objects.table import StreetObjects
+from semsig_gis.reports.quality import quality_report
 from semsig_gis.sources import RowCounts, find_files
 from semsig_gis.sources.catalog import load_catalog, paper_taxonomy
 from semsig_gis.sources.vector import read_layer
@@ -26,8 +25,8 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
     from pathlib import Path
 
-    from semsig_gis.objects.clean import LoadReport
-    from semsig_gis.objects.quality import QualityReport
+    from semsig_gis.objects.load import LoadReport
+    from semsig_gis.reports.quality import QualityReport
     from semsig_gis.sources import RawLayer
 
 TAXONOMY = paper_taxonomy()

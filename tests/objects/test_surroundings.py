@@ -9,7 +9,7 @@ from osm_xml import node, way, write_osm
 from sentences import refused
 
 from semsig_gis.core.errors import InputError, SourceError
-from semsig_gis.objects.surroundings import (
+from semsig_gis.objects.load import (
     licenses_of,
     read_area,
     read_surroundings,

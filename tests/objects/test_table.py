@@ -21,7 +21,7 @@ from raw_layers import raw_layer
 from sentences import assert_sentence, refused
 
 from semsig_gis.core.errors import CrsError, DatabaseError, EmptyResultError, UnknownNameError
-from semsig_gis.objects.clean import build_objects
+from semsig_gis.objects.load import build_objects
 from semsig_gis.objects.table import Licence, objects_specs, open_objects, save_objects
 from semsig_gis.sources import RowCounts
 from semsig_gis.sources.catalog import load_catalog, paper_taxonomy

@@ -23,9 +23,9 @@ from machine import unavailable
 
 import semsig_gis
 from semsig_gis.database.build import build_database
+from semsig_gis.database.city import ObjectStore, save_with_store
 from semsig_gis.database.file import open_database
-from semsig_gis.database.store import ObjectStore, save_with_store
-from semsig_gis.objects.clean import build_objects
+from semsig_gis.objects.load import build_objects
 from semsig_gis.objects.table import open_objects, save_objects
 from semsig_gis.sources.catalog import paper_taxonomy
 from semsig_gis.sources.synthetic.city import CitySpec, synthetic_city

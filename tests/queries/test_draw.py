@@ -14,8 +14,8 @@ from worlds import CORNER, TAXONOMY, World, random_town
 from semsig_gis.core.errors import InputError
 from semsig_gis.core.taxonomy import Taxonomy
 from semsig_gis.database.build import build_database
-from semsig_gis.database.store import ObjectStore
-from semsig_gis.database.viewpoints import ViewpointSpec
+from semsig_gis.database.city import ObjectStore
+from semsig_gis.database.views import ViewpointSpec
 from semsig_gis.objects.load import assemble, choose_layers, read_files
 from semsig_gis.queries.chain import parse_chain
 from semsig_gis.queries.draw import QuerySpec, draw_queries

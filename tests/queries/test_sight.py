@@ -6,7 +6,7 @@ from hypothesis import strategies as st
 from noisy_cells import random_database
 from sights import CITY, REACH, rows, seeds, sight, sights
 
-from semsig_gis.database.database import BEARING_UNITS
+from semsig_gis.core.signature import BEARING_UNITS
 from semsig_gis.queries.sight import CitySights, Sight
 
 

@@ -17,7 +17,7 @@ from worlds import random_town
 
 from semsig_gis.core.statistics import wilson_interval
 from semsig_gis.database.update import UpdateReport
-from semsig_gis.database.viewpoints import ViewpointSpec
+from semsig_gis.database.views import ViewpointSpec
 from semsig_gis.evaluation.evaluate import evaluate
 from semsig_gis.evaluation.identify.check import (
     ChanceBin,
@@ -31,9 +31,8 @@ from semsig_gis.likelihood.method import LikelihoodMethod
 from semsig_gis.likelihood.noise.model import named_noise
 from semsig_gis.matching.method import Method
 from semsig_gis.objects.changes import ClassChange
-from semsig_gis.objects.clean import LayerReport
 from semsig_gis.objects.conflate import ConflatedPair
-from semsig_gis.objects.quality import ClassQuality, QualityReport
+from semsig_gis.objects.load import LayerReport
 from semsig_gis.queries.chain import parse_chain
 from semsig_gis.queries.draw import QuerySpec
 from semsig_gis.reports.database import database_tables
@@ -50,7 +49,7 @@ from semsig_gis.reports.identifiability import (
     identifiability_tables,
 )
 from semsig_gis.reports.page import write_report
-from semsig_gis.reports.quality import quality_tables, update_tables
+from semsig_gis.reports.quality import ClassQuality, QualityReport, quality_tables, update_tables
 from semsig_gis.sources import RowCounts
 
 if TYPE_CHECKING:

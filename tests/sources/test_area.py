@@ -16,7 +16,7 @@ from sentences import refused
 from semsig_gis.core.errors import InputError, SemsigError
 from semsig_gis.sources import RawLayer, RowCounts
 from semsig_gis.sources.area import clip_layer, join_areas, names_place, parse_area
-from semsig_gis.sources.layers import LayerSpec
+from semsig_gis.sources.catalog import LayerSpec
 
 if TYPE_CHECKING:
     from pathlib import Path

@@ -17,12 +17,14 @@ from semsig_gis.core.taxonomy import ObjectClass
 from semsig_gis.sources import FILE_SUFFIXES, find_files
 from semsig_gis.sources.catalog import (
     Catalog,
+    ClassBy,
+    LayerSpec,
+    WidthBy,
     catalog_names,
     combine_catalogs,
     load_catalog,
     paper_taxonomy,
 )
-from semsig_gis.sources.layers import ClassBy, LayerSpec, WidthBy
 from semsig_gis.sources.vector import DRIVERS
 
 if TYPE_CHECKING:

@@ -25,7 +25,7 @@ from servers import Answer, published
 
 from semsig_gis.core.errors import CatalogError, CrsError, SourceError
 from semsig_gis.sources.area import Area
-from semsig_gis.sources.layers import ClassBy, LayerSpec
+from semsig_gis.sources.catalog import ClassBy, LayerSpec
 from semsig_gis.sources.opendatasoft.reader import (
     _outline,
     fetch_layers,

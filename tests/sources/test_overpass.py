@@ -20,9 +20,8 @@ from servers import Answer
 
 from semsig_gis.core.errors import CatalogError, InputError, SourceError
 from semsig_gis.sources.area import Area, parse_area
-from semsig_gis.sources.catalog import load_catalog
+from semsig_gis.sources.catalog import ANY_VALUE, LayerSpec, load_catalog
 from semsig_gis.sources.http.fetch import HttpError, HttpSpec, NotCachedError
-from semsig_gis.sources.layers import ANY_VALUE, LayerSpec
 from semsig_gis.sources.osm import file as osm_file
 from semsig_gis.sources.osm.overpass import (
     fetch_layers,

@@ -19,7 +19,7 @@ from sentences import refused
 
 from semsig_gis.core.errors import CatalogError
 from semsig_gis.sources import reader
-from semsig_gis.sources.layers import LayerSpec, WidthBy
+from semsig_gis.sources.catalog import LayerSpec, WidthBy
 from semsig_gis.sources.raw_layer import (
     BETWEEN_SLASHES,
     RowRules,

@@ -13,7 +13,7 @@ from rasterio.transform import Affine
 from sentences import assert_sentence
 
 from semsig_gis.core.errors import CrsError, InputError, SourceError
-from semsig_gis.core.grid import GridSpec
+from semsig_gis.core.geometry import GridSpec
 from semsig_gis.storage.raster import raster_at_cells
 
 if TYPE_CHECKING:

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from semsig_gis.core.errors import InputError
-from semsig_gis.core.grid import cell_ids
+from semsig_gis.core.geometry import cell_ids
 from semsig_gis.likelihood.index import BIN_UNITS, BINS
 
 if TYPE_CHECKING:

@@ -17,18 +17,17 @@ import numpy as np
 from semsig_gis.core.errors import DatabaseError, InputError
 from semsig_gis.core.parallel import check_workers
 from semsig_gis.database.build import build_database
-from semsig_gis.database.city import City
+from semsig_gis.database.city import City, ObjectStore, save_with_store
 from semsig_gis.database.file import open_database, save_database
 from semsig_gis.database.properties import database_summary
-from semsig_gis.database.store import ObjectStore, save_with_store
-from semsig_gis.database.viewpoints import ViewpointSpec
+from semsig_gis.database.views import ViewpointSpec
 from semsig_gis.evaluation.evaluate import versions
 from semsig_gis.evaluation.methods import parse_method
 from semsig_gis.evaluation.spec import ExperimentSpec
 from semsig_gis.experiments.run import run_experiments
 from semsig_gis.matching.method import Method
 from semsig_gis.matching.scores import score_cells
-from semsig_gis.objects.clean import build_objects
+from semsig_gis.objects.load import build_objects
 from semsig_gis.queries.chain import parse_chain
 from semsig_gis.queries.draw import QuerySpec, check_count
 from semsig_gis.reports import paris

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
     from semsig_gis.core.signature import Signature
     from semsig_gis.core.taxonomy import Taxonomy
-    from semsig_gis.database.visibility import Views
+    from semsig_gis.database.views import Views
     from semsig_gis.likelihood.association import Pairs
 
 

@@ -10,12 +10,12 @@ import numpy as np
 import pandas as pd
 
 from semsig_gis.core.errors import InputError
-from semsig_gis.core.grid import cell_ids
+from semsig_gis.core.geometry import cell_ids
 from semsig_gis.core.rtree import ObjectIndex
 from semsig_gis.core.signature import Signature
 from semsig_gis.core.taxonomy import WILDCARD
-from semsig_gis.database.database import SignatureDatabase
-from semsig_gis.database.visibility import views_at, views_in
+from semsig_gis.database.database import SignatureDatabase, views_in
+from semsig_gis.database.views import views_at
 from semsig_gis.likelihood.noise.fit import (
     ALL,
     estimated_rates,
@@ -36,7 +36,7 @@ if TYPE_CHECKING:
 
     from semsig_gis.core.taxonomy import Taxonomy
     from semsig_gis.database.occlusion import Footprints
-    from semsig_gis.database.visibility import Views
+    from semsig_gis.database.views import Views
     from semsig_gis.likelihood.noise.fit import Evidence
     from semsig_gis.likelihood.noise.table import NoiseTable
     from semsig_gis.objects.table import StreetObjects
@@ -51,7 +51,7 @@ class Sample:
     """What was detected, perhaps nothing, at a known place.
 
     The place is either `xy`, in metres in the CRS of the city, or `cell_id` (see
-    `core.grid.cell_ids`). The signature must have types, all known, and bearings.
+    `core.geometry.cell_ids`). The signature must have types, all known, and bearings.
     """
 
     signature: Signature

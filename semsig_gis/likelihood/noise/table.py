@@ -13,9 +13,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from semsig_gis.core.errors import InputError, nearest_name
+from semsig_gis.core.signature import BEARING_UNITS, DISTANCE_UNITS
 from semsig_gis.core.taxonomy import WILDCARD
 from semsig_gis.database.answer import check_query
-from semsig_gis.database.database import BEARING_UNITS, DISTANCE_UNITS
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from semsig_gis.core.signature import Signature
     from semsig_gis.core.taxonomy import Taxonomy
     from semsig_gis.database.database import SignatureDatabase
-    from semsig_gis.database.visibility import Views
+    from semsig_gis.database.views import Views
     from semsig_gis.likelihood.noise.model import Noise, NoiseSpec
 
 # No chance is quite nought or one: a model that excludes something is wrong one day, and then

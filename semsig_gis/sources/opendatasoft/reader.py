@@ -16,8 +16,8 @@ from shapely.errors import ShapelyError
 
 from semsig_gis.core.errors import CatalogError, SourceError
 from semsig_gis.sources import vector as vector_file
+from semsig_gis.sources.catalog import ClassBy
 from semsig_gis.sources.http.fetch import DEFAULT_HTTP, HttpError, fetch
-from semsig_gis.sources.layers import ClassBy
 from semsig_gis.sources.opendatasoft.table import open_table
 from semsig_gis.sources.raw_layer import (
     WGS84,
@@ -36,9 +36,9 @@ if TYPE_CHECKING:
 
     from semsig_gis.sources import RawLayer
     from semsig_gis.sources.area import Area
+    from semsig_gis.sources.catalog import LayerSpec
     from semsig_gis.sources.http.cache import Cache, Fetched
     from semsig_gis.sources.http.fetch import HttpSpec
-    from semsig_gis.sources.layers import LayerSpec
     from semsig_gis.sources.opendatasoft.table import Record, Table
     from semsig_gis.sources.raw_layer import Position
 

@@ -17,6 +17,7 @@ import shapely
 
 from semsig_gis.core.errors import InputError, SourceError
 from semsig_gis.sources.area import Area, join_areas
+from semsig_gis.sources.catalog import ANY_VALUE
 from semsig_gis.sources.http.fetch import (
     DEFAULT_HTTP,
     HttpError,
@@ -26,7 +27,6 @@ from semsig_gis.sources.http.fetch import (
     host_of,
     read_text,
 )
-from semsig_gis.sources.layers import ANY_VALUE
 from semsig_gis.sources.osm.elements import (
     ElementLayer,
     TagIndex,
@@ -42,9 +42,9 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from semsig_gis.sources import RawLayer
+    from semsig_gis.sources.catalog import LayerSpec
     from semsig_gis.sources.http.cache import Cache
     from semsig_gis.sources.http.fetch import HttpSpec
-    from semsig_gis.sources.layers import LayerSpec
     from semsig_gis.sources.raw_layer import Position
 
 JSON = ("application/json",)

@@ -15,10 +15,10 @@ import numpy as np
 import pandas as pd
 import shapely
 
-from semsig_gis.core.crs import CLASS_NAME, SOURCE_ID
 from semsig_gis.core.errors import InputError
+from semsig_gis.core.geometry import CLASS_NAME, SOURCE_ID
 from semsig_gis.sources import RawLayer, RowCounts
-from semsig_gis.sources.layers import LayerSpec
+from semsig_gis.sources.catalog import LayerSpec
 from semsig_gis.sources.synthetic.streets import CLASSES, furnish, lay_streets
 
 if TYPE_CHECKING:
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from semsig_gis.sources.layers import GeometryKind, Role
+    from semsig_gis.sources.catalog import GeometryKind, Role
     from semsig_gis.sources.synthetic.streets import Network
 
     Ints = NDArray[np.int64]
