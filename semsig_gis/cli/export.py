@@ -62,19 +62,23 @@ def export(
 ) -> None:
     """Export cells, objects and queries for QGIS and other programs."""
     from semsig_gis.database.city import open_city
-    from semsig_gis.evaluation.file import open_evaluation
     from semsig_gis.exports import export_database
     from semsig_gis.objects.table import open_objects
 
     keep_inputs(out, read=(database, objects))
     city = open_city(database)
+    queries = None
+    if evaluation is not None:
+        from semsig_gis.evaluation.file import open_evaluation
+
+        queries = open_evaluation(evaluation)
     with progress(f"writing {out.name}") as advance:
         export_database(
             city.database,
             out,
             layers=layer or (),
             objects=None if objects is None else open_objects(objects),
-            evaluation=None if evaluation is None else open_evaluation(evaluation),
+            evaluation=queries,
             identifiability=known_identifiability(city),
             geometry=None if geometry is None else geometry.value,
             progress=advance,

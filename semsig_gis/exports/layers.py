@@ -27,8 +27,7 @@ from semsig_gis.core.geometry import (
     SOURCE_ID,
 )
 from semsig_gis.core.signature import BEARING_UNITS, DISTANCE_UNITS
-from semsig_gis.core.signs import ERROR_RAMP, FAILED, FOUND_RAMP, SUCCESSFUL, class_signs
-from semsig_gis.core.text import one_line
+from semsig_gis.core.signs import ERROR_RAMP, FAILED, FOUND_RAMP, SUCCESSFUL, class_signs, one_line
 from semsig_gis.database.file import database_specs
 from semsig_gis.evaluation.identify.result import identifiability_facts
 from semsig_gis.evaluation.result import SUCCESS_METRES, SUCCESS_PROBABILITY

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from semsig_gis.core.errors import InputError, UnknownNameError, nearest_name
-from semsig_gis.core.text import plain_number
 from semsig_gis.likelihood.noise.model import NOISES
 
 if TYPE_CHECKING:
@@ -93,6 +92,6 @@ class LikelihoodMethod:
         parts = [LIKELIHOOD, self.noise.name]
         parts += [name for name in ("refined", "on_grid") if getattr(self, name)]
         if self.north_sigma:
-            known = math.isfinite(self.north_sigma)
-            parts.append(f"heading={plain_number(self.north_sigma) if known else 'unknown'}")
+            heading = str(self.north_sigma).removesuffix(".0")
+            parts.append(f"heading={heading if math.isfinite(self.north_sigma) else 'unknown'}")
         return ":".join(parts)

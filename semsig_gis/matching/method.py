@@ -6,7 +6,6 @@ from dataclasses import astuple, dataclass, field
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from semsig_gis.core.errors import InputError, SemsigError
-from semsig_gis.core.text import plain_number
 from semsig_gis.matching.metrics import metric
 from semsig_gis.matching.metrics.edit import EditWeights
 
@@ -129,9 +128,9 @@ class Method:
         else:
             parts = [f"{part}:{name}" for part, name in self.measures.items()]
         if self.keep is not None:
-            parts.append(f"{plain_number(self.keep)}%")
+            parts.append(f"{str(self.keep).removesuffix('.0')}%")
         if self.alpha != Method.__dataclass_fields__["alpha"].default:
-            parts.append(f"alpha={plain_number(self.alpha)}")
+            parts.append(f"alpha={str(self.alpha).removesuffix('.0')}")
         if not self.normalized:
             parts.append("raw")
         if self.weights != EditWeights():

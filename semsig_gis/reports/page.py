@@ -17,7 +17,7 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 
 from semsig_gis import __version__
 from semsig_gis.core.errors import InputError
-from semsig_gis.core.text import escaped, one_line
+from semsig_gis.core.signs import escaped, one_line
 from semsig_gis.reports.plots import draw_plot
 from semsig_gis.reports.scenes import draw_scene
 from semsig_gis.reports.tables import Table, markdown_rows, number_table

@@ -20,7 +20,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
-from semsig_gis.core.text import one_line
+from semsig_gis.core.signs import one_line
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence

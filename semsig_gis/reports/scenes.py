@@ -15,8 +15,7 @@ from matplotlib.patches import Circle
 from matplotlib.path import Path
 from pyproj import Transformer
 
-from semsig_gis.core.signs import ClassSign, class_signs
-from semsig_gis.core.text import one_line
+from semsig_gis.core.signs import ClassSign, class_signs, one_line
 from semsig_gis.queries.sight import Sight
 from semsig_gis.reports.parts import Scene, SceneObject
 from semsig_gis.reports.plots import INK, WHITE, blank_figure, draw_legend, label, saved

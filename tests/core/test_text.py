@@ -5,7 +5,7 @@ import json
 from hypothesis import given
 from hypothesis import strategies as st
 
-from semsig_gis.core.text import escaped, one_line
+from semsig_gis.core.signs import escaped, one_line
 
 
 def test_text_from_data_breaks_no_markdown() -> None:
