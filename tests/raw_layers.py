@@ -25,6 +25,7 @@ def raw_layer(
     filtered: int = 0,
     unreadable: int = 0,
     notes: tuple[str, ...] = (),
+    unique_id: bool = False,
 ) -> RawLayer:
     """Return a layer as a reader would."""
     size = len(geometries)
@@ -42,6 +43,7 @@ def raw_layer(
             class_name=names[0] if names else "alignment_tree",
             license="CC0",
             attribution=attribution,
+            unique_id=unique_id,
         ),
         table=table,
         counts=RowCounts(

@@ -24,12 +24,36 @@ from semsig_gis.sources.catalog import load_catalog
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from semsig_gis.core.taxonomy import Taxonomy
     from semsig_gis.database.database import SignatureDatabase
 
 TAXONOMY = load_catalog("montpellier").taxonomy
 CORNER = np.array([765_200.0, 6_275_000.0])
 CODES = [item.code for item in TAXONOMY.classes]
+Thing = tuple[float, float, int, str, str]  # x, y, class code, source, id
+KINDS = {"class_code": np.uint8, "count": np.int32}
 ARRAYS = ("columns", "rows", "offsets", "codes", "bearing_units", "distance_units")
+
+
+def objects_of(
+    *things: Thing,
+    licenses: tuple[Licence, ...],
+    taxonomy: Taxonomy = TAXONOMY,
+    crs: str = "EPSG:2154",
+    **columns: Sequence[object],
+) -> StreetObjects:
+    """Return street objects with some columns beside those of a thing."""
+    x, y, codes, sources, ids = zip(*things, strict=True) if things else ((),) * 5
+    plain = {"class_code": codes, "source": sources, "source_id": ids, "count": [1] * len(things)}
+    table = gpd.GeoDataFrame(
+        {
+            name: np.array(values, KINDS.get(name, object))
+            for name, values in (plain | columns).items()
+        },
+        geometry=shapely.points(np.array(x, float), np.array(y, float)),
+        crs=crs,
+    )
+    return StreetObjects(table, taxonomy, licenses)
 
 
 @dataclass(frozen=True)
@@ -44,19 +68,8 @@ class World:
 
     @property
     def street_objects(self) -> StreetObjects:
-        x, y, codes = (np.array(part) for part in zip(*self.objects, strict=True))
-        size = len(self.objects)
-        table = gpd.GeoDataFrame(
-            {
-                "class_code": codes.astype(np.uint8),
-                "source": ["world"] * size,
-                "source_id": [str(row) for row in range(size)],
-                "count": np.ones(size, np.int32),
-            },
-            geometry=shapely.points(x.astype(float), y.astype(float)),
-            crs="EPSG:2154",
-        )
-        return StreetObjects(table, TAXONOMY, (Licence("World (CC0)", ("world",)),))
+        things = [(*one, "world", str(row)) for row, one in enumerate(self.objects)]
+        return objects_of(*things, licenses=(Licence("World (CC0)", ("world",)),))
 
     @property
     def database(self) -> SignatureDatabase:

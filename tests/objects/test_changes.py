@@ -2,53 +2,37 @@ from __future__ import annotations
 
 import dataclasses
 from collections import Counter
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
-import geopandas as gpd
 import numpy as np
 import pytest
-import shapely
 from hypothesis import given
 from hypothesis import strategies as st
-from raw_layers import raw_layer
 from sentences import refused
-from worlds import CODES, TAXONOMY
+from worlds import CODES, TAXONOMY, objects_of
 
 from semsig_gis.core.errors import CrsError, InputError
 from semsig_gis.core.taxonomy import ObjectClass, Taxonomy
 from semsig_gis.objects.changes import compare_objects, replace_layers
-from semsig_gis.objects.load import build_objects
-from semsig_gis.objects.table import Licence, StreetObjects, open_objects, save_objects
+from semsig_gis.objects.table import Licence, open_objects, save_objects
 
 if TYPE_CHECKING:
     from pathlib import Path
 
+    from worlds import Thing
+
     from semsig_gis.objects.changes import ObjectChanges
+    from semsig_gis.objects.table import StreetObjects
 
 TREE, FOUNTAIN, LAMP = CODES[:3]
 KINDS = ("same", "moved", "changed", "removed", "added")
-Thing = tuple[float, float, int, str, str]  # x, y, class code, source, id
 
 
-def table(
-    *things: Thing,
-    licenses: tuple[Licence, ...] = (Licence("City (CC0)", ("trees", "lamps")),),
-    taxonomy: Taxonomy = TAXONOMY,
-    merged: list[str] | None = None,
-    crs: str = "EPSG:2154",
-) -> StreetObjects:
-    x, y, codes, sources, ids = zip(*things, strict=True) if things else ((),) * 5
-    columns = {
-        "class_code": np.array(codes, np.uint8),
-        "source": np.array(sources, object),
-        "source_id": np.array(ids, object),
-        "count": np.ones(len(things), np.int32),
-    }
-    if merged is not None:
-        columns["merged"] = np.array(merged, object)
-    return StreetObjects(
-        gpd.GeoDataFrame(columns, geometry=shapely.points(x, y), crs=crs), taxonomy, licenses
-    )
+CITY = (Licence("City (CC0)", ("trees", "lamps")),)
+
+
+def table(*things: Thing, licenses: tuple[Licence, ...] = CITY, **more: Any) -> StreetObjects:  # noqa: ANN401
+    return objects_of(*things, licenses=licenses, **more)
 
 
 def rows_of(changes: ObjectChanges) -> tuple[list[object], ...]:
@@ -109,27 +93,22 @@ THINGS = st.lists(
 def test_every_row_is_told_of_once(before: list[Thing], now: list[Thing]) -> None:
     old, new = table(*before), table(*now)
     changes = compare_objects(old, new)
-    old_rows = [*changes.same[:, 0], *changes.gone]
-    new_rows = [*changes.same[:, 1], *changes.come]
-    assert sorted(old_rows) == list(range(len(old)))
-    assert sorted(new_rows) == list(range(len(new)))
+    assert sorted([*changes.same[:, 0], *changes.gone]) == list(range(len(old)))
+    assert sorted([*changes.same[:, 1], *changes.come]) == list(range(len(new)))
     # What is gone and has come is what differs in class and place, and no more.
     looks = [Counter(thing[:3] for thing in things) for things in (before, now)]
     assert Counter(before[row][:3] for row in changes.gone) == looks[0] - looks[1]
     assert Counter(now[row][:3] for row in changes.come) == looks[1] - looks[0]
+    names = [Counter(thing[3:] for thing in things) for things in (before, now)]
     for kind, alike in ((changes.moved, True), (changes.changed, False)):
         for row, other in kind:
-            assert before[row][3:] == now[other][3:]
-            assert before[row][4]
+            name = before[row][3:]
+            assert name == now[other][3:]
+            assert name[1]
             assert (before[row][2] == now[other][2]) == alike
-            for things, number in ((before, row), (now, other)):
-                assert [thing[3:] for thing in things].count(things[number][3:]) == 1
-    names = {before[row][3:] for row in changes.removed} & {now[row][3:] for row in changes.added}
-    for name in names:
-        assert (
-            not name[1]
-            or max([thing[3:] for thing in things].count(name) for things in (before, now)) > 1
-        )
+            assert names[0][name] == names[1][name] == 1
+    left = {before[row][3:] for row in changes.removed} & {now[row][3:] for row in changes.added}
+    assert all(not name[1] or names[0][name] > 1 or names[1][name] > 1 for name in left)
     for item in changes.classes:
         gains, losses = item.added + item.gained, item.removed + item.lost
         assert item.after == item.before + gains - losses
@@ -164,23 +143,18 @@ def test_layers_that_were_not_loaded_anew_stay() -> None:
 @pytest.mark.parametrize("name", ["parks, trees", "parks: trees", "A: parks, trees", ": trees, "])
 @pytest.mark.parametrize("has_objects", [True, False])
 def test_a_layer_may_have_any_name(tmp_path: Path, name: str, *, has_objects: bool) -> None:
-    def saved(file: str, **places: list[tuple[float, float]]) -> StreetObjects:
-        """Save a layer for each name, all of one publisher, and open them again."""
-        layers = [
-            raw_layer([shapely.Point(point) for point in points], name=name)
-            for name, points in places.items()
-        ]
-        objects, _ = build_objects(layers, taxonomy=TAXONOMY, crs="EPSG:2154")
-        save_objects(objects, tmp_path / file)
-        return open_objects(tmp_path / file)
+    def saved(*sources: str, layers: tuple[str, ...]) -> StreetObjects:
+        """Save an object of each source, and open them again."""
+        things = [(float(x), 0.0, TREE, source, str(x)) for x, source in enumerate(sources)]
+        licences = (Licence("Town (CC0)", layers),)
+        save_objects(table(*things, licenses=licences), tmp_path / "objects.parquet")
+        return open_objects(tmp_path / "objects.parquet")
 
-    city = saved("city.parquet", trees=[(0, 0), (1, 0)], parks=[(3, 0)], **{name: [(2.0, 0.0)]})
-    renewed: dict[str, list[tuple[float, float]]] = {name: [(5, 0)] if has_objects else []}
-    objects, kept, _ = replace_layers(city, saved("new.parquet", **renewed, lamps=[(9, 9)]))
+    city = saved("trees", "trees", "parks", name, layers=("trees", "parks", name))
+    new = [name] * has_objects + ["lamps"]
+    objects, kept, _ = replace_layers(city, saved(*new, layers=(name, "lamps")))
     assert kept == ("parks", "trees")
-    assert Counter(objects.table["source"]) == Counter(
-        {"trees": 2, "parks": 1, "lamps": 1} | ({name: 1} if has_objects else {})
-    )
+    assert Counter(objects.table["source"]) == Counter(["trees", "trees", "parks", *new])
 
 
 def test_all_layers_may_be_loaded_anew() -> None:
@@ -209,16 +183,11 @@ def test_what_may_be_twice_is_told() -> None:
 def test_a_licence_of_unknown_layers_renews_none() -> None:
     """Nothing is lost by it; and what may have stayed too long is told."""
     unclear = Licence("City (CC0): lamps, trees")
-    old = dataclasses.replace(OLD, licenses=(unclear,))
+    before = (Licence("Town (CC0)"),)
     new = table((4, 4, TREE, "trees", "5"), licenses=(unclear,))
-    objects, kept, notes = replace_layers(old, new)
-    assert (kept, objects.licenses) == (("lamps",), (unclear,))
+    objects, kept, notes = replace_layers(dataclasses.replace(OLD, licenses=before), new)
+    assert (kept, objects.licenses) == (("lamps",), (*before, unclear))
     assert "which layers 'City (CC0): lamps, trees' is about" in notes[0]
-
-
-def test_another_crs_is_refused() -> None:
-    with refused(CrsError, "EPSG:32631", "EPSG:2154", "--metric-crs"):
-        replace_layers(OLD, table((0, 0, TREE, "trees", "1"), crs="EPSG:32631"))
 
 
 def changed(**values: object) -> Taxonomy:
@@ -227,34 +196,38 @@ def changed(**values: object) -> Taxonomy:
 
 
 @pytest.mark.parametrize(
-    ("taxonomy", "words"),
+    ("options", "error", "words"),
     [
-        (changed(symbol="9"), ["symbol 9", "again"]),
-        (changed(name="shrub"), ["'shrub'", "'alignment_tree'"]),
-        (changed(range_m=50.0), ["seen from 50 m"]),
-        (changed(code=251), ["given to both", "again"]),
-        (changed(code=251, symbol="9"), ["name 'alignment_tree' is given to both"]),
+        ({"crs": "EPSG:32631"}, CrsError, ["EPSG:32631", "EPSG:2154", "--metric-crs"]),
+        *(
+            ({"taxonomy": taxonomy}, InputError, words)
+            for taxonomy, words in (
+                (changed(symbol="9"), ["symbol 9", "again"]),
+                (changed(name="shrub"), ["'shrub'", "'alignment_tree'"]),
+                (changed(range_m=50.0), ["seen from 50 m"]),
+                (changed(code=251), ["given to both", "again"]),
+                (changed(code=251, symbol="9"), ["name 'alignment_tree' is given to both"]),
+            )
+        ),
     ],
 )
-def test_another_meaning_of_a_class_is_refused(taxonomy: Taxonomy, words: list[str]) -> None:
+def test_another_crs_or_meaning_of_a_class_is_refused(
+    options: dict[str, Any], error: type[Exception], words: list[str]
+) -> None:
     old = dataclasses.replace(OLD, taxonomy=Taxonomy(TAXONOMY.classes[:2]))
-    new = table((4, 4, LAMP, "lamps", "5"), taxonomy=taxonomy)
-    with refused(InputError, *words):
-        replace_layers(old, new)
+    with refused(error, *words):
+        replace_layers(old, table((4, 4, LAMP, "lamps", "5"), **options))
 
 
 def test_further_classes_are_fine() -> None:
-    few, further = TAXONOMY.classes[:3], ObjectClass(250, "9", "drain", "Drain")
+    few, drain = TAXONOMY.classes[:3], ObjectClass(250, "9", "drain", "Drain")
     old = dataclasses.replace(OLD, taxonomy=Taxonomy(few))
-    new = table((4, 4, 250, "drains", "5"), taxonomy=Taxonomy((further,)), licenses=())
-    objects, _, _ = replace_layers(old, new)
-    assert objects.taxonomy.classes == (*few, further)
-    both = Taxonomy((further, *few[::-1]))
-    objects, _, _ = replace_layers(old, dataclasses.replace(new, taxonomy=both))
-    assert objects.taxonomy == both
-    changes = compare_objects(old, objects)
-    (drain,) = (change for change in changes.classes if change.class_name == "drain")
-    assert drain.added == 1
+    for classes, joined in (((drain,), (*few, drain)), ((drain, *few[::-1]), (drain, *few[::-1]))):
+        new = table((4, 4, 250, "drains", "5"), taxonomy=Taxonomy(classes), licenses=())
+        objects, _, _ = replace_layers(old, new)
+        assert objects.taxonomy.classes == joined
+        classes_of = {change.class_name: change for change in compare_objects(old, objects).classes}
+        assert classes_of["drain"].added == 1
     titled = changed(title="Tree in a row")
     objects, _, _ = replace_layers(OLD, table((4, 4, LAMP, "lamps", "5"), taxonomy=titled))
     assert objects.taxonomy == titled
