@@ -17,6 +17,7 @@ from semsig_gis.core.geometry import GridSpec, cell_ids
 from semsig_gis.database.build import build_database
 from semsig_gis.database.file import open_database, save_database
 from semsig_gis.objects.load import build_objects, choose_layers
+from semsig_gis.reports.quality import quality_report
 from semsig_gis.sources import find_files
 from semsig_gis.sources.catalog import load_catalog
 from semsig_gis.sources.vector import read_layer
@@ -252,6 +253,21 @@ def test_the_catalogue_leaves_what_it_should(
     distinct = places.drop_duplicates(["kind", "bay", "x", "y"])
     assert len(objects) == len(distinct)
     assert objects.table["source"].tolist() == distinct["layer"].tolist()
+
+
+def test_the_quality_of_the_load(chosen: tuple[StreetObjects, LoadReport]) -> None:
+    objects, load = chosen
+    report = quality_report(objects, load)
+    by_name = {item.class_name: item for item in report.classes}
+    assert by_name["alignment_tree"].nearest_m == pytest.approx(6.5, abs=0.1)
+    meters = by_name["parking_meter"]
+    assert (meters.rows, meters.objects, report.objects) == (823, 701, len(objects))
+    # The commune has 57 km2; the hull of its objects is of that size, what is lit is less.
+    assert 40 < report.hull_km2 < 80
+    squares = {(int(x // 100), int(y // 100)) for x, y in objects.xy.tolist()}
+    assert report.occupied_km2 == pytest.approx(len(squares) / 100)
+    assert report.occupied_km2 < report.hull_km2
+    assert np.allclose(report.extent_degrees, (3.81, 43.57, 3.94, 43.65), atol=0.02)
 
 
 def test_duplicates_at_one_place_are_counted(geodata: Path) -> None:
