@@ -4,7 +4,7 @@ import math
 from typing import TYPE_CHECKING
 
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from sentences import refused
 
@@ -20,50 +20,38 @@ if TYPE_CHECKING:
     from semsig_gis.core.errors import SemsigError
 
 
-@pytest.mark.parametrize(
-    "text",
-    [
-        "edit+edit",
-        "edit+jaccard:alpha=0.3",
-        "jaccard+histogram:alpha=0.9:raw",
-        "edit+edit:weights=3/1/2",
-        "angles:histogram",
-        "edit+edit:5%",
-        "edit+jaccard:0.25%:alpha=0.125:raw:weights=1/2/100",
-        "types:jaccard",
-    ],
-)
+TEXTS = """
+edit+edit edit+jaccard:alpha=0.3 jaccard+histogram:alpha=0.9:raw edit+edit:weights=3/1/2
+angles:histogram edit+edit:5% edit+jaccard:0.25%:alpha=0.125:raw:weights=1/2/100 types:jaccard
+"""
+
+
+@pytest.mark.parametrize("text", TEXTS.split())
 def test_text_of_a_method_is_read_back(text: str) -> None:
     assert str(Method.parse(text)) == text
 
 
-@given(
-    st.builds(
-        Method,
-        types=st.sampled_from(list(METRICS)),
-        angles=st.sampled_from(list(METRICS)),
-        alpha=st.floats(0, 1),
-        keep=st.none() | st.floats(0, 100, exclude_min=True),
-        normalized=st.booleans(),
-        weights=st.builds(EditWeights, *[st.integers(1, 100)] * 3),
-    )
-)
-def test_every_method_has_a_text_of_its_own(method: Method) -> None:
-    assert Method.parse(str(method)) == method
-
-
 MINE = {**NOISES, "mine": NoiseSpec(detection=0.7, name="mine")}
-
-
-@given(
-    noise=st.sampled_from(list(MINE.values())),
-    place=st.sampled_from([{}, {"refined": True}, {"on_grid": True}]),
-    north_sigma=st.one_of(st.floats(0, 180), st.just(math.inf)),
+DISTANCES = st.builds(
+    Method,
+    types=st.sampled_from(list(METRICS)),
+    angles=st.sampled_from(list(METRICS)),
+    alpha=st.floats(0, 1),
+    keep=st.none() | st.floats(0, 100, exclude_min=True),
+    normalized=st.booleans(),
+    weights=st.builds(EditWeights, *[st.integers(1, 100)] * 3),
 )
-def test_every_likelihood_method_has_a_text_of_its_own(
-    noise: NoiseSpec, place: dict[str, bool], north_sigma: float
-) -> None:
-    method = LikelihoodMethod(noise=noise, north_sigma=north_sigma, **place)
+LIKELIHOODS = st.builds(
+    lambda noise, place, north: LikelihoodMethod(noise=noise, north_sigma=north, **place),
+    st.sampled_from(list(MINE.values())),
+    st.sampled_from([{}, {"refined": True}, {"on_grid": True}]),
+    st.floats(0, 180) | st.just(math.inf),
+)
+
+
+@settings(max_examples=100)
+@given(DISTANCES | LIKELIHOODS)
+def test_every_method_has_a_text_of_its_own(method: Method | LikelihoodMethod) -> None:
     assert parse_method(str(method), noises=MINE) == method
 
 

@@ -34,53 +34,25 @@ def test_the_best_cells_are_those_up_to_the_last_wanted(
     assert best_cells(scores, count).tolist() == np.flatnonzero(scores <= cut).tolist()
 
 
-def test_hand_computed_cut_among_ties() -> None:
-    # Three slots: one cell is in for sure, two of four tied cells are drawn.
-    expected, within = expected_best([80], [10, 30, 60, 90], slots=2, thresholds=[5, 10, 30, 60])
-    # Of the six pairs, three hold 10, two more hold 30, and one has 60 as its best.
-    assert expected == pytest.approx((3 * 10 + 2 * 30 + 60) / 6)
-    assert within == pytest.approx([0, 3 / 6, 5 / 6, 1])
-
-
-def test_a_better_cell_within_reach_decides() -> None:
-    expected, within = expected_best([20], [10, 1000], slots=1, thresholds=[10, 19, 20])
-    assert expected == pytest.approx(15)
-    assert within == pytest.approx([0.5, 0.5, 1])
-
-
-@given(better=Errors, tied=Errors.filter(len), metres=st.integers(0, 60), data=st.data())
-def test_the_chance_of_one_threshold_is_that_of_all(
-    better: list[float], tied: list[float], metres: int, data: st.DataObject
-) -> None:
-    slots = data.draw(st.integers(1, len(tied)))
-    _, (chance,) = expected_best(better, tied, slots=slots, thresholds=[metres])
-    found = chance_within(better, tied, slots=slots, metres=metres)
-    assert found == pytest.approx(chance, abs=1e-12)
-
-
-def test_the_formula_of_combinations() -> None:
+def test_many_ties_stay_exact() -> None:
     tied = np.repeat([5.0, 500.0], [7, 13])
     _, within = expected_best([], tied, slots=4, thresholds=[5])
     assert within[0] == pytest.approx(1 - math.comb(13, 4) / math.comb(20, 4), rel=1e-12)
+    expected, within = expected_best([], np.arange(300_000.0), slots=1, thresholds=[29_999])
+    assert (expected, within[0]) == pytest.approx((299_999 / 2, 0.1), rel=1e-9)
 
 
-def test_many_ties_stay_exact() -> None:
-    tied = np.arange(300_000.0)
-    expected, within = expected_best([], tied, slots=1, thresholds=[29_999])
-    assert expected == pytest.approx(299_999 / 2, rel=1e-9)
-    assert within[0] == pytest.approx(0.1, rel=1e-9)
-
-
-@given(better=Errors, tied=Errors.filter(bool), data=st.data())
+@given(better=Errors, tied=Errors.filter(bool), metres=st.integers(0, 60), data=st.data())
 def test_expectation_equals_every_draw(
-    better: list[float], tied: list[float], data: st.DataObject
+    better: list[float], tied: list[float], metres: int, data: st.DataObject
 ) -> None:
     slots = data.draw(st.integers(1, len(tied)))
-    expected, within = expected_best(better, tied, slots=slots)
     draws = [min((*better, *drawn)) for drawn in itertools.combinations(tied, slots)]
+    expected, within = expected_best(better, tied, slots=slots)
     assert expected == pytest.approx(np.mean(draws), abs=1e-9)
-    shares = [np.mean([best <= limit for best in draws]) for limit in THRESHOLDS]
-    assert within == pytest.approx(shares, abs=1e-12)
+    shares = [np.mean([best <= limit for best in draws]) for limit in (*THRESHOLDS, metres)]
+    chance = chance_within(better, tied, slots=slots, metres=metres)
+    assert [*within, chance] == pytest.approx(shares, abs=1e-12)
 
 
 @given(
