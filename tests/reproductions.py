@@ -11,15 +11,16 @@ from semsig_gis.database.city import ObjectStore, save_with_store
 if TYPE_CHECKING:
     from pathlib import Path
 
+    from worlds import World
+
 TOWN = random_town()
 QUERIES = 30
 
 
-def save_town(folder: Path) -> Path:
-    """Save the town with its street objects, and return its file."""
-    file = folder / "city.parquet"
-    save_with_store(TOWN.database, ObjectStore.of(TOWN.street_objects), file)
-    return file
+def save_town(folder: Path, town: World = TOWN, name: str = "city.parquet") -> Path:
+    """Save a town with its street objects, and return its file."""
+    save_with_store(town.database, ObjectStore.of(town.street_objects), folder / name)
+    return folder / name
 
 
 def contents(folder: Path) -> dict[str, bytes]:
