@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from itertools import pairwise
 from typing import TYPE_CHECKING
 
@@ -22,7 +22,7 @@ from semsig_gis.objects.table import Licence, StreetObjects
 from semsig_gis.sources.catalog import load_catalog
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Mapping, Sequence
 
     from semsig_gis.core.taxonomy import Taxonomy
     from semsig_gis.database.database import SignatureDatabase
@@ -65,11 +65,23 @@ class World:
     origin: tuple[float, float] = (0.0, 0.0)
     radius: float = 30.0
     levels: int = 16
+    ranges: Mapping[int, float] = field(default_factory=dict)
+    """From how far some classes are seen, by code; the others from the radius."""
+
+    @property
+    def taxonomy(self) -> Taxonomy:
+        names = {TAXONOMY.by_code(code).name: metres for code, metres in self.ranges.items()}
+        return TAXONOMY.with_ranges(names)
+
+    @property
+    def reach(self) -> float:
+        return max(self.radius, *self.ranges.values(), 0.0)
 
     @property
     def street_objects(self) -> StreetObjects:
         things = [(*one, "world", str(row)) for row, one in enumerate(self.objects)]
-        return objects_of(*things, licenses=(Licence("World (CC0)", ("world",)),))
+        licenses = (Licence("World (CC0)", ("world",)),)
+        return objects_of(*things, licenses=licenses, taxonomy=self.taxonomy)
 
     @property
     def database(self) -> SignatureDatabase:
@@ -83,7 +95,7 @@ class World:
 def brute_force(world: World) -> dict[tuple[int, int], list[tuple[float, float, int]]]:
     """Return (bearing, distance, class code) of what every cell sees, one pair at a time."""
     cells: dict[tuple[int, int], list[tuple[float, float, int]]] = {}
-    reach = int(world.radius / world.step) + 2
+    reach = int(world.reach / world.step) + 2
     for x, y, code in world.objects:
         middle = (
             math.floor((x - world.origin[0]) / world.step),
@@ -94,7 +106,7 @@ def brute_force(world: World) -> dict[tuple[int, int], list[tuple[float, float, 
                 dx = x - (world.origin[0] + (column + 0.5) * world.step)
                 dy = y - (world.origin[1] + (row + 0.5) * world.step)
                 distance = math.hypot(dx, dy)
-                if distance <= world.radius:
+                if distance <= world.ranges.get(code, world.radius):
                     bearing = round(math.degrees(math.atan2(dx, dy)) % 360.0, 9) % 360.0
                     cells.setdefault((column, row), []).append((bearing, distance, code))
     return {cell: sorted(cells[cell]) for cell in sorted(cells)}
@@ -114,7 +126,7 @@ def check_against_brute_force(world: World) -> None:
     assert database.codes.tolist() == [code for _, _, code in entries]
     units = [math.floor(bearing * 20) for bearing, _, _ in entries]
     assert database.bearing_units.tolist() == units
-    scale = DISTANCE_UNITS / world.radius
+    scale = DISTANCE_UNITS / world.reach
     assert database.distance_units.tolist() == [round(d * scale) for _, d, _ in entries]
     if BEARING_UNITS % world.levels == 0:
         levels = [math.floor(bearing / (360 / world.levels)) for bearing, _, _ in entries]
@@ -144,6 +156,7 @@ def assert_same(one: SignatureDatabase, other: SignatureDatabase) -> None:
 # Quarters of a metre: sums of their squares are exact, so a circle has an exact edge.
 QUARTERS = st.integers(-160, 160).map(lambda number: number / 4)
 LEVELS = st.sampled_from([8, 16, 24, 32, 7])
+RANGES = st.sampled_from([2.5, 12.5, 40.0])
 
 
 @st.composite
@@ -159,6 +172,7 @@ def worlds(draw: st.DrawFn) -> World:
         origin=draw(st.tuples(QUARTERS, QUARTERS)),
         radius=draw(st.sampled_from([0.25, 5.0, 12.5, 30.0])),
         levels=draw(LEVELS),
+        ranges=draw(st.dictionaries(st.sampled_from(CODES), RANGES, max_size=2)),
     )
 
 

@@ -16,7 +16,6 @@ from semsig_gis.core.errors import InputError, UnknownNameError
 from semsig_gis.core.taxonomy import WILDCARD
 from semsig_gis.database.answer import DistanceMemo, Requirement
 from semsig_gis.database.database import SequenceTable
-from semsig_gis.matching.metrics import edit
 from semsig_gis.sources.catalog import paper_taxonomy
 
 if TYPE_CHECKING:
@@ -51,11 +50,6 @@ LIMIT = st.tuples(
 )
 
 
-def table_of(rows: list[list[int]]) -> SequenceTable:
-    flat = np.array([value for row in rows for value in row], np.uint8)
-    return SequenceTable.from_csr(flat, np.cumsum([0, *map(len, rows)]))
-
-
 @given(ROWS, st.lists(LIMIT, max_size=3))
 def test_requirement_is_checked_as_if_cell_by_cell(
     rows: list[list[int]], limits: list[tuple[int, int, float]]
@@ -64,7 +58,9 @@ def test_requirement_is_checked_as_if_cell_by_cell(
     for row in rows:
         seen = Counter(row) | Counter({WILDCARD: len(row)})
         expected.append(all(low <= seen[code] <= high for code, low, high in limits))
-    assert Requirement(tuple(limits)).met(table_of(rows)).tolist() == expected
+    flat = np.array([value for row in rows for value in row], np.uint8)
+    table = SequenceTable.from_csr(flat, np.cumsum([0, *map(len, rows)]))
+    assert Requirement(tuple(limits)).met(table).tolist() == expected
 
 
 @pytest.mark.parametrize(
@@ -96,15 +92,3 @@ def test_parse(text: str, limits: dict[int, tuple[int, float]]) -> None:
 def test_text_that_is_no_requirement(kind: type[SemsigError], text: str, words: str) -> None:
     with refused(kind, words):
         Requirement.parse(text, PAPER)
-
-
-def test_a_pattern_finds_the_cells_that_it_may_mean() -> None:
-    table = table_of([[11, 1, 1], [11, 3, 1], [11, 1], [3, 3, 3]])
-    pattern = PAPER.encode("M?B")
-    (distances,) = edit.distances([pattern], table, wildcard=WILDCARD)
-    fits = distances[table.inverse] == 0
-    assert fits.tolist() == [True, True, False, False]
-    met = Requirement.parse("2B", PAPER).met(table)
-    assert (fits & met).tolist() == [True, False, False, False]
-    with refused(UnknownNameError, "'Z'"):
-        PAPER.encode("M?Z")

@@ -1,6 +1,5 @@
 from __future__ import annotations
 
-import dataclasses
 import math
 from typing import TYPE_CHECKING
 
@@ -15,10 +14,8 @@ from worlds import (
     CODES,
     CORNER,
     LEVELS,
-    TAXONOMY,
     World,
     assert_same,
-    brute_force,
     check_against_brute_force,
     lamps,
     surroundings,
@@ -29,7 +26,6 @@ from semsig_gis.core.errors import CrsError, EmptyResultError, InputError
 from semsig_gis.core.geometry import GridSpec, bearings, cells_near, wrap_degrees
 from semsig_gis.core.rtree import PackedIndex
 from semsig_gis.core.signature import SignatureSpec
-from semsig_gis.core.taxonomy import Taxonomy
 from semsig_gis.database import build
 from semsig_gis.database.build import build_cells, build_database, visible_objects
 from semsig_gis.database.file import open_database, save_database
@@ -61,7 +57,9 @@ def look(
     ):
         assert block.start == end
         end = block.stop
-        assert ((seen.viewpoint >= 0) & (seen.viewpoint < block.stop - block.start)).all()
+        size = block.stop - block.start
+        assert ((seen.viewpoint >= 0) & (seen.viewpoint < size)).all()
+        assert len(seen.object) <= build.PAIRS_A_BLOCK or size == 1
         moved = seen.viewpoint + block.start
         parts.append(Sightings(moved, seen.object, seen.bearing, seen.distance))
     assert end == len(columns)
@@ -89,17 +87,10 @@ def assert_equal(one: Sightings, other: Sightings) -> None:
         assert getattr(one, name).tolist() == getattr(other, name).tolist(), name
 
 
-def test_what_is_seen_has_bearing_and_distance() -> None:
-    seen = look([(50, 50)], [[100, 110], [120, 100], [100, 70], [82, 76], [100, 131], [100, 100]])
-    assert seen.object.tolist() == [0, 1, 2, 3, 5]
-    assert seen.bearing == pytest.approx([0, 90, 180, 180 + math.degrees(math.atan2(3, 4)), 0])
-    assert seen.distance.tolist() == [10, 20, 30, 30, 0]
-    # Noise beside north is north.
+def test_noise_beside_north_is_north() -> None:
     seen = look([(0, 0)], [[-1e-13, 20], [1e-13, 20], [-1e-300, 20], [-5e-7, 20]])
     assert seen.bearing[:3].tolist() == [0.0, 0.0, 0.0]
     assert 359.9999 < seen.bearing[3] < 360.0
-    assert look([(450, 450)], [[0, 0]]).viewpoint.size == 0
-    assert look([], [[0, 0]]).viewpoint.size == 0
 
 
 @given(st.integers(-30, 30), st.integers(-30, 30), st.integers(1, 12))
@@ -151,26 +142,14 @@ def test_what_is_seen_is_what_measuring_every_pair_finds(
     assert_equal(found, slow_look(near[chosen], objects, ranges, grid))
 
 
-@pytest.mark.parametrize("most", [1, 50, 10**6])
-def test_a_block_that_sees_very_much_is_halved(most: int, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(build, "PAIRS_A_BLOCK", most)
-    objects = np.random.default_rng(3).uniform(0, 60, (40, 2))
-    columns, rows = cells_near(objects, grid=GridSpec(), radius=30.0)
-    index = PackedIndex(objects)
-    blocks = [
-        (block.stop - block.start, len(seen.object))
-        for block, seen in visible_objects(
-            columns, rows, objects, grid=GridSpec(), index=index, ranges=np.full(40, 30.0)
-        )
-    ]
-    assert sum(cells for cells, _ in blocks) == len(columns)
-    assert all(pairs <= most or cells == 1 for cells, pairs in blocks)
-    assert (len(blocks) == 1) == (most == 10**6)
-
-
 @given(worlds())
 @example(World(((0.0, 0.0, 3),), step=100.0, radius=10.0))  # which sees nothing
 @example(World(((0.0, 5999.99, 3), (0.0, 0.0, 1)), step=1000.0, radius=6000.0))
+# The last is beyond the range of a cell by one bit, and objects in one direction tie.
+@example(
+    World(((35.0, 5.0, 3), (5.0, -25.0, 3), (23.0, 29.0, 3), (math.nextafter(35, 99), 5.0, 3)))
+)
+@example(World(((14.0, 26.0, 1), (8.0, 12.0, 9), (11.0, 19.0, 5), (8.0, 12.0, 2))))
 def test_a_database_is_what_a_plain_loop_finds(world: World) -> None:
     check_against_brute_force(world)
 
@@ -200,25 +179,6 @@ def test_objects_on_the_edge_of_a_level_belong_to_the_next(levels: int) -> None:
     part = slice(*database.offsets[cell : cell + 2])
     assert database.levels[part].tolist() == list(range(levels))
     assert database.signature(cell).levels(levels).tolist() == list(range(levels))
-
-
-def test_on_one_bearing_the_nearer_comes_first_then_the_lower_code() -> None:
-    # From the centre of cell (0, 0), three objects in one direction that no fraction rounds well.
-    objects = [(5 + 3 * k, 5 + 7 * k, code) for k, code in ((3, 1), (1, 9), (2, 5), (1, 2))]
-    database = World(tuple((float(x), float(y), code) for x, y, code in objects)).database
-    cell = database.cell_ids.tolist().index(0)
-    assert database.types(cell) == TAXONOMY.decode([2, 9, 5, 1])
-    part = slice(*database.offsets[cell : cell + 2])
-    assert len(set(database.bearing_units[part].tolist())) == 1
-
-
-def test_the_range_is_kept_to_the_last_bit() -> None:
-    ring = [(35.0, 5.0), (5.0, -25.0), (23.0, 29.0), (math.nextafter(35.0, 99.0), 5.0)]
-    database = World(tuple((x, y, 3) for x, y in ring)).database
-    cell = database.cell_ids.tolist().index(0)
-    assert database.lengths[cell] == 3
-    part = slice(database.offsets[cell], database.offsets[cell + 1])
-    assert database.distances[part].tolist() == [30.0, 30.0, 30.0]
 
 
 @pytest.mark.parametrize("size", [1, 7, 100, 10**6])
@@ -307,35 +267,3 @@ def test_some_cells_are_the_same_cells(town: World) -> None:
     assert_same(some, whole.select(chosen))
     nowhere = np.zeros(1, np.int64), np.zeros(1, np.int64)
     assert len(build_cells(town.street_objects, *nowhere, grid=GridSpec(), spec=whole.spec)) == 0
-
-
-@given(worlds(), st.sampled_from([2.5, 12.5, 40.0]))
-@settings(max_examples=25)
-def test_a_class_is_seen_from_its_own_range(world: World, metres: float) -> None:
-    code = world.objects[0][2]
-    taxonomy = Taxonomy(
-        tuple(
-            dataclasses.replace(item, range_m=metres if item.code == code else None)
-            for item in TAXONOMY.classes
-        )
-    )
-    expected: dict[tuple[int, int], list[tuple[float, float, int]]] = {}
-    for chosen, radius in ((code, metres), (None, world.radius)):
-        for cell, seen in brute_force(dataclasses.replace(world, radius=radius)).items():
-            kept = [one for one in seen if (one[2] == code) == (chosen == code)]
-            expected.setdefault(cell, []).extend(kept)
-    lengths = [len(seen) for _, seen in sorted(expected.items()) if seen]
-    codes = [one[2] for _, seen in sorted(expected.items()) for one in sorted(seen)]
-    objects = dataclasses.replace(world.street_objects, taxonomy=taxonomy)
-    if not lengths:
-        return
-    database = build_database(
-        objects,
-        grid=GridSpec(world.step, world.origin),
-        spec=SignatureSpec(world.radius, world.levels),
-    )
-    assert database.lengths.tolist() == lengths
-    assert database.codes.tolist() == codes
-    assert database.reach == max(metres, world.radius)
-    distances = [one[1] for _, seen in sorted(expected.items()) for one in sorted(seen)]
-    assert np.abs(database.distances - distances).max() <= database.reach / 510 + 1e-9

@@ -10,14 +10,14 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 from pyproj import CRS
 from sentences import refused
-from worlds import ARRAYS, CODES, TAXONOMY, assert_same
+from worlds import ARRAYS, TAXONOMY, assert_same
 
 import semsig_gis
 from semsig_gis.core.errors import DatabaseError, InputError
 from semsig_gis.core.geometry import GridSpec
 from semsig_gis.core.signature import SignatureSpec
 from semsig_gis.database.database import SequenceTable, checked_sequence, join_databases
-from semsig_gis.database.file import open_database, save_database
+from semsig_gis.database.file import open_database
 from semsig_gis.database.views import ViewpointSpec
 
 if TYPE_CHECKING:
@@ -32,14 +32,10 @@ def test_cells_are_ordered_and_numbered(database: SignatureDatabase) -> None:
     assert (np.diff(database.cell_ids) > 0).all()
     assert len(database) == len(database.columns) == len(database.offsets) - 1
     assert (database.lengths > 0).all()
-    assert (
-        database.xy.tolist() == database.grid.viewpoints(database.columns, database.rows).tolist()
-    )
     assert database.crs == CRS("EPSG:2154")
     assert database.licenses == ("World (CC0): world",)
     assert database.version == semsig_gis.__version__
     assert database.present_codes.tolist() == sorted(set(database.codes.tolist()))
-    assert set(database.present_codes) <= set(CODES)
 
 
 def test_places_are_in_their_cells(database: SignatureDatabase) -> None:
@@ -54,31 +50,15 @@ def test_a_signature_is_a_part_of_the_arrays(database: SignatureDatabase) -> Non
     for cell in range(0, len(database), 37):
         part = slice(database.offsets[cell], database.offsets[cell + 1])
         signature = database.signature(cell)
-        assert signature.codes is not None
-        assert signature.bearings is not None
-        assert signature.codes.tolist() == database.codes[part].tolist()
-        assert signature.bearings.tolist() == database.bearings[part].tolist()
-        assert database.types(cell) == TAXONOMY.decode(database.codes[part])
+        types = TAXONOMY.decode(database.codes[part])
+        bearings = database.bearings[part].tolist()
+        told = {"types": types, "bearings": bearings, "length": len(types)}
+        assert signature.to_dict(TAXONOMY) == told
+        assert database.types(cell) == types
         for levels in (7, 8, 16, 24, 32):
             again = dataclasses.replace(database, spec=SignatureSpec(levels=levels))
             assert signature.levels(levels).tolist() == again.levels[part].tolist()
     assert ((database.bearings >= 0) & (database.bearings < 360)).all()
-
-
-def test_a_database_cannot_be_changed_by_accident(
-    database: SignatureDatabase, tmp_path: Path
-) -> None:
-    save_database(database, tmp_path / "a.parquet")
-    for one in (database, open_database(tmp_path / "a.parquet")):
-        for name in (*ARRAYS, "xy", "lengths", "levels", "present_codes"):
-            with pytest.raises(ValueError, match="read-only"):
-                getattr(one, name)[0] = 0
-        signature = one.signature(0)
-        assert signature.codes is not None
-        with pytest.raises(ValueError, match="read-only"):
-            signature.codes[0] = 0
-        with pytest.raises(dataclasses.FrozenInstanceError):
-            one.spec = SignatureSpec()  # type: ignore[misc]
 
 
 @given(st.lists(st.integers(0, 3), min_size=1))
@@ -152,8 +132,7 @@ def test_histogram_counts_every_value_block_by_block(rows: list[list[int]], bloc
     width = max((value + 1 for row in rows for value in row), default=0)
     assert histogram.shape == (len(table), width)
     for index in range(len(table)):
-        counts = Counter(table[index].tolist())
-        assert histogram[index].tolist() == [counts[value] for value in range(histogram.shape[1])]
+        assert histogram[index].tolist() == np.bincount(table[index], minlength=width).tolist()
 
 
 @given(ROWS, st.lists(VALUES, max_size=5))
@@ -175,31 +154,30 @@ def test_counts_of_a_very_long_sequence_do_not_wrap() -> None:
     assert table.histogram[:, 3].tolist() == [1, 70_000]
 
 
-@pytest.mark.parametrize("name", ["values", "offsets", "inverse", "counts", "lengths", "histogram"])
-def test_arrays_are_read_only(name: str) -> None:
-    table = table_of([[1, 2], [1]])
-    with pytest.raises(ValueError, match="read-only"):
-        getattr(table, name)[...] = 0
+def test_arrays_are_read_only(database: SignatureDatabase, path: Path) -> None:
+    of_database = (*ARRAYS, "xy", "lengths", "levels", "present_codes")
+    of_table = ("values", "offsets", "inverse", "counts", "lengths", "histogram")
+    for one, names in (
+        (database, of_database),
+        (open_database(path), of_database),
+        (database.signature(0), ("codes",)),
+        (table_of([[1, 2], [1]]), of_table),
+    ):
+        for name in names:
+            with pytest.raises(ValueError, match="read-only"):
+                getattr(one, name)[...] = 0
 
 
-def test_table_does_not_follow_its_input() -> None:
-    values, offsets = sequence(1, 2, 3), np.array([0, 1, 3])
+def test_a_table_does_not_follow_its_input_which_may_be_strided() -> None:
+    values, offsets = np.arange(8, dtype=np.uint8)[::2], np.array([0, 2, 4], np.int32)
     table = SequenceTable.from_csr(values, offsets)
     values[:] = 9
     offsets[:] = 0
-    assert [table[0].tolist(), table[1].tolist()] == [[1], [2, 3]]
-
-
-def test_input_may_be_strided_and_of_another_integer_type() -> None:
-    values = np.arange(8, dtype=np.uint8)[::2]
-    table = SequenceTable.from_csr(values, np.array([0, 2, 4], np.int32))
     assert [table[0].tolist(), table[1].tolist()] == [[0, 2], [4, 6]]
 
 
 @pytest.mark.parametrize(
-    "offsets",
-    [[], [0], [1, 3], [0, 2], [0, 4], [0, 3, 2, 3], [[0, 3]]],
-    ids=["none", "too few", "late start", "short", "long", "decreasing", "two-dimensional"],
+    "offsets", [[], [0], [1, 3], [0, 2], [0, 4], [0, 3, 2, 3], [[0, 3]]], ids=str
 )
 def test_offsets_that_do_not_divide_the_values(offsets: list[int]) -> None:
     with pytest.raises(InputError, match="do not divide their 3 values"):
