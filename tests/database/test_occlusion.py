@@ -154,17 +154,6 @@ def test_blocks_make_no_difference(monkeypatch: pytest.MonkeyPatch) -> None:
     assert 0 < whole.mean() < 1
 
 
-def test_interiors_and_cores_make_up_the_same() -> None:
-    rng = np.random.default_rng(8)
-    corners, sizes = rng.uniform(0, 120, (40, 2)), rng.uniform(3, 20, (40, 2))
-    footprints = Footprints(np.asarray(shapely.box(*corners.T, *(corners + sizes).T)))
-    assert len(footprints.interiors) > 3
-    for number, interior in enumerate(footprints.interiors):
-        cores = footprints.cores(number)
-        assert shapely.union_all(cores).symmetric_difference(interior).area < 1e-6
-        assert footprints.cores(number) is cores
-
-
 EDGES = st.lists(st.tuples(st.integers(0, 30), st.integers(0, 30)), max_size=40)
 
 

@@ -5,7 +5,6 @@ import json
 import os
 import shutil
 import tempfile
-from multiprocessing import get_context
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -351,30 +350,3 @@ def test_a_full_disk_leaves_what_was_there(stored: Path, monkeypatch: pytest.Mon
         assert_fits(open_store(stored), TOWN)
         assert_same(open_database(stored), build_database(TOWN))
         assert len(names_in(stored.parent)) == 2
-
-
-def save_and_die(path: Path, scratch: str) -> None:
-    tempfile.tempdir = scratch
-    settle, calls = store_module._settle, []
-
-    def dying(database: Path) -> Path:
-        calls.append(database)
-        if len(calls) == 2:
-            os._exit(9)
-        return settle(database)
-
-    store_module._settle = dying
-    save(path, fewer(7))
-
-
-def test_a_process_that_is_killed_leaves_a_pair_that_fits(stored: Path) -> None:
-    """Without any tidying up, between the rename of the database and that of the store."""
-    other = get_context("spawn").Process(target=save_and_die, args=(stored, tempfile.gettempdir()))
-    other.start()
-    other.join()
-    assert other.exitcode == 9
-    assert stored.with_name("city.objects.next").is_dir()
-    assert len(open_database(stored)) == len(build_database(fewer(7)))
-    assert_fits(open_store(stored), fewer(7))
-    shown = [name for name in names_in(stored.parent) if not name.startswith(".")]
-    assert shown == ["city.objects", "city.parquet"]

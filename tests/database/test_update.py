@@ -19,7 +19,6 @@ from semsig_gis.core.errors import CrsError, DatabaseError, EmptyResultError, In
 from semsig_gis.core.geometry import GridSpec
 from semsig_gis.core.rtree import ObjectIndex
 from semsig_gis.core.taxonomy import ObjectClass, Taxonomy
-from semsig_gis.database import city as store_module
 from semsig_gis.database.build import build_database
 from semsig_gis.database.city import ObjectStore, open_store, save_with_store
 from semsig_gis.database.database import ENTRY_ARRAYS
@@ -349,28 +348,6 @@ def test_a_damaged_r_tree_is_told_and_healed(path: Path, table: pd.DataFrame) ->
     assert "R-tree" in note
     assert_equal(open_database(path), build_database(objects_of(table[2:])))
     assert update_file(path, objects_of(table[3:])).notes == ()
-
-
-def test_an_update_that_was_interrupted_is_finished_by_the_next(
-    path: Path, table: pd.DataFrame, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    settle, calls = store_module._settle, []
-
-    def interrupted(file: Path) -> Path:
-        calls.append(file)
-        if len(calls) == 3:  # opening, before and after the new database is in place
-            raise KeyboardInterrupt
-        return settle(file)
-
-    with monkeypatch.context() as patch:
-        patch.setattr(store_module, "_settle", interrupted)
-        with pytest.raises(KeyboardInterrupt):
-            update_file(path, objects_of(table[5:]))
-    assert_equal(open_database(path), build_database(objects_of(table[5:])))
-    report = update_file(path, objects_of(table[8:]))
-    assert sum(item.removed for item in report.classes) == 3
-    assert_equal(open_database(path), build_database(objects_of(table[8:])))
-    assert_index_fits(open_store(path))
 
 
 def test_the_share_is_of_all_cells_before_or_after() -> None:

@@ -3,10 +3,10 @@ from __future__ import annotations
 import numpy as np
 import shapely
 from hypothesis import given
-from worlds import CODES, CORNER, World, lamps, worlds
+from worlds import CODES, World, worlds
 
 from semsig_gis.core.errors import EmptyResultError
-from semsig_gis.core.rtree import ObjectIndex, StoredIndex
+from semsig_gis.core.rtree import ObjectIndex
 from semsig_gis.database.database import views_in
 from semsig_gis.database.occlusion import Footprints
 from semsig_gis.database.views import views_at
@@ -30,17 +30,6 @@ def test_the_viewpoints_of_a_database_see_what_it_says(world: World) -> None:
     assert np.abs(stored.distances - exact.distances).max(initial=0) <= database.reach / 510 + 1e-9
     assert (stored.objects == -1).all()
     assert len(stored) == len(database)
-
-
-def test_every_tree_serves() -> None:
-    objects = lamps()
-    places = CORNER + np.array([[20.0, 30.0], [900.0, 900.0], [50.0, 50.0]])
-    one, other = (
-        views_at(objects, places, index=tree, radius=25.0)
-        for tree in (ObjectIndex(objects.xy), StoredIndex.pack(objects.xy))
-    )
-    assert one.lengths[0] > 0 == one.lengths[1]
-    assert one.objects.tolist() == other.objects.tolist()
 
 
 def test_buildings_hide() -> None:
