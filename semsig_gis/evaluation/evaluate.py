@@ -19,7 +19,7 @@ import pandas as pd
 from semsig_gis import __version__
 from semsig_gis.core.errors import InputError
 from semsig_gis.core.geometry import angular_distance, cell_ids
-from semsig_gis.evaluation.result import QUERY_COLUMNS, SUCCESS_METRES, Evaluation
+from semsig_gis.evaluation.result import QUERY_COLUMNS, Evaluation
 from semsig_gis.likelihood.locate import LikelihoodLocator
 from semsig_gis.likelihood.method import LikelihoodMethod
 from semsig_gis.matching.method import DEFAULT_METHOD, Method
@@ -265,7 +265,7 @@ class _Pool:
             for count in NEAR_PLACES
         }
         if ranking.chances is not None:
-            right = chance_within(**self._cut(1), metres=SUCCESS_METRES)
+            right = chance_within(**self._cut(1), metres=Evaluation.success_metres)
         return {
             "distance": ranking.best_score,
             "rank_low": low,

@@ -7,7 +7,7 @@ import math
 import os
 import platform
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any, ClassVar, TypeVar
 
 import numpy as np
 
@@ -44,9 +44,6 @@ if TYPE_CHECKING:
     from semsig_gis.queries.draw import QuerySpec
 
 N = TypeVar("N", int, float)
-
-SUCCESS_METRES = 50
-SUCCESS_PROBABILITY = 0.5
 
 QUERY_COLUMNS = (
     *("seed", "number", "cell", "cell_id", "types", "length", "type_group", "angle_group"),
@@ -130,6 +127,10 @@ class Evaluation:
     True
     """
 
+    # A query is successful where the answer is so near with such a chance.
+    success_metres: ClassVar[int] = 50
+    success_probability: ClassVar[float] = 0.5
+
     queries: gpd.GeoDataFrame
     method: AnyMethod
     asked: QuerySpec
@@ -158,8 +159,8 @@ class Evaluation:
     @property
     def successful(self) -> NDArray[np.bool_]:
         """Whether each query has an error of at most 50 m with probability 0.5 or more."""
-        within = self.queries[f"p{SUCCESS_METRES}"].to_numpy(dtype=np.float64)
-        return np.asarray(within >= SUCCESS_PROBABILITY)
+        within = self.queries[f"p{self.success_metres}"].to_numpy(dtype=np.float64)
+        return np.asarray(within >= self.success_probability)
 
     @property
     def unlocalized(self) -> int:

@@ -18,7 +18,6 @@ from semsig_gis.exports import geopackage
 from semsig_gis.exports.files import write_csv, write_geoparquet
 from semsig_gis.exports.geotiff import cell_errors, export_geotiff
 from semsig_gis.exports.layers import answer_layers, cells_layer, evaluation_layers, objects_layer
-from semsig_gis.exports.regions import search_regions
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
@@ -256,6 +255,8 @@ def export_answer(
             "likelihood method, or write a GeoPackage."
         )
         raise InputError(msg)
+    from semsig_gis.exports.regions import search_regions  # noqa: PLC0415 - only where it is used
+
     regions = search_regions(answer, database, share=share, within=within)
     if suffix in _RASTER and answer.chances is not None:
         export_geotiff(database, answer.chances, path, name="posterior")

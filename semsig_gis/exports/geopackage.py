@@ -24,7 +24,6 @@ from semsig_gis.core.geometry import CLASS_CODE, COUNT, GEOMETRY, MERGED, SOURCE
 from semsig_gis.core.signature import BEARING_UNITS, DISTANCE_UNITS
 from semsig_gis.core.taxonomy import Taxonomy
 from semsig_gis.database.file import database_of
-from semsig_gis.evaluation.identify.result import identifiability_of
 from semsig_gis.exports.layers import GEOMETRY_TYPES
 from semsig_gis.objects.table import objects_of
 from semsig_gis.storage.whole import whole_file
@@ -144,6 +143,10 @@ def read_geopackage(path: str | Path) -> GeopackageContents:
         database = database_of(signatures, specs, crs, path=path)
         identifiability = None
         if specs["identifiability"]:
+            from semsig_gis.evaluation.identify.result import (  # noqa: PLC0415 - where it is used
+                identifiability_of,
+            )
+
             try:
                 identifiability = identifiability_of(
                     database, cells.select(more), specs["identifiability"], path

@@ -29,8 +29,6 @@ from semsig_gis.core.geometry import (
 from semsig_gis.core.signature import BEARING_UNITS, DISTANCE_UNITS
 from semsig_gis.core.signs import ERROR_RAMP, FAILED, FOUND_RAMP, SUCCESSFUL, class_signs, one_line
 from semsig_gis.database.file import database_specs
-from semsig_gis.evaluation.identify.result import identifiability_facts
-from semsig_gis.evaluation.result import SUCCESS_METRES, SUCCESS_PROBABILITY
 from semsig_gis.objects.table import objects_specs
 
 if TYPE_CHECKING:
@@ -405,7 +403,7 @@ def cells_layer(
     draw = functools.partial(by_amount, geometry=geometry, size=step)
     styles = [draw("Ambiguity", "type_group_size", AMBIGUITY)]
     if identifiability is not None:
-        facts["identifiability"] = identifiability_facts(identifiability)
+        facts["identifiability"] = identifiability.facts
         styles.insert(0, draw("Identifiability", "chance_found", IDENTIFIABILITY))
     corners = [(part.min(), part.max()) for part in (database.columns, database.rows)]
     (west, south), (east, north) = database.grid.viewpoints(*corners).tolist()
@@ -489,7 +487,8 @@ def evaluation_layers(evaluation: Evaluation, licenses: tuple[str, ...]) -> list
             title="Queries",
             description=(
                 f"{len(queries)} queries at their true places; found: the best place is within "
-                f"{SUCCESS_METRES} m with a probability of {SUCCESS_PROBABILITY:g} or more."
+                f"{evaluation.success_metres} m with a probability of "
+                f"{evaluation.success_probability:g} or more."
             ),
             geometry="point",
             styles=(by_outcome(geometry="point"),),

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from semsig_gis.core.signs import ERROR_RAMP, FAILED, SUCCESSFUL, mixed
-from semsig_gis.evaluation.result import SUCCESS_METRES, SUCCESS_PROBABILITY
+from semsig_gis.evaluation.result import Evaluation
 from semsig_gis.maps.image import mercator, packed
 from semsig_gis.maps.parts import (
     add_city,
@@ -39,10 +39,15 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from semsig_gis.database.database import SignatureDatabase
-    from semsig_gis.evaluation.result import Evaluation
 
 QUERY_FIELDS = (
-    *("True cell sees", "Query", "Expected error", f"P(error ≤ {SUCCESS_METRES} m)", "True rank"),
+    *(
+        "True cell sees",
+        "Query",
+        "Expected error",
+        f"P(error ≤ {Evaluation.success_metres} m)",
+        "True rank",
+    ),
     *("True cell", "Best cell", "Next best cells", "Best cell sees"),
 )
 MANY = 2000  # queries, whose circles are smaller
@@ -151,7 +156,7 @@ def _query_records(
             if query.query_length
             else "nothing left of it",
             _metres(query.error_m),
-            f"{getattr(query, f'p{SUCCESS_METRES}'):.2f}",
+            f"{getattr(query, f'p{Evaluation.success_metres}'):.2f}",
             f"{ranks_text(query.rank_low, query.rank_high)} of {len(database):,}",
             str(query.cell_id),
             f"{query.best_cell_id}, distance {query.distance:.3f}{ties_text(query.tied)}"
@@ -228,8 +233,8 @@ def evaluation_legend(evaluation: Evaluation, *, error_limit: str, licenses: Seq
         f"Method: {escape(str(evaluation.method))}, {best}<br>"
         f"Distortion: {isolated(distortions or 'none')}</p>"
         f"<table>{shares}</table>"
-        f"<p>{swatch(SUCCESSFUL)}{successes:,} successful: within {SUCCESS_METRES} m "
-        f"with probability {SUCCESS_PROBABILITY:g} or more<br>"
+        f"<p>{swatch(SUCCESSFUL)}{successes:,} successful: within {Evaluation.success_metres} m "
+        f"with probability {Evaluation.success_probability:g} or more<br>"
         f"{swatch(FAILED)}{count - successes:,} failed</p>"
         "<p>Mean expected error nearby"
         f"{ramp_bar(ERROR_RAMP, '0 m', f'{error_limit}, as bad as a guess', sign='ramp heat')}</p>"

@@ -121,6 +121,19 @@ class Identifiability:
             columns[f"gain_{names[item.code]}"] = pa.array(self.gains[rows, number])
         return pa.table(columns)
 
+    @property
+    def facts(self) -> dict[str, Any]:
+        """What is needed beside `table` to read it again, as values for JSON."""
+        return {
+            "format": FORMAT,
+            "belongs_to": index_fingerprint(self.database, self.noise),
+            "noise": self.noise.to_dict(),
+            "radius": self.radius,
+            "trials": self.trials,
+            "seed": self.seed,
+            "classes": [asdict(gain) for gain in self.classes],
+        }
+
     def summary(self, *, object_counts: Mapping[int, int] | None = None) -> dict[str, Any]:
         """Return what there is to say of the city as plain values for JSON.
 
@@ -204,21 +217,8 @@ def save_identifiability(identifiability: Identifiability, path: str | Path) -> 
         NAME,
         identifiability.table(),
         cell_ids=identifiability.database.cell_ids,
-        facts=identifiability_facts(identifiability),
+        facts=identifiability.facts,
     )
-
-
-def identifiability_facts(identifiability: Identifiability) -> dict[str, Any]:
-    """Return what is needed beside `Identifiability.table` to read it again, as values for JSON."""
-    return {
-        "format": FORMAT,
-        "belongs_to": index_fingerprint(identifiability.database, identifiability.noise),
-        "noise": identifiability.noise.to_dict(),
-        "radius": identifiability.radius,
-        "trials": identifiability.trials,
-        "seed": identifiability.seed,
-        "classes": [asdict(gain) for gain in identifiability.classes],
-    }
 
 
 def open_identifiability(database: SignatureDatabase, path: str | Path) -> Identifiability | None:
@@ -262,7 +262,7 @@ def open_identifiability(database: SignatureDatabase, path: str | Path) -> Ident
 def identifiability_of(
     database: SignatureDatabase, table: pa.Table, facts: dict[str, Any], path: str | Path
 ) -> Identifiability:
-    """Return the value of `Identifiability.table` and `identifiability_facts` read from `path`.
+    """Return the value of `Identifiability.table` and `Identifiability.facts` read from `path`.
 
     Raises DatabaseError if they are damaged, or belong to other signatures or another version of
     the format.
