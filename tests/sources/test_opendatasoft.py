@@ -459,51 +459,43 @@ TYPES = {
 }
 
 
-class Portal:
-    """Plays the Explore API v2.1 for one dataset, with as much of its language as we speak."""
-
-    def __init__(self, server: Server) -> None:
-        described = {"fields": [{"name": name, "type": kind} for name, kind in TYPES.items()]}
-        server.on(DESCRIPTION, published(json.dumps(described).encode(), etag='"d"'))
-        server.on(EXPORT, self.geojson)
-
-    def geojson(self, seen: Seen) -> Answer:
-        assert seen.query["limit"] == "-1"
-        conditions = re.findall(r"\((.+?)\)(?: and (?=\()|$)", seen.query.get("where", ""))
-        names = seen.query.get("select", ",".join(TYPES)).split(",")
-        assert set(names) <= set(TYPES)
-        features = []
-        for row in json.loads(FILES["v21.json"]):
-            if all(self._holds(text, row) for text in conditions):
-                properties = {name: row[name] for name in names}
-                geometry = properties.pop("geo_shape")["geometry"]
-                features.append({"type": "Feature", "geometry": geometry, "properties": properties})
-        content = {"type": "FeatureCollection", "features": features}
-        return Answer(json.dumps(content).encode(), type="application/geo+json", chunked=True)
-
-    @staticmethod
-    def _holds(condition: str, row: dict[str, Any]) -> bool:
-        place = shapely.Point(row["geo_point_2d"]["lon"], row["geo_point_2d"]["lat"])
-        box = re.fullmatch(r"in_bbox\(geo_point_2d, (\S+), (\S+), (\S+), (\S+)\)", condition)
-        if box:
-            south, west, north, east = map(float, box.groups())
-            return bool(shapely.box(west, south, east, north).covers(place))
-        outline = re.fullmatch(r"intersects\(geo_point_2d, geom'(.+)'\)", condition)
-        if outline:
-            return bool(shapely.from_wkt(outline[1]).intersects(place))
-        equals = re.fullmatch(r"(\w+) = '(\w+)'", condition)
-        assert equals, condition
-        return bool(row[equals[1]] == equals[2])
+def holds(condition: str, row: dict[str, Any]) -> bool:
+    """Tell whether a condition holds for a row, in as much of the portal's language as we speak."""
+    place = shapely.Point(row["geo_point_2d"]["lon"], row["geo_point_2d"]["lat"])
+    box = re.fullmatch(r"in_bbox\(geo_point_2d, (\S+), (\S+), (\S+), (\S+)\)", condition)
+    if box:
+        south, west, north, east = map(float, box.groups())
+        return bool(shapely.box(west, south, east, north).covers(place))
+    outline = re.fullmatch(r"intersects\(geo_point_2d, geom'(.+)'\)", condition)
+    if outline:
+        return bool(shapely.from_wkt(outline[1]).intersects(place))
+    equals = re.fullmatch(r"(\w+) = '(\w+)'", condition)
+    assert equals, condition
+    return bool(row[equals[1]] == equals[2])
 
 
-@pytest.fixture
-def portal(server: Server) -> Portal:
-    return Portal(server)
+def exported(seen: Seen) -> Answer:
+    """Answer to an export as the Explore API v2.1 does."""
+    assert seen.query["limit"] == "-1"
+    conditions = re.findall(r"\((.+?)\)(?: and (?=\()|$)", seen.query.get("where", ""))
+    names = seen.query.get("select", ",".join(TYPES)).split(",")
+    assert set(names) <= set(TYPES)
+    features = []
+    for row in json.loads(FILES["v21.json"]):
+        if all(holds(text, row) for text in conditions):
+            properties = {name: row[name] for name in names}
+            geometry = properties.pop("geo_shape")["geometry"]
+            features.append({"type": "Feature", "geometry": geometry, "properties": properties})
+    content = {"type": "FeatureCollection", "features": features}
+    return Answer(json.dumps(content).encode(), type="application/geo+json", chunked=True)
 
 
 @pytest.fixture
 def fetched(server: Server, cache: Cache, quick: HttpSpec) -> Fetch:
-    """Fetch one layer from the server."""
+    """Fetch one layer from the server, which is a portal with one dataset."""
+    described = {"fields": [{"name": name, "type": kind} for name, kind in TYPES.items()]}
+    server.on(DESCRIPTION, published(json.dumps(described).encode(), etag='"d"'))
+    server.on(EXPORT, exported)
 
     def fetch(layer: LayerSpec = TREES, **options: Any) -> Fetched:  # noqa: ANN401
         given = {"endpoints": [server.url], "cache": cache, "spec": quick, **options}
@@ -518,18 +510,18 @@ def box(west: float, south: float, east: float, north: float) -> Area:
     return Area(shapely.box(west, south, east, north), "a box")
 
 
-@pytest.mark.usefixtures("portal")
-def test_an_export_is_fetched_and_read(server: Server, fetched: Fetch) -> None:
+def test_an_export_is_fetched_and_read(server: Server, fetched: Fetch, quick: HttpSpec) -> None:
     steps: list[tuple[int, int]] = []
     file = fetched(progress=lambda done, total: steps.append((done, total)))
     layer = read(file.path)
     assert (ids(layer), xy(layer)) == (["11", "12", "13"], XY)
     assert steps[-1][0] == file.path.stat().st_size
     assert server.paths() == [DESCRIPTION, EXPORT]
+    assert fetched(spec=replace(quick, offline=True)) == replace(file, from_cache=True)
+    assert len(server.seen) == 2
     assert len(read(fetched(area=box(5.0, 48.0, 5.1, 48.1)).path).table) == 0  # which is no fault
 
 
-@pytest.mark.usefixtures("portal")
 def test_what_is_not_wanted_is_not_sent(server: Server, fetched: Fetch) -> None:
     spec = replace(ALIGNED, server_where="domanialite = 'Alignement'", select=("IDBASE",))
     file = fetched(spec, endpoints=[f"{server.url}/"], area=box(2.0, 48.0, 2.36, 48.9))
@@ -544,7 +536,6 @@ def test_what_is_not_wanted_is_not_sent(server: Server, fetched: Fetch) -> None:
     assert (layer.counts.read, layer.counts.filtered) == (1, 0)
 
 
-@pytest.mark.usefixtures("portal")
 def test_an_area_may_be_a_polygon(server: Server, fetched: Fetch) -> None:
     area = Area(shapely.Polygon([(2.355, 48.855), (2.4, 48.855), (2.38, 48.9)]), "a corner")
     file = fetched(area=area)
@@ -568,35 +559,6 @@ def test_a_long_outline_is_shortened_and_loses_nothing(
     assert shapely.from_wkt(text).buffer(1e-7).covers(area)
 
 
-def test_a_second_run_is_answered_from_the_cache(
-    server: Server, fetched: Fetch, quick: HttpSpec
-) -> None:
-    offline = replace(quick, offline=True)
-    with refused(SourceError, "les-arbres", "cache"):
-        fetched(spec=offline)
-    assert server.seen == []
-    Portal(server)
-    date = "Sat, 21 Nov 2026 00:00:00 GMT"
-    server.on(EXPORT, published(PUBLISHED, type="application/geo+json", modified=date))
-    first, second = fetched(), fetched()
-    assert (first.from_cache, second.from_cache) == (False, True)
-    assert (first.sha256, first.path) == (second.sha256, second.path)
-    assert server.seen[-1].headers["if-modified-since"] == date
-    asked = len(server.seen)
-    assert fetched(spec=offline).sha256 == first.sha256
-    assert len(server.seen) == asked
-
-
-def test_an_export_that_ends_too_soon_is_not_kept(
-    server: Server, portal: Portal, fetched: Fetch
-) -> None:
-    server.on(EXPORT, Answer(PUBLISHED[:-20]))
-    with refused(SourceError, "whole geojson"):
-        fetched()
-    server.on(EXPORT, portal.geojson)
-    assert len(read(fetched().path).table) == 3
-
-
 UNKNOWN_DATASET = ["http://", "'arbres'", "'trees'", "/explore", "`dataset`", "catalogue"]
 UNKNOWN_FIELD = b'{"error_code": "ODSQLError", "message": "Unknown field: kind. Check it."}'
 NO_POSITIONS = Answer(b'{"fields": [{"name": "idbase", "type": "int"}]}')
@@ -604,7 +566,6 @@ BAD_QUERY = Answer(UNKNOWN_FIELD, status=400)
 LOG_IN = Answer(b'{"message": "Log in"}', status=403)
 
 
-@pytest.mark.usefixtures("portal")
 @pytest.mark.parametrize(
     ("change", "answers", "error", "words"),
     [
@@ -616,6 +577,7 @@ LOG_IN = Answer(b'{"message": "Log in"}', status=403)
             ["les-arbres", "'idbaze'", "select", "'idbase'"],
         ),
         ({"server_where": "kind=1"}, {EXPORT: BAD_QUERY}, SourceError, ["400", "field: kind"]),
+        ({}, {EXPORT: Answer(PUBLISHED[:-20])}, SourceError, ["whole geojson"]),
         ({}, {DESCRIPTION: LOG_IN}, SourceError, ["layer 'trees'", "403", "Log in"]),
         ({}, {DESCRIPTION: NO_POSITIONS}, CatalogError, ["les-arbres", "trees", "positions"]),
         ({}, {DESCRIPTION: Answer(b"<html>", type="text/html")}, SourceError, ["address"]),

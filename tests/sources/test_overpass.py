@@ -172,13 +172,6 @@ def test_a_list_of_values_matches_exactly_those(value: str) -> None:
     assert not re.search(pattern, f"x{value}") or value.startswith("x")
 
 
-def test_the_builtin_catalogue_can_be_asked_for() -> None:
-    query = overpass_query(load_catalog("openstreetmap").layers, (1, 2, 3, 4))
-    assert 'node["natural"="tree"];' in query
-    assert 'way["building"]["building"!="no"];' in query
-    assert len(set(query.splitlines())) == len(query.splitlines())
-
-
 def test_an_area_is_fetched_in_tiles(server: Server, get: Get, slept: list[float]) -> None:
     steps: list[tuple[int, int]] = []
     paths = get(progress=lambda *step: steps.append(step))

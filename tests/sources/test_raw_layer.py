@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import json
 import math
 from typing import TYPE_CHECKING, Any
 
@@ -252,24 +251,16 @@ def test_every_reader_gives_the_widths(tmp_path: Path) -> None:
         geometry=[shapely.LineString(places[:2]), shapely.LineString(places[1:])],
         crs="EPSG:4326",
     )
-    table.to_file(tmp_path / "streets.gpkg")
     table.to_file(tmp_path / "streets.geojson")
     nodes = [node(number, *place) for number, place in enumerate(places, start=1)]
     ways = [way(10 + n, [1 + n, 2 + n], tags[n]) for n in range(2)]
     write_osm(tmp_path / "streets.osm", *nodes, *ways)
-    lines = [[{"lon": x, "lat": y} for x, y in places[n : n + 2]] for n in range(2)]
-    elements = [
-        {"type": "way", "id": 10 + n, "tags": tags[n], "geometry": lines[n]} for n in range(2)
-    ]
-    (tmp_path / "tile.json").write_text(json.dumps({"elements": elements}), encoding="utf-8")
     bare = street(geometry="line", tags=((("highway", ("*",)),),))
     unknown = dataclasses.replace(bare, width_field="width")
     spec = dataclasses.replace(unknown, width_by=BY_CLASS)
     for name, file in (
-        ("vector_file", "streets.gpkg"),
         ("vector_file", "streets.geojson"),
         ("osm_file", "streets.osm"),
-        ("overpass", "tile.json"),
         ("opendatasoft", "streets.geojson"),
     ):
         whole, half, none = (reader(name)(tmp_path / file, [s])[0] for s in (spec, unknown, bare))

@@ -523,15 +523,16 @@ LAMBERT = {"crs": crs_member("urn:ogc:def:crs:EPSG::2154")}
 CRS84 = {"crs": crs_member("urn:ogc:def:crs:OGC:1.3:CRS84")}
 STATED = "the coordinates look like degrees, yet EPSG:2154 is stated"
 OTHER = "the file is in EPSG:4326, not in EPSG:2154 as stated; the file's CRS is used"
+DEGREES, PLANE = (3, 43), (765277, 6275109)
 
 
 @pytest.mark.parametrize(
     ("members", "place", "stated", "crs", "notes"),
     [
-        ({}, (3, 43), None, "EPSG:4326", ()),
-        ({}, (3, 43), "EPSG:2154", "EPSG:2154", (STATED,)),
-        (LAMBERT, (765277, 6275109), "EPSG:2154", "EPSG:2154", ()),
-        (CRS84, (3, 43), "EPSG:2154", "EPSG:4326", (OTHER,)),
+        ({}, DEGREES, None, "EPSG:4326", ()),
+        ({}, DEGREES, "EPSG:2154", "EPSG:2154", (STATED,)),
+        (LAMBERT, PLANE, "EPSG:2154", "EPSG:2154", ()),
+        (CRS84, DEGREES, "EPSG:2154", "EPSG:4326", (OTHER,)),
     ],
 )
 def test_geojson_is_in_degrees_unless_said_otherwise(  # noqa: PLR0917
@@ -549,27 +550,15 @@ def test_geojson_is_in_degrees_unless_said_otherwise(  # noqa: PLR0917
     assert list_layers(path)[0].crs == ("EPSG:2154" if members is LAMBERT else "EPSG:4326")
 
 
-@pytest.mark.parametrize("member", [None, crs_member("urn:nobody:knows")])
-def test_geojson_crs_member_that_says_nothing(tmp_path: Path, member: object) -> None:
-    path = geojson(tmp_path, point(3, 43), crs=member)
-    with refused(CrsError, "does not say which CRS"):
-        read(path)
-    assert list_layers(path)[0].crs is None
-
-
-def test_a_file_that_contradicts_itself(tmp_path: Path) -> None:
-    member = crs_member("urn:ogc:def:crs:EPSG::4326")
-    path = geojson(tmp_path, point(765277, 6275109), crs=member)
+def test_geojson_whose_crs_is_none_or_wrong(tmp_path: Path) -> None:
+    for member in (None, crs_member("urn:nobody:knows")):
+        path = geojson(tmp_path, point(*DEGREES), crs=member)
+        with refused(CrsError, "does not say which CRS"):
+            read(path)
+        assert list_layers(path)[0].crs is None
+    path = geojson(tmp_path, point(*PLANE), crs=crs_member("urn:ogc:def:crs:EPSG::4326"))
     with refused(CrsError, "correct the file"):
         read_layer(path, spec_of(), crs="EPSG:2154")
-
-
-def test_a_crs_of_no_place_is_none(tmp_path: Path) -> None:
-    plane = 'LOCAL_CS["Undefined Cartesian SRS",UNIT["metre",1],AXIS["X",EAST],AXIS["Y",NORTH]]'
-    path = write(frame([(1, 2)], n=[1]), tmp_path, "shp")
-    for wkt in (plane, "nonsense"):
-        path.with_suffix(".prj").write_text(wkt)
-        assert list_layers(path)[0].crs is None
 
 
 @pytest.mark.parametrize("suffix", FORMATS)
