@@ -32,5 +32,6 @@ def slept() -> list[float]:
 
 
 @pytest.fixture
-def quick() -> HttpSpec:
-    return HttpSpec(timeout=(2.0, 2.0), attempts=3, backoff_s=0.0, sleep=lambda _: None)
+def quick(slept: list[float]) -> HttpSpec:
+    """Return a specification that does not sleep, but says in `slept` how long it would."""
+    return HttpSpec(timeout=(2.0, 2.0), attempts=3, backoff_s=1.0, sleep=slept.append)

@@ -51,18 +51,13 @@ DATE = "Thu, 01 Jan 2026 00:00:00 GMT"
 
 
 @pytest.fixture
-def spec(slept: list[float]) -> HttpSpec:
-    return HttpSpec(timeout=(2.0, 2.0), attempts=3, backoff_s=1.0, sleep=slept.append)
-
-
-@pytest.fixture
-def get(server: Server, cache: Cache, spec: HttpSpec) -> Get:
+def get(server: Server, cache: Cache, quick: HttpSpec) -> Get:
     """Fetch a path of the server; keywords change the specification or are those of `fetch`."""
     fields = {field.name for field in dataclasses.fields(HttpSpec)}
 
     def call(path: str = "/trees", **what: Any) -> Fetched:  # noqa: ANN401 - see above
         own = {name: what.pop(name) for name in fields & what.keys()}
-        return fetch(server.url + path, cache=cache, spec=dataclasses.replace(spec, **own), **what)
+        return fetch(server.url + path, cache=cache, spec=dataclasses.replace(quick, **own), **what)
 
     return call
 
@@ -134,11 +129,11 @@ def test_a_redirect_within_the_host_is_followed(server: Server, get: Get) -> Non
     assert fetched.url == f"{server.url}/moved/trees?x=1"
 
 
-def test_a_short_text_is_read(server: Server, spec: HttpSpec) -> None:
+def test_a_short_text_is_read(server: Server, quick: HttpSpec) -> None:
     server.on("/status", Answer(b"2 slots available now.\n", type="text/plain"))
     server.on("/long", Answer(b"x" * 200_000))
-    assert read_text(f"{server.url}/status", spec=spec) == "2 slots available now.\n"
-    assert len(read_text(f"{server.url}/long", spec=spec)) == 2**16
+    assert read_text(f"{server.url}/status", spec=quick) == "2 slots available now.\n"
+    assert len(read_text(f"{server.url}/long", spec=quick)) == 2**16
 
 
 @pytest.mark.parametrize("status", [429, 500, 502, 503, 504])
@@ -187,7 +182,7 @@ def recoveries() -> dict[str, tuple[list[str | None], list[Script]]]:
         return answers(body, Content_Encoding="gzip")
 
     twice: list[str | None] = ["bytes=1000-", "bytes=3000-"]
-    tag = {"etag": '"7"'}
+    tag: dict[str, Any] = {"etag": '"7"'}
     elsewhere = answers(CONTENT[5:], 206, Content_Range="bytes 5-9/10")
     other = answers(CONTENT[9:], 206, Content_Range="bytes 1000-", ETag='"8"')
     members = gzip.compress(CONTENT[:9]) + gzip.compress(CONTENT[9:])
@@ -278,24 +273,16 @@ def test_what_is_no_good_answer_ends_in_a_sentence(
     assert leftovers(cache) == set()
 
 
-@pytest.mark.parametrize(
-    ("status", "target", "words"),
-    [
-        (301, "http://localhost:{port}/trees", " redirects to localhost:{port}, which neither"),
-        (301, "//localhost:{port}/trees", " redirects to localhost:{port}, which neither"),
-        (301, "http://127.0.0.1:1/trees", " redirects to 127.0.0.1:1, which neither"),
-        (308, "file:///etc/hostname", ""),
-        (308, "http://127.0.0.1:port/", ""),
-        (308, "", ""),
-    ],
-)
+@pytest.mark.parametrize("target", ["http://localhost:{port}/trees", "//localhost:{port}/trees"])
 def test_a_redirect_to_another_host_or_nowhere_is_refused(
-    server: Server, get: Get, status: int, target: str, words: str
+    server: Server, get: Get, target: str
 ) -> None:
-    location = target.format(port=server.port)
-    server.on("/trees", answers(b"", status, Location=location))
-    failure_of(get, f"127.0.0.1:{{port}}{words}".format(port=server.port))
-    assert len(server.seen) == 1 or not target  # the empty address is the same one again
+    server.on("/trees", answers(b"", 301, Location=target.format(port=server.port)))
+    words = f"127.0.0.1:{server.port} redirects to localhost:{server.port}, which neither"
+    failure_of(get, words)
+    assert len(server.seen) == 1
+    server.on("/trees", answers(b"", 308, Location=""))
+    failure_of(get, "127.0.0.1")
 
 
 @pytest.mark.parametrize(
@@ -307,12 +294,14 @@ def test_a_redirect_to_another_host_or_nowhere_is_refused(
         ("http://a.example:8080/x", "https://a.example/y", False),
         ("https://a.example/x", "https://b.a.example/y", False),
         ("https://a.example/x", "https://a.example:444/y", False),
+        ("https://a.example/x", "https://a.example:port/y", False),
+        ("https://a.example/x", "file:///etc/hostname", False),
     ],
 )
 def test_the_only_way_to_another_scheme_is_the_safer_one(
     source: str, target: str, *, allowed: bool
 ) -> None:
-    with nullcontext() if allowed else refused(SourceError, "redirects to"):
+    with nullcontext() if allowed else refused(SourceError, "a.example", " redirects to "):
         _require_same_host(source, target)
 
 
@@ -430,10 +419,10 @@ def test_offline_asks_nobody(server: Server, get: Get) -> None:
     assert len(server.seen) == 1
 
 
-def test_mirrors_share_what_they_sent(server: Server, cache: Cache, spec: HttpSpec) -> None:
+def test_mirrors_share_what_they_sent(server: Server, cache: Cache, quick: HttpSpec) -> None:
     server.on("/trees", Answer(CONTENT))
     for host in (server.url, server.other_host):
-        fetched = fetch(f"{host}/trees", cache=cache, spec=spec, identity="trees")
+        fetched = fetch(f"{host}/trees", cache=cache, spec=quick, identity="trees")
         assert fetched.url == f"{server.url}/trees"
     assert len(server.seen) == 1
 

@@ -8,7 +8,6 @@ import pickle
 import subprocess
 import sys
 from dataclasses import replace
-from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -25,9 +24,8 @@ from sentences import refused
 from semsig_gis.core.errors import CatalogError, SourceError
 from semsig_gis.sources import RowCounts
 from semsig_gis.sources.catalog import ClassBy, LayerSpec
-from semsig_gis.sources.osm.elements import TagIndex, has_shape, has_tags, relation_shape, way_shape
+from semsig_gis.sources.osm.elements import TagIndex, has_tags, relation_shape, way_shape
 from semsig_gis.sources.osm.file import read_layers
-from semsig_gis.sources.raw_layer import BadFeatureError
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable
@@ -36,13 +34,13 @@ if TYPE_CHECKING:
     from shapely.geometry.base import BaseGeometry
 
     from semsig_gis.sources import RawLayer
-    from semsig_gis.sources.catalog import ElementKind
 
     Read = Callable[..., Any]
 
 TREE = {"natural": "tree"}
 BENCH = {"amenity": "bench"}
 HOUSE = {"building": "yes"}
+STREET = {"highway": "residential"}
 FORMATS = [".osm", ".osm.bz2", ".osm.pbf"]
 
 
@@ -114,29 +112,6 @@ def test_the_index_finds_what_trying_every_layer_finds(
         assert set(index.keys) & set(tags)
 
 
-@pytest.mark.parametrize(
-    ("kind", "tags", "spec", "expected"),
-    [
-        ("node", {}, POINTS, True),
-        ("way", {}, POINTS, False),
-        ("way", {}, BENCHES, True),
-        ("relation", {"type": "multipolygon"}, BENCHES, True),
-        ("relation", {"type": "site"}, BENCHES, False),
-        ("relation", {"type": "building"}, BENCHES, False),
-        ("relation", {"type": "boundary"}, BENCHES, False),
-        ("relation", {}, BENCHES, False),
-        ("way", {"highway": "pedestrian"}, STREETS, True),
-        ("way", {"highway": "pedestrian", "area": "no"}, STREETS, True),
-        ("way", {"highway": "pedestrian", "area": "yes"}, STREETS, False),
-        ("way", {"area": "yes"}, BENCHES, True),
-    ],
-)
-def test_kinds_of_element(
-    kind: ElementKind, tags: dict[str, str], spec: LayerSpec, *, expected: bool
-) -> None:
-    assert has_shape(kind, tags, spec) == expected
-
-
 def xy(*places: tuple[float, float]) -> NDArray[np.float64]:
     return np.array(places, dtype=float).reshape(-1, 2)
 
@@ -203,28 +178,6 @@ def test_pieces_of_a_ring_join_in_any_order_and_direction(cuts: list[int], rando
     assert shape.area == pytest.approx(shapely.Polygon(ring).area)
 
 
-@pytest.mark.parametrize(
-    ("line", "reason"),
-    [
-        (xy((0, 0), (1, 0), (1, 1)), "not closed"),
-        (xy((0, 0), (1, 0), (0, 0)), "not closed"),
-        (xy((0, 0), (1, 0), (2, 0), (0, 0)), "no area"),
-        (xy((0, 0)), "two nodes"),
-        (xy(), "two nodes"),
-        ([xy((0, 0), (1, 0), (1, 1))], "join"),
-        ([square(2), xy((5, 5), (6, 6))], "join"),
-        ([], "no area"),
-        ([xy((0, 0))], "no area"),
-    ],
-)
-def test_what_is_no_building(line: Any, reason: str) -> None:  # noqa: ANN401 - of a way, or several
-    shape = (
-        partial(relation_shape, line, []) if isinstance(line, list) else partial(way_shape, line)
-    )
-    with pytest.raises(BadFeatureError, match=reason):
-        shape("buildings")
-
-
 CORNERS = [node(1, 0, 0), node(2, 1, 0), node(3, 1, 1), node(4, 0, 1)]
 
 
@@ -268,7 +221,7 @@ def test_one_pass_reads_every_layer_in_the_order_asked(read: Read) -> None:
         node(10, 2, 48, {**TREE, **BENCH}),
         way(7, [1, 2], BENCH),
         way(8, [1, 2, 3, 4, 1], HOUSE),
-        way(9, [1, 3], {"highway": "residential"}),
+        way(9, [1, 3], STREET),
     )
     assert [layer.spec.name for layer in layers] == ["streets", "benches", "trees", "buildings"]
     streets, benches, trees, buildings = layers
@@ -294,16 +247,24 @@ def test_every_format_reads_the_same(tmp_path: Path, suffix: str) -> None:
 
 
 def test_elements_of_another_kind_are_filtered(read: Read) -> None:
-    points, anything = read(
-        [POINTS, BENCHES],
+    relations = [
+        relation(7 + n, {6: ""}, {**kind, **BENCH})
+        for n, kind in enumerate([{}, {"type": "site"}, {"type": "building"}, {"type": "boundary"}])
+    ]
+    points, anything, streets = read(
+        [POINTS, BENCHES, STREETS],
         *CORNERS,
         node(5, 2, 48, BENCH),
-        way(6, [1, 2], BENCH),
-        relation(7, {6: ""}, {"type": "site", **BENCH}),
+        way(6, [1, 2, 3, 1], {"area": "yes", **BENCH}),
+        way(11, [1, 2, 3, 1], STREET),
+        way(12, [1, 2, 3, 1], {"area": "no", **STREET}),
+        way(13, [1, 2, 3, 1], {"area": "yes", **STREET}),
+        *relations,
     )
-    assert (points.counts, list(found(points))) == (RowCounts(read=3, filtered=2), ["node/5"])
-    assert anything.counts == RowCounts(read=3, filtered=1)
+    assert (points.counts, list(found(points))) == (RowCounts(read=6, filtered=5), ["node/5"])
+    assert anything.counts == RowCounts(read=6, filtered=4)
     assert list(found(anything)) == ["node/5", "way/6"]
+    assert list(found(streets)) == ["way/11", "way/12"]
 
 
 def test_multipolygons_with_untagged_members(read: Read) -> None:
@@ -384,35 +345,40 @@ def test_no_user_metadata_is_kept(read: Read) -> None:
     assert all(number.tobytes() not in kept for number in numbers)
 
 
-def test_what_is_incomplete_or_broken_is_skipped_and_counted(read: Read) -> None:
-    area = {"type": "multipolygon", **HOUSE}
-    buildings = read(
-        BUILDINGS,
-        *CORNERS,
-        node(5, 200, 95, HOUSE),
-        way(6, [1, 2, 98, 99, 1], HOUSE),
-        way(7, [1, 2, 3], HOUSE),
-        way(8, [1], HOUSE),
-        way(9, [], HOUSE),
-        way(10, [1, 2, 3, 4, 1], HOUSE),
-        relation(11, {10: "outer", 77: "inner"}, area),
-        relation(12, {6: "outer"}, area),
-        relation(13, {7: "outer"}, area),
-        relation(14, {}, area),
-    )
-    assert list(found(buildings)) == ["way/10"]
-    assert (buildings.counts.read, buildings.counts.unreadable) == (10, 9)
-    assert buildings.errors == (
-        "row 1: node/5 has no valid position",
-        "row 2: way/6 lacks 2 of its 5 nodes, as where a file is clipped",
-        "row 3: way/7 is not closed, as the outline of a building is",
-        "row 4: way/8 has less than two nodes",
-        "row 5: way/9 has less than two nodes",
-        "row 7: relation/11 lacks 1 of its 2 ways, as where a file is clipped",
-        "row 8: relation/12 lacks 2 of its 5 nodes, as where a file is clipped",
-        "row 9: relation/13 has ways that do not join to rings",
-        "row 10: relation/14 encloses no area",
-    )
+AREA = {"type": "multipolygon", **HOUSE}
+UNTAGGED = [
+    node(5, 2, 0),
+    way(6, [1, 2, 3, 4, 1]),
+    way(7, [1, 2, 9]),
+    way(8, [1, 2, 3]),
+    way(9, [1]),
+]
+
+
+@pytest.mark.parametrize(
+    ("element", "message"),
+    [
+        (node(10, 200, 95, HOUSE), "node/10 has no valid position"),
+        (way(10, [1, 8, 9, 1], HOUSE), "way/10 lacks 2 of its 4 nodes, as where a file is clipped"),
+        (way(10, [1, 2, 3], HOUSE), "way/10 is not closed, as the outline of a building is"),
+        (way(10, [1, 2, 1], HOUSE), "way/10 is not closed, as the outline of a building is"),
+        (way(10, [1, 2, 5, 1], HOUSE), "way/10 encloses no area"),
+        (way(10, [1], HOUSE), "way/10 has less than two nodes"),
+        (way(10, [], HOUSE), "way/10 has less than two nodes"),
+        (relation(1, {6: "", 77: ""}, AREA), "relation/1 lacks 1 of its 2 ways, as where a file"),
+        (relation(1, {6: "", 7: "inner"}, AREA), "relation/1 lacks 1 of its 8 nodes, as where a"),
+        (relation(1, {8: "outer"}, AREA), "relation/1 has ways that do not join to rings"),
+        (relation(1, {6: "", 8: ""}, AREA), "relation/1 has ways that do not join to rings"),
+        (relation(1, {}, AREA), "relation/1 encloses no area"),
+        (relation(1, {9: "outer"}, AREA), "relation/1 encloses no area"),
+    ],
+)
+def test_what_is_incomplete_or_broken_is_skipped(read: Read, element: str, message: str) -> None:
+    house = way(20, [1, 2, 3, 4, 1], HOUSE)
+    buildings = read(BUILDINGS, *CORNERS, *UNTAGGED, house, element)
+    assert list(found(buildings)) == ["way/20"]
+    assert buildings.counts == RowCounts(read=2, unreadable=1)
+    assert buildings.errors[0].partition(": ")[2].startswith(message)
 
 
 @pytest.fixture(scope="module")

@@ -110,15 +110,15 @@ def server(server: Server) -> Server:
 
 
 @pytest.fixture
-def get(server: Server, cache: Cache, slept: list[float]) -> Get:
+def get(server: Server, cache: Cache, quick: HttpSpec) -> Get:
     """Fetch the benches of the area; keywords change the specification or those of the call."""
     fields = {field.name for field in dataclasses.fields(HttpSpec)}
 
     def call(**what: Any) -> list[Path]:  # noqa: ANN401 - see above
         own = {name: what.pop(name) for name in fields & what.keys()}
-        spec = HttpSpec(timeout=(2.0, 2.0), attempts=2, backoff_s=1.0, sleep=slept.append)
-        given = {"area": AREA, "endpoints": [f"{server.url}/api"], "cache": cache}
-        return fetch_layers([BENCH], **{**given, "spec": dataclasses.replace(spec, **own), **what})
+        spec = replace(quick, **{"attempts": 2, **own})
+        given = {"area": AREA, "endpoints": [f"{server.url}/api"], "cache": cache, "spec": spec}
+        return fetch_layers([BENCH], **{**given, **what})
 
     return call
 

@@ -27,7 +27,6 @@ from semsig_gis.sources.raw_layer import (
     crs_label,
     matches,
     off_the_globe,
-    settle_crs,
     usable_crs,
 )
 
@@ -68,29 +67,6 @@ def test_wkt_of_esri_becomes_the_code_that_it_means() -> None:
 )
 def test_wkt_that_places_nothing(wkt: str) -> None:
     assert usable_crs(wkt) is None
-
-
-@pytest.mark.parametrize(
-    ("own", "expected", "given", "settled", "notes"),
-    [
-        (2154, None, None, 2154, 0),
-        (2154, "EPSG:2154", None, 2154, 0),
-        (2154, "EPSG:2154", "EPSG:4326", 2154, 1),
-        (2154, "EPSG:4326", None, 2154, 1),
-        (4326, None, None, 4326, 0),  # GeoJSON that says nothing
-        (4326, "EPSG:2154", None, 2154, 0),
-        (None, "EPSG:2154", None, 2154, 0),
-        (None, "EPSG:4326", "EPSG:2154", 2154, 0),
-    ],
-)
-def test_statements_in_their_order(
-    own: int | None, expected: str | None, given: str | None, settled: int, notes: int
-) -> None:
-    stated = None if own is None else CRS.from_epsg(own)
-    crs, said = settle_crs(
-        stated, implicit=own == 4326, expected=expected, given=given, where="here"
-    )
-    assert (crs.to_epsg(), len(said)) == (settled, notes)
 
 
 def test_only_degrees_have_limits() -> None:
@@ -184,11 +160,6 @@ def test_a_pattern_that_is_none() -> None:
         RowRules(spec, ["kind"], filters=True, where="layer 'things'")
 
 
-def test_only_true_ids_may_be_unique() -> None:
-    spec = LayerSpec(name="things", class_name="bench", id_field="n", unique_id=True)
-    assert table(spec, n=[3.0, "3.0", None, " "])["source_id"].tolist() == ["3", "3", "", ""]
-
-
 BY_CLASS = WidthBy("highway", (("primary", 24.0), ("/.*_link/", 14.0)), 12.0)
 
 
@@ -201,31 +172,31 @@ def half_width(spec: LayerSpec, **row: object) -> float:
     return math.nan if widths is None else float(widths.iloc[0])
 
 
+ODD_WIDTHS = (True, 0, 0.05, -3, math.nan, math.inf, 201, "wide", "", None, "9'")
+
+
 @pytest.mark.parametrize(
-    ("by", "value", "expected"),
+    ("by", "highway", "width", "half"),
     [
-        (BY_CLASS, "primary", 12.0),
-        (BY_CLASS, "trunk_link", 7.0),
-        (BY_CLASS, "road", 6.0),
-        (BY_CLASS, None, 6.0),
-        (WidthBy("highway", (("primary", 24.0),)), "road", math.nan),
-        (None, "primary", math.nan),
+        (BY_CLASS, "primary", None, 12.0),
+        (BY_CLASS, "trunk_link", None, 7.0),
+        (BY_CLASS, None, None, 6.0),
+        *((BY_CLASS, "road", odd, 6.0) for odd in ODD_WIDTHS),
+        (WidthBy("highway", (("primary", 24.0),)), "road", None, math.nan),
+        (None, "primary", None, math.nan),
+        # A field of widths goes before the class.
+        *((BY_CLASS, "primary", width, 4.75) for width in (9.5, "9.5", "9,5 m", "9.5m")),
+        (None, "primary", 9, 4.5),
     ],
 )
-def test_the_class_of_a_street_says_its_width(
-    by: WidthBy | None, value: str | None, expected: float
+def test_a_street_is_as_wide_as_its_field_or_else_its_class_says(
+    by: WidthBy | None, highway: str | None, width: object, half: float
 ) -> None:
-    assert half_width(street(width_by=by), highway=value) == pytest.approx(expected, nan_ok=True)
-
-
-@pytest.mark.parametrize(
-    ("value", "expected"),
-    [(9, 4.5), (9.5, 4.75), ("9.5", 4.75), ("9,5 m", 4.75), ("10m", 5.0), (True, 6.0)]
-    + [(bad, 6.0) for bad in (0, 0.05, -3, math.nan, math.inf, 201, "wide", "", None, "9'")],
-)
-def test_a_field_of_widths_goes_before_the_class(value: object, expected: float) -> None:
-    spec = street(width_by=BY_CLASS, width_field="width")
-    assert half_width(spec, highway="service", width=value) == expected
+    spec = street(width_by=by, width_field="width")
+    assert half_width(spec, highway=highway, width=width) == pytest.approx(half, nan_ok=True)
+    if width is None:
+        spec = street(width_by=by)
+        assert half_width(spec, highway=highway) == pytest.approx(half, nan_ok=True)
 
 
 @given(values)

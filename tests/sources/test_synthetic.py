@@ -20,6 +20,7 @@ from semsig_gis.database.build import build_database
 from semsig_gis.database.occlusion import Footprints
 from semsig_gis.database.views import ViewpointSpec
 from semsig_gis.objects.load import build_objects
+from semsig_gis.reports.paris import DATABASE, OCCURRENCES
 from semsig_gis.sources.catalog import paper_taxonomy
 from semsig_gis.sources.synthetic import city as synthetic
 from semsig_gis.sources.synthetic import streets as _city_streets
@@ -38,21 +39,6 @@ if TYPE_CHECKING:
 
     City = tuple[RawLayer, ...]
 
-# How often the paper's 312,134 signatures of Paris hold each class.
-CELLS = 312_134
-PARIS = {
-    "alignment_tree": 1_752_696,
-    "street_light": 2_299_639,
-    "bench": 135_748,
-    "traffic_light": 102_240,
-    "indicator": 36_333,
-    "bus_stop": 32_320,
-    "bike_station": 14_397,
-    "automatic_wc": 8_006,
-    "water_fountain": 6_713,
-    "car_station": 4_421,
-    "taxi_station": 2_537,
-}
 COMMON = ("alignment_tree", "street_light", "bench", "traffic_light", "indicator", "bus_stop")
 
 cities = st.builds(
@@ -189,8 +175,8 @@ def test_a_small_city_has_about_the_shares_of_paris(seed: int) -> None:
     counts = {layer.spec.class_name: layer.counts.read for layer in layers}
     total = sum(counts.values())
     assert 9_000 < total < 15_000
-    for name, occurrences in PARIS.items():
-        expected = total * occurrences / sum(PARIS.values())
+    for name, occurrences in OCCURRENCES.items():
+        expected = total * occurrences / sum(OCCURRENCES.values())
         # A third more or less, and the chance of a small number.
         assert abs(counts[name] - expected) < expected / 3 + 3 * math.sqrt(expected), name
 
@@ -272,13 +258,12 @@ def test_signals_stand_at_corners_of_avenues(city: City, network: Network) -> No
     meeting = np.bincount(network.junction[network.avenue].ravel())
     corner = network.junction[signals["edge"], signals["number"]]
     assert (meeting[corner] >= 2).all()
-    assert (meeting[corner] == 3).any()
-    assert (meeting[corner] == 2).any()
+    assert {2, 3} <= set(meeting[corner])
     assert not signals.duplicated(["edge", "number"]).any()
 
 
 def test_other_classes_are_ten_times_as_frequent_on_avenues(city: City, network: Network) -> None:
-    scattered = set(PARIS) - {"alignment_tree", "street_light", "traffic_light"}
+    scattered = set(OCCURRENCES) - {"alignment_tree", "street_light", "traffic_light"}
     frames = [along_streets(of_class(city, name), network) for name in scattered]
     on_avenue = network.avenue[pd.concat(frames)["edge"]]
     free = np.maximum(network.length - network.clear.sum(axis=1), 0.0)
@@ -322,12 +307,12 @@ def test_the_paris_like_city_has_the_counts_of_the_paper() -> None:
     objects, _ = build_objects(layers, taxonomy=paper_taxonomy(), crs="EPSG:32631")
     streets = synthetic_surroundings(PARIS_LIKE)[1].table
     database = build_database(objects, viewpoints=ViewpointSpec(mode="streets"), streets=streets)
-    assert len(database) == pytest.approx(CELLS, rel=0.02)
+    assert len(database) == pytest.approx(DATABASE["signatures"], rel=0.02)
     assert database.lengths.mean() == pytest.approx(14.0, abs=0.5)
     for item in paper_taxonomy().classes:
         slack = 0.05 if item.name in COMMON else 0.15
         held = database.occurrences[item.code]
-        assert held == pytest.approx(PARIS[item.name], rel=slack), item.name
+        assert held == pytest.approx(OCCURRENCES[item.name], rel=slack), item.name
     types, angles = database.type_sequences, database.angle_sequences
     assert len(types) / len(database) == pytest.approx(0.45, abs=0.04)
     assert len(angles) / len(database) == pytest.approx(0.656, abs=0.04)
