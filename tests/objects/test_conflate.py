@@ -15,7 +15,7 @@ from sentences import refused
 from worlds import TAXONOMY, objects_of
 
 from semsig_gis.core.errors import InputError, UnknownNameError
-from semsig_gis.objects.conflate import ConflatedPair, ConflationReport, conflate
+from semsig_gis.objects.conflate import conflate
 from semsig_gis.objects.load import build_objects
 from semsig_gis.objects.table import Licence, open_objects, save_objects
 from semsig_gis.sources.catalog import load_catalog
@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
     from pathlib import Path
 
+    from semsig_gis.objects.conflate import ConflationReport
     from semsig_gis.objects.table import StreetObjects
 
 LICENCES = (Licence("A (CC0)", ("a",)), Licence("B (ODbL)", ("b",)))
@@ -54,26 +55,18 @@ def bench(source: str, name: str, x: float, y: float = 0.0) -> Thing:
 
 
 def test_the_same_object_in_two_sources_is_one() -> None:
-    objects, report = conflate(
-        world([bench("city", "1", 0), bench("osm", "node/7", 3, 4), bench("osm", "node/8", 50)]),
-        {"bench": 5.0},
+    things = [bench("city", "1", 0), bench("osm", "node/7", 3, 4), bench("osm", "node/8", 50)]
+    objects, report = conflate(world(things), {"bench": 5.0})
+    expected = objects_of(
+        (0.0, 0.0, 10, "city", "1"),
+        (50.0, 0.0, 10, "osm", "node/8"),
+        licenses=LICENCES,
+        count=[2, 1],
+        merged=["osm:node/7", ""],
     )
-    assert content(objects) == [
-        (10, "city", "1", 2, "osm:node/7", 0.0, 0.0),
-        (10, "osm", "node/8", 1, "", 50.0, 0.0),
-    ]
-    types = objects.table.drop(columns="geometry").dtypes.astype(str).to_dict()
-    assert (types["count"], types["class_code"]) == ("int32", "uint8")
-    assert list(types) == ["class_code", "source", "source_id", "count", "merged"]
-    assert objects.table.index.tolist() == [0, 1]
-    assert objects.crs.to_epsg() == 2154
+    assert_geodataframe_equal(objects.table, expected.table)
     # The identifier and the count of the merged row come from its source, so its licence holds.
     assert objects.licenses == LICENCES
-    pair = ConflatedPair(
-        class_name="bench", radius=5.0, kept="city", merged="osm",
-        count=1, median_m=5.0, largest_m=5.0,
-    )  # fmt: skip
-    assert report == ConflationReport((pair,))
     assert report.count == 1
 
 

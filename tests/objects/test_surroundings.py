@@ -3,6 +3,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Literal
 
 import geopandas as gpd
+import numpy as np
 import pytest
 import shapely
 from osm_xml import node, way, write_osm
@@ -60,6 +61,7 @@ LINE = shapely.LineString([(770_000, 6_280_000), (770_100, 6_280_000)])
 FLAT = shapely.Polygon([(770_000, 6_280_000)] * 3)
 
 
+@pytest.mark.parametrize("name", ["x.parquet", "x.gpkg"])
 @pytest.mark.parametrize(
     ("shape", "role", "words"),
     [
@@ -70,17 +72,25 @@ FLAT = shapely.Polygon([(770_000, 6_280_000)] * 3)
     ],
 )
 def test_a_file_of_something_else_is_refused(
-    tmp_path: Path, shape: shapely.Geometry | None, role: Role, words: tuple[str, ...]
+    tmp_path: Path, name: str, shape: shapely.Geometry | None, role: Role, words: tuple[str, ...]
 ) -> None:
-    for name in ("x.parquet", "x.gpkg"):
-        path = write(tmp_path / name, shape)
-        with refused(InputError, name, *words):
-            read_surroundings(path, role=role, crs=CRS) if role else read_area(path, crs=CRS)
+    path = write(tmp_path / name, shape)
+    with refused(InputError, name, *words):
+        read_surroundings(path, role=role, crs=CRS) if role else read_area(path, crs=CRS)
+
+
+EAST, NORTH = np.mgrid[770_000:770_900:10, 6_280_900:6_280_000:-10].reshape(2, -1)
+HOUSES = gpd.GeoDataFrame(
+    {"n": range(EAST.size)}, geometry=shapely.box(EAST, NORTH, EAST + 6, NORTH + 6), crs=CRS
+)
+NOWHERE = (0, 0, 9, 9)
 
 
 def test_a_file_that_cannot_be_used_is_named(tmp_path: Path) -> None:
     (tmp_path / "broken.parquet").write_text("no", encoding="utf-8")
     gpd.GeoDataFrame(geometry=[HOUSE]).to_parquet(tmp_path / "bare.parquet")
+    HOUSES.to_parquet(tmp_path / "unbounded.parquet")
+    save_surroundings(HOUSES.iloc[:0], tmp_path / "empty.parquet")
     for name, words in (
         ("nowhere.parquet", "does not exist"),
         ("nowhere.gpkg", "does not exist"),
@@ -89,19 +99,14 @@ def test_a_file_that_cannot_be_used_is_named(tmp_path: Path) -> None:
     ):
         with refused(SourceError, name, words):
             read_area(tmp_path / name, crs=CRS)
-
-
-def rows_of_houses() -> gpd.GeoDataFrame:
-    shapes = [
-        shapely.box(770_000 + x, 6_280_000 + y, 770_006 + x, 6_280_006 + y)
-        for x in range(0, 900, 10)
-        for y in range(900, 0, -10)
-    ]
-    return gpd.GeoDataFrame({"n": range(len(shapes))}, geometry=shapes, crs=CRS)
+    with refused(SourceError, "unbounded.parquet"):
+        read_surroundings(tmp_path / "unbounded.parquet", role="buildings", crs=CRS, box=NOWHERE)
+    with refused(InputError, "holds no polygon"):
+        read_surroundings(tmp_path / "empty.parquet", role="buildings", crs=CRS)
 
 
 def test_saved_surroundings_come_back_by_box(tmp_path: Path) -> None:
-    table = rows_of_houses()
+    table = HOUSES.copy()
     table.attrs["licenses"] = ["City (CC0): houses"]
     path = tmp_path / "new" / "houses.parquet"
     save_surroundings(table, path)
@@ -112,23 +117,8 @@ def test_saved_surroundings_come_back_by_box(tmp_path: Path) -> None:
     assert sorted(near["n"]) == sorted(table["n"][table.intersects(shapely.box(*box))])
     assert list(near.columns) == ["n", "geometry"]
     assert licenses_of(near) == licenses_of(again) == ("City (CC0): houses",)
+    for crs in (CRS, "EPSG:32631"):
+        none = read_surroundings(path, role="buildings", crs=crs, box=NOWHERE)
+        assert (len(none), none.crs) == (0, crs)
     save_surroundings(again, tmp_path / "again.parquet")
     assert (tmp_path / "again.parquet").read_bytes() == path.read_bytes()
-
-
-def test_a_box_without_any_is_empty(tmp_path: Path) -> None:
-    path = tmp_path / "houses.parquet"
-    save_surroundings(rows_of_houses(), path)
-    for crs in (CRS, "EPSG:32631"):
-        near = read_surroundings(path, role="buildings", crs=crs, box=(0, 0, 9, 9))
-        assert (len(near), near.crs) == (0, crs)
-
-
-def test_files_without_bounds_or_buildings_are_refused(tmp_path: Path) -> None:
-    path = tmp_path / "houses.parquet"
-    rows_of_houses().to_parquet(path)
-    with refused(SourceError, "houses.parquet"):
-        read_surroundings(path, role="buildings", crs=CRS, box=(0, 0, 9, 9))
-    save_surroundings(rows_of_houses().iloc[:0], path)
-    with refused(InputError, "holds no polygon"):
-        read_surroundings(path, role="buildings", crs=CRS)

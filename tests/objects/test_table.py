@@ -18,6 +18,7 @@ from hypothesis import strategies as st
 from pyproj import CRS, Transformer
 from raw_layers import raw_layer
 from sentences import assert_sentence, refused
+from worlds import objects_of
 
 from semsig_gis.core.errors import CrsError, DatabaseError, EmptyResultError, UnknownNameError
 from semsig_gis.objects.load import LayerReport, build_objects
@@ -67,18 +68,10 @@ def test_the_table_has_the_columns_it_promises() -> None:
     objects = build(
         raw_layer(points((1, 2), (3, 4)), ids=["a7", "é8"], classes=["bench", "street_light"])
     )
-    expected = gpd.GeoDataFrame(
-        {
-            "class_code": np.array([10, 3], np.uint8),
-            "source": "trees",
-            "source_id": ["a7", "é8"],
-            "count": np.ones(2, np.int32),
-        },
-        geometry=shapely.points([[1, 2], [3, 4]]),
-        crs=LAMBERT,
-    )
-    assert_geodataframe_equal(objects.table, expected)
-    assert objects.codes.tolist() == [10, 3]
+    town = (Licence("Town (CC0)", ("trees",)),)
+    expected = objects_of((1, 2, 10, "trees", "a7"), (3, 4, 3, "trees", "é8"), licenses=town)
+    assert_geodataframe_equal(objects.table, expected.table)
+    assert (objects.licenses, objects.codes.tolist()) == (town, [10, 3])
     assert objects.xy.tolist() == [[1, 2], [3, 4]]
     assert not objects.xy.flags.writeable
 
@@ -361,15 +354,15 @@ def scattered(count: int) -> StreetObjects:
 
 def test_saved_objects_come_back_in_an_order_that_stays(tmp_path: Path) -> None:
     objects = scattered(3_000)
-    one, two = tmp_path / "one.parquet", tmp_path / "two.parquet"
-    save_objects(objects, one)
-    again = open_objects(one)
+    path = tmp_path / "objects.parquet"
+    save_objects(objects, path)
+    content, again = path.read_bytes(), open_objects(path)
     # Every object once, whatever the order.
     rows = again.table["source_id"].astype(int)
     assert sorted(rows) == list(range(len(objects)))
     assert_geodataframe_equal(again.table, objects.table.iloc[rows].reset_index(drop=True))
-    save_objects(again, two)
-    assert one.read_bytes() == two.read_bytes()
+    save_objects(again, path)
+    assert path.read_bytes() == content
     # Neighbours in the file are neighbours in the city.
     assert np.median(np.hypot(*np.diff(again.xy, axis=0).T)) < 150
     assert np.median(np.hypot(*np.diff(objects.xy, axis=0).T)) > 1_500
