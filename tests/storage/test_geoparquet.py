@@ -1,9 +1,12 @@
+"""GeoParquet files, the rows of tables, and the signatures that they hold."""
+
 from __future__ import annotations
 
 import errno
 import json
 import random
-from typing import TYPE_CHECKING, Any, NoReturn
+from typing import TYPE_CHECKING, Any
+from unittest.mock import Mock
 
 import geopandas as gpd
 import numpy as np
@@ -17,15 +20,19 @@ from hypothesis.extra.numpy import arrays
 from pyproj import CRS
 from sentences import assert_sentence, refused
 
-from semsig_gis.core.errors import DatabaseError
+from semsig_gis.core.errors import DatabaseError, InputError
+from semsig_gis.sources.catalog import paper_taxonomy
 from semsig_gis.storage.geoparquet import (
     bounds_column,
     each_bounds,
     geo_metadata,
     groups_meeting,
     hilbert_order,
+    parse_rows,
     points_to_wkb,
     read_geoparquet,
+    read_rows,
+    row_signature,
     rows_meeting,
     write_geoparquet,
 )
@@ -84,24 +91,19 @@ def test_what_is_written_is_read_again(example: Path) -> None:
     assert some.column_names == ["text"]
 
 
-def test_geopandas_reads_the_file(example: Path) -> None:
+def test_other_programs_read_the_file(example: Path) -> None:
     frame = gpd.read_parquet(example)
     assert frame.crs == CRS(2154)
     assert frame.geometry.tolist() == POINTS
     assert frame["number"].tolist() == NUMBERS
     assert frame["text"].tolist() == TEXTS
     assert [row.tolist() for row in frame["list"]] == LISTS
-    metadata = json.loads(pq.read_metadata(example).metadata[b"geo"])
-    assert metadata["version"] == "1.1.0"
-    assert metadata["primary_column"] == "geometry"
-    column = metadata["columns"]["geometry"]
-    assert column["encoding"] == "WKB"
-    assert column["geometry_types"] == ["Point"]
-    assert column["bbox"] == list(shapely.total_bounds(POINTS))
-
-
-def test_pyarrow_alone_reads_a_column(example: Path) -> None:
     assert pq.read_table(example, columns=["number"])["number"].to_pylist() == NUMBERS
+    metadata = json.loads(pq.read_metadata(example).metadata[b"geo"])
+    column = metadata["columns"]["geometry"]
+    assert (metadata["version"], metadata["primary_column"]) == ("1.1.0", "geometry")
+    assert (column["encoding"], column["geometry_types"]) == ("WKB", ["Point"])
+    assert column["bbox"] == list(shapely.total_bounds(POINTS))
 
 
 def test_a_file_cut_anywhere_is_an_error(example: Path) -> None:
@@ -128,11 +130,6 @@ def test_a_flipped_bit_is_an_error_or_changes_nothing_that_is_read(example: Path
             assert table.equals(whole)
 
 
-def test_a_file_of_another_kind_is_named(example: Path) -> None:
-    with refused(DatabaseError, "is a sample file", "give a signature database file"):
-        read_geoparquet(example, kind="signature database")
-
-
 @pytest.mark.parametrize(
     "change",
     [
@@ -148,44 +145,33 @@ def test_a_file_with_specs_or_a_crs_of_another_kind_is_not_ours(
         read_geoparquet(path, kind="sample")
 
 
-def test_a_geoparquet_file_of_another_program_is_not_ours(tmp_path: Path) -> None:
-    path = tmp_path / "a.parquet"
-    gpd.GeoDataFrame(geometry=POINTS, crs=2154).to_parquet(path)
-    with refused(DatabaseError, "was not written by semsig", "give a sample file"):
-        read_geoparquet(path, kind="sample")
-
-
-@pytest.mark.parametrize("content", [b"", b"PAR1", b"name = 'town'\n", b"PK\x03\x04" * 20])
-def test_a_file_that_is_not_parquet_is_an_error(tmp_path: Path, content: bytes) -> None:
-    path = tmp_path / "a.parquet"
-    path.write_bytes(content)
-    with refused(DatabaseError, str(path), "is damaged or is not a Parquet file"):
-        read_geoparquet(path, kind="sample")
-
-
-def test_a_missing_file_and_a_folder_are_told_apart(tmp_path: Path) -> None:
-    missing = (tmp_path / "a.parquet", tmp_path / ("a" * 300))
-    for path in missing:
-        with refused(DatabaseError, str(path), "does not exist"):
-            read_geoparquet(path, kind="sample")
-    with refused(DatabaseError, str(tmp_path), "is a folder"):
-        read_geoparquet(tmp_path, kind="sample")
-
-
-def test_a_file_that_may_not_be_read_is_not_called_damaged(
+def test_what_is_not_the_file_that_is_meant_is_said(
     example: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    def refuse(*_: object, **__: object) -> NoReturn:
-        raise PermissionError(errno.EACCES, "Failed to open local file")
-
-    monkeypatch.setattr(pq, "ParquetFile", refuse)
-    with refused(DatabaseError, str(example), "cannot be read (Permission denied)"):
-        read_geoparquet(example, kind="sample")
-
-
-def test_a_missing_column_is_named(example: Path) -> None:
+    with refused(DatabaseError, "is a sample file", "give a signature database file"):
+        read_geoparquet(example, kind="signature database")
     with refused(DatabaseError, "lacks the column 'types'"):
         read_geoparquet(example, kind="sample", columns=["number", "types"])
+    folder = example.parent
+    other = folder / "other.parquet"
+    gpd.GeoDataFrame(geometry=POINTS, crs=2154).to_parquet(other)
+    denied = PermissionError(errno.EACCES, "Failed to open local file")
+    for path, *words in (
+        (other, "was not written by semsig", "give a sample file"),
+        (folder / "a.parquet", "does not exist"),
+        (folder / ("a" * 300), "does not exist"),
+        (folder, "is a folder"),
+    ):
+        with refused(DatabaseError, str(path), *words):
+            read_geoparquet(path, kind="sample")
+    for content in (b"", b"PAR1", b"name = 'town'\n", b"PK\x03\x04" * 20):
+        other.write_bytes(content)
+        with refused(DatabaseError, str(other), "is damaged or is not a Parquet file"):
+            read_geoparquet(other, kind="sample")
+    # A file that may not be read is not called damaged.
+    monkeypatch.setattr(pq, "ParquetFile", Mock(side_effect=denied))
+    with refused(DatabaseError, str(example), "cannot be read (Permission denied)"):
+        read_geoparquet(example, kind="sample")
 
 
 def test_a_file_in_use_can_be_replaced(example: Path) -> None:
@@ -217,11 +203,8 @@ def test_neighbours_in_the_order_are_neighbours_in_the_plane() -> None:
     steps = shapely.distance(points[order][1:], points[order][:-1])
     assert np.median(steps) < 3
     assert np.median(shapely.distance(points[1:], points[:-1])) > 40
-
-
-def test_equal_places_and_none_at_all_have_an_order() -> None:
-    assert hilbert_order(np.asarray(shapely.points([[3.0, 4.0]] * 5))).tolist() == [0, 1, 2, 3, 4]
-    assert hilbert_order(np.asarray(shapely.points(np.empty((0, 2))))).tolist() == []
+    for equal in (5, 0):
+        assert hilbert_order(points[[0] * equal]).tolist() == [*range(equal)]
 
 
 def test_groups_and_rows_that_may_meet_a_box_are_found(tmp_path: Path) -> None:
@@ -246,3 +229,56 @@ def test_a_file_without_bounds_may_meet_any_box(tmp_path: Path) -> None:
             assert groups_meeting(file, (0, 0, 1, 1)) == [0]
         assert list(each_bounds(tmp_path / "a.parquet")) == []
         assert rows_meeting(table, (0, 0, 1, 1)) == table
+
+
+TAXONOMY = paper_taxonomy()
+WORDS = st.text(st.characters(codec="utf-8", exclude_characters="\x00"), max_size=6)
+
+
+@given(st.lists(st.fixed_dictionaries({"a": WORDS, "b": WORDS}), min_size=1, max_size=4))
+def test_what_was_written_is_read(rows: list[dict[str, str]]) -> None:
+    text = "\n".join(json.dumps(row) for row in rows)
+    found = parse_rows(text, "x", dict, what="thing")
+    assert found == list(enumerate(rows, start=1))
+
+
+def test_cells_of_a_table_may_hold_commas_and_line_breaks(tmp_path: Path) -> None:
+    path = tmp_path / "rows.CSV"
+    path.write_text('\ufeffid,types\n"a, b",D\n\n"c\nd",B\n', encoding="utf-8")
+    found = read_rows(path, lambda row: (row["id"], row["types"]), what="thing")
+    assert found == [(2, ("a, b", "D")), (5, ("c\nd", "B"))]
+
+
+@pytest.mark.parametrize(
+    "bearings", [[360, -10, -360], "360;-10;-360", "360, -10,-360", " 360 -10 -360 "]
+)
+def test_bearings_in_any_shape_and_beyond_the_circle(bearings: object) -> None:
+    seen = row_signature({"types": " DBL ", "bearings": bearings}, TAXONOMY)
+    assert seen is not None
+    assert seen.bearings is not None
+    assert seen.bearings.tolist() == [0.0, 0.0, 350.0]
+
+
+@pytest.mark.parametrize("row", [{}, {"types": ""}, {"types": None, "bearings": []}])
+def test_nothing_was_seen(row: dict[str, object]) -> None:
+    assert row_signature(row, TAXONOMY) is None
+
+
+@pytest.mark.parametrize(
+    ("text", "table", "words"),
+    [
+        ("", False, ["no rows", "one thing"]),
+        ("a,b\n", True, ["no rows"]),
+        ("{", False, ["line 1", "not JSON"]),
+        ("\n[1]", False, ["line 2", "names and values"]),
+        ('{"types": "D", "bearings": NaN}', False, ["line 1", "nan"]),
+        ('{"types": ["D"]}', False, ["line 1"]),
+        ('{"types": "D", "bearings": {"a": 1}}', False, ["line 1", "not all numbers"]),
+        ('{"types": "D", "bearings": [[1]]}', False, ["line 1"]),
+        ("[" * 100_000, False, ["line 1"]),
+        ("types\n" + "D" * 200_000, True, ["not CSV"]),
+    ],
+)
+def test_what_cannot_be_used_is_named(text: str, table: bool, words: list[str]) -> None:  # noqa: FBT001
+    with refused(InputError, "x", *words):
+        parse_rows(text, "x", lambda row: row_signature(row, TAXONOMY), what="thing", table=table)
