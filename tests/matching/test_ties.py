@@ -42,17 +42,19 @@ def test_many_ties_stay_exact() -> None:
     assert (expected, within[0]) == pytest.approx((299_999 / 2, 0.1), rel=1e-9)
 
 
-@given(better=Errors, tied=Errors.filter(bool), metres=st.integers(0, 60), data=st.data())
+@given(better=Errors, tied=Errors.filter(bool), data=st.data())
 def test_expectation_equals_every_draw(
-    better: list[float], tied: list[float], metres: int, data: st.DataObject
+    better: list[float], tied: list[float], data: st.DataObject
 ) -> None:
     slots = data.draw(st.integers(1, len(tied)))
     draws = [min((*better, *drawn)) for drawn in itertools.combinations(tied, slots)]
-    expected, within = expected_best(better, tied, slots=slots)
+    limits = [*THRESHOLDS, *better, *tied]
+    expected, within = expected_best(better, tied, slots=slots, thresholds=limits)
     assert expected == pytest.approx(np.mean(draws), abs=1e-9)
-    shares = [np.mean([best <= limit for best in draws]) for limit in (*THRESHOLDS, metres)]
-    chance = chance_within(better, tied, slots=slots, metres=metres)
-    assert [*within, chance] == pytest.approx(shares, abs=1e-12)
+    shares = [np.mean([best <= limit for best in draws]) for limit in limits]
+    assert within == pytest.approx(shares, abs=1e-12)
+    chances = [chance_within(better, tied, slots=slots, metres=limit) for limit in limits]
+    assert chances == pytest.approx(shares, abs=1e-12)
 
 
 @given(

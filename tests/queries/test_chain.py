@@ -1,28 +1,45 @@
+"""Chains of distortions, and what distortions and drawn queries refuse."""
+
 from __future__ import annotations
 
 import itertools
-from typing import TYPE_CHECKING
+from dataclasses import replace
+from math import inf, nan
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from pyproj import CRS
+from sentences import refused
 from sights import CITY, CLASSES, many, paper_errors, rows, seeds, sights
+from worlds import random_town
 
+from semsig_gis.core.errors import CrsError, InputError, UnknownNameError
+from semsig_gis.core.signature import Signature
 from semsig_gis.likelihood.noise.model import NOISES, NoiseSpec
 from semsig_gis.queries.chain import NAMED_DISTORTIONS, chain_text, parse_chain, ready_chain
 from semsig_gis.queries.distortions import (
-    DISTORTIONS,
     BlockedSectors,
     CompassBias,
     Detector,
+    Distortion,
     FieldOfView,
     HiddenBehind,
     MissingClasses,
     Obstacles,
+    distort,
+    named_distortion,
 )
+from semsig_gis.queries.draw import QuerySpec, draw_queries
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from numpy.typing import NDArray
+
+    from semsig_gis.core.errors import SemsigError
     from semsig_gis.queries.chain import QueryDistortion
     from semsig_gis.queries.sight import Sight
 
@@ -77,14 +94,12 @@ def test_any_order_of_any_distortions_gives_a_query(
 ) -> None:
     before = rows(one)
     for order in itertools.islice(itertools.permutations(chain), 6):
-        seen = ready_chain(order, CITY)(one, seed, number)
+        seen, again = (ready_chain(order, CITY)(one, seed, number) for _ in range(2))
         assert set(seen.codes.tolist()) <= set(CLASSES)
         assert ((seen.bearings >= 0) & (seen.bearings < 360)).all()
         assert (seen.distances >= 0).all()
         assert len(seen.signature) == len(seen)
-        again = ready_chain(order, CITY)(one, seed, number)
-        assert rows(again) == rows(seen)
-        assert again.heading == seen.heading
+        assert (rows(again), again.heading) == (rows(seen), seen.heading)
     assert rows(one) == before
 
 
@@ -106,13 +121,6 @@ def test_numbers_seeds_and_repeats_have_chances_of_their_own() -> None:
     once = ready_chain([CompassBias()], CITY)(many(1), 0, 0).heading
     twice = spoil(many(1), 0, 0).heading
     assert twice != pytest.approx(2.0 * once % 360.0)
-
-
-def test_nothing_happens_without_distortions() -> None:
-    one = many(3)
-    assert ready_chain((), CITY)(one, 0, 0) is one
-    none = ready_chain([DISTORTIONS["none"]], CITY)(one, 0, 0)
-    assert rows(none) == rows(one)
 
 
 def test_misses_and_clutter_add_up() -> None:
@@ -139,3 +147,99 @@ def test_the_streams_of_random_numbers_are_fixed() -> None:
         "blocked": 4_207_042_345,
         "detector": 4_129_241_295,
     }
+
+
+# --- Refusals ---------------------------------------------------------------------------------
+
+MISSPELT = NoiseSpec(detection_by_class={"bnech": 0.5})
+DATABASE = random_town().database
+ORIGIN = np.zeros(1)
+
+
+@pytest.mark.parametrize(
+    ("kind", "name", "values", "words"),
+    [
+        (Distortion, "occurrences", [-1], ["occurrences", "0 or more"]),
+        (Distortion, "bearing_sigma", [-0.1, nan], ["bearing sigma", "0 or more"]),
+        (Distortion, "bearing_clip", [-0.1, inf], ["bearing clip", "0 or more"]),
+        (CompassBias, "sigma", [-1.0, nan, inf], ["compass", "0 or more"]),
+        (FieldOfView, "degrees", [0.0, -5.0, 360.5, nan], ["above 0", "at most 360"]),
+        (HiddenBehind, "width", [-1.0, nan, inf], ["width of the objects", "0 or more"]),
+        (Obstacles, "count", [-1.0, nan, inf], ["number of obstacles", "0 or more"]),
+        (Obstacles, "width", [-1.0, nan, inf], ["width of the obstacles", "0 or more"]),
+        (BlockedSectors, "count", [-1], ["sectors", "from 0"]),
+        (BlockedSectors, "degrees", [-1.0, nan, inf], ["degrees", "from 0 to 360"]),
+        (Detector, "half", [0.0, -3.0, nan], ["above 0"]),
+        (QuerySpec, "number", [0], ["queries", "from 1"]),
+        (QuerySpec, "seeds", [[], [1, 1]], ["at least one", "none twice"]),
+        (QuerySpec, "seeds", [[-1]], ["-1", "0 or more"]),
+    ],
+)
+def test_settings_out_of_range(kind: type, name: str, values: list[Any], words: list[str]) -> None:
+    needed = {"noise": MINE} if kind is Detector else {}
+    for value in values:
+        with refused(InputError, str(value).strip("[]"), *words):
+            kind(**needed, **{name: value})
+
+
+@pytest.mark.parametrize(
+    ("kind", "text", "words"),
+    [
+        (UnknownNameError, "meduim", ["'meduim'", "nearest is 'medium'"]),
+        (UnknownNameError, "medium,,view:90", ["''", "no distortion"]),
+        (UnknownNameError, "medium:7", ["'7'", "means nothing", "of medium are occurrences"]),
+        (UnknownNameError, "view:90:degree=3", ["'degree'", "nearest is 'degrees'"]),
+        (UnknownNameError, "detector:mime", ["'mime'", "nearest is 'mine'"]),
+        (UnknownNameError, "missing:bnech", ["'bnech'", "nearest is 'bench'"]),
+        (InputError, "detector:misspelt", ["'bnech'", "nearest is 'bench'"]),
+        (InputError, "compass:5:sigma=6", ["compass:5:sigma=6", "'sigma'", "given twice"]),
+        (InputError, "view:sixty", ["'sixty'", "a number"]),
+        (InputError, "errors:2.5", ["'2.5'", "a whole number"]),
+        (InputError, "medium:resort=no", ["'no'", "true or false"]),
+        (InputError, "view:0", ["0.0 degrees", "above 0"]),
+    ],
+)
+def test_texts_of_distortions(kind: type[SemsigError], text: str, words: list[str]) -> None:
+    with refused(kind, *words):
+        ready_chain(parse_chain(text, noises={**KNOWN, "misspelt": MISSPELT}), CITY)
+
+
+def spoil(
+    classes: list[int],
+    weights: list[float] | None = None,
+    *,
+    bearings: NDArray[np.float64] | None = ORIGIN,
+    false: Any = "frequency",  # noqa: ANN401
+) -> None:
+    one, rng = Signature(np.array([1], np.uint8), bearings), np.random.default_rng(0)
+    distort(one, Distortion(false_class=false), classes=classes, weights=weights, rng=rng)
+
+
+def draw(crs: int = 2154, **options: Any) -> None:  # noqa: ANN401
+    draw_queries(DATABASE, QuerySpec(**options), city=replace(DATABASE, crs=CRS(crs)))
+
+
+CASES: list[tuple[type[SemsigError], Callable[[], object], list[str]]] = [
+    (UnknownNameError, lambda: spoil([1], false="frequencies"), ["frequencies", "is 'frequency'"]),
+    (UnknownNameError, lambda: spoil([1], false="rarity"), ["rarity", "uniform or frequency"]),
+    (UnknownNameError, lambda: named_distortion("heavy"), ["heavy", "light, medium or strong"]),
+    (UnknownNameError, lambda: draw(seen_from="anywere"), ["is 'anywhere'", "cells or"]),
+    (InputError, lambda: draw(number=10**6), ["1000000 queries", f"1 to {len(DATABASE)}"]),
+    (InputError, lambda: draw(number=1, seen_from="anywhere"), ["street objects"]),
+    (CrsError, lambda: draw(32631, number=1), ["EPSG:32631", "EPSG:2154"]),
+    (InputError, lambda: spoil([]), ["distinct codes", "at least one"]),
+    (InputError, lambda: spoil([3, 3]), ["distinct codes"]),
+    (InputError, lambda: spoil([1, 3]), ["need weights", "one a class"]),
+    (InputError, lambda: spoil([1, 3], [1]), ["1 weights for 2 classes"]),
+    (InputError, lambda: spoil([1, 3], [1, -1]), ["0 or more"]),
+    (InputError, lambda: spoil([1, 3], [0, 0]), ["all zero", "above zero"]),
+    (InputError, lambda: spoil([1, 3], [1, 1], bearings=None), ["one with both"]),
+]
+
+
+@pytest.mark.parametrize(("kind", "call", "words"), CASES)
+def test_what_cannot_be_used_is_refused(
+    kind: type[SemsigError], call: Callable[[], object], words: list[str]
+) -> None:
+    with refused(kind, *words):
+        call()
