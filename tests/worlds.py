@@ -16,6 +16,7 @@ from sentences import refused
 
 from semsig_gis.core.errors import EmptyResultError
 from semsig_gis.core.geometry import GridSpec
+from semsig_gis.core.rtree import ObjectIndex
 from semsig_gis.core.signature import BEARING_UNITS, DISTANCE_UNITS, SignatureSpec
 from semsig_gis.database.build import build_database
 from semsig_gis.objects.table import Licence, StreetObjects
@@ -25,6 +26,7 @@ if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
     from semsig_gis.core.taxonomy import Taxonomy
+    from semsig_gis.database.city import ObjectStore
     from semsig_gis.database.database import SignatureDatabase
 
 TAXONOMY = load_catalog("montpellier").taxonomy
@@ -33,6 +35,7 @@ CODES = [item.code for item in TAXONOMY.classes]
 Thing = tuple[float, float, int, str, str]  # x, y, class code, source, id
 KINDS = {"class_code": np.uint8, "count": np.int32}
 ARRAYS = ("columns", "rows", "offsets", "codes", "bearing_units", "distance_units")
+SPECS = ("grid", "spec", "taxonomy", "crs", "licenses", "version", "viewpoints", "occlusion")
 
 
 def objects_of(
@@ -149,8 +152,19 @@ def assert_same(one: SignatureDatabase, other: SignatureDatabase) -> None:
     for name in ARRAYS:
         assert getattr(one, name).tolist() == getattr(other, name).tolist(), name
         assert getattr(one, name).dtype == getattr(other, name).dtype, name
-    for name in ("grid", "spec", "taxonomy", "crs", "licenses", "version"):
+    for name in SPECS:
         assert getattr(one, name) == getattr(other, name), name
+
+
+def assert_index_fits(store: ObjectStore) -> None:
+    """Check that the R-tree of a store is over its objects."""
+    xy = store.objects.xy
+    for radius in (0.0, 25.0):
+        ours, fresh = (
+            sorted(zip(*index.pairs_within(xy, radius=radius), strict=True))
+            for index in (store.index, ObjectIndex(xy))
+        )
+        assert ours == fresh
 
 
 # Quarters of a metre: sums of their squares are exact, so a circle has an exact edge.
