@@ -107,10 +107,9 @@ def compare_evaluations(
 def common_cases(
     first: Mapping[str, Evaluation], second: Mapping[str, Evaluation]
 ) -> dict[str, tuple[Evaluation, Evaluation]]:
-    """Return the evaluations of two results that have the same name.
+    """Return the evaluations of two results that have the same name; InputError if none has.
 
-    Of two single evaluations, return these, whatever they are called. Raises InputError if no name
-    is common.
+    Of two single evaluations, return these, whatever they are called.
     """
     if len(first) == len(second) == 1:
         (name, one), (other_name, other) = *first.items(), *second.items()

@@ -1,8 +1,6 @@
 """Measure localization: draw queries of known places, let a method answer, score errors and ranks.
 
-Equal scores are common (a street with three lamps looks like thousands of others), so every
-figure is an expectation over all orders of the tied cells, worked out exactly, never the luck of
-an array order.
+Equal scores are common, so every figure is an expectation over all orders of the tied cells.
 """
 
 from __future__ import annotations
@@ -150,9 +148,8 @@ def score_queries(
 ) -> dict[int, list[dict[str, Any]]]:
     """Let a method answer queries of known places, and score the answers.
 
-    Return, for each of `tops` (how many best candidates count), one row of outcomes a query. `memo`
-    keeps distances of these queries that other methods have needed; `progress` is called with the
-    number of queries done and in all.
+    Return one row of outcomes a query for each of `tops` (how many best candidates count). `memo`
+    keeps distances of these queries that other methods have needed.
     """
     views = [query.asked.signature for query in queries if len(query.asked)]
     rankings = locator.rankings(views, memo=memo)
@@ -179,7 +176,7 @@ def scored_tables(
 ) -> dict[int, pd.DataFrame]:
     """Return for each number of best candidates a table of what was asked and found.
 
-    One row a query: the columns of `Evaluation.queries`, but for ``geometry``, and ``x``, ``y`` and
+    One row a query: the columns of `Evaluation.queries`, but ``x`` and ``y`` for ``geometry``, and
     ``seconds``, which is NaN where nothing was asked.
     """
     about = _query_table(database, queries)
@@ -201,11 +198,7 @@ def make_evaluation(
     city: str | None = None,
     file_bytes: int | None = None,
 ) -> Evaluation:
-    """Return the evaluation of all queries that `scored_tables` gave.
-
-    `city` is the city that was looked at, if not the one that was searched; `file_bytes` the size
-    of the files of the database.
-    """
+    """Return the evaluation of all queries that `scored_tables` gave; see `Evaluation`."""
     points = gpd.points_from_xy(scored["x"], scored["y"], crs=database.crs)
     seconds = scored["seconds"].to_numpy(dtype=np.float64)
     timed = seconds[~np.isnan(seconds)]
@@ -336,13 +329,11 @@ def _unlocalized(cells: int) -> dict[str, Any]:
     return {
         "best_cell_id": None,
         "next_cell_ids": "",
-        "distance": math.inf,
         "tied": 0,
-        "error_m": math.inf,
+        **dict.fromkeys(("distance", "error_m"), math.inf),
         **{f"p{t}": 0.0 for t in THRESHOLDS},
         **{f"near{count}": 0.0 for count in NEAR_PLACES},
-        "rank_low": cells,
-        "rank_high": cells,
+        **dict.fromkeys(("rank_low", "rank_high"), cells),
         **dict.fromkeys(untold, math.nan),
     }
 

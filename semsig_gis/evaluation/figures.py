@@ -1,7 +1,6 @@
 """Figures of many scored queries, with intervals: shares, percentiles, groups, calibration.
 
-Every function takes the table of queries that `evaluation.result` keeps. What a query
-adds to a figure is a chance, an expectation over all orders of the tied cells.
+What a query adds to a figure is a chance, an expectation over all orders of the tied cells.
 """
 
 from __future__ import annotations
@@ -37,11 +36,10 @@ BINS = 10
 def query_figures(queries: pd.DataFrame, *, cells: int) -> pd.DataFrame:
     """Return what each query adds to each figure: chances in [0, 1], one row a query.
 
-    Columns are ``p5``, ``p10``, ``p25``, ``p50``, ``p100`` (error at most so many metres),
-    ``recall1``, ``recall10`` (true cell in the top 1 or 10 % of so many `cells`), ``near1``,
-    ``near5``, ``near10``, ``near20`` (one of the best N places within 25 m) and, where a method
-    states chances, ``coverage`` (answered), ``precision`` (answered and right; NaN where not
-    answered) and ``in_region``.
+    Columns are ``p5``, ... (error at most so many metres), ``near1``, ... (one of the best N places
+    within 25 m), ``recall1``, ``recall10`` (true cell in the top 1 or 10 % of so many `cells`) and,
+    where a method states chances, ``coverage`` (answered), ``precision`` (answered and right; NaN
+    where not answered) and ``in_region``.
     """
     names = [*(f"p{metres}" for metres in WITHIN), *(f"near{count}" for count in NEAR_PLACES)]
     figures = {name: queries[name].to_numpy(dtype=np.float64) for name in names}
@@ -81,10 +79,10 @@ def _share(values: NDArray[np.float64]) -> tuple[float, float, float, int]:
 def grouped_means(
     figures: pd.DataFrame, labels: Sequence[str], *, by: str, order: Iterable[str]
 ) -> pd.DataFrame:
-    """Return the means of all figures, one row a group, in the order wanted.
+    """Return the means of all figures, one row a group in the order wanted, with queries or not.
 
     `labels` has the group of each query. Columns are the one named `by`, ``n``, all figures, and
-    ``p50_low`` and ``p50_high`` (95 %). Groups without queries have a row, too.
+    ``p50_low`` and ``p50_high`` (95 %).
     """
     groups, values = np.asarray(labels), figures.to_numpy(dtype=np.float64)
     rows = []

@@ -134,10 +134,7 @@ def open_evaluation(folder: str | Path) -> Evaluation:
 
 
 def settings_to_dict(method: AnyMethod, asked: QuerySpec) -> dict[str, Any]:
-    """Return a method and what it was asked as plain values for JSON.
-
-    The noise models are among them in full. Raises InputError as `used_noises` does.
-    """
+    """Return a method and what it was asked as values for JSON, noise models in full."""
     noises = used_noises([method], asked.distortions)
     return {
         "method": str(method),
@@ -168,8 +165,7 @@ def used_noises(
 ) -> dict[str, Noise]:
     """Return the noise models of likelihood methods and detectors by name.
 
-    Raises InputError if two models have one name, or a name has one of the signs ``, : / =`` that
-    texts of methods and distortions use.
+    InputError if two have one name, or a name has a sign that texts of methods use.
     """
     noises: dict[str, Noise] = {}
     models = [one.noise for one in methods if one.noise is not None]

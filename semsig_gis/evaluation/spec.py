@@ -163,10 +163,7 @@ class ExperimentSpec:
         )
 
     def to_dict(self) -> dict[str, Any]:
-        """Return what `parse_experiment` reads as TOML, as plain values.
-
-        Noise models that this package does not have by name are written out.
-        """
+        """Return what `parse_experiment` reads, with noise models that have no known name."""
         noises = {
             name: noise.to_dict()
             for name, noise in self.noises.items()
@@ -198,12 +195,10 @@ def parse_experiment(
 ) -> ExperimentSpec:
     """Read an experiment from TOML, which messages call `where`.
 
-    It has ``database``; the table ``methods`` with texts such as ``"edit+edit:5%"`` or
-    ``"likelihood:generic:refined"``; the table ``distortions`` with texts (or lists of them) such
-    as ``"medium, view:90"``; and perhaps ``queries``, ``seeds``, ``seen_from``, ``city``, ``top``,
-    the table ``districts`` (``file``, ``name``) and the table ``noises``, where each is a table or
-    the name of a file in `folder`. Raises UnknownNameError for an unknown method, distortion or
-    noise model, and InputError if it is not TOML or a key or value cannot be used.
+    It has the fields of `ExperimentSpec`: ``methods`` are texts such as ``"edit+edit:5%"``,
+    ``distortions`` texts or lists of them, such as ``"medium, view:90"``. Each of the table
+    ``noises`` is a table or the name of a file in `folder`. Raises UnknownNameError for an unknown
+    method, distortion or noise model, and InputError if a key or value cannot be used.
     """
     try:
         values = parse_toml(text, where)

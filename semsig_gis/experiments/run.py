@@ -47,10 +47,12 @@ if TYPE_CHECKING:
     from semsig_gis.likelihood.noise.model import Noise
     from semsig_gis.queries.draw import Query
 
+    # Experiments and the folders where their parts are put, by the folders for their results.
+    Running = Mapping[Path, tuple["ExperimentWork", Path]]
+    Task = tuple[Path, "Part"]
 
-PARTS = "_parts"
-"""Folder of the answers in a run that is not finished."""
 
+PARTS = "_parts"  # folder of the answers in a run that is not finished
 SPEC = "experiment.toml"
 INPUTS = "inputs.json"
 FIGURES = "figures.csv"
@@ -171,10 +173,7 @@ class ExperimentWork:
         self._locators: dict[str, Locator[Answer]] = {}
 
     def digests(self) -> dict[str, str]:
-        """Return a digest of the content of each file that is looked at, by name.
-
-        Raise SemsigError if a file is missing.
-        """
+        """Return a digest of each file by name; SemsigError if one is missing."""
         names = (self.spec.database, self._seen_city)
         digests = {name: self._city(name).digest for name in dict.fromkeys(names)}
         for name in self._stores():
@@ -197,10 +196,7 @@ class ExperimentWork:
         return dict.fromkeys([*anywhere, *([self.spec.database] if refined else [])])
 
     def prepare(self) -> None:
-        """Build the indexes that methods need.
-
-        Raise SemsigError if a file cannot be read, or something does not fit the database.
-        """
+        """Build the indexes that methods need; SemsigError if something does not fit."""
         for top in self.spec.top:
             check_count("candidates", top, len(self.database))
         if self.districts is not None and self.spec.districts is not None:
@@ -248,10 +244,7 @@ class ExperimentWork:
         return min(PART_QUERIES, self._number - part.number * PART_QUERIES)
 
     def answer(self, place: Path, part: Part) -> None:
-        """Let every method answer the queries of a part, unless it has done so before.
-
-        ``place`` is the folder of the files with the answers.
-        """
+        """Let every method answer the queries of a part, unless its file is in the folder."""
         count = self.queries_in(part) * len(self.spec.top)
         files = {name: _part_file(place, part, name) for name in self.spec.methods}
         missing = {name: file for name, file in files.items() if not _is_whole(file, rows=count)}
@@ -476,7 +469,7 @@ def run_experiments(
         As in `run_experiment`. Nothing is answered if one of the experiments is refused.
     """
     check_workers(workers, scheduler)
-    running: dict[Path, _Running] = {}
+    running: dict[Path, tuple[ExperimentWork, Path]] = {}
     for out, spec in specs.items():
         work = ExperimentWork(spec, Path(folder), note)
         recipe = {**spec.to_dict(), "inputs": work.digests(), "versions": versions()}
@@ -486,7 +479,7 @@ def run_experiments(
             shutil.rmtree(target / PARTS, ignore_errors=True)  # of a run killed at the very end
         else:
             RUN.begin(partial_out, recipe)
-            running[out] = _Running(work, partial_out)
+            running[out] = work, partial_out
     for work, _ in running.values():
         work.prepare()
     _answer(running, workers=workers, scheduler=scheduler, progress=progress)
@@ -502,22 +495,8 @@ def run_experiments(
     return results
 
 
-class _Running(NamedTuple):
-    """An experiment that is not finished, and the folder where its parts are put."""
-
-    work: ExperimentWork
-    partial: Path
-
-
-class _Task(NamedTuple):
-    """A part of one of the experiments."""
-
-    out: Path
-    part: Part
-
-
 def _answer(
-    running: Mapping[Path, _Running],
+    running: Running,
     *,
     workers: int,
     scheduler: str | None,
@@ -525,7 +504,7 @@ def _answer(
 ) -> None:
     """Answer all parts of all experiments."""
     sizes = {
-        _Task(out, part): work.queries_in(part) * len(work.spec.methods)
+        (out, part): work.queries_in(part) * len(work.spec.methods)
         for out, (work, _) in running.items()
         for part in work.parts
     }
@@ -539,7 +518,7 @@ def _answer(
         answer = partial(_answer_here, running)
     done, total = 0, sum(sizes.values())
 
-    def count_answers(task: _Task, _value: None) -> None:
+    def count_answers(task: Task, _value: None) -> None:
         nonlocal done
         done += sizes[task]
         if progress is not None:
@@ -554,22 +533,24 @@ def _answer(
         files=[work.folder.resolve() / work.spec.database for work, _ in running.values()],
     )
     if failed:
-        task, reason = next(iter(failed.items()))
+        (out, _), reason = next(iter(failed.items()))
         msg = (
             f"{len(failed)} of the {len(sizes)} parts of the work failed ({reason}); what is done "
-            f"is kept in {running[task.out].partial}, so mend that and run the same command again."
+            f"is kept in {running[out][1]}, so mend that and run the same command again."
         )
         raise DatabaseError(msg)
 
 
-def _answer_here(running: Mapping[Path, _Running], task: _Task) -> None:
-    work, place = running[task.out]
-    work.answer(place / PARTS, task.part)
+def _answer_here(running: Running, task: Task) -> None:
+    out, part = task
+    work, place = running[out]
+    work.answer(place / PARTS, part)
 
 
-def _answer_apart(places: Mapping[Path, tuple[str, Path, Path]], task: _Task) -> None:
-    spec, folder, place = places[task.out]
-    _opened(spec, folder).answer(place, task.part)
+def _answer_apart(places: Mapping[Path, tuple[str, Path, Path]], task: Task) -> None:
+    out, part = task
+    spec, folder, place = places[out]
+    _opened(spec, folder).answer(place, part)
 
 
 @lru_cache(maxsize=2)

@@ -187,10 +187,8 @@ def test_workers_write_the_same_files_as_one_process(
     where: str, folder: Path, results: Path, tmp_path: Path, cluster: LocalCluster
 ) -> None:
     seen: list[int] = []
-    options: dict[str, Any] = {
-        "processes": {"workers": 2},
-        "scheduler": {"scheduler": cluster.scheduler_address},
-    }[where]
+    address = {"scheduler": cluster.scheduler_address}
+    options: dict[str, Any] = {"workers": 2} if where == "processes" else address
     options["progress"] = lambda done, _: seen.append(done)
     run_experiment(SPEC, tmp_path / "out", folder=folder, **options)
     assert contents(tmp_path / "out") == contents(results)

@@ -1,8 +1,4 @@
-"""Whether the chances of cells come true, by queries that they were not learnt from.
-
-Two questions: do cells with a higher chance succeed more often (a rank correlation), and do as many
-succeed as their chances say (calibration)?
-"""
+"""Whether the chances of cells come true, by queries that they were not learnt from."""
 
 from __future__ import annotations
 
@@ -28,10 +24,9 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ChanceBin:
-    """Queries from cells with a chance from `low` to `high`.
+    """Queries from cells with a chance from `low` to `high`: the mean of it, and the share found.
 
-    `stated` is the mean of their chances, `true` the share of the queries that was found, with
-    Wilson's 95 % interval from `true_low` to `true_high`.
+    That is `true`, with Wilson's 95 % interval from `true_low` to `true_high`.
     """
 
     low: float
@@ -75,9 +70,7 @@ class IdentifiabilityCheck:
         """Return the fields as plain values for JSON; None for a correlation that there is not."""
         return {
             **asdict(self),
-            "correlations": {
-                name: finite_or_none(value) for name, value in self.correlations.items()
-            },
+            "correlations": {name: finite_or_none(one) for name, one in self.correlations.items()},
             "attainable": finite_or_none(self.attainable),
             "bins": [asdict(one) for one in self.bins],
         }

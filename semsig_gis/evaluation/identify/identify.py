@@ -175,10 +175,7 @@ def identify(
 def _stages(
     progress: Callable[[int, int], None] | None, *seconds: float
 ) -> list[Callable[[int, int], None] | None]:
-    """Return for each stage of some work what it is to call with its own progress.
-
-    It tells how far the whole work is, in the seconds that the stages are thought to take.
-    """
+    """Return what each stage calls with its progress, to tell that of all, by expected seconds."""
     if progress is None:
         return [None] * len(seconds)
     ends = np.cumsum([0.0, *seconds]).tolist()
@@ -251,8 +248,8 @@ def _gains(
 ) -> tuple[NDArray[np.float64], tuple[ClassGain, ...]]:
     """Return what each class adds to the chance of the place, by cell and for the city.
 
-    `again` are the cells of the trials that were asked without each class, `without` what came of
-    that (see `try_without_classes`), and `rise` is that of `compare_without_classes`.
+    `without` is what came of the cells `again` (`try_without_classes`), `rise` is that of
+    `compare_without_classes`.
     """
     database, codes = index.database, index.table.codes
     starts = database.offsets[:-1]

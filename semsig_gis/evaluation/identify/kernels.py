@@ -1,7 +1,4 @@
-"""The loops that compare every cell with every other, as machine code.
-
-Each has a slow, obvious twin in the tests.
-"""
+"""The loops that compare every cell with every other, as machine code."""
 
 from __future__ import annotations
 
@@ -48,10 +45,7 @@ def _powers(
     bits: NDArray[np.int32],
     powers: NDArray[np.float32],
 ) -> np.int32:
-    """Fill the powers of two of the differences to one score; return the bits of the largest.
-
-    `bits` is room to work in.
-    """
+    """Fill the powers of two of the differences to one score; return the largest of the `bits`."""
     whole = bits.view(np.float32)
     top = np.int32(0)
     for place in range(len(scores)):

@@ -1,9 +1,8 @@
 """Which cells look like which: every cell compared with all others.
 
-The likelihood index tells how well a query fits every cell. Here the signature of each cell is
-the query, so that the ratio of two likelihoods tells how far another cell is from looking the
-same to a detector. A real query is spoiled, which brings the ratios nearer to one: they are raised
-to a power, the *temperature*, before they are added up.
+The signature of each cell is the query here: the ratio of two likelihoods tells how far another
+cell is from looking the same to a detector. A real query is spoiled, which brings the ratios nearer
+to one: they are raised to a power, the *temperature*, before they are added up.
 """
 
 from __future__ import annotations
@@ -37,11 +36,10 @@ SAMPLE = 16_384
 class Lookalikes:
     """How like other cells are to each of c cells.
 
-    `near` (c,) is the sum, over the cells in the circle around each cell, of the likelihood of its
-    signature there over that in the cell itself, to the power of the temperature; `far` (c,) is the
-    same for all other cells. `cells` (c, k) are row numbers of the likest cells outside the circle
-    whose own circles do not overlap, by falling sum, -1 where there are no more; `sums` (c, k) is
-    the sum over the circle of each, without what is also in the circle of the compared cell.
+    `near` (c,) is the sum of the tempered ratios of likelihood over the circle around each cell,
+    `far` (c,) that over all other cells. `cells` (c, k) are row numbers of the likest cells outside
+    the circle whose own circles do not overlap, by falling sum, -1 where there are no more; `sums`
+    (c, k) is the sum over the circle of each, without what is in the circle of the compared cell.
     """
 
     near: NDArray[np.float64]
@@ -51,10 +49,9 @@ class Lookalikes:
 
 
 def cell_circle(radius: float, step: float) -> NDArray[np.int64]:
-    """Return which cells are within a radius (metres) of a cell, shape (a, 2).
+    """Return which cells of side `step` are within a radius (both in metres) of a cell, (a, 2).
 
-    For each column of cells, the first and the last cell number less that of the cell. `step` is
-    the side of a cell in metres.
+    For each column of cells, the first and the last cell number less that of the cell.
     """
     reach = radius / step + 1e-9
     across = np.arange(-math.floor(reach), math.floor(reach) + 1)
@@ -80,10 +77,9 @@ def find_lookalikes(
 ) -> Lookalikes:
     """Compare cells (row numbers, all by default) with all others, and name the likest `places`.
 
-    `temperature` (above 0) is the power of the ratios of likelihoods: 1 for a query that is just
-    the signature of the cell, less for one that is spoiled. `radius` is what counts as near, in
-    metres. A ratio beyond 2 to the power of 100, or below its inverse, counts as that. Raises
-    InputError if the temperature or the radius is out of range.
+    `temperature` (above 0) is 1 for a query that is just the signature of the cell, less for one
+    that is spoiled; `radius` is what counts as near, in metres; InputError if one is out of range.
+    A ratio beyond 2 to the power of 100, or below its inverse, counts as that.
     """
     from semsig_gis.evaluation.identify.kernels import compare_signatures  # noqa: PLC0415 - numba loads slowly
 
@@ -143,10 +139,9 @@ def compare_without_classes(
 ) -> NDArray[np.float64]:
     """Compare cells with a sample of the others as if a class were not published.
 
-    Parameters are as in `find_lookalikes`; `seed` draws the sample. The result (c, k) is by how
-    much the natural logarithm of `Lookalikes.far` would rise without each class that occurs, in the
-    order of ``index.table.codes``: without its objects and the detections that bear its name. That
-    some of the objects are detected under another name is neglected.
+    As `find_lookalikes`; `seed` draws the sample. The result (c, k) is by how much the logarithm of
+    `Lookalikes.far` would rise without each class of ``index.table.codes``: without its objects and
+    the detections of its name. That some objects are detected under another name is neglected.
     """
     from semsig_gis.evaluation.identify.kernels import compare_without  # noqa: PLC0415
 

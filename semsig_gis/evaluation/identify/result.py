@@ -150,10 +150,7 @@ class Identifiability:
             objects = None if object_counts is None else int(object_counts.get(gain.code, 0))
             classes.append(
                 {
-                    "code": kind.code,
-                    "symbol": kind.symbol,
-                    "name": kind.name,
-                    "title": kind.title,
+                    **{key: getattr(kind, key) for key in ("code", "symbol", "name", "title")},
                     "chance_near": gain.near,
                     "bits": gain.bits,
                     "objects": objects,
@@ -262,10 +259,9 @@ def open_identifiability(database: SignatureDatabase, path: str | Path) -> Ident
 def identifiability_of(
     database: SignatureDatabase, table: pa.Table, facts: dict[str, Any], path: str | Path
 ) -> Identifiability:
-    """Return the value of `Identifiability.table` and `Identifiability.facts` read from `path`.
+    """Return what `Identifiability.table` and `Identifiability.facts` told, read from `path`.
 
-    Raises DatabaseError if they are damaged, or belong to other signatures or another version of
-    the format.
+    DatabaseError if they are damaged, or belong to other signatures or another format.
     """
     try:
         noise = noise_from_dict(facts["noise"])

@@ -35,11 +35,10 @@ HOPELESS = 20.0  # nats below the likeliest cell, at which a cell is left out of
 class Trials:
     """What came of simulated queries, arrays of one item a query.
 
-    `cells` has row numbers of the true cells. The answer gave the chance `itself` to the true cell
-    and `near` to all cells near it; `found` tells whether the best place is near, `bits` the
-    entropy of the chances of all cells. `lean` is the mean, by these chances, of the logarithm of
-    the likelihood of the true cell's own signature in a cell over that in the true one; NaN where
-    nothing was detected.
+    The answer gave the chance `itself` to the true cell (a row number of `cells`) and `near` to all
+    cells near it; `found` tells whether the best place is near, `bits` the entropy of all chances.
+    `lean` is the mean, by these chances, of the log-likelihood of the true cell's own signature in
+    a cell less that in the true one; NaN where nothing was detected.
     """
 
     cells: NDArray[np.int64]
@@ -210,10 +209,9 @@ def try_without_classes(
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Ask simulated queries once more for each class, as if it had not been published.
 
-    The queries are those of `try_cells` with the same `cells` (m,) and seed. The results (m, k) are
-    `Trials.near` and `Trials.bits` without each class, in the order of ``index.table.codes``. The
-    database has no objects of the class, and detections of its name are dropped. A cell that sees
-    nothing else cannot be found: no chance, and all bits are left.
+    The queries are those of `try_cells`, without detections of the class; the results (m, k) are
+    `Trials.near` and `Trials.bits` by class of ``index.table.codes``. A cell that sees nothing else
+    cannot be found: no chance, and all bits are left.
     """
     codes = index.table.codes.tolist()
     queries = list(draw_trials(index, cells, seed=seed))

@@ -46,6 +46,7 @@ if TYPE_CHECKING:
     from semsig_gis.evaluation.result import Evaluation
     from semsig_gis.experiments.paper.reproduce import Reproduction
     from semsig_gis.experiments.paper.shares import Figure, Points
+    from semsig_gis.reports.parts import Scene
 
 JUST_5 = "recall@10 %, just 5 % kept"
 GROUP_KEYS = ("count", "mean", "std", "min", "25%", "50%", "75%", "max")
@@ -113,6 +114,24 @@ def reproduction_report(results: Reproduction) -> Report:
     )
 
 
+def _section(
+    name: str,
+    title: str,
+    *text: str,
+    numbers: Iterable[Number] = (),
+    plots: Iterable[Plot] = (),
+    scenes: Iterable[Scene] = (),
+) -> Section:
+    return Section(
+        name=name,
+        title=title,
+        text=text,
+        numbers=tuple(numbers),
+        plots=tuple(plots),
+        scenes=tuple(scenes),
+    )
+
+
 def _shares(
     case: Evaluation, row: str, paper: Mapping[Figure, float | None] | None = None
 ) -> list[Number]:
@@ -147,16 +166,12 @@ def _object_section(results: Reproduction) -> Section:
             Number(row, "occurrences", one["number"], paper=paper, decimals=0),
             Number(row, "share of all", one["share"], paper=share),
         ]
-    return Section(
-        name="objects",
-        title="Street objects",
-        text=(
-            (
-                "Paper, Table 1. An object counts once in every signature that it is in; the "
-                "paper's numbers are of that kind, for they sum to 14 for each of its signatures."
-            ),
-        ),
-        numbers=tuple(numbers),
+    return _section(
+        "objects",
+        "Street objects",
+        "Paper, Table 1. An object counts once in every signature that it is in; the "
+        "paper's numbers are of that kind, for they sum to 14 for each of its signatures.",
+        numbers=numbers,
     )
 
 
@@ -176,38 +191,30 @@ def _database_section(results: Reproduction) -> Section:
     for part, alone in (("type", paris.ALONE), ("angle", None)):
         row = f"cells alone in their group by {part}"
         numbers.append(Number(row, "", facts["groups"][part]["alone"], paper=alone, decimals=3))
-    return Section(
-        name="database",
-        title="Database",
-        text=(
-            (
-                "Paper, Tables 2a and 2b. A group is all cells with one sequence of types, or of "
-                "angle levels. The paper's area is that of its city; ours is that of the cells. "
-                "Its share of cells alone is that of its queries; it does not say by which part."
-            ),
-        ),
-        numbers=tuple(numbers),
+    return _section(
+        "database",
+        "Database",
+        "Paper, Tables 2a and 2b. A group is all cells with one sequence of types, or of "
+        "angle levels. The paper's area is that of its city; ours is that of the cells. "
+        "Its share of cells alone is that of its queries; it does not say by which part.",
+        numbers=numbers,
     )
 
 
 def _example_sections(results: Reproduction) -> Iterator[Section]:
     evaluation = case_of(results, "medium", BEST)
-    yield Section(
-        name="found",
-        title="Places that were found",
-        text=(
-            (
-                "The first queries of the two-stage fusion at 5 %, medium distortion, whose "
-                "answer is right within 50 m. Signatures are as the database has them, before "
-                "the distortion."
-            ),
-        ),
+    yield _section(
+        "found",
+        "Places that were found",
+        "The first queries of the two-stage fusion at 5 %, medium distortion, whose "
+        "answer is right within 50 m. Signatures are as the database has them, before "
+        "the distortion.",
         scenes=example_scenes(evaluation, results.database, successful=True),
     )
-    yield Section(
-        name="lost",
-        title="Places that were not found",
-        text=("The first ones whose answer is not. They see few objects, and of common classes.",),
+    yield _section(
+        "lost",
+        "Places that were not found",
+        "The first ones whose answer is not. They see few objects, and of common classes.",
         scenes=example_scenes(evaluation, results.database, successful=False),
     )
 
@@ -227,16 +234,12 @@ def _distortion_section(results: Reproduction) -> Section:
         numbers.append(Number(name, "mean objects asked", length, decimals=2))
         numbers.append(Number(name, "left empty", empty))
     seen = float(case.queries["length"].mean())
-    return Section(
-        name="distortion",
-        title="Distortion",
-        text=(
-            (
-                "Each error is, with equal chance, an object missed, an object made up, or a class "
-                f"mistaken. The queries see a mean of {seen:.2f} objects before."
-            ),
-        ),
-        numbers=tuple(numbers),
+    return _section(
+        "distortion",
+        "Distortion",
+        "Each error is, with equal chance, an object missed, an object made up, or a class "
+        f"mistaken. The queries see a mean of {seen:.2f} objects before.",
+        numbers=numbers,
     )
 
 
@@ -265,13 +268,9 @@ class Comparison:
 
     def section(self, results: Reproduction) -> Section:
         """Return the section of a reproduction."""
-        return Section(
-            name=self.name,
-            title=self.title,
-            text=(self.text,),
-            numbers=(*self._numbers(results), *self._best_numbers(results)),
-            plots=tuple(self._plot(results, *plot) for plot in self.plots),
-        )
+        numbers = (*self._numbers(results), *self._best_numbers(results))
+        plots = (self._plot(results, *plot) for plot in self.plots)
+        return _section(self.name, self.title, self.text, numbers=numbers, plots=plots)
 
     def _numbers(self, results: Reproduction) -> Iterator[Number]:
         for distortion, metres, percent in self.figures:
@@ -383,18 +382,14 @@ def _time_section(results: Reproduction) -> Section:
             ours, paper = 1000.0 * results.seconds[method], paris.QUERY_MS[method]
             row = f"{name} distance"
             numbers.append(Number(row, column, ours, paper=paper, unit="ms", decimals=2))
-    return Section(
-        name="times",
-        title="Retrieval times",
-        text=(
-            (
-                "Mean time to compare a query of 14 objects with all cells, of 100 queries, asked "
-                "one by one on one thread. The paper used another computer and another program, so "
-                f"that only orders of magnitude compare; it has 312,134 cells, we "
-                f"{len(results.database):,}."
-            ),
-        ),
-        numbers=tuple(numbers),
+    return _section(
+        "times",
+        "Retrieval times",
+        "Mean time to compare a query of 14 objects with all cells, of 100 queries, asked "
+        "one by one on one thread. The paper used another computer and another program, so "
+        f"that only orders of magnitude compare; it has 312,134 cells, we "
+        f"{len(results.database):,}.",
+        numbers=numbers,
     )
 
 
@@ -413,7 +408,7 @@ def _level_section(results: Reproduction) -> Section:
         for name, case in cases.items()
         for figure in (P10, P50, RECALL10)
     ]
-    points: dict[str, Points] = {
+    points = {
         "error": (
             (50.0, PARIS_P50, "medium (table)"),
             (10.0, READ_OFF["light_small_error"], "highest at small errors (text)"),
@@ -421,34 +416,40 @@ def _level_section(results: Reproduction) -> Section:
         ),
         "recall": ((10.0, PARIS_RECALL10 or 0.0, "medium (table)"),),
     }
-    return Section(
-        name="levels",
-        title="The recommended method: edit + edit, 5 %",
-        text=(
-            (
-                "The first candidate alone counts. For medium the paper prints figures. Of the "
-                "levels together its text says that small errors range from 0.25 to 0.70, and "
-                "recalls of top ranks from 0.50 to more than 0.90, without saying of which level, "
-                "error and rank. The highest may be of light distortion or of none; both have it."
-            ),
-            (
-                "Where cells tie with the last of the 5 %, all of them are kept here. If just 5 % "
-                "are, the best 10 % are those of the first stage, the edit distance of the types: "
-                "that recall is told, too."
-            ),
+    return _section(
+        "levels",
+        "The recommended method: edit + edit, 5 %",
+        (
+            "The first candidate alone counts. For medium the paper prints figures. Of the "
+            "levels together its text says that small errors range from 0.25 to 0.70, and "
+            "recalls of top ranks from 0.50 to more than 0.90, without saying of which level, "
+            "error and rank. The highest may be of light distortion or of none; both have it."
         ),
-        numbers=(*numbers, _just_5(results, "medium", "medium", JUST_5)),
-        plots=tuple(
-            plot_of(
-                "levels",
-                f"{kind.title()} of the recommended method",
-                kind,
-                [curve_of(case, name, kind) for name, case in cases.items()],
-                paper_points,
-            )
-            for kind, paper_points in points.items()
+        (
+            "Where cells tie with the last of the 5 %, all of them are kept here. If just 5 % "
+            "are, the best 10 % are those of the first stage, the edit distance of the types: "
+            "that recall is told, too."
         ),
+        numbers=[*numbers, _just_5(results, "medium", "medium", JUST_5)],
+        plots=_plots("levels", "the recommended method", cases, points),
     )
+
+
+def _plots(
+    name: str,
+    subject: str,
+    cases: Mapping[str, Evaluation],
+    paper: Mapping[str, Points],
+    *,
+    alone: bool = False,
+) -> Iterator[Plot]:
+    """Yield the errors and the recalls of all queries, or of unambiguous ones alone."""
+    for kind in ("error", "recall"):
+        curves = [
+            curve_of(case, label, kind, is_alone(case) if alone else slice(None))
+            for label, case in cases.items()
+        ]
+        yield plot_of(name, f"{kind.title()} of {subject}", kind, curves, paper.get(kind, ()))
 
 
 def _alone_section(results: Reproduction) -> Section:
@@ -459,25 +460,13 @@ def _alone_section(results: Reproduction) -> Section:
         for figure in (P50, RECALL10):
             share = share_of(case, figure, is_alone(case))
             numbers.append(share.number(name, COLUMNS[figure]))
-    return Section(
-        name="alone",
-        title="Unambiguous queries",
-        text=(
-            (
-                "The same, of the queries whose cell shares its types with no other cell before "
-                "the distortion. The paper shows these as plots alone."
-            ),
-        ),
-        numbers=tuple(numbers),
-        plots=tuple(
-            plot_of(
-                "alone",
-                f"{kind.title()} of unambiguous queries",
-                kind,
-                [curve_of(case, name, kind, is_alone(case)) for name, case in cases.items()],
-            )
-            for kind in ("error", "recall")
-        ),
+    return _section(
+        "alone",
+        "Unambiguous queries",
+        "The same, of the queries whose cell shares its types with no other cell before "
+        "the distortion. The paper shows these as plots alone.",
+        numbers=numbers,
+        plots=_plots("alone", "unambiguous queries", cases, {}, alone=True),
     )
 
 
@@ -500,21 +489,19 @@ def _range_sections(results: Reproduction) -> Iterator[Section]:
             Number(row, "mean length", facts[radius]["mean_length"], decimals=2),
             share_of(case, P50, middling).number(row, MIDDLING_SEEN),
         ]
-    yield Section(
-        name="ranges",
-        title="Visibility range",
-        text=(
-            (
-                "The recommended method, medium distortion, the first candidate alone, on "
-                "databases that were built anew."
-            ),
-            (
-                "The last column asks whether the range matters by itself, or by how many "
-                "objects are seen: then queries that see as many are found as often at every "
-                "range, and a difference from the paper is one of the cities."
-            ),
+    yield _section(
+        "ranges",
+        "Visibility range",
+        (
+            "The recommended method, medium distortion, the first candidate alone, on "
+            "databases that were built anew."
         ),
-        numbers=tuple(numbers),
+        (
+            "The last column asks whether the range matters by itself, or by how many "
+            "objects are seen: then queries that see as many are found as often at every "
+            "range, and a difference from the paper is one of the cities."
+        ),
+        numbers=numbers,
     )
 
 
@@ -528,11 +515,11 @@ def _scale_section(results: Reproduction) -> Section:
     for levels, case in sorted(cases.items()):
         paper, _ = paris.ACCURACY.get((spec.radius, levels), (None, None))
         numbers.append(share_of(case, P50).number(f"Q = {levels}", COLUMNS[P50], paper))
-    return Section(
-        name="scales",
-        title="Angle levels",
-        text=("The same with bearings in so many levels.",),
-        numbers=tuple(numbers),
+    return _section(
+        "scales",
+        "Angle levels",
+        "The same with bearings in so many levels.",
+        numbers=numbers,
     )
 
 
@@ -555,23 +542,21 @@ def _reading_section(results: Reproduction) -> Section:
     errors = [one for one in numbers if one.column == COLUMNS[P50] and one.difference is not None]
     nearest = min(errors, key=lambda one: abs(one.difference or 0.0))
     queries = len(case_of(results, "readings", BEST, next(iter(READINGS))).queries)
-    return Section(
-        name="readings",
-        title="What the paper leaves open",
-        text=(
-            (
-                "The paper does not say whether a query is sorted again after bearing noise, which "
-                "class a false object has, and whether distances are brought to a scale of 0 to 1 "
-                "before they are added up. Here is the recommended method after each of them, with "
-                f"{queries:,} queries of medium distortion. Its figures are of Paris."
-            ),
-            (
-                "The last row but one looks at the city: it weighs the queries of the first "
-                f"reading so that {100 * paris.ALONE:.1f} % are unambiguous, as in the paper."
-            ),
-            f"Nearest to the paper's {PARIS_P50} is: {nearest.row}, with {nearest.ours:.4f}.",
+    return _section(
+        "readings",
+        "What the paper leaves open",
+        (
+            "The paper does not say whether a query is sorted again after bearing noise, which "
+            "class a false object has, and whether distances are brought to a scale of 0 to 1 "
+            "before they are added up. Here is the recommended method after each of them, with "
+            f"{queries:,} queries of medium distortion. Its figures are of Paris."
         ),
-        numbers=tuple(numbers),
+        (
+            "The last row but one looks at the city: it weighs the queries of the first "
+            f"reading so that {100 * paris.ALONE:.1f} % are unambiguous, as in the paper."
+        ),
+        f"Nearest to the paper's {PARIS_P50} is: {nearest.row}, with {nearest.ours:.4f}.",
+        numbers=numbers,
     )
 
 
@@ -581,17 +566,13 @@ def _likelihood_section(results: Reproduction) -> Section:
     for name, case in cases.items():
         numbers += _shares(case, f"{name}: likelihood")
         numbers += _shares(level_case(results, name), f"{name}: edit + edit, 5 %")
-    return Section(
-        name="likelihood",
-        title="The likelihood method",
-        text=(
-            (
-                "Not in the paper. A model of how detectors fail takes the place of the distances; "
-                "it is not told the level of the distortion. Beside it, the method that the paper "
-                f"recommends. {len(case.queries):,} queries, the first candidate alone."
-            ),
-        ),
-        numbers=tuple(numbers),
+    return _section(
+        "likelihood",
+        "The likelihood method",
+        "Not in the paper. A model of how detectors fail takes the place of the distances; "
+        "it is not told the level of the distortion. Beside it, the method that the paper "
+        f"recommends. {len(case.queries):,} queries, the first candidate alone.",
+        numbers=numbers,
         plots=(
             plot_of(
                 "likelihood",

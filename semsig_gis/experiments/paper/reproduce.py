@@ -97,9 +97,8 @@ def paper_experiments(
 ) -> dict[str, ExperimentSpec]:
     """Return all experiments of the paper by name: ``"none"``, ``"medium"``, ``"levels"``, ...
 
-    ``ranges`` and ``scales`` are the files of databases of the same city by their visibility range
-    in metres and by their number of angle levels; each adds an experiment, such as ``"range-20"``
-    or ``"levels-8"``.
+    ``ranges`` and ``scales`` are files of databases of the same city, by their range in metres and
+    by their number of angle levels; each adds an experiment: ``"range-20"``, ``"levels-8"``, ...
     """
     stages = {name: f"edit+edit:{k}%" for k, name in PERCENTS.items() if name not in FUSIONS}
     weights = {name: f"edit+edit:alpha={w}" for w, name in WEIGHTS.items() if name not in FUSIONS}
@@ -349,10 +348,7 @@ def _make_city(
 def _variants(
     city: City, folder: Path, show: Progress
 ) -> tuple[dict[float, Path], dict[int, Path]]:
-    """Return databases of other visibility ranges and angle levels, built where they are missing.
-
-    Without street objects there are no other ranges.
-    """
+    """Return databases of other ranges (with street objects) and levels, built where missing."""
     folder.mkdir(parents=True, exist_ok=True)
     database = city.database
     ranges = {one: folder / f"range-{one:g}.parquet" for one in RANGES if city.has_store}
@@ -387,9 +383,8 @@ def time_queries(
 ) -> dict[str, float]:
     """Return the mean seconds that each method takes to compare one query with all cells.
 
-    As in the paper's table: queries of mean length, asked one at a time, on one thread. They are
-    cells with `length` objects, or of the nearest length; what is worked out once for a database
-    does not count.
+    As in the paper's table: queries of mean length (cells with `length` objects, or the nearest),
+    one at a time, on one thread; what is worked out once for a database does not count.
     """
     if repetitions < 1:
         msg = f"{repetitions} repetitions were asked for; give a whole number from 1."

@@ -1,7 +1,6 @@
 """Shares of the queries that are answered well, as numbers and curves of a report.
 
-The kinds of figures are ``error``, the share with an error of at most so many metres, and
-``recall``, the share whose cell is among the best so many per cent.
+Kinds: ``error`` (at most so many metres), ``recall`` (cell among the best so many per cent).
 """
 
 from __future__ import annotations
