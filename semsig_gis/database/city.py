@@ -8,6 +8,7 @@ needs it, and so does whatever looks at objects from a place off the grid.
 from __future__ import annotations
 
 import json
+import os
 import zlib
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -24,10 +25,8 @@ from semsig_gis.core.geometry import HALF_WIDTH, LICENSES
 from semsig_gis.core.rtree import INDEX_FILES, StoredIndex
 from semsig_gis.database.build import moved
 from semsig_gis.database.file import (
-    BUILT_DIGEST,
     KIND,
     Manifest,
-    built_digest,
     damaged_files,
     digest,
     is_folder,
@@ -38,7 +37,6 @@ from semsig_gis.database.file import (
     read_specs,
     require_file,
     save_database,
-    store_path,
 )
 from semsig_gis.database.occlusion import Footprints, buildings_near
 from semsig_gis.objects.load import licenses_of
@@ -58,6 +56,7 @@ if TYPE_CHECKING:
 STORE_KIND = "object store"
 # Raised whenever a store of before would be read wrongly.
 FORMAT = 1
+STORE_SUFFIX = ".objects"
 MANIFEST = "manifest.json"
 OBJECTS = "objects.parquet"
 FOOTPRINTS = "footprints.parquet"
@@ -229,6 +228,29 @@ def open_store(database: str | Path, folder: str | Path | None = None) -> Object
     return _read(_settle(Path(database)) if folder is None else Path(folder), Path(database))
 
 
+def store_path(database: str | Path) -> Path:
+    """Return the folder beside a database file where its object store lies.
+
+    Links are followed. Raise InputError if the name of the database has the ending of a store.
+    """
+    file = Path(os.path.realpath(database))
+    if file.suffix == STORE_SUFFIX:
+        msg = f"{database} is a name for an object store; give a database another ending."
+        raise InputError(msg)
+    return file.with_suffix(STORE_SUFFIX)
+
+
+def built_digest(path: str | Path) -> str:
+    """Return the SHA-256 digest that a database file had before columns were put into it.
+
+    Without such columns it is the digest of the file as it is, even if that is damaged.
+    """
+    try:
+        return str(read_specs(path)[BUILT_DIGEST])
+    except (DatabaseError, KeyError):
+        return digest(Path(path))
+
+
 def _manifest(folder: Path) -> dict[str, Any]:
     path = folder / MANIFEST
     try:
@@ -323,6 +345,7 @@ def _waiting(final: Path) -> Path:
 
 
 ADDED = "added"
+BUILT_DIGEST = "built_digest"
 GEOMETRY = "geometry"
 
 

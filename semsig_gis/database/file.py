@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pyarrow as pa
 
-from semsig_gis.core.errors import DatabaseError, InputError, SemsigError
+from semsig_gis.core.errors import DatabaseError, SemsigError
 from semsig_gis.core.geometry import GridSpec, split_ids
 from semsig_gis.core.signature import BEARING_UNITS, SignatureSpec
 from semsig_gis.core.taxonomy import Taxonomy
@@ -35,8 +35,6 @@ if TYPE_CHECKING:
 KIND = "signature database"
 # Raised whenever a file of before would be read wrongly.
 FORMAT = 2
-BUILT_DIGEST = "built_digest"
-STORE_SUFFIX = ".objects"
 # Readers of Parquet folders, such as pyarrow, leave out what begins so.
 MANIFEST = "_manifest.json"
 PARTS_KIND = "signature database in parts"
@@ -245,17 +243,6 @@ def damaged_files(folder: Path, digests: Mapping[str, str]) -> list[str]:
     return damaged
 
 
-def built_digest(path: str | Path) -> str:
-    """Return the SHA-256 digest that a database file had before columns were put into it.
-
-    Without such columns it is the digest of the file as it is, even if that is damaged.
-    """
-    try:
-        return str(read_specs(path)[BUILT_DIGEST])
-    except (DatabaseError, KeyError):
-        return digest(Path(path))
-
-
 def read_specs(path: str | Path) -> dict[str, Any]:
     """Return what a database file, or a part file, says of itself."""
     return read_geoparquet(path, kind=KIND, columns=[])[1]
@@ -271,18 +258,6 @@ def require_file(path: str | Path) -> None:
     if not os.path.isfile(path):  # noqa: PTH113 - it answers where Path.is_file raises
         msg = f"{path} does not exist; give a signature database file."
         raise DatabaseError(msg)
-
-
-def store_path(database: str | Path) -> Path:
-    """Return the folder beside a database file where its object store lies.
-
-    Links are followed. Raise InputError if the name of the database has the ending of a store.
-    """
-    file = Path(os.path.realpath(database))
-    if file.suffix == STORE_SUFFIX:
-        msg = f"{database} is a name for an object store; give a database another ending."
-        raise InputError(msg)
-    return file.with_suffix(STORE_SUFFIX)
 
 
 @dataclass(frozen=True, slots=True, order=True)

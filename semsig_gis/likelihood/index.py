@@ -438,7 +438,7 @@ def save_index(
     """
     _keep_database(path, noise)
     shape = _shape(database)
-    start = _columns_start(len(database))
+    start = _columns_start(shape[-1])
     with whole_file(path) as partial:
         with partial.open("wb") as file:
             file.truncate(start + math.prod(shape))
@@ -472,11 +472,11 @@ def open_index(
     """
     fingerprint = fingerprint or index_fingerprint(database, noise)
     shape = _shape(database)
-    start = _columns_start(len(database))
+    start = _columns_start(shape[-1])
     try:
         with Path(path).open("rb") as file:
             header = json.loads(file.read(HEADER_PAGES * PAGE))
-            constants = np.fromfile(file, np.float32, len(database))
+            constants = np.fromfile(file, np.float32, shape[-1])
         same = header["fingerprint"] == fingerprint
         step = float(header["step"])
         whole = (

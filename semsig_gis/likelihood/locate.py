@@ -329,13 +329,13 @@ class LikelihoodLocator:
             estimate = cell_estimate(
                 query, noise, posterior, answer.cell, radius=radius, north_sigma=sigma
             )
-        candidates = _candidates(scores, posterior, min(top, len(database)))
+        candidates = _candidates(scores, posterior, min(top, len(scores.loglik)))
         first = candidates["cell"].to_list()[: self.explained if len(query) else 0]
         return Location(
             query=query,
             noise=noise.name,
             candidates=candidates,
-            cells=len(database),
+            cells=len(scores.loglik),
             crs=database.crs,
             taxonomy=database.taxonomy,
             licenses=database.licenses,
@@ -353,7 +353,7 @@ class LikelihoodLocator:
     ) -> Refinement:
         """Return the chances of the parts of the likeliest cells."""
         database, chances = posterior.database, posterior.chances
-        count = min(KEPT[0], len(database))
+        count = min(KEPT[0], len(chances))
         cells = np.argpartition(-chances, count - 1)[:count]
         cells = cells[chances[cells] > 0]
         cells = cells[np.argsort(-chances[cells], kind="stable")]

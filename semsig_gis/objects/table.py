@@ -107,10 +107,11 @@ class StreetObjects:
         crs: CRS = self.table.crs
         return crs
 
-    @property
+    @functools.cached_property
     def codes(self) -> NDArray[np.uint8]:
         """Class code of every object, shape (n,)."""
-        codes: NDArray[np.uint8] = self.table[CLASS_CODE].to_numpy(np.uint8)
+        codes: NDArray[np.uint8] = self.table[CLASS_CODE].to_numpy(np.uint8, copy=True)
+        codes.setflags(write=False)
         return codes
 
     @property

@@ -15,10 +15,16 @@ from sentences import assert_sentence, refused
 from worlds import assert_same
 
 from semsig_gis.core.errors import DatabaseError, InputError
-from semsig_gis.database.city import City, ObjectStore, open_city, open_store, save_with_store
+from semsig_gis.database.city import (
+    City,
+    ObjectStore,
+    built_digest,
+    open_city,
+    open_store,
+    save_with_store,
+)
 from semsig_gis.database.file import (
     PartitionedDatabase,
-    built_digest,
     digest,
     open_database,
     part_files,

@@ -18,8 +18,8 @@ from semsig_gis.core.errors import CrsError, DatabaseError, InputError
 from semsig_gis.core.rtree import INDEX_FILES
 from semsig_gis.database import city as store_module
 from semsig_gis.database.build import build_database
-from semsig_gis.database.city import ObjectStore, open_store, save_with_store
-from semsig_gis.database.file import open_database, save_database, store_path
+from semsig_gis.database.city import ObjectStore, open_store, save_with_store, store_path
+from semsig_gis.database.file import open_database, save_database
 from semsig_gis.storage.whole import move_folder
 
 if TYPE_CHECKING:

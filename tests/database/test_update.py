@@ -21,8 +21,8 @@ from semsig_gis.core.errors import CrsError, DatabaseError, EmptyResultError, In
 from semsig_gis.core.geometry import GridSpec
 from semsig_gis.core.taxonomy import ObjectClass, Taxonomy
 from semsig_gis.database.build import build_database
-from semsig_gis.database.city import ObjectStore, open_store, save_with_store
-from semsig_gis.database.file import open_database, store_path
+from semsig_gis.database.city import ObjectStore, open_store, save_with_store, store_path
+from semsig_gis.database.file import open_database
 from semsig_gis.database.update import compare_cells, update_database, update_file
 from semsig_gis.database.views import ViewpointSpec
 from semsig_gis.objects.load import assemble, choose_layers, read_files
