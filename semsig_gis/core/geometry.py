@@ -32,17 +32,6 @@ def signed_degrees(angles: ArrayLike) -> NDArray[np.float64]:
     return np.asarray((np.asarray(angles) + HALF_TURN) % FULL_TURN - HALF_TURN)
 
 
-def bearings(dx: ArrayLike, dy: ArrayLike) -> NDArray[np.float64]:
-    """Return degrees clockwise from grid north, in [0, 360), of displacements to east and north.
-
-    A displacement of zero has bearing 0.
-    """
-    turned = np.degrees(np.arctan2(np.asarray(dx), np.asarray(dy)))
-    # What `wrap_degrees` gives for half a turn to each side, without its costly remainder.
-    wrapped = np.where(turned < 0.0, turned + FULL_TURN, np.abs(turned))
-    return np.where(wrapped >= FULL_TURN, 0.0, wrapped)
-
-
 def angular_distance(a: ArrayLike, b: ArrayLike) -> NDArray[np.float64]:
     """Return the smaller angle between directions in degrees, from 0 to 180."""
     difference = wrap_degrees(np.asarray(a, dtype=np.float64) - np.asarray(b, dtype=np.float64))

@@ -11,7 +11,7 @@ import shapely
 from shapely.geometry.base import BaseGeometry
 
 from semsig_gis.core.errors import InputError, nearest_name
-from semsig_gis.core.geometry import FULL_TURN, bearings
+from semsig_gis.core.geometry import FULL_TURN
 from semsig_gis.database.occlusion import hidden
 
 if TYPE_CHECKING:
@@ -48,6 +48,17 @@ class Sightings:
         return Sightings(
             self.viewpoint[kept], self.object[kept], self.bearing[kept], self.distance[kept]
         )
+
+
+def bearings(dx: ArrayLike, dy: ArrayLike) -> NDArray[np.float64]:
+    """Return degrees clockwise from grid north, in [0, 360), of displacements to east and north.
+
+    A displacement of zero has bearing 0.
+    """
+    turned = np.degrees(np.arctan2(np.asarray(dx), np.asarray(dy)))
+    # What `wrap_degrees` gives for half a turn to each side, without its costly remainder.
+    wrapped = np.where(turned < 0.0, turned + FULL_TURN, np.abs(turned))
+    return np.where(wrapped >= FULL_TURN, 0.0, wrapped)
 
 
 def sightings(

@@ -315,7 +315,8 @@ class LikelihoodLocator:
     ) -> Location:
         """Return the answer to a query, from the chances of the cells; a store is to refine it."""
         parts = None
-        if store is not None and len(query):
+        seen = len(query) > 0
+        if store is not None and seen:
             parts = self._parts(query, scores, posterior, store)
             scores, posterior = _with_parts(parts, scores, posterior)
         answer = self.rule.decide(posterior)
@@ -330,7 +331,7 @@ class LikelihoodLocator:
                 query, noise, posterior, answer.cell, radius=radius, north_sigma=sigma
             )
         candidates = _candidates(scores, posterior, min(top, len(scores.loglik)))
-        first = candidates["cell"].to_list()[: self.explained if len(query) else 0]
+        first = candidates["cell"].to_list()[: self.explained if seen else 0]
         return Location(
             query=query,
             noise=noise.name,

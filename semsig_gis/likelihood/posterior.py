@@ -139,12 +139,12 @@ def posterior(
     Raises `InputError` if a number is NaN or plus infinity, or no cell is possible.
     """
     parts = [loglik] if log_prior is None else [loglik, log_prior]
-    total = np.zeros(len(database))
+    total = np.zeros(database.columns.size)
     for part in parts:
         values = np.asarray(part, dtype=np.float64)
         if values.shape != total.shape:
             msg = (
-                f"{values.size} likelihoods or priors were given for {len(database)} cells; "
+                f"{values.size} likelihoods or priors were given for {total.size} cells; "
                 "give one a cell."
             )
             raise InputError(msg)

@@ -12,8 +12,9 @@ from typing import TYPE_CHECKING, ClassVar, Literal, TypeVar, get_args
 import numpy as np
 
 from semsig_gis.core.errors import InputError, UnknownNameError, nearest_name
-from semsig_gis.core.geometry import FULL_TURN, angular_distance, bearings, wrap_degrees
+from semsig_gis.core.geometry import FULL_TURN, angular_distance, wrap_degrees
 from semsig_gis.core.signature import Signature
+from semsig_gis.database.views import bearings
 from semsig_gis.likelihood.noise.table import LONGEST_TABLE, noise_tables
 
 if TYPE_CHECKING:

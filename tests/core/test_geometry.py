@@ -7,7 +7,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from semsig_gis.core.geometry import angular_distance, bearings, wrap_degrees
+from semsig_gis.core.geometry import angular_distance, wrap_degrees
+from semsig_gis.database.views import bearings
 
 ANGLES = st.floats(-1e6, 1e6)
 METRES = st.floats(-1e4, 1e4)

@@ -23,13 +23,13 @@ from worlds import (
 )
 
 from semsig_gis.core.errors import CrsError, EmptyResultError, InputError
-from semsig_gis.core.geometry import GridSpec, bearings, cells_near, wrap_degrees
+from semsig_gis.core.geometry import GridSpec, cells_near, wrap_degrees
 from semsig_gis.core.rtree import PackedIndex
 from semsig_gis.core.signature import SignatureSpec
 from semsig_gis.database import build
 from semsig_gis.database.build import build_cells, build_database, visible_objects
 from semsig_gis.database.file import open_database, save_database
-from semsig_gis.database.views import Sightings, ViewpointSpec
+from semsig_gis.database.views import Sightings, ViewpointSpec, bearings
 
 if TYPE_CHECKING:
     from pathlib import Path

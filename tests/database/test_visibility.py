@@ -22,7 +22,10 @@ def test_the_viewpoints_of_a_database_see_what_it_says(world: World) -> None:
     cells = np.arange(len(database))[::-1]
     stored = views_in(database, cells)
     exact = views_at(
-        objects, database.xy[cells], index=ObjectIndex(objects.xy), radius=world.radius
+        objects,
+        database.xy[cells],
+        index=ObjectIndex(objects.xy),
+        radius=world.radius,
     )
     assert stored.offsets.tolist() == exact.offsets.tolist()
     assert stored.codes.tolist() == exact.codes.tolist() == objects.codes[exact.objects].tolist()
@@ -37,7 +40,11 @@ def test_buildings_hide() -> None:
     objects = world.street_objects
     wall = Footprints([shapely.box(4.0, -2.0, 6.0, 2.0)])
     seen = views_at(
-        objects, np.array([[0.0, 0.0]]), index=ObjectIndex(objects.xy), radius=30.0, footprints=wall
+        objects,
+        np.array([[0.0, 0.0]]),
+        index=ObjectIndex(objects.xy),
+        radius=30.0,
+        footprints=wall,
     )
     assert seen.objects.tolist() == [1]
     assert seen.bearings.tolist() == [270.0]
