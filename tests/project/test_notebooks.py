@@ -77,10 +77,7 @@ def test_a_notebook_uses_what_everybody_has(path: Path) -> None:
             if not isinstance(node, ast.Import | ast.ImportFrom):
                 continue
             names = [alias.name for alias in node.names]
-            modules = names
-            if isinstance(node, ast.ImportFrom):
-                assert node.level == 0
-                modules = [node.module or ""]
+            modules = names if isinstance(node, ast.Import) else [node.module or ""]
             for module in modules:
                 package = module.split(".")[0]
                 assert package in IMPORTED | sys.stdlib_module_names

@@ -22,6 +22,7 @@ from semsig_gis.maps import page as map_assets
 
 ROOT = Path(__file__).parents[2]
 PACKAGE = ROOT / "semsig_gis"
+INFO = f"semsig_gis-{semsig_gis.__version__}.dist-info"
 
 pytestmark = pytest.mark.skipif(
     not (ROOT / "pyproject.toml").is_file(), reason="the tests do not run from a checkout"
@@ -63,11 +64,8 @@ def tracked_files() -> list[Path]:
 
 def modules() -> set[str]:
     """Return the dotted names of the package's public modules, without the package itself."""
-    names = {
-        ".".join(path.relative_to(ROOT).with_suffix("").parts) for path in PACKAGE.rglob("*.py")
-    }
-    names = {name.removesuffix(".__init__") for name in names} - {"semsig_gis"}
-    return {name for name in names if "._" not in name}
+    files = (path.relative_to(ROOT).with_suffix("") for path in PACKAGE.rglob("*.py"))
+    return {".".join(file.parts).removesuffix(".__init__") for file in files} - {"semsig_gis"}
 
 
 @pytest.mark.parametrize("pattern", [REGISTRY_HOST, MACHINE_PATH], ids=["host", "path"])
@@ -102,17 +100,13 @@ def test_the_wheel_is_complete(wheel: dict[str, str]) -> None:
     assert data | code | {f"semsig_gis/{name}" for name in others} <= wheel.keys()
     if map_assets.available():
         assert {f"semsig_gis/assets/{name}" for name in map_assets.assets()} <= wheel.keys()
-    assert {name.partition("/")[0] for name in wheel} == {
-        "semsig_gis",
-        f"semsig_gis-{semsig_gis.__version__}.dist-info",
-    }
+    assert {name.partition("/")[0] for name in wheel} == {"semsig_gis", INFO}
 
 
 def test_the_wheel_says_what_it_is(wheel: dict[str, str]) -> None:
-    info = f"semsig_gis-{semsig_gis.__version__}.dist-info"
-    assert "semsig = semsig_gis.cli:main" in wheel[f"{info}/entry_points.txt"]
-    assert "License-Expression: BSD-3-Clause" in wheel[f"{info}/METADATA"]
-    assert "BSD 3-Clause License" in wheel[f"{info}/licenses/LICENSE"]
+    assert "semsig = semsig_gis.cli:main" in wheel[f"{INFO}/entry_points.txt"]
+    assert "License-Expression: BSD-3-Clause" in wheel[f"{INFO}/METADATA"]
+    assert "BSD 3-Clause License" in wheel[f"{INFO}/licenses/LICENSE"]
 
 
 def test_every_dependency_is_pinned() -> None:
@@ -123,9 +117,8 @@ def test_every_dependency_is_pinned() -> None:
     pins = [Requirement(line) for line in lines if line and not line.startswith("#")]
     assert all(str(pin.specifier).startswith("==") and pin.url is None for pin in pins)
     names = {canonicalize_name(pin.name) for pin in pins}
-    assert {canonicalize_name(Requirement(name).name) for name in required} - names == {
-        "semsig-gis"
-    }
+    wanted = {canonicalize_name(Requirement(name).name) for name in required}
+    assert wanted - names == {"semsig-gis"}
 
 
 def test_the_version_is_the_same_everywhere() -> None:
@@ -163,10 +156,8 @@ def test_no_public_name_is_also_a_module() -> None:
 
 
 def test_no_test_reaches_the_network() -> None:
-    with (
-        socket.socket() as outward,
-        pytest.raises(RuntimeError, match=r"tried to reach \('192\.0\.2\.1', 80\)"),
-    ):
+    refused = pytest.raises(RuntimeError, match=r"tried to reach \('192\.0\.2\.1', 80\)")
+    with socket.socket() as outward, refused:
         outward.connect(("192.0.2.1", 80))
     with pytest.raises(RuntimeError, match=r"tried to reach \('example\.org',\)"):
         socket.getaddrinfo("example.org", 80)
