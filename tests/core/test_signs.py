@@ -1,13 +1,16 @@
-"""Tests of semsig_gis.core.signs."""
+"""Signs, and text made fit to be shown."""
 
 from __future__ import annotations
 
 import itertools
+import json
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
-from semsig_gis.core.signs import COLOURS, SHAPES, ClassSign, class_signs
+from semsig_gis.core.signs import COLOURS, SHAPES, ClassSign, class_signs, escaped, one_line
 from semsig_gis.core.taxonomy import ObjectClass, Taxonomy
 from semsig_gis.exports.layers import CLASS_MARKERS
 from semsig_gis.maps.parts import OUTLINES
@@ -50,3 +53,24 @@ def test_a_letter_is_readable(colour: str) -> None:
 
 def test_all_who_draw_signs_know_every_shape() -> None:
     assert list(OUTLINES) == list(CLASS_MARKERS) == list(MARKERS) == list(SHAPES)
+
+
+def test_text_from_data_breaks_no_markdown() -> None:
+    assert escaped(" a\n& b ") == "a &amp; b"
+
+
+@given(st.text() | st.text(st.characters(categories=["Cc", "Cf", "Cs", "Zs", "Lo"])))
+def test_text_on_one_line(text: str) -> None:
+    plain = one_line(text)
+    assert one_line(plain) == plain
+    assert plain == plain.strip()
+    assert not set(plain) & set("\n\r\t\0\x85\u2028\u202e\u2066\ufeff\ufffe")
+    plain.encode("utf-8")
+    assert one_line(f"{plain} B") == f"{plain} B".strip()
+
+
+def test_text_that_hides_nothing_stays() -> None:
+    astronaut = "\U0001f469\u200d\U0001f680"
+    for text in ("Arbre d'alignement", "\u0645\u06cc\u200c\u062e", astronaut):
+        assert one_line(text) == text
+    assert one_line(json.loads('"\\ud83d"')) == "\ufffd"

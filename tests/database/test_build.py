@@ -27,7 +27,7 @@ from semsig_gis.core.geometry import GridSpec, cells_near, wrap_degrees
 from semsig_gis.core.rtree import PackedIndex
 from semsig_gis.core.signature import SignatureSpec
 from semsig_gis.database import build
-from semsig_gis.database.build import build_cells, build_database, visible_objects
+from semsig_gis.database.build import build_database, visible_objects
 from semsig_gis.database.file import open_database, save_database
 from semsig_gis.database.views import Sightings, ViewpointSpec, bearings
 
@@ -252,18 +252,3 @@ def test_what_sees_nothing_or_cannot_be_placed_is_told() -> None:
     house = gpd.GeoDataFrame(geometry=[shapely.box(-2, -2, 2, 2)], crs="EPSG:2154")
     with refused(EmptyResultError, "1 objects", "look at", "buildings"):
         build_database(world.street_objects, spec=SignatureSpec(12.0), footprints=house)
-
-
-def test_some_cells_are_the_same_cells(town: World) -> None:
-    whole = town.database
-    chosen = np.arange(3, len(whole), 11)
-    some = build_cells(
-        town.street_objects,
-        whole.columns[chosen].astype(np.int64),
-        whole.rows[chosen].astype(np.int64),
-        grid=whole.grid,
-        spec=whole.spec,
-    )
-    assert_same(some, whole.select(chosen))
-    nowhere = np.zeros(1, np.int64), np.zeros(1, np.int64)
-    assert len(build_cells(town.street_objects, *nowhere, grid=GridSpec(), spec=whole.spec)) == 0

@@ -1,9 +1,14 @@
-"""Cities: a database and what lies beside it, and columns put in whole or not at all."""
+"""Cities: a database with its object store beside it, and columns put into its file."""
 
 from __future__ import annotations
 
 import dataclasses
+import itertools
+import json
+import os
 import shutil
+import tempfile
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import geopandas as gpd
@@ -11,10 +16,14 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
+import shapely
 from sentences import assert_sentence, refused
-from worlds import assert_same
+from worlds import CORNER, assert_index_fits, assert_same, random_town, surroundings
 
-from semsig_gis.core.errors import DatabaseError, InputError
+from semsig_gis.core.errors import CrsError, DatabaseError, InputError
+from semsig_gis.core.rtree import INDEX_FILES
+from semsig_gis.database import city as store_module
+from semsig_gis.database.build import build_database
 from semsig_gis.database.city import (
     City,
     ObjectStore,
@@ -22,6 +31,7 @@ from semsig_gis.database.city import (
     open_city,
     open_store,
     save_with_store,
+    store_path,
 )
 from semsig_gis.database.file import (
     PartitionedDatabase,
@@ -31,13 +41,16 @@ from semsig_gis.database.file import (
     read_manifest,
     save_database,
 )
+from semsig_gis.storage.whole import move_folder
 
 if TYPE_CHECKING:
-    from pathlib import Path
-
     from worlds import World
 
     from semsig_gis.database.database import SignatureDatabase
+    from semsig_gis.objects.table import StreetObjects
+
+
+# --- Cities and columns -----------------------------------------------------------------------
 
 
 @pytest.fixture(params=["path", "parts"])
@@ -215,3 +228,301 @@ def test_parts_that_do_not_agree_are_told(parts: Path, database: SignatureDataba
     dataclasses.replace(manifest, parts=(first, bare, *others)).write(parts)
     with refused(DatabaseError, "do not agree on their numbers"):
         City(parts).columns("numbers")
+
+
+# --- Object stores ----------------------------------------------------------------------------
+
+
+TOWN = random_town().street_objects
+HOUSES = surroundings(shapely.box(*CORNER, *(CORNER + 9)), shapely.Polygon())
+HOUSES.attrs["licenses"] = ["City (CC0): houses"]
+STREETS = surroundings(shapely.LineString([CORNER, CORNER + 50]), half_width=[7.5])
+
+
+@pytest.fixture(autouse=True)
+def _own_temporary_folder(
+    tmp_path_factory: pytest.TempPathFactory, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Keep what killed runs leave behind out of the system's folder."""
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path_factory.mktemp("own")))
+
+
+def fewer(number: int) -> StreetObjects:
+    return dataclasses.replace(TOWN, table=TOWN.table[number:].reset_index(drop=True))
+
+
+def save(path: Path, objects: StreetObjects = TOWN) -> Path:
+    save_with_store(build_database(objects), ObjectStore.of(objects), path)
+    return path
+
+
+def names_in(folder: Path) -> list[str]:
+    return sorted(file.name for file in folder.iterdir())
+
+
+def assert_fits(store: ObjectStore, objects: StreetObjects) -> None:
+    """Check that a store holds these objects, in any order, and that its R-tree is over them."""
+    columns = ["class_code", "source", "source_id", "count"]
+    ours, theirs = (
+        sorted(zip(*(one.table[name] for name in columns), *one.xy.T, strict=True))
+        for one in (store.objects, objects)
+    )
+    assert ours == theirs
+    for name in ("taxonomy", "licenses", "crs"):
+        assert getattr(store.objects, name) == getattr(objects, name)
+    assert_index_fits(store)
+
+
+def test_a_store_lies_beside_its_database(stored: Path) -> None:
+    assert names_in(stored.parent) == ["city.objects", "city.parquet"]
+    store = open_store(stored)
+    assert_fits(store, TOWN)
+    assert (store.footprints, store.streets, store.notes) == (None, None, ())
+    assert_same(open_database(stored), build_database(TOWN))
+    assert set(names_in(store_path(stored))) == {"manifest.json", "objects.parquet", *INDEX_FILES}
+    manifest = json.loads((store_path(stored) / "manifest.json").read_text())
+    assert manifest["objects"] == len(TOWN)
+    assert set(manifest["files"]) == {"objects.parquet", *INDEX_FILES}
+    assert np.load(store_path(stored) / "rtree.npy").tolist() == list(range(len(TOWN)))
+
+
+def test_buildings_and_streets_are_kept_in_the_crs_of_the_objects(tmp_path: Path) -> None:
+    houses = HOUSES.assign(name=["town hall", "nothing"])
+    store = ObjectStore.of(TOWN, footprints=houses, streets=STREETS)
+    save_with_store(build_database(TOWN, footprints=houses), store, tmp_path / "city.parquet")
+    again = open_store(tmp_path / "city.parquet")
+    assert again.footprints is not None
+    assert again.streets is not None
+    assert again.footprints.crs == again.streets.crs == TOWN.crs
+    # To the last bit, since the sight lines of an update are held against them.
+    assert again.footprints.geometry.tolist() == houses.to_crs(TOWN.crs).geometry.tolist()[:1]
+    assert again.footprints.columns.tolist() == ["geometry"]
+    assert again.footprints.attrs["licenses"] == ["City (CC0): houses"]
+    licenses = open_database(tmp_path / "city.parquet").licenses
+    assert licenses == (*map(str, TOWN.licenses), "City (CC0): houses")
+    assert again.streets["half_width"].tolist() == [7.5]
+    with refused(CrsError, "no coordinate reference system"):
+        ObjectStore.of(TOWN, footprints=houses.set_crs(None, allow_override=True))
+
+
+def test_a_store_that_is_missing_or_of_another_database_is_told(tmp_path: Path) -> None:
+    path = tmp_path / "city.parquet"
+    with refused(DatabaseError, "does not exist"):
+        open_store(path)
+    with refused(DatabaseError, "is a folder"):
+        open_store(tmp_path)
+    save_database(build_database(TOWN), path)
+    with refused(DatabaseError, "no object store", "city.objects", "build the database again"):
+        open_store(path)
+    save(path)
+    with refused(DatabaseError, "nowhere"):
+        open_store(path, tmp_path / "nowhere")
+    save_database(build_database(fewer(1)), path)
+    with refused(DatabaseError, "belongs to another database"):
+        open_store(path)
+    with refused(InputError, "another ending"):
+        save(tmp_path / "town.objects")
+    assert names_in(tmp_path) == ["city.objects", "city.parquet"]
+
+
+def test_a_store_goes_where_its_database_goes(stored: Path, tmp_path: Path) -> None:
+    store_path(stored).rename(tmp_path / "elsewhere")
+    assert_fits(open_store(stored, tmp_path / "elsewhere"), TOWN)
+    (tmp_path / "far").mkdir()
+    stored.rename(tmp_path / "far" / "town.parquet")
+    (tmp_path / "elsewhere").rename(tmp_path / "far" / "town.objects")
+    assert_fits(open_store(tmp_path / "far" / "town.parquet"), TOWN)
+    (tmp_path / "link.parquet").symlink_to(tmp_path / "far" / "town.parquet")
+    assert_fits(open_store(tmp_path / "link.parquet"), TOWN)
+
+
+def test_buildings_around_places() -> None:
+    north, south = (shapely.box(*(CORNER + low), *(CORNER + low + 8.0)) for low in (50.0, 10.0))
+    store = ObjectStore.of(TOWN, footprints=surroundings(north, south))
+    near = store.buildings_around(CORNER[None], distance=20.0)
+    assert near is not None
+    assert len(near) == 1
+    assert store.buildings_around(CORNER[None] - 500.0, distance=20.0) is None
+    assert ObjectStore.of(TOWN).buildings_around(CORNER[None], distance=20.0) is None
+
+
+def damage(file: Path, how: str) -> None:
+    content = bytearray(file.read_bytes())
+    content[len(content) // 2] ^= 255
+    file.write_bytes(content if how == "flipped" else content[: len(content) // 2])
+    if how == "gone":
+        file.unlink()
+
+
+@pytest.mark.parametrize("name", INDEX_FILES)
+@pytest.mark.parametrize("how", ["cut", "flipped", "gone"])
+def test_a_damaged_r_tree_is_made_again(stored: Path, name: str, how: str) -> None:
+    damage(store_path(stored) / name, how)
+    store = open_store(stored)
+    assert_fits(store, TOWN)
+    (note,) = store.notes
+    assert "R-tree" in note
+    assert "made again" in note
+    # It is whole again when it is saved.
+    save_with_store(open_database(stored), store, stored)
+    assert open_store(stored).notes == ()
+
+
+@pytest.mark.parametrize("name", ["objects.parquet", "footprints.parquet", "streets.parquet"])
+@pytest.mark.parametrize("how", ["cut", "flipped", "gone"])
+def test_other_damage_is_told(
+    database: SignatureDatabase, tmp_path: Path, name: str, how: str
+) -> None:
+    path = tmp_path / "city.parquet"
+    store = ObjectStore.of(TOWN, footprints=HOUSES, streets=STREETS)
+    save_with_store(database, store, path)
+    damage(store_path(path) / name, how)
+    with refused(DatabaseError, name, "damaged", "build the database again"):
+        open_store(path)
+
+
+@pytest.mark.parametrize(
+    ("content", "words"),
+    [
+        *((text, "manifest.json") for text in (None, "", "{", "[]", "{}", "null")),
+        ('{"kind": "other"}', "manifest.json"),
+        ('{"kind": "object store", "format": 1}', "manifest.json"),
+        ({"format": 99, "version": "9.9"}, "another version of semsig (9.9)"),
+        ({"files": {}}, "objects.parquet is damaged"),
+    ],
+)
+def test_a_damaged_manifest_is_told(stored: Path, content: Any, words: str) -> None:  # noqa: ANN401
+    manifest = store_path(stored) / "manifest.json"
+    if isinstance(content, dict):
+        content = json.dumps(json.loads(manifest.read_text()) | content)
+    manifest.unlink()
+    if content is not None:
+        manifest.write_text(content)
+    with refused(DatabaseError, words, "build the database again"):
+        open_store(stored)
+
+
+def test_reading_changes_nothing(stored: Path) -> None:
+    folders = [store_path(stored), stored.parent]
+    files = [stored, *folders[0].iterdir()]
+    before = [(file.read_bytes(), file.stat().st_mtime_ns) for file in files]
+    for folder in folders:
+        folder.chmod(0o555)
+    try:
+        for _ in range(2):
+            assert_fits(open_store(stored), TOWN)
+    finally:
+        for folder in folders:
+            folder.chmod(0o755)
+    assert [(file.read_bytes(), file.stat().st_mtime_ns) for file in files] == before
+    assert len(names_in(stored.parent)) == 2
+
+
+class KilledError(BaseException):
+    """What ends a run at some step."""
+
+
+def steps_until_killed(
+    step: int, database: SignatureDatabase, store: ObjectStore, path: Path
+) -> bool:
+    """Save, and die before the rename of that number; tell whether it came so far."""
+    count = 0
+
+    def counted(original: object) -> object:
+        def rename(*args: object) -> object:
+            nonlocal count
+            count += 1
+            if count == step:
+                raise KilledError
+            return original(*args)  # type: ignore[operator]
+
+        return rename
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(os, "replace", counted(os.replace))
+        patch.setattr(Path, "rename", counted(Path.rename))
+        # A run that is killed does not tidy up.
+        tidy = shutil.rmtree
+        patch.setattr(shutil, "rmtree", lambda *a, **k: None if count == step else tidy(*a, **k))
+        try:
+            save_with_store(database, store, path)
+        except KilledError:
+            return True
+    return False
+
+
+def test_a_run_may_be_killed_at_any_step(tmp_path: Path) -> None:
+    """Database and store are both the old ones or both the new ones, whatever happens.
+
+    So they are when the next run is killed, too; what waits is not lost to it.
+    """
+    states = [TOWN, fewer(7), fewer(12)]
+    databases = [build_database(objects) for objects in states]
+    by_cells = {len(database): number for number, database in enumerate(databases)}
+    assert len(by_cells) == 3
+    outcomes = set()
+    for first, second in itertools.product(range(1, 9), range(9)):
+        path = save(tmp_path / f"{first}-{second}" / "city.parquet")
+        killed = steps_until_killed(first, databases[1], ObjectStore.of(states[1]), path)
+        if second:
+            steps_until_killed(second, databases[2], ObjectStore.of(states[2]), path)
+        number = by_cells[len(open_database(path))]
+        assert_same(open_database(path), databases[number])
+        assert_fits(open_store(path), states[number])
+        outcomes.add((killed, second > 0, number))
+    assert outcomes >= {(True, False, 0), (True, False, 1), (False, False, 1)}
+    assert outcomes >= {(True, True, 0), (True, True, 1), (True, True, 2)}
+
+
+def test_what_waits_is_read_where_nothing_can_be_written(
+    stored: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    waiting = stored.with_name("city.objects.next")
+    store_path(stored).rename(waiting)
+
+    def read_only(*_: Path) -> None:
+        msg = "nothing may be written here."
+        raise InputError(msg)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(store_module, "move_folder", read_only)
+        assert_fits(open_store(stored), TOWN)
+        assert waiting.exists()
+    assert_fits(open_store(stored), TOWN)
+    assert not waiting.exists()
+    assert store_path(stored).is_dir()
+
+
+def test_another_program_may_finish_it_first(stored: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    waiting = stored.with_name("city.objects.next")
+    shutil.copytree(store_path(stored), waiting)
+
+    def late(new: Path, place: Path) -> None:
+        new.rename(stored.with_name("taken"))  # which the other has put in its place
+        move_folder(new, place)
+
+    monkeypatch.setattr(store_module, "move_folder", late)
+    assert_fits(open_store(stored), TOWN)
+    assert not waiting.exists()
+    assert store_path(stored).is_dir()
+
+
+def test_a_full_disk_leaves_what_was_there(stored: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def full(*_: object, **__: object) -> None:
+        raise OSError(28, "No space left on device")
+
+    def full_partial(_: object, partial: Path) -> None:
+        msg = f"{partial} could not be written (No space left on device); make room."
+        raise InputError(msg)
+
+    for name, act, file in (
+        ("save_objects", full, "city.objects.next"),
+        ("save_database", full_partial, str(stored)),  # the name that was given
+    ):
+        with monkeypatch.context() as patch:
+            patch.setattr(store_module, name, act)
+            with refused(InputError, f"{file} could not be written (No space", "make room"):
+                save(stored, fewer(7))
+        assert_fits(open_store(stored), TOWN)
+        assert_same(open_database(stored), build_database(TOWN))
+        assert len(names_in(stored.parent)) == 2

@@ -169,14 +169,6 @@ def test_what_a_chain_of_pairs_joins_has_one_label(edges: list[tuple[int, int]])
     assert labels.tolist() == [min(group) for group in groups]
 
 
-def test_a_long_row_of_houses_is_one_block() -> None:
-    order = np.random.default_rng(4).permutation(3000)
-    labels = occlusion._joined(order[:-1], order[1:], 3000)
-    assert not labels.any()
-    row = [shapely.box(8.0 * number, 0, 8.0 * number + 8, 10) for number in order if number < 300]
-    assert len(Footprints(row).interiors) == 1
-
-
 @settings(max_examples=25)
 @given(st.integers(0, 2**32 - 1))
 def test_random_towns_equal_the_oracle(seed: int) -> None:
