@@ -37,11 +37,10 @@ FILE_SUFFIXES = frozenset(
 class RowCounts:
     """How many rows a layer has, and how many of them are left out for each reason.
 
-    Rows are `unreadable`, `filtered` (by the catalogue's filter, or outside the area), `missing`
-    (no geometry, or an empty one), `duplicates` (the id of an earlier row, where the catalogue says
-    that ids are unique), `misplaced` (no finite coordinates in the metric CRS, or off the Earth),
-    `collapsed` (at the same place as an earlier object of the class) or `conflated` (merged into an
-    object of an earlier layer).
+    Rows are `unreadable`, `filtered` (by the catalogue, or outside the area), `missing` (without a
+    geometry), `duplicates` (the id of an earlier row, where ids are unique), `misplaced` (off the
+    Earth, or not finite in the metric CRS), `collapsed` (at the place of an earlier object of the
+    class) or `conflated` (merged into an object of an earlier layer).
     """
 
     read: int

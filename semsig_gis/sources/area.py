@@ -41,10 +41,7 @@ class Area:
 
 
 def parse_area(text: str) -> Area:
-    """Return the area of ``"west,south,east,north"`` in degrees, or of a vector file's polygons.
-
-    InputError if the text is neither or is no area, SourceError if the file cannot be read.
-    """
+    """Return the area of ``"west,south,east,north"`` in degrees, or of a vector file's polygons."""
     if NUMBERS.fullmatch(text):
         return _box(text)
     if names_place(text):

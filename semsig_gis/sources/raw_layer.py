@@ -77,11 +77,10 @@ def crs_label(crs: CRS) -> str:
 def settle_crs(
     own: CRS | None, *, implicit: bool, expected: str | None, given: str | None, where: str
 ) -> tuple[CRS, tuple[str, ...]]:
-    """Return the CRS of a layer: the file's own statement, else the user's, catalogue's or default.
+    """Return the CRS of a layer: the file's `own`, else that `given` by the user or `expected`.
 
-    `implicit` says that `own` is only the default of the format; `expected` is the catalogue's word
-    and `given` the user's. A note says where the file contradicts it. CrsError if nobody states
-    one.
+    `implicit` says that `own` is only the default of the format, which goes last. A note says where
+    the file contradicts the others. CrsError if nobody states one.
     """
     stated = given or expected
     if own is not None and not implicit:
@@ -221,10 +220,7 @@ def _not_finite(table: pd.DataFrame) -> dict[int, str]:
 
 
 def _off_globe(table: pd.DataFrame, *, crs: CRS, by_file: bool, file: str) -> dict[int, str]:
-    """Refuse rows that cannot be longitudes and latitudes where they must be.
-
-    A few are bad rows; if they are most of the layer, then it is the CRS that is wrong.
-    """
+    """Refuse rows that are not degrees where they must be, or the CRS if they are most."""
     xy, owner = shapely.get_coordinates(table[GEOMETRY].to_numpy(), return_index=True)
     wrong = off_the_globe(xy, crs)
     if 2 * wrong.sum() > len(xy):
@@ -291,9 +287,8 @@ def as_text(value: object) -> str:
 def matches(value: object, wanted: Value) -> bool:
     """Tell whether a field value is the one a catalogue names.
 
-    Text compares as text and numbers as numbers, so that 3 is found in a text field and the key "3"
-    in a numeric one. A text between slashes is a regular expression that the whole value must
-    match.
+    Text compares as text and numbers as numbers, so that 3 is found in a text field and "3" in a
+    numeric one. A text between slashes is a regular expression for the whole value.
     """
     if value is None:
         return False

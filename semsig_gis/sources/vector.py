@@ -59,10 +59,7 @@ SIDE_SUFFIXES = frozenset({".csv", ".json"})
 
 @dataclass(frozen=True, slots=True)
 class Member:
-    """One layer of a file, or of a file in an archive, by its name there (`inner`).
-
-    `layer` is None until its name is known.
-    """
+    """One layer of a file, or of the file `inner` of an archive; `layer` is None until known."""
 
     file: Path
     inner: str | None
@@ -105,10 +102,7 @@ def unreadable(what: object, error: BaseException) -> SourceError:
 
 
 def members(path: Path) -> tuple[Member, ...]:
-    """Return the parts of a file that hold layers: itself, or the vector files in an archive.
-
-    SourceError if it is missing, of another kind, or a damaged or useless archive.
-    """
+    """Return the parts of a file that hold layers: itself, or the vector files in an archive."""
     suffix = path.suffix.lower()
     require_file(path, "a vector file")
     suffixes = {*DRIVERS, ".zip"}
@@ -160,16 +154,8 @@ class CsvColumns:
     x: str | None
     y: str | None
 
-    @property
-    def options(self) -> dict[str, str]:
-        """GDAL's open options; its own guess of the separator fails on `id;size (a, b);x;y`."""
-        return {"SEPARATOR": SEPARATORS[self.separator], "HEADERS": "YES"}
-
     def position(self, row: Mapping[str, Any]) -> tuple[float, float] | None:
-        """Return the coordinates of a row, or None where both are blank.
-
-        BadFeatureError if they are not two numbers.
-        """
+        """Return the coordinates of a row, or None where both are blank."""
         texts = {name: (row[name] or "").strip() for name in (self.x, self.y) if name}
         if not any(texts.values()):
             return None
@@ -190,11 +176,7 @@ class CsvColumns:
 
 
 def csv_columns(header: str, spec: LayerSpec | None, *, where: str) -> CsvColumns:
-    """Find the separator and the coordinate columns from the first line of a file.
-
-    CatalogError if `spec` names only one column, or one that does not exist; SourceError if none is
-    recognised, but without `spec`.
-    """
+    """Return what a header says; SourceError if `spec` is given and no coordinates are found."""
     layouts = {sep: next(csv.reader([header], delimiter=sep), []) for sep in SEPARATORS}
     widest = max(layouts, key=lambda separator: len(layouts[separator]))
     if spec is not None and (spec.x_field or spec.y_field):
@@ -364,10 +346,7 @@ def read_layers(
 def first_rows(
     path: Path, *, limit: int
 ) -> Iterator[tuple[LayerInfo, tuple[Mapping[str, Any], ...], tuple[str, ...]]]:
-    """Yield every layer of a file, its first rows, and its two coordinate columns if it has them.
-
-    Rows that cannot be read are passed over.
-    """
+    """Yield every layer of a file, its first readable rows, and its coordinate columns if any."""
     with listening():
         for member in _layers(path):
             columns = _columns(member, None, where=str(member))
@@ -389,15 +368,14 @@ def _properties(source: Iterable[fiona.Feature], limit: int) -> Iterator[Mapping
         yield feature.properties
 
 
-# --- Opening ----------------------------------------------------------------------------------
-
-
 @contextlib.contextmanager
 def _opened(
     member: Member, columns: CsvColumns | None = None, *, fields: tuple[str, ...] | None = None
 ) -> Iterator[fiona.Collection]:
     """Open a layer; what goes wrong in opening it becomes a `SourceError`."""
-    options: dict[str, Any] = dict(columns.options) if columns else {}
+    options: dict[str, Any] = {}
+    if columns:  # GDAL's own guess of the separator fails on `id;size (a, b);x;y`
+        options |= {"SEPARATOR": SEPARATORS[columns.separator], "HEADERS": "YES"}
     if member.driver == "GeoJSON":
         # Has GDAL keep the members of the file that are not features, `crs` among them.
         options["NATIVE_DATA"] = "YES"
@@ -507,9 +485,6 @@ def _own_crs(source: fiona.Collection) -> tuple[CRS | None, bool]:
         if usable_crs(source.crs_wkt) == WGS84 and not WGS84_NAMES.search(str(members["crs"])):
             return None, False  # GDAL takes what it does not understand for WGS 84
     return usable_crs(source.crs_wkt), False
-
-
-# --- Reading ----------------------------------------------------------------------------------
 
 
 def _read_rows(

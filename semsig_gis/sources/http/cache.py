@@ -103,10 +103,7 @@ class Cache:
 
     @contextlib.contextmanager
     def locked(self, key: str) -> Iterator[Entry]:
-        """Give the entry of a request while no other process works on it.
-
-        InputError if the folder cannot be written to.
-        """
+        """Give the entry of a request while no other process works on it."""
         try:
             Path(self.folder).mkdir(parents=True, exist_ok=True)
             lock = (Path(self.folder) / f"{key}.lock").open("ab")
@@ -190,8 +187,7 @@ class Entry:
     def start_part(self, edition: Edition) -> None:
         """Begin an empty part."""
         self.drop_part()
-        what = json.dumps(dataclasses.asdict(edition))
-        self._part_info.write_text(what, encoding="utf-8")
+        self._part_info.write_text(json.dumps(dataclasses.asdict(edition)), encoding="utf-8")
 
     def drop_part(self) -> None:
         """Forget what has arrived so far."""

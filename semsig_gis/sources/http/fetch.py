@@ -56,7 +56,6 @@ class HttpSpec:
     max_bytes: int = 2**31
     fresh_s: float = 86_400.0
     offline: bool = False
-    user_agent: str = USER_AGENT
     sleep: Callable[[float], None] = time.sleep
 
     def __post_init__(self) -> None:
@@ -101,10 +100,10 @@ class Request:
 
 
 @contextlib.contextmanager
-def session_for(spec: HttpSpec) -> Iterator[requests.Session]:
+def polite_session() -> Iterator[requests.Session]:
     """Give a session that introduces itself and asks for nothing but gzip."""
     with requests.Session() as session:
-        session.headers.update({"User-Agent": spec.user_agent, "Accept-Encoding": "gzip"})
+        session.headers.update({"User-Agent": USER_AGENT, "Accept-Encoding": "gzip"})
         session.auth = lambda prepared: prepared  # no password from the user's .netrc
         yield session
 
@@ -113,11 +112,7 @@ def session_for(spec: HttpSpec) -> Iterator[requests.Session]:
 def answer_to(
     session: requests.Session, request: Request, headers: Mapping[str, str], spec: HttpSpec
 ) -> Iterator[requests.Response]:
-    """Send a request and give the response, of which no body is read yet.
-
-    Redirects within the host are followed. PassingError if the server cannot be reached now,
-    HttpError if it never can, SourceError for a redirect to another host.
-    """
+    """Send a request, follow redirects within the host, and give the response, its body unread."""
     url = request.url
     params: tuple[tuple[str, str], ...] | None = request.params
     for _ in range(MOST_REDIRECTS + 1):
@@ -176,10 +171,7 @@ def _failure(error: Exception, url: str) -> Exception:
 
 
 def require_success(response: requests.Response, spec: HttpSpec) -> None:
-    """Refuse an answer that is not the file, or a part of it.
-
-    PassingError if it may be another one later, HttpError if it is final.
-    """
+    """Refuse an answer that is no part of the file; PassingError if a later one may be."""
     status = response.status_code
     if status in {requests.codes.ok, requests.codes.partial}:
         return
@@ -210,10 +202,7 @@ def _detail(response: requests.Response, spec: HttpSpec) -> str:
 
 
 def blocks_of(response: requests.Response, spec: HttpSpec) -> Iterator[bytes]:
-    """Yield the body as it is sent.
-
-    PassingError if the server closes the connection too early, stops, or gets too slow.
-    """
+    """Yield the body as it is sent; PassingError if the server hangs up, stops or is too slow."""
     since, got = time.monotonic(), 0
     try:
         while block := response.raw.read1(BLOCK, decode_content=False):
@@ -265,7 +254,6 @@ def host_of(url: str) -> str:
 Progress = Callable[[int, int], None]
 
 NOT_MODIFIED, PARTIAL, BEYOND_THE_END = 304, 206, 416
-TEXT_BYTES = 2**16  # the most that `read_text` takes
 
 
 class TooLargeError(SourceError):
@@ -299,9 +287,7 @@ def fetch(
     gave an ETag or a date; else it is taken as it is for ``spec.fresh_s``. A connection that is cut
     goes on where it was cut (RFC 9110, If-Range), also in a later run, if the server can do that.
 
-    HttpError if the server refuses or fails until the attempts are used up; TooLargeError above
-    ``spec.max_bytes``; NotCachedError if offline without a sound copy; SourceError if something
-    else is sent, or a redirect leads to another host.
+    HttpError, TooLargeError, NotCachedError or another SourceError says why there is no file.
     """
     require_address(url)
     request = Request(url, _pairs(params), _pairs(data))
@@ -340,17 +326,17 @@ def read_text(url: str, *, spec: HttpSpec = DEFAULT_HTTP) -> str:
     require_address(url)
     request = Request(url)
     try:
-        with session_for(spec) as session, answer_to(session, request, {}, spec) as response:
+        with polite_session() as session, answer_to(session, request, {}, spec) as response:
             require_success(response, spec)
             body = b""
             for block in blocks_of(response, spec):
                 body += block
-                if len(body) > TEXT_BYTES:
+                if len(body) > BLOCK:
                     break
     except PassingError as error:
         msg = f"{host_of(url)} {error}; try again later."
         raise HttpError(msg, error.status) from error
-    return body[:TEXT_BYTES].decode("utf-8", errors="replace")
+    return body[:BLOCK].decode("utf-8", errors="replace")
 
 
 # --- One file, several attempts -----------------------------------------------------------------
@@ -371,7 +357,7 @@ class _Job:
 def _persist(job: _Job, before: Callable[[], None] | None) -> Fetched:
     """Try until it works, or has failed too often."""
     spec = job.spec
-    with session_for(spec) as session:
+    with polite_session() as session:
         for attempt in range(1, spec.attempts + 1):
             if before is not None:
                 before()

@@ -16,7 +16,6 @@ from shapely.errors import ShapelyError
 
 from semsig_gis.core.errors import CatalogError, SourceError
 from semsig_gis.sources import vector as vector_file
-from semsig_gis.sources.catalog import ClassBy
 from semsig_gis.sources.http.fetch import DEFAULT_HTTP, HttpError, fetch
 from semsig_gis.sources.opendatasoft.table import open_table
 from semsig_gis.sources.raw_layer import (
@@ -59,13 +58,10 @@ def find_field(name: str, spec: LayerSpec, fields: Sequence[str]) -> str | None:
 
 
 def settle_fields(spec: LayerSpec, fields: Sequence[str]) -> LayerSpec:
-    """Return a specification that calls every field as the file does.
-
-    A field that the file lacks keeps its name, for the error that names it.
-    """
+    """Return a specification that calls every field as the file does."""
 
     def own(name: str) -> str:
-        return find_field(name, spec, fields) or name
+        return find_field(name, spec, fields) or name  # which an error names if it is absent
 
     class_by, width_by = spec.class_by, spec.width_by
     return dataclasses.replace(
@@ -74,7 +70,7 @@ def settle_fields(spec: LayerSpec, fields: Sequence[str]) -> LayerSpec:
         width_field=spec.width_field and own(spec.width_field),
         width_by=width_by and dataclasses.replace(width_by, field=own(width_by.field)),
         where=tuple((own(field), accepted) for field, accepted in spec.where),
-        class_by=class_by and ClassBy(own(class_by.field), class_by.classes),
+        class_by=class_by and dataclasses.replace(class_by, field=own(class_by.field)),
         select=tuple(own(field) for field in spec.select),
     )
 
@@ -109,10 +105,7 @@ class Positions:
             raise SourceError(msg)
 
     def of(self, record: Record) -> Position:
-        """Return the position of a record, or None where it has none.
-
-        BadFeatureError if it cannot be understood.
-        """
+        """Return the position of a record, or None where it has none."""
         values = record.values
         if self._shape is not None:
             shape = _shape(values.get(self._shape))
@@ -196,9 +189,8 @@ def read_layers(
     """Read layers, in one pass, from a file that a portal exports, as it is.
 
     JSON of version 1, 2.0 or 2.1 of the API, GeoJSON, CSV and Parquet are told apart by what is in
-    the file; a vector file or archive made of such a file will do too. A shape (``geo_shape``) goes
-    before a point (``geo_point_2d``, latitude first), and that before ``x_field`` and ``y_field``.
-    What portals publish is in WGS 84; `crs` is for a file that states none.
+    the file; a vector file or archive made of such a file will do too. What portals publish is in
+    WGS 84; `crs` is for a file that states none.
     """
     path = Path(path)
     if path.suffix.lower() in VECTOR_SUFFIXES:

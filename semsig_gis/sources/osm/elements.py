@@ -113,7 +113,10 @@ def has_tags(tags: Mapping[str, str], spec: LayerSpec) -> bool:
     ``amenity=toilets;bench`` is neither.
     """
     return any(
-        all(_accepts(accepted, tags.get(key)) for key, accepted in alternative)
+        all(
+            tags.get(key) in accepted or (ANY_VALUE in accepted and tags.get(key, "no") != "no")
+            for key, accepted in alternative
+        )
         for alternative in spec.tags
     )
 
@@ -140,10 +143,7 @@ def require_tags(spec: LayerSpec) -> tuple[tuple[tuple[str, tuple[str, ...]], ..
 
 
 class TagIndex:
-    """The layers of a catalogue by tag, to find those of an element without trying each.
-
-    CatalogError if a layer says no tags.
-    """
+    """The layers of a catalogue by tag, to find those of an element without trying each."""
 
     def __init__(self, specs: Sequence[LayerSpec]) -> None:
         self._specs = specs
@@ -167,10 +167,6 @@ class TagIndex:
             for looked_up in (value, ANY_VALUE):
                 candidates |= self._by_tag.get((key, looked_up), set())
         return [number for number in sorted(candidates) if has_tags(tags, self._specs[number])]
-
-
-def _accepts(accepted: tuple[str, ...], value: str | None) -> bool:
-    return value in accepted or (ANY_VALUE in accepted and value not in {None, "no"})
 
 
 class ElementLayer:

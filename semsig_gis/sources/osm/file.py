@@ -52,11 +52,9 @@ def read_layers(
     """Read layers of a ``.osm``, ``.osm.pbf`` or ``.osm.bz2`` file, one for each of `specs`.
 
     The file is streamed; where a layer has ways, the places of all nodes are kept meanwhile in an
-    unnamed temporary file, of 16 bytes a node. Fields that a layer names are keys of tags, and
-    identifiers such as ``"node/123"``. Street objects are points, the centroid of a way or an area;
-    buildings are polygons and streets lines. Filtered are also elements that are mapped in another
-    way than the layer wants; incomplete (clipped) and broken ones are unreadable. `crs` is ignored
-    but for a note.
+    unnamed temporary file, of 16 bytes a node. Street objects are points, the centroid of a way or
+    an area; identifiers are such as ``"node/123"``. Elements that are mapped in another way than
+    the layer wants are filtered, clipped and broken ones unreadable. `crs` is only noted.
     """
     path = Path(path)
     file = _file(path)
@@ -88,7 +86,7 @@ def read_layers(
 
 
 def _file(path: Path) -> osmium.io.File:
-    """Return a file, once it is seen to exist and to be of a known kind."""
+    """Return a file that exists and is of a known kind."""
     require_file(path, "an OpenStreetMap file")
     name = path.name.lower()
     kind = next((kind for suffix, kind in FORMATS.items() if name.endswith(suffix)), None)

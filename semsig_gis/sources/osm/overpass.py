@@ -208,10 +208,7 @@ def _point(place: dict[str, Any]) -> tuple[float, float]:
 
 
 def find_place(name: str, *, endpoint: str, cache: Cache, spec: HttpSpec = DEFAULT_HTTP) -> Area:
-    """Return the first place of that name that has an outline, from a Nominatim server.
-
-    InputError if there is no such place, or it is known as a point or a line only.
-    """
+    """Return the first place of that name that has an outline, from a Nominatim server."""
     name = " ".join(name.split())
     if not name:
         msg = "the name of the place is empty; write one such as 'Helsinki'."
@@ -379,10 +376,7 @@ class _Servers:
         )
 
     def answer(self, query: str, *, last: bool) -> Path | None:
-        """Return the file of the answer, or None where a smaller question may have one.
-
-        `last` says that the question cannot be made smaller. SourceError if there is neither.
-        """
+        """Return the file of the answer; None where a smaller question, unless `last`, may do."""
         failures: list[SourceError] = []
         for address in tuple(self._addresses):
             try:
@@ -451,10 +445,7 @@ class _Servers:
 
 
 def waiting_time(status: str) -> float:
-    """Return the seconds until a slot is free, by an Overpass server's page ``/api/status``.
-
-    0 if one is free, there is no limit, or nothing is said.
-    """
+    """Return the seconds until a slot is free, by the page ``/api/status``; 0 if none is said."""
     free = re.search(r"^(\d+) slots? available now", status, re.MULTILINE)
     if free and int(free[1]):
         return 0.0

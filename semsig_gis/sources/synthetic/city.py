@@ -18,8 +18,8 @@ import shapely
 from semsig_gis.core.errors import InputError
 from semsig_gis.core.geometry import CLASS_NAME, SOURCE_ID
 from semsig_gis.sources import RawLayer, RowCounts
-from semsig_gis.sources.catalog import LayerSpec
-from semsig_gis.sources.synthetic.streets import CLASSES, furnish, lay_streets
+from semsig_gis.sources.catalog import LayerSpec, paper_taxonomy
+from semsig_gis.sources.synthetic.streets import counted, furnish, lay_streets
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -54,10 +54,7 @@ def open_ground(network: Network, rng: np.random.Generator) -> tuple[Ints, Ints]
 
 
 def cut_back(faces: Objects, network: Network) -> Objects:
-    """Return what of each face is farther from every centre line than its street's half-width.
-
-    It may be several parts, or empty.
-    """
+    """Return what of each face is farther from every centre line than its street's half-width."""
     # An arc of chords lies inside the circle: a little wider, it holds the whole of it.
     radius = network.half_width / math.cos(math.pi / (4 * ARC_CHORDS))
     streets = shapely.buffer(network.lines, radius, quad_segs=ARC_CHORDS)
@@ -79,8 +76,7 @@ def build_houses(network: Network, built: Objects, rng: np.random.Generator) -> 
     rings = shapely.difference(blocks, shapely.buffer(blocks, -HOUSE_DEPTH_M, join_style="mitre"))
     outlines = shapely.get_exterior_ring(blocks)
     counts = np.maximum((shapely.length(outlines) / FRONTAGE_M).astype(np.int64), LEAST_HOUSES)
-    block = np.repeat(np.arange(len(blocks)), counts)
-    number = np.arange(len(block)) - np.repeat(np.cumsum(counts) - counts, counts)
+    block, number = counted(counts)
     # Party walls run from the middle of the block through a point of its outline.
     share = (number + rng.uniform(-0.25, 0.25, size=len(block))) / counts[block] % 1.0
     wall = shapely.get_coordinates(
@@ -180,7 +176,7 @@ def synthetic_city(spec: CitySpec | None = None) -> tuple[RawLayer, ...]:
         for some in open_ground(network, _random(spec, "open ground"))
     )
     layers = []
-    for name in CLASSES:
+    for name in (item.name for item in paper_taxonomy().classes):
         rng = _random(spec, name)
         objects = furnish(name, network, parks=parks, squares=squares, rng=rng)
         inside = (np.abs(objects.xy) <= spec.size / 2).all(axis=1)

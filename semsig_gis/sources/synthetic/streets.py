@@ -1,9 +1,8 @@
 """The streets of the synthetic city and what stands along them: trees, lights, signals, the rest.
 
 Streets are the edges between the faces of a Voronoi diagram. Neighbouring faces form quarters; the
-edges between two quarters are an avenue, all others are streets of their own. Every class of object
-has a rule of its own. What is scattered is drawn evenly, so that a city of a size has nearly the
-same number of each class whatever its seed.
+edges between two quarters are an avenue, all others are streets of their own. What is scattered is
+drawn evenly, so that cities of a size have nearly the same number of each class.
 """
 
 from __future__ import annotations
@@ -61,10 +60,7 @@ class Network:
         return len(self.length)
 
     def drawn(self, limits: tuple[float, float], rng: np.random.Generator) -> Floats:
-        """Draw a number for each avenue and street, and return that of every edge, shape (n,).
-
-        Avenues fill the range between the limits evenly, and so do streets.
-        """
+        """Draw numbers that fill a range evenly for avenues, and for streets; of every edge."""
         avenues = int(self.street[self.avenue].max(initial=-1)) + 1
         streets = int(self.street.max(initial=-1)) + 1 - avenues
         numbers = np.concatenate([_evenly(avenues, limits, rng), _evenly(streets, limits, rng)])
@@ -189,19 +185,6 @@ def _crossing(ends: Ints, avenue: Bools, kerb: Floats) -> Floats:
 
 # --- Objects ------------------------------------------------------------------------------------
 
-CLASSES = (
-    "alignment_tree",
-    "water_fountain",
-    "street_light",
-    "indicator",
-    "traffic_light",
-    "bike_station",
-    "automatic_wc",
-    "car_station",
-    "taxi_station",
-    "bench",
-    "bus_stop",
-)
 # The numbers below are calibrated together: the signatures of PARIS_LIKE then hold each class as
 # often as the paper's. Change one, and its test tells which counts have left their range.
 # Metres between neighbours in a row; one rhythm a street.
@@ -257,10 +240,7 @@ def furnish(
     squares: NDArray[np.object_],
     rng: np.random.Generator,
 ) -> Furniture:
-    """Place the objects of one of the paper's eleven classes.
-
-    Parks and squares are polygons of open ground, which have trees and lights of their own.
-    """
+    """Place the objects of one class; parks and squares, polygons, have trees and lights too."""
     if class_name == "alignment_tree":
         return _joined(*_trees(network, rng), _on_ground(parks, PARK_TREE_SPACING_M, rng))
     if class_name == "street_light":
@@ -304,20 +284,17 @@ class _Row:
 def _row(
     network: Network, edges: Ints, spacing: Floats, jitter: float, rng: np.random.Generator
 ) -> _Row:
-    """Return objects evenly spaced on edges, the first at random within one spacing.
-
-    The spacing is of every edge, shape (n,).
-    """
+    """Return objects evenly spaced on edges, by the spacing of every edge, shape (n,)."""
     gap = spacing[edges]
     begin = network.clear[edges, 0] + rng.uniform(size=len(edges)) * gap
     room = network.length[edges] - network.clear[edges, 1] - begin
     counts = np.maximum(np.floor(room / gap).astype(np.int64) + 1, 0)
-    owner, number = _counted(counts)
+    owner, number = counted(counts)
     shift = rng.uniform(-jitter, jitter, size=len(owner))
     return _Row(edges[owner], number, begin[owner] + number * gap[owner] + shift)
 
 
-def _counted(counts: Ints) -> tuple[Ints, Ints]:
+def counted(counts: Ints) -> tuple[Ints, Ints]:
     """Return who owns each of the things counted, and its number with its owner."""
     owner = np.repeat(np.arange(len(counts)), counts)
     return owner, np.arange(len(owner)) - np.repeat(np.cumsum(counts) - counts, counts)
@@ -392,7 +369,7 @@ def _scattered(network: Network, rate: float, rng: np.random.Generator) -> Furni
     drawn = (np.arange(count) + rng.uniform(size=count)) * (expected[-1] / max(count, 1))
     edge = np.searchsorted(expected, drawn, side="right") - 1
     t = network.clear[edge, 0] + (drawn - expected[edge]) / per_metre[edge]
-    number = _counted(np.bincount(edge, minlength=len(network)))[1]
+    number = counted(np.bincount(edge, minlength=len(network)))[1]
     side = rng.choice([-1.0, 1.0], size=count)
     return _Row(edge, number, t).beside(network, side, SETBACK_M)
 
@@ -401,7 +378,7 @@ def _on_ground(grounds: NDArray[np.object_], spacing: float, rng: np.random.Gene
     """Place objects about `spacing` apart all over open ground."""
     bounds = shapely.bounds(grounds).reshape(-1, 4)
     cells = np.ceil((bounds[:, 2:] - bounds[:, :2]) / spacing).astype(np.int64)
-    owner, number = _counted(cells.prod(axis=1))
+    owner, number = counted(cells.prod(axis=1))
     lattice = np.stack(np.divmod(number, cells[owner, 1]), axis=1) + 0.5
     xy = bounds[owner, :2] + (lattice + rng.uniform(-0.2, 0.2, size=lattice.shape)) * spacing
     inside = shapely.contains_xy(grounds[owner], *xy.T)
