@@ -139,7 +139,7 @@ from .exports.geopackage import (
     GeopackageContents as GeopackageContents,
     read_geopackage as read_geopackage,
 )
-from .exports.geotiff import export_geotiff as export_geotiff
+from .exports.files import export_geotiff as export_geotiff
 from .exports.regions import SearchRegions as SearchRegions, search_regions as search_regions
 from .reports.evaluation import evaluation_tables as evaluation_tables
 from .reports.parts import Curve as Curve, Plot as Plot

@@ -1,7 +1,7 @@
 """Files for other programs, by their suffix.
 
 ``.gpkg`` (`exports.geopackage`) holds many layers, with styles for QGIS; ``.parquet`` and ``.csv``
-(`exports.files`) hold one; ``.tif`` (`exports.geotiff`) holds one number a cell.
+(`exports.files`) hold one; ``.tif`` (`exports.files`) holds one number a cell.
 """
 
 from __future__ import annotations
@@ -15,8 +15,7 @@ from semsig_gis.core.errors import EmptyResultError, InputError, UnknownNameErro
 from semsig_gis.database.answer import REGION_SHARE
 from semsig_gis.database.database import require_same_place
 from semsig_gis.exports import geopackage
-from semsig_gis.exports.files import write_csv, write_geoparquet
-from semsig_gis.exports.geotiff import cell_errors, export_geotiff
+from semsig_gis.exports.files import cell_errors, export_geotiff, write_csv, write_geoparquet
 from semsig_gis.exports.layers import answer_layers, cells_layer, evaluation_layers, objects_layer
 
 if TYPE_CHECKING:

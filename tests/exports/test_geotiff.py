@@ -15,7 +15,7 @@ from small_city import chances_of, small_city, small_evaluation, small_location
 from semsig_gis.core.errors import InputError
 from semsig_gis.core.geometry import GridSpec
 from semsig_gis.exports import export_answer, export_database
-from semsig_gis.exports.geotiff import cell_errors, export_geotiff
+from semsig_gis.exports.files import cell_errors, export_geotiff
 from semsig_gis.storage import raster
 
 if TYPE_CHECKING:
