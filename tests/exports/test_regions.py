@@ -11,7 +11,7 @@ import shapely
 from hypothesis import example, given
 from hypothesis import strategies as st
 from sentences import refused
-from six_cells import six_cells
+from six_cells import cells_at
 from small_city import small_city, small_localization, small_location
 
 from semsig_gis.core.errors import InputError
@@ -28,21 +28,7 @@ if TYPE_CHECKING:
 
 Cell = tuple[int, int]
 PLACES = st.tuples(st.integers(-3, 3), st.integers(-3, 3))
-
-
-def database_of(cells: list[Cell]) -> SignatureDatabase:
-    """Return a database of cells that see one object each."""
-    places = np.array(sorted(cells))
-    return dataclasses.replace(
-        six_cells(),
-        grid=GridSpec(2.5, (0.1, -7.3)),
-        columns=places[:, 0].astype(np.int32),
-        rows=places[:, 1].astype(np.int32),
-        offsets=np.arange(len(cells) + 1),
-        codes=np.ones(len(cells), np.uint8),
-        bearing_units=np.zeros(len(cells), np.uint16),
-        distance_units=np.zeros(len(cells), np.uint8),
-    )
+GRID = GridSpec(2.5, (0.1, -7.3))
 
 
 def located(database: SignatureDatabase, chances: np.ndarray) -> Location:
@@ -74,7 +60,7 @@ def flooded(cells: set[Cell]) -> set[frozenset[Cell]]:
 def test_regions_are_the_cells_that_share_sides(weighted: list[tuple[Cell, int]]) -> None:
     weights = np.array([weight for _, weight in sorted(weighted)], float)
     weights[0] += not weights.any()
-    database = database_of([cell for cell, _ in weighted])
+    database = cells_at(*np.array([cell for cell, _ in weighted]).T, grid=GRID)
     chances = weights / weights.sum()
     found = search_regions(located(database, chances), database, share=0.8)
     chosen = Posterior(database=database, chances=chances).credible_cells(0.8)
@@ -112,7 +98,7 @@ def test_regions_are_the_cells_that_share_sides(weighted: list[tuple[Cell, int]]
     st.sampled_from([0.0, 1.0, 2.5, 3.6, 100.0]),
 )
 def test_cells_within_are_searched_too(cells: list[Cell], best: int, within: float) -> None:
-    database = database_of(cells)
+    database = cells_at(*np.array(cells).T, grid=GRID)
     chances = np.zeros(len(cells))
     chances[best % len(cells)] = 1.0
     found = search_regions(located(database, chances), database, within=within)

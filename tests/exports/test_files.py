@@ -1,0 +1,121 @@
+"""One layer a file: what is read back is what was there, and no spreadsheet runs any of it."""
+
+from __future__ import annotations
+
+import csv
+import dataclasses
+import io
+import json
+import re
+from typing import TYPE_CHECKING
+
+import geopandas as gpd
+import numpy as np
+import pandas as pd
+import pyarrow.parquet as pq
+import pytest
+from hypothesis import example, given
+from hypothesis import strategies as st
+from sentences import refused
+from small_city import chances_of, small_city, small_evaluation
+
+from semsig_gis.core.errors import DatabaseError
+from semsig_gis.database.file import open_database
+from semsig_gis.exports import export_database
+from semsig_gis.exports.files import as_written, formula_safe
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+CITY, OBJECTS = small_city()
+FORMULAS = [
+    *("=cmd|' /C calc'!A0", "+1;=2", "-1", "@SUM(A1)", "\t=1", "\r=1", "a\n=1", 'a"=1'),
+    *('a;"=HYPERLINK(1)"', "\uff1d1", "'=1", "''", ""),
+]
+TEXTS = st.text() | st.text(alphabet="=+-@'\t\r\n;,|\"a") | st.sampled_from(FORMULAS)
+
+
+@given(TEXTS)
+@example("=1")
+def test_text_is_safe_and_comes_back(text: str) -> None:
+    safe = formula_safe(text)
+    assert as_written(safe) == text
+    assert not re.search('(^|[;,|"\t\r\n])[=+@\uff1d\uff0b\uff0d\uff20-]', safe)
+
+
+@pytest.mark.parametrize("separator", [",", ";", "\t", "|"])
+def test_no_spreadsheet_of_any_country_finds_a_formula(separator: str) -> None:
+    for text in FORMULAS:
+        quoted = formula_safe(text).replace('"', '""')
+        line = f'12,"{quoted}",3\n'
+        for row in csv.reader(io.StringIO(line, newline=""), delimiter=separator):
+            assert not any(cell.startswith(tuple("=+-@\t\r")) for cell in row), (text, row)
+
+
+def test_cells_come_back_from_csv(tmp_path: Path) -> None:
+    file = tmp_path / "cells.csv"
+    export_database(CITY, file)
+    cells = pd.read_csv(file, dtype={"types": str, "x": str, "y": str})
+    assert cells["cell_id"].tolist() == CITY.cell_ids.tolist()
+    assert np.array_equal(cells[["x", "y"]].astype(float).to_numpy(), CITY.xy)
+    assert cells["types"].tolist() == [CITY.types(cell) for cell in range(len(CITY))]
+    assert cells["type_group_size"].tolist() == CITY.type_group_sizes.tolist()
+    assert "WKT" not in cells.columns
+    export_database(CITY, file, geometry="polygon")
+    assert pd.read_csv(file)["WKT"].str.startswith("POLYGON").all()
+
+
+def test_hostile_texts_come_back_from_csv(tmp_path: Path) -> None:
+    texts = [*FORMULAS, "é" * 10_000, "\u202eright", "<script>"]
+    ids = [texts[number % len(texts)] for number in range(len(OBJECTS))]
+    hostile = dataclasses.replace(OBJECTS, table=OBJECTS.table.assign(source_id=ids))
+    file = tmp_path / "objects.csv"
+    export_database(CITY, file, layers=["objects"], objects=hostile)
+    with file.open(encoding="utf-8", newline="") as opened:
+        rows = list(csv.DictReader(opened))
+    assert [as_written(row["source_id"]) for row in rows] == ids
+    assert not any(row["source_id"].startswith(tuple("=+-@\t\r\n")) for row in rows)
+    assert [float(row["x"]) for row in rows] == OBJECTS.xy[:, 0].tolist()
+    results = small_evaluation()
+    queries = results.queries.assign(next_cell_ids="-5,-4;=cmd")
+    evaluation = dataclasses.replace(results, queries=queries)
+    export_database(CITY, file, layers="evaluation", evaluation=evaluation)
+    assert set(pd.read_csv(file)["next_cell_ids"]) == {"'-5,'-4;'=cmd"}
+
+
+def test_cells_come_back_from_geoparquet(tmp_path: Path) -> None:
+    told, file = chances_of(CITY), tmp_path / "cells.parquet"
+    steps: list[tuple[int, int]] = []
+    export_database(
+        CITY, file, identifiability=told, progress=lambda done, rows: steps.append((done, rows))
+    )
+    cells = gpd.read_parquet(file)
+    assert cells.crs == CITY.crs
+    assert cells["cell_id"].tolist() == CITY.cell_ids.tolist()
+    assert cells["types"].tolist() == [CITY.types(cell) for cell in range(len(CITY))]
+    assert cells["chance_found"].tolist() == told.found.tolist()
+    assert np.array_equal(cells.geometry.area, np.full(len(CITY), 100.0))
+    assert (steps[0], steps[-1]) == ((100, len(CITY)), (len(CITY), len(CITY)))
+    west, south = CITY.xy.mean(axis=0)
+    box = (west, south, west + 35, south + 35)
+    some = gpd.read_parquet(file, bbox=box)
+    # The bounds are rounded outwards to float32: a neighbour that is a hair away may come along.
+    wanted = cells.cx[box[0] : box[2], box[1] : box[3]]
+    assert set(wanted["cell_id"]) <= set(some["cell_id"])
+    assert 9 <= len(some) < len(cells) / 4
+    with refused(DatabaseError, "signature cells export", "signature database"):
+        open_database(file)
+
+
+@pytest.mark.parametrize(("layer", "kind"), [("cells", "Polygon"), ("objects", "Point")])
+def test_the_metadata_of_geoparquet_say_what_it_is(layer: str, kind: str, tmp_path: Path) -> None:
+    file = tmp_path / "a.parquet"
+    export_database(CITY, file, layers=layer, objects=OBJECTS if layer == "objects" else None)
+    metadata = pq.read_schema(file).metadata
+    geo, specs = (json.loads(metadata[key]) for key in (b"geo", b"semsig"))
+    column = geo["columns"]["geometry"]
+    assert (geo["version"], column["geometry_types"]) == ("1.1.0", [kind])
+    assert column["covering"]["bbox"]["xmin"] == ["bbox", "xmin"]
+    assert np.allclose(column["bbox"], gpd.read_parquet(file).total_bounds, rtol=0, atol=1e-6)
+    assert specs["licenses"] == list(map(str, OBJECTS.licenses))
+    assert specs["taxonomy"] == OBJECTS.taxonomy.to_list()
