@@ -30,19 +30,12 @@ if TYPE_CHECKING:
 ROUNDING_M = 1e-6
 
 
-class ObjectIndex:
-    """An R-tree over points in metres, shape (n, 2).
+class _Index:
+    """A tree of libspatialindex over points; `_rows` are those of its numbers."""
 
-    InputError if there is no point, or one is not finite. The tree is packed in one go and asked
-    for many boxes at once. It belongs to the process and thread that made it.
-    """
-
-    def __init__(self, xy: NDArray[np.float64]) -> None:
-        self._xy = checked_points(xy)
-        self._tree = rtree_index.Index((np.arange(len(self._xy)), self._xy, self._xy))
-
-    def __reduce__(self) -> str | tuple[object, ...]:  # noqa: D105
-        return (type(self), (self._xy,))
+    _tree: rtree_index.Index
+    _xy: NDArray[np.float64]
+    _rows: NDArray[np.int64]
 
     def pairs_within(
         self, viewpoints: NDArray[np.float64], *, radius: float
@@ -51,7 +44,28 @@ class ObjectIndex:
 
         Viewpoints, shape (v, 2), and radius are in metres; a point at exactly the radius counts.
         """
-        return tree_pairs(self._tree, self._xy, viewpoints, radius=radius)
+        places = np.ascontiguousarray(viewpoints, dtype=np.float64)
+        reach = _a_touch_more(radius)
+        found, counts = self._tree.intersection_v(places - reach, places + reach)
+        point = self._rows[found.astype(np.int64)]
+        viewpoint = np.repeat(np.arange(len(places)), counts.astype(np.int64))
+        return _near(viewpoint, point, places, self._xy, radius)
+
+
+class ObjectIndex(_Index):
+    """An R-tree over points in metres, shape (n, 2).
+
+    InputError if there is no point, or one is not finite. The tree is packed in one go and asked
+    for many boxes at once. It belongs to the process and thread that made it.
+    """
+
+    def __init__(self, xy: NDArray[np.float64]) -> None:
+        self._xy = checked_points(xy)
+        self._rows = np.arange(len(self._xy))
+        self._tree = rtree_index.Index((self._rows, self._xy, self._xy))
+
+    def __reduce__(self) -> str | tuple[object, ...]:  # noqa: D105
+        return (type(self), (self._xy,))
 
 
 class PackedIndex:
@@ -97,27 +111,6 @@ def checked_points(xy: ArrayLike) -> NDArray[np.float64]:
     return points
 
 
-def tree_pairs(
-    tree: rtree_index.Index,
-    xy: NDArray[np.float64],
-    viewpoints: ArrayLike,
-    *,
-    radius: float,
-    rows: NDArray[np.int64] | None = None,
-) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Return the rows of viewpoint and point of every pair within a radius, ordered by viewpoint.
-
-    All is in metres; a point at exactly the radius counts. `rows` gives the row in `xy` of each
-    number of the tree, by default the number itself.
-    """
-    places = np.ascontiguousarray(viewpoints, dtype=np.float64)
-    reach = _a_touch_more(radius)
-    found, counts = tree.intersection_v(places - reach, places + reach)
-    number = found.astype(np.int64)
-    viewpoint = np.repeat(np.arange(len(places)), counts.astype(np.int64))
-    return _near(viewpoint, number if rows is None else rows[number], places, xy, radius)
-
-
 def _a_touch_more(radius: float) -> float:
     """Return a reach that no rounding in a tree makes too small; `_near` decides alone."""
     return radius * (1 + 1e-12) + ROUNDING_M
@@ -155,7 +148,7 @@ EDITS_BYTES = 1 << 16
 FEW_EDITS = 1000
 
 
-class StoredIndex:
+class StoredIndex(_Index):
     """An R-tree over points that is kept in files; make one with `pack` or `open`.
 
     `folder` holds the tree and is removed with this object. `numbers` says under which number each
@@ -253,12 +246,6 @@ class StoredIndex:
                 tree.insert(int(numbers[row]), (*points[row], *points[row]))
             tree.close()
             return StoredIndex(folder, points, numbers)
-
-    def pairs_within(
-        self, viewpoints: NDArray[np.float64], *, radius: float
-    ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-        """Return all pairs within a radius, as `ObjectIndex.pairs_within` does."""
-        return tree_pairs(self._tree, self._xy, viewpoints, radius=radius, rows=self._rows)
 
 
 def _tree(

@@ -152,9 +152,8 @@ class Taxonomy:
 
     def by_name(self, name: str) -> ObjectClass:
         """Return the class of a name; UnknownNameError offers the nearest where there is none."""
-        for item in self.classes:
-            if item.name == name:
-                return item
+        if item := next((one for one in self.classes if one.name == name), None):
+            return item
         known = [item.name for item in self.classes]
         msg = (
             f"class {name!r} is unknown{nearest_name(name, known)}; "
@@ -164,17 +163,15 @@ class Taxonomy:
 
     def by_code(self, code: int) -> ObjectClass:
         """Return the class of a code; UnknownNameError where there is none."""
-        for item in self.classes:
-            if item.code == code:
-                return item
+        if item := next((one for one in self.classes if one.code == code), None):
+            return item
         msg = f"class code {code} is unknown; the codes are {[c.code for c in self.classes]}."
         raise UnknownNameError(msg)
 
     def by_symbol(self, symbol: str) -> ObjectClass:
         """Return the class of a symbol; UnknownNameError where there is none."""
-        for item in self.classes:
-            if item.symbol == symbol:
-                return item
+        if item := next((one for one in self.classes if one.symbol == symbol), None):
+            return item
         raise self._unknown_symbol(symbol)
 
     def encode(self, symbols: str) -> NDArray[np.uint8]:

@@ -173,9 +173,6 @@ def save_with_store(database: SignatureDatabase, store: ObjectStore, path: str |
     True
     """
     _settle(Path(path))  # what waits there may be needed until the new database is in place
-    # The new store is written whole under another name, then the database is renamed into its
-    # place, and at last the store into its own. It names the digest of its database, so that
-    # whoever opens the two after an interrupted run takes the store that belongs to the database.
     with whole_file(path) as partial:
         try:
             save_database(database, partial)

@@ -75,7 +75,6 @@ def database_summary(
     pairs = types.inverse.astype(np.int64) * len(angles) + angles.inverse
     both = np.unique(pairs, return_counts=True)[1]
     largest = int(np.argmax(types.counts))
-    codes = types.values[types.offsets[largest] : types.offsets[largest + 1]]
     return {
         "signatures": len(database),
         "mean_length": float(database.lengths.mean()),
@@ -106,7 +105,7 @@ def database_summary(
             "both": _group_statistics(both),
         },
         "largest_type_group": {
-            "types": database.taxonomy.decode(codes),
+            "types": database.taxonomy.decode(types[largest]),
             "cells": int(types.counts[largest]),
         },
     }

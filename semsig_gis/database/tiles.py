@@ -454,7 +454,7 @@ def build_tile(plan: TilePlan, tile: Tile) -> Part | None:
             path = plan.folder / part_name(tile)
             save_database(database, path)
             return describe(tile, database, path)
-    mark_empty(plan.folder, tile)
+    (plan.folder / part_name(tile)).with_suffix(EMPTY).touch()
     return None
 
 
@@ -504,11 +504,6 @@ def _require_replaceable(target: Path) -> None:
 def describe(tile: Tile, database: SignatureDatabase, path: Path) -> Part:
     """Return the manifest's entry for a part that was saved to a path."""
     return Part(tile, len(database), len(database.codes), path.stat().st_size, digest(path))
-
-
-def mark_empty(folder: Path, tile: Tile) -> None:
-    """Note that a tile is done and that none of its cells sees anything."""
-    (folder / part_name(tile)).with_suffix(EMPTY).touch()
 
 
 def finished_tiles(folder: Path, tiles: Iterable[Tile]) -> dict[Tile, Part | None]:
