@@ -107,35 +107,8 @@ def associate(
     `lengths` how many objects are seen together with it, itself included. `names` is the class row
     of each detection, k if it is unknown.
     """
-    weights = pair_weights(
-        table, pairs, kinds=kinds, distances=distances, lengths=lengths, names=names
-    )
-    chances, log_sums = associate_pairs(pairs, weights)
-    loglik = (
-        log_sums.sum()
-        + np.log(table.missed[table.length_rows(lengths), kinds]).sum()
-        + np.log(table.density[names]).sum()
-        - len(log_sums) * table.clutter.sum()
-    )
-    return chances, float(loglik)
-
-
-def pair_weights(
-    table: NoiseTable,
-    pairs: Pairs,
-    *,
-    kinds: NDArray[np.int64],
-    distances: NDArray[np.float64],
-    lengths: NDArray[np.int64],
-    names: NDArray[np.int64],
-) -> NDArray[np.float64]:
-    """Return how much likelier each pair is one thing than a miss and clutter, shape (e,).
-
-    The weight is ``p / (1 - p) * C * N / lambda``, in the notation of `likelihood.index`; the
-    arguments are those of `associate`.
-    """
-    kind = kinds[pairs.objects]
-    length = table.length_rows(lengths[pairs.objects])
+    rows = table.length_rows(lengths)
+    kind, length = kinds[pairs.objects], rows[pairs.objects]
     turned = np.degrees(table.position_sigma / np.maximum(distances[pairs.objects], 1e-3))
     spread = np.minimum(np.hypot(table.sigma[kind], turned), 180.0)
     density = np.exp(-0.5 * (pairs.away / spread) ** 2)
@@ -144,7 +117,14 @@ def pair_weights(
     density[wide] = np.exp(-0.5 * laps**2).sum(axis=1)
     density /= spread * np.sqrt(2.0 * np.pi)
     naming = table.naming[length, kind, names[pairs.detections]]
-    return np.asarray(table.odds[length, kind] * naming * density)
+    chances, log_sums = associate_pairs(pairs, table.odds[length, kind] * naming * density)
+    loglik = (
+        log_sums.sum()
+        + np.log(table.missed[rows, kinds]).sum()
+        + np.log(table.density[names]).sum()
+        - len(log_sums) * table.clutter.sum()
+    )
+    return chances, float(loglik)
 
 
 def associate_pairs(

@@ -402,12 +402,8 @@ def ready_index(
     ...     again = ready_index(demo_database, named_noise("light"), path, note=print)
     The likelihood index does not exist yet and is built.
     """
-
-    def say(sentence: str) -> None:
-        if note is not None:
-            note(sentence)
-
     _keep_database(path, noise)
+    say = note or (lambda _: None)
     fingerprint = index_fingerprint(database, noise)
     if not Path(path).exists():
         say("The likelihood index does not exist yet and is built.")

@@ -62,15 +62,12 @@ def scan(  # noqa: PLR0917
     ends: NDArray[np.int64],
     normalized: bool,  # noqa: FBT001
     result: NDArray[np.float32],
-    low: int,
-    high: int,
 ) -> None:
-    """Fill `result`, shape (queries, d), with distances to the sequences of some blocks.
+    """Fill `result`, shape (queries, d), with distances to the sequences of all blocks.
 
-    They run from `low` to before `high`. `lengths` are those of the d sequences of the blocks that
-    `bounds` lists; `query_digits`, shape (entries, 2), holds the two planes of each value of the
-    queries, one query after the other, and query i begins at ``ends[i]``. `normalized` divides by
-    the longer length.
+    `lengths` are those of the d sequences of the blocks that `bounds` lists; `query_digits`, shape
+    (entries, 2), holds the two planes of each value of the queries, one query after the other, and
+    query i begins at ``ends[i]``. `normalized` divides by the longer length.
     """
     stripe = planes.shape[1]
     longest = 0
@@ -84,7 +81,7 @@ def scan(  # noqa: PLR0917
     sums = np.empty((bits, stripe), np.uint64)
     spread = np.empty(8 * stripe, np.uint64)
     costs = np.empty(64 * stripe, np.int32)
-    for block in range(low, high):
+    for block in range(len(bounds) - 1):
         start = block * 64 * stripe
         own = lengths[start : start + 64 * stripe]
         for query in range(len(ends) - 1):

@@ -330,7 +330,7 @@ def _distances(
     name = method.measures[part]
     wild = part == TYPES and any((sequence == WILDCARD).any() for sequence in sequences)
     measure = metric(name, weights=method.weights, wildcard=WILDCARD if wild else None)
-    find = partial(measure.distances, sequences, table, normalized=method.normalized, only=only)
+    find = partial(measure, sequences, table, normalized=method.normalized, only=only)
     if memo is None:
         return find()
     queries = tuple(sequence.tobytes() for sequence in sequences)

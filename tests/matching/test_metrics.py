@@ -23,7 +23,7 @@ from semsig_gis.matching.metrics.edit import BLOCK, BitPlanes, EditWeights
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from semsig_gis.matching.metrics import Metric
+    from semsig_gis.matching.metrics import Distances
 
     Bytes = NDArray[np.uint8]
 
@@ -45,18 +45,18 @@ def flat(rows: Sequences | list[Bytes]) -> tuple[Bytes, NDArray[np.int64]]:
 
 
 def between(
-    measure: Metric, queries: Sequences, rows: Sequences, *, normalized: bool = True
+    measure: Distances, queries: Sequences, rows: Sequences, *, normalized: bool = True
 ) -> np.ndarray:
     """Return the distances of queries to rows that may repeat."""
     table = SequenceTable.from_csr(*flat(rows))
     arrays = [np.array(query, np.uint8) for query in queries]
-    return measure.distances(arrays, table, normalized=normalized)[:, table.inverse]
+    return measure(arrays, table, normalized=normalized)[:, table.inverse]
 
 
 @each
 @given(queries=SOME, rows=SOME)
 def test_distances_are_symmetric_on_the_unit_interval_and_none_to_oneself(
-    measure: Metric, queries: Sequences, rows: Sequences
+    measure: Distances, queries: Sequences, rows: Sequences
 ) -> None:
     found = between(measure, queries, rows)
     assert found.shape == (len(queries), len(rows))
@@ -71,7 +71,7 @@ def test_distances_are_symmetric_on_the_unit_interval_and_none_to_oneself(
 
 @each
 @given(row=st.lists(VALUES, min_size=1, max_size=7))
-def test_nothing_in_common_is_the_largest_distance(measure: Metric, row: Sequence[int]) -> None:
+def test_nothing_in_common_is_the_largest_distance(measure: Distances, row: Sequence[int]) -> None:
     strangers = [value + 100 for value in row]
     for other in ([], strangers):
         assert between(measure, [other, row], [other, row]).tolist() == [[0, 1], [1, 0]]
@@ -90,27 +90,27 @@ def test_order_does_not_matter(
 @each
 @scaled
 def test_a_query_does_not_depend_on_the_others_or_on_the_rows_asked_for(
-    measure: Metric, *, normalized: bool
+    measure: Distances, *, normalized: bool
 ) -> None:
     rng = np.random.default_rng(1)
     rows = [rng.integers(0, 12, length).tolist() for length in rng.integers(0, 40, 300)]
     table = SequenceTable.from_csr(*flat(rows))
     queries = [rng.integers(0, 14, length).astype(np.uint8) for length in range(0, 80, 2)]
-    together = measure.distances(queries, table, normalized=normalized)
+    together = measure(queries, table, normalized=normalized)
     only = np.array([5, 3, 250 % len(table)])
     for query, expected in zip(queries, together, strict=True):
-        alone = measure.distances([query], table, normalized=normalized)
+        alone = measure([query], table, normalized=normalized)
         np.testing.assert_array_equal(alone[0], expected)
-        some = measure.distances([query], table, normalized=normalized, only=only)
+        some = measure([query], table, normalized=normalized, only=only)
         np.testing.assert_array_equal(some[0], expected[only])
 
 
 @each
-def test_no_queries_no_rows_and_no_bytes(measure: Metric) -> None:
+def test_no_queries_no_rows_and_no_bytes(measure: Distances) -> None:
     assert between(measure, [[1]], []).shape == (1, 0)
     assert between(measure, [], [[1]]).shape == (0, 1)
     with pytest.raises(InputError, match="int64 values in 1 dimensions"):
-        measure.distances([np.array([1])], SequenceTable.from_csr(*flat([[1]])))
+        measure([np.array([1])], SequenceTable.from_csr(*flat([[1]])))
 
 
 @scaled
@@ -201,13 +201,11 @@ def test_the_kernel_and_rapidfuzz_agree(
     measure = partial(edit.distances, queries, table, normalized=normalized)
     expected = measure()
     assert table not in edit._planes
-    np.testing.assert_array_equal(measure(threads=2), expected)
     monkeypatch.setattr(edit, "_LOADING", 0)
     np.testing.assert_array_equal(measure(only=few), expected[:, few])
     assert table not in edit._planes
     np.testing.assert_array_equal(measure(), expected)
     assert table in edit._planes
-    np.testing.assert_array_equal(measure(threads=2), expected)
     np.testing.assert_array_equal(measure(only=some), expected[:, some])
 
 
@@ -298,9 +296,6 @@ def test_several_blocks_and_a_thousand_objects(*, normalized: bool) -> None:
     for query, expected in zip(queries, found, strict=True):
         alone = planes.edit_distances([query], normalized=normalized)
         np.testing.assert_array_equal(alone[0], expected)
-    for threads in (2, 3, 7):
-        shared = planes.edit_distances(queries, normalized=normalized, threads=threads)
-        np.testing.assert_array_equal(shared, found)
 
 
 def test_a_wildcard_in_a_long_query() -> None:

@@ -37,7 +37,7 @@ def slow_scores(database: SignatureDatabase, query: Signature, method: Method) -
     found = {}
     for part, name in method.measures.items():
         sequence, table = parts[part]
-        measure = metric(name, weights=method.weights).distances
+        measure = metric(name, weights=method.weights)
         measured = [
             measure([sequence], table, normalized=method.normalized, only=row).item()
             for row in np.arange(len(table))[:, None]

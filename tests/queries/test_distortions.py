@@ -389,6 +389,7 @@ def table_of(noise: Noise) -> NoiseTable:
 def test_detection_naming_and_bearings_are_those_of_the_model(
     noise: NoiseSpec, code: int, seed: int
 ) -> None:
+    noise = replace(noise, bearing_sigma_by_class={"bench": noise.bearing_sigma / 3})
     table = table_of(noise)
     kind = int(table.row_of[code])
     seen = spoiled(Detector(noise=noise), many(TRIALS, code=code, distance=17.0), seed)
@@ -416,9 +417,10 @@ def test_false_objects_are_those_of_the_model(noise: NoiseSpec, seed: int) -> No
         count = sum(int((one.codes == code).sum()) for one in found)
         # Poisson, too, with the mean of all: neither tail is unheard of.
         assert min(poisson.cdf(count, 600 * mean), poisson.sf(count - 1, 600 * mean)) > 1e-9
-    bearings = np.concatenate([one.bearings for one in found])
+    bearings, distances = np.concatenate([(one.bearings, one.distances) for one in found], axis=1)
     if len(bearings) > 50:
         assert abs(np.exp(1j * np.radians(bearings)).mean()) < 6.0 / sqrt(len(bearings))
+        assert abs(((distances / REACH) ** 2).mean() - 0.5) < 6.0 / sqrt(12 * len(distances))
 
 
 @given(half=st.floats(3.0, 60.0), distance=st.floats(0.0, REACH), seed=seeds)

@@ -6,7 +6,6 @@ A new one is added to `METRICS`; the laws in ``tests/matching/test_metrics.py`` 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import partial
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Protocol
@@ -39,29 +38,15 @@ class Distances(Protocol):
         """Return float32 distances of shape (queries, d), or (queries, len(only))."""
 
 
-@dataclass(frozen=True, slots=True)
-class Metric:
-    """A measure under the `name` that methods use and the `title` that tables and maps show."""
-
-    name: str
-    title: str
-    distances: Distances
-
-
-METRICS: Mapping[str, Metric] = MappingProxyType(
-    {
-        measure.name: measure
-        for measure in (
-            Metric("jaccard", "Jaccard distance", jaccard.distances),
-            Metric("histogram", "histogram distance", histogram.distances),
-            Metric("edit", "edit distance", edit.distances),
-        )
-    }
+METRICS: Mapping[str, Distances] = MappingProxyType(
+    {"jaccard": jaccard.distances, "histogram": histogram.distances, "edit": edit.distances}
 )
 """Every measure, by name."""
 
 
-def metric(name: str, *, weights: EditWeights | None = None, wildcard: int | None = None) -> Metric:
+def metric(
+    name: str, *, weights: EditWeights | None = None, wildcard: int | None = None
+) -> Distances:
     """Return the measure of a name in `METRICS`, with the edit weights bound to it.
 
     Measures other than the edit distance ignore weights and refuse a wildcard (a value of the query
@@ -74,8 +59,7 @@ def metric(name: str, *, weights: EditWeights | None = None, wildcard: int | Non
         )
         raise UnknownNameError(msg)
     if name == "edit" and (weights is not None or wildcard is not None):
-        bound = partial(edit.distances, weights=weights, wildcard=wildcard)
-        return Metric(name, METRICS[name].title, bound)
+        return partial(edit.distances, weights=weights, wildcard=wildcard)
     if wildcard is not None:
         msg = (
             f"the query has objects of unknown class (?), which measure {name!r} cannot compare; "

@@ -6,9 +6,7 @@ query. Both give the same distances.
 
 from __future__ import annotations
 
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import astuple, dataclass, fields
-from functools import partial
 from typing import TYPE_CHECKING
 from weakref import WeakKeyDictionary, WeakSet
 
@@ -95,7 +93,6 @@ class BitPlanes:
         *,
         normalized: bool = True,
         wildcard: int | None = None,
-        threads: int = 1,
     ) -> NDArray[np.float32]:
         """Measure the fewest changes that turn each query into each sequence, shape (queries, d).
 
@@ -112,23 +109,8 @@ class BitPlanes:
         query_digits = digits[np.concatenate([*queries, np.empty(0, np.uint8)])]
         result = np.empty((len(queries), len(self.lengths)), np.float32)
         per_position = int(self.digits.max()) + 1
-        scan_blocks = partial(
-            scan,
-            self.planes,
-            self.bounds,
-            per_position,
-            self.lengths,
-            query_digits,
-            ends,
-            normalized,
-            result,
-        )
-        cuts = np.linspace(0, len(self.bounds) - 1, max(1, threads) + 1).astype(np.int64).tolist()
-        if threads > 1:
-            with ThreadPoolExecutor(threads) as pool:
-                list(pool.map(scan_blocks, cuts[:-1], cuts[1:]))
-        else:
-            scan_blocks(*cuts)
+        planes, bounds, lengths = self.planes, self.bounds, self.lengths
+        scan(planes, bounds, per_position, lengths, query_digits, ends, normalized, result)
         return result
 
 
@@ -168,7 +150,6 @@ def distances(
     weights: EditWeights | None = None,
     only: NDArray[np.int64] | None = None,
     wildcard: int | None = None,
-    threads: int = 1,
 ) -> NDArray[np.float32]:
     """Measure the cheapest way to turn each query into each distinct sequence.
 
@@ -177,8 +158,8 @@ def distances(
     everything and inserting everything, or, if cheaper, of substituting along the shorter length
     and inserting or deleting the rest. With weights of 1 it is the longer length.
 
-    A `wildcard` in a query, for an object of unknown class, equals every value; it needs weights of
-    1. Threads share the sequences, which does not pay for a single query.
+    A `wildcard` in a query, for an object of unknown class, equals any value; it needs weights of
+    1.
     """
     sequences = [checked_sequence(query) for query in queries]
     costs = weights or EditWeights()
@@ -194,9 +175,8 @@ def distances(
     ):
         if table not in _planes:
             _planes[table] = BitPlanes.build(table.values, table.offsets)
-        everything = _planes[table].edit_distances(
-            sequences, normalized=normalized, wildcard=wildcard, threads=threads
-        )
+        planes = _planes[table]
+        everything = planes.edit_distances(sequences, normalized=normalized, wildcard=wildcard)
         return everything if only is None else everything[:, only]
     choices = table.strings if only is None else list(map(table.strings.__getitem__, only.tolist()))
     result: NDArray[np.float32] = cdist(
@@ -205,7 +185,6 @@ def distances(
         scorer=Levenshtein.normalized_distance if normalized else Levenshtein.distance,
         scorer_kwargs={"weights": astuple(costs)},
         dtype=np.float32,
-        workers=threads,
     )
     return result
 
