@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from typing import Any
 
 import geopandas as gpd
 import numpy as np
@@ -28,32 +27,34 @@ from semsig_gis.evaluation.figures import (
     query_figures,
     range_labels,
 )
-from semsig_gis.matching.ties import THRESHOLDS, expected_best
+from semsig_gis.matching.ties import THRESHOLDS
 
 NAN = math.nan
 
 # Five queries of a database of 200 cells. The first is right for sure; the second ties with one
 # cell 30 m off; the third is 60 m off; the fourth is far off; of the fifth nothing is left.
-ERRORS = ([0.0], [0.0, 30.0], [60.0], [900.0], None)
+ERRORS = ([0.0], [0.0, 30.0], [60.0], [900.0], [math.inf])
 RANKS = ((1, 1), (1, 2), (3, 4), (150, 150), (200, 200))
 CHANCES = (0.97, 0.5, 0.91, 0.2, NAN)
 
 
 def table() -> pd.DataFrame:
-    rows: list[dict[str, Any]] = []
-    for errors, (low, high), chance in zip(ERRORS, RANKS, CHANCES, strict=True):
-        within = np.zeros(len(THRESHOLDS))
-        expected = math.inf
-        if errors is not None:
-            expected, within = expected_best([], errors, slots=1)
-        row = {f"p{x}": value for x, value in zip(THRESHOLDS, within, strict=True)}
-        near = {f"near{count}": row["p25"] for count in (1, 5, 10, 20)}
-        right = NAN if errors is None else row["p50"]
-        truth = {"chance": chance, "right": right, "in_region": 0.0 if math.isnan(chance) else 1.0}
-        rows.append(
-            {"error_m": expected, **row, **near, "rank_low": low, "rank_high": high, **truth}
-        )
-    return pd.DataFrame(rows)
+    errors = [np.array(one) for one in ERRORS]
+    within = {x: [(one <= x).mean() for one in errors] for x in THRESHOLDS}
+    low, high = zip(*RANKS, strict=True)
+    stated = ~np.isnan(CHANCES)
+    return pd.DataFrame(
+        {
+            "error_m": [one.mean() for one in errors],
+            **{f"p{x}": shares for x, shares in within.items()},
+            **{f"near{count}": within[25] for count in (1, 5, 10, 20)},
+            "rank_low": low,
+            "rank_high": high,
+            "chance": CHANCES,
+            "right": np.where(stated, within[50], NAN),
+            "in_region": stated.astype(float),
+        }
+    )
 
 
 def test_figures_counted_by_hand() -> None:
@@ -79,19 +80,6 @@ def test_figures_counted_by_hand() -> None:
     for name, value in expected.items():
         low, high = wilson_interval(value, int(means["n"][name]))
         assert (means["low"][name], means["high"][name]) == pytest.approx((low, high))
-
-
-def test_a_rank_that_ties_counts_by_its_share() -> None:
-    ranks = pd.DataFrame({"rank_low": [1, 2, 3], "rank_high": [4, 5, 3]})
-    filled = ranks.assign(**{str(name): 0.0 for name in table() if name not in ranks})
-    # 1 % of 300 cells are three of them.
-    figures = query_figures(filled, cells=300)
-    assert figures["recall1"].tolist() == pytest.approx([3 / 4, 2 / 4, 1.0])
-
-
-def test_methods_without_chances_have_no_figures_of_them() -> None:
-    plain = table().assign(chance=NAN, right=NAN, in_region=NAN)
-    assert {"coverage", "precision", "in_region"}.isdisjoint(query_figures(plain, cells=200))
 
 
 def test_groups_share_the_queries_out() -> None:
