@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import pytest
-from reproductions import save_town
 from sentences import sentence
 
 if TYPE_CHECKING:
@@ -33,10 +32,7 @@ def write_spec(text: str = SPEC) -> None:
 
 
 @pytest.fixture(autouse=True)
-def _city(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Run in a folder with a database and an experiment on it."""
-    monkeypatch.chdir(tmp_path)
-    save_town(tmp_path)
+def _spec(town: Path) -> None:  # noqa: ARG001
     write_spec()
 
 
@@ -64,9 +60,7 @@ def test_an_experiment_is_run_and_compared(run: Run, done: Done) -> None:
 
 
 def test_what_is_refused(run: Run, done: Done) -> None:
-    assert run("experiment spec.toml")[0] == 2
     sentence(run(EXPERIMENT, "results", "--workers", -1), "-1 workers", "from 0 up")
-    sentence(run("experiment no.toml --out results"), "no.toml", "cannot be read")
     write_spec(SPEC.replace("edit+edit", "edti+edit"))
     sentence(run(EXPERIMENT, "results"), "'edti'", "nearest is 'edit'")
     write_spec(SPEC.replace("30", "1000000"))
@@ -75,7 +69,6 @@ def test_what_is_refused(run: Run, done: Done) -> None:
     done(EXPERIMENT, "results")
     write_spec(SPEC.replace("compass:5", "compass:6"))
     sentence(run(EXPERIMENT, "results"), "another experiment", "distortions")
-    sentence(run("compare results ."), "holds no results")
     write_spec(SPEC.replace("paper", "best").replace("30", "20"))
     done(EXPERIMENT, "other")
     sentence(run("compare results other"), "other queries")
@@ -83,7 +76,7 @@ def test_what_is_refused(run: Run, done: Done) -> None:
     sentence(run(pair), "a single evaluation", "none in common")
 
 
-def test_distortions_on_the_command_line(run: Run, done: Done) -> None:
+def test_distortions_on_the_command_line(done: Done) -> None:
     default = "light:resort=false:false_class=frequency"
     several = "--distortion medium,missing:bench,view:120 --keep-order"
     for options, distortions in (
@@ -94,5 +87,3 @@ def test_distortions_on_the_command_line(run: Run, done: Done) -> None:
     ):
         out = done(f"evaluate city.parquet --queries 5 --json {options}")
         assert json.loads(out)["settings"]["distortions"] == distortions
-    outcome = run("evaluate city.parquet --distortion medium,veiw:120")
-    sentence(outcome, "nearest is 'view'")

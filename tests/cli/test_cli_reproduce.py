@@ -34,8 +34,5 @@ def test_a_small_run_with_workers(tmp_path: Path, done: Done) -> None:
 
 def test_what_is_refused(reproduced: Path, tmp_path: Path, run: Run) -> None:
     town, out = save_town(tmp_path), tmp_path / "out"
-    sentence(run("reproduce", tmp_path / "no.parquet", "--out", out), "no.parquet")
-    sentence(run("reproduce --queries 1000000", town, "--out", out), "1000000 queries")
-    sentence(run("reproduce --workers -2", town, "--out", out), "-2 workers")
     sentence(run("reproduce", town, "--out", reproduced), "other settings", "another folder")
     assert not out.exists()
