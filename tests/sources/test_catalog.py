@@ -104,31 +104,19 @@ def test_streets_say_how_wide_they_are(town: Town) -> None:
     assert not load_catalog(town()).layer("posts").has_width
 
 
-# Parts of the catalogue that the table of mistakes names.
-TITLE = 'title = "Town open data"'
-POSTS = 'name = "posts"'
-NAMED = {
-    "LAYERS": TOWN[TOWN.index("[[layers]]") :],
-    "REST": TOWN[TOWN.index("[[classes]]") :],
-    "VALUES": ', values = { Kiosk = "kiosk", "Bus/Tram" = "bus_stop" }',
-    "WHERE": '{ STATE = ["ok", 1, 2.5, true], KIND = "big" }',
-    "HEAD": 'metric_crs = "EPSG:2154"\n\n[[classes]]',
-    "TOP": TITLE,
-    "POSTS": POSTS,
-    "STREETS": f'{POSTS}\nclass = "street_light"',
-}
 MISTAKES = (DATA / "mistakes.txt").read_text(encoding="utf-8").splitlines()[2:]
 
 
 def mistake(row: str) -> tuple[str, str, list[str]]:
     """Return the text to replace, its replacement, and the words of a row."""
     change, *words = row.replace(r"\n", "\n").split(" | ")
-    if " -> " in change:
-        old, new = change.split(" -> ")
-        return NAMED.get(old, old), new, words
-    place, line = change.split(" + ")
-    kept = f'{POSTS}\nrole = "streets"' if place == "STREETS" else NAMED[place]
-    return NAMED[place], f"{kept}\n{line}", words
+    old, sign, new = change.partition(" -> ")
+    if not sign:
+        old, _, line = change.partition(" + ")
+        new = f"{old}\n{line}"
+    if old.endswith("..."):
+        old = TOWN[TOWN.index(old.removesuffix("...")) :]
+    return old, new, words
 
 
 @pytest.mark.parametrize("row", MISTAKES)

@@ -278,8 +278,7 @@ def test_a_redirect_to_another_host_or_nowhere_is_refused(
     server: Server, get: Get, target: str
 ) -> None:
     server.on("/trees", answers(b"", 301, Location=target.format(port=server.port)))
-    words = f"127.0.0.1:{server.port} redirects to localhost:{server.port}, which neither"
-    failure_of(get, words)
+    failure_of(get, f"127.0.0.1:{server.port} redirects to localhost:{server.port}, which neither")
     assert len(server.seen) == 1
     server.on("/trees", answers(b"", 308, Location=""))
     failure_of(get, "127.0.0.1")

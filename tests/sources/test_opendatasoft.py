@@ -605,13 +605,11 @@ def test_the_field_of_the_area_goes_by_its_own_name(server: Server, fetched: Fet
     assert "in_bbox(coordonnees_geo, " in server.seen[-1].query["where"]
 
 
-def test_the_name_of_a_dataset_is_part_of_the_path(server: Server, fetched: Fetch) -> None:
+def test_the_name_of_a_dataset_is_part_of_the_path(
+    server: Server, cache: Cache, fetched: Fetch
+) -> None:
+    files_only = replace(TREES, dataset=None)
+    assert fetch_layers([files_only], endpoints=[server.url], cache=cache) == []
     with pytest.raises(CatalogError):
         fetched(replace(TREES, dataset="a/../b?c"))
     assert server.paths() == [f"{DATASETS}/a%2F..%2Fb%3Fc"]
-
-
-def test_layers_of_no_dataset_are_not_fetched(server: Server, cache: Cache) -> None:
-    files_only = replace(TREES, dataset=None)
-    assert fetch_layers([files_only], endpoints=[server.url], cache=cache) == []
-    assert server.seen == []

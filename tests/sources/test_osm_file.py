@@ -325,17 +325,8 @@ def test_layers_of_no_elements_and_another_crs(read: Read) -> None:
     assert any("EPSG:2154" in note for note in trees.notes)
 
 
-def test_no_user_metadata_is_kept(read: Read) -> None:
-    who = 'user="Quasimodo" uid="987654321" changeset="876543210" version="77"'
-    when = 'timestamp="2019-07-06T05:04:03Z"'
-    tag = '<tag k="amenity" v="bench"/>'
-    layer = read(
-        BENCHES,
-        f'<node id="1" lat="0" lon="0" {who} {when}/>',
-        f'<node id="2" lat="0" lon="1" {who} {when}>{tag}<tag k="name" v="Esmeralda"/></node>',
-        f'<way id="3" {who} {when}><nd ref="1"/><nd ref="2"/>{tag}</way>',
-        f'<way id="4" {who} {when}><nd ref="1"/><nd ref="9"/>{tag}</way>',
-    )
+def test_no_user_metadata_is_kept() -> None:
+    (layer,) = read_layers(Path(__file__).with_name("data") / "mappers.osm", [BENCHES])
     assert layer.table.columns.tolist() == ["class_name", "source_id", "geometry"]
     assert (len(layer.table), layer.counts.unreadable) == (2, 1)
     kept = pickle.dumps(layer) + repr(layer).encode()

@@ -8,6 +8,7 @@ import json
 import math
 import re
 from dataclasses import replace
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -19,6 +20,7 @@ from sentences import refused
 from servers import Answer
 
 from semsig_gis.core.errors import CatalogError, InputError, SourceError
+from semsig_gis.sources import RowCounts
 from semsig_gis.sources.area import Area, parse_area
 from semsig_gis.sources.catalog import ANY_VALUE, LayerSpec, load_catalog
 from semsig_gis.sources.http.fetch import HttpError, HttpSpec, NotCachedError
@@ -33,7 +35,6 @@ from semsig_gis.sources.osm.overpass import (
 
 if TYPE_CHECKING:
     from collections.abc import Callable
-    from pathlib import Path
 
     from servers import Seen, Server
 
@@ -41,6 +42,7 @@ if TYPE_CHECKING:
 
     Get = Callable[..., list[Path]]
 
+DATA = Path(__file__).with_name("data")
 AREA = parse_area("2,48,2.2,48.1")  # two tiles
 TIMED_OUT = 'runtime error: Query timed out in "query" at line 3 after 91 seconds.'
 NO_MEMORY = "runtime error: Query run out of memory using about 512 MB of RAM."
@@ -137,22 +139,13 @@ def ids(paths: list[Path]) -> list[str]:
 ALL = [f"node/{bench['id']}" for bench in BENCHES]
 
 
-def test_the_query_asks_for_exact_tags() -> None:
+def test_the_query_asks_for_exact_tags(snapshot: Callable[[str, str], None]) -> None:
     marked = (("highway", ("crossing",)), ("crossing", ("marked", "a.b;c")))
     tags = (marked, (("crossing:markings", ("*",)),))
     crossings = replace(BENCH, tags=tags, elements=("node",))
     areas = replace(BENCH, tags=((("na\\me", ('a"b',)),),), elements=("way", "relation"))
     query = overpass_query([crossings, areas, crossings], (1, 2, 3, 4), timeout=25)
-    assert query.splitlines() == [
-        "[out:json][timeout:25][bbox:2.0000000,1.0000000,4.0000000,3.0000000];",
-        "(",
-        r'node["highway"="crossing"]["crossing"~"^(marked|a\\.b;c)$"];',
-        'node["crossing:markings"]["crossing:markings"!="no"];',
-        r'way["na\\me"="a\"b"];',
-        r'relation["na\\me"="a\"b"]["type"="multipolygon"];',
-        ");",
-        "out body geom;",
-    ]
+    snapshot("query.overpassql", f"{query}\n")
     with refused(CatalogError, "has no tags"):
         overpass_query([replace(BENCH, tags=())], (1, 2, 3, 4))
 
@@ -316,34 +309,15 @@ def test_where_all_servers_fail_each_is_told(server: Server, get: Get) -> None:
         get(tile_deg=0)
 
 
-def read(folder: Path, elements: list[Any], *specs: LayerSpec) -> Any:  # noqa: ANN401
-    path = folder / "tile.json"
-    path.write_bytes(sent(elements))
-    layers = read_layers(path, specs)
+def read(path: Path, *specs: LayerSpec, **options: Any) -> Any:  # noqa: ANN401
+    layers = read_layers(path, specs, **options)
     assert all(layer.counts.kept == len(layer.table) for layer in layers)
     return layers[0] if len(layers) == 1 else layers
 
 
-def way(number: int, *xy: tuple[float, float], **tags: str) -> dict[str, Any]:
-    return {"type": "way", "id": number, "tags": tags, "geometry": line(*xy)}
-
-
-SQUARE = [(2.0, 48.0), (2.002, 48.0), (2.002, 48.002), (2.0, 48.002), (2.0, 48.0)]
-
-
-def test_nodes_and_ways_become_objects(tmp_path: Path) -> None:
-    tags = {"amenity": "bench", "user": "kept by no one"}
-    elements = [
-        node(1, 2.5, 48.5, **tags) | {"user": "me", "uid": 7},
-        way(1, (2, 48), (2.2, 48), **tags),
-        way(2, *SQUARE, **tags),
-        {"type": "way", "id": 3, "tags": tags, "center": {"lon": 2.25, "lat": 48.25}},
-        {"type": "way", "id": 4, "tags": tags, "nodes": [91, 92]},
-        node(91, 2.0, 49.0),
-        node(92, 2.2, 49.0),
-        node(2, 2.5, 48.5, amenity="public_bookcase"),
-    ]
-    layer = read(tmp_path, elements, BENCH)
+def test_nodes_and_ways_become_objects() -> None:
+    path = DATA / "overpass_objects.json"
+    layer = read(path, BENCH)
     assert layer.table["source_id"].tolist() == ["node/1", "way/1", "way/2", "way/3", "way/4"]
     expected = [(2.5, 48.5), (2.1, 48.0), (2.001, 48.001), (2.25, 48.25), (2.1, 49.0)]
     places = shapely.get_coordinates(layer.table.geometry.array)
@@ -351,38 +325,18 @@ def test_nodes_and_ways_become_objects(tmp_path: Path) -> None:
     assert list(layer.table.columns) == ["class_name", "source_id", "geometry"]
     assert layer.table.crs == "EPSG:4326"
     nodes = replace(BENCH, elements=("node",), where=(("user", ("nobody",)),))
-    (layer,) = read_layers(tmp_path / "tile.json", [nodes])
-    assert (layer.counts.read, layer.counts.filtered) == (5, 5)
-    (layer,) = read_layers(tmp_path / "tile.json", [nodes], filters=False)
-    assert layer.table["source_id"].tolist() == ["node/1"]
+    assert read(path, nodes).counts == RowCounts(read=5, filtered=5)
+    assert read(path, nodes, filters=False).table["source_id"].tolist() == ["node/1"]
 
 
-def test_buildings_and_streets_keep_their_shape(tmp_path: Path) -> None:
-    hole = [(2.0005, 48.0005), (2.001, 48.0005), (2.001, 48.001), (2.0005, 48.0005)]
-    yes = {"building": "yes"}
-    members = [
-        {"type": "way", "ref": 1, "role": "outer", "geometry": line(*SQUARE[:3])},
-        {"type": "way", "ref": 2, "role": "outer"},
-        {"type": "way", "ref": 3, "role": "inner", "geometry": line(*hole)},
-        {"type": "node", "ref": 4, "role": "entrance"},
-    ]
-    area, site = yes | {"type": "multipolygon"}, yes | {"type": "site"}
-    elements = [
-        way(1, *SQUARE, **yes),
-        way(2, *SQUARE[2:]),
-        way(3, *SQUARE, building="no"),
-        {"type": "relation", "id": 5, "tags": area, "members": members},
-        {"type": "relation", "id": 6, "tags": site, "members": []},
-        way(9, *SQUARE, highway="residential"),
-        {"type": "way", "id": 10, "tags": yes, "center": {"lon": 2.0, "lat": 48.0}},
-    ]
+def test_buildings_and_streets_keep_their_shape() -> None:
     shaped = replace(BENCH, class_name="", role="buildings", geometry="polygon")
     buildings = replace(shaped, tags=((("building", ("*",)),),))
     streets = replace(shaped, role="streets", geometry="line", tags=((("highway", ("*",)),),))
-    footprints, lines = read(tmp_path, elements, buildings, streets)
+    footprints, lines = read(DATA / "overpass_shapes.json", buildings, streets)
     assert footprints.table["source_id"].tolist() == ["way/1", "relation/5"]
     areas = footprints.table.geometry.map(lambda shape: shape.area).tolist()
-    assert areas == pytest.approx([0.002**2, 0.002**2 - shapely.Polygon(hole).area])
+    assert areas == pytest.approx([0.002**2, 0.002**2 - 0.0005**2 / 2])  # a triangle is left out
     assert footprints.counts.filtered == 1  # the site
     assert footprints.errors == ("row 4: way/10 has no positions",)
     assert lines.table.geometry.geom_type.tolist() == ["LineString"]
@@ -405,7 +359,9 @@ def test_an_incomplete_element_is_counted(
     tmp_path: Path, element: dict[str, Any], words: str
 ) -> None:
     tags = {"amenity": "bench", "type": "multipolygon"}
-    layer = read(tmp_path, [BENCHES[0], element | {"tags": tags, "id": 99}], BENCH)
+    path = tmp_path / "tile.json"
+    path.write_bytes(sent([BENCHES[0], element | {"tags": tags, "id": 99}]))
+    layer = read(path, BENCH)
     assert layer.counts.unreadable == 1
     assert len(layer.table) == 1
     assert words.replace("/1 ", "/99 ") in layer.errors[0]

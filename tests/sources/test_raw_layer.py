@@ -4,15 +4,13 @@ from __future__ import annotations
 
 import dataclasses
 import math
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import geopandas as gpd
 import numpy as np
 import pytest
-import shapely
 from hypothesis import given
 from hypothesis import strategies as st
-from osm_xml import node, way, write_osm
 from pyproj import CRS
 from sentences import refused
 
@@ -31,20 +29,11 @@ from semsig_gis.sources.raw_layer import (
 )
 
 if TYPE_CHECKING:
-    from pathlib import Path
-
     import pandas as pd
 
 
-LAMBERT = (
-    'PROJCS["RGF93_Lambert_93",GEOGCS["GCS_RGF_1993",DATUM["D_RGF_1993",'
-    'SPHEROID["GRS_1980",6378137.0,298.257222101]],PRIMEM["Greenwich",0.0],'
-    'UNIT["Degree",0.0174532925199433]],PROJECTION["Lambert_Conformal_Conic"],'
-    'PARAMETER["False_Easting",700000.0],PARAMETER["False_Northing",6600000.0],'
-    'PARAMETER["Central_Meridian",3.0],PARAMETER["Standard_Parallel_1",44.0],'
-    'PARAMETER["Standard_Parallel_2",49.0],PARAMETER["Latitude_Of_Origin",46.5],'
-    'UNIT["Meter",1.0]]'
-)
+DATA = Path(__file__).with_name("data")
+LAMBERT = (DATA / "esri.prj").read_text(encoding="utf-8")
 SHIFTED = LAMBERT.replace("700000.0", "700001.0")
 PLANE = 'LOCAL_CS["Undefined Cartesian SRS",UNIT["metre",1],AXIS["X",EAST],AXIS["Y",NORTH]]'
 UNDEFINED = (
@@ -205,40 +194,24 @@ def test_a_width_is_plausible_or_unknown(value: Any) -> None:  # noqa: ANN401
     assert math.isnan(half) or 0.05 <= half <= 100
 
 
-def test_a_field_of_widths_must_exist() -> None:
-    for spec, key in (
-        (street(width_by=BY_CLASS), "width_by"),
-        (street(width_field="highway"), "width_field"),
-    ):
-        with refused(CatalogError, "'highway'", key, "the nearest is 'highways'"):
-            RowRules(spec, ["highways"], filters=True, where="streets")
-
-
-def test_every_reader_gives_the_widths(tmp_path: Path) -> None:
-    places = [(7.40, 43.70), (7.41, 43.70), (7.42, 43.70)]
-    tags = [{"highway": "primary"}, {"highway": "primary_link", "width": "8"}]
-    table = gpd.GeoDataFrame(
-        {"highway": ["primary", "primary_link"], "width": [None, 8.0]},
-        geometry=[shapely.LineString(places[:2]), shapely.LineString(places[1:])],
-        crs="EPSG:4326",
-    )
-    table.to_file(tmp_path / "streets.geojson")
-    nodes = [node(number, *place) for number, place in enumerate(places, start=1)]
-    ways = [way(10 + n, [1 + n, 2 + n], tags[n]) for n in range(2)]
-    write_osm(tmp_path / "streets.osm", *nodes, *ways)
+@pytest.mark.parametrize(
+    ("name", "file"),
+    [
+        ("vector_file", "streets.geojson"),
+        ("osm_file", "streets.osm"),
+        ("overpass", "streets.json"),
+        ("opendatasoft", "streets.geojson"),
+    ],
+)
+def test_every_reader_gives_the_widths(name: str, file: str) -> None:
     bare = street(geometry="line", tags=((("highway", ("*",)),),))
     unknown = dataclasses.replace(bare, width_field="width")
     spec = dataclasses.replace(unknown, width_by=BY_CLASS)
-    for name, file in (
-        ("vector_file", "streets.geojson"),
-        ("osm_file", "streets.osm"),
-        ("opendatasoft", "streets.geojson"),
-    ):
-        whole, half, none = (reader(name)(tmp_path / file, [s])[0] for s in (spec, unknown, bare))
-        assert whole.table["half_width"].tolist() == [12.0, 4.0], name
-        assert (whole.notes, whole.table["half_width"].dtype) == ((), "float64")
-        assert half.notes == ("1 of 2 streets have no known width",)
-        assert "half_width" not in none.table
+    whole, half, none = (reader(name)(DATA / file, [s])[0] for s in (spec, unknown, bare))
+    assert whole.table["half_width"].tolist() == [12.0, 4.0]
+    assert (whole.notes, whole.table["half_width"].dtype) == ((), "float64")
+    assert half.notes == ("1 of 2 streets have no known width",)
+    assert "half_width" not in none.table
 
 
 def test_a_portal_may_spell_the_fields_otherwise(tmp_path: Path) -> None:

@@ -36,6 +36,7 @@ if TYPE_CHECKING:
 
     Publication = Callable[[str], Path]
 
+DATA = Path(__file__).with_name("data")
 FORMATS = ("csv", "fgb", "geojson", "gpkg", "shp", "zip")
 
 
@@ -287,16 +288,10 @@ def test_empty_layer_is_read(suffix: str, tmp_path: Path) -> None:
     assert list_layers(path)[0].rows == 0
 
 
-def test_other_geometries_are_noted(tmp_path: Path) -> None:
-    shapes: list[dict[str, object]] = [
-        point(3, 43, 12),
-        {"type": "MultiPoint", "coordinates": [[3, 43], [3, 44]]},
-        {"type": "LineString", "coordinates": [[3, 43], [3, 44]]},
-        {"type": "Polygon", "coordinates": [[[3, 43], [3, 44], [4, 44], [3, 43]]]},
-        {"type": "GeometryCollection", "geometries": [point(3, 43)]},
-    ]
-    layer = read(geojson(tmp_path, *shapes), rows=(10, 20))
-    assert layer.table.geom_type.tolist() == [shape["type"] for shape in shapes]
+def test_other_geometries_are_noted() -> None:
+    layer = read(DATA / "mixed.geojson", rows=(10, 20))
+    kinds = ["Point", "MultiPoint", "LineString", "Polygon", "GeometryCollection"]
+    assert layer.table.geom_type.tolist() == kinds
     assert not layer.table.has_z.any()  # the third dimension of points is left out
     assert layer.notes == (
         "the layer has 5 rows, and 10 to 20 were expected",
@@ -305,24 +300,7 @@ def test_other_geometries_are_noted(tmp_path: Path) -> None:
 
 
 def test_broken_geojson_geometries_are_told_from_null_ones(tmp_path: Path) -> None:
-    good = [
-        point(3, 43),
-        None,
-        point(),
-        {"type": "GeometryCollection", "geometries": []},
-        {"type": "MultiPoint", "coordinates": [[]]},
-    ]
-    bad = [
-        point("a", "b"),
-        {"type": "Point"},
-        {"type": "Dot", "coordinates": [1, 2]},
-        point(1),
-        point(None, None),
-        "text",
-        {"type": "LineString", "coordinates": [[1, 2]]},
-        {"type": "Polygon", "coordinates": [[[1, 2], [2, 3]]]},
-    ]
-    path = geojson(tmp_path, *bad, *good)
+    path = DATA / "broken.geojson"  # of whose rows five are good: a point, and empty ones
     layer = read(path)
     assert counts(layer) == (13, 5, 8)
     assert [message.split(":")[0] for message in layer.errors] == [f"row {n}" for n in range(1, 9)]
@@ -330,8 +308,8 @@ def test_broken_geojson_geometries_are_told_from_null_ones(tmp_path: Path) -> No
     assert layer.errors[6].startswith("row 7: its LineString is not valid")
     archive = pack(tmp_path / "things.zip", path, inside="below/")
     assert read(archive).errors == layer.errors
-    path.write_text(json.dumps(point(3, 43)))  # without features
-    assert xy(read(path)) == [[3.0, 43.0]]
+    alone = text_file(tmp_path, "things.geojson", json.dumps(point(3, 43)))  # without features
+    assert xy(read(alone)) == [[3.0, 43.0]]
 
 
 class Source:

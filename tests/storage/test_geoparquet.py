@@ -85,8 +85,7 @@ def test_what_is_written_is_read_again(example: Path) -> None:
     assert table["number"].to_pylist() == NUMBERS
     assert table["text"].to_pylist() == TEXTS
     assert table["list"].to_pylist() == LISTS
-    assert specs == {"kind": "sample"}
-    assert crs == CRS(2154)
+    assert (specs, crs) == (SPECS, CRS(2154))
     some, _, _ = read_geoparquet(example, kind="sample", columns=["text"])
     assert some.column_names == ["text"]
 
