@@ -40,8 +40,5 @@ def test_a_misspelt_name_is_offered_its_nearest(
 def test_what_is_offered_is_one_of_the_names(name: str, names: list[str]) -> None:
     offer = errors.nearest_name(name, names)
     assert not offer or offer in {f"; the nearest is {item!r}" for item in names}
-
-
-@given(st.lists(NAMES.filter(bool), min_size=1, unique_by=str.lower))
-def test_a_name_is_nearest_to_itself(names: list[str]) -> None:
-    assert errors.nearest_name(names[0], names) == f"; the nearest is {names[0]!r}"
+    if name:  # which is nearest to itself
+        assert errors.nearest_name(name, [*names, name]) == f"; the nearest is {name!r}"

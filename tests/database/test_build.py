@@ -28,12 +28,9 @@ from semsig_gis.core.rtree import PackedIndex
 from semsig_gis.core.signature import SignatureSpec
 from semsig_gis.database import build
 from semsig_gis.database.build import build_database, visible_objects
-from semsig_gis.database.file import open_database, save_database
 from semsig_gis.database.views import Sightings, ViewpointSpec, bearings
 
 if TYPE_CHECKING:
-    from pathlib import Path
-
     from numpy.typing import NDArray
 
 
@@ -216,7 +213,7 @@ def test_what_buildings_hide_is_not_seen() -> None:
     assert hindered.lengths.sum() < open_air.lengths.sum()
 
 
-def test_only_viewpoints_become_cells(tmp_path: Path) -> None:
+def test_only_viewpoints_become_cells() -> None:
     objects, house = lamps(), shapely.box(*(CORNER + 22), *(CORNER + 71))
     full = build_database(objects)
     street = shapely.LineString([CORNER, CORNER + np.array([100, 0])])
@@ -233,10 +230,6 @@ def test_only_viewpoints_become_cells(tmp_path: Path) -> None:
     assert along.lengths.tolist() == full.lengths[near].tolist()
     streets = surroundings(street, half_width=[25.0])
     assert len(build_database(objects, viewpoints=spec, streets=streets)) > len(along)
-    for database in (outdoor, along, full):
-        save_database(database, tmp_path / "city.parquet")
-        again = open_database(tmp_path / "city.parquet")
-        assert (again.viewpoints, again.occlusion) == (database.viewpoints, database.occlusion)
 
 
 def test_what_sees_nothing_or_cannot_be_placed_is_told() -> None:

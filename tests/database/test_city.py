@@ -80,14 +80,13 @@ def test_a_city_is_the_database_and_what_lies_beside_it(
         _ = city.store
 
 
-def test_a_city_is_opened_whole_or_in_parts(city: City, database: SignatureDatabase) -> None:
+def test_a_city_in_parts_is_all_of_them(parts: Path, database: SignatureDatabase) -> None:
+    city = City(parts)
     assert_same(city.database, database)
-    assert isinstance(city.dataset, PartitionedDatabase) == city.path.is_dir()
-    assert len(city.dataset) == len(database)
-    if city.path.is_dir():
-        assert city.files == part_files(city.path)
-        assert city.bytes == sum(file.stat().st_size for file in city.path.iterdir())
-        assert city.digest == digest(*city.files)
+    assert isinstance(city.dataset, PartitionedDatabase)
+    assert city.files == part_files(parts)
+    assert city.bytes == sum(file.stat().st_size for file in parts.iterdir())
+    assert city.digest == digest(*city.files)
 
 
 def test_what_is_no_database_is_told(tmp_path: Path) -> None:
@@ -115,44 +114,32 @@ def put(city: City, table: pa.Table, *, name: str = "numbers", **facts: Any) -> 
     city.put_columns(name, table, cell_ids=city.database.cell_ids[: len(table)], facts=facts)
 
 
-def columns_of(city: City, name: str = "numbers") -> tuple[pa.Table, dict[str, Any]]:
-    stored = city.columns(name)
-    assert stored is not None
-    return stored
-
-
 def test_columns_come_back_beside_signatures_that_stay(
     city: City, database: SignatureDatabase
 ) -> None:
     assert city.columns("numbers") is None
     assert not city.has_columns
-    put(city, columns(len(database)), made="up")
-    table, facts = columns_of(city)
-    assert facts == {"made": "up"}
-    assert table["cell_id"].to_numpy().tolist() == database.cell_ids.tolist()
-    expected = columns(len(database)).combine_chunks()
-    assert table.drop_columns(["cell_id"]).combine_chunks().equals(expected)
+    size = len(database)
+    put(city, pa.table({"other": np.ones(size)}), name="ones")
+    for times in (1.0, 3.0):  # those of one name replace each other
+        expected = columns(size, times=times).drop_columns(["maybe"] if times > 1.0 else [])
+        put(city, expected, times=times)
+        table, facts = city.columns("numbers") or (pa.table({}), {})
+        assert facts == {"times": times}
+        assert table["cell_id"].to_numpy().tolist() == database.cell_ids.tolist()
+        found = table.drop_columns(["cell_id"]).combine_chunks()
+        assert found.equals(expected.combine_chunks())
+    table, _ = city.columns("ones") or (pa.table({}), {})
+    assert table["other"].to_numpy().sum() == size
     assert city.has_columns
-    assert_same(open_database(city.path), database)
     assert city.columns("others") is None
+    assert_same(open_database(city.path), database)
     for file in city.files:  # which other programs read, too
         seen = gpd.read_parquet(file)
         rows = np.searchsorted(database.cell_ids, seen["cell_id"])
-        assert seen["number"].tolist() == rows.tolist()
+        assert seen["number"].tolist() == (rows * 3.0).tolist()
         assert seen.columns[-1] == "geometry"
         assert seen.crs == database.crs
-
-
-def test_columns_of_one_name_replace_each_other(city: City, database: SignatureDatabase) -> None:
-    size = len(database)
-    put(city, columns(size))
-    put(city, pa.table({"other": np.ones(size)}), name="ones")
-    put(city, columns(size, times=3.0).drop_columns(["maybe"]), times=3)
-    table, facts = columns_of(city)
-    assert table.column_names == ["cell_id", "number"]
-    assert table["number"].to_numpy().tolist() == (np.arange(size) * 3.0).tolist()
-    assert facts == {"times": 3}
-    assert columns_of(city, "ones")[0]["other"].to_numpy().sum() == size
 
 
 def test_a_file_keeps_its_digest_and_a_folder_its_recipe(

@@ -100,14 +100,16 @@ def swap(table: pa.Table, one: str, other: str) -> pa.Table:
     return table.rename_columns([names.get(name, name) for name in table.column_names])
 
 
-def with_first(table: pa.Table, column: str, value: object) -> pa.Table:
-    values = [value, *table[column].to_pylist()[1:]]
-    place = table.column_names.index(column)
-    return table.set_column(place, column, pa.array(values, table[column].type))
+def put(table: pa.Table, name: str, values: pa.Array) -> pa.Table:
+    return table.set_column(table.column_names.index(name), name, values)
 
 
-def turned_over(table: pa.Table) -> pa.Table:
-    return table.take(list(range(len(table)))[::-1])
+def first(table: pa.Table, **values: object) -> pa.Table:
+    """Put other values into the first row."""
+    for name, value in values.items():
+        row = [value, *table[name].to_pylist()[1:]]
+        table = put(table, name, pa.array(row, table[name].type))
+    return table
 
 
 DAMAGE = {
@@ -115,28 +117,26 @@ DAMAGE = {
     "types and bearings swapped": lambda t: swap(t, "types", "bearings"),
     "a missing column": lambda t: t.drop_columns(["bearings"]),
     "another type of column": lambda t: swap(t, "types", "length"),
-    "large strings": lambda t: t.set_column(1, "types", t["types"].cast(pa.large_string())),
-    "cells as floats": lambda t: t.set_column(0, "cell_id", t["cell_id"].cast(pa.float64())),
-    "a missing cell": lambda t: with_first(t, "cell_id", None),
-    "cells out of order": turned_over,
+    "large strings": lambda t: put(t, "types", t["types"].cast(pa.large_string())),
+    "cells as floats": lambda t: put(t, "cell_id", t["cell_id"].cast(pa.float64())),
+    "a missing cell": lambda t: first(t, cell_id=None),
+    "cells out of order": lambda t: t.take(list(range(len(t)))[::-1]),
     "a cell twice": lambda t: pa.concat_tables([t, t]),
     "no cells": lambda t: t.slice(0, 0),
-    "a missing value": lambda t: with_first(t, "bearings", None),
-    "an unknown symbol": lambda t: with_first(t, "types", "?" * t["length"][0].as_py()),
-    "one object too many": lambda t: with_first(t, "types", t["types"][0].as_py() + "D"),
-    "an empty signature": lambda t: with_first(
-        with_first(with_first(t, "types", ""), "bearings", []), "distances", []
+    "a missing value": lambda t: first(t, bearings=None),
+    "an unknown symbol": lambda t: first(t, types="?" * t["length"][0].as_py()),
+    "one object too many": lambda t: first(t, types=t["types"][0].as_py() + "D"),
+    "an empty signature": lambda t: first(t, types="", bearings=[], distances=[]),
+    "a missing number": lambda t: first(t, distances=[None] * t["length"][0].as_py()),
+    "numbers of another size": lambda t: put(
+        t, "bearings", t["bearings"].cast(pa.list_(pa.int32()))
     ),
-    "a missing number": lambda t: with_first(t, "distances", [None] * t["length"][0].as_py()),
-    "numbers of another size": lambda t: t.set_column(
-        2, "bearings", t["bearings"].cast(pa.list_(pa.int32()))
+    "bytes for numbers": lambda t: put(
+        t, "distances", pa.array(map(bytes, t["distances"].to_pylist()))
     ),
-    "bytes for numbers": lambda t: t.set_column(
-        3, "distances", pa.array([bytes(row) for row in t["distances"].to_pylist()])
-    ),
-    "a bearing of 360": lambda t: with_first(t, "bearings", [7200] * t["length"][0].as_py()),
-    "bearings in another order": lambda t: t.set_column(
-        2, "bearings", pa.array([b[::-1] for b in t["bearings"].to_pylist()], t["bearings"].type)
+    "a bearing of 360": lambda t: first(t, bearings=[7200] * t["length"][0].as_py()),
+    "bearings in another order": lambda t: put(
+        t, "bearings", pa.array([b[::-1] for b in t["bearings"].to_pylist()], t["bearings"].type)
     ),
 }
 

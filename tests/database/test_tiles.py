@@ -339,12 +339,11 @@ def test_other_things_are_never_replaced(database: SignatureDatabase, tmp_path: 
 def test_a_rename_that_fails_leaves_one_whole_database_and_the_run(
     database: SignatureDatabase, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, fails: int
 ) -> None:
-    target = tmp_path / "city"
+    target, rename, calls = tmp_path / "city", Path.rename, []
     folder = begin(target, RECIPE)
     publish(folder, [build(folder, database)])
     folder = begin(target, RECIPE)
     part = build(folder, database.select(slice(20)))
-    rename, calls = Path.rename, []
 
     def refuse(self: Path, to: Path) -> Path:
         calls.append(to)
@@ -356,10 +355,9 @@ def test_a_rename_that_fails_leaves_one_whole_database_and_the_run(
         patch.setattr(Path, "rename", refuse)
         with refused(InputError, str(target), "Permission denied", "run the same command again"):
             publish(folder, [part])
-    assert len(open_database(target)) == len(database)
+    assert_same(open_database(target), database)
     # As the same command does.
-    folder = begin(target, RECIPE)
-    assert finished_tiles(folder, [(0, 0)]) == {(0, 0): part}
+    assert finished_tiles(begin(target, RECIPE), [(0, 0)]) == {(0, 0): part}
     publish(folder, [part])
     assert len(open_database(target)) == 20
     assert [path.name for path in tmp_path.iterdir()] == ["city"]

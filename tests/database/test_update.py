@@ -7,11 +7,11 @@ from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import geopandas as gpd
 import numpy as np
 import pandas as pd
 import pytest
 import shapely
+import worlds
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from sentences import refused
@@ -26,7 +26,7 @@ from semsig_gis.database.file import open_database
 from semsig_gis.database.update import compare_cells, update_database, update_file
 from semsig_gis.database.views import ViewpointSpec
 from semsig_gis.objects.load import assemble, choose_layers, read_files
-from semsig_gis.objects.table import Licence, StreetObjects
+from semsig_gis.objects.table import Licence
 from semsig_gis.sources.catalog import load_catalog
 
 if TYPE_CHECKING:
@@ -38,6 +38,7 @@ if TYPE_CHECKING:
     from semsig_gis.database.update import UpdateReport
     from semsig_gis.database.views import Mode
     from semsig_gis.objects.load import Loaded
+    from semsig_gis.objects.table import StreetObjects
 
 # Two classes that are seen from further than the others, and one from nearer.
 RANGES = {CODES[0]: 45.0, CODES[1]: 12.5}
@@ -73,15 +74,9 @@ AREA = shapely.Polygon([at(-20, -20), at(400, 0), at(200, 280)])
 
 
 def objects_of(table: pd.DataFrame, taxonomy: Taxonomy = CLASSES) -> StreetObjects:
-    columns = table[["class_code", "source", "source_id", "count"]].reset_index(drop=True)
-    columns = columns.astype({"class_code": np.uint8, "count": np.int32})
-    places = shapely.points(table["x"].to_numpy(float), table["y"].to_numpy(float))
-    layers = tuple(sorted(table["source"].unique()))
-    return StreetObjects(
-        gpd.GeoDataFrame(columns, geometry=places, crs="EPSG:2154"),
-        taxonomy,
-        (Licence("A (CC0)", layers),),
-    )
+    things = table[["x", "y", "class_code", "source", "source_id"]].itertuples(index=False)
+    licenses = (Licence("A (CC0)", tuple(sorted(table["source"].unique()))),)
+    return worlds.objects_of(*things, licenses=licenses, taxonomy=taxonomy)
 
 
 def random_table(rng: np.random.Generator, size: int) -> pd.DataFrame:
@@ -91,7 +86,6 @@ def random_table(rng: np.random.Generator, size: int) -> pd.DataFrame:
             "class_code": rng.choice(CODES[:6], size),
             "source": rng.choice(["trees", "lamps", "signs"], size),
             "source_id": [str(number) for number in rng.integers(0, 10 * size, size)],
-            "count": 1,
             "x": places[:, 0],
             "y": places[:, 1],
         }
