@@ -117,12 +117,7 @@ def test_problems_do_not_touch_each_other() -> None:
 
 
 def slow_weights(
-    table: NoiseTable,
-    database: SignatureDatabase,
-    query: Signature,
-    cell: int,
-    *,
-    tails: float = 4.5,
+    table: NoiseTable, database: SignatureDatabase, query: Signature, cell: int, tails: float = 4.5
 ) -> np.ndarray:
     """Return what each pair of an object and a detection adds."""
     part = slice(database.offsets[cell], database.offsets[cell + 1])
@@ -284,8 +279,7 @@ WORLD = World(((0.0, 10.0, TREE), (20.0, 0.0, LAMP), (0.0, -15.0, TREE), (0.0, 9
 def explained(query: Signature, world: World = WORLD, **options: Any) -> Explanation:  # noqa: ANN401
     xy, noise = options.pop("xy", (0.0, 0.0)), options.pop("noise", NOISE)
     objects = world.street_objects
-    index = ObjectIndex(objects.xy)
-    return explain(query, xy, noise, objects=objects, index=index, **options)
+    return explain(query, xy, noise, objects=objects, index=ObjectIndex(objects.xy), **options)
 
 
 def test_every_verdict() -> None:
@@ -305,8 +299,7 @@ def test_every_verdict() -> None:
     assert all(0.5 < row["chance"] <= 1.0 for row in rows)
     assert found.counts == {"matched": 1, "misnamed": 1, "missed": 1, "false": 1}
     assert json.loads(json.dumps(found.to_dict()))["x"] == 0.0
-    shapes = found.table.geometry
-    assert shapes.isna().tolist() == [False, False, True, False]
+    assert found.table.geometry.isna().tolist() == [False, False, True, False]
     assert found.table.crs == WORLD.street_objects.crs
 
 
@@ -351,6 +344,5 @@ def test_a_cell_is_explained_without_the_street_objects() -> None:
     assert found.counts == exact.counts
     assert found.loglik == pytest.approx(exact.loglik, abs=0.1)
     assert found.table["object"].isna().all()
-    apart = found.table.geometry.distance(exact.table.geometry)
-    assert apart.max() < 0.2
+    assert found.table.geometry.distance(exact.table.geometry).max() < 0.2
     assert found.table.crs == WORLD.street_objects.crs

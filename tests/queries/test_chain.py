@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 from dataclasses import replace
+from functools import partial
 from math import inf, nan
 from typing import TYPE_CHECKING, Any
 
@@ -126,8 +127,7 @@ def test_numbers_seeds_and_repeats_have_chances_of_their_own() -> None:
 def test_misses_and_clutter_add_up() -> None:
     # Seen in half of the turn, half of what is left is detected.
     half = NoiseSpec(detection=0.5, misnamed=0.0, clutter=0.0, name="half")
-    chain = parse_chain("view:180, detector:half", noises={"half": half})
-    spoil = ready_chain(chain, CITY)
+    spoil = ready_chain(parse_chain("view:180, detector:half", noises={"half": half}), CITY)
     kept = np.array([len(spoil(many(1), 0, number)) for number in range(4000)])
     assert kept.mean() == pytest.approx(0.25, abs=0.04)
 
@@ -169,17 +169,16 @@ ORIGIN = np.zeros(1)
         (Obstacles, "width", [-1.0, nan, inf], ["width of the obstacles", "0 or more"]),
         (BlockedSectors, "count", [-1], ["sectors", "from 0"]),
         (BlockedSectors, "degrees", [-1.0, nan, inf], ["degrees", "from 0 to 360"]),
-        (Detector, "half", [0.0, -3.0, nan], ["above 0"]),
+        (partial(Detector, noise=MINE), "half", [0.0, -3.0, nan], ["above 0"]),
         (QuerySpec, "number", [0], ["queries", "from 1"]),
         (QuerySpec, "seeds", [[], [1, 1]], ["at least one", "none twice"]),
         (QuerySpec, "seeds", [[-1]], ["-1", "0 or more"]),
     ],
 )
-def test_settings_out_of_range(kind: type, name: str, values: list[Any], words: list[str]) -> None:
-    needed = {"noise": MINE} if kind is Detector else {}
+def test_settings_out_of_range(kind: Any, name: str, values: list[Any], words: list[str]) -> None:  # noqa: ANN401
     for value in values:
         with refused(InputError, str(value).strip("[]"), *words):
-            kind(**needed, **{name: value})
+            kind(**{name: value})
 
 
 @pytest.mark.parametrize(

@@ -78,19 +78,11 @@ def test_objects_on_one_bearing_stay_in_order() -> None:
     assert parts_of(one.signature)[0].tolist() == [3, 1, 5]
 
 
-@given(one=sights)
-def test_some_objects_keep_what_they_are(one: Sight) -> None:
-    near = one.only(one.distances < 10.0)
-    assert rows(near) == [row for row in rows(one) if row[2] < 10.0]
-    assert rows(one.only(np.arange(len(one))[::-1])) == rows(one)[::-1]
-
-
 def test_what_there_is_to_see_in_a_database() -> None:
     database = random_database(3)
     city = CitySights.of(database)
-    assert city.codes.tolist() == sorted(set(database.codes.tolist()))
-    counts = [(database.codes == code).sum() for code in city.codes]
-    assert city.frequencies.tolist() == counts
+    counts = Counter(database.codes.tolist())
+    assert list(zip(city.codes, city.frequencies, strict=True)) == sorted(counts.items())
     assert (city.reach, city.taxonomy) == (database.reach, database.taxonomy)
 
 
@@ -129,31 +121,20 @@ def distorted(
 
 
 def test_the_levels_of_the_paper() -> None:
-    levels = {
-        name: (one.occurrences, one.bearing_sigma, one.bearing_clip)
-        for name, one in DISTORTIONS.items()
-    }
-    assert levels == {
-        "none": (0, 0.0, 30.0),
-        "light": (1, 5.0, 30.0),
-        "medium": (7, 5.0, 30.0),
-        "strong": (13, 5.0, 30.0),
-    }
+    levels = {"none": (0, 0.0), "light": (1, 5.0), "medium": (7, 5.0), "strong": (13, 5.0)}
+    assert {
+        name: Distortion(occurrences=count, bearing_sigma=sigma, bearing_clip=30.0)
+        for name, (count, sigma) in levels.items()
+    } == DISTORTIONS
 
 
 @given(one=sights, how=paper_errors, seed=seeds)
-def test_invariants(one: Sight, how: Distortion, seed: int) -> None:
-    before = rows(one)
+def test_errors_change_so_many_objects(one: Sight, how: Distortion, seed: int) -> None:
     codes, bearings = distorted(one.signature, how, seed)
     assert abs(len(codes) - len(one)) <= how.occurrences
     assert codes.dtype == np.uint8
-    assert set(codes.tolist()) <= set(CLASSES)
-    assert ((bearings >= 0) & (bearings < 360)).all()
     if how.resort:
         assert (np.diff(bearings) >= 0).all()
-    again = distorted(one.signature, how, seed)
-    assert np.array_equal(again, (codes, bearings))
-    assert rows(one) == before
     none = distorted(one.signature, DISTORTIONS["none"], seed)
     assert np.array_equal(none, parts_of(one.signature))
 
@@ -238,7 +219,7 @@ def test_classes_and_bearings_of_false_objects(
     assert np.abs(quadrants - 0.25).max() < 4 * sqrt(0.25 * 0.75 / len(bearings))
 
 
-def test_false_classes_by_frequency_leave_the_true_one_out() -> None:
+def test_false_classes_leave_the_true_one_out() -> None:
     how = replace(QUIET, occurrences=1, false_class="frequency")
     rng = np.random.default_rng(2)
     drawn = [
@@ -248,14 +229,12 @@ def test_false_classes_by_frequency_leave_the_true_one_out() -> None:
     renamed = np.array([codes[0] for codes in drawn if len(codes) == 1])
     assert set(renamed.tolist()) == {3, 5}
     assert abs((renamed == 3).mean() - 0.75) < 4 * sqrt(0.75 * 0.25 / len(renamed))
-
-
-def test_without_another_class_a_false_classification_changes_nothing() -> None:
-    how = replace(QUIET, occurrences=5)
-    alone, _ = distorted(signature([3, 3, 3]), how, 1, classes=[3], weights=None)
-    by_frequency = replace(how, false_class="frequency")
-    unseen, _ = distorted(signature([3, 3, 3]), by_frequency, 1, classes=[3, 5], weights=[1, 0])
-    assert set(alone.tolist()) | set(unseen.tolist()) <= {3}
+    # Without another class, a false classification changes nothing.
+    cases: list[tuple[FalseClass, list[int]]] = [("uniform", [3]), ("frequency", [3, 5])]
+    for false_class, classes in cases:
+        often = replace(how, occurrences=5, false_class=false_class)
+        codes, _ = distorted(signature([3] * 3), often, 1, classes=classes, weights=[1, 0])
+        assert set(codes.tolist()) <= {3}
 
 
 def test_the_noise_of_bearings_is_normal_and_clipped() -> None:
@@ -333,11 +312,11 @@ def test_each_object_is_in_view_as_often_as_the_view_is_wide(degrees: float, see
 @given(one=sights, width=st.floats(0.0, 5.0))
 def test_hidden_behind_nearer_objects(one: Sight, width: float) -> None:
     expected = [
-        (code, bearing, distance)
-        for code, bearing, distance in rows(one)
+        row
+        for row in rows(one)
         if not any(
-            near < distance
-            and angular_distance(bearing, other) < degrees(atan(width / 2 / max(near, 0.01)))
+            near < row[2]
+            and angular_distance(row[1], other) < degrees(atan(width / 2 / max(near, 0.01)))
             for _, other, near in rows(one)
         )
     ]

@@ -1,5 +1,8 @@
+"""Queries that are drawn, and queries and routes in files."""
+
 from __future__ import annotations
 
+import json
 import math
 from dataclasses import replace
 from typing import TYPE_CHECKING
@@ -8,6 +11,8 @@ import geopandas as gpd
 import numpy as np
 import pytest
 import shapely
+from hypothesis import given
+from hypothesis import strategies as st
 from noisy_cells import parts_of
 from sentences import refused
 from worlds import CORNER, TAXONOMY, World, random_town
@@ -17,12 +22,15 @@ from semsig_gis.core.taxonomy import Taxonomy
 from semsig_gis.database.build import build_database
 from semsig_gis.database.city import ObjectStore
 from semsig_gis.database.views import ViewpointSpec
+from semsig_gis.likelihood.route import Leg
 from semsig_gis.objects.load import assemble, choose_layers, read_files
 from semsig_gis.queries.chain import parse_chain
 from semsig_gis.queries.draw import QuerySpec, draw_queries
+from semsig_gis.queries.file import parse_queries, parse_route, read_queries, read_route
 from semsig_gis.sources.catalog import load_catalog
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
     from pathlib import Path
 
     from semsig_gis.database.database import SignatureDatabase
@@ -93,15 +101,8 @@ def test_fewer_queries_seeds_and_parts_are_parts_of_the_whole(seen_from: SeenFro
     assert drawn(replace(spec, seeds=(2,))) == whole[5:]
     for start, stop in ((0, 10), (0, 3), (3, 7), (5, 10), (9, 20), (10, 12)):
         assert drawn(spec, slice(start, stop)) == whole[start:stop]
-
-
-def test_distortions_do_not_move_the_places() -> None:
-    spoiled = replace(ANYWHERE, distortions=parse_chain("medium, compass:20"))
-    drawn = draw_queries(DATABASE, spoiled, store=STORE)
-    plain = draw_queries(DATABASE, ANYWHERE, store=STORE)
-    assert [query.xy for query in drawn] == [query.xy for query in plain]
-    assert [query.length for query in drawn] == [query.length for query in plain]
-    assert len({query.asked.heading for query in drawn}) == 40
+    plain = drawn(replace(spec, distortions=()))  # distortions do not move the places
+    assert [one[:4] for one in plain] == [one[:4] for one in whole]
 
 
 def store_with(*houses: shapely.Polygon) -> ObjectStore:
@@ -189,3 +190,90 @@ def test_monaco_a_year_later(geodata: Path) -> None:
     # What is asked is as much as the cells of that year see.
     seen = np.mean([query.length for query in drawn])
     assert seen == pytest.approx(city.lengths.mean(), rel=0.3)
+
+
+# --- Files ------------------------------------------------------------------------------------
+
+ROWS = st.lists(
+    st.lists(st.tuples(st.sampled_from("BCDEG?"), st.integers(0, 359)), min_size=1, max_size=6),
+    min_size=1,
+    max_size=5,
+)
+
+
+@given(ROWS)
+def test_json_lines_and_csv_say_the_same(
+    tmp_path_factory: pytest.TempPathFactory, rows: list[list[tuple[str, int]]]
+) -> None:
+    folder = tmp_path_factory.mktemp("queries")
+    plain = [
+        {"id": f"q{number}", "types": "".join(t for t, _ in row), "bearings": [b for _, b in row]}
+        for number, row in enumerate(rows)
+    ]
+    lines = folder / "queries.jsonl"
+    lines.write_text("\n".join(map(json.dumps, plain)) + "\n\n")
+    table = folder / "queries.csv"
+    text = [f"{q['id']},{q['types']},{' '.join(map(str, q['bearings']))}" for q in plain]
+    table.write_text("\ufeffid,types,bearings\n" + "\n".join(text))
+    one, other = (read_queries(path, taxonomy=TAXONOMY) for path in (lines, table))
+    assert [name for name, _ in one] == [name for name, _ in other] == [q["id"] for q in plain]
+    for (_, query), (_, same), row in zip(one, other, rows, strict=True):
+        codes, bearings = parts_of(query)
+        assert np.array_equal(parts_of(same), (codes, bearings))
+        assert bearings.tolist() == sorted(b for _, b in row)
+
+
+def test_a_part_may_be_missing_and_lines_are_numbered() -> None:
+    found = parse_queries('\n{"types": "DB"}\n{"bearings": [5, 6]}', "x", taxonomy=TAXONOMY)
+    assert [name for name, _ in found] == [2, 3]
+    assert found[0][1].bearings is None
+    assert found[1][1].codes is None
+
+
+def test_a_route_tells_the_way_from_view_to_view() -> None:
+    lines = """
+{"id": "start", "types": "DB", "bearings": [10, 200]}
+{"dx": 3, "dy": -4, "sigma": 2}
+{"types": "D", "bearings": "90", "distance": 20, "bearing": 90}
+"""
+    views, legs = parse_route(lines, "these lines", taxonomy=TAXONOMY)
+    assert [name for name, _ in views] == ["start", 3, 4]
+    assert [len(view) for _, view in views] == [2, 0, 1]
+    assert legs == [Leg(dx=3.0, dy=-4.0, sigma=2.0), Leg.towards(90.0, 20.0, sigma=0.0)]
+
+
+def test_a_route_in_a_table(tmp_path: Path) -> None:
+    (tmp_path / "route.csv").write_text("types,dx,dy\nDB,,\nD,0,5.5\n")
+    views, legs = read_route(tmp_path / "route.csv", taxonomy=TAXONOMY)
+    assert [name for name, _ in views] == [2, 3]
+    assert legs == [Leg(dx=0.0, dy=5.5)]
+
+
+@pytest.mark.parametrize(
+    ("parsers", "text", "words"),
+    [
+        ([parse_queries, parse_route], "", ["no rows"]),
+        ([parse_queries, parse_route], "{", ["line 1", "not JSON"]),
+        ([parse_queries, parse_route], '{"types": "Z"}', ["line 1", "'Z'"]),
+        ([parse_queries, parse_route], '{"types": "DB", "bearings": [1]}', ["2 types and 1 bear"]),
+        ([parse_queries, parse_route], '{"bearings": ["north"]}', ["line 1", "not all numbers"]),
+        ([parse_queries], "[1]", ["line 1", "no query"]),
+        ([parse_queries], '{"types": "D"}\n{"other": 1}', ["line 2", "types, bearings or both"]),
+        ([parse_route], "[1]", ["line 1", "no view"]),
+        ([parse_route], '{"types": "D", "dx": 1, "dy": 2}', ["line 1", "tells a way", "the first"]),
+        ([parse_route], '{"types": "D"}\n{"types": "B"}', ["line 2", "does not tell the way"]),
+        ([parse_route], '{"dx": 5}', ["line 1", "dx and dy, or distance and bearing"]),
+    ],
+)
+def test_lines_of_files(parsers: list[Callable[..., object]], text: str, words: list[str]) -> None:
+    for parse in parsers:
+        with refused(InputError, "these lines", *words):
+            parse(text, "these lines", taxonomy=TAXONOMY)
+
+
+@pytest.mark.parametrize("read", [read_queries, read_route])
+def test_files_that_cannot_be_read(tmp_path: Path, read: Callable[..., object]) -> None:
+    (tmp_path / "b.csv").write_bytes(b"\xff\xfe\x00")
+    for name in ("a.csv", "b.csv"):
+        with refused(InputError, name, "cannot be read"):
+            read(tmp_path / name, taxonomy=TAXONOMY)
