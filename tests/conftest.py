@@ -186,15 +186,13 @@ def _chromium(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Chrome]:
         unavailable("browser", "chromium and chromedriver are not both on this machine")
     options = webdriver.ChromeOptions()
     options.binary_location = chromium
+    switches = (
+        "--headless=new --no-sandbox --disable-dev-shm-usage --disable-gpu --disable-quic "
+        "--disable-component-update --window-size=1200,900"
+    )
     for argument in (
-        "--headless=new",
-        "--no-sandbox",
-        "--disable-dev-shm-usage",
-        "--disable-gpu",
-        "--disable-quic",
-        "--disable-component-update",
+        *switches.split(),
         "--host-resolver-rules=MAP * ~NOTFOUND",
-        "--window-size=1200,900",
         f"--user-data-dir={tmp_path_factory.mktemp('chromium')}",
     ):
         options.add_argument(argument)

@@ -63,8 +63,7 @@ class MapPage:
 
     def circles(self, colour: str) -> int:
         """Return the number of circles of a colour."""
-        count: int = self.ask("return circles(arguments[0]).length", colour)
-        return count
+        return int(self.ask("return circles(arguments[0]).length", colour))
 
     def drawn(self, colour: str, canvas: str = ".leaflet-marker-pane canvas") -> int:
         """Return the number of pixels of about this colour on a canvas, by default the circles'."""
@@ -82,8 +81,7 @@ class MapPage:
         }
         return count;
         """
-        count: int = self.ask(script, colour, canvas)
-        return count
+        return int(self.ask(script, colour, canvas))
 
     def one(self, selector: str) -> WebElement:
         return self.browser.find_element(By.CSS_SELECTOR, selector)
@@ -93,8 +91,7 @@ class MapPage:
 
     def text(self, selector: str) -> str:
         """Return the text of the first such element, shown or not."""
-        text: str = self.ask("return document.querySelector(arguments[0]).textContent", selector)
-        return text
+        return str(self.ask("return document.querySelector(arguments[0]).textContent", selector))
 
     def layers(self) -> list[str]:
         """Return the names in the layer control."""
@@ -118,10 +115,8 @@ class MapPage:
     def popup(self) -> str:
         """Return what the newest popup says, if any; one before it may still fade away."""
         time.sleep(0.4)  # arrays are unpacked once
-        text: str = self.ask(
-            "return [...document.querySelectorAll('.semsig-details')].pop()?.innerText ?? ''"
-        )
-        return text
+        script = "return [...document.querySelectorAll('.semsig-details')].pop()?.innerText ?? ''"
+        return str(self.ask(script))
 
     def told(self) -> dict[str, str]:
         """Return what the popup says by its labels, its ``title``, and all of it as ``text``."""
@@ -193,12 +188,8 @@ class MapPage:
 def assert_quiet(browser: Chrome) -> None:
     """Check that the page reported no error and asked for nothing."""
     # `drawn` reads canvases back, for which Chromium has an advice, not an error.
-    messages = [
-        entry
-        for entry in browser.get_log("browser")
-        if "willReadFrequently" not in entry["message"]
-    ]
-    assert messages == []
+    messages = [entry["message"] for entry in browser.get_log("browser")]
+    assert [message for message in messages if "willReadFrequently" not in message] == []
     assert browser.execute_script("return performance.getEntriesByType('resource').length") == 0
     requests = requested(browser)
     assert [url for url in requests if not url.startswith(("file:", "data:"))] == []
@@ -221,6 +212,5 @@ def hostile_database(database: SignatureDatabase) -> SignatureDatabase:
         ObjectClass(item.code, item.symbol, item.name, f"{item.symbol} {HOSTILE}")
         for item in database.taxonomy.classes
     )
-    return dataclasses.replace(
-        database, taxonomy=Taxonomy(classes), licenses=(f"{HOSTILE}: {HOSTILE}",)
-    )
+    licenses = (f"{HOSTILE}: {HOSTILE}",)
+    return dataclasses.replace(database, taxonomy=Taxonomy(classes), licenses=licenses)

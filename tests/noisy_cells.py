@@ -26,6 +26,16 @@ if TYPE_CHECKING:
     from semsig_gis.likelihood.noise.model import Noise
 
 TAXONOMY = paper_taxonomy()
+METHODS = [
+    "edit+edit",
+    "edit+jaccard:alpha=0.3",
+    "histogram+edit:raw",
+    "jaccard+histogram:alpha=0.9:raw",
+    "edit+edit:weights=3/1/2",
+    "types:edit",
+    "angles:histogram",
+]
+NOTHING = Signature(np.empty(0, np.uint8), np.empty(0))
 
 
 def random_database(
@@ -73,6 +83,19 @@ def database_of(
         crs=CRS("EPSG:2154"),
         licenses=("trees: the city (CC0)",),
     )
+
+
+def random_cells(count: int, *, seed: int = 0) -> list[tuple[str, list[float]]]:
+    """Return short signatures of few classes, so that many are equal or tie."""
+    rng = np.random.default_rng(seed)
+    return [
+        ("".join(rng.choice(list("DDDBG"), length)), np.sort(rng.uniform(0, 360, length)).tolist())
+        for length in rng.integers(1, 6, count)
+    ]
+
+
+def asked(types: str | None, bearings: Sequence[float] | None = None) -> Signature:
+    return Signature.parse(types, bearings, taxonomy=TAXONOMY)
 
 
 def random_query(database: SignatureDatabase, seed: int, *, size: int) -> Signature:

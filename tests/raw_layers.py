@@ -30,13 +30,12 @@ def raw_layer(
     """Return a layer as a reader would."""
     size = len(geometries)
     names = [classes] * size if isinstance(classes, str) else list(classes)
+    texts = {"class_name": names, "source_id": ids or [str(row) for row in range(size)]}
     table = gpd.GeoDataFrame(
-        {
-            "class_name": np.array(names, dtype=object),
-            "source_id": np.array(ids or [str(row) for row in range(size)], dtype=object),
-        },
+        {column: np.array(values, dtype=object) for column, values in texts.items()},
         geometry=gpd.GeoSeries(list(geometries), crs=crs),
     )
+    read = size + filtered + unreadable
     return RawLayer(
         spec=LayerSpec(
             name=name,
@@ -46,9 +45,7 @@ def raw_layer(
             unique_id=unique_id,
         ),
         table=table,
-        counts=RowCounts(
-            read=size + filtered + unreadable, filtered=filtered, unreadable=unreadable
-        ),
+        counts=RowCounts(read=read, filtered=filtered, unreadable=unreadable),
         errors=tuple(f"row {row}: broken" for row in range(min(unreadable, 10))),
         notes=notes,
     )

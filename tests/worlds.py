@@ -48,11 +48,9 @@ def objects_of(
     """Return street objects with some columns beside those of a thing."""
     x, y, codes, sources, ids = zip(*things, strict=True) if things else ((),) * 5
     plain = {"class_code": codes, "source": sources, "source_id": ids, "count": [1] * len(things)}
+    named = (plain | columns).items()
     table = gpd.GeoDataFrame(
-        {
-            name: np.array(values, KINDS.get(name, object))
-            for name, values in (plain | columns).items()
-        },
+        {name: np.array(values, KINDS.get(name, object)) for name, values in named},
         geometry=shapely.points(np.array(x, float), np.array(y, float)),
         crs=crs,
     )
@@ -100,12 +98,10 @@ def brute_force(world: World) -> dict[tuple[int, int], list[tuple[float, float, 
     cells: dict[tuple[int, int], list[tuple[float, float, int]]] = {}
     reach = int(world.reach / world.step) + 2
     for x, y, code in world.objects:
-        middle = (
-            math.floor((x - world.origin[0]) / world.step),
-            math.floor((y - world.origin[1]) / world.step),
-        )
-        for column in range(middle[0] - reach, middle[0] + reach + 1):
-            for row in range(middle[1] - reach, middle[1] + reach + 1):
+        middle = math.floor((x - world.origin[0]) / world.step)
+        level = math.floor((y - world.origin[1]) / world.step)
+        for column in range(middle - reach, middle + reach + 1):
+            for row in range(level - reach, level + reach + 1):
                 dx = x - (world.origin[0] + (column + 0.5) * world.step)
                 dy = y - (world.origin[1] + (row + 0.5) * world.step)
                 distance = math.hypot(dx, dy)

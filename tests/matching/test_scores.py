@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from noisy_cells import database_of
-from tying_cells import CITY, METHODS, NOTHING, asked, random_cells
+from noisy_cells import METHODS, NOTHING, asked, database_of, random_cells
 
 from semsig_gis.core.errors import InputError
 from semsig_gis.core.signature import Signature
@@ -24,6 +23,7 @@ if TYPE_CHECKING:
     from semsig_gis.database.database import SignatureDatabase
 
 
+CITY = database_of(random_cells(400))
 FUSIONS = [one for one in METHODS if "+" in one]
 
 

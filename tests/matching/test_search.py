@@ -12,10 +12,9 @@ import pandas as pd
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from noisy_cells import database_of
+from noisy_cells import METHODS, NOTHING, asked, database_of, random_cells
 from pyproj import Transformer
 from sentences import refused
-from tying_cells import CITY, METHODS, NOTHING, asked, random_cells
 from worlds import random_town
 
 from semsig_gis.core.errors import EmptyResultError, InputError
@@ -32,6 +31,7 @@ if TYPE_CHECKING:
     from semsig_gis.database.database import SignatureDatabase
 
 
+CITY = database_of(random_cells(400))
 TOWN = random_town().database
 
 
