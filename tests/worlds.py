@@ -163,24 +163,26 @@ def assert_index_fits(store: ObjectStore) -> None:
         assert ours == fresh
 
 
-# Quarters of a metre: sums of their squares are exact, so a circle has an exact edge.
-QUARTERS = st.integers(-160, 160).map(lambda number: number / 4)
+NUMBERS = st.integers(-160, 160)
+# Sums of the squares of quarters of a metre are exact, so that a circle has an exact edge.
+UNITS = st.sampled_from([0.25, 0.25, math.e / 10])
 LEVELS = st.sampled_from([8, 16, 24, 32, 7])
 RANGES = st.sampled_from([2.5, 12.5, 40.0])
 
 
 @st.composite
 def worlds(draw: st.DrawFn) -> World:
-    places = st.tuples(QUARTERS, QUARTERS, st.sampled_from(CODES))
+    places = st.tuples(NUMBERS, NUMBERS, st.sampled_from(CODES))
+    unit = draw(UNITS)
     corner = draw(st.sampled_from([(0.0, 0.0), (765_200.0, 6_275_000.0), (-3e6, -1e6)]))
     return World(
         objects=tuple(
-            (x + corner[0], y + corner[1], code)
+            (x * unit + corner[0], y * unit + corner[1], code)
             for x, y, code in draw(st.lists(places, min_size=1, max_size=12))
         ),
-        step=draw(st.sampled_from([5.0, 10.0, 12.5, 40.0])),
-        origin=draw(st.tuples(QUARTERS, QUARTERS)),
-        radius=draw(st.sampled_from([0.25, 5.0, 12.5, 30.0])),
+        step=draw(st.sampled_from([5.0, 7.3, 10.0, 12.5, 40.0])),
+        origin=(draw(NUMBERS) * unit, draw(NUMBERS) * unit),
+        radius=draw(st.sampled_from([0.25, 5.0, 12.5, 17.3, 30.0])),
         levels=draw(LEVELS),
         ranges=draw(st.dictionaries(st.sampled_from(CODES), RANGES, max_size=2)),
     )
