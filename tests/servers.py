@@ -69,7 +69,6 @@ def zipped(body: bytes, **what: str) -> Answer:
 def published(
     body: bytes,
     *,
-    type: str = "application/json",  # noqa: A002 - as in Answer
     etag: str = "",
     modified: str = "",
     ranges: bool = True,
@@ -94,12 +93,12 @@ def published(
         condition = seen.headers.get("if-range")
         cut = left.pop(0) if left else None
         if not part or condition not in {None, etag, modified}:
-            return Answer(body, type=type, headers=headers, cut=cut)
+            return Answer(body, headers=headers, cut=cut)
         start = int(part.removeprefix("bytes=").partition("-")[0])
         if start >= len(body):
             return Answer(status=416, headers={"Content-Range": f"bytes */{len(body)}"})
         headers["Content-Range"] = f"bytes {start}-{len(body) - 1}/{len(body)}"
-        return Answer(body[start:], status=206, type=type, headers=headers, cut=cut)
+        return Answer(body[start:], status=206, headers=headers, cut=cut)
 
     return answer
 

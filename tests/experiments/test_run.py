@@ -182,15 +182,13 @@ def test_a_run_that_was_killed_ends_with_the_same_bytes(
     run_to_the_end(folder, tmp_path, results)
 
 
-@pytest.mark.parametrize("where", ["processes", "scheduler"])
 def test_workers_write_the_same_files_as_one_process(
-    where: str, folder: Path, results: Path, tmp_path: Path, cluster: LocalCluster
+    folder: Path, results: Path, tmp_path: Path, cluster: LocalCluster
 ) -> None:
     seen: list[int] = []
-    address = {"scheduler": cluster.scheduler_address}
-    options: dict[str, Any] = {"workers": 2} if where == "processes" else address
-    options["progress"] = lambda done, _: seen.append(done)
-    run_experiment(SPEC, tmp_path / "out", folder=folder, **options)
+    options: dict[str, Any] = {"progress": lambda done, _: seen.append(done)}
+    address = cluster.scheduler_address
+    run_experiment(SPEC, tmp_path / "out", folder=folder, scheduler=address, **options)
     assert contents(tmp_path / "out") == contents(results)
     assert len(seen) == 4
     assert seen[-1] == 520

@@ -5,6 +5,7 @@ import shutil
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -53,16 +54,47 @@ OF_MAPS = {
 FUSIONS = {f"one {measure}+{measure}:5% query" for measure in MEASURES}
 
 
-def test_every_benchmark_runs_and_is_written(tmp_path: Path) -> None:
-    out = tmp_path / "results.json"
-    checkout = Path(__file__).parents[2]
-    subprocess.run(
-        [sys.executable, "-W", "error", "-m", "benchmarks", "--size", "small", "--out", str(out)],
-        cwd=checkout,
+FIGURES = [
+    *("city", "cells", "queries", "distortion", "method", "setting"),
+    *("p25", "p50", "p50_low", "p50_high", "recall10pct", "ms_per_query"),
+]
+SHARES = [
+    *("p5", "p25", "p50", "p50_low", "p50_high", "recall10pct", "chance"),
+    *("in_exact_region", "in_region", "region_mass", "coverage", "precision"),
+]
+# Words of the method and of the setting of a figure, and how many rows have both.
+ROWS = {
+    ("edit+edit:5%, order kept", "on the grid"): 3,
+    ("edit+edit:5%, sorted after the noise", "on the grid"): 3,
+    ("noise generic, re-ranked", "answers only where sure"): 3,
+    ("noise generic, re-ranked", "deg), modelled"): 1,
+    ("noise generic, re-ranked", "deg), ignored"): 1,
+    ("noise generic, re-ranked", "north unknown"): 1,
+    ("noise generic, re-ranked", "route of"): 7,
+    ("edit+edit:5%", "off the grid"): 2,
+    ("noise generic, re-ranked, place in the cell unknown", "off the grid"): 1,
+    ("noise generic, re-ranked, refined", "off the grid"): 1,
+    ("noise medium", "on the grid"): 1,
+    ("noise light", "on the grid"): 1,
+    ("noise strong", "on the grid"): 1,
+}
+
+
+def run(module: str, out: Path) -> tuple[list[dict[str, Any]], str]:
+    """Run the benchmarks of a module on small cities; return what it wrote and printed."""
+    done = subprocess.run(
+        f"{sys.executable} -W error -m {module} --size small --out {out}".split(),
+        cwd=Path(__file__).parents[2],
         check=True,
+        stdout=subprocess.PIPE,
+        text=True,
         timeout=300,
     )
-    results = json.loads(out.read_text(encoding="utf-8"))
+    return json.loads(out.read_text(encoding="utf-8")), done.stdout
+
+
+def test_every_benchmark_runs_and_is_written(tmp_path: Path) -> None:
+    results, _ = run("benchmarks", tmp_path / "results.json")
     names = [one["name"] for one in results]
     assert len(set(names)) == len(names)
     drawn = shutil.which("chromedriver") and shutil.which("chromium") and map_assets.available()
@@ -82,3 +114,26 @@ def test_the_page_of_figures_is_that_of_the_results() -> None:
         for name in ("accuracy.json", "results.json", "reproduction.json")
     )
     assert tables.PAGE.read_text(encoding="utf-8") == tables.page(*results)
+
+
+def test_every_figure_is_measured_and_written(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.delenv("SEMSIG_GEODATA", raising=False)
+    rows, printed = run("benchmarks.accuracy", tmp_path / "accuracy.json")
+    assert "Montpellier is left out" in printed
+    named = [(one["city"], one["distortion"], one["method"], one["setting"]) for one in rows]
+    assert len(set(named)) == len(named)
+    for (method, setting), count in ROWS.items():
+        assert sum(method in one[2] and setting in one[3] for one in named) == count, method
+    for one in rows:
+        assert [name for name in one if name in FIGURES] == FIGURES
+        assert all(0.0 <= one[name] <= 1.0 for name in SHARES if one[name] is not None)
+        assert one["p50_low"] <= one["p50"] <= one["p50_high"]
+        assert one["p5"] <= one["p25"] <= one["p50"]
+        assert one["ms_per_query"] > 0.0
+    bars = [bar for one in rows for bar in one["bars"]]
+    assert f"of {len(bars)} bars met" in printed
+    for bar in (bar for bar in bars if bar["met"]):
+        assert bar["low"] is None or bar["value"] >= bar["low"]
+        assert bar["high"] is None or bar["value"] <= bar["high"]
