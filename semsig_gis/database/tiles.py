@@ -211,7 +211,6 @@ def build_tiles(
         buildings=buildings,
         streets=streets,
     )
-    paths = [plan.folder, plan.objects, plan.buildings, plan.streets]
     try:
         tiles = touched_tiles(plan.objects, grid=plan.grid, side=plan.side, reach=plan.reach)
         done = finished_tiles(plan.folder, tiles)
@@ -229,7 +228,7 @@ def build_tiles(
             done=note_part,
             workers=workers,
             scheduler=scheduler,
-            files=[path for path in paths if path is not None],
+            files=[*filter(None, (plan.folder, plan.objects, plan.buildings, plan.streets))],
         )
     finally:
         RUN.abandon(plan.folder)
@@ -296,10 +295,9 @@ def plan_tiles(
 
     Streets are needed by the viewpoints ``"streets"`` and left aside by others.
     """
+    along = streets if viewpoints.mode == "streets" else None
     places: dict[Input, str | Path | None]
-    places = {"objects": objects, "buildings": buildings, "streets": streets}
-    if viewpoints.mode != "streets":
-        del places["streets"]
+    places = {"objects": objects, "buildings": buildings, "streets": along}
     paths = {name: Path(path).absolute() for name, path in places.items() if path is not None}
     nothing = open_objects(paths["objects"], box=NOWHERE)
     reach = float(nothing.taxonomy.ranges(spec.radius).max())

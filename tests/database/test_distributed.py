@@ -12,12 +12,11 @@ import time
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-import numpy as np
 import pyarrow.parquet as pq
 import pytest
 from machine import largest_file
 from sentences import refused
-from worlds import CODES, CORNER, World, assert_same
+from worlds import CODES, CORNER, World, assert_same, random_town
 
 from semsig_gis.core.errors import DatabaseError, InputError
 from semsig_gis.database import tiles as distributed
@@ -35,17 +34,10 @@ SIDE = 200.0
 CHECKOUT = Path(distributed.__file__).parents[2]
 
 
-def two_places() -> World:
-    """Return two places of different size, some tiles apart."""
-    rng = np.random.default_rng(11)
-    places = np.concatenate([rng.uniform(0, 700, (1500, 2)), rng.uniform(1500, 1700, (100, 2))])
-    codes = rng.choice(CODES[:5], len(places)).tolist()
-    return World(
-        tuple((x, y, code) for (x, y), code in zip((places + CORNER).tolist(), codes, strict=True))
-    )
-
-
-TOWN = two_places()
+# Two places of different size, some tiles apart.
+CITY = random_town(11, count=1500, side=700.0, codes=CODES[:5])
+HAMLET = random_town(12, count=100, codes=CODES[:5])
+TOWN = World((*CITY.objects, *((x + 1500.0, y + 1500.0, code) for x, y, code in HAMLET.objects)))
 
 
 def build(folder: Path, name: str = "city", **options: object) -> dict[str, bytes]:
