@@ -38,7 +38,7 @@ class HtmlPage(HTMLParser):
             self.text += "\n" if tag in ON_A_NEW_LINE else " "
 
     def handle_endtag(self, tag: str) -> None:
-        assert self.open.pop() == tag
+        assert tag in VOID or self.open.pop() == tag
 
     def handle_data(self, data: str) -> None:
         self.text += data

@@ -6,6 +6,7 @@ import dataclasses
 import json
 import time
 from contextlib import contextmanager
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from pyproj import Transformer
@@ -17,7 +18,6 @@ from semsig_gis.maps.page import save_map
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
-    from pathlib import Path
 
     import folium
     from selenium.webdriver import Chrome
@@ -33,16 +33,7 @@ IMAGES = "img.leaflet-image-layer"
 LEGEND = ".semsig-legend"
 
 # What the script of a page can be asked about its one map.
-ASK = """
-const map = Object.values(window).find((value) => value instanceof L.Map);
-const circles = (colour) => {
-  const found = [];
-  map.eachLayer((layer) => {
-    if (layer instanceof L.CircleMarker && layer.options.fillColor === colour) found.push(layer);
-  });
-  return found;
-};
-"""
+ASK = Path(__file__).with_name("map_pages.js").read_text(encoding="utf-8")
 
 
 @dataclasses.dataclass(frozen=True)
@@ -58,6 +49,10 @@ class MapPage:
         assert save_map(map_, file, self_contained=True)
         self.browser.get(file.as_uri())
 
+    def ask_later(self, script: str, *arguments: Any) -> Any:  # noqa: ANN401
+        """Return what a script hands to the last of its arguments."""
+        return self.browser.execute_async_script(ASK + script, *arguments)
+
     def ask(self, script: str, *arguments: Any) -> Any:  # noqa: ANN401
         return self.browser.execute_script(ASK + script, *arguments)
 
@@ -68,20 +63,7 @@ class MapPage:
     def drawn(self, colour: str, canvas: str = ".leaflet-marker-pane canvas") -> int:
         """Return the number of pixels of about this colour on a canvas, by default the circles'."""
         time.sleep(0.3)  # canvases are drawn with the next frame
-        script = """
-        const canvas = document.querySelector(arguments[1]);
-        if (canvas === null) return 0;
-        const wanted = [1, 3, 5].map((at) => parseInt(arguments[0].slice(at, at + 2), 16));
-        const data = canvas.getContext("2d").getImageData(0, 0, canvas.width, canvas.height).data;
-        let count = 0;
-        for (let at = 0; at < data.length; at += 4) {
-          if (data[at + 3] > 200 && wanted.every((part, i) => Math.abs(data[at + i] - part) < 12)) {
-            count += 1;
-          }
-        }
-        return count;
-        """
-        return int(self.ask(script, colour, canvas))
+        return int(self.ask("return drawn(...arguments)", colour, canvas))
 
     def one(self, selector: str) -> WebElement:
         return self.browser.find_element(By.CSS_SELECTOR, selector)
@@ -115,8 +97,8 @@ class MapPage:
     def popup(self) -> str:
         """Return what the newest popup says, if any; one before it may still fade away."""
         time.sleep(0.4)  # arrays are unpacked once
-        script = "return [...document.querySelectorAll('.semsig-details')].pop()?.innerText ?? ''"
-        return str(self.ask(script))
+        details = self.all(".semsig-details")
+        return str(details[-1].get_property("innerText")) if details else ""
 
     def told(self) -> dict[str, str]:
         """Return what the popup says by its labels, its ``title``, and all of it as ``text``."""

@@ -37,9 +37,9 @@ def small_city() -> tuple[SignatureDatabase, StreetObjects]:
 
 
 @functools.cache
-def small_evaluation() -> Evaluation:
-    """Return an evaluation in which some queries are found, some missed and some empty."""
-    return evaluate(small_city()[0], queries=60, distortion="strong")
+def small_evaluation(distortion: str = "strong") -> Evaluation:
+    """Return an evaluation in which some queries are found, some missed and, if strong, empty."""
+    return evaluate(small_city()[0], queries=60, distortion=distortion)
 
 
 @functools.cache

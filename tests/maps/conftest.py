@@ -6,22 +6,15 @@ from typing import TYPE_CHECKING
 
 import pytest
 from map_pages import MapPage, assert_quiet
+from small_city import small_city, small_evaluation
 
-from semsig_gis.database.build import build_database
-from semsig_gis.evaluation.evaluate import evaluate
 from semsig_gis.maps.evaluation import evaluation_map
-from semsig_gis.objects.load import build_objects
-from semsig_gis.sources.catalog import paper_taxonomy
-from semsig_gis.sources.synthetic.city import CitySpec, synthetic_city
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
     from pathlib import Path
 
     from selenium.webdriver import Chrome
-
-    from semsig_gis.database.database import SignatureDatabase
-    from semsig_gis.evaluation.result import Evaluation
 
 
 @pytest.fixture
@@ -31,21 +24,8 @@ def page(browser: Chrome, tmp_path: Path, carried: None) -> Iterator[MapPage]:  
     assert_quiet(browser)
 
 
-@pytest.fixture(scope="session")
-def database() -> SignatureDatabase:
-    layers = synthetic_city(CitySpec(size=600.0))
-    objects, _ = build_objects(layers, taxonomy=paper_taxonomy(), crs="EPSG:32631")
-    return build_database(objects)
-
-
-@pytest.fixture(scope="session")
-def evaluation(database: SignatureDatabase) -> Evaluation:
-    """Return an evaluation of 60 queries in the city."""
-    return evaluate(database, queries=60, distortion="medium", seed=1)
-
-
 @pytest.fixture
-def evaluated(page: MapPage, evaluation: Evaluation, database: SignatureDatabase) -> MapPage:
-    """Return the page with the map of the evaluation."""
-    page.open(evaluation_map(evaluation, database))
+def evaluated(page: MapPage) -> MapPage:
+    """Return the page with the map of an evaluation."""
+    page.open(evaluation_map(small_evaluation("medium"), small_city()[0]))
     return page

@@ -8,11 +8,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
-from map_pages import HOSTILE, IMAGES, LEGEND, hostile_database
+from map_pages import IMAGES
 from small_city import chances_of
 from worlds import random_town
 
-from semsig_gis.likelihood.noise.model import named_noise
 from semsig_gis.maps.cells import ambiguity_map, identifiability_map
 
 if TYPE_CHECKING:
@@ -120,15 +119,6 @@ def test_what_is_known_of_queries_is_told_too(page: MapPage) -> None:
     assert len(numbers) == int((TOLD.lookalike_chances[LARGEST] >= 0.01).sum())
 
 
-def test_hostile_classes_are_shown_and_never_run(page: MapPage) -> None:
-    harmful = hostile_database(CITY)
-    page.open(ambiguity_map(harmful))
-    assert HOSTILE in page.text(LEGEND)
-    page.click(harmful, LARGEST)
-    assert HOSTILE in page.text(".semsig-details")
-    page.assert_text_stays_text()
-
-
 def whole_percent(chance: float) -> str:
     percent = round(chance * 100)
     if percent < 1:
@@ -158,28 +148,10 @@ def test_a_lookalike_is_a_jump_away(page: MapPage) -> None:
     page.open(identifiability_map(TOLD))
     cell = int(np.flatnonzero((TOLD.lookalike_chances > 0.1).all(axis=1))[0])
     assert page.click(CITY, cell)["Cell"] == str(CITY.cell_ids[cell])
-    jump = """
-    const numbers = [];
-    map.eachLayer((layer) => { if (layer.getTooltip && layer.getTooltip()) numbers.push(layer); });
-    numbers[1].fire("click");
-    """
-    page.ask(jump)
+    page.ask("shown((one) => one.getTooltip && one.getTooltip())[1].fire('click')")
     other = int(TOLD.lookalikes[cell, 1])
     assert page.told()["Cell"] == str(CITY.cell_ids[other])
     assert page.ask("return map.getBounds().contains(map._popup.getLatLng())")
     page.switch("Tell of a cell when clicked")
     time.sleep(0.5)
     assert page.all(".semsig-number") == []
-    page.ask("map.fire('click', {latlng: map.getCenter()})")
-    assert page.popup() == ""
-
-
-def test_hostile_data_is_shown_and_never_run(page: MapPage) -> None:
-    noise = dataclasses.replace(named_noise("medium"), name=HOSTILE)
-    told = dataclasses.replace(TOLD, database=hostile_database(CITY), noise=noise)
-    page.open(identifiability_map(told))
-    assert HOSTILE in page.text(LEGEND)
-    helped = np.flatnonzero((told.gains > 0.1).any(axis=1))
-    page.click(told.database, int(helped[0]))
-    assert HOSTILE in page.text(".semsig-details")
-    page.assert_text_stays_text()

@@ -1,4 +1,4 @@
-"""The map of what has changed between two dates, in a real page.browser."""
+"""The map of what has changed between two dates, in a real browser."""
 
 from __future__ import annotations
 
@@ -6,28 +6,21 @@ import dataclasses
 from typing import TYPE_CHECKING
 
 import numpy as np
-import pytest
 import shapely
-from map_pages import HOSTILE, IMAGES, LEGEND, hostile_database
-from sentences import refused
+from map_pages import IMAGES, LEGEND
 from worlds import CODES, TAXONOMY, random_town
 
-from semsig_gis.core.errors import CrsError, DatabaseError, InputError
-from semsig_gis.core.signature import SignatureSpec
 from semsig_gis.core.signs import OBJECT_COLOURS
-from semsig_gis.core.taxonomy import Taxonomy
 from semsig_gis.database.build import build_database
 from semsig_gis.database.update import compare_cells
 from semsig_gis.maps.drift import drift_map
 from semsig_gis.maps.objects import objects_map
 from semsig_gis.maps.parts import layers_of
 from semsig_gis.objects.changes import compare_objects
-from semsig_gis.objects.table import Licence
 
 if TYPE_CHECKING:
     from map_pages import MapPage
 
-    from semsig_gis.database.database import SignatureDatabase
     from semsig_gis.objects.table import StreetObjects
 
 BEFORE = random_town().street_objects
@@ -50,8 +43,6 @@ def later() -> StreetObjects:
 AFTER = later()
 OLD, NEW = build_database(BEFORE), build_database(AFTER)
 CELLS = compare_cells(OLD, NEW)
-OTHER = Taxonomy((dataclasses.replace(TAXONOMY.classes[0], name="other"), *TAXONOMY.classes[1:]))
-TURNED = dataclasses.replace(AFTER, table=AFTER.table.to_crs("EPSG:32631"))
 
 
 def test_cells_before_and_now(page: MapPage) -> None:
@@ -121,26 +112,6 @@ def test_a_class_is_found_before_its_objects(page: MapPage) -> None:
     assert offered[1].startswith("Object removed\n")
 
 
-def test_hostile_data_is_shown_and_never_run(page: MapPage) -> None:
-    taxonomy = hostile_database(NEW).taxonomy
-    objects = [
-        dataclasses.replace(
-            one,
-            table=one.table.assign(source=HOSTILE),
-            taxonomy=taxonomy,
-            licenses=(Licence(HOSTILE),),
-        )
-        for one in (BEFORE, AFTER)
-    ]
-    old, new = map(build_database, objects)
-    page.open(drift_map(old, new, objects_before=objects[0], objects_after=objects[1]))
-    assert HOSTILE in page.text(LEGEND)
-    page.popup_of(OBJECT_COLOURS["removed"])
-    assert page.text(".semsig-details").count(HOSTILE) == 2  # class and source
-    page.click(new, int(CELLS.changed[0, 1]))
-    page.assert_text_stays_text()
-
-
 def test_nothing_has_changed_or_everything() -> None:
     half = len(OLD) // 2
     same = drift_map(OLD, OLD, objects_before=BEFORE, objects_after=BEFORE)
@@ -148,24 +119,3 @@ def test_nothing_has_changed_or_everything() -> None:
     for map_, cells in ((same, "Cells that are the same"), (other, "Cells that differ")):
         names = [getattr(child, "layer_name", "") for child in layers_of(map_).values()]
         assert [name for name in names if name.startswith(("Cells that", "Objects"))] == [cells]
-
-
-@pytest.mark.parametrize(
-    ("before", "after", "objects", "error", "words"),
-    [
-        (OLD, build_database(AFTER, spec=SignatureSpec(20.0)), None, DatabaseError, "radius=20.0"),
-        (OLD, dataclasses.replace(NEW, taxonomy=OTHER), None, InputError, "'other'"),
-        (OLD, NEW, TURNED, CrsError, "EPSG:32631"),
-        (OLD.select(slice(0)), NEW.select(slice(0)), None, InputError, "no cells"),
-        (OLD, dataclasses.replace(NEW, rows=NEW.rows + 10_000), None, InputError, "same city"),
-    ],
-)
-def test_what_does_not_belong_together(
-    before: SignatureDatabase,
-    after: SignatureDatabase,
-    objects: StreetObjects | None,
-    error: type[Exception],
-    words: str,
-) -> None:
-    with refused(error, words):
-        drift_map(before, after, objects_before=BEFORE, objects_after=objects)

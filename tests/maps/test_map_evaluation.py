@@ -3,45 +3,37 @@
 from __future__ import annotations
 
 import dataclasses
+import re
 from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
-from map_pages import ASK, IMAGES, LEGEND
+from map_pages import IMAGES, LEGEND
 from selenium.webdriver.common.by import By
 from selenium.webdriver.common.keys import Keys
 from sentences import refused
+from small_city import small_city, small_evaluation
 
 from semsig_gis.core.errors import InputError
 from semsig_gis.core.signs import ERROR_RAMP, FAILED, SUCCESSFUL
-from semsig_gis.evaluation.evaluate import evaluate
 from semsig_gis.maps.evaluation import evaluation_map
 from semsig_gis.maps.page import page_of_map
 
 if TYPE_CHECKING:
     from map_pages import MapPage
 
-    from semsig_gis.database.database import SignatureDatabase
-    from semsig_gis.evaluation.result import Evaluation
+CITY, EVALUATION = small_city()[0], small_evaluation("medium")
 
 
-# Counts layers, or the lines in them.
-COUNT = """
-let count = 0;
-map.eachLayer((one) => {{ count += Number({}) || 0; }});
-return count;
-"""
-
-
-def test_an_evaluation_in_a_browser(evaluated: MapPage, evaluation: Evaluation) -> None:
-    successes = int(evaluation.successful.sum())
-    assert 0 < successes < len(evaluation.queries)
+def test_an_evaluation_in_a_browser(evaluated: MapPage) -> None:
+    successes = int(EVALUATION.successful.sum())
+    assert 0 < successes < len(EVALUATION.queries)
     assert evaluated.browser.title == "Localization errors"
     assert evaluated.circles(SUCCESSFUL) == successes
-    assert evaluated.circles(FAILED) == len(evaluation.queries) - successes
+    assert evaluated.circles(FAILED) == len(EVALUATION.queries) - successes
     image = evaluated.one(IMAGES)
     assert evaluated.ask("return arguments[0].naturalWidth", image) > 100
-    assert f"{len(evaluation.queries)} queries" in evaluated.one(LEGEND).text
+    assert f"{len(EVALUATION.queries)} queries" in evaluated.one(LEGEND).text
     for name, colour in (("Successful", SUCCESSFUL), ("Failed", FAILED)):
         before = evaluated.drawn(colour)
         assert before > 0
@@ -57,41 +49,20 @@ def test_an_evaluation_in_a_browser(evaluated: MapPage, evaluation: Evaluation) 
     evaluated.switch("Objects seen")
     assert evaluated.all(IMAGES) == []
     evaluated.switch("Lines")
-    lines = COUNT.format("one.getLatLngs && one.getLatLngs().length")
-    assert evaluated.ask(lines) == int((evaluation.queries["tied"] > 0).sum())
+    count = "return lines(() => true).reduce((sum, one) => sum + one.getLatLngs().length, 0)"
+    assert evaluated.ask(count) == int((EVALUATION.queries["tied"] > 0).sum())
 
 
-def test_the_heatmap_shows_mean_errors_at_every_zoom(
-    evaluated: MapPage, evaluation: Evaluation, database: SignatureDatabase
-) -> None:
+def test_the_heatmap_shows_mean_errors_at_every_zoom(evaluated: MapPage) -> None:
     """The oracle weighs every query for every place, in pixels of the screen."""
-    guess = np.sqrt(2.0 * database.xy.var(axis=0).sum())
-    errors = np.minimum(evaluation.queries["error_m"].to_numpy() / guess, 1.0)
-    degrees = evaluation.queries.to_crs("EPSG:4326").geometry
+    guess = np.sqrt(2.0 * CITY.xy.var(axis=0).sum())
+    errors = np.minimum(EVALUATION.queries["error_m"].to_numpy() / guess, 1.0)
+    degrees = EVALUATION.queries.to_crs("EPSG:4326").geometry
     places = np.stack([degrees.y, degrees.x], axis=1).tolist()
     stops = np.linspace(0.0, 1.0, len(ERROR_RAMP))
     ramp = np.array([list(bytes.fromhex(colour[1:])) for colour in ERROR_RAMP])
-    # The colours at the queries, mixed from the four pixels of the field around each.
-    script = """
-    const [places, zoom, done] = arguments;
-    map.setZoom(map.getZoom() + zoom, {animate: false});
-    requestAnimationFrame(() => requestAnimationFrame(() => {
-      const canvas = document.querySelector("canvas.semsig-heat");
-      const copy = document.createElement("canvas");
-      [copy.width, copy.height] = [canvas.width, canvas.height];
-      const context = copy.getContext("2d", {willReadFrequently: true});
-      context.drawImage(canvas, 0, 0);
-      const box = canvas.getBoundingClientRect();
-      const shape = map.getContainer().getBoundingClientRect();
-      done(places.map((place) => {
-        const {x, y} = map.latLngToContainerPoint(place);
-        const [left, top] = [x + shape.left - box.left, y + shape.top - box.top];
-        return [x, y, ...context.getImageData(Math.round(left), Math.round(top), 1, 1).data];
-      }));
-    }));
-    """
     for zoom in (0, -1, 2):
-        told = np.array(evaluated.browser.execute_async_script(ASK + script, places, zoom))
+        told = np.array(evaluated.ask_later("heat(...arguments)", places, zoom))
         away = np.hypot(*(told[:, None, :2] - told[None, :, :2]).T)
         weights = np.maximum(0.0, 1.0 - (away / 28.0) ** 2) ** 2
         means = (weights * errors[:, None]).sum(axis=0) / weights.sum(axis=0)
@@ -102,41 +73,34 @@ def test_the_heatmap_shows_mean_errors_at_every_zoom(
             assert np.abs(told[seen, 2 + part] - expected[seen]).max() < 16
 
 
-def test_a_click_shows_the_signature_and_the_place_found(
-    evaluated: MapPage, evaluation: Evaluation, database: SignatureDatabase
-) -> None:
-    row = evaluation.queries.iloc[-1]
+def test_a_click_shows_the_signature_and_the_place_found(evaluated: MapPage) -> None:
+    row = EVALUATION.queries.iloc[-1]
     assert evaluated.all(".semsig-details") == []
     last = """
     [...circles(arguments[1]), ...circles(arguments[2])].find(
-      (one) => one.getPopup().getContent()(one).firstChild.textContent.startsWith(arguments[0]))
+      (one) => content(one).firstChild.textContent.startsWith(arguments[0]))
     """
-    evaluated.point_at(last, f"Query {len(evaluation.queries)}:", SUCCESSFUL, FAILED)
+    evaluated.point_at(last, f"Query {len(EVALUATION.queries)}:", SUCCESSFUL, FAILED)
     outline = "return circles(arguments[0])[0].options.color"
     assert evaluated.ask(outline, SUCCESSFUL) == "#222"
     evaluated.one(".semsig-colours").click()
     assert evaluated.ask(outline, SUCCESSFUL) == "#e9e9e6"  # light on dark
     evaluated.ask("localStorage.clear()")
     popup = evaluated.popup().replace("\u00a0", " ")
-    bearings = database.signature(int(row["cell"])).bearings
-    assert bearings is not None
-    first = f"{row['types'][0]} {round(float(bearings[0])) % 360}°"
-    legend = f"{row['types'][0]} {database.taxonomy.by_symbol(row['types'][0]).title}"
-    for said in (row["types"], row["query_types"], first, legend, str(row["cell_id"])):
+    legend = f"{row['types'][0]} {CITY.taxonomy.by_symbol(row['types'][0]).title}"
+    for said in (row["types"], row["query_types"], legend, str(row["cell_id"])):
         assert said in popup
-    assert f"of {len(database):,}" in popup
-    dashed = COUNT.format("one.options.dashArray && !!one.getLatLngs")
+    assert f"of {len(CITY):,}" in popup
+    dashed = "return lines((one) => one.options.dashArray).length"
     assert evaluated.ask(dashed) == 1  # to the best place
-    empty = COUNT.format("one instanceof L.CircleMarker && !one.options.fill")
-    assert evaluated.ask(empty) == 1 + len(evaluation.next_cell_ids[-1])
+    empty = "return shown((one) => one instanceof L.CircleMarker && !one.options.fill).length"
+    assert evaluated.ask(empty) == 1 + len(EVALUATION.next_cell_ids[-1])
     evaluated.ask("map.closePopup()")
     assert evaluated.ask(dashed) == 0
 
 
-def test_a_popup_draws_signatures_as_wheels(
-    evaluated: MapPage, evaluation: Evaluation, database: SignatureDatabase
-) -> None:
-    lengths = evaluation.queries["query_length"]
+def test_a_popup_draws_signatures_as_wheels(evaluated: MapPage) -> None:
+    lengths = EVALUATION.queries["query_length"]
     letters = """
     return [...document.querySelectorAll(".semsig-wheels text")].map((one) =>
       one.getAttribute("font-size") * one.ownerSVGElement.getBoundingClientRect().width / 116);
@@ -147,10 +111,10 @@ def test_a_popup_draws_signatures_as_wheels(
         assert evaluated.popup().startswith(name)
         assert min(evaluated.ask(letters)) >= 9.0
     wheels = evaluated.all(".semsig-wheels figure")
-    row = evaluation.queries.iloc[query]
+    row = EVALUATION.queries.iloc[query]
     seen = (
-        ("True cell sees", row["types"], database.signature(int(row["cell"])).bearings),
-        ("Query", row["query_types"], evaluation.query_bearings[query]),
+        ("True cell sees", row["types"], CITY.signature(int(row["cell"])).bearings),
+        ("Query", row["query_types"], EVALUATION.query_bearings[query]),
     )
     assert wheels[0].rect["y"] == wheels[1].rect["y"]  # side by side
     for wheel, (label, types, bearings) in zip(wheels, seen, strict=False):
@@ -169,37 +133,33 @@ def test_a_popup_draws_signatures_as_wheels(
             assert np.hypot(x, y) < 54.0
 
 
-def test_queries_of_which_nothing_is_left(database: SignatureDatabase) -> None:
-    strong = evaluate(database, queries=len(database), distortion="strong")
+def test_queries_of_which_nothing_is_left() -> None:
+    strong = small_evaluation()
     lost = strong.queries["tied"] == 0
     assert lost.any()
     only = dataclasses.replace(strong, queries=strong.queries[lost].reset_index(drop=True))
-    page = page_of_map(evaluation_map(only, database), self_contained=False)
+    page = page_of_map(evaluation_map(only, CITY), self_contained=False)
     assert page.count("nothing left of it") == int(lost.sum())
     assert "infinite, not localized" in page
-    assert "NaN" not in page.partition("</head>")[2]
+    assert not re.search(r"\bNaN\b", page.partition("</head>")[2])
 
 
-def test_queries_from_cells_that_the_database_has_not(
-    evaluation: Evaluation, database: SignatureDatabase
-) -> None:
-    queries = evaluation.queries.copy()
+def test_queries_from_cells_that_the_database_has_not() -> None:
+    queries = EVALUATION.queries.copy()
     queries.loc[:2, ["cell", "cell_id"]] = -1, -7
     queries.loc[:2, "types"] = ""
-    elsewhere = dataclasses.replace(evaluation, queries=queries)
-    assert (elsewhere.rows_in(database)[:3] == -1).all()
-    page = page_of_map(evaluation_map(elsewhere, database), self_contained=False)
+    elsewhere = dataclasses.replace(EVALUATION, queries=queries)
+    assert (elsewhere.rows_in(CITY)[:3] == -1).all()
+    page = page_of_map(evaluation_map(elsewhere, CITY), self_contained=False)
     assert page.count("no such cell") == 3
     queries.loc[5, "types"] = "?"
     with refused(InputError, "evaluation was not made with this database"):
-        evaluation_map(dataclasses.replace(evaluation, queries=queries), database)
+        evaluation_map(dataclasses.replace(EVALUATION, queries=queries), CITY)
 
 
 @pytest.mark.parametrize(("number", "most"), [(500, 500_000), (10_000, 8_000_000)])
-def test_ten_thousand_queries_stay_small(
-    number: int, most: int, evaluation: Evaluation, database: SignatureDatabase
-) -> None:
-    rows = np.arange(number) % len(evaluation.queries)
-    queries = evaluation.queries.iloc[rows].reset_index(drop=True)
-    many = dataclasses.replace(evaluation, queries=queries)
-    assert len(page_of_map(evaluation_map(many, database), self_contained=False)) < most
+def test_ten_thousand_queries_stay_small(number: int, most: int) -> None:
+    rows = np.arange(number) % len(EVALUATION.queries)
+    queries = EVALUATION.queries.iloc[rows].reset_index(drop=True)
+    many = dataclasses.replace(EVALUATION, queries=queries)
+    assert len(page_of_map(evaluation_map(many, CITY), self_contained=False)) < most

@@ -14,16 +14,16 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 from PIL import Image
 from pyproj import CRS, Transformer
+from six_cells import cells_at
 
 from semsig_gis.core.geometry import GridSpec
-from semsig_gis.core.signature import SignatureSpec
-from semsig_gis.database.database import SignatureDatabase
 from semsig_gis.maps import image as map_image
 from semsig_gis.maps.image import city_image, level_image, place_lattices, script_json
-from semsig_gis.sources.catalog import paper_taxonomy
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
+
+    from semsig_gis.database.database import SignatureDatabase
 
 PLACES = [
     ("EPSG:2154", (765_200.0, 6_275_000.0)),
@@ -38,25 +38,10 @@ def a_city(
     rows: NDArray[np.int64],
     *,
     crs: str = "EPSG:2154",
-    grid: GridSpec | None = None,
-    seed: int = 0,
+    origin: tuple[float, float] = (765_200.0, 6_275_000.0),
 ) -> SignatureDatabase:
-    """Return a database with random lengths in the given cells."""
-    order = np.lexsort((rows, columns))
-    lengths = np.random.default_rng(seed).integers(1, 15, len(order))
-    total = int(lengths.sum())
-    return SignatureDatabase(
-        columns=columns[order].astype(np.int32),
-        rows=rows[order].astype(np.int32),
-        offsets=np.concatenate([[0], np.cumsum(lengths)]),
-        codes=np.ones(total, np.uint8),
-        bearing_units=np.zeros(total, np.uint16),
-        distance_units=np.zeros(total, np.uint8),
-        grid=grid or GridSpec(10.0, (765_200.0, 6_275_000.0)),
-        spec=SignatureSpec(),
-        taxonomy=paper_taxonomy(),
-        crs=CRS(crs),
-    )
+    """Return a city that sees random numbers of objects from the given cells."""
+    return cells_at(columns, rows, longest=14, crs=CRS(crs), grid=GridSpec(10.0, origin))
 
 
 def scattered(side: int, share: float, seed: int = 1) -> tuple[NDArray[np.int64], ...]:
@@ -92,7 +77,7 @@ def seen_at(
 @pytest.mark.parametrize("side", [7, 600])
 @pytest.mark.parametrize(("crs", "origin"), PLACES)
 def test_cells_lie_where_the_map_has_them(side: int, crs: str, origin: tuple[float, float]) -> None:
-    database = a_city(*scattered(side, 0.4), crs=crs, grid=GridSpec(10.0, origin))
+    database = a_city(*scattered(side, 0.4), crs=crs, origin=origin)
     image, bounds = city_image(database, SHADES)
     # A pixel is at most half a cell wide, so the middle of a cell always has the cell's shade.
     expected = np.digitize(database.lengths, list(SHADES))
@@ -171,7 +156,7 @@ def between(
 
 @pytest.mark.parametrize(("crs", "origin"), PLACES)
 def test_lattices_place_cells_to_a_centimetre(crs: str, origin: tuple[float, float]) -> None:
-    database = a_city(*scattered(300, 0.01), crs=crs, grid=GridSpec(10.0, origin))
+    database = a_city(*scattered(300, 0.01), crs=crs, origin=origin)
     lattices = place_lattices(database)
     to_degrees = Transformer.from_crs(crs, "EPSG:4326")
     latlon = np.stack(to_degrees.transform(*database.xy.T), axis=1)

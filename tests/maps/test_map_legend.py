@@ -4,16 +4,15 @@ from __future__ import annotations
 
 import dataclasses
 import functools
-from html.parser import HTMLParser
 from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
+from html_pages import HtmlPage
 from small_city import chances_of, small_city
 
 import semsig_gis
 from semsig_gis.core.signature import Signature
-from semsig_gis.core.signs import SHADES
 from semsig_gis.core.taxonomy import Taxonomy
 from semsig_gis.database.update import CellChanges
 from semsig_gis.evaluation.evaluate import evaluate
@@ -91,31 +90,12 @@ def legends(city: SignatureDatabase, objects: StreetObjects, name: str) -> dict[
     }
 
 
-class Text(HTMLParser):
-    """The text of HTML, and the elements in it."""
-
-    def __init__(self, text: str) -> None:
-        super().__init__()
-        self.shown = ""
-        self.tags: set[str] = set()
-        self.feed(text)
-        self.close()
-
-    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:  # noqa: ARG002
-        self.tags.add(tag)
-        if tag != "bdi":
-            self.shown += "\n" if tag in {"p", "br", "tr", "table"} else " "
-
-    def handle_data(self, data: str) -> None:
-        self.shown += data
-
-
-LEGENDS = {name: Text(text) for name, text in legends(CITY, OBJECTS, "light").items()}
+LEGENDS = {name: HtmlPage(text) for name, text in legends(CITY, OBJECTS, "light").items()}
 
 
 @pytest.mark.parametrize("name", LEGENDS)
 def test_what_a_legend_says(name: str, snapshot: Callable[[str, str], None]) -> None:
-    text = LEGENDS[name].shown.replace(semsig_gis.__version__, "VERSION")
+    text = LEGENDS[name].text.replace(semsig_gis.__version__, "VERSION")
     lines = (" ".join(line.split()) for line in text.splitlines())
     snapshot(f"{name}.txt", "\n".join(line for line in lines if line) + "\n")
 
@@ -130,7 +110,7 @@ def test_the_numbers_are_those_of_the_results() -> None:
         ("identifiability", f"{facts['chance_found']:.1%} for the mean cell"),
         ("identifiability", f"90% to 100%: {facts['bands'][-1]['share']:.1%} of the cells"),
     ):
-        assert words in LEGENDS[name].shown
+        assert words in LEGENDS[name].text
 
 
 def test_text_from_data_stays_text_and_turns_no_other() -> None:
@@ -139,12 +119,7 @@ def test_text_from_data_stays_text_and_turns_no_other() -> None:
     city = dataclasses.replace(CITY, taxonomy=taxonomy, licenses=(HOSTILE,))
     objects = dataclasses.replace(OBJECTS, taxonomy=taxonomy, licenses=(Licence(HOSTILE),))
     for name, legend in legends(city, objects, HOSTILE).items():
-        text = Text(legend)
-        assert (HOSTILE in text.shown) == (name != "evaluation_without_distortion")
-        assert text.tags == LEGENDS[name].tags
+        page = HtmlPage(legend)
+        assert (HOSTILE in page.text) == (name != "evaluation_without_distortion")
+        assert page.tags == LEGENDS[name].tags
         assert legend.count("\u202e") == legend.count("\u202eabc</bdi>")
-
-
-def test_shades_begin_with_one_object() -> None:
-    assert min(SHADES) == 1
-    assert list(SHADES) == sorted(SHADES)

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import dataclasses
 import math
 import time
 from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
-from map_pages import HOSTILE, IMAGES, LEGEND, hostile_database
+from map_pages import IMAGES, LEGEND
 from selenium.webdriver.common.by import By
 from worlds import random_town
 
@@ -25,7 +24,6 @@ from semsig_gis.matching.search import localize
 if TYPE_CHECKING:
     from map_pages import MapPage
 
-    from semsig_gis.database.database import SignatureDatabase
     from semsig_gis.likelihood.locate import Location
 
 WORLD = random_town()
@@ -34,18 +32,18 @@ STORE = ObjectStore.of(WORLD.street_objects)
 LONGEST = int(CITY.lengths.argmax())
 
 
-def found(database: SignatureDatabase = CITY, store: ObjectStore = STORE) -> Location:
+def found() -> Location:
     """Return where the richest cell was seen, with an error of each kind."""
-    query = database.signature(LONGEST)
+    query = CITY.signature(LONGEST)
     assert query.codes is not None
     assert query.bearings is not None
     seen = query.codes.copy()
-    seen[1] = next(code for code in database.present_codes if code != seen[1])
+    seen[1] = next(code for code in CITY.present_codes if code != seen[1])
     gap = (query.bearings[-1] + 360.0 + query.bearings[0]) / 2.0 % 360.0
     codes = np.append(np.delete(seen, 3), seen[0])
     query = Signature(codes, np.append(np.delete(query.bearings, 3), gap))
-    index = build_index(database, cell_noise(named_noise("medium"), 10.0))
-    return locate(index, query, explained=2, top=5, store=store, refined=True, north_sigma=math.inf)
+    index = build_index(CITY, cell_noise(named_noise("medium"), 10.0))
+    return locate(index, query, explained=2, top=5, store=STORE, refined=True, north_sigma=math.inf)
 
 
 def test_a_location_in_a_browser(page: MapPage) -> None:
@@ -66,11 +64,9 @@ def test_a_location_in_a_browser(page: MapPage) -> None:
     for verdict in ("matched", "misnamed", "false"):
         assert page.circles(VERDICTS[verdict]) == counts[verdict]
     ellipse = """
-    const rings = [];
-    map.eachLayer((one) => {
-      if (one.options.color === arguments[0] && one.getLatLngs) rings.push(one.getLatLngs()[0]);
-    });
-    return [rings.length, map.distance(rings[0][0], rings[0][36]), rings[0].length];
+    const rings = lines((one) => one.options.color === arguments[0]);
+    const [ring] = rings[0].getLatLngs();
+    return [rings.length, map.distance(ring[0], ring[36]), ring.length];
     """
     rings, across, corners = page.ask(ellipse, SUCCESSFUL)
     assert (rings, corners) == (1, 73)
@@ -126,42 +122,24 @@ def test_what_cannot_be_told_is_shown_from_afar(page: MapPage) -> None:
     assert page.ask(inside)
 
 
-def test_hostile_data_is_shown_and_never_run(page: MapPage) -> None:
-    harmful = hostile_database(CITY)
-    table = STORE.objects.table.assign(source=HOSTILE, source_id=HOSTILE)
-    objects = dataclasses.replace(STORE.objects, table=table, taxonomy=harmful.taxonomy)
-    location = found(harmful, ObjectStore.of(objects))
-    page.open(location_map(dataclasses.replace(location, noise=HOSTILE)))
-    assert page.text(LEGEND).count(HOSTILE) == 3  # the noise, and a licence of two parts
-    page.popup_of(VERDICTS["matched"])
-    # Both classes, source and identifier.
-    assert page.text(".semsig-details").count(HOSTILE) == 4
-    page.assert_text_stays_text()
-
-
-def test_a_localization_in_a_browser(page: MapPage, database: SignatureDatabase) -> None:
-    cell = int(np.argmax(database.lengths))
-    localization = localize(database, database.signature(cell), top=50)
-    page.open(localization_map(localization, database))
+def test_a_localization_in_a_browser(page: MapPage) -> None:
+    page.open(localization_map(localize(CITY, CITY.signature(LONGEST), top=50), CITY))
+    assert page.browser.title == "Candidate places"
     texts = """
-    const texts = [];
-    map.eachLayer((one) => {
-      if (one instanceof L.CircleMarker) texts.push(one.getPopup().getContent()(one).textContent);
-    });
-    return texts;
+    return shown((one) => one instanceof L.CircleMarker).map((one) => content(one).textContent);
     """
     popups = page.ask(texts)
     assert len(popups) == 50
     best = popups[-1]  # drawn last, on top
     assert best.startswith("Rank 1")
     assert "Rank1 of " in best
-    assert str(database.cell_ids[cell]) in best
-    assert database.types(cell) in best
+    assert str(CITY.cell_ids[LONGEST]) in best
+    assert CITY.types(LONGEST) in best
     # The query and what the cell sees, side by side.
     page.ask("circles(arguments[0])[0].openPopup()", CANDIDATE_RAMP[0])
     captions = [one.get_property("innerText") for one in page.all("figcaption")]
     assert captions == ["Query", "Signature"]
     page.ask("map.closePopup()")
-    assert f"Types: {database.types(cell)}" in page.one(LEGEND).text
+    assert f"Types: {CITY.types(LONGEST)}" in page.one(LEGEND).text
     page.switch("Candidates")
     assert page.ask(texts) == []

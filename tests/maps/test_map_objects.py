@@ -7,11 +7,12 @@ import html
 import re
 from typing import TYPE_CHECKING
 
+import folium
 import geopandas as gpd
 import numpy as np
 import pytest
 import shapely
-from map_pages import ASK, HOSTILE, LEGEND, MapPage, assert_quiet
+from map_pages import HOSTILE, LEGEND, MapPage, assert_quiet
 from selenium.webdriver.common.by import By
 from selenium.webdriver.common.keys import Keys
 from worlds import random_town
@@ -99,23 +100,7 @@ def test_a_click_tells_of_the_nearest_object(page: MapPage) -> None:
 def test_the_script_has_every_object_where_it_is(page: MapPage) -> None:
     page.open(objects_map(OBJECTS))
     page.browser.set_script_timeout(30)
-    script = """
-    const done = arguments[arguments.length - 1];
-    const places = [];
-    const look = () => {
-      for (let one = 0; one < arguments[0]; one += 1) {
-        const name = semsig.finders.flatMap((finder) => finder(String(one), 99))
-          .find((other) => other.name === String(one));
-        if (!name) return setTimeout(look, 50);
-        name.show(map);
-        const place = map._popup.getLatLng();
-        places.push([place.lat, place.lng]);
-      }
-      done(places);
-    };
-    look();
-    """
-    places = page.browser.execute_async_script(ASK + script, 40)
+    places = page.ask_later("placesOfObjects(...arguments)", 40)
     expected = np.array([place_of(number) for number in range(40)])
     assert np.abs(np.array(places) - expected).max() < 4e-6  # a quarter of a metre
 
@@ -168,13 +153,7 @@ def test_the_search_is_used_by_keyboard(page: MapPage) -> None:
     offered = page.search("1")
     assert len(offered) == 8
     assert page.one("[aria-selected=true]").text == offered[0]
-    covered = """
-    return [...document.querySelectorAll('[role=option]')].filter((one) => {
-      const {left, top, height} = one.getBoundingClientRect();
-      return !one.contains(document.elementFromPoint(left + 10, top + height / 2));
-    }).length;
-    """
-    assert page.ask(covered) == 0  # no button lies on what is offered
+    assert page.ask("return covered()") == 0  # no button lies on what is offered
     box.send_keys(Keys.ARROW_DOWN, Keys.ARROW_DOWN)
     assert page.one("[aria-selected=true]").text == offered[2]
     active = box.get_attribute("aria-activedescendant")
@@ -256,10 +235,7 @@ def test_hostile_data_is_shown_and_never_run(page: MapPage) -> None:
     # No sign of direction reaches what stands beside, and no name fills the page.
     for alone in (".leaflet-control-attribution bdi", ".leaflet-control-layers-overlays bdi"):
         assert page.text(alone).endswith(harm)
-    highest = """
-    const parts = [...document.querySelectorAll(arguments[0])];
-    return Math.max(...parts.map((one) => one.getBoundingClientRect().height));
-    """
+    highest = "return Math.max(...[...document.querySelectorAll(arguments[0])].map(height))"
     assert page.ask(highest, ".leaflet-control-layers-overlays label") <= 90
     assert page.ask(highest, ".semsig-legend tr") <= 90
     click(page, NUMBER)
@@ -313,12 +289,13 @@ def test_maps_lie_over_each_other_and_the_ground_below_all(page: MapPage) -> Non
     x, y = CITY.xy.mean(axis=0)
     house = table(shapely.box(x - 50, y - 50, x + 50, y + 50))
     house.attrs["licenses"] = ["Mapper (CC0)"]
-    map_ = localization_map(localize(CITY, CITY.signature(0), top=3), CITY)
+    map_ = folium.Map([43.0, 3.0], zoom_start=12, tiles=None)
+    localization_map(localize(CITY, CITY.signature(0), top=3), CITY, map_=map_)
     for _ in range(2):
         objects_map(OBJECTS, map_=map_)
     ground_map(buildings=house, map_=map_)
     page.open(map_)
-    assert page.browser.title == "Candidate places"
+    assert page.ask("return map.getZoom()") == 12  # the view is the caller's
     assert page.all(BOARD) == []  # hidden at first
     assert len(page.all(".semsig-search")) == 1
     assert len(page.all(".semsig-legend[open]")) == 1

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import html
 import re
-from html.parser import HTMLParser
 from typing import TYPE_CHECKING
 
 import folium
 import folium.plugins
 import pytest
+from html_pages import HtmlPage
 from map_pages import requested
 from sentences import refused
 
@@ -48,27 +48,6 @@ def linked_page() -> str:
     return page
 
 
-class Resources(HTMLParser):
-    """Every address that a page makes a browser load, as an HTML parser sees it."""
-
-    def __init__(self) -> None:
-        super().__init__()
-        self.addresses: list[str] = []
-        self.open: str | None = None
-        self.text: dict[str, list[str]] = {"script": [], "style": []}
-
-    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
-        self.open = tag
-        self.addresses += [value for name, value in attrs if name in {"src", "href"} and value]
-
-    def handle_endtag(self, tag: str) -> None:  # noqa: ARG002
-        self.open = None
-
-    def handle_data(self, data: str) -> None:
-        if self.open in self.text:
-            self.text[self.open].append(data)
-
-
 def test_every_link_of_a_folium_page_is_known() -> None:
     known = {file for asset in assets().values() for file in asset.stands_for}
     linked = {address.rpartition("/")[2] for address in external_files(linked_page())}
@@ -80,12 +59,11 @@ def test_every_link_of_a_folium_page_is_known() -> None:
 def test_a_page_is_left_without_addresses_to_load() -> None:
     page = inline_assets(linked_page())
     assert external_files(page) == ()
-    parser = Resources()
-    parser.feed(page)
-    assert parser.addresses == []
+    parsed = HtmlPage(page)
+    assert [address for address in parsed.loaded if not address.startswith("data:")] == []
     # one element a file: nothing inside a script or style closed it early
-    assert [text for text in parser.text["style"] if "images/" in text] == []
-    assert sum("Leaflet 1.9.3" in text for text in parser.text["script"]) == 1
+    assert [text for text in parsed.text_of["style"] if "images/" in text] == []
+    assert sum("Leaflet 1.9.3" in text for text in parsed.text_of["script"]) == 1
     assert "sourceMappingURL" not in page
 
 
@@ -124,11 +102,13 @@ def test_the_end_of_an_element_inside_a_file_is_escaped(monkeypatch: pytest.Monk
     assert asset_text("leaflet.css") == r"let a = '</SCRIPT><!-- <\/style>';"
 
 
-def test_unknown_names() -> None:
-    with pytest.raises(UnknownNameError, match=r"nearest is 'jquery\.min\.js'"):
-        asset_text("jquery.js")
-    with pytest.raises(UnknownNameError, match=r"'layers\.png' is not a map file"):
-        asset_text("layers.png")
+@pytest.mark.parametrize(
+    ("name", "words"),
+    [("jquery.js", "nearest is 'jquery.min.js'"), ("layers.png", "'layers.png' is not a map file")],
+)
+def test_unknown_names(name: str, words: str) -> None:
+    with refused(UnknownNameError, words):
+        asset_text(name)
 
 
 @pytest.mark.parametrize("damage", ["absent", "changed"])

@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 from functools import partial
 from importlib import resources
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import folium
 import geopandas as gpd
@@ -22,11 +22,14 @@ from selenium.webdriver.common.keys import Keys
 from selenium.webdriver.support.ui import WebDriverWait
 from sentences import refused
 from small_city import chances_of
-from worlds import random_town
+from worlds import TAXONOMY, random_town
 
-from semsig_gis.core.errors import CrsError, EmptyResultError, InputError
-from semsig_gis.core.signature import Signature
-from semsig_gis.core.signs import FAILED, SUCCESSFUL
+from semsig_gis.core.errors import CrsError, DatabaseError, EmptyResultError, InputError
+from semsig_gis.core.signature import SignatureSpec
+from semsig_gis.core.signs import CANDIDATE_RAMP, FAILED, OBJECT_COLOURS, SUCCESSFUL, VERDICTS
+from semsig_gis.core.taxonomy import Taxonomy
+from semsig_gis.database.build import build_database
+from semsig_gis.database.city import ObjectStore
 from semsig_gis.evaluation.evaluate import evaluate
 from semsig_gis.likelihood.index import build_index
 from semsig_gis.likelihood.locate import locate
@@ -38,7 +41,7 @@ from semsig_gis.maps.location import localization_map, location_map
 from semsig_gis.maps.objects import ground_map, objects_map
 from semsig_gis.maps.parts import _area, layers_of, page_element, to_latlon
 from semsig_gis.matching.search import localize
-from semsig_gis.objects.table import StreetObjects
+from semsig_gis.objects.table import Licence, StreetObjects
 from semsig_gis.queries.distortions import MissingClasses
 from semsig_gis.queries.draw import QuerySpec
 from semsig_gis.sources.catalog import paper_taxonomy
@@ -50,6 +53,7 @@ if TYPE_CHECKING:
 
     from semsig_gis.database.database import SignatureDatabase
     from semsig_gis.evaluation.result import Evaluation
+    from semsig_gis.likelihood.noise.model import Noise
 
 WORLD = random_town()
 CITY, OBJECTS = WORLD.database, WORLD.street_objects
@@ -58,47 +62,58 @@ NO_PLACE = gpd.GeoDataFrame(geometry=[None], crs=2154)
 LANE = gpd.GeoDataFrame(geometry=[shapely.LineString([(3.0, 43.0), (3.1, 43.0)])], crs=4326)
 EVALUATION = evaluate(CITY, queries=5)
 LOCALIZATION = localize(CITY, CITY.signature(0), top=5)
-LOCATION = locate(build_index(CITY, named_noise("light")), CITY.signature(0), top=5)
-TOLD, OTHER_TOLD = chances_of(CITY), chances_of(CITY.select(slice(1, None)))
+OTHER_CHANCES = chances_of(CITY.select(slice(1, None)))
 OTHER_CITY = dataclasses.replace(CITY, rows=CITY.rows + 10_000)
 OTHER_SIGHT = dataclasses.replace(CITY, codes=CITY.codes[::-1].copy())
+OTHER = dataclasses.replace(TAXONOMY.classes[0], name="other")
+OTHER_CLASSES = dataclasses.replace(CITY, taxonomy=Taxonomy((OTHER, *TAXONOMY.classes[1:])))
+EMPTY, NARROW = CITY.select(slice(0)), build_database(OBJECTS, spec=SignatureSpec(20.0))
 NO_OBJECTS = dataclasses.replace(OBJECTS, table=OBJECTS.table.iloc[:0])
+TURNED = dataclasses.replace(OBJECTS, table=OBJECTS.table.to_crs("EPSG:32631"))
 NOWHERE, FAR = LANE.set_crs(None, allow_override=True), (0.0, 0.0, 1.0, 1.0)
 BROWSER_FILES = sorted(
     one.name for one in resources.files("semsig_gis.maps").joinpath("js").iterdir()
 )
 
 
-MAPS: dict[str, tuple[Callable[..., folium.Map], set[str]]] = {
-    "evaluation": (
-        partial(evaluation_map, EVALUATION, CITY),
-        {"Expected errors", "Lines from true to estimated places"},
-    ),
-    "localization": (partial(localization_map, LOCALIZATION, CITY), {"Candidates (5)"}),
-    "location": (
-        partial(location_map, LOCATION),
-        {"Best place", "Chance of a cell", "Candidates (5)"},
-    ),
-    "ambiguity": (
-        partial(ambiguity_map, CITY),
-        {"Same types", "Same types and angle levels", "Tell of a cell when clicked"},
-    ),
-    "identifiability": (
-        partial(identifiability_map, TOLD),
-        {"Chance to be found", "Tell of a cell when clicked"},
-    ),
-    "drift": (
-        partial(drift_map, CITY, CITY),
-        {"Cells that are the same", "Tell of a cell when clicked"},
-    ),
-    "objects": (partial(objects_map, OBJECTS), set()),
-    "ground": (partial(ground_map, buildings=HOUSE), {"Streets and buildings"}),
+def maps_of(
+    city: SignatureDatabase, objects: StreetObjects, evaluation: Evaluation, noise: Noise
+) -> dict[str, Callable[..., folium.Map]]:
+    """Return what draws each map of a city."""
+    query, index = city.signature(0), build_index(city, noise)
+    location = locate(index, query, top=5, explained=1, store=ObjectStore.of(objects))
+    chances = dataclasses.replace(chances_of(city), noise=noise)
+    later = dataclasses.replace(objects, table=objects.table[3:])
+    dates: dict[str, Any] = {"objects_before": objects, "objects_after": later}
+    return {
+        "evaluation": partial(evaluation_map, evaluation, city),
+        "localization": partial(localization_map, localize(city, query, top=5), city),
+        "location": partial(location_map, location),
+        "ambiguity": partial(ambiguity_map, city),
+        "identifiability": partial(identifiability_map, chances),
+        "drift": partial(drift_map, city, build_database(later), **dates),
+        "objects": partial(objects_map, objects),
+        "ground": partial(ground_map, buildings=HOUSE),
+    }
+
+
+MAPS = maps_of(CITY, OBJECTS, EVALUATION, named_noise("light"))
+LAYERS = {
+    "evaluation": {"Expected errors", "Lines from true to estimated places"},
+    "localization": {"Candidates (5)"},
+    "location": {"Best place", "Chance of a cell", "Candidates (5)"},
+    "ambiguity": {
+        *("Same types", "Same types and angle levels", "Tell of a cell when clicked"),
+    },
+    "identifiability": {"Chance to be found", "Tell of a cell when clicked"},
+    "drift": {"Cells that are the same", "Tell of a cell when clicked"},
+    "ground": {"Streets and buildings"},
 }
 
 
 @pytest.mark.parametrize("name", MAPS)
 def test_a_map_of_ones_own_is_drawn_on_twice_and_keeps_its_view(name: str) -> None:
-    draw, layers = MAPS[name]
+    draw, layers = MAPS[name], LAYERS.get(name, set())
     own = folium.Map([43.0, 3.0], zoom_start=12, tiles=None)
     assert draw(map_=own) is own
     assert draw(map_=own) is own
@@ -112,7 +127,7 @@ def test_a_map_of_ones_own_is_drawn_on_twice_and_keeps_its_view(name: str) -> No
 
 @pytest.mark.parametrize("name", sorted(MAPS.keys() - {"ground"}))
 def test_tiles_are_those_of_folium_and_of_a_new_map(name: str) -> None:
-    draw, _ = MAPS[name]
+    draw = MAPS[name]
     assert "tile.openstreetmap.org" in draw(tiles="OpenStreetMap").get_root().render()
     with refused(InputError, "Openstreetmop", "OpenStreetMap"):
         draw(tiles="Openstreetmop")
@@ -126,8 +141,17 @@ def test_tiles_are_those_of_folium_and_of_a_new_map(name: str) -> None:
         (partial(evaluation_map, EVALUATION, CITY.select(slice(9))), InputError, "evaluat"),
         (partial(localization_map, LOCALIZATION, OTHER_CITY), InputError, "localization"),
         (partial(localization_map, LOCALIZATION, OTHER_SIGHT), InputError, "localization"),
-        (partial(ambiguity_map, CITY.select(slice(0))), InputError, "no cells"),
-        (partial(ambiguity_map, CITY, identifiability=OTHER_TOLD), InputError, "other cells"),
+        (partial(ambiguity_map, EMPTY), InputError, "no cells"),
+        (partial(ambiguity_map, CITY, identifiability=OTHER_CHANCES), InputError, "other cells"),
+        (partial(drift_map, EMPTY, EMPTY), InputError, "no cells"),
+        (partial(drift_map, CITY, OTHER_CITY), InputError, "same city"),
+        (partial(drift_map, CITY, OTHER_CLASSES), InputError, "'other'"),
+        (partial(drift_map, CITY, NARROW), DatabaseError, "radius=20.0"),
+        (
+            partial(drift_map, CITY, CITY, objects_before=OBJECTS, objects_after=TURNED),
+            CrsError,
+            "EPSG:32631",
+        ),
         (partial(objects_map, NO_OBJECTS), EmptyResultError, "no street object"),
         (ground_map, EmptyResultError, "streets or buildings"),
         (partial(ground_map, buildings=NO_PLACE), EmptyResultError, "streets or buildings"),
@@ -150,29 +174,52 @@ def test_style_and_script_are_no_templates_themselves(file: str) -> None:
     assert element.count("</") == 1
 
 
+HARMFUL = hostile_database(CITY)
+HARMFUL_OBJECTS = dataclasses.replace(
+    OBJECTS,
+    table=OBJECTS.table.assign(source=HOSTILE, source_id=HOSTILE),
+    taxonomy=HARMFUL.taxonomy,
+    licenses=(Licence(HOSTILE),),
+)
+HARMFUL_MAPS = maps_of(
+    HARMFUL,
+    HARMFUL_OBJECTS,
+    dataclasses.replace(
+        EVALUATION, asked=QuerySpec(distortions=(MissingClasses(classes=(HOSTILE,)),))
+    ),
+    dataclasses.replace(named_noise("light"), name=HOSTILE),
+)
+HELPED = int(np.flatnonzero((chances_of(CITY).gains > 0.1).any(axis=1))[0])
+
+
+@pytest.mark.parametrize(
+    ("name", "popup", "counts"),
+    [
+        ("evaluation", FAILED, (3, 5)),
+        ("localization", CANDIDATE_RAMP[0], (2, 1)),
+        ("location", VERDICTS["matched"], (3, 4)),
+        ("drift", OBJECT_COLOURS["removed"], (6, 3)),
+        ("ambiguity", 0, (2, 1)),
+        ("identifiability", HELPED, (9, 3)),
+    ],
+)
 def test_hostile_data_is_shown_word_for_word_and_never_run(
-    page: MapPage, evaluation: Evaluation, database: SignatureDatabase
+    page: MapPage, name: str, popup: str | int, counts: tuple[int, int]
 ) -> None:
-    harmful = hostile_database(database)
-    spec = QuerySpec(distortions=(MissingClasses(classes=(HOSTILE,)),))
-    map_ = evaluation_map(dataclasses.replace(evaluation, asked=spec), harmful)
-    query = Signature(harmful.signature(0).codes, None)
-    localization_map(localize(harmful, query, top=3), harmful, map_=map_)
-    page.open(map_)
-    texts = [str(one.get_property("textContent")) for one in page.all(LEGEND)]
-    assert sorted(text.count(HOSTILE) for text in texts) == [2, 3]
-    page.ask("circles(arguments[0])[0].openPopup()", FAILED)
-    symbol = evaluation.queries["types"][~evaluation.successful].iloc[0][0]
-    assert f"{symbol} {symbol} {HOSTILE}" in page.text(".semsig-details")
+    page.open(HARMFUL_MAPS[name]())
+    if isinstance(popup, str):
+        page.popup_of(popup)
+    else:
+        page.click(HARMFUL, popup)
+    texts = (page.text(LEGEND), page.text(".semsig-details"))
+    assert tuple(text.count(HOSTILE) for text in texts) == counts
     page.assert_text_stays_text()
 
 
 @pytest.mark.parametrize("screen", [(390, 800), (844, 390), (720, 600)])
-def test_a_small_screen_is_not_covered(
-    page: MapPage, evaluation: Evaluation, database: SignatureDatabase, screen: tuple[int, int]
-) -> None:
-    map_ = evaluation_map(evaluation, database)
-    localization_map(localize(database, database.signature(0), top=3), database, map_=map_)
+def test_a_small_screen_is_not_covered(page: MapPage, screen: tuple[int, int]) -> None:
+    map_ = evaluation_map(EVALUATION, CITY)
+    localization_map(LOCALIZATION, CITY, map_=map_)
     with page.screen(*screen):
         page.open(map_)
         legends = page.all(LEGEND)
@@ -209,16 +256,8 @@ def test_nothing_lies_below_the_boxes(evaluated: MapPage) -> None:
     """
     across = evaluated.ask(places, SUCCESSFUL, FAILED)
     assert left <= min(across) <= max(across) <= right
-    opening = """
-    const pan = map.panBy;
-    map.panBy = (offset) => pan.call(map, offset, {animate: false});
-    const [marker] = circles(arguments[0]);
-    map.setView(marker.getLatLng(), 18, {animate: false});
-    pan.call(map, [arguments[1] * map.getSize().x / 2, 0], {animate: false});
-    marker.openPopup();
-    """
     for side in (-0.95, 0.95):
-        evaluated.ask(opening, FAILED, side)
+        evaluated.ask("openAt(circles(arguments[0])[0], arguments[1])", FAILED, side)
         box = evaluated.one(".leaflet-popup-content-wrapper").rect
         assert left <= box["x"]
         assert box["x"] + box["width"] <= right
@@ -240,22 +279,6 @@ def test_the_search_offers_the_best_match_first(evaluated: MapPage) -> None:
     assert evaluated.popup().startswith("Query 3: ")
     evaluated.browser.switch_to.active_element.send_keys(Keys.ESCAPE)
     assert evaluated.ask("return map._popup.isOpen()") is False
-
-
-def test_maps_are_drawn_one_over_the_other(
-    page: MapPage, evaluation: Evaluation, database: SignatureDatabase
-) -> None:
-    map_ = folium.Map([43.0, 3.0], zoom_start=12, tiles=None)
-    evaluation_map(evaluation, database, map_=map_)
-    for _ in range(2):
-        localization_map(localize(database, database.signature(0), top=4), database, map_=map_)
-    page.open(map_)
-    names = page.layers()
-    assert names[-2:] == ["Candidates (4)", "Candidates (4), 2"]
-    assert names.count("Objects seen from a cell") == 1
-    assert len(names) == 7
-    assert page.ask("return map.getZoom()") == 12  # the view is the caller's
-    page.switch("Candidates (4), 2")
 
 
 @settings(max_examples=20)
