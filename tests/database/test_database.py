@@ -80,7 +80,7 @@ def test_selected_cells_keep_their_signatures(database: SignatureDatabase) -> No
 def test_databases_that_do_not_fit_are_not_joined(database: SignatureDatabase) -> None:
     half = database.select(slice(10))
     for change, word in (
-        ({"grid": GridSpec(20.0)}, "grid"),
+        ({"grid": GridSpec(20.0)}, "grid (GridSpec(step=10.0, "),
         ({"spec": SignatureSpec(25.0)}, "range"),
         ({"crs": CRS("EPSG:32631")}, "coordinate"),
         ({"viewpoints": ViewpointSpec(mode="outdoor")}, "viewpoints"),

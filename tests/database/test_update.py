@@ -18,7 +18,6 @@ from sentences import refused
 from worlds import CODES, CORNER, TAXONOMY, assert_index_fits, assert_same, surroundings
 
 from semsig_gis.core.errors import CrsError, DatabaseError, EmptyResultError, InputError
-from semsig_gis.core.geometry import GridSpec
 from semsig_gis.core.taxonomy import ObjectClass, Taxonomy
 from semsig_gis.database.build import build_database
 from semsig_gis.database.city import ObjectStore, open_store, save_with_store, store_path
@@ -233,21 +232,17 @@ def test_only_what_is_in_range_is_computed(path: Path, table: pd.DataFrame) -> N
         assert (item.class_name, item.added) == (CLASSES.by_code(code).name, 1)
 
 
-def test_nothing_new_changes_nothing(path: Path, table: pd.DataFrame) -> None:
-    content = path.read_bytes()
+def test_a_file_stays_where_nothing_is_new_or_another_is_written(
+    path: Path, table: pd.DataFrame
+) -> None:
+    content, other = path.read_bytes(), path.with_name("later.parquet")
+    update_file(path, objects_of(table[3:]), out=other)
+    assert_same(open_database(other), build_database(objects_of(table[3:])))
+    assert (len(open_store(path).objects), len(open_store(other).objects)) == (120, 117)
     report = update_file(path, objects_of(table.sample(frac=1.0, random_state=1)))
     assert path.read_bytes() == content
     assert (report.recomputed, report.share) == (0, 0.0)
     assert_index_fits(open_store(path))
-
-
-def test_the_update_may_go_to_another_file(path: Path, table: pd.DataFrame) -> None:
-    content = path.read_bytes()
-    other = path.with_name("later.parquet")
-    update_file(path, objects_of(table[3:]), out=other)
-    assert path.read_bytes() == content
-    assert_same(open_database(other), build_database(objects_of(table[3:])))
-    assert (len(open_store(path).objects), len(open_store(other).objects)) == (120, 117)
 
 
 def test_layers_that_were_not_loaded_stay(path: Path, table: pd.DataFrame) -> None:
@@ -323,9 +318,7 @@ def test_a_damaged_r_tree_is_told_and_healed(path: Path, table: pd.DataFrame) ->
     assert update_file(path, objects_of(table[3:])).notes == ()
 
 
-def test_cells_of_different_grids_or_ranges_are_not_compared(database: SignatureDatabase) -> None:
-    with refused(DatabaseError, "grid", "step=5.0", "in the same way"):
-        compare_cells(database, dataclasses.replace(database, grid=GridSpec(5.0)))
+def test_cells_of_different_ranges_are_not_compared(database: SignatureDatabase) -> None:
     first, *others = database.taxonomy.classes
     farther = Taxonomy((dataclasses.replace(first, range_m=99.0), *others))
     with refused(DatabaseError, "30.0 and 99.0"):
