@@ -12,7 +12,7 @@ import shapely
 from semsig_gis.core.errors import InputError
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
+    from collections.abc import Sequence
 
     from numpy.typing import ArrayLike, NDArray
 
@@ -112,10 +112,10 @@ class Footprints:
         places = np.asarray(xy, dtype=np.float64).reshape(-1, 2)
         covered = np.zeros(len(places), bool)
         shapely.prepare(self._polygons)
-        for part in _parts(len(places)):
-            points = np.asarray(shapely.points(places[part]))
+        for start in range(0, len(places), PAIRS_A_BLOCK):
+            points = np.asarray(shapely.points(places[start : start + PAIRS_A_BLOCK]))
             inside = shapely.STRtree(points).query(self._polygons, predicate="intersects")[1]
-            covered[part.start + inside] = True
+            covered[start + inside] = True
         return covered
 
 
@@ -133,7 +133,8 @@ def hidden(
     ends = np.asarray(objects, dtype=np.float64).reshape(-1, 2)
     blocked = np.zeros(len(starts), bool)
     west, south, east, north = shapely.bounds(footprints.interiors).reshape(-1, 4).T
-    for part in _parts(len(starts)):
+    for first in range(0, len(starts), PAIRS_A_BLOCK):  # so that memory stays flat
+        part = slice(first, first + PAIRS_A_BLOCK)
         low = np.minimum(starts[part], ends[part]).min(axis=0)
         high = np.maximum(starts[part], ends[part]).max(axis=0)
         # Only the part of a large city that these pairs are in.
@@ -141,7 +142,7 @@ def hidden(
             (east >= low[0]) & (west <= high[0]) & (north >= low[1]) & (south <= high[1])
         )
         interiors = footprints.interiors[here]
-        pair = part.start + _near(starts[part], ends[part], interiors)
+        pair = first + _near(starts[part], ends[part], interiors)
         lines = np.asarray(shapely.linestrings(np.stack([starts[pair], ends[pair]], axis=1)))
         # The lines make the tree, so that it is the interiors that are prepared.
         hit, line = shapely.STRtree(lines).query(interiors, predicate="intersects")
@@ -239,9 +240,3 @@ def buildings_near(
         touching = tree.query(polygons[found], predicate="dwithin", distance=TOUCHING_M)[1]
         found = np.unique(touching[~chosen[touching]])
     return np.flatnonzero(chosen)
-
-
-def _parts(size: int) -> Iterator[slice]:
-    """Yield the blocks in which so many pairs are worked through, so that memory stays flat."""
-    for start in range(0, size, PAIRS_A_BLOCK):
-        yield slice(start, min(start + PAIRS_A_BLOCK, size))

@@ -23,7 +23,6 @@ from semsig_gis.database.views import bearings
 
 # --- Coordinate reference systems -------------------------------------------------------------
 
-
 METRIC = {
     "Lambert-93": 2154,
     "as text": "EPSG:2154",
@@ -99,7 +98,6 @@ def test_one_metre_is_one_metre_in_an_accepted_system(crs: str) -> None:
 
 # --- Directions -------------------------------------------------------------------------------
 
-
 ANGLES = st.floats(-1e6, 1e6)
 OFFSETS = st.floats(-1e4, 1e4)
 
@@ -164,7 +162,6 @@ def test_arrays_keep_their_shape() -> None:
 
 
 # --- The grid ---------------------------------------------------------------------------------
-
 
 CELLS = st.integers(-40_000_000, 40_000_000)
 ORIGINS = st.tuples(st.floats(-1e6, 1e6), st.floats(-1e6, 1e6))

@@ -39,8 +39,6 @@ RADII = st.integers(1, 80).map(lambda number: number / 4)
 ANYWHERE = st.tuples(st.floats(-100, 100), st.floats(-100, 100))
 CORNERS = st.sampled_from([(0.0, 0.0), (765_200.0, 6_275_000.0), (-5e6, 1e7)])
 
-in_memory = pytest.mark.parametrize("kind", [ObjectIndex, PackedIndex])
-
 
 def shifted(places: Points, corner: tuple[float, float]) -> Places:
     moved: Places = np.array(places, float).reshape(-1, 2) + np.array(corner)
@@ -101,7 +99,7 @@ def test_all_points_at_one_place_or_none_are_returned() -> None:
     assert pairs_of([(1, 1)], [], 5.0) == pairs_of([(1, 1)], [(9, 9), (8, 8)], 5.0) == []
 
 
-@in_memory
+@pytest.mark.parametrize("kind", [ObjectIndex, PackedIndex])
 def test_a_pickled_copy_and_a_changed_array_make_no_difference(kind: type[ObjectIndex]) -> None:
     points = np.array([[0.0, 0.0], [3.0, 4.0], [50.0, 0.0]])
     index = kind(points)

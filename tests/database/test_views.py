@@ -25,7 +25,6 @@ if TYPE_CHECKING:
 
 # --- Viewpoints -------------------------------------------------------------------------------
 
-
 GRID = GridSpec(step=10.0)
 CELLS = tuple(part.ravel() for part in np.meshgrid(np.arange(10), np.arange(10), indexing="ij"))
 LINE = shapely.LineString([(0, 5), (100, 5)])
