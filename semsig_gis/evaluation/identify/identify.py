@@ -1,9 +1,8 @@
 """How well a query from each cell will be placed, found out before there is one.
 
-A sample of cells is asked one simulated query each, with all that localization does. What comes of
-these *trials* depends, nearly alone, on how like the other cells of the city are to the cell and on
-how many objects it sees. Both are cheap to know for every cell, so that a curve through the trials
-gives the chances of all of them.
+What comes of simulated queries from some cells, the *trials*, depends nearly alone on how like the
+other cells are to the cell and on how many objects it sees. Both are cheap to know for every cell,
+so that a curve through the trials gives the chances of all of them.
 """
 
 from __future__ import annotations
