@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import dataclasses
 import json
 import time
 from contextlib import contextmanager
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -13,7 +13,7 @@ from pyproj import Transformer
 from selenium.webdriver.common.actions.action_builder import ActionBuilder
 from selenium.webdriver.common.by import By
 
-from semsig_gis.core.taxonomy import ObjectClass, Taxonomy
+from semsig_gis.core.taxonomy import Taxonomy
 from semsig_gis.maps.page import save_map
 
 if TYPE_CHECKING:
@@ -36,7 +36,7 @@ LEGEND = ".semsig-legend"
 ASK = Path(__file__).with_name("map_pages.js").read_text(encoding="utf-8")
 
 
-@dataclasses.dataclass(frozen=True)
+@dataclass(frozen=True)
 class MapPage:
     """A self-contained page with a map, open in a browser."""
 
@@ -188,11 +188,12 @@ def requested(browser: Chrome) -> list[str]:
     ]
 
 
+def hostile_taxonomy(taxonomy: Taxonomy, harm: str = HOSTILE) -> Taxonomy:
+    classes = (replace(one, title=f"{one.symbol} {harm}") for one in taxonomy.classes)
+    return Taxonomy(tuple(classes))
+
+
 def hostile_database(database: SignatureDatabase) -> SignatureDatabase:
     """Return the database with a taxonomy and licences that try to do harm."""
-    classes = tuple(
-        ObjectClass(item.code, item.symbol, item.name, f"{item.symbol} {HOSTILE}")
-        for item in database.taxonomy.classes
-    )
-    licenses = (f"{HOSTILE}: {HOSTILE}",)
-    return dataclasses.replace(database, taxonomy=Taxonomy(classes), licenses=licenses)
+    taxonomy = hostile_taxonomy(database.taxonomy)
+    return replace(database, taxonomy=taxonomy, licenses=(f"{HOSTILE}: {HOSTILE}",))

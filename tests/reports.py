@@ -6,9 +6,8 @@ import dataclasses
 import xml.etree.ElementTree as ET
 from typing import Any
 
-from map_pages import HOSTILE
+from map_pages import HOSTILE, hostile_taxonomy
 
-from semsig_gis.core.taxonomy import ObjectClass, Taxonomy
 from semsig_gis.reports.parts import Curve, Number, Plot, Report, Scene, SceneObject, Section
 from semsig_gis.sources.catalog import paper_taxonomy
 
@@ -73,10 +72,6 @@ def ordinary_report() -> Report:
 
 def hostile_report(harm: str = HARM) -> Report:
     """Return a report in which every text that can come from data tries to do harm."""
-    classes = tuple(
-        ObjectClass(item.code, item.symbol, item.name, f"{item.symbol}{harm}")
-        for item in paper_taxonomy().classes
-    )
     curve = Curve(label=harm, x=(0.0, 1.0), y=(0.5, float("nan")))
     shown = plot(title=harm, x_label=harm, y_label=harm)
     section = Section(
@@ -96,6 +91,6 @@ def hostile_report(harm: str = HARM) -> Report:
         title=harm,
         text=(harm,),
         settings=((harm, harm),),
-        taxonomy=Taxonomy(classes),
+        taxonomy=hostile_taxonomy(paper_taxonomy(), harm),
         facts={"path": harm},
     )
