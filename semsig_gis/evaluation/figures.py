@@ -124,8 +124,7 @@ def district_labels(queries: gpd.GeoDataFrame, districts: gpd.GeoDataFrame, name
 def percentile(values: NDArray[np.float64], percent: float) -> tuple[float, float, float]:
     """Return a percentile as `percentiles`, and the ends of its interval of about 95 %.
 
-    The ends are order statistics and suppose nothing of the distribution: how many values are
-    below the true percentile is binomial.
+    The ends are order statistics: how many values are below the true percentile is binomial.
     """
     ordered = np.sort(values[~np.isnan(values)])
     if not ordered.size:

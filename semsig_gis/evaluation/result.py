@@ -202,10 +202,9 @@ class Evaluation:
         return np.asarray(self.queries[columns].to_numpy(dtype=np.float64).mean(axis=0))
 
     def recall(self, percent: float) -> float:
-        """Return the share of queries whose true cell ranks in the top per cent of the cells.
+        """Return the share of queries whose true cell is in the top per cent of cells, rounded down.
 
-        Rounded down, and of tied cells each rank is equally likely. Raises InputError unless
-        0 < percent <= 100.
+        Of tied cells each rank is equally likely. InputError unless 0 < percent <= 100.
         """
         ranks = self.queries["rank_low"], self.queries["rank_high"]
         chances = expected_recall(*ranks, cells=self.database["cells"], percent=percent)
@@ -218,8 +217,7 @@ class Evaluation:
     def by_length(self) -> pd.DataFrame:
         """Return the figures by how many objects are really seen.
 
-        One row a range: ``length`` (text), ``n``, the figures, ``p50_low`` and ``p50_high``; NaN
-        where there is no query to tell.
+        One row a range: ``length`` (text), ``n``, the figures (or NaN), ``p50_low``, ``p50_high``.
         """
         return self._by_range("length", LENGTHS, label="length")
 

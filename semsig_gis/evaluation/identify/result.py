@@ -35,10 +35,9 @@ BANDS = (0.0, 0.1, 0.5, 0.9)
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ClassGain:
-    """What a city gains by publishing a class of objects.
+    """What the mean cell gains if a city publishes a class of objects.
 
-    `near` is what the mean cell's chance of the place within the radius gains; `bits` what the mean
-    query tells of the cell beyond what the other classes tell.
+    `near` is the gain in chance of the place within the radius, `bits` that in knowledge.
     """
 
     code: int

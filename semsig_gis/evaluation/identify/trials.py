@@ -64,8 +64,7 @@ def draw_trials(
 ) -> Iterator[Signature]:
     """Yield what a detector tells of cells, if it fails as the noise model of the index says.
 
-    `cells` are row numbers and may repeat. Detections are clockwise, perhaps none. Query number i
-    is the same whatever the number of queries.
+    `cells` are row numbers. Query number i is the same whatever the number of queries.
     """
     detector = Detector(noise=index.noise)
     spoil = ready_chain((detector,), CitySights.of(index.database))

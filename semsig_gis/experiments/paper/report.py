@@ -66,11 +66,7 @@ PARIS_P50, PARIS_RECALL10 = paris.ACCURACY[30.0, 16]
 
 
 def reproduction_report(results: Reproduction) -> Report:
-    """Put together what the experiments of the paper found, in the order of the paper.
-
-    Its tables and plots come first, each with its figures where it prints them; then what it leaves
-    open, and the likelihood method.
-    """
+    """Put together what was found: the paper's figures, what it leaves open, the likelihood."""
     settings = results.settings
     first = next(iter(results.experiments["none"].values()))
     return Report(

@@ -1,7 +1,6 @@
 """Run all experiments of the source paper on a city, and gather what they find.
 
-The city is one that was built before, or one that is made up to be like the paper's Paris. What is
-finished stays in the folder of the results, so that an interrupted run goes on where it was.
+What is finished stays in the folder of the results, so that an interrupted run goes on there.
 """
 
 from __future__ import annotations
