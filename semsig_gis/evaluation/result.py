@@ -202,9 +202,9 @@ class Evaluation:
         return np.asarray(self.queries[columns].to_numpy(dtype=np.float64).mean(axis=0))
 
     def recall(self, percent: float) -> float:
-        """Return the share of queries whose true cell is in the top per cent of cells, rounded down.
+        """Return the share of queries whose true cell is in the top per cent of cells.
 
-        Of tied cells each rank is equally likely. InputError unless 0 < percent <= 100.
+        Rounded down; of tied cells each rank is as likely. InputError unless 0 < percent <= 100.
         """
         ranks = self.queries["rank_low"], self.queries["rank_high"]
         chances = expected_recall(*ranks, cells=self.database["cells"], percent=percent)
