@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import enum
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
@@ -27,14 +26,6 @@ from semsig_gis.core.errors import InputError
 
 if TYPE_CHECKING:
     from semsig_gis.database.city import City
-
-
-class Viewpoints(enum.StrEnum):
-    """Which cells `semsig build` looks from."""
-
-    all = "all"
-    outdoor = "outdoor"
-    streets = "streets"
 
 
 @app.command()
@@ -60,9 +51,9 @@ def build(
     ] = None,
     streets: Annotated[Path | None, typer.Option(help="Centre lines of streets.")] = None,
     viewpoints: Annotated[
-        Viewpoints,
+        Literal["all", "outdoor", "streets"],
         typer.Option(help="Look from every cell, outside --buildings, or along --streets."),
-    ] = Viewpoints.all,
+    ] = "all",
     street_width: Annotated[
         float, typer.Option(help="Default street width in metres, where --streets has none.")
     ] = 16.0,
@@ -84,7 +75,7 @@ def build(
     from semsig_gis.objects.table import open_objects
     from semsig_gis.storage.geoparquet import NOWHERE
 
-    if streets is not None and viewpoints is not Viewpoints.streets:
+    if streets is not None and viewpoints != "streets":
         msg = "--streets was given, which only --viewpoints streets uses; give both or none."
         raise InputError(msg)
     keep_inputs(out, read=(objects, buildings, streets, area))
@@ -93,7 +84,7 @@ def build(
         "grid": GridSpec(step, tuple(corner)),  # type: ignore[arg-type] # it checks the length
         "spec": SignatureSpec(radius, levels),
         "viewpoints": ViewpointSpec(
-            mode=viewpoints.value,
+            mode=viewpoints,
             width=street_width / 2,
             area=None
             if area is None

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-import enum
 import os
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
@@ -31,13 +30,6 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
 
-class FalseClass(enum.StrEnum):
-    """How the class of a false object is drawn."""
-
-    uniform = "uniform"
-    frequency = "frequency"
-
-
 @app.command()
 def evaluate(
     database: Database,
@@ -55,7 +47,7 @@ def evaluate(
         typer.Option("--keep-order", help="Do not sort again after the bearing noise."),
     ] = False,
     false_class: Annotated[
-        FalseClass | None,
+        Literal["uniform", "frequency"] | None,
         typer.Option(help="How the class of a false object is drawn; uniform by default."),
     ] = None,
     method: MethodText = "edit+edit",
@@ -83,7 +75,7 @@ def evaluate(
         dataclasses.replace(
             one,
             resort=one.resort and not keep_order,
-            false_class=one.false_class if false_class is None else false_class.value,
+            false_class=false_class or one.false_class,
         )
         if isinstance(one, Distortion)
         else one
@@ -170,13 +162,6 @@ def compare(first: Results, second: Results, *, as_json: AsJson = False) -> None
 NUMBER_KEYS = ("row", "column", "unit", "ours", "low", "high", "paper")
 
 
-class Size(enum.StrEnum):
-    """How much is run."""
-
-    full = "full"
-    small = "small"
-
-
 @app.command()
 def reproduce(
     database: Annotated[
@@ -188,8 +173,9 @@ def reproduce(
     *,
     out: Annotated[Path, typer.Option(help="Folder to write the report and results to.")],
     size: Annotated[
-        Size, typer.Option(help="Ask the paper's 10,000 queries, or 300 of a small city.")
-    ] = Size.full,
+        Literal["full", "small"],
+        typer.Option(help="Ask the paper's 10,000 queries, or 300 of a small city."),
+    ] = "full",
     queries: Annotated[
         int | None, typer.Option(help="Number of queries, in place of that of --size.")
     ] = None,
@@ -212,7 +198,7 @@ def reproduce(
     from semsig_gis.reports.page import write_report
 
     if workers is None:
-        workers = (os.cpu_count() or 1) if size is Size.full else 0
+        workers = (os.cpu_count() or 1) if size == "full" else 0
     with contextlib.ExitStack() as bar:
 
         def show(label: str) -> Callable[[int, int], None]:
@@ -222,7 +208,7 @@ def reproduce(
         reproduction = run(
             out,
             database=database,
-            size=size.value,
+            size=size,
             queries=queries,
             seed=seed,
             workers=workers,

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import enum
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Literal
 
 import typer
 
@@ -18,13 +17,6 @@ from semsig_gis.cli.console import (
     require_suffix,
 )
 from semsig_gis.core.errors import InputError
-
-
-class CellGeometry(enum.StrEnum):
-    """How `semsig export` draws a cell."""
-
-    polygon = "polygon"
-    point = "point"
 
 
 @app.command()
@@ -53,7 +45,7 @@ def export(
         ),
     ] = None,
     geometry: Annotated[
-        CellGeometry | None,
+        Literal["polygon", "point"] | None,
         typer.Option(
             help="How a cell is drawn; by default as a polygon, in CSV as a point.",
             show_default=False,
@@ -80,7 +72,7 @@ def export(
             objects=None if objects is None else open_objects(objects),
             evaluation=queries,
             identifiability=known_identifiability(city),
-            geometry=None if geometry is None else geometry.value,
+            geometry=geometry,
             progress=advance,
         )
     typer.echo(f"exported: {out}")

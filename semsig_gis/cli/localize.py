@@ -5,7 +5,7 @@ from __future__ import annotations
 import sys
 from dataclasses import dataclass, fields
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, TypeVar
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -27,13 +27,11 @@ from semsig_gis.cli.options import SearchOptions, command
 from semsig_gis.core.errors import InputError
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
-
+    from semsig_gis.core.signature import Signature
     from semsig_gis.core.taxonomy import Taxonomy
     from semsig_gis.database.answer import Answer, Locator
     from semsig_gis.database.city import City
-    from semsig_gis.likelihood.locate import Location
-    from semsig_gis.matching.search import Localization
+    from semsig_gis.matching.method import Method
     from semsig_gis.queries.file import Queries, Route
 
 
@@ -165,68 +163,55 @@ def localize(options: LocalizeOptions) -> None:
 
     The options --route, --share and those from --noise to --objects are for --method likelihood.
     """
-    if options.method == LIKELIHOOD:
-        _localize_by_likelihood(options)
-    else:
-        _localize_by_distance(options)
-
-
-def _localize_by_distance(options: LocalizeOptions) -> None:
-    from semsig_gis.database.city import open_city
-    from semsig_gis.matching.method import Method
-    from semsig_gis.matching.search import DistanceLocator
-
-    method = Method.parse(options.method)
-    city = open_city(options.database)
-    taxonomy, requirement = city.dataset.taxonomy, None
-    if options.require is not None:
-        from semsig_gis.database.answer import Requirement
-
-        requirement = Requirement.parse(options.require, taxonomy)
-    locator = DistanceLocator(
-        database=city.dataset, method=method, requirement=requirement, top=options.top
-    )
-    _answer(options, city, locator, options.read_queries(taxonomy), _localization_map)
-
-
-def _localize_by_likelihood(options: LocalizeOptions) -> None:
     from semsig_gis.database.city import open_city
 
+    method = None
+    if options.method != LIKELIHOOD:
+        from semsig_gis.matching.method import Method
+
+        method = Method.parse(options.method)
     city = open_city(options.database)
-    taxonomy = city.database.taxonomy
+    taxonomy = city.dataset.taxonomy
     # Queries are read before the index, which takes much longer than to find a slip in a query.
     if options.route:
         views, legs = options.read_route(taxonomy)
         locations = options.locator(city).locate_route([query for _, query in views], legs)
         for (name, _), location in zip(views, locations, strict=True):
             print_json({"id": name, **location.to_dict()}, indent=None)
-    else:
-        queries = options.read_queries(taxonomy)
-        _answer(options, city, options.locator(city), queries, _location_map)
-
-
-_Answer = TypeVar("_Answer", bound="Answer")
-
-
-def _answer(
-    options: LocalizeOptions,
-    city: City,
-    locator: Locator[_Answer],
-    queries: Queries,
-    draw: Callable[[_Answer, City], Any],
-) -> None:
-    """Answer a query, or many, and print it."""
-    if options.queries is not None:
-        for name, query in queries:
-            print_json({"id": name, **locator.locate(query).to_dict()}, indent=None)
         return
-    ((_, query),) = queries
+    locator = None if method is None else _distance_locator(options, city, method)
+    queries = options.read_queries(taxonomy)
+    locator = locator or options.locator(city)
+    if options.queries is None:
+        _answer(options, city, locator, queries[0][1])
+        return
+    for name, query in queries:
+        print_json({"id": name, **locator.locate(query).to_dict()}, indent=None)
+
+
+def _distance_locator(options: LocalizeOptions, city: City, method: Method) -> Locator[Any]:
+    from semsig_gis.database.answer import Requirement
+    from semsig_gis.matching.search import DistanceLocator
+
+    database, require = city.dataset, options.require
+    requirement = None if require is None else Requirement.parse(require, database.taxonomy)
+    return DistanceLocator(
+        database=database, method=method, requirement=requirement, top=options.top
+    )
+
+
+def _answer(options: LocalizeOptions, city: City, locator: Locator[Any], query: Signature) -> None:
+    """Answer a query, draw and write what is asked for, and print it."""
     answer = locator.locate(query)
     if options.map_ is not None:
+        from semsig_gis.maps.location import localization_map, location_map
         from semsig_gis.maps.page import save_map
 
         with progress("drawing the map"):
-            map_ = draw(answer, city)
+            if options.method == LIKELIHOOD:
+                map_ = location_map(answer)
+            else:
+                map_ = localization_map(answer, city.database)
             draw_ground(map_, city)
             tell_if_online(save_map(map_, options.map_))
     result = answer.to_dict()
@@ -262,18 +247,6 @@ def _write(
     share = REGION_SHARE if options.share is None else options.share
     regions = export_answer(answer, city.database, out, share=share, within=options.within)
     return regions.to_dict()
-
-
-def _localization_map(localization: Localization, city: City) -> Any:  # noqa: ANN401 - folium's
-    from semsig_gis.maps.location import localization_map
-
-    return localization_map(localization, city.database)
-
-
-def _location_map(location: Location, _city: City) -> Any:  # noqa: ANN401 - folium's
-    from semsig_gis.maps.location import location_map
-
-    return location_map(location)
 
 
 VERDICTS = ("matched", "misnamed", "missed", "false")
