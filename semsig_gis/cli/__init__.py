@@ -14,7 +14,7 @@ from typing import Annotated
 import typer
 
 from semsig_gis import __version__
-from semsig_gis.cli.console import stop_with_supervisor, supervised
+from semsig_gis.cli.console import app, remark, stop_with_supervisor, supervised
 
 # The order of these imports is that of the help.
 # isort: off
@@ -30,7 +30,6 @@ from semsig_gis.cli import (  # noqa: F401
 )
 
 # isort: on
-from semsig_gis.cli.console import app, remark
 from semsig_gis.core.errors import SemsigError
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import Annotated, Any, Literal
 
 import typer
 
@@ -23,9 +23,6 @@ from semsig_gis.cli.console import (
     require_suffix,
 )
 from semsig_gis.core.errors import InputError
-
-if TYPE_CHECKING:
-    from semsig_gis.database.city import City
 
 
 @app.command()
@@ -79,9 +76,8 @@ def build(
         msg = "--streets was given, which only --viewpoints streets uses; give both or none."
         raise InputError(msg)
     keep_inputs(out, read=(objects, buildings, streets, area))
-    corner = numbers(origin, "--origin")
     specs: dict[str, Any] = {
-        "grid": GridSpec(step, tuple(corner)),  # type: ignore[arg-type] # it checks the length
+        "grid": GridSpec(step, tuple(numbers(origin, "--origin"))),  # type: ignore[arg-type]
         "spec": SignatureSpec(radius, levels),
         "viewpoints": ViewpointSpec(
             mode=viewpoints,
@@ -178,32 +174,28 @@ def info(database: Database, *, as_json: AsJson = False) -> None:
     if as_json:
         print_json(_info(database))
         return
+    from semsig_gis.database.city import open_city
     from semsig_gis.reports.database import database_tables
     from semsig_gis.reports.identifiability import identifiability_tables
 
-    city, facts = _opened(database)
-    print_tables(database_tables(city.database, **facts))
+    city = open_city(database)
+    counts = city.object_counts
+    print_tables(database_tables(city.database, file_bytes=city.bytes, object_counts=counts))
     columns = known_identifiability(city)
     if columns is not None:
-        print_tables(identifiability_tables(columns, object_counts=facts["object_counts"]))
+        print_tables(identifiability_tables(columns, object_counts=counts))
     for line in city.licenses:
         typer.echo(line)
 
 
 def _info(path: Path) -> dict[str, Any]:
+    from semsig_gis.database.city import open_city
     from semsig_gis.database.properties import database_summary
 
-    city, facts = _opened(path)
-    summary = database_summary(city.database, **facts)
+    city = open_city(path)
+    counts = city.object_counts
+    summary = database_summary(city.database, file_bytes=city.bytes, object_counts=counts)
     columns = known_identifiability(city)
     if columns is not None:
-        summary["identifiability"] = columns.summary(object_counts=facts["object_counts"])
+        summary["identifiability"] = columns.summary(object_counts=counts)
     return summary
-
-
-def _opened(path: Path) -> tuple[City, dict[str, Any]]:
-    """Open a database; return also what its files tell of it."""
-    from semsig_gis.database.city import open_city
-
-    city = open_city(path)
-    return city, {"file_bytes": city.bytes, "object_counts": city.object_counts}

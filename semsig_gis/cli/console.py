@@ -116,25 +116,17 @@ def progress(
     if supervised():
         yield _progress_lines(label)
         return
+    from rich import progress as parts
     from rich.console import Console
-    from rich.progress import (
-        BarColumn,
-        DownloadColumn,
-        MofNCompleteColumn,
-        Progress,
-        TextColumn,
-        TimeRemainingColumn,
-        TransferSpeedColumn,
-    )
 
     screen = Console(stderr=True)
-    bar = Progress(
-        TextColumn("{task.description}"),
-        BarColumn(),
+    bar = parts.Progress(
+        parts.TextColumn("{task.description}"),
+        parts.BarColumn(),
         *(
-            (DownloadColumn(), TransferSpeedColumn())
+            (parts.DownloadColumn(), parts.TransferSpeedColumn())
             if unit == "bytes"
-            else (MofNCompleteColumn(), TimeRemainingColumn())
+            else (parts.MofNCompleteColumn(), parts.TimeRemainingColumn())
         ),
         console=screen,
         transient=True,
@@ -192,8 +184,7 @@ MethodText = Annotated[
 
 Workers = Annotated[int, typer.Option(help="Number of processes on this machine.")]
 Scheduler = Annotated[str | None, typer.Option(help="Dask scheduler, as tcp://HOST:PORT.")]
-LIKELIHOOD = "likelihood"
-"""What `--method` says for the likelihood method."""
+LIKELIHOOD = "likelihood"  # as a value of --method
 
 
 def keep_inputs(*written: Path | None, read: Iterable[str | Path | None]) -> None:

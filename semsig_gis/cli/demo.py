@@ -9,14 +9,12 @@ import typer
 
 from semsig_gis.cli.console import app, print_tables, progress, remark, tell_if_online
 
-DEMO_QUERIES = 200
-
 
 @app.command()
 def demo(
     *,
     out: Annotated[Path, typer.Option(help="Folder to write to.")] = Path("demo"),
-    queries: Annotated[int, typer.Option(help="Number of queries to ask.")] = DEMO_QUERIES,
+    queries: Annotated[int, typer.Option(help="Number of queries to ask.")] = 200,
     seed: Annotated[int, typer.Option(help="Seed of the city and the queries.")] = 0,
 ) -> None:
     """Run every step on the embedded synthetic city, offline."""

@@ -191,7 +191,6 @@ def reproduce(
 ) -> None:
     """Run the paper's experiments, ours beside its figures."""
     import contextlib
-    import os
 
     from semsig_gis.experiments.paper.report import reproduction_report
     from semsig_gis.experiments.paper.reproduce import reproduce as run
@@ -232,18 +231,15 @@ def reproduce(
             ]
         )
         return
-    print_rows(
-        report.title,
-        ("Section", "What", "", "Ours", "95 %", "Paper"),
-        [
-            (
-                *(section.title, one.row, one.column, _number(one.ours)),
-                "" if one.low is None or one.high is None else f"{one.low:.4g} to {one.high:.4g}",
-                _number(one.paper),
-            )
-            for section, one in numbers
-        ],
-    )
+    rows = [
+        (
+            *(section.title, one.row, one.column, _number(one.ours)),
+            "" if one.low is None or one.high is None else f"{one.low:.4g} to {one.high:.4g}",
+            _number(one.paper),
+        )
+        for section, one in numbers
+    ]
+    print_rows(report.title, ("Section", "What", "", "Ours", "95 %", "Paper"), rows)
     typer.echo(f"report: {out / 'report.html'}  (open it in a browser)")
     typer.echo(f"numbers: {out / 'numbers.csv'}")
 

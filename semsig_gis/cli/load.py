@@ -24,9 +24,6 @@ if TYPE_CHECKING:
     from semsig_gis.sources.catalog import LayerSpec
 
 
-Catalogs = Annotated[
-    list[str], typer.Option(help="Catalogue, by name or .toml file; repeat to merge, best first.")
-]
 Objects = Annotated[Path, typer.Option(help="Street objects to write (.parquet).")]
 Layers = Annotated[list[str] | None, typer.Option(help="Read only this layer; may be repeated.")]
 MetricCrs = Annotated[
@@ -52,7 +49,10 @@ Streets = Annotated[
 def load(
     files: Annotated[list[Path], typer.Argument(help="Files, or a folder of files.")],
     *,
-    catalog: Catalogs,
+    catalog: Annotated[
+        list[str],
+        typer.Option(help="Catalogue, by name or .toml file; repeat to merge, best first."),
+    ],
     out: Objects,
     layer: Layers = None,
     crs: Annotated[

@@ -268,10 +268,8 @@ def print_answer(result: dict[str, Any]) -> None:
             [
                 row["rank"] if by_chance else _rank_text(row["rank_low"], row["rank_high"]),
                 row["cell_id"],
-                f"{row['x']:.1f}",
-                f"{row['y']:.1f}",
-                f"{row['lon']:.6f}",
-                f"{row['lat']:.6f}",
+                *(f"{row[axis]:.1f}" for axis in ("x", "y")),
+                *(f"{row[axis]:.6f}" for axis in ("lon", "lat")),
                 f"{row[score]:.4f}",
                 row["types"],
             ]

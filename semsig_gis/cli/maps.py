@@ -24,20 +24,9 @@ if TYPE_CHECKING:
     import folium
 
     from semsig_gis.database.city import City
-    from semsig_gis.objects.table import StreetObjects
 
 
 AROUND_M = 100.0
-
-Buildings = Annotated[
-    Path | None,
-    typer.Option(help="Footprints to draw below the map; default: those of the database."),
-]
-
-Streets = Annotated[
-    Path | None,
-    typer.Option(help="Centre lines to draw below the map; default: those of the database."),
-]
 
 
 def draw_ground(
@@ -88,8 +77,14 @@ def map_(
     objects: Annotated[
         Path | None, typer.Option(help="Draw street objects written by `semsig load`.")
     ] = None,
-    buildings: Buildings = None,
-    streets: Streets = None,
+    buildings: Annotated[
+        Path | None,
+        typer.Option(help="Footprints to draw below the map; default: those of the database."),
+    ] = None,
+    streets: Annotated[
+        Path | None,
+        typer.Option(help="Centre lines to draw below the map; default: those of the database."),
+    ] = None,
     out: Annotated[Path, typer.Option(help="Map to write (.html).")],
 ) -> None:
     """Draw an evaluation, cells, changes or street objects on a map."""
@@ -135,7 +130,10 @@ def map_(
         elif results is not None:
             drawn = evaluation_map(results, opened)
         elif newer is not None:
-            before, after = _objects_of_both(city, newer)
+            before, after = city.objects, newer.objects
+            if before is None or after is None:
+                remark("street objects of both databases were not found; drawing cells only")
+                before = after = None
             drawn = drift_map(opened, newer.database, objects_before=before, objects_after=after)
         if seen is not None:
             drawn = objects_map(seen, database=opened if drawn is None else None, map_=drawn)
@@ -143,13 +141,3 @@ def map_(
         offline = save_map(drawn, out)
     typer.echo(f"map: {out}")
     tell_if_online(offline)
-
-
-def _objects_of_both(
-    before: City, after: City
-) -> tuple[StreetObjects | None, StreetObjects | None]:
-    """Return the street objects of two databases; tell where those of one are not at hand."""
-    if before.objects is None or after.objects is None:
-        remark("street objects of both databases were not found; drawing cells only")
-        return None, None
-    return before.objects, after.objects

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import inspect
 import math
-from dataclasses import MISSING, dataclass, fields
+from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, TypeVar, get_type_hints
+from typing import TYPE_CHECKING, Annotated, Any, get_type_hints
 
 import typer
 
@@ -24,8 +24,7 @@ if TYPE_CHECKING:
     from semsig_gis.likelihood.locate import LikelihoodLocator
     from semsig_gis.likelihood.noise.model import Noise
 
-EXPLAINED = 3
-"""How many candidates are explained."""
+EXPLAINED = 3  # candidates
 
 NoiseName = Annotated[
     str,
@@ -68,25 +67,16 @@ Objects = Annotated[
     ),
 ]
 
-_Options = TypeVar("_Options")
 
-
-def command(
-    options: type[_Options],
-) -> Callable[[Callable[[_Options], None]], Callable[..., None]]:
+def command(options: type[Any]) -> Callable[[Callable[[Any], None]], Callable[..., None]]:
     """Make a command of a function that takes a dataclass, whose fields are the options."""
     hints = get_type_hints(options, include_extras=True)
     parameters = [
-        inspect.Parameter(
-            field.name,
-            inspect.Parameter.KEYWORD_ONLY,
-            default=inspect.Parameter.empty if field.default is MISSING else field.default,
-            annotation=hints[field.name],
-        )
-        for field in fields(options)  # type: ignore[arg-type]
+        parameter.replace(annotation=hints[name])
+        for name, parameter in inspect.signature(options).parameters.items()
     ]
 
-    def register(function: Callable[[_Options], None]) -> Callable[..., None]:
+    def register(function: Callable[[Any], None]) -> Callable[..., None]:
         def run(**values: Any) -> None:  # noqa: ANN401 - as many types as options
             function(options(**values))
 
@@ -140,15 +130,18 @@ class SearchOptions:
         from semsig_gis.likelihood.posterior import DEFAULT_RULE, open_rule
 
         if self.on_grid and self.refine:
-            msg = "--on-grid and --refine were given; a place on the grid is not to be refined, "
-            msg += "so leave out one of them."
+            msg = (
+                "--on-grid and --refine were given; a place on the grid is not to be refined, so "
+                "leave out one of them."
+            )
             raise InputError(msg)
         refined = False if self.on_grid else self.refine
         needs_objects = refined is not False or self.explain
         if self.objects is not None and not needs_objects:
             option = "--on-grid" if self.on_grid else "--no-refine"
-            msg = f"--objects and {option} were given, so that nothing looks at them; leave out "
-            msg += "one."
+            msg = (
+                f"--objects and {option} were given, so that nothing looks at them; leave out one."
+            )
             raise InputError(msg)
         sigma = _north_sigma(self.heading)
         rule = DEFAULT_RULE if self.rule is None else open_rule(self.rule)
@@ -156,9 +149,8 @@ class SearchOptions:
         if not self.on_grid:
             noise = cell_noise(noise, city.database.grid.step)
         log_prior = self._log_prior(city.database)
-        store = None
-        if needs_objects:
-            store = object_store(city, self.objects, needed=bool(self.refine))
+        needed = bool(self.refine)
+        store = object_store(city, self.objects, needed=needed) if needs_objects else None
         return LikelihoodLocator(
             index=prepared_index(city, noise),
             north_sigma=sigma,

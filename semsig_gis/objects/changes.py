@@ -153,29 +153,28 @@ def _by_class(
     old: StreetObjects, new: StreetObjects, changes: ObjectChanges
 ) -> Iterable[ClassChange]:
     """Yield the numbers of every class that one of the tables has."""
-
-    def count(codes: NDArray[np.uint8]) -> NDArray[np.int64]:
-        return np.bincount(codes, minlength=256)
-
-    before, after = count(old.codes), count(new.codes)
-    added, removed = count(new.codes[changes.added]), count(old.codes[changes.removed])
+    numbers = {
+        name: np.bincount(codes, minlength=256)
+        for name, codes in {
+            "before": old.codes,
+            "after": new.codes,
+            "added": new.codes[changes.added],
+            "removed": old.codes[changes.removed],
+            "gained": new.codes[changes.changed[:, 1]],
+            "lost": old.codes[changes.changed[:, 0]],
+        }.items()
+    }
     moved_codes = new.codes[changes.moved[:, 1]]
     metres = np.hypot(*(new.xy[changes.moved[:, 1]] - old.xy[changes.moved[:, 0]]).T)
-    lost, gained = count(old.codes[changes.changed[:, 0]]), count(new.codes[changes.changed[:, 1]])
     for item in new.taxonomy.classes:
-        code = item.code
-        if before[code] or after[code]:
-            far = metres[moved_codes == code]
+        own = {name: int(counts[item.code]) for name, counts in numbers.items()}
+        if own["before"] or own["after"]:
+            far = metres[moved_codes == item.code]
             yield ClassChange(
                 class_name=item.name,
-                before=int(before[code]),
-                after=int(after[code]),
-                added=int(added[code]),
-                removed=int(removed[code]),
                 moved=len(far),
                 moved_m=float(np.median(far)) if len(far) else None,
-                gained=int(gained[code]),
-                lost=int(lost[code]),
+                **own,
             )
 
 

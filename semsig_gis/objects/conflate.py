@@ -138,16 +138,14 @@ class _Match(NamedTuple):
 
 def _view(objects: StreetObjects) -> _View:
     table = objects.table
-    names = list(dict.fromkeys(table[SOURCE]))
-    number = {name: place for place, name in enumerate(names)}
-    source = table[SOURCE].map(number).to_numpy(np.int64)
+    source, names = pd.factorize(table[SOURCE])
     x, y = objects.xy.T
     keys = pd.DataFrame(
         {"source": source, "x": x, "y": y, "id": table[SOURCE_ID], "count": table[COUNT]}
     )
     rank = np.empty(len(keys), np.int64)
     rank[keys.sort_values(list(keys.columns)).index] = np.arange(len(keys))
-    return _View(objects.xy, source, names, rank)
+    return _View(objects.xy, source, names.tolist(), rank)
 
 
 def _matches(
@@ -169,8 +167,7 @@ def _nearest_first(
     """Pair old and new objects one to one, the nearest first."""
     new_at, old_at = ObjectIndex(view.xy[old]).pairs_within(view.xy[new], radius=radius)
     new_row, old_row = new[new_at], old[old_at]
-    delta = view.xy[old_row] - view.xy[new_row]
-    metres = np.hypot(delta[:, 0], delta[:, 1])
+    metres = np.hypot(*(view.xy[old_row] - view.xy[new_row]).T)
     order = np.lexsort((view.rank[new_row], view.rank[old_row], metres))
     taken: set[int] = set()
     pairs = []
@@ -202,24 +199,22 @@ def _merged(objects: StreetObjects, view: _View, matches: Sequence[_Match]) -> S
 
 
 def _report(view: _View, matches: Sequence[_Match], radii: Mapping[str, float]) -> ConflationReport:
-    metres_of: dict[tuple[str, int, int], list[float]] = {}
+    classes = list(radii)
+    metres_of: dict[tuple[int, int, int], list[float]] = {}
     for match in matches:
         sources = int(view.source[match.kept]), int(view.source[match.merged])
-        metres_of.setdefault((match.class_name, *sources), []).append(match.metres)
-    order = list(radii)
+        metres_of.setdefault((classes.index(match.class_name), *sources), []).append(match.metres)
     return ConflationReport(
         tuple(
             ConflatedPair(
-                class_name=name,
-                radius=float(radii[name]),
+                class_name=classes[number],
+                radius=float(radii[classes[number]]),
                 kept=view.names[kept],
                 merged=view.names[merged],
                 count=len(metres),
                 median_m=float(np.median(metres)),
                 largest_m=max(metres),
             )
-            for (name, kept, merged), metres in sorted(
-                metres_of.items(), key=lambda item: (order.index(item[0][0]), item[0][1:])
-            )
+            for (number, kept, merged), metres in sorted(metres_of.items())
         )
     )

@@ -353,9 +353,8 @@ def _draft(path: Path, sample: Sample) -> _Draft:
 
 def _metric_crs(layers: Sequence[Sample]) -> str:
     """Take the CRS of the layers, where it is one in which distances can be taken."""
-    systems = {item.info.crs for item in layers}
-    if len(systems) == 1:
-        (crs,) = systems
+    crs, *others = {item.info.crs for item in layers}
+    if not others:
         with contextlib.suppress(CrsError):
             require_metric_crs(crs)
             return f"metric_crs = {_text(str(crs))}"
