@@ -32,6 +32,9 @@ def tiny_city(tmp_path_factory: pytest.TempPathFactory) -> Path:
         "bad.toml": catalog.replace("where =", "wehre ="),
         "noise.toml": "[confusion.bench]\nbench = 0.5\n",
         "rule.json": '{"threshold": "high"}',
+        "jump.jsonl": '{"types": "D"}\n{"types": "D"}\n',
+        "placeless.csv": "types,bearings\nD,3\n",
+        "far.csv": "x,y,types,bearings\n1,2,D,3\n",
     }.items():
         (folder / name).write_text(text, encoding="utf-8")
     lights = [shapely.Point(X + 23 * i, Y + 31 * (i % 3)) for i in range(20)]

@@ -181,23 +181,6 @@ def test_a_route_is_answered_line_by_line(
     assert len(run(*query, "-")[1].splitlines()) == 4
 
 
-def test_a_route_whose_legs_do_not_fit(city: Path, run: Run) -> None:
-    query = "localize", city, *BY, "--route", "--queries", city.with_name("route.jsonl")
-    _, rows = walk(3)
-    for number, change, words in (
-        (1, {"dx": None, "dy": None, "sigma": None}, ("line 2", "does not tell the way")),
-        (0, {"dx": 1.0, "dy": 2.0}, ("line 1", "tells a way")),
-        (2, {"dy": None}, ("line 3", "dx and dy")),
-        (2, {"bearing": 3.0}, ("line 3", "dx and dy, or distance and bearing")),
-        (2, {"dx": "far"}, ("line 3", "far")),
-        (2, {"dx": math.inf}, ("line 3", "finite")),
-        (2, {"sigma": -1.0}, ("line 3", "-1.0")),
-    ):
-        changed = [row | change if line == number else row for line, row in enumerate(rows)]
-        written(city.with_name("route.jsonl"), changed)
-        sentence(run(*query), "route.jsonl", *words)
-
-
 def samples(count: int, *, seed: int = 0) -> list[dict[str, Any]]:
     """Return what a poor detector tells from random places."""
     rng = np.random.default_rng(seed)
@@ -273,48 +256,13 @@ def test_a_rule_is_calibrated_and_used(city: Path, run: Run) -> None:
     sentence(run(*calibrate[:-1], 1.5), "precision", "1.5")
 
 
-def test_samples_that_are_none(city: Path, run: Run) -> None:
-    file, out = city.with_name("s.csv"), city.with_name("out.toml")
-    for text, words in (
-        ("", ("no rows", "one sample")),
-        ("x,y,types,bearings\n", ("no rows",)),
-        ("types,bearings\nD,3\n", ("line 2", "true place")),
-        ("x,y,types,bearings\n1,2,D,nan\n", ("line 2", "nan")),
-    ):
-        file.write_text(text, encoding="utf-8")
-        for command in ("learn", "calibrate"):
-            sentence(run(command, city, "--samples", file, "--out", out), "s.csv", *words)
-    file.write_text("x,y,types,bearings\n1,2,D,3\n", encoding="utf-8")
-    sentence(run("learn", city, "--samples", file, "--out", out), "none of the 1", "EPSG:2154")
-    sentence(run("learn", city, "--samples", city.with_name("n.csv"), "--out", out), "n.csv")
-    assert not out.exists()
-
-
-def test_a_damaged_or_stale_index_is_built_again(city: Path, run: Run) -> None:
+def test_an_index_is_kept_and_built_again_for_another_city(city: Path, run: Run) -> None:
     query = "localize", city, *options(SEEN), *BY, "--json"
     assert "does not exist yet and is built" in run(*query)[2]
-    first = run(*query)
-    assert (first[0], first[2]) == (0, "")
-    (index,) = city.parent.glob("*.likelihood")
-    index.write_bytes(index.read_bytes()[:-500])
-    damaged = run(*query)
-    assert "is built again" in damaged[2]
-    assert "damaged" in damaged[2]
-    assert damaged[1] == first[1]
+    assert run(*query)[2] == ""
     save_with_store(CITY.select(slice(0, 300)), STORE, city)
     assert "is built again" in run(*query)[2]
     assert run(*query)[2] == ""
-
-
-def test_a_database_of_one_cell(city: Path, run: Run) -> None:
-    save_with_store(CITY.select(slice(40, 41)), STORE, city)
-    seen = seen_from(CITY.xy[40])
-    for more in (("--no-refine",), ("--explain", "--heading", "unknown")):
-        code, out, _ = run("localize", city, *options(seen), *BY, *more, "--json")
-        assert code == 0
-        answer = json.loads(out)
-        assert answer["answered"]
-        assert answer["candidates"][0]["chance"] == pytest.approx(1.0)
 
 
 def test_a_query_longer_than_any_signature(city: Path, run: Run) -> None:

@@ -206,7 +206,7 @@ def test_csv_and_json_lines_say_the_same(tmp_path: Path) -> None:
         ("x,types,bearings\n7,D,10\n", ["line 2", "place"]),
         ("x,y,types,bearings\n7,inf,D,10\n", ["line 2", "inf"]),
         ("x,y,bearings\n7,8,10\n", ["line 2", "types"]),
-        ("x,y,types,bearings\n", ["no rows"]),
+        ("x,y,types,bearings\n", ["no rows", "one sample"]),
         ("[1]", ["line 1"]),
         ("{", ["line 1"]),
         ('{"types": "D", "bearings": {"a": 1}, "cell_id": 7}', ["line 1"]),

@@ -263,6 +263,10 @@ def test_a_route_in_a_table(tmp_path: Path) -> None:
         ([parse_route], '{"types": "D", "dx": 1, "dy": 2}', ["line 1", "tells a way", "the first"]),
         ([parse_route], '{"types": "D"}\n{"types": "B"}', ["line 2", "does not tell the way"]),
         ([parse_route], '{"dx": 5}', ["line 1", "dx and dy, or distance and bearing"]),
+        ([parse_route], '{"dx": 1, "dy": 2, "bearing": 3}', ["dx and dy, or distance and bearing"]),
+        ([parse_route], '{"types": "D"}\n{"dx": "far", "dy": 2}', ["line 2", "far"]),
+        ([parse_route], '{"types": "D"}\n{"dx": Infinity, "dy": 2}', ["line 2", "finite"]),
+        ([parse_route], '{"types": "D"}\n{"dx": 1, "dy": 2, "sigma": -1.0}', ["line 2", "-1.0"]),
     ],
 )
 def test_lines_of_files(parsers: list[Callable[..., object]], text: str, words: list[str]) -> None:
