@@ -103,14 +103,12 @@ def _outline(path: Path) -> Area:
         msg = f"{path} has polygons that cannot be read ({layer.errors[0]}); correct the file."
         raise InputError(msg)
     geometry = layer.table.geometry.dropna()
-    others = set(geometry.geom_type) - POLYGONAL
-    if others or geometry.empty:
-        found = f"holds {', '.join(sorted(others))}" if others else "holds nothing"
-        msg = f"{path} {found}; give a file of polygons."
-        raise InputError(msg)
-    polygon = join_areas(geometry.to_crs(WGS84).to_numpy())
+    others = sorted(set(geometry.geom_type) - POLYGONAL)
+    polygon = None if others else join_areas(geometry.to_crs(WGS84).to_numpy())
     if polygon is None:
-        msg = f"{path} encloses no area; give a file of polygons."
+        kinds = ", ".join(others) or "nothing"
+        what = "encloses no area" if len(geometry) and not others else f"holds {kinds}"
+        msg = f"{path} {what}; give a file of polygons."
         raise InputError(msg)
     return Area(polygon, path.stem)
 

@@ -100,10 +100,7 @@ def settle_crs(
 
 
 def off_the_globe(xy: NDArray[np.float64], crs: CRS) -> NDArray[np.bool_]:
-    """Tell which coordinates cannot be longitudes and latitudes in degrees, shape (n,).
-
-    All False for a CRS that is projected, or in other units such as gons.
-    """
+    """Tell which coordinates cannot be degrees, shape (n,); where the CRS has none, all can."""
     units = {axis.unit_name for axis in crs.axis_info}
     if not crs.is_geographic or units != {"degree"}:
         return np.zeros(len(xy), dtype=np.bool_)
@@ -167,8 +164,7 @@ def raw_layer(
 ) -> RawLayer:
     """Filter and classify the rows, build their geometries and check these against the CRS.
 
-    `by_file` says whether the file itself states the CRS. CrsError if that is in degrees and most
-    coordinates cannot be.
+    CrsError if that is in degrees and most coordinates are not; `by_file` if the file states it.
     """
     spec = rules.spec
     table = rules.table(rows)
@@ -311,10 +307,7 @@ def _pattern(wanted: str) -> re.Pattern[str] | None:
 
 
 class RowRules:
-    """The filter, classes, widths and identifiers of one layer, checked against its fields.
-
-    `filters` says whether its ``where`` holds. CatalogError for an absent field or a wrong pattern.
-    """
+    """The filter, classes, widths and identifiers of one layer, checked against its fields."""
 
     def __init__(
         self, spec: LayerSpec, fields: Sequence[str], *, filters: bool, where: str

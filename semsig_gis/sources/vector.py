@@ -251,8 +251,7 @@ WGS84_NAMES = re.compile(r"4326|CRS84|WGS ?84", re.IGNORECASE)
 class LayerInfo:
     """What one layer of a file is: its name, kind, CRS, number of features and fields with types.
 
-    `geometry` is as GDAL calls it, ``"Point"`` for a CSV file with coordinates. `crs` is a code or
-    name, None where the file does not say enough to transform coordinates.
+    `geometry` is GDAL's word, ``"Point"`` for a CSV file with coordinates; `crs` is a code or name.
     """
 
     name: str

@@ -34,8 +34,7 @@ RING_NODES = 4  # of the smallest, a triangle: the first node comes again at its
 def way_shape(xy: NDArray[np.float64], role: Role) -> Position:
     """Return what a way stands for: a centroid for objects, a polygon for buildings, or a line.
 
-    Nodes are longitude and latitude, shape (n, 2). A closed way is the outline of an area, but for
-    a street. BadFeatureError for less than two nodes, and for a building that encloses nothing.
+    Nodes are longitude and latitude, shape (n, 2). A closed way is an area, but for a street.
     """
     if len(xy) < 2:  # noqa: PLR2004
         msg = "has less than two nodes"
@@ -58,8 +57,7 @@ def relation_shape(
 ) -> Position:
     """Return what a multipolygon stands for: a centroid for objects, or the area of a building.
 
-    Its ways come in any order and direction. BadFeatureError if they do not join to rings, or
-    enclose nothing.
+    Its ways come in any order and direction. BadFeatureError if they do not join to rings.
     """
     area: BaseGeometry = shapely.Polygon()
     for ring in (*_rings(outer), *_rings(inner)):

@@ -261,9 +261,8 @@ def overpass_query(
 ) -> str:
     """Return the Overpass QL for the elements of layers, by their ``tags`` and ``elements``.
 
-    Bounds are west, south, east and north in degrees. Values are exact, ways and multipolygons come
-    with their positions, and nothing with the names of mappers. CatalogError if a layer says no
-    tags.
+    Bounds are west, south, east and north in degrees. Values are exact; ways and multipolygons come
+    with their positions, nothing with the names of mappers.
     """
     west, south, east, north = bounds
     # a dict keeps the order, and an element asked for by two layers is asked for once

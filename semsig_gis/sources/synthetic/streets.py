@@ -152,10 +152,8 @@ def _scattered_lattice(reach: float, step: float, turn: float, rng: np.random.Ge
 
 
 def _shared_edges(faces: NDArray[np.object_]) -> tuple[Ints, Ints, Floats]:
-    """Return the edges that two faces share: numbers of their corners and faces, and the corners.
-
-    GEOS gives all faces at a corner the same coordinates, to the last bit.
-    """
+    """Return the edges that two faces share: numbers of corners and faces, and the corners."""
+    # GEOS gives all faces at a corner the same coordinates, to the last bit.
     ring, face = shapely.get_coordinates(faces, return_index=True)
     corners, number = np.unique(ring.view(np.complex128).ravel(), return_inverse=True)
     inner = face[1:] == face[:-1]
@@ -170,15 +168,13 @@ def _shared_edges(faces: NDArray[np.object_]) -> tuple[Ints, Ints, Floats]:
 
 
 def _crossing(ends: Ints, avenue: Bools, kerb: Floats) -> Floats:
-    """Return how much of either end of each edge what crosses there takes up.
-
-    An avenue is not interrupted by itself, only by the streets that join it.
-    """
+    """Return how much of either end of each edge what crosses there takes up."""
     widest = np.zeros((2, int(ends.max(initial=0)) + 1))
     for end in (0, 1):
         np.maximum.at(widest[0], ends[:, end], kerb)
         np.maximum.at(widest[1], ends[~avenue, end], kerb[~avenue])
     any_street, side_street = widest[:, ends]
+    # An avenue is not interrupted by itself, only by the streets that join it.
     clear: Floats = np.where(avenue[:, None] & (side_street > 0), side_street, any_street)
     return clear + 1.0
 
