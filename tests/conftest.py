@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, get_args
 import hypothesis
 import pytest
 from browser_coverage import BrowserCoverage
-from machine import Part, required, unavailable
+from machine import Part, qgis_variables, required, unavailable
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -105,16 +105,8 @@ def qgis_python(qgis_process: Path) -> str:  # noqa: ARG001
 
 @pytest.fixture
 def qgis_environment(tmp_path: Path) -> dict[str, str]:
-    """Return a clean environment for QGIS, without a screen and with a profile of its own."""
-    # Nothing is inherited: our PYTHONPATH, GDAL_DATA or PROJ_LIB would crash QGIS's own Python.
-    return {
-        "HOME": str(tmp_path),
-        "LANG": "C.UTF-8",
-        "PATH": os.defpath,
-        "QGIS_CUSTOM_CONFIG_PATH": str(tmp_path / "qgis"),
-        "QT_QPA_PLATFORM": "offscreen",
-        "XDG_RUNTIME_DIR": str(tmp_path),
-    }
+    """Return the environment for QGIS."""
+    return qgis_variables(tmp_path)
 
 
 @pytest.fixture

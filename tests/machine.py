@@ -11,6 +11,7 @@ import pytest
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
+    from pathlib import Path
 
 Part = Literal["browser", "geodata", "qgis"]
 """A test that needs one of them skips where it is missing, unless SEMSIG_REQUIRE names it."""
@@ -38,3 +39,18 @@ def largest_file(size: int) -> Iterator[None]:
         yield
     finally:
         resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
+
+
+def qgis_variables(home: Path) -> dict[str, str]:
+    """Return a clean environment for QGIS, without a screen and with a profile of its own.
+
+    Nothing is inherited: our PYTHONPATH, GDAL_DATA or PROJ_LIB would crash QGIS's own Python.
+    """
+    return {
+        "HOME": str(home),
+        "LANG": "C.UTF-8",
+        "PATH": os.defpath,
+        "QGIS_CUSTOM_CONFIG_PATH": str(home / "profile"),
+        "QT_QPA_PLATFORM": "offscreen",
+        "XDG_RUNTIME_DIR": str(home),
+    }

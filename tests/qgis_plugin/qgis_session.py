@@ -50,19 +50,15 @@ class Feedback(QgsProcessingFeedback):
         self.percents: list[float] = []
 
     def setProgress(self, percent: float) -> None:  # noqa: N802
-        """Keep the progress."""
         self.percents.append(percent)
 
     def reportError(self, error: str, fatalError: bool = False) -> None:  # noqa: ARG002, FBT001, FBT002, N802, N803
-        """Keep an error."""
         self.errors.append(error)
 
     def pushInfo(self, info: str) -> None:  # noqa: N802
-        """Keep what is said beside."""
         self.infos.append(info)
 
     def setProgressText(self, text: str) -> None:  # noqa: N802
-        """Cancel once there is something to cancel."""
         if self.cancelling and text == "Building":
             self.cancel()
 

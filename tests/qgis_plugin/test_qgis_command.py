@@ -7,6 +7,7 @@ import math
 import os
 import sys
 import time
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import pytest
@@ -39,35 +40,24 @@ unix = pytest.mark.skipif(sys.platform == "win32", reason="the stand-ins are she
 SAY = "import sys\nsay = lambda text: print(text, file=sys.stderr, flush=True)\n"
 
 
+@dataclass
 class Log:
-    """What a watcher hears, in order; it cancels at the first percentage if it shall."""
+    """What a watcher hears, in order; it cancels at the first of it if it shall."""
 
-    def __init__(self, *, cancelling: bool = False) -> None:
-        self.percents: list[tuple[int, str]] = []
-        self.remarks: list[str] = []
-        self.labels: list[str] = []
-        self.cancelling = cancelling
-
-    def progress(self, percent: int, label: str) -> None:
-        self.percents.append((percent, label))
-        self.labels.append(label)
-
-    def remark(self, text: str) -> None:
-        self.remarks.append(text)
-        self.labels.append(text)
+    cancelling: bool = False
+    heard: list[object] = field(default_factory=list)
 
     def run(self, *command: object, written: str | None = None) -> str:
         watcher = Watcher(
-            self.progress, self.remark, lambda: self.cancelling and bool(self.percents)
+            lambda *progress: self.heard.append(progress),
+            self.heard.append,
+            lambda: self.cancelling and bool(self.heard),
         )
         arguments = [str(part) for part in command]
         return run_command(arguments, clean_environment(os.environ), watcher, written=written)
 
     def run_code(self, code: str, *arguments: object, written: str | None = None) -> str:
         return self.run(sys.executable, "-c", SAY + code, *arguments, written=written)
-
-
-# --- Where the command is -----------------------------------------------------------------------
 
 
 def program(folder: Path, name: str = "semsig") -> str:
@@ -82,12 +72,14 @@ def program(folder: Path, name: str = "semsig") -> str:
 def test_what_was_chosen_comes_first_then_the_path_then_the_usual_places(tmp_path: Path) -> None:
     preferred = program(tmp_path / "chosen", "semsig-of-mine")
     on_path, usual = program(tmp_path / "path"), program(tmp_path / "py3.12" / "bin")
-    path = {"PATH": str(tmp_path / "path")}
-    places = (str(tmp_path / "nowhere"), str(tmp_path / "py3.*" / "bin"))
+    path, places = (
+        {"PATH": str(tmp_path / "path")},
+        (f"{tmp_path}/nowhere", f"{tmp_path}/py3.*/bin"),
+    )
     assert find_command(preferred, path, places) == preferred
     assert find_command("", path, places) == on_path
-    assert find_command("", {"PATH": str(tmp_path)}, places) == usual
-    assert find_command("", {}, places) == usual
+    for variables in ({"PATH": str(tmp_path)}, {}):
+        assert find_command("", variables, places) == usual
 
 
 @unix
@@ -108,9 +100,8 @@ def test_a_command_that_is_nowhere(tmp_path: Path) -> None:
     for name in ("text", "missing"):
         with refused(CommandError, name, "choose the semsig command"):
             find_command(str(tmp_path / name), {"PATH": os.defpath})
-
-
-# --- The environment ----------------------------------------------------------------------------
+    with refused(CommandError, "text cannot be run"):
+        Log().run(tmp_path / "text")
 
 
 def test_nothing_of_qgis_is_handed_on() -> None:
@@ -127,9 +118,6 @@ def test_nothing_of_qgis_is_handed_on() -> None:
     assert clean_environment(foreign | own) == own | {"PYTHONUTF8": "1", VARIABLE: "1"}
 
 
-# --- Running ------------------------------------------------------------------------------------
-
-
 def test_results_progress_and_remarks_are_told_apart() -> None:
     log = Log()
     printed = log.run_code(
@@ -142,29 +130,30 @@ def test_results_progress_and_remarks_are_told_apart() -> None:
         "print('x' * 300_000)\n"
     )
     assert printed == "Défibrillateur ┃ 1\n" + "x" * 300_000 + "\n"
-    assert log.percents == [(0, "digging"), (40, "filling")]
-    assert log.remarks == ["a remark", "a bare line about 40%"]
     # A remark is not held back until the end.
-    assert log.labels == ["a remark", "digging", "filling", "a bare line about 40%"]
+    assert log.heard == ["a remark", (0, "digging"), (40, "filling"), "a bare line about 40%"]
 
 
 FAILED = "The semsig command failed with exit code"
 
 
 @pytest.mark.parametrize(
-    ("code", "message", "remarks"),
+    ("code", "message"),
     [
-        ("say('semsig: a'); say('semsig: x is wrong; give y.'); exit(2)", "x is wrong; give y.", 1),
-        ("say('semsig: a'); say('KeyError: 3'); exit(1)", f"{FAILED} 1: KeyError: 3", 1),
-        ("say('semsig progress 0% a'); exit(9)", f"{FAILED} 9 and did not say why.", 0),
+        ("say('semsig: a'); say('semsig: x is wrong; give y.'); exit(2)", "x is wrong; give y."),
+        ("say('semsig: a'); say('KeyError: 3'); exit(1)", f"{FAILED} 1: KeyError: 3"),
+        (
+            "say('semsig: a'); say('semsig progress 0% a'); exit(9)",
+            f"{FAILED} 9 and did not say why.",
+        ),
     ],
 )
-def test_a_failure_is_reported_once(code: str, message: str, remarks: int) -> None:
+def test_a_failure_is_reported_once(code: str, message: str) -> None:
     log = Log()
     with pytest.raises(CommandError) as caught:
         log.run_code(code)
     assert str(caught.value) == message
-    assert log.remarks == ["a"] * remarks
+    assert [one for one in log.heard if isinstance(one, str)] == ["a"]
 
 
 @pytest.mark.parametrize(
@@ -195,12 +184,6 @@ def test_a_file_that_was_written_anew(tmp_path: Path) -> None:
     for _ in range(2):
         Log().run_code(code, tmp_path / "part", place, written=str(place))
     assert place.read_text() == "city"
-
-
-def test_a_program_that_cannot_be_run(tmp_path: Path) -> None:
-    (tmp_path / "text").write_text("not a program")
-    with refused(CommandError, "text cannot be run"):
-        Log().run(tmp_path / "text")
 
 
 def test_a_cancel_ends_the_command_by_the_end_of_its_input(tmp_path: Path) -> None:
@@ -258,9 +241,6 @@ def test_a_watcher_that_fails_ends_the_command_too() -> None:
         run_command(command, clean_environment(os.environ), Watcher(fail, print, lambda: False))
 
 
-# --- Arguments ----------------------------------------------------------------------------------
-
-
 def test_the_command_understands_any_value() -> None:
     nasty = ["--out=x", "-", "--", "a b", "=", "é \u202e'\"`$(x)\\", "*", "\n"]
     line = command_line(
@@ -277,16 +257,13 @@ def test_the_command_understands_any_value() -> None:
     assert not values["layer"]
 
 
-def test_the_lists_are_those_of_the_command() -> None:
+def test_methods_and_other_names_are_those_of_the_command() -> None:
     assert set(arguments.CATALOGS) == set(catalog_names())
     assert set(arguments.NOISES) == set(NOISES)
     for method in arguments.METHODS:
         assert method == arguments.LIKELIHOOD or str(Method.parse(method))
     for name in arguments.DISTORTIONS:
         assert parse_chain(name)
-
-
-def test_what_only_the_likelihood_has() -> None:
     require_likelihood("likelihood", "Place")
     with refused(CommandError, "Place", "types:edit", "choose the method likelihood"):
         require_likelihood("types:edit", "Place")
@@ -298,10 +275,9 @@ def test_outputs_are_checked_before_the_work(
     monkeypatch.chdir(tmp_path)
     (tmp_path / "text").write_text("a file")
     (tmp_path / "folder.gpkg").mkdir()
-    check_output("a.gpkg", "gpkg")
-    check_output(str(tmp_path / "new" / "folder" / "A.GPKG"), "gpkg")
-    check_output("new/folder", "")
-    check_output(str(tmp_path), "")
+    for path, suffix in (("a.gpkg", "gpkg"), (f"{tmp_path}/new/folder/A.GPKG", "gpkg"),
+                         ("new/folder", ""), (str(tmp_path), "")):  # fmt: skip
+        check_output(path, suffix)
     for path, suffix, words in (
         ("b.shp", "gpkg", "does not end in .gpkg"),
         ("gpkg", "gpkg", "does not end in .gpkg"),
@@ -316,9 +292,6 @@ def test_outputs_are_checked_before_the_work(
     for path, suffix in (("b.gpkg", "gpkg"), ("new/folder", "")):
         with refused(CommandError, path, f"{tmp_path} is read-only"):
             check_output(path, suffix)
-
-
-# --- Answers ------------------------------------------------------------------------------------
 
 
 @given(
@@ -342,13 +315,11 @@ def test_an_ellipse_has_its_axes_and_its_middle(
 
 
 def test_rows_have_the_fields_that_they_say() -> None:
-    ranked = {"rank_low": 1, "rank_high": 20, "distance": 0.3}
-    likely = {"rank": 2, "chance": 0.5}
     common = {"cell_id": 7, "types": "DD", "length": 2, "x": 1.0, "y": 2.0}
-    rows = candidate_rows({"candidates": [common | ranked, common | likely]})
-    columns = dict(
-        zip(answers.CANDIDATE_FIELDS, zip(*(row[2] for row in rows), strict=True), strict=True)
-    )
+    ranked = {**common, "rank_low": 1, "rank_high": 20, "distance": 0.3}
+    likely = {**common, "rank": 2, "chance": 0.5}
+    values = zip(*(row[2] for row in candidate_rows({"candidates": [ranked, likely]})), strict=True)
+    columns = dict(zip(answers.CANDIDATE_FIELDS, values, strict=True))
     assert (columns["rank"], columns["rank_high"]) == ((1, 2), (20, 2))
     assert (columns["chance"], columns["distance"]) == ((None, 0.5), (0.3, None))
     assert place_row({"candidates": []}) is None

@@ -11,6 +11,7 @@ import shutil
 import subprocess
 import sys
 import zipfile
+from dataclasses import dataclass
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -19,20 +20,18 @@ from xml.etree import ElementTree as ET
 import geopandas as gpd
 import pyogrio
 import pytest
-from machine import unavailable
+from machine import qgis_variables, unavailable
+from small_city import small_city
 
 import semsig_gis
-from semsig_gis.database.build import build_database
 from semsig_gis.database.city import ObjectStore, save_with_store
 from semsig_gis.database.file import open_database
-from semsig_gis.objects.load import build_objects
 from semsig_gis.objects.table import open_objects, save_objects
-from semsig_gis.sources.catalog import paper_taxonomy
-from semsig_gis.sources.synthetic.city import CitySpec, synthetic_city
 
 ROOT = Path(__file__).parents[2]
 PLUGIN = ROOT / "qgis_plugin" / "semsig"
 SCRIPT = Path(__file__).with_name("qgis_session.py")
+DATA = Path(__file__).with_name("data")  # three lamps, and their catalogue
 
 # The command with few simulated queries.
 QUICK = """
@@ -50,9 +49,6 @@ pytestmark = pytest.mark.skipif(not PLUGIN.is_dir(), reason="the tests do not ru
 def package() -> SimpleNamespace:
     """Return what the program defines that makes the zip file."""
     return SimpleNamespace(**runpy.run_path(str(ROOT / "qgis_plugin" / "package.py")))
-
-
-# --- The zip file -------------------------------------------------------------------------------
 
 
 def test_the_zip_file_is_always_the_same_and_holds_what_a_plugin_needs(
@@ -95,16 +91,13 @@ def test_the_plugin_runs_on_an_old_python() -> None:
         ast.parse(path.read_text(encoding="utf-8"), path.name, feature_version=(3, 9))
 
 
-# --- In QGIS ------------------------------------------------------------------------------------
-
-
+@dataclass(frozen=True)
 class Qgis:
     """A fresh profile with the plugin from its zip file, and a small city."""
 
-    def __init__(self, place: Path, environment: dict[str, str], program: Path) -> None:
-        self.place = place
-        self.environment = environment
-        self.program = program
+    place: Path
+    environment: dict[str, str]
+    program: Path
 
     def process(self, *arguments: object) -> subprocess.CompletedProcess[str]:
         return subprocess.run(
@@ -131,10 +124,10 @@ def qgis(
     qgis_process: Path, package: SimpleNamespace, tmp_path_factory: pytest.TempPathFactory
 ) -> Qgis:
     place = tmp_path_factory.mktemp("qgis")
-    layers = synthetic_city(CitySpec(size=300.0))
-    objects, _ = build_objects(layers, taxonomy=paper_taxonomy(), crs=layers[0].table.crs)
+    shutil.copytree(DATA, place, dirs_exist_ok=True)
+    database, objects = small_city()
     save_objects(objects, place / "objects.parquet")
-    save_with_store(build_database(objects), ObjectStore.of(objects), place / "city.parquet")
+    save_with_store(database, ObjectStore.of(objects), place / "city.parquet")
     profile = place / "profile" / "profiles" / "default"
     with zipfile.ZipFile(package.write_zip(place)) as archive:
         archive.extractall(profile / "python" / "plugins")
@@ -153,37 +146,14 @@ def qgis(
         f"[Processing]\nConfiguration\\SEMSIG_COMMAND={command}\n[PythonPlugins]\nsemsig=true\n"
     )
     place.chmod(0o700)  # as Qt wishes its runtime folder to be
-    environment = {
-        "GDAL_DATA": "/usr/share/gdal",
-        "HOME": str(place),
-        "LANG": "C.UTF-8",
-        "PATH": os.defpath,
-        "QGIS_CUSTOM_CONFIG_PATH": str(place / "profile"),
-        "QT_QPA_PLATFORM": "offscreen",
-        "XDG_RUNTIME_DIR": str(place),
-    }
+    environment = {**qgis_variables(place), "GDAL_DATA": "/usr/share/gdal"}
     return Qgis(place, environment, qgis_process)
 
 
-@pytest.fixture(scope="module")
-def lamps(qgis: Qgis) -> Path:
-    """Return the catalogue of a file with three lamps."""
-    lamps = gpd.GeoDataFrame(geometry=gpd.points_from_xy([0, 40, 80], [0, 0, 0]), crs="EPSG:2154")
-    lamps.to_file(qgis.place / "lamps.geojson", driver="GeoJSON")
-    catalog = qgis.place / "town.toml"
-    catalog.write_text(
-        'name = "town"\ntitle = "Town"\nurl = "https://example.org"\nmetric_crs = "EPSG:2154"\n'
-        'license = "CC0"\nattribution = "Town"\n'
-        '[[layers]]\nname = "lamps"\nclass = "street_light"\nfiles = ["lamps.geojson"]\n'
-        'geometry = "point"\n'
-    )
-    return catalog
-
-
-def test_load_and_build(qgis: Qgis, lamps: Path) -> None:
+def test_load_and_build(qgis: Qgis) -> None:
     objects = qgis.place / "lamps.parquet"
     files = {"OUTPUT": objects, "BUILDINGS": qgis.place / "no_buildings.parquet"}
-    done = qgis.run("load", FOLDER=qgis.place, CATALOG_FILE=lamps, **files)
+    done = qgis.run("load", FOLDER=qgis.place, CATALOG_FILE=qgis.place / "town.toml", **files)
     assert done == {"OUTPUT": str(objects)}
     assert len(open_objects(objects)) == 3
     files = {"OUTPUT": qgis.place / "lamps_city.parquet", "CELLS": qgis.place / "lamps.gpkg"}
@@ -195,34 +165,37 @@ def test_load_and_build(qgis: Qgis, lamps: Path) -> None:
 
 
 def test_localize(qgis: Qgis) -> None:
-    database = open_database(qgis.place / "city.parquet")
+    database, _ = small_city()
     cell = int(database.lengths.argmax())
-    seen = database.signature(cell)
-    assert seen.bearings is not None
-    files = {name: qgis.place / f"{name}.gpkg" for name in ("CANDIDATES", "PLACE", "REGIONS")}
-    query = {
-        "TYPES": database.types(cell),
-        "BEARINGS": ",".join(f"{bearing:.1f}" for bearing in seen.bearings),
-    }
-    files["MAP"] = qgis.place / "place.html"
-    source = qgis.place / "city.parquet"
-    qgis.run("localize", DATABASE=source, METHOD="likelihood", TOP=3, **query, **files)
-    candidates = gpd.read_file(files["CANDIDATES"], layer="CANDIDATES")
-    assert candidates["rank"].tolist() == [1, 2, 3]
-    assert candidates["cell_id"][0] == database.cell_ids[cell]
-    assert candidates["chance"].is_monotonic_decreasing
-    assert candidates["distance"].isna().all()
-    assert candidates.crs == database.crs
-    for name in ("CANDIDATES", "PLACE"):
-        styles = gpd.read_file(files[name], layer="layer_styles")
-        assert styles["styleName"].tolist() == [name.lower()]
+    bearings = database.signature(cell).bearings
+    assert bearings is not None
+    candidates, place, regions = (qgis.place / f"{name}.gpkg" for name in ("best", "here", "where"))
+    qgis.run(
+        "localize",
+        DATABASE=qgis.place / "city.parquet",
+        METHOD="likelihood",
+        TOP=3,
+        TYPES=database.types(cell),
+        BEARINGS=",".join(f"{bearing:.1f}" for bearing in bearings),
+        CANDIDATES=candidates,
+        PLACE=place,
+        REGIONS=regions,
+        MAP=qgis.place / "place.html",
+    )
+    for file, name in ((candidates, "candidates"), (place, "place")):
+        styles = gpd.read_file(file, layer="layer_styles")
+        assert styles["styleName"].tolist() == [name]
         assert styles["useAsDefault"].all()
-    place = gpd.read_file(files["PLACE"], layer="PLACE")
-    assert place["answered"].tolist() == ["yes"]
-    regions = gpd.read_file(files["REGIONS"], layer="regions")
-    assert regions.geometry[0].distance(candidates.geometry[0]) == 0
-    assert place.geometry[0].centroid.distance(candidates.geometry[0]) < 10
-    assert "<html" in files["MAP"].read_text(encoding="utf-8")[:200].lower()
+    best, here, where = (gpd.read_file(file, layer=0) for file in (candidates, place, regions))
+    assert best["rank"].tolist() == [1, 2, 3]
+    assert best["cell_id"][0] == database.cell_ids[cell]
+    assert best["chance"].is_monotonic_decreasing
+    assert best["distance"].isna().all()
+    assert best.crs == database.crs
+    assert here["answered"].tolist() == ["yes"]
+    assert where.geometry[0].distance(best.geometry[0]) == 0
+    assert here.geometry[0].centroid.distance(best.geometry[0]) < 10
+    assert "<html" in (qgis.place / "place.html").read_text(encoding="utf-8")[:200].lower()
 
 
 def test_evaluate(qgis: Qgis) -> None:
@@ -247,11 +220,11 @@ def test_evaluate(qgis: Qgis) -> None:
 
 
 @pytest.fixture(scope="module")
-def session(qgis: Qgis, lamps: Path) -> dict[str, Any]:
+def session(qgis: Qgis) -> dict[str, Any]:
     """Play `qgis_session.py` in QGIS's own Python, and return what it tells."""
     python = shutil.which("python3", path=os.defpath) or "python3"
     shutil.copy(qgis.place / "city.parquet", qgis.place / "session.parquet")
-    done = qgis.process(python, SCRIPT, qgis.place, lamps)
+    done = qgis.process(python, SCRIPT, qgis.place, qgis.place / "town.toml")
     if "No module named 'qgis'" in done.stderr:
         unavailable("qgis", f"{python} does not have QGIS's modules")
     assert done.returncode == 0, done.stdout + done.stderr
@@ -259,8 +232,10 @@ def session(qgis: Qgis, lamps: Path) -> dict[str, Any]:
     return happened
 
 
-def test_qgis_lists_the_algorithms_in_their_order(session: dict[str, Any]) -> None:
+def test_qgis_lists_the_algorithms_and_loads_a_file(session: dict[str, Any], qgis: Qgis) -> None:
     assert session["listed"] == ["load", "build", "localize", "evaluate", "identify", "export"]
+    assert session["loaded"] is True
+    assert len(open_objects(qgis.place / "session_lamps.parquet")) == 3
     text = session["help"]
     assert "<p>Tells where in the city a view was taken from: what is seen, clockwise" in text
     assert "?&lt;=10" in text
@@ -310,6 +285,7 @@ def test_what_cannot_be_is_refused_before_the_work(session: dict[str, Any]) -> N
     )
     for (sentence,), words in zip(session["refused"], expected, strict=True):
         assert all(word in sentence for word in words), sentence
+    assert "install semsig_gis" in session["lost"]
 
 
 @pytest.mark.usefixtures("session")
@@ -326,26 +302,16 @@ def test_identify_and_export(qgis: Qgis) -> None:
     assert layers["cells"] == layers["objects"] == "Point"
 
 
-def test_files_one_by_one(session: dict[str, Any], qgis: Qgis) -> None:
-    assert session["loaded"] is True
-    assert len(open_objects(qgis.place / "session_lamps.parquet")) == 3
-
-
-def test_a_failing_run_shows_the_sentence_and_leaves_nothing(session: dict[str, Any]) -> None:
+def test_a_run_that_fails_or_is_cancelled_says_so_and_leaves_nothing(
+    session: dict[str, Any],
+) -> None:
     run = session["failed"]
     (sentence,) = run["errors"]
     assert "objects.parquet is a street objects file; give a signature database file." in sentence
     assert (run["successful"], run["left"]) == (False, [])
-
-
-def test_a_cancel_leaves_no_process_and_no_file(session: dict[str, Any]) -> None:
     run = session["cancelled"]
     assert run["errors"] == ["Cancelled; no file is half-written."]
     assert (run["successful"], run["left"]) == (False, [])
     assert run["percents"] != []
     with pytest.raises(ProcessLookupError):
         os.kill(run["process"], 0)
-
-
-def test_without_the_command_it_is_told_how_to_get_it(session: dict[str, Any]) -> None:
-    assert "install semsig_gis" in session["lost"]
