@@ -1,8 +1,4 @@
-"""What of a city must be searched after a query: polygons for whoever looks closer.
-
-A pipeline that estimates poses compares pictures, which costs time for every square metre. It
-takes the regions by rank until it has found the place.
-"""
+"""What of a city must be searched after a query: polygons, by rank, for whoever looks closer."""
 
 from __future__ import annotations
 
@@ -24,6 +20,8 @@ if TYPE_CHECKING:
     from semsig_gis.database.answer import Answer
     from semsig_gis.database.database import SignatureDatabase
 
+CHANCES = ["chance", "searched_chance"]  # which the likelihood method alone tells
+
 
 @dataclass(frozen=True, eq=False)
 class SearchRegions:
@@ -42,10 +40,7 @@ class SearchRegions:
     table: gpd.GeoDataFrame
 
     def to_dict(self) -> dict[str, Any]:
-        """Return what is to be searched in all as plain values for JSON: ``regions``, ``cells``...
-
-        ``percent`` is of the area of all cells; ``chance`` is of the likelihood method only.
-        """
+        """Return what is to be searched in all; ``percent`` is of the area of all cells."""
         last = self.table.iloc[-1]
         summary = {
             "regions": len(self.table),
@@ -113,32 +108,31 @@ def search_regions(
     region = shape[np.argsort(inside)]
     first = np.unique(region, return_index=True)[1]
     counts = np.bincount(region)
-    held = None if chances is None else np.bincount(region, chances[cells])
-    order = np.argsort(first if held is None else -held, kind="stable")
+    held = np.bincount(region, None if chances is None else chances[cells])
+    order = np.argsort(first if chances is None else -held, kind="stable")
     best = cells[first[order]]
     km2 = counts[order] * database.grid.step**2 / 1e6
-    columns: dict[str, Any] = {"rank": np.arange(1, len(order) + 1)}
-    if held is not None:
-        columns["chance"] = held[order]
-    columns |= {
-        "cells": counts[order],
-        "km2": km2,
-        "best_cell_id": database.cell_ids[best],
-        "best_x": database.xy[best, 0],
-        "best_y": database.xy[best, 1],
-    }
-    if held is not None:
-        columns["searched_chance"] = np.minimum(np.cumsum(held[order]), 1.0)
-    columns["searched_km2"] = np.cumsum(km2)
-    columns["searched_percent"] = 100.0 * np.cumsum(counts[order]) / len(database)
-    return SearchRegions(gpd.GeoDataFrame(columns, geometry=shapes[order], crs=database.crs))
+    table = gpd.GeoDataFrame(
+        {
+            "rank": np.arange(1, len(order) + 1),
+            "chance": held[order],
+            "cells": counts[order],
+            "km2": km2,
+            "best_cell_id": database.cell_ids[best],
+            "best_x": database.xy[best, 0],
+            "best_y": database.xy[best, 1],
+            "searched_chance": np.minimum(np.cumsum(held[order]), 1.0),
+            "searched_km2": np.cumsum(km2),
+            "searched_percent": 100.0 * np.cumsum(counts[order]) / len(database),
+        },
+        geometry=shapes[order],
+        crs=database.crs,
+    )
+    return SearchRegions(table if chances is not None else table.drop(columns=CHANCES))
 
 
 def _runs(database: SignatureDatabase, cells: NDArray[np.int64]) -> NDArray[np.object_]:
-    """Return cells as rectangles, one for all that follow each other in a column.
-
-    There are far fewer of these than of cells to be merged.
-    """
+    """Return cells as rectangles, one for all that follow each other in a column."""
     step, (west, south) = database.grid.step, database.grid.origin
     breaks = np.diff(database.cell_ids[cells]) != 1
     first, last = cells[np.append(True, breaks)], cells[np.append(breaks, True)]

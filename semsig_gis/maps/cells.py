@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import itertools
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from html import escape
 from typing import TYPE_CHECKING, Any
 
@@ -43,17 +43,15 @@ if TYPE_CHECKING:
 class CellFacts:
     """A part of what a click on a cell tells, with numbers and a JavaScript function of its own.
 
-    The file ``NAME.js`` defines the function ``semsig.cellFacts.NAME(city, cell)``, where NAME is
-    ``name``. It returns what there is of ``title``; ``rows``: label and value each, as
-    `semsig.details` shows them; ``jumps``: a label and buttons, each with a text, a cell and a
-    hint; ``marks``: cells to number and to join by lines; ``dots``: cells and colours. ``arrays``
-    are packed numbers of the cells (see `maps.image`); ``settings`` reach the function in
-    ``city.grid``.
+    The file ``NAME.js`` defines the function ``semsig.cellFacts.NAME(city, cell)``. It returns what
+    there is of ``title``; ``rows``: label and value each; ``jumps``: a label and buttons, each with
+    a text, a cell and a hint; ``marks``: cells to number and to join by lines; ``dots``: cells and
+    colours. ``arrays`` are packed numbers of the cells; ``settings`` are in ``city.grid``.
     """
 
     name: str
-    arrays: Mapping[str, list[str]] = field(default_factory=dict)
-    settings: Mapping[str, Any] = field(default_factory=dict)
+    arrays: Mapping[str, list[str]]
+    settings: Mapping[str, Any]
 
 
 def add_cells(map_: folium.Map, database: SignatureDatabase, facts: Sequence[CellFacts]) -> None:
@@ -90,8 +88,7 @@ def packed_signatures(
 
 def _cells(database: SignatureDatabase) -> tuple[dict[str, list[str]], dict[str, Any]]:
     """Return where the cells are, and how to read it."""
-    lattices = place_lattices(database)
-    columns = database.columns - database.columns[0]
+    lattices, columns = place_lattices(database), database.columns - database.columns[0]
     arrays = {
         "rows": steps(database.rows),
         "columnEnds": steps(np.cumsum(np.bincount(columns)).astype(np.int32)),
@@ -164,10 +161,8 @@ def ambiguity_map(
         levels = np.digitize(size, list(GROUP_COLOURS)).astype(np.uint8)
         image = level_image(database, levels, list(GROUP_COLOURS.values()))
         add_image(page, *image, name=name, dark="lift", show=name == "Same types")
-    facts = [_group_facts(database)]
-    if identifiability is not None:
-        facts.append(_lookalike_facts(identifiability))
-    add_cells(page, database, facts)
+    more = [] if identifiability is None else [_lookalike_facts(identifiability)]
+    add_cells(page, database, [_group_facts(database), *more])
     legend = ambiguity_legend(sizes, licenses=database.licenses)
     return finished_map(page, database, legend=legend, view=view if map_ is None else None)
 

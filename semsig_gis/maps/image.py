@@ -33,11 +33,9 @@ _LATTICE = 64
 class PlaceLattices:
     """The places of a city on a web map, and back, at the crossings of two lattices.
 
-    To interpolate is fast, needs no projection where the map is shown, and is exact to a centimetre
-    in a city. ``metres`` (65, 65, 2) holds x and y
-    in the CRS of the database over ``mercator_box`` (Web Mercator), rows from south to north and
-    columns from west to east; ``degrees`` (65, 65, 2) holds latitude and longitude over
-    ``metric_box``. Boxes are west, south, east, north.
+    To interpolate is exact to a centimetre in a city. ``metres`` (65, 65, 2; from south to north,
+    west to east) holds x and y over ``mercator_box`` (Web Mercator), ``degrees`` latitude and
+    longitude over ``metric_box``. Boxes are west, south, east, north.
     """
 
     metres: NDArray[np.float64]
@@ -68,11 +66,9 @@ def city_image(
 ) -> tuple[bytes, list[list[float]]]:
     """Draw how many objects are seen from every cell, as a PNG with its corners.
 
-    ``shades`` gives a colour (``#rrggbb``) to each smallest number of objects, rising from 1. The
-    PNG is transparent where nothing is seen; its rows and columns are even steps of Web Mercator,
-    as the map's are, so it needs no warping. The corners are south-west and north-east, latitude
-    and longitude in degrees (WGS 84). A city wider than 2048 cells is drawn in blocks of cells,
-    each with its mean.
+    ``shades`` gives a colour (``#rrggbb``) to each smallest number of objects, rising from 1. Rows
+    and columns are even steps of Web Mercator. The corners are south-west and north-east, latitude
+    and longitude. A city wider than 2048 cells is drawn in blocks of cells, each with its mean.
     """
 
     def mean_shades(members: NDArray[np.int64]) -> NDArray[np.uint8]:
@@ -173,10 +169,9 @@ QUANTUM_M = 0.25  # of Web Mercator
 
 
 def script_json(value: object) -> str:
-    """Return a value as JSON that may stand in the script of a folium page.
+    """Return a value as JSON for the script of a folium page; its numbers must be finite.
 
-    It is ASCII that no HTML parser takes for markup and no Jinja rendering changes. Numbers must be
-    finite.
+    It is ASCII that no HTML parser takes for markup and no Jinja rendering changes.
     """
     text = json.dumps(value, separators=(",", ":"), allow_nan=False)
     # Only a brace of text can be followed by one of these: JSON's own is by a quote or a "}".

@@ -50,9 +50,7 @@ if TYPE_CHECKING:
     from semsig_gis.matching.search import Localization
 
 
-Image = tuple[bytes, list[list[float]]]
-"""A PNG with the latitudes and longitudes of its corners."""
-
+Image = tuple[bytes, list[list[float]]]  # a PNG, and latitudes and longitudes of its corners
 PLACE_FIELDS = ("Chance", "Place", "Give or take", "North of the query", "Cell")
 CANDIDATE_FIELDS = (
     *("Query", "Cell sees", "Chance", "Log-likelihood"),
@@ -62,6 +60,7 @@ OBJECT_FIELDS = (
     *("Chance", "Seen as", "Seen at", "Street object", "It is at", "Off by"),
     *("Source", "Identifier"),
 )
+# What became of an object, and the look of the line to it, by default in its own colour.
 RAYS: dict[str, tuple[str, dict[str, object]]] = {
     "matched": ("a street object", {"weight": 2, "opacity": 0.9, "dashArray": None}),
     "misnamed": ("one of another class", {"weight": 2, "opacity": 0.9, "dashArray": "9 4"}),
@@ -71,10 +70,7 @@ RAYS: dict[str, tuple[str, dict[str, object]]] = {
     ),
     "false": ("no street object", {"weight": 2, "opacity": 0.9, "dashArray": "3 5"}),
 }
-"""What became of an object, and the look of the line to it, by default in its own colour."""
-BEST_PLACE = (
-    "<p>The best place is where most of the chance is around it; ranks are of single cells.</p>"
-)
+BEST_PLACE = "The best place is where most of the chance is around it; ranks are of single cells."
 SURROUNDINGS_M = 45.0  # to see around the answer
 CLOSEST_ZOOM = 20
 ELLIPSE_STEPS = 72
@@ -289,7 +285,7 @@ def location_legend(location: Location) -> str:
     colour, verdict, note = (
         (SUCCESSFUL, "The answer", "")
         if answer.given
-        else (FAILED, "Cannot tell; the best place", BEST_PLACE)
+        else (FAILED, "Cannot tell; the best place", f"<p>{BEST_PLACE}</p>")
     )
     counts = {share: len(posterior.credible_cells(share)) for share in CHANCES}
     regions = "<br>".join(

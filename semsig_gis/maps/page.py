@@ -1,8 +1,7 @@
 """Leaflet and its companions, put into a page so that a map opens without any request.
 
-The files that our maps need are brought into the folder ``assets`` when the package is built
-(``hatch_build.py``, which needs ``npm``); here they replace the links of a finished page. Where
-they were not brought, `available` is false and a map keeps its links.
+They are brought into the folder ``assets`` when the package is built (``hatch_build.py``, which
+needs ``npm``). Where they were not, `available` is false and a map keeps its links.
 """
 
 from __future__ import annotations
@@ -84,10 +83,9 @@ def available() -> bool:
 
 
 def asset_text(name: str) -> str:
-    """Return a script or style sheet as it may stand inside a page, without the element around it.
+    """Return a script or style sheet as it may stand inside its element of a page.
 
-    Images of a style sheet become data URIs, and nothing in the text can close the element that it
-    is put into. Raises `InputError` if the package was built without the file.
+    Images of a style sheet become data URIs. Raises `InputError` if the package has not the file.
     """
     files = {asset.name: asset for asset in assets().values() if asset.stands_for}
     if name not in files:
@@ -105,20 +103,16 @@ def asset_text(name: str) -> str:
 
 
 def external_files(page: str) -> tuple[str, ...]:
-    """Return the addresses of the scripts and style sheets that the head of a page loads, in order.
-
-    Map tiles, which a script asks for later, are not among them.
-    """
+    """Return the addresses of scripts and style sheets that the head of a page loads, in order."""
     head, _, _ = page.partition("</head>")
     return tuple(match["script"] or match["link"] for match in _REFERENCE.finditer(head))
 
 
 def inline_assets(page: str) -> str:
-    """Return a page of folium's with every external script and style sheet put into it.
+    """Return a page of folium's with the script and style sheets that our maps use put into it.
 
-    Those that our maps do not use are dropped; the result is about 250 kB longer. Raises
-    `InputError` if the package was built without the files, or the page needs one that is not among
-    them (a plugin, `folium.Icon`, a colour map drawn by branca).
+    Raises `InputError` if the package was built without the files, or the page needs others (for a
+    plugin, `folium.Icon`, a colour map drawn by branca).
     """
     replacements = {
         file: asset.name for asset in assets().values() for file in asset.stands_for

@@ -39,11 +39,11 @@ if TYPE_CHECKING:
 
 MAX_ZOOM = 20
 CLOSE_ZOOM = 17  # the closest that a new map shows by itself
+# Files of the folder ``js`` that every page has, in this order.
 PAGE_FILES = (
     *("page.css", "layers.js", "popup.js", "search.js", "controls.js", "arrays.js"),
     *("board.js", "heat.js", "objects.js", "ground.js"),
 )
-"""Files of the folder ``js`` that every page has, in this order."""
 POWERS = 4  # of x and y, which tell a place within millimetres in a city
 LATTICE = 9
 
@@ -99,10 +99,7 @@ class Drawing(Call, Layer):
 
 
 class Surroundings(Call):
-    """What stands around a map: search, light and dark, and whom to name for the data.
-
-    It comes last, when all boxes are there, and shows what the map is to show between them.
-    """
+    """What stands around a map, added last: search, light and dark, whom to name for the data."""
 
     def __init__(
         self,
@@ -153,8 +150,7 @@ def finished_map(
 ) -> folium.Map:
     """Add what every map has, last, where the layer control knows all layers.
 
-    ``view`` holds places to show at first, at most as close as ``zoom``. The source of what was
-    drawn names whom to credit, and the cells and CRS of what a search finds.
+    ``view`` holds places to show at first, at most as close as ``zoom``; ``source`` is searched.
     """
     if legend:
         corners = None if view is None else [view.min(axis=0).tolist(), view.max(axis=0).tolist()]
@@ -283,10 +279,9 @@ def add_image(
     dark: Literal["flip", "lift"],
     show: bool = True,
 ) -> None:
-    """Add a PNG below everything that is drawn, and say what becomes of it in the dark.
+    """Add a PNG below everything that is drawn.
 
-    Shades that begin near the colour of paper flip their lightness; ramps from dark to light are
-    lifted, so that their dark end is seen.
+    In the dark, shades that begin near the colour of paper flip, and the dark end of ramps lifts.
     """
     ImageOverlay(
         _data_url(image),
@@ -303,15 +298,10 @@ def _data_url(image: bytes) -> str:
     return f"data:image/png;base64,{base64.b64encode(image).decode('ascii')}"
 
 
-FLIPPING = "square semsig-flip"
-"""A sign whose lightness flips in the dark, as what it explains does."""
-
-LIFTING = "square semsig-lift"
-"""A sign that is brighter in the dark, as what it explains is."""
-
-NAMED_CLASSES = 6
-"""How many classes a legend names."""
-
+# Signs that change in the dark as what they explain does.
+FLIPPING, LIFTING = "square semsig-flip", "square semsig-lift"
+NAMED_CLASSES = 6  # in a legend
+# Path of an SVG for each shape, around (0, 0), of about the area of a circle of radius 1.
 OUTLINES = {
     "circle": "M-1,0A1,1 0 1 1 1,0A1,1 0 1 1 -1,0Z",
     "square": "M-.9,-.9H.9V.9H-.9Z",
@@ -321,7 +311,6 @@ OUTLINES = {
     "triangle_down": "M0,1.2L1.2,-1.2H-1.2Z",
     "cross": "M-.6,-1.1H.6V-.6H1.1V.6H.6V1.1H-.6V.6H-1.1V-.6H-.6Z",
 }
-"""Path of an SVG for each shape, around (0, 0), of about the area of a circle of radius 1."""
 
 
 def sign_svg(sign: ClassSign) -> str:

@@ -104,11 +104,10 @@ POINT_COLUMNS = ("source", "label", "x", "y", "low", "high")
 def write_report(report: Report, folder: str | Path) -> None:
     """Write a report into a folder, which is made if need be; files of the same names are replaced.
 
-    ``report.html`` is one page that asks the network for nothing, ``report.md`` is the same as
-    Markdown. ``figures`` holds each plot and scene as SVG and PNG, and the points of each plot as
-    CSV. ``numbers.csv`` holds every number of the tables, and ``report.json`` all there is, with
-    null for what is infinite or not a number. Raises `InputError` if a name in the report cannot be
-    that of a file or stands twice, or the folder cannot be written to.
+    ``report.html`` is one page, ``report.md`` the same as Markdown; ``figures`` holds plots and
+    scenes as SVG and PNG, and points of plots as CSV; ``numbers.csv`` holds every number, and
+    ``report.json`` all there is. Raises `InputError` if a name cannot be that of a file or stands
+    twice, or the folder cannot be written to.
     """
     _require_names([section.name for section in report.sections])
     _require_names([part.name for section in report.sections for part in section.drawn])
@@ -142,9 +141,6 @@ def _require_names(names: Sequence[str]) -> None:
         seen.add(name.lower())
 
 
-# --- CSV ----------------------------------------------------------------------------------------
-
-
 def _csv(columns: Iterable[str], rows: Iterable[Sequence[str | float | None]]) -> str:
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
@@ -175,9 +171,6 @@ def _points(plot: Plot) -> Iterator[tuple[str | float | None, ...]]:
             yield ("ours", curve.label, x, y, low, high)
     for x, y, label in plot.paper:
         yield ("paper", label, x, y, None, None)
-
-
-# --- JSON ---------------------------------------------------------------------------------------
 
 
 def _json(report: Report) -> str:

@@ -16,8 +16,7 @@ class Number:
     """A number of ours, beside the paper's where it prints one.
 
     ``ours`` is None where it could not be worked out; ``low`` and ``high`` are the ends of its
-    interval of 95 %, where it has one. The unit is of all of them, ``""`` for a share or a pure
-    number.
+    interval of 95 %. The unit of all is ``""`` for a share or a pure number.
     """
 
     row: str
@@ -113,13 +112,11 @@ class SceneObject:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Scene:
-    """A viewpoint with the street objects around it.
+    """A viewpoint with the street objects around it; its files are called ``name``.
 
-    ``name`` (letters, digits and ``-``) is what its files are called. ``lon`` and ``lat`` are in
-    degrees (WGS 84), ``radius`` is the visibility range in metres, and ``types`` holds the symbols
-    of the signature, clockwise from north. ``others`` are objects around that are not seen from
-    there. ``answer`` is metres east and north to the place that was answered, if near enough to be
-    drawn; ``error_m`` is None where nothing was asked.
+    ``lon`` and ``lat`` are in degrees (WGS 84), ``radius`` in metres; ``types`` are the symbols of
+    the signature, clockwise from north. ``others`` are not seen from there. ``answer`` is metres
+    east and north to the place that was answered; ``error_m`` is None where nothing was asked.
     """
 
     name: str

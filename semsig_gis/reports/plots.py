@@ -82,10 +82,9 @@ def blank_figure(width: float, height: float) -> Iterator[Figure]:
 
 
 def saved(figure: Figure, *, title: str, description: str) -> Picture:
-    """Return a figure as files; call it in the block of `blank_figure`.
+    """Return a figure as files without dates and names of programs, within `blank_figure`.
 
-    The files hold no dates and no names of programs. Title and description are what a screen reader
-    says.
+    Title and description are what a screen reader says.
     """
     svg, png = io.BytesIO(), io.BytesIO()
     nothing = dict.fromkeys(("Creator", "Date", "Format", "Type"))
@@ -100,10 +99,7 @@ def saved(figure: Figure, *, title: str, description: str) -> Picture:
 
 
 def label(text: str, length: int) -> str:
-    """Return text from data on one line, cut where it does not fit into a picture.
-
-    ``length`` is the most letters; a Chinese one, say, counts as two.
-    """
+    """Return text on one line of at most so many letters, of which, say, a Chinese one is two."""
     plain = one_line(text)
     wide = (unicodedata.east_asian_width(letter) in "WF" for letter in plain)
     ends = list(itertools.accumulate(1 + is_wide for is_wide in wide))
@@ -121,10 +117,9 @@ def draw_legend(
     size: float,
     sign_width: float,
 ) -> None:
-    """Draw a legend in columns of one width.
+    """Draw a legend in columns of one width, at left, top and width as shares of the figure's.
 
-    ``place`` is left, top and width as shares of the figure's; ``size`` is in points,
-    ``sign_width`` in letters.
+    ``size`` is in points, ``sign_width`` in letters.
     """
     left, top, width = place
     rows = math.ceil(len(keys) / columns)
@@ -190,7 +185,7 @@ def draw_plot(plot: Plot) -> Picture:
     """
     titles = textwrap.wrap(label(plot.title, 2 * TITLE_LETTERS), TITLE_LETTERS)
     curves, others = _keys(plot), _other_keys(plot)
-    heights = [LEGEND_LINE * _rows([text for _, text in keys]) for keys in (curves, others)]
+    heights = [LEGEND_LINE * math.ceil(len(keys) / _columns(keys)) for keys in (curves, others)]
     below = BELOW_AXES + sum(heights) + 0.08
     above = TITLE_LINE * len(titles) + 0.16
     height = above + AXES_HEIGHT + below
@@ -203,8 +198,10 @@ def draw_plot(plot: Plot) -> Picture:
         _draw_paper(axes, plot.paper)
         look: dict[str, Any] = {"va": "top", "weight": "bold", "size": 10.5, "linespacing": 1.25}
         figure.text(0.1 / WIDTH, 1 - 0.08 / height, "\n".join(titles), **look)
-        _legend(figure, curves, top=(sum(heights) + 0.04) / height)
-        _legend(figure, others, top=(heights[1] + 0.04) / height)
+        for keys, top in ((curves, sum(heights)), (others, heights[1])):
+            place = (LEFT / WIDTH, (top + 0.04) / height, (WIDTH - LEFT) / WIDTH)
+            columns = _columns(keys)
+            draw_legend(figure, keys, place=place, columns=columns, size=9, sign_width=3.2)
         return saved(figure, title=plot.title, description=_described(plot))
 
 
@@ -313,24 +310,9 @@ def _other_keys(plot: Plot) -> Keys:
     return keys
 
 
-def _columns(texts: Sequence[str]) -> int:
-    longest = max(map(len, texts), default=0)
+def _columns(keys: Keys) -> int:
+    longest = max((len(text) for _, text in keys), default=0)
     return next((columns for letters, columns in COLUMNS if longest <= letters), 1)
-
-
-def _rows(texts: Sequence[str]) -> int:
-    return math.ceil(len(texts) / _columns(texts))
-
-
-def _legend(figure: Figure, keys: Keys, *, top: float) -> None:
-    draw_legend(
-        figure,
-        keys,
-        place=(LEFT / WIDTH, top, (WIDTH - LEFT) / WIDTH),
-        columns=_columns([text for _, text in keys]),
-        size=9,
-        sign_width=3.2,
-    )
 
 
 def _described(plot: Plot) -> str:

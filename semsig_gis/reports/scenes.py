@@ -29,8 +29,7 @@ if TYPE_CHECKING:
     from semsig_gis.reports.plots import Picture
 
 
-SAME_M = 1.0
-"""How far apart, in metres, two cells may see one object: bearings and distances are rounded."""
+SAME_M = 1.0  # how far apart two cells may see one object: bearings and distances are rounded
 
 
 def cell_scene(database: SignatureDatabase, cell: int, *, title: str = "") -> Scene:
@@ -74,11 +73,7 @@ def cell_scene(database: SignatureDatabase, cell: int, *, title: str = "") -> Sc
 def example_scenes(
     evaluation: Evaluation, database: SignatureDatabase, *, successful: bool, count: int = 4
 ) -> tuple[Scene, ...]:
-    """Return the first queries that were answered well (see `Evaluation.successful`), or not.
-
-    The queries must be seen from cells of the database. The objects that are not seen from a cell
-    are those that the cells around it see.
-    """
+    """Return the first queries from cells of the database that were answered well, or not."""
     queries = evaluation.queries
     examples = queries[(evaluation.successful == successful) & (queries["cell"] >= 0)].head(count)
     kind = "found" if successful else "lost"
@@ -120,14 +115,13 @@ def _seen_around(
         dx, dy = (database.xy[other] - database.xy[cell]).tolist()
         for one in _seen_from(database, other):
             moved = SceneObject(code=one.code, east=one.east + dx, north=one.north + dy)
-            if not any(_same(moved, known) for known in (*own, *others)):
+            if not any(
+                math.hypot(moved.east - known.east, moved.north - known.north) <= SAME_M
+                for known in (*own, *others)
+                if known.code == moved.code
+            ):
                 others.append(moved)
     return tuple(others)
-
-
-def _same(one: SceneObject, other: SceneObject) -> bool:
-    apart = math.hypot(one.east - other.east, one.north - other.north)
-    return one.code == other.code and apart <= SAME_M
 
 
 # A cross with wider arms than matplotlib's own, so that a letter has room on it.

@@ -137,8 +137,7 @@ class _Cell(NamedTuple):
 def number_table(numbers: Sequence[Number]) -> Table:
     """Lay out at least one number, rows and columns in the order in which they first come.
 
-    Where the columns side by side would be too wide for a sheet of paper, each number has a row of
-    its own.
+    Where that would be too wide for a sheet of paper, each number has a row of its own.
     """
     units = _units(numbers)
     names = {number.column: one_line(number.column) for number in numbers}
