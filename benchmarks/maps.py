@@ -14,11 +14,10 @@ from benchmarks.comparison import Comparison
 from semsig_gis.database.build import build_database
 from semsig_gis.database.views import ViewpointSpec
 from semsig_gis.evaluation.evaluate import evaluate
-from semsig_gis.maps import page as map_assets
 from semsig_gis.maps.cells import ambiguity_map
 from semsig_gis.maps.drift import drift_map
 from semsig_gis.maps.evaluation import evaluation_map
-from semsig_gis.maps.page import save_map
+from semsig_gis.maps.page import available, save_map
 from semsig_gis.matching.method import Method
 from semsig_gis.objects.load import build_objects
 from semsig_gis.objects.table import StreetObjects
@@ -103,7 +102,7 @@ def comparisons(size: str) -> Iterator[Comparison]:
         without Chromium, its driver, or the map files that the package is built with.
     """
     chromium, driver = shutil.which("chromium"), shutil.which("chromedriver")
-    if chromium is None or driver is None or not map_assets.available():
+    if chromium is None or driver is None or not available():
         print("maps: not measured, because Chromium, its driver or the map files are not here")
         return
     with tempfile.TemporaryDirectory() as folder:

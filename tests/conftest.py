@@ -156,9 +156,9 @@ def snapshot(request: pytest.FixtureRequest) -> Callable[[str, str], None]:
 @pytest.fixture
 def carried() -> None:
     """Need the map files that a package built with npm carries."""
-    from semsig_gis.maps import page as map_assets
+    from semsig_gis.maps import page
 
-    if not map_assets.available():
+    if not page.available():
         unavailable("browser", "the package was built without npm, so it carries no map files")
 
 

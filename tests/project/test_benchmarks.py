@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 
 from benchmarks import tables
-from semsig_gis.maps import page as map_assets
+from semsig_gis.maps import page
 
 MEASURES = ("edit", "jaccard", "histogram")
 SINGLES = {
@@ -97,7 +97,7 @@ def test_every_benchmark_runs_and_is_written(tmp_path: Path) -> None:
     results, _ = run("benchmarks", tmp_path / "results.json")
     names = [one["name"] for one in results]
     assert len(set(names)) == len(names)
-    drawn = shutil.which("chromedriver") and shutil.which("chromium") and map_assets.available()
+    drawn = shutil.which("chromedriver") and shutil.which("chromium") and page.available()
     for part, bar in {**PARTS, **(OF_MAPS if drawn else {})}.items():
         bars = {one["bar"] is not None for one in results if part in one["name"]}
         assert bars == {bar}, part

@@ -18,7 +18,7 @@ from packaging.requirements import Requirement
 from packaging.utils import canonicalize_name
 
 import semsig_gis
-from semsig_gis.maps import page as map_assets
+from semsig_gis.maps import page
 
 ROOT = Path(__file__).parents[2]
 PACKAGE = ROOT / "semsig_gis"
@@ -92,8 +92,8 @@ def test_the_wheel_is_complete(wheel: dict[str, str]) -> None:
     code = {str(path.relative_to(ROOT)) for path in PACKAGE.rglob("*") if path.suffix in suffixes}
     others = {"py.typed", "assets/manifest.toml", "templates/report.html"}
     assert data | code | {f"semsig_gis/{name}" for name in others} <= wheel.keys()
-    if map_assets.available():
-        assert {f"semsig_gis/assets/{name}" for name in map_assets.assets()} <= wheel.keys()
+    if page.available():
+        assert {f"semsig_gis/assets/{name}" for name in page.assets()} <= wheel.keys()
     assert {name.partition("/")[0] for name in wheel} == {"semsig_gis", INFO}
 
 
@@ -121,8 +121,8 @@ def test_the_version_is_the_same_everywhere() -> None:
 
 
 def test_the_api_page_lists_the_public_names() -> None:
-    page = (ROOT / "docs/api.md").read_text(encoding="utf-8")
-    assert sorted(re.findall(r"^   (\w+)$", page, re.MULTILINE)) == sorted(dir(semsig_gis))
+    text = (ROOT / "docs/api.md").read_text(encoding="utf-8")
+    assert sorted(re.findall(r"^   (\w+)$", text, re.MULTILINE)) == sorted(dir(semsig_gis))
 
 
 def test_the_picture_of_the_architecture_is_current() -> None:
