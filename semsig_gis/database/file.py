@@ -379,6 +379,17 @@ class PartitionedDatabase:
         The part files; no cell is in two of them.
     cells : int
         Number of cells in all parts.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> from semsig_gis import build_tiles, save_objects
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     save_objects(demo_objects, f"{folder}/objects.parquet")
+    ...     tiles = build_tiles(f"{folder}/objects.parquet", f"{folder}/town")
+    ...     database = open_dataset(f"{folder}/town")
+    >>> len(database) == len(demo_database)
+    True
     """
 
     files: tuple[Path, ...]

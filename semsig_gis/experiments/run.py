@@ -467,6 +467,18 @@ def run_experiments(
     ------
     InputError, SemsigError
         As in `run_experiment`. Nothing is answered if one of the experiments is refused.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> from semsig_gis import ExperimentSpec, parse_method, save_database
+    >>> none, paper = {"none": ()}, {"paper": parse_method("edit+edit:5%")}
+    >>> spec = ExperimentSpec(database="city.parquet", methods=paper, distortions=none, queries=5)
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     save_database(demo_database, f"{folder}/city.parquet")
+    ...     results = run_experiments({Path(folder, "results"): spec}, folder=folder)
+    >>> [list(evaluations) for evaluations in results.values()]
+    [['none/paper-top1']]
     """
     check_workers(workers, scheduler)
     running: dict[Path, tuple[ExperimentWork, Path]] = {}

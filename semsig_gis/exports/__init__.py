@@ -246,6 +246,15 @@ def export_answer(
     InputError
         If the suffix is another, a number is out of range, the answer has no chances or is from
         another database, or the file cannot be written.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> from semsig_gis import localize
+    >>> answer = localize(demo_database, demo_database.signature(0), top=5)
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     export_answer(answer, demo_database, f"{folder}/regions.gpkg").to_dict()["cells"]
+    5
     """
     suffix = _suffix(path)
     if suffix in _RASTER and answer.chances is None:

@@ -81,6 +81,16 @@ class GeopackageContents:
         Where that was exported too and still fits.
     notes : tuple of str
         What was left out, and why, a sentence each.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> from semsig_gis import export_database
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     export_database(demo_database, f"{folder}/city.gpkg", objects=demo_objects)
+    ...     contents = read_geopackage(f"{folder}/city.gpkg")
+    >>> len(contents.objects) == len(demo_objects), contents.identifiability
+    (True, None)
     """
 
     database: SignatureDatabase

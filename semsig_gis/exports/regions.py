@@ -35,6 +35,14 @@ class SearchRegions:
         ``best_cell_id``, ``best_x`` and ``best_y`` (its best cell, and the viewpoint of that);
         ``searched_chance``, ``searched_km2`` and ``searched_percent`` (of the city) with all
         regions before it; ``geometry`` (polygon of whole cells that share sides).
+
+    Examples
+    --------
+    >>> from semsig_gis import localize
+    >>> answer = localize(demo_database, demo_database.signature(0), top=5)
+    >>> regions = search_regions(answer, demo_database)
+    >>> regions.table["cells"].tolist(), regions.to_dict()["regions"]
+    ([5], 1)
     """
 
     table: gpd.GeoDataFrame

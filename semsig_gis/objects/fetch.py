@@ -60,6 +60,18 @@ def fetch_layers(
     tuple of RawLayer
         The layers, cut to the area. InputError if the catalogue has no service to fetch from,
         SourceError if a service refuses, fails, or sends something else.
+
+    Examples
+    --------
+    >>> from semsig_gis import find_area, load_catalog, open_cache
+    >>> files = load_catalog("montpellier")
+    >>> cache, http = open_cache("unused", offline=True)
+    >>> area = find_area("3.8,43.6,3.9,43.7", files, cache=cache, http=http)
+    >>> fetch_layers(files.layers, files, area=area, cache=cache, http=http)
+    Traceback (most recent call last):
+    ...
+    semsig_gis.core.errors.InputError: catalogue 'montpellier' has no service to fetch from; use
+    `semsig load` on files.
     """
     if not catalog.endpoints or catalog.reader not in {"opendatasoft", "osm_file"}:
         msg = (
@@ -105,6 +117,12 @@ def open_cache(
     -------
     tuple of (Cache, HttpSpec)
         The cache, and how requests are made.
+
+    Examples
+    --------
+    >>> cache, http = open_cache("downloads", offline=True)
+    >>> http.offline
+    True
     """
     base = os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
     return Cache(Path(folder or Path(base) / "semsig")), HttpSpec(offline=offline)

@@ -77,6 +77,13 @@ class RawLayer:
         What was wrong with features that could not be read, the first ten of them.
     notes : tuple of str
         Where the source differs from what the catalogue expects of it.
+
+    Examples
+    --------
+    >>> from semsig_gis import CitySpec, synthetic_city
+    >>> layer = synthetic_city(CitySpec(size=300.0))[0]
+    >>> layer.counts.kept == len(layer.table) <= len(demo_objects)
+    True
     """
 
     spec: LayerSpec

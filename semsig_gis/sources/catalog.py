@@ -369,6 +369,14 @@ class Catalog:
         Classes whose objects from different layers are the same thing within so many metres.
     license, attribution : str
         What holds for every layer that does not say otherwise.
+
+    Examples
+    --------
+    >>> catalog = load_catalog("montpellier")
+    >>> catalog.layer("cameras").class_name
+    'camera'
+    >>> demo_objects.taxonomy.classes == catalog.taxonomy.classes[:11]
+    True
     """
 
     name: str

@@ -130,11 +130,18 @@ def test_the_picture_of_the_architecture_is_current() -> None:
     assert subprocess.run(check, check=False, cwd=ROOT).returncode == 0
 
 
-@pytest.mark.parametrize(
-    "name", [name for name in dir(semsig_gis) if inspect.isfunction(getattr(semsig_gis, name))]
-)
+EXPORTED = {name: getattr(semsig_gis, name) for name in dir(semsig_gis)}
+FUNCTIONS = [name for name, one in EXPORTED.items() if inspect.isfunction(one)]
+
+
+@pytest.mark.parametrize("name", [name for name, one in EXPORTED.items() if callable(one)])
+def test_exported_functions_and_classes_have_an_example(name: str) -> None:
+    assert "\n>>> " in (inspect.getdoc(EXPORTED[name]) or "")
+
+
+@pytest.mark.parametrize("name", FUNCTIONS)
 def test_exported_functions_say_what_they_take_and_give(name: str) -> None:
-    signature = inspect.signature(getattr(semsig_gis, name))
+    signature = inspect.signature(EXPORTED[name])
     wanted = {"GL08"}
     if "options" not in signature.parameters:  # those are said one by one
         wanted |= {"PR01", "PR02"}

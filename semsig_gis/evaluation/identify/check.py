@@ -57,6 +57,14 @@ class IdentifiabilityCheck:
         or no.
     bins : tuple of ChanceBin
         The tenths of ``found`` that have queries.
+
+    Examples
+    --------
+    >>> from semsig_gis import build_index, identify, named_noise
+    >>> index = build_index(demo_database, named_noise("medium"))
+    >>> check = check_identifiability(identify(index, trials=20, class_trials=5), index, queries=50)
+    >>> sum(one.queries for one in check.bins)
+    50
     """
 
     queries: int

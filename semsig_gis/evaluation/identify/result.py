@@ -75,6 +75,14 @@ class Identifiability:
         The same for the city as a whole.
     trials, seed : int
         Number of simulated queries, and the seed of all chances.
+
+    Examples
+    --------
+    >>> from semsig_gis import build_index, identify, named_noise
+    >>> index = build_index(demo_database, named_noise("medium"))
+    >>> cells = identify(index, trials=20, class_trials=5)
+    >>> cells.lookalikes.shape == (len(demo_database), 3), bool((cells.itself <= cells.near).all())
+    (True, True)
     """
 
     database: SignatureDatabase

@@ -198,6 +198,14 @@ class Reproduction:
         What was run, as plain values: ``size``, ``database`` (a name), ``queries``, ``seed``.
     missing : tuple of str
         What could not be run, and why: whole sentences.
+
+    Examples
+    --------
+    >>> from semsig_gis import database_summary
+    >>> facts = database_summary(demo_database)
+    >>> rest = {"variants": {}, "experiments": {}, "seconds": {}, "settings": {"queries": 300}}
+    >>> Reproduction(database=demo_database, summary=facts, **rest).missing
+    ()
     """
 
     database: SignatureDatabase
