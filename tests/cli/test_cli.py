@@ -7,6 +7,7 @@ import json
 import shutil
 import subprocess
 import sys
+import warnings
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -297,6 +298,16 @@ def test_what_cannot_be_used_is_refused_and_changes_no_file(
     line, words = row.split(" -> ")
     sentence(run(line), *words.split(" | "))
     assert contents(tiny_city) == before
+
+
+def test_a_warning_is_one_line(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
+    def suggest(_: Path) -> str:
+        warnings.warn("the file is old", stacklevel=1)
+        return "draft"
+
+    monkeypatch.setattr("semsig_gis.objects.draft.suggest_catalog", suggest)
+    with warnings.catch_warnings(action="always"):
+        assert run("suggest x.gpkg") == (0, "draft", "semsig: the file is old\n")
 
 
 def test_usage_errors_exit_2(run: Run) -> None:
