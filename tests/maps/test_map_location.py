@@ -71,15 +71,15 @@ def test_a_location_in_a_browser(page: MapPage) -> None:
     rings, across, corners = page.ask(ellipse, SUCCESSFUL)
     assert (rings, corners) == (1, 73)
     assert across == pytest.approx(2.0 * location.estimate.ellipse()[0], abs=0.4)
-    page.switch("Objects from rank 1")
-    assert page.circles(VERDICTS["matched"]) == 0
-    page.switch("Objects from rank 2")
     other = location.explanations[1].counts["matched"]
-    assert page.circles(VERDICTS["matched"]) == other
-    page.switch("Chance of a cell")
-    assert len(page.all(IMAGES)) == 1
-    page.switch("Regions of 50, 90 and 99 %")
-    assert len(page.all(IMAGES)) == 2
+    for layer, matched, images in (
+        ("Objects from rank 1", 0, 2),
+        ("Objects from rank 2", other, 2),
+        ("Chance of a cell", other, 1),
+        ("Regions of 50, 90 and 99 %", other, 2),
+    ):
+        page.switch(layer)
+        assert (page.circles(VERDICTS["matched"]), len(page.all(IMAGES))) == (matched, images)
     page.switch("Candidates")
     time.sleep(0.5)  # numbers fade away
     assert page.all(".semsig-number") == []
