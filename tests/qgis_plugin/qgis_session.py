@@ -48,6 +48,7 @@ class Feedback(QgsProcessingFeedback):
         self.errors: list[str] = []
         self.infos: list[str] = []
         self.percents: list[float] = []
+        self.ended: list[bool] = []  # well, or not
 
     def setProgress(self, percent: float) -> None:  # noqa: N802
         self.percents.append(percent)
@@ -68,27 +69,27 @@ def algorithm(name: str) -> Any:  # noqa: ANN401
     return QgsApplication.processingRegistry().createAlgorithmById(f"semsig:{name}")
 
 
-def run(name: str, feedback: Feedback, **parameters: object) -> bool:
+def run(name: str, *, cancelling: bool = False, **parameters: object) -> Feedback:
     """Run an algorithm as its dialog does, and load what it gives."""
+    feedback = Feedback(cancelling=cancelling)
     context = QgsProcessingContext()
     context.setProject(QgsProject.instance())
     ready = algorithm(name)
     task = QgsProcessingAlgRunnerTask(ready, parameters, context, feedback)
-    ended: list[bool] = []
-    task.executed.connect(lambda successful, _results: ended.append(successful))
+    task.executed.connect(lambda successful, _results: feedback.ended.append(successful))
     QgsApplication.taskManager().addTask(task)
-    while not ended:
+    while not feedback.ended:
         application.processEvents()
         time.sleep(0.01)
-    if ended[0]:
+    if feedback.ended[0]:
         handleAlgorithmResults(ready, context, feedback)
-    return ended[0]
+    return feedback
 
 
 def run_well(name: str, **parameters: object) -> Feedback:
     """Run an algorithm on the database, which must succeed."""
-    feedback = Feedback()
-    if not run(name, feedback, DATABASE=DATABASE, **parameters):
+    feedback = run(name, DATABASE=DATABASE, **parameters)
+    if not feedback.ended[0]:
         raise RuntimeError(feedback.errors)
     return feedback
 
@@ -156,24 +157,19 @@ def refuse() -> list[list[str]]:
         ("identify", {"CELLS": shown(), "MAP": str(PLACE / "map.json")}),
         ("evaluate", {"OUTPUT": TEMPORARY, "LAYERS": str(PLACE / "lamps.geojson" / "b.gpkg")}),
     ):
-        feedback = Feedback()
         database = {} if name == "build" else {"DATABASE": DATABASE}
-        run(name, feedback, **database, **parameters)
-        errors.append(feedback.errors)
+        errors.append(run(name, **database, **parameters).errors)
     ProcessingConfig.setSettingValue("SEMSIG_COMMAND", "/bin/true")
-    feedback = Feedback()
-    run("build", feedback, OBJECTS=objects, OUTPUT=later)
-    return [*errors, feedback.errors]
+    return [*errors, run("build", OBJECTS=objects, OUTPUT=later).errors]
 
 
-def stop(name: str, *, cancelling: bool = False, **parameters: object) -> dict[str, Any]:
+def stop(name: str, **parameters: Any) -> dict[str, Any]:  # noqa: ANN401
     """Run what does not end well, and return what is told and left."""
     log = PLACE / "processes"
     before = {*PLACE.rglob("*"), log}
-    feedback = Feedback(cancelling=cancelling)
-    successful = run(name, feedback, **parameters)
+    feedback = run(name, **parameters)
     return {
-        "successful": successful,
+        "successful": feedback.ended[0],
         "errors": feedback.errors,
         "percents": feedback.percents,
         "process": int(log.read_text().split()[-1]),
@@ -187,28 +183,18 @@ def play() -> dict[str, Any]:
     provider = registry.providerById("semsig")
     listed = sorted((one.displayName(), one.name()) for one in provider.algorithms())
     objects = str(PLACE / "objects.parquet")
+    lamps, loaded = [str(PLACE / "lamps.geojson")], str(PLACE / "session_lamps.parquet")
+    cancelled = {"OUTPUT": str(PLACE / "cancelled.parquet"), "CELLS": shown()}
     happened = {
         "listed": [name for _, name in listed],
         "help": algorithm("localize").shortHelpString(),
-        "loaded": run(
-            "load",
-            Feedback(),
-            FILES=[str(PLACE / "lamps.geojson")],
-            CATALOG_FILE=sys.argv[2],
-            OUTPUT=str(PLACE / "session_lamps.parquet"),
-        ),
+        "loaded": run("load", FILES=lamps, CATALOG_FILE=sys.argv[2], OUTPUT=loaded).ended[0],
         **show_twice(),
         "shown": show(),
         "order": [layer.name() for layer in QgsProject.instance().layerTreeRoot().layerOrder()],
         "failed": stop("export", DATABASE=objects, OUTPUT=str(PLACE / "fails.gpkg")),
         "cancelled": stop(
-            "build",
-            cancelling=True,
-            OBJECTS=objects,
-            STEP=1.0,
-            RADIUS=100.0,
-            OUTPUT=str(PLACE / "cancelled.parquet"),
-            CELLS=shown(),
+            "build", cancelling=True, OBJECTS=objects, STEP=1.0, RADIUS=100.0, **cancelled
         ),
     }
     happened["refused"] = refuse()

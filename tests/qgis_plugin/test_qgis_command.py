@@ -72,10 +72,7 @@ def program(folder: Path, name: str = "semsig") -> str:
 def test_what_was_chosen_comes_first_then_the_path_then_the_usual_places(tmp_path: Path) -> None:
     preferred = program(tmp_path / "chosen", "semsig-of-mine")
     on_path, usual = program(tmp_path / "path"), program(tmp_path / "py3.12" / "bin")
-    path, places = (
-        {"PATH": str(tmp_path / "path")},
-        (f"{tmp_path}/nowhere", f"{tmp_path}/py3.*/bin"),
-    )
+    path, places = {"PATH": f"{tmp_path}/path"}, (f"{tmp_path}/none", f"{tmp_path}/py3.*/bin")
     assert find_command(preferred, path, places) == preferred
     assert find_command("", path, places) == on_path
     for variables in ({"PATH": str(tmp_path)}, {}):
@@ -134,7 +131,7 @@ def test_results_progress_and_remarks_are_told_apart() -> None:
     assert log.heard == ["a remark", (0, "digging"), (40, "filling"), "a bare line about 40%"]
 
 
-FAILED = "The semsig command failed with exit code"
+FAILED, SILENT = "The semsig command failed with exit code", "did not say why."
 
 
 @pytest.mark.parametrize(
@@ -142,10 +139,7 @@ FAILED = "The semsig command failed with exit code"
     [
         ("say('semsig: a'); say('semsig: x is wrong; give y.'); exit(2)", "x is wrong; give y."),
         ("say('semsig: a'); say('KeyError: 3'); exit(1)", f"{FAILED} 1: KeyError: 3"),
-        (
-            "say('semsig: a'); say('semsig progress 0% a'); exit(9)",
-            f"{FAILED} 9 and did not say why.",
-        ),
+        ("say('semsig: a'); say('semsig progress 0% b'); exit(9)", f"{FAILED} 9 and {SILENT}"),
     ],
 )
 def test_a_failure_is_reported_once(code: str, message: str) -> None:
@@ -249,10 +243,8 @@ def test_the_command_understands_any_value() -> None:
     assert line[0] == "load"
     load = typer.main.get_command(app).commands["load"]  # type: ignore[attr-defined]
     values = load.make_context("load", line[1:]).params
-    assert [str(path) for path in values["files"]] == nasty
-    assert values["catalog"] == nasty
-    assert str(values["out"]) == nasty[0]
-    assert values["crs"] == nasty[5]
+    assert [str(path) for path in values["files"]] == values["catalog"] == nasty
+    assert (str(values["out"]), values["crs"]) == (nasty[0], nasty[5])
     assert values["filters"] is True
     assert not values["layer"]
 

@@ -199,24 +199,17 @@ def test_localize(qgis: Qgis) -> None:
 
 
 def test_evaluate(qgis: Qgis) -> None:
-    done = qgis.run(
-        "evaluate",
-        DATABASE=qgis.place / "city.parquet",
-        QUERIES=20,
-        DISTORTION="light",
-        MORE="compass:5",
-        METHOD="edit+edit",
-        OUTPUT=qgis.place / "evaluation",
-        LAYERS=qgis.place / "evaluation.gpkg",
-        MAP=qgis.place / "evaluation.html",
-    )
+    folder, layers, map_ = (qgis.place / f"evaluation{end}" for end in ("", ".gpkg", ".html"))
+    source, files = qgis.place / "city.parquet", {"OUTPUT": folder, "LAYERS": layers, "MAP": map_}
+    query = {"QUERIES": 20, "DISTORTION": "light", "MORE": "compass:5", "METHOD": "edit+edit"}
+    done = qgis.run("evaluate", DATABASE=source, **query, **files)
     assert 0 < float(done["WITHIN_50_M"]) <= 1
-    summary = json.loads((qgis.place / "evaluation" / "evaluation.json").read_text("utf-8"))
-    assert summary["settings"]["queries"] == 20
-    assert summary["settings"]["distortions"] == ["light", "compass:5"]
-    assert done["LAYERS"] == f"{qgis.place}/evaluation.gpkg|layername=evaluation"
-    assert len(gpd.read_file(qgis.place / "evaluation.gpkg", layer="evaluation")) == 20
-    assert Path(done["MAP"]).is_file()
+    asked = json.loads((folder / "evaluation.json").read_text("utf-8"))["settings"]
+    assert (asked["queries"], asked["distortions"]) == (20, ["light", "compass:5"])
+    assert done["LAYERS"] == f"{layers}|layername=evaluation"
+    assert len(gpd.read_file(layers, layer="evaluation")) == 20
+    assert done["MAP"] == str(map_)
+    assert map_.is_file()
 
 
 @pytest.fixture(scope="module")
