@@ -166,16 +166,9 @@ def _query_records(
             cell_signature(database, best_rows[number]) if located else None,
         ]
         outcome, colour = ("successful", SUCCESSFUL) if successful[number] else ("failed", FAILED)
-        records.append(
-            [
-                places[number].tolist(),
-                colour,
-                radius,
-                [best_places[number].tolist(), *next_places[number]] if located else None,
-                f"Query {number + 1:,}: {outcome}",
-                details,
-            ]
-        )
+        best = [best_places[number].tolist(), *next_places[number]] if located else None
+        name = f"Query {number + 1:,}: {outcome}"
+        records.append([places[number].tolist(), colour, radius, best, name, details])
     return records
 
 

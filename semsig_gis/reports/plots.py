@@ -262,18 +262,10 @@ def _draw_paper(axes: Axes, points: Sequence[tuple[float, float, str]]) -> None:
         axes.plot([x], [y], clip_on=False, zorder=5, **_PAPER_LOOK)
         if len(points) > 1:
             side = -1 if x > left + 0.9 * (right - left) else 1
-            axes.annotate(
-                str(number),
-                (x, y),
-                xytext=(7 * side, -4),
-                textcoords="offset points",
-                ha="left" if side > 0 else "right",
-                va="center",
-                weight="bold",
-                size=9,
-                zorder=6,
-                bbox={"facecolor": WHITE, "alpha": 0.8, "edgecolor": "none", "pad": 0.6},
-            )
+            halo = {"facecolor": WHITE, "alpha": 0.8, "edgecolor": "none", "pad": 0.6}
+            look: dict[str, Any] = {"va": "center", "weight": "bold", "size": 9, "bbox": halo}
+            look |= {"xytext": (7 * side, -4), "ha": "left" if side > 0 else "right"}
+            axes.annotate(str(number), (x, y), textcoords="offset points", **look, zorder=6)
 
 
 _PAPER_LOOK: dict[str, Any] = {

@@ -155,6 +155,7 @@ TYPE_LETTERS, TYPE_LINES = 42, 3
 CLASS_LETTERS = 21
 MANY_OBJECTS = 40
 HALO = {"facecolor": WHITE, "alpha": 0.85, "edgecolor": "none", "pad": 1}  # behind letters
+_IN_FRONT: dict[str, Any] = {"ha": "center", "bbox": HALO}
 
 
 def draw_scene(scene: Scene, taxonomy: Taxonomy) -> Picture:
@@ -220,7 +221,8 @@ def _draw_map(axes: Axes, scene: Scene, signs: dict[int, ClassSign]) -> None:
     # The nearest last, so that they lie on top.
     for item in sorted(scene.objects, key=lambda one: -math.hypot(one.east, one.north)):
         _draw_object(axes, item, signs.get(item.code, UNKNOWN), size)
-    axes.plot(0, 0, **_VIEWPOINT_LOOK, zorder=6)
+    edge: dict[str, Any] = {"markeredgecolor": WHITE, "markeredgewidth": 1.5}
+    axes.plot(0, 0, color=INK, marker="o", markersize=7, **edge, zorder=6)
     if scene.answer:
         _draw_answer(axes, scene.answer, away, reach)
     _draw_north(axes)
@@ -258,33 +260,12 @@ def _draw_answer(axes: Axes, answer: tuple[float, float], away: float, reach: fl
         return
     share = 0.96 * reach / max(abs(east), abs(north))
     tip = (share * east, share * north)
-    axes.annotate(
-        "",
-        tip,
-        xytext=(0.84 * tip[0], 0.84 * tip[1]),
-        arrowprops={"arrowstyle": "-|>", "color": ANSWER, "linewidth": 1.6},
-        zorder=7,
-    )
-    axes.text(
-        0.78 * tip[0],
-        0.78 * tip[1],
-        f"{away:,.0f} m",
-        color=ANSWER,
-        size=8.5,
-        ha="center",
-        va="center",
-        zorder=7,
-        bbox=HALO,
-    )
+    arrow = {"arrowstyle": "-|>", "color": ANSWER, "linewidth": 1.6}
+    axes.annotate("", tip, xytext=(0.84 * tip[0], 0.84 * tip[1]), arrowprops=arrow, zorder=7)
+    look: dict[str, Any] = {"color": ANSWER, "size": 8.5, "va": "center", **_IN_FRONT}
+    axes.text(0.78 * tip[0], 0.78 * tip[1], f"{away:,.0f} m", **look, zorder=7)
 
 
-_VIEWPOINT_LOOK: dict[str, Any] = {
-    "color": INK,
-    "marker": "o",
-    "markersize": 7,
-    "markeredgecolor": WHITE,
-    "markeredgewidth": 1.5,
-}
 _ANSWER_LOOK: dict[str, Any] = {
     "color": ANSWER,
     "linestyle": "",
@@ -296,20 +277,10 @@ _ANSWER_LOOK: dict[str, Any] = {
 
 
 def _draw_north(axes: Axes) -> None:
-    axes.annotate(
-        "N",
-        (0.955, 0.985),
-        xytext=(0.955, 0.885),
-        xycoords="axes fraction",
-        textcoords="axes fraction",
-        ha="center",
-        va="center",
-        weight="bold",
-        size=9,
-        arrowprops={"arrowstyle": "-|>", "color": INK, "linewidth": 1.2, "shrinkB": 0},
-        bbox=HALO,
-        zorder=8,
-    )
+    share = dict.fromkeys(("xycoords", "textcoords"), "axes fraction")
+    arrow = {"arrowstyle": "-|>", "color": INK, "linewidth": 1.2, "shrinkB": 0}
+    look: dict[str, Any] = {"va": "center", "weight": "bold", "size": 9, **share, **_IN_FRONT}
+    axes.annotate("N", (0.955, 0.985), xytext=(0.955, 0.885), arrowprops=arrow, **look, zorder=8)
 
 
 def _draw_scale(axes: Axes, reach: float) -> None:
@@ -319,17 +290,8 @@ def _draw_scale(axes: Axes, reach: float) -> None:
     look: dict[str, Any] = {"color": INK, "linewidth": 1.4, "solid_capstyle": "butt", "zorder": 8}
     ends = [start, start, end, end], [0.045, 0.03, 0.03, 0.045]
     axes.plot(*ends, transform=axes.transAxes, **look)
-    axes.text(
-        (start + end) / 2,
-        0.045,
-        f"{metres:g} m",
-        transform=axes.transAxes,
-        ha="center",
-        va="bottom",
-        size=8.5,
-        bbox=HALO,
-        zorder=8,
-    )
+    text: dict[str, Any] = {"va": "bottom", "size": 8.5, "transform": axes.transAxes, **_IN_FRONT}
+    axes.text((start + end) / 2, 0.045, f"{metres:g} m", **text, zorder=8)
 
 
 def _round_length(longest: float) -> float:
