@@ -1,10 +1,11 @@
-"""Databases of given or random cells, and random queries and noise models."""
+"""Databases of given, of six or of random cells, and random queries and noise models."""
 
 from __future__ import annotations
 
 import itertools
 import math
-from typing import TYPE_CHECKING
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from hypothesis import strategies as st
@@ -13,17 +14,20 @@ from worlds import CODES, random_town
 
 from semsig_gis.core.geometry import GridSpec
 from semsig_gis.core.signature import BEARING_UNITS, Signature, SignatureSpec
+from semsig_gis.core.taxonomy import ObjectClass
 from semsig_gis.database.database import SignatureDatabase
 from semsig_gis.likelihood.noise.model import NoiseMixture, NoiseSpec, named_noise
 from semsig_gis.queries.distortions import distort, named_distortion
 from semsig_gis.sources.catalog import paper_taxonomy
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Mapping, Sequence
 
+    from numpy.typing import NDArray
     from worlds import World
 
     from semsig_gis.likelihood.noise.model import Noise
+    from semsig_gis.reports.tables import Table
 
 TAXONOMY = paper_taxonomy()
 METHODS = [
@@ -83,6 +87,57 @@ def database_of(
         crs=CRS("EPSG:2154"),
         licenses=("trees: the city (CC0)",),
     )
+
+
+# Six cells: by type three DD, one DB, two B; by angle (levels) four alike, two alike.
+SIX = [
+    ("DD", [10, 100]),
+    ("DD", [10, 100]),
+    ("DD", [10, 200]),
+    ("DB", [10, 100]),
+    ("B", [300]),
+    ("B", [300]),
+]
+
+
+def six_cells() -> SignatureDatabase:
+    crossing = ObjectClass(code=40, symbol="z", name="crossing", title="Crossing | zebra")
+    return replace(
+        database_of(SIX, height=6),
+        distance_units=np.full(10, 50, np.uint8),
+        grid=GridSpec(),
+        taxonomy=TAXONOMY.extended([crossing]),
+        licenses=("trees: City <of> Paris (ODbL)",),
+        version="0.1.0",
+    )
+
+
+def cells_at(
+    columns: NDArray[np.int64],
+    rows: NDArray[np.int64],
+    *,
+    longest: int = 1,
+    **facts: Any,  # noqa: ANN401
+) -> SignatureDatabase:
+    """Return cells at places, each of which sees one object, or random numbers of them."""
+    order = np.lexsort((rows, columns))
+    lengths = np.random.default_rng(0).integers(1, longest + 1, len(order))
+    objects = int(lengths.sum())
+    return replace(
+        six_cells(),
+        columns=columns[order].astype(np.int32),
+        rows=rows[order].astype(np.int32),
+        offsets=np.append(0, np.cumsum(lengths)),
+        codes=np.ones(objects, np.uint8),
+        bearing_units=np.zeros(objects, np.uint16),
+        distance_units=np.zeros(objects, np.uint8),
+        **facts,
+    )
+
+
+def rows(table: Table) -> Mapping[str, tuple[str, ...]]:
+    """Return the rows of a table by their first cell."""
+    return {row[0]: row[1:] for row in table.rows}
 
 
 def random_cells(count: int, *, seed: int = 0) -> list[tuple[str, list[float]]]:

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 import shapely
 from hypothesis import assume, given
-from six_cells import six_cells
+from noisy_cells import six_cells
 from worlds import CORNER, lamps, surroundings, worlds
 
 from semsig_gis.core.errors import EmptyResultError

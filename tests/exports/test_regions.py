@@ -10,8 +10,8 @@ import pytest
 import shapely
 from hypothesis import example, given
 from hypothesis import strategies as st
+from noisy_cells import cells_at
 from sentences import refused
-from six_cells import cells_at
 from small_city import small_city, small_localization, small_location
 
 from semsig_gis.core.errors import InputError

@@ -12,9 +12,9 @@ import pytest
 from folium.template import Template
 from hypothesis import example, given
 from hypothesis import strategies as st
+from noisy_cells import cells_at
 from PIL import Image
 from pyproj import CRS, Transformer
-from six_cells import cells_at
 
 from semsig_gis.core.geometry import GridSpec
 from semsig_gis.maps import image as map_image

@@ -10,8 +10,7 @@ import numpy as np
 import pandas as pd
 import pytest
 import shapely
-from noisy_cells import random_database
-from six_cells import rows, six_cells
+from noisy_cells import random_database, rows, six_cells
 from small_city import chances_of
 from worlds import random_town
 
