@@ -229,7 +229,7 @@ def cluster(tmp_path_factory: pytest.TempPathFactory) -> Iterator[LocalCluster]:
 @pytest.fixture(scope="session")
 def reproduced(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Return a folder in which the experiments of the paper were run on a small town."""
-    from reproductions import QUERIES, save_town
+    from worlds import QUERIES, save_town
 
     from semsig_gis.experiments.paper.reproduce import reproduce
 

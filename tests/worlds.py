@@ -1,4 +1,4 @@
-"""Small worlds of street objects, and what a plain loop sees in them."""
+"""Small worlds of street objects, what a plain loop sees in them, and the files of runs on one."""
 
 from __future__ import annotations
 
@@ -19,14 +19,15 @@ from semsig_gis.core.geometry import GridSpec
 from semsig_gis.core.rtree import ObjectIndex
 from semsig_gis.core.signature import BEARING_UNITS, DISTANCE_UNITS, SignatureSpec
 from semsig_gis.database.build import build_database
+from semsig_gis.database.city import ObjectStore, save_with_store
 from semsig_gis.objects.table import Licence, StreetObjects
 from semsig_gis.sources.catalog import load_catalog
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
+    from pathlib import Path
 
     from semsig_gis.core.taxonomy import Taxonomy
-    from semsig_gis.database.city import ObjectStore
     from semsig_gis.database.database import SignatureDatabase
 
 TAXONOMY = load_catalog("montpellier").taxonomy
@@ -204,3 +205,22 @@ def lamps() -> StreetObjects:
 def surroundings(*shapes: shapely.Geometry, **columns: list[float]) -> gpd.GeoDataFrame:
     # In degrees, so that they have to be moved.
     return gpd.GeoDataFrame(columns, geometry=list(shapes), crs="EPSG:2154").to_crs("EPSG:4326")
+
+
+TOWN = random_town()
+QUERIES = 30
+
+
+def save_town(folder: Path, town: World = TOWN, name: str = "city.parquet") -> Path:
+    """Save a town with its street objects, and return its file."""
+    save_with_store(town.database, ObjectStore.of(town.street_objects), folder / name)
+    return folder / name
+
+
+def contents(folder: Path) -> dict[str, bytes]:
+    """Return all files in a folder, but for those that tell times."""
+    return {
+        path.relative_to(folder).as_posix(): path.read_bytes()
+        for path in sorted(folder.rglob("*"))
+        if path.is_file() and path.name not in {"timing.json", "times.json"}
+    }

@@ -11,8 +11,7 @@ import geopandas as gpd
 import numpy as np
 import pytest
 import shapely
-from reproductions import save_town
-from worlds import random_town, surroundings
+from worlds import random_town, save_town, surroundings
 
 from semsig_gis.cli import main
 from semsig_gis.database.file import open_database, save_database

@@ -5,8 +5,8 @@ from __future__ import annotations
 import json
 from typing import TYPE_CHECKING
 
-from reproductions import QUERIES, save_town
 from sentences import sentence
+from worlds import QUERIES, save_town
 
 if TYPE_CHECKING:
     from pathlib import Path

@@ -8,8 +8,8 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import pytest
-from reproductions import QUERIES, TOWN, contents, save_town
 from sentences import refused
+from worlds import QUERIES, TOWN, contents, save_town
 
 from semsig_gis.core.errors import InputError, SemsigError
 from semsig_gis.database.file import open_database, save_database

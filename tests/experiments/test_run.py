@@ -17,9 +17,8 @@ import pytest
 import shapely
 from geopandas.testing import assert_geodataframe_equal
 from pandas.testing import assert_frame_equal
-from reproductions import TOWN, contents, save_town
 from sentences import refused
-from worlds import CORNER, World
+from worlds import CORNER, TOWN, World, contents, save_town
 
 from semsig_gis.core.errors import DatabaseError, InputError, SemsigError
 from semsig_gis.evaluation.evaluate import evaluate, score_queries
