@@ -242,6 +242,8 @@ def test_objects_that_have_changed(page: MapPage) -> None:
         assert said.startswith(f"Object {kind}")
         assert ("5.0 m" in said) == (kind == "moved")
         assert ("Class before" in said) == (kind in {"moved", "of another class"})
+        former = TAXONOMY.by_code(int(BEFORE.codes[4])).title
+        assert kind != "of another class" or former in said
         page.switch(f"Objects {kind}")
         assert page.circles(colour) == 0
 

@@ -91,6 +91,9 @@ def test_a_click_shows_the_signature_and_the_place_found(evaluated: MapPage) -> 
     for said in (row["types"], row["query_types"], legend, str(row["cell_id"])):
         assert said in popup
     assert f"of {len(CITY):,}" in popup
+    following = np.searchsorted(CITY.cell_ids, EVALUATION.next_cell_ids[-1])
+    off = np.hypot(*(CITY.xy[following] - [row.geometry.x, row.geometry.y]).T)
+    assert ", ".join(f"{metres:,.0f} m off" for metres in off) in popup
     dashed = "return lines((one) => one.options.dashArray).length"
     assert evaluated.ask(dashed) == 1  # to the best place
     empty = "return shown((one) => one instanceof L.CircleMarker && !one.options.fill).length"

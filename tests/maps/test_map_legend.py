@@ -36,9 +36,7 @@ if TYPE_CHECKING:
     from semsig_gis.database.database import SignatureDatabase
     from semsig_gis.objects.table import StreetObjects
 
-HOSTILE = (
-    "<script>alert(1)</script><img src=x onerror=alert(1)> \"'`${alert(1)} {{7*7}} & \\ é\u202eabc"
-)
+HOSTILE = "<script>alert(1)</script><img src=x onerror=alert(1)>\"'`${alert(1)}{{7*7}}&\\é\u202eabc"
 CITY, OBJECTS = small_city()
 EVALUATION = evaluate(CITY, queries=40, distortion="errors:3, view:200")
 QUERY = Signature.parse("DB", [10, 359.7], taxonomy=CITY.taxonomy)

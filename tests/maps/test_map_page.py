@@ -77,21 +77,15 @@ def test_the_rest_of_the_page_is_not_touched() -> None:
     assert inline_assets(body) == body
 
 
-@pytest.mark.parametrize(
-    "element",
-    [
-        folium.Marker([43.6, 3.88], icon=folium.Icon(color="red")),
-        folium.plugins.MarkerCluster([[43.6, 3.88]]),
-        folium.plugins.Draw(),
-    ],
-    ids=["icon", "cluster", "draw"],
-)
 @carried
-def test_an_element_that_needs_another_file_is_linked_or_refused(element: folium.Element) -> None:
-    map_ = a_map(element)
-    assert external_files(page_of_map(map_)) != ()
-    with pytest.raises(InputError, match="A self-contained map cannot"):
-        page_of_map(map_, self_contained=True)
+def test_an_element_that_needs_another_file_is_linked_or_refused() -> None:
+    icon = folium.Marker([43.6, 3.88], icon=folium.Icon(color="red"))
+    cluster = folium.plugins.MarkerCluster([[43.6, 3.88]])
+    for element in (icon, cluster, folium.plugins.Draw()):
+        map_ = a_map(element)
+        assert external_files(page_of_map(map_)) != ()
+        with pytest.raises(InputError, match="A self-contained map cannot"):
+            page_of_map(map_, self_contained=True)
 
 
 @carried

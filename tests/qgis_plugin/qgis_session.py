@@ -69,7 +69,7 @@ def algorithm(name: str) -> Any:  # noqa: ANN401
     return QgsApplication.processingRegistry().createAlgorithmById(f"semsig:{name}")
 
 
-def run(name: str, *, cancelling: bool = False, **parameters: object) -> Feedback:
+def run(name: str, *, cancelling: bool = False, **parameters: Any) -> Feedback:  # noqa: ANN401
     """Run an algorithm as its dialog does, and load what it gives."""
     feedback = Feedback(cancelling=cancelling)
     context = QgsProcessingContext()
@@ -86,7 +86,7 @@ def run(name: str, *, cancelling: bool = False, **parameters: object) -> Feedbac
     return feedback
 
 
-def run_well(name: str, **parameters: object) -> Feedback:
+def run_well(name: str, **parameters: Any) -> Feedback:  # noqa: ANN401
     """Run an algorithm on the database, which must succeed."""
     feedback = run(name, DATABASE=DATABASE, **parameters)
     if not feedback.ended[0]:
@@ -157,7 +157,7 @@ def refuse() -> list[list[str]]:
         ("identify", {"CELLS": shown(), "MAP": str(PLACE / "map.json")}),
         ("evaluate", {"OUTPUT": TEMPORARY, "LAYERS": str(PLACE / "lamps.geojson" / "b.gpkg")}),
     ):
-        database = {} if name == "build" else {"DATABASE": DATABASE}
+        database: dict[str, Any] = {} if name == "build" else {"DATABASE": DATABASE}
         errors.append(run(name, **database, **parameters).errors)
     ProcessingConfig.setSettingValue("SEMSIG_COMMAND", "/bin/true")
     return [*errors, run("build", OBJECTS=objects, OUTPUT=later).errors]
