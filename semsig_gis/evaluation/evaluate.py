@@ -120,7 +120,10 @@ def evaluate(
     """
     check_count("queries", queries, len(database))
     check_count("candidates", top, len(database))
-    spec = QuerySpec(number=queries, seeds=(seed,), distortions=_chain(distortion))
+    if isinstance(distortion, str):
+        distortion = parse_chain(distortion)
+    chain = (distortion,) if isinstance(distortion, QueryDistortion) else tuple(distortion)
+    spec = QuerySpec(number=queries, seeds=(seed,), distortions=chain)
     used: AnyMethod
     locator: Locator[Answer]
     if isinstance(method, Method):
@@ -218,14 +221,6 @@ def versions() -> dict[str, str]:
     """Return the versions of the software that decides the figures and their speed."""
     parts = {name: metadata.version(name) for name in ("numpy", "pandas", "rapidfuzz")}
     return {"semsig_gis": __version__, "python": platform.python_version(), **parts}
-
-
-def _chain(
-    distortion: str | QueryDistortion | Sequence[QueryDistortion],
-) -> tuple[QueryDistortion, ...]:
-    if isinstance(distortion, str):
-        return parse_chain(distortion)
-    return (distortion,) if isinstance(distortion, QueryDistortion) else tuple(distortion)
 
 
 class _Pool:

@@ -24,10 +24,8 @@ if TYPE_CHECKING:
 
 WITHIN = (5, 10, 25, 50, 100)
 RECALLS = (1, 10)
-LENGTHS = ("1-4", "5-9", "10-19", "20+")
-"""Ranges of how many objects are really seen."""
-AMBIGUITIES = ("1", "2-9", "10-99", "100-999", "1000+")
-"""Ranges of how many cells have the types of the true one."""
+LENGTHS = ("1-4", "5-9", "10-19", "20+")  # objects that are really seen
+AMBIGUITIES = ("1", "2-9", "10-99", "100-999", "1000+")  # cells with the types of the true one
 ELSEWHERE = "elsewhere"
 RULES = (0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 0.95, 0.98, 0.99)
 BINS = 10

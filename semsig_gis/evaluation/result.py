@@ -7,7 +7,7 @@ import math
 import os
 import platform
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, ClassVar, TypeVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
@@ -33,7 +33,7 @@ from semsig_gis.matching.ties import NEAR_PLACES, THRESHOLDS, expected_recall
 from semsig_gis.queries.chain import chain_text
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Mapping, Sequence
+    from collections.abc import Mapping, Sequence
 
     import geopandas as gpd
     import pandas as pd
@@ -42,8 +42,6 @@ if TYPE_CHECKING:
     from semsig_gis.database.database import SignatureDatabase
     from semsig_gis.evaluation.methods import AnyMethod
     from semsig_gis.queries.draw import QuerySpec
-
-N = TypeVar("N", int, float)
 
 QUERY_COLUMNS = (
     *("seed", "number", "cell", "cell_id", "types", "length", "type_group", "angle_group"),
@@ -149,12 +147,14 @@ class Evaluation:
     @property
     def query_bearings(self) -> list[list[float]]:
         """Bearings of what each query asked for, in degrees."""
-        return _numbers(self.queries["query_bearings"], float)
+        texts = self.queries["query_bearings"]
+        return [[float(one) for one in text.split(",") if one] for text in texts]
 
     @property
     def next_cell_ids(self) -> list[list[int]]:
         """Ids of the best cells of each query after the answer."""
-        return _numbers(self.queries["next_cell_ids"], int)
+        texts = self.queries["next_cell_ids"]
+        return [[int(one) for one in text.split(",") if one] for text in texts]
 
     @property
     def successful(self) -> NDArray[np.bool_]:
@@ -312,8 +312,3 @@ class Evaluation:
                 "machine": dict(self.machine),
             },
         }
-
-
-def _numbers(texts: Iterable[str], number: Callable[[str], N]) -> list[list[N]]:
-    """Read numbers with commas between them, perhaps none."""
-    return [[number(part) for part in text.split(",") if part] for text in texts]

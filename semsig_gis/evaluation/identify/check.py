@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import asdict, dataclass, fields
+from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from semsig_gis.likelihood.index import LikelihoodIndex
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, slots=True)
 class ChanceBin:
     """Queries from cells with a chance from `low` to `high`: the mean of it, and the share found.
 
@@ -185,6 +185,4 @@ def _correlation(one: NDArray[np.float64], other: NDArray[np.float64]) -> float:
 def _bins(stated: NDArray[np.float64], success: NDArray[np.float64]) -> tuple[ChanceBin, ...]:
     """Return the tenths that have queries."""
     bins = calibration_bins(pd.DataFrame({"chance": stated, "right": success}))
-    names = [field.name for field in fields(ChanceBin)]  # in the order of these columns
-    rows = bins[bins["n"] > 0].to_dict("split")["data"]
-    return tuple(ChanceBin(**dict(zip(names, row, strict=True))) for row in rows)
+    return tuple(ChanceBin(*row) for row in bins[bins["n"] > 0].to_dict("split")["data"])

@@ -34,14 +34,11 @@ if TYPE_CHECKING:
     from semsig_gis.likelihood.index import LikelihoodIndex
 
 TRIALS = 3000
-CLASS_TRIALS = 400
-"""Trials without each class."""
-PLACES = 3
-"""Places that are named for each cell."""
+CLASS_TRIALS = 400  # without each class
+PLACES = 3  # that are named for each cell
 TEMPERATURES = (0.15, 0.2, 0.25, 0.3, 0.35, 0.4, 0.5, 0.6, 0.8, 1.0)
 TEMPERATURE_TRIALS = 300
-DECIMALS = 3
-"""Of all numbers: more than they are sure to, and short in a file."""
+DECIMALS = 3  # of all numbers: more than they are sure to, and short in a file
 
 # Seconds that a trial, and a pair of cells, takes: only for telling how far the work is.
 TRIAL_S, PAIR_S, SAMPLED_S = 1.5e-2, 2.7e-9, 2.5e-4

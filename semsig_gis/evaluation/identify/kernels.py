@@ -127,11 +127,10 @@ def compare_signatures(  # noqa: C901, PLR0915, PLR0917 - a kernel takes no keyw
     """Compare cells with all others, by the likelihood of their own signature there.
 
     `cells` (c,) are row numbers. The entries of a cell begin at its item of `offsets` (n + 1,) in
-    `symbols` (m,), which are rows of `flat` (s, n), the columns of the index in steps of `step`.
-    `constants` (n,) is what each cell adds whatever the signature. Ratios of likelihoods are taken
-    to the power `temperature`. `ids` (n,) are the rising numbers of the cells, `places` (n, 2)
-    their columns and rows, `circle` (a, 2) that of `cell_circle`, and `limit` its squared radius in
-    cells. It fills `near`, `far` (c,), `like` and `share` (c, k), which is `Lookalikes`, unsorted.
+    `symbols` (m,), which are rows of `flat` (s, n), the columns of the index in steps of `step`;
+    `constants` (n,) is what each cell adds to them. `ids` (n,) are the rising numbers of the cells,
+    `places` (n, 2) their columns and rows, `circle` (a, 2) that of `cell_circle`, `limit` its
+    squared radius in cells. It fills `near`, `far` (c,), `like` and `share` (c, k), unsorted.
     """
     count = len(constants)
     scores = np.empty(count, np.float32)

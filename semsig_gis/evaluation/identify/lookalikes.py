@@ -28,8 +28,7 @@ if TYPE_CHECKING:
 
 CELLS_A_TASK = 256
 LEAST_SUM = 1e-30  # of ratios, so that it has a logarithm
-SAMPLE = 16_384
-"""Cells with which each cell is compared where classes are left out."""
+SAMPLE = 16_384  # cells with which each is compared where classes are left out
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

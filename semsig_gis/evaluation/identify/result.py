@@ -29,8 +29,7 @@ if TYPE_CHECKING:
 NAME = "identifiability"
 FORMAT = 1  # raised whenever the same cells and noise give other numbers, or are written otherwise
 
-BANDS = (0.0, 0.1, 0.5, 0.9)
-"""Lower ends of the chances to be found by which cells are counted."""
+BANDS = (0.0, 0.1, 0.5, 0.9)  # lower ends of the chances to be found by which cells are counted
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -65,9 +65,8 @@ SINGLES: Mapping[str, str] = {
 }
 FUSIONS: Mapping[str, str] = {f"fusion-{measure}": f"edit+{measure}" for measure in MEASURES}
 WEIGHTS: Mapping[float, str] = {
-    **{share: f"weights-{round(100 * share)}" for share in (0.1, 0.3)},
+    **{share: f"weights-{round(100 * share)}" for share in (0.1, 0.3, 0.5, 0.7, 0.9)},
     0.5: "fusion-edit",
-    **{share: f"weights-{round(100 * share)}" for share in (0.7, 0.9)},
 }
 PERCENTS: Mapping[int, str] = {
     **{percent: f"stages-{percent}" for percent in (1, 5, 10, 20, 50)},

@@ -25,8 +25,7 @@ if TYPE_CHECKING:
 
     Points = tuple[tuple[float, float, str], ...]
 
-Figure = tuple[str, float]
-"""The kind of a figure, and how many metres or per cent."""
+Figure = tuple[str, float]  # the kind of a figure, and how many metres or per cent
 
 # What plots show: metres and per cent.
 STEPS: Mapping[str, tuple[float, ...]] = {
