@@ -49,10 +49,9 @@ _MARK = re.compile(f"(?:^|(?<={_END}))'")
 
 
 def formula_safe(text: str) -> str:
-    """Return text that no spreadsheet takes for a formula, by apostrophes before risky parts.
+    """Return text that no spreadsheet takes for a formula; `as_written` undoes it.
 
-    An apostrophe that stands at such a place already gets another one, so that `as_written` can
-    undo it.
+    An apostrophe is put before risky parts, and before apostrophes that stand at such places.
     """
     return _RISK.sub("'", text)
 
@@ -67,9 +66,8 @@ def write_csv(
 ) -> None:
     """Write a layer as one CSV file, which appears whole, by rename.
 
-    UTF-8 with commas; texts stand in quotes and are `formula_safe`, what is missing is empty.
-    Numbers have all their digits. A point is ``x`` and ``y``, another geometry ``WKT``, in the CRS
-    of the layer.
+    UTF-8 with commas; texts stand in quotes and are `formula_safe`, what is missing is empty. A
+    point is ``x`` and ``y``, another geometry ``WKT``, in the CRS of the layer.
     """
     with whole_file(path) as partial, partial.open("wb") as file:
         writer = None
@@ -109,9 +107,8 @@ def write_geoparquet(
 ) -> None:
     """Write a layer as one GeoParquet 1.1 file, which appears whole, by rename.
 
-    The column ``bbox`` holds the bounds of every row as float32, rounded outwards, the covering of
-    ``geometry``. The metadata key ``semsig`` holds the specs, the classes and the licences as JSON.
-    The rows are in the order of the database, column by column.
+    The column ``bbox`` holds the bounds of every row as float32, rounded outwards. The metadata key
+    ``semsig`` holds the specs, the classes and the licences as JSON.
     """
     geo = geo_metadata(
         layer.crs, geometry_types=[GEOMETRY_TYPES[layer.geometry]], bounds=layer.bounds

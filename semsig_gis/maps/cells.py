@@ -252,10 +252,7 @@ def _chance_bytes(chances: NDArray[np.float64]) -> list[str]:
 
 
 def ambiguity_legend(sizes: Mapping[str, NDArray[np.int64]], *, licenses: Sequence[str]) -> str:
-    """Return the legend of a map of how many cells look the same, as HTML with data escaped.
-
-    ``sizes`` has for every cell how many look the same, by what is compared.
-    """
+    """Return the legend of a map of how many cells look the same, by what is compared, as HTML."""
     starts = list(GROUP_COLOURS)
     labels = [
         "no other",

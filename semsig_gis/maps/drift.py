@@ -210,10 +210,7 @@ def drift_legend(
     taxonomy: Taxonomy,
     licenses: Sequence[str],
 ) -> str:
-    """Return the legend of a map of changes between two dates, as HTML with data escaped.
-
-    ``objects`` is None where the street objects are not at hand.
-    """
+    """Return the legend of a map of changes between two dates, as HTML with data escaped."""
     kinds = {
         "same": (cells.same, "see what they saw"),
         "changed": (cells.changed, "see something else"),

@@ -209,10 +209,7 @@ def _heat(
 
 
 def evaluation_legend(evaluation: Evaluation, *, error_limit: str, licenses: Sequence[str]) -> str:
-    """Return the legend of a map of errors, as HTML for a ``details`` element with data escaped.
-
-    ``error_limit`` is the error at the end of the colour ramp, with its unit.
-    """
+    """Return the legend of a map of errors, of which the ramp ends at a limit, as escaped HTML."""
     count, distortions = len(evaluation.queries), chain_text(evaluation.asked.distortions)
     successes = int(evaluation.successful.sum())
     best = "the best candidate" if evaluation.top == 1 else f"the best of {evaluation.top:,}"

@@ -83,8 +83,7 @@ def level_image(
 ) -> tuple[bytes, list[list[float]]]:
     """Draw a level of every cell, as a PNG with its corners (see `city_image`).
 
-    Levels count from 1 into ``colours`` (``#rrggbb``); 0 is nothing. Of several cells in a block
-    the highest level is shown.
+    Levels count from 1 into ``colours``; 0 is nothing. A block has the highest of its cells.
     """
 
     def highest(members: NDArray[np.int64]) -> NDArray[np.uint8]:

@@ -59,10 +59,7 @@ def page_element(file: str) -> str:
 
 
 class Call(MacroElement):
-    """A call of a function of the page's script, which is put into the page once.
-
-    The arguments are elements of the map, such as the map itself, or plain values.
-    """
+    """A call of a function of the page's script, with elements of the map or plain values."""
 
     files: tuple[str, ...] = PAGE_FILES
     _template = Template(

@@ -23,10 +23,7 @@ def database_tables(
     file_bytes: int | None = None,
     object_counts: Mapping[int, int] | None = None,
 ) -> tuple[Table, ...]:
-    """Return the paper's Tables 1, 2a and 2b for a database, and a table of its classes.
-
-    ``object_counts`` is by class code.
-    """
+    """Return the paper's Tables 1, 2a and 2b for a database, and a table of its classes."""
     facts = database_summary(database, file_bytes=file_bytes, object_counts=object_counts)
     tables = (_occurrence_table, _property_table, _group_table, _class_table)
     return tuple(table(facts) for table in tables)

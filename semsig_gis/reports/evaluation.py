@@ -1,7 +1,4 @@
-"""Tables of an evaluation, with the paper's figures beside them where it ran the same settings.
-
-The same numbers as plain values are in `Evaluation.summary`.
-"""
+"""Tables of an evaluation, with the paper's figures beside them where it ran the same settings."""
 
 from __future__ import annotations
 
@@ -199,9 +196,7 @@ def experiment_figures(results: Mapping[str, Evaluation]) -> pd.DataFrame:
     """Return all figures of the evaluations, given by the names of their cases.
 
     One row a case and figure: ``case``, ``figure``, ``value``, ``low`` and ``high`` (95 %) and
-    ``n`` (queries). The figures are shares (see `evaluation.figures.query_figures`),
-    ``error_median`` and ``error_p90`` in metres and, where there is one, ``heading_error_median``
-    in degrees.
+    ``n`` (queries). Figures are shares, errors in metres, or ``heading_error_median`` in degrees.
     """
     parts = []
     for name, evaluation in results.items():
@@ -226,8 +221,7 @@ def experiment_tables(
 ) -> tuple[Table, ...]:
     """Return the settings of an experiment, then for each distortion a table of its main figures.
 
-    A row is a method and number of candidates. `times` tells whether to show the seconds of a
-    query, which differ from run to run.
+    `times` tells whether to show the seconds of a query, which differ from run to run.
     """
     database = next(iter(results.values())).database
     megabytes = database["mb_per_km2"]

@@ -28,7 +28,7 @@ SCORES = {
 def identifiability_tables(
     identifiability: Identifiability, *, object_counts: Mapping[int, int] | None = None
 ) -> tuple[Table, ...]:
-    """Return the mean cell with the bands of cells, and what each class adds, as tables.
+    """Return tables of the mean cell with the bands of cells, and of what each class adds.
 
     `object_counts` is by class code; without it the columns about objects are left out.
     """
@@ -97,10 +97,7 @@ def identifiability_page(
     name: str,
     object_counts: Mapping[int, int] | None = None,
 ) -> Report:
-    """Put together what is known of a city's cells, and whether fresh queries bear it out.
-
-    `name` is what the database is called; `object_counts` is by class code.
-    """
+    """Put together what is known of the cells of a database, and whether fresh queries agree."""
     facts = identifiability.summary(object_counts=object_counts)
     return Report(
         title=f"Where a query can be placed in {name}",
@@ -210,10 +207,7 @@ def _calibration_section(check: IdentifiabilityCheck) -> Section:
 
 
 def _rank_section(check: IdentifiabilityCheck) -> Section:
-    attainable = (
-        "Success is yes or no, so that chances that are just right would have "
-        f"{check.attainable:.3f}."
-    )
+    attainable = "Success is yes or no, so that chances that are just right would have {:.3f}."
     scores = {
         SCORES[name]: None if math.isnan(value) else value
         for name, value in check.correlations.items()
@@ -222,6 +216,6 @@ def _rank_section(check: IdentifiabilityCheck) -> Section:
     return Section(
         name="ranks",
         title="Do cells with a higher score succeed more often?",
-        text=() if math.isnan(check.attainable) else (attainable,),
+        text=() if math.isnan(check.attainable) else (attainable.format(check.attainable),),
         numbers=tuple(Number(row, column, value, decimals=3) for row, value in scores.items()),
     )
