@@ -14,7 +14,7 @@ from semsig_gis.core.signature import BEARING_UNITS, DISTANCE_UNITS, SignatureSp
 from semsig_gis.database.database import SignatureDatabase, consecutive
 from semsig_gis.database.occlusion import TOLERANCE_M, Footprints
 from semsig_gis.database.views import ViewpointSpec, choose_viewpoints, clockwise_order, sightings
-from semsig_gis.objects.load import licenses_of
+from semsig_gis.objects.table import licenses_of
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator

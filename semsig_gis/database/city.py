@@ -39,8 +39,7 @@ from semsig_gis.database.file import (
     save_database,
 )
 from semsig_gis.database.occlusion import Footprints, buildings_near
-from semsig_gis.objects.load import licenses_of
-from semsig_gis.objects.table import open_objects, save_objects
+from semsig_gis.objects.table import licenses_of, open_objects, save_objects
 from semsig_gis.storage.geoparquet import read_geoparquet, write_geoparquet
 from semsig_gis.storage.whole import move_folder, whole_file, whole_folder
 
@@ -387,7 +386,7 @@ class City:
     @cached_property
     def dataset(self) -> SignatureDatabase | PartitionedDatabase:
         """The database; in parts, where it lies in parts (see `open_dataset`)."""
-        return open_dataset(self.path) if is_folder(self.path) else self.database
+        return open_dataset(self.path) if self.path.is_dir() else self.database
 
     @property
     def licenses(self) -> tuple[str, ...]:
@@ -397,7 +396,7 @@ class City:
     @property
     def files(self) -> tuple[Path, ...]:
         """The file of the database, or those of its parts; DatabaseError if one is missing."""
-        if is_folder(self.path):
+        if self.path.is_dir():
             return part_files(self.path)
         require_file(self.path)
         return (self.path,)
@@ -405,7 +404,7 @@ class City:
     @property
     def bytes(self) -> int:
         """Size of the file, or of all files in the folder."""
-        files = self.path.iterdir() if is_folder(self.path) else [self.path]
+        files = self.path.iterdir() if self.path.is_dir() else [self.path]
         return sum(file.stat().st_size for file in files)
 
     @property
@@ -483,7 +482,7 @@ class City:
         replaced as a whole. DatabaseError if it has other cells.
         """
         added = {name: {"columns": columns.column_names, "facts": facts}}
-        if not is_folder(self.path):
+        if not self.path.is_dir():
             _extend(self.path, self.path, columns, cell_ids, added)
             return
         files, manifest = self.files, read_manifest(self.path)

@@ -18,7 +18,7 @@ from semsig_gis.database.file import open_database
 from semsig_gis.database.occlusion import TOUCHING_M, buildings_near
 from semsig_gis.database.views import sightings
 from semsig_gis.objects.changes import compare_objects, replace_layers
-from semsig_gis.objects.load import licenses_of
+from semsig_gis.objects.table import licenses_of
 
 if TYPE_CHECKING:
     from collections.abc import Callable

@@ -26,7 +26,7 @@ from semsig_gis.maps.parts import (
     sources,
     to_latlon,
 )
-from semsig_gis.objects.load import licenses_of
+from semsig_gis.objects.table import licenses_of
 from semsig_gis.storage.geoparquet import hilbert_order
 
 if TYPE_CHECKING:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
@@ -511,15 +510,6 @@ def read_surroundings(
     [25.0]
     """
     return _read(Path(path), role, crs, box)
-
-
-def licenses_of(*tables: gpd.GeoDataFrame | None) -> tuple[str, ...]:
-    """Return whom to name for buildings and streets, a line for every publisher and licence.
-
-    The tables are those of `read_surroundings` or `objects.load.assemble`.
-    """
-    lines = [table.attrs.get(LICENSES, ()) for table in tables if table is not None]
-    return tuple(dict.fromkeys(itertools.chain.from_iterable(lines)))
 
 
 def read_area(path: str | Path, *, crs: CRS | str) -> shapely.Polygon | shapely.MultiPolygon:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+import itertools
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -14,7 +15,15 @@ import shapely
 
 from semsig_gis import __version__
 from semsig_gis.core.errors import DatabaseError
-from semsig_gis.core.geometry import CLASS_CODE, COUNT, GEOMETRY, MERGED, SOURCE, SOURCE_ID
+from semsig_gis.core.geometry import (
+    CLASS_CODE,
+    COUNT,
+    GEOMETRY,
+    LICENSES,
+    MERGED,
+    SOURCE,
+    SOURCE_ID,
+)
 from semsig_gis.core.taxonomy import Taxonomy
 from semsig_gis.storage.geoparquet import (
     BBOX,
@@ -303,3 +312,12 @@ def objects_of(
         inside = ((xy >= box[:2]) & (xy <= box[2:])).all(axis=1)
         table = table[inside].reset_index(drop=True)
     return StreetObjects(table, taxonomy, licenses)
+
+
+def licenses_of(*tables: gpd.GeoDataFrame | None) -> tuple[str, ...]:
+    """Return whom to name for buildings and streets, a line for every publisher and licence.
+
+    The tables are those of `read_surroundings` or `objects.load.assemble`.
+    """
+    lines = [table.attrs.get(LICENSES, ()) for table in tables if table is not None]
+    return tuple(dict.fromkeys(itertools.chain.from_iterable(lines)))
