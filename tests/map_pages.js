@@ -16,6 +16,9 @@ const lines = (test) => shown((layer) => layer.getLatLngs && test(layer));
 // The text of the popup of a circle, which need not be open.
 const content = (circle) => circle.getPopup().getContent()(circle);
 
+// What the newest popup says; one before it may still fade away.
+const popup = () => [...document.querySelectorAll(".semsig-details")].pop()?.innerText ?? "";
+
 const height = (element) => element.getBoundingClientRect().height;
 
 // The number of pixels of about a colour on a canvas.

@@ -97,8 +97,7 @@ class MapPage:
     def popup(self) -> str:
         """Return what the newest popup says, if any; one before it may still fade away."""
         time.sleep(0.4)  # arrays are unpacked once
-        details = self.all(".semsig-details")
-        return str(details[-1].get_property("innerText")) if details else ""
+        return str(self.ask("return popup()"))
 
     def told(self) -> dict[str, str]:
         """Return what the popup says by its labels, its ``title``, and all of it as ``text``."""
