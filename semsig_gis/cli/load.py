@@ -49,9 +49,11 @@ Streets = Annotated[
 def load(
     files: Annotated[list[Path], typer.Argument(help="Files, or a folder of files.")],
     *,
-    catalog: Annotated[
+    names: Annotated[
         list[str],
-        typer.Option(help="Catalogue, by name or .toml file; repeat to merge, best first."),
+        typer.Option(
+            "--catalog", help="Catalogue, by name or .toml file; repeat to merge, best first."
+        ),
     ],
     out: Objects,
     layer: Layers = None,
@@ -70,21 +72,24 @@ def load(
     from semsig_gis.objects.load import assemble, choose_layers, read_files
     from semsig_gis.sources.catalog import combine_catalogs, load_catalog
 
-    keep_inputs(out, buildings, streets, read=[*files, *catalog])
+    keep_inputs(out, buildings, streets, read=[*files, *names])
     require_suffix(".parquet", out, buildings, streets)
-    chosen = combine_catalogs([load_catalog(name) for name in catalog])
-    specs = choose_layers(chosen, layer or (), surroundings=bool(buildings or streets))
+    catalog = combine_catalogs([load_catalog(name) for name in names])
+    specs = choose_layers(catalog, layer or (), surroundings=bool(buildings or streets))
     with progress("reading") as advance:
         layers, absent = read_files(specs, files, filters=filters, crs=crs, progress=advance)
     for spec in absent:
         remark(f"layer {spec.name!r} has no file here ({', '.join(spec.files)}); it is left out")
-    loaded = assemble(layers, chosen, metric_crs=metric_crs, collapse=collapse, merge=merge)
+    loaded = assemble(layers, catalog, metric_crs=metric_crs, collapse=collapse, merge=merge)
     _save_loaded(loaded, out, buildings, streets, as_json=as_json)
 
 
 @app.command()
 def fetch(
-    catalog: Annotated[str, typer.Argument(help="Catalogue with a service, by name or .toml.")],
+    name: Annotated[
+        str,
+        typer.Argument(metavar="CATALOG", help="Catalogue with a service, by name or .toml."),
+    ],
     *,
     area: Annotated[
         str,
@@ -109,17 +114,17 @@ def fetch(
     from semsig_gis.objects.load import assemble, choose_layers
     from semsig_gis.sources.catalog import load_catalog
 
-    keep_inputs(out, buildings, streets, read=(catalog, area))
+    keep_inputs(out, buildings, streets, read=(name, area))
     require_suffix(".parquet", out, buildings, streets)
-    chosen = load_catalog(catalog)
-    specs = choose_layers(chosen, layer or (), surroundings=bool(buildings or streets))
+    catalog = load_catalog(name)
+    specs = choose_layers(catalog, layer or (), surroundings=bool(buildings or streets))
     kept, http = open_cache(cache, offline=offline)
-    unit: Literal["steps", "bytes"] = "steps" if chosen.reader == "osm_file" else "bytes"
+    unit: Literal["steps", "bytes"] = "steps" if catalog.reader == "osm_file" else "bytes"
     with progress("fetching", unit=unit) as advance:
-        place = find_area(area, chosen, cache=kept, http=http)
+        place = find_area(area, catalog, cache=kept, http=http)
         layers = fetch_layers(
             specs,
-            chosen,
+            catalog,
             area=place,
             cache=kept,
             http=http,
@@ -127,7 +132,7 @@ def fetch(
             progress=advance,
             tell=remark,
         )
-    loaded = assemble(layers, chosen, metric_crs=metric_crs, collapse=collapse, merge=merge)
+    loaded = assemble(layers, catalog, metric_crs=metric_crs, collapse=collapse, merge=merge)
     _save_loaded(loaded, out, buildings, streets, as_json=as_json)
 
 
