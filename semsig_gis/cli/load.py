@@ -88,7 +88,7 @@ def load(
 def fetch(
     name: Annotated[
         str,
-        typer.Argument(metavar="CATALOG", help="Catalogue with a service, by name or .toml."),
+        typer.Argument(metavar="catalog", help="Catalogue with a service, by name or .toml."),
     ],
     *,
     area: Annotated[
