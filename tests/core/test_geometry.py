@@ -19,7 +19,6 @@ from semsig_gis.core.geometry import (
     split_ids,
     wrap_degrees,
 )
-from semsig_gis.database.views import bearings
 
 # --- Coordinate reference systems -------------------------------------------------------------
 
@@ -99,7 +98,6 @@ def test_one_metre_is_one_metre_in_an_accepted_system(crs: str) -> None:
 # --- Directions -------------------------------------------------------------------------------
 
 ANGLES = st.floats(-1e6, 1e6)
-OFFSETS = st.floats(-1e4, 1e4)
 
 
 def apart(a: float, b: float) -> float:
@@ -120,30 +118,6 @@ def test_whole_turns_do_not_matter() -> None:
     assert wrap_degrees(np.arange(-720, 1080)).tolist() == [*range(360)] * 5
     # A tiny negative angle does not become a whole turn.
     assert wrap_degrees([-1e-20, -5e-324, -0.0, 360.0, 720.0]).tolist() == [0.0] * 5
-    assert bearings([-1e-300, -5e-324], [1.0, 30.0]).tolist() == [0.0, 0.0]
-
-
-def test_bearings_count_clockwise_from_north() -> None:
-    dx, dy = [0, 7, 7, 7, 0, -7, -7], [7, 7, 0, -7, -7, -7, 0]
-    assert bearings(dx, dy).tolist() == [0, 45, 90, 135, 180, 225, 270]
-    assert bearings([0.0, -0.0, 0.0, -0.0], [0.0, 0.0, -0.0, -0.0])[0] == 0.0
-    assert bearings([], []).shape == (0,)
-
-
-@given(st.floats(allow_nan=False), st.floats(allow_nan=False))
-def test_a_bearing_is_the_wrapped_arctangent(dx: float, dy: float) -> None:
-    bearing = bearings(dx, dy)
-    assert bearing == wrap_degrees(np.degrees(np.arctan2(dx, dy)))
-    assert not np.signbit(bearing)
-
-
-@given(OFFSETS, OFFSETS)
-def test_a_bearing_points_along_its_displacement(dx: float, dy: float) -> None:
-    bearing = float(bearings(dx, dy))
-    length = math.hypot(dx, dy)
-    assert 0.0 <= bearing < 360.0
-    assert math.isclose(length * math.sin(math.radians(bearing)), dx, abs_tol=1e-9)
-    assert math.isclose(length * math.cos(math.radians(bearing)), dy, abs_tol=1e-9)
 
 
 @given(ANGLES, ANGLES)
@@ -156,7 +130,7 @@ def test_angular_distance_is_the_smaller_angle(a: float, b: float) -> None:
 
 def test_arrays_keep_their_shape() -> None:
     grid = np.arange(-6.0, 6.0).reshape(3, 4)
-    for angles in (wrap_degrees(grid), bearings(grid, grid), angular_distance(grid, 10.0)):
+    for angles in (wrap_degrees(grid), angular_distance(grid, 10.0)):
         assert angles.shape == (3, 4)
     assert wrap_degrees(np.arange(3, dtype=np.uint8)).dtype == np.float64
 

@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import json
+import math
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -12,12 +13,12 @@ from sentences import refused
 from worlds import CODES, World, worlds
 
 from semsig_gis.core.errors import EmptyResultError, InputError
-from semsig_gis.core.geometry import GridSpec
+from semsig_gis.core.geometry import GridSpec, wrap_degrees
 from semsig_gis.core.rtree import ObjectIndex
 from semsig_gis.database import views as viewpoints
 from semsig_gis.database.database import views_in
 from semsig_gis.database.occlusion import Footprints
-from semsig_gis.database.views import ViewpointSpec, choose_viewpoints, views_at
+from semsig_gis.database.views import ViewpointSpec, bearings, choose_viewpoints, views_at
 
 if TYPE_CHECKING:
     from semsig_gis.database.views import Mode
@@ -105,6 +106,31 @@ def test_a_choice_survives_json() -> None:
 
 
 # --- What is seen -----------------------------------------------------------------------------
+
+
+def test_bearings_count_clockwise_from_north() -> None:
+    dx, dy = [0, 7, 7, 7, 0, -7, -7], [7, 7, 0, -7, -7, -7, 0]
+    assert bearings(dx, dy).tolist() == [0, 45, 90, 135, 180, 225, 270]
+    assert bearings([0.0, -0.0, 0.0, -0.0], [0.0, 0.0, -0.0, -0.0])[0] == 0.0
+    # A tiny negative angle does not become a whole turn.
+    assert bearings([-1e-300, -5e-324], [1.0, 30.0]).tolist() == [0.0, 0.0]
+    assert bearings(np.zeros((0, 3)), 0.0).shape == (0, 3)
+
+
+@given(st.floats(allow_nan=False), st.floats(allow_nan=False))
+def test_a_bearing_is_the_wrapped_arctangent(dx: float, dy: float) -> None:
+    bearing = bearings(dx, dy)
+    assert bearing == wrap_degrees(np.degrees(np.arctan2(dx, dy)))
+    assert not np.signbit(bearing)
+
+
+@given(st.floats(-1e4, 1e4), st.floats(-1e4, 1e4))
+def test_a_bearing_points_along_its_displacement(dx: float, dy: float) -> None:
+    bearing = float(bearings(dx, dy))
+    length = math.hypot(dx, dy)
+    assert 0.0 <= bearing < 360.0
+    assert math.isclose(length * math.sin(math.radians(bearing)), dx, abs_tol=1e-9)
+    assert math.isclose(length * math.cos(math.radians(bearing)), dy, abs_tol=1e-9)
 
 
 @given(worlds())
