@@ -221,11 +221,11 @@ def numbers(text: str, option: str) -> list[float]:
 
 def known_identifiability(city: City) -> Identifiability | None:
     """Return what the columns of a database tell; None, and say so, where they do not fit it."""
-    if not city.has_columns:
-        return None
-    from semsig_gis.evaluation.identify.result import open_identifiability
-
     try:
+        if not city.has_columns:
+            return None
+        from semsig_gis.evaluation.identify.result import open_identifiability
+
         return open_identifiability(city.database, city.path)
     except DatabaseError as error:
         remark(str(error))

@@ -453,8 +453,8 @@ class City:
 
     @property
     def has_columns(self) -> bool:
-        """Whether columns were put into the file, or the first part."""
-        return bool(read_specs(self.files[0]).get(ADDED))
+        """Whether columns were put into the file, or a part."""
+        return any(read_specs(file).get(ADDED) for file in self.files)
 
     def columns(self, name: str) -> tuple[pa.Table, dict[str, Any]] | None:
         """Return columns that were put into the database under a name, and their facts.
