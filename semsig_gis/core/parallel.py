@@ -166,7 +166,8 @@ def _client(workers: int, scheduler: str | None) -> Iterator[Client]:
         try:
             yield stack.enter_context(client)
         finally:
-            _await_processes(client, workers)
+            if scheduler is None:
+                _await_processes(client, workers)
 
 
 def _connect(workers: int, scheduler: str | None, stack: ExitStack) -> Client | None:
