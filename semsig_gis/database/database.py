@@ -420,13 +420,13 @@ class SequenceTable:
         """
         sets = self.value_sets if only is None else self.value_sets[only]
         values = np.unique(query)
-        wanted = [0] * sets.shape[1]
+        words = [0] * sets.shape[1]
         for value in values.tolist():
             word, bit = divmod(value, WORD_BITS)
-            if word < len(wanted):  # a value past the last word is in no sequence of the table
-                wanted[word] |= 1 << bit
+            if word < len(words):  # a value past the last word is in no sequence of the table
+                words[word] |= 1 << bit
         both = np.zeros(len(sets), np.int16)
-        for word, bits in enumerate(wanted):
+        for word, bits in enumerate(words):
             both += np.bitwise_count(sets[:, word] & np.uint64(bits))
         sizes = self.value_set_sizes if only is None else self.value_set_sizes[only]
         return both, sizes + np.int16(len(values)) - both

@@ -552,8 +552,8 @@ def _read(
     dimensions = shapely.get_dimensions(table.geometry.to_numpy())
     others = table.geometry[dimensions != DIMENSIONS[kind]]
     if (len(table) == 0 and box is None) or len(others):
-        found = f"holds a {others.iloc[0].geom_type}" if len(others) else f"holds no {kind}"
-        msg = f"{path} {found}; give a file of {kind}s."
+        content = f"holds a {others.iloc[0].geom_type}" if len(others) else f"holds no {kind}"
+        msg = f"{path} {content}; give a file of {kind}s."
         raise InputError(msg)
     return table.to_crs(crs)
 
