@@ -68,7 +68,7 @@ ready to be searched; keep it there.
                 "VIEWPOINTS",
                 "Viewpoints",
                 ("all", "outdoor", "streets"),
-                "Every cell, those outside the buildings, or those along the streets.",
+                "Every cell, those outside the buildings, or along the streets and outside them.",
             ),
             file_to_read(
                 "STREETS",

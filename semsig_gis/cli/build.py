@@ -49,7 +49,9 @@ def build(
     streets: Annotated[Path | None, typer.Option(help="Centre lines of streets.")] = None,
     viewpoints: Annotated[
         Literal["all", "outdoor", "streets"],
-        typer.Option(help="Look from every cell, outside --buildings, or along --streets."),
+        typer.Option(
+            help="Look from every cell, outside --buildings, or along --streets and outside them."
+        ),
     ] = "all",
     street_width: Annotated[
         float, typer.Option(help="Default street width in metres, where --streets has none.")

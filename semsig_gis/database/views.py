@@ -187,7 +187,7 @@ class ViewpointSpec:
     ----------
     mode : {"all", "outdoor", "streets"}
         Every cell, those whose centre is outside the building footprints, or those whose centre
-        is near the centre line of a street.
+        is near the centre line of a street and, where footprints are given, outside them.
     width : float, default 8
         How far from a centre line is near, in metres: half the width of a street.
     area : shapely.Polygon or shapely.MultiPolygon, optional
@@ -257,8 +257,9 @@ def choose_viewpoints(
     """Tell which cells are viewpoints, by their centres.
 
     A centre on the outline of a building is none; one on the edge of a street or of the area is.
-    The footprints are needed for ``"outdoor"``, and the centre lines in metres for ``"streets"``;
-    missing and empty lines are left out. `widths` holds half the width of each street in metres,
+    The footprints are needed for ``"outdoor"``, and the centre lines in metres for ``"streets"``,
+    which leaves out what is in footprints too, because nobody stands there; missing and empty lines
+    are left out. `widths` holds half the width of each street in metres,
     not finite where ``spec.width`` holds.
     """
     require_surroundings(spec, footprints, streets)
@@ -267,11 +268,11 @@ def choose_viewpoints(
     if spec.area is not None:
         shapely.prepare(spec.area)
         chosen &= shapely.intersects_xy(spec.area, places[:, 0], places[:, 1])
-    if spec.mode == "outdoor" and footprints is not None:
-        chosen[chosen] = ~footprints.cover(places[chosen])
-    elif spec.mode == "streets" and streets is not None:
+    if spec.mode == "streets" and streets is not None:
         lines, reaches = _lines(streets, widths, spec.width)
         chosen[chosen] = _within(places[chosen], lines, reaches)
+    if spec.mode != "all" and footprints is not None:
+        chosen[chosen] = ~footprints.cover(places[chosen])
     return chosen
 
 

@@ -266,6 +266,7 @@ def test_buildings_streets_and_an_area_narrow_what_is_built(
         "buildings": "--buildings houses.gpkg",
         "outdoor": "--buildings houses.gpkg --viewpoints outdoor",
         "streets": "--streets streets.geojson --viewpoints streets",
+        "free": "--streets streets.geojson --viewpoints streets --buildings houses.gpkg",
         "wide": "--streets streets.geojson --viewpoints streets --street-width 40",
         "area": "--area area.parquet",
     }.items():
@@ -274,7 +275,7 @@ def test_buildings_streets_and_an_area_narrow_what_is_built(
         cells[name], seen[name] = len(database), int(database.lengths.sum())
     assert cells["outdoor"] < cells["buildings"] <= cells["all"]
     assert seen["buildings"] < seen["all"]
-    assert cells["streets"] < cells["wide"] < cells["all"]
+    assert cells["free"] < cells["streets"] < cells["wide"] < cells["all"]
     assert cells["area"] <= cells["all"]
     code, _, err = run(build, "--buildings", city / "bow.gpkg")
     assert code == 0

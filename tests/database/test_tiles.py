@@ -28,7 +28,7 @@ from semsig_gis.core.geometry import GridSpec
 from semsig_gis.core.signature import SignatureSpec
 from semsig_gis.database.build import build_database
 from semsig_gis.database.file import MANIFEST, open_database, part_name, save_database
-from semsig_gis.database.occlusion import TOLERANCE_M
+from semsig_gis.database.occlusion import TOLERANCE_M, Footprints
 from semsig_gis.database.tiles import (
     TileSpec,
     begin,
@@ -158,6 +158,8 @@ def test_tiles_with_buildings_and_streets_are_the_same_as_the_whole(
     assert_same(found, whole)
     assert (found.viewpoints, found.occlusion) == (viewpoints, TOLERANCE_M)
     assert len(found) < len(town.database) or mode == "all"
+    covered = Footprints(tables["buildings"].geometry.to_numpy()).cover(found.xy)
+    assert covered.any() == (mode == "all")
 
 
 def test_a_wall_whose_neighbour_is_far_hides_as_in_the_whole(tmp_path: Path) -> None:

@@ -49,6 +49,14 @@ def test_outdoor_is_outside_the_footprints_and_an_area_holds_in_every_mode() -> 
     assert [index for index, kept in enumerate(chosen) if kept] == [0, 10, 20]
 
 
+def test_nobody_stands_in_a_building_along_a_street() -> None:
+    arcade = shapely.box(30, 0, 55, 10)  # holds two centres, and a third is on its outline
+    spec, footprints = ViewpointSpec(mode="streets", width=1.0), Footprints([arcade])
+    assert sum(choose(spec, streets=[LINE])) == 10
+    chosen = choose(spec, streets=[LINE], footprints=footprints)
+    assert [number // 10 for number, kept in enumerate(chosen) if kept] == [0, 1, 2, 6, 7, 8, 9]
+
+
 @settings(max_examples=30)
 @given(st.integers(0, 2**32 - 1), st.sampled_from([7, 1 << 18]))
 def test_streets_equal_a_plain_loop(seed: int, block: int) -> None:
