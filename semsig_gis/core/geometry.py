@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from pyproj import CRS
+from pyproj import CRS, Geod, Proj
 from pyproj.exceptions import CRSError
 
 from semsig_gis.core.errors import CrsError, InputError
@@ -94,6 +94,48 @@ def _fault(system: CRS) -> str:
     if {axis.direction for axis in system.axis_info} != {"east", "north"}:
         return "has axes that do not point east and north"
     return ""
+
+
+# Long against the rounding of coordinates, short against how fast the angle changes.
+STEP_M = 10.0
+
+
+def grid_convergence(crs: CRS, xy: ArrayLike) -> NDArray[np.float64]:
+    """Return the angle from true to grid north at places in a metric CRS, in degrees clockwise.
+
+    A bearing from true north is the bearing in the grid plus this angle.
+
+    Parameters
+    ----------
+    crs : pyproj.CRS
+        Metric coordinate reference system.
+    xy : array_like of float, shape (n, 2)
+        Places in metres.
+
+    Returns
+    -------
+    ndarray of float, shape (n,)
+        Angles in [-180, 180), NaN where a place is not on the Earth.
+
+    Examples
+    --------
+    >>> from semsig_gis.core.geometry import grid_convergence, require_metric_crs
+    >>> grid_convergence(require_metric_crs("EPSG:2154"), [(770_000, 6_280_000)]).round(2).tolist()
+    [0.63]
+    """
+    azimuth, _ = _on_the_ground(crs, xy, (0.0, STEP_M))
+    return signed_degrees(azimuth)
+
+
+def _on_the_ground(
+    crs: CRS, xy: ArrayLike, step: tuple[float, float]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return true azimuth and length of a step in the plane from places, along the ellipsoid."""
+    plane, ellipsoid = Proj(crs), crs.get_geod() or Geod(ellps="WGS84")
+    here = np.asarray(xy, dtype=np.float64).reshape(-1, 2)
+    from_to = [plane(xy[:, 0], xy[:, 1], inverse=True) for xy in (here, here + step)]
+    azimuth, _, metres = ellipsoid.inv(*from_to[0], *from_to[1])
+    return np.where(np.isfinite(metres), azimuth, np.nan), np.asarray(metres)
 
 
 ROW_SPAN = 10**8

@@ -15,6 +15,7 @@ from semsig_gis.core.geometry import (
     angular_distance,
     cell_ids,
     cells_near,
+    grid_convergence,
     require_metric_crs,
     split_ids,
     wrap_degrees,
@@ -93,6 +94,40 @@ def test_one_metre_is_one_metre_in_an_accepted_system(crs: str) -> None:
     factors = Proj(crs).get_factors(*middle)
     assert factors.meridional_scale == pytest.approx(1.0, rel=2e-3)
     assert factors.parallel_scale == pytest.approx(1.0, rel=2e-3)
+
+
+PLACES = {  # a metric system, longitude and latitude
+    "Brest": ("EPSG:2154", -4.49, 48.39),
+    "Helsinki": ("EPSG:3067", 24.94, 60.17),
+    "Paris by a meridian of its own": ("EPSG:27572", 2.35, 48.86),
+    "Munich, northing first": ("EPSG:31468", 11.58, 48.14),
+    "Suva": ("EPSG:32760", 178.44, -18.14),
+    "east of the antimeridian": ("EPSG:32760", -179.9, -16.8),
+    "Buenos Aires": ("EPSG:32721", -58.38, -34.6),
+    "a plane of one's own": ("+proj=tmerc +lon_0=3 +ellps=GRS80 +towgs84=1,2,3 +type=crs", 9, 50),
+}
+
+
+@pytest.mark.parametrize(("code", "longitude", "latitude"), PLACES.values(), ids=PLACES)
+def test_convergence_leads_from_the_grid_to_true_north(
+    code: str, longitude: float, latitude: float
+) -> None:
+    crs = require_metric_crs(code)
+    plane, ellipsoid = Proj(crs), crs.get_geod()
+    assert ellipsoid is not None
+    xy = np.array(plane(longitude, latitude))
+    (angle,) = grid_convergence(crs, [xy])
+    for bearing in (0.0, 77.0, 230.0):  # as the grid has it, against the geodesic
+        turn = math.radians(bearing)
+        x, y = xy + 30.0 * np.array([math.sin(turn), math.cos(turn)])
+        azimuth, _, _ = ellipsoid.inv(longitude, latitude, *plane(x, y, inverse=True))
+        assert apart(azimuth, bearing + angle) < 1e-4
+
+
+def test_convergence_nowhere_is_not_a_number() -> None:
+    crs = require_metric_crs("EPSG:32631")
+    assert np.isnan(grid_convergence(crs, [(math.inf, 0.0), (math.nan, 1.0)])).all()
+    assert grid_convergence(crs, np.empty((0, 2))).shape == (0,)
 
 
 # --- Directions -------------------------------------------------------------------------------
