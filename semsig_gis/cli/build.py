@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -126,9 +127,9 @@ def _build_whole(
     from semsig_gis.objects.table import open_objects
 
     opened = open_objects(objects)
-    crs = opened.crs
-    houses = None if buildings is None else read_surroundings(buildings, role="buildings", crs=crs)
-    lines = None if streets is None else read_surroundings(streets, role="streets", crs=crs)
+    read = partial(read_surroundings, crs=opened.crs, tell=remark)
+    houses = None if buildings is None else read(buildings, role="buildings")
+    lines = None if streets is None else read(streets, role="streets")
     if houses is not None and (invalid := int((~houses.is_valid).sum())):
         remark(f"{invalid} building footprints in {buildings} are invalid polygons; repaired here")
     with progress("building") as advance:

@@ -210,6 +210,7 @@ def build_tiles(
         viewpoints=viewpoints or ViewpointSpec(),
         buildings=buildings,
         streets=streets,
+        tell=tell,
     )
     try:
         tiles = touched_tiles(plan.objects, grid=plan.grid, side=plan.side, reach=plan.reach)
@@ -290,10 +291,12 @@ def plan_tiles(
     viewpoints: ViewpointSpec,
     buildings: str | Path | None = None,
     streets: str | Path | None = None,
+    tell: Callable[[str], None] | None = None,
 ) -> TilePlan:
     """Check the inputs of a run, begin it or take it up again, and return the plan of its tiles.
 
-    Streets are needed by the viewpoints ``"streets"`` and left aside by others.
+    Streets are needed by the viewpoints ``"streets"`` and left aside by others. `tell` takes
+    remarks on the files of buildings and streets.
     """
     along = streets if viewpoints.mode == "streets" else None
     places: dict[Input, str | Path | None]
@@ -314,7 +317,9 @@ def plan_tiles(
     }
     folder = begin(out, recipe)
     try:
-        files = {name: _by_box(name, path, nothing.crs, folder) for name, path in paths.items()}
+        files = {
+            name: _by_box(name, path, nothing.crs, folder, tell) for name, path in paths.items()
+        }
         lines = files.get("streets")
         return TilePlan(
             folder=folder,
@@ -348,7 +353,9 @@ def _fingerprint(path: Path) -> str:
         raise SourceError(msg) from error
 
 
-def _by_box(name: Input, path: Path, crs: CRS, folder: Path) -> Path:
+def _by_box(
+    name: Input, path: Path, crs: CRS, folder: Path, tell: Callable[[str], None] | None
+) -> Path:
     """Return an input that can be read by box in a CRS: its file, or else a copy."""
     copy = folder / INPUTS / f"{name}.parquet"
     if _covered(path, crs):
@@ -358,7 +365,7 @@ def _by_box(name: Input, path: Path, crs: CRS, folder: Path) -> Path:
     if name == "objects":  # those of before have no bounds
         save_objects(open_objects(path), copy)
     else:
-        save_surroundings(read_surroundings(path, role=name, crs=crs), copy)
+        save_surroundings(read_surroundings(path, role=name, crs=crs, tell=tell), copy)
     return copy
 
 

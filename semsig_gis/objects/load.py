@@ -40,7 +40,7 @@ if TYPE_CHECKING:
 
     from semsig_gis.core.taxonomy import Taxonomy
     from semsig_gis.sources import RawLayer, RowCounts
-    from semsig_gis.sources.catalog import Catalog, GeometryKind
+    from semsig_gis.sources.catalog import Catalog, GeometryKind, Role
 
 
 # Two objects of a class within the same centimetre are one object listed twice.
@@ -51,11 +51,15 @@ BEYOND_EARTH_M = 1e8
 
 @dataclass(frozen=True, slots=True)
 class LayerReport:
-    """What became of one layer's rows; `notes` are warnings and messages on unreadable rows."""
+    """What became of one layer's rows; `notes` are warnings and messages on unreadable rows.
+
+    `role` is that of the layer: street objects, buildings or streets.
+    """
 
     name: str
     counts: RowCounts
     notes: tuple[str, ...] = ()
+    role: Role = "objects"
 
 
 @dataclass(frozen=True, slots=True)
@@ -409,29 +413,58 @@ def assemble(
     merged = ConflationReport(())
     if merge and catalog.conflate:
         objects, merged = conflate(objects, dict(catalog.conflate))
+    buildings, on_buildings = _surroundings(layers, "buildings", objects.crs)
+    streets, on_streets = _surroundings(layers, "streets", objects.crs)
     return Loaded(
         objects=objects,
-        report=report,
+        report=LoadReport((*report.layers, *on_buildings, *on_streets)),
         conflation=merged,
-        buildings=_surroundings(layers, "buildings", objects.crs),
-        streets=_surroundings(layers, "streets", objects.crs),
+        buildings=buildings,
+        streets=streets,
         notes=notes,
     )
 
 
-def _surroundings(layers: Sequence[RawLayer], role: str, crs: CRS) -> gpd.GeoDataFrame | None:
+DIMENSIONS: dict[GeometryKind, int] = {"line": 1, "polygon": 2}
+KIND_OF: dict[str, GeometryKind] = {"buildings": "polygon", "streets": "line", "area": "polygon"}
+
+
+def _surroundings(
+    layers: Sequence[RawLayer], role: Literal["buildings", "streets"], crs: CRS
+) -> tuple[gpd.GeoDataFrame | None, tuple[LayerReport, ...]]:
+    """Return the usable buildings or streets of all layers, and what became of their rows."""
     of_role = [layer for layer in layers if layer.spec.role == role]
     if not of_role:
-        return None
-    tables = [layer.table.to_crs(crs) for layer in of_role]
+        return None, ()
+    kind = KIND_OF[role]
+    tables, reports = [], []
+    for layer in of_role:
+        table = layer.table.to_crs(crs)
+        nowhere = (table.geometry.isna() | table.geometry.is_empty).to_numpy(bool)
+        other = ~nowhere & (shapely.get_dimensions(table.geometry.array) != DIMENSIONS[kind])
+        far = ~(nowhere | other) & ~_on_earth(table.geometry.array)
+        counts = replace(
+            layer.counts,
+            unreadable=layer.counts.unreadable + int(other.sum()),
+            missing=int(nowhere.sum()),
+            misplaced=int(far.sum()),
+        )
+        reports.append(LayerReport(layer.spec.name, counts, (*layer.notes, *layer.errors), role))
+        tables.append(table[~(nowhere | other | far)])
     table = pd.concat(tables, ignore_index=True).drop(columns=CLASS_NAME)
-    table = table[~(table.geometry.isna() | table.geometry.is_empty)].reset_index(drop=True)
     table.attrs[LICENSES] = [str(licence) for licence in layer_licences(of_role)]
-    return table
+    return table, tuple(reports)
+
+
+def _on_earth(shapes: NDArray[np.object_]) -> NDArray[np.bool_]:
+    """Tell which shapes have all of their coordinates on the Earth; false for NaN too."""
+    xy, row = shapely.get_coordinates(shapes, return_index=True)
+    placed = np.ones(len(shapes), bool)
+    placed[row[~(np.abs(xy) < BEYOND_EARTH_M).all(axis=1)]] = False
+    return placed
 
 
 OSM_SUFFIXES = (".osm", ".osm.pbf", ".osm.bz2")
-DIMENSIONS: dict[GeometryKind, int] = {"line": 1, "polygon": 2}
 
 
 def save_surroundings(table: gpd.GeoDataFrame, path: str | Path) -> None:
@@ -475,6 +508,7 @@ def read_surroundings(
     role: Literal["buildings", "streets"],
     crs: CRS | str,
     box: Sequence[float] | None = None,
+    tell: Callable[[str], None] | None = None,
 ) -> gpd.GeoDataFrame:
     """Read the buildings or the streets of a city.
 
@@ -491,6 +525,8 @@ def read_surroundings(
     box : sequence of float, optional
         ``xmin, ymin, xmax, ymax`` in the CRS of the file, which `save_surroundings` wrote: only
         features whose bounds meet it.
+    tell : callable, optional
+        Takes a remark on the file, such as on outlines that are not closed and so left out.
 
     Returns
     -------
@@ -509,7 +545,7 @@ def read_surroundings(
     >>> houses.area.round().tolist()
     [25.0]
     """
-    return _read(Path(path), role, crs, box)
+    return _read(Path(path), role, crs, box, tell)
 
 
 def read_area(path: str | Path, *, crs: CRS | str) -> shapely.Polygon | shapely.MultiPolygon:
@@ -525,9 +561,14 @@ def read_area(path: str | Path, *, crs: CRS | str) -> shapely.Polygon | shapely.
 
 
 def _read(
-    path: Path, role: str, crs: CRS | str, box: Sequence[float] | None = None
+    path: Path,
+    role: str,
+    crs: CRS | str,
+    box: Sequence[float] | None = None,
+    tell: Callable[[str], None] | None = None,
 ) -> gpd.GeoDataFrame:
-    kind: GeometryKind = "line" if role == "streets" else "polygon"
+    kind = KIND_OF[role]
+    notes: tuple[str, ...] = ()
     if path.suffix.lower() == ".parquet":
         table = _read_parquet(path, kind, box)
     elif path.name.lower().endswith(OSM_SUFFIXES) and role != "area":
@@ -535,6 +576,7 @@ def _read(
         (layer,) = osm_file.read_layers(path, [spec])
         table = layer.table
         table.attrs[LICENSES] = [str(licence) for licence in layer_licences([layer])]
+        notes = layer.notes
     else:
         layer = vector_file.read_layer(path, LayerSpec(name=role, class_name="", geometry=kind))
         if layer.errors:
@@ -543,7 +585,10 @@ def _read(
                 f"({layer.errors[0]}); correct the file."
             )
             raise SourceError(msg)
-        table = layer.table
+        table, notes = layer.table, layer.notes
+    if tell is not None:
+        for note in notes:
+            tell(f"{path}: {note}")
     if table.crs is None:
         msg = f"{path} states no coordinate reference system; write it with one."
         raise SourceError(msg)

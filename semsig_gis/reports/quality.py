@@ -85,7 +85,7 @@ class QualityReport:
         sources = [
             {"name": item.name}
             | asdict(item.counts)
-            | {"objects": item.counts.kept, "notes": item.notes}
+            | {"kept": item.counts.kept, "role": item.role, "notes": item.notes}
             for item in self.sources
         ]
         return {"objects": self.objects, **asdict(self), "sources": sources}
@@ -192,6 +192,8 @@ def _sources(
 
 
 ROW_COUNTS = tuple(field.name for field in fields(RowCounts))
+# A table has no room for all that is said of a layer with many unreadable rows.
+NOTES_SHOWN = 4
 
 
 def quality_tables(report: QualityReport) -> tuple[Table, ...]:
@@ -222,12 +224,12 @@ def quality_tables(report: QualityReport) -> tuple[Table, ...]:
         _class_table(report),
         Table(
             "Rows by layer",
-            ("layer", *ROW_COUNTS, "objects", "notes"),
+            ("layer", *ROW_COUNTS, "kept", "notes"),
             tuple(
                 (
                     item.name,
                     *(f"{number:,}" for number in (*astuple(item.counts), item.counts.kept)),
-                    "; ".join(item.notes),
+                    _notes_text(item.notes),
                 )
                 for item in report.sources
             ),
@@ -280,6 +282,11 @@ def _class_table(report: QualityReport) -> Table:
 
 def _text(number: float | None) -> str:
     return "" if number is None else f"{number:,.1f}"
+
+
+def _notes_text(notes: Sequence[str]) -> str:
+    more = len(notes) - NOTES_SHOWN
+    return "; ".join([*notes[:NOTES_SHOWN], *([f"and {more} more (--json)"] if more > 0 else [])])
 
 
 CLASS_COUNTS = ("before", "after", "added", "removed", "moved", "gained", "lost")

@@ -6,6 +6,7 @@ import dataclasses
 import functools
 import math
 import re
+from collections import Counter
 from typing import TYPE_CHECKING, Any, TypeVar
 
 import geopandas as gpd
@@ -120,6 +121,8 @@ KINDS = {
 ERRORS_KEPT = 10
 # Rows of one id farther apart than this are told of: about a metre, by unit of the CRS.
 APART_DEGREES, APART_METRES = 1e-5, 1.0
+# How much an element of OpenStreetMap lacks, in the text that says so.
+SHARE = re.compile(r"\d+ of its \d+")
 WHOLE_FLOAT = re.compile(r"(-?\d+)\.0+")
 # A value that a catalogue writes between slashes is a pattern.
 BETWEEN_SLASHES = re.compile(r"/(.+)/")
@@ -140,11 +143,13 @@ class Rows:
     `numbers` count from 1 in the order of the file; `names` are the identifiers that rows have
     without a field for it; `values` are those of `RowRules.fields`; of a row that cannot be used,
     `positions` has the text that says why. `read` counts all rows, `filtered` those that the reader
-    leaves out, and `errors` says by number what is wrong with rows that have no values at all.
+    leaves out, `closed` those with rings that it had to close, and `errors` says by number what is
+    wrong with rows that have no values at all.
     """
 
     read: int = 0
     filtered: int = 0
+    closed: int = 0
     errors: dict[int, str] = dataclasses.field(default_factory=dict)
     numbers: list[int] = dataclasses.field(default_factory=list)
     names: list[str] = dataclasses.field(default_factory=list)
@@ -187,6 +192,10 @@ def raw_layer(
     if crs.is_projected and not by_file and fits_the_globe(shapely.get_coordinates(geometry)):
         notes += (f"the coordinates look like degrees, yet {crs_label(crs)} is stated",)
     notes += tuple(_surprises(rows.read, table, spec))
+    if rows.closed:
+        notes += (f"{rows.closed} of {rows.read} rows have rings that are not closed; closed here",)
+    if spec.tags and errors:
+        notes += (_causes(errors.values()),)
     table = table.drop(columns=GEOMETRY).reset_index(drop=True)
     return RawLayer(
         spec=spec,
@@ -269,6 +278,13 @@ def _surprises(read: int, table: pd.DataFrame, spec: LayerSpec) -> Iterable[str]
     unknown = table[HALF_WIDTH].isna().sum() if spec.has_width else 0
     if unknown:
         yield f"{unknown} of {len(table)} streets have no known width"
+
+
+def _causes(errors: Iterable[str]) -> str:
+    """Say how many elements of OpenStreetMap are unreadable for which reason."""
+    causes = Counter(SHARE.sub("some of its", text.partition(" ")[2]) for text in errors)
+    listed = ", ".join(f"{cause} ({number:,})" for cause, number in causes.most_common())
+    return f"unreadable: {listed}"
 
 
 def as_text(value: object) -> str:

@@ -516,6 +516,7 @@ def _read_rows(
             break
         rows.read += 1
         properties = feature.properties
+        rows.closed += feature.geometry is not None and _has_open_ring(feature.geometry)
         try:
             position = columns.position(properties) if columns else _position(feature.geometry)
             # From the first damage on, GDAL gives null for what it cannot read.
@@ -543,6 +544,14 @@ def _position(geometry: fiona.Geometry | None) -> Position:
     except (AttributeError, TypeError, ValueError, shapely.errors.ShapelyError) as error:
         msg = f"its {geometry.type} is not valid ({error})"
         raise BadFeatureError(msg) from error
+
+
+def _has_open_ring(geometry: fiona.Geometry) -> bool:
+    """Tell whether a ring of a polygon does not end where it begins; shapely closes it untold."""
+    if geometry.type not in {"Polygon", "MultiPolygon"}:
+        return False
+    parts = [geometry.coordinates] if geometry.type == "Polygon" else geometry.coordinates
+    return any(ring[0] != ring[-1] for part in parts for ring in part if ring)
 
 
 def _refuse_broken(rows: Rows, member: Member) -> None:

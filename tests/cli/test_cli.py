@@ -52,8 +52,8 @@ def test_the_road_from_files_to_a_place(done: Done) -> None:
     report = json.loads(done(LOAD, "--json"))
     lights, crossings = report["sources"]
     assert report["objects"] == 21
-    assert (lights["read"], lights["collapsed"], lights["objects"]) == (21, 1, 20)
-    assert (crossings["read"], crossings["filtered"], crossings["objects"]) == (2, 1, 1)
+    assert (lights["read"], lights["collapsed"], lights["kept"]) == (21, 1, 20)
+    assert (crossings["read"], crossings["filtered"], crossings["kept"]) == (2, 1, 1)
     out = done(LOAD)
     assert "per km² of hull" in out
     assert "Nobody (CC0-1.0): lights, crossings" in out

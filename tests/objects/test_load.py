@@ -2,11 +2,12 @@ from __future__ import annotations
 
 import json
 import math
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import pytest
 import shapely
-from osm_xml import node, way, write_osm
+from osm_xml import node, relation, way, write_osm
 from raw_layers import raw_layer
 from sentences import refused
 from servers import Answer, Server
@@ -18,6 +19,8 @@ from semsig_gis.database.file import open_database, save_database
 from semsig_gis.objects.fetch import fetch_layers, find_area, open_cache
 from semsig_gis.objects.load import assemble, choose_layers, metric_crs_of, read_files
 from semsig_gis.objects.table import open_objects, save_objects
+from semsig_gis.reports.quality import quality_report, quality_tables
+from semsig_gis.sources import RowCounts
 from semsig_gis.sources.catalog import Catalog, LayerSpec, load_catalog, paper_taxonomy
 from semsig_gis.sources.osm import file as osm_file
 
@@ -83,6 +86,47 @@ def test_a_file_is_read_once_for_all_its_layers(
     assert loaded.buildings.crs == loaded.objects.crs
     assert loaded.streets is not None
     assert loaded.streets["half_width"].tolist() == pytest.approx([12.0, math.nan], nan_ok=True)
+
+
+def test_buildings_and_streets_are_reported_like_other_layers(tmp_path: Path) -> None:
+    osm = load_catalog("openstreetmap")
+    shapes = [way(n, ring, {"building": "yes"}) for n, ring in ((9, [1, 2, 3, 1]), (10, [1, 2, 3]))]
+    square = way(11, [1, 2, 3, 1], {"highway": "pedestrian", "area": "yes"})
+    corners = [
+        node(1, 7.42, 43.73, {"amenity": "bench"}),
+        node(2, 7.43, 43.73),
+        node(3, 7.42, 43.74),
+    ]
+    clipped = [
+        relation(n, ways, {"type": "multipolygon", "building": "yes"})
+        for n, ways in ((1, {9: "", 77: ""}), (2, {9: "", 88: "", 99: ""}))
+    ]
+    path = write_osm(tmp_path / "town.osm", *corners, *shapes, square, *clipped)
+    layers, _ = read_files(choose_layers(osm, ["benches"], surroundings=True), [path])
+    loaded = assemble(layers, osm)
+    _, buildings, streets = loaded.report.layers
+    assert [layer.role for layer in loaded.report.layers] == ["objects", "buildings", "streets"]
+    assert buildings.counts == RowCounts(read=4, unreadable=3)
+    assert streets.counts == RowCounts(read=1, filtered=1)
+    why = (
+        "lacks some of its ways, as where a file is clipped (2), is not closed, as the outline of a"
+    )
+    assert buildings.notes[0] == f"unreadable: {why} building is (1)"
+    report = quality_report(loaded.objects, loaded.report)
+    assert [source["kept"] for source in report.to_dict()["sources"]] == [1, 1, 0]
+    assert "buildings" in str(quality_tables(report)[1].rows)
+
+
+def test_buildings_that_cannot_be_used_are_counted() -> None:
+    house = shapely.box(770_000, 6_280_000, 770_010, 6_280_010)
+    far = shapely.box(1e9, 0, 2e9, 1)
+    layer = raw_layer([house, None, shapely.Polygon(), house.boundary, far], name="houses")
+    spec = replace(layer.spec, role="buildings", geometry="polygon")
+    benches = raw("city", (770000, 6280000))
+    loaded = assemble([benches, replace(layer, spec=spec)], catalog_of(metric_crs="EPSG:2154"))
+    assert loaded.buildings is not None
+    assert loaded.buildings.geometry.tolist() == [house]
+    assert loaded.report.layers[1].counts == RowCounts(read=5, unreadable=1, missing=2, misplaced=1)
 
 
 def test_one_bench_in_two_layers_is_one_bench() -> None:

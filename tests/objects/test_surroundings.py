@@ -40,11 +40,16 @@ def test_files_are_moved_to_the_crs_asked_for(tmp_path: Path, name: str) -> None
 
 def test_an_openstreetmap_file_gives_what_it_tags(tmp_path: Path) -> None:
     nodes = [node(1, 24.9, 60.1), node(2, 24.91, 60.1), node(3, 24.91, 60.11)]
-    ways = [way(4, [1, 2, 3, 1], {"building": "yes"}), way(5, [1, 2], {"highway": "residential"})]
+    ways = [way(n, ring, {"building": "yes"}) for n, ring in ((4, [1, 2, 3, 1]), (6, [1, 2, 3]))]
+    ways += [way(5, [1, 2], {"highway": "residential"})]
     path = write_osm(tmp_path / "city.osm", *nodes, *ways)
     houses = read_surroundings(path, role="buildings", crs="EPSG:32635")
     streets = read_surroundings(path, role="streets", crs="EPSG:32635")
     assert (houses.geom_type.tolist(), streets.geom_type.tolist()) == (["Polygon"], ["LineString"])
+    told: list[str] = []
+    read_surroundings(path, role="buildings", crs="EPSG:32635", tell=told.append)
+    why = "unreadable: is not closed, as the outline of a building is (1)"
+    assert told == [f"{path}: {why}"]
     named = tuple(
         f"OpenStreetMap contributors (ODbL 1.0): {name}" for name in ("buildings", "streets")
     )

@@ -312,6 +312,28 @@ def test_broken_geojson_geometries_are_told_from_null_ones(tmp_path: Path) -> No
     assert xy(read(alone)) == [[3.0, 43.0]]
 
 
+def test_rings_that_are_not_closed_are_closed_and_counted(tmp_path: Path) -> None:
+    corners = [[3.0, 43.0], [3.1, 43.0], [3.1, 43.1], [3.0, 43.1]]
+    whole, hole = [*corners, corners[0]], [[3.04, 43.04], [3.06, 43.04], [3.06, 43.06]]
+    shapes = {
+        "Polygon": [[corners], [whole], [whole, hole]],
+        "MultiPolygon": [[[whole], [corners]]],
+    }
+    features = [
+        {
+            "type": "Feature",
+            "properties": {},
+            "geometry": {"type": kind, "coordinates": coordinates},
+        }
+        for kind, several in shapes.items()
+        for coordinates in several
+    ]
+    document = json.dumps({"type": "FeatureCollection", "features": features})
+    layer = read(text_file(tmp_path, "houses.geojson", document), geometry="polygon")
+    assert layer.notes == ("3 of 4 rows have rings that are not closed; closed here",)
+    assert (layer.counts.kept, layer.table.geometry[0].area) == (4, pytest.approx(0.01))
+
+
 class Source:
     """A source of so many features, of which some raise, as GDAL may."""
 
