@@ -315,7 +315,7 @@ def test_broken_geojson_geometries_are_told_from_null_ones(tmp_path: Path) -> No
 def test_rings_that_are_not_closed_are_closed_and_counted(tmp_path: Path) -> None:
     corners = [[3.0, 43.0], [3.1, 43.0], [3.1, 43.1], [3.0, 43.1]]
     whole, hole = [*corners, corners[0]], [[3.04, 43.04], [3.06, 43.04], [3.06, 43.06]]
-    shapes = {
+    shapes: dict[str, list[Any]] = {
         "Polygon": [[corners], [whole], [whole, hole]],
         "MultiPolygon": [[[whole], [corners]]],
     }
