@@ -1,67 +1,146 @@
 """Parse, call, print: a module a command.
 
 Results go to standard output, progress and remarks to standard error. The exit code is 0 when the
-work is done, 2 when the input cannot be used (with one plain sentence), 1 when the fault is ours.
+work is done, 2 when it cannot be done with this input or on this machine (with one plain sentence),
+1 when the fault is ours, 130 after an interrupt and 141 when nobody reads the output any more.
 Heavy modules are imported by the commands that need them, so that the help appears at once.
 """
 
 from __future__ import annotations
 
+import contextlib
+import os
+import platform
 import sys
+import tempfile
+import traceback
 import warnings
-from typing import Annotated
-
-import typer
+from typing import TextIO
 
 from semsig_gis import __version__
-from semsig_gis.cli.console import app, remark, stop_with_supervisor, supervised
+from semsig_gis.core.errors import InputError, SemsigError
 
-# The order of these imports is that of the help.
-# isort: off
-from semsig_gis.cli import (  # noqa: F401
-    demo,
-    load,
-    build,
-    maps,
-    localize,
-    learn,
-    evaluate,
-    export,
-)
-
-# isort: on
-from semsig_gis.core.errors import SemsigError
+FAULT, UNUSABLE = 1, 2
+# As a shell counts programs that SIGINT and SIGPIPE end.
+INTERRUPTED, UNREAD = 130, 141
+LONGEST = 300  # characters of what an error says that nobody wrote for a user
 
 
 def main() -> None:
-    """Run the command; an unusable input ends it with one sentence and exit code 2."""
+    """Run the command, and end with its exit code; what goes wrong is told in one sentence."""
+    said = ""
+    try:
+        code = _run()
+    except KeyboardInterrupt:
+        code, said = INTERRUPTED, "interrupted"
+    except BrokenPipeError:
+        code = UNREAD
+    except SemsigError as error:
+        code, said = UNUSABLE, str(error)
+    except MemoryError as error:
+        code, said = UNUSABLE, _short_of_memory(error)
+    except OSError as error:
+        code, said = (UNUSABLE, _refusal(error)) if error.errno else (FAULT, _fault(error))
+    except Exception as error:  # noqa: BLE001 - nothing passes the door
+        code, said = FAULT, _fault(error)
+    if said:
+        with contextlib.suppress(OSError):
+            _remark(said)
+    for stream in _streams():
+        _settle(stream)
+    sys.exit(code)
+
+
+def _run() -> int:
+    """Run the command and return its exit code."""
+    for stream in _streams():
+        with contextlib.suppress(AttributeError):  # one that another program has put there
+            stream.reconfigure(errors="backslashreplace")  # type: ignore[attr-defined]
+    _require_place()
+    from semsig_gis.cli.commands import run
+    from semsig_gis.cli.console import stop_with_supervisor, supervised
+
     if supervised():
         stop_with_supervisor()
     with warnings.catch_warnings():
         warnings.showwarning = _show_warning
+        code = run()
+    if sys.stdout is not None:
+        sys.stdout.flush()
+    return code
+
+
+def _streams() -> list[TextIO]:
+    return [stream for stream in (sys.stdout, sys.stderr) if stream is not None]
+
+
+def _settle(stream: TextIO) -> None:
+    """Write what is left; where that fails, give it up, or Python would try again and complain."""
+    try:
+        stream.flush()
+    except OSError:
+        with contextlib.suppress(OSError):
+            os.dup2(os.open(os.devnull, os.O_WRONLY), stream.fileno())
+
+
+def _require_place() -> None:
+    """Refuse a working folder that is gone, and names that cannot be told."""
+    try:
+        os.getcwd()  # noqa: PTH109 - only whether there is one
+    except OSError as error:
+        msg = "the working folder is not there any more; change to another folder."
+        raise InputError(msg) from error
+    for argument in sys.argv[1:]:
         try:
-            app()
-        except SemsigError as error:
-            remark(str(error))
-            sys.exit(2)
+            argument.encode()
+        except UnicodeEncodeError as error:
+            msg = f"{argument!r} is not text in UTF-8; give the file a name that is."
+            raise InputError(msg) from error
 
 
 def _show_warning(message: Warning | str, *_: object, **__: object) -> None:
     """Show a warning as one sentence, without the line of code that it comes from."""
-    remark(str(message))
+    _remark(str(message))
 
 
-def _version(wanted: bool) -> None:  # noqa: FBT001 - typer calls it so
-    if wanted:
-        typer.echo(f"semsig {__version__}")
-        raise typer.Exit
+def _remark(text: str) -> None:
+    from semsig_gis.cli.console import remark
+
+    remark(text)
 
 
-@app.callback()
-def _common(
-    *,
-    version: Annotated[
-        bool, typer.Option("--version", callback=_version, is_eager=True, help="Print the version.")
-    ] = False,
-) -> None:
-    """Tell where in a city a view was taken from the street objects in it."""
+def _short_of_memory(error: MemoryError) -> str:
+    return (
+        f"memory is short on this machine ({_brief(error)}); end other programs, or give less at "
+        "once."
+    )
+
+
+def _refusal(error: OSError) -> str:
+    """Return what the system says of a file, or of the machine."""
+    what = "this" if error.filename is None else repr(error.filename)
+    return f"the system refuses {what} ({error.strerror}); give another file, or make room."
+
+
+def _fault(error: Exception) -> str:
+    """Write down a fault of ours, and return where."""
+    try:
+        with tempfile.NamedTemporaryFile(
+            "w", prefix="semsig-fault-", suffix=".log", delete=False, encoding="utf-8"
+        ) as log:
+            print(f"semsig {__version__}, Python {sys.version}", file=log)
+            print(f"{platform.platform()}\n{sys.argv!r}\n", file=log)
+            traceback.print_exception(error, file=log)
+        proof = log.name
+    except OSError:  # a full or read-only disk
+        proof = "this line"
+    return (
+        f"a fault of semsig, not of yours ({_brief(error)}); please report it to the authors of "
+        f"semsig_gis, with {proof}."
+    )
+
+
+def _brief(error: Exception) -> str:
+    """Return the kind of an error and what it says, on one line."""
+    text = " ".join(f"{type(error).__name__}: {error}".split())
+    return text.rstrip(".: ")[:LONGEST]

@@ -92,11 +92,12 @@ def print_rows(title: str, header: Iterable[str], rows: Iterable[Iterable[object
         table.add_column(Text(name), overflow="fold")
     for row in rows:
         table.add_row(*(Text(_cell_text(cell)) for cell in row))
-    console = Console()
+    console = Console(file=sys.stdout)
     if not console.is_terminal:
         # A file or a pipe has no width to fold to.
-        wide = Console(width=10_000)
-        console = Console(width=max(wide.measure(table).maximum, wide.measure(title).maximum))
+        wide = Console(file=sys.stdout, width=10_000)
+        width = max(wide.measure(table).maximum, wide.measure(title).maximum)
+        console = Console(file=sys.stdout, width=width)
     console.print(table)
 
 
@@ -163,7 +164,6 @@ def _progress_lines(label: str) -> Callable[[int, int], None]:
 app = typer.Typer(
     name="semsig",
     help="Tell where in a city a view was taken from the street objects in it.",
-    no_args_is_help=True,
     add_completion=False,
     pretty_exceptions_enable=False,
     rich_markup_mode=None,

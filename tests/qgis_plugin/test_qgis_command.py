@@ -27,7 +27,8 @@ from semsig.command import (
 )
 from sentences import refused
 
-from semsig_gis.cli.console import VARIABLE, app
+from semsig_gis.cli.commands import app
+from semsig_gis.cli.console import VARIABLE
 from semsig_gis.likelihood.noise.model import NOISES
 from semsig_gis.matching.method import Method
 from semsig_gis.queries.chain import parse_chain

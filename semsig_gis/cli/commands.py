@@ -1,0 +1,68 @@
+"""All commands, and what goes before each of them."""
+
+from __future__ import annotations
+
+import sys
+from typing import Annotated
+
+import typer
+
+from semsig_gis import __version__
+from semsig_gis.cli.console import app
+
+# The order of these imports is that of the help.
+# isort: off
+from semsig_gis.cli import (  # noqa: F401
+    demo,
+    load,
+    build,
+    maps,
+    localize,
+    learn,
+    evaluate,
+    export,
+)
+
+# isort: on
+from semsig_gis.core.errors import InputError
+
+__all__ = ["app", "run"]
+
+INTERRUPTED = 130
+
+
+def run() -> int:
+    """Run the command that the arguments name, and return its exit code.
+
+    InputError if they name none, or an option has a value that it does not take.
+    """
+    try:
+        arguments = sys.argv[1:] or ["--help"]
+        code = app(arguments, prog_name="semsig", standalone_mode=False)
+    except typer.TyperException as error:
+        context = getattr(error, "ctx", None)
+        command = "semsig" if context is None else context.command_path
+        fault = error.format_message().rstrip(".?").replace(". ", "; ")
+        msg = f"{fault}; see {command} --help."
+        raise InputError(msg) from error
+    except SystemExit as end:  # so typer ends where nobody reads the output any more
+        raise BrokenPipeError from end
+    if code == INTERRUPTED:  # which typer makes of the interrupt key
+        raise KeyboardInterrupt
+    return code if isinstance(code, int) else 0
+
+
+def _version(wanted: bool) -> None:  # noqa: FBT001 - typer calls it so
+    if wanted:
+        typer.echo(f"semsig {__version__}")
+        raise typer.Exit
+
+
+@app.callback()
+def _common(
+    *,
+    version: Annotated[
+        bool, typer.Option("--version", callback=_version, is_eager=True, help="Print the version.")
+    ] = False,
+) -> None:
+    """Tell where in a city a view was taken from the street objects in it."""
