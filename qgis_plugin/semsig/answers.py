@@ -120,7 +120,8 @@ def answer_lines(answer: dict[str, Any]) -> list[str]:
     Returns
     -------
     list of str
-        Sentences: how sure the place is, or which candidates tie; and what must be searched.
+        Sentences: how sure the place is, or which candidates tie; what of the query could not be
+        used as it was given; and what must be searched.
 
     Examples
     --------
@@ -130,6 +131,7 @@ def answer_lines(answer: dict[str, Any]) -> list[str]:
     """
     place, searched = answer.get("place"), answer.get("searched")
     lines = _tie_lines(answer) if place is None else [_verdict(answer["answered"], place)]
+    lines += [f"Note: {note}" for note in answer.get("notes", [])]
     return lines if searched is None else [*lines, _search_line(searched)]
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import functools
 import json
 import os
 import signal
@@ -73,9 +74,15 @@ def remark(text: str) -> None:
 def print_json(value: Any, *, indent: int | None = 2) -> None:  # noqa: ANN401 - any JSON
     """Print plain values without NaN or infinity as JSON on standard output.
 
-    ``indent=None`` gives a single line.
+    ``indent=None`` gives a single line. Characters that the output cannot hold are escaped.
     """
-    typer.echo(json.dumps(value, indent=indent, ensure_ascii=False, allow_nan=False))
+    dump = functools.partial(json.dumps, value, indent=indent, allow_nan=False)
+    text = dump(ensure_ascii=False)
+    try:
+        text.encode(sys.stdout.encoding or "utf-8")
+    except UnicodeEncodeError:
+        text = dump(ensure_ascii=True)
+    typer.echo(text)
 
 
 def print_rows(title: str, header: Iterable[str], rows: Iterable[Iterable[object]]) -> None:

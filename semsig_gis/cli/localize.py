@@ -19,20 +19,23 @@ from semsig_gis.cli.console import (
     print_json,
     print_rows,
     progress,
+    remark,
     require_suffix,
     tell_if_online,
 )
 from semsig_gis.cli.maps import draw_ground
 from semsig_gis.cli.options import SearchOptions, command
-from semsig_gis.core.errors import InputError
+from semsig_gis.core.errors import EmptyResultError, InputError, UnknownNameError
 
 if TYPE_CHECKING:
+    from collections.abc import Iterable, Iterator
+
     from semsig_gis.core.signature import Signature
     from semsig_gis.core.taxonomy import Taxonomy
     from semsig_gis.database.answer import Answer, Locator
     from semsig_gis.database.city import City
     from semsig_gis.matching.method import Method
-    from semsig_gis.queries.file import Queries, Route
+    from semsig_gis.queries.file import QueryLine, Route
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -51,7 +54,7 @@ class QueryOptions:
         str | None,
         typer.Option(
             help="Many queries: a CSV or JSON lines file with types and bearings, or - for JSON "
-            "lines from standard input; the answers are JSON lines."
+            "lines from standard input; the answers are JSON lines, one for each, or its error."
         ),
     ] = None
     route: Annotated[
@@ -64,26 +67,33 @@ class QueryOptions:
     ] = False
     method: MethodText = "edit+edit"
 
-    def read_queries(self, taxonomy: Taxonomy) -> Queries:
-        """Return the queries with their names; one from the command line has none."""
-        if self.queries is None:
-            from semsig_gis.core.signature import Signature
+    def query(self, taxonomy: Taxonomy) -> Signature:
+        """Return the query of --types and --bearings."""
+        from semsig_gis.core.signature import Signature
 
-            angles = None if self.bearings is None else numbers(self.bearings, "--bearings")
-            return [("", Signature.parse(self.types, angles, taxonomy=taxonomy))]
+        angles = None if self.bearings is None else numbers(self.bearings, "--bearings")
+        return Signature.parse(self.types, angles, taxonomy=taxonomy)
+
+    @property
+    def source(self) -> str:
+        """What messages call the file of the queries."""
+        return "standard input" if self.queries == "-" else str(self.queries)
+
+    def read_queries(self, taxonomy: Taxonomy) -> Iterator[QueryLine]:
+        """Return the queries of --queries, each when it is needed."""
         from semsig_gis.queries.file import parse_queries, read_queries
 
         if self.queries == "-":
-            return parse_queries(sys.stdin.read(), "standard input", taxonomy=taxonomy)
-        return read_queries(self.queries, taxonomy=taxonomy)
+            return parse_queries(sys.stdin.buffer, self.source, taxonomy=taxonomy)
+        return read_queries(self.source, taxonomy=taxonomy)
 
     def read_route(self, taxonomy: Taxonomy) -> Route:
         """Return the views of a route with their names, and the legs between them."""
         from semsig_gis.queries.file import parse_route, read_route
 
         if self.queries == "-":
-            return parse_route(sys.stdin.read(), "standard input", taxonomy=taxonomy)
-        return read_route(str(self.queries), taxonomy=taxonomy)
+            return parse_route(sys.stdin.buffer, self.source, taxonomy=taxonomy)
+        return read_route(self.source, taxonomy=taxonomy)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -180,13 +190,12 @@ def localize(options: LocalizeOptions) -> None:
             print_json({"id": name, **location.to_dict()}, indent=None)
         return
     locator = None if method is None else _distance_locator(options, city, method)
-    queries = options.read_queries(taxonomy)
-    locator = locator or options.locator(city)
     if options.queries is None:
-        _answer(options, city, locator, queries[0][1])
+        query = options.query(taxonomy)
+        _answer(options, city, locator or options.locator(city), query)
         return
-    for name, query in queries:
-        print_json({"id": name, **locator.locate(query).to_dict()}, indent=None)
+    queries = options.read_queries(taxonomy)
+    _answer_lines(queries, locator or options.locator(city), options.source)
 
 
 def _distance_locator(options: LocalizeOptions, city: City, method: Method) -> Locator[Any]:
@@ -198,6 +207,30 @@ def _distance_locator(options: LocalizeOptions, city: City, method: Method) -> L
     return DistanceLocator(
         database=database, method=method, requirement=requirement, top=options.top
     )
+
+
+def _answer_lines(queries: Iterable[QueryLine], locator: Locator[Any], source: str) -> None:
+    """Print an answer for each line, or its error, as soon as there is one."""
+    first_error, answered, failed = "", 0, 0
+    for one in queries:
+        result: dict[str, Any]
+        try:
+            if isinstance(one.query, InputError):
+                raise one.query
+            result = locator.locate(one.query).to_dict()
+            answered += 1
+        except (EmptyResultError, InputError, UnknownNameError) as error:
+            result = {"error": str(error)}
+            first_error = first_error or str(error)
+            failed += 1
+        print_json({"id": one.name, "line": one.line, **result}, indent=None)
+    if not answered:
+        what = f"is answered: {first_error}" if failed else "was found; give one on each line."
+        msg = f"no query of {source} {what}"
+        raise InputError(msg)
+    if failed:
+        of = f"{failed:,} of {answered + failed:,} queries of {source}"
+        remark(f"{of} could not be answered; their lines say why under error.")
 
 
 def _answer(options: LocalizeOptions, city: City, locator: Locator[Any], query: Signature) -> None:
@@ -283,6 +316,8 @@ def print_answer(result: dict[str, Any]) -> None:
         tied = result["tied_beyond"]
         more = "1 further cell ties" if tied == 1 else f"{tied:,} further cells tie"
         typer.echo(f"{more} with the last one.")
+    for note in result["notes"]:
+        typer.echo(f"Note: {note}")
 
 
 def _print_place(result: dict[str, Any]) -> None:

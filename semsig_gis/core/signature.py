@@ -10,7 +10,7 @@ import numpy as np
 
 from semsig_gis.core.errors import InputError
 from semsig_gis.core.geometry import FULL_TURN, wrap_degrees
-from semsig_gis.core.taxonomy import MAX_RANGE_M
+from semsig_gis.core.taxonomy import MAX_RANGE_M, WILDCARD
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -140,6 +140,19 @@ class Signature:
             "length": len(self),
         }
 
+    def among(self, codes: ArrayLike) -> NDArray[np.bool_]:
+        """Tell which objects are of these classes or of unknown class, shape (n,)."""
+        if self.codes is None:
+            return np.ones(len(self), np.bool_)
+        return np.asarray(np.isin(self.codes, codes) | (self.codes == WILDCARD))
+
+    def select(self, objects: NDArray[np.bool_ | np.int64]) -> Signature:
+        """Return the signature of some of the objects, by their row numbers or a mask."""
+        return Signature(
+            None if self.codes is None else self.codes[objects],
+            None if self.bearings is None else self.bearings[objects],
+        )
+
     def levels(self, levels: int) -> NDArray[np.uint8]:
         """Return the angle level of each bearing, shape (n,); InputError where they are unknown."""
         if self.bearings is None:
@@ -158,18 +171,16 @@ class Signature:
         """Make a query, sorted clockwise from north, from what a person or a detector says.
 
         `types` are symbols such as ``"DDBL"``, clockwise where no bearings are given; `bearings`
-        are degrees clockwise from north, -360 to 360, one for each type in any order.
-        UnknownNameError if a symbol belongs to no class; InputError if nothing is given, the
-        lengths differ, or a bearing is not a number or out of range.
+        are degrees clockwise from north, -360 to 360, one for each type in any order. Either may
+        be empty, where nothing was seen. UnknownNameError if a symbol belongs to no class;
+        InputError if neither is given, the lengths differ, or a bearing is not a number or out of
+        range.
 
         >>> query = Signature.parse("DB", [200, -10], taxonomy=demo_database.taxonomy)
         >>> query.codes.tolist(), query.bearings.tolist()
         ([3, 1], [200.0, 350.0])
         """
         codes = None if types is None else taxonomy.encode(types)
-        if types == "" or (bearings is not None and len(bearings) == 0):
-            msg = "a query without objects was given; give one symbol or bearing an object."
-            raise InputError(msg)
         if bearings is None:
             return cls(codes, None)
         try:

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Hashable, Iterator, Sequence
 
     import pandas as pd
-    from numpy.typing import NDArray
+    from numpy.typing import ArrayLike, NDArray
     from pyproj import CRS
 
     from semsig_gis.core.signature import Signature
@@ -40,7 +40,8 @@ class Answer(ABC):
 
     `candidates` has one row a cell, best first: its rank, ``cell`` (row in the database),
     ``cell_id``, ``x`` and ``y`` (viewpoint in `crs`), ``types`` (symbols), ``length`` (objects) and
-    what the method tells of it. `cells` counts the cells that were searched.
+    what the method tells of it. `cells` counts the cells that were searched, and `notes` are
+    sentences on what of the query could not be used as it was given.
     """
 
     query: Signature
@@ -50,6 +51,7 @@ class Answer(ABC):
     taxonomy: Taxonomy
     licenses: tuple[str, ...]
     tied_beyond: int = 0
+    notes: tuple[str, ...] = ()
 
     @property
     def chances(self) -> NDArray[np.float64] | None:
@@ -156,7 +158,8 @@ class Locator(Protocol[_Answer_co]):
     def locate(self, query: Signature, *, top: int | None = None) -> _Answer_co:
         """Answer a query, with its own number of candidates or another one.
 
-        Raises InputError if the query has nothing to compare.
+        Objects of a class that no cell sees count as false detections, and the answer says so.
+        Raises InputError if the query lacks a part that the method needs.
         """
 
     def rankings(
@@ -176,11 +179,16 @@ def check_top(top: int) -> None:
         raise InputError(msg)
 
 
-def check_query(query: Signature) -> None:
-    """Refuse a query of nothing."""
+def query_notes(query: Signature, present: ArrayLike, taxonomy: Taxonomy) -> tuple[str, ...]:
+    """Return what to say of a query to a database that sees the classes `present` alone."""
     if not len(query):
-        msg = "the query has no objects; give at least one type or bearing."
-        raise InputError(msg)
+        return ("the query saw nothing, which tells little of the place.",)
+    codes = [] if query.codes is None else query.codes[~query.among(present)].tolist()
+    if not codes:
+        return ()
+    lacking = map(taxonomy.by_code, dict.fromkeys(codes))
+    legend = ", ".join(f"{item.symbol} ({item.title.lower()})" for item in lacking)
+    return (f"no cell of the database sees {legend}, so that this counts as a false detection.",)
 
 
 _COMPARISON = re.compile(r"(\S)\s*(>=|<=|=)\s*(\d+)")

@@ -93,7 +93,8 @@ def explain(
     The query needs bearings; its types may be unknown. `xy` and `radius` are in metres, `heading`
     is in degrees to add to the bearings, and what `footprints` hide is not seen. Chances are those
     of all one-to-one associations together, each model of a mixture counting as much as the query
-    speaks for it here. An empty query and a class that the city does not have raise `InputError`.
+    speaks for it here. An object of a class that the city does not have is false; a query without
+    any other raises `InputError`.
     """
     x, y = map(float, xy)
     place = np.array([[x, y]])
@@ -156,9 +157,10 @@ class _Scene:
         tables, weights = noise_tables(
             noise, taxonomy=self.taxonomy, codes=self.codes, longest=LONGEST_TABLE
         )
-        names = tables[0].query_rows(query)
+        known = np.flatnonzero(query.among(self.codes))
+        names = tables[0].query_rows(query.select(known))
         kinds = tables[0].row_of[view.codes]
-        pairs = near_pairs(view.offsets, view.bearings, np.array([0, len(query)]), bearings)
+        pairs = near_pairs(view.offsets, view.bearings, np.array([0, len(known)]), bearings[known])
         logliks = np.log(weights)
         each = np.zeros((len(tables), len(view.codes), len(query)))
         for number, table in enumerate(tables):
@@ -170,7 +172,7 @@ class _Scene:
                 lengths=np.full(len(kinds), len(kinds)),
                 names=names,
             )
-            each[number, pairs.objects, pairs.detections] = chances
+            each[number, pairs.objects, known[pairs.detections]] = chances
             logliks[number] += loglik
         total = float(np.logaddexp.reduce(logliks))
         return np.tensordot(np.exp(logliks - total), each, axes=1), total

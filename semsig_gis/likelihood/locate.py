@@ -22,8 +22,8 @@ from semsig_gis.database.answer import (
     Answer,
     Ranking,
     candidate_columns,
-    check_query,
     check_top,
+    query_notes,
 )
 from semsig_gis.likelihood.association import align_cells, rerank
 from semsig_gis.likelihood.explain import explain, explain_cell
@@ -215,6 +215,7 @@ class Location(Answer):
             "threshold": threshold if math.isfinite(threshold) else None,
             "region": {"share": REGION_SHARE, "cells": len(self.region), "km2": self.region_km2},
             "entropy_bits": self.posterior.entropy,
+            "notes": list(self.notes),
             "crs": self.crs.to_string(),
             "licenses": list(self.licenses),
             "candidates": candidates,
@@ -245,7 +246,6 @@ class LikelihoodLocator:
 
     def locate(self, query: Signature, *, top: int | None = None) -> Location:
         """Find where a query was seen from."""
-        check_query(query)
         scores = self._scores(query, self.log_prior)
         chances = posterior(self.index.database, scores.loglik, log_prior=self.log_prior)
         store = self._store_for([query])
@@ -291,8 +291,14 @@ class LikelihoodLocator:
                 seconds=seconds,
             )
 
+    def _known(self, query: Signature) -> Signature:
+        """Return a query without what is false wherever it was seen from."""
+        known = query.among(self.index.database.present_codes)
+        return query if known.all() else query.select(known)
+
     def _scores(self, query: Signature, log_prior: NDArray[np.float64] | None) -> CellScores:
         """Return the scores of all cells, the best ones by one-to-one associations."""
+        query = self._known(query)
         if not len(query):
             return CellScores(loglik=self.index.constants)
         sigma = self.north_sigma
@@ -315,9 +321,9 @@ class LikelihoodLocator:
     ) -> Location:
         """Return the answer to a query, from the chances of the cells; a store is to refine it."""
         parts = None
-        seen = len(query) > 0
-        if store is not None and seen:
-            parts = self._parts(query, scores, posterior, store)
+        known = self._known(query)
+        if store is not None and len(known):
+            parts = self._parts(known, scores, posterior, store)
             scores, posterior = _with_parts(parts, scores, posterior)
         answer = self.rule.decide(posterior)
         radius, sigma = self.rule.radius, self.north_sigma
@@ -328,10 +334,10 @@ class LikelihoodLocator:
             estimate = refined_estimate(parts, xy, radius=radius, turned=sigma > 0)
         if estimate is None:
             estimate = cell_estimate(
-                query, noise, posterior, answer.cell, radius=radius, north_sigma=sigma
+                known, noise, posterior, answer.cell, radius=radius, north_sigma=sigma
             )
         candidates = _candidates(scores, posterior, min(top, len(scores.loglik)))
-        first = candidates["cell"].to_list()[: self.explained if seen else 0]
+        first = candidates["cell"].to_list()[: self.explained if len(known) else 0]
         return Location(
             query=query,
             noise=noise.name,
@@ -340,6 +346,7 @@ class LikelihoodLocator:
             crs=database.crs,
             taxonomy=database.taxonomy,
             licenses=database.licenses,
+            notes=query_notes(query, database.present_codes, database.taxonomy),
             answer=answer,
             estimate=estimate,
             rule=self.rule,
@@ -422,7 +429,8 @@ def locate(index: LikelihoodIndex, query: Signature, **options: Unpack[LocateOpt
         The cells and the noise model; for queries from anywhere, not from the middles of cells
         alone, that is ``cell_noise(noise, step)``.
     query : Signature
-        At least one object; types or bearings may be unknown.
+        What was seen, perhaps nothing; types or bearings may be unknown. Objects of a class that
+        no cell sees are false detections, and the answer says so.
     **options : LocateOptions
         ``north_sigma`` is the standard deviation in degrees of the north of the query, 0 by
         default and infinite if it is not known; ``log_prior``, shape (n,), what else is known of
@@ -440,8 +448,8 @@ def locate(index: LikelihoodIndex, query: Signature, **options: Unpack[LocateOpt
     Raises
     ------
     InputError
-        If the query is empty or has a class that no cell sees, a number is out of its range, or
-        what is asked for needs bearings, a store, or another index.
+        If a number is out of its range, or what is asked for needs bearings, a store, or another
+        index.
 
     Examples
     --------

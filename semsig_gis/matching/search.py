@@ -13,14 +13,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pandas as pd
 
-from semsig_gis.core.errors import EmptyResultError, InputError
-from semsig_gis.core.taxonomy import WILDCARD
+from semsig_gis.core.errors import EmptyResultError
 from semsig_gis.database.answer import (
     Answer,
     Ranking,
     candidate_columns,
-    check_query,
     check_top,
+    query_notes,
 )
 from semsig_gis.database.database import join_databases, rows_of_result
 from semsig_gis.database.file import PartitionedDatabase
@@ -29,12 +28,11 @@ from semsig_gis.matching.scores import score_cells, score_parts
 from semsig_gis.matching.ties import top_candidates
 
 if TYPE_CHECKING:
-    from collections.abc import Collection, Iterator, Sequence
+    from collections.abc import Iterator, Sequence
 
     from numpy.typing import NDArray
 
     from semsig_gis.core.signature import Signature
-    from semsig_gis.core.taxonomy import Taxonomy
     from semsig_gis.database.answer import DistanceMemo, Requirement
     from semsig_gis.database.database import SignatureDatabase
     from semsig_gis.matching.method import Method
@@ -88,6 +86,7 @@ class Localization(Answer):
             "used": self.used,
             "cells": self.cells,
             "tied_beyond": self.tied_beyond,
+            "notes": list(self.notes),
             "crs": self.crs.to_string(),
             "licenses": list(self.licenses),
             "candidates": self._candidate_records(),
@@ -109,26 +108,17 @@ class DistanceLocator:
 
     def locate(self, query: Signature, *, top: int | None = None) -> Localization:
         """List the cells whose signature is most like a query, of all parts of a database."""
-        check_query(query)
-        shortlist = Shortlist(top or self.top)
-        met = np.empty(0, np.bool_)
-        for part, scores in score_parts(self.database, query, self.method):
-            shortlist.present.update(part.present_codes.tolist())
-            if self.requirement is None:
-                shortlist.add(part, scores)
-                continue
-            met = self.requirement.met(part.type_sequences)
-            if met.any():
-                shortlist.add(part.select(met), scores[met])
-        _require_present(query, shortlist.present, part.taxonomy)
-        if shortlist.cells == 0:
-            cells = len(self.database)
-            msg = f"none of the {cells:,} cells meets the requirement; ask for less."
-            raise EmptyResultError(msg)
+        count = top or self.top
+        shortlist, part = self._search(query, count)
+        present = sorted(shortlist.present)
+        known = query.among(present)
+        if not known.all():  # the last part might have had the class
+            shortlist, part = self._search(query.select(known), count)
         candidates, tied_beyond = shortlist.ranked()
         if isinstance(self.database, PartitionedDatabase):
             candidates["cell"] = self.database.row_numbers(candidates["cell_id"].to_numpy())
         elif self.requirement is not None:
+            met = self.requirement.met(self.database.type_sequences)
             candidates["cell"] = np.flatnonzero(met)[candidates["cell"]]
         return Localization(
             query=query,
@@ -140,7 +130,25 @@ class DistanceLocator:
             crs=part.crs,
             taxonomy=part.taxonomy,
             licenses=part.licenses,
+            notes=query_notes(query, present, part.taxonomy),
         )
+
+    def _search(self, query: Signature, top: int) -> tuple[Shortlist, SignatureDatabase]:
+        """Return the best cells of all parts, and a database of no cells that stands for them."""
+        shortlist = Shortlist(top)
+        for part, scores in score_parts(self.database, query, self.method):
+            shortlist.present.update(part.present_codes.tolist())
+            if self.requirement is None:
+                shortlist.add(part, scores)
+                continue
+            met = self.requirement.met(part.type_sequences)
+            if met.any():
+                shortlist.add(part.select(met), scores[met])
+        if shortlist.cells == 0:
+            cells = len(self.database)
+            msg = f"none of the {cells:,} cells meets the requirement; ask for less."
+            raise EmptyResultError(msg)
+        return shortlist, part.select(slice(0))
 
     def rankings(
         self, queries: Sequence[Signature], *, memo: DistanceMemo | None = None
@@ -221,7 +229,9 @@ def localize(
     database : SignatureDatabase or PartitionedDatabase
         The cells. Of a database in parts, one part at a time is in memory.
     query : Signature
-        What a person or a detector saw; types or bearings may be unknown.
+        What a person or a detector saw, perhaps nothing; types or bearings may be unknown.
+        Objects of a class that no cell sees are left out as false detections, and the answer
+        says so.
     method : Method
         How the cells are ranked. A fusion uses the part that the query has.
     requirement : Requirement, optional
@@ -237,8 +247,7 @@ def localize(
     Raises
     ------
     InputError
-        If the query is empty, has no part that the method compares or a class that no cell sees,
-        or `top` is below 1.
+        If the query has no part that the method compares, or `top` is below 1.
     EmptyResultError
         If no cell meets the requirement.
 
@@ -250,19 +259,3 @@ def localize(
     """
     locator = DistanceLocator(database=database, method=method, requirement=requirement, top=top)
     return locator.locate(query)
-
-
-def _require_present(query: Signature, present: Collection[int], taxonomy: Taxonomy) -> None:
-    """Refuse a class that no cell sees: it could only make every score worse."""
-    if query.codes is None:
-        return
-    absent = sorted(set(query.codes.tolist()) - {WILDCARD, *present})
-    if absent:
-        missing = taxonomy.by_code(absent[0])
-        seen = [taxonomy.by_code(code) for code in sorted(present)]
-        legend = ", ".join(f"{item.symbol} {item.title.lower()}" for item in seen)
-        msg = (
-            f"the query has symbol {missing.symbol!r} ({missing.title.lower()}), which no cell of "
-            f"the database sees; leave it out, the symbols seen are {legend}."
-        )
-        raise InputError(msg)

@@ -293,38 +293,73 @@ def read_rows(path: str | Path, read: Callable[[Row], _T], *, what: str) -> list
     `read` raises an error that says what is wrong with a row; `what` names a row in messages.
     InputError if the file cannot be read, has no rows, or a row cannot be used.
     """
+    return _all_rows(file_rows(path, what=what), str(path), read, what)
+
+
+def parse_rows(
+    lines: Iterable[str | bytes], source: str, read: Callable[[Row], _T], *, what: str
+) -> list[tuple[int, _T]]:
+    """Return what `read_rows` does, from JSON lines that messages call `source`."""
+    return _all_rows(json_rows(lines), source, read, what)
+
+
+def _all_rows(
+    rows: Iterable[tuple[int, Row | Exception]], source: str, read: Callable[[Row], _T], what: str
+) -> list[tuple[int, _T]]:
+    """Return what `read` made of all rows, and raise the first error."""
+    found = []
+    for line, _, one in scan_rows(rows, source, read, what=what):
+        if isinstance(one, InputError):
+            raise one
+        found.append((line, one))
+    if not found:
+        msg = f"{source} has no rows; give one {what} on each line."
+        raise InputError(msg)
+    return found
+
+
+def file_rows(path: str | Path, *, what: str) -> Iterator[tuple[int, Row | Exception]]:
+    """Give the line number of each row of a file (CSV or JSON lines) and its values, or its error.
+
+    InputError if the file cannot be read; `what` names a row in messages.
+    """
     file = Path(path)
     try:
-        text = file.read_text(encoding="utf-8-sig")
+        if file.suffix.lower() == ".csv":
+            return csv_rows(file.read_text(encoding="utf-8-sig"), str(file))
+        return json_rows(file.read_bytes().split(b"\n"))
     except (OSError, ValueError) as error:
         reason = error.strerror if isinstance(error, OSError) else error
         msg = f"{what} file {file} cannot be read ({reason}); give a CSV or JSON lines file."
         raise InputError(msg) from error
-    return parse_rows(text, str(file), read, what=what, table=file.suffix.lower() == ".csv")
 
 
-def parse_rows(
-    text: str, source: str, read: Callable[[Row], _T], *, what: str, table: bool = False
-) -> list[tuple[int, _T]]:
-    """Return what `read_rows` does, from text that messages call `source`: CSV, or JSON lines."""
-    rows = []
-    for line, values in _csv(text, source) if table else _json_lines(text):
+def scan_rows(
+    rows: Iterable[tuple[int, Row | Exception]],
+    source: str,
+    read: Callable[[Row], _T],
+    *,
+    what: str,
+) -> Iterator[tuple[int, Row, _T | InputError]]:
+    """Give the line number of each row, its values, and what `read` made of it or its error.
+
+    The values of a row that cannot be read are none.
+    """
+    for line, row in rows:
+        found: _T | InputError
         try:
-            row = json.loads(values) if isinstance(values, str) else values
+            if isinstance(row, Exception):
+                raise row
             if not isinstance(row, dict):
                 msg = "it is not a table of names and values"
                 raise InputError(msg)
-            rows.append((line, read(row)))
+            found = read(row)
         except (SemsigError, ValueError, TypeError, OverflowError, RecursionError) as error:
             reason = str(error).rstrip(".")
-            if isinstance(error, json.JSONDecodeError):
-                reason = f"it is not JSON: {reason}"
             msg = f"line {line} of {source} is no {what} ({reason}); correct it or take it out."
-            raise InputError(msg) from error
-    if not rows:
-        msg = f"{source} has no rows; give one {what} on each line."
-        raise InputError(msg)
-    return rows
+            found = InputError(msg)
+            found.__cause__ = error
+        yield line, row if isinstance(row, dict) else {}, found
 
 
 def row_signature(row: Row, taxonomy: Taxonomy) -> Signature | None:
@@ -351,17 +386,32 @@ def row_value(row: Row, name: str) -> Any:  # noqa: ANN401 - any value of JSON
     return None if isinstance(value, str) and not value.strip() else value
 
 
-def _csv(text: str, source: str) -> Iterator[tuple[int, Row]]:
+def csv_rows(text: str, source: str) -> Iterator[tuple[int, Row | Exception]]:
+    """Give the line number of each row of CSV, and its values or its error."""
     reader = csv.DictReader(io.StringIO(text, newline=""))
     try:
-        for row in reader:
-            yield reader.line_num, row
+        _ = reader.fieldnames
     except csv.Error as error:
         msg = f"{source} is not CSV ({error}); correct it."
         raise InputError(msg) from error
+    while True:
+        row: Row | Exception | None
+        try:
+            row = next(reader, None)
+        except csv.Error as error:
+            row = InputError(f"it is not CSV: {error}")
+        if row is None:
+            return
+        yield reader.reader.line_num, row
 
 
-def _json_lines(text: str) -> Iterator[tuple[int, str]]:
-    for line, part in enumerate(text.split("\n"), start=1):
-        if part.strip():
-            yield line, part
+def json_rows(lines: Iterable[str | bytes]) -> Iterator[tuple[int, Row | Exception]]:
+    """Give the number of each line of JSON that is not blank, and its values or its error."""
+    for line, text in enumerate(lines, start=1):
+        if text.strip():
+            row: Row | Exception
+            try:
+                row = json.loads(text)
+            except (ValueError, RecursionError) as error:
+                row = InputError(f"it is not JSON: {error}")
+            yield line, row

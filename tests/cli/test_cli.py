@@ -236,15 +236,50 @@ def test_the_likelihood_is_evaluated_and_drawn(run: Run, done: Done) -> None:
 def test_many_queries_are_answered_line_by_line(
     city: Path, done: Done, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    lines = '{"id": "a", "types": "DD"}\n{"types": "?D", "bearings": [10, 200]}\n'
-    (city / "queries.jsonl").write_text(lines)
+    lines = b'{"id": "a", "types": "DD"}\n{"types": "?D", "bearings": [10, 200]}\n'
+    (city / "queries.jsonl").write_bytes(lines)
     for method in ("edit+edit", "likelihood"):
         out = done("localize city.parquet --queries queries.jsonl --method", method)
         answers = [json.loads(line) for line in out.splitlines()]
         assert [answer["id"] for answer in answers] == ["a", 2]
         assert all(answer["candidates"] for answer in answers)
-    monkeypatch.setattr("sys.stdin", io.StringIO(lines))
+    monkeypatch.setattr("sys.stdin", io.TextIOWrapper(io.BytesIO(lines)))
     assert len(done("localize city.parquet --queries - --require 2D").splitlines()) == 2
+
+
+@pytest.mark.parametrize("method", ["edit+edit", "likelihood"])
+def test_every_line_of_a_batch_has_an_answer_or_an_error(city: Path, run: Run, method: str) -> None:
+    rows = ['{"types": "DX"}', "{", '{"id": "\\ud800", "types": "D!"}', '{"bearings": []}']
+    (city / "queries.jsonl").write_text("\n".join(rows))
+    batch = "localize few.parquet --queries queries.jsonl --method", method
+    code, out, err = run(*batch)
+    assert (code, "2 of 4 queries" in err) == (0, True)
+    answers = [json.loads(line) for line in out.splitlines()]
+    assert [answer["line"] for answer in answers] == [1, 2, 3, 4]
+    assert [answer["id"] for answer in answers] == [1, 2, "\ud800", 4]
+    assert ["error" in answer for answer in answers] == [False, True, True, False]
+    assert "X (crossing)" in answers[0]["notes"][0]
+    assert "saw nothing" in answers[3]["notes"][0]
+    (city / "queries.jsonl").write_text(rows[1])
+    code, out, err = run(*batch)
+    assert (code, "line 1 of queries.jsonl is no query" in err) == (2, True)
+    assert json.loads(out)["error"] in err
+    (city / "queries.jsonl").write_text("")
+    sentence(run(*batch), "no query of queries.jsonl was found")
+
+
+@pytest.mark.usefixtures("city")
+@pytest.mark.parametrize("method", ["edit+edit", "likelihood"])
+@pytest.mark.parametrize(
+    ("seen", "note"), [("--types X", "X (crossing)"), ("--bearings=", "saw nothing")]
+)
+def test_what_no_cell_sees_and_nothing_are_answered(
+    done: Done, method: str, seen: str, note: str
+) -> None:
+    query = f"localize few.parquet {seen} --method {method}"
+    (said,) = json.loads(done(f"{query} --json"))["notes"]
+    assert note in said
+    assert f"Note: {said}" in done(query)
 
 
 def test_buildings_streets_and_an_area_narrow_what_is_built(

@@ -177,7 +177,7 @@ def test_a_route_is_answered_line_by_line(
         for answer, place in zip(answers, places, strict=True):
             assert math.dist((answer["place"]["x"], answer["place"]["y"]), place) < 15.0
             assert answer["answered"]
-    monkeypatch.setattr("sys.stdin", io.StringIO(file.read_text(encoding="utf-8")))
+    monkeypatch.setattr("sys.stdin", io.TextIOWrapper(io.BytesIO(file.read_bytes())))
     assert len(run(*query, "-")[1].splitlines()) == 4
 
 

@@ -187,10 +187,8 @@ def test_queries_in_the_order_of_their_bearings_or_as_they_are() -> None:
     ("types", "bearings", "words"),
     [
         (None, None, ["types, bearings or both"]),
-        ("", None, ["without objects", "one symbol or bearing an object"]),
-        ("", [], ["without objects"]),
-        (None, [], ["without objects"]),
-        ("DD", [], ["without objects"]),
+        ("DD", [], ["2 types and 0 bearings"]),
+        ("", [10], ["0 types and 1 bearings"]),
         ("DD", [10.0], ["2 types and 1 bearings"]),
         ("D", [10.0, 20.0], ["1 types and 2 bearings"]),
         ("D", [math.nan], ["bearing nan", "0 to 360"]),

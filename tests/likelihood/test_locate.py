@@ -105,6 +105,32 @@ def test_explanations_name_the_street_objects() -> None:
     assert alone.counts["matched"] > len(query) // 2
 
 
+@pytest.mark.parametrize("north_sigma", [0.0, math.inf])
+def test_a_class_that_no_cell_sees_is_a_false_detection(north_sigma: float) -> None:
+    absent = CODES[0]
+    sees_none = np.add.reduceat(CITY.codes == absent, CITY.offsets[:-1]) == 0
+    city = CITY.select(sees_none)
+    index = build_index(city, named_noise("generic"))
+    plain = city.signature(int(city.lengths.argmax()))
+    far = Signature(np.array([absent], np.uint8), np.array([33.0]))
+    codes, bearings = parts_of(plain)
+    query = Signature(np.append(codes, absent), np.append(bearings, 33.0))
+    options: Any = {"north_sigma": north_sigma, "explained": 1}
+    found, expected = (locate(index, one, **options) for one in (query, plain))
+    assert np.array_equal(found.chances, expected.chances)
+    assert found.query is query
+    assert len(found.notes) == 1
+    assert found.explanations[0].counts["false"] == expected.explanations[0].counts["false"] + 1
+    assert not expected.notes
+    nothing = Signature(np.empty(0, np.uint8), np.empty(0))
+    unseen, alone = (locate(index, one, **options) for one in (nothing, far))
+    assert np.array_equal(unseen.chances, alone.chances)
+    assert not unseen.answer.given
+    assert np.array_equal(unseen.loglik, index.constants)
+    assert unseen.explanations == ()
+    json.dumps([found.to_dict(), unseen.to_dict(), alone.to_dict()], allow_nan=False)
+
+
 def test_a_turned_place_is_found_with_its_heading() -> None:
     query = turned_query(seen_from(PLACE), -70.0)
     options: Any = {"north_sigma": math.inf, "store": STORE, "explained": 1}

@@ -64,7 +64,6 @@ CASES: list[tuple[Callable[[], object], str, str]] = [
     (lambda: rerank(INDEX, ONE, CellScores(loglik=FLAT), count=0), "0 cells", "from 1"),
     (lambda: align_cells(DATABASE, TYPES, NOISE, np.arange(2)), "no bearings", "give them"),
     (lambda: explain_cell(TYPES, 0, NOISE, database=DATABASE), "no bearings", "give them"),
-    (lambda: locate(INDEX, NOTHING), "no objects", "at least one"),
     (lambda: locate(INDEX, ONE, refined=True), "between the viewpoints", "give the store"),
     (lambda: locate(INDEX, TYPES, refined=True, store=STORE), "no bearings", "give them"),
     (lambda: locate(INDEX, TYPES, explained=1), "no bearings", "give them"),

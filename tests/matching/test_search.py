@@ -80,8 +80,6 @@ def test_a_fusion_falls_back_to_what_the_query_has(
 
 
 def test_what_cannot_be_searched_is_refused() -> None:
-    with refused(InputError, "no objects; give at least one type or bearing"):
-        localize(CITY, NOTHING)
     for top in (0, -1):
         with refused(InputError, f"{top} candidates were asked for; give a whole number from 1"):
             localize(CITY, asked("D"), top=top)
@@ -215,13 +213,25 @@ def test_cells_in_parts_are_ranked_together(tmp_path: Path) -> None:
     assert one.scores.tolist() == other.scores.tolist()
 
 
-def test_a_class_that_no_part_sees_is_refused(tmp_path: Path) -> None:
-    parted = in_parts(CITY, np.arange(len(CITY)) % 3, tmp_path)
-    with pytest.raises(InputError) as whole:
-        localize(CITY, asked("DM", [1.0, 2.0]))
-    for method in (Method(), Method(keep=5)):
-        with refused(InputError, str(whole.value)):
-            localize(parted, asked("DM", [1.0, 2.0]), method=method)
+@pytest.mark.parametrize("text", METHODS)
+def test_a_class_that_no_part_sees_is_a_false_detection(tmp_path: Path, text: str) -> None:
+    parted, method = in_parts(CITY, np.arange(len(CITY)) % 3, tmp_path), Method.parse(text)
+    alone = localize(CITY, asked("D", [1.0]), method=method)
+    for database in (parted, CITY):
+        found = localize(database, asked("MD", [0.5, 1.0]), method=method)
+        pd.testing.assert_frame_equal(found.candidates, alone.candidates)
+        assert len(found.query) == 2
+        (note,) = found.notes
+        assert "M (bus stop)" in note
+    assert not alone.notes
+
+
+@pytest.mark.parametrize("query", [NOTHING, asked("M", [1.0])])
+@pytest.mark.parametrize("text", ["edit+edit:5%", "types:jaccard", "angles:histogram"])
+def test_nothing_tells_no_cell_from_another(query: Signature, text: str) -> None:
+    found = localize(CITY, query, method=Method.parse(text), top=3)
+    assert found.candidates["tied"].tolist() == [len(CITY)] * 3
+    assert len(found.notes) == 1
 
 
 @given(st.integers(0, 2**32 - 1), st.sampled_from(["D", "2B", "D>=1,?<=6", "B=0", "?>=3"]))

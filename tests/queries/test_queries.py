@@ -14,10 +14,11 @@ import shapely
 from hypothesis import given
 from hypothesis import strategies as st
 from noisy_cells import parts_of
-from sentences import refused
+from sentences import assert_sentence, refused
 from worlds import CORNER, TAXONOMY, World, random_town
 
 from semsig_gis.core.errors import InputError
+from semsig_gis.core.signature import Signature
 from semsig_gis.core.taxonomy import Taxonomy
 from semsig_gis.database.build import build_database
 from semsig_gis.database.city import ObjectStore
@@ -35,6 +36,7 @@ if TYPE_CHECKING:
 
     from semsig_gis.database.database import SignatureDatabase
     from semsig_gis.queries.draw import Query, SeenFrom
+    from semsig_gis.queries.file import QueryLine
 
 TOWN = random_town()
 DATABASE = TOWN.database
@@ -201,6 +203,11 @@ ROWS = st.lists(
 )
 
 
+def signature_of(line: QueryLine) -> Signature:
+    assert isinstance(line.query, Signature)
+    return line.query
+
+
 @given(ROWS)
 def test_json_lines_and_csv_say_the_same(
     tmp_path_factory: pytest.TempPathFactory, rows: list[list[tuple[str, int]]]
@@ -215,19 +222,62 @@ def test_json_lines_and_csv_say_the_same(
     table = folder / "queries.csv"
     text = [f"{q['id']},{q['types']},{' '.join(map(str, q['bearings']))}" for q in plain]
     table.write_text("\ufeffid,types,bearings\n" + "\n".join(text))
-    one, other = (read_queries(path, taxonomy=TAXONOMY) for path in (lines, table))
-    assert [name for name, _ in one] == [name for name, _ in other] == [q["id"] for q in plain]
-    for (_, query), (_, same), row in zip(one, other, rows, strict=True):
-        codes, bearings = parts_of(query)
-        assert np.array_equal(parts_of(same), (codes, bearings))
+    one, other = (list(read_queries(path, taxonomy=TAXONOMY)) for path in (lines, table))
+    assert [line.name for line in one] == [line.name for line in other] == [q["id"] for q in plain]
+    for line, same, row in zip(one, other, rows, strict=True):
+        codes, bearings = parts_of(signature_of(line))
+        assert np.array_equal(parts_of(signature_of(same)), (codes, bearings))
         assert bearings.tolist() == sorted(b for _, b in row)
 
 
 def test_a_part_may_be_missing_and_lines_are_numbered() -> None:
-    found = parse_queries('\n{"types": "DB"}\n{"bearings": [5, 6]}', "x", taxonomy=TAXONOMY)
-    assert [name for name, _ in found] == [2, 3]
-    assert found[0][1].bearings is None
-    assert found[1][1].codes is None
+    lines = ["", '{"types": "DB"}', '{"bearings": [5, 6]}', '{"types": ""}', '{"bearings": []}']
+    found = list(parse_queries(lines, "x", taxonomy=TAXONOMY))
+    assert [one.name for one in found] == [2, 3, 4, 5]
+    assert signature_of(found[0]).bearings is None
+    assert signature_of(found[1]).codes is None
+    assert [len(signature_of(one)) for one in found] == [2, 2, 0, 0]
+
+
+def test_queries_are_read_when_they_are_needed() -> None:
+    lines = iter([b'{"types": "D"}', b"{"])
+    found = parse_queries(lines, "x", taxonomy=TAXONOMY)
+    assert next(found).line == 1
+    assert next(lines) == b"{"
+
+
+BAD_LINES: list[tuple[str | bytes, str]] = [
+    ("{", "not JSON"),
+    (b"\xff", "not JSON"),
+    ("[" * 100_000, "not JSON"),
+    ("[1]", "no query"),
+    ('{"types": "Z"}', "'Z'"),
+    ('{"types": "DB", "bearings": [1]}', "2 types and 1 bearings"),
+    ('{"types": "D", "bearings": [NaN]}', "nan"),
+    ('{"bearings": ["north"]}', "not all numbers"),
+    ('{"other": 1}', "types, bearings or both"),
+]
+
+
+def test_a_bad_line_takes_no_other_with_it() -> None:
+    lines: list[str | bytes] = []
+    for text, _ in BAD_LINES:
+        lines += [text, '{"types": "D"}']
+    found = list(parse_queries(lines, "these lines", taxonomy=TAXONOMY))
+    assert [one.line for one in found] == list(range(1, len(lines) + 1))
+    for number, (one, (_, word)) in enumerate(zip(found[::2], BAD_LINES, strict=True)):
+        assert isinstance(one.query, InputError)
+        assert_sentence(one.query, f"line {2 * number + 1} of these lines", word)
+    assert all(len(signature_of(one)) == 1 for one in found[1::2])
+
+
+def test_a_bad_row_of_a_table_takes_no_other_with_it(tmp_path: Path) -> None:
+    rows = ["id,types", "a,D", f"b,{'D' * 200_000}", "c,Z", "d,", "e"]
+    (tmp_path / "q.csv").write_text("\n".join(rows))
+    found = list(read_queries(tmp_path / "q.csv", taxonomy=TAXONOMY))
+    assert [one.line for one in found] == [2, 3, 4, 5, 6]
+    assert [one.name for one in found] == ["a", 3, "c", "d", "e"]
+    assert [isinstance(one.query, InputError) for one in found] == [False, True, True, False, True]
 
 
 def test_a_route_tells_the_way_from_view_to_view() -> None:
@@ -236,7 +286,7 @@ def test_a_route_tells_the_way_from_view_to_view() -> None:
 {"dx": 3, "dy": -4, "sigma": 2}
 {"types": "D", "bearings": "90", "distance": 20, "bearing": 90}
 """
-    views, legs = parse_route(lines, "these lines", taxonomy=TAXONOMY)
+    views, legs = parse_route(lines.split("\n"), "these lines", taxonomy=TAXONOMY)
     assert [name for name, _ in views] == ["start", 3, 4]
     assert [len(view) for _, view in views] == [2, 0, 1]
     assert legs == [Leg(dx=3.0, dy=-4.0, sigma=2.0), Leg.towards(90.0, 20.0, sigma=0.0)]
@@ -250,29 +300,26 @@ def test_a_route_in_a_table(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("parsers", "text", "words"),
+    ("text", "words"),
     [
-        ([parse_queries, parse_route], "", ["no rows"]),
-        ([parse_queries, parse_route], "{", ["line 1", "not JSON"]),
-        ([parse_queries, parse_route], '{"types": "Z"}', ["line 1", "'Z'"]),
-        ([parse_queries, parse_route], '{"types": "DB", "bearings": [1]}', ["2 types and 1 bear"]),
-        ([parse_queries, parse_route], '{"bearings": ["north"]}', ["line 1", "not all numbers"]),
-        ([parse_queries], "[1]", ["line 1", "no query"]),
-        ([parse_queries], '{"types": "D"}\n{"other": 1}', ["line 2", "types, bearings or both"]),
-        ([parse_route], "[1]", ["line 1", "no view"]),
-        ([parse_route], '{"types": "D", "dx": 1, "dy": 2}', ["line 1", "tells a way", "the first"]),
-        ([parse_route], '{"types": "D"}\n{"types": "B"}', ["line 2", "does not tell the way"]),
-        ([parse_route], '{"dx": 5}', ["line 1", "dx and dy, or distance and bearing"]),
-        ([parse_route], '{"dx": 1, "dy": 2, "bearing": 3}', ["dx and dy, or distance and bearing"]),
-        ([parse_route], '{"types": "D"}\n{"dx": "far", "dy": 2}', ["line 2", "far"]),
-        ([parse_route], '{"types": "D"}\n{"dx": Infinity, "dy": 2}', ["line 2", "finite"]),
-        ([parse_route], '{"types": "D"}\n{"dx": 1, "dy": 2, "sigma": -1.0}', ["line 2", "-1.0"]),
+        ("", ["no rows"]),
+        ("{", ["line 1", "not JSON"]),
+        ('{"types": "Z"}', ["line 1", "'Z'"]),
+        ('{"types": "DB", "bearings": [1]}', ["2 types and 1 bear"]),
+        ('{"bearings": ["north"]}', ["line 1", "not all numbers"]),
+        ("[1]", ["line 1", "no view"]),
+        ('{"types": "D", "dx": 1, "dy": 2}', ["line 1", "tells a way", "the first"]),
+        ('{"types": "D"}\n{"types": "B"}', ["line 2", "does not tell the way"]),
+        ('{"dx": 5}', ["line 1", "dx and dy, or distance and bearing"]),
+        ('{"dx": 1, "dy": 2, "bearing": 3}', ["dx and dy, or distance and bearing"]),
+        ('{"types": "D"}\n{"dx": "far", "dy": 2}', ["line 2", "far"]),
+        ('{"types": "D"}\n{"dx": Infinity, "dy": 2}', ["line 2", "finite"]),
+        ('{"types": "D"}\n{"dx": 1, "dy": 2, "sigma": -1.0}', ["line 2", "-1.0"]),
     ],
 )
-def test_lines_of_files(parsers: list[Callable[..., object]], text: str, words: list[str]) -> None:
-    for parse in parsers:
-        with refused(InputError, "these lines", *words):
-            parse(text, "these lines", taxonomy=TAXONOMY)
+def test_lines_of_a_route(text: str, words: list[str]) -> None:
+    with refused(InputError, "these lines", *words):
+        parse_route(text.split("\n"), "these lines", taxonomy=TAXONOMY)
 
 
 @pytest.mark.parametrize("read", [read_queries, read_route])

@@ -237,7 +237,7 @@ WORDS = st.text(st.characters(codec="utf-8", exclude_characters="\x00"), max_siz
 @given(st.lists(st.fixed_dictionaries({"a": WORDS, "b": WORDS}), min_size=1, max_size=4))
 def test_what_was_written_is_read(rows: list[dict[str, str]]) -> None:
     text = "\n".join(json.dumps(row) for row in rows)
-    found = parse_rows(text, "x", dict, what="thing")
+    found = parse_rows(text.split("\n"), "x", dict, what="thing")
     assert found == list(enumerate(rows, start=1))
 
 
@@ -278,6 +278,13 @@ def test_nothing_was_seen(row: dict[str, object]) -> None:
         ("types\n" + "D" * 200_000, True, ["not CSV"]),
     ],
 )
-def test_what_cannot_be_used_is_named(text: str, table: bool, words: list[str]) -> None:  # noqa: FBT001
-    with refused(InputError, "x", *words):
-        parse_rows(text, "x", lambda row: row_signature(row, TAXONOMY), what="thing", table=table)
+def test_what_cannot_be_used_is_named(
+    tmp_path: Path,
+    text: str,
+    table: bool,  # noqa: FBT001
+    words: list[str],
+) -> None:
+    path = tmp_path / ("x.csv" if table else "x.jsonl")
+    path.write_text(text)
+    with refused(InputError, path.name, *words):
+        read_rows(path, lambda row: row_signature(row, TAXONOMY), what="thing")

@@ -15,7 +15,6 @@ import numpy as np
 from semsig_gis.core.errors import InputError, nearest_name
 from semsig_gis.core.signature import BEARING_UNITS, DISTANCE_UNITS
 from semsig_gis.core.taxonomy import WILDCARD
-from semsig_gis.database.answer import check_query
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -117,8 +116,10 @@ class NoiseTable:
 
     def query_rows(self, query: Signature) -> NDArray[np.int64]:
         """Return the class row of each object of a query, k if unknown; InputError without any."""
-        if query.codes is None or not query.codes.size:
-            check_query(query)
+        if not len(query):
+            msg = "the query has no objects; give at least one type or bearing."
+            raise InputError(msg)
+        if query.codes is None:
             return np.full(len(query), len(self.codes))
         rows = self.row_of[query.codes]
         if (rows < 0).any():
