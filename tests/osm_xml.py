@@ -10,13 +10,18 @@ if TYPE_CHECKING:
     from pathlib import Path
 
 
-def node(number: int, lon: float, lat: float, tags: Mapping[str, str] | None = None) -> str:
-    return f'<node id="{number}" lon="{lon}" lat="{lat}">{_tags(tags)}</node>'
+def node(
+    number: int, lon: float, lat: float, tags: Mapping[str, str] | None = None, **meta: object
+) -> str:
+    """Return a node; `meta` are further attributes, such as its version."""
+    return f'<node id="{number}" lon="{lon}" lat="{lat}"{_meta(meta)}>{_tags(tags)}</node>'
 
 
-def way(number: int, nodes: Iterable[int], tags: Mapping[str, str] | None = None) -> str:
+def way(
+    number: int, nodes: Iterable[int], tags: Mapping[str, str] | None = None, **meta: object
+) -> str:
     refs = "".join(f'<nd ref="{ref}"/>' for ref in nodes)
-    return f'<way id="{number}">{refs}{_tags(tags)}</way>'
+    return f'<way id="{number}"{_meta(meta)}>{refs}{_tags(tags)}</way>'
 
 
 def relation(number: int, members: Mapping[int, str], tags: Mapping[str, str]) -> str:
@@ -30,6 +35,10 @@ def relation(number: int, members: Mapping[int, str], tags: Mapping[str, str]) -
 def write_osm(path: Path, *elements: str) -> Path:
     path.write_text(f'<osm version="0.6">{"".join(elements)}</osm>', encoding="utf-8")
     return path
+
+
+def _meta(meta: Mapping[str, object]) -> str:
+    return "".join(f" {key}={quoteattr(str(value))}" for key, value in meta.items())
 
 
 def _tags(tags: Mapping[str, str] | None) -> str:

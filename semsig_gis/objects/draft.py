@@ -22,13 +22,13 @@ from semsig_gis.objects.keywords import keywords, words_of
 from semsig_gis.sources.catalog import catalog_names, load_catalog, paper_taxonomy
 from semsig_gis.sources.opendatasoft.reader import POINT, SHAPE, fold
 from semsig_gis.sources.opendatasoft.table import Record, open_table
+from semsig_gis.sources.osm.file import FORMATS
 from semsig_gis.sources.vector import NO_GEOMETRY, LayerInfo, first_rows
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping, Sequence
 
 VECTOR = "vector_file"
-OSM_SUFFIXES = frozenset({".osm", ".pbf", ".bz2"})
 # Files that may be a plain table of records, which GDAL takes for nothing or for rows of text.
 TABLE_SUFFIXES = frozenset({".csv", ".json", ".parquet"})
 # Marks what a person must fill in; as a class, it does not load.
@@ -69,7 +69,7 @@ class Sample:
 def _samples(path: Path) -> tuple[Sample, ...]:
     """Return the layers of a file that may hold positions; SourceError for one not to describe."""
     suffix = path.suffix.lower()
-    if suffix in OSM_SUFFIXES:
+    if path.name.lower().endswith(tuple(FORMATS)):
         msg = f"{path} is OpenStreetMap data; load it with the built-in catalogue 'openstreetmap'."
         raise SourceError(msg)
     layers: tuple[Sample, ...] = ()

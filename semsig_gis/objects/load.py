@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
@@ -24,7 +25,7 @@ from semsig_gis.core.geometry import (
 )
 from semsig_gis.objects.conflate import ConflationReport, conflate
 from semsig_gis.objects.table import StreetObjects, layer_licences
-from semsig_gis.sources import find_files, reader
+from semsig_gis.sources import MERGING, find_files, reader
 from semsig_gis.sources import vector as vector_file
 from semsig_gis.sources.area import join_areas
 from semsig_gis.sources.catalog import LayerSpec, load_catalog
@@ -292,7 +293,7 @@ def read_files(
     crs: str | None = None,
     progress: Callable[[int, int], None] | None = None,
 ) -> tuple[tuple[RawLayer, ...], tuple[LayerSpec, ...]]:
-    """Read layers from local files, each file once.
+    """Read layers from local files, each file once, and extracts of OpenStreetMap as one.
 
     Parameters
     ----------
@@ -325,14 +326,20 @@ def read_files(
     nowhere does not exist; give a file or a folder of files.
     """
     pairs, absent = find_files(specs, paths)
-    by_file: dict[tuple[Path, str], list[LayerSpec]] = {}
-    for spec, path in pairs:
-        by_file.setdefault((path, spec.reader), []).append(spec)
+    by_files: dict[tuple[str, tuple[Path, ...]], list[LayerSpec]] = {}
+    for spec, found in itertools.groupby(pairs, key=lambda pair: pair[0]):
+        paths_of_spec = tuple(path for _, path in found)
+        together = (
+            [paths_of_spec] if spec.reader in MERGING else [(path,) for path in paths_of_spec]
+        )
+        for some in together:
+            by_files.setdefault((spec.reader, some), []).append(spec)
     layers: list[RawLayer] = []
-    for done, ((path, name), layers_of_file) in enumerate(by_file.items(), start=1):
-        layers.extend(reader(name)(path, layers_of_file, filters=filters, crs=crs))
+    for done, ((name, (first, *more)), layers_of_files) in enumerate(by_files.items(), start=1):
+        path = (first, *more) if more else first
+        layers.extend(reader(name)(path, layers_of_files, filters=filters, crs=crs))
         if progress is not None:
-            progress(done, len(by_file))
+            progress(done, len(by_files))
     order = {spec.name: number for number, spec in enumerate(specs)}
     return tuple(sorted(layers, key=lambda layer: order[layer.spec.name])), absent
 
@@ -464,9 +471,6 @@ def _on_earth(shapes: NDArray[np.object_]) -> NDArray[np.bool_]:
     return placed
 
 
-OSM_SUFFIXES = (".osm", ".osm.pbf", ".osm.bz2")
-
-
 def save_surroundings(table: gpd.GeoDataFrame, path: str | Path) -> None:
     """Save buildings or streets as one GeoParquet file that can be read by box.
 
@@ -571,7 +575,7 @@ def _read(
     notes: tuple[str, ...] = ()
     if path.suffix.lower() == ".parquet":
         table = _read_parquet(path, kind, box)
-    elif path.name.lower().endswith(OSM_SUFFIXES) and role != "area":
+    elif path.name.lower().endswith(tuple(osm_file.FORMATS)) and role != "area":
         spec = load_catalog("openstreetmap").layer(role)
         (layer,) = osm_file.read_layers(path, [spec])
         table = layer.table

@@ -26,9 +26,12 @@ READERS = {
     "vector_file": "vector",
 }
 
+# Those of them that take several files at once, which are extracts of one map.
+MERGING = frozenset({"osm_file"})
+
 # Files with another suffix (.dbf, .prj, a README) accompany data and are not opened on their own.
 FILE_SUFFIXES = frozenset(
-    {".bz2", ".csv", ".fgb", ".geojson", ".gpkg", ".json",
+    {".bz2", ".csv", ".fgb", ".geojson", ".gpkg", ".gz", ".json",
      ".osm", ".parquet", ".pbf", ".shp", ".zip"}
 )  # fmt: skip
 
@@ -94,11 +97,14 @@ class RawLayer:
 
 
 class Reader(Protocol):
-    """What a reader is: a function that reads layers from one file in one pass."""
+    """What a reader is: a function that reads layers from one file in one pass.
+
+    Those of `MERGING` take several files, too.
+    """
 
     def __call__(
         self,
-        path: Path,
+        path: Path | Sequence[Path],
         specs: Sequence[LayerSpec],
         *,
         filters: bool = True,
@@ -143,15 +149,16 @@ def find_files(
     paths : iterable of str or Path
         Files, and folders to look in (not in the folders below them). A file given by itself goes
         before one found in a folder. Of a folder's files, a layer takes those that match the
-        first of its patterns that any matches.
+        first of its patterns that any matches; of OpenStreetMap's, all that match.
 
     Returns
     -------
     pairs : tuple of (LayerSpec, Path)
-        Layers and their files, in the order of `specs`. One file may hold several layers.
+        Layers and their files, in the order of `specs`. One file may hold several layers, and a
+        layer of OpenStreetMap may be in several extracts.
     missing : tuple of LayerSpec
         Layers that no file matches. SourceError if a path does not exist or matches no layer, or
-        several files match a layer whose ids are not unique.
+        several files match another layer whose ids are not unique.
 
     Examples
     --------
@@ -177,11 +184,11 @@ def find_files(
     missing = []
     for spec in specs:
         by_hand = [path for path in files if _matches(path, spec.files)]
-        in_folder = (
-            [path for path in in_folders if _matches(path, (pattern,))] for pattern in spec.files
-        )
+        merging = spec.reader in MERGING
+        patterns = (spec.files,) if merging else tuple((pattern,) for pattern in spec.files)
+        in_folder = ([path for path in in_folders if _matches(path, any_)] for any_ in patterns)
         candidates = by_hand or next(filter(None, in_folder), [])
-        if len(candidates) > 1 and not spec.unique_id:
+        if len(candidates) > 1 and not (spec.unique_id or merging):
             names = " and ".join(str(path) for path in candidates)
             msg = f"layer {spec.name!r} is matched by {names}; give one of them."
             raise SourceError(msg)

@@ -279,6 +279,13 @@ def test_layers_are_paired_with_files(tmp_path: Path) -> None:
     assert {*DRIVERS, ".zip"} < FILE_SUFFIXES
 
 
+def test_a_layer_of_openstreetmap_may_be_in_several_extracts(tmp_path: Path) -> None:
+    files = ("*.osm", "*.pbf")
+    spec = LayerSpec(name="trees", class_name="alignment_tree", files=files, reader="osm_file")
+    extracts = touch(tmp_path, "east.osm.pbf", "west.osm")
+    assert find_files([spec], [tmp_path]) == (tuple((spec, path) for path in extracts), ())
+
+
 def test_files_that_cannot_be_paired(tmp_path: Path) -> None:
     first, second = touch(tmp_path, "trees_a.zip", "trees_b.zip")
     for paths in ([tmp_path], [first, second]):

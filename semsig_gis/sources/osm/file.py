@@ -1,9 +1,12 @@
-"""OpenStreetMap files through pyosmium: ``.osm``, ``.osm.pbf`` and ``.osm.bz2``, in flat memory."""
+"""OpenStreetMap files through pyosmium, in flat memory; several extracts are read as one."""
 
 from __future__ import annotations
 
+import contextlib
 import itertools
 import math
+import tempfile
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -15,10 +18,11 @@ from osmium.osm import NODE, RELATION, WAY, Node, Relation, Way
 from semsig_gis.core.errors import CatalogError, SourceError
 from semsig_gis.sources import require_file
 from semsig_gis.sources.osm.elements import ElementLayer, TagIndex, relation_shape, way_shape
+from semsig_gis.sources.osm.merge import age_notes, merge_extracts, readable
 from semsig_gis.sources.raw_layer import BadFeatureError
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Mapping, Sequence
+    from collections.abc import Iterable, Iterator, Mapping, Sequence
 
     from numpy.typing import NDArray
     from osmium.osm import Location
@@ -28,7 +32,7 @@ if TYPE_CHECKING:
     from semsig_gis.sources.raw_layer import Position
 
 # What a file is by its name, and what pyosmium calls it.
-FORMATS = {".osm": "xml", ".osm.bz2": "xml.bz2", ".osm.pbf": "pbf"}
+FORMATS = {".osm": "xml", ".osm.gz": "xml.gz", ".osm.bz2": "xml.bz2", ".pbf": "pbf"}
 KINDS: dict[str, ElementKind] = {"n": "node", "w": "way", "r": "relation"}
 # pyosmium's table of node places that is not in memory.
 PLACES = "sparse_file_array"
@@ -47,18 +51,24 @@ class _Outline(NamedTuple):
 
 
 def read_layers(
-    path: str | Path, specs: Sequence[LayerSpec], *, filters: bool = True, crs: str | None = None
+    path: str | Path | Sequence[Path],
+    specs: Sequence[LayerSpec],
+    *,
+    filters: bool = True,
+    crs: str | None = None,
 ) -> tuple[RawLayer, ...]:
-    """Read layers of a ``.osm``, ``.osm.pbf`` or ``.osm.bz2`` file, one for each of `specs`.
+    """Read layers of a file in one of `FORMATS`, or of several extracts, one for each of `specs`.
 
     The file is streamed; where a layer has ways, the places of all nodes are kept meanwhile in an
     unnamed temporary file, of 16 bytes a node. Street objects are points, the centroid of a way or
     an area; identifiers are such as ``"node/123"``. Elements that are mapped in another way than
-    the layer wants are filtered, clipped and broken ones unreadable. `crs` is only noted.
+    the layer wants are filtered, clipped and broken ones unreadable. An element in several extracts
+    counts once, by its newest copy. `crs` is only noted.
     """
-    path = Path(path)
-    file = _file(path)
-    layers = [ElementLayer(spec, filters=filters, where=str(path)) for spec in specs]
+    paths = [Path(path)] if isinstance(path, str | Path) else list(path)
+    files = {path: _file(path) for path in paths}
+    where = str(paths[0]) if len(files) == 1 else f"{len(files)} extracts"
+    layers = [ElementLayer(spec, filters=filters, where=where) for spec in specs]
     if not layers:
         return ()
     for spec in specs:
@@ -69,20 +79,25 @@ def read_layers(
             )
             raise CatalogError(msg)
     index = TagIndex(specs)
-    try:
+    with _as_one(files, index) as file, readable(where):
         outlines = _scan(file, layers, index)
         ways = {way for outline in outlines for way in (*outline.outer, *outline.inner)}
         lines = _lines(file, ways) if ways else {}
-    except (osmium.InvalidLocationError, RuntimeError, ValueError) as error:
-        cause = " ".join(str(error).split()).rstrip(".")
-        msg = (
-            f"{path} cannot be read ({cause}); "
-            "it is damaged or not the kind of file that its name says, get it again."
-        )
-        raise SourceError(msg) from error
     for outline in outlines:
         outline.layer.rows.positions[outline.row] = _position(outline, lines)
-    return tuple(layer.raw(crs) for layer in layers)
+    notes = age_notes(files) if len(files) > 1 else ()
+    raw = (layer.raw(crs) for layer in layers)
+    return tuple(replace(layer, notes=(*notes, *layer.notes)) for layer in raw)
+
+
+@contextlib.contextmanager
+def _as_one(files: Mapping[Path, osmium.io.File], index: TagIndex) -> Iterator[osmium.io.File]:
+    """Give the one file there is, or one that several extracts are merged into."""
+    if len(files) == 1:
+        yield from files.values()
+        return
+    with tempfile.TemporaryDirectory(prefix="semsig-") as folder:
+        yield merge_extracts(files, index, Path(folder, "merged.osm.pbf"))
 
 
 def _file(path: Path) -> osmium.io.File:
