@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -127,11 +128,17 @@ def _build_whole(
     from semsig_gis.objects.table import open_objects
 
     opened = open_objects(objects)
-    read = partial(read_surroundings, crs=opened.crs, tell=remark)
+    notes: list[str] = []
+    read = partial(read_surroundings, crs=opened.crs, tell=notes.append)
     houses = None if buildings is None else read(buildings, role="buildings")
     lines = None if streets is None else read(streets, role="streets")
     if houses is not None and (invalid := int((~houses.is_valid).sum())):
-        remark(f"{invalid} building footprints in {buildings} are invalid polygons; repaired here")
+        notes.append(
+            f"{invalid} building footprints in {buildings} are invalid polygons; repaired here"
+        )
+    for note in notes:
+        remark(note)
+    opened = replace(opened, notes=(*opened.notes, *notes))
     with progress("building") as advance:
         database = build_database(
             opened, footprints=houses, streets=lines, progress=advance, **specs

@@ -78,9 +78,17 @@ def load(
     specs = choose_layers(catalog, layer or (), surroundings=bool(buildings or streets))
     with progress("reading") as advance:
         layers, absent = read_files(specs, files, filters=filters, crs=crs, progress=advance)
-    for spec in absent:
-        remark(f"layer {spec.name!r} has no file here ({', '.join(spec.files)}); it is left out")
-    loaded = assemble(layers, catalog, metric_crs=metric_crs, collapse=collapse, merge=merge)
+    loaded = assemble(
+        layers,
+        catalog,
+        metric_crs=metric_crs,
+        collapse=collapse,
+        merge=merge,
+        notes=[
+            f"layer {spec.name!r} has no file here ({', '.join(spec.files)}); it is left out"
+            for spec in absent
+        ],
+    )
     _save_loaded(loaded, out, buildings, streets, as_json=as_json)
 
 
@@ -143,7 +151,7 @@ def _save_loaded(
     from semsig_gis.objects.table import save_objects
     from semsig_gis.reports.quality import quality_report
 
-    report = quality_report(loaded.objects, loaded.report, loaded.conflation)
+    report = quality_report(loaded.objects, loaded.report, loaded.conflation, notes=loaded.notes)
     save_objects(loaded.objects, out)
     for what, table, path in (
         ("buildings", loaded.buildings, buildings),

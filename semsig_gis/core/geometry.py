@@ -47,6 +47,9 @@ MERGED = "merged"
 GEOMETRY = "geometry"
 HALF_WIDTH = "half_width"
 
+NOTES = "notes"
+"""Key of the warnings in the metadata of a file."""
+
 LICENSES = "licenses"
 """Whom to name for a table of buildings or streets: a key of its `attrs`."""
 

@@ -195,6 +195,7 @@ def build_cells(
         ),
         viewpoints=viewpoints,
         occlusion=None if footprints is None else TOLERANCE_M,
+        notes=objects.notes,
     )
 
 

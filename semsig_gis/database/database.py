@@ -87,6 +87,8 @@ class SignatureDatabase:
     occlusion : float or None
         Tolerance in metres with which buildings hide objects (see `database.occlusion`); None
         where no building did.
+    notes : tuple of str
+        Warnings about what it was built from.
 
     Examples
     --------
@@ -108,6 +110,7 @@ class SignatureDatabase:
     version: str = __version__
     viewpoints: ViewpointSpec = ViewpointSpec()  # noqa: RUF009 - it is frozen
     occlusion: float | None = None
+    notes: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:  # noqa: D105
         for name in ("offsets", *CELL_ARRAYS, *ENTRY_ARRAYS):
@@ -220,7 +223,8 @@ class SignatureDatabase:
 def join_databases(parts: Sequence[SignatureDatabase]) -> SignatureDatabase:
     """Join databases of different cells that were made in the same way; DatabaseError otherwise.
 
-    The cells are ordered by column and row, and licences that stand in several parts appear once.
+    The cells are ordered by column and row, and licences and notes that stand in several parts
+    appear once.
     """
     if not parts:
         msg = "there is no database to join; give at least one."
@@ -241,6 +245,7 @@ def join_databases(parts: Sequence[SignatureDatabase]) -> SignatureDatabase:
         first,
         offsets=np.append(0, np.cumsum(arrays.pop("lengths"))),
         licenses=tuple(dict.fromkeys(line for part in parts for line in part.licenses)),
+        notes=tuple(dict.fromkeys(note for part in parts for note in part.notes)),
         **arrays,
     )
     return joined if (np.diff(order) == 1).all() else joined.select(order)

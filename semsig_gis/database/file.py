@@ -13,7 +13,7 @@ import numpy as np
 import pyarrow as pa
 
 from semsig_gis.core.errors import DatabaseError, SemsigError
-from semsig_gis.core.geometry import GridSpec, split_ids
+from semsig_gis.core.geometry import NOTES, GridSpec, split_ids
 from semsig_gis.core.signature import BEARING_UNITS, SignatureSpec
 from semsig_gis.core.taxonomy import Taxonomy
 from semsig_gis.database.database import SignatureDatabase, join_databases, require_same
@@ -88,7 +88,8 @@ def save_database(database: SignatureDatabase, path: str | Path) -> None:
 
 
 def database_specs(database: SignatureDatabase) -> dict[str, Any]:
-    """Return all but the cells of a database, as plain values for JSON."""
+    """Return all but the cells of a database, as plain values for JSON; notes only if any."""
+    notes = {NOTES: list(database.notes)} if database.notes else {}
     return {
         "kind": KIND,
         "format": FORMAT,
@@ -99,6 +100,7 @@ def database_specs(database: SignatureDatabase) -> dict[str, Any]:
         "occlusion": database.occlusion,
         "taxonomy": database.taxonomy.to_list(),
         "licenses": list(database.licenses),
+        **notes,
     }
 
 
@@ -172,6 +174,7 @@ def database_of(
             version=specs["version"],
             viewpoints=ViewpointSpec.from_dict(specs["viewpoints"]),
             occlusion=None if specs["occlusion"] is None else float(specs["occlusion"]),
+            notes=tuple(map(str, specs.get(NOTES, ()))),
         )
     except (KeyError, TypeError, ValueError, SemsigError) as error:
         msg = f"{path} is damaged ({error}); build the database again."

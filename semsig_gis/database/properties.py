@@ -36,18 +36,19 @@ def database_summary(
     Returns
     -------
     dict
-        ``signatures``, ``mean_length``, ``covered_km2``, ``radius_m``, ``step_m``, ``levels``,
-        ``crs``, ``file_mb`` and ``mb_per_km2`` (millions of bytes or None), ``version``,
-        ``licenses``; ``viewpoints``: ``mode``, ``half_width_m`` (of streets, else None) and
-        ``area_km2`` (of the area that they were chosen from, or None); ``occlusion_m``: the
-        tolerance, or None where no building hides anything; ``occurrences``: one dict a class
+        ``signatures``, ``mean_length``, ``covered_km2``, ``radius_m``, ``step_m``,
+        ``levels``, ``crs``, ``file_mb`` and ``mb_per_km2`` (millions of bytes or None),
+        ``version``, ``licenses``, ``notes`` (warnings about what it was built from);
+        ``viewpoints``: ``mode``, ``half_width_m`` (of streets, else None) and ``area_km2``
+        (of the area that they were chosen from, or None); ``occlusion_m``: the tolerance,
+        or None where no building hides anything; ``occurrences``: one dict a class
         (``code``, ``symbol``, ``name``, ``title``, ``range_m``, ``number``, ``share``,
         ``objects``: its count or None, ``objects_per_km2``, ``entropy_bits``);
         ``density_from``: ``"objects"`` or ``"occurrences"``; ``cell_bits``; ``groups``: for
         ``type``, ``angle`` and ``both`` the statistics of the group sizes as
-        `pandas.Series.describe` gives them (``std`` is the sample's, None for a single group),
-        ``alone``, the share of the cells that share their signature with no other, and
-        ``entropy_bits``; ``largest_type_group``: ``types`` and ``cells``.
+        `pandas.Series.describe` gives them (``std`` is the sample's, None for a single
+        group), ``alone``, the share of the cells that share their signature with no other,
+        and ``entropy_bits``; ``largest_type_group``: ``types`` and ``cells``.
 
     Notes
     -----
@@ -87,6 +88,7 @@ def database_summary(
         "mb_per_km2": None if file_bytes is None else file_bytes / 1e6 / covered,
         "version": database.version,
         "licenses": list(database.licenses),
+        "notes": list(database.notes),
         "viewpoints": {
             "mode": mode,
             "half_width_m": float(database.viewpoints.width) if mode == "streets" else None,

@@ -213,7 +213,13 @@ def update_database(
     merged, kept, notes = replace_layers(store.objects, objects)
     along = store.streets if database.viewpoints.mode == "streets" else None
     licenses = (*map(str, merged.licenses), *licenses_of(store.footprints, along))
-    new = replace(database, taxonomy=merged.taxonomy, licenses=licenses, version=__version__)
+    new = replace(
+        database,
+        taxonomy=merged.taxonomy,
+        licenses=licenses,
+        version=__version__,
+        notes=merged.notes,
+    )
     if new.reach > database.reach:  # the unit in which all distances are stored
         furthest = max(new.taxonomy.classes, key=lambda item: item.range_m or 0.0)
         msg = (

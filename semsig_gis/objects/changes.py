@@ -11,7 +11,7 @@ import pandas as pd
 
 from semsig_gis.core.errors import CatalogError, CrsError, InputError
 from semsig_gis.core.geometry import CLASS_CODE, MERGED, SOURCE, SOURCE_ID
-from semsig_gis.objects.table import Licence, StreetObjects, join_licences
+from semsig_gis.objects.table import Licence, StreetObjects, join_licences, layer_note
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -198,7 +198,7 @@ def replace_layers(
     renewed = set(new.table[SOURCE].unique()).union(*(licence.layers for licence in new.licenses))
     stays = ~old.table[SOURCE].isin(renewed).to_numpy()
     if not stays.any():
-        return StreetObjects(new.table, taxonomy, new.licenses), (), ()
+        return replace(new, taxonomy=taxonomy), (), ()
     remaining = old.table[stays]
     table = pd.concat([remaining, new.table], ignore_index=True)
     if MERGED in table:
@@ -209,7 +209,14 @@ def replace_layers(
         if not licence.layers or not renewed.issuperset(licence.layers)
     )
     licenses = join_licences([*staying, *new.licenses])
-    objects = StreetObjects(table.astype({CLASS_CODE: np.uint8}), taxonomy, licenses)
+    about_renewed = tuple(layer_note(name, "") for name in renewed)
+    warnings = (note for note in old.notes if not note.startswith(about_renewed))
+    objects = StreetObjects(
+        table.astype({CLASS_CODE: np.uint8}),
+        taxonomy,
+        licenses,
+        tuple(dict.fromkeys([*warnings, *new.notes])),
+    )
     kept = tuple(sorted(remaining[SOURCE].unique()))
     notes = [*_doubts(objects, len(remaining), renewed)]
     notes += [

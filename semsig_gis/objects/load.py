@@ -24,7 +24,7 @@ from semsig_gis.core.geometry import (
     require_metric_crs,
 )
 from semsig_gis.objects.conflate import ConflationReport, conflate
-from semsig_gis.objects.table import StreetObjects, layer_licences
+from semsig_gis.objects.table import StreetObjects, layer_licences, layer_note
 from semsig_gis.sources import MERGING, find_files, reader
 from semsig_gis.sources import vector as vector_file
 from semsig_gis.sources.area import join_areas
@@ -68,6 +68,11 @@ class LoadReport:
     """What became of every layer, in the order they were given."""
 
     layers: tuple[LayerReport, ...]
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """The notes on all layers, each with the name of its layer before it."""
+        return tuple(layer_note(item.name, note) for item in self.layers for note in item.notes)
 
 
 def build_objects(
@@ -162,7 +167,8 @@ def build_objects(
             collapsed=len(part) - twice - kept_here,
         )
         reports.append(LayerReport(layer.spec.name, dropped, (*layer.notes, *layer.errors)))
-    return StreetObjects(table, taxonomy, layer_licences(layers)), LoadReport(tuple(reports))
+    report = LoadReport(tuple(reports))
+    return StreetObjects(table, taxonomy, layer_licences(layers), report.notes), report
 
 
 def _positions(layer: RawLayer, taxonomy: Taxonomy, crs: CRS) -> tuple[pd.DataFrame, int, int]:
@@ -231,7 +237,7 @@ class Loaded:
         Footprints (polygons) and centre lines in the CRS of the objects, where layers hold them;
         of streets whose widths a layer knows, ``half_width`` in metres.
     notes : tuple of str
-        Remarks for the user.
+        Warnings about all of it; those about a layer are in its report. The objects bear both.
 
     Examples
     --------
@@ -377,6 +383,7 @@ def assemble(
     metric_crs: str | None = None,
     collapse: bool = True,
     merge: bool = True,
+    notes: Sequence[str] = (),
 ) -> Loaded:
     """Place raw layers in one metric CRS and merge what stands in several of them.
 
@@ -392,6 +399,8 @@ def assemble(
         Whether objects of one class at the same place become one.
     merge : bool, default True
         Whether objects of different layers are merged by the catalogue's radii.
+    notes : sequence of str
+        Warnings of the reading, to be kept with those of this.
 
     Returns
     -------
@@ -406,10 +415,11 @@ def assemble(
     >>> assemble(layers, load_catalog("openstreetmap")).objects.crs.name
     'WGS 84 / UTM zone 31N'
     """
-    notes: tuple[str, ...] = ()
+    of_all = tuple(notes)
     system: CRS | str | None = metric_crs or catalog.metric_crs
     if system is None:
-        system, notes = metric_crs_of(layers)
+        system, more = metric_crs_of(layers)
+        of_all += more
     objects, report = build_objects(
         [layer for layer in layers if layer.spec.role == "objects"],
         taxonomy=catalog.taxonomy,
@@ -422,13 +432,14 @@ def assemble(
         objects, merged = conflate(objects, dict(catalog.conflate))
     buildings, on_buildings = _surroundings(layers, "buildings", objects.crs)
     streets, on_streets = _surroundings(layers, "streets", objects.crs)
+    report = LoadReport((*report.layers, *on_buildings, *on_streets))
     return Loaded(
-        objects=objects,
-        report=LoadReport((*report.layers, *on_buildings, *on_streets)),
+        objects=replace(objects, notes=(*of_all, *report.notes)),
+        report=report,
         conflation=merged,
         buildings=buildings,
         streets=streets,
-        notes=notes,
+        notes=of_all,
     )
 
 

@@ -21,6 +21,7 @@ from semsig_gis.core.geometry import (
     GEOMETRY,
     LICENSES,
     MERGED,
+    NOTES,
     SOURCE,
     SOURCE_ID,
 )
@@ -69,6 +70,11 @@ class Licence:
         return f"{self.terms}{BEFORE_LAYERS}{layers}" if layers else self.terms
 
 
+def layer_note(layer: str, note: str) -> str:
+    """Return a warning about a layer as a note of street objects."""
+    return f"{layer}{BEFORE_LAYERS}{note}"
+
+
 def join_licences(licences: Iterable[Licence]) -> tuple[Licence, ...]:
     """Return one licence for all layers of the same terms, each layer once."""
     layers_of: dict[str, dict[str, None]] = {}
@@ -96,6 +102,8 @@ class StreetObjects:
         The classes that the codes belong to.
     licenses : tuple of Licence
         One for every publisher and licence: who, under what, which layers.
+    notes : tuple of str
+        Warnings of the load; one about a layer begins with its name and a colon.
 
     Examples
     --------
@@ -106,6 +114,7 @@ class StreetObjects:
     table: gpd.GeoDataFrame
     taxonomy: Taxonomy
     licenses: tuple[Licence, ...]
+    notes: tuple[str, ...] = ()
 
     def __len__(self) -> int:  # noqa: D105
         return len(self.table)
@@ -184,7 +193,8 @@ def save_objects(objects: StreetObjects, path: str | Path, *, keep_order: bool =
 def objects_specs(objects: StreetObjects) -> dict[str, Any]:
     """Return all but the table of street objects, as plain values for JSON.
 
-    The layers of licences are among them only where the lines of the licences do not tell.
+    The layers of licences are among them only where the lines of the licences do not tell, and
+    notes only where there are some.
     """
     specs: dict[str, Any] = {
         "kind": KIND,
@@ -194,6 +204,8 @@ def objects_specs(objects: StreetObjects) -> dict[str, Any]:
     }
     if _licences(specs, objects.table[SOURCE]) != objects.licenses:
         specs[LICENSE_LAYERS] = [list(licence.layers) for licence in objects.licenses]
+    if objects.notes:
+        specs[NOTES] = list(objects.notes)
     return specs
 
 
@@ -299,6 +311,7 @@ def objects_of(
         for code in pc.unique(arrow[CLASS_CODE]).to_pylist():
             taxonomy.by_code(code)
         licenses = _licences(specs, columns[SOURCE])
+        notes = tuple(map(str, specs.get(NOTES, ())))
     except (TypeError, ValueError, LookupError, shapely.errors.ShapelyError) as error:
         msg = f"{path} is damaged ({error}); load the street objects again."
         raise DatabaseError(msg) from error
@@ -311,7 +324,7 @@ def objects_of(
     if box is not None:
         inside = ((xy >= box[:2]) & (xy <= box[2:])).all(axis=1)
         table = table[inside].reset_index(drop=True)
-    return StreetObjects(table, taxonomy, licenses)
+    return StreetObjects(table, taxonomy, licenses, notes)
 
 
 def licenses_of(*tables: gpd.GeoDataFrame | None) -> tuple[str, ...]:

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 from semsig_gis.database.properties import database_summary
 from semsig_gis.reports import paris
-from semsig_gis.reports.tables import Table, percent
+from semsig_gis.reports.tables import Table, note_tables, percent
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -23,10 +23,10 @@ def database_tables(
     file_bytes: int | None = None,
     object_counts: Mapping[int, int] | None = None,
 ) -> tuple[Table, ...]:
-    """Return the paper's Tables 1, 2a and 2b for a database, and a table of its classes."""
+    """Return the paper's Tables 1, 2a and 2b for a database, one of its classes, one of notes."""
     facts = database_summary(database, file_bytes=file_bytes, object_counts=object_counts)
     tables = (_occurrence_table, _property_table, _group_table, _class_table)
-    return tuple(table(facts) for table in tables)
+    return (*(table(facts) for table in tables), *note_tables(facts["notes"]))
 
 
 def _occurrence_table(facts: Mapping[str, Any]) -> Table:

@@ -17,7 +17,7 @@ import shapely
 from pyproj import Transformer
 
 from semsig_gis.core.geometry import COUNT
-from semsig_gis.reports.tables import Table
+from semsig_gis.reports.tables import Table, note_tables
 from semsig_gis.sources import RowCounts
 
 if TYPE_CHECKING:
@@ -61,7 +61,8 @@ class QualityReport:
     `classes` are those with objects in the order of the taxonomy, `absent` those without; `sources`
     stand in the order they were loaded. `crs` is a code, or a name where there is none. Extents are
     west, south, east and north, in metres and in degrees of WGS 84. `hull_km2` is the area of the
-    convex hull of all objects, `occupied_km2` that of the squares of 100 m that hold one.
+    convex hull of all objects, `occupied_km2` that of the squares of 100 m that hold one. `notes`
+    are warnings about all of the load; those about a layer stand in `sources`.
     """
 
     classes: tuple[ClassQuality, ...]
@@ -74,6 +75,7 @@ class QualityReport:
     hull_km2: float
     occupied_km2: float
     licenses: tuple[str, ...]
+    notes: tuple[str, ...] = ()
 
     @property
     def objects(self) -> int:
@@ -92,7 +94,11 @@ class QualityReport:
 
 
 def quality_report(
-    objects: StreetObjects, load: LoadReport, conflation: ConflationReport | None = None
+    objects: StreetObjects,
+    load: LoadReport,
+    conflation: ConflationReport | None = None,
+    *,
+    notes: Sequence[str] = (),
 ) -> QualityReport:
     """Report on the quality of a load.
 
@@ -104,6 +110,8 @@ def quality_report(
         What `build_objects` says of the layers.
     conflation : ConflationReport, optional
         What `conflate` says, if it was used.
+    notes : sequence of str
+        Warnings about all of the load.
 
     Returns
     -------
@@ -142,6 +150,7 @@ def quality_report(
         hull_km2=hull_km2,
         occupied_km2=occupied_km2,
         licenses=tuple(map(str, objects.licenses)),
+        notes=tuple(notes),
     )
 
 
@@ -197,7 +206,7 @@ NOTES_SHOWN = 4
 
 
 def quality_tables(report: QualityReport) -> tuple[Table, ...]:
-    """Return objects by class, rows by layer, conflated objects if any, place and licences.
+    """Return objects by class, rows by layer, what was conflated, place, licences and notes.
 
     Parameters
     ----------
@@ -207,7 +216,7 @@ def quality_tables(report: QualityReport) -> tuple[Table, ...]:
     Returns
     -------
     tuple of Table
-        Four tables, or five with conflated objects.
+        Four tables, and one more with conflated objects and with notes about all of the load.
 
     Examples
     --------
@@ -255,6 +264,7 @@ def quality_tables(report: QualityReport) -> tuple[Table, ...]:
             ),
         ),
         Table("Licences", ("licence",), tuple((line,) for line in report.licenses)),
+        *note_tables(report.notes),
     )
     return tuple(table for table in tables if table.title != "Conflated" or table.rows)
 

@@ -84,6 +84,11 @@ class Table:
         return f"### {escaped(self.title)}\n\n{markdown_rows(self, escaped)}\n{note}"
 
 
+def note_tables(notes: Sequence[str]) -> tuple[Table, ...]:
+    """Return a table of notes; none where there are no notes."""
+    return (Table("Notes", ("note",), tuple((note,) for note in notes)),) if notes else ()
+
+
 def markdown_rows(table: Table, escape: Callable[[str], str]) -> str:
     """Return the headings and rows of a table as Markdown, with its texts escaped."""
 

@@ -100,10 +100,26 @@ def test_switches_keep_what_filters_and_collapsing_take(done: Done) -> None:
     assert json.loads(done(line, "--layer", "crossings"))["objects"] == 2
 
 
-def test_a_layer_without_a_file_is_named_and_left_out(city: Path, run: Run) -> None:
+@pytest.mark.parametrize("tiles", ["", "--tile 200"])
+def test_what_a_load_warns_of_is_kept_with_the_data(
+    city: Path, run: Run, done: Done, tiles: str
+) -> None:
     (city / "crossings.geojson").unlink()
-    code, _, err = run(LOAD)
-    assert (code, "layer 'crossings' has no file here" in err) == (0, True)
+    catalog = (city / "tiny.toml").read_text(encoding="utf-8")
+    lights = catalog.replace('files = ["lights.*"]', 'files = ["lights.*"]\nrows = [1, 9]')
+    (city / "tiny.toml").write_text(lights, encoding="utf-8")
+    code, out, err = run(f"{LOAD} --json")
+    report = json.loads(out)
+    (absent,), (few,) = report["notes"], report["sources"][0]["notes"]
+    assert (code, f"semsig: {absent}" in err) == (0, True)
+    assert absent.startswith("layer 'crossings' has no file here")
+    assert "1 to 9 were expected" in few
+    target = "town" if tiles else "town.parquet"
+    done(f"build o.parquet --out {target} {tiles}")
+    notes = [absent, f"lights: {few}"]
+    assert json.loads(done(f"info {target} --json"))["notes"] == notes
+    printed = done(f"info {target}")
+    assert all(note in printed for note in notes)
 
 
 @pytest.mark.usefixtures("city")

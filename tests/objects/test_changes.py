@@ -190,6 +190,13 @@ def test_a_licence_of_unknown_layers_renews_none() -> None:
     assert "which layers 'City (CC0): lamps, trees' is about" in notes[0]
 
 
+def test_warnings_go_with_the_layers_that_they_are_about() -> None:
+    old = dataclasses.replace(OLD, notes=("a file is missing", "lamps: odd", "trees: odd"))
+    new = table((4, 4, LAMP, "lamps", "5"), licenses=(Licence("City (CC0)", ("lamps",)),))
+    objects, _, _ = replace_layers(old, dataclasses.replace(new, notes=("lamps: few",)))
+    assert objects.notes == ("a file is missing", "trees: odd", "lamps: few")
+
+
 def changed(**values: object) -> Taxonomy:
     first, *others = TAXONOMY.classes
     return Taxonomy((dataclasses.replace(first, **values), *others))  # type: ignore[arg-type]
