@@ -233,9 +233,7 @@ def sources(
             for spec in catalog.layers
         ),
     )
-    used = {spec.class_name for spec in catalog.layers}
-    for spec in catalog.layers:
-        used |= {value for _, value in spec.class_by.classes} if spec.class_by else set()
+    used = {name for spec in catalog.layers for name in spec.classes}
     print_rows(
         "Classes",
         ("symbol", "code", "class", "title"),
@@ -244,10 +242,8 @@ def sources(
 
 
 def _class_text(spec: LayerSpec) -> str:
-    if spec.class_by is None:
-        return spec.class_name or spec.role
-    others = dict.fromkeys(name for _, name in spec.class_by.classes)
-    return f"{spec.class_name} ({', '.join(others)} by {spec.class_by.field})"
+    by = f" (by {spec.class_by.field})" if spec.class_by else ""
+    return f"{', '.join(spec.classes)}{by}" if spec.classes else spec.role
 
 
 def _origin_text(spec: LayerSpec) -> str:
@@ -262,5 +258,7 @@ def _origin_text(spec: LayerSpec) -> str:
 
 def _filter_text(spec: LayerSpec) -> str:
     return " and ".join(
-        f"{field} = {' or '.join(map(str, accepted))}" for field, accepted in spec.where
+        f"{sign}{field} = {' or '.join(map(str, accepted))}"
+        for sign, rules in (("", spec.where), ("not ", spec.exclusions))
+        for field, accepted in rules
     )

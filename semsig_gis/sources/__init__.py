@@ -40,15 +40,17 @@ FILE_SUFFIXES = frozenset(
 class RowCounts:
     """How many rows a layer has, and how many of them are left out for each reason.
 
-    Rows are `unreadable`, `filtered` (by the catalogue, or outside the area), `missing` (without a
-    geometry), `duplicates` (the id of an earlier row, where ids are unique), `misplaced` (off the
-    Earth, or not finite in the metric CRS), `collapsed` (at the place of an earlier object of the
-    class) or `conflated` (merged into an object of an earlier layer).
+    Rows are `unreadable`, `filtered` (by the catalogue, or outside the area), `excluded` (by what
+    the catalogue says in ``not``), `missing` (without a geometry), `duplicates` (the id of an
+    earlier row, where ids are unique), `misplaced` (off the Earth, or not finite in the metric
+    CRS), `collapsed` (at the place of an earlier object of the class) or `conflated` (merged into
+    an object of an earlier layer).
     """
 
     read: int
     unreadable: int = 0
     filtered: int = 0
+    excluded: int = 0
     missing: int = 0
     duplicates: int = 0
     misplaced: int = 0

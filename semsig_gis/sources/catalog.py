@@ -21,6 +21,7 @@ from semsig_gis.core.errors import (
 from semsig_gis.core.geometry import require_metric_crs
 from semsig_gis.core.plugins import installed_catalogs
 from semsig_gis.core.taxonomy import MAX_RANGE_M, ObjectClass, Taxonomy
+from semsig_gis.sources.conditions import COMPARES, Condition, Value
 from semsig_gis.storage.toml import check_keys, metres, one_of, parse_toml, texts
 
 if TYPE_CHECKING:
@@ -28,12 +29,9 @@ if TYPE_CHECKING:
     from importlib.resources.abc import Traversable
 
 
-Value = str | int | float | bool
 GeometryKind = Literal["point", "line", "polygon"]
 ElementKind = Literal["node", "way", "relation"]
 Role = Literal["objects", "buildings", "streets"]
-# Stands for every value of a tag but "no".
-ANY_VALUE = "*"
 # No street is narrower or wider; the number is in another unit, or means something else.
 MIN_WIDTH_M = 0.1
 MAX_WIDTH_M = 200.0
@@ -41,10 +39,14 @@ MAX_WIDTH_M = 200.0
 
 @dataclass(frozen=True, slots=True)
 class ClassBy:
-    """A field whose value decides the class of a row; for others, the layer's class holds."""
+    """A field whose value decides the class of a row.
+
+    Rows of other values are left out, unless `otherwise` gives them the layer's class.
+    """
 
     field: str
     classes: tuple[tuple[Value, str], ...]
+    otherwise: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,14 +68,17 @@ class LayerSpec:
     Parameters
     ----------
     name, class_name : str
-        Name of the layer in the catalogue, and class of its rows.
+        Name of the layer in the catalogue, and class of its rows; empty where `class_by` says it
+        of every row, and for surroundings.
     files : tuple of str
         File-name patterns (``*``, ``?``) by which the layer's file is recognised.
     layer : str, optional
         Layer inside a file that holds several.
-    where : tuple of (str, tuple)
-        Fields and the values of each that are accepted, compared exactly; all must hold. A text
-        between slashes is a regular expression that the whole value must match.
+    where, exclusions : tuple of (str, tuple)
+        Fields or tags and the values of each: of `where`, all must hold for a row to count, and of
+        `exclusions`, none. Values are exact, but for texts between slashes (a regular expression
+        that the whole value must match), comparisons such as ``">=0"``, ``"none"`` (absent or
+        empty) and ``"*"`` (every value but ``"no"``).
     class_by : ClassBy, optional
         Field that decides the class row by row.
     width_by, width_field : WidthBy, str, optional
@@ -114,6 +119,7 @@ class LayerSpec:
     files: tuple[str, ...] = ()
     layer: str | None = None
     where: tuple[tuple[str, tuple[Value, ...]], ...] = ()
+    exclusions: tuple[tuple[str, tuple[Value, ...]], ...] = ()
     class_by: ClassBy | None = None
     width_by: WidthBy | None = None
     width_field: str | None = None
@@ -143,6 +149,15 @@ class LayerSpec:
         return self.width_by is not None or self.width_field is not None
 
     @property
+    def classes(self) -> tuple[str, ...]:
+        """The classes that objects of the layer may have."""
+        by = self.class_by
+        if by is None:
+            return (self.class_name,) if self.role == "objects" else ()
+        names = [name for _, name in by.classes]
+        return tuple(dict.fromkeys([self.class_name, *names] if by.otherwise else names))
+
+    @property
     def terms(self) -> str:
         """Whom to name for the layer, and under which licence."""
         return f"{self.attribution or 'no attribution given'} ({self.license})"
@@ -151,6 +166,7 @@ class LayerSpec:
     def fields(self) -> tuple[tuple[str, str], ...]:
         """The keys that name a field of the file, but for coordinates, and the fields."""
         uses = [("where", field) for field, _ in self.where]
+        uses += [("not", field) for field, _ in self.exclusions]
         uses += [("class_by", self.class_by.field)] if self.class_by else []
         uses += [("width_by", self.width_by.field)] if self.width_by else []
         uses += [("width_field", self.width_field)] if self.width_field else []
@@ -164,6 +180,7 @@ LAYER_KEYS = {
     "files": list,
     "layer": str,
     "where": dict,
+    "not": dict,
     "class_by": dict,
     "width_by": dict,
     "width_field": str,
@@ -187,6 +204,7 @@ LAYER_KEYS = {
     "attribution": str,
 }
 CLASS_BY_KEYS = {"field": str, "values": dict}
+OTHERWISE = "class"  # the one thing that class_by may say of other values
 WIDTH_BY_KEYS = {"field": str, "values": dict, "default": object}
 
 
@@ -195,7 +213,8 @@ def layer_of(
 ) -> LayerSpec:
     """Return the checked layer of a ``[[layers]]`` table; CatalogError says what is wrong in it.
 
-    `shared` has files, reader, license and attribution of layers that do not say otherwise.
+    `shared` has files, reader, license, attribution and exclusions of layers that do not say
+    otherwise; surroundings have no exclusions but their own.
     """
     if not isinstance(item, dict):
         msg = f"{where} has the layer {item!r}; write a [[layers]] table."
@@ -203,11 +222,9 @@ def layer_of(
     where = f"{where}, layer {item.get('name', '?')!r}"
     check_keys(item, LAYER_KEYS, where, ("name",))
     role = one_of(item.get("role", "objects"), "role", get_args(Role), where)
-    if (role == "objects") != ("class" in item):
-        what = "lacks the key 'class'; add it" if role == "objects" else "needs no class; remove it"
-        msg = f"{where} {what}."
-        raise CatalogError(msg)
-    if role == "objects":
+    class_by = _class_by(item["class_by"], taxonomy, where) if "class_by" in item else None
+    _require_classes(item, role, class_by, where)
+    if "class" in item:
         require_class(item["class"], taxonomy, where)
     if "crs" in item:
         try:
@@ -229,16 +246,17 @@ def layer_of(
         msg = f"{where} has files = []; write a list of file names or patterns."
         raise CatalogError(msg)
     kinds = texts(item.get("elements", list(get_args(ElementKind))), "elements", where)
+    exclusions = shared["exclusions"] if role == "objects" else ()
+    if "not" in item:
+        exclusions = _conditions(item["not"], "not", where)
     plain = {key: value for key, value in item.items() if LAYER_KEYS[key] in {str, bool}}
     own = {
         "class_name": plain.pop("class", ""),
         "role": role,
         "files": files,
-        "where": tuple(
-            (field, _values(accepted, field, where))
-            for field, accepted in item.get("where", {}).items()
-        ),
-        "class_by": _class_by(item["class_by"], taxonomy, where) if "class_by" in item else None,
+        "where": _conditions(item.get("where", {}), "where", where),
+        "exclusions": exclusions,
+        "class_by": class_by,
         "width_by": _width_by(item["width_by"], where) if "width_by" in item else None,
         "aliases": tuple(
             (field, texts(names, f"aliases of {field!r}", where))
@@ -255,14 +273,36 @@ def layer_of(
     return LayerSpec(**{**shared, **plain, **own})
 
 
+def _require_classes(
+    item: Mapping[str, Any], role: Role, class_by: ClassBy | None, where: str
+) -> None:
+    """Refuse objects without a class, and surroundings with one."""
+    given = "class" in item
+    if role == "objects" and not given and (class_by is None or class_by.otherwise):
+        msg = f"{where} lacks the key 'class'; add it."
+        raise CatalogError(msg)
+    if role != "objects" and given:
+        msg = f"{where} needs no class; remove it."
+        raise CatalogError(msg)
+
+
 def _tags(item: object, where: str) -> tuple[tuple[str, tuple[str, ...]], ...]:
     if not isinstance(item, dict) or not item:
         msg = f"{where} has the tags {item!r}; write a table of keys and values."
         raise CatalogError(msg)
-    return tuple(
+    tags = tuple(
         (key, texts(value if isinstance(value, list) else [value], f"tag {key!r}", where))
         for key, value in item.items()
     )
+    for key, values in tags:
+        comparison = next(filter(COMPARES.match, values), None)
+        if comparison is not None:
+            msg = (
+                f"{where} has the tag {key!r} = {comparison!r}, and tags are exact; compare in "
+                f"where = {{ {key} = {comparison!r} }}."
+            )
+            raise CatalogError(msg)
+    return tags
 
 
 def require_class(name: str, taxonomy: Taxonomy, where: str) -> None:
@@ -276,13 +316,19 @@ def require_class(name: str, taxonomy: Taxonomy, where: str) -> None:
 
 def _class_by(item: dict[str, Any], taxonomy: Taxonomy, where: str) -> ClassBy:
     where = f"{where}, class_by"
-    check_keys(item, CLASS_BY_KEYS, where, CLASS_BY_KEYS)
+    check_keys(item, {**CLASS_BY_KEYS, "otherwise": str}, where, CLASS_BY_KEYS)
+    if item.get("otherwise", OTHERWISE) != OTHERWISE:
+        msg = (
+            f"{where} has otherwise = {item['otherwise']!r}; write {OTHERWISE!r}, which gives "
+            "other values the layer's class, or remove it, so that they are left out."
+        )
+        raise CatalogError(msg)
     for value, name in item["values"].items():
         if not isinstance(name, str):
             msg = f"{where} has {value!r} = {name!r}; write the name of a class."
             raise CatalogError(msg)
         require_class(name, taxonomy, where)
-    return ClassBy(item["field"], tuple(item["values"].items()))
+    return ClassBy(item["field"], tuple(item["values"].items()), "otherwise" in item)
 
 
 def _width_by(item: dict[str, Any], where: str) -> WidthBy:
@@ -299,14 +345,25 @@ def _width_by(item: dict[str, Any], where: str) -> WidthBy:
     )
 
 
-def _values(accepted: object, field: str, where: str) -> tuple[Value, ...]:
-    values = accepted if isinstance(accepted, list) else [accepted]
+def _conditions(
+    item: dict[str, Any], key: str, where: str
+) -> tuple[tuple[str, tuple[Value, ...]], ...]:
+    return tuple((field, _values(accepted, key, field, where)) for field, accepted in item.items())
+
+
+def _values(accepted: object, key: str, field: str, where: str) -> tuple[Value, ...]:
+    values: list[Any] = accepted if isinstance(accepted, list) else [accepted]
     if not values or not all(isinstance(value, Value) for value in values):
         msg = (
             f"{where} filters {field!r} by {accepted!r}; "
             "write the accepted value, or a list of accepted values."
         )
         raise CatalogError(msg)
+    try:
+        Condition.parse(values)
+    except CatalogError as error:
+        msg = f"{where} has {key} = {{ {field} = {accepted!r} }}: {error}"
+        raise CatalogError(msg) from error
     return tuple(values)
 
 
@@ -333,6 +390,7 @@ CATALOG_KEYS = {
     "endpoints": list,
     "geocoder": str,
     "files": list,
+    "not": dict,
     "conflate": dict,
     "ranges": dict,
     "classes": list,
@@ -571,6 +629,7 @@ def _catalog(content: dict[str, Any], where: str) -> Catalog:
         key: plain[key] for key in ("license", "attribution", "reader") if key in plain
     }
     shared["files"] = texts(content.get("files", []), "files", where)
+    shared["exclusions"] = _conditions(content.get("not", {}), "not", where)
     layers = tuple(
         layer_of(item, where, taxonomy=taxonomy, shared=shared) for item in content["layers"]
     )

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import functools
+import itertools
 import math
 import re
 from collections import Counter
@@ -20,13 +21,15 @@ from semsig_gis.core.errors import CatalogError, CrsError, nearest_name
 from semsig_gis.core.geometry import CLASS_NAME, GEOMETRY, HALF_WIDTH, SOURCE_ID
 from semsig_gis.sources import RawLayer, RowCounts
 from semsig_gis.sources.catalog import MAX_WIDTH_M, MIN_WIDTH_M
+from semsig_gis.sources.conditions import Condition, as_text, matches
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence
 
     from numpy.typing import NDArray
 
-    from semsig_gis.sources.catalog import LayerSpec, Value
+    from semsig_gis.sources.catalog import LayerSpec
+    from semsig_gis.sources.conditions import Value
 
 
 WGS84 = CRS.from_epsg(4326)
@@ -119,13 +122,13 @@ KINDS = {
     "polygon": ("Polygon", "MultiPolygon"),
 }
 ERRORS_KEPT = 10
+# Values that class_by does not list and that are named.
+UNLISTED_TOLD, LONGEST_VALUE = 8, 40
 # Rows of one id farther apart than this are told of: about a metre, by unit of the CRS.
 APART_DEGREES, APART_METRES = 1e-5, 1.0
 # How much an element of OpenStreetMap lacks, in the text that says so.
 SHARE = re.compile(r"\d+ of its \d+")
 WHOLE_FLOAT = re.compile(r"(-?\d+)\.0+")
-# A value that a catalogue writes between slashes is a pattern.
-BETWEEN_SLASHES = re.compile(r"/(.+)/")
 
 T = TypeVar("T")
 # A point as its two coordinates, so that all points are built at once; else a built geometry.
@@ -172,8 +175,8 @@ def raw_layer(
     CrsError if that is in degrees and most coordinates are not; `by_file` if the file states it.
     """
     spec = rules.spec
-    table = rules.table(rows)
-    filtered = rows.filtered + len(rows.numbers) - len(table)
+    sifted = rules.sift(rows)
+    table = sifted.table
     broken = table[GEOMETRY][[isinstance(position, str) for position in table[GEOMETRY]]]
     errors: dict[int, str] = {**rows.errors, **dict(zip(broken.index, broken, strict=True))}
     table = table.drop(index=broken.index)
@@ -201,10 +204,14 @@ def raw_layer(
         spec=spec,
         table=gpd.GeoDataFrame(table, geometry=geometry, crs=crs),
         counts=RowCounts(
-            read=rows.read, unreadable=len(errors), filtered=filtered, duplicates=repeated
+            read=rows.read,
+            unreadable=len(errors),
+            filtered=rows.filtered + sifted.filtered,
+            excluded=sifted.excluded,
+            duplicates=repeated,
         ),
         errors=tuple(f"row {row}: {text}" for row, text in sorted(errors.items())[:ERRORS_KEPT]),
-        notes=notes,
+        notes=(*sifted.notes, *notes),
     )
 
 
@@ -287,39 +294,17 @@ def _causes(errors: Iterable[str]) -> str:
     return f"unreadable: {listed}"
 
 
-def as_text(value: object) -> str:
-    """Return a field value as text; a whole number has no decimals."""
-    if isinstance(value, bool):
-        return "true" if value else "false"
-    if isinstance(value, float) and value.is_integer():
-        return str(int(value))
-    return str(value)
+@dataclasses.dataclass(frozen=True, eq=False, slots=True)
+class Sifted:
+    """The rows that the rules of a layer let pass, and how many they leave out, and why.
 
-
-def matches(value: object, wanted: Value) -> bool:
-    """Tell whether a field value is the one a catalogue names.
-
-    Text compares as text and numbers as numbers, so that 3 is found in a text field and "3" in a
-    numeric one. A text between slashes is a regular expression for the whole value.
+    Rows are `filtered` by ``where`` or ``class_by``, and `excluded` by ``not``.
     """
-    if value is None:
-        return False
-    if isinstance(wanted, str):
-        pattern = _pattern(wanted)
-        text = as_text(value)
-        return text == wanted if pattern is None else pattern.fullmatch(text) is not None
-    if isinstance(wanted, bool) or isinstance(value, bool):
-        return as_text(value) == as_text(wanted)
-    try:
-        return float(value) == wanted  # type: ignore[arg-type]
-    except (TypeError, ValueError):
-        return False
 
-
-@functools.lru_cache
-def _pattern(wanted: str) -> re.Pattern[str] | None:
-    inner = BETWEEN_SLASHES.fullmatch(wanted)
-    return re.compile(inner[1]) if inner else None
+    table: pd.DataFrame
+    filtered: int
+    excluded: int
+    notes: tuple[str, ...]
 
 
 class RowRules:
@@ -330,24 +315,25 @@ class RowRules:
     ) -> None:
         self.spec = spec
         self.file = where  # for messages
-        self._where = spec.where if filters else ()
-        values = [wanted for _, accepted in self._where for wanted in accepted]
-        if spec.class_by is not None:
-            values.extend(wanted for wanted, _ in spec.class_by.classes)
-        if spec.width_by is not None:
-            values.extend(wanted for wanted, _ in spec.width_by.widths)
-        for value in values:
-            try:
-                _pattern(str(value))
-            except re.error as error:
-                msg = f"{where}: pattern {value} is not a regular expression ({error}); correct it."
-                raise CatalogError(msg) from error
-        uses = [use for use in spec.fields if filters or use[0] != "where"]
+        try:
+            self._where, self._not = (
+                [(field, Condition.parse(accepted)) for field, accepted in rules if filters]
+                for rules in (spec.where, spec.exclusions)
+            )
+            for by in (
+                spec.class_by and spec.class_by.classes,
+                spec.width_by and spec.width_by.widths,
+            ):
+                Condition.parse(value for value, _ in by or ())
+        except CatalogError as error:
+            msg = f"{where}: {error}"
+            raise CatalogError(msg) from error
+        uses = [use for use in spec.fields if filters or use[0] not in {"where", "not"}]
         for key, column in uses:
             require_field(column, fields, where=where, key=key)
         self.fields = tuple(dict.fromkeys(column for _, column in uses))
 
-    def table(self, rows: Rows) -> pd.DataFrame:
+    def sift(self, rows: Rows) -> Sifted:
         """Return class, identifier, half-width in metres and position of the rows that pass.
 
         The index has their numbers. The half-width is NaN where nobody knows it; the identifier is
@@ -355,28 +341,65 @@ class RowRules:
         another row's id.
         """
         spec = self.spec
+        size = len(rows.numbers)
         columns = dict(zip(self.fields, zip(*rows.values, strict=True), strict=False))
-        kept = np.ones(len(rows.numbers), bool)
-        for field, accepted in self._where if rows.numbers else ():
-            kept &= [any(matches(value, one) for one in accepted) for value in columns[field]]
-        ids = columns.get(spec.id_field or "", [None] * len(kept))
-        names = [""] * len(kept) if spec.unique_id else rows.names
+        kept = np.ones(size, bool)
+        for field, condition in self._where if size else ():
+            kept &= [condition.accepts(value) for value in columns[field]]
+        filtered = size - int(kept.sum())
+        excluded: dict[str, int] = {}
+        for field, condition in self._not if size else ():
+            out = kept & [condition.accepts(value, every=True) for value in columns[field]]
+            excluded[field] = int(out.sum())
+            kept &= ~out
+        classes = self._classes(columns, size)
+        unlisted = kept & np.array([name is None for name in classes], bool)
+        ids = columns.get(spec.id_field or "", [None] * size)
+        names = [""] * size if spec.unique_id else rows.names
         table = pd.DataFrame(
             {
-                CLASS_NAME: pd.Series(self._classes(columns, len(kept)), dtype="str"),
+                CLASS_NAME: pd.Series(classes, dtype="str"),
                 SOURCE_ID: pd.Series(map(_identifier, ids, names), dtype="str"),
-                HALF_WIDTH: pd.Series(self._half_widths(columns, len(kept)), dtype="float64"),
+                HALF_WIDTH: pd.Series(self._half_widths(columns, size), dtype="float64"),
                 GEOMETRY: pd.Series(rows.positions, dtype=object),
             }
-        )
+        ).set_index(pd.Index(rows.numbers, dtype=int))
         unused = [] if spec.has_width else [HALF_WIDTH]
-        return table.set_index(pd.Index(rows.numbers, dtype=int))[kept].drop(columns=unused)
+        notes = []
+        if any(excluded.values()):
+            told = (f"{field} {number}" for field, number in excluded.items() if number)
+            notes.append(f"left out by not: {', '.join(told)}")
+        if unlisted.any():
+            notes.append(self._unlisted(columns, unlisted))
+        return Sifted(
+            table[kept & ~unlisted].drop(columns=unused),
+            filtered=filtered + int(unlisted.sum()),
+            excluded=sum(excluded.values()),
+            notes=tuple(notes),
+        )
 
-    def _classes(self, columns: Mapping[str, Sequence[Any]], size: int) -> list[str]:
+    def _classes(self, columns: Mapping[str, Sequence[Any]], size: int) -> list[str | None]:
+        """Return the class of each row, None where `class_by` does not list its value."""
+        by, name = self.spec.class_by, self.spec.class_name
+        if by is None or self.spec.role != "objects":
+            return [name] * size
+        default = name if by.otherwise else None
+        return [_first(by.classes, value, default) for value in columns.get(by.field, ())]
+
+    def _unlisted(self, columns: Mapping[str, Sequence[Any]], rows: NDArray[np.bool_]) -> str:
+        """Name the values that `class_by` does not list, those of the most rows first."""
         by, name = self.spec.class_by, self.spec.class_name
         if by is None:
-            return [name] * size
-        return [_first(by.classes, value, name) for value in columns.get(by.field, ())]
+            return ""
+        values = itertools.compress(columns[by.field], rows)
+        counts = Counter(
+            "no value" if v is None else repr(as_text(v)[:LONGEST_VALUE]) for v in values
+        )
+        told = [f"{value} {number}" for value, number in counts.most_common(UNLISTED_TOLD)]
+        others = len(counts) - len(told)
+        told += [f"and {others} others"] if others else []
+        remedy = f'; write otherwise = "class" to take them as {name}' if name else ""
+        return f"left out, unlisted in class_by {by.field!r}: {', '.join(told)}{remedy}"
 
     def _half_widths(self, columns: Mapping[str, Sequence[Any]], size: int) -> NDArray[np.float64]:
         by, own = self.spec.width_by, self.spec.width_field

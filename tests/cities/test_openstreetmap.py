@@ -155,9 +155,10 @@ def bare_loop(path: Path) -> tuple[Counter[str], Counter[str]]:
 
 
 @functools.cache
-def read_extract(geodata: Path, city: str) -> Mapping[str, RawLayer]:
+def read_extract(geodata: Path, city: str, *, filters: bool = True) -> Mapping[str, RawLayer]:
     path = geodata / "osm" / EXTRACTS[city]
-    return {layer.spec.name: layer for layer in read_layers(path, CATALOG.layers)}
+    layers = read_layers(path, CATALOG.layers, filters=filters)
+    return {layer.spec.name: layer for layer in layers}
 
 
 def by_kind(layers: Mapping[str, RawLayer]) -> Counter[str]:
@@ -181,8 +182,21 @@ def test_objects_of_the_classes_of_the_paper(geodata: Path, city: str) -> None:
 
 
 @pytest.mark.parametrize("city", EXTRACTS)
-def test_a_bare_loop_counts_the_same(geodata: Path, city: str) -> None:
+def test_what_is_not_seen_from_the_street_is_left_out(geodata: Path, city: str) -> None:
     layers = read_extract(geodata, city)
+    told = {
+        name: note.removeprefix("left out by not: ")
+        for name, layer in layers.items()
+        for note in layer.notes
+        if note.startswith("left out by not: ")
+    }
+    assert told == TABLE["cities"][city]["excluded"]
+    assert {name for name, layer in layers.items() if layer.counts.excluded} == set(told)
+
+
+@pytest.mark.parametrize("city", EXTRACTS)
+def test_a_bare_loop_counts_the_same(geodata: Path, city: str) -> None:
+    layers = read_extract(geodata, city, filters=False)
     kept = by_kind(layers)
     seen, clipped = bare_loop(geodata / "osm" / EXTRACTS[city])
     assert seen["buildings way"] == TABLE["cities"][city]["buildings"][0]

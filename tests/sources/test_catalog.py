@@ -96,6 +96,8 @@ def test_streets_say_how_wide_they_are(town: Town) -> None:
     assert spec.fields == (
         ("where", "STATE"),
         ("where", "KIND"),
+        ("not", "LEVEL"),
+        ("not", "GONE"),
         ("class_by", "KIND"),
         ("width_by", "TYPE"),
         ("width_field", "WIDTH"),

@@ -58,7 +58,7 @@ TREES = LayerSpec(
 ALIGNED = replace(
     TREES,
     where=(("DOMANIALITE", ("Alignement",)),),
-    class_by=ClassBy("DOMANIALITE", (("/Jard.*/", "bench"),)),
+    class_by=ClassBy("DOMANIALITE", (("/Jard.*/", "bench"),), otherwise=True),
 )
 # Three trees in every spelling of a portal.
 DATA = Path(__file__).with_name("data") / "les-arbres"

@@ -184,7 +184,7 @@ CORNERS = [node(1, 0, 0), node(2, 1, 0), node(3, 1, 1), node(4, 0, 1)]
 
 
 def found(layer: RawLayer) -> dict[str, str]:
-    assert layer.counts.read == len(layer.table) + layer.counts.filtered + layer.counts.unreadable
+    assert layer.counts.kept == len(layer.table)
     return dict(zip(layer.table.source_id, layer.table.geometry.to_wkt(), strict=True))
 
 
@@ -386,7 +386,7 @@ def test_deleted_elements_are_not_there(read: Read) -> None:
 
 
 def test_where_and_class_by_are_by_tag(read: Read) -> None:
-    by_colour = ClassBy("colour", (("red", "taxi_station"),))
+    by_colour = ClassBy("colour", (("red", "taxi_station"),), otherwise=True)
     spec = replace(BENCHES, where=(("backrest", ("yes",)),), class_by=by_colour)
     nodes = [
         node(1, 2, 48, {**BENCH, "backrest": "yes"}),
@@ -400,6 +400,25 @@ def test_where_and_class_by_are_by_tag(read: Read) -> None:
     assert layer.counts.filtered == 2
     everything = read(spec, *nodes, filters=False)
     assert (len(everything.table), everything.counts.filtered) == (4, 0)
+
+
+def test_what_is_below_the_street_is_left_out_and_told(read: Read) -> None:
+    rules = (("level", ("<0",)), ("layer", ("<0",)), ("disused", ("*",)))
+    spec = replace(BENCHES, exclusions=rules)
+    tags = [
+        *({}, {"level": "0"}, {"level": "-1;0"}, {"disused": "no"}, {"layer": "1"}),
+        *({"level": "-1"}, {"level": "-2;-1"}, {"layer": "-1", "level": "-1"}, {"disused": "yes"}),
+        {"layer": "-1"},
+    ]
+    nodes = [node(number, 2, 48, {**BENCH, **more}) for number, more in enumerate(tags, start=1)]
+    layer = read(spec, *nodes)
+    assert list(found(layer)) == [f"node/{number}" for number in range(1, 6)]
+    assert layer.counts == RowCounts(read=10, excluded=5)
+    assert layer.notes == ("left out by not: level 3, layer 1, disused 1",)
+    everything = read(spec, *nodes, filters=False)
+    assert everything.counts == RowCounts(read=10)
+    above = replace(BENCHES, where=(("level", (">=0 or none",)),))
+    assert read(above, *nodes).counts == RowCounts(read=10, filtered=3)
 
 
 def test_layers_of_no_elements_and_another_crs(read: Read) -> None:

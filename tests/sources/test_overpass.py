@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+import osm_xml
 import pytest
 import shapely
 from hypothesis import given
@@ -22,7 +23,8 @@ from servers import Answer
 from semsig_gis.core.errors import CatalogError, InputError, SourceError
 from semsig_gis.sources import RowCounts
 from semsig_gis.sources.area import Area, parse_area
-from semsig_gis.sources.catalog import ANY_VALUE, LayerSpec, load_catalog
+from semsig_gis.sources.catalog import LayerSpec, load_catalog
+from semsig_gis.sources.conditions import ANY_VALUE
 from semsig_gis.sources.http.fetch import HttpError, HttpSpec, NotCachedError
 from semsig_gis.sources.osm import file as osm_file
 from semsig_gis.sources.osm.overpass import (
@@ -439,6 +441,26 @@ def test_a_server_and_a_file_say_the_same_of_a_city(geodata: Path, tmp_path: Pat
 
         found += len(mine)
     assert found > 300
+
+
+def test_a_server_and_a_file_leave_out_the_same(tmp_path: Path) -> None:
+    """Servers send what is underground too, so that what is left out is counted."""
+    more: list[dict[str, str]] = [
+        {},
+        {"level": "-1"},
+        {"level": "-1;0"},
+        {"indoor": "no"},
+        {"construction": "yes"},
+    ]
+    file, answer = tmp_path / "town.osm", tmp_path / "town.json"
+    benches = ({"amenity": "bench", **tags} for tags in more)
+    osm_xml.write_osm(file, *(osm_xml.node(n, 2, 48, tags) for n, tags in enumerate(benches, 1)))
+    answer.write_bytes(as_overpass(file))
+    spec = load_catalog("openstreetmap").layer("benches")
+    for (layer,) in (read_layers(answer, [spec]), osm_file.read_layers(file, [spec])):
+        assert layer.table["source_id"].tolist() == ["node/1", "node/3", "node/4"]
+        assert layer.counts == RowCounts(read=5, excluded=2)
+    assert "level" not in overpass_query([spec], (1, 47, 3, 49))
 
 
 def test_a_place_is_found_with_its_outline(server: Server, cache: Cache) -> None:

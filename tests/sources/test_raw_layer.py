@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-import dataclasses
 import math
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -16,20 +16,21 @@ from sentences import refused
 
 from semsig_gis.core.errors import CatalogError
 from semsig_gis.sources import reader
-from semsig_gis.sources.catalog import LayerSpec, WidthBy
+from semsig_gis.sources.catalog import ClassBy, LayerSpec, WidthBy
 from semsig_gis.sources.raw_layer import (
-    BETWEEN_SLASHES,
     RowRules,
     Rows,
-    as_text,
     crs_label,
-    matches,
     off_the_globe,
     usable_crs,
 )
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     import pandas as pd
+
+    from semsig_gis.sources.raw_layer import Sifted
 
 
 DATA = Path(__file__).with_name("data")
@@ -65,7 +66,7 @@ def test_only_degrees_have_limits() -> None:
         assert not off_the_globe(xy, CRS.from_epsg(limitless)).any()
 
 
-def table(spec: LayerSpec, **columns: list[object]) -> pd.DataFrame:
+def sifted(spec: LayerSpec, **columns: Sequence[object]) -> Sifted:
     """Return what the rules of a layer make of rows with these fields."""
     rules = RowRules(spec, list(columns), filters=True, where="here")
     rows = Rows()
@@ -73,32 +74,11 @@ def table(spec: LayerSpec, **columns: list[object]) -> pd.DataFrame:
         rows.read += 1
         values = dict(zip(columns, row, strict=True))
         rows.add([values[field] for field in rules.fields], str(rows.read), (0.0, 0.0))
-    return rules.table(rows)
+    return rules.sift(rows)
 
 
-numbers = st.integers(-(2**53), 2**53) | st.floats(allow_nan=False, allow_infinity=False)
-plain = st.text().filter(lambda text: not BETWEEN_SLASHES.fullmatch(text))
-values = st.none() | st.booleans() | numbers | plain
-
-
-@given(values)
-def test_a_value_is_itself_and_nothing_is_missing(value: Any) -> None:  # noqa: ANN401
-    if value is None:
-        assert not matches(value, "None")
-    else:
-        assert matches(value, value)
-        assert matches(value, as_text(value))
-
-
-@given(numbers, numbers)
-def test_numbers_compare_as_numbers(a: float, b: float) -> None:
-    assert matches(a, b) == (a == b)
-    assert matches(repr(a), b) == (a == b)
-
-
-@given(plain, plain)
-def test_text_compares_as_text(a: str, b: str) -> None:
-    assert matches(a, b) == (a == b)
+def table(spec: LayerSpec, **columns: Sequence[object]) -> pd.DataFrame:
+    return sifted(spec, **columns).table
 
 
 @given(st.integers(-(2**53), 2**53))
@@ -109,38 +89,46 @@ def test_whole_identifiers_have_no_decimals(number: int) -> None:
     assert ids.tolist() == [str(number)] * 5 + ["6", "7", "8"]
 
 
-@pytest.mark.parametrize(
-    ("value", "wanted", "expected"),
-    [
-        (1, True, False),
-        (True, 1, False),
-        (0, False, False),
-        (math.nan, 0, False),
-        ("", 0, False),
-        ("x", 1, False),
-        ("1.0", "1", False),
-        ("en fonction ", "en fonction", False),
-        ("En fonction", "en fonction", False),
-        (["en fonction"], 3, False),
-        ("BASTILLE", "/[^a-z]+/", True),
-        ("Bastille", "/[^a-z]+/", False),
-        ("Taxi (nuit)", "/Taxi.*/", True),
-        ("un Taxi", "/Taxi.*/", False),
-        (75012, "/75.../", True),
-        (12.0, "/1./", True),
-        (None, "/.*/", False),
-        ("//", "//", True),
-        ("/", "/", True),
-        ("a/b", "a/b", True),
-    ],
-)
-def test_near_is_not_equal_and_a_text_between_slashes_is_a_pattern(
-    value: object,
-    wanted: Any,  # noqa: ANN401
-    *,
-    expected: bool,
-) -> None:
-    assert matches(value, wanted) == expected
+def test_what_class_by_does_not_list_is_left_out_by_name() -> None:
+    """Waste baskets do not become benches because nobody listed them."""
+    by = ClassBy("kind", (("bench", "bench"), ("/stop.*/", "bus_stop")))
+    kinds = [*["bin"] * 9, *["box", None] * 2, "bench", "stop 1", "\x1b[31m"]
+    layer = sifted(LayerSpec(name="things", class_name="", class_by=by), kind=kinds)
+    assert layer.table["class_name"].tolist() == ["bench", "bus_stop"]
+    assert (layer.filtered, layer.excluded) == (14, 0)
+    told = "'bin' 9, 'box' 2, no value 2, '\\x1b[31m' 1"
+    assert layer.notes == (f"left out, unlisted in class_by 'kind': {told}",)
+    spec = LayerSpec(name="things", class_name="bench", class_by=by)
+    assert (
+        sifted(spec, kind=kinds)
+        .notes[0]
+        .endswith('; write otherwise = "class" to take them as bench')
+    )
+    spec = replace(spec, class_by=replace(by, otherwise=True))
+    assert sifted(spec, kind=kinds).table["class_name"].tolist() == ["bench"] * 14 + [
+        "bus_stop",
+        "bench",
+    ]
+    many = sifted(LayerSpec(name="things", class_name="", class_by=by), kind=[*map(str, range(20))])
+    assert many.notes[0].endswith("'7' 1, and 12 others")
+
+
+def test_what_is_left_out_is_counted_once_by_the_first_reason() -> None:
+    spec = LayerSpec(
+        name="things",
+        class_name="bench",
+        where=(("height", (">=2 or none",)),),
+        exclusions=(("state", ("gone", "/plan.*/")), ("depth", (">0",))),
+    )
+    layer = sifted(
+        spec,
+        height=[2.5, None, 1.0, 3.0, 3.0, 2.0],
+        state=["gone", "planned", "gone", None, "there", ""],
+        depth=[1.0, 0.0, 0.0, 0.5, None, -1.0],
+    )
+    assert layer.table.index.tolist() == [5, 6]
+    assert (layer.filtered, layer.excluded) == (1, 3)
+    assert layer.notes == ("left out by not: state 2, depth 1",)
 
 
 def test_a_pattern_that_is_none() -> None:
@@ -188,7 +176,7 @@ def test_a_street_is_as_wide_as_its_field_or_else_its_class_says(
         assert half_width(spec, highway=highway) == pytest.approx(half, nan_ok=True)
 
 
-@given(values)
+@given(st.none() | st.booleans() | st.integers() | st.floats(allow_nan=False) | st.text())
 def test_a_width_is_plausible_or_unknown(value: Any) -> None:  # noqa: ANN401
     half = half_width(street(width_field="width"), width=value)
     assert math.isnan(half) or 0.05 <= half <= 100
@@ -205,8 +193,8 @@ def test_a_width_is_plausible_or_unknown(value: Any) -> None:  # noqa: ANN401
 )
 def test_every_reader_gives_the_widths(name: str, file: str) -> None:
     bare = street(geometry="line", tags=((("highway", ("*",)),),))
-    unknown = dataclasses.replace(bare, width_field="width")
-    spec = dataclasses.replace(unknown, width_by=BY_CLASS)
+    unknown = replace(bare, width_field="width")
+    spec = replace(unknown, width_by=BY_CLASS)
     whole, half, none = (reader(name)(DATA / file, [s])[0] for s in (spec, unknown, bare))
     assert whole.table["half_width"].tolist() == [12.0, 4.0]
     assert (whole.notes, whole.table["half_width"].dtype) == ((), "float64")

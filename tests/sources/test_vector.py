@@ -595,6 +595,7 @@ def test_where_on_logical_and_missing_values(tmp_path: Path, value: Any, filtere
     "what",
     [
         {"where": (("kinds", ("a",)),)},
+        {"exclusions": (("kinds", ("a",)),)},
         {"class_by": ClassBy("kinds", (("a", "bench"),))},
         {"id_field": "kinds"},
     ],
@@ -604,16 +605,17 @@ def test_missing_fields_are_named(suffix: str, what: dict[str, Any], tmp_path: P
     path = write(frame([(1, 2)], kind=["a"], size=[1]), tmp_path, suffix)
     (key,) = what
     spec = spec_of(crs="EPSG:2154", **what)
+    key = "not" if key == "exclusions" else key
     nearest = f"has no field 'kinds', which the catalogue names in {key}; the nearest is 'kind'"
     with refused(CatalogError, f"layer 'things' ({path})", nearest, "size"):
         read_layer(path, spec)
-    if key == "where":  # which needs no field if it is not applied
+    if key in {"where", "not"}:  # which needs no field if it is not applied
         assert read_layer(path, spec, filters=False).counts.kept == 1
 
 
 def test_classes_and_identifiers(tmp_path: Path) -> None:
     table = frame([(n, 0) for n in range(4)], n=[123704.0, 2.0, 1.5, None])
-    by = ClassBy("n", (("123704", "bus_stop"), (2, "taxi_station")))
+    by = ClassBy("n", (("123704", "bus_stop"), (2, "taxi_station")), otherwise=True)
     layer = read(write(table, tmp_path, "gpkg"), id_field="n", class_by=by)
     assert layer.table["class_name"].tolist() == ["bus_stop", "taxi_station", "bench", "bench"]
     # A feature without a value has its number.

@@ -70,6 +70,7 @@ def settle_fields(spec: LayerSpec, fields: Sequence[str]) -> LayerSpec:
         width_field=spec.width_field and own(spec.width_field),
         width_by=width_by and dataclasses.replace(width_by, field=own(width_by.field)),
         where=tuple((own(field), accepted) for field, accepted in spec.where),
+        exclusions=tuple((own(field), accepted) for field, accepted in spec.exclusions),
         class_by=class_by and dataclasses.replace(class_by, field=own(class_by.field)),
         select=tuple(own(field) for field in spec.select),
     )

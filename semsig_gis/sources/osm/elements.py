@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import shapely
 
 from semsig_gis.core.errors import CatalogError
-from semsig_gis.sources.catalog import ANY_VALUE
+from semsig_gis.sources.conditions import ANY_VALUE
 from semsig_gis.sources.raw_layer import (
     WGS84,
     BadFeatureError,

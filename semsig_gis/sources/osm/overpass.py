@@ -17,7 +17,7 @@ import shapely
 
 from semsig_gis.core.errors import InputError, SourceError
 from semsig_gis.sources.area import Area, join_areas
-from semsig_gis.sources.catalog import ANY_VALUE
+from semsig_gis.sources.conditions import ANY_VALUE
 from semsig_gis.sources.http.fetch import (
     DEFAULT_HTTP,
     HttpError,
