@@ -46,6 +46,9 @@ if TYPE_CHECKING:
 
 # Two objects of a class within the same centimetre are one object listed twice.
 SAME_PLACE_M = 0.01
+# Column of the geometries that positions come from; dimensions of an area.
+SHAPE = "shape"
+AREA = 2
 # Larger than any projected coordinate; files write -1.8e308 and the like for "no value".
 BEYOND_EARTH_M = 1e8
 
@@ -85,8 +88,8 @@ def build_objects(
 ) -> tuple[StreetObjects, LoadReport]:
     """Turn raw layers into one table of street objects.
 
-    A geometry that is not a point is represented by its centroid (paper, section on semantic
-    signatures). Rows without a usable position are dropped and counted.
+    A geometry that is not a point is represented by its centroid in the metric CRS (paper, section
+    on semantic signatures). Rows without a usable position are dropped and counted.
 
     Parameters
     ----------
@@ -98,7 +101,7 @@ def build_objects(
         Metric coordinate reference system to work in.
     collapse : bool, default True
         Whether objects of one class at the same place (within the same centimetre) become one,
-        with their number in ``count``.
+        with their number in ``count``. The place of an area is a point of its class in it, if any.
     apart : collection of str
         Classes that are collapsed within each layer only, because they will be conflated (see
         `conflate`), which keeps account of where objects came from.
@@ -138,9 +141,9 @@ def build_objects(
     everything, owner = everything[~again].reset_index(drop=True), owner[~again]
     if collapse:
         codes = [taxonomy.by_name(name).code for name in apart]
-        first, counts = _first_at_place(
-            everything, np.where(everything[CLASS_CODE].isin(codes), owner, -1)
-        )
+        group = np.where(everything[CLASS_CODE].isin(codes), owner, -1)
+        everything[["x", "y"]] = _at_points(everything, group)
+        first, counts = _first_at_place(everything, group)
     else:
         first, counts = np.arange(len(everything)), np.ones(len(everything), np.int64)
     kept = everything.iloc[first].reset_index(drop=True)
@@ -182,16 +185,16 @@ def _positions(layer: RawLayer, taxonomy: Taxonomy, crs: CRS) -> tuple[pd.DataFr
         raise CrsError(msg)
     geometry = table.geometry
     usable = ~(geometry.isna() | geometry.is_empty).to_numpy(bool)
-    points = geometry[usable]
-    if not (points.geom_type == "Point").all():
-        # In the layer's own plane: a street object is small, so the CRS makes no difference.
-        with np.errstate(invalid="ignore", over="ignore"):  # such rows are dropped below
-            centroids = shapely.centroid(points.array)
-        points = gpd.GeoSeries(centroids, index=points.index, crs=table.crs)
-    moved = points if points.crs == crs else points.to_crs(crs)
+    shapes = geometry[usable]
+    # In metres first: by degrees, a line that turns would have its middle elsewhere.
+    shapes = (shapes if shapes.crs == crs else shapes.to_crs(crs)).to_numpy()
+    others = shapely.get_type_id(shapes) != shapely.GeometryType.POINT
+    points = shapes.copy()
+    with np.errstate(invalid="ignore", over="ignore"):  # such rows are dropped below
+        points[others] = shapely.centroid(shapes[others])
     # A broken geometry may have an empty centroid, which has no coordinates at all.
-    xy = np.full((len(moved), 2), np.nan)
-    coordinates, row = shapely.get_coordinates(moved.array, return_index=True)
+    xy = np.full((len(points), 2), np.nan)
+    coordinates, row = shapely.get_coordinates(points, return_index=True)
     xy[row] = coordinates
     placed = (np.abs(xy) < BEYOND_EARTH_M).all(axis=1)  # false for NaN too
     codes = {name: taxonomy.by_name(name).code for name in table[CLASS_NAME].unique()}
@@ -203,9 +206,30 @@ def _positions(layer: RawLayer, taxonomy: Taxonomy, crs: CRS) -> tuple[pd.DataFr
             CLASS_CODE: rows[CLASS_NAME].map(codes).to_numpy(),
             "x": xy[placed, 0],
             "y": xy[placed, 1],
+            SHAPE: shapes[placed],
         }
     )
     return part, int((~usable).sum()), int((~placed).sum())
+
+
+def _at_points(everything: pd.DataFrame, group: NDArray[np.int64]) -> NDArray[np.float64]:
+    """Return where objects are, an area at the first point of its group and class that is in it.
+
+    They are one thing, drawn as both. Somebody has put the point where it stands, and several
+    points in an area are several things.
+    """
+    xy = everything[["x", "y"]].to_numpy(copy=True)
+    shapes = everything[SHAPE].to_numpy()
+    areas = np.flatnonzero(shapely.get_dimensions(shapes) == AREA)
+    points = np.flatnonzero(shapely.get_type_id(shapes) == shapely.GeometryType.POINT)
+    area, point = shapely.STRtree(shapes[points]).query(shapes[areas], predicate="covers")
+    area, point = areas[area], points[point]
+    codes = everything[CLASS_CODE].to_numpy()
+    same = (group[area] == group[point]) & (codes[area] == codes[point])
+    order = np.lexsort((point[same], area[same]))
+    area, first = np.unique(area[same][order], return_index=True)
+    xy[area] = xy[point[same][order][first]]
+    return xy
 
 
 def _first_at_place(

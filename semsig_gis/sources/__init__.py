@@ -43,8 +43,8 @@ class RowCounts:
     Rows are `unreadable`, `filtered` (by the catalogue, or outside the area), `excluded` (by what
     the catalogue says in ``not``), `missing` (without a geometry), `duplicates` (the id of an
     earlier row, where ids are unique), `misplaced` (off the Earth, or not finite in the metric
-    CRS), `collapsed` (at the place of an earlier object of the class) or `conflated` (merged into
-    an object of an earlier layer).
+    CRS), `collapsed` (at the place of another object of the class, or an area around it) or
+    `conflated` (merged into an object of an earlier layer).
     """
 
     read: int

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import dataclasses
+import math
 import re
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+import numpy as np
 import shapely
 
 from semsig_gis.core.errors import InputError
@@ -17,7 +19,6 @@ from semsig_gis.sources.catalog import LayerSpec
 from semsig_gis.sources.raw_layer import LATITUDE_LIMIT, LONGITUDE_LIMIT, WGS84
 
 if TYPE_CHECKING:
-    import numpy as np
     from numpy.typing import NDArray
 
     from semsig_gis.sources import RawLayer
@@ -70,13 +71,24 @@ def clip_layer(layer: RawLayer, area: Area) -> RawLayer:
     nowhere = shapely.is_missing(geometry) | shapely.is_empty(geometry)
     shapely.prepare(area.polygon)
     if layer.spec.role == "objects":
-        inside = shapely.covers(area.polygon, shapely.centroid(geometry))
+        inside = shapely.covers(area.polygon, _centroids(geometry, area))
     else:
         inside = shapely.intersects(area.polygon, geometry)
     kept = layer.table[nowhere | inside].reset_index(drop=True)
     filtered = layer.counts.filtered + len(layer.table) - len(kept)
     counts = dataclasses.replace(layer.counts, filtered=filtered)
     return dataclasses.replace(layer, table=kept, counts=counts)
+
+
+def _centroids(geometry: NDArray[np.object_], area: Area) -> NDArray[np.object_]:
+    """Return centroids in degrees, those of lines by lengths in metres around an area."""
+    centroids: NDArray[np.object_] = shapely.centroid(geometry)
+    lines = shapely.get_dimensions(geometry) == 1
+    _, south, _, north = area.bounds
+    width = np.array([math.cos(math.radians((south + north) / 2)), 1.0])  # of a degree
+    narrowed = shapely.centroid(shapely.transform(geometry[lines], lambda xy: xy * width))
+    centroids[lines] = shapely.transform(narrowed, lambda xy: xy / width)
+    return centroids
 
 
 def _box(text: str) -> Area:

@@ -279,7 +279,7 @@ def _surprises(read: int, table: pd.DataFrame, spec: LayerSpec) -> Iterable[str]
         yield f"the layer has {read} rows, and {least} to {most} were expected"
     types = pd.Series([item.geom_type for item in table[GEOMETRY].dropna()], dtype="str")
     others = types[~types.isin(KINDS[spec.geometry])]
-    if len(others):
+    if len(others) and not spec.tags:  # of OpenStreetMap, each element says what it is
         names = ", ".join(sorted(others.unique()))
         yield f"{len(others)} of {read} rows are {names}, not {spec.geometry}"
     unknown = table[HALF_WIDTH].isna().sum() if spec.has_width else 0

@@ -115,6 +115,55 @@ def test_an_object_stands_at_its_centroid(wkt: str, centre: tuple[float, float])
     assert not objects.table.has_z.any()
 
 
+def test_a_centroid_is_taken_in_metres() -> None:
+    # At 60 degrees north, a degree to the east is half as long as one to the north.
+    bent = shapely.LineString([(24.941, 60.165), (24.941, 60.1654), (24.9416, 60.1654)])
+    metric = "EPSG:32635"
+    degrees = gpd.GeoSeries([bent], crs="EPSG:4326")
+    layer = raw_layer([bent], crs="EPSG:4326")
+    objects, _ = build_objects([layer], taxonomy=TAXONOMY, crs=metric)
+    expected = shapely.get_coordinates(degrees.to_crs(metric).centroid)
+    assert objects.xy == pytest.approx(expected, abs=1e-6)
+
+
+AREA = shapely.box(0, 0, 20, 20)
+
+
+@pytest.mark.parametrize(
+    ("shapes", "places", "counts"),
+    [
+        ([shapely.Point(3, 4), AREA], [(3, 4)], [2]),
+        ([AREA, shapely.Point(3, 4)], [(3, 4)], [2]),
+        ([AREA, shapely.Point(0, 4), shapely.Point(5, 5)], [(0, 4), (5, 5)], [2, 1]),
+        ([AREA, AREA.buffer(9), shapely.Point(3, 4)], [(3, 4)], [3]),
+        ([AREA, shapely.Point(21, 4)], [(10, 10), (21, 4)], [1, 1]),
+        ([AREA, AREA.boundary], [(10, 10)], [2]),
+    ],
+    ids=["point first", "area first", "several points", "several areas", "outside", "a line"],
+)
+def test_an_area_and_a_point_in_it_are_one_object(
+    shapes: list[shapely.Geometry], places: list[tuple[float, float]], counts: list[int]
+) -> None:
+    objects, report = build_objects([raw_layer(shapes)], taxonomy=TAXONOMY, crs=LAMBERT)
+    assert objects.xy.tolist() == [list(place) for place in places]
+    assert objects.table["count"].tolist() == counts
+    assert report.layers[0].counts.collapsed == len(shapes) - len(places)
+    apart, _ = build_objects([raw_layer(shapes)], taxonomy=TAXONOMY, crs=LAMBERT, collapse=False)
+    assert len(apart) == len(shapes)
+
+
+def test_an_area_of_another_class_or_layer_is_another_object() -> None:
+    shapes = [AREA, shapely.Point(3, 4)]
+    kinds = raw_layer(shapes, classes=["bench", "alignment_tree"])
+    assert len(build(kinds)) == 2
+    layers = [raw_layer([shape], name=name) for name, shape in zip("ab", shapes, strict=True)]
+    assert len(build(*layers)) == 1
+    # Those of classes that are conflated are left to `conflate`.
+    apart = ["alignment_tree"]
+    objects, _ = build_objects(layers, taxonomy=TAXONOMY, crs=LAMBERT, apart=apart)
+    assert len(objects) == 2
+
+
 def test_rows_without_a_place_are_dropped_and_counted() -> None:
     empty = [None, *map(shapely.from_wkt, ("POINT EMPTY", "POLYGON EMPTY"))]
     empty += map(shapely.from_wkt, ("MULTILINESTRING EMPTY", "GEOMETRYCOLLECTION EMPTY"))

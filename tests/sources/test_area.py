@@ -141,3 +141,13 @@ def test_a_layer_is_clipped(role: str, kept: list[str], crs: str) -> None:
     assert clipped.table.index.tolist() == list(range(len(kept)))
     assert clipped.table.crs == table.crs
     assert clipped.counts.read == len(clipped.table) + clipped.counts.filtered
+
+
+def test_a_line_is_clipped_at_its_middle_in_metres() -> None:
+    # At 60 degrees north, a degree to the east is half as long as one to the north.
+    line = shapely.LineString([(25.0, 60.0), (25.0, 60.001), (25.002, 60.001)])
+    table = gpd.GeoDataFrame({"source_id": ["1"]}, geometry=[line], crs="EPSG:4326")
+    spec = LayerSpec(name="x", class_name="bench", geometry="line")
+    layer = RawLayer(spec=spec, table=table, counts=RowCounts(read=1))
+    for east, kept in ((25.00051, 1), (25.00049, 0)):
+        assert len(clip_layer(layer, parse_area(f"24,59,{east},61")).table) == kept

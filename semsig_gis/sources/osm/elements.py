@@ -31,8 +31,8 @@ if TYPE_CHECKING:
 RING_NODES = 4  # of the smallest, a triangle: the first node comes again at its end
 
 
-def way_shape(xy: NDArray[np.float64], role: Role) -> Position:
-    """Return what a way stands for: a centroid for objects, a polygon for buildings, or a line.
+def way_shape(xy: NDArray[np.float64], role: Role) -> BaseGeometry:
+    """Return what a way stands for: an area or a line, of buildings an area, of streets a line.
 
     Nodes are longitude and latitude, shape (n, 2). A closed way is an area, but for a street.
     """
@@ -45,17 +45,17 @@ def way_shape(xy: NDArray[np.float64], role: Role) -> Position:
         if role == "buildings":
             msg = "is not closed, as the outline of a building is"
             raise BadFeatureError(msg)
-        return _centroid(shapely.LineString(xy))
+        return shapely.LineString(xy)
     area = _areas(shapely.Polygon(xy))
     if role == "buildings":
         return _require_area(area)
-    return _centroid(shapely.LineString(xy) if area.is_empty else area)
+    return shapely.LineString(xy) if area.is_empty else area
 
 
 def relation_shape(
-    outer: Iterable[NDArray[np.float64]], inner: Iterable[NDArray[np.float64]], role: Role
-) -> Position:
-    """Return what a multipolygon stands for: a centroid for objects, or the area of a building.
+    outer: Iterable[NDArray[np.float64]], inner: Iterable[NDArray[np.float64]]
+) -> BaseGeometry:
+    """Return the area of a multipolygon.
 
     Its ways come in any order and direction. BadFeatureError if they do not join to rings.
     """
@@ -63,8 +63,7 @@ def relation_shape(
     for ring in (*_rings(outer), *_rings(inner)):
         # Parity, so that an island in a hole is inside again.
         area = shapely.symmetric_difference(area, ring)
-    area = _require_area(_areas(area))
-    return area if role == "buildings" else _centroid(area)
+    return _require_area(_areas(area))
 
 
 def _is_ring(xy: NDArray[np.float64]) -> bool:
@@ -96,12 +95,6 @@ def _require_area(area: BaseGeometry) -> BaseGeometry:
         msg = "encloses no area"
         raise BadFeatureError(msg)
     return area
-
-
-def _centroid(geometry: BaseGeometry) -> tuple[float, float]:
-    # In degrees: a street object is small, so that the shrinking of longitudes cancels out.
-    point = shapely.centroid(geometry)
-    return point.x, point.y
 
 
 def has_tags(tags: Mapping[str, str], spec: LayerSpec) -> bool:

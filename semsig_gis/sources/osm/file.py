@@ -60,9 +60,9 @@ def read_layers(
     """Read layers of a file in one of `FORMATS`, or of several extracts, one for each of `specs`.
 
     The file is streamed; where a layer has ways, the places of all nodes are kept meanwhile in an
-    unnamed temporary file, of 16 bytes a node. Street objects are points, the centroid of a way or
-    an area; identifiers are such as ``"node/123"``. Elements that are mapped in another way than
-    the layer wants are filtered, clipped and broken ones unreadable. An element in several extracts
+    unnamed temporary file, of 16 bytes a node. Nodes are points, ways lines or areas, multipolygons
+    areas; identifiers are such as ``"node/123"``. Elements that are mapped in another way than the
+    layer wants are filtered, clipped and broken ones unreadable. An element in several extracts
     counts once, by its newest copy. `crs` is only noted.
     """
     paths = [Path(path)] if isinstance(path, str | Path) else list(path)
@@ -190,8 +190,9 @@ def _position(outline: _Outline, lines: Mapping[int, NDArray[np.float64]]) -> Po
     try:
         _require_whole((*outline.outer, *outline.inner), lines)
         outer, inner = ([lines[way] for way in ways] for ways in (outline.outer, outline.inner))
-        role = outline.layer.spec.role
-        return way_shape(outer[0], role) if outline.is_way else relation_shape(outer, inner, role)
+        if outline.is_way:
+            return way_shape(outer[0], outline.layer.spec.role)
+        return relation_shape(outer, inner)
     except BadFeatureError as error:
         return f"{outline.name} {error}"
 

@@ -126,6 +126,7 @@ def read_layers(
         return ()
     index = TagIndex(specs)
     seen: set[tuple[str, int]] = set()
+    boxed: collections.Counter[str] = collections.Counter()
     for file in paths:
         document = load_document(file, where=str(file))
         if document.failed:
@@ -139,8 +140,23 @@ def read_layers(
                 seen.add(name)
                 tags = element["tags"]
                 for layer in (layers[place] for place in index.layers(tags)):
-                    layer.add(kind, number, tags, places.position(element, layer.spec))
-    return tuple(layer.raw(crs) for layer in layers)
+                    added = layer.add(kind, number, tags, places.position(element, layer.spec))
+                    boxed[layer.spec.name] += added and _has_only_centre(element)
+    raw = (layer.raw(crs) for layer in layers)
+    return tuple(_with_note(layer, boxed[layer.spec.name]) for layer in raw)
+
+
+def _has_only_centre(element: dict[str, Any]) -> bool:
+    parts = (element, *element.get("members", ()))
+    return "center" in element and not any("geometry" in part for part in parts)
+
+
+def _with_note(layer: RawLayer, boxed: int) -> RawLayer:
+    """Tell of elements whose centroid is not known, and how to get it."""
+    if not boxed or layer.spec.role != "objects":
+        return layer
+    note = f"{boxed:,} elements have only the middle of their box; ask for `out geom`"
+    return dataclasses.replace(layer, notes=(*layer.notes, note))
 
 
 class _Positions:
@@ -168,13 +184,13 @@ class _Positions:
     def _shape(self, element: dict[str, Any], spec: LayerSpec) -> Position:
         if element["type"] == "node":
             return _point(element)
-        if "center" in element and spec.role == "objects" and not _has_outline(element):
+        if spec.role == "objects" and _has_only_centre(element):
             return _point(element["center"])
         if element["type"] == "way":
             return way_shape(self._line(element), spec.role)
         parts = list(self._bounds(element))
         outer = [line for line, inner in parts if not inner]
-        return relation_shape(outer, [line for line, inner in parts if inner], spec.role)
+        return relation_shape(outer, [line for line, inner in parts if inner])
 
     def _bounds(self, relation: dict[str, Any]) -> Iterator[tuple[NDArray[np.float64], bool]]:
         """Yield the ways of a multipolygon, and whether each bounds a hole."""
@@ -193,10 +209,6 @@ class _Positions:
             msg = f"lacks {missing} of its {len(nodes)} nodes" if nodes else "has no positions"
             raise BadFeatureError(msg)
         return np.array([_point(node) for node in nodes])
-
-
-def _has_outline(element: dict[str, Any]) -> bool:
-    return "geometry" in element or any("geometry" in part for part in element.get("members", ()))
 
 
 def _point(place: dict[str, Any]) -> tuple[float, float]:
