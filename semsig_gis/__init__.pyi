@@ -94,6 +94,7 @@ from .likelihood.noise.model import (
 )
 from .likelihood.posterior import Posterior as Posterior
 from .likelihood.priors import (
+    KnownPosition as KnownPosition,
     area_prior as area_prior,
     position_prior as position_prior,
     raster_prior as raster_prior,

@@ -310,6 +310,7 @@ def print_answer(result: dict[str, Any]) -> None:
         ],
     )
     if by_chance:
+        _print_known(result["prior"] or {})
         _print_explanations(candidates)
         _print_place(result)
     elif result["tied_beyond"]:
@@ -318,6 +319,21 @@ def print_answer(result: dict[str, Any]) -> None:
         typer.echo(f"{more} with the last one.")
     for note in result["notes"]:
         typer.echo(f"Note: {note}")
+
+
+def _print_known(prior: dict[str, Any]) -> None:
+    """Say again what was known of the place, as it was understood."""
+    if near := prior.get("near"):
+        typer.echo(
+            f"Known: near {near['lat']:.6f}, {near['lon']:.6f} (lat, lon), x {near['x']:.1f}, "
+            f"y {near['y']:.1f}, ± {near['sigma']:g} m, read as {near['read_as']}."
+        )
+    if area := prior.get("area"):
+        typer.echo(f"Known: in {area['file']}, which has {area['cells']:,} cells.")
+    if popularity := prior.get("popularity"):
+        typer.echo(f"Known: as likely as {popularity['file']} says.")
+    if require := prior.get("require"):
+        typer.echo(f"Known: sees {require['text']}, as {require['cells']:,} cells do.")
 
 
 def _print_place(result: dict[str, Any]) -> None:

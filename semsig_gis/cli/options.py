@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any, get_type_hints
 
 import typer
 
-from semsig_gis.cli.console import app, numbers, progress, remark
+from semsig_gis.cli.console import app, progress, remark
 from semsig_gis.core.errors import CrsError, DatabaseError, InputError
 
 if TYPE_CHECKING:
@@ -98,9 +98,13 @@ class SearchOptions:
     noise: NoiseName = "generic"
     heading: Heading = "known"
     on_grid: OnGrid = False
-    near: Annotated[str | None, typer.Option(help="Last known place, as X,Y,SIGMA in metres.")] = (
-        None
-    )
+    near: Annotated[
+        str | None,
+        typer.Option(
+            help="Last known place, as LAT,LON,SIGMA in degrees or X,Y,SIGMA in the CRS of the "
+            "database, SIGMA in metres."
+        ),
+    ] = None
     area: Annotated[Path | None, typer.Option(help="Polygons that the place lies in.")] = None
     popularity: Annotated[
         Path | None, typer.Option(help="Raster of how likely each place is, such as of people.")
@@ -148,7 +152,7 @@ class SearchOptions:
         noise = read_noise(self.noise)
         if not self.on_grid:
             noise = cell_noise(noise, city.database.grid.step)
-        log_prior = self._log_prior(city.database)
+        log_prior, known = self._prior(city.database)
         needed = bool(self.refine)
         store = object_store(city, self.objects, needed=needed) if needs_objects else None
         return LikelihoodLocator(
@@ -160,28 +164,30 @@ class SearchOptions:
             store=store,
             refined=refined,
             explained=EXPLAINED if self.explain else 0,
+            known=known,
         )
 
-    def _log_prior(self, database: SignatureDatabase) -> NDArray[Any] | None:
-        """Return what is known of the place; None where that is nothing."""
-        parts = []
+    def _prior(self, database: SignatureDatabase) -> tuple[NDArray[Any] | None, dict[str, Any]]:
+        """Return what is known of the place, by cell and in plain values; None if nothing is."""
+        parts, known = [], {}
         if self.near is not None:
-            from semsig_gis.likelihood.priors import position_prior
+            from semsig_gis.likelihood.priors import KnownPosition, position_prior
 
-            place = numbers(self.near, "--near")
-            if len(place) != 3:  # noqa: PLR2004 - x, y and sigma
-                msg = f"--near was given as {self.near!r}; give X,Y,SIGMA in metres."
-                raise InputError(msg)
-            parts.append(position_prior(database, (place[0], place[1]), sigma=place[2]))
+            place = KnownPosition.parse(self.near, database)
+            parts.append(position_prior(database, (place.x, place.y), sigma=place.sigma))
+            known["near"] = place.to_dict()
         if self.area is not None:
             from semsig_gis.likelihood.priors import area_prior
             from semsig_gis.objects.load import read_area
 
             parts.append(area_prior(database, read_area(self.area, crs=database.crs)))
+            inside = int((parts[-1] > -math.inf).sum())
+            known["area"] = {"file": str(self.area), "cells": inside}
         if self.popularity is not None:
             from semsig_gis.likelihood.priors import raster_prior
 
             parts.append(raster_prior(database, self.popularity))
+            known["popularity"] = {"file": str(self.popularity)}
         if self.require is not None:
             from semsig_gis.database.answer import Requirement
             from semsig_gis.likelihood.priors import weight_prior
@@ -189,7 +195,8 @@ class SearchOptions:
             requirement = Requirement.parse(self.require, database.taxonomy)
             met = requirement.met(database.type_sequences)
             parts.append(weight_prior(database, met.astype(float)))
-        return sum(parts[1:], parts[0]) if parts else None
+            known["require"] = {"text": self.require, "cells": int(met.sum())}
+        return (sum(parts[1:], parts[0]) if parts else None), known
 
 
 def prepared_index(city: City, model: Noise) -> LikelihoodIndex:

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 import time
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any, TypedDict, Unpack
 
 import numpy as np
@@ -35,12 +35,13 @@ from semsig_gis.likelihood.posterior import (
     Posterior,
     Refinement,
     posterior,
+    prior_ratio,
     refine,
 )
 from semsig_gis.likelihood.route import route_posteriors
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
+    from collections.abc import Iterator, Mapping, Sequence
 
     from numpy.typing import NDArray
 
@@ -54,8 +55,12 @@ if TYPE_CHECKING:
     from semsig_gis.likelihood.posterior import AnswerRule, Decision
     from semsig_gis.likelihood.route import Leg
 
+DISAGREEMENT = 0.01
+"""Ratio of a prior (see `posterior.prior_ratio`) from which down an answer tells of it."""
 MOST_CELLS = 200
 """Likeliest cells near the answer that are averaged; the others hold next to nothing."""
+LARGE_POWER = 4  # of ten, from which on a number is told as a power
+TINY = np.finfo(np.float64).tiny
 TURN = 2.0  # degrees between the headings that are tried
 
 
@@ -143,6 +148,11 @@ class Location(Answer):
         Natural logarithm of the likelihood of every cell.
     explanations : tuple of Explanation
         Of the first candidates, in their order: which detections are which street objects.
+    known : mapping of str
+        What was known of the place before, in plain values.
+    prior_ratio : float or None
+        How much likelier the query is with what was known than with all cells alike; None if
+        nothing was known.
 
     Examples
     --------
@@ -161,6 +171,8 @@ class Location(Answer):
     posterior: Posterior
     loglik: NDArray[np.floating]
     explanations: tuple[Explanation, ...] = ()
+    known: Mapping[str, Any] = field(default_factory=dict)
+    prior_ratio: float | None = None
 
     @property
     def region_km2(self) -> float:
@@ -192,7 +204,7 @@ class Location(Answer):
         ``place`` is what `PlaceEstimate.to_dict` gives with its ``cell_id``, ``lon``, ``lat``,
         ``chance`` and ``within_m``. ``threshold`` is None where nothing is answered. ``candidates``
         lists the columns of `candidates`, ``lon``, ``lat`` (degrees, WGS 84) and, of the first
-        ones, ``explanation``.
+        ones, ``explanation``. ``prior`` holds `known` and ``ratio``; None if nothing was known.
         """
         lon, lat = self._to_degrees.transform(self.estimate.x, self.estimate.y)
         candidates = self._candidate_records()
@@ -215,6 +227,9 @@ class Location(Answer):
             "threshold": threshold if math.isfinite(threshold) else None,
             "region": {"share": REGION_SHARE, "cells": len(self.region), "km2": self.region_km2},
             "entropy_bits": self.posterior.entropy,
+            "prior": None
+            if self.prior_ratio is None
+            else {**self.known, "ratio": self.prior_ratio},
             "notes": list(self.notes),
             "crs": self.crs.to_string(),
             "licenses": list(self.licenses),
@@ -237,6 +252,7 @@ class LikelihoodLocator:
     store: ObjectStore | None = None
     refined: bool | None = False
     explained: int = 0
+    known: Mapping[str, Any] = field(default_factory=dict)
 
     def __post_init__(self) -> None:  # noqa: D105
         check_top(self.top)
@@ -248,8 +264,11 @@ class LikelihoodLocator:
         """Find where a query was seen from."""
         scores = self._scores(query, self.log_prior)
         chances = posterior(self.index.database, scores.loglik, log_prior=self.log_prior)
-        store = self._store_for([query])
-        return self._location(query, scores, chances, top=top or self.top, store=store)
+        store, ratio = self._store_for([query]), None
+        if self.log_prior is not None:
+            ratio = prior_ratio(self._scores(query, None).loglik, self.log_prior)
+        top = top or self.top
+        return self._location(query, scores, chances, top=top, store=store, ratio=ratio)
 
     def locate_route(
         self, queries: Sequence[Signature], legs: Sequence[Leg]
@@ -258,10 +277,17 @@ class LikelihoodLocator:
         first = [self._scores(query, self.log_prior) for query in queries[:1]]
         scores = first + [self._scores(query, None) for query in queries[1:]]
         logliks = [view.loglik for view in scores]
-        chances = route_posteriors(self.index.database, logliks, legs, log_prior=self.log_prior)
-        store = self._store_for(queries)
-        views = zip(queries, scores, chances, strict=True)
-        return tuple(self._location(*view, top=self.top, store=store) for view in views)
+        database, log_prior = self.index.database, self.log_prior
+        chances = route_posteriors(database, logliks, legs, log_prior=log_prior)
+        store, ratio = self._store_for(queries), None
+        if log_prior is not None:
+            logliks[0] = self._scores(queries[0], None).loglik
+            start = route_posteriors(database, logliks, legs)[0].chances
+            ratio = prior_ratio(np.log(np.maximum(start, TINY)), log_prior)
+        return tuple(
+            self._location(*view, top=self.top, store=store, ratio=ratio)
+            for view in zip(queries, scores, chances, strict=True)
+        )
 
     def rankings(
         self,
@@ -318,6 +344,7 @@ class LikelihoodLocator:
         *,
         top: int,
         store: ObjectStore | None,
+        ratio: float | None,
     ) -> Location:
         """Return the answer to a query, from the chances of the cells; a store is to refine it."""
         parts = None
@@ -346,7 +373,10 @@ class LikelihoodLocator:
             crs=database.crs,
             taxonomy=database.taxonomy,
             licenses=database.licenses,
-            notes=query_notes(query, database.present_codes, database.taxonomy),
+            notes=(
+                *query_notes(query, database.present_codes, database.taxonomy),
+                *_prior_notes(ratio),
+            ),
             answer=answer,
             estimate=estimate,
             rule=self.rule,
@@ -354,6 +384,8 @@ class LikelihoodLocator:
             posterior=posterior,
             loglik=scores.loglik,
             explanations=tuple(self._explanation(query, cell, scores, parts) for cell in first),
+            known=self.known,
+            prior_ratio=ratio,
         )
 
     def _parts(
@@ -418,6 +450,7 @@ class LocateOptions(TypedDict, total=False):
     store: ObjectStore | None
     refined: bool
     explained: int
+    known: Mapping[str, Any]
 
 
 def locate(index: LikelihoodIndex, query: Signature, **options: Unpack[LocateOptions]) -> Location:
@@ -438,7 +471,8 @@ def locate(index: LikelihoodIndex, query: Signature, **options: Unpack[LocateOpt
         by default, and ``top`` (10) how many cells to list. The ``store`` holds the street objects
         behind the cells: with ``refined`` the place is looked for between the viewpoints, too, and
         the chances of the cells are those of their parts together. ``explained`` (0) candidates
-        are explained; without a store, street objects have no identifiers.
+        are explained; without a store, street objects have no identifiers. ``known`` is what the
+        answer repeats of the prior, in plain values.
 
     Returns
     -------
@@ -506,6 +540,19 @@ def locate_route(
     (0, 200)
     """
     return LikelihoodLocator(index=index, **options).locate_route(queries, legs)
+
+
+def _prior_notes(ratio: float | None) -> tuple[str, ...]:
+    """Return what to say of a prior that the view speaks against."""
+    if ratio is None or ratio > DISAGREEMENT:
+        return ()
+    power = -math.log10(ratio)
+    odds = f"{1.0 / ratio:,.0f}" if power < LARGE_POWER else f"10^{power:.0f}"
+    note = (
+        f"the prior and the view disagree: 1 in {odds}, by so much likelier is the view from "
+        "anywhere in the city than from where the prior says."
+    )
+    return (note,)
 
 
 def _candidates(scores: CellScores, posterior: Posterior, count: int) -> pd.DataFrame:

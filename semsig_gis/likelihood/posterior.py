@@ -39,6 +39,7 @@ if TYPE_CHECKING:
     from semsig_gis.objects.table import StreetObjects
 
 
+LEAST_LOG = -700.0  # whose exponential is a number
 PLACES = 1000
 """Likeliest cells among which the best place is looked for."""
 
@@ -158,6 +159,18 @@ def posterior(
         raise InputError(msg)
     chances = np.exp(total - top)
     return Posterior(database=database, chances=chances / chances.sum())
+
+
+def prior_ratio(loglik: NDArray[np.floating], log_prior: NDArray[np.float64]) -> float:
+    """Return how much likelier a query is under a prior than with all cells alike.
+
+    Both are logarithms by cell, shape (n,), up to a constant: with chances p of the prior and
+    likelihoods l, it is ``sum(p * l) / mean(l)``. Where the prior is right, it is below r for at
+    most a share r of the queries, as its inverse is 1 in the mean (Markov's inequality).
+    """
+    both = np.logaddexp.reduce(loglik + log_prior) - np.logaddexp.reduce(log_prior)
+    alike = np.logaddexp.reduce(loglik.astype(np.float64)) - math.log(len(loglik))
+    return math.exp(max(float(both - alike), LEAST_LOG))
 
 
 STARTS = 4

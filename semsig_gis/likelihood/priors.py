@@ -6,12 +6,16 @@ a cell. Priors that do not depend on each other are added.
 
 from __future__ import annotations
 
+import contextlib
 import math
-from typing import TYPE_CHECKING
+import re
+from dataclasses import asdict, dataclass
+from typing import TYPE_CHECKING, Any, Self
 
 import geopandas as gpd
 import numpy as np
 import shapely
+from pyproj import Transformer
 
 from semsig_gis.core.errors import CrsError, InputError
 
@@ -22,6 +26,133 @@ if TYPE_CHECKING:
     from pyproj import CRS
 
     from semsig_gis.database.database import SignatureDatabase
+
+DEGREES = "EPSG:4326"
+FARTHEST = 3.0  # standard deviations of a position, beyond the range of sight, from every cell
+
+METRES, NORTH_EAST, EAST_NORTH = "X,Y", "LAT,LON", "LON,LAT"
+_COORDINATE = re.compile(r"([-+]?[\d.]+(?:e[-+]?\d+)?)\s*(m|°?\s*[NSEW])?", re.IGNORECASE)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class KnownPosition:
+    """A position that is known before a query is looked at, in both systems.
+
+    Parameters
+    ----------
+    x, y : float
+        The position in metres, in the CRS of the database.
+    lat, lon : float
+        The same in degrees (WGS 84).
+    sigma : float
+        Standard deviation each way in metres.
+    read_as : {"X,Y", "LAT,LON", "LON,LAT"}
+        What the numbers were taken for.
+
+    Examples
+    --------
+    >>> x, y = demo_database.xy[7].tolist()
+    >>> position = KnownPosition.parse(f"{x},{y},50", demo_database)
+    >>> same = KnownPosition.parse(f"{position.lon},{position.lat},50", demo_database)
+    >>> position.read_as, same.read_as, round(same.x - x, 3)
+    ('X,Y', 'LON,LAT', 0.0)
+    """
+
+    x: float
+    y: float
+    lat: float
+    lon: float
+    sigma: float
+    read_as: str
+
+    @classmethod
+    def parse(cls, text: str, database: SignatureDatabase) -> Self:
+        """Read a position with its deviation, such as ``60.171,24.947,200``.
+
+        The numbers are x and y in the CRS of the database, or degrees in either order, whichever
+        is in the city; ``60.171N,24.947E,200`` and ``386000m,6672000m,200`` say it. InputError if
+        they cannot be read, or not one of these is in the city.
+        """
+        parts = text.split(",")
+        found = [_COORDINATE.fullmatch(part.strip()) for part in parts[:2]]
+        letters = "".join((one[2] or "?")[-1].upper() for one in found if one)
+        to_degrees = Transformer.from_crs(database.crs, DEGREES, always_xy=True)
+        readings, sigma = [], math.nan
+        if len(parts) == 3 and len(letters) == 2:  # noqa: PLR2004 - two coordinates and sigma
+            with contextlib.suppress(ValueError):
+                sigma = float(parts[2].strip().removesuffix("m"))
+                values = [float(one[1]) for one in found if one]
+                readings = _readings(values, letters, to_degrees)
+        if not readings:
+            msg = (
+                f"the position was given as {text!r}; give {NORTH_EAST},SIGMA in degrees or "
+                f"{METRES},SIGMA in metres of {database.crs.to_string()}, SIGMA in metres."
+            )
+            raise InputError(msg)
+        _check_sigma(sigma)
+        near = []
+        for form, (x, y, lon, lat) in readings:
+            place = cls(x=x, y=y, lat=lat, lon=lon, sigma=sigma, read_as=form)
+            if math.isfinite(x + y) and _is_near(database, (x, y), sigma):
+                near.append(place)
+        if len(near) != 1:
+            read = " and ".join(place.read_as for place in near)
+            msg = (
+                f"the position {text!r} is in the city as {read}; write which is meant, as "
+                "60.171N,24.947E,200 or 386000m,6672000m,200."
+                if near
+                else f"the position {text!r} is in the city neither as {METRES} nor as "
+                f"{NORTH_EAST} or {EAST_NORTH}: {_extent(database)}; give a place there, or a "
+                "larger deviation."
+            )
+            raise InputError(msg)
+        return near[0]
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return plain values, ready for JSON."""
+        return asdict(self)
+
+
+def _readings(
+    values: list[float], letters: str, to_degrees: Transformer
+) -> list[tuple[str, tuple[float, float, float, float]]]:
+    """Return what two numbers may be taken for, with x, y, longitude and latitude of each."""
+    first, second = values
+    readings = []
+    if letters in {"??", "MM"}:
+        readings.append((METRES, (first, second, *to_degrees.transform(first, second))))
+    for form, one, other in ((NORTH_EAST, second, first), (EAST_NORTH, first, second)):
+        east, north = list(letters)[:: -1 if form == NORTH_EAST else 1]
+        if east in "?EW" and north in "?NS" and (east == "?") == (north == "?"):
+            lon, lat = (-one if east == "W" else one), (-other if north == "S" else other)
+            if abs(lat) <= 90 and abs(lon) <= 180:  # noqa: PLR2004 - degrees
+                x, y = to_degrees.transform(lon, lat, direction="INVERSE")
+                readings.append((form, (x, y, lon, lat)))
+    return readings
+
+
+def _check_sigma(sigma: float) -> None:
+    if not (math.isfinite(sigma) and sigma > 0):
+        msg = f"the deviation of the position is {sigma} m; give metres above 0."
+        raise InputError(msg)
+
+
+def _is_near(database: SignatureDatabase, position: tuple[float, float], sigma: float) -> bool:
+    """Tell whether a position may be that of a cell."""
+    away = np.hypot(*(database.xy - np.asarray(position, dtype=np.float64)).T).min()
+    return bool(away <= FARTHEST * sigma + database.reach)
+
+
+def _extent(database: SignatureDatabase) -> str:
+    """Return where the cells lie, in words, in both systems."""
+    (west, south), (east, north) = database.xy.min(axis=0), database.xy.max(axis=0)
+    to_degrees = Transformer.from_crs(database.crs, DEGREES, always_xy=True)
+    low_lon, low_lat, high_lon, high_lat = to_degrees.transform_bounds(west, south, east, north)
+    return (
+        f"the cells lie at x {west:.0f} to {east:.0f}, y {south:.0f} to {north:.0f} "
+        f"({database.crs.to_string()}), which is latitude {low_lat:.4f} to {high_lat:.4f}, "
+        f"longitude {low_lon:.4f} to {high_lon:.4f}"
+    )
 
 
 def area_prior(
@@ -52,7 +183,7 @@ def area_prior(
     Raises
     ------
     InputError
-        If the area is no polygon, or no cell is left.
+        If the area is no polygon, or no cell lies in it.
     CrsError
         If the coordinate reference system cannot be read.
 
@@ -79,9 +210,16 @@ def area_prior(
             raise CrsError(msg) from error
     shapely.prepare(shape)
     inside = shapely.intersects_xy(shape, *database.xy.T)
+    if not inside.any():
+        west, south, east, north = shape.bounds
+        msg = (
+            f"no cell lies in the area, which is at x {west:.0f} to {east:.0f}, y {south:.0f} to "
+            f"{north:.0f}: {_extent(database)}; give an area there."
+        )
+        raise InputError(msg)
     weights = np.where(
         inside,
-        (1.0 - outside) / max(int(inside.sum()), 1),
+        (1.0 - outside) / int(inside.sum()),
         outside / max(int((~inside).sum()), 1),
     )
     return weight_prior(database, weights)
@@ -109,7 +247,8 @@ def position_prior(
     Raises
     ------
     InputError
-        If a number is not finite, or `sigma` is not above 0.
+        If a number is not finite, `sigma` is not above 0, or the position is farther from every
+        cell than three deviations and the range of sight.
 
     Examples
     --------
@@ -117,11 +256,16 @@ def position_prior(
     >>> int(position_prior(demo_database, (x + 2.0, y), sigma=50.0).argmax())
     7
     """
-    if not (math.isfinite(sigma) and sigma > 0):
-        msg = f"the deviation of the position is {sigma} m; give metres above 0."
-        raise InputError(msg)
+    _check_sigma(sigma)
     if not all(map(math.isfinite, position)):
         msg = f"the position is {position}; give x and y in metres."
+        raise InputError(msg)
+    if not _is_near(database, position, sigma):
+        x, y = position
+        msg = (
+            f"the position ({x:.1f}, {y:.1f}) is outside the city: {_extent(database)}; give x and "
+            "y of a place there, or a larger deviation."
+        )
         raise InputError(msg)
     away = ((database.xy - np.asarray(position, dtype=np.float64)) ** 2).sum(axis=1)
     logs = -0.5 * away / sigma**2
@@ -188,7 +332,7 @@ def raster_prior(
     )
     missing = np.isnan(weights)
     if missing.all():
-        msg = f"{path} has no data at any cell of the database; give a raster of its area."
+        msg = f"{path} has no data at any cell: {_extent(database)}; give a raster of this area."
         raise InputError(msg)
     values = weights[~missing]
     if np.isinf(values).any() or (values < 0).any():

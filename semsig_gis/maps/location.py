@@ -43,6 +43,7 @@ if TYPE_CHECKING:
     import folium
     from numpy.typing import ArrayLike, NDArray
 
+    from semsig_gis.database.answer import Answer
     from semsig_gis.database.database import SignatureDatabase
     from semsig_gis.likelihood.explain import Explanation
     from semsig_gis.likelihood.locate import Location
@@ -279,6 +280,11 @@ def _north(heading: float | None, sigma: float | None = None) -> str | None:
     return f"{heading % 360.0:.1f}°" + (f" ± {sigma:.1f}°" if sigma is not None else "")
 
 
+def _notes(answer: Answer) -> str:
+    """Return the notes of an answer as HTML."""
+    return "".join(f"<p>Note: {escape(note)}</p>" for note in answer.notes)
+
+
 def location_legend(location: Location) -> str:
     """Return the legend of a map of chances, as HTML with data escaped."""
     posterior, answer, estimate = location.posterior, location.answer, location.estimate
@@ -306,7 +312,7 @@ def location_legend(location: Location) -> str:
         f"Method: likelihood, {isolated(location.noise)} noise, {len(posterior.database):,} cells"
         f"</p><p>{swatch(colour)}<b>{verdict}</b>: within {location.rule.radius:g} m with a chance "
         f"of {answer.mass:.1%}; if there, ±&nbsp;{estimate.sigma:.1f}&nbsp;m each way "
-        f"(ellipse: 90 %)</p>{note}"
+        f"(ellipse: 90 %)</p>{note}{_notes(location)}"
         f"<p>Chance of a cell, or around it, in percent<br>{chances}</p>"
         f"<p>Regions, the fewest cells that hold<br>{regions}</p>"
         f"<p>{swatch('#ffffff')}Candidates by rank</p>"
@@ -405,6 +411,7 @@ def localization_legend(localization: Localization) -> str:
         f"<p>{query_text(localization.query, localization.taxonomy)}"
         f"Method: {escape(str(localization.method))}, by {escape(localization.used)}</p>"
         f"<p>The best {len(candidates):,} of {localization.cells:,} cells{beyond}</p>"
+        f"{_notes(localization)}"
         "<p>Distance to the query (large sign: rank 1)"
         f"{ramp_bar(CANDIDATE_RAMP, f'{distances.min():.3f}', f'{distances.max():.3f}')}</p>"
         f"{shades()}{sources(localization.licenses)}"

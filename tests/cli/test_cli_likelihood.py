@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 import rasterio
 import shapely
+from pyproj import Transformer
 from sentences import sentence
 from worlds import CORNER, World, random_town
 
@@ -91,11 +92,20 @@ def test_the_likelihood_answers_or_cannot_tell(city: Path, run: Run) -> None:
     assert "Cannot tell: the best place is" in out
     assert "of the chance is in" in out
     x, y = PLACE
+    lon, lat = Transformer.from_crs(2154, 4326, always_xy=True).transform(x, y)
+    query = "localize", city, *options(SEEN), *BY, "--near", f"{lon},{lat},15"
+    assert f"x {x:.1f}, y {y:.1f}, ± 15 m, read as LON,LAT" in run(*query)[1]
+    known = json.loads(run(*query, "--require", SEEN["types"][0], "--json")[1])["prior"]
+    assert known["near"]["x"] == pytest.approx(x, abs=0.01)
+    assert known["near"]["read_as"] == "LON,LAT"
+    assert known["require"]["cells"] > 0
+    assert known["ratio"] > 1
     prior = "--near", f"{x},{y},15", "--require", SEEN["types"][0]
     assert run(*query, *prior, "--heading", 10)[0] == 0
     area = written_area(city.with_name("square.gpkg"), shapely.box(x - 6, y - 6, x + 6, y + 6))
     inside = json.loads(run("localize", city, "--types", SEEN["types"], *BY, *area, "--json")[1])
     assert inside["answered"]
+    assert inside["prior"]["area"] == {"file": str(area[1]), "cells": 1}
     assert sum(row["chance"] for row in inside["candidates"][:4]) == pytest.approx(1.0)
 
 

@@ -76,6 +76,26 @@ def test_a_prior_and_a_rule_decide() -> None:
     assert not locate(INDEX, query, log_prior=near, rule=AnswerRule(threshold=1.5)).answer.given
 
 
+def test_a_prior_that_the_view_speaks_against_is_told() -> None:
+    cell = LONG[0]
+    farthest = int(np.hypot(*(CITY.xy - CITY.xy[cell]).T).argmax())
+    query, places = CITY.signature(cell), CITY.xy[[cell, farthest]]
+    right, wrong = (position_prior(CITY, (x, y), sigma=10.0) for x, y in places.tolist())
+    known = {"near": "the lamp"}
+    found, misled = (locate(WIDE, query, log_prior=one, known=known) for one in (right, wrong))
+    assert found.prior_ratio is not None
+    assert found.prior_ratio > 1
+    assert not found.notes
+    assert found.to_dict()["prior"] == {"near": "the lamp", "ratio": found.prior_ratio}
+    assert misled.prior_ratio is not None
+    assert misled.prior_ratio < 0.01
+    assert "the prior and the view disagree: 1 in" in misled.notes[0]
+    assert locate(WIDE, query).to_dict()["prior"] is None
+    # A route is one view of the place that it begins at.
+    views = locate_route(WIDE, [query], [], log_prior=wrong)
+    assert views[0].prior_ratio == pytest.approx(misled.prior_ratio, rel=1e-6)
+
+
 def test_the_place_between_the_viewpoints_is_found() -> None:
     errors = np.empty((12, 2))
     for trial, xy in enumerate(CORNER + np.random.default_rng(1).uniform(40, 160, (12, 2))):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import geopandas as gpd
@@ -13,15 +14,33 @@ import shapely
 from hypothesis import given
 from hypothesis import strategies as st
 from noisy_cells import random_database
+from pyproj import CRS
 from sentences import refused
 
 from semsig_gis.core.errors import CrsError, InputError
-from semsig_gis.likelihood.posterior import AnswerRule, calibrate, open_rule, posterior, save_rule
-from semsig_gis.likelihood.priors import area_prior, position_prior, raster_prior, weight_prior
+from semsig_gis.likelihood.posterior import (
+    AnswerRule,
+    calibrate,
+    open_rule,
+    posterior,
+    prior_ratio,
+    save_rule,
+)
+from semsig_gis.likelihood.priors import (
+    KnownPosition,
+    area_prior,
+    position_prior,
+    raster_prior,
+    weight_prior,
+)
 from semsig_gis.likelihood.route import LOST, Leg, moved_chances, route_posteriors
 
 if TYPE_CHECKING:
     from pathlib import Path
+
+    from numpy.typing import NDArray
+
+    from semsig_gis.database.database import SignatureDatabase
 
 DATABASE = random_database(3, cells=120)
 FLAT = np.zeros(len(DATABASE))
@@ -102,8 +121,77 @@ def test_a_position_is_a_normal_density() -> None:
     away = np.hypot(*(DATABASE.xy - [50.0, 70.0]).T)
     slow = np.exp(-0.5 * (away / 20.0) ** 2)
     assert chances == pytest.approx(slow / slow.sum())
-    far = position_prior(DATABASE, (1e7, 0.0), sigma=1.0)
-    assert np.isfinite(far).any()
+    # As far as it may be, it excludes nothing by rounding.
+    far = position_prior(DATABASE, (5.0, -3e4), sigma=1e4)
+    assert np.isfinite(far).all()
+
+
+DIAGONAL = replace(DATABASE, crs=CRS("+proj=tmerc +lat_0=45 +lon_0=45 +datum=WGS84"))
+PARIS = replace(
+    DATABASE,
+    crs=CRS("+proj=tmerc +lat_0=48.9 +lon_0=2.3 +x_0=5e5 +y_0=5e5 +datum=WGS84"),
+    grid=replace(DATABASE.grid, origin=(5e5, 5e5)),
+)
+
+
+@pytest.mark.parametrize(
+    ("database", "text", "form"),
+    [
+        (PARIS, "500100,500050.5,20", "X,Y"),
+        (PARIS, "500100 m, 500050.5 m, 20 m", "X,Y"),
+        (PARIS, "48.9005,2.3005,20", "LAT,LON"),
+        (PARIS, "2.3005, 48.9005, 20", "LON,LAT"),
+        (PARIS, "48.9005°N,2.3005°E,20", "LAT,LON"),
+        (PARIS, "2.3005e,48.9005n,20", "LON,LAT"),
+        (DIAGONAL, "45.0005N,45.0005E,20", "LAT,LON"),
+        (DIAGONAL, "45m,45m,20", "X,Y"),
+    ],
+)
+def test_a_position_is_read_as_what_is_in_the_city(
+    database: SignatureDatabase, text: str, form: str
+) -> None:
+    position = KnownPosition.parse(text, database)
+    assert (position.read_as, position.sigma) == (form, 20.0)
+    assert (database.xy.min(axis=0) <= [position.x, position.y]).all()
+    assert (database.xy.max(axis=0) >= [position.x, position.y]).all()
+    lat, lon = (45.0, 45.0) if database is DIAGONAL else (48.9, 2.3)
+    assert (position.lat, position.lon) == pytest.approx((lat, lon), abs=3e-3)
+
+
+@pytest.mark.parametrize(
+    ("database", "text", "words"),
+    [
+        (DIAGONAL, "45.0005,45.0005,20", "as X,Y and LAT,LON and LON,LAT; write which"),
+        (PARIS, "48.9005m,2.3005m,20", "neither as X,Y nor"),
+        (PARIS, "48.9,-2.3,20", "neither as X,Y nor"),
+        (PARIS, "48.9005S,2.3005E,20", "neither as X,Y nor"),
+        (PARIS, "1e9,1e9,20", "neither as X,Y nor"),
+        (PARIS, "48.9005N,2.3005,20", "LAT,LON,SIGMA in degrees or X,Y,SIGMA"),
+        (PARIS, "48.9005N,2.3005S,20", "LAT,LON,SIGMA in degrees"),
+        (PARIS, "48.9,2.3", "LAT,LON,SIGMA in degrees"),
+        (PARIS, "48,9,2,3,20", "LAT,LON,SIGMA in degrees"),
+        (PARIS, "4.8.9,2.3,20", "LAT,LON,SIGMA in degrees"),
+        (PARIS, "48.9,2.3,far", "LAT,LON,SIGMA in degrees"),
+        (PARIS, "nan,2.3,20", "LAT,LON,SIGMA in degrees"),
+        (PARIS, "48.9,2.3,nan", "nan m; give metres above 0"),
+    ],
+)
+def test_a_position_that_is_not_one_place_of_the_city_is_refused(
+    database: SignatureDatabase, text: str, words: str
+) -> None:
+    with refused(InputError, words):
+        KnownPosition.parse(text, database)
+
+
+@given(LOGLIKS, LOGLIKS)
+def test_the_ratio_of_a_prior(loglik: NDArray[np.float64], log_prior: NDArray[np.float64]) -> None:
+    prior = np.exp(log_prior) / np.exp(log_prior).sum()
+    expected = (prior * np.exp(loglik)).sum() / np.exp(loglik).mean()
+    assert prior_ratio(loglik, log_prior) == pytest.approx(expected)
+    assert prior_ratio(loglik, FLAT) == pytest.approx(1.0)
+    nowhere = np.where(loglik == loglik.max(), -math.inf, 0.0)
+    if np.isfinite(nowhere).any():
+        assert 0 < prior_ratio(loglik * 1e4, nowhere) < 1e-300
 
 
 def test_weights_and_priors_add_up() -> None:
