@@ -17,6 +17,7 @@ from __future__ import annotations
 import contextlib
 import gzip
 import http.server
+import io
 import threading
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -26,7 +27,7 @@ from urllib.parse import parse_qsl, urlsplit
 import pytest
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Iterable, Iterator, Mapping, Sequence
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,6 +41,7 @@ class Answer:
     chunked: bool = False  # the length is left unsaid and the body sent in chunks
     cut: int | None = None  # bytes after which the connection is closed, as if it had failed
     drip: tuple[int, float] | None = None  # bytes to send at a time, seconds to wait after each
+    slow_head: bool = False  # the headers drip, too
 
 
 @dataclass(frozen=True, slots=True)
@@ -184,6 +186,16 @@ class _Handler(http.server.BaseHTTPRequestHandler):
     do_POST = do_HEAD = do_GET  # noqa: N815
 
     def _send(self, answer: Answer) -> None:
+        stream, head = self.wfile, io.BytesIO()
+        self.wfile = head
+        self._send_head(answer)
+        self.wfile = stream
+        drip = answer.drip or (2**16, 0.0)
+        self._write([head.getvalue()], drip if answer.slow_head else (2**16, 0.0))
+        if self.command != "HEAD":
+            self._write(self._body(answer, drip[0]), drip)
+
+    def _send_head(self, answer: Answer) -> None:
         self.send_response(answer.status)
         for name, value in answer.headers.items():
             self.send_header(name, value)
@@ -195,15 +207,25 @@ class _Handler(http.server.BaseHTTPRequestHandler):
             self.send_header("Content-Length", str(len(answer.body)))
         self.send_header("Connection", "close")
         self.end_headers()
-        if self.command == "HEAD":
-            return
+
+    @staticmethod
+    def _body(answer: Answer, size: int) -> Iterator[bytes]:
         body = answer.body[: answer.cut]
-        size, pause = answer.drip or (2**16, 0.0)
+        if not answer.chunked:
+            yield body
+            return
         for start in range(0, len(body), size):
             piece = body[start : start + size]
-            self.wfile.write(b"%x\r\n%b\r\n" % (len(piece), piece) if answer.chunked else piece)
-            self.wfile.flush()
-            if pause and self.playing.wait(pause):
-                return
-        if answer.chunked and answer.cut is None:
-            self.wfile.write(b"0\r\n\r\n")
+            yield b"%x\r\n%b\r\n" % (len(piece), piece)
+        if answer.cut is None:
+            yield b"0\r\n\r\n"
+
+    def _write(self, pieces: Iterable[bytes], drip: tuple[int, float]) -> None:
+        """Send pieces so many bytes at a time; OSError where the server ends meanwhile."""
+        size, pause = drip
+        for piece in pieces:
+            for start in range(0, len(piece), size):
+                self.wfile.write(piece[start : start + size])
+                self.wfile.flush()
+                if pause and self.playing.wait(pause):
+                    raise BrokenPipeError

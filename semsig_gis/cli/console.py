@@ -131,6 +131,7 @@ def progress(
     bar = parts.Progress(
         parts.TextColumn("{task.description}"),
         parts.BarColumn(),
+        parts.TimeElapsedColumn(),
         *(
             (parts.DownloadColumn(), parts.TransferSpeedColumn())
             if unit == "bytes"

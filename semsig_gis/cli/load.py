@@ -109,6 +109,12 @@ def fetch(
         Path | None, typer.Option(help="Folder of the cache; default: semsig's own.")
     ] = None,
     offline: Annotated[bool, typer.Option("--offline", help="Use the cache only.")] = False,
+    timeout: Annotated[
+        float,
+        typer.Option(
+            min=1.0, max=86_400.0, help="Give up a file after so many seconds, all attempts in all."
+        ),
+    ] = 600.0,
     metric_crs: MetricCrs = None,
     filters: Filters = True,
     collapse: Collapse = True,
@@ -126,7 +132,7 @@ def fetch(
     require_suffix(".parquet", out, buildings, streets)
     catalog = load_catalog(name)
     specs = choose_layers(catalog, layer or (), surroundings=bool(buildings or streets))
-    kept, http = open_cache(cache, offline=offline)
+    kept, http = open_cache(cache, offline=offline, deadline_s=timeout, tell=remark)
     unit: Literal["steps", "bytes"] = "steps" if catalog.reader == "osm_file" else "bytes"
     with progress("fetching", unit=unit) as advance:
         place = find_area(area, catalog, cache=kept, http=http)

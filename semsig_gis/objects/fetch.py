@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from semsig_gis.core.errors import InputError
 from semsig_gis.sources.area import clip_layer, names_place, parse_area
 from semsig_gis.sources.http.cache import Cache
-from semsig_gis.sources.http.fetch import HttpSpec
+from semsig_gis.sources.http.fetch import DEFAULT_HTTP, HttpSpec
 from semsig_gis.sources.opendatasoft import reader as opendatasoft
 from semsig_gis.sources.osm import overpass
 from semsig_gis.sources.osm.overpass import find_place
@@ -101,7 +101,11 @@ def fetch_layers(
 
 
 def open_cache(
-    folder: str | Path | None = None, *, offline: bool = False
+    folder: str | Path | None = None,
+    *,
+    offline: bool = False,
+    deadline_s: float = DEFAULT_HTTP.deadline_s,
+    tell: Callable[[str], None] = lambda _: None,
 ) -> tuple[Cache, HttpSpec]:
     """Open the cache of downloads.
 
@@ -112,6 +116,10 @@ def open_cache(
         ``.cache`` in the home folder).
     offline : bool, default False
         Whether everything comes from the cache.
+    deadline_s : float, default 600
+        Seconds after which a file has to be there, with all attempts and pauses.
+    tell : callable, optional
+        Takes a line where a server fails and is waited for.
 
     Returns
     -------
@@ -125,7 +133,9 @@ def open_cache(
     True
     """
     base = os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
-    return Cache(Path(folder or Path(base) / "semsig")), HttpSpec(offline=offline)
+    return Cache(Path(folder or Path(base) / "semsig")), HttpSpec(
+        offline=offline, deadline_s=deadline_s, tell=tell
+    )
 
 
 def find_area(text: str, catalog: Catalog, *, cache: Cache, http: HttpSpec) -> Area:

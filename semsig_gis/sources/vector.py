@@ -22,6 +22,7 @@ import shapely.geometry
 
 from semsig_gis.core.errors import CatalogError, SourceError, UnknownNameError, nearest_name
 from semsig_gis.sources import require_file
+from semsig_gis.sources.packed import bomb, swells
 from semsig_gis.sources.raw_layer import (
     WGS84,
     BadFeatureError,
@@ -117,7 +118,12 @@ def _archived(path: Path) -> tuple[str, ...]:
     """Return the names of the vector files in an archive whose checksums hold."""
     try:
         with zipfile.ZipFile(path) as archive:
-            names = [item.filename for item in archive.infolist() if not item.is_dir()]
+            items = [item for item in archive.infolist() if not item.is_dir()]
+            for item in items:
+                if swells(item.compress_size, item.file_size):
+                    what = f"{item.filename} in {path}"
+                    raise bomb(what)
+            names = [item.filename for item in items]
             broken = archive.testzip()
     except (NotImplementedError, OSError, RuntimeError, zipfile.BadZipFile, zlib.error) as error:
         raise unreadable(path, error) from error

@@ -8,7 +8,6 @@ import gzip
 import json
 import multiprocessing
 import socket
-import time
 from contextlib import nullcontext
 from datetime import UTC, datetime, timedelta
 from typing import TYPE_CHECKING, Any
@@ -304,15 +303,46 @@ def test_the_only_way_to_another_scheme_is_the_safer_one(
         _require_same_host(source, target)
 
 
-@pytest.mark.parametrize(("drip", "words"), [((1, 0.02), "too slowly"), ((1, 30.0), "stopped")])
-def test_a_slow_drip_is_not_waited_for(
-    server: Server, get: Get, drip: tuple[int, float], words: str
+@pytest.mark.parametrize(
+    ("answer", "words"),
+    [
+        (Answer(CONTENT, drip=(1, 0.02)), "too slowly"),
+        (Answer(CONTENT, drip=(1, 30.0)), "stopped"),
+        (Answer(CONTENT, drip=(1, 0.02), slow_head=True), "too slowly"),
+        (Answer(CONTENT, drip=(1, 30.0), slow_head=True), "did not answer in time"),
+    ],
+)
+def test_a_slow_drip_is_tried_once_more_and_told(
+    server: Server, get: Get, answer: Answer, words: str
 ) -> None:
-    server.on("/trees", Answer(CONTENT, drip=drip))
-    start = time.monotonic()
-    failure_of(get, words, timeout=(1.0, 0.2), attempts=2)
-    assert time.monotonic() - start < 5
+    server.on("/trees", answer)
+    told: list[str] = []
+    failure_of(get, words, "2 times", timeout=(1.0, 0.2), attempts=5, tell=told.append)
     assert len(server.seen) == 2
+    (line,) = told
+    assert words in line
+    assert line.endswith("attempt 2 of 2 in 1 s")
+
+
+@pytest.mark.parametrize("slow_head", [False, True])
+def test_a_request_ends_by_its_deadline(server: Server, get: Get, *, slow_head: bool) -> None:
+    drip, remedy = ((1, 0.02), "ask for less") if slow_head else ((50, 0.02), "run it again to go")
+    server.on("/trees", Answer(status=302, headers={"Location": "/slow"}))
+    server.on("/slow", Answer(CONTENT, drip=drip, slow_head=slow_head, headers={"ETag": '"1"'}))
+    failure_of(get, "not done after 1 s", remedy, "--timeout", deadline_s=1.0, slowest=1.0)
+    assert server.paths() == ["/trees", "/slow"]
+
+
+def test_a_pause_that_the_deadline_does_not_leave_is_not_made(server: Server, get: Get) -> None:
+    server.on("/trees", Answer(status=503, headers={"Retry-After": "60"}))
+    failure_of(get, "answered 503", "30 s are over; try again later", deadline_s=30.0)
+    assert len(server.seen) == 1
+
+
+def test_what_swells_is_given_up_early(server: Server, cache: Cache, get: Get) -> None:
+    server.on("/trees", zipped(b" " * 2**28))
+    failure_of(get, "unpacks to more than 250 times its size")
+    assert leftovers(cache) == set()
 
 
 def test_a_server_that_says_nothing_is_not_waited_for() -> None:

@@ -9,7 +9,9 @@ import contextlib
 import dataclasses
 import email.utils
 import hashlib
+import itertools
 import json
+import math
 import time
 import zlib
 from collections.abc import Callable
@@ -24,6 +26,13 @@ import urllib3.exceptions
 from semsig_gis import __version__
 from semsig_gis.core.errors import InputError, SourceError
 from semsig_gis.sources.http.cache import Edition, Fetched
+from semsig_gis.sources.http.deadline import (
+    Deadline,
+    OverdueError,
+    PunctualAdapter,
+    SlowError,
+)
+from semsig_gis.sources.packed import bomb, swells
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
@@ -33,6 +42,7 @@ if TYPE_CHECKING:
 
 USER_AGENT = f"semsig_gis/{__version__} (reads open data once, into a cache)"
 MOST_REDIRECTS = 5
+TOO_SLOWLY = "sent too slowly"
 RETRIED = frozenset({408, 429, 500, 502, 503, 504})
 MOVED = frozenset({301, 302, 303, 307, 308})
 BLOCK = 2**16
@@ -42,27 +52,39 @@ BLOCK = 2**16
 class HttpSpec:
     """How requests are made: times in seconds, sizes in bytes.
 
-    `timeout` is for the connection and for the next bytes; less than `slowest` bytes a second over
-    the latter counts as stalled. The pause after a failure, `backoff_s`, doubles each time; a
-    server that asks for more than `longest_wait_s` is not waited for. `max_bytes` holds as sent and
-    as unpacked. `fresh_s` is how long a copy is used that the server cannot confirm.
+    A file has to be there `deadline_s` after it was asked for, with all redirects, attempts and
+    pauses. `timeout` is for the connection and for the next bytes; less than `slowest` bytes a
+    second over the latter counts as stalled, and is tried `slow_attempts` times. The pause after a
+    failure, `backoff_s`, doubles each time; a server that asks for more than `longest_wait_s` is
+    not waited for. `max_bytes` holds as sent and as unpacked. `fresh_s` is how long a copy is used
+    that the server cannot confirm. `tell` takes a line about what is waited for.
     """
 
+    deadline_s: float = 600.0
     timeout: tuple[float, float] = (10.0, 60.0)
     slowest: float = 100.0
     attempts: int = 5
+    slow_attempts: int = 2
     backoff_s: float = 2.0
     longest_wait_s: float = 180.0
     max_bytes: int = 2**31
     fresh_s: float = 86_400.0
     offline: bool = False
     sleep: Callable[[float], None] = time.sleep
+    tell: Callable[[str], None] = lambda _: None
 
     def __post_init__(self) -> None:
-        """Refuse numbers of attempts below 1."""
+        """Refuse numbers of attempts below 1, and a deadline that is now."""
         if self.attempts < 1:
             msg = f"attempts is {self.attempts}; it takes at least 1."
             raise InputError(msg)
+        if not 0 < self.deadline_s < math.inf:
+            msg = f"deadline_s is {self.deadline_s}; give seconds above 0."
+            raise InputError(msg)
+
+    def deadline(self) -> Deadline:
+        """Return the deadline of a request that begins now."""
+        return Deadline(self.deadline_s, patience=self.timeout[1], slowest=self.slowest)
 
 
 DEFAULT_HTTP: HttpSpec = HttpSpec()
@@ -77,12 +99,18 @@ class HttpError(SourceError):
 
 
 class PassingError(Exception):
-    """Something failed that may work the next time, after `wait` seconds if the server said so."""
+    """Something failed that may work the next time, after `wait` seconds if the server said so.
 
-    def __init__(self, what: str, status: int = 0, wait: float | None = None) -> None:
+    `slow` says that the failure took its time, as the next one will.
+    """
+
+    def __init__(
+        self, what: str, status: int = 0, wait: float | None = None, *, slow: bool = False
+    ) -> None:
         super().__init__(what)
         self.status = status
         self.wait = wait
+        self.slow = slow
 
 
 @dataclass(frozen=True, slots=True)
@@ -100,9 +128,11 @@ class Request:
 
 
 @contextlib.contextmanager
-def polite_session() -> Iterator[requests.Session]:
-    """Give a session that introduces itself and asks for nothing but gzip."""
+def polite_session(deadline: Deadline) -> Iterator[requests.Session]:
+    """Give a session that introduces itself, asks for nothing but gzip, and ends by a deadline."""
     with requests.Session() as session:
+        for scheme in ("http://", "https://"):
+            session.mount(scheme, PunctualAdapter(deadline))
         session.headers.update({"User-Agent": USER_AGENT, "Accept-Encoding": "gzip"})
         session.auth = lambda prepared: prepared  # no password from the user's .netrc
         yield session
@@ -127,7 +157,7 @@ def answer_to(
                 stream=True,
                 allow_redirects=False,
             )
-        except (requests.RequestException, urllib3.exceptions.HTTPError) as error:
+        except (requests.RequestException, urllib3.exceptions.HTTPError, SlowError) as error:
             raise _failure(error, request.url) from error
         with response:
             if response.status_code not in MOVED:
@@ -162,15 +192,17 @@ def _failure(error: Exception, url: str) -> Exception:
     if isinstance(error, requests.exceptions.SSLError):
         msg = f"{host_of(url)} has no certificate that this machine trusts; check the address."
         return HttpError(msg)
+    if isinstance(error, SlowError):
+        return PassingError(TOO_SLOWLY, slow=True)
     if isinstance(error, requests.exceptions.ConnectTimeout | requests.exceptions.ReadTimeout):
-        return PassingError("did not answer in time")
+        return PassingError("did not answer in time", slow=True)
     if isinstance(error, requests.exceptions.ConnectionError):
         return PassingError("could not be reached or hung up")
     msg = f"{url} cannot be asked for ({' '.join(str(error).split()).rstrip('.')}); correct it."
     return HttpError(msg)
 
 
-def require_success(response: requests.Response, spec: HttpSpec) -> None:
+def require_success(response: requests.Response) -> None:
     """Refuse an answer that is no part of the file; PassingError if a later one may be."""
     status = response.status_code
     if status in {requests.codes.ok, requests.codes.partial}:
@@ -178,16 +210,16 @@ def require_success(response: requests.Response, spec: HttpSpec) -> None:
     what = f"answered {status} {response.reason or ''}".rstrip()
     if status in RETRIED:
         raise PassingError(what, status, _retry_after(response))
-    detail = _detail(response, spec)
+    detail = _detail(response)
     msg = f"{host_of(response.url)} {what} to {response.url.partition('?')[0]}{detail}; correct it."
     raise HttpError(msg, status)
 
 
-def _detail(response: requests.Response, spec: HttpSpec) -> str:
+def _detail(response: requests.Response) -> str:
     """Return what a service says in JSON about an error, as part of a sentence."""
     body = b""
     with contextlib.suppress(PassingError):
-        for block in blocks_of(response, spec):
+        for block in blocks_of(response):
             body += block
             if len(body) > BLOCK:
                 break
@@ -201,22 +233,16 @@ def _detail(response: requests.Response, spec: HttpSpec) -> str:
     return ""
 
 
-def blocks_of(response: requests.Response, spec: HttpSpec) -> Iterator[bytes]:
+def blocks_of(response: requests.Response) -> Iterator[bytes]:
     """Yield the body as it is sent; PassingError if the server hangs up, stops or is too slow."""
-    since, got = time.monotonic(), 0
     try:
         while block := response.raw.read1(BLOCK, decode_content=False):
             yield block
-            got += len(block)
-            elapsed = time.monotonic() - since
-            if elapsed >= spec.timeout[1]:
-                if got < spec.slowest * elapsed:
-                    what = "sent too slowly"
-                    raise PassingError(what)
-                since, got = time.monotonic(), 0
+    except SlowError as error:
+        raise PassingError(TOO_SLOWLY, slow=True) from error
     except urllib3.exceptions.ReadTimeoutError as error:
         what = "stopped sending"
-        raise PassingError(what) from error
+        raise PassingError(what, slow=True) from error
     except (urllib3.exceptions.HTTPError, OSError) as error:
         what = "cut the connection"
         raise PassingError(what) from error
@@ -326,13 +352,18 @@ def read_text(url: str, *, spec: HttpSpec = DEFAULT_HTTP) -> str:
     require_address(url)
     request = Request(url)
     try:
-        with polite_session() as session, answer_to(session, request, {}, spec) as response:
-            require_success(response, spec)
+        with (
+            polite_session(spec.deadline()) as session,
+            answer_to(session, request, {}, spec) as response,
+        ):
+            require_success(response)
             body = b""
-            for block in blocks_of(response, spec):
+            for block in blocks_of(response):
                 body += block
                 if len(body) > BLOCK:
                     break
+    except OverdueError as error:
+        raise _overdue(url, spec) from error
     except PassingError as error:
         msg = f"{host_of(url)} {error}; try again later."
         raise HttpError(msg, error.status) from error
@@ -355,28 +386,46 @@ class _Job:
 
 
 def _persist(job: _Job, before: Callable[[], None] | None) -> Fetched:
-    """Try until it works, or has failed too often."""
-    spec = job.spec
-    with polite_session() as session:
-        for attempt in range(1, spec.attempts + 1):
+    """Try until it works, has failed too often, or the time is over."""
+    spec, host = job.spec, host_of(job.request.url)
+    deadline = spec.deadline()
+    with polite_session(deadline) as session:
+        for attempt in itertools.count(1):
             if before is not None:
                 before()
             try:
                 return _attempt(session, job)
             except PassingError as error:
                 failure = error
+            except OverdueError as error:
+                raise _overdue(job.request.url, spec, job.entry) from error
             if failure.wait is not None and failure.wait > spec.longest_wait_s:
                 remedy = f" and asks to wait {failure.wait:.0f} s; try again after that"
                 break
-            if attempt < spec.attempts:
-                pause = spec.backoff_s * 2 ** (attempt - 1)
-                spec.sleep(pause if failure.wait is None else failure.wait)
-        else:
-            remedy = f", {spec.attempts} times; try again later"
+            most = min(spec.attempts, spec.slow_attempts) if failure.slow else spec.attempts
+            if attempt >= most:
+                remedy = f", {attempt} times; try again later"
+                break
+            pause = spec.backoff_s * 2 ** (attempt - 1) if failure.wait is None else failure.wait
+            if pause >= deadline.seconds_left:
+                remedy = f", and {spec.deadline_s:g} s are over; try again later"
+                break
+            spec.tell(f"{host} {failure}; attempt {attempt + 1} of {most} in {pause:.0f} s")
+            spec.sleep(pause)
     if job.held is not None:
         remedy += f", or work offline with the copy of {job.held.fetched_at} in the cache"
-    msg = f"{host_of(job.request.url)} {failure}{remedy}."
+    msg = f"{host} {failure}{remedy}."
     raise HttpError(msg, failure.status) from failure
+
+
+def _overdue(url: str, spec: HttpSpec, entry: Entry | None = None) -> HttpError:
+    """Return the plain sentence for a request whose time is over."""
+    resumed = entry is not None and entry.resumable()[0] > 0
+    remedy = "run it again to go on from there" if resumed else "ask for less"
+    return HttpError(
+        f"{host_of(url)} was not done after {spec.deadline_s:g} s; {remedy}, or allow more time "
+        "with --timeout."
+    )
 
 
 def _attempt(session: requests.Session, job: _Job) -> Fetched:
@@ -395,7 +444,7 @@ def _attempt(session: requests.Session, job: _Job) -> Fetched:
                 entry.drop_part()
                 what = "sent another part of the file than the one asked for"
                 raise PassingError(what, wait=0.0)
-        require_success(response, spec)
+        require_success(response)
         edition = begun if have else Edition.of(response.headers)
         if job.accept and edition.content_type and edition.content_type not in job.accept:
             msg = (
@@ -442,7 +491,7 @@ def _receive(response: requests.Response, job: _Job, have: int) -> None:
     total = have + int(length) if length.isdecimal() else 0
     _require_room(total, job)
     with job.entry.part.open("ab") as stream:
-        for block in blocks_of(response, job.spec):
+        for block in blocks_of(response):
             have += len(block)
             _require_room(have, job)
             stream.write(block)
@@ -458,6 +507,9 @@ def _unpack(part: Path, body: Path, encoding: str, job: _Job) -> tuple[str, int]
         for block in _unpacked(packed.read, encoding, host_of(job.request.url)):
             size += len(block)
             _require_room(size, job)
+            if swells(packed.tell(), size):
+                what = f"what {host_of(job.request.url)} sends"
+                raise bomb(what, "tell its publisher")
             digest.update(block)
             stream.write(block)
     return digest.hexdigest(), size

@@ -19,6 +19,7 @@ from semsig_gis.core.errors import CatalogError, SourceError
 from semsig_gis.sources import require_file
 from semsig_gis.sources.osm.elements import ElementLayer, TagIndex, relation_shape, way_shape
 from semsig_gis.sources.osm.merge import age_notes, merge_extracts, readable
+from semsig_gis.sources.packed import require_modest
 from semsig_gis.sources.raw_layer import BadFeatureError
 
 if TYPE_CHECKING:
@@ -111,6 +112,7 @@ def _file(path: Path) -> osmium.io.File:
     if path.stat().st_size == 0:
         msg = f"{path} is empty; get it again."
         raise SourceError(msg)
+    require_modest(path)
     # The whole path, because libosmium takes "-" for standard input and "http:" for an address.
     return osmium.io.File(str(path.absolute()), kind)
 

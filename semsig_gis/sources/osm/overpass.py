@@ -441,10 +441,9 @@ class _Servers:
 
     def _wait_for_slot(self, address: str) -> None:
         spec = self._spec
+        short = dataclasses.replace(spec, timeout=(STATUS_S, STATUS_S), deadline_s=STATUS_S)
         try:
-            status = read_text(
-                f"{address}/status", spec=dataclasses.replace(spec, timeout=(STATUS_S, STATUS_S))
-            )
+            status = read_text(f"{address}/status", spec=short)
         except SourceError:
             return  # a server without it says by its answer that it is busy
         wait = waiting_time(status)
@@ -452,6 +451,7 @@ class _Servers:
             msg = f"{host_of(address)} has no free slot for {wait:.0f} s; try again after that."
             raise HttpError(msg, TOO_MANY)
         if wait:
+            spec.tell(f"{host_of(address)} has no free slot for {wait:.0f} s")
             spec.sleep(wait + NO_SLOT_MARGIN_S)
 
 
