@@ -23,6 +23,7 @@ from semsig_gis.cli.console import (
     progress,
     remark,
     require_suffix,
+    say,
 )
 from semsig_gis.core.errors import InputError
 
@@ -115,7 +116,7 @@ def build(
         print_json(_info(out))
         return
     size = open_city(out).bytes / 1e6
-    typer.echo(f"{cells:,} cells of mean length {entries / cells:.3f}, {size:.1f} MB: {out}")
+    say(f"{cells:,} cells of mean length {entries / cells:.3f}, {size:.1f} MB: {out}")
 
 
 def _build_whole(
@@ -195,7 +196,7 @@ def info(database: Database, *, as_json: AsJson = False) -> None:
     if columns is not None:
         print_tables(identifiability_tables(columns, object_counts=counts))
     for line in city.licenses:
-        typer.echo(line)
+        say(line)
 
 
 def _info(path: Path) -> dict[str, Any]:

@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from semsig_gis import __version__
-from semsig_gis.cli.console import app
+from semsig_gis.cli.console import app, say
 
 # The order of these imports is that of the help.
 # isort: off
@@ -54,7 +54,7 @@ def run() -> int:
 
 def _version(wanted: bool) -> None:  # noqa: FBT001 - typer calls it so
     if wanted:
-        typer.echo(f"semsig {__version__}")
+        say(f"semsig {__version__}")
         raise typer.Exit
 
 

@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 import typer
 
 from semsig_gis.core.errors import DatabaseError, InputError
+from semsig_gis.core.terminal import visible
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator
@@ -66,9 +67,18 @@ PATIENCE_S = 2.0
 LARGEST_COUNT = 10**9
 
 
+def say(text: object, *, err: bool = False, end: str = "\n") -> None:
+    """Print text on standard output, or on standard error; nothing in it moves the cursor.
+
+    Names and messages from elsewhere may hold escape sequences, which are shown (see `visible`).
+    """
+    shown = "\n".join(map(visible, str(text).split("\n")))
+    typer.echo(shown + end, err=err, nl=False)  # noqa: TID251 - the one place
+
+
 def remark(text: str) -> None:
     """Say one sentence on standard error, after the name of the command."""
-    typer.echo(f"semsig: {text}", err=True)
+    say(f"semsig: {visible(text)}", err=True)
 
 
 def print_json(value: Any, *, indent: int | None = 2) -> None:  # noqa: ANN401 - any JSON
@@ -82,11 +92,11 @@ def print_json(value: Any, *, indent: int | None = 2) -> None:  # noqa: ANN401 -
         text.encode(sys.stdout.encoding or "utf-8")
     except UnicodeEncodeError:
         text = dump(ensure_ascii=True)
-    typer.echo(text)
+    say(text)
 
 
 def print_rows(title: str, header: Iterable[str], rows: Iterable[Iterable[object]]) -> None:
-    """Print a table on standard output; text from data is shown as it is, never as markup.
+    """Print a table on standard output; text from data is neither markup nor moves the cursor.
 
     Whole numbers get thousands separators.
     """
@@ -94,9 +104,9 @@ def print_rows(title: str, header: Iterable[str], rows: Iterable[Iterable[object
     from rich.table import Table
     from rich.text import Text
 
-    table = Table(title=Text(title), title_justify="left")
+    table = Table(title=Text(visible(title)), title_justify="left")
     for name in header:
-        table.add_column(Text(name), overflow="fold")
+        table.add_column(Text(visible(name)), overflow="fold")
     for row in rows:
         table.add_row(*(Text(_cell_text(cell)) for cell in row))
     console = Console(file=sys.stdout)
@@ -109,7 +119,9 @@ def print_rows(title: str, header: Iterable[str], rows: Iterable[Iterable[object
 
 
 def _cell_text(cell: object) -> str:
-    return f"{cell:,}" if isinstance(cell, int) and abs(cell) < LARGEST_COUNT else str(cell)
+    if isinstance(cell, int) and abs(cell) < LARGEST_COUNT:
+        return f"{cell:,}"
+    return "\n".join(map(visible, str(cell).split("\n")))
 
 
 @contextlib.contextmanager
@@ -163,7 +175,7 @@ def _progress_lines(label: str) -> Callable[[int, int], None]:
         percent = done * 100 // total if total else 0
         if percent != told:
             told = percent
-            typer.echo(progress_line(label, percent), err=True)
+            say(progress_line(label, percent), err=True)
 
     advance(0, 1)
     return advance
@@ -251,4 +263,4 @@ def print_tables(tables: Iterable[Table]) -> None:
     for table in tables:
         print_rows(table.title, table.columns, table.rows)
         if table.note:
-            typer.echo(table.note)
+            say(table.note)

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from semsig_gis.cli.console import app, print_tables, progress, remark, tell_if_online
+from semsig_gis.cli.console import app, print_tables, progress, remark, say, tell_if_online
 
 
 @app.command()
@@ -55,9 +55,9 @@ def demo(
             progress=advance,
         )
     print_tables(evaluation_tables(evaluation))
-    typer.echo(f"map:        {out / 'map.html'}  (open it in a browser)")
-    typer.echo(f"GeoPackage: {out / 'city.gpkg'}  (open it in QGIS)")
-    typer.echo(f"database:   {out / 'city.parquet'}")
+    say(f"map:        {out / 'map.html'}  (open it in a browser)")
+    say(f"GeoPackage: {out / 'city.gpkg'}  (open it in QGIS)")
+    say(f"database:   {out / 'city.parquet'}")
     tell_if_online(offline)
 
 
@@ -91,4 +91,4 @@ def synthesize(
     for layer in surroundings:
         save_surroundings(layer.table, out / f"{layer.spec.role}.parquet")
     for name in ("objects", *(layer.spec.role for layer in surroundings)):
-        typer.echo(out / f"{name}.parquet")
+        say(out / f"{name}.parquet")

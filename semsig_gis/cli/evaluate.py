@@ -22,6 +22,7 @@ from semsig_gis.cli.console import (
     print_tables,
     progress,
     remark,
+    say,
 )
 from semsig_gis.cli.options import NoiseName, OnGrid, prepared_index, read_noise
 from semsig_gis.core.errors import InputError
@@ -102,7 +103,7 @@ def evaluate(
         return
     print_tables(evaluation_tables(evaluation))
     if out is not None:
-        typer.echo(f"results: {out}")
+        say(f"results: {out}")
 
 
 Results = Annotated[Path, typer.Argument(help="Folder of an experiment or of an evaluation.")]
@@ -137,7 +138,7 @@ def experiment(
         print_json({name: evaluation.summary() for name, evaluation in results.items()})
         return
     print_tables(experiment_tables(opened, results))
-    typer.echo(f"results: {out}")
+    say(f"results: {out}")
 
 
 @app.command()
@@ -240,8 +241,8 @@ def reproduce(
         for section, one in numbers
     ]
     print_rows(report.title, ("Section", "What", "", "Ours", "95 %", "Paper"), rows)
-    typer.echo(f"report: {out / 'report.html'}  (open it in a browser)")
-    typer.echo(f"numbers: {out / 'numbers.csv'}")
+    say(f"report: {out / 'report.html'}  (open it in a browser)")
+    say(f"numbers: {out / 'numbers.csv'}")
 
 
 def _number(value: float | None) -> str:
@@ -322,9 +323,9 @@ def identify(
     print_tables(identifiability_tables(columns, object_counts=counts))
     if verification is not None:
         print_tables(check_tables(verification))
-    typer.echo(f"columns: {database}")
+    say(f"columns: {database}")
     if out is not None:
-        typer.echo(f"report: {out / 'report.html'}")
+        say(f"report: {out / 'report.html'}")
 
 
 def _require_numbers(check: int | None, threads: int | None, out: Path | None) -> None:

@@ -15,6 +15,7 @@ from semsig_gis.cli.console import (
     progress,
     remark,
     require_suffix,
+    say,
 )
 from semsig_gis.core.errors import InputError
 
@@ -75,7 +76,7 @@ def export(
             geometry=geometry,
             progress=advance,
         )
-    typer.echo(f"exported: {out}")
+    say(f"exported: {out}")
 
 
 @app.command(name="import")
@@ -106,6 +107,6 @@ def import_(
     save_database(contents.database, out)
     if contents.identifiability is not None:
         save_identifiability(contents.identifiability, out)
-    typer.echo(f"database: {out}  ({len(contents.database):,} cells)")
+    say(f"database: {out}  ({len(contents.database):,} cells)")
     if objects is not None:
-        typer.echo(f"objects:  {objects}")
+        say(f"objects:  {objects}")

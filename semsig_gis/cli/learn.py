@@ -16,6 +16,7 @@ from semsig_gis.cli.console import (
     print_json,
     print_rows,
     progress,
+    say,
 )
 from semsig_gis.cli.options import (
     Heading,
@@ -81,7 +82,7 @@ def learn(
         ("quantity", "class", "value", "its own samples say", "95% interval", "samples"),
         map(_rate, estimate.rates.to_dict("records")),
     )
-    typer.echo(f"noise model: {out}")
+    say(f"noise model: {out}")
 
 
 def _estimate(city: City, samples: Sequence[Sample], objects: Path | None) -> NoiseEstimate:
@@ -179,16 +180,16 @@ def calibrate(
         print_json({**asdict(rule), "threshold": threshold, "coverage": rule.coverage})
         return
     if rule.answered:
-        typer.echo(
+        say(
             f"Answers from a chance of {rule.threshold:.4f} that the place is within {radius:g} m: "
             f"{rule.answered:,} of {rule.queries:,} samples ({rule.coverage:.1%}), of which "
             f"{rule.wrong:,} wrong; {precision:.0%} right with a confidence of "
             f"{rule.confidence:.0%}."
         )
     else:
-        typer.echo(
+        say(
             f"No chance is proven to be right {precision:.0%} of the time by these "
             f"{rule.queries:,} samples, so nothing is answered; give more samples, or a lower "
             "--precision."
         )
-    typer.echo(f"rule: {out}")
+    say(f"rule: {out}")

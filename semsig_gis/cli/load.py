@@ -17,6 +17,7 @@ from semsig_gis.cli.console import (
     progress,
     remark,
     require_suffix,
+    say,
 )
 
 if TYPE_CHECKING:
@@ -175,7 +176,7 @@ def _save_loaded(
     from semsig_gis.reports.quality import quality_tables
 
     print_tables(quality_tables(report))
-    typer.echo(f"street objects: {out}")
+    say(f"street objects: {out}")
 
 
 @app.command()
@@ -185,7 +186,7 @@ def suggest(
     """Draft a catalogue for a vector file, to be edited."""
     from semsig_gis.objects.draft import suggest_catalog
 
-    typer.echo(suggest_catalog(file), nl=False)
+    say(suggest_catalog(file), end="")
 
 
 @app.command()
@@ -218,7 +219,7 @@ def sources(
             ("name", "title", "layers", "reader", "licence"),
             ([*row.values(), c.license] for row, c in zip(listed, catalogs, strict=True)),
         )
-        typer.echo(f"readers: {', '.join(readers)}")
+        say(f"readers: {', '.join(readers)}")
         return
     catalog = load_catalog(name)
     if as_json:

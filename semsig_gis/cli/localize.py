@@ -21,6 +21,7 @@ from semsig_gis.cli.console import (
     progress,
     remark,
     require_suffix,
+    say,
     tell_if_online,
 )
 from semsig_gis.cli.maps import draw_ground
@@ -256,12 +257,12 @@ def _answer(options: LocalizeOptions, city: City, locator: Locator[Any], query: 
         return
     print_answer(result)
     if options.map_ is not None:
-        typer.echo(f"map: {options.map_}")
+        say(f"map: {options.map_}")
     if options.writes_chances:
-        typer.echo(f"chances: {options.out}")
+        say(f"chances: {options.out}")
     elif options.out is not None:
         count = searched["regions"]
-        typer.echo(
+        say(
             f"to search: {count:,} region{'' if count == 1 else 's'}, {searched['km2']:.4g} km2, "
             f"{searched['percent']:.3g} % of the city: {options.out}"
         )
@@ -316,24 +317,24 @@ def print_answer(result: dict[str, Any]) -> None:
     elif result["tied_beyond"]:
         tied = result["tied_beyond"]
         more = "1 further cell ties" if tied == 1 else f"{tied:,} further cells tie"
-        typer.echo(f"{more} with the last one.")
+        say(f"{more} with the last one.")
     for note in result["notes"]:
-        typer.echo(f"Note: {note}")
+        say(f"Note: {note}")
 
 
 def _print_known(prior: dict[str, Any]) -> None:
     """Say again what was known of the place, as it was understood."""
     if near := prior.get("near"):
-        typer.echo(
+        say(
             f"Known: near {near['lat']:.6f}, {near['lon']:.6f} (lat, lon), x {near['x']:.1f}, "
             f"y {near['y']:.1f}, ± {near['sigma']:g} m, read as {near['read_as']}."
         )
     if area := prior.get("area"):
-        typer.echo(f"Known: in {area['file']}, which has {area['cells']:,} cells.")
+        say(f"Known: in {area['file']}, which has {area['cells']:,} cells.")
     if popularity := prior.get("popularity"):
-        typer.echo(f"Known: as likely as {popularity['file']} says.")
+        say(f"Known: as likely as {popularity['file']} says.")
     if require := prior.get("require"):
-        typer.echo(f"Known: sees {require['text']}, as {require['cells']:,} cells do.")
+        say(f"Known: sees {require['text']}, as {require['cells']:,} cells do.")
 
 
 def _print_place(result: dict[str, Any]) -> None:
@@ -341,20 +342,18 @@ def _print_place(result: dict[str, Any]) -> None:
     where = f"{place['lat']:.6f}, {place['lon']:.6f} (lat, lon)"
     chance = f"within {place['within_m']:g} m of it with a chance of {place['chance']:.1%}"
     if result["answered"]:
-        typer.echo(f"{where}, {chance}.")
+        say(f"{where}, {chance}.")
     else:
-        typer.echo(f"Cannot tell: the best place is {where}, {chance}.")
+        say(f"Cannot tell: the best place is {where}, {chance}.")
     ellipse = place["ellipse_90"]
-    typer.echo(
+    say(
         f"Estimated position: x {place['x']:.1f}, y {place['y']:.1f} ± {place['sigma']:.1f} m "
         f"(90%: {ellipse['longer']:.1f} m along {ellipse['bearing']:.0f}°, "
         f"{ellipse['shorter']:.1f} m across)."
     )
     if place["heading"] is not None:
-        typer.echo(
-            f"North of the query: {place['heading'] % 360.0:.1f}° ± {place['heading_sigma']:.1f}°."
-        )
-    typer.echo(
+        say(f"North of the query: {place['heading'] % 360.0:.1f}° ± {place['heading_sigma']:.1f}°.")
+    say(
         f"{region['share']:.0%} of the chance is in {region['cells']:,} "
         f"cell{'' if region['cells'] == 1 else 's'} "
         f"({_area_text(region['km2'])})."
@@ -374,7 +373,7 @@ def _print_explanations(candidates: list[dict[str, Any]]) -> None:
         counts = ", ".join(f"{why['counts'][verdict]} {verdict}" for verdict in VERDICTS)
         title = f"Rank {row['rank']}, at x {why['x']:.1f}, y {why['y']:.1f}: {counts}"
         if row["rank"] > 1:
-            typer.echo(title)
+            say(title)
             continue
         print_rows(
             title,

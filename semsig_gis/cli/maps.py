@@ -16,6 +16,7 @@ from semsig_gis.cli.console import (
     progress,
     remark,
     require_suffix,
+    say,
     tell_if_online,
 )
 from semsig_gis.core.errors import DatabaseError, EmptyResultError, InputError
@@ -139,5 +140,5 @@ def map_(
             drawn = objects_map(seen, database=opened if drawn is None else None, map_=drawn)
         draw_ground(drawn, city, buildings=buildings, streets=streets)
         offline = save_map(drawn, out)
-    typer.echo(f"map: {out}")
+    say(f"map: {out}")
     tell_if_online(offline)

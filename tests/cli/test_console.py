@@ -32,6 +32,24 @@ def test_rows_are_shown_as_they_are(capsys: pytest.CaptureFixture[str]) -> None:
         assert text in out
 
 
+HOSTILE = "a\x1b[2J\x1b]0;title\x07\u009b31m\u202eb\r\ud83d"
+
+
+def test_nothing_from_elsewhere_moves_the_cursor(capsys: pytest.CaptureFixture[str]) -> None:
+    console.remark(f"{HOSTILE}\nsemsig: all is well")
+    console.say(HOSTILE)
+    console.print_rows(HOSTILE, (HOSTILE,), [(HOSTILE,), ("two\nlines",)])
+    out, err = capsys.readouterr()
+    shown = "a\\u001b[2J\\u001b]0;title\\u0007\\u009b31m\\u202eb\\u000d\\ud83d"
+    assert err == f"semsig: {shown}\\u000asemsig: all is well\n"
+    assert out.count(shown) == 4
+    assert all(letter.isprintable() for letter in out.replace("\n", ""))
+    console.print_json({HOSTILE: HOSTILE})
+    out = capsys.readouterr().out
+    assert out.count(shown.replace("\\u000d", "\\r")) == 2
+    assert json.loads(out) == {HOSTILE: HOSTILE}
+
+
 def test_json_keeps_letters_and_refuses_infinity(capsys: pytest.CaptureFixture[str]) -> None:
     console.print_json({"title": "Défibrillateur"})
     out = capsys.readouterr().out
