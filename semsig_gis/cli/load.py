@@ -19,14 +19,24 @@ from semsig_gis.cli.console import (
     require_suffix,
     say,
 )
+from semsig_gis.core.errors import InputError
 
 if TYPE_CHECKING:
-    from semsig_gis.objects.load import Loaded
+    from semsig_gis.objects.load import Loaded, Selection
     from semsig_gis.sources.catalog import LayerSpec
 
 
 Objects = Annotated[Path, typer.Option(help="Street objects to write (.parquet).")]
-Layers = Annotated[list[str] | None, typer.Option(help="Read only this layer; may be repeated.")]
+Layers = Annotated[
+    list[str] | None,
+    typer.Option(help="Read only this layer, or with +NAME this one as well; may be repeated."),
+]
+AllLayers = Annotated[
+    bool, typer.Option("--all-layers", help="Read the optional layers of objects as well.")
+]
+PaperClasses = Annotated[
+    bool, typer.Option("--paper-classes", help="Read only the eleven classes of the paper.")
+]
 MetricCrs = Annotated[
     str | None,
     typer.Option(help="CRS in metres to work in; default: the catalogue's or the UTM zone."),
@@ -58,6 +68,8 @@ def load(
     ],
     out: Objects,
     layer: Layers = None,
+    all_layers: AllLayers = False,
+    paper_classes: PaperClasses = False,
     crs: Annotated[
         str | None, typer.Option(help="CRS of files that state none, such as EPSG:2154.")
     ] = None,
@@ -70,24 +82,34 @@ def load(
     as_json: AsJson = False,
 ) -> None:
     """Read files of open data into street objects."""
-    from semsig_gis.objects.load import assemble, choose_layers, read_files
+    from semsig_gis.objects.load import assemble, choose_layers, layers_to_count, read_files
     from semsig_gis.sources.catalog import combine_catalogs, load_catalog
 
     keep_inputs(out, buildings, streets, read=[*files, *names])
     require_suffix(".parquet", out, buildings, streets)
     catalog = combine_catalogs([load_catalog(name) for name in names])
-    specs = choose_layers(catalog, layer or (), surroundings=bool(buildings or streets))
+    specs = choose_layers(
+        catalog,
+        layer or (),
+        selection=_selection(all_layers=all_layers, paper_classes=paper_classes),
+        surroundings=bool(buildings or streets),
+    )
+    others = layers_to_count(catalog, specs)
     with progress("reading") as advance:
-        layers, absent = read_files(specs, files, filters=filters, crs=crs, progress=advance)
+        found, absent = read_files(
+            [*specs, *others], files, filters=filters, crs=crs, progress=advance
+        )
     loaded = assemble(
-        layers,
+        [layer for layer in found if layer.spec not in others],
         catalog,
         metric_crs=metric_crs,
         collapse=collapse,
         merge=merge,
+        counted=[layer for layer in found if layer.spec in others],
         notes=[
             f"layer {spec.name!r} has no file here ({', '.join(spec.files)}); it is left out"
             for spec in absent
+            if spec not in others
         ],
     )
     _save_loaded(loaded, out, buildings, streets, as_json=as_json)
@@ -106,6 +128,8 @@ def fetch(
     ],
     out: Objects,
     layer: Layers = None,
+    all_layers: AllLayers = False,
+    paper_classes: PaperClasses = False,
     cache: Annotated[
         Path | None, typer.Option(help="Folder of the cache; default: semsig's own.")
     ] = None,
@@ -132,7 +156,12 @@ def fetch(
     keep_inputs(out, buildings, streets, read=(name, area))
     require_suffix(".parquet", out, buildings, streets)
     catalog = load_catalog(name)
-    specs = choose_layers(catalog, layer or (), surroundings=bool(buildings or streets))
+    specs = choose_layers(
+        catalog,
+        layer or (),
+        selection=_selection(all_layers=all_layers, paper_classes=paper_classes),
+        surroundings=bool(buildings or streets),
+    )
     kept, http = open_cache(cache, offline=offline, deadline_s=timeout, tell=remark)
     unit: Literal["steps", "bytes"] = "steps" if catalog.reader == "osm_file" else "bytes"
     with progress("fetching", unit=unit) as advance:
@@ -149,6 +178,13 @@ def fetch(
         )
     loaded = assemble(layers, catalog, metric_crs=metric_crs, collapse=collapse, merge=merge)
     _save_loaded(loaded, out, buildings, streets, as_json=as_json)
+
+
+def _selection(*, all_layers: bool, paper_classes: bool) -> Selection:
+    if all_layers and paper_classes:
+        msg = "--all-layers and --paper-classes are both given; give one of them."
+        raise InputError(msg)
+    return "all" if all_layers else "paper" if paper_classes else "default"
 
 
 def _save_loaded(

@@ -28,7 +28,7 @@ from semsig_gis.objects.table import StreetObjects, layer_licences, layer_note
 from semsig_gis.sources import MERGING, find_files, reader
 from semsig_gis.sources import vector as vector_file
 from semsig_gis.sources.area import join_areas
-from semsig_gis.sources.catalog import LayerSpec, load_catalog
+from semsig_gis.sources.catalog import LayerSpec, load_catalog, paper_taxonomy
 from semsig_gis.sources.osm import file as osm_file
 from semsig_gis.storage.geoparquet import GROUP_ROWS, hilbert_order
 from semsig_gis.storage.whole import whole_file
@@ -57,20 +57,32 @@ BEYOND_EARTH_M = 1e8
 class LayerReport:
     """What became of one layer's rows; `notes` are warnings and messages on unreadable rows.
 
-    `role` is that of the layer: street objects, buildings or streets.
+    `role` is that of the layer: street objects, buildings or streets. `classes` are those that its
+    objects may have.
     """
 
     name: str
     counts: RowCounts
     notes: tuple[str, ...] = ()
     role: Role = "objects"
+    classes: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class UnreadLayer:
+    """A layer of objects that was not read, and how many it has; None where nobody counted."""
+
+    name: str
+    classes: tuple[str, ...]
+    objects: int | None = None
 
 
 @dataclass(frozen=True, slots=True)
 class LoadReport:
-    """What became of every layer, in the order they were given."""
+    """What became of every layer, in the order they were given, and which were not read."""
 
     layers: tuple[LayerReport, ...]
+    unread: tuple[UnreadLayer, ...] = ()
 
     @property
     def notes(self) -> tuple[str, ...]:
@@ -169,7 +181,14 @@ def build_objects(
             misplaced=misplaced,
             collapsed=len(part) - twice - kept_here,
         )
-        reports.append(LayerReport(layer.spec.name, dropped, (*layer.notes, *layer.errors)))
+        reports.append(
+            LayerReport(
+                layer.spec.name,
+                dropped,
+                (*layer.notes, *layer.errors),
+                classes=layer.spec.classes,
+            )
+        )
     report = LoadReport(tuple(reports))
     return StreetObjects(table, taxonomy, layer_licences(layers), report.notes), report
 
@@ -280,8 +299,16 @@ class Loaded:
     notes: tuple[str, ...] = ()
 
 
+# Which layers are read where none is named.
+Selection = Literal["default", "paper", "all"]
+
+
 def choose_layers(
-    catalog: Catalog, names: Sequence[str] = (), *, surroundings: bool = False
+    catalog: Catalog,
+    names: Sequence[str] = (),
+    *,
+    selection: Selection = "default",
+    surroundings: bool = False,
 ) -> tuple[LayerSpec, ...]:
     """Return the layers to load, in the order of the catalogue.
 
@@ -290,7 +317,12 @@ def choose_layers(
     catalog : Catalog
         The catalogue.
     names : sequence of str
-        Layers by name; by default all that are not optional. UnknownNameError if there is none.
+        Layers by name, which are read alone; with a plus sign before its name, as ``"+cameras"``,
+        a layer is read as well. UnknownNameError if there is none of that name.
+    selection : {"default", "paper", "all"}
+        The layers that are read where none is named alone: those that are not optional, of these
+        the paper's eleven classes only, or every layer of objects. InputError if layers are named
+        alone as well.
     surroundings : bool, default False
         Whether buildings and streets are wanted too.
 
@@ -304,14 +336,53 @@ def choose_layers(
     >>> from semsig_gis import choose_layers, load_catalog
     >>> [spec.name for spec in choose_layers(load_catalog("montpellier"), ["cameras"])]
     ['cameras']
+    >>> osm = load_catalog("openstreetmap")
+    >>> chosen = choose_layers(osm, ["+clocks"], selection="paper")
+    >>> [spec.name for spec in chosen][-2:]
+    ['bus_platforms', 'clocks']
     """
-    layer_names = {catalog.layer(name).name for name in names}
+    alone = {catalog.layer(name).name for name in names if not name.startswith("+")}
+    added = {catalog.layer(name[1:]).name for name in names if name.startswith("+")}
+    if alone and selection != "default":
+        msg = (
+            f"layer {min(alone)!r} is named alone, and {selection} layers are asked for; "
+            f"write '+{min(alone)}' to read it as well, or name the layers only."
+        )
+        raise InputError(msg)
+    chosen: list[LayerSpec | None] = []
+    for spec in catalog.layers:
+        if spec.name in alone | added or (spec.role != "objects" and surroundings):
+            chosen.append(spec)
+        elif spec.role == "objects" and not alone and (selection == "all" or not spec.optional):
+            chosen.append(_of_the_paper(spec) if selection == "paper" else spec)
+    return tuple(spec for spec in chosen if spec is not None)
+
+
+def _of_the_paper(spec: LayerSpec) -> LayerSpec | None:
+    """Return a layer without the classes that the paper lacks, or None if it has no other."""
+    paper = {item.name for item in paper_taxonomy().classes}
+    by = spec.class_by
+    if by is None or paper.issuperset(spec.classes):
+        return spec if paper.issuperset(spec.classes) else None
+    # A value of such a class is still that value: no pattern below it may take it.
+    classes = tuple((value, name if name in paper else "") for value, name in by.classes)
+    otherwise = by.otherwise and spec.class_name in paper
+    own = replace(spec, class_by=replace(by, classes=classes, otherwise=otherwise))
+    return own if own.classes else None
+
+
+def layers_to_count(catalog: Catalog, specs: Sequence[LayerSpec]) -> tuple[LayerSpec, ...]:
+    """Return the other layers of objects that a reading of `specs` passes by anyway.
+
+    These are those of the same extracts of OpenStreetMap, of which every element is looked at.
+    """
+    files = {spec.files for spec in specs if spec.reader == "osm_file"}
+    names = {spec.name for spec in specs}
     return tuple(
         spec
         for spec in catalog.layers
-        if spec.name in layer_names
-        or (spec.role != "objects" and surroundings)
-        or (not layer_names and not spec.optional and spec.role == "objects")
+        if spec.role == "objects" and spec.name not in names
+        if spec.reader == "osm_file" and spec.files in files
     )
 
 
@@ -407,6 +478,7 @@ def assemble(
     metric_crs: str | None = None,
     collapse: bool = True,
     merge: bool = True,
+    counted: Sequence[RawLayer] = (),
     notes: Sequence[str] = (),
 ) -> Loaded:
     """Place raw layers in one metric CRS and merge what stands in several of them.
@@ -423,6 +495,8 @@ def assemble(
         Whether objects of one class at the same place become one.
     merge : bool, default True
         Whether objects of different layers are merged by the catalogue's radii.
+    counted : sequence of RawLayer
+        Layers that are none of the objects; the report tells how many they would add.
     notes : sequence of str
         Warnings of the reading, to be kept with those of this.
 
@@ -456,7 +530,9 @@ def assemble(
         objects, merged = conflate(objects, dict(catalog.conflate))
     buildings, on_buildings = _surroundings(layers, "buildings", objects.crs)
     streets, on_streets = _surroundings(layers, "streets", objects.crs)
-    report = LoadReport((*report.layers, *on_buildings, *on_streets))
+    report = LoadReport(
+        (*report.layers, *on_buildings, *on_streets), _unread(catalog, layers, counted)
+    )
     return Loaded(
         objects=replace(objects, notes=(*of_all, *report.notes)),
         report=report,
@@ -464,6 +540,19 @@ def assemble(
         buildings=buildings,
         streets=streets,
         notes=of_all,
+    )
+
+
+def _unread(
+    catalog: Catalog, layers: Sequence[RawLayer], counted: Sequence[RawLayer]
+) -> tuple[UnreadLayer, ...]:
+    """Return the layers of objects in the catalogue that are not among those read."""
+    read = {layer.spec.name for layer in layers}
+    numbers = {layer.spec.name: layer.counts.kept for layer in counted}
+    return tuple(
+        UnreadLayer(spec.name, spec.classes, numbers.get(spec.name))
+        for spec in catalog.layers
+        if spec.role == "objects" and spec.name not in read
     )
 
 

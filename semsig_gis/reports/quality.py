@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from semsig_gis.core.taxonomy import ObjectClass
     from semsig_gis.database.update import UpdateReport
     from semsig_gis.objects.conflate import ConflatedPair, ConflationReport
-    from semsig_gis.objects.load import LayerReport, LoadReport
+    from semsig_gis.objects.load import LayerReport, LoadReport, UnreadLayer
     from semsig_gis.objects.table import StreetObjects
 
 
@@ -62,7 +62,8 @@ class QualityReport:
     stand in the order they were loaded. `crs` is a code, or a name where there is none. Extents are
     west, south, east and north, in metres and in degrees of WGS 84. `hull_km2` is the area of the
     convex hull of all objects, `occupied_km2` that of the squares of 100 m that hold one. `notes`
-    are warnings about all of the load; those about a layer stand in `sources`.
+    are warnings about all of the load; those about a layer stand in `sources`. `absent` are classes
+    that were looked for; those of layers in `unread` were not.
     """
 
     classes: tuple[ClassQuality, ...]
@@ -75,6 +76,7 @@ class QualityReport:
     hull_km2: float
     occupied_km2: float
     licenses: tuple[str, ...]
+    unread: tuple[UnreadLayer, ...] = ()
     notes: tuple[str, ...] = ()
 
     @property
@@ -133,13 +135,18 @@ def quality_report(
     east, north = xy.max(axis=0).tolist()
     pairs = conflation.pairs if conflation is not None else ()
     present = set(np.unique(objects.codes).tolist())
+    looked_for = {name for layer in load.layers for name in layer.classes}
     return QualityReport(
         classes=tuple(
             _class_quality(objects, item, hull_km2=hull_km2, occupied_km2=occupied_km2)
             for item in objects.taxonomy.classes
             if item.code in present
         ),
-        absent=tuple(item.name for item in objects.taxonomy.classes if item.code not in present),
+        absent=tuple(
+            item.name
+            for item in objects.taxonomy.classes
+            if item.name in looked_for and item.code not in present
+        ),
         sources=tuple(_sources(load.layers, pairs)),
         conflated=pairs,
         crs=f"EPSG:{code}" if (code := objects.crs.to_epsg()) else objects.crs.name,
@@ -150,6 +157,7 @@ def quality_report(
         hull_km2=hull_km2,
         occupied_km2=occupied_km2,
         licenses=tuple(map(str, objects.licenses)),
+        unread=load.unread,
         notes=tuple(notes),
     )
 
@@ -203,10 +211,12 @@ def _sources(
 ROW_COUNTS = tuple(field.name for field in fields(RowCounts))
 # A table has no room for all that is said of a layer with many unreadable rows.
 NOTES_SHOWN = 4
+# Tables that are left out where they have nothing to say.
+MAY_BE_EMPTY = frozenset({"Conflated", "Layers not read"})
 
 
 def quality_tables(report: QualityReport) -> tuple[Table, ...]:
-    """Return objects by class, rows by layer, what was conflated, place, licences and notes.
+    """Return objects by class, rows by layer, what was not read or conflated, place and licences.
 
     Parameters
     ----------
@@ -216,7 +226,8 @@ def quality_tables(report: QualityReport) -> tuple[Table, ...]:
     Returns
     -------
     tuple of Table
-        Four tables, and one more with conflated objects and with notes about all of the load.
+        Four tables, and one more with layers that were not read, with conflated objects and with
+        notes about all of the load.
 
     Examples
     --------
@@ -244,6 +255,16 @@ def quality_tables(report: QualityReport) -> tuple[Table, ...]:
             ),
         ),
         Table(
+            "Layers not read",
+            ("layer", "class", "objects"),
+            tuple(
+                (item.name, ", ".join(item.classes), _count_text(item.objects))
+                for item in report.unread
+            ),
+            note="Add one by --layer +NAME, or all by --all-layers.",
+            labels=2,
+        ),
+        Table(
             "Conflated",
             ("class", "from", "into", "objects", "radius, m", "median, m", "largest, m"),
             tuple(
@@ -266,7 +287,7 @@ def quality_tables(report: QualityReport) -> tuple[Table, ...]:
         Table("Licences", ("licence",), tuple((line,) for line in report.licenses)),
         *note_tables(report.notes),
     )
-    return tuple(table for table in tables if table.title != "Conflated" or table.rows)
+    return tuple(table for table in tables if table.rows or table.title not in MAY_BE_EMPTY)
 
 
 def _class_table(report: QualityReport) -> Table:
@@ -292,6 +313,10 @@ def _class_table(report: QualityReport) -> Table:
 
 def _text(number: float | None) -> str:
     return "" if number is None else f"{number:,.1f}"
+
+
+def _count_text(number: int | None) -> str:
+    return "not counted" if number is None else f"{number:,}"
 
 
 def _notes_text(notes: Sequence[str]) -> str:

@@ -41,7 +41,8 @@ MAX_WIDTH_M = 200.0
 class ClassBy:
     """A field whose value decides the class of a row.
 
-    Rows of other values are left out, unless `otherwise` gives them the layer's class.
+    Rows of other values, and of values without a class, are left out, unless `otherwise` gives the
+    former the layer's class.
     """
 
     field: str
@@ -154,7 +155,7 @@ class LayerSpec:
         by = self.class_by
         if by is None:
             return (self.class_name,) if self.role == "objects" else ()
-        names = [name for _, name in by.classes]
+        names = [name for _, name in by.classes if name]
         return tuple(dict.fromkeys([self.class_name, *names] if by.otherwise else names))
 
     @property

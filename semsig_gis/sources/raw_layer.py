@@ -384,7 +384,8 @@ class RowRules:
         if by is None or self.spec.role != "objects":
             return [name] * size
         default = name if by.otherwise else None
-        return [_first(by.classes, value, default) for value in columns.get(by.field, ())]
+        values = columns.get(by.field, ())
+        return [_first(by.classes, value, default) or None for value in values]
 
     def _unlisted(self, columns: Mapping[str, Sequence[Any]], rows: NDArray[np.bool_]) -> str:
         """Name the values that `class_by` does not list, those of the most rows first."""

@@ -17,7 +17,7 @@ from osmium.osm import WAY, Area, Node, Relation, Way
 
 from semsig_gis.database.build import build_database
 from semsig_gis.evaluation.evaluate import evaluate
-from semsig_gis.objects.load import build_objects, read_surroundings
+from semsig_gis.objects.load import build_objects, choose_layers, read_surroundings
 from semsig_gis.sources import find_files
 from semsig_gis.sources.catalog import load_catalog
 from semsig_gis.sources.osm.file import read_layers
@@ -26,7 +26,6 @@ if TYPE_CHECKING:
     from collections.abc import Mapping
 
     from semsig_gis.sources import RawLayer
-    from semsig_gis.sources.catalog import LayerSpec
 
 CATALOG = load_catalog("openstreetmap")
 EXTRACTS = {
@@ -74,7 +73,7 @@ def test_the_table_has_every_layer_and_tag_of_the_catalogue() -> None:
     }
     for spec in CATALOG.layers:
         _, kinds, texts = LAYERS[spec.name]
-        assert spec.optional == (spec.name in TABLE["further"])
+        assert spec.optional == (spec.name in TABLE["optional"])
         assert spec.elements == tuple(kinds.split(" "))
         listed = {
             (key, value)
@@ -171,9 +170,9 @@ def by_kind(layers: Mapping[str, RawLayer]) -> Counter[str]:
 
 @pytest.mark.parametrize("city", EXTRACTS)
 def test_objects_of_the_classes_of_the_paper(geodata: Path, city: str) -> None:
-    layers = {
-        name: one for name, one in read_extract(geodata, city).items() if not one.spec.optional
-    }
+    read = read_extract(geodata, city)
+    layers = {spec.name: read[spec.name] for spec in choose_layers(CATALOG, selection="paper")}
+    assert list(layers) == list(TABLE["paper"])
     assert all(layer.counts.unreadable == 0 for layer in layers.values())
     expected = TABLE["cities"][city]
     assert len(layers.pop("bus_platforms").table) == expected["platforms"]
@@ -294,7 +293,7 @@ def test_no_tags_and_no_users_are_kept(geodata: Path) -> None:
 def test_a_database_is_built_and_evaluated(
     geodata: Path, city: str, crs: str, extent: float
 ) -> None:
-    specs: list[LayerSpec] = [spec for spec in CATALOG.layers if not spec.optional]
+    specs = choose_layers(CATALOG)
     pairs, missing = find_files(specs, [geodata / "osm" / EXTRACTS[city]])
     assert not missing
     assert len({path for _, path in pairs}) == 1

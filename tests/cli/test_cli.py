@@ -137,7 +137,7 @@ def test_sources(done: Done) -> None:
     assert "osm_file" in listed["readers"]
     for line, words in {
         "sources": ("montpellier",),
-        "sources openstreetmap": ("highway=street_lamp", "fire_hydrants (optional)"),
+        "sources openstreetmap": ("highway=street_lamp", "clocks (optional)"),
         "sources opendata_paris": ("les-arbres",),
         "sources montpellier": ("ETAT = en fonction", "taxi_station"),
         "sources tiny.toml --json": ('"title": "A tiny city"',),
@@ -159,6 +159,35 @@ def test_two_catalogues_are_loaded_and_merged(city: Path, done: Done) -> None:
     assert report["objects"] == 22
     assert [(item["count"], item["kept"]) for item in report["conflated"]] == [(1, "tiny/lights")]
     assert json.loads(done(f"{LOAD} --catalog survey.toml --no-merge --json"))["objects"] == 23
+
+
+def test_which_layers_of_openstreetmap_are_read(city: Path, done: Done) -> None:
+    kinds = (
+        {"amenity": "bench"},
+        {"highway": "crossing", "crossing": "zebra"},
+        {"amenity": "clock"},
+    )
+    write_osm(
+        city / "town.osm",
+        *(node(n, 7.42, 43.73 + n / 1000, tags) for n, tags in enumerate(kinds, start=1)),
+    )
+    line = "load town.osm --catalog openstreetmap --out o.parquet"
+    for options, objects, crossings, clocks in (
+        ("", 2, None, 1),
+        ("--paper-classes", 1, 1, 1),
+        ("--all-layers", 3, None, None),
+        ("--layer +clocks", 3, None, None),
+        ("--layer clocks", 1, 1, None),
+        ("--paper-classes --layer +clocks", 2, 1, None),
+    ):
+        report = json.loads(done(f"{line} {options} --json"))
+        unread = {item["name"]: item["objects"] for item in report["unread"]}
+        found = (report["objects"], unread.get("crossings"), unread.get("clocks"))
+        assert found == (objects, crossings, clocks), options
+    out = done(f"{line} --paper-classes")
+    assert "Layers not read" in out
+    assert "pedestrian_crossing" not in out.partition("No objects of")[2].partition("Rows by")[0]
+    assert "--layer +NAME" in out
 
 
 def test_openstreetmap_with_its_surroundings(city: Path, run: Run, done: Done) -> None:

@@ -12,17 +12,30 @@ from raw_layers import raw_layer
 from sentences import refused
 from servers import Answer, Server
 
-from semsig_gis.core.errors import CrsError, EmptyResultError, InputError, SourceError
+from semsig_gis.core.errors import (
+    CrsError,
+    EmptyResultError,
+    InputError,
+    SourceError,
+    UnknownNameError,
+)
 from semsig_gis.core.geometry import MERGED
 from semsig_gis.database.build import build_database
 from semsig_gis.database.file import open_database, save_database
 from semsig_gis.objects.fetch import fetch_layers, find_area, open_cache
-from semsig_gis.objects.load import assemble, choose_layers, metric_crs_of, read_files
+from semsig_gis.objects.load import (
+    assemble,
+    choose_layers,
+    layers_to_count,
+    metric_crs_of,
+    read_files,
+)
 from semsig_gis.objects.table import open_objects, save_objects
 from semsig_gis.reports.quality import quality_report, quality_tables
 from semsig_gis.sources import RowCounts
-from semsig_gis.sources.catalog import Catalog, LayerSpec, load_catalog, paper_taxonomy
+from semsig_gis.sources.catalog import Catalog, ClassBy, LayerSpec, load_catalog, paper_taxonomy
 from semsig_gis.sources.osm import file as osm_file
+from semsig_gis.sources.raw_layer import RowRules, Rows
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -46,11 +59,64 @@ def catalog_of(**values: object) -> Catalog:
 
 def test_layers_are_chosen() -> None:
     osm = load_catalog("openstreetmap")
-    names = {spec.name for spec in choose_layers(osm)}
-    assert names & {"trees", "fire_hydrants", "buildings"} == {"trees"}
-    assert [spec.name for spec in choose_layers(osm, ["fire_hydrants"])] == ["fire_hydrants"]
+
+    def chosen(*names: str, **options: Any) -> set[str]:  # noqa: ANN401
+        return {spec.name for spec in choose_layers(osm, names, **options)}
+
+    default, paper, everything = chosen(), chosen(selection="paper"), chosen(selection="all")
+    assert default & {"trees", "crossings", "clocks", "buildings"} == {"trees", "crossings"}
+    assert paper & {"trees", "crossings", "clocks"} == {"trees"}
+    assert everything == {spec.name for spec in osm.layers if spec.role == "objects"}
+    assert chosen("clocks") == {"clocks"}
+    assert chosen("+clocks") == default | {"clocks"}
+    assert chosen("+clocks", "trees") == {"clocks", "trees"}
+    assert chosen("+clocks", selection="paper") == paper | {"clocks"}
+    with refused(UnknownNameError, "'clock'", "the nearest is 'clocks'"):
+        chosen("+clock")
+    with refused(InputError, "'clocks' is named alone", "all layers", "'+clocks'"):
+        chosen("clocks", selection="all")
     roles = {spec.role for spec in choose_layers(osm, ["trees"], surroundings=True)}
     assert roles == {"objects", "buildings", "streets"}
+
+
+def test_the_classes_of_the_paper_are_not_taken_from_others() -> None:
+    """Values of other classes are left out, and no pattern below them takes them."""
+    values = (("Taxi VIP", "kiosk"), ("/Taxi.*/", "taxi_station"))
+    bays = LayerSpec(
+        name="bays", class_name="kiosk", class_by=ClassBy("type", values, otherwise=True)
+    )
+    kiosks = LayerSpec(name="kiosks", class_name="kiosk")
+    (own,) = choose_layers(catalog_of(layers=(bays, kiosks)), selection="paper")
+    rules = RowRules(own, ["type"], filters=True, where="bays")
+    rows = Rows()
+    for text in ("Taxi VIP", "Taxi", "other"):
+        rows.read += 1
+        rows.add([text], text, (0.0, 0.0))
+    assert own.classes == ("taxi_station",)
+    assert rules.sift(rows).table["source_id"].tolist() == ["Taxi"]
+
+
+def test_layers_that_are_not_read_are_counted_on_the_way(tmp_path: Path) -> None:
+    osm = load_catalog("openstreetmap")
+    tags = [{"amenity": "bench"}, *[{"amenity": "clock"}] * 2, {"natural": "tree"}]
+    nodes = (node(n, 7.42, 43.73 + n / 1000, one) for n, one in enumerate(tags, start=1))
+    specs = choose_layers(osm, ["benches", "trees"])
+    others = layers_to_count(osm, specs)
+    assert {"clocks", "taxi_ranks"} < {spec.name for spec in others}
+    layers, _ = read_files([*specs, *others], [write_osm(tmp_path / "town.osm", *nodes)])
+    counted = [layer for layer in layers if layer.spec in others]
+    loaded = assemble([one for one in layers if one.spec in specs], osm, counted=counted)
+    numbers = {one.name: one.objects for one in loaded.report.unread}
+    assert (numbers.pop("clocks"), set(numbers.values())) == (2, {0})
+    report = quality_report(loaded.objects, loaded.report)
+    assert report.absent == ()
+    assert {one["name"]: one["objects"] for one in report.to_dict()["unread"]}["clocks"] == 2
+    (table,) = [one for one in quality_tables(report) if one.title == "Layers not read"]
+    assert ("clocks", "clock", "2") in table.rows
+    # Nobody counts what stands in other files, or was not fetched.
+    assert layers_to_count(load_catalog("montpellier"), []) == ()
+    unread = assemble([one for one in layers if one.spec in specs], osm).report.unread
+    assert {one.objects for one in unread} == {None}
 
 
 def test_a_file_is_read_once_for_all_its_layers(

@@ -305,7 +305,8 @@ def test_every_row_is_accounted_for(
                 things[key] = [name, source, source_id, x, y, 1]
             ids.add((source, source_id))
         counts = dataclasses.replace(layer.counts, **gone)
-        reports.append(LayerReport(source, counts, (*layer.notes, *layer.errors)))
+        notes = (*layer.notes, *layer.errors)
+        reports.append(LayerReport(source, counts, notes, classes=layer.spec.classes))
     try:
         objects, report = build_objects(
             layers, taxonomy=TAXONOMY, crs=LAMBERT, collapse=collapse, apart=apart

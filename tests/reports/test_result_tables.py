@@ -31,7 +31,7 @@ from semsig_gis.likelihood.noise.model import named_noise
 from semsig_gis.matching.method import Method
 from semsig_gis.objects.changes import ClassChange
 from semsig_gis.objects.conflate import ConflatedPair
-from semsig_gis.objects.load import LayerReport
+from semsig_gis.objects.load import LayerReport, UnreadLayer
 from semsig_gis.queries.chain import parse_chain
 from semsig_gis.queries.draw import QuerySpec
 from semsig_gis.reports.database import database_tables
@@ -140,6 +140,7 @@ LOAD = QualityReport(
     hull_km2=0.5,
     occupied_km2=20.0,
     licenses=("Town: CC0",),
+    unread=(UnreadLayer("posts", ("bollard", "post_box"), 1234), UnreadLayer("far", ("bench",))),
 )
 TREES = ClassChange(
     class_name="tree",
@@ -334,7 +335,7 @@ def test_what_there_is_nothing_of_is_left_out() -> None:
     assert {one.ours for one in ranks.numbers} == {None}
     assert ranks.text == ()
     assert not any(one.column == "objects" for part in page.sections for one in part.numbers)
-    objects, *others = quality_tables(replace(LOAD, conflated=(), absent=()))
+    objects, *others = quality_tables(replace(LOAD, conflated=(), absent=(), unread=()))
     assert objects.note.endswith("of the class.")
     assert [table.title for table in others] == ["Rows by layer", "Place", "Licences"]
     objects, _ = update_tables(replace(UPDATE, kept=("signs",), replaced=("trees",), classes=()))
