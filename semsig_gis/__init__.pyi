@@ -13,6 +13,7 @@ from .sources.catalog import (
     load_catalog as load_catalog,
     paper_taxonomy as paper_taxonomy,
 )
+from .sources.area import clip_layers as clip_layers
 from .sources.catalog import LayerSpec as LayerSpec
 from .sources.synthetic.city import (
     CitySpec as CitySpec,

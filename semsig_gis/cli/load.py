@@ -54,6 +54,10 @@ Buildings = Annotated[
 Streets = Annotated[
     Path | None, typer.Option(help="Centre lines of streets to write too (.parquet).")
 ]
+AT_THE_EDGE = (
+    "cells within sight of the edge of the clip see only a part of what is there; give `semsig "
+    "build` an --area that is smaller by the visibility range"
+)
 
 
 @app.command()
@@ -74,6 +78,13 @@ def load(
         str | None, typer.Option(help="CRS of files that state none, such as EPSG:2154.")
     ] = None,
     metric_crs: MetricCrs = None,
+    clip: Annotated[
+        str | None,
+        typer.Option(
+            help="Leave out what is outside WEST,SOUTH,EAST,NORTH in degrees, the polygons of a "
+            "file, or the 'box' that OpenStreetMap files say they cover."
+        ),
+    ] = None,
     filters: Filters = True,
     collapse: Collapse = True,
     merge: Merge = True,
@@ -83,9 +94,10 @@ def load(
 ) -> None:
     """Read files of open data into street objects."""
     from semsig_gis.objects.load import assemble, choose_layers, layers_to_count, read_files
+    from semsig_gis.sources.area import clip_layers
     from semsig_gis.sources.catalog import combine_catalogs, load_catalog
 
-    keep_inputs(out, buildings, streets, read=[*files, *names])
+    keep_inputs(out, buildings, streets, read=[*files, *names, clip])
     require_suffix(".parquet", out, buildings, streets)
     catalog = combine_catalogs([load_catalog(name) for name in names])
     specs = choose_layers(
@@ -99,6 +111,14 @@ def load(
         found, absent = read_files(
             [*specs, *others], files, filters=filters, crs=crs, progress=advance
         )
+    notes = [
+        f"layer {spec.name!r} has no file here ({', '.join(spec.files)}); it is left out"
+        for spec in absent
+        if spec not in others
+    ]
+    if clip is not None:
+        found = clip_layers(found, clip)
+        notes.append(AT_THE_EDGE)
     loaded = assemble(
         [layer for layer in found if layer.spec not in others],
         catalog,
@@ -106,11 +126,7 @@ def load(
         collapse=collapse,
         merge=merge,
         counted=[layer for layer in found if layer.spec in others],
-        notes=[
-            f"layer {spec.name!r} has no file here ({', '.join(spec.files)}); it is left out"
-            for spec in absent
-            if spec not in others
-        ],
+        notes=notes,
     )
     _save_loaded(loaded, out, buildings, streets, as_json=as_json)
 

@@ -27,7 +27,7 @@ from semsig_gis.objects.conflate import ConflationReport, conflate
 from semsig_gis.objects.table import StreetObjects, layer_licences, layer_note
 from semsig_gis.sources import MERGING, find_files, reader
 from semsig_gis.sources import vector as vector_file
-from semsig_gis.sources.area import join_areas
+from semsig_gis.sources.area import join_areas, note_outside
 from semsig_gis.sources.catalog import LayerSpec, load_catalog, paper_taxonomy
 from semsig_gis.sources.osm import file as osm_file
 from semsig_gis.storage.geoparquet import GROUP_ROWS, hilbert_order
@@ -139,7 +139,8 @@ def build_objects(
     if not any(len(part) for part, _, _ in parts):
         msg = (
             f"no object remains of {sum(layer.counts.read for layer in layers)} rows in "
-            f"{len(layers)} layers; look at the filters, the geometries and the coordinate systems."
+            f"{len(layers)} layers; look at the filters, the area, the geometries and the "
+            "coordinate systems."
         )
         raise EmptyResultError(msg)
     everything = pd.concat([part for part, _, _ in parts], ignore_index=True)
@@ -513,6 +514,7 @@ def assemble(
     >>> assemble(layers, load_catalog("openstreetmap")).objects.crs.name
     'WGS 84 / UTM zone 31N'
     """
+    layers = [note_outside(layer) for layer in layers]
     of_all = tuple(notes)
     system: CRS | str | None = metric_crs or catalog.metric_crs
     if system is None:

@@ -16,6 +16,7 @@ if TYPE_CHECKING:
 
     from geopandas import GeoDataFrame
 
+    from semsig_gis.sources.area import Area
     from semsig_gis.sources.catalog import LayerSpec
 
 # The module of this package that reads what a catalogue's `reader` names.
@@ -40,17 +41,18 @@ FILE_SUFFIXES = frozenset(
 class RowCounts:
     """How many rows a layer has, and how many of them are left out for each reason.
 
-    Rows are `unreadable`, `filtered` (by the catalogue, or outside the area), `excluded` (by what
-    the catalogue says in ``not``), `missing` (without a geometry), `duplicates` (the id of an
-    earlier row, where ids are unique), `misplaced` (off the Earth, or not finite in the metric
-    CRS), `collapsed` (at the place of another object of the class, or an area around it) or
-    `conflated` (merged into an object of an earlier layer).
+    Rows are `unreadable`, `filtered` (by the catalogue), `excluded` (by what the catalogue says in
+    ``not``), `outside` (of the area that is fetched or clipped to), `missing` (without a
+    geometry), `duplicates` (the id of an earlier row, where ids are unique), `misplaced` (off the
+    Earth, or not finite in the metric CRS), `collapsed` (at the place of another object of the
+    class, or an area around it) or `conflated` (merged into an object of an earlier layer).
     """
 
     read: int
     unreadable: int = 0
     filtered: int = 0
     excluded: int = 0
+    outside: int = 0
     missing: int = 0
     duplicates: int = 0
     misplaced: int = 0
@@ -82,6 +84,8 @@ class RawLayer:
         What was wrong with features that could not be read, the first ten of them.
     notes : tuple of str
         Where the source differs from what the catalogue expects of it.
+    extent : Area, optional
+        The box that the source says it covers, where it says so.
 
     Examples
     --------
@@ -96,6 +100,7 @@ class RawLayer:
     counts: RowCounts
     errors: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()
+    extent: Area | None = None
 
 
 class Reader(Protocol):

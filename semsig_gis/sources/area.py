@@ -7,7 +7,7 @@ import math
 import re
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
 import shapely
@@ -19,11 +19,17 @@ from semsig_gis.sources.catalog import LayerSpec
 from semsig_gis.sources.raw_layer import LATITUDE_LIMIT, LONGITUDE_LIMIT, WGS84
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from numpy.typing import NDArray
 
     from semsig_gis.sources import RawLayer
 
 NUMBERS = re.compile(r"[\s\d.,;eE+-]*\d[\s\d.,;eE+-]*")
+T = TypeVar("T", shapely.Polygon | shapely.MultiPolygon, "NDArray[np.object_]")
+# How a user asks for the box that a file says it covers.
+BOX = "box"
+METRES_A_DEGREE = 111_195.0  # of latitude
 POLYGONAL = {"Polygon", "MultiPolygon"}
 
 
@@ -61,34 +67,94 @@ def names_place(text: str) -> bool:
     return not is_file and not NUMBERS.fullmatch(text)
 
 
+def clip_layers(layers: Sequence[RawLayer], text: str) -> tuple[RawLayer, ...]:
+    """Leave out what is outside an area.
+
+    Parameters
+    ----------
+    layers : sequence of RawLayer
+        The layers.
+    text : str
+        ``west,south,east,north`` in degrees, the path of a file with polygons, or ``"box"`` for
+        the boxes that OpenStreetMap files say they cover.
+
+    Returns
+    -------
+    tuple of RawLayer
+        The layers; rows outside count as such. InputError if the area is none, or no file says
+        its box.
+
+    Examples
+    --------
+    >>> from semsig_gis import CitySpec, clip_layers, synthetic_city
+    >>> layers = synthetic_city(CitySpec(size=300.0))
+    >>> [layer.counts.kept for layer in clip_layers(layers[:2], "2.3,48.8,2.4,48.9")]
+    [0, 0]
+    """
+    if text != BOX:
+        area = parse_area(text)
+    else:
+        boxes = [layer.extent.polygon for layer in layers if layer.extent is not None]
+        polygon = join_areas(np.array(boxes, dtype=object))
+        if polygon is None:
+            msg = (
+                f"none of the files says which box it covers, so that there is no {BOX!r} to clip "
+                "to; write west,south,east,north in degrees, or the path of a file with polygons."
+            )
+            raise InputError(msg)
+        area = Area(polygon, BOX)
+    return tuple(clip_layer(layer, area) for layer in layers)
+
+
 def clip_layer(layer: RawLayer, area: Area) -> RawLayer:
-    """Leave out the rows of a layer that are outside an area; they count as filtered.
+    """Leave out the rows of a layer that are outside an area.
 
     Objects stay where their centroid is in the area, buildings and streets where they touch it. A
     row without a position stays.
     """
-    geometry = layer.table.geometry.to_crs(WGS84).to_numpy()
-    nowhere = shapely.is_missing(geometry) | shapely.is_empty(geometry)
-    shapely.prepare(area.polygon)
-    if layer.spec.role == "objects":
-        inside = shapely.covers(area.polygon, _centroids(geometry, area))
-    else:
-        inside = shapely.intersects(area.polygon, geometry)
-    kept = layer.table[nowhere | inside].reset_index(drop=True)
-    filtered = layer.counts.filtered + len(layer.table) - len(kept)
-    counts = dataclasses.replace(layer.counts, filtered=filtered)
+    outside, _ = _outside(layer, area)
+    kept = layer.table[~outside].reset_index(drop=True)
+    counts = dataclasses.replace(layer.counts, outside=layer.counts.outside + int(outside.sum()))
     return dataclasses.replace(layer, table=kept, counts=counts)
 
 
-def _centroids(geometry: NDArray[np.object_], area: Area) -> NDArray[np.object_]:
-    """Return centroids in degrees, those of lines by lengths in metres around an area."""
-    centroids: NDArray[np.object_] = shapely.centroid(geometry)
-    lines = shapely.get_dimensions(geometry) == 1
+def note_outside(layer: RawLayer) -> RawLayer:
+    """Tell of rows outside the box that the source says it covers, which may be mistakes."""
+    if layer.extent is None:
+        return layer
+    outside, places = _outside(layer, layer.extent)
+    if not outside.any():
+        return layer
+    metres = shapely.distance(places, _narrowed(layer.extent.polygon, layer.extent))
+    note = (
+        f"{outside.sum():,} of {len(outside):,} rows are outside the box that the file says it "
+        f"covers, by up to {metres.max() * METRES_A_DEGREE:,.0f} m; --clip {BOX} leaves them out"
+    )
+    return dataclasses.replace(layer, notes=(*layer.notes, note))
+
+
+def _outside(layer: RawLayer, area: Area) -> tuple[NDArray[np.bool_], NDArray[np.object_]]:
+    """Tell which rows of a layer are outside an area, and where these are, narrowed."""
+    geometry = layer.table.geometry.to_crs(WGS84).to_numpy()
+    shapely.prepare(area.polygon)
+    outside = ~(shapely.is_missing(geometry) | shapely.is_empty(geometry))
+    outside &= ~shapely.covers(area.polygon, geometry)
+    places = _narrowed(geometry[outside], area)
+    if layer.spec.role == "objects":
+        places = shapely.centroid(places)
+    narrowed = _narrowed(area.polygon, area)
+    shapely.prepare(narrowed)
+    apart = ~shapely.intersects(narrowed, places)
+    outside[outside] = apart
+    return outside, places[apart]
+
+
+def _narrowed(geometry: T, area: Area) -> T:
+    """Return geometries in degrees as wide as these are around an area, as lengths are there."""
     _, south, _, north = area.bounds
-    width = np.array([math.cos(math.radians((south + north) / 2)), 1.0])  # of a degree
-    narrowed = shapely.centroid(shapely.transform(geometry[lines], lambda xy: xy * width))
-    centroids[lines] = shapely.transform(narrowed, lambda xy: xy / width)
-    return centroids
+    width = np.array([math.cos(math.radians((south + north) / 2)), 1.0])
+    narrowed: T = shapely.transform(geometry, lambda xy: xy * width)
+    return narrowed
 
 
 def _box(text: str) -> Area:

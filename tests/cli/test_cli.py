@@ -203,6 +203,20 @@ def test_openstreetmap_with_its_surroundings(city: Path, run: Run, done: Done) -
     assert "EPSG:32632" in done(f"load town.osm --catalog openstreetmap {surroundings}")
     assert list(gpd.read_parquet("b.parquet").geom_type) == ["Polygon"]
     assert list(gpd.read_parquet("s.parquet").geom_type) == ["LineString"]
+    load = "load extract.osm --catalog openstreetmap --out o.parquet --json"
+    write_osm(
+        city / "extract.osm",
+        '<bounds minlon="7.4" minlat="43.7" maxlon="7.45" maxlat="43.75"/>',
+        node(1, 7.42, 43.73, {"amenity": "bench"}),
+        node(2, 7.46, 43.73, {"amenity": "bench"}),
+    )
+    for clip, outside, kept in (("", 0, 2), ("--clip box", 1, 1), ("--clip 7.45,43,8,44", 1, 1)):
+        report = json.loads(done(f"{load} {clip}"))
+        (benches,) = (one for one in report["sources"] if one["name"] == "benches")
+        assert (benches["outside"], benches["kept"]) == (outside, kept)
+        assert any("--area" in note for note in report["notes"]) == bool(clip)
+        told = any("1 of" in note and "by up to 80" in note for note in benches["notes"])
+        assert told == (clip != "--clip box")
     code, _, err = run(LOAD, "--buildings", "none.parquet")
     assert code == 0
     assert "no buildings in what was loaded, so none.parquet is not written" in err

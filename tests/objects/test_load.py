@@ -260,7 +260,7 @@ def test_openstreetmap_is_fetched_cut_to_the_area_and_kept(server: Server, tmp_p
     area = find_area("7.41,43.72,7.43,43.74", here, cache=cache, http=http)
     (layer,) = fetch_layers(here.layers, here, area=area, cache=cache, http=http)
     assert layer.table["source_id"].tolist() == ["node/1"]
-    assert (layer.counts.read, layer.counts.filtered) == (2, 1)
+    assert (layer.counts.read, layer.counts.outside) == (2, 1)
     asked = len(server.seen)
     _, offline = open_cache(tmp_path / "cache", offline=True)
     (again,) = fetch_layers(here.layers, here, area=area, cache=cache, http=offline)

@@ -11,11 +11,19 @@ import pytest
 import shapely
 from hypothesis import given
 from hypothesis import strategies as st
+from pyproj import Geod
 from sentences import refused
 
 from semsig_gis.core.errors import InputError, SemsigError
 from semsig_gis.sources import RawLayer, RowCounts
-from semsig_gis.sources.area import clip_layer, join_areas, names_place, parse_area
+from semsig_gis.sources.area import (
+    clip_layer,
+    clip_layers,
+    join_areas,
+    names_place,
+    note_outside,
+    parse_area,
+)
 from semsig_gis.sources.catalog import LayerSpec
 
 if TYPE_CHECKING:
@@ -140,7 +148,7 @@ def test_a_layer_is_clipped(role: str, kept: list[str], crs: str) -> None:
     assert clipped.table["source_id"].tolist() == kept
     assert clipped.table.index.tolist() == list(range(len(kept)))
     assert clipped.table.crs == table.crs
-    assert clipped.counts.read == len(clipped.table) + clipped.counts.filtered
+    assert clipped.counts == RowCounts(read=9, filtered=5, outside=4 - len(kept))
 
 
 def test_a_line_is_clipped_at_its_middle_in_metres() -> None:
@@ -151,3 +159,48 @@ def test_a_line_is_clipped_at_its_middle_in_metres() -> None:
     layer = RawLayer(spec=spec, table=table, counts=RowCounts(read=1))
     for east, kept in ((25.00051, 1), (25.00049, 0)):
         assert len(clip_layer(layer, parse_area(f"24,59,{east},61")).table) == kept
+
+
+def benches(
+    *places: tuple[float, float], extent: str | None = None, role: str = "objects"
+) -> RawLayer:
+    """Return a layer of points, or of small houses, whose file says that it covers a box."""
+    shapes = shapely.points(places)
+    shapes = shapes if role == "objects" else shapely.buffer(shapes, 0.001)
+    table = gpd.GeoDataFrame(
+        {"source_id": [str(row) for row in range(len(places))]}, geometry=shapes, crs="EPSG:4326"
+    )
+    return RawLayer(
+        spec=LayerSpec(name="benches", class_name="bench", role=role),  # type: ignore[arg-type]
+        table=table,
+        counts=RowCounts(read=len(table)),
+        extent=parse_area(extent) if extent else None,
+    )
+
+
+def test_rows_outside_the_box_of_their_file_are_told_and_clipped() -> None:
+    places = ((25.0, 60.0), (25.1, 60.1), (25.12, 60.0), (25.1005, 60.0))
+    layer = benches(*places, extent="24.9,59.9,25.1,60.1")
+    (note,) = note_outside(layer).notes
+    assert note.startswith("2 of 4 rows are outside the box that the file says it covers")
+    metres = Geod(ellps="WGS84").inv(25.1, 60.0, 25.12, 60.0)[2]
+    told = float(note.partition("up to ")[2].partition(" m;")[0].replace(",", ""))
+    assert told == pytest.approx(metres, rel=0.005)
+    # A house at the edge is there.
+    houses = benches(*places, extent="24.9,59.9,25.1,60.1", role="buildings")
+    assert note_outside(houses).notes[0].startswith("1 of 4 rows")
+    other = benches((25.12, 60.0), (25.2, 60.0))
+    for one, clipped in zip((2, 3, 0), clip_layers([layer, houses, other], "box"), strict=True):
+        assert (clipped.counts.kept, clipped.counts.outside) == (one, clipped.counts.read - one)
+        assert note_outside(clipped).notes == ()
+    other = benches((25.12, 60.0), extent="25.11,59.9,25.2,60.1")
+    both = clip_layers([layer, other], "box")  # of both extracts
+    assert [clipped.counts.kept for clipped in both] == [3, 1]
+    (clipped,) = clip_layers([layer], "25.05,59.9,25.2,60.2")
+    assert (clipped.counts.kept, clipped.counts.outside) == (3, 1)
+    assert note_outside(clipped).notes[0].startswith("2 of 3 rows")
+
+
+def test_a_box_that_no_file_says_is_refused() -> None:
+    with refused(InputError, "none of the files", "'box'", "west,south,east,north"):
+        clip_layers([benches((25.0, 60.0))], "box")

@@ -331,6 +331,35 @@ def test_extracts_of_different_days_are_told_and_a_damaged_one_is_named(tmp_path
         read_layers(paths, [BENCHES])
 
 
+BOUNDS = '<bounds minlat="{1}" minlon="{0}" maxlat="{3}" maxlon="{2}"/>'
+
+
+@pytest.mark.parametrize(
+    ("boxes", "extent"),
+    [
+        ([(1, 2, 3, 4)], shapely.box(1, 2, 3, 4)),
+        ([(1, 2, 3, 4), (3, 2, 5, 4)], shapely.box(1, 2, 5, 4)),
+        ([(1, 2, 3, 4), None], None),
+        ([(1, 2, 1, 2)], None),
+        ([(-180, -90, 180, 90)], None),
+        ([(179, 2, -179, 4)], shapely.box(179, 2, 180, 4) | shapely.box(-180, 2, -179, 4)),
+    ],
+    ids=["one", "two extracts", "one of two", "empty", "all", "across the 180th meridian"],
+)
+def test_the_box_that_files_say_they_cover(
+    tmp_path: Path, boxes: list[tuple[int, ...] | None], extent: shapely.Geometry | None
+) -> None:
+    paths = [
+        write_osm(
+            tmp_path / f"{n}.osm", BOUNDS.format(*box) if box else "", node(n + 1, 1, 2, BENCH)
+        )
+        for n, box in enumerate(boxes)
+    ]
+    (layer,) = read_layers(paths, [BENCHES])
+    assert (layer.extent is None) == (extent is None)
+    assert extent is None or layer.extent.polygon.equals(extent)  # type: ignore[union-attr]
+
+
 def test_elements_of_another_kind_are_filtered(read: Read) -> None:
     relations = [
         relation(7 + n, {6: ""}, {**kind, **BENCH})

@@ -12,11 +12,13 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 import osmium
+import shapely
 from osmium.filter import KeyFilter
-from osmium.osm import NODE, RELATION, WAY, Node, Relation, Way
+from osmium.osm import NODE, NOTHING, RELATION, WAY, Node, Relation, Way
 
 from semsig_gis.core.errors import CatalogError, SourceError
 from semsig_gis.sources import require_file
+from semsig_gis.sources.area import Area, join_areas
 from semsig_gis.sources.osm.elements import ElementLayer, TagIndex, relation_shape, way_shape
 from semsig_gis.sources.osm.merge import age_notes, merge_extracts, readable
 from semsig_gis.sources.packed import require_modest
@@ -38,6 +40,7 @@ KINDS: dict[str, ElementKind] = {"n": "node", "w": "way", "r": "relation"}
 # pyosmium's table of node places that is not in memory.
 PLACES = "sparse_file_array"
 NOWHERE = (math.nan, math.nan)
+HALF_TURN = 180.0
 
 
 class _Outline(NamedTuple):
@@ -87,8 +90,26 @@ def read_layers(
     for outline in outlines:
         outline.layer.rows.positions[outline.row] = _position(outline, lines)
     notes = age_notes(files) if len(files) > 1 else ()
+    extent = _extent(files.values())
     raw = (layer.raw(crs) for layer in layers)
-    return tuple(replace(layer, notes=(*notes, *layer.notes)) for layer in raw)
+    return tuple(replace(layer, notes=(*notes, *layer.notes), extent=extent) for layer in raw)
+
+
+def _extent(files: Iterable[osmium.io.File]) -> Area | None:
+    """Return the boxes that extracts say they cover; None where one of them does not."""
+    boxes = []
+    for file in files:
+        with osmium.io.Reader(file, NOTHING) as reader:
+            box = reader.header().box()
+        if not box.valid():
+            return None
+        low, high = box.bottom_left, box.top_right
+        spans = [(low.lon, high.lon)]
+        if high.lon - low.lon > HALF_TURN:  # across the 180th meridian: osmium has swapped its ends
+            spans = [(high.lon, HALF_TURN), (-HALF_TURN, low.lon)]
+        boxes += [shapely.box(west, low.lat, east, high.lat) for west, east in spans]
+    polygon = join_areas(np.array(boxes, dtype=object))
+    return None if polygon is None else Area(polygon, "extract")
 
 
 @contextlib.contextmanager
