@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import atexit
 import functools
+import gc
 import importlib
 import json
 import os
@@ -86,9 +87,11 @@ def _server() -> subprocess.Popen[str]:
 
 def _serve() -> None:
     """Answer each order on the standard input with how the command ended."""
-    for module in pkgutil.walk_packages(semsig_gis.__path__, "semsig_gis."):
-        if not module.name.endswith("__main__"):
-            importlib.import_module(module.name)
+    modules = [module.name for module in pkgutil.walk_packages(semsig_gis.__path__, "semsig_gis.")]
+    for name in (*modules, "rich.progress", "rich.table"):
+        if not name.endswith("__main__"):
+            importlib.import_module(name)
+    gc.freeze()  # or else every child would copy what it looks through
     for line in sys.stdin:
         order = json.loads(line)
         with (

@@ -230,15 +230,12 @@ def object_store(city: City, objects: Path | None, *, needed: bool) -> ObjectSto
             raise CrsError(msg)
         return store
     try:
-        store = city.store if objects is None else open_store(city.path, objects)
+        return city.store if objects is None else open_store(city.path, objects)
     except DatabaseError as error:
         if needed or objects is not None:
             raise
         remark(f"no street objects found; answering at cell precision: {error}")
         return None
-    for note in store.notes:
-        remark(note)
-    return store
 
 
 def _north_sigma(heading: str) -> float:

@@ -13,15 +13,16 @@ import warnings
 from concurrent.futures import CancelledError
 from dataclasses import dataclass
 from functools import partial
+from pathlib import Path
 from typing import TYPE_CHECKING, Generic, TypeVar
 
 from semsig_gis import __version__
 from semsig_gis.core.errors import InputError, SemsigError
+from semsig_gis.core.scratch import own_folder
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Generator, Iterator, Sequence
     from contextlib import ExitStack
-    from pathlib import Path
 
     from distributed import Client, LocalCluster
 
@@ -137,9 +138,9 @@ def _client(workers: int, scheduler: str | None) -> Iterator[Client]:
     import dask  # noqa: PLC0415 - only where it is used
 
     with contextlib.ExitStack() as stack:
-        scratch = stack.enter_context(tempfile.TemporaryDirectory(prefix="semsig-"))
+        scratch = stack.enter_context(own_folder(Path(tempfile.gettempdir())))
         settings = {
-            "temporary-directory": scratch,
+            "temporary-directory": str(scratch),
             "distributed.scheduler.allowed-failures": ATTEMPTS - 1,
             # A task that kills its worker must not take the tasks down that wait there.
             "distributed.scheduler.worker-saturation": 1.0,

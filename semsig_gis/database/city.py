@@ -7,13 +7,14 @@ needs it, and so does whatever looks at objects from a place off the grid.
 
 from __future__ import annotations
 
+import contextlib
 import json
 import os
 import zlib
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Any, Protocol, TypeVar
 
 import geopandas as gpd
 import numpy as np
@@ -22,7 +23,7 @@ import pyarrow as pa
 from semsig_gis import __version__
 from semsig_gis.core.errors import DatabaseError, InputError
 from semsig_gis.core.geometry import HALF_WIDTH, LICENSES
-from semsig_gis.core.rtree import INDEX_FILES, StoredIndex
+from semsig_gis.core.rtree import ObjectIndex
 from semsig_gis.database.build import moved
 from semsig_gis.database.file import (
     KIND,
@@ -41,9 +42,11 @@ from semsig_gis.database.file import (
 from semsig_gis.database.occlusion import Footprints, buildings_near
 from semsig_gis.objects.table import licenses_of, open_objects, save_objects
 from semsig_gis.storage.geoparquet import read_geoparquet, write_geoparquet
-from semsig_gis.storage.whole import move_folder, whole_file, whole_folder
+from semsig_gis.storage.whole import alone_in, move_folder, whole_file, whole_folder
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from numpy.typing import NDArray
     from pyproj import CRS
 
@@ -72,12 +75,8 @@ class ObjectStore:
     ----------
     objects : StreetObjects
         The objects.
-    index : StoredIndex
-        R-tree over them, in the same order.
     footprints, streets : GeoDataFrame, optional
         Buildings and centre lines in the CRS of the objects, where it was built with them.
-    notes : tuple of str
-        What was wrong with the files and has been put right.
 
     Examples
     --------
@@ -88,10 +87,8 @@ class ObjectStore:
     """
 
     objects: StreetObjects
-    index: StoredIndex
     footprints: gpd.GeoDataFrame | None = None
     streets: gpd.GeoDataFrame | None = None
-    notes: tuple[str, ...] = ()
 
     @classmethod
     def of(
@@ -101,17 +98,21 @@ class ObjectStore:
         footprints: gpd.GeoDataFrame | None = None,
         streets: gpd.GeoDataFrame | None = None,
     ) -> ObjectStore:
-        """Make the store of a database that was built from these, with a new R-tree.
+        """Make the store of a database that was built from these.
 
         `footprints` and `streets` are those that `build_database` got; CrsError if they have no
         CRS.
         """
         return cls(
             objects=objects,
-            index=StoredIndex.pack(objects.xy),
             footprints=None if footprints is None else _stored(footprints, objects.crs),
             streets=None if streets is None else _stored(streets, objects.crs),
         )
+
+    @cached_property
+    def index(self) -> ObjectIndex:
+        """R-tree over the objects, in their order; made when it is first asked for."""
+        return ObjectIndex(self.objects.xy)
 
     def buildings_around(
         self, places: NDArray[np.float64], *, distance: float
@@ -156,11 +157,12 @@ def save_with_store(database: SignatureDatabase, store: ObjectStore, path: str |
 
     Notes
     -----
-    The new store is written whole under another name, then the database is renamed into its
-    place, and at last the store into its own. The store names the digest of its database, so
-    whoever opens the two sees how far an interrupted run came: `open_store` takes the new store
-    as soon as the new database is there, and the old one until then. Any number of programs may
-    read meanwhile; of two that write at once, the later one wins.
+    Both are written whole in a hidden folder first. Then the new store gets its place under
+    another name, the database is renamed into its place, and at last the store into its own. The
+    store names the digest of its database, so whoever opens the two sees how far an interrupted
+    run came: `open_store` takes the new store as soon as the new database is there, and the old one
+    until then. Any number of programs may read meanwhile; of two that write at once, the later one
+    wins.
 
     Examples
     --------
@@ -171,14 +173,19 @@ def save_with_store(database: SignatureDatabase, store: ObjectStore, path: str |
     ...     len(open_store(file).objects) == len(demo_objects)
     True
     """
-    _settle(Path(path))  # what waits there may be needed until the new database is in place
-    with whole_file(path) as partial:
-        try:
-            save_database(database, partial)
-        except InputError as error:  # which knows nothing of the place that was asked for
-            raise InputError(str(error).replace(str(partial), str(path))) from error
-        _write(store, _waiting(store_path(path)), fingerprint=digest(partial))
-    _settle(Path(path))
+    final = store_path(path)
+    with contextlib.ExitStack() as stack:
+        with whole_file(path) as partial:
+            try:
+                save_database(database, partial)
+            except InputError as error:  # which knows nothing of the place that was asked for
+                raise InputError(str(error).replace(str(partial), str(path))) from error
+            new = partial.with_name(final.name)
+            _write(store, new, fingerprint=digest(partial))
+            stack.enter_context(alone_in(final.parent))
+            _settle(Path(path))  # what waits there may be needed until the new database is in place
+            move_folder(new, _waiting(final))
+        move_folder(_waiting(final), final)
 
 
 def open_store(database: str | Path, folder: str | Path | None = None) -> ObjectStore:
@@ -194,7 +201,7 @@ def open_store(database: str | Path, folder: str | Path | None = None) -> Object
     Returns
     -------
     ObjectStore
-        The store; its notes say so where the R-tree had to be made again.
+        The store.
 
     Raises
     ------
@@ -221,7 +228,19 @@ def open_store(database: str | Path, folder: str | Path | None = None) -> Object
         )
         raise DatabaseError(msg)
     require_file(database)
-    return _read(_settle(Path(database)) if folder is None else Path(folder), Path(database))
+    file = Path(database)
+    while True:
+        place = _current(file) if folder is None else Path(folder)
+        before = _state(file), _state(place)
+        try:
+            store = _read(place, file)
+        except DatabaseError:
+            if before == (_state(file), _state(place)):
+                raise
+        else:
+            if before == (_state(file), _state(place)):
+                return store
+        # Another program has put something else there meanwhile.
 
 
 def store_path(database: str | Path) -> Path:
@@ -272,25 +291,16 @@ def _read(folder: Path, database: Path) -> ObjectStore:
     if manifest["database"] != built_digest(database):
         msg = f"{folder} belongs to another database than {database}; build the database again."
         raise DatabaseError(msg)
-    files = manifest["files"]
-    damaged = damaged_files(folder, files)
-    lost = [name for name in damaged if name not in INDEX_FILES]
-    if lost or OBJECTS not in files:
-        msg = f"{folder / min(lost, default=OBJECTS)} is damaged; build the database again."
+    # Stores of before hold an R-tree as well, which nobody reads: damage to it ends the program.
+    names = [name for name in (OBJECTS, FOOTPRINTS, STREETS) if name in manifest["files"]]
+    damaged = damaged_files(folder, {name: manifest["files"][name] for name in names})
+    if damaged or OBJECTS not in names:
+        msg = f"{folder / min(damaged, default=OBJECTS)} is damaged; build the database again."
         raise DatabaseError(msg)
-    objects = open_objects(folder / OBJECTS)
-    notes: tuple[str, ...] = ()
-    if damaged or not set(INDEX_FILES) <= set(files):
-        index = StoredIndex.pack(objects.xy)
-        notes = (f"the R-tree in {folder} is damaged; it was made again from the objects",)
-    else:
-        index = StoredIndex.open(folder, objects.xy)
     return ObjectStore(
-        objects=objects,
-        index=index,
-        footprints=_table(folder / FOOTPRINTS) if FOOTPRINTS in files else None,
-        streets=_table(folder / STREETS) if STREETS in files else None,
-        notes=notes,
+        objects=open_objects(folder / OBJECTS),
+        footprints=_table(folder / FOOTPRINTS) if FOOTPRINTS in names else None,
+        streets=_table(folder / STREETS) if STREETS in names else None,
     )
 
 
@@ -305,8 +315,7 @@ def _table(path: Path) -> gpd.GeoDataFrame:
 def _write(store: ObjectStore, folder: Path, *, fingerprint: str) -> None:
     """Write a whole store of that name, in the place of another."""
     with whole_folder(folder) as partial:
-        save_objects(store.objects, partial / OBJECTS, keep_order=True)  # as in the R-tree
-        store.index.save(partial)
+        save_objects(store.objects, partial / OBJECTS, keep_order=True)
         for name, table in ((FOOTPRINTS, store.footprints), (STREETS, store.streets)):
             if table is not None:
                 table.to_parquet(partial / name, compression="zstd")
@@ -321,19 +330,49 @@ def _write(store: ObjectStore, folder: Path, *, fingerprint: str) -> None:
         (partial / MANIFEST).write_text(json.dumps(manifest, indent=2) + "\n", encoding="utf-8")
 
 
-def _settle(database: Path) -> Path:
-    """Finish what an interrupted run left half done; return where the store is to be read."""
+def _current(database: Path) -> Path:
+    """Return the store of a database, and finish what an interrupted run left, if possible."""
+    final = store_path(database)
+    if not _awaited(database):
+        return final
+    with contextlib.suppress(InputError), alone_in(final.parent) as alone:
+        if alone:
+            _settle(database)
+    return _waiting(final) if _awaited(database) else final
+
+
+def _settle(database: Path) -> None:
+    """Put the store that waits for a database into its place."""
+    if _awaited(database):
+        final = store_path(database)
+        move_folder(_waiting(final), final)
+
+
+def _awaited(database: Path) -> bool:
+    """Tell whether the store that belongs to a database waits to be put into its place."""
     final = store_path(database)
     waiting = _waiting(final)
-    if waiting.exists() and database.exists():
-        try:
-            if _manifest(waiting)["database"] == built_digest(database):
-                move_folder(waiting, final)
-        except DatabaseError:  # what waits is damaged
-            return final
-        except InputError:  # nothing may be written here, or another program was quicker
-            return waiting if waiting.exists() else final
-    return final
+    if not (waiting.exists() and database.exists()):
+        return False
+    belongs = built_digest(database)
+    return _database_of(waiting) == belongs != _database_of(final)
+
+
+def _database_of(store: Path) -> str | None:
+    """Return the digest of the database that a store names, None if it is missing or damaged."""
+    try:
+        return str(_manifest(store)["database"])
+    except DatabaseError:
+        return None
+
+
+def _state(path: Path) -> tuple[int, ...] | None:
+    """Return what changes where another file or folder is put in the place of one."""
+    try:
+        found = path.stat()
+    except OSError:
+        return None
+    return found.st_dev, found.st_ino, found.st_size, found.st_mtime_ns
 
 
 def _waiting(final: Path) -> Path:
@@ -352,6 +391,9 @@ class Model(Protocol):
     def name(self) -> str: ...  # noqa: D102
 
     def to_dict(self) -> dict[str, Any]: ...  # noqa: D102
+
+
+_Part = TypeVar("_Part")
 
 
 class City:
@@ -377,11 +419,12 @@ class City:
 
     def __init__(self, path: str | Path) -> None:
         self.path = Path(path)
+        self._read_state: tuple[int, ...] | None = None
 
     @cached_property
     def database(self) -> SignatureDatabase:
         """The whole database (see `open_database`)."""
-        return open_database(self.path)
+        return self._read(open_database)
 
     @cached_property
     def dataset(self) -> SignatureDatabase | PartitionedDatabase:
@@ -416,7 +459,7 @@ class City:
     @property
     def store_path(self) -> Path:
         """The folder of the object store, whether it is there or not."""
-        return store_path(self.path)
+        return _current(self.path)
 
     @property
     def has_store(self) -> bool:
@@ -426,7 +469,17 @@ class City:
     @cached_property
     def store(self) -> ObjectStore:
         """The object store; DatabaseError if there is none that can be used."""
-        return open_store(self.path)
+        return self._read(open_store)
+
+    def _read(self, part: Callable[[Path], _Part]) -> _Part:
+        """Read a part; DatabaseError if the file is another than that of a part read before."""
+        before = self._read_state or _state(self.path)
+        value = part(self.path)
+        if _state(self.path) != before:
+            msg = f"another program has written {self.path} meanwhile; run this again."
+            raise DatabaseError(msg)
+        self._read_state = before
+        return value
 
     @property
     def objects(self) -> StreetObjects | None:
@@ -483,7 +536,9 @@ class City:
         """
         added = {name: {"columns": columns.column_names, "facts": facts}}
         if not self.path.is_dir():
+            self._read(_state)
             _extend(self.path, self.path, columns, cell_ids, added)
+            self._read_state = None
             return
         files, manifest = self.files, read_manifest(self.path)
         with whole_folder(self.path) as partial:

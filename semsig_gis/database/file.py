@@ -14,6 +14,7 @@ import pyarrow as pa
 
 from semsig_gis.core.errors import DatabaseError, SemsigError
 from semsig_gis.core.geometry import NOTES, GridSpec, split_ids
+from semsig_gis.core.scratch import remove_abandoned
 from semsig_gis.core.signature import BEARING_UNITS, SignatureSpec
 from semsig_gis.core.taxonomy import Taxonomy
 from semsig_gis.database.database import SignatureDatabase, join_databases, require_same
@@ -252,7 +253,12 @@ def read_specs(path: str | Path) -> dict[str, Any]:
 
 
 def is_folder(path: str | Path) -> bool:
-    """Return whether a path is that of a folder, as of a database in parts."""
+    """Return whether a path is that of a folder, as of a database in parts.
+
+    One that a killed run had put aside is put back.
+    """
+    if not os.path.lexists(path):
+        remove_abandoned(Path(path).parent)
     return os.path.isdir(path)  # noqa: PTH112 - it answers where Path.is_dir raises
 
 

@@ -34,6 +34,7 @@ from semsig_gis.core.geometry import (
     split_ids,
 )
 from semsig_gis.core.parallel import check_workers, finish_tasks
+from semsig_gis.core.scratch import HALF_DONE
 from semsig_gis.core.signature import SignatureSpec
 from semsig_gis.database.build import build_cells
 from semsig_gis.database.database import consecutive
@@ -60,7 +61,6 @@ from semsig_gis.storage.runs import (
     read_json,
     write_json,
 )
-from semsig_gis.storage.whole import HALF_WRITTEN
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Sequence
@@ -482,8 +482,11 @@ def begin(out: str | Path, recipe: dict[str, Any]) -> Path:
     Raise InputError if `out` holds something that may not be replaced, or the folder tiles of an
     unfinished run by another recipe, which are never thrown away unasked.
     """
-    _require_replaceable(Path(os.path.realpath(out)))
-    folder = partial_folder(out)
+    target, folder = Path(os.path.realpath(out)), partial_folder(out)
+    _require_replaceable(target)
+    if (target / RECIPE).exists():  # of a run that was killed at the very end
+        shutil.rmtree(folder, ignore_errors=True)  # which holds what it had replaced
+        (target / RECIPE).unlink()
     RUN.begin(folder, recipe)
     return folder
 
@@ -495,7 +498,7 @@ def _require_replaceable(target: Path) -> None:
             msg = f"{target} is a device or a pipe; give the name of a folder to write."
             raise InputError(msg)
         return
-    others = {path.name for path in target.iterdir() if not path.name.startswith(HALF_WRITTEN)}
+    others = {path.name for path in target.iterdir() if not path.name.startswith(HALF_DONE)}
     if MANIFEST in others:
         others -= {MANIFEST, RECIPE, *(part.file for part in read_manifest(target).parts)}
     if others:

@@ -12,9 +12,8 @@ from semsig_gis.core.errors import DatabaseError, EmptyResultError, InputError
 from semsig_gis.core.geometry import SOURCE, cell_ids, cells_near
 from semsig_gis.core.rtree import PackedIndex
 from semsig_gis.database.build import build_cells
-from semsig_gis.database.city import open_store, save_with_store
+from semsig_gis.database.city import open_city, save_with_store
 from semsig_gis.database.database import ENTRY_ARRAYS, join_databases, require_same
-from semsig_gis.database.file import open_database
 from semsig_gis.database.occlusion import TOUCHING_M, buildings_near
 from semsig_gis.database.views import sightings
 from semsig_gis.objects.changes import compare_objects, replace_layers
@@ -148,8 +147,8 @@ def update_file(
     >>> sum(item.removed for item in report.classes), 0 < report.share < 0.5
     (1, True)
     """
-    database, store = open_database(path), open_store(path)
-    database, store, report = update_database(database, store, objects, progress=progress)
+    city = open_city(path)
+    database, store, report = update_database(city.database, city.store, objects, progress=progress)
     save_with_store(database, store, path if out is None else out)
     return report
 
@@ -231,10 +230,7 @@ def update_database(
     places = np.concatenate([store.objects.xy[changes.gone], merged.xy[changes.come]])
     codes = np.concatenate([store.objects.codes[changes.gone], merged.codes[changes.come]])
     cells = _cells_in_range(new, places, codes)
-    old_row = np.full(len(merged), -1)
-    old_row[changes.same[:, 1]] = changes.same[:, 0]
-    index = store.index.edited(merged.xy, old_row)
-    after = replace(store, objects=merged, index=index, notes=())
+    after = replace(store, objects=merged)
     stale = np.isin(database.cell_ids, cell_ids(*cells))
     fresh = _recomputed(new, after, places, cells, progress=progress)
     updated = join_databases([new.select(~stale), fresh])
@@ -253,7 +249,7 @@ def update_database(
         changed=len(drifted.changed),
         appeared=len(drifted.appeared),
         vanished=len(drifted.vanished),
-        notes=(*store.notes, *notes),
+        notes=notes,
     )
     return updated, after, report
 

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
     from semsig_gis.core.geometry import GridSpec
-    from semsig_gis.core.rtree import ObjectIndex, StoredIndex
+    from semsig_gis.core.rtree import ObjectIndex
     from semsig_gis.database.occlusion import Footprints
     from semsig_gis.objects.table import StreetObjects
 
@@ -147,7 +147,7 @@ def views_at(
     objects: StreetObjects,
     places: NDArray[np.float64],
     *,
-    index: ObjectIndex | StoredIndex,
+    index: ObjectIndex,
     radius: float,
     footprints: Footprints | None = None,
 ) -> Views:

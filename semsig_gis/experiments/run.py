@@ -203,9 +203,7 @@ class ExperimentWork:
             nowhere = gpd.GeoDataFrame(geometry=[], crs=self.database.crs)
             district_labels(nowhere, self.districts, self.spec.districts.name)
         for name in self._stores():
-            for sentence in self._city(name).store.notes:
-                if self.note is not None:
-                    self.note(sentence)
+            _ = self._city(name).store
         for distortion in self.spec.distortions:
             self._queries(distortion, slice(1))
         for name in self.spec.methods:

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
     from pyproj import CRS
 
-    from semsig_gis.core.rtree import ObjectIndex, StoredIndex
+    from semsig_gis.core.rtree import ObjectIndex
     from semsig_gis.core.signature import Signature
     from semsig_gis.core.taxonomy import Taxonomy
     from semsig_gis.database.database import SignatureDatabase
@@ -83,7 +83,7 @@ def explain(
     noise: Noise,
     *,
     objects: StreetObjects,
-    index: ObjectIndex | StoredIndex,
+    index: ObjectIndex,
     radius: float = 30.0,
     heading: float = 0.0,
     footprints: Footprints | None = None,

@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import ArrayLike, NDArray
 
-    from semsig_gis.core.rtree import ObjectIndex, StoredIndex
+    from semsig_gis.core.rtree import ObjectIndex
     from semsig_gis.core.signature import Signature
     from semsig_gis.database.database import SignatureDatabase
     from semsig_gis.database.occlusion import Footprints
@@ -486,7 +486,7 @@ def refine(
     noise: Noise,
     *,
     objects: StreetObjects,
-    index: ObjectIndex | StoredIndex,
+    index: ObjectIndex,
     step: float = 10.0,
     radius: float = 30.0,
     north_sigma: float = 0.0,

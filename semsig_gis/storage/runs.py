@@ -14,7 +14,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from semsig_gis.core.errors import InputError
-from semsig_gis.storage.whole import HALF_WRITTEN, put_in_place, reason, write_whole
+from semsig_gis.core.scratch import HALF_DONE, own_folder, remove_abandoned
+from semsig_gis.storage.whole import put_in_place, reason, write_whole
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Mapping
@@ -52,8 +53,8 @@ class RunKind:
         if entries:
             stored = self._read(folder, entries)
             if stored == recipe:
-                for leftover in [*folder.rglob(f"{HALF_WRITTEN}*")]:
-                    shutil.rmtree(leftover, ignore_errors=True)
+                for place in (folder, *filter(Path.is_dir, folder.rglob("*"))):
+                    remove_abandoned(place)
                 return
             if not entries <= set(self.names) or not self.abandon(folder):
                 self._refuse(folder, stored, recipe)
@@ -80,7 +81,7 @@ class RunKind:
         except OSError as error:
             msg = f"{folder} cannot be read ({reason(error)}); choose another folder."
             raise InputError(msg) from error
-        return {name for name in names if not name.startswith(HALF_WRITTEN)}
+        return {name for name in names if not name.startswith(HALF_DONE)}
 
     def _read(self, folder: Path, entries: set[str]) -> Recipe:
         try:
@@ -132,12 +133,8 @@ def finish(folder: Path, *, keep: Collection[str] | None = None) -> Path:
             for path in folder.iterdir():
                 if path.name not in keep:
                     _remove(path)
-            # Killed between its two renames, the next run finds all steps done and renames again.
-            aside = target.with_name(f"{HALF_WRITTEN}{target.name}")
-            if target.exists():
-                _remove(aside)
-            put_in_place(folder, target, aside=aside)
-            _remove(aside)
+            with own_folder(target.parent) as box:
+                put_in_place(folder, target, box=box)
     except OSError as error:
         msg = (
             f"{target} could not be put in its place ({reason(error)}); the results are in "

@@ -3,20 +3,17 @@
 from __future__ import annotations
 
 import contextlib
+import ctypes
 import os
-import shutil
-import tempfile
+import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from semsig_gis.core.errors import InputError
+from semsig_gis.core.scratch import ASIDE, locked, own_folder
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
-
-
-HALF_WRITTEN = ".semsig-"
-"""How the names of temporary folders begin; a process that was killed leaves them."""
 
 
 @contextlib.contextmanager
@@ -34,27 +31,26 @@ def whole_file(path: str | Path) -> Iterator[Path]:
     if os.path.exists(target) and not os.path.isfile(target):  # noqa: PTH110, PTH113
         msg = f"{path} is a device or a pipe; give the name of a file to write."
         raise InputError(msg)
-    try:
-        target.parent.mkdir(parents=True, exist_ok=True)
-        folder = tempfile.mkdtemp(prefix=HALF_WRITTEN, dir=target.parent)
-    except OSError as error:
-        msg = f"{path} cannot be written ({reason(error)}); choose a folder you can write to."
-        raise InputError(msg) from error
-    # A folder of its own, because some formats write companions beside the file (-journal, -wal).
-    partial = Path(folder) / Path(path).name
-    try:
-        yield partial
-        os.replace(partial, target)  # noqa: PTH105 - the rename is the point
-    except OSError as error:
-        if error.errno is None or error.filename not in {None, str(partial), str(target)}:
-            raise
-        msg = (
-            f"{path} could not be written ({reason(error)}); what was there before is unchanged, "
-            "so make room or choose another place."
-        )
-        raise InputError(msg) from error
-    finally:
-        shutil.rmtree(folder, ignore_errors=True)
+    with contextlib.ExitStack() as stack:
+        try:
+            target.parent.mkdir(parents=True, exist_ok=True)
+            folder = stack.enter_context(own_folder(target.parent))
+        except OSError as error:
+            msg = f"{path} cannot be written ({reason(error)}); choose a folder you can write to."
+            raise InputError(msg) from error
+        # A folder of its own, because some formats write companions beside the file (-journal).
+        partial = folder / Path(path).name
+        try:
+            yield partial
+            os.replace(partial, target)  # noqa: PTH105 - the rename is the point
+        except OSError as error:
+            if error.errno is None or error.filename not in {None, str(partial), str(target)}:
+                raise
+            msg = (
+                f"{path} could not be written ({reason(error)}); what was there before is "
+                "unchanged, so make room or choose another place."
+            )
+            raise InputError(msg) from error
 
 
 def write_whole(path: str | Path, content: str | bytes) -> None:
@@ -74,13 +70,13 @@ def whole_folder(path: str | Path) -> Iterator[Path]:
         partial = box / target.name
         partial.mkdir()
         yield partial
-        put_in_place(partial, target, aside=box / "old")
+        put_in_place(partial, target, box=box)
 
 
 def move_folder(new: Path, place: Path) -> None:
     """Rename a folder to its place beside it; what is there is replaced, or stays if that fails."""
     with _box(place) as box:
-        put_in_place(new, place, aside=box / "old")
+        put_in_place(new, place, box=box)
 
 
 @contextlib.contextmanager
@@ -88,11 +84,8 @@ def _box(target: Path) -> Iterator[Path]:
     """Give a temporary folder beside a folder that is being written."""
     try:
         target.parent.mkdir(parents=True, exist_ok=True)
-        box = Path(tempfile.mkdtemp(prefix=HALF_WRITTEN, dir=target.parent))
-        try:
+        with own_folder(target.parent) as box:
             yield box
-        finally:
-            shutil.rmtree(box, ignore_errors=True)
     except OSError as error:
         msg = (
             f"{target} could not be written ({reason(error)}); what was there before is "
@@ -101,8 +94,17 @@ def _box(target: Path) -> Iterator[Path]:
         raise InputError(msg) from error
 
 
-def put_in_place(new: Path, place: Path, *, aside: Path) -> None:
-    """Rename a folder to its place; what is there is put aside, or back if that fails."""
+def put_in_place(new: Path, place: Path, *, box: Path) -> None:
+    """Rename a folder to its place; what is there is put into a temporary folder beside it.
+
+    The place is never empty where the system lets two folders change places. Else a run that is
+    killed in between leaves the old one aside, from where `remove_abandoned` puts it back.
+    """
+    aside = box / ASIDE / place.name
+    aside.parent.mkdir()
+    if exchanged(new, place):
+        new.rename(aside)
+        return
     with contextlib.suppress(FileNotFoundError):
         place.rename(aside)
     try:
@@ -111,6 +113,39 @@ def put_in_place(new: Path, place: Path, *, aside: Path) -> None:
         if aside.exists():
             aside.rename(place)
         raise
+
+
+@contextlib.contextmanager
+def alone_in(folder: Path) -> Iterator[bool]:
+    """Wait until no other program is in such a block with a folder; give whether that is sure.
+
+    It is not where the system does not lock folders.
+    """
+    try:
+        file = os.open(folder, os.O_RDONLY)
+    except OSError:
+        yield False
+        return
+    try:
+        yield locked(file, wait=True)
+    finally:
+        os.close(file)
+
+
+AT_FDCWD = -100
+RENAME_EXCHANGE = 2
+
+
+def exchanged(one: Path, other: Path) -> bool:
+    """Let two files or folders change places in one step; False where that is impossible."""
+    if sys.platform != "linux":
+        return False
+    renameat2 = getattr(ctypes.CDLL(None), "renameat2", None)
+    if renameat2 is None:
+        return False
+    sys.audit("os.rename", str(one), str(other), -1, -1)  # as Python's own renames are told
+    names = os.fsencode(one), os.fsencode(other)
+    return bool(renameat2(AT_FDCWD, names[0], AT_FDCWD, names[1], RENAME_EXCHANGE) == 0)
 
 
 def reason(error: OSError) -> str:

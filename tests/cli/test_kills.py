@@ -1,24 +1,134 @@
-"""Commands that are killed on the way: what was there before stays, or the new is whole."""
+"""Commands that are killed on the way: what was there before stays, or the new is whole.
+
+And whoever runs next finds it, and removes what the killed one had no time to remove. Only some
+moments are tried here: `make soak` tries them all.
+"""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+import dataclasses
+import itertools
+import shutil
+from typing import TYPE_CHECKING, NamedTuple
 
 import pytest
-from kills import killed_at, operations
+from kills import killed_at
+from worlds import assert_index_fits, random_town
+
+from semsig_gis.database.build import build_database
+from semsig_gis.database.city import ObjectStore, open_city, save_with_store
+from semsig_gis.objects.table import save_objects
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
     from pathlib import Path
 
+    from conftest import Run
+    from semsig_gis.objects.table import StreetObjects
 
-@pytest.mark.parametrize("name", ["cells.gpkg", "cells.tif", "cells.csv"])
-def test_an_export_is_the_old_file_or_the_new(town: Path, name: str) -> None:
-    line = ["export", "city.parquet", "--out", name]
-    steps = operations(line, cwd=town)
-    whole = (town / name).stat().st_size
-    for number in range(1, steps + 2):
-        (town / name).write_text("old")
-        outcome = killed_at(number, line, cwd=town)
-        assert outcome.killed == (number <= steps)
-        assert (town / name).stat().st_size in {3, whole}
-    assert (town / name).stat().st_size == whole
+BEFORE = random_town().street_objects
+AFTER = dataclasses.replace(BEFORE, table=BEFORE.table[7:].reset_index(drop=True))
+CELLS = {len(build_database(objects)): len(objects) for objects in (BEFORE, AFTER)}
+
+
+def save_city(objects: StreetObjects, path: Path) -> None:
+    save_with_store(build_database(objects), ObjectStore.of(objects), path)
+
+
+class Place(NamedTuple):
+    """Where a command was killed, with what it said it was about to do."""
+
+    folder: Path
+    change: str
+
+
+@pytest.fixture
+def prepared(tmp_path: Path) -> Path:
+    """Return a folder with a city, another that is to be replaced by it, and changed objects."""
+    folder = tmp_path / "prepared"
+    (folder / "temporary").mkdir(parents=True)
+    save_objects(BEFORE, folder / "before.parquet")
+    save_objects(AFTER, folder / "objects.parquet")
+    save_city(BEFORE, folder / "city.parquet")
+    save_city(AFTER, folder / "other.parquet")
+    return folder
+
+
+def kills(prepared: Path, line: str, *, every: int = 1) -> Iterator[Place]:
+    """Run a command in a copy of a folder, and kill it each time a change later."""
+    for number in itertools.count(1, every):
+        folder = prepared.with_name("killed")
+        shutil.rmtree(folder, ignore_errors=True)
+        shutil.copytree(prepared, folder)
+        env = {"TMPDIR": str(folder / "temporary")}
+        outcome = killed_at(number, line.split(), cwd=folder, env=env)
+        if not outcome.killed:
+            assert outcome.code == 0, outcome.err
+            assert names_in(folder) >= names_in(prepared)
+            return
+        yield Place(folder, outcome.changes[-1])
+
+
+def names_in(folder: Path) -> set[str]:
+    return {path.relative_to(folder).as_posix() for path in folder.rglob("*")}
+
+
+def assert_one_city(path: Path) -> int:
+    """Check that a database and its store are of one city, and return how many objects it has."""
+    city = open_city(path)
+    assert len(city.store.objects) == CELLS[len(city.database)]
+    assert_index_fits(city.store)
+    return len(city.store.objects)
+
+
+UPDATE = "--objects objects.parquet --json"
+
+
+@pytest.mark.parametrize(
+    ("line", "every"),
+    [
+        (f"update city.parquet {UPDATE}", 4),
+        (f"update other.parquet {UPDATE} --out city.parquet", 9),
+    ],
+)
+def test_a_city_is_the_old_one_or_the_new(
+    prepared: Path, line: str, every: int, monkeypatch: pytest.MonkeyPatch, run: Run
+) -> None:
+    outcomes = set()
+    for folder, change in kills(prepared, line, every=every):
+        assert (folder / "city.objects").is_dir(), change
+        outcomes.add(assert_one_city(folder / "city.parquet"))
+        monkeypatch.chdir(folder)
+        code, _, err = run(line)
+        assert code == 0, (change, err)
+        assert assert_one_city(folder / "city.parquet") == len(AFTER)
+        assert names_in(folder) == names_in(prepared), change
+    assert len(BEFORE) in outcomes
+
+
+TILES = "build objects.parquet --out city --tile 100"
+
+
+def test_a_city_in_parts_is_the_old_one_or_the_new(
+    prepared: Path, monkeypatch: pytest.MonkeyPatch, run: Run
+) -> None:
+    monkeypatch.chdir(prepared)
+    code, _, err = run("build before.parquet --out city --tile 100")
+    assert code == 0, err
+    names, outcomes = names_in(prepared), set()
+    for folder, change in kills(prepared, TILES, every=13):
+        outcomes.add(CELLS[len(open_city(folder / "city").database)])
+        monkeypatch.chdir(folder)
+        code, _, err = run(TILES)
+        assert code == 0, (change, err)
+        assert CELLS[len(open_city(folder / "city").database)] == len(AFTER)
+        assert names_in(folder) == names, change
+    assert outcomes == {len(BEFORE), len(AFTER)}
+
+
+def test_an_export_is_the_old_file_or_the_new(prepared: Path) -> None:
+    (prepared / "cells.gpkg").write_text("old")
+    line = "export city.parquet --out cells.gpkg"
+    sizes = [(folder / "cells.gpkg").stat().st_size for folder, _ in kills(prepared, line)]
+    assert sizes[0] == 3
+    assert {*sizes} == {3, sizes[-1]}

@@ -2,33 +2,27 @@
 
 from __future__ import annotations
 
-import gc
 import math
 import pickle
-import sys
-import tempfile
 from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from machine import largest_file
 from sentences import refused
 
-from semsig_gis.core import rtree
 from semsig_gis.core.errors import InputError
-from semsig_gis.core.rtree import ObjectIndex, PackedIndex, StoredIndex
+from semsig_gis.core.rtree import ObjectIndex, PackedIndex
 
 if TYPE_CHECKING:
     from collections.abc import Callable
-    from pathlib import Path
 
     from numpy.typing import NDArray
 
     Points = list[tuple[float, float]]
     Places = NDArray[np.float64]
-    Index = ObjectIndex | PackedIndex | StoredIndex
+    Index = ObjectIndex | PackedIndex
 
 # Quarters of a metre: sums of their squares are exact, so a circle has an exact edge, and places
 # repeat and lie at exactly the radius.
@@ -109,109 +103,10 @@ def test_a_pickled_copy_and_a_changed_array_make_no_difference(kind: type[Object
         assert pairs(one, 5.0, np.zeros((1, 2))) == [(0, 0), (0, 1)]
 
 
-@pytest.mark.parametrize("make", [ObjectIndex, PackedIndex, StoredIndex.pack])
+@pytest.mark.parametrize("make", [ObjectIndex, PackedIndex])
 @pytest.mark.parametrize(
     "xy", [np.empty((0, 2)), [[0.0, math.nan]], [[math.inf, 0.0]], [[0.0, 0.0], [math.nan] * 2]]
 )
 def test_nothing_to_index_is_an_error(xy: object, make: Callable[[object], object]) -> None:
     with refused(InputError, "at least one point", "finite"):
         make(np.asarray(xy))
-
-
-# --- In files, and edited ---------------------------------------------------------------------
-
-
-@pytest.fixture
-def town() -> Places:
-    places = np.random.default_rng(3).uniform(0, 500, (400, 2))
-    return shifted(places.tolist(), (765_200.3, 6_275_000.7))
-
-
-@given(st.lists(PLACES, max_size=30), CORNERS, RADII, st.data())
-def test_after_any_edits_it_answers_as_a_fresh_one(
-    start: Points, corner: tuple[float, float], radius: float, data: st.DataObject
-) -> None:
-    xy = shifted([(0.0, 0.0), *start], corner)
-    index, most = StoredIndex.pack(xy), len(xy)
-    for _ in range(data.draw(st.integers(0, 3), "rounds")):
-        kept = np.array(data.draw(st.permutations(range(len(xy)))), np.int64)
-        kept = kept[: data.draw(st.integers(0, len(xy)))]
-        new = shifted([(1.0, 1.0), *data.draw(st.lists(PLACES, max_size=30))], corner)
-        shuffled = np.random.default_rng(len(new)).permutation(len(kept) + len(new))
-        rows = np.concatenate([kept, np.full(len(new), -1)])[shuffled]
-        old, xy = xy, np.concatenate([xy[kept], new])[shuffled]
-        before, most = index, max(most, len(xy))
-        with pytest.MonkeyPatch.context() as patch:  # or else all is packed anew
-            patch.setattr(rtree, "FEW_EDITS", data.draw(st.sampled_from([0, 1000])))
-            index = index.edited(xy, rows)
-        assert index._numbers.max() < most  # free ones are taken again
-        assert pairs(before, radius, old) == pairs(ObjectIndex(old), radius, old)
-        assert pairs(index, radius, xy) == pairs(ObjectIndex(xy), radius, xy)
-    with tempfile.TemporaryDirectory() as folder:
-        index.save(folder)
-        again = StoredIndex.open(folder, xy)
-        assert len(again) == len(xy)
-        for one in (index, again):
-            assert pairs(one, radius, xy) == pairs(ObjectIndex(xy), radius, xy)
-
-
-def test_nothing_is_left_behind(
-    town: Places, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
-    index = StoredIndex.pack(town)
-    other = index.edited(town[:50], np.arange(50))
-    assert len(list(tmp_path.iterdir())) == 2
-    del index, other
-    assert list(tmp_path.iterdir()) == []
-
-
-def test_it_cannot_be_pickled(town: Places) -> None:
-    with refused(InputError, "pickled", "open it"):
-        pickle.dumps(StoredIndex.pack(town))
-
-
-def test_files_that_cannot_be_used_are_named(town: Places, tmp_path: Path) -> None:
-    with refused(InputError, "no R-tree"):
-        StoredIndex.open(tmp_path, town)
-    StoredIndex.pack(town).save(tmp_path)
-    with refused(InputError, "over 400 points, not 399"):
-        StoredIndex.open(tmp_path, town[1:])
-    # The library opens half a tree without a word.
-    with (tmp_path / "rtree.dat").open("r+b") as file:
-        file.truncate(1024)
-    with refused(InputError, "no R-tree can be made"):
-        StoredIndex.open(tmp_path, town)
-    StoredIndex.pack(town[:50]).save(tmp_path)
-    np.save(tmp_path / "rtree.npy", np.arange(len(town)))
-    with refused(InputError, "R-tree over 400 points came out with 50"):
-        StoredIndex.open(tmp_path, town)
-    (tmp_path / "rtree.dat").unlink()
-    with refused(InputError, "no R-tree can be made", "No such file"):
-        StoredIndex.open(tmp_path, town)
-
-
-def test_a_missing_temporary_folder_is_named(
-    town: Places, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path / "nowhere"))
-    with refused(InputError, "temporary folder", "TMPDIR"):
-        StoredIndex.pack(town)
-
-
-@pytest.mark.skipif(sys.platform == "win32", reason="no limit of file sizes there")
-def test_a_full_disk_is_named(
-    town: Places, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    index = StoredIndex.pack(town)
-    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
-    more = np.concatenate([town, town + 1.0])
-    kept = np.concatenate([np.arange(len(town)), np.full(len(town), -1)])
-    size = (index._folder / "rtree.dat").stat().st_size
-    with largest_file(size):
-        for attempt in ("pack", "edit"):
-            with refused(InputError, "no R-tree can be made", "make room"):
-                StoredIndex.pack(more) if attempt == "pack" else index.edited(more, kept)
-            gc.collect()  # a tree that could not be written would end the program here
-    assert list(tmp_path.iterdir()) == []
-    assert pairs(index, 9.0, town) == pairs(ObjectIndex(town), 9.0, town)

@@ -3,12 +3,9 @@
 from __future__ import annotations
 
 import dataclasses
-import itertools
 import json
-import os
 import shutil
-import tempfile
-from pathlib import Path
+from contextlib import nullcontext
 from typing import TYPE_CHECKING, Any
 
 import geopandas as gpd
@@ -21,7 +18,6 @@ from sentences import assert_sentence, refused
 from worlds import CORNER, assert_index_fits, assert_same, random_town, surroundings
 
 from semsig_gis.core.errors import CrsError, DatabaseError, InputError
-from semsig_gis.core.rtree import INDEX_FILES
 from semsig_gis.database import city as store_module
 from semsig_gis.database.build import build_database
 from semsig_gis.database.city import (
@@ -41,9 +37,11 @@ from semsig_gis.database.file import (
     read_manifest,
     save_database,
 )
-from semsig_gis.storage.whole import move_folder
+from semsig_gis.objects.table import open_objects
 
 if TYPE_CHECKING:
+    from pathlib import Path
+
     from worlds import World
 
     from semsig_gis.database.database import SignatureDatabase
@@ -232,14 +230,6 @@ HOUSES.attrs["licenses"] = ["City (CC0): houses"]
 STREETS = surroundings(shapely.LineString([CORNER, CORNER + 50]), half_width=[7.5])
 
 
-@pytest.fixture(autouse=True)
-def _own_temporary_folder(
-    tmp_path_factory: pytest.TempPathFactory, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """Keep what killed runs leave behind out of the system's folder."""
-    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path_factory.mktemp("own")))
-
-
 def fewer(number: int) -> StreetObjects:
     return dataclasses.replace(TOWN, table=TOWN.table[number:].reset_index(drop=True))
 
@@ -270,13 +260,12 @@ def test_a_store_lies_beside_its_database(stored: Path) -> None:
     assert names_in(stored.parent) == ["city.objects", "city.parquet"]
     store = open_store(stored)
     assert_fits(store, TOWN)
-    assert (store.footprints, store.streets, store.notes) == (None, None, ())
+    assert (store.footprints, store.streets) == (None, None)
     assert_same(open_database(stored), build_database(TOWN))
-    assert set(names_in(store_path(stored))) == {"manifest.json", "objects.parquet", *INDEX_FILES}
+    assert names_in(store_path(stored)) == ["manifest.json", "objects.parquet"]
     manifest = json.loads((store_path(stored) / "manifest.json").read_text())
     assert manifest["objects"] == len(TOWN)
-    assert set(manifest["files"]) == {"objects.parquet", *INDEX_FILES}
-    assert np.load(store_path(stored) / "rtree.npy").tolist() == list(range(len(TOWN)))
+    assert [*manifest["files"]] == ["objects.parquet"]
 
 
 def test_buildings_and_streets_are_kept_in_the_crs_of_the_objects(tmp_path: Path) -> None:
@@ -347,18 +336,14 @@ def damage(file: Path, how: str) -> None:
         file.unlink()
 
 
-@pytest.mark.parametrize("name", INDEX_FILES)
-@pytest.mark.parametrize("how", ["cut", "flipped", "gone"])
-def test_a_damaged_r_tree_is_made_again(stored: Path, name: str, how: str) -> None:
-    damage(store_path(stored) / name, how)
-    store = open_store(stored)
-    assert_fits(store, TOWN)
-    (note,) = store.notes
-    assert "R-tree" in note
-    assert "made again" in note
-    # It is whole again when it is saved.
-    save_with_store(open_database(stored), store, stored)
-    assert open_store(stored).notes == ()
+def test_the_r_tree_of_an_old_store_is_not_read(stored: Path) -> None:
+    folder = store_path(stored)
+    manifest = json.loads((folder / "manifest.json").read_text())
+    for name in ("rtree.dat", "rtree.idx", "rtree.npy"):
+        (folder / name).write_bytes(b"what ends a program that reads it" * 99)
+        manifest["files"][name] = digest(folder / name)
+    (folder / "manifest.json").write_text(json.dumps(manifest))
+    assert_fits(open_store(stored), TOWN)
 
 
 @pytest.mark.parametrize("name", ["objects.parquet", "footprints.parquet", "streets.parquet"])
@@ -411,93 +396,58 @@ def test_reading_changes_nothing(stored: Path) -> None:
     assert len(names_in(stored.parent)) == 2
 
 
-class KilledError(BaseException):
-    """What ends a run at some step."""
-
-
-def steps_until_killed(
-    step: int, database: SignatureDatabase, store: ObjectStore, path: Path
-) -> bool:
-    """Save, and die before the rename of that number; tell whether it came so far."""
-    count = 0
-
-    def counted(original: object) -> object:
-        def rename(*args: object) -> object:
-            nonlocal count
-            count += 1
-            if count == step:
-                raise KilledError
-            return original(*args)  # type: ignore[operator]
-
-        return rename
-
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(os, "replace", counted(os.replace))
-        patch.setattr(Path, "rename", counted(Path.rename))
-        # A run that is killed does not tidy up.
-        tidy = shutil.rmtree
-        patch.setattr(shutil, "rmtree", lambda *a, **k: None if count == step else tidy(*a, **k))
-        try:
-            save_with_store(database, store, path)
-        except KilledError:
-            return True
-    return False
-
-
-def test_a_run_may_be_killed_at_any_step(tmp_path: Path) -> None:
-    """Database and store are both the old ones or both the new ones, whatever happens.
-
-    So they are when the next run is killed, too; what waits is not lost to it.
-    """
-    states = [TOWN, fewer(7), fewer(12)]
-    databases = [build_database(objects) for objects in states]
-    by_cells = {len(database): number for number, database in enumerate(databases)}
-    assert len(by_cells) == 3
-    outcomes = set()
-    for first, second in itertools.product(range(1, 9), range(9)):
-        path = save(tmp_path / f"{first}-{second}" / "city.parquet")
-        killed = steps_until_killed(first, databases[1], ObjectStore.of(states[1]), path)
-        if second:
-            steps_until_killed(second, databases[2], ObjectStore.of(states[2]), path)
-        number = by_cells[len(open_database(path))]
-        assert_same(open_database(path), databases[number])
-        assert_fits(open_store(path), states[number])
-        outcomes.add((killed, second > 0, number))
-    assert outcomes >= {(True, False, 0), (True, False, 1), (False, False, 1)}
-    assert outcomes >= {(True, True, 0), (True, True, 1), (True, True, 2)}
-
-
-def test_what_waits_is_read_where_nothing_can_be_written(
+def test_what_waits_for_its_database_is_put_in_its_place(
     stored: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     waiting = stored.with_name("city.objects.next")
     store_path(stored).rename(waiting)
-
-    def read_only(*_: Path) -> None:
-        msg = "nothing may be written here."
-        raise InputError(msg)
-
+    with monkeypatch.context() as patch:  # where nobody knows who else does so
+        patch.setattr(store_module, "alone_in", lambda _: nullcontext(enter_result=False))
+        assert_fits(open_store(stored), TOWN)
+        assert City(stored).store_path == waiting
     with monkeypatch.context() as patch:
         patch.setattr(store_module, "move_folder", read_only)
         assert_fits(open_store(stored), TOWN)
-        assert waiting.exists()
+    assert names_in(stored.parent) == ["city.objects.next", "city.parquet"]
+    assert City(stored).has_store
     assert_fits(open_store(stored), TOWN)
-    assert not waiting.exists()
-    assert store_path(stored).is_dir()
+    assert names_in(stored.parent) == ["city.objects", "city.parquet"]
 
 
-def test_another_program_may_finish_it_first(stored: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    waiting = stored.with_name("city.objects.next")
-    shutil.copytree(store_path(stored), waiting)
+def read_only(*_: Path) -> None:
+    msg = "nothing may be written here."
+    raise InputError(msg)
 
-    def late(new: Path, place: Path) -> None:
-        new.rename(stored.with_name("taken"))  # which the other has put in its place
-        move_folder(new, place)
 
-    monkeypatch.setattr(store_module, "move_folder", late)
+def test_what_waits_for_another_database_stays_aside(stored: Path, tmp_path: Path) -> None:
+    other = save(tmp_path / "other" / "city.parquet", fewer(7))
+    store_path(other).rename(stored.with_name("city.objects.next"))
     assert_fits(open_store(stored), TOWN)
-    assert not waiting.exists()
-    assert store_path(stored).is_dir()
+    other.replace(stored)  # a run that is killed after this has done so
+    assert_fits(open_store(stored), fewer(7))
+    assert names_in(tmp_path) == ["city.objects", "city.parquet", "other"]
+
+
+def test_a_city_is_read_as_it_was_at_one_moment(
+    stored: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    city, opened = open_city(stored), open_objects
+
+    def overtaken(path: Path) -> StreetObjects:
+        with monkeypatch.context() as patch:
+            patch.setattr(store_module, "open_objects", opened)
+            save(stored, fewer(7))
+        monkeypatch.undo()
+        return opened(path)
+
+    monkeypatch.setattr(store_module, "open_objects", overtaken)
+    assert_fits(open_store(stored), fewer(7))
+    assert len(city.database) == len(build_database(fewer(7)))
+    save(stored, fewer(12))
+    for act in (lambda: city.store, lambda: put(city, columns(len(city.database)))):
+        with refused(DatabaseError, "another program has written", "run this again"):
+            act()
+    assert not City(stored).has_columns
 
 
 def test_a_full_disk_leaves_what_was_there(stored: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -509,7 +459,7 @@ def test_a_full_disk_leaves_what_was_there(stored: Path, monkeypatch: pytest.Mon
         raise InputError(msg)
 
     for name, act, file in (
-        ("save_objects", full, "city.objects.next"),
+        ("save_objects", full, "city.objects"),
         ("save_database", full_partial, str(stored)),  # the name that was given
     ):
         with monkeypatch.context() as patch:

@@ -181,7 +181,6 @@ def test_an_update_is_a_rebuild(
             assert {*report.kept} == layers - {*table["source"]}
             assert_same(after, build(store.objects if report.kept else new))
             assert_index_fits(store)
-            assert store.notes == ()
             check_report(report, before, after)
         assert {file.name for file in path.parent.iterdir()} == {"city.objects", "city.parquet"}
 
@@ -308,14 +307,6 @@ def test_a_store_without_what_the_database_was_built_with_is_told() -> None:
         update_database(database, ObjectStore.of(objects), objects)
     with refused(DatabaseError, "lacks the streets"):
         update_database(database, ObjectStore.of(objects, footprints=HOUSES), objects)
-
-
-def test_a_damaged_r_tree_is_told_and_healed(path: Path, table: pd.DataFrame) -> None:
-    (store_path(path) / "rtree.dat").unlink()
-    (note,) = update_file(path, objects_of(table[2:])).notes
-    assert "R-tree" in note
-    assert_same(open_database(path), build_database(objects_of(table[2:])))
-    assert update_file(path, objects_of(table[3:])).notes == ()
 
 
 def test_cells_of_different_ranges_are_not_compared(database: SignatureDatabase) -> None:

@@ -8,6 +8,7 @@ import pytest
 from sentences import refused
 
 from semsig_gis.core.errors import InputError
+from semsig_gis.core.scratch import MACHINE
 from semsig_gis.storage.runs import RunKind, finish, partial_folder, read_json, write_json
 
 if TYPE_CHECKING:
@@ -42,7 +43,7 @@ def folder(tmp_path: Path) -> Path:
 
 
 def test_a_run_is_taken_up_by_the_same_recipe(folder: Path) -> None:
-    (folder / "deep" / ".semsig-x").mkdir(parents=True)  # a killed process leaves such a folder
+    (folder / "deep" / f"{MACHINE}x").mkdir(parents=True)  # a killed process leaves such a folder
     RUN.begin(folder, RECIPE)
     assert sorted(path.name for path in folder.iterdir()) == ["deep", "part_1", "recipe.json"]
     assert list((folder / "deep").iterdir()) == []

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import errno
 import os
+import sys
 import tempfile
 from pathlib import Path
 from typing import NoReturn
@@ -13,7 +14,7 @@ import pytest
 from sentences import assert_sentence, refused
 
 from semsig_gis.core.errors import InputError
-from semsig_gis.storage.whole import move_folder, whole_file, whole_folder
+from semsig_gis.storage.whole import exchanged, move_folder, whole_file, whole_folder
 
 
 @pytest.fixture
@@ -171,6 +172,8 @@ def test_a_folder_that_cannot_be_renamed_changes_nothing(
             raise PermissionError(errno.EACCES, "Permission denied")
         return rename(self, target)
 
+    # Where two folders cannot change places.
+    monkeypatch.setattr("semsig_gis.storage.whole.exchanged", lambda *_: False)
     with monkeypatch.context() as patch, refused(InputError, "Permission denied", "is unchanged"):
         patch.setattr(Path, "rename", denied)
         move_folder(new, old)
@@ -179,3 +182,15 @@ def test_a_folder_that_cannot_be_renamed_changes_nothing(
     move_folder(new, old)
     assert_alone(old / "a.txt", "new")
     assert list(tmp_path.iterdir()) == [old]
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="other systems do it in two steps")
+def test_two_folders_change_places(tmp_path: Path) -> None:
+    new, old = tmp_path / "new", tmp_path / "old"
+    new.mkdir()
+    assert not exchanged(new, old)
+    (old / "a.txt").parent.mkdir()
+    (old / "a.txt").write_text("old")
+    assert exchanged(new, old)
+    assert_alone(new / "a.txt", "old")
+    assert list(old.iterdir()) == []

@@ -1,0 +1,112 @@
+"""Hidden folders for what is half done: each belongs to one process and does not outlive it.
+
+A process that is killed cannot tidy up. So each folder holds a file that its process keeps locked,
+and whoever makes a folder beside it removes those that nobody holds any more.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import hashlib
+import os
+import platform
+import shutil
+import sys
+import tempfile
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+if sys.platform != "win32":
+    import fcntl
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+HALF_DONE = ".semsig-"
+"""How the names of these folders begin."""
+
+# Locks may be seen by one machine only, so that those of others are left alone.
+MACHINE = f"{HALF_DONE}{hashlib.blake2b(platform.node().encode(), digest_size=4).hexdigest()}-"
+OWNER = f"{HALF_DONE}owner"
+ASIDE = f"{HALF_DONE}aside"
+"""Folder in such a folder; what it holds belongs in the place of that name beside the folder."""
+
+
+@contextlib.contextmanager
+def own_folder(parent: Path) -> Iterator[Path]:
+    """Give a new hidden folder in another, which is removed after the block.
+
+    OSError if there is no writing there.
+    """
+    remove_abandoned(parent)
+    folder, owner = _claimed(parent)
+    try:
+        yield folder
+    finally:
+        _remove(folder, owner)
+
+
+def remove_abandoned(parent: Path) -> None:
+    """Remove from a folder the hidden folders of processes of this machine that were killed.
+
+    What such a process had put aside, with nothing in its place yet, is put back.
+    """
+    for folder in parent.glob(f"{MACHINE}*"):
+        with contextlib.suppress(OSError):
+            try:
+                owner = os.open(folder / OWNER, os.O_RDWR)
+            except FileNotFoundError:
+                folder.rmdir()  # if it is empty
+                continue
+            if not locked(owner, wait=False):
+                os.close(owner)
+                continue
+            for kept in (folder / ASIDE).glob("*"):
+                if not os.path.lexists(parent / kept.name):
+                    kept.rename(parent / kept.name)
+            _remove(folder, owner)
+
+
+def locked(file: int, *, wait: bool) -> bool:
+    """Lock an open file or folder until it is closed; False where that is impossible."""
+    if sys.platform == "win32":
+        return False
+    try:
+        fcntl.flock(file, fcntl.LOCK_EX if wait else fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except OSError:
+        return False
+    return True
+
+
+def _claimed(parent: Path) -> tuple[Path, int]:
+    """Make a folder, and return it with the open file that says so."""
+    while True:
+        folder = Path(tempfile.mkdtemp(prefix=MACHINE, dir=parent))
+        try:
+            owner = os.open(folder / OWNER, os.O_CREAT | os.O_RDWR, 0o600)
+        except FileNotFoundError:  # another process took it for abandoned just now
+            continue
+        except OSError:
+            folder.rmdir()
+            raise
+        locked(owner, wait=True)
+        if (folder / OWNER).exists():
+            return folder, owner
+        os.close(owner)
+
+
+def _remove(folder: Path, owner: int) -> None:
+    """Remove a folder, and at last what says whose it is; a later run does what fails."""
+    try:
+        for entry in [*folder.iterdir()]:
+            if entry.is_dir() and not entry.is_symlink():
+                shutil.rmtree(entry)
+            elif entry.name != OWNER:
+                entry.unlink()
+    except OSError:
+        return
+    finally:
+        os.close(owner)
+    with contextlib.suppress(OSError):
+        (folder / OWNER).unlink()
+        folder.rmdir()
