@@ -8,7 +8,13 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, ParamSpec, TypeVar
 
-import numba
+from semsig_gis.core.memory import require_address_space
+
+# Where LLVM gets no memory, it ends the process without a word of ours.
+COMPILER_BYTES = 400_000_000
+require_address_space(COMPILER_BYTES, "the compiler of number loops")
+
+import numba  # noqa: E402
 
 if TYPE_CHECKING:
     from collections.abc import Callable

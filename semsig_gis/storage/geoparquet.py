@@ -25,6 +25,7 @@ from pyproj import CRS
 from pyproj.exceptions import CRSError
 
 from semsig_gis.core.errors import DatabaseError, InputError, SemsigError
+from semsig_gis.core.memory import raise_if_short
 from semsig_gis.core.signature import Signature
 from semsig_gis.storage.whole import reason, whole_file
 
@@ -245,6 +246,7 @@ def read_geoparquet(
         msg = f"{file} cannot be read ({reason(error)}); ask its owner for access."
         raise DatabaseError(msg) from error
     except (pa.ArrowException, OSError, ValueError) as error:
+        raise_if_short(error)
         msg = (
             f"{file} is damaged or is not a Parquet file; give another, or make the {kind} file "
             "again."
@@ -266,6 +268,7 @@ def read_geoparquet(
         else:
             table = parquet.read_row_groups(groups_meeting(parquet, box), columns)
     except (pa.ArrowException, OSError, ValueError) as error:
+        raise_if_short(error)
         msg = f"{file} is damaged; make the {kind} file again."
         raise DatabaseError(msg) from error
     missing = set(columns or ()) - set(table.column_names)
