@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING
 import pyarrow as pa
 import pytest
 
-from semsig_gis.core import memory
 from semsig_gis.core.memory import raise_if_short, require_address_space
 from semsig_gis.database.file import save_database
 
@@ -60,8 +59,8 @@ def test_a_limit_is_looked_at_before_the_compiler_is_loaded(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     require_address_space(2**60, "this")  # no limit
-    monkeypatch.setattr(memory.resource, "getrlimit", lambda _: (2**20, 2**20))
+    monkeypatch.setattr(resource, "getrlimit", lambda _: (2**20, 2**20))
     with pytest.raises(MemoryError, match="this takes 1,000 MB, and the limit leaves 0 MB"):
         require_address_space(10**9, "this")
-    monkeypatch.setattr(memory.resource, "getrlimit", lambda _: (2**60, resource.RLIM_INFINITY))
+    monkeypatch.setattr(resource, "getrlimit", lambda _: (2**60, resource.RLIM_INFINITY))
     require_address_space(10**9, "this")
