@@ -55,6 +55,7 @@ from .database.file import (
     open_dataset as open_dataset,
     save_database as save_database,
 )
+from .database.north import North as North
 from .database.occlusion import Footprints as Footprints
 from .database.properties import database_summary as database_summary
 from .database.answer import Requirement as Requirement

@@ -5,7 +5,7 @@ from __future__ import annotations
 import sys
 from dataclasses import dataclass, fields
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
@@ -35,6 +35,7 @@ if TYPE_CHECKING:
     from semsig_gis.core.taxonomy import Taxonomy
     from semsig_gis.database.answer import Answer, Locator
     from semsig_gis.database.city import City
+    from semsig_gis.database.north import North
     from semsig_gis.matching.method import Method
     from semsig_gis.queries.file import QueryLine, Route
 
@@ -66,7 +67,31 @@ class QueryOptions:
             "distance,bearing (metres, degrees) from the line before, and its sigma.",
         ),
     ] = False
+    north: Annotated[
+        Literal["grid", "true", "magnetic"],
+        typer.Option(help="Count the bearings from this north, of the database's grid by default."),
+    ] = "grid"
+    date: Annotated[
+        str | None,
+        typer.Option(help="Day of the view, as 2024-05-31, for magnetic north.  [default: today]"),
+    ] = None
     method: MethodText = "edit+edit"
+
+    def seen_north(self, city: City) -> North:
+        """Return what the bearings count from."""
+        import datetime as dt
+
+        from semsig_gis.database.north import GRID_NORTH, North
+
+        try:
+            day = None if self.date is None else dt.date.fromisoformat(self.date)
+        except ValueError as error:
+            msg = f"--date was given as {self.date!r}; give a day as 2024-05-31."
+            raise InputError(msg) from error
+        if day is not None and self.north != "magnetic":
+            msg = f"--date was given with --north {self.north}, which stays; leave it out."
+            raise InputError(msg)
+        return GRID_NORTH if self.north == "grid" else North.of(self.north, city.dataset, date=day)
 
     def query(self, taxonomy: Taxonomy) -> Signature:
         """Return the query of --types and --bearings."""
@@ -88,13 +113,13 @@ class QueryOptions:
             return parse_queries(sys.stdin.buffer, self.source, taxonomy=taxonomy)
         return read_queries(self.source, taxonomy=taxonomy)
 
-    def read_route(self, taxonomy: Taxonomy) -> Route:
+    def read_route(self, taxonomy: Taxonomy, north: North) -> Route:
         """Return the views of a route with their names, and the legs between them."""
         from semsig_gis.queries.file import parse_route, read_route
 
         if self.queries == "-":
-            return parse_route(sys.stdin.buffer, self.source, taxonomy=taxonomy)
-        return read_route(self.source, taxonomy=taxonomy)
+            return parse_route(sys.stdin.buffer, self.source, taxonomy=taxonomy, north=north)
+        return read_route(self.source, taxonomy=taxonomy, north=north)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -184,29 +209,32 @@ def localize(options: LocalizeOptions) -> None:
     city = open_city(options.database)
     taxonomy = city.dataset.taxonomy
     # Queries are read before the index, which takes much longer than to find a slip in a query.
+    north = options.seen_north(city)
     if options.route:
-        views, legs = options.read_route(taxonomy)
-        locations = options.locator(city).locate_route([query for _, query in views], legs)
+        views, legs = options.read_route(taxonomy, north)
+        locations = options.locator(city, north).locate_route([query for _, query in views], legs)
         for (name, _), location in zip(views, locations, strict=True):
             print_json({"id": name, **location.to_dict()}, indent=None)
         return
-    locator = None if method is None else _distance_locator(options, city, method)
+    locator = None if method is None else _distance_locator(options, city, method, north)
     if options.queries is None:
         query = options.query(taxonomy)
-        _answer(options, city, locator or options.locator(city), query)
+        _answer(options, city, locator or options.locator(city, north), query)
         return
     queries = options.read_queries(taxonomy)
-    _answer_lines(queries, locator or options.locator(city), options.source)
+    _answer_lines(queries, locator or options.locator(city, north), options.source)
 
 
-def _distance_locator(options: LocalizeOptions, city: City, method: Method) -> Locator[Any]:
+def _distance_locator(
+    options: LocalizeOptions, city: City, method: Method, north: North
+) -> Locator[Any]:
     from semsig_gis.database.answer import Requirement
     from semsig_gis.matching.search import DistanceLocator
 
     database, require = city.dataset, options.require
     requirement = None if require is None else Requirement.parse(require, database.taxonomy)
     return DistanceLocator(
-        database=database, method=method, requirement=requirement, top=options.top
+        database=database, method=method, requirement=requirement, top=options.top, north=north
     )
 
 
@@ -313,11 +341,18 @@ def print_answer(result: dict[str, Any]) -> None:
     if by_chance:
         _print_known(result["prior"] or {})
         _print_explanations(candidates)
-        _print_place(result)
+        _print_place(result, north=result["north"]["name"])
     elif result["tied_beyond"]:
         tied = result["tied_beyond"]
         more = "1 further cell ties" if tied == 1 else f"{tied:,} further cells tie"
         say(f"{more} with the last one.")
+    north = result["north"]
+    if north["name"] != "grid":
+        day = f" of {north['date']}" if north["date"] else ""
+        say(
+            f"Bearings count from {north['name']} north{day}, at {north['turn'] % 360.0:.1f}° from "
+            "grid north."
+        )
     for note in result["notes"]:
         say(f"Note: {note}")
 
@@ -337,7 +372,7 @@ def _print_known(prior: dict[str, Any]) -> None:
         say(f"Known: sees {require['text']}, as {require['cells']:,} cells do.")
 
 
-def _print_place(result: dict[str, Any]) -> None:
+def _print_place(result: dict[str, Any], *, north: str) -> None:
     place, region = result["place"], result["region"]
     where = f"{place['lat']:.6f}, {place['lon']:.6f} (lat, lon)"
     chance = f"within {place['within_m']:g} m of it with a chance of {place['chance']:.1%}"
@@ -352,7 +387,10 @@ def _print_place(result: dict[str, Any]) -> None:
         f"{ellipse['shorter']:.1f} m across)."
     )
     if place["heading"] is not None:
-        say(f"North of the query: {place['heading'] % 360.0:.1f}° ± {place['heading_sigma']:.1f}°.")
+        say(
+            f"North of the query: {place['heading'] % 360.0:.1f}° ± {place['heading_sigma']:.1f}° "
+            f"from {north} north."
+        )
     say(
         f"{region['share']:.0%} of the chance is in {region['cells']:,} "
         f"cell{'' if region['cells'] == 1 else 's'} "

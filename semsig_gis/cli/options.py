@@ -20,6 +20,7 @@ if TYPE_CHECKING:
 
     from semsig_gis.database.city import City, ObjectStore
     from semsig_gis.database.database import SignatureDatabase
+    from semsig_gis.database.north import North
     from semsig_gis.likelihood.index import LikelihoodIndex
     from semsig_gis.likelihood.locate import LikelihoodLocator
     from semsig_gis.likelihood.noise.model import Noise
@@ -127,8 +128,9 @@ class SearchOptions:
     ] = False
     objects: Objects = None
 
-    def locator(self, city: City) -> LikelihoodLocator:
-        """Return what answers queries by likelihood."""
+    def locator(self, city: City, north: North | None = None) -> LikelihoodLocator:
+        """Return what answers queries by likelihood, whose bearings count from a north."""
+        from semsig_gis.database.north import GRID_NORTH
         from semsig_gis.likelihood.locate import LikelihoodLocator
         from semsig_gis.likelihood.noise.model import cell_noise
         from semsig_gis.likelihood.posterior import DEFAULT_RULE, open_rule
@@ -165,6 +167,7 @@ class SearchOptions:
             refined=refined,
             explained=EXPLAINED if self.explain else 0,
             known=known,
+            north=north or GRID_NORTH,
         )
 
     def _prior(self, database: SignatureDatabase) -> tuple[NDArray[Any] | None, dict[str, Any]]:

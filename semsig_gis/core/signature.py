@@ -153,6 +153,14 @@ class Signature:
             None if self.bearings is None else self.bearings[objects],
         )
 
+    def turned(self, degrees: float) -> Signature:
+        """Return the signature with bearings that are so many degrees larger, in their order."""
+        if self.bearings is None:
+            return self
+        bearings = wrap_degrees(self.bearings + degrees)
+        order = np.argsort(bearings, kind="stable")
+        return Signature(None if self.codes is None else self.codes[order], bearings[order])
+
     def levels(self, levels: int) -> NDArray[np.uint8]:
         """Return the angle level of each bearing, shape (n,); InputError where they are unknown."""
         if self.bearings is None:
@@ -194,7 +202,4 @@ class Signature:
                 f"bearing {wrong[0]:g} is not usable; give degrees clockwise from north, 0 to 360."
             )
             raise InputError(msg)
-        turned = wrap_degrees(angles)
-        query = cls(codes, turned)
-        order = np.argsort(turned, kind="stable")
-        return cls(None if query.codes is None else query.codes[order], turned[order])
+        return cls(codes, wrap_degrees(angles)).turned(0.0)

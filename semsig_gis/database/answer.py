@@ -17,6 +17,7 @@ from pyproj import Transformer
 
 from semsig_gis.core.errors import InputError
 from semsig_gis.core.taxonomy import WILDCARD
+from semsig_gis.database.north import GRID_NORTH
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Hashable, Iterator, Sequence
@@ -28,6 +29,7 @@ if TYPE_CHECKING:
     from semsig_gis.core.signature import Signature
     from semsig_gis.core.taxonomy import Taxonomy
     from semsig_gis.database.database import SequenceTable, SignatureDatabase
+    from semsig_gis.database.north import North
 
 
 REGION_SHARE = 0.9
@@ -41,7 +43,8 @@ class Answer(ABC):
     `candidates` has one row a cell, best first: its rank, ``cell`` (row in the database),
     ``cell_id``, ``x`` and ``y`` (viewpoint in `crs`), ``types`` (symbols), ``length`` (objects) and
     what the method tells of it. `cells` counts the cells that were searched, and `notes` are
-    sentences on what of the query could not be used as it was given.
+    sentences on what of the query could not be used as it was given. The bearings of `query` count
+    from `north`.
     """
 
     query: Signature
@@ -52,6 +55,12 @@ class Answer(ABC):
     licenses: tuple[str, ...]
     tied_beyond: int = 0
     notes: tuple[str, ...] = ()
+    north: North = GRID_NORTH
+
+    @property
+    def grid_query(self) -> Signature:
+        """The query with its bearings from grid north."""
+        return self.north.to_grid(self.query)
 
     @property
     def chances(self) -> NDArray[np.float64] | None:

@@ -422,6 +422,11 @@ class PartitionedDatabase:
         """The classes that the parts know."""
         return next(self.parts()).taxonomy
 
+    @property
+    def crs(self) -> CRS:
+        """The metric coordinate reference system of the parts."""
+        return next(self.parts()).crs
+
     def row_numbers(self, cell_ids: NDArray[np.int64]) -> NDArray[np.int64]:
         """Return the rows that cells have in the database that `open_database` returns."""
         rows = np.zeros(len(cell_ids), np.int64)

@@ -13,6 +13,7 @@ import shapely
 from semsig_gis.core.geometry import SOURCE, SOURCE_ID, signed_degrees
 from semsig_gis.core.taxonomy import WILDCARD
 from semsig_gis.database.database import views_in
+from semsig_gis.database.north import GRID_NORTH
 from semsig_gis.database.views import views_at
 from semsig_gis.likelihood.association import associate, near_pairs
 from semsig_gis.likelihood.noise.table import LONGEST_TABLE, noise_tables, query_bearings
@@ -25,6 +26,7 @@ if TYPE_CHECKING:
     from semsig_gis.core.signature import Signature
     from semsig_gis.core.taxonomy import Taxonomy
     from semsig_gis.database.database import SignatureDatabase
+    from semsig_gis.database.north import North
     from semsig_gis.database.occlusion import Footprints
     from semsig_gis.database.views import Views
     from semsig_gis.likelihood.noise.model import Noise
@@ -63,9 +65,14 @@ class Explanation:
         counts = self.table["verdict"].value_counts()
         return {verdict: int(counts.get(verdict, 0)) for verdict in VERDICTS}
 
-    def to_dict(self) -> dict[str, Any]:
-        """Return plain values for JSON; what does not apply in a row is None."""
+    def to_dict(self, north: North = GRID_NORTH) -> dict[str, Any]:
+        """Return plain values for JSON; what does not apply in a row is None.
+
+        The bearings of the table count from grid north, those of the values from `north`.
+        """
         plain = pd.DataFrame(self.table.drop(columns="geometry"))
+        for name in ("query_bearing", "object_bearing"):
+            plain[name] = plain[name].map(north.from_grid)
         rows = plain.astype(object).where(plain.notna(), None).to_dict("records")
         return {
             "x": self.xy[0],

@@ -25,6 +25,7 @@ from semsig_gis.database.answer import (
     check_top,
     query_notes,
 )
+from semsig_gis.database.north import GRID_NORTH
 from semsig_gis.likelihood.association import align_cells, rerank
 from semsig_gis.likelihood.explain import explain, explain_cell
 from semsig_gis.likelihood.index import CellScores
@@ -49,6 +50,7 @@ if TYPE_CHECKING:
     from semsig_gis.database.answer import DistanceMemo
     from semsig_gis.database.city import ObjectStore
     from semsig_gis.database.database import SignatureDatabase
+    from semsig_gis.database.north import North
     from semsig_gis.likelihood.explain import Explanation
     from semsig_gis.likelihood.index import LikelihoodIndex
     from semsig_gis.likelihood.noise.model import Noise
@@ -204,15 +206,17 @@ class Location(Answer):
         ``place`` is what `PlaceEstimate.to_dict` gives with its ``cell_id``, ``lon``, ``lat``,
         ``chance`` and ``within_m``. ``threshold`` is None where nothing is answered. ``candidates``
         lists the columns of `candidates`, ``lon``, ``lat`` (degrees, WGS 84) and, of the first
-        ones, ``explanation``. ``prior`` holds `known` and ``ratio``; None if nothing was known.
+        ones, ``explanation``. Its bearings count from ``north``, as those of the query do;
+        ``prior`` holds `known` and ``ratio``; None if nothing was known.
         """
         lon, lat = self._to_degrees.transform(self.estimate.x, self.estimate.y)
         candidates = self._candidate_records()
         for candidate, why in zip(candidates, self.explanations, strict=False):
-            candidate["explanation"] = why.to_dict()
+            candidate["explanation"] = why.to_dict(self.north)
         threshold = self.rule.threshold
         return {
             "query": self.query.to_dict(self.taxonomy),
+            "north": self.north.to_dict(),
             "noise": self.noise,
             "cells": self.cells,
             "answered": self.answer.given,
@@ -253,6 +257,7 @@ class LikelihoodLocator:
     refined: bool | None = False
     explained: int = 0
     known: Mapping[str, Any] = field(default_factory=dict)
+    north: North = GRID_NORTH
 
     def __post_init__(self) -> None:  # noqa: D105
         check_top(self.top)
@@ -318,7 +323,8 @@ class LikelihoodLocator:
             )
 
     def _known(self, query: Signature) -> Signature:
-        """Return a query without what is false wherever it was seen from."""
+        """Return a query in the grid, without what is false wherever it was seen from."""
+        query = self.north.to_grid(query)
         known = query.among(self.index.database.present_codes)
         return query if known.all() else query.select(known)
 
@@ -376,6 +382,7 @@ class LikelihoodLocator:
             notes=(
                 *query_notes(query, database.present_codes, database.taxonomy),
                 *_prior_notes(ratio),
+                *self.north.notes,
             ),
             answer=answer,
             estimate=estimate,
@@ -386,6 +393,7 @@ class LikelihoodLocator:
             explanations=tuple(self._explanation(query, cell, scores, parts) for cell in first),
             known=self.known,
             prior_ratio=ratio,
+            north=self.north,
         )
 
     def _parts(
@@ -418,6 +426,7 @@ class LikelihoodLocator:
         self, query: Signature, cell: int, scores: CellScores, parts: Refinement | None
     ) -> Explanation:
         """Return what speaks for a cell: at the likeliest part of it, or at its middle."""
+        query = self.north.to_grid(query)
         database, noise = self.index.database, self.index.noise
         heading = 0.0 if scores.heading is None else float(scores.heading[cell])
         if self.store is None:
@@ -451,6 +460,7 @@ class LocateOptions(TypedDict, total=False):
     refined: bool
     explained: int
     known: Mapping[str, Any]
+    north: North
 
 
 def locate(index: LikelihoodIndex, query: Signature, **options: Unpack[LocateOptions]) -> Location:
@@ -472,7 +482,8 @@ def locate(index: LikelihoodIndex, query: Signature, **options: Unpack[LocateOpt
         behind the cells: with ``refined`` the place is looked for between the viewpoints, too, and
         the chances of the cells are those of their parts together. ``explained`` (0) candidates
         are explained; without a store, street objects have no identifiers. ``known`` is what the
-        answer repeats of the prior, in plain values.
+        answer repeats of the prior, in plain values. The ``north`` is what the bearings count
+        from, grid north by default.
 
     Returns
     -------

@@ -17,6 +17,7 @@ from semsig_gis.core.signs import (
     mixed,
 )
 from semsig_gis.database.database import rows_of_result
+from semsig_gis.database.north import GRID_NORTH
 from semsig_gis.maps.image import level_image
 from semsig_gis.maps.parts import (
     FLIPPING,
@@ -210,7 +211,7 @@ class _Drawings:
     def candidates(self) -> list[list[Any]]:
         """Return the candidates, likeliest first."""
         rows = self.location.candidates
-        query = query_signature(self.location.query, self.database.taxonomy)
+        query = query_signature(self.location.grid_query, self.database.taxonomy)
         records = []
         places = self.latlon(rows[["x", "y"]].to_numpy())
         for place, row in zip(places, rows.to_dict("records"), strict=True):
@@ -281,8 +282,11 @@ def _north(heading: float | None, sigma: float | None = None) -> str | None:
 
 
 def _notes(answer: Answer) -> str:
-    """Return the notes of an answer as HTML."""
-    return "".join(f"<p>Note: {escape(note)}</p>" for note in answer.notes)
+    """Return what there is to say of the query and its answer, as HTML."""
+    notes = [f"Note: {note}" for note in answer.notes]
+    if answer.north != GRID_NORTH:
+        notes.insert(0, f"Bearings of the query count from {answer.north}.")
+    return "".join(f"<p>{escape(note)}</p>" for note in notes)
 
 
 def location_legend(location: Location) -> str:
@@ -381,7 +385,7 @@ def _candidate_records(
     distances = candidates["distance"].to_numpy(np.float64)
     spread = np.ptp(distances) or 1.0
     colours = mixed((distances - distances.min()) / spread, CANDIDATE_RAMP)
-    query = query_signature(localization.query, database.taxonomy)
+    query = query_signature(localization.grid_query, database.taxonomy)
     records = []
     for number, candidate in enumerate(candidates.to_dict("records")):
         rank = ranks_text(candidate["rank_low"], candidate["rank_high"])

@@ -23,6 +23,7 @@ from semsig_gis.database.answer import (
 )
 from semsig_gis.database.database import join_databases, rows_of_result
 from semsig_gis.database.file import PartitionedDatabase
+from semsig_gis.database.north import GRID_NORTH
 from semsig_gis.matching.method import DEFAULT_METHOD
 from semsig_gis.matching.scores import score_cells, score_parts
 from semsig_gis.matching.ties import top_candidates
@@ -35,6 +36,7 @@ if TYPE_CHECKING:
     from semsig_gis.core.signature import Signature
     from semsig_gis.database.answer import DistanceMemo, Requirement
     from semsig_gis.database.database import SignatureDatabase
+    from semsig_gis.database.north import North
     from semsig_gis.matching.method import Method
 
 
@@ -82,6 +84,7 @@ class Localization(Answer):
         """
         return {
             "query": self.query.to_dict(self.taxonomy),
+            "north": self.north.to_dict(),
             "method": str(self.method),
             "used": self.used,
             "cells": self.cells,
@@ -101,6 +104,7 @@ class DistanceLocator:
     method: Method = DEFAULT_METHOD
     requirement: Requirement | None = None
     top: int = 100
+    north: North = GRID_NORTH
     _compared: set[str] = field(default_factory=set)  # parts of queries
 
     def __post_init__(self) -> None:  # noqa: D105
@@ -109,11 +113,12 @@ class DistanceLocator:
     def locate(self, query: Signature, *, top: int | None = None) -> Localization:
         """List the cells whose signature is most like a query, of all parts of a database."""
         count = top or self.top
-        shortlist, part = self._search(query, count)
+        grid_query = self.north.to_grid(query)
+        shortlist, part = self._search(grid_query, count)
         present = sorted(shortlist.present)
-        known = query.among(present)
+        known = grid_query.among(present)
         if not known.all():  # the last part might have had the class
-            shortlist, part = self._search(query.select(known), count)
+            shortlist, part = self._search(grid_query.select(known), count)
         candidates, tied_beyond = shortlist.ranked()
         if isinstance(self.database, PartitionedDatabase):
             candidates["cell"] = self.database.row_numbers(candidates["cell_id"].to_numpy())
@@ -130,7 +135,8 @@ class DistanceLocator:
             crs=part.crs,
             taxonomy=part.taxonomy,
             licenses=part.licenses,
-            notes=query_notes(query, present, part.taxonomy),
+            notes=(*query_notes(query, present, part.taxonomy), *self.north.notes),
+            north=self.north,
         )
 
     def _search(self, query: Signature, top: int) -> tuple[Shortlist, SignatureDatabase]:
@@ -221,6 +227,7 @@ def localize(
     method: Method = DEFAULT_METHOD,
     requirement: Requirement | None = None,
     top: int = 100,
+    north: North = GRID_NORTH,
 ) -> Localization:
     """Find the cells whose signature is most like a query.
 
@@ -238,6 +245,8 @@ def localize(
         What a cell must see to be a candidate; nothing by default.
     top : int
         How many cells to list, at least 1.
+    north : North, optional
+        What the bearings of the query count from; grid north by default.
 
     Returns
     -------
@@ -257,5 +266,7 @@ def localize(
     >>> answer.used, answer.candidates["distance"][0]
     ('types+angles', np.float64(0.0))
     """
-    locator = DistanceLocator(database=database, method=method, requirement=requirement, top=top)
+    locator = DistanceLocator(
+        database=database, method=method, requirement=requirement, top=top, north=north
+    )
     return locator.locate(query)

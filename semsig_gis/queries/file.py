@@ -9,6 +9,7 @@ import numpy as np
 
 from semsig_gis.core.errors import InputError
 from semsig_gis.core.signature import Signature
+from semsig_gis.database.north import GRID_NORTH
 from semsig_gis.likelihood.route import Leg
 from semsig_gis.storage.geoparquet import (
     file_rows,
@@ -25,6 +26,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from semsig_gis.core.taxonomy import Taxonomy
+    from semsig_gis.database.north import North
     from semsig_gis.storage.geoparquet import Row
 
 Route = tuple[list[tuple[str | int, Signature]], list[Leg]]
@@ -69,22 +71,26 @@ def _query_lines(
         yield QueryLine(line=line, name=_name(row_value(row, "id"), line), query=query)
 
 
-def read_route(path: str | Path, *, taxonomy: Taxonomy) -> Route:
+def read_route(path: str | Path, *, taxonomy: Taxonomy, north: North = GRID_NORTH) -> Route:
     """Read the views of a route from a file of queries (see `read_queries`).
 
     A line without types and bearings, like one where both are empty, has seen nothing. Each line
     but the first also tells the way from the line before: ``dx`` and ``dy`` (metres to
-    grid east and north), or ``distance`` (metres) and ``bearing`` (degrees clockwise from grid
-    north), and ``sigma`` (standard deviation of each coordinate in metres, 0 if missing). There is
-    one leg fewer than views. Raises InputError if the file cannot
-    be read or a line of it is no view of a route.
+    grid east and north), or ``distance`` (metres) and ``bearing`` (degrees clockwise from
+    `north`), and ``sigma`` (standard deviation of each coordinate in metres, 0 if missing).
+    There is one leg fewer than views. Raises InputError if the file cannot be read or a line of it
+    is no view of a route.
     """
-    return _route(read_rows(path, lambda row: _view(row, taxonomy), what="view"), str(path))
+    rows = read_rows(path, lambda row: _view(row, taxonomy, north), what="view")
+    return _route(rows, str(path))
 
 
-def parse_route(lines: Iterable[str | bytes], source: str, *, taxonomy: Taxonomy) -> Route:
+def parse_route(
+    lines: Iterable[str | bytes], source: str, *, taxonomy: Taxonomy, north: North = GRID_NORTH
+) -> Route:
     """Read a route as `read_route` does, from JSON lines that messages call `source`."""
-    return _route(parse_rows(lines, source, lambda row: _view(row, taxonomy), what="view"), source)
+    rows = parse_rows(lines, source, lambda row: _view(row, taxonomy, north), what="view")
+    return _route(rows, source)
 
 
 def _query(row: Row, taxonomy: Taxonomy) -> Signature:
@@ -95,8 +101,8 @@ def _query(row: Row, taxonomy: Taxonomy) -> Signature:
     return _seen(row, taxonomy)
 
 
-def _view(row: Row, taxonomy: Taxonomy) -> tuple[object, Signature, Leg | None]:
-    return row_value(row, "id"), _seen(row, taxonomy), _leg(row)
+def _view(row: Row, taxonomy: Taxonomy, north: North) -> tuple[object, Signature, Leg | None]:
+    return row_value(row, "id"), _seen(row, taxonomy), _leg(row, north)
 
 
 def _seen(row: Row, taxonomy: Taxonomy) -> Signature:
@@ -104,7 +110,7 @@ def _seen(row: Row, taxonomy: Taxonomy) -> Signature:
     return Signature(np.empty(0, np.uint8), np.empty(0)) if signature is None else signature
 
 
-def _leg(row: Row) -> Leg | None:
+def _leg(row: Row, north: North) -> Leg | None:
     values = {
         name: float(row_value(row, name))
         for name in (*PLAIN_LEG, *TOWARDS, "sigma")
@@ -116,7 +122,7 @@ def _leg(row: Row) -> Leg | None:
     if values.keys() == set(PLAIN_LEG):
         return Leg(dx=values["dx"], dy=values["dy"], sigma=sigma)
     if values.keys() == set(TOWARDS):
-        return Leg.towards(values["bearing"], values["distance"], sigma=sigma)
+        return Leg.towards(values["bearing"] + north.turn, values["distance"], sigma=sigma)
     msg = "the way to it needs dx and dy, or distance and bearing"
     raise InputError(msg)
 

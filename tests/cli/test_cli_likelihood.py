@@ -293,6 +293,18 @@ def test_bearings_of_360_and_minus_10(city: Path, run: Run) -> None:
     assert json.loads(plain[1])["query"]["bearings"] == [0.0, 20.0, 350.0]
 
 
+def test_bearings_from_another_north(city: Path, run: Run) -> None:
+    query = "localize", city, *options(SEEN), "--north", "magnetic", "--date", "2024-05-31"
+    for more in ((), BY):
+        north = json.loads(run(*query, *more, "--json")[1])["north"]
+        assert (north["name"], north["date"]) == ("magnetic", "2024-05-31")
+        assert "from magnetic north of 2024-05-31, at 1.6° from grid" in run(*query, *more)[1]
+    out = run(*query, *BY, "--heading", "unknown", "--map", city.with_name("map.html"))[1]
+    assert "° from magnetic north." in out
+    page = city.with_name("map.html").read_text(encoding="utf-8")
+    assert "count from magnetic north of 2024-05-31" in page
+
+
 def test_nobody_stands_where_nothing_is_possible(city: Path, run: Run) -> None:
     apart = World((*WORLD.objects, (CORNER[0] + 900.0, CORNER[1], WORLD.objects[0][2])))
     save_with_store(apart.database, ObjectStore.of(apart.street_objects), city)

@@ -22,6 +22,7 @@ from semsig_gis.core.signature import Signature
 from semsig_gis.core.taxonomy import Taxonomy
 from semsig_gis.database.build import build_database
 from semsig_gis.database.city import ObjectStore
+from semsig_gis.database.north import North
 from semsig_gis.database.views import ViewpointSpec
 from semsig_gis.likelihood.route import Leg
 from semsig_gis.objects.load import assemble, choose_layers, read_files
@@ -290,6 +291,12 @@ def test_a_route_tells_the_way_from_view_to_view() -> None:
     assert [name for name, _ in views] == ["start", 3, 4]
     assert [len(view) for _, view in views] == [2, 0, 1]
     assert legs == [Leg(dx=3.0, dy=-4.0, sigma=2.0), Leg.towards(90.0, 20.0, sigma=0.0)]
+
+
+def test_a_route_counts_its_bearings_from_the_north_of_its_views() -> None:
+    lines = ['{"types": "D"}', '{"types": "D", "bearing": 80, "distance": 20}']
+    (leg,) = parse_route(lines, "x", taxonomy=TAXONOMY, north=North(name="true", turn=10.0))[1]
+    assert (leg.dx, leg.dy) == pytest.approx((20.0, 0.0))
 
 
 def test_a_route_in_a_table(tmp_path: Path) -> None:

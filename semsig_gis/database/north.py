@@ -1,0 +1,149 @@
+"""The north that the bearings of a query count from: grid, true or magnetic."""
+
+from __future__ import annotations
+
+import datetime as dt
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Literal, Self, get_args
+
+import numpy as np
+from pyproj import Transformer
+
+from semsig_gis.core.errors import InputError, UnknownNameError, nearest_name
+from semsig_gis.core.geometry import grid_convergence, signed_degrees
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from semsig_gis.core.signature import Signature
+    from semsig_gis.database.database import SignatureDatabase
+    from semsig_gis.database.file import PartitionedDatabase
+
+NorthName = Literal["grid", "true", "magnetic"]
+NORTHS: tuple[NorthName, ...] = get_args(NorthName)
+
+MODELLED = dt.date(1900, 1, 1), dt.date(2029, 12, 31)
+"""First and last day that the magnetic field is known or foretold for (IGRF-14)."""
+WIDE = 0.5  # degrees by which north may differ within a city before an answer tells of it
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class North:
+    """What the bearings of a query count from.
+
+    Parameters
+    ----------
+    name : {"grid", "true", "magnetic"}, default "grid"
+        Grid north is that of the CRS of the database.
+    turn : float, default 0
+        Its bearing from grid north in the middle of the city, in degrees clockwise.
+    spread : float, default 0
+        By how many degrees it differs from that elsewhere in the city, at most.
+    date : datetime.date, optional
+        The day for which the magnetic north was worked out.
+
+    Examples
+    --------
+    >>> import datetime as dt
+    >>> north = North.of("magnetic", demo_database, date=dt.date(2024, 5, 1))
+    >>> round(north.turn, 1), round(north.spread, 2)
+    (1.9, 0.01)
+    """
+
+    name: NorthName = "grid"
+    turn: float = 0.0
+    spread: float = 0.0
+    date: dt.date | None = None
+
+    @classmethod
+    def of(
+        cls,
+        name: NorthName,
+        database: SignatureDatabase | PartitionedDatabase,
+        *,
+        date: dt.date | None = None,
+    ) -> Self:
+        """Return the north of a city: the convergence of the grid and the declination there.
+
+        The magnetic north is that of a `date`, by default of today. UnknownNameError if there is
+        no such north; InputError if a date is given for another, or lies outside `MODELLED`.
+        """
+        if name not in NORTHS:
+            msg = f"north {name!r} is unknown{nearest_name(name, NORTHS)}; give one of {NORTHS}."
+            raise UnknownNameError(msg)
+        if date is not None and name != "magnetic":
+            msg = f"a date was given for {name} north, which stays; give it for magnetic north."
+            raise InputError(msg)
+        if name == "grid":
+            return cls()
+        places = _places(database)
+        turns = -grid_convergence(database.crs, places)
+        if name == "magnetic":
+            date = dt.datetime.now().astimezone().date() if date is None else date
+            to_degrees = Transformer.from_crs(database.crs, "EPSG:4326", always_xy=True)
+            turns = turns + declination(*to_degrees.transform(*places.T), date)
+        middle = float(signed_degrees(turns[0]))
+        spread = float(np.abs(signed_degrees(turns - middle)).max())
+        return cls(name=name, turn=middle, spread=spread, date=date)
+
+    def __str__(self) -> str:
+        """Return its name in words, with the date where it matters."""
+        return f"{self.name} north" + (f" of {self.date}" if self.date else "")
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What to say where one north does not do for all the city."""
+        if self.spread <= WIDE:
+            return ()
+        note = (
+            f"{self.name} north differs by up to {self.spread:.1f}° from its bearing in the middle "
+            "of the city, which was taken for all of it."
+        )
+        return (note,)
+
+    def to_grid(self, query: Signature) -> Signature:
+        """Return a query with its bearings from grid north."""
+        return query.turned(self.turn) if self.turn else query
+
+    def from_grid(self, bearing: float) -> float:
+        """Return a bearing from grid north as one from this north, in [0, 360)."""
+        return (bearing - self.turn) % 360.0 if self.turn else bearing
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return plain values, ready for JSON."""
+        date = None if self.date is None else self.date.isoformat()
+        return {"name": self.name, "turn": self.turn, "spread": self.spread, "date": date}
+
+
+GRID_NORTH: North = North()
+"""The north that bearings are kept from."""
+
+
+def declination(
+    lon: NDArray[np.float64], lat: NDArray[np.float64], date: dt.date
+) -> NDArray[np.float64]:
+    """Return the bearing of magnetic from true north at places, in degrees clockwise.
+
+    It is that of the International Geomagnetic Reference Field. InputError if the date lies
+    outside `MODELLED`.
+    """
+    import ppigrf  # noqa: PLC0415 - only where it is used
+
+    first, last = MODELLED
+    if not first <= date <= last:
+        msg = f"the date {date} was given for magnetic north; give one from {first} to {last}."
+        raise InputError(msg)
+    day = dt.datetime.combine(date, dt.time())
+    east, north, _ = ppigrf.igrf(lon, lat, 0.0, day)
+    return np.asarray(np.degrees(np.arctan2(east, north))).reshape(-1)
+
+
+def _places(database: SignatureDatabase | PartitionedDatabase) -> NDArray[np.float64]:
+    """Return the middle and the corners of the box of the cells, shape (5, 2)."""
+    from semsig_gis.database.file import PartitionedDatabase  # noqa: PLC0415 - it loads slowly
+
+    parts = database.parts() if isinstance(database, PartitionedDatabase) else [database]
+    boxes = [(part.xy.min(axis=0), part.xy.max(axis=0)) for part in parts if len(part)]
+    low, high = np.min([box[0] for box in boxes], axis=0), np.max([box[1] for box in boxes], axis=0)
+    corners = [low, (high[0], low[1]), high, (low[0], high[1])]
+    return np.array([(low + high) / 2.0, *corners])
