@@ -59,7 +59,10 @@ def build(
     street_width: Annotated[
         float, typer.Option(help="Default street width in metres, where --streets has none.")
     ] = 16.0,
-    area: Annotated[Path | None, typer.Option(help="Polygons to keep the cells of.")] = None,
+    area: Annotated[
+        Path | None,
+        typer.Option(help="Keep the cells in WEST,SOUTH,EAST,NORTH in degrees, or in polygons."),
+    ] = None,
     tile: Annotated[
         float | None,
         typer.Option(help="Tile size in metres; 2000 with --workers or --scheduler."),

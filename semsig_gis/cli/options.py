@@ -106,7 +106,10 @@ class SearchOptions:
             "database, SIGMA in metres."
         ),
     ] = None
-    area: Annotated[Path | None, typer.Option(help="Polygons that the place lies in.")] = None
+    area: Annotated[
+        Path | None,
+        typer.Option(help="WEST,SOUTH,EAST,NORTH in degrees, or polygons: the place lies in it."),
+    ] = None
     popularity: Annotated[
         Path | None, typer.Option(help="Raster of how likely each place is, such as of people.")
     ] = None

@@ -27,9 +27,10 @@ from semsig_gis.objects.conflate import ConflationReport, conflate
 from semsig_gis.objects.table import StreetObjects, layer_licences, layer_note
 from semsig_gis.sources import MERGING, find_files, reader
 from semsig_gis.sources import vector as vector_file
-from semsig_gis.sources.area import join_areas, note_outside
+from semsig_gis.sources.area import NUMBERS, join_areas, note_outside, parse_area
 from semsig_gis.sources.catalog import LayerSpec, load_catalog, paper_taxonomy
 from semsig_gis.sources.osm import file as osm_file
+from semsig_gis.sources.raw_layer import WGS84
 from semsig_gis.storage.geoparquet import GROUP_ROWS, hilbert_order
 from semsig_gis.storage.whole import whole_file
 
@@ -51,6 +52,8 @@ SHAPE = "shape"
 AREA = 2
 # Larger than any projected coordinate; files write -1.8e308 and the like for "no value".
 BEYOND_EARTH_M = 1e8
+# Between the points of an edge of a box, so that the curve that it is is met to centimetres.
+EDGE_DEGREES = 0.01
 
 
 @dataclass(frozen=True, slots=True)
@@ -678,16 +681,22 @@ def read_surroundings(
     return _read(Path(path), role, crs, box, tell)
 
 
-def read_area(path: str | Path, *, crs: CRS | str) -> shapely.Polygon | shapely.MultiPolygon:
-    """Read what all polygons of a file enclose together, moved to a CRS.
+def read_area(area: str | Path, *, crs: CRS | str) -> shapely.Polygon | shapely.MultiPolygon:
+    """Return ``west,south,east,north`` in degrees, or all polygons of a file, moved to a CRS.
 
-    Errors are as of `read_surroundings`.
+    Errors are as of `parse_area` and `read_surroundings`.
     """
-    area = join_areas(_read(Path(path), "area", crs).geometry.to_numpy())
-    if area is None:
-        msg = f"{path} encloses no area; give a file of polygons."
+    if NUMBERS.fullmatch(str(area)):
+        # In metres an edge of the box is a curve.
+        box = shapely.segmentize(parse_area(str(area)).polygon, EDGE_DEGREES)
+        shapes = gpd.GeoSeries([box], crs=WGS84).to_crs(crs)
+    else:
+        shapes = _read(Path(area), "area", crs).geometry
+    joined = join_areas(shapes.to_numpy())
+    if joined is None:
+        msg = f"{area} encloses no area; give a file of polygons."
         raise InputError(msg)
-    return area
+    return joined
 
 
 def _read(

@@ -38,6 +38,15 @@ def test_files_are_moved_to_the_crs_asked_for(tmp_path: Path, name: str) -> None
     assert area.area == pytest.approx(HOUSE.buffer(5).area, rel=1e-3)
 
 
+def test_an_area_may_be_a_box_of_degrees() -> None:
+    area = read_area("24.5,60,25.5,60.2", crs="EPSG:32635")
+    south = gpd.GeoSeries(shapely.points([(25, 59.99999), (25, 60.00001)]), crs="EPSG:4326")
+    inside = shapely.covers(area, south.to_crs("EPSG:32635").to_numpy())
+    assert inside.tolist() == [False, True]  # though the edge is 190 m off a line in metres
+    with refused(InputError, "west below east"):
+        read_area("25,60,24,61", crs=CRS)
+
+
 def test_an_openstreetmap_file_gives_what_it_tags(tmp_path: Path) -> None:
     nodes = [node(1, 24.9, 60.1), node(2, 24.91, 60.1), node(3, 24.91, 60.11)]
     ways = [way(n, ring, {"building": "yes"}) for n, ring in ((4, [1, 2, 3, 1]), (6, [1, 2, 3]))]
