@@ -37,7 +37,7 @@ from .objects.load import (
     read_files as read_files,
 )
 from .reports.quality import quality_report as quality_report
-from .objects.load import (
+from .objects.surroundings import (
     read_surroundings as read_surroundings,
     save_surroundings as save_surroundings,
 )

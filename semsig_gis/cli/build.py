@@ -76,7 +76,7 @@ def build(
     from semsig_gis.core.signature import SignatureSpec
     from semsig_gis.database.city import open_city
     from semsig_gis.database.views import ViewpointSpec
-    from semsig_gis.objects.load import read_area
+    from semsig_gis.objects.surroundings import read_area
     from semsig_gis.objects.table import open_objects
     from semsig_gis.storage.geoparquet import NOWHERE
 
@@ -128,7 +128,7 @@ def _build_whole(
     """Build a database in one piece, and the object store beside it; return cells and entries."""
     from semsig_gis.database.build import build_database
     from semsig_gis.database.city import ObjectStore, save_with_store
-    from semsig_gis.objects.load import read_surroundings
+    from semsig_gis.objects.surroundings import read_surroundings
     from semsig_gis.objects.table import open_objects
 
     opened = open_objects(objects)

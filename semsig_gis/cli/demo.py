@@ -72,7 +72,8 @@ def synthesize(
     seed: Annotated[int, typer.Option(help="Seed of the random numbers.")] = 0,
 ) -> None:
     """Make up a city: street objects, buildings and streets."""
-    from semsig_gis.objects.load import build_objects, save_surroundings
+    from semsig_gis.objects.load import build_objects
+    from semsig_gis.objects.surroundings import save_surroundings
     from semsig_gis.objects.table import save_objects
     from semsig_gis.sources.catalog import paper_taxonomy
     from semsig_gis.sources.synthetic.city import (

@@ -35,7 +35,7 @@ def draw_ground(
 ) -> None:
     """Add streets and buildings to a map: those of files, else of the store of the database."""
     from semsig_gis.maps.objects import ground_map
-    from semsig_gis.objects.load import read_surroundings
+    from semsig_gis.objects.surroundings import read_surroundings
 
     crs = city.database.crs
     houses = None if buildings is None else read_surroundings(buildings, role="buildings", crs=crs)

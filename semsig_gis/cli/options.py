@@ -184,7 +184,7 @@ class SearchOptions:
             known["near"] = place.to_dict()
         if self.area is not None:
             from semsig_gis.likelihood.priors import area_prior
-            from semsig_gis.objects.load import read_area
+            from semsig_gis.objects.surroundings import read_area
 
             parts.append(area_prior(database, read_area(self.area, crs=database.crs)))
             inside = int((parts[-1] > -math.inf).sum())

@@ -50,7 +50,7 @@ from semsig_gis.database.file import (
 )
 from semsig_gis.database.occlusion import TOLERANCE_M
 from semsig_gis.database.views import ViewpointSpec, require_surroundings
-from semsig_gis.objects.load import read_surroundings, save_surroundings
+from semsig_gis.objects.surroundings import read_surroundings, save_surroundings
 from semsig_gis.objects.table import open_objects, save_objects
 from semsig_gis.storage.geoparquet import NOWHERE, each_bounds
 from semsig_gis.storage.runs import (

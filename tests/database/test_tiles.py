@@ -40,7 +40,7 @@ from semsig_gis.database.tiles import (
     touched_tiles,
 )
 from semsig_gis.database.views import ViewpointSpec
-from semsig_gis.objects.load import read_surroundings, save_surroundings
+from semsig_gis.objects.surroundings import read_surroundings, save_surroundings
 from semsig_gis.objects.table import open_objects, save_objects
 
 if TYPE_CHECKING:

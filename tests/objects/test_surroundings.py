@@ -10,7 +10,7 @@ from osm_xml import node, way, write_osm
 from sentences import refused
 
 from semsig_gis.core.errors import InputError, SourceError
-from semsig_gis.objects.load import read_area, read_surroundings, save_surroundings
+from semsig_gis.objects.surroundings import read_area, read_surroundings, save_surroundings
 from semsig_gis.objects.table import licenses_of
 
 if TYPE_CHECKING:

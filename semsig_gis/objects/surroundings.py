@@ -1,0 +1,186 @@
+"""Files of buildings, streets and areas: what surrounds street objects, and where cells lie."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Literal
+
+import geopandas as gpd
+import pyarrow as pa
+import shapely
+
+from semsig_gis.core.errors import InputError, SourceError
+from semsig_gis.core.geometry import LICENSES
+from semsig_gis.objects.table import layer_licences
+from semsig_gis.sources import vector as vector_file
+from semsig_gis.sources.area import NUMBERS, join_areas, parse_area
+from semsig_gis.sources.catalog import LayerSpec, load_catalog
+from semsig_gis.sources.osm import file as osm_file
+from semsig_gis.sources.raw_layer import WGS84
+from semsig_gis.storage.geoparquet import GROUP_ROWS, hilbert_order
+from semsig_gis.storage.whole import whole_file
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+
+    from pyproj import CRS
+
+    from semsig_gis.sources.catalog import GeometryKind
+
+DIMENSIONS: dict[GeometryKind, int] = {"line": 1, "polygon": 2}
+KIND_OF: dict[str, GeometryKind] = {"buildings": "polygon", "streets": "line", "area": "polygon"}
+# Between the points of an edge of a box, so that the curve that it is is met to centimetres.
+EDGE_DEGREES = 0.01
+
+
+def save_surroundings(table: gpd.GeoDataFrame, path: str | Path) -> None:
+    """Save buildings or streets as one GeoParquet file that can be read by box.
+
+    Parameters
+    ----------
+    table : GeoDataFrame
+        Features, each with a geometry; all columns and the `attrs` are kept. The file holds them in
+        a spatial order, with their bounds in the column ``bbox``.
+    path : str or Path
+        File to write; it appears whole, by rename.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> houses = gpd.GeoDataFrame(
+    ...     geometry=[shapely.box(0, 0, 5, 5), shapely.box(90, 0, 95, 5)], crs="EPSG:2154"
+    ... )
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     file = f"{folder}/houses.parquet"
+    ...     save_surroundings(houses, file)
+    ...     len(read_surroundings(file, role="buildings", crs="EPSG:2154", box=(0, 0, 9, 9)))
+    1
+    """
+    ordered = table.iloc[hilbert_order(table.geometry.array)]
+    with whole_file(path) as partial:
+        ordered.to_parquet(
+            partial,
+            index=False,
+            compression="zstd",
+            schema_version="1.1.0",
+            write_covering_bbox=True,
+            row_group_size=GROUP_ROWS,
+        )
+
+
+def read_surroundings(
+    path: str | Path,
+    *,
+    role: Literal["buildings", "streets"],
+    crs: CRS | str,
+    box: Sequence[float] | None = None,
+    tell: Callable[[str], None] | None = None,
+) -> gpd.GeoDataFrame:
+    """Read the buildings or the streets of a city.
+
+    Parameters
+    ----------
+    path : str or Path
+        Any vector file that `read_layer` reads, an OpenStreetMap file, or a ``.parquet`` file such
+        as ``semsig load --buildings`` writes. SourceError if it is missing, damaged, or of another
+        kind.
+    role : {"buildings", "streets"}
+        What the file holds: polygons or lines. InputError if it has none, or something else too.
+    crs : pyproj.CRS or str
+        CRS to move it to. CrsError if nobody knows its own.
+    box : sequence of float, optional
+        ``xmin, ymin, xmax, ymax`` in the CRS of the file, which `save_surroundings` wrote: only
+        features whose bounds meet it.
+    tell : callable, optional
+        Takes a remark on the file, such as on outlines that are not closed and so left out.
+
+    Returns
+    -------
+    GeoDataFrame
+        One row a feature that has a geometry; in a box there may be none. Of a ``.parquet`` file
+        all columns are kept. ``attrs["licenses"]`` says whom to name for it, where that is known.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> house = shapely.box(*demo_objects.xy[0], *(demo_objects.xy[0] + 5.0))
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     file = f"{folder}/houses.parquet"
+    ...     save_surroundings(gpd.GeoDataFrame(geometry=[house], crs=demo_objects.crs), file)
+    ...     houses = read_surroundings(file, role="buildings", crs=demo_objects.crs)
+    >>> houses.area.round().tolist()
+    [25.0]
+    """
+    return _read(Path(path), role, crs, box, tell)
+
+
+def read_area(area: str | Path, *, crs: CRS | str) -> shapely.Polygon | shapely.MultiPolygon:
+    """Return ``west,south,east,north`` in degrees, or all polygons of a file, moved to a CRS.
+
+    Errors are as of `parse_area` and `read_surroundings`.
+    """
+    if NUMBERS.fullmatch(str(area)):
+        # In metres an edge of the box is a curve.
+        box = shapely.segmentize(parse_area(str(area)).polygon, EDGE_DEGREES)
+        shapes = gpd.GeoSeries([box], crs=WGS84).to_crs(crs)
+    else:
+        shapes = _read(Path(area), "area", crs).geometry
+    joined = join_areas(shapes.to_numpy())
+    if joined is None:
+        msg = f"{area} encloses no area; give a file of polygons."
+        raise InputError(msg)
+    return joined
+
+
+def _read(
+    path: Path,
+    role: str,
+    crs: CRS | str,
+    box: Sequence[float] | None = None,
+    tell: Callable[[str], None] | None = None,
+) -> gpd.GeoDataFrame:
+    kind = KIND_OF[role]
+    notes: tuple[str, ...] = ()
+    if path.suffix.lower() == ".parquet":
+        table = _read_parquet(path, kind, box)
+    elif path.name.lower().endswith(tuple(osm_file.FORMATS)) and role != "area":
+        spec = load_catalog("openstreetmap").layer(role)
+        (layer,) = osm_file.read_layers(path, [spec])
+        table = layer.table
+        table.attrs[LICENSES] = [str(licence) for licence in layer_licences([layer])]
+        notes = layer.notes
+    else:
+        layer = vector_file.read_layer(path, LayerSpec(name=role, class_name="", geometry=kind))
+        if layer.errors:
+            msg = (
+                f"{path} has {layer.counts.unreadable} features that cannot be read "
+                f"({layer.errors[0]}); correct the file."
+            )
+            raise SourceError(msg)
+        table, notes = layer.table, layer.notes
+    if tell is not None:
+        for note in notes:
+            tell(f"{path}: {note}")
+    if table.crs is None:
+        msg = f"{path} states no coordinate reference system; write it with one."
+        raise SourceError(msg)
+    geometry = table.geometry
+    table = table[~(geometry.isna() | geometry.is_empty)].reset_index(drop=True)
+    dimensions = shapely.get_dimensions(table.geometry.to_numpy())
+    others = table.geometry[dimensions != DIMENSIONS[kind]]
+    if (len(table) == 0 and box is None) or len(others):
+        content = f"holds a {others.iloc[0].geom_type}" if len(others) else f"holds no {kind}"
+        msg = f"{path} {content}; give a file of {kind}s."
+        raise InputError(msg)
+    return table.to_crs(crs)
+
+
+def _read_parquet(path: Path, kind: GeometryKind, box: Sequence[float] | None) -> gpd.GeoDataFrame:
+    if not path.is_file():
+        msg = f"{path} does not exist; give a file of {kind}s."
+        raise SourceError(msg)
+    try:
+        return gpd.read_parquet(path, bbox=None if box is None else tuple(box))
+    except (pa.ArrowException, ValueError, OSError) as error:
+        msg = f"{path} is damaged or is not GeoParquet; give a file of {kind}s."
+        raise SourceError(msg) from error
