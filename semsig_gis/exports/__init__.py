@@ -267,7 +267,9 @@ def export_answer(
 
     regions = search_regions(answer, database, share=share, within=within)
     if suffix in _RASTER and answer.chances is not None:
-        export_geotiff(database, answer.chances, path, name="posterior")
+        facts = answer.to_dict()
+        facts = {name: facts[name] for name in ("query", "north", "prior", "notes")}
+        export_geotiff(database, answer.chances, path, name="posterior", facts=facts)
     elif suffix == ".gpkg":
         geopackage.write_layers(answer_layers(answer, regions), path)
     else:

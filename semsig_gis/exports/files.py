@@ -7,8 +7,9 @@ of another country takes for the end of a cell. An apostrophe before it keeps it
 
 from __future__ import annotations
 
+import json
 import re
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pyarrow as pa
@@ -30,7 +31,7 @@ from semsig_gis.storage.raster import write_cells
 from semsig_gis.storage.whole import whole_file
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
+    from collections.abc import Callable, Iterator, Mapping
     from pathlib import Path
 
     from numpy.typing import ArrayLike, NDArray
@@ -127,7 +128,13 @@ def write_geoparquet(
 
 
 def export_geotiff(
-    database: SignatureDatabase, values: ArrayLike, path: str | Path, *, name: str, unit: str = ""
+    database: SignatureDatabase,
+    values: ArrayLike,
+    path: str | Path,
+    *,
+    name: str,
+    unit: str = "",
+    facts: Mapping[str, Any] | None = None,
 ) -> None:
     """Write one number a cell as a Cloud-Optimised GeoTIFF.
 
@@ -144,6 +151,8 @@ def export_geotiff(
         What the numbers are.
     unit : str, optional
         Their unit.
+    facts : mapping of str, optional
+        Plain values on the numbers, which go to the tags of the file as JSON.
 
     Raises
     ------
@@ -176,7 +185,11 @@ def export_geotiff(
         crs=database.crs,
         name=name,
         unit=unit,
-        notes={"licenses": "\n".join(database.licenses), "semsig_version": database.version},
+        notes={
+            "licenses": "\n".join(database.licenses),
+            "semsig_version": database.version,
+            **{key: json.dumps(value) for key, value in (facts or {}).items()},
+        },
     )
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import json
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -66,6 +67,9 @@ def test_layers_of_a_city(tmp_path: Path) -> None:
         "p.tif": location.posterior.chances,
     }.items():
         assert_holds(tmp_path / name, database, values)
+    with rasterio.open(tmp_path / "p.tif") as read:
+        tags = {name: json.loads(read.tags()[name]) for name in ("query", "north", "prior")}
+    assert tags == {name: location.to_dict()[name] for name in tags}
 
 
 def test_a_large_one_is_cloud_optimised_too(tmp_path: Path) -> None:
