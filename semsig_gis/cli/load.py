@@ -24,6 +24,7 @@ from semsig_gis.core.errors import InputError
 if TYPE_CHECKING:
     from semsig_gis.objects.load import Loaded, Selection
     from semsig_gis.sources.catalog import LayerSpec
+    from semsig_gis.sources.conditions import Rules
 
 
 Objects = Annotated[Path, typer.Option(help="Street objects to write (.parquet).")]
@@ -277,6 +278,9 @@ def sources(
     if as_json:
         print_json(dataclasses.asdict(catalog))
         return
+    # What every layer of objects leaves out is said once.
+    rules = {spec.exclusions for spec in catalog.layers if spec.role == "objects"}
+    common = rules.pop() if len(rules) == 1 else ()
     print_rows(
         f"{catalog.title} ({catalog.url})",
         ("layer", "class", "from", "filter", "licence", "note"),
@@ -285,13 +289,15 @@ def sources(
                 f"{spec.name} (optional)" if spec.optional else spec.name,
                 _class_text(spec),
                 _origin_text(spec),
-                _filter_text(spec),
+                _filter_text(spec, common),
                 spec.license,
                 spec.note,
             ]
             for spec in catalog.layers
         ),
     )
+    if common:
+        say(f"left out of every layer of objects: {', '.join(_rules(common))}")
     used = {name for spec in catalog.layers for name in spec.classes}
     print_rows(
         "Classes",
@@ -315,9 +321,10 @@ def _origin_text(spec: LayerSpec) -> str:
     return files if spec.dataset is None else f"{spec.dataset} ({files})"
 
 
-def _filter_text(spec: LayerSpec) -> str:
-    return " and ".join(
-        f"{sign}{field} = {' or '.join(map(str, accepted))}"
-        for sign, rules in (("", spec.where), ("not ", spec.exclusions))
-        for field, accepted in rules
-    )
+def _filter_text(spec: LayerSpec, common: Rules) -> str:
+    exclusions = spec.exclusions if spec.exclusions != common else ()
+    return " and ".join([*_rules(spec.where), *(f"not {rule}" for rule in _rules(exclusions))])
+
+
+def _rules(rules: Rules) -> list[str]:
+    return [f"{field} = {' or '.join(map(str, accepted))}" for field, accepted in rules]

@@ -28,6 +28,8 @@ if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
     from importlib.resources.abc import Traversable
 
+    from semsig_gis.sources.conditions import Rules
+
 
 GeometryKind = Literal["point", "line", "polygon"]
 ElementKind = Literal["node", "way", "relation"]
@@ -119,8 +121,8 @@ class LayerSpec:
     class_name: str
     files: tuple[str, ...] = ()
     layer: str | None = None
-    where: tuple[tuple[str, tuple[Value, ...]], ...] = ()
-    exclusions: tuple[tuple[str, tuple[Value, ...]], ...] = ()
+    where: Rules = ()
+    exclusions: Rules = ()
     class_by: ClassBy | None = None
     width_by: WidthBy | None = None
     width_field: str | None = None
@@ -346,9 +348,7 @@ def _width_by(item: dict[str, Any], where: str) -> WidthBy:
     )
 
 
-def _conditions(
-    item: dict[str, Any], key: str, where: str
-) -> tuple[tuple[str, tuple[Value, ...]], ...]:
+def _conditions(item: dict[str, Any], key: str, where: str) -> Rules:
     return tuple((field, _values(accepted, key, field, where)) for field, accepted in item.items())
 
 

@@ -16,6 +16,8 @@ if TYPE_CHECKING:
 
 
 Value = str | int | float | bool
+# What is accepted of each of several tags or fields.
+Rules = tuple[tuple[str, tuple[Value, ...]], ...]
 # Stands for every value but "no".
 ANY_VALUE = "*"
 # Stands for a tag or a field that is absent or empty.
@@ -71,6 +73,8 @@ class Condition:
         A value may list several numbers, as the levels ``"-1;0"`` or ``"0-2"``; one that passes a
         comparison is enough, unless `every` of them has to.
         """
+        if value is None:
+            return self.nothing
         if _is_blank(value) and self.nothing:
             return True
         if ANY_VALUE in self.values and not _is_blank(value) and as_text(value) != "no":

@@ -137,7 +137,11 @@ def test_sources(done: Done) -> None:
     assert "osm_file" in listed["readers"]
     for line, words in {
         "sources": ("montpellier",),
-        "sources openstreetmap": ("highway=street_lamp", "clocks (optional)"),
+        "sources openstreetmap": (
+            "highway=street_lamp",
+            "clocks (optional)",
+            "of objects: level = <0",
+        ),
         "sources opendata_paris": ("les-arbres",),
         "sources montpellier": ("ETAT = en fonction", "taxi_station"),
         "sources tiny.toml --json": ('"title": "A tiny city"',),
