@@ -42,6 +42,10 @@ MetricCrs = Annotated[
     str | None,
     typer.Option(help="CRS in metres to work in; default: the catalogue's or the UTM zone."),
 ]
+MaxDistortion = Annotated[
+    float,
+    typer.Option(help="Refuse data with bearings off by more degrees, or lengths by more percent."),
+]
 Filters = Annotated[
     bool, typer.Option("--filter/--no-filter", help="Apply the catalogue's filters.")
 ]
@@ -86,6 +90,7 @@ def load(
             "file, or the 'box' that OpenStreetMap files say they cover."
         ),
     ] = None,
+    max_distortion: MaxDistortion = 6.0,
     filters: Filters = True,
     collapse: Collapse = True,
     merge: Merge = True,
@@ -127,6 +132,7 @@ def load(
         collapse=collapse,
         merge=merge,
         counted=[layer for layer in found if layer.spec in others],
+        max_distortion=max_distortion,
         notes=notes,
     )
     _save_loaded(loaded, out, buildings, streets, as_json=as_json)
@@ -158,6 +164,7 @@ def fetch(
         ),
     ] = 600.0,
     metric_crs: MetricCrs = None,
+    max_distortion: MaxDistortion = 6.0,
     filters: Filters = True,
     collapse: Collapse = True,
     merge: Merge = True,
@@ -193,7 +200,14 @@ def fetch(
             progress=advance,
             tell=remark,
         )
-    loaded = assemble(layers, catalog, metric_crs=metric_crs, collapse=collapse, merge=merge)
+    loaded = assemble(
+        layers,
+        catalog,
+        metric_crs=metric_crs,
+        collapse=collapse,
+        merge=merge,
+        max_distortion=max_distortion,
+    )
     _save_loaded(loaded, out, buildings, streets, as_json=as_json)
 
 

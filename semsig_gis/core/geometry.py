@@ -5,10 +5,10 @@ from __future__ import annotations
 import math
 import re
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from pyproj import CRS, Geod, Proj
+from pyproj import CRS, Geod, Proj, Transformer
 from pyproj.exceptions import CRSError
 
 from semsig_gis.core.errors import CrsError, InputError
@@ -99,6 +99,12 @@ def _fault(system: CRS) -> str:
     return ""
 
 
+Bounds = tuple[float, float, float, float]
+
+# Places along each side of an extent at which a plane is compared with the ground.
+SAMPLES = 11
+# Points of an edge of the extent whose degrees are looked at: in degrees an edge is a curve.
+EDGE_POINTS = 21
 # Long against the rounding of coordinates, short against how fast the angle changes.
 STEP_M = 10.0
 
@@ -128,6 +134,76 @@ def grid_convergence(crs: CRS, xy: ArrayLike) -> NDArray[np.float64]:
     """
     azimuth, _ = _on_the_ground(crs, xy, (0.0, STEP_M))
     return signed_degrees(azimuth)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Distortion:
+    """How a metric CRS differs from the ground over an extent.
+
+    `convergence` are the least and the largest angle from true to grid north, in degrees clockwise;
+    `scale` the least and the largest length in the plane of a metre on the ground.
+    """
+
+    convergence: tuple[float, float]
+    scale: tuple[float, float]
+
+    @property
+    def angle(self) -> float:
+        """The largest angle between grid and true north, in degrees."""
+        return max(map(abs, self.convergence))
+
+    @property
+    def turn(self) -> float:
+        """By how many degrees grid north turns over the extent."""
+        return self.convergence[1] - self.convergence[0]
+
+    @property
+    def stretch(self) -> float:
+        """The largest share by which a length is off."""
+        return max(abs(scale - 1.0) for scale in self.scale)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the fields, ``angle`` and ``stretch`` for JSON, None for what is infinite."""
+        values = (*self.convergence, self.angle, *self.scale, self.stretch)
+        # More decimals would be those of the rounding.
+        known = [round(value, 7) if math.isfinite(value) else None for value in values]
+        return {
+            "convergence": known[:2],
+            "angle": known[2],
+            "scale": known[3:5],
+            "stretch": known[5],
+        }
+
+
+def plane_distortion(crs: CRS, bounds: Bounds) -> Distortion:
+    """Return how a metric CRS differs from the ground within ``xmin, ymin, xmax, ymax``.
+
+    It is measured at 11 x 11 places; infinite where one of them is not on the Earth.
+    """
+    if not np.isfinite(bounds).all():
+        return Distortion(convergence=(-math.inf, math.inf), scale=(0.0, math.inf))
+    x, y = np.linspace(bounds[:2], bounds[2:], SAMPLES).T
+    xy = np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
+    north, lengths = _on_the_ground(crs, xy, (0.0, STEP_M))
+    _, others = _on_the_ground(crs, xy, (STEP_M, 0.0))
+    angles = signed_degrees(north)
+    if np.isnan(angles).any():
+        return plane_distortion(crs, (math.nan,) * 4)
+    scales = STEP_M / np.concatenate([lengths, others])
+    return Distortion(
+        convergence=(float(angles.min()), float(angles.max())),
+        scale=(float(scales.min()), float(scales.max())),
+    )
+
+
+def degree_bounds(crs: CRS, bounds: Bounds) -> Bounds:
+    """Return west, south, east and north in degrees of ``xmin, ymin, xmax, ymax`` in a CRS.
+
+    West is greater than east where the box crosses 180 degrees.
+    """
+    to_degrees = Transformer.from_crs(crs, "EPSG:4326", always_xy=True)
+    west, south, east, north = to_degrees.transform_bounds(*bounds, densify_pts=EDGE_POINTS)
+    return west, south, east, north
 
 
 def _on_the_ground(

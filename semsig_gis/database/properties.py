@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pandas as pd
 
+from semsig_gis.core.geometry import degree_bounds, plane_distortion
+
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
@@ -37,18 +39,20 @@ def database_summary(
     -------
     dict
         ``signatures``, ``mean_length``, ``covered_km2``, ``radius_m``, ``step_m``,
-        ``levels``, ``crs``, ``file_mb`` and ``mb_per_km2`` (millions of bytes or None),
-        ``version``, ``licenses``, ``notes`` (warnings about what it was built from);
-        ``viewpoints``: ``mode``, ``half_width_m`` (of streets, else None) and ``area_km2``
-        (of the area that they were chosen from, or None); ``occlusion_m``: the tolerance,
-        or None where no building hides anything; ``occurrences``: one dict a class
-        (``code``, ``symbol``, ``name``, ``title``, ``range_m``, ``number``, ``share``,
-        ``objects``: its count or None, ``objects_per_km2``, ``entropy_bits``);
-        ``density_from``: ``"objects"`` or ``"occurrences"``; ``cell_bits``; ``groups``: for
-        ``type``, ``angle`` and ``both`` the statistics of the group sizes as
-        `pandas.Series.describe` gives them (``std`` is the sample's, None for a single
-        group), ``alone``, the share of the cells that share their signature with no other,
-        and ``entropy_bits``; ``largest_type_group``: ``types`` and ``cells``.
+        ``levels``, ``crs``, ``extent_degrees`` (west, south, east and north of the
+        viewpoints), ``distortion`` (the plane against the ground, `Distortion.to_dict`),
+        ``file_mb`` and ``mb_per_km2`` (millions of bytes or None), ``version``,
+        ``licenses``, ``notes`` (warnings about what it was built from); ``viewpoints``:
+        ``mode``, ``half_width_m`` (of streets, else None) and ``area_km2`` (of the area
+        that they were chosen from, or None); ``occlusion_m``: the tolerance, or None where
+        no building hides anything; ``occurrences``: one dict a class (``code``, ``symbol``,
+        ``name``, ``title``, ``range_m``, ``number``, ``share``, ``objects``: its count or
+        None, ``objects_per_km2``, ``entropy_bits``); ``density_from``: ``"objects"`` or
+        ``"occurrences"``; ``cell_bits``; ``groups``: for ``type``, ``angle`` and ``both``
+        the statistics of the group sizes as `pandas.Series.describe` gives them (``std`` is
+        the sample's, None for a single group), ``alone``, the share of the cells that share
+        their signature with no other, and ``entropy_bits``; ``largest_type_group``:
+        ``types`` and ``cells``.
 
     Notes
     -----
@@ -72,6 +76,8 @@ def database_summary(
     covered = len(database) * database.grid.step**2 / 1e6
     area = database.viewpoints.area
     mode = database.viewpoints.mode
+    (west, south), (east, north) = database.xy.min(axis=0), database.xy.max(axis=0)
+    extent = (float(west), float(south), float(east), float(north))
     types, angles = database.type_sequences, database.angle_sequences
     pairs = types.inverse.astype(np.int64) * len(angles) + angles.inverse
     both = np.unique(pairs, return_counts=True)[1]
@@ -84,6 +90,8 @@ def database_summary(
         "step_m": float(database.grid.step),
         "levels": int(database.spec.levels),
         "crs": database.crs.to_string(),
+        "extent_degrees": list(degree_bounds(database.crs, extent)),
+        "distortion": plane_distortion(database.crs, extent).to_dict(),
         "file_mb": None if file_bytes is None else file_bytes / 1e6,
         "mb_per_km2": None if file_bytes is None else file_bytes / 1e6 / covered,
         "version": database.version,

@@ -22,6 +22,7 @@ from semsig_gis.core.geometry import (
     require_metric_crs,
 )
 from semsig_gis.objects.conflate import ConflationReport, conflate
+from semsig_gis.objects.extent import MAX_DISTORTION, settle_extent
 from semsig_gis.objects.surroundings import DIMENSIONS, KIND_OF
 from semsig_gis.objects.table import StreetObjects, layer_licences, layer_note
 from semsig_gis.sources import MERGING, find_files, reader
@@ -175,7 +176,7 @@ def build_objects(
             layer.counts,
             missing=missing,
             duplicates=layer.counts.duplicates + twice,
-            misplaced=misplaced,
+            misplaced=layer.counts.misplaced + misplaced,
             collapsed=len(part) - twice - kept_here,
         )
         reports.append(
@@ -257,10 +258,6 @@ def _first_at_place(
     _, first, counts = np.unique(keys, axis=0, return_index=True, return_counts=True)
     order = np.argsort(first)
     return first[order], counts[order]
-
-
-# A UTM zone is six degrees wide; across more than one, lengths are off by more than a thousandth.
-ZONE_DEGREES = 6.0
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -442,32 +439,6 @@ def read_files(
     return tuple(sorted(layers, key=lambda layer: order[layer.spec.name])), absent
 
 
-def metric_crs_of(layers: Iterable[RawLayer]) -> tuple[CRS, tuple[str, ...]]:
-    """Return the UTM zone of the middle of all features, and a note if they span more than one.
-
-    Raise CrsError if a layer has no CRS, and EmptyResultError if no feature has a position.
-    """
-    boxes = []
-    for layer in layers:
-        if layer.table.crs is None:
-            msg = f"layer {layer.spec.name!r} has no coordinate reference system; state its crs."
-            raise CrsError(msg)
-        geometry = layer.table.geometry
-        features = geometry[~(geometry.isna() | geometry.is_empty)]
-        if len(features):
-            boxes.append(features.to_crs("EPSG:4326"))
-    if not boxes:
-        msg = "no layer has a feature with a position; look at the filters and the area."
-        raise EmptyResultError(msg)
-    everything = pd.concat(boxes)
-    west, _, east, _ = everything.total_bounds
-    note = (
-        f"the data is {east - west:.1f} degrees wide, more than a UTM zone, so distances "
-        "far from its middle are off; give a metric CRS of the region"
-    )
-    return everything.estimate_utm_crs(), (note,) if east - west > ZONE_DEGREES else ()
-
-
 def assemble(
     layers: Sequence[RawLayer],
     catalog: Catalog,
@@ -476,6 +447,7 @@ def assemble(
     collapse: bool = True,
     merge: bool = True,
     counted: Sequence[RawLayer] = (),
+    max_distortion: float = MAX_DISTORTION,
     notes: Sequence[str] = (),
 ) -> Loaded:
     """Place raw layers in one metric CRS and merge what stands in several of them.
@@ -494,14 +466,17 @@ def assemble(
         Whether objects of different layers are merged by the catalogue's radii.
     counted : sequence of RawLayer
         Layers that are none of the objects; the report tells how many they would add.
+    max_distortion : float, default 6
+        By how many degrees bearings, and by how many percent lengths, may be off over the data.
     notes : sequence of str
         Warnings of the reading, to be kept with those of this.
 
     Returns
     -------
     Loaded
-        The objects and what became of every row. CrsError if the CRS is not metric or a layer has
-        none, EmptyResultError if no object remains.
+        The objects and what became of every row; those far from all others are misplaced. CrsError
+        if the CRS is not metric, a layer has none or lies where it cannot, or the plane is too far
+        from the ground; EmptyResultError if no object remains.
 
     Examples
     --------
@@ -510,12 +485,12 @@ def assemble(
     >>> assemble(layers, load_catalog("openstreetmap")).objects.crs.name
     'WGS 84 / UTM zone 31N'
     """
-    layers = [note_outside(layer) for layer in layers]
-    of_all = tuple(notes)
-    system: CRS | str | None = metric_crs or catalog.metric_crs
-    if system is None:
-        system, more = metric_crs_of(layers)
-        of_all += more
+    layers, system, more = settle_extent(
+        [note_outside(layer) for layer in layers],
+        crs=metric_crs or catalog.metric_crs,
+        max_distortion=max_distortion,
+    )
+    of_all = (*notes, *more)
     objects, report = build_objects(
         [layer for layer in layers if layer.spec.role == "objects"],
         taxonomy=catalog.taxonomy,

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 from semsig_gis.database.properties import database_summary
 from semsig_gis.reports import paris
-from semsig_gis.reports.tables import Table, note_tables, percent
+from semsig_gis.reports.tables import Table, distortion_rows, note_tables, percent
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -71,6 +71,9 @@ def _property_table(facts: Mapping[str, Any]) -> Table:
             ("Viewpoints", _viewpoint_text(facts["viewpoints"]), ""),
             ("Grid step", f"{facts['step_m']:g} m", "10 m"),
             ("Angle levels", str(facts["levels"]), "16"),
+            ("Coordinate system", facts["crs"], ""),
+            ("Degrees", ", ".join(f"{side:.5f}" for side in facts["extent_degrees"]), ""),
+            *((name, value, "") for name, value in distortion_rows(facts["distortion"])),
             ("Signatures", f"{facts['signatures']:,}", "312,134"),
             ("Mean length", f"{facts['mean_length']:.3f} objects", "14 objects"),
             ("Covered area", f"{facts['covered_km2']:.1f} km²", "79 km²"),

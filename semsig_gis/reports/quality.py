@@ -14,10 +14,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import shapely
-from pyproj import Transformer
 
-from semsig_gis.core.geometry import COUNT
-from semsig_gis.reports.tables import Table, note_tables
+from semsig_gis.core.geometry import COUNT, degree_bounds, plane_distortion
+from semsig_gis.reports.tables import Table, distortion_rows, note_tables
 from semsig_gis.sources import RowCounts
 
 if TYPE_CHECKING:
@@ -25,6 +24,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+    from semsig_gis.core.geometry import Distortion
     from semsig_gis.core.taxonomy import ObjectClass
     from semsig_gis.database.update import UpdateReport
     from semsig_gis.objects.conflate import ConflatedPair, ConflationReport
@@ -34,8 +34,6 @@ if TYPE_CHECKING:
 
 SQUARE_M = 100.0
 M2_PER_KM2 = 1e6
-# Points of an edge of the extent whose degrees are looked at: in degrees an edge is a curve.
-EDGE_POINTS = 21
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -73,6 +71,7 @@ class QualityReport:
     crs: str
     extent: tuple[float, float, float, float]
     extent_degrees: tuple[float, float, float, float]
+    distortion: Distortion
     hull_km2: float
     occupied_km2: float
     licenses: tuple[str, ...]
@@ -92,7 +91,9 @@ class QualityReport:
             | {"kept": item.counts.kept, "role": item.role, "notes": item.notes}
             for item in self.sources
         ]
-        return {"objects": self.objects, **asdict(self), "sources": sources}
+        distortion = self.distortion.to_dict()
+        plain = {**asdict(self), "sources": sources, "distortion": distortion}
+        return {"objects": self.objects, **plain}
 
 
 def quality_report(
@@ -151,9 +152,8 @@ def quality_report(
         conflated=pairs,
         crs=f"EPSG:{code}" if (code := objects.crs.to_epsg()) else objects.crs.name,
         extent=(west, south, east, north),
-        extent_degrees=Transformer.from_crs(
-            objects.crs, "EPSG:4326", always_xy=True
-        ).transform_bounds(west, south, east, north, densify_pts=EDGE_POINTS),
+        extent_degrees=degree_bounds(objects.crs, (west, south, east, north)),
+        distortion=plane_distortion(objects.crs, (west, south, east, north)),
         hull_km2=hull_km2,
         occupied_km2=occupied_km2,
         licenses=tuple(map(str, objects.licenses)),
@@ -282,6 +282,7 @@ def quality_tables(report: QualityReport) -> tuple[Table, ...]:
                 ("coordinate system", report.crs),
                 (f"{sides}, m", ", ".join(f"{edge:.0f}" for edge in report.extent)),
                 (f"{sides}, degrees", ", ".join(f"{edge:.5f}" for edge in report.extent_degrees)),
+                *distortion_rows(report.distortion.to_dict()),
             ),
         ),
         Table("Licences", ("licence",), tuple((line,) for line in report.licenses)),

@@ -5,7 +5,7 @@ from __future__ import annotations
 import itertools
 import math
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from semsig_gis.core.signs import escaped, one_line
 
@@ -82,6 +82,18 @@ class Table:
         """Return the table as a Markdown section: its heading, rows and note."""
         note = f"\n{escaped(self.note)}\n" if self.note else ""
         return f"### {escaped(self.title)}\n\n{markdown_rows(self, escaped)}\n{note}"
+
+
+def distortion_rows(facts: Mapping[str, Any]) -> tuple[tuple[str, str], ...]:
+    """Return what a table says of the plane and the ground (`Distortion.to_dict`)."""
+    if facts["stretch"] is None:
+        return (("Grid north", "unknown"), ("Lengths", "unknown"))
+    least, largest = facts["convergence"]
+    turned = f"{least:.2f}° to {largest:.2f}° clockwise"
+    return (
+        ("Grid north", f"at most {facts['angle']:.2f}° off true north ({turned})"),
+        ("Lengths", f"at most {100 * facts['stretch']:.2g} % off"),
+    )
 
 
 def note_tables(notes: Sequence[str]) -> tuple[Table, ...]:

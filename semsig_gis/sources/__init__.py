@@ -44,8 +44,9 @@ class RowCounts:
     Rows are `unreadable`, `filtered` (by the catalogue), `excluded` (by what the catalogue says in
     ``not``), `outside` (of the area that is fetched or clipped to), `missing` (without a
     geometry), `duplicates` (the id of an earlier row, where ids are unique), `misplaced` (off the
-    Earth, or not finite in the metric CRS), `collapsed` (at the place of another object of the
-    class, or an area around it) or `conflated` (merged into an object of an earlier layer).
+    Earth, far from all others, or not finite in the metric CRS), `collapsed` (at the place of
+    another object of the class, or an area around it) or `conflated` (merged into an object of an
+    earlier layer).
     """
 
     read: int

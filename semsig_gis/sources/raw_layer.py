@@ -238,6 +238,11 @@ def _off_globe(table: pd.DataFrame, *, crs: CRS, by_file: bool, file: str) -> di
     if 2 * wrong.sum() > len(xy):
         x, y = xy[wrong][0]
         remedy = "correct the file" if by_file else "state the crs they are in, such as 'EPSG:2154'"
+        if fits_the_globe(xy[:, ::-1]):
+            remedy = (
+                "with x and y exchanged they would be, so exchange x_field and y_field in the "
+                "catalogue, or the axes in the file"
+            )
         msg = (
             f"{file} has coordinates such as ({x:.12g}, {y:.12g}), which are not the degrees that "
             f"{crs_label(crs)} means; {remedy}."

@@ -100,6 +100,16 @@ def test_switches_keep_what_filters_and_collapsing_take(done: Done) -> None:
     assert json.loads(done(line, "--layer", "crossings"))["objects"] == 2
 
 
+@pytest.mark.usefixtures("city")
+def test_how_far_the_plane_is_from_the_ground_is_told_and_limited(run: Run, done: Done) -> None:
+    sentence(run(f"{LOAD} --max-distortion 1e-6"), "too wide", "EPSG:2154", "--max-distortion")
+    plane = json.loads(done("info city.parquet --json"))["distortion"]
+    assert (plane["angle"], plane["stretch"]) == pytest.approx((0.63, 3e-4), abs=0.01)
+    told = json.loads(done(f"{LOAD} --json"))["distortion"]
+    assert told["angle"] == pytest.approx(plane["angle"], abs=0.01)
+    assert "at most 0.63° off true north" in done("info city.parquet")
+
+
 @pytest.mark.parametrize("tiles", ["", "--tile 200"])
 def test_what_a_load_warns_of_is_kept_with_the_data(
     city: Path, run: Run, done: Done, tiles: str

@@ -13,8 +13,6 @@ from sentences import refused
 from servers import Answer, Server
 
 from semsig_gis.core.errors import (
-    CrsError,
-    EmptyResultError,
     InputError,
     SourceError,
     UnknownNameError,
@@ -27,7 +25,6 @@ from semsig_gis.objects.load import (
     assemble,
     choose_layers,
     layers_to_count,
-    metric_crs_of,
     read_files,
 )
 from semsig_gis.objects.table import open_objects, save_objects
@@ -220,20 +217,6 @@ def test_ranges_of_the_catalogue_reach_the_database(tmp_path: Path) -> None:
     database = open_database(tmp_path / "city.parquet")
     assert objects.taxonomy == database.taxonomy == taxonomy
     assert len(database) == 5  # a cell and those beside it, of the 29 within 30 m
-
-
-def test_the_zone_of_the_data() -> None:
-    crs, notes = metric_crs_of([raw("a", (7.4, 43.7), crs="EPSG:4326"), raw("b")])
-    assert (crs.to_epsg(), notes) == (32632, ())
-    wide = raw("a", (0.0, 45.0), (9.0, 45.0), crs="EPSG:4326")
-    _, notes = metric_crs_of([wide])
-    assert "9.0 degrees wide" in notes[0]
-    assert assemble([wide], catalog_of()).notes == notes
-    assert assemble([wide], catalog_of(), metric_crs="EPSG:2154").objects.crs.to_epsg() == 2154
-    with refused(EmptyResultError, "no layer"):
-        metric_crs_of([raw("a")])
-    with refused(CrsError, "'a'"):
-        metric_crs_of([raw("a", (1, 1), crs=None)])
 
 
 @pytest.fixture

@@ -97,6 +97,7 @@ def test_the_whole_report(snapshot: Callable[[str, str], None]) -> None:
     west, south, east, north = plain.pop("extent_degrees")
     assert 3.86 < west < east < 3.88
     assert 43.60 < south < north < 43.62
+    assert plain.pop("distortion")["angle"] == pytest.approx(0.63, abs=0.01)
     snapshot("quality.json", json.dumps(plain, indent=1) + "\n")
 
 

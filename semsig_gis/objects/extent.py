@@ -1,0 +1,359 @@
+"""Where layers lie: their metric CRS, what is misplaced, and whether one plane holds them all.
+
+Whatever is judged here is judged by the bulk of the data, never by its extremes: one row at (0, 0)
+must not move a city.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING, NamedTuple
+
+import geopandas as gpd
+import numpy as np
+import pandas as pd
+import shapely
+from pyproj import Transformer
+
+from semsig_gis.core.errors import CrsError, EmptyResultError, InputError
+from semsig_gis.core.geometry import (
+    plane_distortion,
+    require_metric_crs,
+    signed_degrees,
+    wrap_degrees,
+)
+from semsig_gis.sources.raw_layer import LATITUDE_LIMIT, WGS84, crs_label
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Sequence
+
+    from numpy.typing import NDArray
+    from pyproj import CRS
+
+    from semsig_gis.core.geometry import Bounds
+    from semsig_gis.sources import RawLayer
+
+MAX_DISTORTION = 6.0
+"""How far bearings (degrees) and lengths (percent) may be off over what is loaded.
+
+Grid north turns by at most six degrees within a zone of UTM.
+"""
+
+# Places with gaps of less than about this between them are one town: 111 km.
+GAP_DEGREES = 1.0
+# Places are put together by so many degrees before they are grouped.
+ROUNDING_DECIMALS = 1
+# A town of its own has at least so many places, or this share of all; 50 are always one.
+FEW_PLACES, TOWN_SHARE, MANY_PLACES = 3, 0.01, 50
+# Data may lie so far outside of where a CRS is used: such areas are drawn along borders.
+AREA_MARGIN = 0.5
+PLACES_TOLD = 3
+EXCHANGE = "exchange x_field and y_field in the catalogue, or the axes in the file"
+
+
+class _Located(NamedTuple):
+    """A layer, and a point of each of its rows in degrees, shape (n, 2), NaN where there is none.
+
+    `swapped` are the degrees that they would have with x and y exchanged, `coordinates` the
+    distinct finite points as the source has them.
+    """
+
+    layer: RawLayer
+    degrees: NDArray[np.float64]
+    swapped: NDArray[np.float64]
+    coordinates: NDArray[np.float64]
+
+    @property
+    def name(self) -> str:
+        return self.layer.spec.name
+
+
+class _Towns:
+    """Places in degrees, grouped into towns by the gaps between them; the largest comes first."""
+
+    def __init__(self, places: NDArray[np.float64]) -> None:
+        distinct = _distinct(places)
+        self.size = len(distinct)
+        turn = np.radians(distinct[:, 0])
+        # Longitudes are counted from the middle, so that no town is cut at 180 degrees.
+        self._middle = float(np.degrees(np.arctan2(np.sin(turn).mean(), np.cos(turn).mean())))
+        plane = self._plane(distinct)
+        cells = np.unique(np.round(plane, ROUNDING_DECIMALS), axis=0)
+        wide = GAP_DEGREES / 2 / np.maximum(np.cos(np.radians(cells[:, 1])), 0.05)
+        x, y = cells.T
+        half = GAP_DEGREES / 2
+        boxes = shapely.box(x - wide, y - half, x + wide, y + half)
+        parts = shapely.get_parts(shapely.union_all(boxes))
+        _, town = shapely.STRtree(parts).query(shapely.points(plane), predicate="intersects")
+        order = np.argsort(-np.bincount(town, minlength=len(parts)), kind="stable")
+        self._parts = parts[order]
+        self._tree = shapely.STRtree(self._parts)
+        self._distinct = distinct
+        self._town = np.argsort(order)[town]
+
+    def _plane(self, degrees: NDArray[np.float64]) -> NDArray[np.float64]:
+        return np.column_stack([signed_degrees(degrees[:, 0] - self._middle), degrees[:, 1]])
+
+    def of(self, degrees: NDArray[np.float64]) -> NDArray[np.int64]:
+        """Return the town in which each position lies, -1 where in none."""
+        towns = np.full(len(degrees), -1)
+        points = shapely.points(self._plane(degrees))
+        point, town = self._tree.query(points, predicate="intersects")
+        towns[point] = town
+        return towns
+
+    @property
+    def large(self) -> int:
+        """How many of the towns are more than a few places that have strayed from the largest.
+
+        All are, if the largest does not hold most places.
+        """
+        sizes = np.bincount(self._town)
+        if 2 * sizes[0] <= self.size:
+            return len(sizes)
+        least = max(FEW_PLACES, min(MANY_PLACES, TOWN_SHARE * self.size))
+        return max(1, int((sizes >= least).sum()))
+
+    def centre(self) -> tuple[float, float]:
+        """Return the median longitude and latitude of the largest town."""
+        x, y = np.median(self._plane(self._distinct[self._town == 0]), axis=0)
+        return float(signed_degrees(x + self._middle)), float(y)
+
+    def bounds(self, town: int) -> Bounds:
+        """Return west, south, east and north of a town; west is the greater across 180 degrees."""
+        plane = self._plane(self._distinct[self._town == town])
+        (west, south), (east, north) = plane.min(axis=0), plane.max(axis=0)
+        west, east = signed_degrees([west + self._middle, east + self._middle])
+        return float(west), float(south), float(east), float(north)
+
+
+def settle_extent(
+    layers: Sequence[RawLayer],
+    *,
+    crs: CRS | str | None = None,
+    max_distortion: float = MAX_DISTORTION,
+) -> tuple[tuple[RawLayer, ...], CRS, tuple[str, ...]]:
+    """Check where layers lie, leave out rows that lie far from all others, and choose the plane.
+
+    Parameters
+    ----------
+    layers : sequence of RawLayer
+        What was read.
+    crs : pyproj.CRS or str, optional
+        Metric CRS to work in; by default the UTM zone of the bulk of the objects.
+    max_distortion : float
+        By how many degrees bearings, and by how many percent lengths, may be off over the data.
+
+    Returns
+    -------
+    layers : tuple of RawLayer
+        The layers; rows left out are counted as misplaced, and a note says where they are.
+    crs : pyproj.CRS
+        The metric CRS.
+    notes : tuple of str
+        Warnings about all layers together.
+
+    Raises
+    ------
+    CrsError
+        If a layer has no CRS, lies outside of where its CRS or the metric one is used, or far from
+        all others, or if the plane is too far from the ground.
+    EmptyResultError
+        If no metric CRS is given and no row has a position.
+    InputError
+        If the distortion is no number above 0.
+    """
+    if not max_distortion > 0:
+        msg = (
+            f"the largest distortion is {max_distortion:g}; give a number above 0, which are "
+            "degrees of bearings and percent of lengths."
+        )
+        raise InputError(msg)
+    metric = None if crs is None else require_metric_crs(crs)
+    located = [_located(layer) for layer in layers]
+    placed = [one for one in located if len(one.coordinates)]
+    for one in placed:
+        if len(placed) == 1 or len(one.coordinates) >= FEW_PLACES:
+            _require_area(one, metric)
+    objects = [one.degrees for one in placed if one.layer.spec.role == "objects"]
+    places = [degrees[_known(degrees)] for degrees in objects or [one.degrees for one in placed]]
+    if not sum(map(len, places)):
+        if metric is None:
+            msg = "no layer has a feature with a position; look at the filters and the area."
+            raise EmptyResultError(msg)
+        return tuple(layers), metric, ()
+    towns = _Towns(np.concatenate(places))
+    for one in placed:
+        _require_company(one, towns)
+    metric = metric or _utm_zone(*towns.centre())
+    extents = [towns.bounds(town) for town in range(towns.large)]
+    notes = _require_plane(extents, np.concatenate(places), towns, metric, max_distortion)
+    return tuple(_without_strays(one, towns) for one in located), metric, notes
+
+
+def _located(layer: RawLayer) -> _Located:
+    crs = layer.table.crs
+    if crs is None:
+        msg = (
+            f"layer {layer.spec.name!r} has no coordinate reference system; "
+            "state its crs in the catalogue."
+        )
+        raise CrsError(msg)
+    geometry = layer.table.geometry.to_numpy()
+    coordinates, row = shapely.get_coordinates(geometry, return_index=True)
+    first = np.flatnonzero(np.diff(row, prepend=-1))
+    to_degrees = Transformer.from_crs(crs, WGS84, always_xy=True)
+    degrees, swapped = (np.full((len(geometry), 2), np.nan) for _ in range(2))
+    x, y = coordinates[first].T
+    for target, pair in ((degrees, (x, y)), (swapped, (y, x))):
+        target[row[first]] = np.column_stack(to_degrees.transform(*pair))
+        target[~_known(target)] = np.nan
+    finite = coordinates[first][np.isfinite(coordinates[first]).all(axis=1)]
+    return _Located(layer, degrees, swapped, pd.DataFrame(finite).drop_duplicates().to_numpy())
+
+
+def _known(degrees: NDArray[np.float64]) -> NDArray[np.bool_]:
+    """Tell which positions are on the Earth."""
+    finite = np.isfinite(degrees).all(axis=1)
+    return np.asarray(finite & (np.abs(degrees[:, 1]) <= LATITUDE_LIMIT))
+
+
+def _distinct(degrees: NDArray[np.float64]) -> NDArray[np.float64]:
+    known = pd.DataFrame(degrees[_known(degrees)])
+    return known.drop_duplicates().to_numpy()
+
+
+def _require_area(one: _Located, metric: CRS | None) -> None:
+    """Refuse a layer whose bulk lies where its CRS, or the metric one, is not used."""
+    own: CRS = one.layer.table.crs
+    known = one.degrees[_known(one.degrees)]
+    centre = _Towns(known).centre() if len(known) else None
+    systems = [own] if metric is None else [own, metric]
+    wrong = next((crs for crs in systems if centre is None or not _in_area(centre, crs)), None)
+    if wrong is None:
+        return
+    x, y = one.coordinates[0]
+    where = f"has coordinates such as ({x:.12g}, {y:.12g}), which are nowhere on the Earth"
+    if centre is not None:
+        where = f"lies near {_place(centre)}"
+    area = wrong.area_of_use
+    used = "" if area is None else f" ({_box(area.bounds)} in degrees)"
+    remedy = "state the crs that its coordinates are in"
+    swapped = one.swapped[_known(one.swapped)]
+    if len(swapped) and all(_in_area(_Towns(swapped).centre(), crs) for crs in systems):
+        there = _place(_Towns(swapped).centre())
+        remedy = f"with x and y exchanged it would lie near {there}, so {EXCHANGE}"
+    elif wrong is metric:
+        remedy = f"give another metric CRS, such as {_zone_label(centre)}, or correct the layer's"
+    kind = "the metric CRS" if wrong is metric else "its CRS"
+    msg = (
+        f"layer {one.name!r} {where}, outside of where {kind}, {crs_label(wrong)}, is used{used}; "
+        f"{remedy}."
+    )
+    raise CrsError(msg)
+
+
+def _in_area(place: tuple[float, float], crs: CRS) -> bool:
+    """Tell whether a CRS is used at a place, or nearly there; where it does not say, it is."""
+    area = crs.area_of_use
+    if area is None:
+        return True
+    # From west to east; all the way round where both are the same meridian.
+    width = float(wrap_degrees(area.east - area.west)) or 360.0
+    east_of = float(wrap_degrees(place[0] - area.west + AREA_MARGIN))
+    return east_of <= width + 2 * AREA_MARGIN and (
+        area.south - AREA_MARGIN <= place[1] <= area.north + AREA_MARGIN
+    )
+
+
+def _require_company(one: _Located, towns: _Towns) -> None:
+    """Refuse a layer of which no place lies where most of the data does."""
+    known = one.degrees[_known(one.degrees)]
+    own = _distinct(known)
+    if len(own) < FEW_PLACES or (towns.of(own) == 0).any():
+        return
+    remedy = "correct the crs of the wrong ones, or load them apart"
+    swapped = one.swapped[_known(one.swapped)]
+    if len(swapped) and towns.of(np.array([_Towns(swapped).centre()]))[0] == 0:
+        remedy = f"with x and y exchanged it would lie there, so correct the wrong ones: {EXCHANGE}"
+    msg = (
+        f"layer {one.name!r} lies at {_box(_Towns(own).bounds(0))} in degrees, far from most of "
+        f"the data at {_box(towns.bounds(0))}; {remedy}."
+    )
+    raise CrsError(msg)
+
+
+def _utm_zone(longitude: float, latitude: float) -> CRS:
+    point = gpd.GeoSeries.from_xy([longitude], [latitude], crs=WGS84)
+    try:
+        zone: CRS = point.estimate_utm_crs()
+    except RuntimeError as error:
+        msg = (
+            f"the data lies near {_place((longitude, latitude))}, where there is no UTM zone; give "
+            "a projected CRS in metres as metric CRS."
+        )
+        raise CrsError(msg) from error
+    return zone
+
+
+def _zone_label(centre: tuple[float, float] | None) -> str:
+    return "EPSG:2154" if centre is None else crs_label(_utm_zone(*centre))
+
+
+def _require_plane(
+    extents: Sequence[Bounds],
+    places: NDArray[np.float64],
+    towns: _Towns,
+    metric: CRS,
+    most: float,
+) -> tuple[str, ...]:
+    """Refuse a plane that turns or stretches too much between towns; note if there are several."""
+    kept = places[np.isin(towns.of(places), range(len(extents)))]
+    xy = np.column_stack(Transformer.from_crs(WGS84, metric, always_xy=True).transform(*kept.T))
+    distortion = plane_distortion(metric, (*xy.min(axis=0), *xy.max(axis=0)))
+    listed = " and ".join(map(_box, extents[:PLACES_TOLD]))
+    if len(extents) > PLACES_TOLD:
+        listed += f" and {len(extents) - PLACES_TOLD} more"
+    off = (
+        f"bearings differ by {distortion.turn:.3g} degrees and lengths are off by "
+        f"{100 * distortion.stretch:.2g} percent in {crs_label(metric)}"
+    )
+    if distortion.turn > most or 100 * distortion.stretch > most:
+        what = f"lies in {len(extents)} places far apart" if len(extents) > 1 else "is too wide"
+        msg = (
+            f"the data {what} ({listed} in degrees), over which {off}, more than {most:g}; load "
+            "each city by itself, or allow a larger --max-distortion."
+        )
+        raise CrsError(msg)
+    if len(extents) == 1:
+        return ()
+    return (f"the data lies in {len(extents)} places far apart ({listed} in degrees); {off}",)
+
+
+def _without_strays(one: _Located, towns: _Towns) -> RawLayer:
+    """Leave out the objects that lie far from all others."""
+    layer = one.layer
+    known = _known(one.degrees)
+    if layer.spec.role != "objects" or not known.any():
+        return layer
+    rows = np.flatnonzero(known)
+    strays = rows[towns.of(one.degrees[rows]) >= towns.large]
+    if not len(strays):
+        return layer
+    places = _distinct(one.degrees[strays])
+    told = [_place((float(x), float(y))) for x, y in places[:PLACES_TOLD]]
+    more = f" and {len(places) - PLACES_TOLD} more places" if len(places) > PLACES_TOLD else ""
+    rows_lie = "1 row lies" if len(strays) == 1 else f"{len(strays):,} rows lie"
+    note = f"{rows_lie} far from all others, at {' and '.join(told)}{more}; left out"
+    counts = replace(layer.counts, misplaced=layer.counts.misplaced + len(strays))
+    table = layer.table.drop(index=layer.table.index[strays]).reset_index(drop=True)
+    return replace(layer, table=table, counts=counts, notes=(*layer.notes, note))
+
+
+def _place(place: tuple[float, float]) -> str:
+    return f"longitude {place[0]:.5g}, latitude {place[1]:.5g}"
+
+
+def _box(bounds: Iterable[float]) -> str:
+    """Return bounds in degrees as an area is written."""
+    return ",".join(f"{side:.5g}" for side in bounds)
