@@ -181,6 +181,10 @@ def _read_parquet(path: Path, kind: GeometryKind, box: Sequence[float] | None) -
         raise SourceError(msg)
     try:
         return gpd.read_parquet(path, bbox=None if box is None else tuple(box))
+    except shapely.errors.ShapelyError as error:
+        cause = str(error).partition(": ")[2] or str(error)
+        msg = f"{path} has shapes that cannot be read ({cause.rstrip('.')}); correct the file."
+        raise SourceError(msg) from error
     except (pa.ArrowException, ValueError, OSError) as error:
         msg = f"{path} is damaged or is not GeoParquet; give a file of {kind}s."
         raise SourceError(msg) from error

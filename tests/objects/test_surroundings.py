@@ -4,6 +4,8 @@ from typing import TYPE_CHECKING, Literal
 
 import geopandas as gpd
 import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
 import pytest
 import shapely
 from osm_xml import node, way, write_osm
@@ -99,12 +101,18 @@ NOWHERE = (0, 0, 9, 9)
 def test_a_file_that_cannot_be_used_is_named(tmp_path: Path) -> None:
     (tmp_path / "broken.parquet").write_text("no", encoding="utf-8")
     gpd.GeoDataFrame(geometry=[HOUSE]).to_parquet(tmp_path / "bare.parquet")
+    whole = pq.read_table(write(tmp_path / "open.parquet", HOUSE))
+    (wkb,) = whole["geometry"].to_pylist()
+    ring = pa.array([wkb[:-16] + bytes(16)])  # with another last point
+    opened = whole.set_column(whole.schema.get_field_index("geometry"), "geometry", ring)
+    pq.write_table(opened.replace_schema_metadata(whole.schema.metadata), tmp_path / "open.parquet")
     HOUSES.to_parquet(tmp_path / "unbounded.parquet")
     save_surroundings(HOUSES.iloc[:0], tmp_path / "empty.parquet")
     for name, words in (
         ("nowhere.parquet", "does not exist"),
         ("nowhere.gpkg", "does not exist"),
         ("broken.parquet", "damaged"),
+        ("open.parquet", "Points of LinearRing do not form a closed linestring"),
         ("bare.parquet", "coordinate reference system"),
     ):
         with refused(SourceError, name, words):
