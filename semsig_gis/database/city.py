@@ -41,7 +41,7 @@ from semsig_gis.database.file import (
 )
 from semsig_gis.database.occlusion import Footprints, buildings_near
 from semsig_gis.objects.table import licenses_of, open_objects, save_objects
-from semsig_gis.storage.geoparquet import read_geoparquet, write_geoparquet
+from semsig_gis.storage.geoparquet import UNREADABLE, read_geoparquet, write_geoparquet
 from semsig_gis.storage.whole import alone_in, move_folder, whole_file, whole_folder
 
 if TYPE_CHECKING:
@@ -307,7 +307,7 @@ def _read(folder: Path, database: Path) -> ObjectStore:
 def _table(path: Path) -> gpd.GeoDataFrame:
     try:
         return gpd.read_parquet(path)
-    except (pa.ArrowException, ValueError, OSError) as error:
+    except UNREADABLE as error:
         msg = f"{path} is damaged ({error}); build the database again."
         raise DatabaseError(msg) from error
 

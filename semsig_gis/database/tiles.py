@@ -52,7 +52,7 @@ from semsig_gis.database.occlusion import TOLERANCE_M
 from semsig_gis.database.views import ViewpointSpec, require_surroundings
 from semsig_gis.objects.surroundings import read_surroundings, save_surroundings
 from semsig_gis.objects.table import open_objects, save_objects
-from semsig_gis.storage.geoparquet import NOWHERE, each_bounds
+from semsig_gis.storage.geoparquet import CHECKING_PAGES, NOWHERE, each_bounds
 from semsig_gis.storage.runs import (
     PARTIAL,
     RunKind,
@@ -385,7 +385,7 @@ def _widest(streets: Path) -> float:
     """Return the largest half-width of any street in metres, 0 where the file tells none."""
     if HALF_WIDTH not in pq.read_schema(streets).names:
         return 0.0
-    widths = pq.read_table(streets, columns=[HALF_WIDTH])[HALF_WIDTH].to_numpy()
+    widths = pq.read_table(streets, columns=[HALF_WIDTH], **CHECKING_PAGES)[HALF_WIDTH].to_numpy()
     finite = widths[np.isfinite(widths.astype(np.float64))]
     return float(finite.max(initial=0.0))
 

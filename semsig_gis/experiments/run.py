@@ -32,6 +32,7 @@ from semsig_gis.evaluation.spec import Case, parse_experiment
 from semsig_gis.likelihood.index import ready_index
 from semsig_gis.queries.draw import check_count, draw_queries
 from semsig_gis.reports.evaluation import experiment_figures, experiment_markdown
+from semsig_gis.storage.geoparquet import CHECKING_PAGES, require_intact, seal
 from semsig_gis.storage.runs import RunKind, finish, partial_folder, read_json, write_json
 from semsig_gis.storage.toml import toml_text
 from semsig_gis.storage.whole import whole_file, write_whole
@@ -254,7 +255,8 @@ class ExperimentWork:
         for names in (by_distance, *([name] for name in missing if name not in by_distance)):
             for name, scored in self._scored(names, queries):
                 with whole_file(missing[name]) as half:
-                    scored.to_parquet(half)
+                    scored.to_parquet(half, write_page_checksum=True)
+                    seal(half)
 
     def _scored(
         self, names: Sequence[str], queries: Sequence[Query]
@@ -294,7 +296,8 @@ class ExperimentWork:
         evaluations = {}
         for distortion, method in product(self.spec.distortions, self.spec.methods):
             parts = [part for part in self.parts if part.distortion == distortion]
-            tables = [pq.read_table(_part_file(place, part, method)) for part in parts]
+            files = [_part_file(place, part, method) for part in parts]
+            tables = [pq.read_table(file, **CHECKING_PAGES) for file in files]
             scored = pa.concat_tables(tables, promote_options="default").to_pandas()
             for top in self.spec.top:
                 case = Case(distortion=distortion, method=method, top=top)
@@ -355,7 +358,8 @@ def _is_whole(file: Path, *, rows: int) -> bool:
     if not file.is_file():
         return False
     try:
-        return bool(pq.read_table(file).num_rows == rows)
+        require_intact(file)
+        return bool(pq.read_table(file, **CHECKING_PAGES).num_rows == rows)
     except (OSError, ValueError, pa.ArrowException):
         return False
 

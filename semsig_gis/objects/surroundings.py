@@ -6,7 +6,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
 import geopandas as gpd
-import pyarrow as pa
 import shapely
 
 from semsig_gis.core.errors import InputError, SourceError
@@ -17,7 +16,15 @@ from semsig_gis.sources.area import NUMBERS, join_areas, parse_area
 from semsig_gis.sources.catalog import LayerSpec, load_catalog
 from semsig_gis.sources.osm import file as osm_file
 from semsig_gis.sources.raw_layer import WGS84
-from semsig_gis.storage.geoparquet import GROUP_ROWS, hilbert_order
+from semsig_gis.storage.geoparquet import (
+    CHECKED_PAGES,
+    CHECKING_PAGES,
+    GROUP_ROWS,
+    UNREADABLE,
+    hilbert_order,
+    require_intact,
+    seal,
+)
 from semsig_gis.storage.whole import whole_file
 
 if TYPE_CHECKING:
@@ -65,7 +72,9 @@ def save_surroundings(table: gpd.GeoDataFrame, path: str | Path) -> None:
             schema_version="1.1.0",
             write_covering_bbox=True,
             row_group_size=GROUP_ROWS,
+            **CHECKED_PAGES,
         )
+        seal(partial)
 
 
 def read_surroundings(
@@ -180,11 +189,12 @@ def _read_parquet(path: Path, kind: GeometryKind, box: Sequence[float] | None) -
         msg = f"{path} does not exist; give a file of {kind}s."
         raise SourceError(msg)
     try:
-        return gpd.read_parquet(path, bbox=None if box is None else tuple(box))
+        require_intact(path)
+        return gpd.read_parquet(path, bbox=None if box is None else tuple(box), **CHECKING_PAGES)
     except shapely.errors.ShapelyError as error:
         cause = str(error).partition(": ")[2] or str(error)
         msg = f"{path} has shapes that cannot be read ({cause.rstrip('.')}); correct the file."
         raise SourceError(msg) from error
-    except (pa.ArrowException, ValueError, OSError) as error:
+    except UNREADABLE as error:
         msg = f"{path} is damaged or is not GeoParquet; give a file of {kind}s."
         raise SourceError(msg) from error

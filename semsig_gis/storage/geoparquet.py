@@ -14,13 +14,15 @@ import json
 import math
 import os
 import re
+import zlib
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any, BinaryIO, TypeVar
 
 import geopandas as gpd
 import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
+import shapely
 from pyproj import CRS
 from pyproj.exceptions import CRSError
 
@@ -120,13 +122,19 @@ def _sides(column: pa.ChunkedArray) -> list[NDArray[np.float32]]:
 
 def each_bounds(path: str | Path) -> Iterator[NDArray[np.float64]]:
     """Yield bounds of a Parquet file's rows, shape (n, 4), by group; none without such a column."""
-    with pq.ParquetFile(path) as file:
+    with pq.ParquetFile(path, **CHECKING_PAGES) as file:
         if BBOX not in file.schema_arrow.names or file.schema_arrow.field(BBOX).type != BOUNDS:
             return
         for group in range(file.num_row_groups):
             column = file.read_row_group(group, [BBOX])[BBOX]
             yield np.stack(_sides(column), axis=1).astype(np.float64)
 
+
+UNREADABLE = (
+    *(pa.ArrowException, OSError, ValueError, LookupError, TypeError),
+    *(CRSError, shapely.errors.ShapelyError),
+)
+"""What geopandas raises for a damaged file."""
 
 SPEC_KEY = b"semsig"
 COMPRESSION = 3
@@ -180,6 +188,7 @@ def write_geoparquet(
             row_group_size=group_rows,
             **_encoding(table.schema),
         )
+        seal(partial)
 
 
 def write_geoparquet_blocks(
@@ -193,6 +202,7 @@ def write_geoparquet_blocks(
         with pq.ParquetWriter(partial, schema, **_encoding(schema)) as writer:
             for part in itertools.chain([block], blocks):
                 writer.write_table(part.replace_schema_metadata(schema.metadata), GROUP_ROWS)
+        seal(partial)
 
 
 def _metadata(geo: dict[str, Any], specs: dict[str, Any]) -> dict[bytes, bytes]:
@@ -218,8 +228,53 @@ def _encoding(schema: pa.Schema) -> dict[str, Any]:
         "compression_level": COMPRESSION,
         "use_dictionary": few,
         "column_encoding": encodings,
-        "write_page_checksum": True,
+        **CHECKED_PAGES,
     }
+
+
+CHECKED_PAGES = {"write_page_checksum": True}
+"""For whatever writes Parquet: a sum of every page, which `CHECKING_PAGES` has looked at."""
+CHECKING_PAGES = {"page_checksum_verification": True}
+"""For whatever reads it."""
+
+# Between the pages and the footer, where no reader looks: this and the sum of the footer.
+SEAL = b"semsig"
+SUM_BYTES = 4
+FOOTER_END = 8  # its length and what Parquet files end with
+
+
+def seal(path: Path) -> None:
+    """Put a sum of its footer into a Parquet file, as the sums of pages leave that out.
+
+    All readers take it as it was; whoever writes it anew loses the sum.
+    """
+    with path.open("r+b") as file:
+        start, footer = _footer(file)
+        file.seek(start)
+        file.write(SEAL + _sum(footer) + footer)
+
+
+def require_intact(path: Path) -> None:
+    """Raise ValueError if the footer of a Parquet file is not the one that was sealed, if any."""
+    with path.open("rb") as file:
+        start, footer = _footer(file)
+        file.seek(max(start - len(SEAL) - SUM_BYTES, 0))
+        if file.read(len(SEAL)) == SEAL and file.read(SUM_BYTES) != _sum(footer):
+            msg = "the sum of its footer is another"
+            raise ValueError(msg)
+
+
+def _footer(file: BinaryIO) -> tuple[int, bytes]:
+    """Return where the footer of an open Parquet file begins, and all from there on."""
+    size = file.seek(0, os.SEEK_END)
+    file.seek(max(size - FOOTER_END, 0))
+    length = int.from_bytes(file.read(FOOTER_END // 2), "little") + FOOTER_END
+    start = file.seek(max(size - length, 0))
+    return start, file.read()
+
+
+def _sum(footer: bytes) -> bytes:
+    return zlib.crc32(footer).to_bytes(SUM_BYTES, "little")
 
 
 def read_geoparquet(
@@ -240,7 +295,8 @@ def read_geoparquet(
         msg = f"{file} {what}; give a {kind} file."
         raise DatabaseError(msg)
     try:
-        parquet = pq.ParquetFile(file, memory_map=True, page_checksum_verification=True)
+        require_intact(file)
+        parquet = pq.ParquetFile(file, memory_map=True, **CHECKING_PAGES)
         metadata = parquet.schema_arrow.metadata or {}
     except PermissionError as error:
         msg = f"{file} cannot be read ({reason(error)}); ask its owner for access."

@@ -1,0 +1,99 @@
+"""Files of which one byte was changed: refused, or the same as before."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import geopandas as gpd
+import numpy as np
+import pyarrow.parquet as pq
+import pytest
+import shapely
+from sentences import assert_sentence
+from worlds import ARRAYS, CORNER, random_town
+
+from semsig_gis.core.errors import SemsigError
+from semsig_gis.database.file import database_specs, open_database, save_database
+from semsig_gis.evaluation.evaluate import evaluate
+from semsig_gis.evaluation.file import open_evaluation, save_evaluation
+from semsig_gis.objects.surroundings import read_surroundings, save_surroundings
+from semsig_gis.objects.table import objects_specs, open_objects, save_objects
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+    from pathlib import Path
+
+TOWN = random_town(count=20, side=60.0)
+HOUSES = gpd.GeoDataFrame(
+    {"half_width": [1.0, 2.0, 3.0]},
+    geometry=[shapely.box(*(CORNER + 20 * i), *(CORNER + 20 * i + 9)) for i in range(3)],
+    crs="EPSG:2154",
+)
+TRIES = 60
+
+
+def database_in(path: Path) -> object:
+    database = open_database(path)
+    arrays = [getattr(database, name).tolist() for name in ARRAYS]
+    return database_specs(database), database.crs.to_json(), arrays
+
+
+def objects_in(path: Path) -> object:
+    objects = open_objects(path)
+    table = objects.table.drop(columns="geometry").to_dict("list")
+    return objects_specs(objects), objects.crs.to_json(), objects.xy.tolist(), table
+
+
+def houses_in(path: Path) -> object:
+    houses = read_surroundings(path, role="buildings", crs="EPSG:2154")
+    return houses.to_wkb().to_dict("list"), houses.attrs
+
+
+def evaluation_in(path: Path) -> object:
+    evaluation = open_evaluation(path.parent)
+    return str(evaluation.queries.to_wkb().to_dict("list")), evaluation.summary()
+
+
+@pytest.mark.parametrize(
+    ("name", "save", "content"),
+    [
+        ("city.parquet", lambda path: save_database(TOWN.database, path), database_in),
+        ("objects.parquet", lambda path: save_objects(TOWN.street_objects, path), objects_in),
+        ("houses.parquet", lambda path: save_surroundings(HOUSES, path), houses_in),
+        (
+            "queries.parquet",
+            lambda path: save_evaluation(evaluate(TOWN.database, queries=5), path.parent),
+            evaluation_in,
+        ),
+    ],
+)
+def test_a_changed_byte_is_told_or_means_nothing(
+    tmp_path: Path, name: str, save: Callable[[Path], None], content: Callable[[Path], object]
+) -> None:
+    path = tmp_path / name
+    save(path)
+    whole, expected = path.read_bytes(), content(path)
+    rng = np.random.default_rng(17)
+    told = 0
+    for _ in range(TRIES):
+        changed = bytearray(whole)
+        changed[rng.integers(len(whole))] ^= int(rng.integers(1, 256))
+        path.write_bytes(changed)
+        try:
+            assert content(path) == expected
+        except SemsigError as error:
+            assert_sentence(error, name)
+            told += 1
+    assert told > TRIES // 2
+
+
+def test_files_that_others_wrote_or_changed_have_no_sums(tmp_path: Path) -> None:
+    path = tmp_path / "city.parquet"
+    save_database(TOWN.database, path)
+    expected = database_in(path)
+    pq.write_table(pq.read_table(path), path)
+    assert database_in(path) == expected
+    HOUSES.to_parquet(tmp_path / "houses.parquet")
+    assert (
+        len(read_surroundings(tmp_path / "houses.parquet", role="buildings", crs="EPSG:2154")) == 3
+    )
