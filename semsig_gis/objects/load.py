@@ -547,7 +547,7 @@ def _surroundings(
             layer.counts,
             unreadable=layer.counts.unreadable + int(other.sum()),
             missing=int(nowhere.sum()),
-            misplaced=int(far.sum()),
+            misplaced=layer.counts.misplaced + int(far.sum()),
         )
         reports.append(LayerReport(layer.spec.name, counts, (*layer.notes, *layer.errors), role))
         tables.append(table[~(nowhere | other | far)])
