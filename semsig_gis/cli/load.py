@@ -99,7 +99,8 @@ def load(
     as_json: AsJson = False,
 ) -> None:
     """Read files of open data into street objects."""
-    from semsig_gis.objects.load import assemble, choose_layers, layers_to_count, read_files
+    from semsig_gis.objects.load import assemble, choose_layers, read_files
+    from semsig_gis.objects.unread import passed_by, read_small
     from semsig_gis.sources.area import clip_layers
     from semsig_gis.sources.catalog import combine_catalogs, load_catalog
 
@@ -112,11 +113,12 @@ def load(
         selection=_selection(all_layers=all_layers, paper_classes=paper_classes),
         surroundings=bool(buildings or streets),
     )
-    others = layers_to_count(catalog, specs)
+    others = passed_by(catalog, specs)
     with progress("reading") as advance:
         found, absent = read_files(
             [*specs, *others], files, filters=filters, crs=crs, progress=advance
         )
+        found += read_small(catalog, [*specs, *others], files, filters=filters, crs=crs)
     notes = [
         f"layer {spec.name!r} has no file here ({', '.join(spec.files)}); it is left out"
         for spec in absent
@@ -126,12 +128,12 @@ def load(
         found = clip_layers(found, clip)
         notes.append(AT_THE_EDGE)
     loaded = assemble(
-        [layer for layer in found if layer.spec not in others],
+        [layer for layer in found if layer.spec in specs],
         catalog,
         metric_crs=metric_crs,
         collapse=collapse,
         merge=merge,
-        counted=[layer for layer in found if layer.spec in others],
+        counted=[layer for layer in found if layer.spec not in specs],
         max_distortion=max_distortion,
         notes=notes,
     )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+from collections import Counter
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Literal
 
@@ -365,21 +366,6 @@ def _of_the_paper(spec: LayerSpec) -> LayerSpec | None:
     return own if own.classes else None
 
 
-def layers_to_count(catalog: Catalog, specs: Sequence[LayerSpec]) -> tuple[LayerSpec, ...]:
-    """Return the other layers of objects that a reading of `specs` passes by anyway.
-
-    These are those of the same extracts of OpenStreetMap, of which every element is looked at.
-    """
-    files = {spec.files for spec in specs if spec.reader == "osm_file"}
-    names = {spec.name for spec in specs}
-    return tuple(
-        spec
-        for spec in catalog.layers
-        if spec.role == "objects" and spec.name not in names
-        if spec.reader == "osm_file" and spec.files in files
-    )
-
-
 def read_files(
     specs: Sequence[LayerSpec],
     paths: Iterable[str | Path],
@@ -521,7 +507,9 @@ def _unread(
 ) -> tuple[UnreadLayer, ...]:
     """Return the layers of objects in the catalogue that are not among those read."""
     read = {layer.spec.name for layer in layers}
-    numbers = {layer.spec.name: layer.counts.kept for layer in counted}
+    numbers: Counter[str] = Counter()
+    for layer in counted:  # of which there may be several of one name
+        numbers[layer.spec.name] += layer.counts.kept
     return tuple(
         UnreadLayer(spec.name, spec.classes, numbers.get(spec.name))
         for spec in catalog.layers

@@ -261,7 +261,10 @@ def quality_tables(report: QualityReport) -> tuple[Table, ...]:
                 (item.name, ", ".join(item.classes), _count_text(item.objects))
                 for item in report.unread
             ),
-            note="Add one by --layer +NAME, or all by --all-layers.",
+            note=(
+                "Add one by --layer +NAME, or all by --all-layers. Counted are rows that would be "
+                "kept, before those of one place become one."
+            ),
             labels=2,
         ),
         Table(

@@ -24,10 +24,10 @@ from semsig_gis.objects.fetch import fetch_layers, find_area, open_cache
 from semsig_gis.objects.load import (
     assemble,
     choose_layers,
-    layers_to_count,
     read_files,
 )
 from semsig_gis.objects.table import open_objects, save_objects
+from semsig_gis.objects.unread import passed_by, read_small
 from semsig_gis.reports.quality import quality_report, quality_tables
 from semsig_gis.sources import RowCounts
 from semsig_gis.sources.catalog import Catalog, ClassBy, LayerSpec, load_catalog, paper_taxonomy
@@ -98,7 +98,7 @@ def test_layers_that_are_not_read_are_counted_on_the_way(tmp_path: Path) -> None
     tags = [{"amenity": "bench"}, *[{"amenity": "clock"}] * 2, {"natural": "tree"}]
     nodes = (node(n, 7.42, 43.73 + n / 1000, one) for n, one in enumerate(tags, start=1))
     specs = choose_layers(osm, ["benches", "trees"])
-    others = layers_to_count(osm, specs)
+    others = passed_by(osm, specs)
     assert {"clocks", "taxi_ranks"} < {spec.name for spec in others}
     layers, _ = read_files([*specs, *others], [write_osm(tmp_path / "town.osm", *nodes)])
     counted = [layer for layer in layers if layer.spec in others]
@@ -111,9 +111,30 @@ def test_layers_that_are_not_read_are_counted_on_the_way(tmp_path: Path) -> None
     (table,) = [one for one in quality_tables(report) if one.title == "Layers not read"]
     assert ("clocks", "clock", "2") in table.rows
     # Nobody counts what stands in other files, or was not fetched.
-    assert layers_to_count(load_catalog("montpellier"), []) == ()
+    assert passed_by(load_catalog("montpellier"), []) == ()
     unread = assemble([one for one in layers if one.spec in specs], osm).report.unread
     assert {one.objects for one in unread} == {None}
+
+
+def test_layers_of_small_files_are_counted(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Of the others nothing is told: too large, absent, without a CRS, or of two files."""
+    rows = "\n".join(f"{n};7;43" for n in range(5))
+    for name in ("bins", "odd", "twice_a", "twice_b", "large"):
+        size = 200 if name == "large" else 1
+        (tmp_path / f"{name}.csv").write_text(f"n;lon;lat\n{rows}\n" * size, encoding="utf-8")
+    specs = [
+        LayerSpec(name=name, class_name="bench", files=(f"{name}*.csv",), crs=crs)
+        for name, crs in (
+            *(("bins", "EPSG:4326"), ("odd", None), ("twice", "EPSG:4326")),
+            *(("large", "EPSG:4326"), ("absent", "EPSG:4326")),
+        )
+    ]
+    specs[0] = replace(specs[0], where=(("n", (">=3",)),))
+    catalog = catalog_of(layers=(BENCH, *specs))
+    monkeypatch.setattr("semsig_gis.objects.unread.SMALL_BYTES", 1000)
+    (bins,) = read_small(catalog, [BENCH], [tmp_path, tmp_path / "bins.csv"])
+    assert (bins.spec.name, bins.counts.kept) == ("bins", 2)
+    assert read_small(catalog, specs, [tmp_path]) == ()
 
 
 def test_a_file_is_read_once_for_all_its_layers(
