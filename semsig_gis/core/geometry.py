@@ -206,6 +206,23 @@ def degree_bounds(crs: CRS, bounds: Bounds) -> Bounds:
     return west, south, east, north
 
 
+def across_180(longitudes: ArrayLike, crs: CRS, *, turn: float = FULL_TURN) -> NDArray[np.float64]:
+    """Return longitudes of places in a metric CRS such that neighbours are near each other.
+
+    Those across 180 degrees from the middle of where the CRS is used go beyond 180 or -180. A CRS
+    that does not say where it is used leaves them as they are. `turn` is a full turn, in degrees or
+    as x of a web map.
+    """
+    degrees = np.asarray(longitudes, dtype=np.float64)
+    area = crs.area_of_use
+    width = 0.0 if area is None else float(wrap_degrees(area.east - area.west))
+    if area is None or width == 0.0:  # or it is used all the way round
+        return degrees
+    middle = float(signed_degrees(area.west + width / 2)) * turn / FULL_TURN
+    degrees = np.where(degrees - middle > turn / 2, degrees - turn, degrees)
+    return np.where(degrees - middle < -turn / 2, degrees + turn, degrees)
+
+
 def _on_the_ground(
     crs: CRS, xy: ArrayLike, step: tuple[float, float]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from pyproj import Transformer
 
-from semsig_gis.core.geometry import cell_ids
+from semsig_gis.core.geometry import across_180, cell_ids
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
@@ -56,7 +56,7 @@ def place_lattices(database: SignatureDatabase) -> PlaceLattices:
     return PlaceLattices(
         metres=np.moveaxis(metres, 0, 2),
         mercator_box=mercator_box,
-        degrees=np.stack([latitude, longitude], axis=2),
+        degrees=np.stack([latitude, across_180(longitude, database.crs)], axis=2),
         metric_box=[*low.tolist(), *high.tolist()],
     )
 
@@ -122,7 +122,8 @@ def _drawn(
         pixels[line] = np.where(blocks[nearest] == ids, values[nearest], 0)
     to_degrees = Transformer.from_crs("EPSG:3857", "EPSG:4326", always_xy=True)
     longitudes, latitudes = to_degrees.transform([west, east], [south, north])
-    return _png(pixels, colours), np.stack([latitudes, longitudes], axis=1).tolist()
+    corners = np.stack([latitudes, across_180(longitudes, database.crs)], axis=1)
+    return _png(pixels, colours), corners.tolist()
 
 
 def _mercator_lattice(
@@ -132,6 +133,7 @@ def _mercator_lattice(
     to_mercator = Transformer.from_crs(database.crs, "EPSG:3857", always_xy=True)
     sides = np.linspace(low, high, _LATTICE + 1)
     x, y = to_mercator.transform(*np.meshgrid(sides[:, 0], sides[:, 1]))
+    x = across_180(x, database.crs, turn=MERCATOR_TURN)
     west, south, east, north = float(x.min()), float(y.min()), float(x.max()), float(y.max())
     lattice = np.meshgrid(
         np.linspace(west, east, _LATTICE + 1), np.linspace(south, north, _LATTICE + 1)
@@ -165,6 +167,7 @@ def _png(pixels: NDArray[np.uint8], colours: Sequence[str]) -> bytes:
 
 
 QUANTUM_M = 0.25  # of Web Mercator
+MERCATOR_TURN = 2.0 * math.pi * 6_378_137.0  # its width
 
 
 def script_json(value: object) -> str:
@@ -198,7 +201,8 @@ def steps(values: NDArray[np.int32]) -> list[str]:
 def mercator(xy: NDArray[np.float64], crs: CRS) -> tuple[NDArray[np.int32], dict[str, Any]]:
     """Return places as whole numbers, shape (n, 2), and how the script gets them back."""
     to_mercator = Transformer.from_crs(crs, "EPSG:3857", always_xy=True)
-    metres = np.stack(to_mercator.transform(xy[:, 0], xy[:, 1]), axis=1)
+    x, y = to_mercator.transform(xy[:, 0], xy[:, 1])
+    metres = np.stack([across_180(x, crs, turn=MERCATOR_TURN), y], axis=1)
     origin = metres.min(axis=0)
     places = np.rint((metres - origin) / QUANTUM_M).astype(np.int32)
     return places, {"origin": origin.tolist(), "quantum": QUANTUM_M}

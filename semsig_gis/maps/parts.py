@@ -20,6 +20,7 @@ from pyproj import Transformer
 
 from semsig_gis import __version__
 from semsig_gis.core.errors import InputError
+from semsig_gis.core.geometry import across_180
 from semsig_gis.core.signs import SHADES
 from semsig_gis.database.database import SignatureDatabase
 from semsig_gis.maps.image import city_image, script_json
@@ -207,7 +208,7 @@ def to_latlon(xy: NDArray[np.float64], crs: CRS, *, digits: int = 6) -> NDArray[
     """Return latitudes and longitudes, by default to about 0.1 m, shape (n, 2); NaN stays NaN."""
     to_degrees = Transformer.from_crs(crs, "EPSG:4326", always_xy=True)
     longitude, latitude = to_degrees.transform(xy[:, 0], xy[:, 1])
-    degrees = np.round(np.stack([latitude, longitude], axis=1), digits)
+    degrees = np.round(np.stack([latitude, across_180(longitude, crs)], axis=1), digits)
     return np.where(np.isfinite(degrees), degrees, np.nan)
 
 

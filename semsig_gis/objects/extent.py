@@ -6,6 +6,7 @@ must not move a city.
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -25,7 +26,7 @@ from semsig_gis.core.geometry import (
 from semsig_gis.sources.raw_layer import LATITUDE_LIMIT, WGS84, crs_label
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Sequence
+    from collections.abc import Sequence
 
     from numpy.typing import NDArray
     from pyproj import CRS
@@ -321,8 +322,8 @@ def _require_plane(
     if distortion.turn > most or 100 * distortion.stretch > most:
         what = f"lies in {len(extents)} places far apart" if len(extents) > 1 else "is too wide"
         msg = (
-            f"the data {what} ({listed} in degrees), over which {off}, more than {most:g}; load "
-            "each city by itself, or allow a larger --max-distortion."
+            f"the data {what} ({listed} in degrees), over which {off}, more than {most:g}; load a "
+            "part of it, as with --clip and such a box, or allow a larger --max-distortion."
         )
         raise CrsError(msg)
     if len(extents) == 1:
@@ -354,6 +355,8 @@ def _place(place: tuple[float, float]) -> str:
     return f"longitude {place[0]:.5g}, latitude {place[1]:.5g}"
 
 
-def _box(bounds: Iterable[float]) -> str:
-    """Return bounds in degrees as an area is written."""
-    return ",".join(f"{side:.5g}" for side in bounds)
+def _box(bounds: Bounds) -> str:
+    """Return bounds in degrees as an area is written, which is never smaller than they are."""
+    west, south, east, north = (100.0 * side for side in bounds)
+    sides = (math.floor(west), math.floor(south), math.ceil(east), math.ceil(north))
+    return ",".join(f"{side / 100:g}" for side in sides)

@@ -13,6 +13,7 @@ import numpy as np
 import shapely
 
 from semsig_gis.core.errors import InputError
+from semsig_gis.core.geometry import FULL_TURN, HALF_TURN
 from semsig_gis.sources import FILE_SUFFIXES
 from semsig_gis.sources import vector as vector_file
 from semsig_gis.sources.catalog import LayerSpec
@@ -45,6 +46,17 @@ class Area:
         """West, south, east and north in degrees."""
         west, south, east, north = self.polygon.bounds
         return west, south, east, north
+
+    @property
+    def boxes(self) -> tuple[tuple[float, float, float, float], ...]:
+        """The bounds; those of either side of 180 degrees, where the area lies on both."""
+        west, _, east, _ = self.bounds
+        if east - west <= HALF_TURN:
+            return (self.bounds,)
+        parts = shapely.get_parts(self.polygon)
+        eastern = shapely.get_x(shapely.centroid(parts)) > 0
+        sides = (shapely.total_bounds(parts[side]).tolist() for side in (eastern, ~eastern))
+        return tuple((west, south, east, north) for west, south, east, north in sides)
 
 
 def parse_area(text: str) -> Area:
@@ -163,15 +175,21 @@ def _box(text: str) -> Area:
     except ValueError as error:
         msg = f"bounding box {text!r} is not four numbers; write west,south,east,north in degrees."
         raise InputError(msg) from error
-    if not (-LONGITUDE_LIMIT <= west < east <= LONGITUDE_LIMIT) or not (
+    # What seems to go round more than half of the Earth is a slip.
+    across = east < west and east + FULL_TURN - west < HALF_TURN
+    on_earth = max(abs(west), abs(east)) <= LONGITUDE_LIMIT
+    if not (on_earth and (west < east or across)) or not (
         -LATITUDE_LIMIT <= south < north <= LATITUDE_LIMIT
     ):
         msg = (
             f"bounding box {text!r} is no area; write west,south,east,north in degrees, with west "
-            "below east within -180 to 180 and south below north within -90 to 90."
+            "below east within -180 to 180, or above it across 180 degrees, and south below north "
+            "within -90 to 90."
         )
         raise InputError(msg)
-    return Area(shapely.box(west, south, east, north), text)
+    spans = [(west, HALF_TURN), (-HALF_TURN, east)] if across else [(west, east)]
+    boxes = [shapely.box(left, south, right, north) for left, right in spans if left < right]
+    return Area(boxes[0] if len(boxes) == 1 else shapely.MultiPolygon(boxes), text)
 
 
 def _outline(path: Path) -> Area:

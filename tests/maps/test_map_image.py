@@ -18,7 +18,8 @@ from pyproj import CRS, Transformer
 
 from semsig_gis.core.geometry import GridSpec
 from semsig_gis.maps import image as map_image
-from semsig_gis.maps.image import city_image, level_image, place_lattices, script_json
+from semsig_gis.maps.image import city_image, level_image, mercator, place_lattices, script_json
+from semsig_gis.maps.parts import corners_of
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -42,6 +43,24 @@ def a_city(
 ) -> SignatureDatabase:
     """Return a city that sees random numbers of objects from the given cells."""
     return cells_at(columns, rows, longest=14, crs=CRS(crs), grid=GridSpec(10.0, origin))
+
+
+@pytest.mark.parametrize("crs", ["EPSG:32760", "EPSG:32701", "EPSG:3460"])
+def test_a_city_across_180_degrees_is_as_small_as_it_is(crs: str) -> None:
+    place = Transformer.from_crs("EPSG:4326", crs, always_xy=True).transform(180.0, -16.8)
+    x, y = (10.0 * round(side / 10.0) - 200.0 for side in place)
+    city = a_city(*scattered(40, 0.5), crs=crs, origin=(x, y))
+    _, ((south, west), (north, east)) = city_image(city, SHADES)
+    assert 0 < east - west < 0.005
+    assert 0 < north - south < 0.005
+    assert min(abs(west - 180.0), abs(west + 180.0)) < 0.005
+    places = place_lattices(city)
+    assert np.ptp(places.degrees[..., 1]) < 0.005
+    assert places.mercator_box[2] - places.mercator_box[0] < 500.0
+    assert np.abs(places.metres - city.xy.mean(axis=0)).max() < 300.0
+    spots, about = mercator(city.xy, city.crs)
+    assert np.ptp(spots * about["quantum"], axis=0).max() < 500.0
+    assert np.ptp(corners_of(city), axis=0).max() < 0.005
 
 
 def scattered(side: int, share: float, seed: int = 1) -> tuple[NDArray[np.int64], ...]:

@@ -52,12 +52,31 @@ def test_a_bounding_box_comes_back(west: float, south: float, width: float, heig
 
 
 @pytest.mark.parametrize(
+    ("text", "boxes"),
+    [
+        ("179.9,-17,-179.8,-16", [(179.9, -17, 180, -16), (-180, -17, -179.8, -16)]),
+        ("180,-17,-179.8,-16", [(-180, -17, -179.8, -16)]),
+        ("179.9,-17,-180,-16", [(179.9, -17, 180, -16)]),
+        ("-10,-17,60,-16", [(-10, -17, 60, -16)]),
+    ],
+)
+def test_a_box_may_cross_180_degrees(
+    text: str, boxes: list[tuple[float, float, float, float]]
+) -> None:
+    area = parse_area(text)
+    assert list(area.boxes) == boxes
+    assert area.polygon.equals(shapely.union_all([shapely.box(*box) for box in boxes]))
+
+
+@pytest.mark.parametrize(
     ("text", "words"),
     [
         ("1,2,3", "is not four numbers"),
         ("1,2,3,4,5", "is not four numbers"),
         ("1 2 3 4", "is not four numbers"),
         ("2.4,48.8,2.3,48.9", "west below east"),
+        ("10,48,-170,49", "across 180 degrees"),
+        ("190,48,-170,49", "across 180 degrees"),
         ("2.3,48.9,2.4,48.8", "south below north"),
         ("600000,6800000,600100,6800100", "in degrees"),
         ("2.3,48.8,2.3,48.9", "is no area"),

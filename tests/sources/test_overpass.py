@@ -184,6 +184,12 @@ def test_tiles_outside_the_polygon_are_not_asked_for(server: Server, get: Get) -
     assert 0 < asked(server) < 8
 
 
+def test_an_area_across_180_degrees_is_asked_for_on_both_sides(server: Server, get: Get) -> None:
+    get(area=parse_area("179.95,-17,-179.9,-16.9"))
+    boxes = sorted(box_of(seen) for seen in server.seen if seen.path.endswith("/interpreter"))
+    assert boxes == [(-180, -17, -179.9, -16.9), (179.95, -17, 180, -16.9)]
+
+
 def test_a_second_run_needs_no_server(server: Server, get: Get) -> None:
     first = get()
     assert get() == get(offline=True) == first

@@ -351,10 +351,11 @@ def fetch_layers(
     addresses = [address.rstrip("/").removesuffix("/interpreter") for address in endpoints]
     servers = _Servers(addresses, cache, spec)
     shapely.prepare(area.polygon)
-    west, south, east, north = area.bounds
-    columns, rows = (math.ceil(side / tile_deg - 1e-9) for side in (east - west, north - south))
-    grid = _Tile(area.bounds).parts(max(1, columns), max(1, rows), splits=0)
-    waiting = collections.deque(_touching(area, grid))
+    waiting: collections.deque[_Tile] = collections.deque()
+    for west, south, east, north in area.boxes:
+        columns, rows = (math.ceil(side / tile_deg - 1e-9) for side in (east - west, north - south))
+        grid = _Tile((west, south, east, north)).parts(max(1, columns), max(1, rows), splits=0)
+        waiting.extend(_touching(area, grid))
     paths: list[Path] = []
     while waiting:
         tile = waiting.popleft()
