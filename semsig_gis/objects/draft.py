@@ -20,10 +20,11 @@ from semsig_gis.core.geometry import require_metric_crs
 from semsig_gis.core.taxonomy import MAX_CODE, ObjectClass
 from semsig_gis.objects.keywords import keywords, words_of
 from semsig_gis.sources.catalog import catalog_names, load_catalog, paper_taxonomy
+from semsig_gis.sources.csv_layer import NO_GEOMETRY
 from semsig_gis.sources.opendatasoft.reader import POINT, SHAPE, fold
 from semsig_gis.sources.opendatasoft.table import Record, open_table
 from semsig_gis.sources.osm.file import FORMATS
-from semsig_gis.sources.vector import NO_GEOMETRY, LayerInfo, first_rows
+from semsig_gis.sources.vector import LayerInfo, first_rows
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping, Sequence

@@ -22,6 +22,7 @@ from semsig_gis.core.geometry import CLASS_NAME, GEOMETRY, HALF_WIDTH, SOURCE_ID
 from semsig_gis.sources import RawLayer, RowCounts
 from semsig_gis.sources.catalog import MAX_WIDTH_M, MIN_WIDTH_M
 from semsig_gis.sources.conditions import Condition, as_text, matches
+from semsig_gis.sources.decimals import decimal
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence
@@ -433,7 +434,7 @@ def _identifier(value: object, name: str) -> str:
 def _metres(value: object) -> float:
     """Return a plausible width of a street from a field, or NaN."""
     try:
-        width = float(as_text(value).strip().removesuffix("m").replace(",", "."))
+        width = decimal(as_text(value).strip().removesuffix("m"))
     except ValueError:
         return math.nan
     return width if MIN_WIDTH_M <= width <= MAX_WIDTH_M else math.nan

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import contextvars
-import csv
+import itertools
 import json
 import logging
 import math
@@ -13,15 +13,16 @@ import zipfile
 import zlib
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import IO, TYPE_CHECKING, Any
 
 import fiona
 import numpy as np
 import shapely
 import shapely.geometry
 
-from semsig_gis.core.errors import CatalogError, SourceError, UnknownNameError, nearest_name
+from semsig_gis.core.errors import SourceError, UnknownNameError, nearest_name
 from semsig_gis.sources import require_file
+from semsig_gis.sources.csv_layer import NO_GEOMETRY, csv_table, read_csv_layer
 from semsig_gis.sources.packed import bomb, swells
 from semsig_gis.sources.raw_layer import (
     WGS84,
@@ -31,7 +32,6 @@ from semsig_gis.sources.raw_layer import (
     crs_label,
     fits_the_globe,
     raw_layer,
-    require_field,
     settle_crs,
     usable_crs,
 )
@@ -43,11 +43,13 @@ if TYPE_CHECKING:
 
     from semsig_gis.sources import RawLayer
     from semsig_gis.sources.catalog import LayerSpec
+    from semsig_gis.sources.csv_layer import CsvTable
     from semsig_gis.sources.raw_layer import Position
 
+CSV = "CSV"
 # The only drivers that may open a file: GDAL has some eighty, and a few of them follow links.
 DRIVERS = {
-    ".csv": "CSV",
+    ".csv": CSV,
     ".fgb": "FlatGeobuf",
     ".geojson": "GeoJSON",
     ".gpkg": "GPKG",
@@ -83,13 +85,12 @@ class Member:
         """Return the name as messages say it."""
         return str(self.file) if self.inner is None else f"{self.inner} in {self.file}"
 
-    def content(self, size: int = -1) -> bytes:
-        """Return the bytes of the file, or the first `size` of them."""
+    def open(self) -> IO[bytes]:
+        """Return a stream of the bytes of the file."""
         if self.inner is None:
-            with self.file.open("rb") as stream:
-                return stream.read(size)
-        with zipfile.ZipFile(self.file) as archive, archive.open(self.inner) as stream:
-            return stream.read(size)
+            return self.file.open("rb")
+        with zipfile.ZipFile(self.file) as archive:
+            return archive.open(self.inner)
 
 
 def unreadable(what: object, error: BaseException) -> SourceError:
@@ -145,74 +146,6 @@ def _archived(path: Path) -> tuple[str, ...]:
     return tuple(data or usable)
 
 
-# Separators and what GDAL calls them.
-SEPARATORS = {";": "SEMICOLON", ",": "COMMA", "\t": "TAB"}
-# Degrees go before a plane's coordinates where a file has both.
-KNOWN_NAMES = ((("lon", "longitude"), ("lat", "latitude")), (("x",), ("y",)))
-
-
-@dataclass(frozen=True, slots=True)
-class CsvColumns:
-    """Separator, one character, names, and coordinate columns: x is easting or longitude."""
-
-    separator: str
-    names: tuple[str, ...]
-    x: str | None
-    y: str | None
-
-    def position(self, row: Mapping[str, Any]) -> tuple[float, float] | None:
-        """Return the coordinates of a row, or None where both are blank."""
-        texts = {name: (row[name] or "").strip() for name in (self.x, self.y) if name}
-        if not any(texts.values()):
-            return None
-        x, y = (self._number(name, text) for name, text in texts.items())
-        return x, y
-
-    def _number(self, name: str, text: str) -> float:
-        # Where the comma does not separate columns it is the decimal sign of half of Europe.
-        plain = text if self.separator == "," else text.replace(",", ".")
-        try:
-            value = float(plain)
-        except ValueError:
-            value = math.nan
-        if not math.isfinite(value):
-            msg = f"{name} {text!r} is not a number"
-            raise BadFeatureError(msg)
-        return value
-
-
-def csv_columns(header: str, spec: LayerSpec | None, *, where: str) -> CsvColumns:
-    """Return what a header says; SourceError if `spec` is given and no coordinates are found."""
-    layouts = {sep: next(csv.reader([header], delimiter=sep), []) for sep in SEPARATORS}
-    widest = max(layouts, key=lambda separator: len(layouts[separator]))
-    if spec is not None and (spec.x_field or spec.y_field):
-        x, y = spec.x_field, spec.y_field
-        if not (x and y):
-            msg = f"{where} has only one of x_field and y_field in the catalogue; state both."
-            raise CatalogError(msg)
-        for separator, names in layouts.items():
-            if x in names and y in names:
-                return CsvColumns(separator, tuple(names), x, y)
-        require_field(x, layouts[widest], where=where, key="x_field")
-        require_field(y, layouts[widest], where=where, key="y_field")
-    for separator, names in layouts.items():
-        for x_names, y_names in KNOWN_NAMES:
-            x, y = _first(names, x_names), _first(names, y_names)
-            if x and y:
-                return CsvColumns(separator, tuple(names), x, y)
-    if spec is None:
-        return CsvColumns(widest, tuple(layouts[widest]), None, None)
-    msg = (
-        f"{where} has no coordinate columns lon and lat, or x and y; name them in x_field and "
-        f"y_field; its columns are {', '.join(layouts[widest])}."
-    )
-    raise SourceError(msg)
-
-
-def _first(names: Sequence[str], wanted: Sequence[str]) -> str | None:
-    return next((name for name in names if name.strip().lower() in wanted), None)
-
-
 # fiona's loggers; a filter acts on the very logger that emits, not on those below it.
 LOGGERS = ("fiona._env", "fiona._err", "fiona.collection", "fiona.ogrext")
 _heard: contextvars.ContextVar[list[logging.LogRecord] | None] = contextvars.ContextVar(
@@ -245,9 +178,7 @@ def listening() -> Iterator[list[logging.LogRecord]]:
         _heard.reset(token)
 
 
-NO_GEOMETRY = "None"
 CONTAINER = "GPKG"  # the one driver whose files hold several layers
-HEADER_BYTES = 65_536  # enough for the first line of a CSV file
 # A reader that fails so often without a good feature between does not move on.
 FAILURES_IN_A_ROW = 1_000
 WGS84_NAMES = re.compile(r"4326|CRS84|WGS ?84", re.IGNORECASE)
@@ -324,15 +255,15 @@ def read_layer(
     where = f"layer {spec.name!r} ({path})"
     with listening() as heard:
         member = _pick(Path(path), spec.layer)
-        columns = _columns(member, spec, where=where)
-        fields = _fields(member, spec, columns, where=where)
-        rules = RowRules(spec, fields, filters=filters, where=where)
-        with _opened(member, columns, fields=rules.fields) as source:
+        if (table := _csv(member, spec, where=where)) is not None:
+            return read_csv_layer(table, spec, filters=filters, crs=crs, where=where)
+        rules = RowRules(spec, _fields(member, where=where), filters=filters, where=where)
+        with _opened(member, fields=rules.fields) as source:
             own, implicit = _own_crs(source)
             system, notes = settle_crs(
                 own, implicit=implicit, expected=spec.crs, given=crs, where=where
             )
-            rows = _read_rows(source, rules, columns, heard)
+            rows = _read_rows(source, rules, heard)
         if member.driver == "GeoJSON":
             _refuse_broken(rows, member)
         if any(record.getMessage().startswith("Failed to decode") for record in heard):
@@ -354,11 +285,15 @@ def first_rows(
     """Yield every layer of a file, its first readable rows, and its coordinate columns if any."""
     with listening():
         for member in _layers(path):
-            columns = _columns(member, None, where=str(member))
-            with _opened(member, columns) as source:
+            table = _csv(member, None, where=str(member))
+            if table is not None:
+                good = (row for row in table.rows() if not isinstance(row, str))
+                coordinates = (table.x, table.y) if table.x and table.y else ()
+                yield _describe(member), tuple(itertools.islice(good, limit)), coordinates
+                continue
+            with _opened(member) as source:
                 rows = tuple(_properties(source, limit))
-            coordinates = (columns.x, columns.y) if columns and columns.x and columns.y else ()
-            yield _describe(member), rows, coordinates
+            yield _describe(member), rows, ()
 
 
 def _properties(source: Iterable[fiona.Feature], limit: int) -> Iterator[Mapping[str, Any]]:
@@ -374,19 +309,14 @@ def _properties(source: Iterable[fiona.Feature], limit: int) -> Iterator[Mapping
 
 
 @contextlib.contextmanager
-def _opened(
-    member: Member, columns: CsvColumns | None = None, *, fields: tuple[str, ...] | None = None
-) -> Iterator[fiona.Collection]:
+def _opened(member: Member, *, fields: tuple[str, ...] | None = None) -> Iterator[fiona.Collection]:
     """Open a layer; what goes wrong in opening it becomes a `SourceError`."""
     options: dict[str, Any] = {}
-    if columns:  # GDAL's own guess of the separator fails on `id;size (a, b);x;y`
-        options |= {"SEPARATOR": SEPARATORS[columns.separator], "HEADERS": "YES"}
     if member.driver == "GeoJSON":
         # Has GDAL keep the members of the file that are not features, `crs` among them.
         options["NATIVE_DATA"] = "YES"
     elif fields is not None:  # which GeoJSON's driver cannot select
-        coordinates = (columns.x, columns.y) if columns else ()
-        options["include_fields"] = list(dict.fromkeys([*fields, *filter(None, coordinates)]))
+        options["include_fields"] = list(fields)
     try:
         source = fiona.open(
             member.address, layer=member.layer, enabled_drivers=[member.driver], **options
@@ -402,6 +332,9 @@ def _layers(path: Path) -> tuple[Member, ...]:
     """Return the layers of a file, or of all the files in an archive."""
     layers: list[Member] = []
     for member in members(path):
+        if member.driver == CSV:
+            layers.append(Member(member.file, member.inner, Path(member.inner or path).stem))
+            continue
         # Opened under the allow-list first, because listing would try every driver of GDAL.
         with _opened(member):
             pass
@@ -434,40 +367,43 @@ def _pick(path: Path, wanted: str | None) -> Member:
     raise SourceError(msg)
 
 
-def _columns(member: Member, spec: LayerSpec | None, *, where: str) -> CsvColumns | None:
-    """Return what the first line of a CSV file says; None for a file of another kind."""
-    if member.driver != "CSV":
+def _csv(member: Member, spec: LayerSpec | None, *, where: str) -> CsvTable | None:
+    """Look at a CSV file, which GDAL does not read here; None for a file of another kind."""
+    if member.driver != CSV:
         return None
-    head = member.content(HEADER_BYTES).decode("utf-8-sig", errors="replace")
-    if not head or "\0" in head or "\ufffd" in head:
-        with _opened(member):  # which refuses what is no CSV file, or has names that are not UTF-8
-            pass
-    return csv_columns(next(iter(head.splitlines()), ""), spec, where=where)
+    try:
+        return csv_table(member.open, spec, what=str(member), where=where)
+    except OSError as error:
+        raise unreadable(member, error) from error
 
 
-def _fields(
-    member: Member, spec: LayerSpec, columns: CsvColumns | None, *, where: str
-) -> Sequence[str]:
-    """Return the fields of a layer, by the header alone if it has all that are needed."""
-    if columns is not None and {field for _, field in spec.fields} <= set(columns.names):
-        return columns.names
-    with _opened(member, columns) as source:
-        if columns is None and source.schema["geometry"] == NO_GEOMETRY:
+def _fields(member: Member, *, where: str) -> Sequence[str]:
+    with _opened(member) as source:
+        if source.schema["geometry"] == NO_GEOMETRY:
             msg = f"{where} has no geometry; give the layer that holds the positions."
             raise SourceError(msg)
         return list(source.schema["properties"])
 
 
 def _describe(member: Member) -> LayerInfo:
-    columns = _columns(member, None, where=str(member))
-    with _opened(member, columns) as source:
+    table = _csv(member, None, where=str(member))
+    if table is not None:
+        rows, kinds = table.survey()
+        return LayerInfo(
+            name=str(member.layer),
+            geometry=kinds,
+            crs=None if table.crs is None else crs_label(table.crs),
+            rows=rows,
+            fields=tuple((name, "str") for name in table.names),
+        )
+    with _opened(member) as source:
         crs, implicit = _own_crs(source)
         count = _count(source)
         if implicit and count and not fits_the_globe(np.reshape(source.bounds, (2, 2))):
             crs = None
         return LayerInfo(
             name=str(member.layer),
-            geometry="Point" if columns and columns.x else source.schema["geometry"],
+            geometry=source.schema["geometry"],
             crs=None if crs is None else crs_label(crs),
             rows=sum(1 for _ in source) if count is None else count,
             fields=tuple(source.schema["properties"].items()),
@@ -495,7 +431,6 @@ def _own_crs(source: fiona.Collection) -> tuple[CRS | None, bool]:
 def _read_rows(
     source: fiona.Collection,
     rules: RowRules,
-    columns: CsvColumns | None,
     heard: list[logging.LogRecord],
 ) -> Rows:
     rows = Rows()
@@ -524,7 +459,7 @@ def _read_rows(
         properties = feature.properties
         rows.closed += feature.geometry is not None and _has_open_ring(feature.geometry)
         try:
-            position = columns.position(properties) if columns else _position(feature.geometry)
+            position = _position(feature.geometry)
             # From the first damage on, GDAL gives null for what it cannot read.
             place: Position | str = (damage or None) if position is None else position
         except BadFeatureError as error:
@@ -565,7 +500,8 @@ def _refuse_broken(rows: Rows, member: Member) -> None:
     null = [row for row, position in enumerate(rows.positions) if position is None]
     if not null:
         return
-    document = json.loads(member.content().decode("utf-8-sig", errors="replace"))
+    with member.open() as stream:
+        document = json.loads(stream.read().decode("utf-8-sig", errors="replace"))
     listed = document.get("features", [document])
     features = [item for item in listed if isinstance(item, dict) and item.get("type") == "Feature"]
     if len(features) != rows.read:

@@ -363,7 +363,7 @@ GOOD = fiona.Feature(geometry=GEOMETRY, id="1", properties=fiona.Properties())
 def test_features_that_raise_do_not_stop_the_rest() -> None:
     bad = ValueError("unlucky")
     source = Source(9, [bad, *[GOOD] * 3, bad, *[GOOD] * 3, bad])
-    rows = vector_file._read_rows(source, RULES, None, [])
+    rows = vector_file._read_rows(source, RULES, [])
     assert (rows.read, rows.numbers) == (9, [2, 3, 4, 6, 7, 8])
     assert rows.errors == dict.fromkeys((1, 5, 9), "cannot be read (unlucky)")
 
@@ -371,7 +371,7 @@ def test_features_that_raise_do_not_stop_the_rest() -> None:
 @pytest.mark.parametrize("size", [5, 5000])
 def test_reader_that_is_stuck_comes_to_an_end(size: int) -> None:
     features = itertools.chain([GOOD] * 3, itertools.repeat(OSError(5, "no more")))
-    rows = vector_file._read_rows(Source(size, features), RULES, None, [])
+    rows = vector_file._read_rows(Source(size, features), RULES, [])
     assert rows.numbers == [1, 2, 3]
     assert rows.read == len(rows.numbers) + len(rows.errors) == max(size, 1003)
 
@@ -463,16 +463,17 @@ def test_csv_rows_without_numbers_are_errors(tmp_path: Path) -> None:
     rows = ["1;2", "here;2", "1;", ";", " ; ", "nan;1", "1;inf", "1,5;2", "1", "1;2;3;4"]
     path = text_file(tmp_path, "things.csv", "x;y\n" + "\n".join(rows) + "\n")
     layer = read(path, crs="EPSG:2154")
-    assert counts(layer) == (10, 5, 5)
+    assert counts(layer) == (10, 4, 6)
     assert layer.errors == (
         "row 2: x 'here' is not a number",
         "row 3: y '' is not a number",
         "row 6: x 'nan' is not a number",
         "row 7: y 'inf' is not a number",
         "row 9: y '' is not a number",
+        "row 10: has 4 values, and the header has 2 names",
     )
     assert layer.table.geometry.isna().sum() == 2
-    assert xy(layer) == [[1.0, 2.0], [1.5, 2.0], [1.0, 2.0]]
+    assert xy(layer) == [[1.0, 2.0], [1.5, 2.0]]
 
 
 @pytest.mark.parametrize(
@@ -491,17 +492,6 @@ def test_csv_needs_coordinates(
     with refused(error, *words):
         read(path, **what)
     assert list_layers(path)[0].geometry == "None"
-
-
-def test_csv_in_another_encoding(tmp_path: Path) -> None:
-    path = text_file(tmp_path, "things.csv", "nom;x;y\nété;1;2\n", "latin-1")
-    layer = read_layer(path, spec_of(crs="EPSG:2154", where=(("nom", ("hiver",)),)))
-    assert layer.notes == ("some text is not UTF-8 and was read as missing",)
-    for text, encoding in (("prénom;x;y\na;1;2\n", "latin-1"), ("n;x;y\na;1;2\n", "utf-16")):
-        path = text_file(tmp_path, "things.csv", text, encoding)
-        for use in (list_layers, read):
-            with refused(SourceError, "is not UTF-8 text; save it as UTF-8"):
-                use(path)
 
 
 @pytest.mark.parametrize("suffix", ["csv", "fgb", "gpkg", "shp"])

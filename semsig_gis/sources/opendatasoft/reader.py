@@ -16,6 +16,7 @@ from shapely.errors import ShapelyError
 
 from semsig_gis.core.errors import CatalogError, SourceError
 from semsig_gis.sources import vector as vector_file
+from semsig_gis.sources.decimals import decimal
 from semsig_gis.sources.http.fetch import DEFAULT_HTTP, HttpError, fetch
 from semsig_gis.sources.opendatasoft.table import open_table
 from semsig_gis.sources.raw_layer import (
@@ -166,7 +167,8 @@ def _coordinates(values: Mapping[str, Any], x: str, y: str) -> tuple[float, floa
     if all(value is None or value == "" for value in both):
         return None
     try:
-        return float(both[0]), float(both[1])  # type: ignore[arg-type] # what is not one, raises
+        # What is no number, raises.
+        return tuple(decimal(v) if isinstance(v, str) else float(v) for v in both)  # type: ignore[arg-type, return-value]
     except (TypeError, ValueError) as error:
         msg = f"its {x} {both[0]!r} and {y} {both[1]!r} are not two numbers"
         raise BadFeatureError(msg) from error
@@ -224,6 +226,7 @@ class _TableLayer:
         self._crs, self._notes = settle_crs(
             own, implicit=implicit, expected=spec.crs, given=crs, where=where
         )
+        self._notes = (*table.notes, *self._notes)
         self._by_file = not implicit
         if table.rest:
             rest = (

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import json
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -15,15 +14,15 @@ from pyproj.exceptions import CRSError
 
 from semsig_gis.core.errors import CrsError, SourceError
 from semsig_gis.sources import require_file
+from semsig_gis.sources.csv_file import open_csv
 from semsig_gis.sources.raw_layer import WGS84
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
     from pathlib import Path
 
-SEPARATORS = ";,\t"
-# A shape in a CSV file may be longer than the 128 KiB that Python's reader allows.
-LONGEST_VALUE = 2**24
+    from semsig_gis.sources.csv_file import CsvFile
+
 BATCH = 10_000
 
 
@@ -44,8 +43,9 @@ class Table:
 
     `records` takes the fields that are wanted and returns an iterator over the rows, which may have
     a geometry that is not a field (`has_geometry`). `crs` is what the file states, which those of a
-    portal never do. `empty`: no rows, and so nothing to know the fields by. `rest`: rows that the
-    portal has beyond these, where the file is a page of a longer answer.
+    portal never do, and `notes` what is to be told of it. `empty`: no rows, and so nothing to know
+    the fields by. `rest`: rows that the portal has beyond these, where the file is a page of a
+    longer answer.
     """
 
     fields: tuple[str, ...]
@@ -54,6 +54,7 @@ class Table:
     crs: CRS | None = None
     empty: bool = False
     rest: int = 0
+    notes: tuple[str, ...] = ()
 
 
 def open_table(path: Path) -> Table:
@@ -65,10 +66,6 @@ def open_table(path: Path) -> Table:
         return _parquet(path)
     if begin.startswith((b"{", b"[")):
         return _json(path)
-    if not begin or b"\0" in begin:
-        what = "is not a text" if begin else "is empty"
-        msg = f"{path} {what}; give a JSON, GeoJSON, CSV or Parquet file that a portal exports."
-        raise SourceError(msg)
     return _csv(path)
 
 
@@ -145,42 +142,14 @@ def _stated_crs(definition: object, path: Path) -> CRS:
 
 
 def _csv(path: Path) -> Table:
-    try:
-        with path.open(encoding="utf-8-sig", newline="") as stream:
-            header = stream.readline()
-    except UnicodeDecodeError as error:
-        raise _not_utf8(path) from error
-    layouts = {
-        separator: next(csv.reader([header], delimiter=separator), []) for separator in SEPARATORS
-    }
-    separator = max(layouts, key=lambda separator: len(layouts[separator]))
-    fields = tuple(layouts[separator])
-    return Table(fields, lambda _: _csv_records(path, separator, fields))
+    file = open_csv(lambda: path.open("rb"), str(path))
+    separator = file.separator
+    return Table(file.layouts[separator], lambda _: _csv_records(file, separator), notes=file.notes)
 
 
-def _csv_records(path: Path, separator: str, fields: tuple[str, ...]) -> Records:
-    before = csv.field_size_limit(LONGEST_VALUE)
-    try:
-        with path.open(encoding="utf-8-sig", newline="") as stream:
-            stream.readline()
-            # Strict, because a quote that is never closed would swallow all the rows below it.
-            rows = csv.reader(stream, delimiter=separator, strict=True)
-            while True:
-                try:
-                    row = next(rows)
-                except StopIteration:
-                    return
-                except csv.Error as error:
-                    yield f"cannot be read ({error})"
-                    continue
-                if len(row) == len(fields):
-                    yield Record(dict(zip(fields, row, strict=True)))
-                elif row:
-                    yield f"has {len(row)} values, and the header has {len(fields)} names"
-    except UnicodeDecodeError as error:
-        raise _not_utf8(path) from error
-    finally:
-        csv.field_size_limit(before)
+def _csv_records(file: CsvFile, separator: str) -> Records:
+    for row in file.rows(separator):
+        yield row if isinstance(row, str) else Record(row)
 
 
 def _not_utf8(path: Path) -> SourceError:

@@ -1,0 +1,205 @@
+"""Layers in CSV files: where a row says its position, and what it is."""
+
+from __future__ import annotations
+
+import contextlib
+import math
+import re
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+import shapely
+from pyproj import CRS
+from pyproj.exceptions import CRSError
+
+from semsig_gis.core.errors import CatalogError, SourceError
+from semsig_gis.sources.csv_file import open_csv
+from semsig_gis.sources.decimals import decimal
+from semsig_gis.sources.raw_layer import (
+    BadFeatureError,
+    RowRules,
+    Rows,
+    raw_layer,
+    require_field,
+    settle_crs,
+    usable_crs,
+)
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator, Mapping
+    from typing import IO
+
+    from semsig_gis.sources import RawLayer
+    from semsig_gis.sources.catalog import LayerSpec
+    from semsig_gis.sources.csv_file import CsvFile
+    from semsig_gis.sources.raw_layer import Position
+
+    Row = Mapping[str, str | None]
+
+# Degrees go before a plane's coordinates where a file has both, and both before a shape.
+KNOWN_NAMES = ((("lon", "longitude"), ("lat", "latitude")), (("x",), ("y",)))
+SHAPE_NAMES = ("wkt", "geom", "geometry", "the_geom")
+# Well-known text, extended by the code of its CRS or not, and the same in bytes.
+WELL_KNOWN = re.compile(r"\s*(?:SRID\s*=\s*(\d+)\s*;)?\s*([A-Za-z].*)", re.DOTALL | re.IGNORECASE)
+HEXADECIMAL = re.compile(r"\s*((?:[0-9A-Fa-f]{2}){5,})\s*")
+LONGEST_SHOWN = 40
+NO_GEOMETRY = "None"  # GDAL's word for it
+
+
+@dataclass(slots=True)
+class CsvTable:
+    """A CSV file, its separator, and the columns of its positions.
+
+    Those are two coordinates, x being easting or longitude, or a shape in well-known text. `srid`
+    is the code of the CRS that the shapes state, once one has been read.
+    """
+
+    file: CsvFile
+    separator: str
+    x: str | None = None
+    y: str | None = None
+    shape: str | None = None
+    srid: int = 0
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the columns."""
+        return self.file.layouts[self.separator]
+
+    @property
+    def has_positions(self) -> bool:
+        """Whether there are columns for them."""
+        return bool((self.x and self.y) or self.shape)
+
+    @property
+    def crs(self) -> CRS | None:
+        """The CRS that the shapes state; SourceError where nobody knows it."""
+        if not self.srid:
+            return None
+        try:
+            return usable_crs(CRS.from_epsg(self.srid).to_wkt())
+        except CRSError as error:
+            msg = f"{self.file.what} states SRID={self.srid}, which is unknown; correct it."
+            raise SourceError(msg) from error
+
+    def survey(self) -> tuple[int, str]:
+        """Read all rows; return their number and what they are, in the words of GDAL."""
+        number, kinds = 0, set()
+        for row in self.rows():
+            number += 1
+            with contextlib.suppress(BadFeatureError):
+                position = None if isinstance(row, str) or not self.shape else self.position(row)
+                kinds |= set() if position is None else {getattr(position, "geom_type", "Point")}
+        if not self.shape:
+            return number, "Point" if self.has_positions else NO_GEOMETRY
+        return number, min(kinds) if len(kinds) == 1 else "Unknown"
+
+    def rows(self) -> Iterator[Row | str]:
+        """Yield every row by the names of its columns, or what is wrong with it."""
+        return self.file.rows(self.separator)
+
+    def position(self, row: Row) -> Position:
+        """Return the position of a row, or None where it is blank."""
+        texts = [(name, (row[name] or "").strip()) for name in (self.x, self.y, self.shape) if name]
+        if not any(text for _, text in texts):
+            return None
+        if self.shape:
+            return self._shape(texts[0][1])
+        x, y = (self._number(name, text) for name, text in texts)
+        return x, y
+
+    def _number(self, name: str, text: str) -> float:
+        try:
+            value = decimal(text, english=self.separator == ",")
+        except ValueError:
+            value = math.nan
+        if not math.isfinite(value):
+            msg = f"{name} {text!r} is not a number"
+            raise BadFeatureError(msg)
+        return value
+
+    def _shape(self, text: str) -> Position:
+        try:
+            with np.errstate(invalid="ignore"):  # NaN is looked for in all geometries at once
+                if code := HEXADECIMAL.fullmatch(text):
+                    shape = shapely.from_wkb(code[1])
+                    srid = int(shapely.get_srid(shape))
+                else:
+                    stated, plain = WELL_KNOWN.fullmatch(text).groups()  # type: ignore[union-attr]
+                    shape, srid = shapely.from_wkt(plain), int(stated or 0)
+        except (AttributeError, shapely.errors.ShapelyError) as error:
+            msg = f"{self.shape} {text[:LONGEST_SHOWN]!r} is not well-known text"
+            raise BadFeatureError(msg) from error
+        self.srid = self.srid or srid
+        if srid not in {0, self.srid}:
+            msg = f"{self.shape} has SRID={srid}, and rows before it have {self.srid}"
+            raise BadFeatureError(msg)
+        if isinstance(shape, shapely.Point) and not shape.is_empty:
+            return shape.x, shape.y
+        return shape
+
+
+def csv_table(
+    open_: Callable[[], IO[bytes]], spec: LayerSpec | None, *, what: str, where: str
+) -> CsvTable:
+    """Look at a CSV file; SourceError if `spec` is given and no column for positions is found."""
+    file = open_csv(open_, what)
+    if spec is not None and (spec.x_field or spec.y_field):
+        return _stated_table(file, spec.x_field, spec.y_field, where=where)
+    for separator, names in file.layouts.items():
+        for x_names, y_names in KNOWN_NAMES:
+            x, y = _first(names, x_names), _first(names, y_names)
+            if x and y:
+                return CsvTable(file, separator, x, y)
+    # Shapes hold semicolons and commas, but no tabs.
+    for separator, names in reversed(list(file.layouts.items())):
+        if shape := _first(names, SHAPE_NAMES):
+            return CsvTable(file, separator, shape=shape)
+    if spec is None:
+        return CsvTable(file, file.separator)
+    msg = (
+        f"{where} has no coordinate columns lon and lat, or x and y; name them in x_field and "
+        f"y_field; its columns are {', '.join(file.layouts[file.separator])}."
+    )
+    raise SourceError(msg)
+
+
+def _stated_table(file: CsvFile, x: str | None, y: str | None, *, where: str) -> CsvTable:
+    """Return the table by the columns that the catalogue names."""
+    if not (x and y):
+        msg = f"{where} has only one of x_field and y_field in the catalogue; state both."
+        raise CatalogError(msg)
+    for separator, names in file.layouts.items():
+        if x in names and y in names:
+            return CsvTable(file, separator, x, y)
+    names = file.layouts[file.separator]
+    require_field(x, names, where=where, key="x_field")
+    require_field(y, names, where=where, key="y_field")
+    return CsvTable(file, file.separator, x, y)
+
+
+def _first(names: tuple[str, ...], wanted: tuple[str, ...]) -> str | None:
+    return next((name for name in names if name.lower() in wanted), None)
+
+
+def read_csv_layer(
+    table: CsvTable, spec: LayerSpec, *, filters: bool, crs: str | None, where: str
+) -> RawLayer:
+    """Read the layer that a CSV file is."""
+    rules = RowRules(spec, table.names, filters=filters, where=where)
+    rows = Rows()
+    for row in table.rows():
+        rows.read += 1
+        if isinstance(row, str):
+            rows.errors[rows.read] = row
+            continue
+        try:
+            place: Position | str = table.position(row)
+        except BadFeatureError as error:
+            place = str(error)
+        rows.add([row[field] for field in rules.fields], str(rows.read), place)
+    own = table.crs
+    system, notes = settle_crs(own, implicit=False, expected=spec.crs, given=crs, where=where)
+    notes = (*table.file.notes, *notes)
+    return raw_layer(rows, rules, system, by_file=own is not None, notes=notes)

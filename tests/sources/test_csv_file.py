@@ -1,0 +1,192 @@
+"""CSV files in any encoding, and the numbers, shapes and names in them."""
+
+from __future__ import annotations
+
+import math
+import re
+from typing import TYPE_CHECKING, Any
+
+import pytest
+import shapely
+from hypothesis import given
+from hypothesis import strategies as st
+from sentences import refused
+
+from semsig_gis.core.errors import SourceError
+from semsig_gis.sources.catalog import LayerSpec
+from semsig_gis.sources.decimals import decimal
+from semsig_gis.sources.opendatasoft import reader as opendatasoft
+from semsig_gis.sources.vector import list_layers, read_layer
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from semsig_gis.sources import RawLayer
+
+WORDS = {
+    "cp1252": (
+        "fr",
+        "érable",
+        "platane d\N{RIGHT SINGLE QUOTATION MARK}été",
+        "hêtre",
+        "n° 5",
+        "m²",
+    ),
+    "mac_roman": ("fr", "érable", "hêtre", "chêne vert", "forêt", "à fleurs"),
+    "cp1250": ("pl", "łąka", "żółty", "świerk", "dąb", "Piłsudskiego"),
+    "cp1251": ("ru", "дерево", "улица Ленина", "скамейка", "фонарь"),
+    "cp1253": ("el", "δέντρο", "οδός Ερμού", "παγκάκι"),
+    "koi8_r": ("ru", "дерево", "улица Ленина", "скамейка", "фонарь"),
+    "cp932": ("ja", "木", "東京都千代田区", "街灯"),
+    "utf-16": ("fr", "érable", "木"),
+    "utf-16-le": ("fr", "érable", "hêtre"),
+    "utf-16-be": ("fr", "érable", "hêtre"),
+    "utf-32": ("fr", "érable", "木"),
+    "utf-8-sig": ("fr", "érable", "木"),
+}
+
+
+def read(path: Path, reader: str = "vector", **what: Any) -> RawLayer:  # noqa: ANN401
+    spec = LayerSpec(name="a", class_name="bench", **{"crs": "EPSG:4326", **what})
+    return (
+        read_layer(path, spec) if reader == "vector" else opendatasoft.read_layers(path, [spec])[0]
+    )
+
+
+@pytest.mark.parametrize("reader", ["vector", "opendatasoft"])
+@pytest.mark.parametrize("encoding", WORDS)
+def test_every_encoding_is_told(tmp_path: Path, encoding: str, reader: str) -> None:
+    path = tmp_path / "a.csv"
+    words = WORDS[encoding]
+    lines = ["nom;lon;lat", *(f"{word};2,5;48,5" for word in words)]
+    path.write_bytes("\r\n".join(lines).encode(encoding))
+    layer = read(path, reader, id_field="nom", x_field="lon", y_field="lat")
+    assert tuple(layer.table.source_id) == words
+    assert set(layer.table.geometry.to_wkt()) == {"POINT (2.5 48.5)"}
+    told = [f"the file is not in UTF-8; it is read as {encoding.replace('-', '_')}"]
+    marked = encoding in {"utf-8-sig", "utf-16", "utf-32"}
+    assert list(layer.notes) == ([] if marked else told)
+
+
+def test_text_that_is_damaged_is_told(tmp_path: Path) -> None:
+    path = tmp_path / "a.csv"
+    path.write_bytes("nom;lon;lat\nérable;2;48\nhêtre;2;48\n".encode() + b"ch\xeane;2;48\n")
+    layer = read(path, id_field="nom")
+    assert list(layer.table.source_id) == ["érable", "hêtre", "ch\ufffdne"]
+    assert layer.notes == ("1 places are not UTF-8 and are read as \ufffd",)
+
+
+@pytest.mark.parametrize(
+    "content", [b"", b"\xef\xbb\xbf", b"\n\n", b"\0\1\2" * 99, bytes(range(256))]
+)
+def test_what_is_no_table_of_text_is_refused(tmp_path: Path, content: bytes) -> None:
+    path = tmp_path / "a.csv"
+    path.write_bytes(content)
+    for use in (read, list_layers):
+        with refused(SourceError, str(path)):
+            use(path)
+
+
+@pytest.mark.parametrize("reader", ["vector", "opendatasoft"])
+@pytest.mark.parametrize("separator", [";", ",", "\t"])
+def test_blanks_around_names_are_no_part_of_them(
+    tmp_path: Path, separator: str, reader: str
+) -> None:
+    path = tmp_path / "a.csv"
+    lines = [["id ", " lon", "\u00a0lat "], ["7", " 2.5", "48.5 "]]
+    path.write_text("\n".join(map(separator.join, lines)), encoding="utf-8")
+    layer = read(path, reader, id_field="id", x_field="lon", y_field="lat")
+    assert layer.table.geometry.to_wkt().tolist() == ["POINT (2.5 48.5)"]
+    assert layer.table.source_id.tolist() == ["7"]
+
+
+SQUARE = shapely.box(0, 0, 2, 2)
+SHAPES = {
+    "POINT (2.5 48.5)": "POINT (2.5 48.5)",
+    " point(2.5 48.5) ": "POINT (2.5 48.5)",
+    "POINT Z (2.5 48.5 35)": "POINT (2.5 48.5)",
+    "SRID=4326;POINT(2.5 48.5)": "POINT (2.5 48.5)",
+    SQUARE.wkt: SQUARE.wkt,
+    SQUARE.wkb_hex: SQUARE.wkt,
+    "": None,
+}
+
+
+@pytest.mark.parametrize("name", ["WKT", "geom", "geometry", "the_geom", " wkt "])
+def test_a_shape_may_be_well_known_text(tmp_path: Path, name: str) -> None:
+    path = tmp_path / "a.csv"
+    rows = "".join(f'{number};"{text}"\n' for number, text in enumerate(SHAPES))
+    path.write_text(f"id;{name}\n{rows}99;here\n", encoding="utf-8")
+    layer = read(path)
+    assert [shape and shape.wkt for shape in layer.table.geometry] == list(SHAPES.values())
+    assert layer.errors == (f"row 8: {name.strip()} 'here' is not well-known text",)
+    (info,) = list_layers(path)
+    assert (info.geometry, info.rows, info.crs) == ("Unknown", 8, "EPSG:4326")
+
+
+def test_shapes_state_their_crs(tmp_path: Path) -> None:
+    path = tmp_path / "a.csv"
+    path.write_text(
+        "the_geom\nSRID=2154;POINT(770000 6280000)\nSRID=4326;POINT(2 48)\nPOINT(1 2)\n",
+        encoding="utf-8",
+    )
+    layer = read(path, crs=None)
+    assert layer.table.crs == "EPSG:2154"
+    assert layer.table.geometry.to_wkt().tolist() == ["POINT (770000 6280000)", "POINT (1 2)"]
+    assert layer.errors == ("row 2: the_geom has SRID=4326, and rows before it have 2154",)
+    path.write_text("geom\nSRID=999999;POINT(2 48)\n", encoding="utf-8")
+    with refused(SourceError, "SRID=999999", "unknown"):
+        read(path)
+
+
+NUMBERS: dict[str, float | None] = {
+    "3.88": 3.88,
+    " 3,88 ": 3.88,
+    "\N{MINUS SIGN}3,5": -3.5,
+    "1e5": 1e5,
+    "770\u00a0123,5": 770_123.5,
+    "6\u202f280\u2009000,25": 6_280_000.25,
+    "1 234 567": 1_234_567.0,
+    "2'600'000.5": 2_600_000.5,
+    "1.234,5": 1_234.5,
+    "1,234.5": 1_234.5,
+    "6.280.000": 6_280_000.0,
+    "43,610,123": 43_610_123.0,
+    "": None,
+    "48 85": None,
+    "12,34,5": None,
+    "1234.567,8": None,
+    "1,5.3": None,
+    "here": None,
+}
+
+
+@pytest.mark.parametrize("text", NUMBERS)
+def test_numbers_as_people_write_them(text: str) -> None:
+    expected = NUMBERS[text]
+    if expected is None:
+        with pytest.raises(ValueError, match=f"{re.escape(text)}|convert"):
+            decimal(text)
+    else:
+        assert decimal(text) == expected
+
+
+def test_a_comma_that_could_be_either_is_not_guessed(tmp_path: Path) -> None:
+    assert decimal("770,123") == 770.123
+    assert decimal("2,3488", english=True) == 2.3488
+    path = tmp_path / "a.csv"
+    path.write_text('x,y\n"770,123","6,280,000.5"\n"770,123.5","6,280,000"\n', encoding="utf-8")
+    layer = read(path, crs="EPSG:2154")
+    assert layer.errors == ("row 1: x '770,123' is not a number",)
+    assert layer.table.geometry.to_wkt().tolist() == ["POINT (770123.5 6280000)"]
+
+
+@given(st.floats(allow_nan=False, allow_infinity=False, width=32))
+def test_a_number_is_itself_in_every_style(value: float) -> None:
+    for text in (repr(value), repr(value).replace(".", ",")):
+        assert decimal(text) == value
+    rounded = round(value, 2)
+    if abs(rounded) < 1e15:
+        for blank in ("\u00a0", "\u202f", "\u2009", " ", "'"):
+            styled = f"{rounded:,.2f}".replace(",", blank).replace(".", ",")
+            assert math.isclose(decimal(styled), rounded)
