@@ -108,5 +108,6 @@ def test_what_is_required_may_be_drawn_and_searched(run: Run) -> None:
 def test_the_number_of_cells_that_tie_is_printed(
     tied: int, words: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    print_answer({"used": "types", "cells": 5000, "candidates": [], "tied_beyond": tied})
+    found = {"used": "types", "cells": 5000, "candidates": [], "tied_beyond": tied}
+    print_answer({**found, "notes": [], "north": {"name": "grid"}})
     assert f"\n{words}" in capsys.readouterr().out
