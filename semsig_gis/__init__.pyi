@@ -87,6 +87,13 @@ from .likelihood.locate import (
     locate_route as locate_route,
 )
 from .likelihood.method import LikelihoodMethod as LikelihoodMethod
+from .likelihood.noise.age import (
+    Drift as Drift,
+    aged_noise as aged_noise,
+    fresh_noise as fresh_noise,
+    named_drift as named_drift,
+    open_drift as open_drift,
+)
 from .likelihood.noise.learn import learn_noise as learn_noise, read_samples as read_samples
 from .likelihood.noise.model import (
     NoiseMixture as NoiseMixture,

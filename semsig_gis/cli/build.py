@@ -159,6 +159,13 @@ def update(
         Path, typer.Option(help="New street objects; their layers replace those of the database.")
     ],
     out: Annotated[Path | None, typer.Option(help="Database to write; default: in place.")] = None,
+    years: Annotated[
+        float | None,
+        typer.Option(
+            help="Years between the old objects and the new ones, up to 100, to be told in the "
+            "report of --json."
+        ),
+    ] = None,
     as_json: AsJson = False,
 ) -> None:
     """Apply changed street objects to a database."""
@@ -167,6 +174,9 @@ def update(
     from semsig_gis.objects.table import open_objects
 
     keep_inputs(out, read=(objects,))
+    if years is not None and not 0 < years <= 100:  # noqa: PLR2004 - as of a drift
+        msg = f"--years was given as {years:g}; give years above 0 and up to 100."
+        raise InputError(msg)
     had_columns = open_city(database).has_columns
     with progress("updating") as advance:
         report = update_file(database, open_objects(objects), out=out, progress=advance)
@@ -175,7 +185,7 @@ def update(
     for note in report.notes:
         remark(note)
     if as_json:
-        print_json(report.to_dict())
+        print_json(report.to_dict() | ({} if years is None else {"years": years}))
         return
     from semsig_gis.reports.quality import update_tables
 

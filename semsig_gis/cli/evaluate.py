@@ -24,7 +24,14 @@ from semsig_gis.cli.console import (
     remark,
     say,
 )
-from semsig_gis.cli.options import NoiseName, OnGrid, prepared_index, read_noise
+from semsig_gis.cli.options import (
+    DriftReport,
+    MapAge,
+    NoiseName,
+    OnGrid,
+    prepared_index,
+    read_noise,
+)
 from semsig_gis.core.errors import InputError
 
 if TYPE_CHECKING:
@@ -53,15 +60,23 @@ def evaluate(
     ] = None,
     method: MethodText = "edit+edit",
     noise: NoiseName = "generic",
+    map_age: MapAge = 0.0,
+    drift_report: DriftReport = None,
     top: Annotated[int, typer.Option(help="Count the best of this many candidates (t).")] = 1,
     seed: Annotated[int, typer.Option(help="Seed of the random numbers.")] = 0,
     out: Annotated[Path | None, typer.Option(help="Folder to write the results to.")] = None,
     as_json: AsJson = False,
 ) -> None:
     """Ask queries from known places and measure the errors."""
-    if noise != "generic" and method != LIKELIHOOD:
-        msg = f"--noise is for --method likelihood, not for {method!r}; leave it out."
-        raise InputError(msg)
+    if method != LIKELIHOOD:
+        given = {
+            "--noise": noise != "generic",
+            "--map-age": map_age,
+            "--drift-report": drift_report,
+        }
+        for option in (name for name, value in given.items() if value):
+            msg = f"{option} is for --method likelihood, not for {method!r}; leave it out."
+            raise InputError(msg)
     import dataclasses
 
     from semsig_gis.database.city import open_city
@@ -84,7 +99,11 @@ def evaluate(
     ]
     city = open_city(database)
     measured = (
-        prepared_index(city, read_noise(noise)) if method == LIKELIHOOD else Method.parse(method)
+        prepared_index(
+            city, read_noise(noise, city.database, map_age=map_age, drift_report=drift_report)
+        )
+        if method == LIKELIHOOD
+        else Method.parse(method)
     )
     with progress("evaluating") as advance:
         evaluation = run(
@@ -287,8 +306,8 @@ def identify(
     )
 
     _require_numbers(check, threads, out)
-    model = read_noise(noise)
     city = open_city(database)
+    model = read_noise(noise, city.database)
     if not on_grid:
         model = cell_noise(model, city.database.grid.step)
     columns = known_identifiability(city)

@@ -19,13 +19,16 @@ from semsig_gis.cli.console import (
     say,
 )
 from semsig_gis.cli.options import (
+    DriftReport,
     Heading,
+    MapAge,
     NoiseName,
     Objects,
     OnGrid,
     Refine,
     SearchOptions,
     object_store,
+    read_drift,
 )
 
 if TYPE_CHECKING:
@@ -52,23 +55,32 @@ def learn(
     *,
     samples: Samples,
     out: Annotated[Path, typer.Option(help="Noise model to write (.toml or .json), for --noise.")],
+    map_age: MapAge = 0.0,
+    drift_report: DriftReport = None,
     objects: Objects = None,
     as_json: AsJson = False,
 ) -> None:
-    """Learn how a detector fails from detections of known places."""
+    """Learn how a detector fails from detections of known places.
+
+    What the age of the map explains of the misses and false objects is not the detector's.
+    """
     from dataclasses import replace
 
     from semsig_gis.database.city import open_city
+    from semsig_gis.likelihood.noise.age import check_map_age, fresh_noise
     from semsig_gis.likelihood.noise.learn import read_samples
     from semsig_gis.likelihood.noise.model import save_noise
 
-    keep_inputs(out, read=(database, samples, objects))
+    keep_inputs(out, read=(database, samples, objects, drift_report))
+    check_map_age(map_age)
+    change = read_drift(drift_report, map_age)
     city = open_city(database)
     rows = read_samples(samples, taxonomy=city.database.taxonomy)
     with progress("learning"):
         estimate = _estimate(city, rows, objects)
     # How far the places were known is no matter of the detector.
-    noise = replace(estimate.spec, position_sigma=0.0, name=out.stem)
+    learnt = replace(estimate.spec, position_sigma=0.0, name=out.stem)
+    noise = fresh_noise(learnt, map_age, database=city.database, drift=change)
     save_noise(noise, out)
     estimate = replace(estimate, spec=noise)
     if as_json:
@@ -82,6 +94,12 @@ def learn(
         ("quantity", "class", "value", "its own samples say", "95% interval", "samples"),
         map(_rate, estimate.rates.to_dict("records")),
     )
+    if map_age:
+        say(
+            f"Without what a map of {map_age:g} years explains: detection {noise.detection:.3f} "
+            f"(was {learnt.detection:.3f}), {noise.clutter:.3f} false objects a signature (was "
+            f"{learnt.clutter:.3f})."
+        )
     say(f"noise model: {out}")
 
 
@@ -140,6 +158,8 @@ def calibrate(
         float, typer.Option(help="Share of the answers that shall be right.")
     ] = 0.98,
     noise: NoiseName = "generic",
+    map_age: MapAge = 0.0,
+    drift_report: DriftReport = None,
     heading: Heading = "known",
     on_grid: OnGrid = False,
     refine: Refine = None,
@@ -155,11 +175,18 @@ def calibrate(
     from semsig_gis.likelihood import posterior as abstention
     from semsig_gis.likelihood.noise.learn import read_samples
 
-    keep_inputs(out, read=(database, samples, noise, objects))
+    keep_inputs(out, read=(database, samples, noise, drift_report, objects))
     city = open_city(database)
     rows = read_samples(samples, taxonomy=city.database.taxonomy)
     options = SearchOptions(
-        noise=noise, heading=heading, on_grid=on_grid, refine=refine, objects=objects, top=1
+        noise=noise,
+        map_age=map_age,
+        drift_report=drift_report,
+        heading=heading,
+        on_grid=on_grid,
+        refine=refine,
+        objects=objects,
+        top=1,
     )
     locator = options.locator(city)
     radius = locator.rule.radius

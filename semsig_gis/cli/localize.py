@@ -159,7 +159,7 @@ class LocalizeOptions(SearchOptions, QueryOptions):
             msg = "--route was given without --queries; give the file of its views."
             raise InputError(msg)
         read = (self.database, self.objects, self.area, self.popularity, self.rule, self.noise)
-        keep_inputs(self.map_, self.out, read=read)
+        keep_inputs(self.map_, self.out, read=(*read, self.drift_report))
         require_suffix(".html", self.map_)
         if self.writes_chances and (self.share is not None or self.within):
             msg = (

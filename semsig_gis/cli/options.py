@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from semsig_gis.database.north import North
     from semsig_gis.likelihood.index import LikelihoodIndex
     from semsig_gis.likelihood.locate import LikelihoodLocator
+    from semsig_gis.likelihood.noise.age import Drift
     from semsig_gis.likelihood.noise.model import Noise
 
 EXPLAINED = 3  # candidates
@@ -33,6 +34,23 @@ NoiseName = Annotated[
         "--noise",
         help="How the detector fails: light, medium, strong, generic (any of them), or a file "
         "written by `semsig learn`.",
+    ),
+]
+MapAge = Annotated[
+    float,
+    typer.Option(
+        "--map-age",
+        help="Age of the map in years, 0 to 100: how long before the queries its objects were "
+        "gathered.",
+    ),
+]
+DriftReport = Annotated[
+    Path | None,
+    typer.Option(
+        "--drift-report",
+        help="How fast a city changes, for --map-age: what `semsig update --years N --json` "
+        "prints, or a .toml file of that form.  [default: as Monaco in OpenStreetMap]",
+        show_default=False,
     ),
 ]
 Heading = Annotated[
@@ -97,6 +115,8 @@ class SearchOptions:
     ] = None
     top: Annotated[int, typer.Option(help="Number of candidates.")] = 10
     noise: NoiseName = "generic"
+    map_age: MapAge = 0.0
+    drift_report: DriftReport = None
     heading: Heading = "known"
     on_grid: OnGrid = False
     near: Annotated[
@@ -154,7 +174,9 @@ class SearchOptions:
             raise InputError(msg)
         sigma = _north_sigma(self.heading)
         rule = DEFAULT_RULE if self.rule is None else open_rule(self.rule)
-        noise = read_noise(self.noise)
+        noise = read_noise(
+            self.noise, city.database, map_age=self.map_age, drift_report=self.drift_report
+        )
         if not self.on_grid:
             noise = cell_noise(noise, city.database.grid.step)
         log_prior, known = self._prior(city.database)
@@ -214,11 +236,32 @@ def prepared_index(city: City, model: Noise) -> LikelihoodIndex:
         return ready_index(city.database, model, path, note=remark, progress=advance)
 
 
-def read_noise(noise: str) -> Noise:
-    """Return a noise model by its name or file."""
+def read_noise(
+    noise: str,
+    database: SignatureDatabase,
+    *,
+    map_age: float = 0.0,
+    drift_report: Path | None = None,
+) -> Noise:
+    """Return a noise model by its name or file, for a map of some age."""
+    from semsig_gis.likelihood.noise.age import aged_noise
     from semsig_gis.likelihood.noise.model import NOISES, named_noise, open_noise
 
-    return open_noise(noise) if noise not in NOISES and Path(noise).suffix else named_noise(noise)
+    by_file = noise not in NOISES and Path(noise).suffix
+    model = open_noise(noise) if by_file else named_noise(noise)
+    return aged_noise(model, map_age, database=database, drift=read_drift(drift_report, map_age))
+
+
+def read_drift(drift_report: Path | None, map_age: float) -> Drift | None:
+    """Return how fast a city changes, None for what is usual; it is for an old map alone."""
+    if drift_report is None:
+        return None
+    if map_age == 0:
+        msg = "--drift-report was given without --map-age; give the age of the map in years, too."
+        raise InputError(msg)
+    from semsig_gis.likelihood.noise.age import open_drift
+
+    return open_drift(drift_report)
 
 
 def object_store(city: City, objects: Path | None, *, needed: bool) -> ObjectStore | None:

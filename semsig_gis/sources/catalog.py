@@ -378,7 +378,7 @@ def _rows(item: list[Any], where: str) -> tuple[int, int]:
 
 
 # Shipped beside the catalogues: the paper's classes, and words by which drafts are made.
-NO_CATALOGS = frozenset({"keywords", "taxonomy"})
+NO_CATALOGS = frozenset({"drift", "keywords", "taxonomy"})
 # What a catalogue may say, and of which type; every other key is a mistake that gets named.
 CATALOG_KEYS = {
     "name": str,

@@ -6,9 +6,10 @@ import json
 import re
 import tomllib
 from collections.abc import Mapping
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from semsig_gis.core.errors import CatalogError, nearest_name
+from semsig_gis.core.errors import CatalogError, InputError, nearest_name
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -21,6 +22,21 @@ TYPE_NAMES: dict[type, str] = {
     dict: "a table",
     bool: "true or false",
 }
+
+
+def read_values(path: str | Path, what: str) -> Any:  # noqa: ANN401 - as the file has it
+    """Read plain values from a TOML file (suffix ``.toml``) or a JSON file.
+
+    InputError if it cannot be read; `what` says what it is for.
+    """
+    file = Path(path)
+    try:
+        text = file.read_text(encoding="utf-8")
+        return tomllib.loads(text) if file.suffix.lower() == ".toml" else json.loads(text)
+    except (OSError, ValueError) as error:
+        reason = error.strerror if isinstance(error, OSError) else error
+        msg = f"{what} file {file} cannot be read ({reason}); give a JSON or TOML file."
+        raise InputError(msg) from error
 
 
 def parse_toml(text: str, where: str) -> dict[str, Any]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import io
 import json
 import math
@@ -19,6 +20,7 @@ from worlds import CORNER, World, random_town
 from semsig_gis.database.city import ObjectStore, save_with_store
 from semsig_gis.database.file import save_database
 from semsig_gis.database.views import views_at
+from semsig_gis.evaluation.file import open_evaluation
 from semsig_gis.likelihood.noise.model import open_noise
 from semsig_gis.likelihood.posterior import open_rule
 from semsig_gis.objects.table import save_objects
@@ -225,6 +227,39 @@ def test_noise_is_learnt_and_used(city: Path, run: Run) -> None:
     answer = json.loads(run(*query)[1])
     assert answer["noise"] == "noise"
     assert math.dist((answer["place"]["x"], answer["place"]["y"]), PLACE) < 1.0
+
+
+def test_the_age_of_the_map_is_told_and_taken_off_what_is_learnt(city: Path, run: Run) -> None:
+    fewer = city.with_name("fewer.parquet")
+    objects = WORLD.street_objects
+    save_objects(dataclasses.replace(objects, table=objects.table[::2]), fewer)
+    newer, report = city.with_name("newer.parquet"), city.with_name("drift.json")
+    update = "update", city, "--objects", fewer, "--out", newer
+    report.write_text(run(*update, "--years", 2, "--json")[1], encoding="utf-8")
+    old = "--map-age", 2, "--drift-report", report
+    query = "localize", city, *options(SEEN), *BY
+    assert "by likelihood (2-year-old map with generic noise)" in run(*query, *old)[1]
+    answers = [json.loads(run(*query, *more, "--json")[1]) for more in ((), old)]
+    assert [one["noise"] for one in answers] == ["generic", "2-year-old map with generic"]
+    assert answers[0]["entropy_bits"] < answers[1]["entropy_bits"]
+    file, out = written(city.with_name("s.jsonl"), samples(100)), city.with_name("noise.toml")
+    learn = "learn", city, "--samples", file, "--out", out
+    plain = json.loads(run(*learn, "--json")[1])["spec"]
+    told = run(*learn, *old)[1]
+    spec = open_noise(out).to_dict()
+    assert f"detection {spec['detection']:.3f} (was {plain['detection']:.3f})" in told
+    assert spec["detection"] > 0.95 > plain["detection"]
+    rules = []
+    for more in ((), old):
+        rule = city.with_name("rule.json")
+        calibrate = "calibrate", city, "--samples", file, "--out", rule, "--precision", 0.9
+        assert run(*calibrate, "--no-refine", *more)[0] == 0
+        rules.append(open_rule(rule))
+    assert rules[0].threshold != rules[1].threshold
+    folder = city.with_name("evaluation")
+    assert run("evaluate", city, *BY, *old, "--queries", 20, "--out", folder)[0] == 0
+    method = open_evaluation(folder).method
+    assert str(method) == "likelihood:2-year-old map with generic:on_grid"
 
 
 def test_noise_is_learnt_without_a_store(city: Path, run: Run) -> None:

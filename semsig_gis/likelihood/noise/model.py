@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import json
 import math
-import tomllib
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field, fields, replace
 from pathlib import Path
@@ -17,7 +16,7 @@ from typing import TYPE_CHECKING, Any
 
 from semsig_gis.core.errors import InputError, UnknownNameError, nearest_name
 from semsig_gis.core.geometry import HALF_TURN
-from semsig_gis.storage.toml import toml_text
+from semsig_gis.storage.toml import read_values, toml_text
 from semsig_gis.storage.whole import whole_file
 
 if TYPE_CHECKING:
@@ -368,15 +367,7 @@ NOISES: Mapping[str, Noise] = MappingProxyType(
 
 def open_noise(path: str | Path) -> Noise:
     """Read a noise model from a JSON file, or a TOML file with the suffix ``.toml``."""
-    file = Path(path)
-    try:
-        text = file.read_text(encoding="utf-8")
-        values = tomllib.loads(text) if file.suffix.lower() == ".toml" else json.loads(text)
-    except (OSError, ValueError) as error:
-        reason = error.strerror if isinstance(error, OSError) else error
-        msg = f"noise file {file} cannot be read ({reason}); give a JSON or TOML file."
-        raise InputError(msg) from error
-    return noise_from_dict(values)
+    return noise_from_dict(read_values(path, "noise"))
 
 
 def save_noise(noise: Noise, path: str | Path) -> None:
