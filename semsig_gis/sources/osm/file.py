@@ -17,6 +17,7 @@ from osmium.filter import KeyFilter
 from osmium.osm import NODE, NOTHING, RELATION, WAY, Node, Relation, Way
 
 from semsig_gis.core.errors import CatalogError, SourceError
+from semsig_gis.core.geometry import HALF_TURN
 from semsig_gis.sources import require_file
 from semsig_gis.sources.area import Area, join_areas
 from semsig_gis.sources.osm.elements import ElementLayer, TagIndex, relation_shape, way_shape
@@ -40,7 +41,6 @@ KINDS: dict[str, ElementKind] = {"n": "node", "w": "way", "r": "relation"}
 # pyosmium's table of node places that is not in memory.
 PLACES = "sparse_file_array"
 NOWHERE = (math.nan, math.nan)
-HALF_TURN = 180.0
 
 
 class _Outline(NamedTuple):
