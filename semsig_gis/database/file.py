@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 import os
+import zlib
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -311,12 +312,18 @@ class Manifest:
 
     def write(self, folder: Path) -> None:
         """Write the manifest into the folder of the parts; it appears whole, by rename."""
-        content = {
+        content: dict[str, Any] = {
             "kind": PARTS_KIND,
             "recipe": self.recipe,
             "parts": [{"file": part.file, **asdict(part)} for part in self.parts],
         }
+        content["sum"] = _sum(content)
         write_whole(folder / MANIFEST, json.dumps(content, indent=1) + "\n")
+
+
+def _sum(content: dict[str, Any]) -> int:
+    """Return the CRC-32 of values for JSON."""
+    return zlib.crc32(json.dumps(content).encode())
 
 
 def part_name(tile: tuple[int, int]) -> str:
@@ -329,6 +336,8 @@ def read_manifest(folder: str | Path) -> Manifest:
     path = Path(folder) / MANIFEST
     try:
         content = json.loads(path.read_text(encoding="utf-8"))
+        if "sum" in content and content.pop("sum") != _sum(content):  # those of before have none
+            raise ValueError(path)  # noqa: TRY301
         parts = tuple(
             Part(
                 tile=(int(one["tile"][0]), int(one["tile"][1])),

@@ -5,8 +5,9 @@ what a detection there adds, less ``log(lambda(t))``, which is the same for all 
 density over the step.
 
 The file lies beside its database, is mapped into memory, and renewed when stale. A line of JSON,
-padded to whole pages, tells what it belongs to; then come the constants (float32) and the columns
-(uint8), so that a query touches only the pages of its own columns.
+padded to whole pages, tells what it belongs to; then come the constants (float32), the CRC-32 of
+every column and the columns (uint8), so that a query touches only the pages of its own columns, and
+checks those.
 """
 
 from __future__ import annotations
@@ -47,7 +48,7 @@ BIN_UNITS = BEARING_UNITS // BINS
 
 LEVELS = 128  # of bearing noise, where it depends on the distance
 LINES_A_TASK = 64
-VERSION = 1  # of the index: raised whenever the same database and noise give other columns
+VERSION = 2  # of the index: raised whenever the same database and noise give other columns
 MOST_OBJECTS = 257  # whose bytes add up within 16 bits
 LEAST_PRIOR = 1e-7  # turns that are less likely than this, against the likeliest, are left out
 LEAST_MASS = 1e-6  # below which a turn adds nothing to the sum
@@ -71,6 +72,24 @@ class CellScores:
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
+class IndexFile:
+    """A file that columns are mapped from, and their sums, which the first use of each checks."""
+
+    path: Path
+    sums: NDArray[np.uint32]
+    checked: NDArray[np.bool_]
+
+    def require_intact(self, columns: NDArray[np.uint8], numbers: NDArray[np.int64]) -> None:
+        """Raise DatabaseError if a column of these numbers is not the one that was written."""
+        new = numbers[~self.checked[numbers]]
+        for number in {*new.tolist()}:
+            if zlib.crc32(columns[number].data) != self.sums[number]:
+                msg = f"{self.path} is damaged; delete it, and the index is built again."
+                raise DatabaseError(msg)
+            self.checked[number] = True
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
 class LikelihoodIndex:
     """What the cells of a database add to the likelihood of each symbol.
 
@@ -86,6 +105,8 @@ class LikelihoodIndex:
         Size of a step.
     fingerprint : str
         Stands for the database, the noise model and the version of the index.
+    file : IndexFile, optional
+        Where the columns are mapped from.
 
     Examples
     --------
@@ -102,6 +123,7 @@ class LikelihoodIndex:
     constants: NDArray[np.float32]
     step: float
     fingerprint: str
+    file: IndexFile | None = None
 
     @functools.cached_property
     def models(self) -> tuple[tuple[NoiseTable, ...], NDArray[np.float64]]:
@@ -112,6 +134,16 @@ class LikelihoodIndex:
     def table(self) -> NoiseTable:
         """The noise model that the columns hold."""
         return mean_table(*self.models)
+
+    def flat_columns(self, symbols: NDArray[np.int64] | None = None) -> NDArray[np.uint8]:
+        """Return the columns, shape ((k + 1) * 72, n), of which some, or all, will be looked at.
+
+        DatabaseError if one of those is not the one that was written.
+        """
+        flat = self.columns.reshape(-1, len(self.constants))
+        if self.file is not None:
+            self.file.require_intact(flat, np.arange(len(flat)) if symbols is None else symbols)
+        return flat
 
     def scores(self, query: Signature, *, north_sigma: float = 0.0) -> CellScores:
         """Return the log-likelihood of a query in every cell, and the likeliest turn for each.
@@ -132,8 +164,8 @@ class LikelihoodIndex:
             return self._turned(rows, bins, base, north_sigma)
         from semsig_gis.likelihood.kernels import scan  # noqa: PLC0415 - numba loads slowly
 
-        flat = self.columns.reshape(-1, len(self.constants))
         symbols = rows * BINS + bins
+        flat = self.flat_columns(symbols)
         scores = np.empty(len(self.constants), np.float32)
         constants = self.constants
         for low in range(0, len(symbols), MOST_OBJECTS):
@@ -165,7 +197,7 @@ class LikelihoodIndex:
         scores = np.empty(len(self.constants), np.float32)
         best = np.empty(len(self.constants), np.int16)
         scan_turned(
-            self.columns.reshape(-1, len(self.constants)),
+            self.flat_columns(symbols),
             symbols,
             turns,
             priors,
@@ -434,24 +466,26 @@ def save_index(
     """
     _keep_database(path, noise)
     shape = _shape(database)
-    start = _columns_start(shape[-1])
+    start = _columns_start(shape)
     with whole_file(path) as partial:
         with partial.open("wb") as file:
             file.truncate(start + math.prod(shape))
         columns = np.memmap(partial, np.uint8, "r+", offset=start, shape=shape)
         index = build_index(database, noise, out=columns, progress=progress, threads=threads)
         columns.flush()
-        del columns
+        flat = columns.reshape(-1, shape[-1])
+        sums = np.array([zlib.crc32(column.data) for column in flat], np.uint32)
+        del flat, columns
         header = {
             "kind": KIND,
             "fingerprint": index.fingerprint,
             "shape": list(shape),
             "step": index.step,
-            "constants": zlib.crc32(index.constants.tobytes()),
+            "sum": _sum(index.step, index.constants, sums),
         }
         with partial.open("r+b") as file:
             file.write(json.dumps(header).encode().ljust(HEADER_PAGES * PAGE - 1) + b"\n")
-            file.write(index.constants.tobytes())
+            file.write(index.constants.tobytes() + sums.tobytes())
 
 
 def open_index(
@@ -468,18 +502,19 @@ def open_index(
     """
     fingerprint = fingerprint or index_fingerprint(database, noise)
     shape = _shape(database)
-    start = _columns_start(shape[-1])
+    start = _columns_start(shape)
     try:
         with Path(path).open("rb") as file:
             header = json.loads(file.read(HEADER_PAGES * PAGE))
             constants = np.fromfile(file, np.float32, shape[-1])
+            sums = np.fromfile(file, np.uint32, math.prod(shape[:-1]))
         same = header["fingerprint"] == fingerprint
         step = float(header["step"])
         whole = (
             header["kind"] == KIND
             and header["shape"] == list(shape)
             and Path(path).stat().st_size == start + math.prod(shape)
-            and zlib.crc32(constants.tobytes()) == header["constants"]
+            and header["sum"] == _sum(step, constants, sums)
             and 0 < step < math.inf
         )
         columns = np.memmap(path, np.uint8, "r", offset=start, shape=shape) if whole else None
@@ -500,6 +535,7 @@ def open_index(
         constants=constants,
         step=step,
         fingerprint=fingerprint,
+        file=IndexFile(path=Path(path), sums=sums, checked=np.zeros(len(sums), np.bool_)),
     )
 
 
@@ -518,6 +554,12 @@ def _keep_database(path: str | Path, noise: Noise) -> None:
         raise InputError(msg)
 
 
-def _columns_start(cells: int) -> int:
+def _sum(step: float, constants: NDArray[np.float32], sums: NDArray[np.uint32]) -> int:
+    """Return the CRC-32 of what stands before the columns."""
+    return zlib.crc32(sums.data, zlib.crc32(constants.data, zlib.crc32(repr(step).encode())))
+
+
+def _columns_start(shape: tuple[int, int, int]) -> int:
     """Return the byte at which the columns begin: a whole page."""
-    return HEADER_PAGES * PAGE + -(-4 * cells // PAGE) * PAGE
+    sums, cells = math.prod(shape[:-1]), shape[-1]
+    return HEADER_PAGES * PAGE + -(-4 * (cells + sums) // PAGE) * PAGE

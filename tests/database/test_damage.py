@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from typing import TYPE_CHECKING
 
 import geopandas as gpd
@@ -9,11 +10,12 @@ import numpy as np
 import pyarrow.parquet as pq
 import pytest
 import shapely
-from sentences import assert_sentence
+from sentences import assert_sentence, refused
 from worlds import ARRAYS, CORNER, random_town
 
-from semsig_gis.core.errors import SemsigError
+from semsig_gis.core.errors import DatabaseError, SemsigError
 from semsig_gis.database.file import database_specs, open_database, save_database
+from semsig_gis.database.tiles import build_tiles
 from semsig_gis.evaluation.evaluate import evaluate
 from semsig_gis.evaluation.file import open_evaluation, save_evaluation
 from semsig_gis.objects.surroundings import read_surroundings, save_surroundings
@@ -85,6 +87,21 @@ def test_a_changed_byte_is_told_or_means_nothing(
             assert_sentence(error, name)
             told += 1
     assert told > TRIES // 2
+
+
+def test_a_changed_number_in_a_manifest_is_told(tmp_path: Path) -> None:
+    save_objects(TOWN.street_objects, tmp_path / "objects.parquet")
+    folder = tmp_path / "city"
+    build_tiles(tmp_path / "objects.parquet", folder)
+    manifest = folder / "_manifest.json"
+    text = manifest.read_text()
+    manifest.write_text(text.replace('"entries": ', '"entries": 1'))
+    with refused(DatabaseError, "_manifest.json is damaged"):
+        open_database(folder)
+    old = json.loads(text)
+    del old["sum"]  # as it was written before
+    manifest.write_text(json.dumps(old))
+    assert len(open_database(folder)) == len(TOWN.database)
 
 
 def test_files_that_others_wrote_or_changed_have_no_sums(tmp_path: Path) -> None:

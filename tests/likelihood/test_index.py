@@ -250,6 +250,7 @@ FAULTS: dict[str, tuple[Callable[[bytes], bytes], str]] = {
     "list": (lambda content: b"[]".ljust(len(content)), DAMAGED),
     "constants": (lambda content: content[:16385] + b"\x77" + content[16386:], DAMAGED),
     "step": (lambda content: content.replace(b'"step": 0', b'"step":-0', 1), DAMAGED),
+    "number": (lambda content: content.replace(b'"step": 0.0', b'"step": 0.1', 1), DAMAGED),
     "stale": (
         lambda content: content.replace(b'"fingerprint": "', b'"fingerprint":"x', 1),
         "another database, noise model or version",
@@ -274,6 +275,16 @@ def test_a_damaged_file_is_refused_and_then_renewed(
     (note,) = notes
     assert note.startswith("The likelihood index is built again: ")
     assert word in note
+
+
+def test_a_column_that_was_changed_is_told_when_a_query_needs_it(path: Path) -> None:
+    content = bytearray(path.read_bytes())
+    content[-1] ^= 1  # of the last class, which stands for "not known"
+    path.write_bytes(content)
+    index = open_index(DATABASE, NOISE, path)
+    index.scores(DATABASE.signature(3))
+    with refused(DatabaseError, path.name, "delete it"):
+        index.flat_columns()
 
 
 def test_where_no_file_can_be_written_the_index_is_kept_in_memory(tmp_path: Path) -> None:

@@ -89,7 +89,7 @@ def find_lookalikes(
     radius = min(radius, city_extent(database))
     where = np.stack([database.columns, database.rows], axis=1).astype(np.int64)
     symbols, _ = _symbols(index)
-    ids, flat = database.cell_ids, index.columns.reshape(-1, len(database))
+    ids, flat = database.cell_ids, index.flat_columns()
     circle = cell_circle(radius, step)
     like = Lookalikes(
         near=np.empty(len(rows)),
@@ -151,7 +151,7 @@ def compare_without_classes(
     count, classes = len(database), len(index.table.codes)
     rng = np.random.default_rng([seed, 1])
     sample = np.sort(rng.permutation(count)[:SAMPLE])
-    flat = index.columns.reshape(-1, count)
+    flat = index.flat_columns()
     owner = np.repeat(np.arange(count), database.lengths)
     lengths = np.minimum(database.lengths, len(index.table.missed) - 1)[owner]
     missed = np.log(index.table.missed)[lengths, kinds]
