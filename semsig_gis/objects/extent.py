@@ -7,8 +7,9 @@ must not move a city.
 from __future__ import annotations
 
 import math
-from dataclasses import replace
-from typing import TYPE_CHECKING, NamedTuple
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import TYPE_CHECKING
 
 import geopandas as gpd
 import numpy as np
@@ -18,12 +19,14 @@ from pyproj import Transformer
 
 from semsig_gis.core.errors import CrsError, EmptyResultError, InputError
 from semsig_gis.core.geometry import (
+    cell_ids,
     plane_distortion,
     require_metric_crs,
     signed_degrees,
+    split_ids,
     wrap_degrees,
 )
-from semsig_gis.sources.raw_layer import LATITUDE_LIMIT, WGS84, crs_label
+from semsig_gis.sources.raw_layer import LATITUDE_LIMIT, WGS84, crs_label, fits_the_globe
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -40,10 +43,14 @@ MAX_DISTORTION = 6.0
 Grid north turns by at most six degrees within a zone of UTM.
 """
 
+# Larger than any projected coordinate; files write -1.8e308 and the like for "no value".
+BEYOND_EARTH_M = 1e8
 # Places with gaps of less than about this between them are one town: 111 km.
 GAP_DEGREES = 1.0
-# Places are put together by so many degrees before they are grouped.
-ROUNDING_DECIMALS = 1
+# Places are rounded to so many degrees before they are grouped.
+ROUNDING_DEGREES = 0.1
+# A degree of longitude counts as at least this share of one of latitude, at the poles too.
+LEAST_WIDTH = 0.05
 # A town of its own has at least so many places, or this share of all; 50 are always one.
 FEW_PLACES, TOWN_SHARE, MANY_PLACES = 3, 0.01, 50
 # Data may lie so far outside of where a CRS is used: such areas are drawn along borders.
@@ -52,56 +59,65 @@ PLACES_TOLD = 3
 EXCHANGE = "exchange x_field and y_field in the catalogue, or the axes in the file"
 
 
-class _Located(NamedTuple):
+@dataclass(frozen=True, eq=False)
+class _Located:
     """A layer, and a point of each of its rows in degrees, shape (n, 2), NaN where there is none.
 
-    `swapped` are the degrees that they would have with x and y exchanged, `coordinates` the
-    distinct finite points as the source has them.
+    `coordinates` are those of the points in the CRS of the layer, shape (p, 2).
     """
 
     layer: RawLayer
     degrees: NDArray[np.float64]
-    swapped: NDArray[np.float64]
     coordinates: NDArray[np.float64]
 
-    @property
-    def name(self) -> str:
-        return self.layer.spec.name
+    @cached_property
+    def places(self) -> NDArray[np.float64]:
+        """The different places on the Earth, shape (d, 2)."""
+        return _distinct(self.degrees)
+
+    @cached_property
+    def swapped(self) -> tuple[float, float] | None:
+        """The middle of the places if x and y are exchanged; None if they are off the Earth."""
+        places = _distinct(_to_degrees(self.coordinates[:, ::-1], self.layer.table.crs))
+        return _Towns(places).centre() if len(places) else None
 
 
 class _Towns:
-    """Places in degrees, grouped into towns by the gaps between them; the largest comes first."""
+    """Different places in degrees, in towns by the gaps between them; the largest comes first."""
 
     def __init__(self, places: NDArray[np.float64]) -> None:
-        distinct = _distinct(places)
-        self.size = len(distinct)
-        turn = np.radians(distinct[:, 0])
+        turn = np.radians(places[:, 0])
         # Longitudes are counted from the middle, so that no town is cut at 180 degrees.
         self._middle = float(np.degrees(np.arctan2(np.sin(turn).mean(), np.cos(turn).mean())))
-        plane = self._plane(distinct)
-        cells = np.unique(np.round(plane, ROUNDING_DECIMALS), axis=0)
-        wide = GAP_DEGREES / 2 / np.maximum(np.cos(np.radians(cells[:, 1])), 0.05)
+        cells, cell = self._cells(places)
         x, y = cells.T
         half = GAP_DEGREES / 2
+        wide = half / np.maximum(np.cos(np.radians(y)), LEAST_WIDTH)
         boxes = shapely.box(x - wide, y - half, x + wide, y + half)
         parts = shapely.get_parts(shapely.union_all(boxes))
-        _, town = shapely.STRtree(parts).query(shapely.points(plane), predicate="intersects")
-        order = np.argsort(-np.bincount(town, minlength=len(parts)), kind="stable")
-        self._parts = parts[order]
-        self._tree = shapely.STRtree(self._parts)
-        self._distinct = distinct
-        self._town = np.argsort(order)[town]
+        _, town = shapely.STRtree(parts).query(shapely.points(cells), predicate="intersects")
+        order = np.argsort(-np.bincount(town[cell], minlength=len(parts)), kind="stable")
+        self._tree = shapely.STRtree(parts[order])
+        self._places = places
+        self._town = np.argsort(order)[town][cell]
 
     def _plane(self, degrees: NDArray[np.float64]) -> NDArray[np.float64]:
         return np.column_stack([signed_degrees(degrees[:, 0] - self._middle), degrees[:, 1]])
 
+    def _cells(self, degrees: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+        """Return the different rounded places, shape (c, 2), and which of them each place is in."""
+        ids = cell_ids(*np.rint(self._plane(degrees) / ROUNDING_DEGREES).T)
+        distinct, cell = np.unique(ids, return_inverse=True)
+        cells = np.column_stack(split_ids(distinct)) * np.float64(ROUNDING_DEGREES)
+        return cells, cell.astype(np.int64, copy=False)
+
     def of(self, degrees: NDArray[np.float64]) -> NDArray[np.int64]:
         """Return the town in which each position lies, -1 where in none."""
-        towns = np.full(len(degrees), -1)
-        points = shapely.points(self._plane(degrees))
-        point, town = self._tree.query(points, predicate="intersects")
+        cells, cell = self._cells(degrees)
+        towns = np.full(len(cells), -1)
+        point, town = self._tree.query(shapely.points(cells), predicate="intersects")
         towns[point] = town
-        return towns
+        return towns[cell]
 
     @property
     def large(self) -> int:
@@ -110,19 +126,19 @@ class _Towns:
         All are, if the largest does not hold most places.
         """
         sizes = np.bincount(self._town)
-        if 2 * sizes[0] <= self.size:
+        if 2 * sizes[0] <= len(self._places):
             return len(sizes)
-        least = max(FEW_PLACES, min(MANY_PLACES, TOWN_SHARE * self.size))
+        least = max(FEW_PLACES, min(MANY_PLACES, TOWN_SHARE * len(self._places)))
         return max(1, int((sizes >= least).sum()))
 
     def centre(self) -> tuple[float, float]:
         """Return the median longitude and latitude of the largest town."""
-        x, y = np.median(self._plane(self._distinct[self._town == 0]), axis=0)
+        x, y = np.median(self._plane(self._places[self._town == 0]), axis=0)
         return float(signed_degrees(x + self._middle)), float(y)
 
     def bounds(self, town: int) -> Bounds:
         """Return west, south, east and north of a town; west is the greater across 180 degrees."""
-        plane = self._plane(self._distinct[self._town == town])
+        plane = self._plane(self._places[self._town == town])
         (west, south), (east, north) = plane.min(axis=0), plane.max(axis=0)
         west, east = signed_degrees([west + self._middle, east + self._middle])
         return float(west), float(south), float(east), float(north)
@@ -174,22 +190,32 @@ def settle_extent(
     located = [_located(layer) for layer in layers]
     placed = [one for one in located if len(one.coordinates)]
     for one in placed:
-        if len(placed) == 1 or len(one.coordinates) >= FEW_PLACES:
+        # A row or two are left out where they lie far from all others.
+        if (
+            len(placed) == 1
+            or len(one.places if len(one.places) else one.coordinates) >= FEW_PLACES
+        ):
             _require_area(one, metric)
-    objects = [one.degrees for one in placed if one.layer.spec.role == "objects"]
-    places = [degrees[_known(degrees)] for degrees in objects or [one.degrees for one in placed]]
-    if not sum(map(len, places)):
+    places = _distinct(np.concatenate([np.empty((0, 2)), *_deciding(placed)]))
+    if not len(places):
         if metric is None:
             msg = "no layer has a feature with a position; look at the filters and the area."
             raise EmptyResultError(msg)
         return tuple(layers), metric, ()
-    towns = _Towns(np.concatenate(places))
+    towns = _Towns(places)
     for one in placed:
         _require_company(one, towns)
     metric = metric or _utm_zone(*towns.centre())
     extents = [towns.bounds(town) for town in range(towns.large)]
-    notes = _require_plane(extents, np.concatenate(places), towns, metric, max_distortion)
+    kept = places[towns.of(places) < towns.large]
+    notes = _require_plane(extents, kept, metric, max_distortion)
     return tuple(_without_strays(one, towns) for one in located), metric, notes
+
+
+def _deciding(placed: Sequence[_Located]) -> list[NDArray[np.float64]]:
+    """Return the places of the layers that say where the city is: those of objects, if any."""
+    objects = [one.places for one in placed if one.layer.spec.role == "objects"]
+    return objects or [one.places for one in placed]
 
 
 def _located(layer: RawLayer) -> _Located:
@@ -203,14 +229,18 @@ def _located(layer: RawLayer) -> _Located:
     geometry = layer.table.geometry.to_numpy()
     coordinates, row = shapely.get_coordinates(geometry, return_index=True)
     first = np.flatnonzero(np.diff(row, prepend=-1))
+    first = first[(np.abs(coordinates[first]) < BEYOND_EARTH_M).all(axis=1)]  # false for NaN too
+    degrees = np.full((len(geometry), 2), np.nan)
+    degrees[row[first]] = _to_degrees(coordinates[first], crs)
+    return _Located(layer, degrees, coordinates[first])
+
+
+def _to_degrees(xy: NDArray[np.float64], crs: CRS) -> NDArray[np.float64]:
+    """Return longitudes and latitudes, NaN off the Earth."""
     to_degrees = Transformer.from_crs(crs, WGS84, always_xy=True)
-    degrees, swapped = (np.full((len(geometry), 2), np.nan) for _ in range(2))
-    x, y = coordinates[first].T
-    for target, pair in ((degrees, (x, y)), (swapped, (y, x))):
-        target[row[first]] = np.column_stack(to_degrees.transform(*pair))
-        target[~_known(target)] = np.nan
-    finite = coordinates[first][np.isfinite(coordinates[first]).all(axis=1)]
-    return _Located(layer, degrees, swapped, pd.DataFrame(finite).drop_duplicates().to_numpy())
+    degrees = np.column_stack(to_degrees.transform(xy[:, 0], xy[:, 1]))
+    degrees[~_known(degrees)] = np.nan
+    return degrees
 
 
 def _known(degrees: NDArray[np.float64]) -> NDArray[np.bool_]:
@@ -227,8 +257,7 @@ def _distinct(degrees: NDArray[np.float64]) -> NDArray[np.float64]:
 def _require_area(one: _Located, metric: CRS | None) -> None:
     """Refuse a layer whose bulk lies where its CRS, or the metric one, is not used."""
     own: CRS = one.layer.table.crs
-    known = one.degrees[_known(one.degrees)]
-    centre = _Towns(known).centre() if len(known) else None
+    centre = _Towns(one.places).centre() if len(one.places) else None
     systems = [own] if metric is None else [own, metric]
     wrong = next((crs for crs in systems if centre is None or not _in_area(centre, crs)), None)
     if wrong is None:
@@ -240,16 +269,17 @@ def _require_area(one: _Located, metric: CRS | None) -> None:
     area = wrong.area_of_use
     used = "" if area is None else f" ({_box(area.bounds)} in degrees)"
     remedy = "state the crs that its coordinates are in"
-    swapped = one.swapped[_known(one.swapped)]
-    if len(swapped) and all(_in_area(_Towns(swapped).centre(), crs) for crs in systems):
-        there = _place(_Towns(swapped).centre())
+    if one.swapped is not None and all(_in_area(one.swapped, crs) for crs in systems):
+        there = _place(one.swapped)
         remedy = f"with x and y exchanged it would lie near {there}, so {EXCHANGE}"
+    elif own.is_projected and fits_the_globe(one.coordinates):
+        remedy = "its coordinates look like degrees, so state crs = 'EPSG:4326'"
     elif wrong is metric:
         remedy = f"give another metric CRS, such as {_zone_label(centre)}, or correct the layer's"
     kind = "the metric CRS" if wrong is metric else "its CRS"
     msg = (
-        f"layer {one.name!r} {where}, outside of where {kind}, {crs_label(wrong)}, is used{used}; "
-        f"{remedy}."
+        f"layer {one.layer.spec.name!r} {where}, outside of where {kind}, {crs_label(wrong)}, is "
+        f"used{used}; {remedy}."
     )
     raise CrsError(msg)
 
@@ -269,17 +299,15 @@ def _in_area(place: tuple[float, float], crs: CRS) -> bool:
 
 def _require_company(one: _Located, towns: _Towns) -> None:
     """Refuse a layer of which no place lies where most of the data does."""
-    known = one.degrees[_known(one.degrees)]
-    own = _distinct(known)
-    if len(own) < FEW_PLACES or (towns.of(own) == 0).any():
+    if len(one.places) < FEW_PLACES or (towns.of(one.places) == 0).any():
         return
     remedy = "correct the crs of the wrong ones, or load them apart"
-    swapped = one.swapped[_known(one.swapped)]
-    if len(swapped) and towns.of(np.array([_Towns(swapped).centre()]))[0] == 0:
+    if one.swapped is not None and towns.of(np.array([one.swapped]))[0] == 0:
         remedy = f"with x and y exchanged it would lie there, so correct the wrong ones: {EXCHANGE}"
+    here, there = _Towns(one.places).bounds(0), towns.bounds(0)
     msg = (
-        f"layer {one.name!r} lies at {_box(_Towns(own).bounds(0))} in degrees, far from most of "
-        f"the data at {_box(towns.bounds(0))}; {remedy}."
+        f"layer {one.layer.spec.name!r} lies at {_box(here)} in degrees, far from most of the data "
+        f"at {_box(there)}; {remedy}."
     )
     raise CrsError(msg)
 
@@ -302,15 +330,10 @@ def _zone_label(centre: tuple[float, float] | None) -> str:
 
 
 def _require_plane(
-    extents: Sequence[Bounds],
-    places: NDArray[np.float64],
-    towns: _Towns,
-    metric: CRS,
-    most: float,
+    extents: Sequence[Bounds], places: NDArray[np.float64], metric: CRS, most: float
 ) -> tuple[str, ...]:
     """Refuse a plane that turns or stretches too much between towns; note if there are several."""
-    kept = places[np.isin(towns.of(places), range(len(extents)))]
-    xy = np.column_stack(Transformer.from_crs(WGS84, metric, always_xy=True).transform(*kept.T))
+    xy = np.column_stack(Transformer.from_crs(WGS84, metric, always_xy=True).transform(*places.T))
     distortion = plane_distortion(metric, (*xy.min(axis=0), *xy.max(axis=0)))
     listed = " and ".join(map(_box, extents[:PLACES_TOLD]))
     if len(extents) > PLACES_TOLD:
@@ -357,6 +380,6 @@ def _place(place: tuple[float, float]) -> str:
 
 def _box(bounds: Bounds) -> str:
     """Return bounds in degrees as an area is written, which is never smaller than they are."""
-    west, south, east, north = (100.0 * side for side in bounds)
+    west, south, east, north = (round(100.0 * side, 6) for side in bounds)
     sides = (math.floor(west), math.floor(south), math.ceil(east), math.ceil(north))
     return ",".join(f"{side / 100:g}" for side in sides)

@@ -23,7 +23,7 @@ from semsig_gis.core.geometry import (
     require_metric_crs,
 )
 from semsig_gis.objects.conflate import ConflationReport, conflate
-from semsig_gis.objects.extent import MAX_DISTORTION, settle_extent
+from semsig_gis.objects.extent import BEYOND_EARTH_M, MAX_DISTORTION, settle_extent
 from semsig_gis.objects.surroundings import DIMENSIONS, KIND_OF
 from semsig_gis.objects.table import StreetObjects, layer_licences, layer_note
 from semsig_gis.sources import MERGING, find_files, reader
@@ -47,8 +47,6 @@ SAME_PLACE_M = 0.01
 # Column of the geometries that positions come from; dimensions of an area.
 SHAPE = "shape"
 AREA = 2
-# Larger than any projected coordinate; files write -1.8e308 and the like for "no value".
-BEYOND_EARTH_M = 1e8
 
 
 @dataclass(frozen=True, slots=True)

@@ -136,6 +136,7 @@ REFUSED = {  # layers, the metric CRS, words
         None,
         ["'a'", "its CRS, EPSG:25833", "state the crs"],
     ),
+    "degrees as metres": ([layer(town(PARIS), crs="EPSG:2154")], None, ["'EPSG:4326'"]),
     "another metric CRS": (
         [layer(town(HELSINKI))],
         "EPSG:2154",
