@@ -227,18 +227,19 @@ def _save_loaded(
     from semsig_gis.objects.table import save_objects
     from semsig_gis.reports.quality import quality_report
 
-    report = quality_report(loaded.objects, loaded.report, loaded.conflation, notes=loaded.notes)
+    notes = list(loaded.notes)
     save_objects(loaded.objects, out)
     for what, table, path in (
         ("buildings", loaded.buildings, buildings),
         ("streets", loaded.streets, streets),
     ):
         if path is not None and table is None:
-            remark(f"there are no {what} in what was loaded, so {path} is not written")
+            notes.append(f"there are no {what} in what was loaded, so {path} is not written")
         elif path is not None:
             save_surroundings(table, path)
-    for note in loaded.notes:
+    for note in notes:
         remark(note)
+    report = quality_report(loaded.objects, loaded.report, loaded.conflation, notes=notes)
     if as_json:
         print_json(report.to_dict())
         return
