@@ -63,7 +63,7 @@ class Condition:
                 )
                 raise CatalogError(msg)
             elif part != NO_VALUE:
-                _pattern(text)  # which refuses one that is none
+                pattern_of(text)  # which refuses one that is none
                 values.append(part)
         return cls(tuple(values), tuple(comparisons), nothing=NO_VALUE in parts)
 
@@ -136,7 +136,7 @@ def matches(value: object, wanted: Value) -> bool:
     if value is None:
         return False
     if isinstance(wanted, str):
-        pattern = _pattern(wanted)
+        pattern = pattern_of(wanted)
         text = as_text(value)
         return text == wanted if pattern is None else pattern.fullmatch(text) is not None
     if isinstance(wanted, bool) or isinstance(value, bool):
@@ -148,7 +148,7 @@ def matches(value: object, wanted: Value) -> bool:
 
 
 @functools.lru_cache
-def _pattern(wanted: str) -> re.Pattern[str] | None:
+def pattern_of(wanted: str) -> re.Pattern[str] | None:
     """Return the pattern that a text between slashes is; CatalogError if it is not valid."""
     inner = BETWEEN_SLASHES.fullmatch(wanted)
     try:
