@@ -10,6 +10,7 @@ from typing import Annotated, Any, Literal
 import typer
 
 from semsig_gis.cli.console import (
+    MOST_METRES,
     AsJson,
     Database,
     Scheduler,
@@ -35,14 +36,18 @@ def build(
     out: Annotated[
         Path, typer.Option(help="Signature database to write (.parquet), or a folder with tiles.")
     ],
-    step: Annotated[float, typer.Option(help="Side of a cell in metres.")] = 10.0,
+    step: Annotated[
+        float, typer.Option(min=0.01, max=100_000, help="Side of a cell in metres.")
+    ] = 10.0,
     radius: Annotated[
         float,
         typer.Option(
-            help="Visibility range in metres for classes without a range in the catalogue."
+            min=0.01,
+            max=6000,
+            help="Visibility range in metres for classes without a range in the catalogue.",
         ),
     ] = 30.0,
-    levels: Annotated[int, typer.Option(help="Number of angle levels.")] = 16,
+    levels: Annotated[int, typer.Option(min=1, max=255, help="Number of angle levels.")] = 16,
     origin: Annotated[
         str, typer.Option(help="Corner of a cell as X,Y in metres, in the CRS of the objects.")
     ] = "0,0",
@@ -57,7 +62,10 @@ def build(
         ),
     ] = "all",
     street_width: Annotated[
-        float, typer.Option(help="Default street width in metres, where --streets has none.")
+        float,
+        typer.Option(
+            min=0.1, max=400, help="Default street width in metres, where --streets has none."
+        ),
     ] = 16.0,
     area: Annotated[
         Path | None,
@@ -65,7 +73,11 @@ def build(
     ] = None,
     tile: Annotated[
         float | None,
-        typer.Option(help="Tile size in metres; 2000 with --workers or --scheduler."),
+        typer.Option(
+            min=1,
+            max=MOST_METRES,
+            help="Tile size in metres; 2000 with --workers or --scheduler.",
+        ),
     ] = None,
     workers: Workers = 0,
     scheduler: Scheduler = None,
@@ -162,8 +174,10 @@ def update(
     years: Annotated[
         float | None,
         typer.Option(
-            help="Years between the old objects and the new ones, up to 100, to be told in the "
-            "report of --json."
+            min=0.001,
+            max=100,
+            help="Years between the old objects and the new ones, to be told in the report of "
+            "--json.",
         ),
     ] = None,
     as_json: AsJson = False,
@@ -174,9 +188,6 @@ def update(
     from semsig_gis.objects.table import open_objects
 
     keep_inputs(out, read=(objects,))
-    if years is not None and not 0 < years <= 100:  # noqa: PLR2004 - as of a drift
-        msg = f"--years was given as {years:g}; give years above 0 and up to 100."
-        raise InputError(msg)
     had_columns = open_city(database).has_columns
     with progress("updating") as advance:
         report = update_file(database, open_objects(objects), out=out, progress=advance)

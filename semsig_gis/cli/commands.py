@@ -37,8 +37,7 @@ def run() -> int:
     InputError if they name none, or an option has a value that it does not take.
     """
     try:
-        arguments = sys.argv[1:] or ["--help"]
-        code = app(arguments, prog_name="semsig", standalone_mode=False)
+        code = app(None if sys.argv[1:] else ["--help"], prog_name="semsig", standalone_mode=False)
     except typer.TyperException as error:
         context = getattr(error, "ctx", None)
         command = "semsig" if context is None else context.command_path

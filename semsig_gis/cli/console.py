@@ -202,7 +202,12 @@ MethodText = Annotated[
     ),
 ]
 
-Workers = Annotated[int, typer.Option(help="Number of processes on this machine.")]
+# The ranges of numbers are those of the core (`core.ranges` and the specs), which loads slowly.
+MOST_SEED, MOST_METRES, MOST_WORKERS, MOST_QUERIES = 10**18, 1_000_000, 1024, 10_000_000
+
+Workers = Annotated[
+    int, typer.Option(min=0, max=MOST_WORKERS, help="Number of processes on this machine.")
+]
 Scheduler = Annotated[str | None, typer.Option(help="Dask scheduler, as tcp://HOST:PORT.")]
 LIKELIHOOD = "likelihood"  # as a value of --method
 

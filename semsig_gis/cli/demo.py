@@ -7,15 +7,28 @@ from typing import Annotated
 
 import typer
 
-from semsig_gis.cli.console import app, print_tables, progress, remark, say, tell_if_online
+from semsig_gis.cli.console import (
+    MOST_QUERIES,
+    MOST_SEED,
+    app,
+    print_tables,
+    progress,
+    remark,
+    say,
+    tell_if_online,
+)
 
 
 @app.command()
 def demo(
     *,
     out: Annotated[Path, typer.Option(help="Folder to write to.")] = Path("demo"),
-    queries: Annotated[int, typer.Option(help="Number of queries to ask.")] = 200,
-    seed: Annotated[int, typer.Option(help="Seed of the city and the queries.")] = 0,
+    queries: Annotated[
+        int, typer.Option(min=1, max=MOST_QUERIES, help="Number of queries to ask.")
+    ] = 200,
+    seed: Annotated[
+        int, typer.Option(min=0, max=MOST_SEED, help="Seed of the city and the queries.")
+    ] = 0,
 ) -> None:
     """Run every step on the embedded synthetic city, offline."""
     from semsig_gis.database.build import build_database
@@ -67,9 +80,15 @@ def synthesize(
     out: Annotated[Path, typer.Option(help="Folder to write to.")],
     size: Annotated[
         float | None,
-        typer.Option(help="Side of the square city in metres; default: as many cells as Paris."),
+        typer.Option(
+            min=100,
+            max=20_000,
+            help="Side of the square city in metres; default: as many cells as Paris.",
+        ),
     ] = None,
-    seed: Annotated[int, typer.Option(help="Seed of the random numbers.")] = 0,
+    seed: Annotated[
+        int, typer.Option(min=0, max=MOST_SEED, help="Seed of the random numbers.")
+    ] = 0,
 ) -> None:
     """Make up a city: street objects, buildings and streets."""
     from semsig_gis.objects.load import build_objects

@@ -10,6 +10,10 @@ import typer
 
 from semsig_gis.cli.console import (
     LIKELIHOOD,
+    MOST_METRES,
+    MOST_QUERIES,
+    MOST_SEED,
+    MOST_WORKERS,
     AsJson,
     Database,
     MethodText,
@@ -37,12 +41,16 @@ from semsig_gis.core.errors import InputError
 if TYPE_CHECKING:
     from collections.abc import Callable
 
+Seed = Annotated[int, typer.Option(min=0, max=MOST_SEED, help="Seed of the random numbers.")]
+
 
 @app.command()
 def evaluate(
     database: Database,
     *,
-    queries: Annotated[int, typer.Option(help="Number of queries to ask.")] = 500,
+    queries: Annotated[
+        int, typer.Option(min=1, max=MOST_QUERIES, help="Number of queries to ask.")
+    ] = 500,
     distortion: Annotated[
         str,
         typer.Option(
@@ -62,8 +70,11 @@ def evaluate(
     noise: NoiseName = "generic",
     map_age: MapAge = 0.0,
     drift_report: DriftReport = None,
-    top: Annotated[int, typer.Option(help="Count the best of this many candidates (t).")] = 1,
-    seed: Annotated[int, typer.Option(help="Seed of the random numbers.")] = 0,
+    top: Annotated[
+        int,
+        typer.Option(min=1, max=MOST_QUERIES, help="Count the best of this many candidates (t)."),
+    ] = 1,
+    seed: Seed = 0,
     out: Annotated[Path | None, typer.Option(help="Folder to write the results to.")] = None,
     as_json: AsJson = False,
 ) -> None:
@@ -197,14 +208,19 @@ def reproduce(
         typer.Option(help="Ask the paper's 10,000 queries, or 300 of a small city."),
     ] = "full",
     queries: Annotated[
-        int | None, typer.Option(help="Number of queries, in place of that of --size.")
+        int | None,
+        typer.Option(
+            min=1, max=MOST_QUERIES, help="Number of queries, in place of that of --size."
+        ),
     ] = None,
-    seed: Annotated[int, typer.Option(help="Seed of the random numbers.")] = 0,
+    seed: Seed = 0,
     workers: Annotated[
         int | None,
         typer.Option(
+            min=0,
+            max=MOST_WORKERS,
             help="Number of processes, 0 for this one alone; default: all processors, 0 for "
-            "--size small."
+            "--size small.",
         ),
     ] = None,
     as_json: AsJson = False,
@@ -276,14 +292,24 @@ def identify(
     *,
     noise: NoiseName = "generic",
     on_grid: OnGrid = False,
-    radius: Annotated[float, typer.Option(help="Distance in metres that counts as found.")] = 50.0,
-    seed: Annotated[int, typer.Option(help="Seed of the simulated queries.")] = 0,
+    radius: Annotated[
+        float,
+        typer.Option(min=0, max=MOST_METRES, help="Distance in metres that counts as found."),
+    ] = 50.0,
+    seed: Annotated[
+        int, typer.Option(min=0, max=MOST_SEED, help="Seed of the simulated queries.")
+    ] = 0,
     threads: Annotated[
-        int | None, typer.Option(help="Number of threads; default: all processors.")
+        int | None,
+        typer.Option(min=1, max=MOST_WORKERS, help="Number of threads; default: all processors."),
     ] = None,
     check: Annotated[
         int | None,
-        typer.Option(help="Number of new queries to verify the predictions with."),
+        typer.Option(
+            min=1,
+            max=1_000_000,
+            help="Number of new queries to verify the predictions with.",
+        ),
     ] = None,
     out: Annotated[
         Path | None, typer.Option(help="Folder to write a report of the check to.")
@@ -305,7 +331,7 @@ def identify(
         identifiability_tables,
     )
 
-    _require_numbers(check, threads, out)
+    _require_check(check, out)
     city = open_city(database)
     model = read_noise(noise, city.database)
     if not on_grid:
@@ -347,12 +373,8 @@ def identify(
         say(f"report: {out / 'report.html'}")
 
 
-def _require_numbers(check: int | None, threads: int | None, out: Path | None) -> None:
-    """Refuse options that cannot be used."""
-    for option, number in (("--check", check), ("--threads", threads)):
-        if number is not None and number < 1:
-            msg = f"{option} was given as {number}; give a whole number from 1."
-            raise InputError(msg)
+def _require_check(check: int | None, out: Path | None) -> None:
+    """Refuse a folder for a report that nobody asked for."""
     if out is not None and check is None:
         msg = "--out was given without --check; give both or none."
         raise InputError(msg)

@@ -155,7 +155,8 @@ def calibrate(
     samples: Samples,
     out: Annotated[Path, typer.Option(help="Rule to write (.json), for --rule.")],
     precision: Annotated[
-        float, typer.Option(help="Share of the answers that shall be right.")
+        float,
+        typer.Option(min=0.01, max=0.9999, help="Share of the answers that shall be right."),
     ] = 0.98,
     noise: NoiseName = "generic",
     map_age: MapAge = 0.0,

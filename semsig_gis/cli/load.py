@@ -44,7 +44,11 @@ MetricCrs = Annotated[
 ]
 MaxDistortion = Annotated[
     float,
-    typer.Option(help="Refuse data with bearings off by more degrees, or lengths by more percent."),
+    typer.Option(
+        min=0,
+        max=180,
+        help="Refuse data with bearings off by more degrees, or lengths by more percent.",
+    ),
 ]
 Filters = Annotated[
     bool, typer.Option("--filter/--no-filter", help="Apply the catalogue's filters.")

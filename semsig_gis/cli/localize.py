@@ -11,6 +11,7 @@ import typer
 
 from semsig_gis.cli.console import (
     LIKELIHOOD,
+    MOST_METRES,
     AsJson,
     Database,
     MethodText,
@@ -136,10 +137,15 @@ class LocalizeOptions(SearchOptions, QueryOptions):
     ] = None
     share: Annotated[
         float | None,
-        typer.Option(help="Of the chance, that the regions of --out hold.  [default: 0.9]"),
+        typer.Option(
+            min=0.001, max=1, help="Of the chance, that the regions of --out hold.  [default: 0.9]"
+        ),
     ] = None
     within: Annotated[
-        float, typer.Option(help="Metres around the cells of --out to search, too.")
+        float,
+        typer.Option(
+            min=0, max=MOST_METRES, help="Metres around the cells of --out to search, too."
+        ),
     ] = 0.0
     as_json: AsJson = False
 

@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     from semsig_gis.likelihood.noise.model import Noise
 
 EXPLAINED = 3  # candidates
+MOST_TOP = 10_000
 
 NoiseName = Annotated[
     str,
@@ -40,8 +41,9 @@ MapAge = Annotated[
     float,
     typer.Option(
         "--map-age",
-        help="Age of the map in years, 0 to 100: how long before the queries its objects were "
-        "gathered.",
+        min=0,
+        max=100,
+        help="Age of the map in years: how long before the queries its objects were gathered.",
     ),
 ]
 DriftReport = Annotated[
@@ -57,7 +59,7 @@ Heading = Annotated[
     str,
     typer.Option(
         "--heading",
-        help="North of the query: known, unknown, or its standard deviation in degrees.",
+        help="North of the query: known, unknown, or its standard deviation, 0.001 to 360 degrees.",
     ),
 ]
 OnGrid = Annotated[
@@ -113,7 +115,7 @@ class SearchOptions:
         str | None,
         typer.Option(help="What a cell must see: M (one), 2B (two or more), B=0, ?<=10 (in all)."),
     ] = None
-    top: Annotated[int, typer.Option(help="Number of candidates.")] = 10
+    top: Annotated[int, typer.Option(min=1, max=MOST_TOP, help="Number of candidates.")] = 10
     noise: NoiseName = "generic"
     map_age: MapAge = 0.0
     drift_report: DriftReport = None
@@ -295,7 +297,7 @@ def _north_sigma(heading: str) -> float:
         sigma = float(heading)
     except ValueError:
         sigma = -1.0
-    if not sigma >= 0:
-        msg = f"--heading was given as {heading!r}; give known, unknown, or degrees from 0 up."
+    if sigma and not 0.001 <= sigma <= 360:  # noqa: PLR2004 - as `check_north` has it
+        msg = f"--heading was given as {heading!r}; give known, unknown, or 0.001 to 360 degrees."
         raise InputError(msg)
     return sigma

@@ -11,7 +11,9 @@ import numpy as np
 from pyproj import CRS, Geod, Proj, Transformer
 from pyproj.exceptions import CRSError
 
+from semsig_gis.core.effort import require_memory
 from semsig_gis.core.errors import CrsError, InputError
+from semsig_gis.core.ranges import require_number
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
@@ -235,6 +237,8 @@ def _on_the_ground(
 
 
 ROW_SPAN = 10**8
+CELL_BYTES = 48  # for a cell, while all are gathered
+LEAST_STEP, MOST_STEP = 0.01, 100_000
 # More cells on each side of a point than this would fill the memory.
 MAX_REACH = 1000
 # Rows that a cell number can hold, with room for the cells around a point.
@@ -248,7 +252,7 @@ class GridSpec:
     Parameters
     ----------
     step : float, default 10
-        Side of a cell in metres (the paper's s).
+        Side of a cell in metres (the paper's s), from 0.01 to 100,000.
     origin : tuple of (float, float), default (0, 0)
         Lower-left corner of the cell in column 0 and row 0, in metres. Only its remainder by
         `step` matters for where cells lie; it also sets where columns and rows count from.
@@ -256,7 +260,7 @@ class GridSpec:
     Raises
     ------
     InputError
-        If the step is not a positive number or the origin is not finite.
+        If the step is out of its range or the origin is not finite.
 
     Examples
     --------
@@ -268,9 +272,7 @@ class GridSpec:
     origin: tuple[float, float] = (0.0, 0.0)
 
     def __post_init__(self) -> None:  # noqa: D105
-        if not (math.isfinite(self.step) and self.step > 0):
-            msg = f"grid step is {self.step} m; give a number of metres above 0."
-            raise InputError(msg)
+        require_number("grid step", self.step, least=LEAST_STEP, most=MOST_STEP, unit="metres")
         if np.shape(self.origin) != (2,) or not np.isfinite(self.origin).all():
             msg = f"grid origin is {self.origin}; give two finite coordinates in metres."
             raise InputError(msg)
@@ -322,11 +324,20 @@ def cells_near(
     """Return the columns and rows of every cell whose centre may be within `radius` of a point.
 
     Points, shape (n, 2), and radius are in metres. Cells are distinct, ordered by column, then row.
-    The square around a point is taken, so that some cells see nothing in the end.
+    The square around a point is taken, so that some cells see nothing in the end. InputError if
+    there would be more than the memory holds.
     """
     require_step(grid, radius)
     reach = math.ceil(radius / grid.step + 0.5)
     columns, rows = grid.cells_at(xy)
+    if len(xy):
+        around, box = 2 * reach + 1, (np.ptp(columns) + 2 * reach + 1, np.ptp(rows) + 2 * reach + 1)
+        most = min(len(xy) * around**2, int(box[0]) * int(box[1]))
+        require_memory(
+            most * CELL_BYTES,
+            f"up to {most:,} cells of {grid.step:g} m within {radius:g} m of {len(xy):,} points",
+            advice="make the step larger or the range smaller, or build in tiles",
+        )
     rows, columns = split_ids(_widened(cell_ids(rows, columns), reach))
     return split_ids(_widened(cell_ids(columns, rows), reach))
 

@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING, Generic, TypeVar
 
 from semsig_gis import __version__
 from semsig_gis.core.errors import InputError, SemsigError
+from semsig_gis.core.ranges import MOST_WORKERS, require_number
 from semsig_gis.core.scratch import own_folder
 
 if TYPE_CHECKING:
@@ -45,13 +46,14 @@ class Outcome(Generic[_Task, _Value]):
 
 
 def check_workers(workers: int, scheduler: str | None) -> None:
-    """Refuse a negative number of workers, an empty scheduler address, or both at once."""
+    """Refuse a number of workers out of range, an empty scheduler address, or both at once."""
     if workers < 0 or (workers and scheduler is not None) or scheduler == "":
         msg = (
             f"{workers} workers and the scheduler {scheduler!r} were given; give a number of "
             "workers from 0 up, or the address of a scheduler."
         )
         raise InputError(msg)
+    require_number("number of workers", workers, least=0, most=MOST_WORKERS)
 
 
 def run_tasks(
@@ -79,7 +81,7 @@ def run_tasks(
         return
     from distributed import KilledWorker, as_completed  # noqa: PLC0415 - only where it is used
 
-    with _client(workers, scheduler) as client:
+    with _answering(scheduler), _client(workers, scheduler) as client:
         _require_same_view(client, files)
         futures = client.map(partial(_attempt, work), tasks, pure=False)
         task_of = {future.key: task for future, task in zip(futures, tasks, strict=True)}
@@ -130,6 +132,20 @@ def _attempt(work: Callable[[_Task], _Value], task: _Task) -> Outcome[_Task, _Va
         except Exception as error:  # noqa: BLE001 - one task must not end the run
             reason = f"{type(error).__name__}: {error}"
     return Outcome(task, reason=reason)
+
+
+@contextlib.contextmanager
+def _answering(scheduler: str | None) -> Iterator[None]:
+    """Say in a sentence that processes do not answer in time, as on a loaded machine."""
+    try:
+        yield
+    except (TimeoutError, OSError) as error:
+        whose = "the processes" if scheduler is None else f"the scheduler {scheduler}"
+        msg = (
+            f"{whose} did not answer in time ({type(error).__name__}); run the same command again, "
+            "with fewer workers or when the machine is less busy."
+        )
+        raise InputError(msg) from error
 
 
 @contextlib.contextmanager

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from semsig_gis.core.errors import CrsError, EmptyResultError
+from semsig_gis.core.effort import announce, require_memory
+from semsig_gis.core.errors import CrsError, EmptyResultError, InputError
 from semsig_gis.core.geometry import GridSpec, cell_ids, cells_near, split_ids
 from semsig_gis.core.rtree import PackedIndex
 from semsig_gis.core.signature import BEARING_UNITS, DISTANCE_UNITS, SignatureSpec
@@ -30,6 +32,11 @@ if TYPE_CHECKING:
 CELLS_A_BLOCK = 1 << 14
 PAIRS_A_BLOCK = 1 << 20
 TILE_CELLS = 16
+# Measured: bytes of a block, of a cell and of a sighting until they are saved, and seconds of a
+# sighting in the open and among buildings.
+BLOCK_BYTES, CELL_BYTES, PAIR_BYTES = 1e8, 100, 26
+PAIR_S, HIDDEN_PAIR_S = 2e-7, 1e-6
+MOST_PAIRS = 2**31 - 1  # that a file counts
 # More than any rounding, so that the measured distance decides alone.
 ROUNDING_CELLS = 1e-3
 
@@ -74,7 +81,8 @@ def build_database(
         If no cell sees an object, as when the step is much larger than the range, or no cell is
         a viewpoint.
     InputError
-        If footprints, streets or viewpoints cannot be used, or those that are needed are missing.
+        If footprints, streets or viewpoints cannot be used, those that are needed are missing, or
+        the memory does not hold what there is to see.
     CrsError
         If footprints or streets have no CRS.
 
@@ -148,8 +156,14 @@ def build_cells(
         streets=None if streets is None else moved(streets, objects.crs).geometry.to_numpy(),
         widths=None if streets is None else streets.get("half_width"),
     )
-    columns, rows = columns[chosen], rows[chosen]
     codes, ranges = objects.codes, objects.taxonomy.ranges(spec.radius)
+    count = int(chosen.sum())
+    share = count / max(len(chosen), 1)
+    pairs = expected_pairs(ranges[codes], grid=grid, cells=count, share=share)
+    require_room(pairs, cells=count, objects=len(objects))
+    if not partial:
+        announce(pairs * (PAIR_S if buildings is None else HIDDEN_PAIR_S), "building")
+    columns, rows = columns[chosen], rows[chosen]
     # Lengths, codes, bearings and distances, block by block; the first is that of no cell.
     blocks = [tuple(np.empty(0, kind) for kind in (np.int64, np.uint8, np.uint16, np.uint8))]
     for cells, seen in visible_objects(
@@ -197,6 +211,34 @@ def build_cells(
         occlusion=None if footprints is None else TOLERANCE_M,
         notes=objects.notes,
     )
+
+
+def expected_pairs(
+    ranges: NDArray[np.float64], *, grid: GridSpec, cells: int, share: float = 1.0
+) -> float:
+    """Return how many pairs of a cell and an object in range to expect, at most all.
+
+    `ranges` are those of the objects in metres, `share` the part of the cells around them that are
+    viewpoints.
+    """
+    in_range = math.pi * float(((ranges / grid.step) ** 2).sum())
+    return min(in_range * share, float(cells) * len(ranges))
+
+
+def require_room(pairs: float, *, cells: int, objects: int, processes: int = 1) -> None:
+    """Refuse to build what the memory does not hold, or one file cannot count.
+
+    So many `processes` build as many cells and pairs each.
+    """
+    what = f"{objects:,} objects seen from {cells:,} cells (about {pairs:,.0f} sightings)"
+    advice = "make the step larger, the visibility range smaller, or build in smaller tiles"
+    if pairs > MOST_PAIRS:
+        msg = f"{what} are more than the {MOST_PAIRS:,} that one file holds; {advice}."
+        raise InputError(msg)
+    needed = BLOCK_BYTES + CELL_BYTES * cells + PAIR_BYTES * pairs
+    if processes > 1:
+        what += f" by each of {processes} processes"
+    require_memory(processes * needed, what, advice=advice)
 
 
 def moved(table: gpd.GeoDataFrame, crs: CRS) -> gpd.GeoDataFrame:

@@ -42,6 +42,7 @@ from semsig_gis.database.file import (
 from semsig_gis.database.occlusion import Footprints, buildings_near
 from semsig_gis.objects.table import licenses_of, open_objects, save_objects
 from semsig_gis.storage.geoparquet import UNREADABLE, read_geoparquet, write_geoparquet
+from semsig_gis.storage.text import parse_json, read_whole
 from semsig_gis.storage.whole import alone_in, move_folder, whole_file, whole_folder
 
 if TYPE_CHECKING:
@@ -269,7 +270,7 @@ def built_digest(path: str | Path) -> str:
 def _manifest(folder: Path) -> dict[str, Any]:
     path = folder / MANIFEST
     try:
-        manifest = json.loads(path.read_bytes())
+        manifest = parse_json(read_whole(path), finite=True)
         if manifest["kind"] != STORE_KIND or not isinstance(manifest["files"], dict):
             raise ValueError(manifest["kind"])  # noqa: TRY301
         known: bool = manifest["format"] == FORMAT

@@ -26,6 +26,7 @@ from semsig_gis.storage.geoparquet import (
     read_geoparquet,
     write_geoparquet,
 )
+from semsig_gis.storage.text import parse_json, read_whole
 from semsig_gis.storage.whole import write_whole
 
 if TYPE_CHECKING:
@@ -335,7 +336,7 @@ def read_manifest(folder: str | Path) -> Manifest:
     """Read what a database in parts consists of; DatabaseError without a whole manifest."""
     path = Path(folder) / MANIFEST
     try:
-        content = json.loads(path.read_text(encoding="utf-8"))
+        content = parse_json(read_whole(path), finite=True)
         if "sum" in content and content.pop("sum") != _sum(content):  # those of before have none
             raise ValueError(path)  # noqa: TRY301
         parts = tuple(

@@ -7,7 +7,6 @@ left; when all are there, the folder is renamed to ``OUT``.
 from __future__ import annotations
 
 import json
-import math
 import os
 import shutil
 from collections import Counter
@@ -24,6 +23,7 @@ from pyproj import CRS
 from pyproj.exceptions import CRSError
 
 from semsig_gis import __version__
+from semsig_gis.core.effort import announce
 from semsig_gis.core.errors import DatabaseError, EmptyResultError, InputError, SourceError
 from semsig_gis.core.geometry import (
     HALF_WIDTH,
@@ -34,9 +34,16 @@ from semsig_gis.core.geometry import (
     split_ids,
 )
 from semsig_gis.core.parallel import check_workers, finish_tasks
+from semsig_gis.core.ranges import MOST_METRES, require_number
 from semsig_gis.core.scratch import HALF_DONE
 from semsig_gis.core.signature import SignatureSpec
-from semsig_gis.database.build import build_cells
+from semsig_gis.database.build import (
+    HIDDEN_PAIR_S,
+    PAIR_S,
+    build_cells,
+    expected_pairs,
+    require_room,
+)
 from semsig_gis.database.database import consecutive
 from semsig_gis.database.file import (
     MANIFEST,
@@ -78,6 +85,7 @@ MARGIN_M = 2.0
 # Tiles that one object may touch in a row, and tiles in all.
 MOST_REACHED = 16
 MOST_TILES = 1_000_000
+TILE_S = 0.05  # that a tile takes at least
 
 RECIPE = "_recipe.json"
 # Copies of inputs that can be read by box.
@@ -103,12 +111,12 @@ class TileSpec:
     Parameters
     ----------
     side : float, default 2000
-        Side of a tile in metres; it is rounded to whole cells, at least one.
+        Side of a tile in metres, from 1 to 1,000,000; it is rounded to whole cells, at least one.
 
     Raises
     ------
     InputError
-        If the side is not a number of metres above 0.
+        If the side is out of its range.
 
     Examples
     --------
@@ -119,9 +127,7 @@ class TileSpec:
     side: float = 2000.0
 
     def __post_init__(self) -> None:  # noqa: D105
-        if not (math.isfinite(self.side) and self.side > 0):
-            msg = f"the side of a tile is {self.side} m; give a number of metres above 0."
-            raise InputError(msg)
+        require_number("side of a tile", self.side, least=1, most=MOST_METRES, unit="metres")
 
     def cells(self, grid: GridSpec) -> int:
         """Return the side in cells of a grid, at least 1."""
@@ -176,8 +182,9 @@ def build_tiles(
     Raises
     ------
     InputError
-        If an option cannot be used, the scheduler cannot be reached, or `out` holds something
-        else or an unfinished run with other inputs or specs.
+        If an option cannot be used, the scheduler cannot be reached, the memory does not hold
+        the fullest tile, or `out` holds something else or an unfinished run with other inputs or
+        specs.
     DatabaseError
         If the street objects cannot be read, or a tile cannot be built; the other tiles are kept
         for the next run.
@@ -215,6 +222,7 @@ def build_tiles(
     try:
         tiles = touched_tiles(plan.objects, grid=plan.grid, side=plan.side, reach=plan.reach)
         done = finished_tiles(plan.folder, tiles)
+        _look_ahead(plan, tiles, left=len(tiles) - len(done), workers=workers, scheduler=scheduler)
         if done and tell is not None:
             tell(f"an unfinished run has left {len(done):,} of {len(tiles):,} tiles; it goes on")
 
@@ -252,6 +260,30 @@ def build_tiles(
         )
         raise EmptyResultError(msg)
     return publish(plan.folder, parts)
+
+
+def _look_ahead(
+    plan: TilePlan, tiles: Sequence[Tile], *, left: int, workers: int, scheduler: str | None
+) -> None:
+    """Refuse tiles that the memory does not hold, and tell when all will take long.
+
+    The fullest comes first. Workers elsewhere look at their own memory when they begin a tile.
+    """
+    if not left:
+        return
+    objects = open_objects(plan.objects, box=plan.box(tiles[0], plan.reach + MARGIN_M))
+    ranges = objects.taxonomy.ranges(plan.spec.radius)[objects.codes]
+    cells = plan.side**2
+    pairs = expected_pairs(ranges, grid=plan.grid, cells=cells)
+    if scheduler is None:
+        # Most of a large tile may be far from any object.
+        near = min(cells, round(len(objects) * (2.0 * plan.reach / plan.grid.step + 2.0) ** 2))
+        require_room(pairs, cells=near, objects=len(objects), processes=max(workers, 1))
+    if len(objects):
+        each = PAIR_S if plan.buildings is None else HIDDEN_PAIR_S
+        count = pq.read_metadata(plan.objects).num_rows
+        seconds = TILE_S * len(tiles) + each * pairs * count / len(objects)
+        announce(seconds * left / len(tiles) / max(workers, 1), "building tiles")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Literal, get_args
 
@@ -12,6 +11,7 @@ from shapely.geometry.base import BaseGeometry
 
 from semsig_gis.core.errors import InputError, nearest_name
 from semsig_gis.core.geometry import FULL_TURN
+from semsig_gis.core.ranges import require_number
 from semsig_gis.database.occlusion import hidden
 
 if TYPE_CHECKING:
@@ -175,6 +175,7 @@ def views_at(
 
 Mode = Literal["all", "outdoor", "streets"]
 STREET_HALF_WIDTH_M = 8.0
+LEAST_WIDTH_M, MOST_WIDTH_M = 0.05, 200
 CELLS_A_BLOCK = 1 << 18
 CURVES = 1  # dimensions
 
@@ -189,7 +190,8 @@ class ViewpointSpec:
         Every cell, those whose centre is outside the building footprints, or those whose centre
         is near the centre line of a street and, where footprints are given, outside them.
     width : float, default 8
-        How far from a centre line is near, in metres: half the width of a street.
+        How far from a centre line is near, in metres: half the width of a street; from 0.05 to
+        200.
     area : shapely.Polygon or shapely.MultiPolygon, optional
         In the CRS of the objects; only cells whose centre is in it count, in every mode.
 
@@ -214,9 +216,9 @@ class ViewpointSpec:
             near = nearest_name(str(self.mode), get_args(Mode))
             msg = f"viewpoints {self.mode!r} are unknown{near}; give one of {known}."
             raise InputError(msg)
-        if not (math.isfinite(self.width) and self.width > 0):
-            msg = f"street half-width is {self.width} m; give a number of metres above 0."
-            raise InputError(msg)
+        require_number(
+            "street half-width", self.width, least=LEAST_WIDTH_M, most=MOST_WIDTH_M, unit="metres"
+        )
         if self.area is not None:
             area = shapely.make_valid(self.area)
             if not isinstance(area, shapely.Polygon | shapely.MultiPolygon) or not area.area > 0:

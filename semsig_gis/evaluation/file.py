@@ -19,6 +19,7 @@ from semsig_gis.queries.chain import chain_text, parse_chain
 from semsig_gis.queries.distortions import Detector
 from semsig_gis.queries.draw import QuerySpec
 from semsig_gis.storage.geoparquet import geo_metadata, read_geoparquet, write_geoparquet
+from semsig_gis.storage.text import parse_json, read_whole
 from semsig_gis.storage.whole import write_whole
 
 if TYPE_CHECKING:
@@ -115,7 +116,7 @@ def open_evaluation(folder: str | Path) -> Evaluation:
         points = gpd.GeoSeries.from_wkb(frame.pop("geometry"), crs=crs)
         frame["best_cell_id"] = frame["best_cell_id"].astype("Int64")
         method, asked = settings_from_dict(specs)
-        timing = json.loads(times.read_text("utf-8")) if times.exists() else {}
+        timing = parse_json(read_whole(times), finite=True) if times.exists() else {}
         seconds = timing.get("seconds_per_query")
         return Evaluation(
             queries=gpd.GeoDataFrame(frame, geometry=points),

@@ -13,6 +13,7 @@ from semsig_gis.evaluation.methods import parse_method
 from semsig_gis.likelihood.noise.model import NOISES, noise_from_dict, open_noise
 from semsig_gis.queries.chain import chain_text, parse_chain
 from semsig_gis.queries.draw import QuerySpec
+from semsig_gis.storage.text import read_text
 from semsig_gis.storage.toml import check_keys, parse_toml, toml_text
 
 if TYPE_CHECKING:
@@ -261,7 +262,7 @@ def open_experiment_spec(path: str | Path) -> ExperimentSpec:
     """
     file = Path(path)
     try:
-        text = file.read_text(encoding="utf-8")
+        text = read_text(file)
     except (OSError, UnicodeDecodeError) as error:
         reason = error.strerror if isinstance(error, OSError) else "it is not text"
         msg = f"experiment {file} cannot be read ({reason}); give a TOML file."

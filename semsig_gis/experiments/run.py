@@ -34,6 +34,7 @@ from semsig_gis.queries.draw import check_count, draw_queries
 from semsig_gis.reports.evaluation import experiment_figures, experiment_markdown
 from semsig_gis.storage.geoparquet import CHECKING_PAGES, require_intact, seal
 from semsig_gis.storage.runs import RunKind, finish, partial_folder, read_json, write_json
+from semsig_gis.storage.text import read_text
 from semsig_gis.storage.toml import toml_text
 from semsig_gis.storage.whole import whole_file, write_whole
 
@@ -63,7 +64,7 @@ DISTRICTS = "districts.csv"
 
 def _read_recipe(folder: Path) -> dict[str, Any]:
     """Return the experiment as plain values, with ``inputs`` and ``versions``."""
-    text = (folder / SPEC).read_text(encoding="utf-8")
+    text = read_text(folder / SPEC)
     spec = parse_experiment(text, where=str(folder / SPEC))
     # A process that was killed between the two files has left no inputs, and no results.
     inputs = read_json(folder / INPUTS) if (folder / INPUTS).exists() else {}
@@ -138,7 +139,7 @@ def open_results(folder: str | Path) -> dict[str, Evaluation]:
     if (place / "queries.parquet").is_file():
         return {"": open_evaluation(place)}
     try:
-        text = (place / SPEC).read_text(encoding="utf-8")
+        text = read_text(place / SPEC)
     except OSError as error:
         msg = f"{place} holds no results; give a folder that `semsig evaluate` wrote."
         raise DatabaseError(msg) from error

@@ -26,6 +26,7 @@ from semsig_gis.core.taxonomy import Taxonomy
 from semsig_gis.database.file import database_of
 from semsig_gis.exports.layers import GEOMETRY_TYPES
 from semsig_gis.objects.table import objects_of
+from semsig_gis.storage.text import parse_json
 from semsig_gis.storage.whole import whole_file
 
 if TYPE_CHECKING:
@@ -197,7 +198,9 @@ def _facts(path: str | Path, layer: str) -> tuple[dict[str, Any], CRS, list[str]
     info = pyogrio.read_info(path, layer=layer)
     metadata = info["layer_metadata"] or {}
     # GDAL's own are in capital letters.
-    specs = {name: json.loads(text) for name, text in metadata.items() if name.islower()}
+    specs = {
+        name: parse_json(text, finite=True) for name, text in metadata.items() if name.islower()
+    }
     return specs, CRS.from_user_input(specs.pop("crs")), list(info["fields"])
 
 

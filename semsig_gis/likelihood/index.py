@@ -25,9 +25,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from semsig_gis.core.errors import DatabaseError, InputError
+from semsig_gis.core.geometry import FULL_TURN
+from semsig_gis.core.ranges import require_number
 from semsig_gis.core.signature import BEARING_UNITS
 from semsig_gis.database.city import City
 from semsig_gis.likelihood.noise.table import database_tables, mean_table
+from semsig_gis.storage.text import parse_json
 from semsig_gis.storage.whole import whole_file
 
 if TYPE_CHECKING:
@@ -229,11 +232,22 @@ class LikelihoodIndex:
         return distinct[types.inverse]
 
 
+LEAST_TURN = 0.001
+
+
 def check_north(north_sigma: float) -> None:
-    """Refuse a standard deviation of north, in degrees, that is negative or not a number."""
-    if not north_sigma >= 0:
-        msg = f"the deviation of north is {north_sigma} degrees; give 0 or more, or infinity."
-        raise InputError(msg)
+    """Refuse a standard deviation of north, in degrees, that is out of range.
+
+    It is 0, or 0.001 to 360; infinite where nothing is known of north.
+    """
+    if north_sigma not in {0, math.inf}:
+        require_number(
+            "deviation of north",
+            north_sigma,
+            least=LEAST_TURN,
+            most=FULL_TURN,
+            unit="degrees, 0 or infinity",
+        )
 
 
 def build_index(
@@ -505,7 +519,7 @@ def open_index(
     start = _columns_start(shape)
     try:
         with Path(path).open("rb") as file:
-            header = json.loads(file.read(HEADER_PAGES * PAGE))
+            header = parse_json(file.read(HEADER_PAGES * PAGE), finite=True)
             constants = np.fromfile(file, np.float32, shape[-1])
             sums = np.fromfile(file, np.uint32, math.prod(shape[:-1]))
         same = header["fingerprint"] == fingerprint

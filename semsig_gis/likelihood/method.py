@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from semsig_gis.core.errors import InputError, UnknownNameError, nearest_name
+from semsig_gis.likelihood.index import check_north
 from semsig_gis.likelihood.noise.model import NOISES
 
 if TYPE_CHECKING:
@@ -45,9 +46,7 @@ class LikelihoodMethod:
     north_sigma: float = 0.0
 
     def __post_init__(self) -> None:  # noqa: D105
-        if not self.north_sigma >= 0:
-            msg = f"the deviation of north is {self.north_sigma} degrees; give 0 or more."
-            raise InputError(msg)
+        check_north(self.north_sigma)
         if self.refined and self.on_grid:
             msg = "a place on the grid is not to be refined; leave out refined or on_grid."
             raise InputError(msg)

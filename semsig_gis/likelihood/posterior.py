@@ -12,7 +12,6 @@ import json
 import math
 from dataclasses import asdict, dataclass, fields, replace
 from functools import cached_property
-from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeGuard
 
 import numpy as np
@@ -24,10 +23,12 @@ from semsig_gis.database.views import views_at
 from semsig_gis.likelihood.association import turn_logs
 from semsig_gis.likelihood.index import check_north
 from semsig_gis.likelihood.noise.table import LONGEST_TABLE, noise_tables, place_loglik
+from semsig_gis.storage.text import parse_json, read_whole
 from semsig_gis.storage.whole import whole_file
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
+    from pathlib import Path
 
     from numpy.typing import ArrayLike, NDArray
 
@@ -105,7 +106,9 @@ class Posterior:
         # The cells are ordered by column and row: in each column, the circle is one run of them.
         ids = database.cell_ids
         before = np.concatenate([[0.0], np.cumsum(self.chances)])
-        steps = radius / database.grid.step + 1e-9
+        # All cells are within the diagonal of the city.
+        most = np.hypot(np.ptp(database.columns), np.ptp(database.rows)) + 1.0
+        steps = min(radius / database.grid.step + 1e-9, float(most))
         total = np.zeros(len(columns))
         for aside in range(-math.floor(steps), math.floor(steps) + 1):
             up = math.floor(math.sqrt(steps**2 - aside**2))
@@ -398,7 +401,7 @@ def open_rule(path: str | Path) -> AnswerRule:
     0.9
     """
     try:
-        values: Mapping[str, Any] = json.loads(Path(path).read_text(encoding="utf-8"))
+        values: Mapping[str, Any] = parse_json(read_whole(path), finite=True)
         names = {field.name for field in fields(AnswerRule)}
         if not isinstance(values, dict) or not {"threshold"} <= set(values) <= names:
             msg = f"it does not hold just the fields {', '.join(sorted(names))}"

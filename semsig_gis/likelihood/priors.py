@@ -18,6 +18,7 @@ import shapely
 from pyproj import Transformer
 
 from semsig_gis.core.errors import CrsError, InputError
+from semsig_gis.core.ranges import MOST_METRES, require_number
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -28,6 +29,7 @@ if TYPE_CHECKING:
     from semsig_gis.database.database import SignatureDatabase
 
 DEGREES = "EPSG:4326"
+LEAST_SIGMA_M = 0.01
 FARTHEST = 3.0  # standard deviations of a position, beyond the range of sight, from every cell
 
 METRES, NORTH_EAST, EAST_NORTH = "X,Y", "LAT,LON", "LON,LAT"
@@ -132,9 +134,9 @@ def _readings(
 
 
 def _check_sigma(sigma: float) -> None:
-    if not (math.isfinite(sigma) and sigma > 0):
-        msg = f"the deviation of the position is {sigma} m; give metres above 0."
-        raise InputError(msg)
+    require_number(
+        "deviation of the position", sigma, least=LEAST_SIGMA_M, most=MOST_METRES, unit="metres"
+    )
 
 
 def _is_near(database: SignatureDatabase, position: tuple[float, float], sigma: float) -> bool:
@@ -237,7 +239,7 @@ def position_prior(
     position : tuple of (float, float)
         x and y in the CRS of the database.
     sigma : float
-        Standard deviation each way in metres, above 0.
+        Standard deviation each way in metres, from 0.01 to 1,000,000.
 
     Returns
     -------
@@ -247,8 +249,8 @@ def position_prior(
     Raises
     ------
     InputError
-        If a number is not finite, `sigma` is not above 0, or the position is farther from every
-        cell than three deviations and the range of sight.
+        If a number is not finite, `sigma` is out of its range, or the position is farther from
+        every cell than three deviations and the range of sight.
 
     Examples
     --------

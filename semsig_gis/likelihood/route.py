@@ -14,6 +14,7 @@ import numpy as np
 
 from semsig_gis.core.errors import InputError
 from semsig_gis.core.geometry import ROW_SPAN
+from semsig_gis.core.ranges import MOST_METRES, require_number
 from semsig_gis.likelihood.posterior import Posterior, posterior
 
 if TYPE_CHECKING:
@@ -27,7 +28,7 @@ LOST = 1e-6
 """Chance that a leg is quite wrong, and the next place anywhere."""
 LEAST_CHANCE = 1e-12  # cells below this, against the likeliest, do not move
 LEAST_SHARE = 1e-6  # of the blur that is left out
-MOST_SIGMA = 1000.0
+MOST_SIGMA = 1000
 REACH = 6.0  # standard deviations
 
 
@@ -38,7 +39,7 @@ class Leg:
     Parameters
     ----------
     dx, dy : float
-        Metres to grid east and grid north; finite, or InputError.
+        Metres to grid east and grid north, at most 1,000,000 each way, or InputError.
     sigma : float, default 0
         Standard deviation of each of them, in metres; 0 to 1000, or InputError.
 
@@ -53,12 +54,9 @@ class Leg:
     sigma: float = 0.0
 
     def __post_init__(self) -> None:  # noqa: D105
-        if not (math.isfinite(self.dx) and math.isfinite(self.dy)):
-            msg = f"a leg of ({self.dx}, {self.dy}) m was given; give two finite numbers."
-            raise InputError(msg)
-        if not 0 <= self.sigma <= MOST_SIGMA:
-            msg = f"the deviation of a leg is {self.sigma} m; give 0 to {MOST_SIGMA:.0f} metres."
-            raise InputError(msg)
+        for value in (self.dx, self.dy):
+            require_number("leg", value, least=-MOST_METRES, most=MOST_METRES, unit="metres")
+        require_number("deviation of a leg", self.sigma, least=0, most=MOST_SIGMA, unit="metres")
 
     @classmethod
     def towards(cls, bearing: float, distance: float, *, sigma: float = 0.0) -> Leg:

@@ -48,6 +48,7 @@ if TYPE_CHECKING:
     from semsig_gis.sources import RawLayer
 
 KIND = "street objects"
+NUMBERS, TEXTS = {CLASS_CODE, COUNT}, {SOURCE, SOURCE_ID, MERGED}
 BETWEEN_LAYERS = ", "
 BEFORE_LAYERS = ": "
 # Key of the layers that each line of ``licenses`` is about, where the line does not tell.
@@ -294,6 +295,7 @@ def objects_of(
     damaged; without a box, a table without objects is.
     """
     try:
+        _require_types(arrow)
         taxonomy = Taxonomy.from_list(specs["taxonomy"])
         columns = {
             CLASS_CODE: arrow[CLASS_CODE].to_numpy(),
@@ -312,7 +314,10 @@ def objects_of(
             taxonomy.by_code(code)
         licenses = _licences(specs, columns[SOURCE])
         notes = tuple(map(str, specs.get(NOTES, ())))
-    except (TypeError, ValueError, LookupError, shapely.errors.ShapelyError) as error:
+    except (
+        *(TypeError, ValueError, LookupError),
+        *(pa.ArrowException, shapely.errors.ShapelyError),
+    ) as error:
         msg = f"{path} is damaged ({error}); load the street objects again."
         raise DatabaseError(msg) from error
     xy = shapely.get_coordinates(table.geometry.array)
@@ -334,3 +339,14 @@ def licenses_of(*tables: gpd.GeoDataFrame | None) -> tuple[str, ...]:
     """
     lines = [table.attrs.get(LICENSES, ()) for table in tables if table is not None]
     return tuple(dict.fromkeys(itertools.chain.from_iterable(lines)))
+
+
+def _require_types(arrow: pa.Table) -> None:
+    """Raise TypeError if a column of street objects holds values of another type."""
+    for field in arrow.schema:
+        kind = field.type
+        if (field.name in NUMBERS and not pa.types.is_integer(kind)) or (
+            field.name in TEXTS and kind not in {pa.string(), pa.large_string(), pa.null()}
+        ):
+            msg = f"its column {field.name} holds {kind}"
+            raise TypeError(msg)

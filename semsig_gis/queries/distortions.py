@@ -13,6 +13,7 @@ import numpy as np
 
 from semsig_gis.core.errors import InputError, UnknownNameError, nearest_name
 from semsig_gis.core.geometry import FULL_TURN, angular_distance, wrap_degrees
+from semsig_gis.core.ranges import require_number
 from semsig_gis.core.signature import Signature
 from semsig_gis.database.views import bearings
 from semsig_gis.likelihood.noise.table import LONGEST_TABLE, noise_tables
@@ -27,6 +28,8 @@ if TYPE_CHECKING:
     from semsig_gis.queries.sight import CitySights, Sight, Spoiling
 
 
+MOST_WIDTH_M = 1000
+MOST_FALSE = 1000  # objects
 NEAREST_M = 0.01  # that anything stands, so that its width is an angle
 
 
@@ -47,7 +50,7 @@ class _AnyCity(ABC):
 class CompassBias(_AnyCity):
     """A compass that is off by the same angle for all objects of a query.
 
-    The angle is normal, with a standard deviation of `sigma` degrees, 0 or more.
+    The angle is normal, with a standard deviation of `sigma` degrees, 0 to 360.
     """
 
     stream: ClassVar[int] = 3_628_719_812
@@ -55,10 +58,10 @@ class CompassBias(_AnyCity):
     sigma: float = 10.0
 
     def __post_init__(self) -> None:  # noqa: D105
-        _check_amount("standard deviation of the compass", self.sigma)
+        require_number("deviation of the compass", self.sigma, least=0, most=FULL_TURN)
 
     def _spoil(self, sight: Sight, rng: np.random.Generator) -> Sight:
-        return sight.turned(float(rng.normal(0.0, self.sigma)))
+        return sight.turned(float(rng.normal(0.0, abs(self.sigma))))  # -0.0 is 0, too
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -114,8 +117,8 @@ class FieldOfView(_AnyCity):
 class HiddenBehind(_AnyCity):
     """Objects that nearer objects hide.
 
-    An object is hidden when a nearer one covers its bearing: one of `width` w metres (0 or more) at
-    distance d covers ``atan(w / 2 d)`` to either side.
+    An object is hidden when a nearer one covers its bearing: one of `width` w metres (0 to 1,000)
+    at distance d covers ``atan(w / 2 d)`` to either side.
     """
 
     stream: ClassVar[int] = 3_881_164_136
@@ -123,7 +126,7 @@ class HiddenBehind(_AnyCity):
     width: float = 0.5
 
     def __post_init__(self) -> None:  # noqa: D105
-        _check_amount("width of the objects", self.width)
+        require_number("width of the objects", self.width, least=0, most=MOST_WIDTH_M)
 
     def _spoil(self, sight: Sight, rng: np.random.Generator) -> Sight:  # noqa: ARG002
         return sight.only(~_behind(sight, sight.bearings, sight.distances, self.width))
@@ -134,7 +137,7 @@ class Obstacles:
     """Things at the kerb, on no map, that hide what is behind them.
 
     Their number around a place is a Poisson one with mean `count`; each is `width` metres wide and
-    stands anywhere within the range of the city. Both are 0 or more.
+    stands anywhere within the range of the city. Both are from 0 to 1,000.
     """
 
     stream: ClassVar[int] = 626_356_719
@@ -143,8 +146,8 @@ class Obstacles:
     width: float = 4.0
 
     def __post_init__(self) -> None:  # noqa: D105
-        _check_amount("number of obstacles", self.count)
-        _check_amount("width of the obstacles", self.width)
+        require_number("number of obstacles", self.count, least=0, most=MOST_FALSE)
+        require_number("width of the obstacles", self.width, least=0, most=MOST_WIDTH_M)
 
     def ready(self, city: CitySights) -> Spoiling:
         """Return what it does to a query."""
@@ -196,12 +199,6 @@ def _behind(
     )
 
 
-def _check_amount(label: str, value: float) -> None:
-    if not (math.isfinite(value) and value >= 0):
-        msg = f"the {label} is {value!r}; give a number, 0 or more."
-        raise InputError(msg)
-
-
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Detector:
     """A detector that fails as a noise model says.
@@ -218,10 +215,10 @@ class Detector:
     half: float = math.inf
 
     def __post_init__(self) -> None:  # noqa: D105
-        if not self.half > 0:
+        if not self.half >= NEAREST_M:
             msg = (
-                f"a detector that sees half at {self.half!r} m was given; give metres above 0, or "
-                "infinity where distance does not matter."
+                f"a detector that sees half at {self.half!r} m was given; give metres from "
+                f"{NEAREST_M}, or infinity where distance does not matter."
             )
             raise InputError(msg)
 
@@ -321,13 +318,9 @@ class Distortion:
     false_class: FalseClass = "uniform"
 
     def __post_init__(self) -> None:  # noqa: D105
-        if self.occurrences < 0:
-            msg = f"{self.occurrences} occurrences of distortion were given; give 0 or more."
-            raise InputError(msg)
+        require_number("occurrences of distortion", self.occurrences, least=0, most=MOST_FALSE)
         for label, value in (("sigma", self.bearing_sigma), ("clip", self.bearing_clip)):
-            if not math.isfinite(value) or value < 0:
-                msg = f"a bearing {label} of {value!r} was given; give degrees, 0 or more."
-                raise InputError(msg)
+            require_number(f"bearing {label}", value, least=0, most=FULL_TURN, unit="degrees")
         if self.false_class not in get_args(FalseClass):
             hint = nearest_name(str(self.false_class), get_args(FalseClass))
             msg = (

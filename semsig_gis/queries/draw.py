@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Literal, get_args
 import numpy as np
 
 from semsig_gis.core.errors import CrsError, InputError, UnknownNameError, nearest_name
+from semsig_gis.core.ranges import MOST_SEED, require_number
 from semsig_gis.database.views import views_at
 from semsig_gis.queries.chain import ready_chain
 from semsig_gis.queries.distortions import DISTORTIONS
@@ -44,7 +45,7 @@ class QuerySpec:
     number : int, default 500
         How many of each seed; at least 1.
     seeds : tuple of int, default (0,)
-        Seeds of all chances; different ones, each 0 or more.
+        Seeds of all chances; different ones, each from 0 to 10**18.
     seen_from : {"cells", "anywhere"}, default "cells"
         The viewpoints of cells, as in the paper, or places anywhere in cells, outside of
         buildings.
@@ -76,9 +77,8 @@ class QuerySpec:
         if not self.seeds or len(set(self.seeds)) < len(self.seeds):
             msg = f"the seeds are {list(self.seeds)}; give at least one, and none twice."
             raise InputError(msg)
-        if min(self.seeds) < 0:
-            msg = f"a seed of {min(self.seeds)} was given; give a whole number, 0 or more."
-            raise InputError(msg)
+        for seed in self.seeds:
+            require_number("a seed", seed, least=0, most=MOST_SEED)
         if self.seen_from not in get_args(SeenFrom):
             hint = nearest_name(self.seen_from, get_args(SeenFrom))
             msg = f"queries are seen from {self.seen_from!r}{hint}; give cells or anywhere."

@@ -22,6 +22,7 @@ from semsig_gis.core.geometry import require_metric_crs
 from semsig_gis.core.plugins import installed_catalogs
 from semsig_gis.core.taxonomy import MAX_RANGE_M, ObjectClass, Taxonomy
 from semsig_gis.sources.conditions import COMPARES, Condition, Value
+from semsig_gis.storage.text import read_text
 from semsig_gis.storage.toml import check_keys, metres, one_of, parse_toml, texts
 
 if TYPE_CHECKING:
@@ -537,7 +538,8 @@ def load_catalog(name: str | Path) -> Catalog:
             raise UnknownNameError(msg)
         source = sources[text]
     try:
-        content = source.read_text(encoding="utf-8-sig")  # some editors write a BOM
+        # A package may lie in an archive, whose members are no files.
+        content = read_text(source) if isinstance(source, Path) else source.read_text("utf-8")
     except UnicodeDecodeError as error:
         msg = f"catalogue {text} is not UTF-8 text ({error}); save it as UTF-8."
         raise CatalogError(msg) from error

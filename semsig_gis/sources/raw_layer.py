@@ -21,7 +21,7 @@ from semsig_gis.core.errors import CatalogError, CrsError, nearest_name
 from semsig_gis.core.geometry import CLASS_NAME, GEOMETRY, HALF_WIDTH, SOURCE_ID
 from semsig_gis.sources import RawLayer, RowCounts
 from semsig_gis.sources.catalog import MAX_WIDTH_M, MIN_WIDTH_M
-from semsig_gis.sources.conditions import Condition, as_text, matches, pattern_of
+from semsig_gis.sources.conditions import Condition, as_text, matches
 from semsig_gis.sources.decimals import decimal
 
 if TYPE_CHECKING:
@@ -40,12 +40,18 @@ LATITUDE_LIMIT = 90.0 + 1e-6
 
 
 def parse_crs(text: str) -> CRS:
-    """Return the CRS that a person wrote; CrsError if pyproj does not know it."""
+    """Return the CRS that a person wrote; CrsError if pyproj does not know it, or no map has it."""
+    advice = "write a code such as 'EPSG:2154' or 'EPSG:4326'"
     try:
-        return CRS.from_user_input(text)
+        crs = CRS.from_user_input(text)
     except CRSError as error:
-        msg = f"CRS {text!r} is unknown; write a code such as 'EPSG:2154' or 'EPSG:4326'."
+        msg = f"CRS {text!r} is unknown; {advice}."
         raise CrsError(msg) from error
+    if crs.is_geocentric or crs.is_vertical:
+        kind = crs.type_name.removesuffix(" CRS").lower()
+        msg = f"CRS {text!r} is {kind}, so that two coordinates are no place in it; {advice}."
+        raise CrsError(msg)
+    return crs
 
 
 @functools.lru_cache(maxsize=64)  # looking for the code takes 0.2 s
@@ -326,12 +332,11 @@ class RowRules:
                 [(field, Condition.parse(accepted)) for field, accepted in rules if filters]
                 for rules in (spec.where, spec.exclusions)
             )
-            listed = [
-                *(spec.class_by.classes if spec.class_by else ()),
-                *(spec.width_by.widths if spec.width_by else ()),
-            ]
-            for value, _ in listed:
-                pattern_of(str(value))
+            for by in (
+                spec.class_by and spec.class_by.classes,
+                spec.width_by and spec.width_by.widths,
+            ):
+                Condition.parse(value for value, _ in by or ())
         except CatalogError as error:
             msg = f"{where}: {error}"
             raise CatalogError(msg) from error

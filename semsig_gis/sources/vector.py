@@ -5,7 +5,6 @@ from __future__ import annotations
 import contextlib
 import contextvars
 import itertools
-import json
 import logging
 import math
 import re
@@ -35,6 +34,7 @@ from semsig_gis.sources.raw_layer import (
     settle_crs,
     usable_crs,
 )
+from semsig_gis.storage.text import parse_json
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -420,7 +420,7 @@ def _count(source: fiona.Collection) -> int | None:
 def _own_crs(source: fiona.Collection) -> tuple[CRS | None, bool]:
     """Return the CRS of a layer, and whether it is only what GeoJSON means by saying nothing."""
     if source.driver == "GeoJSON":
-        members = json.loads(source.tags(ns="NATIVE_DATA").get("NATIVE_DATA", "{}"))
+        members = parse_json(source.tags(ns="NATIVE_DATA").get("NATIVE_DATA", "{}"))
         if "crs" not in members:
             return WGS84, True
         if usable_crs(source.crs_wkt) == WGS84 and not WGS84_NAMES.search(str(members["crs"])):
@@ -501,7 +501,7 @@ def _refuse_broken(rows: Rows, member: Member) -> None:
     if not null:
         return
     with member.open() as stream:
-        document = json.loads(stream.read().decode("utf-8-sig", errors="replace"))
+        document = parse_json(stream.read().decode("utf-8-sig", errors="replace"))
     listed = document.get("features", [document])
     features = [item for item in listed if isinstance(item, dict) and item.get("type") == "Feature"]
     if len(features) != rows.read:

@@ -29,6 +29,7 @@ from pyproj.exceptions import CRSError
 from semsig_gis.core.errors import DatabaseError, InputError, SemsigError
 from semsig_gis.core.memory import raise_if_short
 from semsig_gis.core.signature import Signature
+from semsig_gis.storage.text import parse_json, read_whole
 from semsig_gis.storage.whole import reason, whole_file
 
 if TYPE_CHECKING:
@@ -38,6 +39,9 @@ if TYPE_CHECKING:
 
     from semsig_gis.core.taxonomy import Taxonomy
 
+
+MOST_ROWS = 2**30
+"""Bytes of a file of rows, which is read whole."""
 
 BBOX = "bbox"
 SIDES = ("xmin", "ymin", "xmax", "ymax")
@@ -309,8 +313,8 @@ def read_geoparquet(
         )
         raise DatabaseError(msg) from error
     try:
-        specs = json.loads(metadata[SPEC_KEY])
-        crs = _crs_of(json.dumps(json.loads(metadata[b"geo"])["columns"]["geometry"]["crs"]))
+        specs = parse_json(metadata[SPEC_KEY], finite=True)
+        crs = _crs_of(json.dumps(parse_json(metadata[b"geo"])["columns"]["geometry"]["crs"]))
         stored = specs["kind"]
     except (KeyError, TypeError, ValueError, CRSError) as error:
         msg = f"{file} was not written by semsig; give a {kind} file."
@@ -385,8 +389,8 @@ def file_rows(path: str | Path, *, what: str) -> Iterator[tuple[int, Row | Excep
     file = Path(path)
     try:
         if file.suffix.lower() == ".csv":
-            return csv_rows(file.read_text(encoding="utf-8-sig"), str(file))
-        return json_rows(file.read_bytes().split(b"\n"))
+            return csv_rows(read_whole(file, most=MOST_ROWS).decode("utf-8-sig"), str(file))
+        return json_rows(read_whole(file, most=MOST_ROWS).split(b"\n"))
     except (OSError, ValueError) as error:
         reason = error.strerror if isinstance(error, OSError) else error
         msg = f"{what} file {file} cannot be read ({reason}); give a CSV or JSON lines file."
@@ -470,7 +474,7 @@ def json_rows(lines: Iterable[str | bytes]) -> Iterator[tuple[int, Row | Excepti
         if text.strip():
             row: Row | Exception
             try:
-                row = json.loads(text)
-            except (ValueError, RecursionError) as error:
+                row = parse_json(text)
+            except ValueError as error:
                 row = InputError(f"it is not JSON: {error}")
             yield line, row

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import warnings
 from typing import TYPE_CHECKING
 
@@ -16,6 +17,7 @@ from rasterio.vrt import WarpedVRT
 from rasterio.windows import Window
 
 from semsig_gis.core.errors import CrsError, InputError, SourceError
+from semsig_gis.storage.text import require_regular
 from semsig_gis.storage.whole import whole_file
 
 if TYPE_CHECKING:
@@ -55,6 +57,8 @@ def raster_at_cells(
         with warnings.catch_warnings():
             # A raster without a place on the ground is told about below.
             warnings.simplefilter("ignore", NotGeoreferencedWarning)
+            if os.path.exists(path):  # noqa: PTH110 - it answers where Path.exists raises
+                require_regular(path)
             source = rasterio.open(path)
         with source:
             if source.crs is None:
@@ -81,8 +85,8 @@ def raster_at_cells(
             "give a raster in another."
         )
         raise CrsError(msg) from error
-    except RasterioError as error:
-        reason = str(error).split(". ")[0].strip().rstrip(".")
+    except (RasterioError, OSError) as error:
+        reason = (getattr(error, "strerror", None) or str(error)).split(". ")[0].strip().rstrip(".")
         msg = f"{path} cannot be read as a raster ({reason}); give a file such as a GeoTIFF."
         raise SourceError(msg) from error
     return values[top - up, across - left]

@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any
 
 from semsig_gis.core.errors import InputError
 from semsig_gis.core.scratch import HALF_DONE, own_folder, remove_abandoned
+from semsig_gis.storage.text import parse_json, read_whole
 from semsig_gis.storage.whole import put_in_place, reason, write_whole
 
 if TYPE_CHECKING:
@@ -153,7 +154,7 @@ def _remove(path: Path) -> None:
 
 def read_json(path: Path) -> Recipe:
     """Return the values of a JSON file; TypeError if it holds anything but an object."""
-    values = json.loads(path.read_text(encoding="utf-8"))
+    values = parse_json(read_whole(path), finite=True)
     if not isinstance(values, dict):
         msg = f"{path} holds no values by name"
         raise TypeError(msg)

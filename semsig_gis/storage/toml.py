@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from semsig_gis.core.errors import CatalogError, InputError, nearest_name
+from semsig_gis.storage.text import parse_json, read_text
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -31,9 +32,10 @@ def read_values(path: str | Path, what: str) -> Any:  # noqa: ANN401 - as the fi
     """
     file = Path(path)
     try:
-        text = file.read_text(encoding="utf-8")
-        return tomllib.loads(text) if file.suffix.lower() == ".toml" else json.loads(text)
-    except (OSError, ValueError) as error:
+        text = read_text(file)
+        toml = file.suffix.lower() == ".toml"
+        return tomllib.loads(text) if toml else parse_json(text, finite=True)
+    except (OSError, ValueError, RecursionError) as error:
         reason = error.strerror if isinstance(error, OSError) else error
         msg = f"{what} file {file} cannot be read ({reason}); give a JSON or TOML file."
         raise InputError(msg) from error
@@ -43,7 +45,7 @@ def parse_toml(text: str, where: str) -> dict[str, Any]:
     """Parse TOML; CatalogError names the file, `where`, if the text is something else."""
     try:
         return tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
+    except (tomllib.TOMLDecodeError, RecursionError) as error:
         msg = f"{where} is not valid TOML: {error}."
         raise CatalogError(msg) from error
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import json
+import os
 import shutil
 import subprocess
 import sys
@@ -436,3 +437,54 @@ def test_a_file_without_a_crs_needs_one(city: Path, run: Run, done: Done) -> Non
     sentence(run(line), "lights.shp")
     done(line, "--crs", "EPSG:2154")
     sentence(run(line, "--crs", "EPSG:0"), "EPSG:0")
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="no such files")
+@pytest.mark.parametrize(
+    ("line", "suffix"),
+    [
+        ("localize city.parquet --queries", ""),
+        ("localize city.parquet --queries", ".csv"),
+        ("learn city.parquet --out n.toml --samples", ".jsonl"),
+        (f"{LIKELIHOOD} --types D --noise", ".toml"),
+        (f"{LIKELIHOOD} --types D --rule", ".json"),
+        (f"{LIKELIHOOD} --types D --popularity", ".tif"),
+        (f"{LIKELIHOOD} --types D --area", ".geojson"),
+        ("build objects.parquet --out c.parquet --buildings", ".gpkg"),
+        ("load . --out o.parquet --catalog", ".toml"),
+        ("load --catalog tiny.toml --out o.parquet", ".gpkg"),
+        ("experiment --out x", ".toml"),
+        ("suggest", ".csv"),
+        ("info", ".parquet"),
+        ("build --out c.parquet", ".parquet"),
+        ("import --out c.parquet", ".gpkg"),
+    ],
+)
+def test_a_pipe_is_not_waited_for(line: str, suffix: str, city: Path, run: Run) -> None:
+    pipe = city / f"pipe{suffix}"
+    os.mkfifo(pipe)
+    sentence(run(line, pipe), str(pipe))
+
+
+@pytest.mark.parametrize(
+    ("line", "name", "text"),
+    [
+        (f"{LIKELIHOOD} --types D --noise", "deep.json", "[" * 100_000),
+        (f"{LIKELIHOOD} --types D --noise", "deep.toml", "a = " + "[" * 100_000),
+        (f"{LIKELIHOOD} --types D --noise", "huge.toml", f"clutter = {10**400}"),
+        (f"{LIKELIHOOD} --types D --noise", "nan.json", '{"clutter": NaN}'),
+        (f"{LIKELIHOOD} --types D --rule", "deep.json", '{"threshold": ' + "[" * 100_000),
+        (f"{LIKELIHOOD} --types D --rule", "huge.json", '{"threshold": 1e999}'),
+        ("load . --out o.parquet --catalog", "deep.toml", "a = " + "[" * 100_000),
+        ("load --catalog tiny.toml --out o.parquet", "crossings.geojson", '{"type": ' * 100_000),
+        ("suggest", "deep.geojson", '{"type": ' * 100_000),
+        ("experiment --out x", "deep.toml", "a = " + "[" * 100_000),
+    ],
+)
+def test_what_is_nested_or_large_beyond_reason_is_refused(
+    line: str, name: str, text: str, city: Path, run: Run
+) -> None:
+    (city / name).write_text(text, encoding="utf-8")
+    outcome = run(line, name)
+    sentence(outcome)
+    assert len(outcome[2]) < 500

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 import signal
 from typing import TYPE_CHECKING, Any
@@ -93,6 +94,21 @@ def test_whatever_dask_raises_is_one_sentence(
     monkeypatch.setattr(f"distributed.{part}", fail)
     with refused(InputError, *words):
         list(run_tasks(abs, [1], **where))
+
+
+@pytest.mark.parametrize(
+    ("address", "words"), [(None, "the processes"), ("tcp://x:1", "the scheduler tcp://x:1")]
+)
+def test_processes_that_do_not_answer_in_time_are_told(
+    address: str | None, words: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def wait(*_: object) -> None:
+        raise TimeoutError
+
+    monkeypatch.setattr(parallel, "_client", lambda *_: contextlib.nullcontext())
+    monkeypatch.setattr(parallel, "_require_same_view", wait)
+    with refused(InputError, words, "did not answer in time", "same command"):
+        list(run_tasks(abs, [1], workers=0 if address else 1, scheduler=address))
 
 
 def test_processes_that_cannot_be_ended_take_nothing_back(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -21,6 +21,7 @@ from worlds import (
     worlds,
 )
 
+from semsig_gis.core import effort
 from semsig_gis.core.errors import CrsError, EmptyResultError, InputError
 from semsig_gis.core.geometry import GridSpec, cells_near, wrap_degrees
 from semsig_gis.core.rtree import PackedIndex
@@ -225,3 +226,26 @@ def test_what_sees_nothing_or_cannot_be_placed_is_told() -> None:
     house = gpd.GeoDataFrame(geometry=[shapely.box(-2, -2, 2, 2)], crs="EPSG:2154")
     with refused(EmptyResultError, "1 objects", "look at", "buildings"):
         build_database(world.street_objects, spec=SignatureSpec(12.0), footprints=house)
+
+
+@pytest.mark.parametrize(("radius", "step"), [(30.0, 10.0), (200.0, 20.0), (15.0, 3.0)])
+def test_as_many_pairs_are_expected_as_there_are(town: World, radius: float, step: float) -> None:
+    objects, grid = town.street_objects, GridSpec(step)
+    database = build_database(objects, grid=grid, spec=SignatureSpec(radius))
+    ranges = objects.taxonomy.ranges(radius)[objects.codes]
+    expected = build.expected_pairs(ranges, grid=grid, cells=10**9)
+    assert expected == pytest.approx(len(database.codes), rel=0.05)
+    assert build.expected_pairs(ranges, grid=grid, cells=3) == 3 * len(objects)
+
+
+def test_what_the_memory_does_not_hold_is_not_begun(
+    town: World, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(effort, "free_memory", lambda: 120_000_000)
+    build_database(town.street_objects)
+    with refused(InputError, "sightings", "0.1 GB are free", "smaller tiles"):
+        build_database(town.street_objects, spec=SignatureSpec(3000.0))
+    with refused(InputError, "cells of 6.5 m within 6000 m", "free"):
+        build_database(town.street_objects, grid=GridSpec(6.5), spec=SignatureSpec(6000.0))
+    with refused(InputError, "more than the 2,147,483,647 that one file holds"):
+        build.require_room(3e9, cells=10, objects=10**6)

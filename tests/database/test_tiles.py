@@ -77,7 +77,7 @@ def test_a_tile_is_so_many_whole_cells() -> None:
     assert TileSpec(104.0).cells(GridSpec(step=10.0)) == 10
     assert TileSpec(1.0).cells(GridSpec(step=10.0)) == 1
     for side in (0.0, -5.0, float("nan"), float("inf")):
-        with refused(InputError, "side of a tile", "above 0"):
+        with refused(InputError, "side of a tile", "from 1"):
             TileSpec(side)
 
 

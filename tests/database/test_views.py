@@ -98,7 +98,7 @@ def test_a_wrong_choice_is_refused() -> None:
     with refused(InputError, "'street'", "nearest is 'streets'"):
         ViewpointSpec(mode="street")  # type: ignore[arg-type]
     for width in (0.0, -1.0, np.nan):
-        with refused(InputError, "half-width", "above 0"):
+        with refused(InputError, "half-width", "from 0.05"):
             ViewpointSpec(width=width)
     for area in (shapely.Point(0, 0), shapely.Polygon()):
         with refused(InputError, area.geom_type, "give a polygon"):

@@ -326,7 +326,7 @@ def test_the_report_tells_of_the_answers(snapshot: Callable[[str, str], None]) -
         ({"queries": 0}, ["0 queries", "from 1"]),
         ({"top": 151}, ["151 candidates", "from 1 to 150"]),
         ({"top": 0}, ["0 candidates", "from 1"]),
-        ({"seed": -1}, ["seed of -1", "0 or more"]),
+        ({"seed": -1}, ["seed is -1", "from 0"]),
         ({"distortion": "strng"}, ["'strng'", "nearest is 'strong'"]),
         ({"method": OTHER}, ["another database"]),
     ],

@@ -42,7 +42,7 @@ if TYPE_CHECKING:
         ({"detection": -0.1}, "detection of the noise is -0.1; give a chance from 0 to 1."),
         ({"detection": True}, "detection of the noise is True"),
         ({"misnamed": float("nan")}, "misnamed of the noise is nan"),
-        ({"clutter": -1}, "clutter of the noise is -1; give a number, 0 or more."),
+        ({"clutter": -1}, "clutter of the noise is -1; give a number from 0"),
         ({"bearing_sigma": 0}, "bearing_sigma of the noise is 0; give degrees above 0"),
         ({"bearing_sigma": 200}, "up to 180"),
         ({"position_sigma": float("inf")}, "position_sigma of the noise is inf"),

@@ -173,7 +173,7 @@ def test_a_position_is_read_as_what_is_in_the_city(
         (PARIS, "4.8.9,2.3,20", "LAT,LON,SIGMA in degrees"),
         (PARIS, "48.9,2.3,far", "LAT,LON,SIGMA in degrees"),
         (PARIS, "nan,2.3,20", "LAT,LON,SIGMA in degrees"),
-        (PARIS, "48.9,2.3,nan", "nan m; give metres above 0"),
+        (PARIS, "48.9,2.3,nan", "is nan; give a number from 0.01"),
     ],
 )
 def test_a_position_that_is_not_one_place_of_the_city_is_refused(

@@ -320,7 +320,7 @@ def test_a_route_in_a_table(tmp_path: Path) -> None:
         ('{"dx": 5}', ["line 1", "dx and dy, or distance and bearing"]),
         ('{"dx": 1, "dy": 2, "bearing": 3}', ["dx and dy, or distance and bearing"]),
         ('{"types": "D"}\n{"dx": "far", "dy": 2}', ["line 2", "far"]),
-        ('{"types": "D"}\n{"dx": Infinity, "dy": 2}', ["line 2", "finite"]),
+        ('{"types": "D"}\n{"dx": Infinity, "dy": 2}', ["line 2", "leg is inf"]),
         ('{"types": "D"}\n{"dx": 1, "dy": 2, "sigma": -1.0}', ["line 2", "-1.0"]),
     ],
 )

@@ -9,9 +9,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pandas as pd
 
+from semsig_gis.core.effort import announce
 from semsig_gis.core.errors import InputError
+from semsig_gis.core.ranges import MOST_SEED, MOST_WORKERS, require_number
 from semsig_gis.evaluation.figures import calibration_bins, finite_or_none
-from semsig_gis.evaluation.identify.trials import trial_cells, try_cells
+from semsig_gis.evaluation.identify.trials import MOST_TRIALS, TRIAL_S, trial_cells, try_cells
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
@@ -102,7 +104,7 @@ def check_identifiability(
     index : LikelihoodIndex
         The index that they were found out with.
     queries : int, default 2000
-        How many to ask, 1 or more.
+        How many to ask, 1 to 1,000,000.
     seed : int, optional
         Seed of the cells and of all draws, another than that of the trials; by default the next.
     threads : int, default 1
@@ -131,20 +133,18 @@ def check_identifiability(
     """
     if seed is None:
         seed = identifiability.seed + 1
-    if queries < 1:
-        msg = f"a check by {queries} queries was asked for; give a whole number from 1."
-        raise InputError(msg)
-    if seed < 0 or seed == identifiability.seed:
-        msg = (
-            f"a check with seed {seed} was asked for; give a whole number from 0 other than "
-            f"{identifiability.seed}, with which the chances were found out."
-        )
+    require_number("number of queries", queries, least=1, most=MOST_TRIALS)
+    require_number("number of threads", threads, least=1, most=MOST_WORKERS)
+    require_number("seed", seed, least=0, most=MOST_SEED + 1)
+    if seed == identifiability.seed:
+        msg = f"a check with seed {seed} was asked for, that of the trials; give another."
         raise InputError(msg)
     database = identifiability.database
     same = np.array_equal(index.database.cell_ids, database.cell_ids)
     if not same or index.noise != identifiability.noise:
         msg = "the index belongs to another database or noise model; pass the matching one."
         raise InputError(msg)
+    announce(queries * TRIAL_S / threads, "checking")
     cells = trial_cells(len(database), queries, seed=seed)
     tried = try_cells(
         index, cells, radius=identifiability.radius, seed=seed, threads=threads, progress=progress

@@ -13,7 +13,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from semsig_gis.core.errors import InputError
+from semsig_gis.core.effort import announce
+from semsig_gis.core.ranges import MOST_SEED, MOST_WORKERS, require_number
 from semsig_gis.core.statistics import fit_shares
 from semsig_gis.evaluation.identify.lookalikes import (
     LEAST_SUM,
@@ -22,7 +23,13 @@ from semsig_gis.evaluation.identify.lookalikes import (
     find_lookalikes,
 )
 from semsig_gis.evaluation.identify.result import ClassGain, Identifiability
-from semsig_gis.evaluation.identify.trials import trial_cells, try_cells, try_without_classes
+from semsig_gis.evaluation.identify.trials import (
+    MOST_TRIALS,
+    TRIAL_S,
+    trial_cells,
+    try_cells,
+    try_without_classes,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -40,8 +47,8 @@ TEMPERATURES = (0.15, 0.2, 0.25, 0.3, 0.35, 0.4, 0.5, 0.6, 0.8, 1.0)
 TEMPERATURE_TRIALS = 300
 DECIMALS = 3  # of all numbers: more than they are sure to, and short in a file
 
-# Seconds that a trial, and a pair of cells, takes: only for telling how far the work is.
-TRIAL_S, PAIR_S, SAMPLED_S = 1.5e-2, 2.7e-9, 2.5e-4
+# Seconds that a trial, and a pair of cells, takes: for telling how long and how far the work is.
+PAIR_S, SAMPLED_S = 2.7e-9, 2.5e-4
 
 
 def identify(
@@ -61,15 +68,15 @@ def identify(
     index : LikelihoodIndex
         The cells, and how the detector fails; the answers know that, too.
     radius : float, default 50
-        Metres that count as near, 0 or more.
+        Metres that count as near, 0 to 1,000,000.
     trials : int, default 3000
-        How many simulated queries to ask, 1 or more.
+        How many simulated queries to ask, 1 to 1,000,000.
     class_trials : int, default 400
         How many of them to ask again without each class, 1 or more.
     seed : int, default 0
-        Seed of all chances, 0 or more.
+        Seed of all chances, 0 to 10**18.
     threads : int, default 1
-        How many threads share the work; the result does not depend on it.
+        How many threads share the work, 1 to 1,024; the result does not depend on it.
     progress : callable, optional
         Called with how much is done and how much there is in all.
 
@@ -107,26 +114,25 @@ def identify(
     >>> bool(cells.found[rich].mean() > cells.found[poor].mean())
     True
     """
-    for what, count, least in (
-        ("number of trials", trials, 1),
-        ("number of trials without a class", class_trials, 1),
-        ("number of threads", threads, 1),
-        ("seed", seed, 0),
+    for what, count, least, most in (
+        ("number of trials", trials, 1, MOST_TRIALS),
+        ("number of trials without a class", class_trials, 1, MOST_TRIALS),
+        ("number of threads", threads, 1, MOST_WORKERS),
+        ("seed", seed, 0, MOST_SEED),
     ):
-        if count < least:
-            msg = f"the {what} is {count}; give a whole number from {least}."
-            raise InputError(msg)
+        require_number(what, count, least=least, most=most)
     check_radius(radius)
     database = index.database
     cells, sample = len(database), trial_cells(len(index.database), trials, seed=seed)
     again = sample[:class_trials]
-    stages = _stages(
-        progress,
+    seconds = (
         trials * TRIAL_S,
         cells**2 * PAIR_S,
         cells * SAMPLED_S,
         len(again) * len(index.table.codes) * TRIAL_S,
     )
+    announce(sum(seconds) / threads, "comparing cells")
+    stages = _stages(progress, *seconds)
     tried = try_cells(index, sample, radius=radius, seed=seed, threads=threads, progress=stages[0])
     temperature = _temperature(index, tried, radius=radius, threads=threads)
     like = find_lookalikes(

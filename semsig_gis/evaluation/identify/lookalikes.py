@@ -16,6 +16,7 @@ import numpy as np
 
 from semsig_gis.core.errors import InputError
 from semsig_gis.core.geometry import cell_ids
+from semsig_gis.core.ranges import MOST_METRES, require_number
 from semsig_gis.likelihood.index import BIN_UNITS, BINS
 
 if TYPE_CHECKING:
@@ -193,10 +194,8 @@ def _check(temperature: float, radius: float) -> None:
 
 
 def check_radius(radius: float) -> None:
-    """Raise InputError unless a radius is a number of metres, 0 or more."""
-    if not 0 <= radius < math.inf:
-        msg = f"a radius of {radius} m was given; give metres, 0 or more."
-        raise InputError(msg)
+    """Raise InputError unless a radius is a number of metres from 0 to a million."""
+    require_number("radius", radius, least=0, most=MOST_METRES, unit="metres")
 
 
 def _symbols(index: LikelihoodIndex) -> tuple[NDArray[np.int64], NDArray[np.int64]]:

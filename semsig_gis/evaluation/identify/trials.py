@@ -49,6 +49,10 @@ class Trials:
     lean: NDArray[np.float64]
 
 
+MOST_TRIALS = 1_000_000
+TRIAL_S = 1.5e-2  # about what one takes
+
+
 def trial_cells(cells: int, count: int, *, seed: int = 0) -> NDArray[np.int64]:
     """Return row numbers of the cells of `count` trials: all equally often, the rest drawn.
 

@@ -22,6 +22,7 @@ from semsig_gis.storage.whole import whole_file
 if TYPE_CHECKING:
     from collections.abc import Callable
 
+MOST = 1000  # objects in a signature, and metres of the place
 ROUNDING = 1e-6  # of sums of shares, and of squares of metres
 
 
@@ -294,7 +295,7 @@ def named_noise(name: str) -> Noise:
 
 @dataclass(frozen=True, slots=True)
 class _Number:
-    """A kind of finite number, in words and as a test."""
+    """A kind of number, in words and as a test, which NaN and infinity fail."""
 
     words: str
     fits: Callable[[float], bool]
@@ -302,13 +303,13 @@ class _Number:
     def check(self, label: str, value: object) -> None:
         """Refuse anything else."""
         number = value if isinstance(value, (int, float)) else math.nan
-        if isinstance(value, bool) or not math.isfinite(number) or not self.fits(number):
-            msg = f"{label} of the noise is {value!r}; give {self.words}."
+        if isinstance(value, bool) or not self.fits(number):
+            msg = f"{label} of the noise is {value!r:.40}; give {self.words}."
             raise InputError(msg)
 
 
 _CHANCE = _Number("a chance from 0 to 1", lambda value: 0 <= value <= 1)
-_AMOUNT = _Number("a number, 0 or more", lambda value: value >= 0)
+_AMOUNT = _Number(f"a number from 0 to {MOST:,}", lambda value: 0 <= value <= MOST)
 _DEGREES = _Number("degrees above 0 and up to 180", lambda value: 0 < value <= HALF_TURN)
 _NUMBERS = MappingProxyType(
     {

@@ -20,6 +20,7 @@ from pathlib import Path
 from typing import IO, TYPE_CHECKING
 
 from semsig_gis.core.errors import InputError
+from semsig_gis.storage.text import parse_json
 from semsig_gis.storage.whole import whole_file
 
 if sys.platform == "win32":
@@ -146,7 +147,7 @@ class Entry:
     def copy(self) -> Fetched | None:
         """Return the cached copy, or None where there is none or it is damaged."""
         try:
-            meta = json.loads(self.sidecar.read_text(encoding="utf-8"))
+            meta = parse_json(self.sidecar.read_text(encoding="utf-8"))
             path = self.folder / Path(meta["file"]).name
             copy = Fetched(path=path, from_cache=True, **{name: meta[name] for name in KEPT})
             if checksum(path) != copy.sha256:
@@ -179,7 +180,7 @@ class Entry:
         """Return how many bytes have arrived, and of what; 0 where the rest cannot be asked for."""
         try:
             size = self.part.stat().st_size
-            edition = Edition(**json.loads(self._part_info.read_text(encoding="utf-8")))
+            edition = Edition(**parse_json(self._part_info.read_text(encoding="utf-8")))
         except (OSError, TypeError, ValueError):
             return 0, Edition()
         return (size, edition) if edition.if_range else (0, Edition())

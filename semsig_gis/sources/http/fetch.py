@@ -33,6 +33,7 @@ from semsig_gis.sources.http.deadline import (
     SlowError,
 )
 from semsig_gis.sources.packed import bomb, swells
+from semsig_gis.storage.text import parse_json
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
@@ -226,7 +227,7 @@ def _detail(response: requests.Response) -> str:
     with contextlib.suppress(ValueError, AttributeError, zlib.error):
         if response.headers.get("Content-Encoding", "") == "gzip":
             body = zlib.decompressobj(wbits=31).decompress(body, BLOCK)
-        reply = json.loads(body)
+        reply = parse_json(body)
         text = " ".join(str(reply.get("message") or reply.get("error") or "").split())
         if text:
             return f" ({text[:200].rstrip('.')})".replace(". ", ", ")

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import json
 import unicodedata
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -28,6 +27,7 @@ from semsig_gis.sources.raw_layer import (
     require_field,
     settle_crs,
 )
+from semsig_gis.storage.text import parse_json
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
@@ -131,7 +131,7 @@ def _shape(value: Any) -> Position:  # noqa: ANN401 - whatever is in the file
     try:
         if isinstance(value, bytes):
             return shapely.from_wkb(value)
-        geometry = json.loads(value) if isinstance(value, str) else value
+        geometry = parse_json(value) if isinstance(value, str) else value
         if geometry.get("type") == "Feature":
             geometry = geometry["geometry"]
         if geometry is None:
@@ -331,7 +331,7 @@ def _field_types(
 
 def _described(path: Path) -> dict[str, str]:
     try:
-        content: Any = json.loads(path.read_text(encoding="utf-8"))
+        content: Any = parse_json(path.read_text(encoding="utf-8"))
         return {field["name"]: field["type"] for field in content["fields"]}
     except (KeyError, TypeError, ValueError) as error:
         msg = (

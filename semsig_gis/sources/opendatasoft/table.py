@@ -16,6 +16,7 @@ from semsig_gis.core.errors import CrsError, SourceError
 from semsig_gis.sources import require_file
 from semsig_gis.sources.csv_file import open_csv
 from semsig_gis.sources.raw_layer import WGS84
+from semsig_gis.storage.text import parse_json
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
@@ -71,7 +72,7 @@ def open_table(path: Path) -> Table:
 
 def _json(path: Path) -> Table:
     try:
-        content = json.loads(path.read_text(encoding="utf-8-sig"))
+        content = parse_json(path.read_text(encoding="utf-8-sig"))
     except UnicodeDecodeError as error:
         raise _not_utf8(path) from error
     except (ValueError, RecursionError) as error:
@@ -160,7 +161,7 @@ def _parquet(path: Path) -> Table:
     try:
         with pq.ParquetFile(path) as file:
             fields = tuple(file.schema_arrow.names)
-            metadata = json.loads((file.schema_arrow.metadata or {}).get(b"geo", b"{}"))
+            metadata = parse_json((file.schema_arrow.metadata or {}).get(b"geo", b"{}"))
     except (pa.ArrowException, OSError, ValueError) as error:
         raise _broken_parquet(path, error) from error
     # A portal's own exports name no geometry; those that other programs made of them do.

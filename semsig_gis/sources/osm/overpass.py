@@ -35,6 +35,7 @@ from semsig_gis.sources.osm.elements import (
     way_shape,
 )
 from semsig_gis.sources.raw_layer import BadFeatureError
+from semsig_gis.storage.text import parse_json
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
@@ -84,7 +85,7 @@ class Document:
 def load_document(path: Path, *, where: str) -> Document:
     """Read an answer, complete or not; SourceError if it is not one of an Overpass server."""
     try:
-        content = json.loads(path.read_bytes())
+        content = parse_json(path.read_bytes())
         elements = [element for element in content["elements"] if _is_element(element)]
         remark = " ".join(str(content.get("remark", "")).split())
         # as part of a sentence of ours
@@ -250,7 +251,7 @@ def find_place(name: str, *, endpoint: str, cache: Cache, spec: HttpSpec = DEFAU
 
 def _places(path: Path, host: str) -> list[dict[str, Any]]:
     try:
-        places = json.loads(path.read_bytes())
+        places = parse_json(path.read_bytes())
     except ValueError:
         places = None
     if not isinstance(places, list) or not all(isinstance(place, dict) for place in places):

@@ -17,6 +17,7 @@ import shapely
 
 from semsig_gis.core.errors import InputError
 from semsig_gis.core.geometry import CLASS_NAME, SOURCE_ID
+from semsig_gis.core.ranges import MOST_SEED, require_number
 from semsig_gis.sources import RawLayer, RowCounts
 from semsig_gis.sources.catalog import LayerSpec, paper_taxonomy
 from semsig_gis.sources.synthetic.streets import counted, furnish, lay_streets
@@ -96,7 +97,8 @@ def build_houses(network: Network, built: Objects, rng: np.random.Generator) -> 
 CRS = "EPSG:32631"
 # On the zone's central meridian, where north is north.
 CENTRE = (500_000.0, 5_400_000.0)
-SIZE_LIMITS = (100.0, 20_000.0)
+SIZE_LIMITS = (100, 20_000)
+MOST_CENTRE_M = 1e8
 SURROUNDINGS: dict[str, tuple[Role, GeometryKind]] = {
     "buildings": ("buildings", "polygon"),
     "streets": ("streets", "line"),
@@ -128,13 +130,9 @@ class CitySpec:
 
     def __post_init__(self) -> None:  # noqa: D105
         least, most = SIZE_LIMITS
-        if not least <= self.size <= most:  # which NaN is not either
-            msg = f"size of the city is {self.size}; give a number from {least:g} to {most:g}."
-            raise InputError(msg)
-        if self.seed < 0:
-            msg = f"seed of the city is {self.seed}; give a whole number, 0 or more."
-            raise InputError(msg)
-        if not all(map(math.isfinite, self.centre)):
+        require_number("size of the city", self.size, least=least, most=most, unit="metres")
+        require_number("seed of the city", self.seed, least=0, most=MOST_SEED)
+        if not all(abs(one) <= MOST_CENTRE_M for one in self.centre):
             msg = f"centre of the city is {self.centre}; give x and y in metres."
             raise InputError(msg)
 
