@@ -359,8 +359,9 @@ def _of_the_paper(spec: LayerSpec) -> LayerSpec | None:
         return spec if paper.issuperset(spec.classes) else None
     # A value of such a class is still that value: no pattern below it may take it.
     classes = tuple((value, name if name in paper else "") for value, name in by.classes)
-    otherwise = by.otherwise and spec.class_name in paper
-    own = replace(spec, class_by=replace(by, classes=classes, otherwise=otherwise))
+    class_name = spec.class_name if spec.class_name in paper else ""
+    by = replace(by, classes=classes, otherwise=by.otherwise and class_name != "")
+    own = replace(spec, class_name=class_name, class_by=by)
     return own if own.classes else None
 
 

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from semsig_gis.core.errors import CatalogError
+from semsig_gis.sources.decimals import decimal
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -25,12 +26,12 @@ NO_VALUE = "none"
 # A value that a catalogue writes between slashes is a pattern.
 BETWEEN_SLASHES = re.compile(r"/(.+)/")
 SIGNS = {"<": operator.lt, "<=": operator.le, ">": operator.gt, ">=": operator.ge}
-NUMBER = r"(-?\d+(?:[.,]\d+)?)"
+NUMBER = r"(-?\d+(?:\.\d+)?)"
 COMPARISON = re.compile(rf"(<=?|>=?)\s*{NUMBER}")
 # What begins so is meant as a comparison.
 COMPARES = re.compile(r"[<>=≤≥≠]|!=")
-# One number, or the lowest and highest of several, as in "0-2".
-NUMBERS = re.compile(rf"\s*{NUMBER}(?:\s*-\s*{NUMBER})?\s*")
+# The lowest and highest of several numbers, as in "0-2".
+RANGE = re.compile(rf"\s*{NUMBER}\s*-\s*{NUMBER}\s*")
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,7 +56,7 @@ class Condition:
             text = part if isinstance(part, str) else ""
             comparison = COMPARISON.fullmatch(text)
             if comparison:
-                comparisons.append((comparison[1], _number(comparison[2])))
+                comparisons.append((comparison[1], float(comparison[2])))
             elif COMPARES.match(text):
                 msg = (
                     f"{text!r} is no comparison; write one such as '>=0' or '>=0 or none', or "
@@ -63,7 +64,7 @@ class Condition:
                 )
                 raise CatalogError(msg)
             elif part != NO_VALUE:
-                _pattern(text)  # which refuses one that is none
+                pattern_of(text)  # which refuses one that is none
                 values.append(part)
         return cls(tuple(values), tuple(comparisons), nothing=NO_VALUE in parts)
 
@@ -99,17 +100,21 @@ def _alternatives(value: Value) -> list[Value]:
     return [*parts] if special else [value]
 
 
-def _number(text: str) -> float:
-    return float(text.replace(",", "."))
-
-
 def _numbers(value: object) -> list[float]:
     """Return the numbers that a value lists, NaN for a part that is none."""
     if isinstance(value, int | float) and not isinstance(value, bool):
         return [float(value)]
-    found = [NUMBERS.fullmatch(part) for part in str(value).split(";")]
-    parts = [[text for text in match.groups() if text] if match else ["nan"] for match in found]
-    return [_number(text) for part in parts for text in part]
+    return [number for part in str(value).split(";") for number in _numbers_of(part)]
+
+
+def _numbers_of(part: str) -> list[float]:
+    several = RANGE.fullmatch(part)
+    if several:
+        return [float(number) for number in several.groups()]
+    try:
+        return [decimal(part)]
+    except ValueError:
+        return [math.nan]
 
 
 def _is_blank(value: object) -> bool:
@@ -136,7 +141,7 @@ def matches(value: object, wanted: Value) -> bool:
     if value is None:
         return False
     if isinstance(wanted, str):
-        pattern = _pattern(wanted)
+        pattern = pattern_of(wanted)
         text = as_text(value)
         return text == wanted if pattern is None else pattern.fullmatch(text) is not None
     if isinstance(wanted, bool) or isinstance(value, bool):
@@ -148,7 +153,7 @@ def matches(value: object, wanted: Value) -> bool:
 
 
 @functools.lru_cache
-def _pattern(wanted: str) -> re.Pattern[str] | None:
+def pattern_of(wanted: str) -> re.Pattern[str] | None:
     """Return the pattern that a text between slashes is; CatalogError if it is not valid."""
     inner = BETWEEN_SLASHES.fullmatch(wanted)
     try:

@@ -21,7 +21,7 @@ from semsig_gis.core.errors import CatalogError, CrsError, nearest_name
 from semsig_gis.core.geometry import CLASS_NAME, GEOMETRY, HALF_WIDTH, SOURCE_ID
 from semsig_gis.sources import RawLayer, RowCounts
 from semsig_gis.sources.catalog import MAX_WIDTH_M, MIN_WIDTH_M
-from semsig_gis.sources.conditions import Condition, as_text, matches
+from semsig_gis.sources.conditions import Condition, as_text, matches, pattern_of
 from semsig_gis.sources.decimals import decimal
 
 if TYPE_CHECKING:
@@ -332,11 +332,12 @@ class RowRules:
                 [(field, Condition.parse(accepted)) for field, accepted in rules if filters]
                 for rules in (spec.where, spec.exclusions)
             )
-            for by in (
-                spec.class_by and spec.class_by.classes,
-                spec.width_by and spec.width_by.widths,
-            ):
-                Condition.parse(value for value, _ in by or ())
+            listed = [
+                *(spec.class_by.classes if spec.class_by else ()),
+                *(spec.width_by.widths if spec.width_by else ()),
+            ]
+            for value, _ in listed:
+                pattern_of(str(value))
         except CatalogError as error:
             msg = f"{where}: {error}"
             raise CatalogError(msg) from error

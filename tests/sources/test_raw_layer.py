@@ -113,6 +113,12 @@ def test_what_class_by_does_not_list_is_left_out_by_name() -> None:
     assert many.notes[0].endswith("'7' 1, and 12 others")
 
 
+def test_what_class_by_lists_is_never_a_comparison() -> None:
+    by = ClassBy("height", (("<2 m", "bench"), ("none", "bus_stop")))
+    layer = sifted(LayerSpec(name="a", class_name="", class_by=by), height=["<2 m", "none", None])
+    assert layer.table["class_name"].tolist() == ["bench", "bus_stop"]
+
+
 def test_what_is_left_out_is_counted_once_by_the_first_reason() -> None:
     spec = LayerSpec(
         name="things",
