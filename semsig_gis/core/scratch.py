@@ -51,7 +51,10 @@ def remove_abandoned(parent: Path) -> None:
 
     What such a process had put aside, with nothing in its place yet, is put back.
     """
-    for folder in parent.glob(f"{MACHINE}*"):
+    folders: list[Path] = []
+    with contextlib.suppress(OSError):  # a name that no folder can have
+        folders += parent.glob(f"{MACHINE}*")
+    for folder in folders:
         with contextlib.suppress(OSError):
             try:
                 owner = os.open(folder / OWNER, os.O_RDWR)

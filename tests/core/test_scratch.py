@@ -51,6 +51,8 @@ def test_what_was_put_aside_is_put_back_where_its_place_is_empty(tmp_path: Path)
         assert [path.name for path in tmp_path.iterdir()] == ["city"]
 
 
-def test_a_folder_that_cannot_be_made_is_an_error(tmp_path: Path) -> None:
-    with pytest.raises(FileNotFoundError), own_folder(tmp_path / "nowhere"):
+@pytest.mark.parametrize("name", ["nowhere", "n" * 5000])
+def test_a_folder_that_cannot_be_made_is_an_error(tmp_path: Path, name: str) -> None:
+    remove_abandoned(tmp_path / name)
+    with pytest.raises(OSError, match=name), own_folder(tmp_path / name):
         pytest.fail("the block must not run")
