@@ -256,11 +256,15 @@ def _save_loaded(
 @app.command()
 def suggest(
     file: Annotated[Path, typer.Argument(help="Vector file to draft a catalogue for.")],
+    *,
+    crs: Annotated[
+        str | None, typer.Option(help="CRS of a file that states none, such as EPSG:2154.")
+    ] = None,
 ) -> None:
     """Draft a catalogue for a vector file, to be edited."""
     from semsig_gis.objects.draft import suggest_catalog
 
-    say(suggest_catalog(file), end="")
+    say(suggest_catalog(file, crs=crs), end="")
 
 
 @app.command()

@@ -7,32 +7,48 @@ import glob
 import itertools
 import json
 import re
+import tempfile
 from collections import Counter
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+import shapely
 from pyproj import CRS
 from pyproj.exceptions import CRSError
 
-from semsig_gis.core.errors import CrsError, SourceError
+from semsig_gis.core.errors import (
+    CatalogError,
+    CrsError,
+    EmptyResultError,
+    SemsigError,
+    SourceError,
+)
 from semsig_gis.core.geometry import require_metric_crs
 from semsig_gis.core.taxonomy import MAX_CODE, ObjectClass
 from semsig_gis.objects.keywords import keywords, words_of
-from semsig_gis.sources.catalog import catalog_names, load_catalog, paper_taxonomy
+from semsig_gis.objects.load import assemble, read_files
+from semsig_gis.sources import reader
+from semsig_gis.sources.catalog import LayerSpec, catalog_names, load_catalog, paper_taxonomy
+from semsig_gis.sources.conditions import ANY_VALUE, BETWEEN_SLASHES, Condition
 from semsig_gis.sources.csv_layer import NO_GEOMETRY
+from semsig_gis.sources.decimals import decimal
 from semsig_gis.sources.opendatasoft.reader import POINT, SHAPE, fold
 from semsig_gis.sources.opendatasoft.table import Record, open_table
 from semsig_gis.sources.osm.file import FORMATS
+from semsig_gis.sources.raw_layer import LATITUDE_LIMIT, LONGITUDE_LIMIT, WGS84, off_the_globe
 from semsig_gis.sources.vector import LayerInfo, first_rows
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping, Sequence
 
 VECTOR = "vector_file"
+# Any plane will do to look at coordinates as they are.
+PLANE = "EPSG:3857"
 # Files that may be a plain table of records, which GDAL takes for nothing or for rows of text.
 TABLE_SUFFIXES = frozenset({".csv", ".json", ".parquet"})
-# Marks what a person must fill in; as a class, it does not load.
+# Marks what a person must check.
 EDIT = "EDIT"
 SAMPLE_ROWS = 100_000
 FILTERS_SHOWN = 8
@@ -44,6 +60,8 @@ GEOMETRIES = {"Point": "point", "LineString": "line", "LinearRing": "line", "Pol
 ROLE_GEOMETRY = {"buildings": "polygon", "streets": "line"}
 # A field with no more values is one to filter by, unless most of them are seen only once.
 FEW_VALUES = 12
+# A field that tells the class may have more.
+MOST_CLASS_VALUES = 50
 LONGEST_VALUE = 60
 LEAST_SHARE = 0.1
 # A class must be named by the values of at least this share of the rows.
@@ -123,9 +141,13 @@ class Column:
     @property
     def few(self) -> bool:
         """Whether the values are few, name something, and most rows or many have one."""
+        return self.at_most(FEW_VALUES)
+
+    def at_most(self, values: int) -> bool:
+        """Tell as `few` does, where few are so many."""
         rows = self.counts.total()
         return (
-            2 <= len(self.counts) <= FEW_VALUES  # noqa: PLR2004 - one value tells nothing apart
+            2 <= len(self.counts) <= values  # noqa: PLR2004 - one value tells nothing apart
             and 2 * len(self.counts) <= rows
             and rows >= LEAST_SHARE * (rows + self.missing)
             and all(_names_something(value) for value in self.counts)
@@ -135,9 +157,14 @@ class Column:
         """Tell whether the name is typical of a filter, identifier, row_number, x or y."""
         return any(match.name == purpose for match in keywords("fields").find(self.name))
 
+    @property
+    def numeric(self) -> bool:
+        """Whether a value is a number, as a column of coordinates has them."""
+        return any(map(_number, self.counts))
+
     def within(self, limit: float) -> bool:
-        """Tell whether all values are numbers from ``-limit`` to ``limit``."""
-        return all(_number(value) and abs(float(value)) <= limit for value in self.counts)
+        """Tell whether all of its numbers are from ``-limit`` to ``limit``."""
+        return all(abs(_value_of(value)) <= limit for value in self.counts if _number(value))
 
 
 def _names_something(value: object) -> bool:
@@ -148,10 +175,15 @@ def _names_something(value: object) -> bool:
 
 def _number(value: object) -> bool:
     try:
-        float(value)  # type: ignore[arg-type] # what cannot be one raises
+        _value_of(value)
     except (TypeError, ValueError):
         return False
     return True
+
+
+def _value_of(value: object) -> float:
+    """Return a number, or one that is written as text."""
+    return decimal(value) if isinstance(value, str) else float(value)  # type: ignore[arg-type] # what cannot be one raises
 
 
 def columns_of(sample: Sample) -> tuple[Column, ...]:
@@ -234,7 +266,7 @@ def guess_class_by(columns: Sequence[Column], class_name: str) -> tuple[str, dic
             },
         )
         for column in columns
-        if column.few
+        if column.at_most(MOST_CLASS_VALUES)
     ]
     best = max(fields, key=lambda field: len(field[1]), default=None)
     return best if best and best[1] else None
@@ -244,13 +276,27 @@ def guess_position(sample: Sample, columns: Sequence[Column]) -> tuple[str, ...]
     """Return the field of a table that holds ``lat, lon``, or those of x and y, or nothing."""
     for name, _ in sample.info.fields:
         values = [row[name] for row in sample.rows if row.get(name) not in {None, ""}]
-        if values and all(isinstance(value, str) and LAT_LON.fullmatch(value) for value in values):
+        points = sum(isinstance(value, str) and bool(LAT_LON.fullmatch(value)) for value in values)
+        if values and 2 * points >= len(values):
             return (name,)
-    numbers = [column for column in columns if column.counts and column.within(float("inf"))]
-    x, y = (
-        [column.name for column in numbers if column.meant_for(purpose)] for purpose in ("x", "y")
-    )
-    return (x[0], y[0]) if x and y else ()
+    numbers = [column for column in columns if column.numeric]
+    pairs = [
+        (x, y)
+        for x in numbers
+        for y in numbers
+        if x is not y and x.meant_for("x") and y.meant_for("y")
+    ]
+    best = max(pairs, key=_likeness, default=())
+    return tuple(column.name for column in best)
+
+
+def _likeness(pair: tuple[Column, Column]) -> tuple[bool, bool]:
+    """Tell whether two coordinates are named alike, and are degrees rather than a plane's."""
+    x, y = pair
+    first, second = (words_of(column.name) for column in pair)
+    differing = sum(one != other for one, other in zip(first, second, strict=False))
+    alike = len(first) == len(second) and differing == 1
+    return alike, x.within(LONGITUDE_LIMIT) and y.within(LATITUDE_LIMIT)
 
 
 @dataclass(frozen=True, slots=True)
@@ -264,27 +310,33 @@ class _Draft:
     guess: ClassGuess
     class_by: tuple[str, dict[str, str]] | None
     position: tuple[str, ...]
+    crs: str | None
+    crs_reason: str = ""
 
 
-def suggest_catalog(path: str | Path) -> str:
+def suggest_catalog(path: str | Path, *, crs: str | None = None) -> str:
     r"""Draft a catalogue for a file from its names, its fields and its values.
 
     Parameters
     ----------
     path : str or Path
         A vector file, an archive with such files, or a table of a portal (JSON, CSV, Parquet).
+    crs : str, optional
+        CRS of a file that does not state one.
 
     Returns
     -------
     str
-        TOML text. What only a person can know is marked ``EDIT`` in a comment; where not even
-        the class could be guessed, ``EDIT`` stands for it, which `load_catalog` refuses. Filters,
-        classes by the value of a field and the like are offered in comments.
+        TOML text, by which the file loads. What only a person can know is marked ``EDIT`` in a
+        comment; where nothing tells the class, it is one of its own. Filters, classes by the value
+        of a field and the like are offered in comments.
 
     Raises
     ------
     SourceError
         If the file is missing, damaged, of another kind, or holds no positions.
+    CrsError
+        If nobody states the CRS, and the coordinates cannot be degrees.
 
     Examples
     --------
@@ -312,7 +364,7 @@ def suggest_catalog(path: str | Path) -> str:
     if not layers:
         msg = f"{path} holds no layer with positions; give a file that does."
         raise SourceError(msg)
-    drafts = [_draft(path, item) for item in layers]
+    drafts = [_draft(path, item, crs) for item in layers]
     lines = [
         f"# Draft of a catalogue for {_text(path.name)}, from its names, fields and values.",
         f"# Check every line; what only a person can know is marked {EDIT}.",
@@ -331,10 +383,30 @@ def suggest_catalog(path: str | Path) -> str:
     if len(layers) < len(items):
         tables = ", ".join(_text(item.info.name) for item in items if item not in layers)
         lines += ["", f"# Left out, because they have no geometry: {tables}"]
-    return "\n".join(lines) + "\n"
+    text = "\n".join(lines) + "\n"
+    _require_loads(text, path)
+    return text
 
 
-def _draft(path: Path, sample: Sample) -> _Draft:
+def _require_loads(text: str, path: Path) -> None:
+    """Refuse a draft by which its own file does not load, with what a load says of it."""
+    with tempfile.TemporaryDirectory(prefix="semsig-") as folder:
+        file = Path(folder, "draft.toml")
+        file.write_text(text, encoding="utf-8")
+        try:
+            catalog = load_catalog(file)
+            layers, _ = read_files(catalog.layers, [path])
+            if any(layer.spec.role == "objects" for layer in layers):
+                assemble(layers, catalog)
+        except EmptyResultError as error:
+            msg = f"{path} holds no layer with positions; give a file that does."
+            raise SourceError(msg) from error
+        except SemsigError as error:
+            msg = f"no catalogue can be drafted for {path}: {str(error).rstrip('.')}."
+            raise SourceError(msg) from error
+
+
+def _draft(path: Path, sample: Sample, crs: str | None) -> _Draft:
     columns = columns_of(sample)
     geometry = GEOMETRIES.get(sample.info.geometry.removeprefix("3D ").removeprefix("Multi"))
     position = sample.coordinates if sample.placed else guess_position(sample, columns)
@@ -347,9 +419,50 @@ def _draft(path: Path, sample: Sample) -> _Draft:
         raise SourceError(msg)
     names = f"{path.stem} / {sample.info.name}"
     guess = guess_class(names, columns, geometry=geometry, rows=len(sample.rows))
+    if not guess.name:
+        guess = ClassGuess(_class_name(path.stem))
     kinds = [column for column in columns if column.meant_for("filter") or not guess.sure]
     class_by = None if guess.is_role else guess_class_by(kinds, guess.name)
-    return _Draft(path, sample, columns, geometry, guess, class_by, position)
+    found, reason = _crs(path, sample, position, crs)
+    return _Draft(path, sample, columns, geometry, guess, class_by, position, found, reason)
+
+
+def _class_name(text: str) -> str:
+    """Return the name of a class for what nothing is known of but its name."""
+    name = re.sub(r"[^a-z0-9]+", "_", _snake(text)).strip("_")
+    return name if name[:1].isalpha() else f"layer_{name}".rstrip("_")
+
+
+def _crs(
+    path: Path, sample: Sample, position: tuple[str, ...], given: str | None
+) -> tuple[str | None, str]:
+    """Return the CRS that a catalogue has to state, None where the file does, and how it is known.
+
+    CrsError where nobody knows.
+    """
+    stated = sample.info.crs
+    if stated is not None and len(position) < 2:  # noqa: PLR2004 - not x and y
+        return (stated if sample.reader == VECTOR else None), ""
+    if given is not None:
+        return given, ""
+    x, y = position if len(position) == 2 else (None, None)  # noqa: PLR2004 - x and y
+    spec = LayerSpec(
+        name="draft",
+        class_name="",
+        layer=sample.info.name if sample.reader == VECTOR else None,
+        crs=PLANE,
+        x_field=x,
+        y_field=y,
+    )
+    (layer,) = reader(sample.reader)(path, [spec])
+    xy = shapely.get_coordinates(layer.table.geometry.dropna().array)
+    if 2 * np.count_nonzero(off_the_globe(xy, WGS84)) <= len(xy):
+        return "EPSG:4326", "the file does not say; its coordinates could be degrees"
+    msg = (
+        f"{path} has coordinates such as ({xy[0][0]:.12g}, {xy[0][1]:.12g}) and does not say in "
+        "which CRS; state it with --crs, such as --crs EPSG:2154."
+    )
+    raise CrsError(msg)
 
 
 def _metric_crs(layers: Sequence[Sample]) -> str:
@@ -413,10 +526,10 @@ def _stanza(name: str, draft: _Draft, *, several: bool) -> Iterator[str]:
 
 
 def _class(guess: ClassGuess) -> str:
-    if not guess.name:
+    if not guess.reason:
         return (
-            f'class = "{EDIT}"  # {EDIT}: nothing tells what this is; write a class (or role = '
-            '"buildings" or "streets" instead), or remove the layer'
+            f"class = {_text(guess.name)}  # {EDIT}: nothing tells what this is; write a class (or "
+            'role = "buildings" or "streets" instead), or remove the layer'
         )
     line = f"{'role' if guess.is_role else 'class'} = {_text(guess.name)}  # "
     if guess.sure:
@@ -455,54 +568,40 @@ def _identifier(draft: _Draft) -> Iterator[str]:
 
 def _place(draft: _Draft) -> Iterator[str]:
     """Yield where positions are found, and in which CRS."""
-    crs, by_gdal = draft.sample.info.crs, draft.sample.reader == VECTOR
     if len(draft.position) == 1:
         (field,) = draft.position
         yield f"aliases = {{ geo_point_2d = [{_text(field)}] }}  # latitude, longitude"
-    degrees = True
     if len(draft.position) == 2:  # noqa: PLR2004 - x and y
         x, y = draft.position
         yield f"x_field = {_text(x)}"
         yield f"y_field = {_text(y)}"
-        limits = {x: 180.0, y: 90.0}
-        degrees = all(
-            column.within(limits[column.name]) for column in draft.columns if column.name in limits
-        )
-    if crs is not None and by_gdal:
-        try:
-            CRS.from_user_input(crs)
-        except CRSError:
-            yield f"# The file states its own coordinate system, {_text(crs)}, which has no code."
-        else:
-            yield f"crs = {_text(crs)}"
-    elif draft.position and degrees and by_gdal:
-        yield (
-            f'crs = "EPSG:4326"  # {EDIT}: the file does not say; its coordinates could be degrees'
-        )
-    elif not degrees or by_gdal:
-        yield (
-            f"# {EDIT}: the file does not say its coordinate system; write its code, such as "
-            'crs = "EPSG:2154"'
-        )
+    if draft.crs is None:
+        return
+    try:
+        CRS.from_user_input(draft.crs)
+    except CRSError:
+        yield f"# The file states its own coordinate system, {_text(draft.crs)}, which has no code."
+    else:
+        why = f"  # {EDIT}: {draft.crs_reason}" if draft.crs_reason else ""
+        yield f"crs = {_text(draft.crs)}{why}"
 
 
 def _filters(draft: _Draft) -> Iterator[str]:
     """Yield, in comments, the fields of few values, and the classes that one of them tells."""
+    rows = len(draft.sample.rows)
+    seen = "" if rows == draft.sample.info.rows else f" (seen in the first {rows:,} rows)"
     if draft.class_by is not None:
         field, classes = draft.class_by
-        values = ", ".join(f"{_key(value)} = {_text(name)}" for value, name in classes.items())
-        yield f"# If {_plain(field)} tells the class of a row:"
+        (counts,) = (column.counts for column in draft.columns if column.name == field)
+        values = ", ".join(
+            f"{_key(_exactly(str(value)))} = {_text(classes.get(value, draft.guess.name))}"
+            for value, _ in counts.most_common()
+        )
+        yield f"# If {_plain(field)} tells the class of a row, by all of its values{seen}:"
         yield f"# class_by = {{ field = {_text(field)}, values = {{ {values} }} }}"
-    few = [
-        column
-        for column in draft.columns
-        # A catalogue would take a value with a slash for a pattern.
-        if column.few and not any(str(value).startswith("/") for value in column.counts)
-    ]
+    few = [column for column in draft.columns if column.few]
     few.sort(key=lambda column: not column.meant_for("filter"))  # the others keep their order
     if few:
-        rows = len(draft.sample.rows)
-        seen = "" if rows == draft.sample.info.rows else f" (seen in the first {rows:,} rows)"
         yield f"# To keep some rows only, take one of these without the values not wanted{seen}:"
     for column in few[:FILTERS_SHOWN]:
         values = ", ".join(_value(value) for value, _ in column.counts.most_common())
@@ -526,7 +625,15 @@ def _plain(text: str) -> str:
 
 
 def _value(value: object) -> str:
-    return str(value).lower() if isinstance(value, bool) else _text(str(value))
+    return str(value).lower() if isinstance(value, bool) else _text(_exactly(str(value)))
+
+
+def _exactly(value: str) -> str:
+    """Return what a catalogue takes for that very value, which may look like a condition."""
+    with contextlib.suppress(CatalogError):
+        if Condition.parse([value]) == Condition((value,)) and value != ANY_VALUE:
+            return value if not BETWEEN_SLASHES.fullmatch(value) else f"/{re.escape(value)}/"
+    return f"/{re.escape(value)}/"
 
 
 def _key(name: str) -> str:

@@ -38,7 +38,11 @@ if TYPE_CHECKING:
     Row = Mapping[str, str | None]
 
 # Degrees go before a plane's coordinates where a file has both, and both before a shape.
-KNOWN_NAMES = ((("lon", "longitude"), ("lat", "latitude")), (("x",), ("y",)))
+KNOWN_NAMES = (
+    (("lon", "longitude"), ("lat", "latitude")),
+    (("x",), ("y",)),
+    (("long", "lng"), ("lat", "latitude")),
+)
 SHAPE_NAMES = ("wkt", "geom", "geometry", "the_geom")
 # Well-known text, extended by the code of its CRS or not, and the same in bytes.
 WELL_KNOWN = re.compile(r"\s*(?:SRID\s*=\s*(\d+)\s*;)?\s*([A-Za-z].*)", re.DOTALL | re.IGNORECASE)

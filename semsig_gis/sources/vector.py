@@ -18,6 +18,7 @@ import fiona
 import numpy as np
 import shapely
 import shapely.geometry
+from fiona.errors import DriverError
 
 from semsig_gis.core.errors import SourceError, UnknownNameError, nearest_name
 from semsig_gis.sources import require_file
@@ -399,7 +400,7 @@ def _describe(member: Member) -> LayerInfo:
     with _opened(member) as source:
         crs, implicit = _own_crs(source)
         count = _count(source)
-        if implicit and count and not fits_the_globe(np.reshape(source.bounds, (2, 2))):
+        if implicit and count and not _in_degrees(source):
             crs = None
         return LayerInfo(
             name=str(member.layer),
@@ -408,6 +409,14 @@ def _describe(member: Member) -> LayerInfo:
             rows=sum(1 for _ in source) if count is None else count,
             fields=tuple(source.schema["properties"].items()),
         )
+
+
+def _in_degrees(source: fiona.Collection) -> bool:
+    """Tell whether the features could be in degrees, as those without a geometry could."""
+    try:
+        return fits_the_globe(np.reshape(source.bounds, (2, 2)))
+    except DriverError:  # no feature has a geometry
+        return True
 
 
 def _count(source: fiona.Collection) -> int | None:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import csv
+import io
 import json
 import re
 import textwrap
@@ -14,11 +16,11 @@ import pandas as pd
 import pyogrio
 import pytest
 import shapely
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from sentences import refused
 
-from semsig_gis.core.errors import CatalogError, SourceError
+from semsig_gis.core.errors import CrsError, SourceError
 from semsig_gis.objects.draft import (
     Column,
     Sample,
@@ -29,6 +31,7 @@ from semsig_gis.objects.draft import (
     suggest_catalog,
 )
 from semsig_gis.objects.keywords import Keywords, Match, keywords, words_of
+from semsig_gis.objects.load import assemble, read_files
 from semsig_gis.sources import reader
 from semsig_gis.sources.catalog import catalog_names, load_catalog, paper_taxonomy
 from semsig_gis.sources.vector import LayerInfo
@@ -43,7 +46,6 @@ if TYPE_CHECKING:
 
 # What a person would take of the comments.
 OFFERED = re.compile(r"# (?=\[\[classes|(?:where|class_by|\w*id\w*|code|symbol|name|title) = )")
-UNKNOWN_CRS = re.compile(r"# EDIT: the file does not say its coordinate.*")
 
 
 def load(draft: str, folder: Path) -> Catalog:
@@ -53,9 +55,8 @@ def load(draft: str, folder: Path) -> Catalog:
 
 
 def read(draft: str, file: Path, folder: Path) -> tuple[RawLayer, ...]:
-    """Read a file by its draft, in which what a person must fill in is filled in."""
-    draft = draft.replace('class = "EDIT"', 'class = "bench"')
-    catalog = load(UNKNOWN_CRS.sub('crs = "EPSG:2154"', draft), folder)
+    """Read a file by its draft."""
+    catalog = load(draft, folder)
     return reader(catalog.reader)(file, catalog.layers)
 
 
@@ -71,7 +72,7 @@ def write(path: Path, fields: Mapping[str, Sequence[object]]) -> Path:
 
 def check(file: Path, snapshot: Callable[[str, str], None]) -> None:
     """Compare a draft, and what is read by it when all that it offers is taken."""
-    text = draft = suggest_catalog(file)
+    text = draft = suggest_catalog(file, crs="EPSG:2154" if "lambert" in file.name else None)
     assert all(layer.counts.kept == layer.counts.read for layer in read(draft, file, file.parent))
     for layer in read(OFFERED.sub("", draft), file, file.parent):
         text += f"\n# {layer.spec.name}: {layer.counts.kept} of {layer.counts.read} rows\n"
@@ -122,10 +123,15 @@ def test_a_draft_is_read_by(
     check(file, snapshot)
 
 
-def test_a_draft_that_knows_no_class_does_not_load(tmp_path: Path) -> None:
-    draft = suggest_catalog(write(tmp_path / "stuff.gpkg", {"a": [1, 2]}))
-    with refused(CatalogError, "'EDIT'"):
-        load(draft, tmp_path)
+@pytest.mark.parametrize(
+    ("stem", "name"), [("stuff", "stuff"), ("2019 œuvres", "layer_2019_uvres"), ("木", "layer")]
+)
+def test_what_nothing_is_known_of_is_a_class_of_its_own(
+    tmp_path: Path, stem: str, name: str
+) -> None:
+    draft = suggest_catalog(write(tmp_path / f"{stem}.gpkg", {"a": [1, 2]}))
+    assert f'class = "{name}"  # EDIT: nothing tells' in draft
+    assert load(draft, tmp_path).layers[0].class_name == name
 
 
 def test_classes_that_the_paper_has_not_keep_their_code_or_get_a_free_one(tmp_path: Path) -> None:
@@ -145,7 +151,8 @@ def test_every_layer_with_geometry_is_drafted(
     tmp_path: Path, snapshot: Callable[[str, str], None]
 ) -> None:
     file = tmp_path / "town.gpkg"
-    square, line = shapely.box(0, 0, 1, 1), shapely.LineString([(0, 0), (1, 1)])
+    x, y = 770_000, 6_280_000
+    square, line = shapely.box(x, y, x + 1, y + 1), shapely.LineString([(x, y), (x + 1, y + 1)])
     shapes = {"Arbres": line.centroid, "arbres!": line.centroid, "batiments": square, "rues": line}
     for layer, shape in shapes.items():
         gpd.GeoDataFrame({"a": [1]}, geometry=[shape], crs="EPSG:2154").to_file(file, layer=layer)
@@ -165,11 +172,16 @@ def test_strange_names_and_values_stay_within_their_quotes(tmp_path: Path) -> No
     )
     draft = suggest_catalog(file)
     offered = [line for line in draft.splitlines() if line.startswith("# where")]
-    assert len(offered) == 3  # a pattern is no value
+    assert len(offered) == 4
+    assert r'"//\\.\\*//"' in draft  # the pattern of a value that looks like one
     for line in ("", *offered):
         (layer,) = read(draft.replace(line, OFFERED.sub("", line)), file, tmp_path)
         assert layer.spec.name == "arbres_2_x_u"
         assert (layer.counts.read, layer.counts.filtered) == (12, 0), line
+
+
+NOWHERE = b"""{"type": "FeatureCollection", "features": [
+    {"type": "Feature", "properties": {"a": 1}, "geometry": null}]}"""
 
 
 @pytest.mark.parametrize(
@@ -177,6 +189,9 @@ def test_strange_names_and_values_stay_within_their_quotes(tmp_path: Path) -> No
     [
         ("town.osm.pbf", b"x", ("OpenStreetMap", "'openstreetmap'")),
         ("town.osm", b"<osm/>", ("OpenStreetMap", "'openstreetmap'")),
+        ("town.csv", b"x;y\n770000;6280000\n", ("(770000, 6280000)", "--crs EPSG:2154")),
+        ("town.csv", b"x;y\n;\n", ("no layer with positions",)),
+        ("town.geojson", NOWHERE, ("town.geojson holds no layer with positions",)),
         ("town.csv", b"name;size\na;1\n", ("no field that looks like a position", "name, size")),
         ("town.json", b'[{"a": 1}]', ("no field that looks like a position",)),
         ("town.json", b"[", ("town.json",)),
@@ -192,8 +207,88 @@ def test_what_cannot_be_drafted_is_an_error(
 ) -> None:
     if content is not None:
         (tmp_path / name).write_bytes(content)
-    with refused(SourceError, *words):
+    with refused((CrsError, SourceError), *words):
         suggest_catalog(tmp_path / name)
+
+
+STEMS = ("bancs", "stuff", "arbres & bancs", "日本 [1]", "Batiments", "rues", "2024", "a'b;c")
+AXES = (
+    *(("lon", "lat"), ("X", "Y"), ("Coord_X", "Coord_Y"), ("lon_wgs84", "lat_wgs84")),
+    *(("Long", "Lat"), ("Längengrad", "Breitengrad"), ("wkt", ""), ("geo_point_2d", "")),
+)
+TEXTS = st.text(st.characters(exclude_categories=["Cs"], exclude_characters="\0"), max_size=8)
+VALUES = st.none() | st.booleans() | st.integers() | st.floats() | TEXTS
+CENTRES = st.tuples(st.floats(-170, 170), st.floats(-70, 70))
+OFFSETS = st.lists(st.tuples(st.integers(0, 99), st.integers(0, 99)), min_size=1, max_size=6)
+
+
+def near(centre: tuple[float, float], offset: tuple[int, int]) -> tuple[float, float]:
+    """Return a place within some hundred metres."""
+    lon, lat = (round(one + 1e-5 * other, 6) for one, other in zip(centre, offset, strict=True))
+    return lon, lat
+
+
+@st.composite
+def csv_files(draw: st.DrawFn) -> bytes:
+    """Draw a table of places in one of many styles, some of whose rows are of no use."""
+    separator = draw(st.sampled_from(";,\t"))
+    comma = draw(st.booleans()) and separator != ","
+    names = draw(st.lists(TEXTS | st.sampled_from(["id", "type", "Nom"]), max_size=3))
+    x, y = draw(st.sampled_from(AXES))
+    centre = draw(CENTRES)
+    rows = []
+    for offset in draw(OFFSETS):
+        lon, lat = near(centre, offset)
+        place = {"wkt": f"POINT ({lon} {lat})", "geo_point_2d": f"{lat}, {lon}"}.get(x)
+        styled = [f"{lon:.6f}", f"{lat:.6f}"]
+        if comma:
+            styled = [text.replace(".", ",") for text in styled]
+        rows.append([*(str(draw(VALUES)) for _ in names), *(styled if place is None else [place])])
+    if draw(st.booleans()):
+        rows.append(["?"] * len(rows[0]))
+    text = io.StringIO()
+    writer = csv.writer(text, delimiter=separator)
+    writer.writerow([*names, *filter(None, (x, y))])
+    writer.writerows(rows)
+    return text.getvalue().encode(draw(st.sampled_from(["utf-8", "utf-8-sig", "utf-16"])))
+
+
+@st.composite
+def geojson_files(draw: st.DrawFn) -> bytes:
+    """Draw features of all kinds, some of which have no geometry."""
+    centre = draw(CENTRES)
+    fields = draw(st.lists(TEXTS.filter(bool), max_size=3, unique=True))
+    features: list[dict[str, object]] = []
+    for offset in draw(OFFSETS):
+        point = shapely.Point(near(centre, offset))
+        line = shapely.LineString([point.coords[0], (point.x + 1e-4, point.y + 1e-4)])
+        kinds = [point, line, line.envelope, shapely.MultiPoint([point]), None]
+        shape = draw(st.sampled_from(kinds)) if features else point
+        geometry = shape and json.loads(shapely.to_geojson(shape))
+        values = st.none() | st.booleans() | st.integers(-9, 9) | TEXTS | st.lists(st.integers())
+        properties = {field: draw(values) for field in fields}
+        features.append({"type": "Feature", "properties": properties, "geometry": geometry})
+    return json.dumps({"type": "FeatureCollection", "features": features}).encode()
+
+
+@pytest.mark.parametrize(
+    ("suffix", "files"), [(".csv", csv_files()), (".geojson", geojson_files())]
+)
+def test_every_file_loads_by_its_draft(
+    suffix: str, files: st.SearchStrategy[bytes], tmp_path: Path
+) -> None:
+    @settings(max_examples=8, deadline=None)
+    @given(st.sampled_from(STEMS), files)
+    def loads(stem: str, content: bytes) -> None:
+        file = tmp_path / f"{stem}{suffix}"
+        file.write_bytes(content)
+        catalog = load(suggest_catalog(file), tmp_path)
+        layers, absent = read_files(catalog.layers, [file])
+        assert not absent
+        if layers[0].spec.role == "objects":
+            assert len(assemble(layers, catalog).objects.table) >= 1
+
+    loads()
 
 
 @pytest.mark.parametrize("folder", ["montpellier", "paris"])
@@ -204,7 +299,7 @@ def test_published_files_are_drafted_and_read_by_their_drafts(
     for file in sorted((geodata / folder).iterdir()):
         if file.suffix == ".txt":
             continue
-        draft = suggest_catalog(file)
+        draft = suggest_catalog(file, crs="EPSG:2154" if folder == "montpellier" else None)
         (stanza,) = tomllib.loads(draft)["layers"]
         guesses.append(f"{file.name}: {stanza.get('class', stanza.get('role'))}\n")
         (layer,) = read(draft, file, tmp_path)
@@ -422,6 +517,12 @@ def test_values_that_name_other_classes_are_found() -> None:
         ([{"x": 1, "y": 2}], ("x", "y")),
         ([{"lng": "here", "lat": "there"}], ()),
         ([{"x": 1}], ()),
+        ([{"Coord_X": "770000,5", "Coord_Y": "6 280 000,5"}], ("Coord_X", "Coord_Y")),
+        ([{"X_L93": 770000, "Y_L93": 6280000}], ("X_L93", "Y_L93")),
+        ([{"lon_wgs84": 2.5, "lat_wgs84": 48.5}], ("lon_wgs84", "lat_wgs84")),
+        ([{"X_L93": 7e5, "lat": 48, "Y_L93": 6e6, "lon": 2}], ("lon", "lat")),
+        ([{"x_old": 1, "lat_new": 48, "y_old": 2, "lon_new": 2}], ("x_old", "y_old")),
+        ([{"lon": "?", "lat": 1}, {"lon": 2.5, "lat": 48}], ("lon", "lat")),
     ],
 )
 def test_positions_are_found_in_a_table(
