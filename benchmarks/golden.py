@@ -12,13 +12,11 @@ from __future__ import annotations
 import argparse
 import contextlib
 import csv
-import hashlib
 import io
 import json
 import os
 import re
 import shlex
-import sqlite3
 import sys
 import tempfile
 import time
@@ -27,6 +25,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import semsig_gis
+from benchmarks._contents import TIMES, digest, file_digest, masked
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -38,26 +37,6 @@ _CITIES = ("general", "synthetic", "helsinki", "montpellier")  # the last one is
 _QUERIES, _SAMPLES = 6, 30
 _SEEN = 6  # objects at least, of cells that queries are made from
 
-# What differs from run to run, or from machine to machine, and what stands there instead.
-_MASKS = (
-    (r'"(seconds\w*|\w+_seconds)": [\d.e-]+', r'"\1": 0'),
-    (r'"(timing|machine|versions)": \{[^{}]*\}', r'"\1": {}'),
-    (r"(Seconds a query\s*│\s*)[\d.]+\s*", r"\1"),
-    # The table of times in `semsig reproduce`: as JSON, CSV, Markdown and HTML.
-    (r'\{[^{}]*"unit": "ms"[^{}]*\}', "{}"),
-    (r"(?m:^)times,.*\n", ""),
-    (r"(?s)(## |>)Retrieval times\b(?:(?!\n## |<h2).)*", r"\1"),
-    # folium makes up the names of what a map has.
-    (r"_[0-9a-f]{32}(?![0-9a-f])", "_"),
-    # Leaflet and jQuery are in a page, or linked where they were not when the package was built.
-    (r'[ \t]*(<script src="http[^>]*></script>|<link rel="stylesheet" href="http[^>]*>)\s*', ""),
-    (r"(?s)[ \t]*<(script|style)>\n/\*(! jQuery| @preserve| required styles).*?</\1>\s*", ""),
-    (r"semsig: the map takes Leaflet from the web.*\n", ""),
-)
-_TEXTS = {".csv", ".geojson", ".html", ".json", ".jsonl", ".md", ".svg", ".toml"}
-_TIMES = {"timing.json", "times.json"}  # seconds and machine, nothing else
-_SCHEMA = "SELECT type, name, sql FROM sqlite_master ORDER BY name"
-_STAMPS = {"last_change", "timestamp", "update_time"}  # columns of a GeoPackage
 
 _TABLE = tomllib.loads(Path(__file__).with_name("golden.toml").read_text(encoding="utf-8"))
 
@@ -83,7 +62,7 @@ def main() -> None:
             for command in _commands(city):
                 printed, written = _run(command)
                 transcript.append(f"$ semsig {command}\n{printed}\n")
-                frozen[f"{city}: {command}"] = _digest(printed.encode())
+                frozen[f"{city}: {command}"] = digest(printed.encode())
                 frozen |= {f"{city}: {name}": digest for name, digest in written.items()}
         (out / f"{city}.txt").write_text("".join(transcript), encoding="utf-8")
         took = time.perf_counter() - start
@@ -199,44 +178,16 @@ def _run(command: str) -> tuple[str, dict[str, str]]:
             code = end.code or 0
         except Exception as fault:  # noqa: BLE001 - the other commands are to be seen nevertheless
             code = repr(fault)
-    text = _masked(f"{printed.getvalue()}{remarked.getvalue()}exit code: {code}\n")
+    text = masked(f"{printed.getvalue()}{remarked.getvalue()}exit code: {code}\n")
     changed = [path for path, state in _files().items() if before.get(path) != state]
-    named = {f"{command} > {path}": path for path in changed if path.name not in _TIMES}
-    return text, {n: _file_digest(path) for n, path in named.items()}
+    named = {f"{command} > {path}": path for path in changed if path.name not in TIMES}
+    return text, {n: file_digest(path) for n, path in named.items()}
 
 
 def _files() -> dict[Path, tuple[int, int]]:
     """Return when each file was written last, and its size."""
     paths = [Path(root, name) for root, _, names in os.walk(".") for name in names]
     return {path: (path.stat().st_mtime_ns, path.stat().st_size) for path in paths}
-
-
-def _masked(text: str) -> str:
-    for pattern, instead in _MASKS:
-        text = re.sub(pattern, instead, text)
-    return text
-
-
-def _digest(content: bytes) -> str:
-    return hashlib.sha256(content).hexdigest()
-
-
-def _file_digest(path: Path) -> str:
-    if path.suffix == ".gpkg":
-        return _digest("\n".join(_dump(path)).encode())
-    content = path.read_bytes()
-    return _digest(_masked(content.decode()).encode() if path.suffix in _TEXTS else content)
-
-
-def _dump(path: Path) -> Iterator[str]:
-    """Yield the rows of all tables of a GeoPackage, but for the times when they were written."""
-    with contextlib.closing(sqlite3.connect(path)) as file:
-        for kind, name, sql in file.execute(_SCHEMA).fetchall():
-            yield f"{kind} {name}: {sql}"
-            if kind == "table":
-                rows = file.execute(f'SELECT * FROM "{name}"')  # noqa: S608 - as the file says
-                kept = [i for i, (item, *_) in enumerate(rows.description) if item not in _STAMPS]
-                yield from sorted(repr([row[i] for i in kept]) for row in rows)
 
 
 def _compare(old: Path, new: Path) -> int:

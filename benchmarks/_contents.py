@@ -1,0 +1,67 @@
+"""What files hold, without what differs from run to run or from machine to machine."""
+
+from __future__ import annotations
+
+import contextlib
+import hashlib
+import re
+import sqlite3
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+    from pathlib import Path
+
+# What differs from run to run, or from machine to machine, and what stands there instead.
+_MASKS = (
+    (r'"(seconds\w*|\w+_seconds)": [\d.e-]+', r'"\1": 0'),
+    (r'"(timing|machine|versions)": \{[^{}]*\}', r'"\1": {}'),
+    (r"(Seconds a query\s*│\s*)[\d.]+\s*", r"\1"),
+    # The table of times in `semsig reproduce`: as JSON, CSV, Markdown and HTML.
+    (r'\{[^{}]*"unit": "ms"[^{}]*\}', "{}"),
+    (r"(?m:^)times,.*\n", ""),
+    (r"(?s)(## |>)Retrieval times\b(?:(?!\n## |<h2).)*", r"\1"),
+    # folium makes up the names of what a map has.
+    (r"_[0-9a-f]{32}(?![0-9a-f])", "_"),
+    # Leaflet and jQuery are in a page, or linked where they were not when the package was built.
+    (r'[ \t]*(<script src="http[^>]*></script>|<link rel="stylesheet" href="http[^>]*>)\s*', ""),
+    (r"(?s)[ \t]*<(script|style)>\n/\*(! jQuery| @preserve| required styles).*?</\1>\s*", ""),
+    (r"semsig: the map takes Leaflet from the web.*\n", ""),
+)
+TIMES = {"timing.json", "times.json"}
+"""Files with seconds and the machine, nothing else."""
+
+_TEXTS = {".csv", ".geojson", ".html", ".json", ".jsonl", ".md", ".svg", ".toml"}
+_SCHEMA = "SELECT type, name, sql FROM sqlite_master ORDER BY name"
+_STAMPS = {"last_change", "timestamp", "update_time"}  # columns of a GeoPackage
+
+
+def masked(text: str) -> str:
+    """Return a text with fixed words where it differs from run to run."""
+    for pattern, instead in _MASKS:
+        text = re.sub(pattern, instead, text)
+    return text
+
+
+def digest(content: bytes) -> str:
+    """Return the SHA-256 of bytes."""
+    return hashlib.sha256(content).hexdigest()
+
+
+def file_digest(path: Path) -> str:
+    """Return the SHA-256 of what a file holds."""
+    if path.suffix == ".gpkg":
+        return digest("\n".join(_dump(path)).encode())
+    content = path.read_bytes()
+    return digest(masked(content.decode()).encode() if path.suffix in _TEXTS else content)
+
+
+def _dump(path: Path) -> Iterator[str]:
+    """Yield the rows of all tables of a GeoPackage, but for the times when they were written."""
+    with contextlib.closing(sqlite3.connect(path)) as file:
+        for kind, name, sql in file.execute(_SCHEMA).fetchall():
+            yield f"{kind} {name}: {sql}"
+            if kind == "table":
+                rows = file.execute(f'SELECT * FROM "{name}"')  # noqa: S608 - as the file says
+                kept = [i for i, (item, *_) in enumerate(rows.description) if item not in _STAMPS]
+                yield from sorted(repr([row[i] for i in kept]) for row in rows)

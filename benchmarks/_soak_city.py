@@ -1,0 +1,238 @@
+"""The small city that the soak works on: its files, its commands, and what these write."""
+
+from __future__ import annotations
+
+import functools
+import http.server
+import json
+import os
+import shutil
+import tomllib
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+from xml.sax.saxutils import quoteattr
+
+from benchmarks._contents import TIMES, digest, file_digest
+from benchmarks._soak_runs import Ending, forked, run
+from semsig_gis import load_catalog, open_database, open_objects
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Mapping
+
+    from semsig_gis import LayerSpec
+
+TABLE = tomllib.loads(Path(__file__).with_name("soak.toml").read_text(encoding="utf-8"))
+_SEEN = 5  # objects at least, of cells that queries are made from
+
+
+@dataclass(frozen=True, kw_only=True)
+class Command:
+    """A command, the names in the folder that it writes under, and how it went.
+
+    `before` is a folder with what lies under these names before it is run; `old` and `new` are the
+    digests of these files before and after.
+    """
+
+    text: str
+    names: tuple[str, ...]
+    before: Path
+    ending: Ending
+    old: Mapping[str, str]
+    new: Mapping[str, str]
+
+
+@dataclass(frozen=True, kw_only=True)
+class World:
+    """A folder in which every command has been run once, and the commands."""
+
+    folder: Path
+    commands: tuple[Command, ...]
+
+    def copy(self, command: Command, to: Path) -> None:
+        """Make a folder in which a command is about to be run."""
+        shutil.copytree(self.folder, to, ignore=shutil.ignore_patterns(*command.names))
+        shutil.copytree(command.before, to, dirs_exist_ok=True)
+
+
+def made_world(folder: Path) -> World:
+    """Make the city and its queries, run all commands on it, and keep what they change.
+
+    What a command replaces is its work on another city, unless it changes what is there.
+    """
+    port = _portal(folder)
+    now, other = folder / "now", folder / "other"
+    commands = []
+    texts = [_prepared(side, seed, port) for seed, side in enumerate((other, now))]
+    for number, (there, here) in enumerate(zip(*texts, strict=True)):
+        before = folder / "before" / str(number)
+        earlier = folder / "earlier"
+        before.mkdir(parents=True)
+        shutil.copytree(now, earlier)
+        states = files_in(now)
+        ending = _done(here, now)
+        _done(there, other)
+        changed = (name for name, state in files_in(now).items() if states.get(name) != state)
+        names = sorted({Path(name).parts[0] for name in changed})
+        for name in names:
+            was = earlier / name if (earlier / name).exists() else other / name
+            if was.is_dir():
+                shutil.copytree(was, before / name)
+            elif was.exists():
+                shutil.copy2(was, before / name)
+        shutil.rmtree(earlier)
+        commands.append(
+            Command(
+                text=here,
+                names=tuple(names),
+                before=before,
+                ending=ending,
+                old=digests(before, names),
+                new=digests(now, names),
+            )
+        )
+    return World(folder=now, commands=tuple(commands))
+
+
+def digests(folder: Path, names: tuple[str, ...] | list[str]) -> dict[str, str]:
+    """Return the digest of every file that lies under these names, by its path."""
+    return {
+        name: _digest(folder / name)
+        for name in files_in(folder)
+        if Path(name).parts[0] in names and Path(name).name not in TIMES
+    }
+
+
+def _digest(path: Path) -> str:
+    try:
+        return file_digest(path)
+    except Exception:  # noqa: BLE001 - a file of this kind that is no such file
+        return digest(path.read_bytes())
+
+
+def files_in(folder: Path) -> dict[str, tuple[int, int, int]]:
+    """Return the state of every file in a folder, by its path."""
+    paths = (Path(root, name) for root, _, names in os.walk(folder) for name in names)
+    return {
+        str(path.relative_to(folder)): (stat.st_mtime_ns, stat.st_size, stat.st_ino)
+        for path in paths
+        for stat in [path.stat()]
+    }
+
+
+def _lines(table: str, words: Mapping[str, object]) -> list[str]:
+    """Return the commands of a table."""
+    return [
+        " ".join(f"{shared} {rest}".split())
+        for line in TABLE[table].format(**words).strip().splitlines()
+        for shared, _, rests in [line.partition("|")]
+        for rest in rests.split(";")
+    ]
+
+
+def _done(command: str, folder: Path) -> Ending:
+    """Run a command that must go well."""
+    ending = run(command, folder)
+    if ending.code or ending.fault:
+        msg = f"semsig {command} ended with {ending.code}:\n{ending.err}"
+        raise RuntimeError(msg)
+    return ending
+
+
+def _prepared(folder: Path, seed: int, port: int) -> list[str]:
+    """Make a city, its queries and all that its commands read; return the commands."""
+    folder.mkdir()
+    words: dict[str, object] = {"seed": seed, "other": 1 - seed}
+    for command in _lines("city", words):
+        _done(command, folder)
+    words |= forked(lambda: _write_inputs(folder, port))
+    for command in _lines("prepare", words):
+        _done(command, folder)
+    return _lines("writing", words)
+
+
+def _write_inputs(folder: Path, port: int) -> dict[str, str]:
+    """Write the city as OpenStreetMap and as a portal's file, and views of it."""
+    database = open_database(folder / "known.parquet")
+    views: list[dict[str, Any]] = []
+    for cell, (x, y) in enumerate(database.xy.tolist()):
+        bearings = database.signature(cell).bearings
+        if bearings is not None and len(bearings) >= _SEEN:
+            view = {"types": database.types(cell), "bearings": bearings.round(1).tolist()}
+            views.append(view | {"x": x + 2, "y": y - 1})
+    _write_rows(folder / "samples.jsonl", views[:30])
+    _write_rows(
+        folder / "queries.jsonl",
+        [{"id": f"q{number}"} | view for number, view in enumerate(views[:5])],
+    )
+    rows = [f"{one['types']},{' '.join(map(str, one['bearings']))}" for one in views[:5]]
+    (folder / "queries.csv").write_text("\n".join(["types,bearings", *rows, ""]), encoding="utf-8")
+    (folder / "experiment.toml").write_text(TABLE["experiment"], encoding="utf-8")
+    (folder / "service.toml").write_text(
+        TABLE["service"].format(address=f"http://127.0.0.1:{port}/{folder.name}"), encoding="utf-8"
+    )
+    places = open_objects(folder / "in" / "objects.parquet").table.to_crs("EPSG:4326")
+    places.drop(columns="source").to_file(folder / "portal.geojson", driver="GeoJSON")
+    fields = [{"name": "geo_shape", "type": "geo_shape"}]
+    (folder / "portal.json").write_text(json.dumps({"fields": fields}), encoding="utf-8")
+    catalog = load_catalog("openstreetmap")
+    tags = {
+        catalog.taxonomy.by_name(layer.class_name).code: layer
+        for layer in reversed(catalog.layers)
+        if layer.class_name and layer.tags and "node" in layer.elements
+    }
+    nodes = "".join(
+        _node(number, tags[code], point.x, point.y)
+        for number, (code, point) in enumerate(
+            zip(places["class_code"], places.geometry, strict=True), start=1
+        )
+    )
+    (folder / "city.osm").write_text(f"<osm version='0.6'>{nodes}</osm>\n", encoding="utf-8")
+    west, south, east, north = places.total_bounds.round(4).tolist()
+    view = views[len(views) // 2]
+    angles = ",".join(map(str, view["bearings"]))
+    return {
+        "query": f"--types {view['types']} --bearings {angles}",
+        "box": f"{west},{south},{east},{north}",
+    }
+
+
+def _node(number: int, layer: LayerSpec, lon: float, lat: float) -> str:
+    tags = "".join(
+        f"<tag k={quoteattr(key)} v={quoteattr(values[0].replace('*', 'yes'))}/>"
+        for key, values in layer.tags[0]
+    )
+    return f"<node id='{number}' version='1' lat='{lat:.7f}' lon='{lon:.7f}'>{tags}</node>\n"
+
+
+def _write_rows(path: Path, rows: list[dict[str, object]]) -> None:
+    path.write_text("".join(f"{json.dumps(row)}\n" for row in rows), encoding="utf-8")
+
+
+class _Portal(http.server.SimpleHTTPRequestHandler):
+    """Sends files of a folder: of ``/CITY/.../objects`` a description, of others the export."""
+
+    def translate_path(self, path: str) -> str:
+        """Return the file that is meant by an address."""
+        parts = path.partition("?")[0].split("/")
+        name = "portal.json" if parts[-1] == "objects" else "portal.geojson"
+        return str(Path(self.directory) / parts[1] / name)
+
+    def log_message(self, *_: object) -> None:
+        """Say nothing."""
+
+
+def _portal(folder: Path) -> int:
+    """Serve a folder on the loopback, as long as this process lives; return the port."""
+    folder.mkdir(parents=True, exist_ok=True)
+    server = http.server.HTTPServer(
+        ("127.0.0.1", 0), functools.partial(_Portal, directory=str(folder))
+    )
+    parent = os.getpid()
+    if os.fork() == 0:
+        server.timeout = 1.0
+        while os.getppid() == parent:
+            server.handle_request()
+        os._exit(0)
+    server.socket.close()
+    return server.server_port
