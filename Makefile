@@ -13,7 +13,7 @@ BIOME := @biomejs/biome@2.6.8
 
 .DEFAULT_GOAL := help
 .NOTPARALLEL:
-.PHONY: help demo test lint bench accuracy reproduce golden walks docs plugin clean
+.PHONY: help demo test lint bench accuracy reproduce golden soak walks docs plugin clean
 
 help: ## show this list
 	@sed -n 's/^\([a-z]*\):.*## \(.*\)/  make \1\t\2/p' $(MAKEFILE_LIST) | expand -t 14
@@ -56,6 +56,9 @@ docs: $(DEV) ## the documentation, into docs/_build/html
 
 golden: $(DEV) ## what must not change, into golden/: outputs and files of all commands
 	$(BIN)/python -m benchmarks.golden golden
+
+soak: $(DEV) ## kill, starve and damage everything, some thousand times: an hour
+	$(BIN)/python -m benchmarks.soak
 
 walks: $(DEV) ## the functions and modules that a row of trees and a query cross
 	$(BIN)/python -m benchmarks.walks

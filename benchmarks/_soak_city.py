@@ -14,15 +14,17 @@ from typing import TYPE_CHECKING, Any
 from xml.sax.saxutils import quoteattr
 
 from benchmarks._contents import TIMES, digest, file_digest
-from benchmarks._soak_runs import Ending, forked, run
+from benchmarks._soak_runs import forked, run
 from semsig_gis import load_catalog, open_database, open_objects
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping
+    from collections.abc import Mapping
 
+    from benchmarks._soak_runs import Ending
     from semsig_gis import LayerSpec
 
 TABLE = tomllib.loads(Path(__file__).with_name("soak.toml").read_text(encoding="utf-8"))
+_TIMED = (".lock", ".meta.json")  # of the cache: when something was fetched
 _SEEN = 5  # objects at least, of cells that queries are made from
 
 
@@ -99,7 +101,9 @@ def digests(folder: Path, names: tuple[str, ...] | list[str]) -> dict[str, str]:
     return {
         name: _digest(folder / name)
         for name in files_in(folder)
-        if Path(name).parts[0] in names and Path(name).name not in TIMES
+        if Path(name).parts[0] in names
+        and Path(name).name not in TIMES
+        and not name.endswith(_TIMED)
     }
 
 

@@ -145,9 +145,11 @@ def _child(
         tempfile.tempdir = None
         _note_changes(changes, stop)
         code = exit_code(command)
+    except BaseException:  # noqa: BLE001 - told, and the process ends
+        sys.excepthook(*sys.exc_info())
     finally:
         with contextlib.suppress(BaseException):
-            atexit._run_exitfuncs()
+            atexit._run_exitfuncs()  # noqa: SLF001 - as the end of Python would
             sys.stderr.flush()
         os._exit(code)
 

@@ -1,9 +1,9 @@
-"""Try to break the commands and the readers, many thousand times: ``python -m benchmarks.soak``.
+"""Try to break commands and readers, some thousand times: ``python -m benchmarks.soak``.
 
 Every command that writes is killed and interrupted at random moments, finds full and read-only
 disks, closed pipes and odd environments; every format that is read gets damaged files. What was
 there before must be whole, or what is new; the next run must work and clean up; a refusal must be
-one sentence. What goes wrong is printed, and the table of all trials is written as JSON.
+one sentence. What goes wrong is printed, and the table of all trials is kept as JSON.
 """
 
 from __future__ import annotations
@@ -18,57 +18,169 @@ import shutil
 import sys
 import tempfile
 import time
+from collections import Counter
+from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import semsig_gis
-from benchmarks import _soak_faults as faults
+from benchmarks import _soak_faults as trials
+from benchmarks import _soak_mutants as mutants
+from benchmarks import tables
 from benchmarks._soak_city import made_world
 from benchmarks._soak_runs import forked
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
+    from collections.abc import Collection, Iterator
 
     from benchmarks._soak_city import World
 
-RESULTS = Path(__file__).with_name("soak.json")
-_KILLS = 700
-_MUTANTS = 50_000
-_SKIPPED = "skipped"
+KILLS = 700
+MUTANTS = 50_000
+FAULTS = (
+    *("tracebacks", "hangs", "crashes", "lost or half-written"),
+    *("read differently", "leftovers", "other"),
+)
+_MUTANTS = "damaged files"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Place:
+    """Where trials take place: the city, sound files, and whether disks can be mounted."""
+
+    world: World
+    corpus: Path
+    disks: bool
 
 
 def main() -> None:
     """Read the options, run all trials, and print the table."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks.soak", description=__doc__)
     parser.add_argument("--share", type=float, default=1.0, help="of all trials, such as 0.1")
-    parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--seed", type=int, default=0, help="of the random trials")
     parser.add_argument("--part", action="append", help="only this part; may be repeated")
-    parser.add_argument("--lanes", type=int, default=os.cpu_count() or 1)
-    parser.add_argument("--out", type=Path, default=RESULTS)
+    parser.add_argument("--lanes", type=int, default=os.cpu_count() or 1, help="trials at a time")
+    parser.add_argument("--out", type=Path, default=tables.FOLDER / "soak.json")
     options = parser.parse_args()
+    start = time.perf_counter()
     for module in pkgutil.walk_packages(semsig_gis.__path__, "semsig_gis."):
         if not module.name.endswith("__main__"):
             importlib.import_module(module.name)
-    start = time.perf_counter()
-    with tempfile.TemporaryDirectory(prefix="soak-") as name:
-        folder = Path(name)
-        world = made_world(folder / "world")
-        print(f"a city and {len(world.commands)} commands, {time.perf_counter() - start:.0f} s")
-        trials = [
-            case
-            for case in faults.cases(round(_KILLS * options.share), seed=options.seed)
-            if options.part is None or case.part in options.part
+    # Not a TemporaryDirectory, which every forked process would remove at its end.
+    folder = Path(tempfile.mkdtemp(prefix="soak-"))
+    try:
+        place = _prepared(folder)
+        print(f"{len(place.world.commands)} commands, {time.perf_counter() - start:.0f} s")
+        rows = {
+            part: {"part": part, "cases": 0, "clean": 0, **dict.fromkeys(FAULTS, 0)}
+            for part in (*trials.PARTS, _MUTANTS)
+            if options.part is None or part in options.part
+        }
+        lanes = [
+            _lane(place, folder / f"lane{number}", rows.keys(), options, number)
+            for number in range(options.lanes)
         ]
-        (folder / "disk").mkdir()
-        disks = faults.disks_possible(folder / "disk")
-        for case, found in _all(world, trials, folder, lanes=options.lanes):
-            print(case, found)
+        for part, count, faults in _told(lanes):
+            _add(rows[part], count, faults)
+    finally:
+        shutil.rmtree(folder, ignore_errors=True)
+    result = {
+        "share": options.share,
+        "seed": options.seed,
+        "seconds": round(time.perf_counter() - start),
+        "rows": [*rows.values()],
+    }
+    options.out.write_text(json.dumps(result, indent=1) + "\n", encoding="utf-8")
+    print(tables.soak_table(result["rows"]))
+    sys.exit(int(any(row["cases"] != row["clean"] for row in rows.values())))
 
 
-def _all(
-    world: World, trials: list[faults.Case], folder: Path, *, lanes: int
-) -> Iterator[tuple[faults.Case, list[str]]]:
-    raise NotImplementedError
+def _prepared(folder: Path) -> Place:
+    world = made_world(folder / "world")
+    forked(lambda: mutants.made_corpus(world, folder / "corpus"))
+    disk = folder / "disk"
+    disk.mkdir()
+    disks = trials.disks_possible(disk)
+    if not disks:
+        print("This machine mounts no disks for the soak; full and read-only ones are left out.")
+    return Place(world=world, corpus=folder / "corpus", disks=disks)
+
+
+def _lane(
+    place: Place, folder: Path, parts: Collection[str], options: argparse.Namespace, lane: int
+) -> int:
+    """Begin every n-th trial in a process of its own; return where it tells what it found."""
+    reading, writing = os.pipe()
+    if os.fork():
+        os.close(writing)
+        return reading
+    code = 1
+    try:
+        os.close(reading)
+        folder.mkdir()
+        with open(writing, "w", encoding="utf-8", buffering=1) as file:  # noqa: PTH123 - descriptor
+            for number, trial in enumerate(_trials(place, parts, options)):
+                if number % options.lanes == lane:
+                    file.write(json.dumps(_outcome(place, trial, folder / "trial")) + "\n")
+        code = 0
+    except BaseException:  # noqa: BLE001 - told, and the process ends
+        sys.excepthook(*sys.exc_info())
+    finally:
+        os._exit(code)
+
+
+def _trials(
+    place: Place, parts: Collection[str], options: argparse.Namespace
+) -> Iterator[trials.Case | mutants.Batch]:
+    for case in trials.cases(round(KILLS * options.share), seed=options.seed):
+        if case.part in parts and (place.disks or not case.part.endswith("disks")):
+            yield case
+    if _MUTANTS in parts:
+        yield from mutants.batches(round(MUTANTS * options.share), seed=options.seed)
+
+
+def _outcome(
+    place: Place, trial: trials.Case | mutants.Batch, folder: Path
+) -> tuple[str, int, list[tuple[str, list[str]]]]:
+    """Return the part of a trial, how many cases it was, and what is wrong with which."""
+    if isinstance(trial, mutants.Batch):
+        form = mutants.FORMATS[trial.format].name
+        found = mutants.faults(trial, place.corpus, folder)
+        return _MUTANTS, trial.count, [(f"{form}, mutant {one}", [told]) for one, told in found]
+    folder.mkdir()
+    found = forked(lambda: trials.faults(place.world, trial, folder))
+    shutil.rmtree(folder, ignore_errors=True)
+    command = place.world.commands[trial.number % len(place.world.commands)].text
+    return trial.part, 1, [(f"trial {trial.number}, semsig {command}", found)] if found else []
+
+
+def _told(lanes: list[int]) -> Iterator[Any]:
+    """Yield what the lanes tell, until all are done."""
+    with selectors.DefaultSelector() as selector:
+        for lane in lanes:
+            file = open(lane, encoding="utf-8")  # noqa: PTH123, SIM115 - a descriptor
+            selector.register(file, selectors.EVENT_READ, file)
+        while selector.get_map():
+            for key, _ in selector.select():
+                line = key.data.readline()
+                if line:
+                    yield json.loads(line)
+                else:
+                    selector.unregister(key.fileobj)
+                    key.data.close()
+
+
+def _add(row: dict[str, Any], count: int, faults: list[tuple[str, list[str]]]) -> None:
+    """Count trials, and print what is wrong."""
+    row["cases"] += count
+    row["clean"] += count - len(faults)
+    for what, found in faults:
+        kinds = Counter(told.partition(":")[0] for told in found)
+        for kind in kinds:
+            row[kind if kind in FAULTS else "other"] += 1
+        print(f"{row['part']}, {what}", flush=True)
+        for told in found:
+            print(f"    {told.strip()}")
 
 
 if __name__ == "__main__":

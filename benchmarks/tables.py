@@ -201,6 +201,28 @@ def _speed_table(rows: Iterable[dict[str, Any]]) -> str:
     )
 
 
+def soak_table(rows: Iterable[dict[str, Any]]) -> str:
+    """Return the table of a soak's trials.
+
+    Parameters
+    ----------
+    rows : iterable of dict
+        Rows of ``soak.json``.
+
+    Returns
+    -------
+    str
+        Markdown.
+    """
+    rows = list(rows)
+    counts = list(rows[0])[1:]
+    total = {"part": "all"} | {name: sum(row[name] for row in rows) for name in counts}
+    return _table(
+        " | ".join(["trial", *counts]),
+        ([row["part"], *(f"{row[name]:,}" for name in counts)] for row in [*rows, total]),
+    )
+
+
 def _table(head: str, rows: Iterable[Sequence[str]]) -> str:
     """Return a table; the columns of the head are parted by bars."""
     titles = head.split(" | ")
