@@ -59,6 +59,7 @@ golden: $(DEV) ## what must not change, into golden/: outputs and files of all c
 
 soak: $(DEV) ## kill, starve and damage everything, some thousand times: an hour
 	$(BIN)/python -m benchmarks.soak
+	$(BIN)/python -m benchmarks.tables
 
 walks: $(DEV) ## the functions and modules that a row of trees and a query cross
 	$(BIN)/python -m benchmarks.walks

@@ -1,4 +1,4 @@
-"""Write the page of figures from the result files: ``python -m benchmarks.tables``."""
+"""Write result files into the documentation: ``python -m benchmarks.tables``."""
 
 from __future__ import annotations
 
@@ -13,6 +13,8 @@ __all__ = ["main", "page"]
 
 FOLDER = Path(__file__).parent
 PAGE = FOLDER.parent / "docs" / "figures.md"
+TRUST = FOLDER.parent / "docs" / "reliability.md"
+_SOAK = ("<!-- make soak -->\n", "<!-- end -->")
 
 _HEAD = """# Figures
 
@@ -59,10 +61,14 @@ times are those that it prints, for 312,134 cells on a machine of its own.
 
 
 def main() -> None:
-    """Write the page."""
+    """Write the page of figures, and the table of the soak."""
     names = ("accuracy.json", "results.json", "reproduction.json")
     PAGE.write_text(page(*map(_results, names)), encoding="utf-8")
-    print(f"wrote {PAGE.relative_to(FOLDER.parent)}")
+    TRUST.write_text(
+        trust_page(TRUST.read_text(encoding="utf-8"), _results("soak.json")), encoding="utf-8"
+    )
+    for path in (PAGE, TRUST):
+        print(f"wrote {path.relative_to(FOLDER.parent)}")
 
 
 def page(
@@ -199,6 +205,26 @@ def _speed_table(rows: Iterable[dict[str, Any]]) -> str:
             for row in rows
         ),
     )
+
+
+def trust_page(text: str, rows: Iterable[dict[str, Any]]) -> str:
+    """Return the page of what can be relied on, with another table.
+
+    Parameters
+    ----------
+    text : str
+        The page as it is.
+    rows : iterable of dict
+        Rows of ``soak.json``.
+
+    Returns
+    -------
+    str
+        Markdown.
+    """
+    before, _, rest = text.partition(_SOAK[0])
+    after = rest.partition(_SOAK[1])[2]
+    return f"{before}{_SOAK[0]}\n{soak_table(rows)}\n{_SOAK[1]}{after}"
 
 
 def soak_table(rows: Iterable[dict[str, Any]]) -> str:
