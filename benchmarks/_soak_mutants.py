@@ -27,7 +27,7 @@ from benchmarks._contents import digest
 from semsig_gis.evaluation.identify.result import open_identifiability
 from semsig_gis.likelihood.index import open_index
 from semsig_gis.likelihood.noise.model import open_noise
-from semsig_gis.objects.load import read_area
+from semsig_gis.objects.surroundings import read_area
 from semsig_gis.queries.file import read_queries, read_route
 from semsig_gis.sources import reader
 

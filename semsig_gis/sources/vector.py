@@ -8,6 +8,7 @@ import itertools
 import logging
 import math
 import re
+import sqlite3
 import zipfile
 import zlib
 from dataclasses import dataclass
@@ -318,6 +319,8 @@ def _opened(member: Member, *, fields: tuple[str, ...] | None = None) -> Iterato
         options["NATIVE_DATA"] = "YES"
     elif fields is not None:  # which GeoJSON's driver cannot select
         options["include_fields"] = list(fields)
+    if member.driver == "GPKG" and member.inner is None:
+        _refuse_damaged(member.file)
     try:
         source = fiona.open(
             member.address, layer=member.layer, enabled_drivers=[member.driver], **options
@@ -327,6 +330,22 @@ def _opened(member: Member, *, fields: tuple[str, ...] | None = None) -> Iterato
         raise unreadable(member, error) from error
     with source:
         yield source
+
+
+def _refuse_damaged(path: Path) -> None:
+    """Refuse a damaged GeoPackage, of which GDAL says things at which fiona crashes."""
+    try:
+        with contextlib.closing(
+            sqlite3.connect(f"{path.resolve().as_uri()}?mode=ro", uri=True)
+        ) as f:
+            found = f.execute("PRAGMA quick_check(1)").fetchone()[0]
+    except UnicodeDecodeError:
+        found = "a name in it is not UTF-8 text"
+    except sqlite3.Error as error:
+        found = str(error)
+    if found != "ok":
+        msg = f"{path} cannot be read ({found}); it may be damaged, get it again."
+        raise SourceError(msg)
 
 
 def _layers(path: Path) -> tuple[Member, ...]:
@@ -429,12 +448,22 @@ def _count(source: fiona.Collection) -> int | None:
 def _own_crs(source: fiona.Collection) -> tuple[CRS | None, bool]:
     """Return the CRS of a layer, and whether it is only what GeoJSON means by saying nothing."""
     if source.driver == "GeoJSON":
-        members = parse_json(source.tags(ns="NATIVE_DATA").get("NATIVE_DATA", "{}"))
+        with _sound_json(source.path):
+            members = parse_json(source.tags(ns="NATIVE_DATA").get("NATIVE_DATA", "{}"))
         if "crs" not in members:
             return WGS84, True
         if usable_crs(source.crs_wkt) == WGS84 and not WGS84_NAMES.search(str(members["crs"])):
             return None, False  # GDAL takes what it does not understand for WGS 84
     return usable_crs(source.crs_wkt), False
+
+
+@contextlib.contextmanager
+def _sound_json(what: object) -> Iterator[None]:
+    """Refuse what GDAL takes for GeoJSON although it is none, such as text after its end."""
+    try:
+        yield
+    except ValueError as error:
+        raise unreadable(what, error) from error
 
 
 def _read_rows(
@@ -509,7 +538,7 @@ def _refuse_broken(rows: Rows, member: Member) -> None:
     null = [row for row, position in enumerate(rows.positions) if position is None]
     if not null:
         return
-    with member.open() as stream:
+    with _sound_json(member), member.open() as stream:
         document = parse_json(stream.read().decode("utf-8-sig", errors="replace"))
     listed = document.get("features", [document])
     features = [item for item in listed if isinstance(item, dict) and item.get("type") == "Feature"]
