@@ -688,6 +688,21 @@ def test_content_that_belies_its_name(suffix: str, text: str, tmp_path: Path) ->
         read(path, crs="EPSG:4326")
 
 
+@pytest.mark.parametrize("damage", [b"{", b'"\x01"', b"[" * 5000], ids=["more", "control", "deep"])
+def test_geojson_that_only_gdal_takes_for_json(damage: bytes, tmp_path: Path) -> None:
+    path = write(frame([(0, 0)]), tmp_path, "geojson")
+    path.write_bytes(path.read_bytes().rstrip().removesuffix(b"}") + b', "a": ' + damage)
+    with refused(SourceError, path.name, "get it again"):
+        read_layer(path, spec_of())
+
+
+def test_geopackage_with_names_that_are_no_text(tmp_path: Path) -> None:
+    path = write(frame([(0, 0)]), tmp_path, "gpkg")
+    path.write_bytes(path.read_bytes().replace(b"CREATE TRIGGER", b"CREATE T\xffIGGER"))
+    with refused(SourceError, f"{path.name} cannot be read (", "get it again"):
+        read_layer(path, spec_of())
+
+
 def test_drivers_are_limited(tmp_path: Path) -> None:
     geojson(tmp_path, point(3, 43))
     link = (
