@@ -60,32 +60,29 @@ class World:
 def made_world(folder: Path) -> World:
     """Make the city and its queries, run all commands on it, and keep what they change.
 
-    What a command replaces is its work on another city, unless it changes what is there.
+    Before a command is run again, its results are there already, with a byte more in each; but for
+    folders, with which it goes on.
     """
-    port = _portal(folder)
-    now, other = folder / "now", folder / "other"
+    now = folder / "now"
     commands = []
-    texts = [_prepared(side, seed, port) for seed, side in enumerate((other, now))]
-    for number, (there, here) in enumerate(zip(*texts, strict=True)):
+    for number, text in enumerate(_prepared(now, _portal(folder))):
         before = folder / "before" / str(number)
         earlier = folder / "earlier"
         before.mkdir(parents=True)
         shutil.copytree(now, earlier)
         states = files_in(now)
-        ending = _done(here, now)
-        _done(there, other)
-        changed = (name for name, state in files_in(now).items() if states.get(name) != state)
+        ending = _done(text, now)
+        changed = [name for name, state in files_in(now).items() if states.get(name) != state]
         names = sorted({Path(name).parts[0] for name in changed})
-        for name in names:
-            was = earlier / name if (earlier / name).exists() else other / name
-            if was.is_dir():
-                shutil.copytree(was, before / name)
-            elif was.exists():
-                shutil.copy2(was, before / name)
+        for name in changed:
+            if name in states:
+                _put(before / name, (earlier / name).read_bytes())
+            elif "/" not in name or ".objects/" in name:
+                _put(before / name, (now / name).read_bytes() + b"\0")
         shutil.rmtree(earlier)
         commands.append(
             Command(
-                text=here,
+                text=text,
                 names=tuple(names),
                 before=before,
                 ending=ending,
@@ -94,6 +91,11 @@ def made_world(folder: Path) -> World:
             )
         )
     return World(folder=now, commands=tuple(commands))
+
+
+def _put(path: Path, content: bytes) -> None:
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_bytes(content)
 
 
 def digests(folder: Path, names: tuple[str, ...] | list[str]) -> dict[str, str]:
@@ -124,7 +126,7 @@ def files_in(folder: Path) -> dict[str, tuple[int, int, int]]:
     }
 
 
-def _lines(table: str, words: Mapping[str, object]) -> list[str]:
+def _lines(table: str, words: Mapping[str, str]) -> list[str]:
     """Return the commands of a table."""
     return [
         " ".join(f"{shared} {rest}".split())
@@ -143,13 +145,12 @@ def _done(command: str, folder: Path) -> Ending:
     return ending
 
 
-def _prepared(folder: Path, seed: int, port: int) -> list[str]:
+def _prepared(folder: Path, port: int) -> list[str]:
     """Make a city, its queries and all that its commands read; return the commands."""
     folder.mkdir()
-    words: dict[str, object] = {"seed": seed, "other": 1 - seed}
-    for command in _lines("city", words):
+    for command in _lines("city", {}):
         _done(command, folder)
-    words |= forked(lambda: _write_inputs(folder, port))
+    words: dict[str, str] = forked(lambda: _write_inputs(folder, port))
     for command in _lines("prepare", words):
         _done(command, folder)
     return _lines("writing", words)

@@ -113,8 +113,9 @@ def _after(
         for ending in endings
         if ending.fault and not (killed and ending.code == -signal.SIGKILL)
     ]
-    if not killed:
-        found += [f"leftovers: {name}" for name in _leftovers(world, place)]
+    # A run that was not killed leaves at most what the next one goes on with.
+    left = [] if killed else _leftovers(world, place)
+    found += [f"leftovers: {name}" for name in left if Path(name).parts[0] not in command.names]
     found += [f"lost or half-written: {name}" for name in _broken(command, place)]
     again = run(command.text, place)
     if again.code or again.fault:
@@ -124,9 +125,7 @@ def _after(
             name for name in {**state, **command.new} if state.get(name) != command.new.get(name)
         ]
         found.append(f"next run: other results: {' '.join(wrong)}")
-    if killed:
-        found += [f"leftovers: {name}" for name in _leftovers(world, place)]
-    return found
+    return found + [f"leftovers: {name}" for name in _leftovers(world, place) if name not in left]
 
 
 def _leftovers(world: World, place: Path) -> list[str]:

@@ -219,8 +219,8 @@ def made_corpus(world: World, folder: Path) -> None:
                  "portal.geojson", "service.toml", "city.osm"):  # fmt: skip
         shutil.copy2(here / name, folder / name)
     shutil.copytree(here / "known.objects", folder / "known.objects")
-    shutil.copytree(next(here.glob("tiles_*")), folder / "tiles")
-    shutil.copytree(next(here.glob("known_evaluation*")), folder / "evaluation")
+    shutil.copytree(here / "tiles", folder / "tiles")
+    shutil.copytree(here / "known_evaluation", folder / "evaluation")
     shutil.copy2(next(here.glob("known.parquet.*likelihood")), folder / "known.likelihood")
     for name in ("objects", "buildings"):
         shutil.copy2(here / "in" / f"{name}.parquet", folder / f"{name}.parquet")
