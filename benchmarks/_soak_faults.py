@@ -125,7 +125,8 @@ def _after(
             name for name in {**state, **command.new} if state.get(name) != command.new.get(name)
         ]
         found.append(f"next run: other results: {' '.join(wrong)}")
-    return found + [f"leftovers: {name}" for name in _leftovers(world, place) if name not in left]
+    told = [f"leftovers: {name}" for name in _leftovers(world, place)]
+    return found + [one for one in told if one not in found]
 
 
 def _leftovers(world: World, place: Path) -> list[str]:

@@ -114,6 +114,9 @@ def test_the_page_of_figures_is_that_of_the_results() -> None:
         for name in ("accuracy.json", "results.json", "reproduction.json")
     )
     assert tables.PAGE.read_text(encoding="utf-8") == tables.page(*results)
+    trials = json.loads((tables.FOLDER / "soak.json").read_text(encoding="utf-8"))
+    page_of_trust = tables.TRUST.read_text(encoding="utf-8")
+    assert page_of_trust == tables.trust_page(page_of_trust, trials)
 
 
 def test_every_figure_is_measured_and_written(

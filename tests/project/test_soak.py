@@ -1,0 +1,28 @@
+"""A tenth of the soak (see `benchmarks.soak`): nothing is lost, and every refusal is a sentence."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="forks, and mounts disks of its own")
+def test_a_tenth_of_the_soak(tmp_path: Path) -> None:
+    out = tmp_path / "soak.json"
+    done = subprocess.run(
+        [*(sys.executable, "-m", "benchmarks.soak"), *f"--share 0.1 --out {out}".split()],
+        cwd=Path(__file__).parents[2],
+        capture_output=True,
+        check=False,
+        text=True,
+        timeout=900,
+    )
+    assert done.returncode == 0, done.stdout + done.stderr
+    rows = {row["part"]: row for row in json.loads(out.read_text(encoding="utf-8"))}
+    assert rows["kills"]["cases"] == 70
+    assert rows["damaged files"]["cases"] > 4_900
+    assert all(row["clean"] == row["cases"] for row in rows.values())
