@@ -344,7 +344,7 @@ def _refuse_damaged(path: Path) -> None:
     except sqlite3.Error as error:
         found = str(error)
     if found != "ok":
-        msg = f"{path} cannot be read ({found}); it may be damaged, get it again."
+        msg = f"{path} cannot be read ({' '.join(found.split())}); it may be damaged, get it again."
         raise SourceError(msg)
 
 
