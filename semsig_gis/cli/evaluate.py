@@ -333,6 +333,7 @@ def identify(
 
     _require_check(check, out)
     city = open_city(database)
+    counts = city.object_counts  # before the file changes
     model = read_noise(noise, city.database)
     if not on_grid:
         model = cell_noise(model, city.database.grid.step)
@@ -355,7 +356,6 @@ def identify(
             verification = check_identifiability(
                 columns, index, queries=check, threads=workers, progress=advance
             )
-    counts = city.object_counts
     if out is not None and verification is not None:
         from semsig_gis.reports.page import write_report  # it loads what draws
 

@@ -38,8 +38,8 @@ def _city(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 def test_the_columns_are_printed_drawn_and_exported(run: Run, done: Done) -> None:
     code, out, err = run("identify city.parquet --noise medium --check 40")
     assert code == 0
-    for words in ("Identifiability, medium noise", "What each class adds", "bits left",
-                  "Do the chances come true?", "Rank correlation", "columns: "):  # fmt: skip
+    for words in ("Identifiability, medium noise", "What each class adds", "by 1,000 objects",
+                  "bits left", "Do the chances come true?", "Rank correlation", "columns: "):  # fmt: skip
         assert words in out
     assert "is built" in err
     cells = gpd.read_parquet("city.parquet")
