@@ -8,17 +8,18 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import TYPE_CHECKING
 
 import geopandas as gpd
 import numpy as np
 import pandas as pd
 import shapely
-from pyproj import Transformer
+from pyproj import CRS, Transformer
 
 from semsig_gis.core.errors import CrsError, EmptyResultError, InputError
 from semsig_gis.core.geometry import (
+    FULL_TURN,
     cell_ids,
     plane_distortion,
     require_metric_crs,
@@ -32,7 +33,6 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from numpy.typing import NDArray
-    from pyproj import CRS
 
     from semsig_gis.core.geometry import Bounds
     from semsig_gis.sources import RawLayer
@@ -266,8 +266,8 @@ def _require_area(one: _Located, metric: CRS | None) -> None:
     where = f"has coordinates such as ({x:.12g}, {y:.12g}), which are nowhere on the Earth"
     if centre is not None:
         where = f"lies near {_place(centre)}"
-    area = wrong.area_of_use
-    used = "" if area is None else f" ({_box(area.bounds)} in degrees)"
+    bounds = _used_in(wrong)
+    used = "" if bounds is None else f" ({_box(bounds)} in degrees)"
     remedy = "state the crs that its coordinates are in"
     if one.swapped is not None and all(_in_area(one.swapped, crs) for crs in systems):
         there = _place(one.swapped)
@@ -284,16 +284,26 @@ def _require_area(one: _Located, metric: CRS | None) -> None:
     raise CrsError(msg)
 
 
+@lru_cache(maxsize=64)  # looking for the code takes 0.2 s
+def _used_in(crs: CRS) -> Bounds | None:
+    """Return where a CRS is used; for one that does not say, where its likeness of EPSG is."""
+    code = crs.to_epsg() if crs.area_of_use is None else None
+    area = crs.area_of_use if code is None else CRS.from_epsg(code).area_of_use
+    return None if area is None else area.bounds
+
+
 def _in_area(place: tuple[float, float], crs: CRS) -> bool:
     """Tell whether a CRS is used at a place, or nearly there; where it does not say, it is."""
-    area = crs.area_of_use
-    if area is None:
+    bounds = _used_in(crs)
+    if bounds is None:
         return True
+    west, south, east, north = bounds
     # From west to east; all the way round where both are the same meridian.
-    width = float(wrap_degrees(area.east - area.west)) or 360.0
-    east_of = float(wrap_degrees(place[0] - area.west + AREA_MARGIN))
-    return east_of <= width + 2 * AREA_MARGIN and (
-        area.south - AREA_MARGIN <= place[1] <= area.north + AREA_MARGIN
+    width = float(wrap_degrees(east - west)) or FULL_TURN
+    east_of = float(wrap_degrees(place[0] - west + AREA_MARGIN))
+    return (
+        east_of <= width + 2 * AREA_MARGIN
+        and south - AREA_MARGIN <= place[1] <= north + AREA_MARGIN
     )
 
 
@@ -341,17 +351,28 @@ def _require_plane(
     off = (
         f"bearings differ by {distortion.turn:.3g} degrees and lengths are off by "
         f"{100 * distortion.stretch:.2g} percent in {crs_label(metric)}"
+        if np.isfinite(distortion.turn)
+        else f"bearings and lengths mean nothing in {crs_label(metric)}"
     )
     if distortion.turn > most or 100 * distortion.stretch > most:
         what = f"lies in {len(extents)} places far apart" if len(extents) > 1 else "is too wide"
         msg = (
-            f"the data {what} ({listed} in degrees), over which {off}, more than {most:g}; load a "
-            "part of it, as with --clip and such a box, or allow a larger --max-distortion."
+            f"the data {what} ({listed} in degrees), over which {off}; at most {most:g} is "
+            "allowed, so load a part of it, as with --clip and such a box, or give a larger "
+            "--max-distortion."
         )
         raise CrsError(msg)
-    if len(extents) == 1:
-        return ()
-    return (f"the data lies in {len(extents)} places far apart ({listed} in degrees); {off}",)
+    notes = []
+    if len(extents) > 1:
+        notes.append(
+            f"the data lies in {len(extents)} places far apart ({listed} in degrees); {off}"
+        )
+    if distortion.angle > most:
+        notes.append(
+            f"grid north of {crs_label(metric)} is up to {distortion.angle:.3g} degrees off true "
+            "north; say --north where the bearings of queries do not count from the grid"
+        )
+    return tuple(notes)
 
 
 def _without_strays(one: _Located, towns: _Towns) -> RawLayer:

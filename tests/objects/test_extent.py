@@ -157,12 +157,17 @@ REFUSED = {  # layers, the metric CRS, words
         None,
         ["2 places far apart", "2.33", "151.1", "bearings differ by", "--max-distortion"],
     ),
-    "two cities of neighbours": ([layer(town(PARIS), town(BERLIN))], None, ["8.8", "more than 6"]),
+    "two cities of neighbours": ([layer(town(PARIS), town(BERLIN))], None, ["8.8", "at most 6"]),
     "two cities in a given plane": ([layer(town(PARIS), town(BERLIN))], "EPSG:3035", ["EPSG:3035"]),
     "a continent": (
         [layer(town((10.0, 50.0), size=3000, km=2000.0))],
         None,
         ["is too wide", "bearings differ"],
+    ),
+    "all over the Earth": (
+        [layer(np.random.default_rng(1).uniform(-80.0, 80.0, (99, 2)))],
+        None,
+        ["and 9", "mean nothing"],
     ),
     "beyond the zones": ([layer(town((10.0, 86.0)))], None, ["no UTM zone"]),
 }
@@ -183,6 +188,18 @@ def test_a_larger_distortion_can_be_allowed() -> None:
     for most in (0.0, -1.0, float("nan")):
         with refused(InputError, "above 0", "degrees"):
             settle_extent(layers, max_distortion=most)
+
+
+def test_a_grid_that_is_much_turned_is_told() -> None:
+    _, _, (note,) = settle_extent([layer(town((-9.1, 38.7)))], crs="EPSG:3035")
+    assert "grid north of EPSG:3035 is up to 13" in note
+
+
+def test_a_crs_without_a_code_is_used_where_its_likeness_is() -> None:
+    alike = CRS.from_user_input(CRS(2154).to_wkt("WKT1_ESRI"))
+    assert alike.area_of_use is None
+    with refused(CrsError, "-9.86,41.15,10.38,51.56", "with x and y exchanged"):
+        settle_extent([layer(swapped(lambert(town(PARIS))), crs=alike)])
 
 
 def test_towns_of_one_zone_are_told() -> None:
