@@ -5,12 +5,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pytest
 import shapely
-from pyproj import CRS, Geod, Transformer
+from pyproj import CRS, Geod, Proj, Transformer
 from raw_layers import raw_layer
 from sentences import refused
 
 from semsig_gis.core.errors import CrsError, EmptyResultError, InputError
-from semsig_gis.core.geometry import grid_convergence
+from semsig_gis.core.geometry import angular_distance, grid_convergence, wrap_degrees
+from semsig_gis.database.build import build_database
 from semsig_gis.objects.extent import settle_extent
 from semsig_gis.objects.load import assemble
 from semsig_gis.sources.catalog import Catalog, LayerSpec, paper_taxonomy
@@ -217,14 +218,23 @@ def test_layers_without_places() -> None:
 
 
 def test_bearings_and_distances_across_180_degrees() -> None:
-    """The plane's, against geodesics on the ellipsoid."""
-    places = town(TAVEUNI, km=2.3)
+    """What cells see, against geodesics on the ellipsoid."""
+    places = town(TAVEUNI, size=400, km=1.0)
+    assert np.ptp(places[:, 0]) > 359.0
     objects = loaded(layer(places)).objects
     assert objects.crs.to_epsg() in {32701, 32760}
-    here, there = objects.xy[:-1], objects.xy[1:]
-    east, north = (there - here).T
-    bearings = np.degrees(np.arctan2(east, north)) + grid_convergence(objects.crs, here)
-    azimuths, _, metres = Geod(ellps="WGS84").inv(*places[:-1].T, *places[1:].T)
-    assert np.ptp(places[:, 0]) > 359.0
-    np.testing.assert_allclose((bearings - azimuths + 180.0) % 360.0 - 180.0, 0.0, atol=0.005)
-    np.testing.assert_allclose(np.hypot(east, north), metres, rtol=2e-3)
+    database = build_database(objects)
+    cells = np.flatnonzero(database.lengths > 1)[::20]
+    xy = database.xy[cells]
+    here = np.column_stack(Proj(objects.crs)(xy[:, 0], xy[:, 1], inverse=True))
+    assert np.ptp(here[:, 0]) > 359.0
+    ellipsoid, turned = Geod(ellps="WGS84"), grid_convergence(objects.crs, xy)
+    for cell, start, turn in zip(cells.tolist(), here, turned, strict=True):
+        azimuth, _, metres = ellipsoid.inv(*np.broadcast_to(start, places.shape).T, *places.T)
+        part = slice(database.offsets[cell], database.offsets[cell + 1])
+        nearest = np.argsort(metres)[: database.lengths[cell]]
+        assert np.sort(metres)[len(nearest)] > 29.9  # all others are out of sight
+        expected = np.argsort(wrap_degrees(azimuth[nearest] - turn))
+        bearings = wrap_degrees(azimuth[nearest] - turn)[expected]
+        assert angular_distance(database.bearings[part], bearings).max() < 0.06
+        np.testing.assert_allclose(database.distances[part], metres[nearest][expected], atol=0.1)
