@@ -20,6 +20,7 @@ from typing import TYPE_CHECKING, Any
 import pandas as pd
 
 from benchmarks._later_city import later_city
+from benchmarks.tables import TODAY
 from semsig_gis.core.statistics import wilson_interval
 from semsig_gis.database.build import build_database
 from semsig_gis.database.city import ObjectStore
@@ -51,7 +52,6 @@ OLD_LEVELS = ("light", "medium")  # of the old maps
 YEARS = 3
 MONACO_YEARS = named_drift().years
 MADE_UP = "made up"
-TODAY = "of the day"
 GENERIC = named_noise("generic")
 WHERE_FROM = {
     "Helsinki": ("openstreetmap", "osm/helsinki_2019.osm.pbf", "EPSG:32635"),
@@ -115,7 +115,7 @@ def _cases(
 ) -> Iterator[tuple[dict[str, Any], Callable[[], dict[str, Any]]]]:
     """Yield what to ask of a city, one case for each map and noise model, and what asks it."""
     if name == MADE_UP:
-        layers = synthetic_city(CitySpec(size=400.0 if small else 1000.0))
+        layers = synthetic_city(CitySpec(size=200.0 if small else 1000.0))
         objects, _ = build_objects(layers, taxonomy=paper_taxonomy(), crs=layers[0].table.crs)
         read: Callable[[str], StreetObjects] = {name: objects}.__getitem__
     else:
@@ -123,7 +123,7 @@ def _cases(
     city = _City(read(name))
     if name != MADE_UP:
         case = {"city": name, "map": TODAY, "told": "", "levels": [*LEVELS]}
-        count = 20 if small else 300
+        count = 5 if small else 300
         yield case, functools.partial(_asked, city, city, LEVELS, count)
     if name == "Monaco":
         now, years, drifts = _City(read("Monaco a year later")), MONACO_YEARS, [named_drift()]
@@ -138,7 +138,7 @@ def _cases(
             noise = aged_noise(noise, years, database=city.database, drift=drift)
         map_ = f"{years:g} years old"
         case = {"city": name, "map": map_, "told": told, "levels": [*OLD_LEVELS]}
-        count = 20 if small else 200
+        count = 5 if small else 200
         yield case, functools.partial(_asked, city, now, OLD_LEVELS, count, noise)
 
 

@@ -7,20 +7,22 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Sequence
+    from collections.abc import Iterable, Mapping, Sequence
 
 __all__ = ["main", "page"]
 
 FOLDER = Path(__file__).parent
+TODAY = "of the day"
+"""The map in the rows of ``chances.json`` that are of no old one."""
 PAGE = FOLDER.parent / "docs" / "figures.md"
 TRUST = FOLDER.parent / "docs" / "reliability.md"
 _SOAK = ("<!-- make soak -->\n", "<!-- end -->")
 
 _HEAD = """# Figures
 
-This page is written by `python -m benchmarks.tables`, which `make bench`, `make accuracy` and
-`make reproduce` end with. All figures are from one machine with two cores that other programs
-share, so ratios say more than times.
+This page is written by `python -m benchmarks.tables`, which `make bench`, `make accuracy`,
+`make chances` and `make reproduce` end with. All figures are from one machine with two cores that
+other programs share, so ratios say more than times.
 """
 _ACCURACY = """## Accuracy
 
@@ -46,6 +48,24 @@ _BARS = """## What was asked for
 
 The figures that accuracy was to reach, and what came out.
 """
+_REAL = """## Chances in real cities
+
+`make chances` asks for what is seen from anywhere in a city, {queries} queries at each of `light`,
+`medium` and `strong`, and answers as `semsig localize --method likelihood` does: generic noise,
+refined places. "Stated" is the mean chance, of the queries in a tenth, to be within 50 m; "came
+true" how often it was. Queries of which nothing remains are not among them.
+"""
+_OLD = """## Old maps
+
+`make chances` also asks with a map that is older than the queries ({queries} at each of `light` and
+`medium`). Of Monaco there are two real dates, and its own changes are those that are shipped. The
+other cities are changed for three years, by rules that the noise model does not have: objects go,
+come and move, one by one, and in whole streets lamps are replaced and trees felled and planted
+again, and new rows appear. "Told" is what the answer was told of that: nothing, the age
+(`--map-age`) with the changes of Monaco, or with a drift report of a first year of the city, made
+with other random numbers (`--drift-report`). "Answered" are the queries with a chance of 0.9 or
+more.
+"""
 _PAPER = """## The paper's experiments
 
 `make reproduce` runs them on a made-up city as large and as furnished as the paper's Paris, with
@@ -62,7 +82,7 @@ times are those that it prints, for 312,134 cells on a machine of its own.
 
 def main() -> None:
     """Write the page of figures, and the table of the soak."""
-    names = ("accuracy.json", "results.json", "reproduction.json")
+    names = ("accuracy.json", "results.json", "reproduction.json", "chances.json")
     PAGE.write_text(page(*map(_results, names)), encoding="utf-8")
     TRUST.write_text(
         trust_page(TRUST.read_text(encoding="utf-8"), _results("soak.json")), encoding="utf-8"
@@ -75,13 +95,14 @@ def page(
     accuracy: Sequence[dict[str, Any]],
     speed: Sequence[dict[str, Any]],
     paper: Sequence[dict[str, Any]],
+    chances: Sequence[dict[str, Any]],
 ) -> str:
     """Return the page.
 
     Parameters
     ----------
-    accuracy, speed, paper : sequence of dict
-        Rows of ``accuracy.json``, ``results.json`` and ``reproduction.json``.
+    accuracy, speed, paper, chances : sequence of dict
+        Rows of ``accuracy.json``, ``results.json``, ``reproduction.json`` and ``chances.json``.
 
     Returns
     -------
@@ -97,10 +118,14 @@ def page(
         parts += [f"### {city}, {rows[0]['cells']:,} cells\n", _accuracy_table(rows)]
     told = [row for row in plain if row["in_region"] is not None]
     sure = [row for row in accuracy if row["coverage"] is not None]
+    real = [row for row in chances if row["map"] == TODAY]
+    old = [row for row in chances if row["map"] != TODAY]
     bars = [{**bar, "city": row["city"]} for row in accuracy for bar in row["bars"]]
     for text, rows, table in (
         (_CHANCES, told, _chance_table),
         (_SURE, sure, _answer_table),
+        (_each_level(_REAL, real), real, _real_table),
+        (_each_level(_OLD, old), old, _old_table),
         (_BARS, bars, _bar_table),
         (_PAPER, list(paper), _paper_table),
         (_SPEED, list(speed), _speed_table),
@@ -173,6 +198,49 @@ def _answer_table(rows: Iterable[dict[str, Any]]) -> str:
             for row in rows
         ),
     )
+
+
+def _each_level(text: str, rows: Sequence[dict[str, Any]]) -> str:
+    """Fill in how many queries there are at each level."""
+    return text.format(queries=rows[0]["queries"] // len(rows[0]["levels"])) if rows else text
+
+
+def _real_table(rows: Iterable[dict[str, Any]]) -> str:
+    return _table(
+        "city | chance | queries | stated | came true | interval",
+        (
+            (
+                *(row["city"], f"{tenth['from']:g} to {tenth['to']:g}", f"{tenth['n']:,}"),
+                *(_share(tenth["stated"]), _share(tenth["true"])),
+                _interval(tenth),
+            )
+            for row in rows
+            for tenth in row["bins"]
+        ),
+    )
+
+
+def _old_table(rows: Iterable[dict[str, Any]]) -> str:
+    return _table(
+        "city | map | told | within 50 m | stated | answered | right, of these | interval | "
+        "right, of those below 0.99",
+        (
+            (
+                *(row["city"], row["map"], f"`{row['told']}`" if row["told"] else "nothing"),
+                *(_share(row["p50"]), _share(row["stated"])),
+                f"{row['answered']} of {row['queries']}",
+                f"{row['right'] / row['answered']:.3f}",
+                _interval(row),
+                f"{row['nearly_right']} of {row['nearly']}",
+            )
+            for row in rows
+        ),
+    )
+
+
+def _interval(values: Mapping[str, Any]) -> str:
+    low, high = values["low"], values["high"]
+    return "" if low is None else f"{_share(low)}-{_share(high)}"
 
 
 def _bar_table(rows: Iterable[dict[str, Any]]) -> str:

@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 
-from benchmarks import tables
+from benchmarks import chances, tables
 from semsig_gis.maps import page
 
 MEASURES = ("edit", "jaccard", "histogram")
@@ -111,7 +111,7 @@ def test_every_benchmark_runs_and_is_written(tmp_path: Path) -> None:
 def test_the_page_of_figures_is_that_of_the_results() -> None:
     results = (
         json.loads((tables.FOLDER / name).read_text(encoding="utf-8"))
-        for name in ("accuracy.json", "results.json", "reproduction.json")
+        for name in ("accuracy.json", "results.json", "reproduction.json", "chances.json")
     )
     assert tables.PAGE.read_text(encoding="utf-8") == tables.page(*results)
     trials = json.loads((tables.FOLDER / "soak.json").read_text(encoding="utf-8"))
@@ -140,3 +140,25 @@ def test_every_figure_is_measured_and_written(
     for bar in (bar for bar in bars if bar["met"]):
         assert bar["low"] is None or bar["value"] >= bar["low"]
         assert bar["high"] is None or bar["value"] <= bar["high"]
+
+
+def test_chances_on_old_maps_are_measured_and_kept(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.delenv("SEMSIG_GEODATA", raising=False)
+    out = tmp_path / "chances.json"
+    monkeypatch.setattr(sys, "argv", ["chances", "--size", "small", "--out", str(out)])
+    chances.main()
+    assert "Real cities are left out" in capsys.readouterr().out
+    written = out.read_text(encoding="utf-8")
+    rows = json.loads(written)
+    assert [one["told"] for one in rows] == [
+        *("", "--map-age 3 --drift-report", "--map-age 3"),
+    ]
+    for one in rows:
+        assert 0 <= one["right"] <= one["answered"] <= one["queries"] == 10
+        assert sum(tenth["n"] for tenth in one["bins"]) <= 10
+        assert one["bins"][-1]["n"] == one["answered"]
+    chances.main()
+    assert out.read_text(encoding="utf-8") == written
+    assert "made up" not in capsys.readouterr().out
