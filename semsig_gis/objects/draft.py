@@ -26,6 +26,7 @@ from semsig_gis.core.errors import (
     SourceError,
 )
 from semsig_gis.core.geometry import require_metric_crs
+from semsig_gis.core.scratch import own_folder
 from semsig_gis.core.taxonomy import MAX_CODE, ObjectClass
 from semsig_gis.objects.keywords import keywords, words_of
 from semsig_gis.objects.load import assemble, read_files
@@ -390,8 +391,8 @@ def suggest_catalog(path: str | Path, *, crs: str | None = None) -> str:
 
 def _require_loads(text: str, path: Path) -> None:
     """Refuse a draft by which its own file does not load, with what a load says of it."""
-    with tempfile.TemporaryDirectory(prefix="semsig-") as folder:
-        file = Path(folder, "draft.toml")
+    with own_folder(Path(tempfile.gettempdir())) as folder:
+        file = folder / "draft.toml"
         file.write_text(text, encoding="utf-8")
         try:
             catalog = load_catalog(file)

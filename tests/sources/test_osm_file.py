@@ -316,6 +316,16 @@ def test_an_element_of_several_extracts_counts_once(tmp_path: Path, case: str) -
         assert not layer.errors
 
 
+def test_merging_changes_no_tag(tmp_path: Path) -> None:
+    strange = {"name": 'Bänke, "alt" = 100 % @\n木 \U0001f333', "amenity": "bench", "a:b": " x "}
+    path = write_osm(tmp_path / "a.osm", node(-5, -1.2345678, 2.0000001, strange))
+    other = write_osm(tmp_path / "b.osm", node(2, 0, 0, BENCH))
+    spec = replace(BENCHES, where=tuple((key, (value,)) for key, value in strange.items()))
+    alone, merged = (read_layers(some, [spec])[0] for some in (path, [path, other]))
+    assert alone.table.source_id.tolist() == merged.table.source_id.tolist() == ["node/-5"]
+    assert alone.table.geometry.equals(merged.table.geometry)
+
+
 def test_extracts_of_different_days_are_told_and_a_damaged_one_is_named(tmp_path: Path) -> None:
     paths = [tmp_path / name for name in ("old.osm.pbf", "new.pbf")]
     for path, year in zip(paths, (2021, 2022), strict=True):

@@ -18,6 +18,7 @@ from osmium.osm import NODE, NOTHING, RELATION, WAY, Node, Relation, Way
 
 from semsig_gis.core.errors import CatalogError, SourceError
 from semsig_gis.core.geometry import HALF_TURN
+from semsig_gis.core.scratch import own_folder
 from semsig_gis.sources import require_file
 from semsig_gis.sources.area import Area, join_areas
 from semsig_gis.sources.osm.elements import ElementLayer, TagIndex, relation_shape, way_shape
@@ -118,8 +119,8 @@ def _as_one(files: Mapping[Path, osmium.io.File], index: TagIndex) -> Iterator[o
     if len(files) == 1:
         yield from files.values()
         return
-    with tempfile.TemporaryDirectory(prefix="semsig-") as folder:
-        yield merge_extracts(files, index, Path(folder, "merged.osm.pbf"))
+    with own_folder(Path(tempfile.gettempdir())) as folder:
+        yield merge_extracts(files, index, folder / "merged.opl")
 
 
 def _file(path: Path) -> osmium.io.File:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import re
 from typing import TYPE_CHECKING
 
 import osmium
@@ -17,6 +18,7 @@ if TYPE_CHECKING:
 
     from semsig_gis.sources.osm.elements import TagIndex
 
+NOT_PLAIN = re.compile(r"[^A-Za-z0-9_]")
 # Kind and number of an element, as pyosmium has them: ("n", 123).
 Name = tuple[str, int]
 
@@ -53,14 +55,35 @@ def merge_extracts(
                 if name in wanted:
                     rank = (element.version, _size(element), -number)
                     best[name] = max(rank, best.get(name, rank))
-    with osmium.SimpleWriter(str(merged), header=_header(files)) as writer:
+    # As text, because pyosmium's own writers end the process where a disk is full.
+    with merged.open("w", encoding="ascii") as stream:
         for number, (path, file) in enumerate(files.items()):
             with readable(path):
                 for element in _elements(file):
                     rank = (element.version, _size(element), -number)
                     if not element.deleted and best.get(_name(element)) == rank:
-                        writer.add(element)
-    return osmium.io.File(str(merged))
+                        print(_line(element), file=stream)
+    return osmium.io.File(str(merged), "opl")
+
+
+def _line(element: Node | Way | Relation) -> str:
+    """Return an element in OPL, the format of a line for each."""
+    parts = [f"{element.type_str()}{element.id}", f"v{element.version}"]
+    if element.tags:
+        parts.append("T" + ",".join(f"{_plain(tag.k)}={_plain(tag.v)}" for tag in element.tags))
+    if isinstance(element, Way):
+        parts.append("N" + ",".join(f"n{node.ref}" for node in element.nodes))
+    elif isinstance(element, Relation):
+        members = (f"{one.type}{one.ref}@{_plain(one.role)}" for one in element.members)
+        parts.append("M" + ",".join(members))
+    elif element.location.valid():
+        parts += [f"x{element.location.lon:.7f}", f"y{element.location.lat:.7f}"]
+    return " ".join(parts)
+
+
+def _plain(text: str) -> str:
+    """Return text in which all but letters and digits of ASCII are written by their numbers."""
+    return NOT_PLAIN.sub(lambda match: f"%{ord(match[0]):x}%", text)
 
 
 def _wanted(files: Mapping[Path, osmium.io.File], index: TagIndex) -> set[Name]:
@@ -125,16 +148,3 @@ def age_notes(files: Mapping[Path, osmium.io.File]) -> tuple[str, ...]:
     return (
         f"the extracts are from {min(days)} to {max(days)}; what the map has lost since counts",
     )
-
-
-def _header(files: Mapping[Path, osmium.io.File]) -> osmium.io.Header:
-    """Return a header with the boxes of all files, or none where one of them has none."""
-    header = osmium.io.Header()
-    boxes = []
-    for path, file in files.items():
-        with readable(path), osmium.io.Reader(file, osmium.osm.NOTHING) as reader:
-            boxes.append(reader.header().box())
-    if all(box.valid() for box in boxes):
-        for box in boxes:
-            header.add_box(box)
-    return header
