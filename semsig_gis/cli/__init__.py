@@ -96,6 +96,9 @@ def _require_place() -> None:
         except UnicodeEncodeError as error:
             msg = f"{argument!r} is not text in UTF-8; give the file a name that is."
             raise InputError(msg) from error
+        if "\0" in argument:
+            msg = f"{argument!r} holds a null byte, which no name has; leave it out."
+            raise InputError(msg)
 
 
 def _show_warning(message: Warning | str, *_: object, **__: object) -> None:

@@ -15,6 +15,7 @@ import numpy as np
 import pandas as pd
 
 from semsig_gis import __version__
+from semsig_gis.core.effort import announce
 from semsig_gis.core.errors import InputError
 from semsig_gis.core.geometry import angular_distance, cell_ids
 from semsig_gis.evaluation.result import QUERY_COLUMNS, Evaluation
@@ -46,6 +47,8 @@ if TYPE_CHECKING:
     from semsig_gis.likelihood.index import LikelihoodIndex
     from semsig_gis.queries.draw import Query
 
+# Seconds that a query, and a cell of a query, takes: only for telling how long the work is.
+QUERY_S, PAIR_S = 5e-3, 1e-7
 NEXT_CELLS = 4  # that are named after the best candidate
 
 # What is told of an answer, in this order.
@@ -134,6 +137,7 @@ def evaluate(
     else:
         msg = "the likelihood index belongs to another database; build that of the one to search."
         raise InputError(msg)
+    announce(queries * (QUERY_S + PAIR_S * len(database)), "evaluating")
     drawn = draw_queries(database, spec)
     outcomes = score_queries(database, locator, drawn, tops=(top,), progress=progress)
     scored = scored_tables(database, drawn, outcomes)[top]

@@ -19,12 +19,20 @@ import pandas as pd
 import pyarrow as pa
 import pyarrow.parquet as pq
 
+from semsig_gis.core.effort import announce
 from semsig_gis.core.errors import DatabaseError, SourceError
 from semsig_gis.core.parallel import check_workers, finish_tasks
 from semsig_gis.database.answer import DistanceMemo
 from semsig_gis.database.city import City
 from semsig_gis.database.file import digest
-from semsig_gis.evaluation.evaluate import make_evaluation, score_queries, scored_tables, versions
+from semsig_gis.evaluation.evaluate import (
+    PAIR_S,
+    QUERY_S,
+    make_evaluation,
+    score_queries,
+    scored_tables,
+    versions,
+)
 from semsig_gis.evaluation.figures import district_labels
 from semsig_gis.evaluation.file import open_evaluation, save_evaluation
 from semsig_gis.evaluation.methods import make_locator
@@ -532,6 +540,12 @@ def _answer(
     else:
         answer = partial(_answer_here, running)
     done, total = 0, sum(sizes.values())
+    if scheduler is None:
+        seconds = sum(
+            size * (QUERY_S + PAIR_S * len(running[out][0].database))
+            for (out, _), size in sizes.items()
+        )
+        announce(seconds / max(workers, 1), "answering")
 
     def count_answers(task: Task, _value: None) -> None:
         nonlocal done

@@ -51,10 +51,10 @@ class Area:
     def boxes(self) -> tuple[tuple[float, float, float, float], ...]:
         """The bounds; those of either side of 180 degrees, where the area lies on both."""
         west, _, east, _ = self.bounds
-        if east - west <= HALF_TURN:
-            return (self.bounds,)
         parts = shapely.get_parts(self.polygon)
         eastern = shapely.get_x(shapely.centroid(parts)) > 0
+        if east - west <= HALF_TURN or eastern.all() or not eastern.any():
+            return (self.bounds,)
         sides = (shapely.total_bounds(parts[side]).tolist() for side in (eastern, ~eastern))
         return tuple((west, south, east, north) for west, south, east, north in sides)
 

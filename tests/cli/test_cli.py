@@ -437,6 +437,8 @@ def test_a_file_without_a_crs_needs_one(city: Path, run: Run, done: Done) -> Non
     sentence(run(line), "lights.shp")
     done(line, "--crs", "EPSG:2154")
     sentence(run(line, "--crs", "EPSG:0"), "EPSG:0")
+    sentence(run(line, "--crs", "EPSG:4978"), "EPSG:4978", "geocentric")
+    sentence(run(line, "--crs", "EPSG:5773"), "EPSG:5773", "vertical")
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="no such files")

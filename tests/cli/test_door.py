@@ -30,7 +30,7 @@ def failing(
     monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
 
     def call(error: BaseException) -> list[object]:
-        def suggest(_: Path) -> str:
+        def suggest(*_: object, **__: object) -> str:
             raise error
 
         monkeypatch.setattr("semsig_gis.objects.draft.suggest_catalog", suggest)
@@ -84,6 +84,7 @@ def test_each_end_has_a_code(
         ("bulid", ["Did you mean 'build'", "see semsig --help"]),
         ("build o --out c --frob", ["--frob"]),
         ("info \udcff.parquet", ["not text in UTF-8"]),
+        ("info a\0.parquet", ["null byte"]),
         (f"load {'n' * 300} --catalog openstreetmap --out o.parquet", ["File name too long"]),
         (f"suggest {'n' * 300}", ["File name too long"]),
     ],

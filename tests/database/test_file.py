@@ -305,6 +305,11 @@ def test_parts_that_do_not_fit_each_other_are_refused(town: World, parts: Path) 
         *((text, "damaged") for text in ("", "{", "[]", "{}", '{"kind": 3}', '{"parts": 3}')),
         ('{"kind": "signature database in parts", "recipe": {}, "parts": [{}]}', "damaged"),
         ('{"kind": "album", "recipe": {}, "parts": []}', "another kind"),
+        *(
+            (f'{{"kind": 1, "recipe": {{}}, "parts": [{{"cells": {number}}}]}}', "damaged")
+            for number in ("1e999", "Infinity", "NaN", "1" + "0" * 40)
+        ),
+        ("[" * 100_000, "damaged"),
     ],
 )
 def test_a_damaged_manifest_is_named(tmp_path: Path, content: str, words: str) -> None:

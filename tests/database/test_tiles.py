@@ -17,6 +17,7 @@ from hypothesis import strategies as st
 from sentences import refused
 from worlds import CODES, CORNER, World, assert_same, worlds
 
+from semsig_gis.core import effort
 from semsig_gis.core.errors import (
     CrsError,
     DatabaseError,
@@ -26,6 +27,7 @@ from semsig_gis.core.errors import (
 )
 from semsig_gis.core.geometry import GridSpec
 from semsig_gis.core.signature import SignatureSpec
+from semsig_gis.database import tiles
 from semsig_gis.database.build import build_database
 from semsig_gis.database.file import MANIFEST, open_database, part_name, save_database
 from semsig_gis.database.occlusion import TOLERANCE_M, Footprints
@@ -333,6 +335,19 @@ def test_other_things_are_never_replaced(database: SignatureDatabase, tmp_path: 
         os.mkfifo(tmp_path / "pipe")
         with refused(InputError, "is a device or a pipe"):
             begin(tmp_path / "pipe", RECIPE)
+
+
+def test_tiles_that_the_memory_does_not_hold_are_not_begun(
+    objects_file: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(effort, "free_memory", lambda: 150_000_000)
+    build_tiles(objects_file, tmp_path / "city", tile=TileSpec(80.0))
+    with refused(InputError, "by each of 2 processes", "0.2 GB", "smaller tiles"):
+        build_tiles(objects_file, tmp_path / "other", tile=TileSpec(80.0), workers=2)
+    assert not (tmp_path / "other.partial").exists()
+    monkeypatch.setattr(tiles, "TILE_S", 1e6)
+    with pytest.warns(UserWarning, match="building tiles will take about"):
+        build_tiles(objects_file, tmp_path / "city", tile=TileSpec(80.0))
 
 
 @pytest.mark.parametrize("fails", [1, 2])

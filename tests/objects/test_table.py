@@ -506,6 +506,11 @@ TREE = shapely.Point(1, 2)
             {"geometry": pa.array(shapely.to_wkb([TREE, other]), pa.binary())}
             for other in (None, shapely.Point(), shapely.box(0, 0, 1, 1), shapely.Point(1, NAN))
         ),
+        *(
+            {name: pa.array([value, value])}
+            for name in ("class_code", "source", "source_id", "count")
+            for value in ([1], 1.5, True, b"x")
+        ),
         {"taxonomy": None},
         {"taxonomy": [{"code": 1}]},
         {"taxonomy": [{"code": 0, "symbol": "B", "name": "b", "title": "B"}]},
