@@ -16,6 +16,7 @@ import functools
 import hashlib
 import json
 import math
+import os
 import zlib
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
@@ -484,6 +485,8 @@ def save_index(
     with whole_file(path) as partial:
         with partial.open("wb") as file:
             file.truncate(start + math.prod(shape))
+            if hasattr(os, "posix_fallocate"):  # where there is no room, a mapped file crashes
+                os.posix_fallocate(file.fileno(), 0, start + math.prod(shape))
         columns = np.memmap(partial, np.uint8, "r+", offset=start, shape=shape)
         index = build_index(database, noise, out=columns, progress=progress, threads=threads)
         columns.flush()

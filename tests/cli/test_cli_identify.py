@@ -39,7 +39,8 @@ def test_the_columns_are_printed_drawn_and_exported(run: Run, done: Done) -> Non
     code, out, err = run("identify city.parquet --noise medium --check 40")
     assert code == 0
     for words in ("Identifiability, medium noise", "What each class adds", "by 1,000 objects",
-                  "bits left", "Do the chances come true?", "Rank correlation", "columns: "):  # fmt: skip
+                  "bits left", "Do the chances come true?", "Rank correlation",
+                  "columns: "):  # fmt: skip
         assert words in out
     assert "is built" in err
     cells = gpd.read_parquet("city.parquet")
