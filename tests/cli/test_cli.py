@@ -411,7 +411,7 @@ def test_what_cannot_be_used_is_refused_and_changes_no_file(
 
 
 def test_a_warning_is_one_line(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
-    def suggest(_: Path) -> str:
+    def suggest(_: Path, *, crs: str | None) -> str:  # noqa: ARG001
         warnings.warn("the file is old", stacklevel=1)
         return "draft"
 
