@@ -315,6 +315,8 @@ def test_where_all_servers_fail_each_is_told(server: Server, get: Get) -> None:
         get(endpoints=[f"{server.url}/a", f"{server.other_host}/b"])
     with refused(InputError, "tile_deg is 0"):
         get(tile_deg=0)
+    with refused(InputError, "requests, and at most 10,000 are sent", "smaller one", "extract"):
+        get(tile_deg=1e-7)
 
 
 def read(path: Path, *specs: LayerSpec, **options: Any) -> Any:  # noqa: ANN401

@@ -52,6 +52,7 @@ JSON = ("application/json",)
 QUERY_S = 90  # a server gives up a query after so many seconds
 ANSWER_S = 30.0  # for what comes before and after it
 STATUS_S = 10.0
+MOST_TILES = 10_000
 TILE_BYTES = 2**28  # a tile is parsed in memory
 MOST_SPLITS = 4
 TOO_SLOW = 504
@@ -355,6 +356,12 @@ def fetch_layers(
     waiting: collections.deque[_Tile] = collections.deque()
     for west, south, east, north in area.boxes:
         columns, rows = (math.ceil(side / tile_deg - 1e-9) for side in (east - west, north - south))
+        if columns * rows > MOST_TILES:
+            msg = (
+                f"the area takes {columns * rows:,} requests, and at most {MOST_TILES:,} are sent; "
+                "give a smaller one, or load an extract of OpenStreetMap."
+            )
+            raise InputError(msg)
         grid = _Tile((west, south, east, north)).parts(max(1, columns), max(1, rows), splits=0)
         waiting.extend(_touching(area, grid))
     paths: list[Path] = []
