@@ -105,7 +105,7 @@ def _store(path: Path) -> str:
 def _index(path: Path) -> str:
     database = sg.open_database(path.parent / "known.parquet")
     index = open_index(database, sg.cell_noise(sg.named_noise("generic"), 10.0), path)
-    return digest(index.columns.tobytes() + index.constants.tobytes())
+    return digest(index.flat_columns().tobytes() + index.constants.tobytes())
 
 
 def _loaded(path: Path) -> None:

@@ -325,7 +325,7 @@ def _opened(member: Member, *, fields: tuple[str, ...] | None = None) -> Iterato
         source = fiona.open(
             member.address, layer=member.layer, enabled_drivers=[member.driver], **options
         )
-        source.schema  # noqa: B018 - the names of the fields are decoded here
+        source.schema, source.crs_wkt  # noqa: B018 - names are decoded here, and companions read
     except Exception as error:
         raise unreadable(member, error) from error
     with source:
