@@ -37,6 +37,7 @@ class Command:
     """
 
     text: str
+    long: bool
     names: tuple[str, ...]
     before: Path
     ending: Ending
@@ -50,6 +51,13 @@ class World:
 
     folder: Path
     commands: tuple[Command, ...]
+
+    def command(self, number: int) -> Command:
+        """Return the command of a trial: each in turn, of the long ones one in every other turn."""
+        quick = [one for one in self.commands if not one.long]
+        long = [one for one in self.commands if one.long]
+        turn, at = divmod(number, len(quick))
+        return long[turn // 2 % len(long)] if at == 0 and turn % 2 == 0 else quick[at]
 
     def copy(self, command: Command, to: Path) -> None:
         """Make a folder in which a command is about to be run."""
@@ -65,7 +73,9 @@ def made_world(folder: Path) -> World:
     """
     now = folder / "now"
     commands = []
-    for number, text in enumerate(_prepared(now, _portal(folder))):
+    words = _prepared(now, _portal(folder))
+    quick, long = _lines("writing", words), _lines("long", words)
+    for number, text in enumerate([*quick, *long]):
         before = folder / "before" / str(number)
         earlier = folder / "earlier"
         before.mkdir(parents=True)
@@ -83,6 +93,7 @@ def made_world(folder: Path) -> World:
         commands.append(
             Command(
                 text=text,
+                long=number >= len(quick),
                 names=tuple(names),
                 before=before,
                 ending=ending,
@@ -145,15 +156,15 @@ def _done(command: str, folder: Path) -> Ending:
     return ending
 
 
-def _prepared(folder: Path, port: int) -> list[str]:
-    """Make a city, its queries and all that its commands read; return the commands."""
+def _prepared(folder: Path, port: int) -> dict[str, str]:
+    """Make a city, its queries and all that its commands read; return words of the commands."""
     folder.mkdir()
     for command in _lines("city", {}):
         _done(command, folder)
     words: dict[str, str] = forked(lambda: _write_inputs(folder, port))
     for command in _lines("prepare", words):
         _done(command, folder)
-    return _lines("writing", words)
+    return words
 
 
 def _write_inputs(folder: Path, port: int) -> dict[str, str]:

@@ -146,7 +146,7 @@ def _outcome(
     folder.mkdir()
     found = forked(lambda: trials.faults(place.world, trial, folder))
     shutil.rmtree(folder, ignore_errors=True)
-    command = place.world.commands[trial.number % len(place.world.commands)].text
+    command = place.world.command(trial.number).text
     return trial.part, 1, [(f"trial {trial.number}, semsig {command}", found)] if found else []
 
 

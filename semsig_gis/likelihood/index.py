@@ -28,6 +28,7 @@ import numpy as np
 from semsig_gis.core.errors import DatabaseError, InputError
 from semsig_gis.core.geometry import FULL_TURN
 from semsig_gis.core.ranges import require_number
+from semsig_gis.core.scratch import remove_abandoned
 from semsig_gis.core.signature import BEARING_UNITS
 from semsig_gis.database.city import City
 from semsig_gis.likelihood.noise.table import database_tables, mean_table
@@ -450,6 +451,7 @@ def ready_index(
     The likelihood index does not exist yet and is built.
     """
     _keep_database(path, noise)
+    remove_abandoned(Path(path).parent)  # else only who writes does
     say = note or (lambda _: None)
     fingerprint = index_fingerprint(database, noise)
     if not Path(path).exists():
