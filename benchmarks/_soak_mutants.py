@@ -42,6 +42,7 @@ _RESPELT = 0.6  # of the damages to texts
 _SMALL = 30  # objects in files that others write
 _MEMORY = 6 * 2**30  # bytes more than there are at the beginning
 
+_NOISE = sg.cell_noise(sg.named_noise("generic"), 10.0)  # as `semsig localize` takes it
 _CATALOG = """
 name = "fuzz"
 title = "Fuzz"
@@ -104,7 +105,7 @@ def _store(path: Path) -> str:
 
 def _index(path: Path) -> str:
     database = sg.open_database(path.parent / "known.parquet")
-    index = open_index(database, sg.cell_noise(sg.named_noise("generic"), 10.0), path)
+    index = open_index(database, _NOISE, path)
     return digest(index.flat_columns().tobytes() + index.constants.tobytes())
 
 
@@ -221,7 +222,8 @@ def made_corpus(world: World, folder: Path) -> None:
     shutil.copytree(here / "known.objects", folder / "known.objects")
     shutil.copytree(here / "tiles", folder / "tiles")
     shutil.copytree(here / "known_evaluation", folder / "evaluation")
-    shutil.copy2(next(here.glob("known.parquet.*likelihood")), folder / "known.likelihood")
+    index = sg.open_city(here / "known.parquet").index_path(_NOISE)
+    shutil.copy2(index, folder / "known.likelihood")
     for name in ("objects", "buildings"):
         shutil.copy2(here / "in" / f"{name}.parquet", folder / f"{name}.parquet")
     (folder / "fuzz.toml").write_text(_CATALOG, encoding="utf-8")
