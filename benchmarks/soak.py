@@ -58,7 +58,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(prog="python -m benchmarks.soak", description=__doc__)
     parser.add_argument("--share", type=float, default=1.0, help="of all trials, such as 0.1")
     parser.add_argument("--seed", type=int, default=0, help="of the random trials")
-    parser.add_argument("--part", action="append", help="only this part; may be repeated")
+    parser.add_argument("--part", action="append", help="only this part; others stay in --out")
     parser.add_argument("--lanes", type=int, default=os.cpu_count() or 1, help="trials at a time")
     parser.add_argument("--out", type=Path, default=tables.FOLDER / "soak.json")
     options = parser.parse_args()
@@ -84,6 +84,8 @@ def main() -> None:
             _add(rows[part], count, faults)
     finally:
         shutil.rmtree(folder, ignore_errors=True)
+    if options.part is not None and options.out.exists():
+        rows = {row["part"]: row for row in json.loads(options.out.read_text("utf-8"))} | rows
     text = json.dumps([*rows.values()], indent=1)
     options.out.write_text(f"{text}\n", encoding="utf-8")
     print(tables.soak_table(rows.values()))

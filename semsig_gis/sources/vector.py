@@ -9,6 +9,7 @@ import logging
 import math
 import re
 import sqlite3
+import struct
 import zipfile
 import zlib
 from dataclasses import dataclass
@@ -117,6 +118,13 @@ def members(path: Path) -> tuple[Member, ...]:
     return tuple(Member(path, name) for name in inner)
 
 
+# What zipfile raises at damaged archives.
+_ZIP_FAULTS = (
+    *(EOFError, IndexError, NotImplementedError, OSError, RuntimeError, ValueError),
+    *(struct.error, zipfile.BadZipFile, zlib.error),
+)
+
+
 def _archived(path: Path) -> tuple[str, ...]:
     """Return the names of the vector files in an archive whose checksums hold."""
     try:
@@ -128,7 +136,7 @@ def _archived(path: Path) -> tuple[str, ...]:
                     raise bomb(what)
             names = [item.filename for item in items]
             broken = archive.testzip()
-    except (NotImplementedError, OSError, RuntimeError, zipfile.BadZipFile, zlib.error) as error:
+    except _ZIP_FAULTS as error:
         raise unreadable(path, error) from error
     if broken is not None:
         msg = f"archive {path} is damaged at {broken}; get it again."
