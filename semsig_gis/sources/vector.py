@@ -136,6 +136,8 @@ def _archived(path: Path) -> tuple[str, ...]:
                     raise bomb(what)
             names = [item.filename for item in items]
             broken = archive.testzip()
+    except SourceError:
+        raise
     except _ZIP_FAULTS as error:
         raise unreadable(path, error) from error
     if broken is not None:
