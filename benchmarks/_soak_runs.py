@@ -4,8 +4,11 @@ from __future__ import annotations
 
 import atexit
 import contextlib
+import gc
+import importlib
 import json
 import os
+import pkgutil
 import shlex
 import signal
 import sys
@@ -15,6 +18,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import IO, TYPE_CHECKING, Any
 
+import semsig_gis
 from semsig_gis.cli import main as semsig
 
 if TYPE_CHECKING:
@@ -64,6 +68,15 @@ class Ending:
         if self.code not in {0, 130} and not (last.startswith("semsig: ") and last.endswith(".")):
             return "tracebacks"
         return ""
+
+
+def load_all() -> None:
+    """Import all modules, so that the processes that are forked have them at once."""
+    modules = [module.name for module in pkgutil.walk_packages(semsig_gis.__path__, "semsig_gis.")]
+    for name in (*modules, "rich.progress", "rich.table"):
+        if not name.endswith("__main__"):
+            importlib.import_module(name)
+    gc.freeze()  # or else every process would copy what it looks through
 
 
 def run(

@@ -9,10 +9,8 @@ one sentence. What goes wrong is printed, and the table of all trials is kept as
 from __future__ import annotations
 
 import argparse
-import importlib
 import json
 import os
-import pkgutil
 import selectors
 import shutil
 import sys
@@ -23,12 +21,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import semsig_gis
 from benchmarks import _soak_faults as trials
 from benchmarks import _soak_mutants as mutants
 from benchmarks import tables
 from benchmarks._soak_city import made_world
-from benchmarks._soak_runs import forked
+from benchmarks._soak_runs import forked, load_all
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterator
@@ -63,9 +60,7 @@ def main() -> None:
     parser.add_argument("--out", type=Path, default=tables.FOLDER / "soak.json")
     options = parser.parse_args()
     start = time.perf_counter()
-    for module in pkgutil.walk_packages(semsig_gis.__path__, "semsig_gis."):
-        if not module.name.endswith("__main__"):
-            importlib.import_module(module.name)
+    load_all()
     # Not a TemporaryDirectory, which every forked process would remove at its end.
     folder = Path(tempfile.mkdtemp(prefix="soak-"))
     try:
