@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sys
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
@@ -42,13 +42,26 @@ def run() -> int:
         context = getattr(error, "ctx", None)
         command = "semsig" if context is None else context.command_path
         fault = error.format_message().rstrip(".?").replace(". ", "; ")
-        msg = f"{fault}; see {command} --help."
+        msg = _out_of_range(error) or f"{fault}; see {command} --help."
         raise InputError(msg) from error
     except SystemExit as end:  # so typer ends where nobody reads the output any more
         raise BrokenPipeError from end
     if code == INTERRUPTED:  # which typer makes of the interrupt key
         raise KeyboardInterrupt
     return code if isinstance(code, int) else 0
+
+
+def _out_of_range(error: typer.TyperException) -> str:
+    """Return which number was given and which are accepted, or nothing if it is another fault."""
+    option: Any = getattr(error, "param", None)
+    least, most = getattr(option, "min", None), getattr(option, "max", None)
+    faults: list[dict[str, Any]] = getattr(error.__cause__, "errors", list)()  # of pydantic
+    if not faults or least is None or most is None:
+        return ""
+    kind, given = faults[0]["type"], faults[0]["input"]
+    number = "a whole number" if kind.startswith("int") else "a number"
+    shown = repr(given) if kind.endswith("parsing") else given
+    return f"{option.opts[0]} was given as {shown}; give {number} from {least:,} to {most:,}."
 
 
 def _version(wanted: bool) -> None:  # noqa: FBT001 - typer calls it so

@@ -60,7 +60,7 @@ def test_an_experiment_is_run_and_compared(run: Run, done: Done) -> None:
 
 
 def test_what_is_refused(run: Run, done: Done) -> None:
-    sentence(run(EXPERIMENT, "results", "--workers", -1), "-1 workers", "from 0 up")
+    sentence(run(EXPERIMENT, "results", "--workers", -1), "--workers was given as -1", "0 to 1,024")
     write_spec(SPEC.replace("edit+edit", "edti+edit"))
     sentence(run(EXPERIMENT, "results"), "'edti'", "nearest is 'edit'")
     write_spec(SPEC.replace("30", "1000000"))

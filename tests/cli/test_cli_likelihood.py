@@ -298,7 +298,7 @@ def test_a_rule_is_calibrated_and_used(city: Path, run: Run) -> None:
     assert "nothing is answered" in printed
     answer = json.loads(run(*query)[1])
     assert (answer["answered"], answer["threshold"]) == (False, None)
-    sentence(run(*calibrate[:-1], 1.5), "precision", "1.5")
+    sentence(run(*calibrate[:-1], 1.5), "--precision was given as 1.5", "from 0.01 to 0.9999")
 
 
 def test_an_index_is_kept_and_built_again_for_another_city(city: Path, run: Run) -> None:

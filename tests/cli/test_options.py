@@ -47,7 +47,8 @@ def test_every_number_has_a_range(command: str, option: Any, run: Run) -> None: 
     assert math.isfinite(option.max)
     name = option.opts[-1]
     for value in ("nan", "1e999", "-1e308", "x"):
-        sentence(run(f"{command} {name}={value}"), name, f"see semsig {command} --help")
+        told = f"{name} was given as ", value, f"from {option.min:,} to {option.max:,}."
+        sentence(run(f"{command} {name}={value}"), *told)
 
 
 TAKEN: dict[str, Callable[[Any], object]] = {

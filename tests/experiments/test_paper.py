@@ -165,7 +165,7 @@ def test_a_city_is_made_up(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> N
         ({"queries": 0}, ["0 queries", "number of cells"]),
         ({"database": "nowhere.parquet"}, ["nowhere.parquet", "signature database"]),
         ({"workers": -1}, ["-1 workers"]),
-        ({"seed": -1}, ["seed of -1"]),
+        ({"seed": -1}, ["a seed is -1", "from 0 to"]),
     ],
 )
 def test_what_is_refused(tmp_path: Path, options: dict[str, Any], words: list[str]) -> None:
