@@ -32,7 +32,8 @@ class LikelihoodMethod:
     on_grid : bool, default False
         Whether queries are from the very viewpoints, as in the paper, and then not `refined`.
     north_sigma : float, default 0
-        Standard deviation in degrees of the north of a query, 0 or more; infinite if not known.
+        Standard deviation in degrees of the north of a query, 0 or 0.001 to 360; infinite if not
+        known.
 
     Examples
     --------

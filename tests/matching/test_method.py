@@ -9,7 +9,9 @@ from hypothesis import strategies as st
 from sentences import refused
 
 from semsig_gis.core.errors import InputError, UnknownNameError
+from semsig_gis.core.geometry import FULL_TURN
 from semsig_gis.evaluation.methods import parse_method
+from semsig_gis.likelihood.index import LEAST_TURN
 from semsig_gis.likelihood.method import LikelihoodMethod
 from semsig_gis.likelihood.noise.model import NOISES, NoiseSpec
 from semsig_gis.matching.method import Method
@@ -45,7 +47,7 @@ LIKELIHOODS = st.builds(
     lambda noise, place, north: LikelihoodMethod(noise=noise, north_sigma=north, **place),
     st.sampled_from(list(MINE.values())),
     st.sampled_from([{}, {"refined": True}, {"on_grid": True}]),
-    st.floats(0, 180) | st.just(math.inf),
+    st.floats(LEAST_TURN, FULL_TURN) | st.sampled_from([0.0, math.inf]),
 )
 
 
@@ -91,7 +93,7 @@ def test_text_that_is_no_method(text: str) -> None:
         ("likelihood:light:refine", InputError, "cannot be read; give 'likelihood:NOISE'"),
         ("likelihood:light:heading", InputError, "cannot be read; give 'likelihood:NOISE'"),
         ("likelihood:light:heading=north", InputError, "cannot be read; give 'likelihood:NOISE'"),
-        ("likelihood:light:heading=-4", InputError, "-4.0 degrees; give 0 or more"),
+        ("likelihood:light:heading=-4", InputError, "is -4.0; give a number from 0.001 to 360"),
         ("likelihood:light:on_grid:refined", InputError, "leave out refined or on_grid"),
     ],
 )
