@@ -137,7 +137,7 @@ def test_a_file_that_cannot_be_read_is_named(town: Town, monkeypatch: pytest.Mon
     with refused(CatalogError, str(path), "is not UTF-8 text", "save it as UTF-8"):
         load_catalog(path)
     denied = Mock(side_effect=PermissionError(13, "Permission denied", str(path)))
-    monkeypatch.setattr(Path, "read_text", denied)
+    monkeypatch.setattr(Path, "read_bytes", denied)
     with refused(CatalogError, str(path), "cannot be read (Permission denied)"):
         load_catalog(path)
 
