@@ -112,9 +112,7 @@ they rank cells by a distance, and cells that look the same share a rank.
                 "With likelihood and an uncertain north, the standard deviation.",
             ),
             area("With likelihood: polygons that the place lies in."),
-            whole_number(
-                "TOP", "Number of candidates", 10, (1, 100_000), "How many cells to list."
-            ),
+            whole_number("TOP", "Number of candidates", 10, (1, 10_000), "How many cells to list."),
             advanced(
                 described(
                     QgsProcessingParameterString("REQUIRE", "A cell must see", optional=True),
