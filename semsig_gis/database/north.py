@@ -46,8 +46,8 @@ class North:
     --------
     >>> import datetime as dt
     >>> north = North.of("magnetic", demo_database, date=dt.date(2024, 5, 1))
-    >>> round(north.turn, 1), round(north.spread, 2)
-    (1.9, 0.01)
+    >>> round(north.turn, 1), round(north.spread, 3)
+    (1.9, 0.001)
     """
 
     name: NorthName = "grid"
