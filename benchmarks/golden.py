@@ -169,7 +169,7 @@ def _run(command: str) -> tuple[str, dict[str, str]]:
     printed, remarked = io.StringIO(), io.StringIO()
     with contextlib.redirect_stdout(printed), contextlib.redirect_stderr(remarked):
         sys.argv = ["semsig", *shlex.split(words)]
-        sys.stdin = io.StringIO(Path(given).read_text(encoding="utf-8") if given else "")
+        sys.stdin = io.TextIOWrapper(io.BytesIO(Path(given).read_bytes() if given else b""))
         code: object = 0
         try:
             semsig()

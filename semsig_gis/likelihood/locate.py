@@ -560,8 +560,8 @@ def _prior_notes(ratio: float | None) -> tuple[str, ...]:
     power = -math.log10(ratio)
     odds = f"{1.0 / ratio:,.0f}" if power < LARGE_POWER else f"10^{power:.0f}"
     note = (
-        f"the prior and the view disagree: 1 in {odds}, by so much likelier is the view from "
-        "anywhere in the city than from where the prior says."
+        f"the prior and the view disagree: 1 in {odds} (the view is so many times likelier from "
+        "anywhere in the city than from where the prior says)."
     )
     return (note,)
 

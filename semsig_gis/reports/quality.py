@@ -9,7 +9,7 @@ class, which leave out empty ground but grow with every object. The truth mostly
 from __future__ import annotations
 
 from collections import Counter
-from dataclasses import asdict, astuple, dataclass, fields, replace
+from dataclasses import asdict, dataclass, fields, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -242,18 +242,7 @@ def quality_tables(report: QualityReport) -> tuple[Table, ...]:
     sides = "west, south, east, north"
     tables = (
         _class_table(report),
-        Table(
-            "Rows by layer",
-            ("layer", *ROW_COUNTS, "kept", "notes"),
-            tuple(
-                (
-                    item.name,
-                    *(f"{number:,}" for number in (*astuple(item.counts), item.counts.kept)),
-                    _notes_text(item.notes),
-                )
-                for item in report.sources
-            ),
-        ),
+        _layer_table(report),
         Table(
             "Layers not read",
             ("layer", "class", "objects"),
@@ -312,6 +301,26 @@ def _class_table(report: QualityReport) -> Table:
             f"{report.occupied_km2:,.2f} km². Nearest: the median distance to the nearest other "
             f"object of the class.{absent}"
         ),
+    )
+
+
+def _layer_table(report: QualityReport) -> Table:
+    counts = [asdict(item.counts) for item in report.sources]
+    # Most loads have a few reasons only; a terminal has no room for columns of zeros.
+    none = [name for name in ROW_COUNTS[1:] if not any(count[name] for count in counts)]
+    shown = [name for name in ROW_COUNTS if name not in none]
+    return Table(
+        "Rows by layer",
+        ("layer", *shown, "kept", "notes"),
+        tuple(
+            (
+                item.name,
+                *(f"{count[name]:,}" for name in shown),
+                *(f"{item.counts.kept:,}", _notes_text(item.notes)),
+            )
+            for item, count in zip(report.sources, counts, strict=True)
+        ),
+        note=f"0 in all layers: {', '.join(none)}." if none else "",
     )
 
 

@@ -88,10 +88,10 @@ def distortion_rows(facts: Mapping[str, Any]) -> tuple[tuple[str, str], ...]:
     """Return what a table says of the plane and the ground (`Distortion.to_dict`)."""
     if facts["stretch"] is None:
         return (("Grid north", "unknown"), ("Lengths", "unknown"))
-    least, largest = facts["convergence"]
-    turned = f"{least:.2f}° to {largest:.2f}° clockwise"
+    # Plus 0 so that there is no minus before a zero.
+    turned = " to ".join(dict.fromkeys(f"{round(x, 2) + 0.0:.2f}°" for x in facts["convergence"]))
     return (
-        ("Grid north", f"at most {facts['angle']:.2f}° off true north ({turned})"),
+        ("Grid north", f"at most {facts['angle']:.2f}° off true north ({turned} clockwise)"),
         ("Lengths", f"at most {100 * facts['stretch']:.2g} % off"),
     )
 
