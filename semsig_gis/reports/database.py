@@ -72,7 +72,11 @@ def _property_table(facts: Mapping[str, Any]) -> Table:
             ("Grid step", f"{facts['step_m']:g} m", "10 m"),
             ("Angle levels", str(facts["levels"]), "16"),
             ("Coordinate system", facts["crs"], ""),
-            ("Degrees", ", ".join(f"{side:.5f}" for side in facts["extent_degrees"]), ""),
+            (
+                "West, south, east, north",
+                ", ".join(f"{side:.5f}" for side in facts["extent_degrees"]),
+                "",
+            ),
             *((name, value, "") for name, value in distortion_rows(facts["distortion"])),
             ("Signatures", f"{facts['signatures']:,}", "312,134"),
             ("Mean length", f"{facts['mean_length']:.3f} objects", "14 objects"),

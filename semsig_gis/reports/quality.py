@@ -16,7 +16,7 @@ import numpy as np
 import shapely
 
 from semsig_gis.core.geometry import COUNT, degree_bounds, plane_distortion
-from semsig_gis.reports.tables import Table, distortion_rows, note_tables
+from semsig_gis.reports.tables import Table, brief_notes, distortion_rows, note_tables
 from semsig_gis.sources import RowCounts
 
 if TYPE_CHECKING:
@@ -332,7 +332,8 @@ def _count_text(number: int | None) -> str:
     return "not counted" if number is None else f"{number:,}"
 
 
-def _notes_text(notes: Sequence[str]) -> str:
+def _notes_text(all_notes: Sequence[str]) -> str:
+    notes = list(brief_notes(all_notes))
     more = len(notes) - NOTES_SHOWN
     return "; ".join([*notes[:NOTES_SHOWN], *([f"and {more} more (--json)"] if more > 0 else [])])
 

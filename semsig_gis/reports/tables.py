@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import itertools
 import math
+import re
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from semsig_gis.core.signs import escaped, one_line
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Mapping, Sequence
+    from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 
     from semsig_gis.reports.parts import Number
 
@@ -98,7 +99,27 @@ def distortion_rows(facts: Mapping[str, Any]) -> tuple[tuple[str, str], ...]:
 
 def note_tables(notes: Sequence[str]) -> tuple[Table, ...]:
     """Return a table of notes; none where there are no notes."""
-    return (Table("Notes", ("note",), tuple((note,) for note in notes)),) if notes else ()
+    rows = tuple((note,) for note in brief_notes(notes))
+    return (Table("Notes", ("note",), rows),) if rows else ()
+
+
+# A note about one row, with the name of its layer or without.
+_ROW = re.compile(r"([^:]*: )?row \d+: ")
+
+
+def brief_notes(notes: Iterable[str]) -> Iterator[str]:
+    """Yield notes; of those about single rows of a layer the first, and how many follow it."""
+
+    def layer(note: str) -> str | None:
+        found = _ROW.match(note)
+        return found and (found[1] or "")
+
+    for name, run in itertools.groupby(notes, key=layer):
+        first, *others = run
+        if name is None:
+            yield from (first, *others)
+        else:
+            yield f"{first}; and {len(others)} more (--json)" if others else first
 
 
 def markdown_rows(table: Table, escape: Callable[[str], str]) -> str:

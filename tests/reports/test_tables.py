@@ -11,8 +11,11 @@ from semsig_gis.reports.tables import (
     WIDEST,
     Table,
     _width,
+    brief_notes,
+    distortion_rows,
     figure,
     interval,
+    note_tables,
     number_table,
     percent,
 )
@@ -155,3 +158,28 @@ def test_every_number_is_shown_once_and_no_table_is_too_wide(numbers: list[Numbe
     assert list(dict.fromkeys(row[0] for row in table.rows)) == list(
         dict.fromkeys(" ".join(number.row.split()) for number in numbers)
     )
+
+
+def test_notes_on_single_rows_are_shortened() -> None:
+    notes = (
+        "odd",
+        "a: old",
+        "a: row 9: broken",
+        "a: row 12: no ring",
+        "b: row 1: broken",
+        "b: few",
+    )
+    shown = ["odd", "a: old", "a: row 9: broken; and 1 more (--json)", "b: row 1: broken", "b: few"]
+    assert list(brief_notes(notes)) == shown
+    (table,) = note_tables(notes)
+    assert [note for (note,) in table.rows] == shown
+    assert list(brief_notes(["row 1: x", "row 2: x", "row 3: y"])) == [
+        "row 1: x; and 2 more (--json)"
+    ]
+    assert note_tables(()) == ()
+
+
+def test_grid_north_has_no_minus_before_nothing() -> None:
+    facts = {"convergence": (-0.0038, 0.0038), "angle": 0.0038, "stretch": 0.0004}
+    (_, turned), _ = distortion_rows(facts)
+    assert turned == "at most 0.00° off true north (0.00° clockwise)"
