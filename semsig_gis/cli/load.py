@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
@@ -241,16 +242,17 @@ def _save_loaded(
             notes.append(f"there are no {what} in what was loaded, so {path} is not written")
         elif path is not None:
             save_surroundings(table, path)
-    for note in notes:
-        remark(note)
     report = quality_report(loaded.objects, loaded.report, loaded.conflation, notes=notes)
     if as_json:
         print_json(report.to_dict())
-        return
-    from semsig_gis.reports.quality import quality_tables
+    else:
+        from semsig_gis.reports.quality import quality_tables
 
-    print_tables(quality_tables(report))
-    say(f"street objects: {out}")
+        # The notes are said below the tables, where they are seen, and not twice.
+        print_tables(quality_tables(replace(report, notes=())))
+        say(f"street objects: {out}")
+    for note in notes:
+        remark(note)
 
 
 @app.command()

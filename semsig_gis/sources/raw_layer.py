@@ -381,7 +381,7 @@ class RowRules:
         notes = []
         if any(excluded.values()):
             told = (f"{field} {number}" for field, number in excluded.items() if number)
-            notes.append(f"left out by not: {', '.join(told)}")
+            notes.append(f"left out by the catalogue's not: {', '.join(told)}")
         if unlisted.any():
             notes.append(self._unlisted(columns, unlisted))
         return Sifted(

@@ -185,10 +185,10 @@ def test_objects_of_the_classes_of_the_paper(geodata: Path, city: str) -> None:
 def test_what_is_not_seen_from_the_street_is_left_out(geodata: Path, city: str) -> None:
     layers = read_extract(geodata, city)
     told = {
-        name: note.removeprefix("left out by not: ")
+        name: note.removeprefix("left out by the catalogue's not: ")
         for name, layer in layers.items()
         for note in layer.notes
-        if note.startswith("left out by not: ")
+        if note.startswith("left out by the catalogue's not: ")
     }
     assert told == TABLE["cities"][city]["excluded"]
     assert {name for name, layer in layers.items() if layer.counts.excluded} == set(told)

@@ -455,7 +455,7 @@ def test_what_is_below_the_street_is_left_out_and_told(read: Read) -> None:
     layer = read(spec, *nodes)
     assert list(found(layer)) == [f"node/{number}" for number in range(1, 6)]
     assert layer.counts == RowCounts(read=10, excluded=5)
-    assert layer.notes == ("left out by not: level 3, layer 1, disused 1",)
+    assert layer.notes == ("left out by the catalogue's not: level 3, layer 1, disused 1",)
     everything = read(spec, *nodes, filters=False)
     assert everything.counts == RowCounts(read=10)
     above = replace(BENCHES, where=(("level", (">=0 or none",)),))

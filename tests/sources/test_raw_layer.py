@@ -134,7 +134,7 @@ def test_what_is_left_out_is_counted_once_by_the_first_reason() -> None:
     )
     assert layer.table.index.tolist() == [5, 6]
     assert (layer.filtered, layer.excluded) == (1, 3)
-    assert layer.notes == ("left out by not: state 2, depth 1",)
+    assert layer.notes == ("left out by the catalogue's not: state 2, depth 1",)
 
 
 def test_a_pattern_that_is_none() -> None:
