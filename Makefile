@@ -61,7 +61,7 @@ docs: $(DEV) ## the documentation, into docs/_build/html
 golden: $(DEV) ## what must not change, into golden/: outputs and files of all commands
 	$(BIN)/python -m benchmarks.golden golden
 
-soak: $(DEV) ## kill, starve and damage everything, some thousand times: an hour
+soak: $(DEV) ## kill, starve and damage everything, some thousand times: half an hour
 	$(BIN)/python -m benchmarks.soak
 	$(BIN)/python -m benchmarks.tables
 
