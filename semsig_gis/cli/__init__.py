@@ -8,11 +8,13 @@ Heavy modules are imported by the commands that need them, so that the help appe
 
 from __future__ import annotations
 
+import _thread
 import contextlib
 import os
 import platform
 import sys
 import tempfile
+import threading
 import traceback
 import warnings
 from typing import TextIO
@@ -23,12 +25,15 @@ from semsig_gis.core.errors import InputError, SemsigError
 FAULT, UNUSABLE = 1, 2
 # As a shell counts programs that SIGINT and SIGPIPE end.
 INTERRUPTED, UNREAD = 130, 141
+AGAIN_S = 0.05
 LONGEST = 300  # characters of what an error says that nobody wrote for a user
 
 
 def main() -> None:
     """Run the command, and end with its exit code; what goes wrong is told in one sentence."""
     said = ""
+    passing = sys.unraisablehook
+    sys.unraisablehook = _pass_over
     try:
         code = _run()
     except KeyboardInterrupt:
@@ -43,6 +48,8 @@ def main() -> None:
         code, said = (UNUSABLE, _refusal(error)) if error.errno else (FAULT, _fault(error))
     except Exception as error:  # noqa: BLE001 - nothing passes the door
         code, said = FAULT, _fault(error)
+    finally:
+        sys.unraisablehook = passing
     if said:
         with contextlib.suppress(OSError):
             _remark(said)
@@ -99,6 +106,16 @@ def _require_place() -> None:
         if "\0" in argument:
             msg = f"{argument!r} holds a null byte, which no name has; leave it out."
             raise InputError(msg)
+
+
+def _pass_over(unraisable: sys.UnraisableHookArgs) -> None:
+    """Tell of an error where Python cannot stop, as in a callback; let an interrupt come again."""
+    if unraisable.exc_type is KeyboardInterrupt:
+        again = threading.Timer(AGAIN_S, _thread.interrupt_main)
+        again.daemon = True
+        again.start()
+    elif isinstance(unraisable.exc_value, Exception):
+        _remark(f"a library passed over an error ({_brief(unraisable.exc_value)})")
 
 
 def _show_warning(message: Warning | str, *_: object, **__: object) -> None:

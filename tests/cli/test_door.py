@@ -77,6 +77,43 @@ def test_each_end_has_a_code(
     assert str(err).count("\n") == bool(said)
 
 
+CALLBACK = """
+import ctypes, sys, time
+from semsig_gis import cli
+from semsig_gis.cli import commands
+
+@ctypes.CFUNCTYPE(None)
+def callback():
+    raise {error}
+
+def run():
+    callback()
+    time.sleep({seconds})
+    return 0
+
+commands.run = run
+cli.main()
+"""
+
+
+@pytest.mark.parametrize(
+    ("error", "seconds", "code", "said"),
+    [
+        ("KeyboardInterrupt", 60, 130, "semsig: interrupted\n"),
+        ("ValueError('x')", 0, 0, "semsig: a library passed over an error (ValueError: x)\n"),
+    ],
+)
+def test_what_a_library_cannot_raise(error: str, seconds: int, code: int, said: str) -> None:
+    done = subprocess.run(
+        [sys.executable, "-c", CALLBACK.format(error=error, seconds=seconds)],
+        capture_output=True,
+        check=False,
+        text=True,
+        timeout=300,
+    )
+    assert (done.returncode, done.stderr) == (code, said)
+
+
 @pytest.mark.parametrize(
     ("line", "words"),
     [
