@@ -272,8 +272,8 @@ class Batch:
 
 
 def batches(mutants: int, *, seed: int) -> Iterator[Batch]:
-    """Yield so many mutants, as many of each format."""
-    each = max(1, mutants // len(FORMATS))
+    """Yield at least so many mutants, as many of each format."""
+    each = -(-mutants // len(FORMATS))
     for first in range(0, each, BATCH):
         for number in range(len(FORMATS)):
             yield Batch(format=number, first=first, count=min(BATCH, each - first), seed=seed)

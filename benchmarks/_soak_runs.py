@@ -146,7 +146,7 @@ def _child(
     out, err, changes = files
     try:
         os.setpgid(0, 0)
-        signal.signal(signal.SIGINT, signal.default_int_handler)
+        signal.signal(signal.SIGINT, signal.SIG_IGN)  # until the command begins
         os.dup2(os.open(os.devnull, os.O_RDONLY), 0)
         if pipe:
             reader, out = os.pipe()
@@ -157,6 +157,7 @@ def _child(
         os.environ.update(environment)
         tempfile.tempdir = None
         _note_changes(changes, stop)
+        signal.signal(signal.SIGINT, signal.default_int_handler)
         code = exit_code(command)
     except BaseException:  # noqa: BLE001 - told, and the process ends
         sys.excepthook(*sys.exc_info())
