@@ -3,16 +3,13 @@
 from __future__ import annotations
 
 import contextlib
-import sys
 import warnings
 from pathlib import Path
 
 import psutil
 
 from semsig_gis.core.errors import InputError
-
-if sys.platform != "win32":
-    import resource
+from semsig_gis.core.memory import address_space_left
 
 # What a group of processes has used and may use, of Linux's two kinds of such groups.
 GROUPS = (
@@ -33,11 +30,8 @@ def free_memory() -> int:
     for used, most in GROUPS:
         with contextlib.suppress(OSError, ValueError):  # "max" is no number
             free.append(int(Path(most).read_text("ascii")) - int(Path(used).read_text("ascii")))
-    if sys.platform != "win32":
-        soft, _ = resource.getrlimit(resource.RLIMIT_AS)
-        if soft != resource.RLIM_INFINITY:
-            free.append(soft - psutil.Process().memory_info().vms)
-    return max(int(min(free)), 0)
+    left = address_space_left()
+    return max(int(min(free if left is None else [*free, left])), 0)
 
 
 def require_memory(needed: float, what: str, *, advice: str) -> None:

@@ -5,7 +5,8 @@ from __future__ import annotations
 import errno
 import os
 import sys
-from pathlib import Path
+
+import psutil
 
 if sys.platform != "win32":
     import resource
@@ -20,17 +21,18 @@ def raise_if_short(error: Exception) -> None:
         raise MemoryError(str(error)) from error
 
 
-def require_address_space(size: int, what: str) -> None:
-    """Raise MemoryError where a limit (``ulimit -v``) leaves fewer bytes to this process."""
+def address_space_left() -> int | None:
+    """Return the bytes that a limit (``ulimit -v``) leaves to this process; None without one."""
     if sys.platform == "win32":
-        return
+        return None
     limit, _ = resource.getrlimit(resource.RLIMIT_AS)
-    try:
-        pages = int(Path("/proc/self/statm").read_text(encoding="ascii").split()[0])
-    except OSError:  # a system that does not tell
-        return
-    left = limit - pages * resource.getpagesize()
-    if limit != resource.RLIM_INFINITY and left < size:
+    return None if limit == resource.RLIM_INFINITY else limit - psutil.Process().memory_info().vms
+
+
+def require_address_space(size: int, what: str) -> None:
+    """Raise MemoryError where a limit leaves fewer bytes to this process."""
+    left = address_space_left()
+    if left is not None and left < size:
         msg = (
             f"{what} takes {size / 1e6:,.0f} MB, and the limit leaves {max(left, 0) / 1e6:,.0f} MB"
         )
