@@ -5,6 +5,7 @@ from .core.geometry import GridSpec as GridSpec
 from .core.signature import Signature as Signature, SignatureSpec as SignatureSpec
 from .core.signs import class_signs as class_signs
 from .core.statistics import wilson_interval as wilson_interval
+from .core.view import Photo as Photo, View as View
 from .core.taxonomy import ObjectClass as ObjectClass, Taxonomy as Taxonomy
 from .sources import RawLayer as RawLayer, find_files as find_files
 from .sources.catalog import (

@@ -26,10 +26,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from semsig_gis.core.errors import DatabaseError, InputError
-from semsig_gis.core.geometry import FULL_TURN
-from semsig_gis.core.ranges import require_number
 from semsig_gis.core.scratch import remove_abandoned
 from semsig_gis.core.signature import BEARING_UNITS
+from semsig_gis.core.view import check_north
 from semsig_gis.database.city import City
 from semsig_gis.likelihood.noise.table import database_tables, mean_table
 from semsig_gis.storage.text import parse_json
@@ -232,24 +231,6 @@ class LikelihoodIndex:
             distinct,
         )
         return distinct[types.inverse]
-
-
-LEAST_TURN = 0.001
-
-
-def check_north(north_sigma: float) -> None:
-    """Refuse a standard deviation of north, in degrees, that is out of range.
-
-    It is 0, or 0.001 to 360; infinite where nothing is known of north.
-    """
-    if north_sigma not in {0, math.inf}:
-        require_number(
-            "deviation of north",
-            north_sigma,
-            least=LEAST_TURN,
-            most=FULL_TURN,
-            unit="degrees, 0 or infinity",
-        )
 
 
 def build_index(

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from semsig_gis.core.errors import InputError, UnknownNameError, nearest_name
-from semsig_gis.likelihood.index import check_north
+from semsig_gis.core.view import check_north
 from semsig_gis.likelihood.noise.model import NOISES
 
 if TYPE_CHECKING:

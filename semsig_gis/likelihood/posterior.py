@@ -19,9 +19,9 @@ import numpy as np
 from semsig_gis.core.errors import InputError
 from semsig_gis.core.geometry import cell_ids, signed_degrees
 from semsig_gis.core.statistics import binomial_tail
+from semsig_gis.core.view import check_north
 from semsig_gis.database.views import views_at
 from semsig_gis.likelihood.association import turn_logs
-from semsig_gis.likelihood.index import check_north
 from semsig_gis.likelihood.noise.table import LONGEST_TABLE, noise_tables, place_loglik
 from semsig_gis.storage.text import parse_json, read_whole
 from semsig_gis.storage.whole import whole_file

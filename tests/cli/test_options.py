@@ -15,10 +15,10 @@ from semsig_gis.core.geometry import GridSpec
 from semsig_gis.core.parallel import check_workers
 from semsig_gis.core.ranges import MOST_METRES, MOST_SEED
 from semsig_gis.core.signature import SignatureSpec
+from semsig_gis.core.view import check_north
 from semsig_gis.database.tiles import TileSpec
 from semsig_gis.database.views import ViewpointSpec
 from semsig_gis.evaluation.identify.lookalikes import check_radius
-from semsig_gis.likelihood.index import check_north
 from semsig_gis.likelihood.method import LikelihoodMethod
 from semsig_gis.likelihood.noise.model import NoiseSpec, named_noise
 from semsig_gis.likelihood.route import Leg

@@ -10,8 +10,8 @@ from sentences import refused
 
 from semsig_gis.core.errors import InputError, UnknownNameError
 from semsig_gis.core.geometry import FULL_TURN
+from semsig_gis.core.view import LEAST_TURN
 from semsig_gis.evaluation.methods import parse_method
-from semsig_gis.likelihood.index import LEAST_TURN
 from semsig_gis.likelihood.method import LikelihoodMethod
 from semsig_gis.likelihood.noise.model import NOISES, NoiseSpec
 from semsig_gis.matching.method import Method

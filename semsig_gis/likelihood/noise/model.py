@@ -14,15 +14,24 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from semsig_gis.core.errors import InputError, UnknownNameError, nearest_name
 from semsig_gis.core.geometry import HALF_TURN
 from semsig_gis.storage.toml import read_values, toml_text
 from semsig_gis.storage.whole import whole_file
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Sequence
 
+MOST_ERROR = 3.0
 MOST = 1000  # objects in a signature, and metres of the place
+BY_CLASS = (
+    *("detection_by_class", "misnamed_by_class"),
+    *("bearing_sigma_by_class", "range_sigma_by_class"),
+)
+ALL = "all"
+"""What stands for all classes that have no name of their own."""
 ROUNDING = 1e-6  # of sums of shares, and of squares of metres
 
 
@@ -55,6 +64,13 @@ class NoiseSpec:
         Expected number of further objects that are missed or misnamed in every signature, few or
         many: an object among L survives m draws with chance ``(1 - 1/L) ** m`` (the source's
         distortion, section 4.2).
+    range_sigma : float, default 0.25
+        Relative error of a rough distance: the standard deviation of its logarithm, above 0 and up
+        to 3. `range_sigma_by_class` has it for single classes.
+    fading : mapping of str to sequence of (float, float), optional
+        How the chance of detection falls with the distance, for classes by name, or ``all``
+        others: pairs of metres, ascending, and of the share of `detection` that is left there, 0 to
+        1; straight lines between, and the last share beyond.
     name : str, default "custom"
         Name to print.
 
@@ -85,6 +101,9 @@ class NoiseSpec:
     position_sigma: float = 0.0
     missed_each: float = 0.0
     misnamed_each: float = 0.0
+    range_sigma: float = 0.25
+    range_sigma_by_class: Mapping[str, float] = field(default_factory=dict)
+    fading: Mapping[str, Sequence[Sequence[float]]] = field(default_factory=dict)
     name: str = "custom"
 
     def __post_init__(self) -> None:  # noqa: D105
@@ -93,12 +112,14 @@ class NoiseSpec:
             raise InputError(msg)
         for label, number in _NUMBERS.items():
             number.check(label, getattr(self, label))
-        for label in ("detection_by_class", "misnamed_by_class", "bearing_sigma_by_class"):
+        for label in BY_CLASS:
             number = _NUMBERS[label.removesuffix("_by_class")]
             for name, value in _table(label, getattr(self, label)).items():
                 number.check(f"{label} {name!r}", value)
         for name, row in _table("confusion", self.confusion).items():
             _check_shares(f"confusion row {name!r}", _table(f"confusion row {name!r}", row))
+        for name, points in _table("fading", self.fading).items():
+            _check_fading(name, points)
         if _table("clutter_shares", self.clutter_shares):
             _check_shares("clutter_shares", self.clutter_shares)
 
@@ -311,6 +332,12 @@ class _Number:
 _CHANCE = _Number("a chance from 0 to 1", lambda value: 0 <= value <= 1)
 _AMOUNT = _Number(f"a number from 0 to {MOST:,}", lambda value: 0 <= value <= MOST)
 _DEGREES = _Number("degrees above 0 and up to 180", lambda value: 0 < value <= HALF_TURN)
+
+
+def _is_error(value: float) -> bool:
+    return 0 < value <= MOST_ERROR
+
+
 _NUMBERS = MappingProxyType(
     {
         "detection": _CHANCE,
@@ -320,8 +347,29 @@ _NUMBERS = MappingProxyType(
         "position_sigma": _AMOUNT,
         "missed_each": _AMOUNT,
         "misnamed_each": _AMOUNT,
+        "range_sigma": _Number(
+            "a number above 0 and up to 3", lambda value: 0 < value <= MOST_ERROR
+        ),
     }
 )
+
+
+def _check_fading(name: str, points: object) -> None:
+    """Refuse a table of shares by distance that is none."""
+    try:
+        table = np.array(points, dtype=np.float64)
+    except (TypeError, ValueError):
+        table = np.empty(0)
+    fits = table.ndim == 2 and table.shape[1] == 2 and len(table)  # noqa: PLR2004 - pairs
+    if fits:
+        metres, shares = table.T
+        fits = (np.diff(metres, prepend=-1e-9) > 0).all() and ((shares >= 0) & (shares <= 1)).all()
+    if not fits:
+        msg = (
+            f"fading of the noise for {name!r} is {points!r:.60}; give pairs of metres, ascending, "
+            "and a share from 0 to 1."
+        )
+        raise InputError(msg)
 
 
 def _check_shares(label: str, shares: Mapping[str, float]) -> None:
@@ -346,6 +394,8 @@ def _plain(value: Any) -> Any:  # noqa: ANN401
     """Return mappings of any kind as dictionaries."""
     if isinstance(value, Mapping):
         return {name: _plain(part) for name, part in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [_plain(part) for part in value]
     return value
 
 
