@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from semsig_gis.core.errors import InputError
 from semsig_gis.core.signature import Signature
 from semsig_gis.core.view import FULL_VIEW, Photo, View
-from tests.sentences import refused
+from sentences import refused
 
 if TYPE_CHECKING:
     from collections.abc import Callable
