@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from sentences import refused
 
 from semsig_gis.core.errors import InputError
 from semsig_gis.core.signature import Signature
 from semsig_gis.core.view import FULL_VIEW, Photo, View
-from sentences import refused
 
 if TYPE_CHECKING:
     from collections.abc import Callable
