@@ -27,6 +27,7 @@ from semsig_gis.database.city import City
 from semsig_gis.database.file import open_database, save_database
 from semsig_gis.evaluation.identify import result as identifiability_file
 from semsig_gis.evaluation.identify.check import check_identifiability
+from semsig_gis.evaluation.identify.columns import symbol_columns
 from semsig_gis.evaluation.identify.identify import identify
 from semsig_gis.evaluation.identify.lookalikes import compare_without_classes, find_lookalikes
 from semsig_gis.evaluation.identify.result import (
@@ -48,6 +49,7 @@ if TYPE_CHECKING:
 
 DATABASE = random_database(5, cells=90, longest=8)
 INDEX = build_index(DATABASE, named_noise("medium"))
+COLUMNS = symbol_columns(INDEX)
 TOLD = chances_of(DATABASE)
 REPEATS = 40
 SHARP = NoiseSpec(detection=0.9, misnamed=0.05, clutter=0.5, bearing_sigma=4.0)
@@ -304,8 +306,8 @@ LIGHT = build_index(DATABASE, named_noise("light"))
 ELSEWHERE = build_index(random_database(6, cells=90), TOLD.noise)
 ask = functools.partial(identify, INDEX)
 check = functools.partial(check_identifiability, TOLD, index=INDEX)
-alike = functools.partial(find_lookalikes, INDEX)
-without = functools.partial(compare_without_classes, INDEX)
+alike = functools.partial(find_lookalikes, COLUMNS)
+without = functools.partial(compare_without_classes, COLUMNS)
 
 
 @pytest.mark.parametrize(

@@ -16,6 +16,7 @@ import numpy as np
 from semsig_gis.core.effort import announce
 from semsig_gis.core.ranges import MOST_SEED, MOST_WORKERS, require_number
 from semsig_gis.core.statistics import fit_shares
+from semsig_gis.evaluation.identify.columns import symbol_columns
 from semsig_gis.evaluation.identify.lookalikes import (
     LEAST_SUM,
     check_radius,
@@ -36,6 +37,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+    from semsig_gis.evaluation.identify.columns import SymbolColumns
     from semsig_gis.evaluation.identify.lookalikes import Lookalikes
     from semsig_gis.evaluation.identify.trials import Trials
     from semsig_gis.likelihood.index import LikelihoodIndex
@@ -134,9 +136,10 @@ def identify(
     announce(sum(seconds) / threads, "comparing cells")
     stages = _stages(progress, *seconds)
     tried = try_cells(index, sample, radius=radius, seed=seed, threads=threads, progress=stages[0])
-    temperature = _temperature(index, tried, radius=radius, threads=threads)
+    columns = symbol_columns(index, threads=threads)
+    temperature = _temperature(columns, tried, radius=radius, threads=threads)
     like = find_lookalikes(
-        index,
+        columns,
         temperature=temperature,
         radius=radius,
         places=PLACES,
@@ -144,7 +147,7 @@ def identify(
         progress=stages[1],
     )
     rise = compare_without_classes(
-        index,
+        columns,
         temperature=temperature,
         radius=radius,
         seed=seed,
@@ -188,7 +191,7 @@ def _stages(
     return [partial(tell, low, high) for low, high in pairwise(ends)]
 
 
-def _temperature(index: LikelihoodIndex, tried: Trials, *, radius: float, threads: int) -> float:
+def _temperature(columns: SymbolColumns, tried: Trials, *, radius: float, threads: int) -> float:
     """Return the power that brings the likelihoods of signatures nearest to the answers."""
     some = np.flatnonzero(np.isfinite(tried.lean))[:TEMPERATURE_TRIALS]
     if not len(some):
@@ -196,7 +199,7 @@ def _temperature(index: LikelihoodIndex, tried: Trials, *, radius: float, thread
     fits = []
     for power in TEMPERATURES:
         like = find_lookalikes(
-            index,
+            columns,
             temperature=power,
             radius=radius,
             cells=tried.cells[some],

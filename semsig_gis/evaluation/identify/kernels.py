@@ -7,11 +7,16 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from semsig_gis.core.jit import compiled
-from semsig_gis.likelihood.kernels import scan
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+LINE = 64
+"""Cells that are worked out together: as many as a cache line has bytes."""
+MANTISSA_BITS = 9
+"""Of a float32, how many the table of logarithms looks at."""
+_LEFT = 23 - MANTISSA_BITS
+_BEGIN = 127 << MANTISSA_BITS  # where the bits of 1.0 begin
 _MOST_OBJECTS = 257  # whose bytes add up within 16 bits
 _BLOCK = 4096  # cells whose powers stay in the fastest cache
 _CANDIDATES = 24  # likest cells among which places are chosen
@@ -20,6 +25,129 @@ _OCTAVES_A_NAT = 1.4426950408889634
 # Of 2 ** x for x from 0 to 1, to 1 part in 10,000.
 _FIRST, _SECOND, _THIRD = np.float32(0.69606564), np.float32(0.22449434), np.float32(0.07944024)
 _ONE, _BIAS, _SHIFT = np.float32(1.0), np.float32(127.0), np.int32(23)
+
+
+@compiled
+def fill_columns(  # noqa: C901, PLR0912, PLR0917 - a kernel takes no keywords
+    lines: NDArray[np.int64],
+    offsets: NDArray[np.int64],
+    rows: NDArray[np.uint8],
+    bearing_units: NDArray[np.uint16],
+    spread_of: NDArray[np.uint8],
+    spread: NDArray[np.float32],
+    odds: NDArray[np.float32],
+    naming: NDArray[np.float32],
+    logs: NDArray[np.uint8],
+    columns: NDArray[np.uint8],
+) -> None:
+    """Write the columns of some cells: the log of what each symbol adds, in whole steps.
+
+    Fills the cells of ``lines[0]`` to ``lines[1] - 1``, each `LINE` cells, in `columns`, shape
+    (symbols, bins, n). `rows` are the class rows of the entries and `spread_of` their rows of
+    `spread`, shape (levels, units, bins): the density per degree in each bin for an object at a
+    unit of bin 0. By length and class, `odds` are of detection over a miss and `naming`, by name,
+    the chance of the name over the density of such clutter; `logs` is the logarithm in steps, by
+    the leading bits of a float32 from 1.
+    """
+    cells = len(offsets) - 1
+    kinds = odds.shape[1]
+    symbols, bins = columns.shape[0], columns.shape[1]
+    units = spread.shape[1]
+    heard = np.zeros((kinds, bins), np.float32)
+    present = np.zeros(kinds, np.bool_)
+    inner = np.empty(bins, np.float32)
+    bits = inner.view(np.int32)
+    top = len(logs) - 1
+    buffer = np.empty((symbols, bins, LINE), np.uint8)
+    for line in range(lines[0], lines[1]):
+        first = line * LINE
+        last = min(first + LINE, cells)
+        for cell in range(first, last):
+            low, high = offsets[cell], offsets[cell + 1]
+            length = min(high - low, len(odds) - 1)
+            present[:] = False
+            for entry in range(low, high):
+                kind = rows[entry]
+                if not present[kind]:
+                    present[kind] = True
+                    heard[kind, :] = np.float32(0.0)
+                level = spread_of[entry]
+                shift = bearing_units[entry] // units
+                unit = bearing_units[entry] - shift * units
+                factor = odds[length, kind]
+                for place in range(bins - shift):
+                    heard[kind, place + shift] += factor * spread[level, unit, place]
+                for place in range(bins - shift, bins):
+                    heard[kind, place + shift - bins] += factor * spread[level, unit, place]
+            for symbol in range(symbols):
+                for place in range(bins):
+                    inner[place] = np.float32(1.0)
+                for kind in range(kinds):
+                    if present[kind]:
+                        share = naming[length, kind, symbol]
+                        for place in range(bins):
+                            inner[place] += share * heard[kind, place]
+                for place in range(bins):
+                    index = (bits[place] >> _LEFT) - _BEGIN
+                    buffer[symbol, place, cell - first] = logs[min(index, top)]
+        for symbol in range(symbols):
+            for place in range(bins):
+                for cell in range(first, last):
+                    columns[symbol, place, cell] = buffer[symbol, place, cell - first]
+
+
+@compiled
+def _add_up(
+    columns: NDArray[np.uint8],
+    symbols: NDArray[np.int64],
+    low: int,
+    size: int,
+    sums: NDArray[np.uint16],
+) -> None:
+    """Fill the sums of some columns over a block of cells."""
+    for cell in range(size):
+        sums[cell] = 0
+    # Four columns in one go: a sum is fetched and put back a quarter as often.
+    fours = len(symbols) - len(symbols) % 4
+    for place in range(0, fours, 4):
+        first = columns[symbols[place], low : low + size]
+        second = columns[symbols[place + 1], low : low + size]
+        third = columns[symbols[place + 2], low : low + size]
+        fourth = columns[symbols[place + 3], low : low + size]
+        for cell in range(size):
+            sums[cell] += (
+                np.uint16(first[cell])
+                + np.uint16(second[cell])
+                + np.uint16(third[cell])
+                + np.uint16(fourth[cell])
+            )
+    for symbol in symbols[fours:]:
+        column = columns[symbol, low : low + size]
+        for cell in range(size):
+            sums[cell] += column[cell]
+
+
+@compiled
+def _scan(
+    columns: NDArray[np.uint8],
+    symbols: NDArray[np.int64],
+    constants: NDArray[np.float32],
+    step: float,
+    scores: NDArray[np.float32],
+) -> None:
+    """Fill `scores`, shape (n,), with the sums of one column for each object of a query.
+
+    `symbols` are the rows of `columns`, shape (s, n), to add: at most 257, or 16 bits overflow.
+    `constants` are what each cell adds to any query, `step` is the size of a step of the columns.
+    """
+    cells = len(constants)
+    sums = np.empty(_BLOCK, np.uint16)
+    scale = np.float32(step)
+    for low in range(0, cells, _BLOCK):
+        size = min(_BLOCK, cells - low)
+        _add_up(columns, symbols, low, size, sums)
+        for cell in range(size):
+            scores[low + cell] = constants[low + cell] + scale * np.float32(sums[cell])
 
 
 @compiled
@@ -32,9 +160,9 @@ def _score(
 ) -> None:
     """Score every cell by a signature of any length."""
     first = min(len(symbols), _MOST_OBJECTS)
-    scan(flat, symbols[:first], constants, 0.0, step, scores)
+    _scan(flat, symbols[:first], constants, step, scores)
     for low in range(first, len(symbols), _MOST_OBJECTS):
-        scan(flat, symbols[low : low + _MOST_OBJECTS], scores, 0.0, step, scores)
+        _scan(flat, symbols[low : low + _MOST_OBJECTS], scores, step, scores)
 
 
 @compiled

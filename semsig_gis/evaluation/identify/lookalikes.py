@@ -17,7 +17,6 @@ import numpy as np
 from semsig_gis.core.errors import InputError
 from semsig_gis.core.geometry import cell_ids
 from semsig_gis.core.ranges import MOST_METRES, require_number
-from semsig_gis.likelihood.index import BIN_UNITS, BINS
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -25,7 +24,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from semsig_gis.database.database import SignatureDatabase
-    from semsig_gis.likelihood.index import LikelihoodIndex
+    from semsig_gis.evaluation.identify.columns import SymbolColumns
 
 CELLS_A_TASK = 256
 LEAST_SUM = 1e-30  # of ratios, so that it has a logarithm
@@ -66,7 +65,7 @@ def city_extent(database: SignatureDatabase) -> float:
 
 
 def find_lookalikes(
-    index: LikelihoodIndex,
+    columns: SymbolColumns,
     *,
     temperature: float,
     radius: float = 50.0,
@@ -83,14 +82,13 @@ def find_lookalikes(
     """
     from semsig_gis.evaluation.identify.kernels import compare_signatures  # noqa: PLC0415 - numba loads slowly
 
-    database = index.database
+    database = columns.database
     _check(temperature, radius)
     rows = np.arange(len(database)) if cells is None else np.asarray(cells, dtype=np.int64)
     step = database.grid.step
     radius = min(radius, city_extent(database))
     where = np.stack([database.columns, database.rows], axis=1).astype(np.int64)
-    symbols, _ = _symbols(index)
-    ids, flat = database.cell_ids, index.flat_columns()
+    ids, symbols = database.cell_ids, columns.symbols
     circle = cell_circle(radius, step)
     like = Lookalikes(
         near=np.empty(len(rows)),
@@ -104,9 +102,9 @@ def find_lookalikes(
             rows[part],
             database.offsets,
             symbols,
-            flat,
-            index.constants,
-            index.step,
+            columns.values,
+            columns.constants,
+            columns.step,
             temperature,
             ids,
             where,
@@ -128,7 +126,7 @@ def find_lookalikes(
 
 
 def compare_without_classes(
-    index: LikelihoodIndex,
+    columns: SymbolColumns,
     *,
     temperature: float,
     radius: float = 50.0,
@@ -140,26 +138,25 @@ def compare_without_classes(
     """Compare cells with a sample of the others as if a class were not published.
 
     As `find_lookalikes`; `seed` draws the sample. The result (c, k) is by how much the logarithm of
-    `Lookalikes.far` would rise without each class of ``index.table.codes``: without its objects and
-    the detections of its name. That some objects are detected under another name is neglected.
+    `Lookalikes.far` would rise without each class of ``columns.table.codes``: without its objects
+    and the detections of its name. That some objects are detected under another name is neglected.
     """
     from semsig_gis.evaluation.identify.kernels import compare_without  # noqa: PLC0415
 
-    database = index.database
+    database = columns.database
     _check(temperature, radius)
     rows = np.arange(len(database)) if cells is None else np.asarray(cells, dtype=np.int64)
-    symbols, kinds = _symbols(index)
-    count, classes = len(database), len(index.table.codes)
+    symbols, kinds = columns.symbols, columns.kinds
+    count, classes = len(database), len(columns.table.codes)
     rng = np.random.default_rng([seed, 1])
     sample = np.sort(rng.permutation(count)[:SAMPLE])
-    flat = index.flat_columns()
     owner = np.repeat(np.arange(count), database.lengths)
-    lengths = np.minimum(database.lengths, len(index.table.missed) - 1)[owner]
-    missed = np.log(index.table.missed)[lengths, kinds]
+    lengths = np.minimum(database.lengths, len(columns.table.missed) - 1)[owner]
+    missed = np.log(columns.table.missed)[lengths, kinds]
     by_class = np.bincount(kinds * count + owner, missed, classes * count).reshape(classes, count)
-    constants = index.constants - np.concatenate([np.zeros((1, count)), by_class])
+    constants = columns.constants - np.concatenate([np.zeros((1, count)), by_class])
     constants = constants.astype(np.float32)
-    sampled = np.ascontiguousarray(flat[:, sample])
+    sampled = np.ascontiguousarray(columns.values[:, sample])
     ids = database.cell_ids
     circle = cell_circle(min(radius, city_extent(database)), database.grid.step)
     far = np.empty((len(rows), classes + 1))
@@ -170,9 +167,9 @@ def compare_without_classes(
             database.offsets,
             symbols,
             kinds,
-            flat,
+            columns.values,
             constants,
-            index.step,
+            columns.step,
             temperature,
             ids,
             circle,
@@ -196,12 +193,6 @@ def _check(temperature: float, radius: float) -> None:
 def check_radius(radius: float) -> None:
     """Raise InputError unless a radius is a number of metres from 0 to a million."""
     require_number("radius", radius, least=0, most=MOST_METRES, unit="metres")
-
-
-def _symbols(index: LikelihoodIndex) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Return the column of the index and the class row of every entry of the database."""
-    kinds = index.table.row_of[index.database.codes]
-    return kinds * BINS + index.database.bearing_units // BIN_UNITS, kinds
 
 
 def _in_parts(

@@ -1,0 +1,140 @@
+"""What each thing that a detector may tell adds to the log-likelihood of every cell.
+
+A column holds, for a class t and a step of bearings, ``log(1 + sum_i o_i C(i, t) N / lambda(t))``:
+what a detection there adds, less ``log(lambda(t))``, which is the same for all cells. N is the mean
+density over the step.
+"""
+
+from __future__ import annotations
+
+import math
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from semsig_gis.core.signature import BEARING_UNITS
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from semsig_gis.database.database import SignatureDatabase
+    from semsig_gis.likelihood.index import LikelihoodIndex
+    from semsig_gis.likelihood.noise.table import NoiseTable
+
+BINS = 72
+"""Bearing steps of five degrees."""
+BIN_DEGREES = 360.0 / BINS
+BIN_UNITS = BEARING_UNITS // BINS
+
+LEVELS = 128  # of bearing noise, where it depends on the distance
+LINES_A_TASK = 64
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class SymbolColumns:
+    """What each symbol, a class in a step of bearings, adds to the score of each cell.
+
+    `values`, shape (k * 72, n), are in steps of `step`, with the rows of a class of the `table`
+    together; `constants` (n,) is what each cell adds to any query.
+    """
+
+    database: SignatureDatabase
+    table: NoiseTable
+    values: NDArray[np.uint8]
+    constants: NDArray[np.float32]
+    step: float
+
+    @property
+    def kinds(self) -> NDArray[np.int64]:
+        """The class row of every entry of the database."""
+        return self.table.row_of[self.database.codes]
+
+    @property
+    def symbols(self) -> NDArray[np.int64]:
+        """The row of `values` of every entry of the database."""
+        return self.kinds * BINS + self.database.bearing_units // BIN_UNITS
+
+
+def symbol_columns(index: LikelihoodIndex, *, threads: int = 1) -> SymbolColumns:
+    """Work out the columns of the cells and the mean noise model of an index."""
+    database, table = index.database, index.table
+    unseen = table.nothing_seen(database.offsets, table.row_of[database.codes])
+    values = np.empty((len(table.codes), BINS, len(database)), np.uint8)
+    return SymbolColumns(
+        database=database,
+        table=table,
+        step=_write_columns(database, table, values, threads),
+        values=values.reshape(-1, len(database)),
+        constants=unseen.astype(np.float32),
+    )
+
+
+def _write_columns(
+    database: SignatureDatabase,
+    table: NoiseTable,
+    columns: NDArray[np.uint8],
+    threads: int,
+) -> float:
+    """Fill `columns`, shape (k, 72, n), and return the size of their steps."""
+    from semsig_gis.evaluation.identify.kernels import LINE, fill_columns  # noqa: PLC0415 - numba loads slowly
+
+    spread_of, spread = _spreads(database, table)
+    # 255 steps reach what four objects in one direction add.
+    peak = float(spread.max() * (table.odds[:, :, None] * table.naming).max())
+    step = math.log1p(4.0 * peak) / 255.0
+    arguments = (
+        database.offsets,
+        table.row_of.astype(np.uint8)[database.codes],
+        database.bearing_units,
+        spread_of,
+        spread,
+        table.odds.astype(np.float32),
+        table.naming.astype(np.float32),
+        _logs(step),
+        columns,
+    )
+    lines = -(-len(database) // LINE)
+    parts = [
+        np.array([low, min(low + LINES_A_TASK, lines)]) for low in range(0, lines, LINES_A_TASK)
+    ]
+    with ThreadPoolExecutor(threads) as pool:
+        list(pool.map(lambda part: fill_columns(part, *arguments), parts))
+    return step
+
+
+def _spreads(
+    database: SignatureDatabase, table: NoiseTable
+) -> tuple[NDArray[np.uint8], NDArray[np.float32]]:
+    """Return which bearing noise each entry has, and the density of each in every bin."""
+    sigma = table.sigmas(database.reach)
+    if table.position_sigma == 0:
+        levels, level = np.unique(sigma, return_inverse=True)
+    else:
+        levels = np.geomspace(sigma.min(), sigma.max(), LEVELS)
+        middle = np.sqrt(levels[1:] * levels[:-1])
+        level = np.searchsorted(middle, sigma)
+    level_of = np.zeros((256, 256), np.uint8)
+    level_of[table.codes] = level.reshape(sigma.shape)
+    spread_of = level_of[database.codes, database.distance_units]
+    inside = (np.arange(BIN_UNITS) + 0.5) * (BIN_DEGREES / BIN_UNITS)
+    edges = np.arange(BINS + 1) * BIN_DEGREES
+    away = edges[None, None, :] - inside[None, :, None]
+    below = np.zeros((len(levels), BIN_UNITS, BINS + 1))
+    erf = np.vectorize(math.erf, otypes=[np.float64])
+    for turn in range(-3, 4):  # 180 degrees of deviation reach three turns
+        deviations = (away + 360.0 * turn) / levels[:, None, None]
+        below += 0.5 * (1.0 + erf(deviations / math.sqrt(2.0)))
+    return spread_of, (np.diff(below, axis=2) / BIN_DEGREES).astype(np.float32)
+
+
+def _logs(step: float) -> NDArray[np.uint8]:
+    """Return the logarithm in steps, by the leading bits of a float32 from 1 up."""
+    from semsig_gis.evaluation.identify.kernels import MANTISSA_BITS  # noqa: PLC0415
+
+    octaves = math.ceil(255 * step / math.log(2.0))
+    octave, part = np.divmod(np.arange(octaves << MANTISSA_BITS), 1 << MANTISSA_BITS)
+    value = np.log((1.0 + (part + 0.5) / (1 << MANTISSA_BITS)) * 2.0**octave)
+    value[0] = 0.0  # where nothing is near, exactly nothing is added
+    return np.minimum(np.rint(value / step), 255).astype(np.uint8)
