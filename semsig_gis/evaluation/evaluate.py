@@ -17,7 +17,7 @@ import pandas as pd
 from semsig_gis import __version__
 from semsig_gis.core.effort import announce
 from semsig_gis.core.errors import InputError
-from semsig_gis.core.geometry import angular_distance, cell_ids
+from semsig_gis.core.geometry import angular_distance, cell_ids, wrap_degrees
 from semsig_gis.evaluation.result import QUERY_COLUMNS, Evaluation
 from semsig_gis.likelihood.locate import LikelihoodLocator
 from semsig_gis.likelihood.method import LikelihoodMethod
@@ -41,6 +41,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+    from semsig_gis.core.view import Photo
     from semsig_gis.database.answer import Answer, DistanceMemo, Locator, Ranking
     from semsig_gis.database.database import SignatureDatabase
     from semsig_gis.evaluation.methods import AnyMethod
@@ -354,6 +355,8 @@ def _query_table(database: SignatureDatabase, queries: Sequence[Query]) -> pd.Da
             "angle_group": np.where(known, database.angle_group_sizes[cells], 0),
             "query_types": [database.taxonomy.decode(one.asked.codes) for one in queries],
             "query_bearings": [_bearing_text(one.asked.bearings) for one in queries],
+            "query_ranges": [_range_text(one.asked.ranges) for one in queries],
+            "query_sectors": [_sector_text(one.asked.photo) for one in queries],
             "query_length": np.array([len(one.asked) for one in queries], np.int64),
             "heading": np.array([one.asked.heading for one in queries], np.float64),
             "x": places[:, 0],
@@ -366,6 +369,17 @@ def _bearing_text(bearings: NDArray[np.float64]) -> str:
     """Return bearings as the command line takes them, to a tenth of a degree."""
     tenths = np.floor(bearings * 10.0) / 10.0  # down, so that none becomes 360
     return ",".join(f"{value:.1f}" for value in tenths)
+
+
+def _range_text(ranges: NDArray[np.float64] | None) -> str:
+    """Return rough distances to a tenth of a metre, nothing where none were told."""
+    return "" if ranges is None else ",".join(f"{value:.1f}" for value in ranges)
+
+
+def _sector_text(photo: Photo) -> str:
+    """Return the sectors that were looked at, nothing for the full turn."""
+    ends = [wrap_degrees(np.array(sector)) for sector in photo.sectors]
+    return ",".join(_bearing_text(pair).replace(",", "-") for pair in ends)
 
 
 def _database_summary(database: SignatureDatabase, file_bytes: int | None) -> dict[str, Any]:

@@ -45,7 +45,7 @@ if TYPE_CHECKING:
 
 QUERY_COLUMNS = (
     *("seed", "number", "cell", "cell_id", "types", "length", "type_group", "angle_group"),
-    *("query_types", "query_bearings", "query_length", "heading"),
+    *("query_types", "query_bearings", "query_ranges", "query_sectors", "query_length", "heading"),
     *("best_cell_id", "best_x", "best_y", "distance", "tied", "next_cell_ids", "error_m"),
     *(f"p{threshold}" for threshold in THRESHOLDS),
     *(f"near{count}" for count in NEAR_PLACES),
@@ -85,6 +85,8 @@ class Evaluation:
         - ``query_types``, ``query_bearings``, ``query_length``: what was asked: symbols, degrees
           (text, comma-separated) and how many there are (none: the query is *unlocalized*);
           ``heading``: degrees to add to the bearings to have them from true north;
+        - ``query_ranges``, ``query_sectors``: rough distances in metres, and the sectors that were
+          told to have been looked at, such as ``340.0-50.0`` (text, comma-separated, else empty);
         - ``best_cell_id``, ``best_x``, ``best_y``, ``distance``: the best candidate, drawn from the
           tied, and its distance or negative log-likelihood; missing when unlocalized;
         - ``tied``: cells that share the best score, 0 when unlocalized; ``next_cell_ids``: the

@@ -14,6 +14,7 @@ from semsig_gis.likelihood.noise.model import NOISES, NoiseMixture, NoiseSpec, n
 from semsig_gis.queries.distortions import (
     DISTORTIONS,
     BlockedSectors,
+    ClassScores,
     CompassBias,
     Detector,
     Distortion,
@@ -21,6 +22,7 @@ from semsig_gis.queries.distortions import (
     HiddenBehind,
     MissingClasses,
     Obstacles,
+    RoughRanges,
     distortion_of,
 )
 
@@ -58,6 +60,8 @@ NAMED_DISTORTIONS: Mapping[str, QueryDistortion] = MappingProxyType(
         "obstacles": Obstacles(),
         "blocked": BlockedSectors(),
         "detector": Detector(noise=named_noise("generic")),
+        "ranges": RoughRanges(),
+        "scores": ClassScores(),
     }
 )
 """What each name stands for, before its settings."""
@@ -101,7 +105,8 @@ def ready_chain(
     It takes what is seen, a seed and the number of the query. The random numbers of a distortion
     depend on these, its kind and how many of that kind come before: a query meets the same compass
     whatever else happens to it, and experiments that differ in one distortion differ in nothing
-    else. Raises SemsigError if a distortion does not fit the city.
+    else. What ends up out of a view that is told is left out. Raises SemsigError if a distortion
+    does not fit the city.
     """
     repeats: Counter[int] = Counter()
     steps = []
@@ -113,7 +118,7 @@ def ready_chain(
         for stream, step in steps:
             entropy = np.random.SeedSequence(seed, spawn_key=(number, *stream))
             sight = step(sight, np.random.default_rng(entropy))
-        return sight
+        return sight.in_view()
 
     return spoil
 

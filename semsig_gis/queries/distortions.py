@@ -1,4 +1,7 @@
-"""What spoils a query: the paper's errors, weak eyes, a narrow view, things in the way."""
+"""What happens to a query: the paper's errors, weak eyes, a narrow view, things in the way.
+
+Or what more than types and bearings a detector tells: rough distances, scores of several classes.
+"""
 
 from __future__ import annotations
 
@@ -15,8 +18,11 @@ from semsig_gis.core.errors import InputError, UnknownNameError, nearest_name
 from semsig_gis.core.geometry import FULL_TURN, angular_distance, wrap_degrees
 from semsig_gis.core.ranges import require_number
 from semsig_gis.core.signature import Signature
+from semsig_gis.core.taxonomy import MAX_RANGE_M
+from semsig_gis.core.view import CLASSES, Photo
 from semsig_gis.database.views import bearings
 from semsig_gis.likelihood.noise.table import LONGEST_TABLE, noise_tables
+from semsig_gis.queries.sight import NEAREST_M
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -30,7 +36,8 @@ if TYPE_CHECKING:
 
 MOST_WIDTH_M = 1000
 MOST_FALSE = 1000  # objects
-NEAREST_M = 0.01  # that anything stands, so that its width is an angle
+MOST_PERCENT = 300
+LEAST_RIGHT, MOST_RIGHT = 0.51, 0.999
 
 
 class _AnyCity(ABC):
@@ -93,13 +100,14 @@ class MissingClasses:
 class FieldOfView(_AnyCity):
     """A camera that looks in one direction, drawn at random, and sees part of the turn.
 
-    It sees `degrees`, above 0 and at most 360. Bearings are still counted from north; nothing tells
-    which part of the turn was looked at.
+    It sees `degrees`, above 0 and at most 360. Bearings are still counted from north. Which part of
+    the turn was looked at is `told`, or not: then what is out of view counts as missed.
     """
 
     stream: ClassVar[int] = 20_362_731
 
     degrees: float = 90.0
+    told: bool = True
 
     def __post_init__(self) -> None:  # noqa: D105
         if not 0 < self.degrees <= FULL_TURN:
@@ -109,8 +117,25 @@ class FieldOfView(_AnyCity):
             raise InputError(msg)
 
     def _spoil(self, sight: Sight, rng: np.random.Generator) -> Sight:
-        aside = angular_distance(sight.bearings, rng.uniform(0.0, FULL_TURN))
-        return sight.only(aside <= self.degrees / 2.0)
+        middle = rng.uniform(0.0, FULL_TURN)
+        seen = sight.only(angular_distance(sight.bearings, middle) <= self.degrees / 2.0)
+        if not self.told:
+            return seen
+        return replace(seen, photo=_common(sight.photo, middle, self.degrees))
+
+
+def _common(photo: Photo, heading: float, fov: float) -> Photo:
+    """Return the part of a photo that a narrower one shows, too; that one where there is none."""
+    other = Photo.looking(heading=heading, fov=fov)
+    if not (photo.sectors and other.sectors):
+        return Photo(sectors=photo.sectors or other.sectors)
+    both = [
+        (max(low, start + turn), min(high, end + turn))
+        for low, high in photo.sectors
+        for start, end in other.sectors
+        for turn in (-FULL_TURN, 0.0, FULL_TURN)
+    ]
+    return Photo(sectors=tuple(one for one in both if one[0] < one[1]) or other.sectors)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -237,12 +262,7 @@ class Detector:
             codes = np.repeat(table.codes, rng.poisson(table.clutter))
             false = rng.uniform(0.0, FULL_TURN, len(codes))
             distances = city.false_distances(len(codes), rng)
-            return replace(
-                seen,
-                codes=np.concatenate([seen.codes, codes]),
-                bearings=np.concatenate([seen.bearings, false]),
-                distances=np.concatenate([seen.distances, distances]),
-            ).clockwise()
+            return seen.with_false(codes, false, distances).clockwise()
 
         return spoil
 
@@ -256,7 +276,9 @@ class Detector:
         names = np.cumsum(table.named[length, kinds], axis=1)
         labels = (rng.random(len(seen))[:, None] * names[:, -1:] >= names).sum(axis=1)
         off = rng.normal(0.0, table.sigma[kinds])
-        return replace(seen, codes=table.codes[labels], bearings=wrap_degrees(seen.bearings + off))
+        return replace(
+            seen.renamed(table.codes[labels]), bearings=wrap_degrees(seen.bearings + off)
+        )
 
 
 def _from_aside(sight: Sight, sigma: float, rng: np.random.Generator) -> Sight:
@@ -268,6 +290,63 @@ def _from_aside(sight: Sight, sigma: float, rng: np.random.Generator) -> Sight:
     x = sight.distances * np.sin(turned) - dx
     y = sight.distances * np.cos(turned) - dy
     return replace(sight, bearings=bearings(x, y), distances=np.hypot(x, y))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RoughRanges(_AnyCity):
+    """A depth network, or a person's guess: how far away each object seems to be.
+
+    The logarithm of a distance is off by a normal error of `percent` hundredths (0.1 to 300), which
+    the query states. A false object is anywhere within the range of the city, all places alike.
+    """
+
+    stream: ClassVar[int] = 2_716_057_031
+
+    percent: float = 25.0
+
+    def __post_init__(self) -> None:  # noqa: D105
+        require_number("error of the ranges", self.percent, least=0.1, most=MOST_PERCENT, unit="%")
+
+    def _spoil(self, sight: Sight, rng: np.random.Generator) -> Sight:
+        error = self.percent / 100.0
+        off = np.exp(rng.normal(0.0, error, len(sight)))
+        if sight.false is not None:
+            off[sight.false] = 1.0
+        ranges = np.clip(sight.distances * off, NEAREST_M, MAX_RANGE_M)
+        return replace(sight, ranges=ranges, range_error=error)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ClassScores:
+    """A detector that gives each object scores of all classes of the city, in place of one name.
+
+    The scores can be trusted: an object of any class is as likely to be given some scores as they
+    say. That of its own class is `right` in the mean (0.51 to 0.999). Methods that take names alone
+    have the one with the best score.
+    """
+
+    stream: ClassVar[int] = 1_530_938_417
+
+    right: float = 0.8
+
+    def __post_init__(self) -> None:  # noqa: D105
+        require_number("mean score", self.right, least=LEAST_RIGHT, most=MOST_RIGHT)
+
+    def ready(self, city: CitySights) -> Spoiling:
+        """Return what it does to a query."""
+        count = len(city.codes)
+        # Scores that come from a symmetric Dirichlet distribution, and a class that comes from the
+        # scores, are the same as a class, and scores from this distribution with one more for it.
+        spread = (1.0 - self.right) / (self.right * count - 1.0) if count > 1 else 1.0
+
+        def spoil(sight: Sight, rng: np.random.Generator) -> Sight:
+            own = np.searchsorted(city.codes, sight.codes)
+            parts = rng.standard_gamma(spread + np.eye(count)[own])
+            scores = np.zeros((len(sight), CLASSES))
+            scores[:, city.codes] = parts / parts.sum(axis=1, keepdims=True)
+            return replace(sight, codes=scores.argmax(axis=1).astype(np.uint8), scores=scores)
+
+        return spoil
 
 
 FalseClass = Literal["uniform", "frequency"]
@@ -335,11 +414,12 @@ class Distortion:
 
         def spoil(sight: Sight, rng: np.random.Generator) -> Sight:
             codes, bearings, rows = _spoiled(sight.signature, self, (city.codes, chances), rng)
-            distances = np.empty(len(rows))
             real = rows >= 0
-            distances[real] = sight.distances[rows[real]]
-            distances[~real] = city.false_distances(int((~real).sum()), rng)
-            return replace(sight, codes=codes, bearings=bearings, distances=distances)
+            seen = sight.only(rows[real]).renamed(codes[real])
+            seen = replace(seen, bearings=bearings[real])
+            distances = city.false_distances(int((~real).sum()), rng)
+            seen = seen.with_false(codes[~real], bearings[~real], distances)
+            return seen.only(np.argsort(np.argsort(~real, kind="stable")))  # in their order again
 
         return spoil
 

@@ -1,18 +1,21 @@
 """What is seen from one place, and told in some order: types, bearings and distances.
 
-A detector tells types and bearings only. The distances stay with them for as long as something
-that happens to the query, a weak eye or a parked van, depends on how far away things are.
+A detector tells types and bearings, and perhaps rough distances and scores of several classes. The
+true distances stay with them for as long as something that happens to the query, a weak eye or a
+parked van, depends on how far away things are.
 """
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from semsig_gis.core.geometry import FULL_TURN, wrap_degrees
 from semsig_gis.core.signature import BEARING_UNITS, DISTANCE_UNITS, Signature
+from semsig_gis.core.view import CLASSES, FULL_VIEW, View
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -20,10 +23,14 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
     from semsig_gis.core.taxonomy import Taxonomy
+    from semsig_gis.core.view import Photo
     from semsig_gis.database.database import SignatureDatabase
 
     Spoiling = Callable[["Sight", np.random.Generator], "Sight"]
     """What a distortion does to what is seen, with all chances from a generator."""
+
+NEAREST_M = 0.01  # that anything stands, so that its width is an angle
+_BY_OBJECT = ("codes", "bearings", "distances", "false", "ranges", "scores")
 
 
 @dataclass(frozen=True, eq=False, slots=True, kw_only=True)
@@ -40,6 +47,14 @@ class Sight:
         Metres; of a false object, how far away it seems to be.
     heading : float, default 0
         Degrees to add to the bearings to have them from true north, in [0, 360).
+    false : ndarray of bool, shape (n,), or None
+        Whether each object is a false one; None where none is.
+    ranges, scores : ndarray of float64 or None
+        Rough distances and scores of classes that a detector tells, as in `View`.
+    range_error : float, default NaN
+        The relative error that it states of the rough distances, as in `View`.
+    photo : Photo, default the full turn
+        The directions that are told to have been looked at.
 
     Examples
     --------
@@ -56,14 +71,28 @@ class Sight:
     bearings: NDArray[np.float64]
     distances: NDArray[np.float64]
     heading: float = 0.0
+    false: NDArray[np.bool_] | None = None
+    ranges: NDArray[np.float64] | None = None
+    range_error: float = math.nan
+    scores: NDArray[np.float64] | None = None
+    photo: Photo = FULL_VIEW
 
     def __len__(self) -> int:  # noqa: D105
         return len(self.codes)
 
     @property
     def signature(self) -> Signature:
-        """What a detector tells of it."""
-        return Signature(self.codes, self.bearings)
+        """What a detector tells of it: a `View` if that is more than types and bearings."""
+        if self.ranges is None and self.scores is None and self.photo == FULL_VIEW:
+            return Signature(self.codes, self.bearings)
+        return View(
+            self.codes,
+            self.bearings,
+            ranges=self.ranges,
+            range_errors=None if self.ranges is None else np.full(len(self), self.range_error),
+            scores=self.scores,
+            photos=(self.photo,),
+        )
 
     @classmethod
     def of_cell(cls, database: SignatureDatabase, cell: int) -> Sight:
@@ -78,12 +107,44 @@ class Sight:
     def only(self, objects: ArrayLike) -> Sight:
         """Return some of the objects: those of a mask, or of numbers in the order wanted."""
         index = np.asarray(objects)
-        return replace(
-            self,
-            codes=self.codes[index],
-            bearings=self.bearings[index],
-            distances=self.distances[index],
-        )
+        columns = {name: getattr(self, name) for name in _BY_OBJECT}
+        kept = {name: values[index] for name, values in columns.items() if values is not None}
+        return replace(self, **kept)
+
+    def in_view(self) -> Sight:
+        """Return the objects in the directions that are told to have been looked at."""
+        return self.only(self.photo.sees(self.bearings)) if self.photo.sectors else self
+
+    def renamed(self, codes: NDArray[np.uint8]) -> Sight:
+        """Return the objects by other names; where a name changes, its scores are sure of it."""
+        scores = self.scores
+        if scores is not None:
+            scores = np.where((codes == self.codes)[:, None], scores, np.eye(CLASSES)[codes])
+        return replace(self, codes=codes, scores=scores)
+
+    def with_false(
+        self,
+        codes: NDArray[np.uint8],
+        bearings: NDArray[np.float64],
+        distances: NDArray[np.float64],
+    ) -> Sight:
+        """Return the objects, and then false ones; their rough distances are just these."""
+        more = {
+            "codes": codes,
+            "bearings": bearings,
+            "distances": distances,
+            "false": np.ones(len(codes), np.bool_),
+            "ranges": np.maximum(distances, NEAREST_M),
+            "scores": np.eye(CLASSES)[codes],
+        }
+        one = self if self.false is not None else replace(self, false=np.zeros(len(self), np.bool_))
+        columns = {name: getattr(one, name) for name in _BY_OBJECT}
+        joined: dict[str, Any] = {
+            name: np.concatenate([values, more[name]])
+            for name, values in columns.items()
+            if values is not None
+        }
+        return replace(one, **joined)
 
     def clockwise(self) -> Sight:
         """Return the objects sorted by bearing; those on one bearing stay in their order."""
@@ -95,6 +156,7 @@ class Sight:
             self,
             bearings=wrap_degrees(self.bearings + degrees),
             heading=float(wrap_degrees(self.heading - degrees)),
+            photo=self.photo.turned(degrees),
         ).clockwise()
 
 

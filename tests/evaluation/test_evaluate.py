@@ -131,6 +131,24 @@ def test_columns_tell_the_truth() -> None:
     counts = [len(text.split(",")) if text else 0 for text in table["query_bearings"]]
     assert (table["query_length"] == counts).all()
     assert (EVALUATION.successful == (table["p50"] >= 0.5)).all()
+    assert (table[["query_ranges", "query_sectors"]] == "").all(axis=None)
+
+
+def test_columns_tell_the_view() -> None:
+    asked = evaluate(DATABASE, queries=20, distortion="compass:9, ranges:25, view:100").queries
+    for row in asked.to_dict("records"):
+        start, end = map(float, row["query_sectors"].split("-"))
+        assert (end - start) % 360.0 == pytest.approx(100.0, abs=0.11)
+        bearings = [float(one) for one in row["query_bearings"].split(",") if one]
+        assert all((one - start + 0.1) % 360.0 <= 100.2 for one in bearings)
+        assert len([float(one) for one in row["query_ranges"].split(",") if one]) == len(bearings)
+
+
+def test_methods_on_sequences_take_types_and_bearings_alone() -> None:
+    told = evaluate(DATABASE, queries=20, distortion="light, ranges:25, view:100").queries
+    untold = evaluate(DATABASE, queries=20, distortion="light, view:100:told=false").queries
+    columns = ["best_cell_id", "distance", "error_m", "rank_low", "rank_high"]
+    assert told[columns].equals(untold[columns])
 
 
 def test_a_query_of_which_nothing_is_left() -> None:

@@ -23,6 +23,7 @@ from semsig_gis.likelihood.noise.model import NOISES, NoiseSpec
 from semsig_gis.queries.chain import NAMED_DISTORTIONS, chain_text, parse_chain, ready_chain
 from semsig_gis.queries.distortions import (
     BlockedSectors,
+    ClassScores,
     CompassBias,
     Detector,
     Distortion,
@@ -30,6 +31,7 @@ from semsig_gis.queries.distortions import (
     HiddenBehind,
     MissingClasses,
     Obstacles,
+    RoughRanges,
     distort,
     named_distortion,
 )
@@ -54,7 +56,9 @@ any_distortion: st.SearchStrategy[QueryDistortion] = st.one_of(
     paper_errors,
     st.builds(CompassBias, sigma=st.floats(0, 180)),
     st.builds(MissingClasses, classes=classes, others=st.booleans()),
-    st.builds(FieldOfView, degrees=st.floats(0.1, 360)),
+    st.builds(FieldOfView, degrees=st.floats(0.1, 360), told=st.booleans()),
+    st.builds(RoughRanges, percent=st.floats(0.1, 300)),
+    st.builds(ClassScores, right=st.floats(0.51, 0.999)),
     st.builds(HiddenBehind, width=st.floats(0, 5)),
     st.builds(Obstacles, count=st.floats(0, 9), width=st.floats(0, 9)),
     st.builds(BlockedSectors, count=st.integers(0, 5), degrees=st.floats(0, 360)),
@@ -81,6 +85,8 @@ def test_written_and_read_is_the_same(chain: tuple[QueryDistortion, ...]) -> Non
         "missing:bench/bus_stop",
         "known:alignment_tree",
         "view:60, behind:0.5, obstacles:2, blocked:1:degrees=45",
+        "view:60:told=false",
+        "ranges:25, scores:0.8",
         "detector:mine:half=20",
         "",
     ],
@@ -100,6 +106,7 @@ def test_any_order_of_any_distortions_gives_a_query(
         assert ((seen.bearings >= 0) & (seen.bearings < 360)).all()
         assert (seen.distances >= 0).all()
         assert len(seen.signature) == len(seen)
+        assert seen.photo.sees(seen.bearings).all()
         assert (rows(again), again.heading) == (rows(seen), seen.heading)
     assert rows(one) == before
 
@@ -146,6 +153,8 @@ def test_the_streams_of_random_numbers_are_fixed() -> None:
         "obstacles": 626_356_719,
         "blocked": 4_207_042_345,
         "detector": 4_129_241_295,
+        "ranges": 2_716_057_031,
+        "scores": 1_530_938_417,
     }
 
 
@@ -170,6 +179,8 @@ ORIGIN = np.zeros(1)
         (BlockedSectors, "count", [-1], ["sectors", "from 0"]),
         (BlockedSectors, "degrees", [-1.0, nan, inf], ["degrees", "from 0 to 360"]),
         (partial(Detector, noise=MINE), "half", [0.0, -3.0, nan], ["from 0.01"]),
+        (RoughRanges, "percent", [0.0, -5.0, 301.0, nan], ["error of the ranges", "to 300 %"]),
+        (ClassScores, "right", [0.5, 1.0, nan], ["mean score", "from 0.51"]),
         (QuerySpec, "number", [0], ["queries", "from 1"]),
         (QuerySpec, "seeds", [[], [1, 1]], ["at least one", "none twice"]),
         (QuerySpec, "seeds", [[-1]], ["-1", "from 0"]),
@@ -196,6 +207,7 @@ def test_settings_out_of_range(kind: Any, name: str, values: list[Any], words: l
         (InputError, "errors:2.5", ["'2.5'", "a whole number"]),
         (InputError, "medium:resort=no", ["'no'", "true or false"]),
         (InputError, "view:0", ["0.0 degrees", "above 0"]),
+        (InputError, "view:70:told=no", ["'no'", "true or false"]),
     ],
 )
 def test_texts_of_distortions(kind: type[SemsigError], text: str, words: list[str]) -> None:

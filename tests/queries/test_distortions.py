@@ -30,11 +30,14 @@ from sights import (
 
 from semsig_gis.core.geometry import angular_distance
 from semsig_gis.core.signature import Signature
+from semsig_gis.core.view import FULL_VIEW, View
 from semsig_gis.likelihood.noise.model import NoiseMixture, NoiseSpec, named_noise
 from semsig_gis.likelihood.noise.table import LONGEST_TABLE, noise_tables
+from semsig_gis.queries.chain import parse_chain, ready_chain
 from semsig_gis.queries.distortions import (
     DISTORTIONS,
     BlockedSectors,
+    ClassScores,
     CompassBias,
     Detector,
     Distortion,
@@ -42,6 +45,7 @@ from semsig_gis.queries.distortions import (
     HiddenBehind,
     MissingClasses,
     Obstacles,
+    RoughRanges,
     distort,
 )
 from semsig_gis.queries.sight import CitySights
@@ -307,6 +311,93 @@ def test_each_object_is_in_view_as_often_as_the_view_is_wide(degrees: float, see
     assert_shown(view, seed, degrees / 360.0)
     # Of objects all round, just the width of the view is shown every time.
     assert abs(len(spoiled(view, all_round(3600), seed)) - 10.0 * degrees) <= 1.5
+
+
+@given(degrees=st.floats(1.0, 360.0), turn=st.floats(-400, 400), one=sights, seed=seeds)
+def test_a_view_tells_where_it_looked(degrees: float, turn: float, one: Sight, seed: int) -> None:
+    there = spoiled(FieldOfView(degrees=degrees), one, seed)
+    untold = spoiled(FieldOfView(degrees=degrees, told=False), one, seed)
+    assert rows(there) == rows(untold)
+    assert untold.photo == FULL_VIEW
+    assert there.photo.width == pytest.approx(degrees)
+    middle = np.deg2rad(there.photo.turned(turn).sectors[0]).mean() if degrees < 360.0 else 0.0
+    turned = there.turned(turn)
+    if degrees < 360.0:  # its sectors turn with the objects in it
+        found = np.deg2rad(turned.photo.sectors[0]).mean()
+        assert np.exp(1j * found) == pytest.approx(np.exp(1j * middle), abs=1e-9)
+        view = turned.signature
+        assert isinstance(view, View)
+        assert view.photos == (turned.photo,)
+
+
+@given(first=st.floats(1.0, 359.0), second=st.floats(1.0, 359.0), seed=seeds)
+def test_of_a_view_of_a_view_the_common_part_is_told(
+    first: float, second: float, seed: int
+) -> None:
+    chain = (FieldOfView(degrees=first), FieldOfView(degrees=second))
+    both = ready_chain(chain, CITY)(all_round(3600), seed, 0)
+    if len(both):
+        assert both.photo.width == pytest.approx(len(both) / 10.0, abs=0.3)
+        assert both.photo.sees(both.bearings).all()
+
+
+def test_nothing_false_is_out_of_a_view_that_is_told() -> None:
+    for text, inside in (("view:40, errors:13", True), ("view:40:told=false, errors:13", False)):
+        seen = [ready_chain(parse_chain(text), CITY)(many(0), 0, number) for number in range(300)]
+        gaps = [np.diff([*one.bearings, one.bearings[0] + 360.0]).max() for one in seen if len(one)]
+        assert bool(min(gaps) >= 320.0) is inside
+
+
+@pytest.mark.parametrize("percent", [10.0, 25.0, 80.0])
+def test_rough_ranges_are_off_by_their_error(percent: float) -> None:
+    seen = spoiled(RoughRanges(percent=percent), many(TRIALS, distance=12.0))
+    assert seen.ranges is not None
+    off = np.log(seen.ranges / 12.0) / (percent / 100.0)
+    assert abs(off.mean()) < 6.0 / sqrt(TRIALS)
+    assert abs(off.std() - 1.0) < 6.0 / sqrt(2 * TRIALS)
+    view = seen.signature
+    assert isinstance(view, View)
+    assert view.range_errors is not None
+    assert (view.range_errors == percent / 100.0).all()
+
+
+@pytest.mark.parametrize("text", ["errors:200, ranges:80", "ranges:80, errors:200", "ranges:80, F"])
+def test_false_objects_are_anywhere_on_the_disc(text: str) -> None:
+    noise = replace(PERFECT, clutter=70.0, name="F")
+    chain = parse_chain(text.replace("F", "detector:F"), noises={"F": noise})
+    seen = [ready_chain(chain, CITY)(many(0), 0, number) for number in range(40)]
+    squares = (np.concatenate([one.ranges for one in seen if one.ranges is not None]) / REACH) ** 2
+    assert len(squares) > 300
+    assert 0.0 < squares.min() <= squares.max() <= 1.0
+    assert abs(squares.mean() - 0.5) < 6.0 / sqrt(12 * len(squares))
+
+
+@pytest.mark.parametrize("right", [0.55, 0.8, 0.95])
+def test_scores_can_be_trusted(right: float) -> None:
+    each = TRIALS * 2
+    codes = np.repeat(np.array(CLASSES, np.uint8), each)
+    here = sight([(code, 90.0, 10.0) for code in codes.tolist()])
+    seen = spoiled(ClassScores(right=right), here)
+    assert seen.scores is not None
+    assert (seen.codes == seen.scores.argmax(axis=1)).all()
+    own = seen.scores[np.arange(len(codes)), codes]
+    assert own.mean() == pytest.approx(right, abs=0.02)
+    for code in CLASSES:  # of all that is given such a score of a class, so much is of the class
+        said = seen.scores[:, code]
+        for low in np.arange(0.0, 1.0, 0.2):
+            some = (said >= low) & (said < low + 0.2)
+            spread = sqrt(0.25 / max(some.sum(), 1))
+            assert abs(said[some].mean() - (codes[some] == code).mean()) < 4 * spread
+    # What is misnamed or made up afterwards, the detector is sure of.
+    after = spoiled(Distortion(occurrences=40), seen.only(np.arange(20)))
+    assert after.scores is not None
+    sure = after.scores.max(axis=1) == 1.0
+    assert 15 < sure.sum() < len(after)
+    assert (after.codes[sure] == after.scores[sure].argmax(axis=1)).all()
+
+
+def test_types_and_bearings_alone_are_no_view() -> None:
+    assert type(spoiled(Distortion(), all_round(9)).signature) is Signature
 
 
 @given(one=sights, width=st.floats(0.0, 5.0))
