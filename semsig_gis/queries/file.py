@@ -11,7 +11,7 @@ from semsig_gis.core.errors import InputError
 from semsig_gis.core.signature import Signature
 from semsig_gis.database.north import GRID_NORTH
 from semsig_gis.likelihood.route import Leg
-from semsig_gis.storage.geoparquet import (
+from semsig_gis.storage.rows import (
     file_rows,
     json_rows,
     parse_rows,
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
     from semsig_gis.core.taxonomy import Taxonomy
     from semsig_gis.database.north import North
-    from semsig_gis.storage.geoparquet import Row
+    from semsig_gis.storage.rows import Row
 
 Route = tuple[list[tuple[str | int, Signature]], list[Leg]]
 

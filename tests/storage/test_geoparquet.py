@@ -1,4 +1,4 @@
-"""GeoParquet files, the rows of tables, and the signatures that they hold."""
+"""GeoParquet files."""
 
 from __future__ import annotations
 
@@ -20,19 +20,15 @@ from hypothesis.extra.numpy import arrays
 from pyproj import CRS
 from sentences import assert_sentence, refused
 
-from semsig_gis.core.errors import DatabaseError, InputError
-from semsig_gis.sources.catalog import paper_taxonomy
+from semsig_gis.core.errors import DatabaseError
 from semsig_gis.storage.geoparquet import (
     bounds_column,
     each_bounds,
     geo_metadata,
     groups_meeting,
     hilbert_order,
-    parse_rows,
     points_to_wkb,
     read_geoparquet,
-    read_rows,
-    row_signature,
     rows_meeting,
     write_geoparquet,
 )
@@ -228,63 +224,3 @@ def test_a_file_without_bounds_may_meet_any_box(tmp_path: Path) -> None:
             assert groups_meeting(file, (0, 0, 1, 1)) == [0]
         assert list(each_bounds(tmp_path / "a.parquet")) == []
         assert rows_meeting(table, (0, 0, 1, 1)) == table
-
-
-TAXONOMY = paper_taxonomy()
-WORDS = st.text(st.characters(codec="utf-8", exclude_characters="\x00"), max_size=6)
-
-
-@given(st.lists(st.fixed_dictionaries({"a": WORDS, "b": WORDS}), min_size=1, max_size=4))
-def test_what_was_written_is_read(rows: list[dict[str, str]]) -> None:
-    text = "\n".join(json.dumps(row) for row in rows)
-    found = parse_rows(text.split("\n"), "x", dict, what="thing")
-    assert found == list(enumerate(rows, start=1))
-
-
-def test_cells_of_a_table_may_hold_commas_and_line_breaks(tmp_path: Path) -> None:
-    path = tmp_path / "rows.CSV"
-    path.write_text('\ufeffid,types\n"a, b",D\n\n"c\nd",B\n', encoding="utf-8")
-    found = read_rows(path, lambda row: (row["id"], row["types"]), what="thing")
-    assert found == [(2, ("a, b", "D")), (5, ("c\nd", "B"))]
-
-
-@pytest.mark.parametrize(
-    "bearings", [[360, -10, -360], "360;-10;-360", "360, -10,-360", " 360 -10 -360 "]
-)
-def test_bearings_in_any_shape_and_beyond_the_circle(bearings: object) -> None:
-    seen = row_signature({"types": " DBL ", "bearings": bearings}, TAXONOMY)
-    assert seen is not None
-    assert seen.bearings is not None
-    assert seen.bearings.tolist() == [0.0, 0.0, 350.0]
-
-
-@pytest.mark.parametrize("row", [{}, {"types": ""}, {"types": None, "bearings": []}])
-def test_nothing_was_seen(row: dict[str, object]) -> None:
-    assert row_signature(row, TAXONOMY) is None
-
-
-@pytest.mark.parametrize(
-    ("text", "table", "words"),
-    [
-        ("", False, ["no rows", "one thing"]),
-        ("a,b\n", True, ["no rows"]),
-        ("{", False, ["line 1", "not JSON"]),
-        ("\n[1]", False, ["line 2", "names and values"]),
-        ('{"types": "D", "bearings": NaN}', False, ["line 1", "nan"]),
-        ('{"types": ["D"]}', False, ["line 1"]),
-        ('{"types": "D", "bearings": {"a": 1}}', False, ["line 1", "not all numbers"]),
-        ('{"types": "D", "bearings": [[1]]}', False, ["line 1"]),
-        ("[" * 100_000, False, ["line 1"]),
-        ("types\n" + "D" * 200_000, True, ["not CSV"]),
-    ],
-)
-def test_what_cannot_be_used_is_named(
-    tmp_path: Path,
-    text: str,
-    table: bool,  # noqa: FBT001
-    words: list[str],
-) -> None:
-    path = tmp_path / ("x.csv" if table else "x.jsonl")
-    path.write_text(text)
-    with refused(InputError, path.name, *words):
-        read_rows(path, lambda row: row_signature(row, TAXONOMY), what="thing")

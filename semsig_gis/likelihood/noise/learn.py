@@ -26,7 +26,7 @@ from semsig_gis.likelihood.noise.fit import (
     starting_model,
 )
 from semsig_gis.likelihood.noise.model import NoiseSpec
-from semsig_gis.storage.geoparquet import read_rows, row_signature, row_value
+from semsig_gis.storage.rows import read_rows, row_signature, row_value
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -40,7 +40,7 @@ if TYPE_CHECKING:
     from semsig_gis.likelihood.noise.fit import Evidence
     from semsig_gis.likelihood.noise.table import NoiseTable
     from semsig_gis.objects.table import StreetObjects
-    from semsig_gis.storage.geoparquet import Row
+    from semsig_gis.storage.rows import Row
 
 MOST_ROUNDS = 500
 SETTLED = 1e-4  # largest change of a log-odds or logarithm

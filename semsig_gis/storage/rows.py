@@ -1,0 +1,156 @@
+"""Rows of text files: CSV, and JSON lines."""
+
+from __future__ import annotations
+
+import csv
+import io
+import re
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, TypeVar
+
+from semsig_gis.core.errors import InputError, SemsigError
+from semsig_gis.core.signature import Signature
+from semsig_gis.storage.text import parse_json, read_whole
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterable, Iterator
+
+    from semsig_gis.core.taxonomy import Taxonomy
+
+MOST_ROWS = 2**30
+"""Bytes of a file of rows, which is read whole."""
+
+Row = dict[str, Any]
+"""The values of a row by name."""
+
+_T = TypeVar("_T")
+
+
+def read_rows(path: str | Path, read: Callable[[Row], _T], *, what: str) -> list[tuple[int, _T]]:
+    """Return the line number of each row of a file (CSV or JSON lines), and what `read` made of it.
+
+    `read` raises an error that says what is wrong with a row; `what` names a row in messages.
+    InputError if the file cannot be read, has no rows, or a row cannot be used.
+    """
+    return _all_rows(file_rows(path, what=what), str(path), read, what)
+
+
+def parse_rows(
+    lines: Iterable[str | bytes], source: str, read: Callable[[Row], _T], *, what: str
+) -> list[tuple[int, _T]]:
+    """Return what `read_rows` does, from JSON lines that messages call `source`."""
+    return _all_rows(json_rows(lines), source, read, what)
+
+
+def _all_rows(
+    rows: Iterable[tuple[int, Row | Exception]], source: str, read: Callable[[Row], _T], what: str
+) -> list[tuple[int, _T]]:
+    """Return what `read` made of all rows, and raise the first error."""
+    found = []
+    for line, _, one in scan_rows(rows, source, read, what=what):
+        if isinstance(one, InputError):
+            raise one
+        found.append((line, one))
+    if not found:
+        msg = f"{source} has no rows; give one {what} on each line."
+        raise InputError(msg)
+    return found
+
+
+def file_rows(path: str | Path, *, what: str) -> Iterator[tuple[int, Row | Exception]]:
+    """Give the line number of each row of a file (CSV or JSON lines) and its values, or its error.
+
+    InputError if the file cannot be read; `what` names a row in messages.
+    """
+    file = Path(path)
+    try:
+        if file.suffix.lower() == ".csv":
+            return csv_rows(read_whole(file, most=MOST_ROWS).decode("utf-8-sig"), str(file))
+        return json_rows(read_whole(file, most=MOST_ROWS).split(b"\n"))
+    except (OSError, ValueError) as error:
+        reason = error.strerror if isinstance(error, OSError) else error
+        msg = f"{what} file {file} cannot be read ({reason}); give a CSV or JSON lines file."
+        raise InputError(msg) from error
+
+
+def scan_rows(
+    rows: Iterable[tuple[int, Row | Exception]],
+    source: str,
+    read: Callable[[Row], _T],
+    *,
+    what: str,
+) -> Iterator[tuple[int, Row, _T | InputError]]:
+    """Give the line number of each row, its values, and what `read` made of it or its error.
+
+    The values of a row that cannot be read are none.
+    """
+    for line, row in rows:
+        found: _T | InputError
+        try:
+            if isinstance(row, Exception):
+                raise row
+            if not isinstance(row, dict):
+                msg = "it is not a table of names and values"
+                raise InputError(msg)
+            found = read(row)
+        except (SemsigError, ValueError, TypeError, OverflowError, RecursionError) as error:
+            reason = str(error).rstrip(".")
+            msg = f"line {line} of {source} is no {what} ({reason}); correct it or take it out."
+            found = InputError(msg)
+            found.__cause__ = error
+        yield line, row if isinstance(row, dict) else {}, found
+
+
+def row_signature(row: Row, taxonomy: Taxonomy) -> Signature | None:
+    """Return the signature of a row, clockwise from north, or None where nothing was seen.
+
+    The row has ``types`` (symbols such as ``DDB``) and ``bearings`` (degrees; a list, or text with
+    blanks, commas or semicolons between them), each of which may be missing or empty. InputError if
+    they cannot be used or do not fit each other.
+    """
+    types, bearings = row_value(row, "types"), row_value(row, "bearings")
+    if isinstance(bearings, str):
+        bearings = [float(part) for part in re.split(r"[\s,;]+", bearings.strip()) if part]
+    elif isinstance(bearings, (int, float)):
+        bearings = [bearings]
+    symbols = None if types is None else str(types).strip()
+    if not symbols and not bearings:
+        return None
+    return Signature.parse(symbols or None, bearings or None, taxonomy=taxonomy)
+
+
+def row_value(row: Row, name: str) -> Any:  # noqa: ANN401 - any value of JSON
+    """Return a value of a row, None where it is missing or empty; 0 is a value."""
+    value = row.get(name)
+    return None if isinstance(value, str) and not value.strip() else value
+
+
+def csv_rows(text: str, source: str) -> Iterator[tuple[int, Row | Exception]]:
+    """Give the line number of each row of CSV, and its values or its error."""
+    reader = csv.DictReader(io.StringIO(text, newline=""))
+    try:
+        _ = reader.fieldnames
+    except csv.Error as error:
+        msg = f"{source} is not CSV ({error}); correct it."
+        raise InputError(msg) from error
+    while True:
+        row: Row | Exception | None
+        try:
+            row = next(reader, None)
+        except csv.Error as error:
+            row = InputError(f"it is not CSV: {error}")
+        if row is None:
+            return
+        yield reader.reader.line_num, row
+
+
+def json_rows(lines: Iterable[str | bytes]) -> Iterator[tuple[int, Row | Exception]]:
+    """Give the number of each line of JSON that is not blank, and its values or its error."""
+    for line, text in enumerate(lines, start=1):
+        if text.strip():
+            row: Row | Exception
+            try:
+                row = parse_json(text)
+            except ValueError as error:
+                row = InputError(f"it is not JSON: {error}")
+            yield line, row
