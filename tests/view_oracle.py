@@ -5,13 +5,15 @@ w_i how much of its wrapped normal lies in the sectors S of a photo; detection j
 a_j, the range r_j (or none) and the weights of classes c_j(t). In a photo,
 
     hit_ij   = p_i * sum_t c_j(t) C(tau_i, t) * N(a_j - theta_i; sigma_i) * LN(r_j; d_i, s_ij)
-    lambda_j = sum_t c_j(t) clutter_t / 360 * (2 r_j^2 / R^2 with a range)
-    log L    = -|S| / 360 * sum_t clutter_t + sum_i log(1 - p_i w_i) + log of
+    lambda_j = sum_t c_j(t) (clutter_t + sum_i l_i C(tau_i, t)) / 360 * (2 r_j^2 / R^2 with a range)
+    log L    = -|S| / 360 * (sum_t clutter_t + sum_i l_i) + sum_i log(1 - p_i w_i) + log of
                exact: the sum over all one-to-one associations of products of hit_ij / (1 - p_i w_i)
                       of pairs and of lambda_j of the detections that are in none;
                set:   prod_j (lambda_j + sum_i hit_ij / (1 - p_i w_i))
 
-LN is a density of the logarithm of the range. Photos are independent given the place.
+LN is a density of the logarithm of the range. Photos are independent given the place. Who stands
+elsewhere in a cell than in its middle (position_sigma) has some objects at the edge of range beyond
+it, which p_i leaves out, and sees as many others instead: l_i, anywhere.
 """
 
 from __future__ import annotations
@@ -50,6 +52,7 @@ class Thing:
     distance: float
     range_sigma: float
     distance_sigma: float = 0.0
+    leaving: float = 0.0
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -105,7 +108,8 @@ def range_density(seen: Seen, thing: Thing) -> float:
 def false_density(seen: Seen, scene: Scene) -> float:
     """Return the density of a false detection: lambda_j."""
     disc = 1.0 if math.isnan(seen.range) else 2.0 * (seen.range / scene.reach) ** 2
-    return disc * float(np.dot(seen.weights, scene.clutter)) / 360.0
+    come = sum(one.leaving * float(np.dot(seen.weights, one.names)) for one in scene.things)
+    return disc * (float(np.dot(seen.weights, scene.clutter)) + come) / 360.0
 
 
 def hit_density(seen: Seen, thing: Thing) -> float:
@@ -124,8 +128,8 @@ def _empty(scene: Scene, photo: Photo) -> tuple[float, list[float]]:
         1.0 - one.chance * mass_inside(one.bearing, one.bearing_sigma, photo)
         for one in scene.things
     ]
-    nothing = sum(map(math.log, missed)) - photo.width / 360.0 * sum(scene.clutter)
-    return nothing, missed
+    false = sum(scene.clutter) + sum(one.leaving for one in scene.things)
+    return sum(map(math.log, missed)) - photo.width / 360.0 * false, missed
 
 
 def set_loglik(scene: Scene, seen: Sequence[Seen], photo: Photo) -> float:
@@ -192,15 +196,14 @@ def fading(spec: NoiseSpec, name: str, distance: float) -> float:
     return float(np.interp(distance, metres, shares))
 
 
-def scene_of(
-    database: SignatureDatabase,
-    cell: int,
-    spec: NoiseSpec,
-    table: NoiseTable,
-    *,
-    in_range: Callable[[float], float] = lambda _: 1.0,
-) -> Scene:
-    """Return what a cell sees by a noise model; `in_range` is a chance by distance."""
+def in_range(distance: float, limit: float, sigma: float) -> float:
+    """Return the chance that an object is in range of an observer who may stand elsewhere."""
+    return 0.5 * math.erfc((distance - limit) / (sigma * math.sqrt(2.0))) if sigma else 1.0
+
+
+def scene_of(database: SignatureDatabase, cell: int, spec: NoiseSpec, table: NoiseTable) -> Scene:
+    """Return what a cell sees by a noise model."""
+    limits = database.taxonomy.ranges(database.spec.radius)
     views = views_in(database, np.array([cell]))
     row = int(table.length_rows(views.lengths)[0])
     things = []
@@ -210,16 +213,18 @@ def scene_of(
         kind, name = int(table.row_of[code]), database.taxonomy.by_code(code).name
         metres = max(distance, 0.5 * database.reach / 255.0)  # the middle of the first unit
         turned = math.degrees(spec.position_sigma / metres)
-        seen = 1.0 - float(table.missed[row, kind])
+        seen = (1.0 - float(table.missed[row, kind])) * fading(spec, name, metres)
+        inside = in_range(metres, float(limits[code]), spec.position_sigma)
         things.append(
             Thing(
-                chance=seen * fading(spec, name, metres) * in_range(metres),
+                chance=seen * inside,
                 names=table.named[row, kind].tolist(),
                 bearing=bearing,
                 bearing_sigma=min(math.hypot(float(table.sigma[kind]), turned), 180.0),
                 distance=metres,
                 range_sigma=spec.range_sigma_by_class.get(name, spec.range_sigma),
                 distance_sigma=spec.position_sigma,
+                leaving=seen * (1.0 - inside),
             )
         )
     return Scene(things=things, clutter=table.clutter.tolist(), reach=database.reach)
@@ -252,7 +257,6 @@ def cell_loglik(
     *,
     headings: Iterable[Sequence[tuple[float, float]]] | None = None,
     form: Callable[[Scene, Sequence[Seen], Photo], float] = exact_loglik,
-    in_range: Callable[[float], float] = lambda _: 1.0,
 ) -> float:
     """Return the log-likelihood of a view in a cell; `form` is `exact_loglik` or `set_loglik`.
 
@@ -264,7 +268,7 @@ def cell_loglik(
     codes = database.present_codes.tolist()
     each = []
     for spec, table, chance in zip(noise.specs, *database_tables(database, noise), strict=True):
-        scene = scene_of(database, cell, spec, table, in_range=in_range)
+        scene = scene_of(database, cell, spec, table)
         each.append(math.log(chance) + turned_loglik(scene, view, codes, turns, form))
     return float(np.logaddexp.reduce(each))
 
