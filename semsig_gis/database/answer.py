@@ -11,20 +11,19 @@ from functools import cached_property
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any, Protocol, Self, TypeVar
 
-import geopandas as gpd
 import numpy as np
-from pyproj import Transformer
 
 from semsig_gis.core.errors import InputError
 from semsig_gis.core.taxonomy import WILDCARD
 from semsig_gis.database.north import GRID_NORTH
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Hashable, Iterator, Sequence
+    from collections.abc import Callable, Hashable, Iterator, Mapping, Sequence
 
+    import geopandas as gpd
     import pandas as pd
     from numpy.typing import ArrayLike, NDArray
-    from pyproj import CRS
+    from pyproj import CRS, Transformer
 
     from semsig_gis.core.signature import Signature
     from semsig_gis.core.taxonomy import Taxonomy
@@ -40,15 +39,15 @@ REGION_SHARE = 0.9
 class Answer(ABC):
     """The best cells for a query, whatever ranked them.
 
-    `candidates` has one row a cell, best first: its rank, ``cell`` (row in the database),
+    `columns` tell of the cells by name, best first: the rank, ``cell`` (row in the database),
     ``cell_id``, ``x`` and ``y`` (viewpoint in `crs`), ``types`` (symbols), ``length`` (objects) and
-    what the method tells of it. `cells` counts the cells that were searched, and `notes` are
-    sentences on what of the query could not be used as it was given. The bearings of `query` count
-    from `north`.
+    what the method tells of them; `candidates` is the table of them. `cells` counts the cells that
+    were searched, and `notes` are sentences on what of the query could not be used as it was given.
+    The bearings of `query` count from `north`.
     """
 
     query: Signature
-    candidates: pd.DataFrame
+    columns: Mapping[str, NDArray[Any]]
     cells: int
     crs: CRS
     taxonomy: Taxonomy
@@ -56,6 +55,13 @@ class Answer(ABC):
     tied_beyond: int = 0
     notes: tuple[str, ...] = ()
     north: North = GRID_NORTH
+
+    @cached_property
+    def candidates(self) -> pd.DataFrame:
+        """The cells of `columns`, a row each."""
+        import pandas as pd  # noqa: PLC0415 - it loads slowly
+
+        return pd.DataFrame(dict(self.columns))
 
     @property
     def grid_query(self) -> Signature:
@@ -81,22 +87,29 @@ class Answer(ABC):
 
     def to_geodataframe(self) -> gpd.GeoDataFrame:
         """Return the candidates with their viewpoints as points in the CRS of the database."""
+        import geopandas as gpd  # noqa: PLC0415 - it loads slowly
+
         points = gpd.points_from_xy(self.candidates["x"], self.candidates["y"])
         return gpd.GeoDataFrame(self.candidates.copy(), geometry=points, crs=self.crs)
 
     @cached_property
     def _to_degrees(self) -> Transformer:
+        from pyproj import Transformer  # noqa: PLC0415 - it loads slowly
+
         return Transformer.from_crs(self.crs, "EPSG:4326", always_xy=True)
 
-    def _candidate_records(self) -> list[dict[Hashable, Any]]:
+    def _candidate_records(self) -> list[dict[str, Any]]:
         """Return the candidates as plain values, with ``lon`` and ``lat`` to a centimetre."""
-        x, y = (self.candidates[name].to_numpy() for name in ("x", "y"))
-        lon, lat = np.round(self._to_degrees.transform(x, y), 7)
-        return self.candidates.assign(lon=lon, lat=lat).to_dict(orient="records")
+        lon, lat = np.round(self._to_degrees.transform(self.columns["x"], self.columns["y"]), 7)
+        columns = {**self.columns, "lon": lon, "lat": lat}
+        rows = zip(*(column.tolist() for column in columns.values()), strict=True)
+        return [dict(zip(columns, row, strict=True)) for row in rows]
 
 
-def candidate_columns(database: SignatureDatabase, cells: NDArray[np.int64]) -> dict[str, Any]:
-    """Return what `Answer.candidates` tells of some cells, whatever ranked them."""
+def candidate_columns(
+    database: SignatureDatabase, cells: NDArray[np.int64]
+) -> dict[str, NDArray[Any]]:
+    """Return what `Answer.columns` tell of some cells, whatever ranked them."""
     listed = database.select(cells)
     symbols, ends = database.taxonomy.decode(listed.codes), listed.offsets.tolist()
     return {
@@ -104,7 +117,7 @@ def candidate_columns(database: SignatureDatabase, cells: NDArray[np.int64]) -> 
         "cell_id": listed.cell_ids,
         "x": listed.xy[:, 0],
         "y": listed.xy[:, 1],
-        "types": [symbols[start:end] for start, end in pairwise(ends)],
+        "types": np.array([symbols[start:end] for start, end in pairwise(ends)], dtype=object),
         "length": listed.lengths,
     }
 

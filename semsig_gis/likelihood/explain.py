@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from dataclasses import dataclass
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
-import geopandas as gpd
 import numpy as np
-import pandas as pd
-import shapely
 
 from semsig_gis.core.geometry import SOURCE, SOURCE_ID, signed_degrees
 from semsig_gis.core.taxonomy import WILDCARD
@@ -19,6 +18,7 @@ from semsig_gis.likelihood.association import associate, near_pairs
 from semsig_gis.likelihood.noise.table import LONGEST_TABLE, noise_tables, query_bearings
 
 if TYPE_CHECKING:
+    import geopandas as gpd
     from numpy.typing import NDArray
     from pyproj import CRS
 
@@ -35,6 +35,7 @@ if TYPE_CHECKING:
 UNKNOWN_NAME = "unknown"
 LEAST_CHANCE = 0.01  # of two things being one, to be set beside each other
 VERDICTS = ("matched", "misnamed", "missed", "false")
+NUMBERS = ("query", "object")  # of rows
 COLUMNS = [
     *("verdict", "chance", "query", "query_class", "query_bearing", "object", "source"),
     *("source_id", "object_class", "object_bearing", "distance", "bearing_error"),
@@ -45,35 +46,48 @@ COLUMNS = [
 class Explanation:
     """What a query and a place have in common, and what not.
 
-    `table` has one row for each object of the query, then one for each street object that none of
-    them is likely to be, with the street object as geometry. `verdict` is ``"matched"`` (more
-    likely an object than not), ``"misnamed"`` (the same, but of another class), ``"false"`` or
-    ``"missed"``; `chance` is that it holds. `query` and `object` are row numbers, `distance` is in
-    metres, and `bearing_error` in degrees clockwise from object to detection. What does not apply
-    is missing. `xy` is the place in metres, `heading` the degrees added to the bearings of the
-    query.
+    `rows` has one for each object of the query, then one for each street object that none of them
+    is likely to be; `table` is the table of them. `verdict` is ``"matched"`` (more likely an object
+    than not), ``"misnamed"`` (the same, but of another class), ``"false"`` or ``"missed"``;
+    `chance` is that it holds. `query` and `object` are row numbers, `distance` is in metres,
+    `bearing_error` in degrees clockwise from object to detection, and `place` that of the street
+    object. What does not apply is None. `place` and `xy` are in metres in `crs`, `heading` is the
+    degrees added to the bearings of the query.
     """
 
-    table: gpd.GeoDataFrame
+    rows: tuple[dict[str, Any], ...]
     xy: tuple[float, float]
     heading: float
     loglik: float
+    crs: CRS
+
+    @cached_property
+    def table(self) -> gpd.GeoDataFrame:
+        """The rows with the street object as geometry; what does not apply is missing."""
+        import geopandas as gpd  # noqa: PLC0415 - it loads slowly
+        import pandas as pd  # noqa: PLC0415
+        import shapely  # noqa: PLC0415
+
+        places = [row["place"] for row in self.rows]
+        points = [None if place is None else shapely.Point(place) for place in places]
+        table = pd.DataFrame(self.rows, columns=COLUMNS).astype(dict.fromkeys(NUMBERS, "Int64"))
+        return gpd.GeoDataFrame(table, geometry=points, crs=self.crs)
 
     @property
     def counts(self) -> dict[str, int]:
         """How many rows there are of each verdict."""
-        counts = self.table["verdict"].value_counts()
-        return {verdict: int(counts.get(verdict, 0)) for verdict in VERDICTS}
+        counts = Counter(row["verdict"] for row in self.rows)
+        return {verdict: counts[verdict] for verdict in VERDICTS}
 
     def to_dict(self, north: North = GRID_NORTH) -> dict[str, Any]:
         """Return plain values for JSON; what does not apply in a row is None.
 
         The bearings of the table count from grid north, those of the values from `north`.
         """
-        plain = pd.DataFrame(self.table.drop(columns="geometry"))
-        for name in ("query_bearing", "object_bearing"):
-            plain[name] = plain[name].map(north.from_grid)
-        rows = plain.astype(object).where(plain.notna(), None).to_dict("records")
+        rows = [{name: row[name] for name in COLUMNS} for row in self.rows]
+        for row in rows:
+            for name in ("query_bearing", "object_bearing"):
+                row[name] = None if row[name] is None else north.from_grid(row[name])
         return {
             "x": self.xy[0],
             "y": self.xy[1],
@@ -107,7 +121,7 @@ def explain(
     place = np.array([[x, y]])
     view = views_at(objects, place, index=index, radius=radius, footprints=footprints)
     codes = np.unique(objects.codes)
-    scene = _Scene((x, y), view, codes, objects.taxonomy, objects.crs, objects.table)
+    scene = _Scene((x, y), view, codes, objects.taxonomy, objects.crs, objects)
     return scene.explanation(query, noise, heading)
 
 
@@ -139,7 +153,7 @@ class _Scene:
     codes: NDArray[np.uint8]
     taxonomy: Taxonomy
     crs: CRS
-    objects: gpd.GeoDataFrame | None = None
+    objects: StreetObjects | None = None
 
     def explanation(self, query: Signature, noise: Noise, heading: float) -> Explanation:
         """Return the verdicts on the objects of a query and those of the scene."""
@@ -151,10 +165,14 @@ class _Scene:
             if entry not in partners.values():
                 chance = max(1.0 - whole, 0.0)
                 rows.append({"verdict": "missed", "chance": chance, **self._object(entry)})
-        shapes = [row.get("geometry") for row in rows]
-        table = pd.DataFrame(rows, columns=COLUMNS).astype({"query": "Int64", "object": "Int64"})
-        placed = gpd.GeoDataFrame(table, geometry=shapes, crs=self.crs)
-        return Explanation(table=placed, xy=self.xy, heading=heading, loglik=loglik)
+        blank = dict.fromkeys([*COLUMNS, "place"])
+        return Explanation(
+            rows=tuple(blank | row for row in rows),
+            xy=self.xy,
+            heading=heading,
+            loglik=loglik,
+            crs=self.crs,
+        )
 
     def _chances(
         self, query: Signature, bearings: NDArray[np.float64], noise: Noise
@@ -227,15 +245,15 @@ class _Scene:
         if self.objects is None:
             x, y = self.xy
             angle = np.radians(bearing)
-            place = shapely.Point(x + distance * np.sin(angle), y + distance * np.cos(angle))
-            return facts | {"geometry": place}
+            place = float(x + distance * np.sin(angle)), float(y + distance * np.cos(angle))
+            return facts | {"place": place}
         row = int(view.objects[entry])
-        street_object = self.objects.iloc[row]
+        street_object = self.objects.table.iloc[row]
         return facts | {
             "object": row,
             "source": str(street_object[SOURCE]),
             "source_id": str(street_object[SOURCE_ID]),
-            "geometry": street_object.geometry,
+            "place": tuple(self.objects.xy[row].tolist()),
         }
 
     def _class_name(self, code: int) -> str:

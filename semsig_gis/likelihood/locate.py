@@ -13,7 +13,6 @@ from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any, TypedDict, Unpack
 
 import numpy as np
-import pandas as pd
 
 from semsig_gis.core.errors import InputError
 from semsig_gis.core.geometry import cell_ids, signed_degrees
@@ -130,12 +129,12 @@ class Location(Answer):
         CRS, classes and sources.
     noise : str
         Name of the noise model.
-    candidates : DataFrame
-        One row a cell, likeliest first: ``rank`` (from 1), ``cell`` (row in the database),
-        ``cell_id``, ``x`` and ``y`` (viewpoint, CRS of the database), ``types`` (symbols),
-        ``length`` (objects), ``loglik`` (natural logarithm of the likelihood), ``chance`` and,
-        where north was not known for sure, ``heading`` (degrees to add to the bearings of the
-        query).
+    columns : mapping of str to ndarray
+        Of the likeliest cells, which are the rows of `candidates`, likeliest first: ``rank`` (from
+        1), ``cell`` (row in the database), ``cell_id``, ``x`` and ``y`` (viewpoint, CRS of the
+        database), ``types`` (symbols), ``length`` (objects), ``loglik`` (natural logarithm of the
+        likelihood), ``chance`` and, where north was not known for sure, ``heading`` (degrees to
+        add to the bearings of the query).
     answer : Decision
         The cell around which the chance is largest, that chance, and whether it is enough.
     estimate : PlaceEstimate
@@ -205,7 +204,7 @@ class Location(Answer):
 
         ``place`` is what `PlaceEstimate.to_dict` gives with its ``cell_id``, ``lon``, ``lat``,
         ``chance`` and ``within_m``. ``threshold`` is None where nothing is answered. ``candidates``
-        lists the columns of `candidates`, ``lon``, ``lat`` (degrees, WGS 84) and, of the first
+        has the names of `columns`, ``lon``, ``lat`` (degrees, WGS 84) and, of the first
         ones, ``explanation``. Its bearings count from ``north``, as those of the query do;
         ``prior`` holds `known` and ``ratio``; None if nothing was known.
         """
@@ -369,12 +368,12 @@ class LikelihoodLocator:
             estimate = cell_estimate(
                 known, noise, posterior, answer.cell, radius=radius, north_sigma=sigma
             )
-        candidates = _candidates(scores, posterior, min(top, len(scores.loglik)))
-        first = candidates["cell"].to_list()[: self.explained if len(known) else 0]
+        columns = _columns(scores, posterior, min(top, len(scores.loglik)))
+        first = columns["cell"].tolist()[: self.explained if len(known) else 0]
         return Location(
             query=query,
             noise=noise.name,
-            candidates=candidates,
+            columns=columns,
             cells=len(scores.loglik),
             crs=database.crs,
             taxonomy=database.taxonomy,
@@ -566,8 +565,8 @@ def _prior_notes(ratio: float | None) -> tuple[str, ...]:
     return (note,)
 
 
-def _candidates(scores: CellScores, posterior: Posterior, count: int) -> pd.DataFrame:
-    """Return the likeliest cells."""
+def _columns(scores: CellScores, posterior: Posterior, count: int) -> dict[str, NDArray[Any]]:
+    """Return the likeliest cells, by column."""
     database, chances = posterior.database, posterior.chances
     likely = np.argpartition(-chances, count - 1)[:count]
     listed = likely[np.lexsort((likely, -chances[likely]))]
@@ -579,7 +578,7 @@ def _candidates(scores: CellScores, posterior: Posterior, count: int) -> pd.Data
     }
     if scores.heading is not None:
         columns["heading"] = scores.heading[listed].astype(np.float64)
-    return pd.DataFrame(columns)
+    return columns
 
 
 def _places_like(location: Location) -> NDArray[np.intp]:

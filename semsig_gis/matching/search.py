@@ -11,7 +11,6 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import pandas as pd
 
 from semsig_gis.core.errors import EmptyResultError
 from semsig_gis.database.answer import (
@@ -52,12 +51,12 @@ class Localization(Answer):
         How the cells were ranked.
     used : str
         Which parts of the query were compared: ``"types"``, ``"angles"`` or ``"types+angles"``.
-    candidates : DataFrame
-        One row a cell, best first, equal distances in the order of the database: ``rank_low``
-        and ``rank_high`` (the first and last rank, from 1, that the cell can have when ties are
-        broken either way), ``tied`` (how many cells share its distance), ``cell`` (row in the
-        database), ``cell_id``, ``x`` and ``y`` (viewpoint, CRS of the database), ``types``
-        (symbols), ``length`` (objects), ``distance``.
+    columns : mapping of str to ndarray
+        Of the best cells, which are the rows of `candidates`, best first, equal distances in the
+        order of the database: ``rank_low`` and ``rank_high`` (the first and last rank, from 1, that
+        the cell can have when ties are broken either way), ``tied`` (how many cells share its
+        distance), ``cell`` (row in the database), ``cell_id``, ``x`` and ``y`` (viewpoint, CRS of
+        the database), ``types`` (symbols), ``length`` (objects), ``distance``.
     tied_beyond : int
         How many cells are as good as the last candidate but are not listed.
 
@@ -74,13 +73,13 @@ class Localization(Answer):
 
     def region_cells(self, database: SignatureDatabase, share: float) -> NDArray[np.int64]:  # noqa: ARG002
         """Return the rows of the candidates in the database that was searched."""
-        ids, types = self.candidates["cell_id"], self.candidates["types"]
+        ids, types = self.columns["cell_id"], self.columns["types"]
         return rows_of_result(database, ids, types, what="localization")
 
     def to_dict(self) -> dict[str, Any]:
         """Return everything as plain values that JSON can hold, candidates as a list of records.
 
-        They have the columns of `candidates` and ``lon``, ``lat`` (degrees, WGS 84).
+        They have the names of `columns` and ``lon``, ``lat`` (degrees, WGS 84).
         """
         return {
             "query": self.query.to_dict(self.taxonomy),
@@ -119,17 +118,17 @@ class DistanceLocator:
         known = grid_query.among(present)
         if not known.all():  # the last part might have had the class
             shortlist, part = self._search(grid_query.select(known), count)
-        candidates, tied_beyond = shortlist.ranked()
+        columns, tied_beyond = shortlist.ranked()
         if isinstance(self.database, PartitionedDatabase):
-            candidates["cell"] = self.database.row_numbers(candidates["cell_id"].to_numpy())
+            columns["cell"] = self.database.row_numbers(columns["cell_id"])
         elif self.requirement is not None:
             met = self.requirement.met(self.database.type_sequences)
-            candidates["cell"] = np.flatnonzero(met)[candidates["cell"]]
+            columns["cell"] = np.flatnonzero(met)[columns["cell"]]
         return Localization(
             query=query,
             method=self.method,
             used=self.method.used(query),
-            candidates=candidates,
+            columns=columns,
             cells=shortlist.cells,
             tied_beyond=tied_beyond,
             crs=part.crs,
@@ -181,12 +180,12 @@ class DistanceLocator:
 class Shortlist:
     """The best `top` cells of a search, gathered from one part of a database after the other.
 
-    `listed` holds them best first, equal distances in the order of columns and rows; `present` the
-    class codes that some cell sees; `cells` how many cells were looked at.
+    `listed` has their columns, best first, equal distances in the order of columns and rows of the
+    grid; `present` the class codes that some cell sees; `cells` how many cells were looked at.
     """
 
     def __init__(self, top: int) -> None:
-        self.listed = pd.DataFrame()
+        self.listed: dict[str, NDArray[Any]] = {}
         self.present: set[int] = set()
         self.cells = 0
         self._top = top
@@ -201,23 +200,24 @@ class Shortlist:
         values, sizes = np.unique(scores[cells], return_counts=True)
         self._sizes.update(dict(zip(values.tolist(), sizes.tolist(), strict=True)))
         cells = cells[: self._top]
-        part = pd.DataFrame(candidate_columns(database, cells))
+        part = candidate_columns(database, cells)
         part["distance"] = scores[cells].astype(np.float64)
         if self.cells:
-            both = pd.concat([self.listed, part], ignore_index=True)
-            part = both.sort_values(["distance", "cell_id"], ignore_index=True).head(self._top)
+            both = {name: np.append(self.listed[name], part[name]) for name in part}
+            best = np.lexsort((both["cell_id"], both["distance"]))[: self._top]
+            part = {name: column[best] for name, column in both.items()}
         self.listed = part
         self.present.update(database.present_codes.tolist())
         self.cells += len(database)
 
-    def ranked(self) -> tuple[pd.DataFrame, int]:
-        """Return the candidates and the number of ties beyond them, as in `Localization`."""
+    def ranked(self) -> tuple[dict[str, NDArray[Any]], int]:
+        """Return the columns and the number of ties beyond them, as in `Localization`."""
         values = np.array(sorted(self._sizes))
         sizes = np.array([self._sizes[value] for value in values.tolist()])
-        place = np.searchsorted(values, self.listed["distance"].to_numpy())
+        place = np.searchsorted(values, self.listed["distance"])
         high, tied = np.cumsum(sizes)[place], sizes[place]
-        ranks = pd.DataFrame({"rank_low": high - tied + 1, "rank_high": high, "tied": tied})
-        return pd.concat([ranks, self.listed], axis=1), int(high[-1]) - len(self.listed)
+        ranks = {"rank_low": high - tied + 1, "rank_high": high, "tied": tied}
+        return {**ranks, **self.listed}, int(high[-1]) - len(high)
 
 
 def localize(
