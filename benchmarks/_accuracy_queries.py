@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from semsig_gis.database.database import SignatureDatabase
     from semsig_gis.objects.table import StreetObjects
 
-__all__ = ["City", "Query", "Walk", "off_grid", "on_grid", "turned", "walks"]
+__all__ = ["City", "Query", "Walk", "off_grid", "on_grid", "straight_walk", "turned", "walks"]
 
 _SEED = 0
 # Streams of random numbers: a kind of query changes none of the others.
@@ -131,7 +131,7 @@ def walks(
         if len(found) == count:
             break
         rng = _random(_WALKS, start)
-        cells = _walk(city.database, start, panoramas, rng)
+        cells = straight_walk(city.database, start, panoramas, rng)
         if not cells:
             continue
         places = _centres(city, cells)
@@ -154,7 +154,7 @@ def _legs(
     return tuple(Leg(dx=dx, dy=dy, sigma=sigma) for dx, dy in ways.tolist())
 
 
-def _walk(
+def straight_walk(
     database: SignatureDatabase, start: int, panoramas: int, rng: np.random.Generator
 ) -> list[int]:
     """Return cells along a straight line in a random direction; none where no line has them."""

@@ -27,21 +27,15 @@ from benchmarks._accuracy_methods import (
 )
 from benchmarks._accuracy_queries import City, off_grid, on_grid, turned, walks
 from benchmarks._accuracy_rows import Bar, Row
+from benchmarks._cities import MONTPELLIER, made_up, made_up_streets, real
+from benchmarks._cities import PARIS_LIKE as PARIS
 from semsig_gis.core.rtree import ObjectIndex
 from semsig_gis.database.build import build_database
-from semsig_gis.database.views import ViewpointSpec
 from semsig_gis.likelihood.index import build_index
 from semsig_gis.likelihood.noise.model import cell_noise, named_noise
 from semsig_gis.likelihood.posterior import calibrate
 from semsig_gis.matching.method import Method
-from semsig_gis.objects.load import build_objects, choose_layers, read_files
-from semsig_gis.sources.catalog import load_catalog, paper_taxonomy
-from semsig_gis.sources.synthetic.city import (
-    PARIS_LIKE,
-    CitySpec,
-    synthetic_city,
-    synthetic_surroundings,
-)
+from semsig_gis.sources.synthetic.city import PARIS_LIKE, CitySpec
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -61,7 +55,6 @@ NORTH_SIGMA = 10.0
 PAPER = Method.parse("edit+edit:5%")  # the best that the paper reports
 REGION_BAR = (0.85, 0.95)
 
-PARIS, MONTPELLIER = "Paris-like", "Montpellier"
 INDEX = "likelihood, noise generic"
 RERANKED = "likelihood, noise generic, re-ranked"
 ON_GRID = "north known; on the grid"
@@ -114,20 +107,13 @@ def main() -> None:
 
 
 def _cities(size: _Size, geodata: Path | None) -> Iterator[City]:
-    layers = synthetic_city(size.city)
-    objects, _ = build_objects(layers, taxonomy=paper_taxonomy(), crs=layers[0].table.crs)
-    _, streets = synthetic_surroundings(size.city)
-    database = build_database(
-        objects, viewpoints=ViewpointSpec(mode="streets"), streets=streets.table
-    )
+    objects = made_up(size.city)
+    database = made_up_streets(size.city, objects)
     yield City(name=PARIS, database=database, objects=objects, tree=ObjectIndex(objects.xy))
     if geodata is None:
         print("Montpellier is left out: SEMSIG_GEODATA does not name the folder of open data.")
         return
-    catalog = load_catalog("montpellier")
-    layers, _ = read_files(choose_layers(catalog), [geodata / "montpellier"])
-    crs = catalog.metric_crs or layers[0].table.crs
-    objects, _ = build_objects(layers, taxonomy=catalog.taxonomy, crs=crs)
+    objects = real(geodata, MONTPELLIER)
     yield City(
         name=MONTPELLIER,
         database=build_database(objects),

@@ -19,6 +19,7 @@ from typing import TYPE_CHECKING, Any
 
 import pandas as pd
 
+from benchmarks._cities import MADE_UP, MONTPELLIER, made_up, real
 from benchmarks._later_city import later_city
 from benchmarks.tables import TODAY
 from semsig_gis.core.statistics import wilson_interval
@@ -32,11 +33,9 @@ from semsig_gis.likelihood.noise.age import Drift, aged_noise, named_drift
 from semsig_gis.likelihood.noise.model import cell_noise, named_noise
 from semsig_gis.likelihood.posterior import DEFAULT_RULE
 from semsig_gis.objects.changes import compare_objects
-from semsig_gis.objects.load import build_objects, choose_layers, read_files
 from semsig_gis.queries.chain import parse_chain
 from semsig_gis.queries.draw import QuerySpec, draw_queries
-from semsig_gis.sources.catalog import load_catalog, paper_taxonomy
-from semsig_gis.sources.synthetic.city import CitySpec, synthetic_city
+from semsig_gis.sources.synthetic.city import CitySpec
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
@@ -51,15 +50,8 @@ LEVELS = ("light", "medium", "strong")
 OLD_LEVELS = ("light", "medium")  # of the old maps
 YEARS = 3
 MONACO_YEARS = named_drift().years
-MADE_UP = "made up"
 GENERIC = named_noise("generic")
-WHERE_FROM = {
-    "Helsinki": ("openstreetmap", "osm/helsinki_2019.osm.pbf", "EPSG:32635"),
-    "Monaco": ("openstreetmap", "osm/monaco_2021.osm.pbf", "EPSG:32632"),
-    "Monaco a year later": ("openstreetmap", "osm/monaco_2022.osm.pbf", "EPSG:32632"),
-    "Montpellier": ("montpellier", "montpellier", "EPSG:2154"),
-}
-CITIES = ("Helsinki", "Monaco", "Montpellier", MADE_UP)
+CITIES = ("Helsinki", "Monaco", MONTPELLIER, MADE_UP)
 
 
 @dataclass(frozen=True, eq=False)
@@ -115,11 +107,10 @@ def _cases(
 ) -> Iterator[tuple[dict[str, Any], Callable[[], dict[str, Any]]]]:
     """Yield what to ask of a city, one case for each map and noise model, and what asks it."""
     if name == MADE_UP:
-        layers = synthetic_city(CitySpec(size=200.0 if small else 1000.0))
-        objects, _ = build_objects(layers, taxonomy=paper_taxonomy(), crs=layers[0].table.crs)
+        objects = made_up(CitySpec(size=200.0 if small else 1000.0))
         read: Callable[[str], StreetObjects] = {name: objects}.__getitem__
     else:
-        read = functools.partial(_real, Path(str(geodata)))
+        read = functools.partial(real, Path(str(geodata)))
     city = _City(read(name))
     if name != MADE_UP:
         case = {"city": name, "map": TODAY, "told": "", "levels": [*LEVELS]}
@@ -140,13 +131,6 @@ def _cases(
         case = {"city": name, "map": map_, "told": told, "levels": [*OLD_LEVELS]}
         count = 5 if small else 200
         yield case, functools.partial(_asked, city, now, OLD_LEVELS, count, noise)
-
-
-def _real(geodata: Path, name: str) -> StreetObjects:
-    catalog_name, path, crs = WHERE_FROM[name]
-    catalog = load_catalog(catalog_name)
-    layers, _ = read_files(choose_layers(catalog), [geodata / path])
-    return build_objects(layers, taxonomy=catalog.taxonomy, crs=crs)[0]
 
 
 def _asked(

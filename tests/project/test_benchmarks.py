@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 
-from benchmarks import chances, tables
+from benchmarks import chances, tables, views
 from semsig_gis.maps import page
 
 MEASURES = ("edit", "jaccard", "histogram")
@@ -111,7 +111,10 @@ def test_every_benchmark_runs_and_is_written(tmp_path: Path) -> None:
 def test_the_page_of_figures_is_that_of_the_results() -> None:
     results = (
         json.loads((tables.FOLDER / name).read_text(encoding="utf-8"))
-        for name in ("accuracy.json", "results.json", "reproduction.json", "chances.json")
+        for name in (
+            *("accuracy.json", "results.json", "reproduction.json", "chances.json"),
+            "views.json",
+        )
     )
     assert tables.PAGE.read_text(encoding="utf-8") == tables.page(*results)
     trials = json.loads((tables.FOLDER / "soak.json").read_text(encoding="utf-8"))
@@ -162,3 +165,26 @@ def test_chances_on_old_maps_are_measured_and_kept(
     chances.main()
     assert out.read_text(encoding="utf-8") == written
     assert "made up" not in capsys.readouterr().out
+
+
+def test_views_are_measured_and_kept(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.delenv("SEMSIG_GEODATA", raising=False)
+    out = tmp_path / "views.json"
+    words = f"views --size small --queries 2 --processes 1 --out {out}"
+    monkeypatch.setattr(sys, "argv", words.split())
+    views.main()
+    assert "Real cities are left out" in capsys.readouterr().out
+    rows = json.loads(out.read_text(encoding="utf-8"))
+    assert len(rows) == len(list(views.lines()))
+    for row in rows:
+        assert 0.0 <= row["p50_low"] <= row["p50"] <= row["p50_high"] <= 1.0
+        assert row["queries"] == sum(tenth["n"] for tenth in row["bins"]) == 2
+    assert [row["photos"] for row in rows if "alone" in row] == [5, 5]
+    out.write_text(json.dumps(rows[:-1]), encoding="utf-8")
+    views.main()  # goes on where it was
+    assert json.loads(out.read_text(encoding="utf-8"))[:-1] == rows[:-1]
+    page = tables.page([], [], [], [], rows)
+    assert "as a full turn | sectors | sectors and ranges |" in page
+    assert all(bar.what in page for _, bar in views.bars(rows))
