@@ -57,6 +57,7 @@ from .database.file import (
     save_database as save_database,
 )
 from .database.north import North as North
+from .database.observation import parse_view as parse_view
 from .database.occlusion import Footprints as Footprints
 from .database.properties import database_summary as database_summary
 from .database.answer import Requirement as Requirement

@@ -75,7 +75,7 @@ def learn(
     check_map_age(map_age)
     change = read_drift(drift_report, map_age)
     city = open_city(database)
-    rows = read_samples(samples, taxonomy=city.database.taxonomy)
+    rows = read_samples(samples, taxonomy=city.database.taxonomy, radius=city.database.spec.radius)
     with progress("learning"):
         estimate = _estimate(city, rows, objects)
     # How far the places were known is no matter of the detector.
@@ -178,7 +178,7 @@ def calibrate(
 
     keep_inputs(out, read=(database, samples, noise, drift_report, objects))
     city = open_city(database)
-    rows = read_samples(samples, taxonomy=city.database.taxonomy)
+    rows = read_samples(samples, taxonomy=city.database.taxonomy, radius=city.database.spec.radius)
     options = SearchOptions(
         noise=noise,
         map_age=map_age,

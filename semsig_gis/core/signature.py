@@ -73,6 +73,20 @@ def quantize(bearings: ArrayLike, levels: int) -> NDArray[np.uint8]:
     return np.minimum(scaled, levels - 1).astype(np.uint8)
 
 
+def wrapped_bearings(bearings: Sequence[float] | NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return degrees clockwise from north, -360 to 360, on one turn; InputError for any other."""
+    try:
+        angles = np.asarray(bearings, dtype=np.float64)
+    except (TypeError, ValueError) as error:
+        msg = f"bearings {bearings!r} are not all numbers; give degrees clockwise from north."
+        raise InputError(msg) from error
+    wrong = angles[~(np.abs(angles) <= FULL_TURN)]  # NaN too
+    if len(wrong):
+        msg = f"bearing {wrong[0]:g} is not usable; give degrees clockwise from north, 0 to 360."
+        raise InputError(msg)
+    return wrap_degrees(angles)
+
+
 @dataclass(frozen=True, eq=False)
 class Signature:
     """One signature: of a cell, or a query.
@@ -191,15 +205,4 @@ class Signature:
         codes = None if types is None else taxonomy.encode(types)
         if bearings is None:
             return cls(codes, None)
-        try:
-            angles = np.asarray(bearings, dtype=np.float64)
-        except (TypeError, ValueError) as error:
-            msg = f"bearings {bearings!r} are not all numbers; give degrees clockwise from north."
-            raise InputError(msg) from error
-        wrong = angles[~(np.abs(angles) <= FULL_TURN)]  # NaN too
-        if len(wrong):
-            msg = (
-                f"bearing {wrong[0]:g} is not usable; give degrees clockwise from north, 0 to 360."
-            )
-            raise InputError(msg)
-        return cls(codes, wrap_degrees(angles)).turned(0.0)
+        return cls(codes, wrapped_bearings(bearings)).turned(0.0)

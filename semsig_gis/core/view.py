@@ -118,7 +118,8 @@ class Photo:
         if not 0 < fov <= FULL_TURN:
             msg = f"a field of view of {fov} degrees was given; give degrees above 0, at most 360."
             raise InputError(msg)
-        sector = heading - fov / 2.0, heading + fov / 2.0
+        start = float(wrap_degrees(heading - fov / 2.0))
+        sector = start, start + fov
         return cls(sectors=() if fov == FULL_TURN else (sector,), north_sigma=north_sigma)
 
     @property
@@ -140,9 +141,10 @@ class Photo:
         return replace(self, sectors=tuple((low, low + width) for low, width in start))
 
     def to_dict(self) -> dict[str, Any]:
-        """Return plain values for JSON: ``sectors``, and ``heading_error`` where it is known."""
-        sectors = [[low, high % FULL_TURN] for low, high in self.sectors] or None
-        values: dict[str, Any] = {"sectors": sectors}
+        """Return plain values for JSON: ``sectors`` and ``heading_error``, where they are told."""
+        values: dict[str, Any] = {}
+        if self.sectors:
+            values["sectors"] = [[low, high % FULL_TURN] for low, high in self.sectors]
         if self.north_sigma is not None:
             unknown = math.isinf(self.north_sigma)
             values["heading_error"] = "unknown" if unknown else self.north_sigma
@@ -324,7 +326,8 @@ class View(Signature):
         """Return what `Signature.to_dict` gives, and what else is known, ready for JSON.
 
         ``ranges`` and ``range_errors`` have None where nothing is known, ``scores`` is by name of
-        the class; ``photos`` are those of `Photo.to_dict`, ``photo`` tells which each object is in.
+        the class. What `Photo.to_dict` tells of one photo stands beside it; of several it is in
+        ``photos``, and ``photo`` tells which one each object is in. `parse_view` reads it again.
         """
         values = super().to_dict(taxonomy)
         for name in ("ranges", "range_errors"):
@@ -337,8 +340,7 @@ class View(Signature):
                 {names[code]: float(row[code]) for code in np.flatnonzero(row).tolist()}
                 for row in self.scores
             ]
-        if self.photos != (FULL_VIEW,):
-            values["photos"] = [photo.to_dict() for photo in self.photos]
-        if len(self.photos) > 1:
-            values["photo"] = self.photo_rows.tolist()
-        return values
+        if len(self.photos) == 1:
+            return values | self.photos[0].to_dict()
+        photos = [photo.to_dict() for photo in self.photos]
+        return values | {"photos": photos, "photo": self.photo_rows.tolist()}

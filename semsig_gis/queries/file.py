@@ -5,31 +5,29 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
 from semsig_gis.core.errors import InputError
-from semsig_gis.core.signature import Signature
+from semsig_gis.core.view import View
 from semsig_gis.database.north import GRID_NORTH
+from semsig_gis.database.observation import RADIUS_M, parse_view, require_seen
 from semsig_gis.likelihood.route import Leg
 from semsig_gis.storage.rows import (
     file_rows,
     json_rows,
     parse_rows,
     read_rows,
-    row_signature,
     row_value,
     scan_rows,
 )
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator
+    from collections.abc import Callable, Iterable, Iterator
     from pathlib import Path
 
     from semsig_gis.core.taxonomy import Taxonomy
     from semsig_gis.database.north import North
     from semsig_gis.storage.rows import Row
 
-Route = tuple[list[tuple[str | int, Signature]], list[Leg]]
+Route = tuple[list[tuple[str | int, View]], list[Leg]]
 
 PLAIN_LEG = ("dx", "dy")
 TOWARDS = ("distance", "bearing")
@@ -44,70 +42,82 @@ class QueryLine:
 
     line: int
     name: str | int
-    query: Signature | InputError
+    query: View | InputError
 
 
-def read_queries(path: str | Path, *, taxonomy: Taxonomy) -> Iterator[QueryLine]:
+def read_queries(
+    path: str | Path, *, taxonomy: Taxonomy, radius: float = RADIUS_M
+) -> Iterator[QueryLine]:
     """Read the queries of a CSV file, or of a file of JSON lines, line by line.
 
-    The columns are those of `row_signature` and perhaps ``id``. A line that is no query takes none
-    of the others with it. Raises InputError if the file cannot be read.
+    The columns are those of `parse_view` and perhaps ``id``; `radius` is the visibility range of
+    the city. A line that is no query takes none of the others with it. Raises InputError if the
+    file cannot be read.
     """
-    return _query_lines(file_rows(path, what="query"), str(path), taxonomy)
+    return _query_lines(file_rows(path, what="query"), str(path), taxonomy, radius)
 
 
 def parse_queries(
-    lines: Iterable[str | bytes], source: str, *, taxonomy: Taxonomy
+    lines: Iterable[str | bytes], source: str, *, taxonomy: Taxonomy, radius: float = RADIUS_M
 ) -> Iterator[QueryLine]:
     """Read queries as `read_queries` does, from JSON lines that messages call `source`."""
-    return _query_lines(json_rows(lines), source, taxonomy)
+    return _query_lines(json_rows(lines), source, taxonomy, radius)
 
 
 def _query_lines(
-    rows: Iterable[tuple[int, Row | Exception]], source: str, taxonomy: Taxonomy
+    rows: Iterable[tuple[int, Row | Exception]], source: str, taxonomy: Taxonomy, radius: float
 ) -> Iterator[QueryLine]:
-    lines = scan_rows(rows, source, lambda row: _query(row, taxonomy), what="query")
-    for line, row, query in lines:
+    def read(row: Row) -> View:
+        require_seen(row)
+        return parse_view(row, taxonomy=taxonomy, radius=radius)
+
+    for line, row, query in scan_rows(rows, source, read, what="query"):
         yield QueryLine(line=line, name=_name(row_value(row, "id"), line), query=query)
 
 
-def read_route(path: str | Path, *, taxonomy: Taxonomy, north: North = GRID_NORTH) -> Route:
+def read_route(
+    path: str | Path,
+    *,
+    taxonomy: Taxonomy,
+    north: North = GRID_NORTH,
+    radius: float = RADIUS_M,
+) -> Route:
     """Read the views of a route from a file of queries (see `read_queries`).
 
-    A line without types and bearings, like one where both are empty, has seen nothing. Each line
-    but the first also tells the way from the line before: ``dx`` and ``dy`` (metres to
+    A line that does not say what was seen, like one where that is empty, has seen nothing. Each
+    line but the first also tells the way from the line before: ``dx`` and ``dy`` (metres to
     grid east and north), or ``distance`` (metres) and ``bearing`` (degrees clockwise from
     `north`), and ``sigma`` (standard deviation of each coordinate in metres, 0 if missing).
     There is one leg fewer than views. Raises InputError if the file cannot be read or a line of it
     is no view of a route.
     """
-    rows = read_rows(path, lambda row: _view(row, taxonomy, north), what="view")
+    rows = read_rows(path, _route_reader(taxonomy, north, radius), what="view")
     return _route(rows, str(path))
 
 
 def parse_route(
-    lines: Iterable[str | bytes], source: str, *, taxonomy: Taxonomy, north: North = GRID_NORTH
+    lines: Iterable[str | bytes],
+    source: str,
+    *,
+    taxonomy: Taxonomy,
+    north: North = GRID_NORTH,
+    radius: float = RADIUS_M,
 ) -> Route:
     """Read a route as `read_route` does, from JSON lines that messages call `source`."""
-    rows = parse_rows(lines, source, lambda row: _view(row, taxonomy, north), what="view")
+    rows = parse_rows(lines, source, _route_reader(taxonomy, north, radius), what="view")
     return _route(rows, source)
 
 
-def _query(row: Row, taxonomy: Taxonomy) -> Signature:
-    # Without their names, an empty row would be one that saw nothing, whatever it was meant for.
-    if row.get("types") is None and row.get("bearings") is None:
-        msg = "it needs types, bearings or both, which may be empty where nothing was seen"
-        raise InputError(msg)
-    return _seen(row, taxonomy)
+def _route_reader(
+    taxonomy: Taxonomy, north: North, radius: float
+) -> Callable[[Row], tuple[object, View, Leg | None]]:
+    """Return what reads a line of a route: its name, its view, and the way to it."""
 
+    def read(row: Row) -> tuple[object, View, Leg | None]:
+        view = parse_view(row, taxonomy=taxonomy, radius=radius)
+        return row_value(row, "id"), view, _leg(row, north)
 
-def _view(row: Row, taxonomy: Taxonomy, north: North) -> tuple[object, Signature, Leg | None]:
-    return row_value(row, "id"), _seen(row, taxonomy), _leg(row, north)
-
-
-def _seen(row: Row, taxonomy: Taxonomy) -> Signature:
-    signature = row_signature(row, taxonomy)
-    return Signature(np.empty(0, np.uint8), np.empty(0)) if signature is None else signature
+    return read
 
 
 def _leg(row: Row, north: North) -> Leg | None:
@@ -127,7 +137,7 @@ def _leg(row: Row, north: North) -> Leg | None:
     raise InputError(msg)
 
 
-def _route(rows: list[tuple[int, tuple[object, Signature, Leg | None]]], source: str) -> Route:
+def _route(rows: list[tuple[int, tuple[object, View, Leg | None]]], source: str) -> Route:
     for number, (line, (_, _, leg)) in enumerate(rows):
         if (leg is None) != (number == 0):
             fault = "does not tell the way from the line before" if number else "tells a way"

@@ -4,18 +4,14 @@ from __future__ import annotations
 
 import csv
 import io
-import re
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from semsig_gis.core.errors import InputError, SemsigError
-from semsig_gis.core.signature import Signature
 from semsig_gis.storage.text import parse_json, read_whole
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator
-
-    from semsig_gis.core.taxonomy import Taxonomy
 
 MOST_ROWS = 2**30
 """Bytes of a file of rows, which is read whole."""
@@ -99,24 +95,6 @@ def scan_rows(
             found = InputError(msg)
             found.__cause__ = error
         yield line, row if isinstance(row, dict) else {}, found
-
-
-def row_signature(row: Row, taxonomy: Taxonomy) -> Signature | None:
-    """Return the signature of a row, clockwise from north, or None where nothing was seen.
-
-    The row has ``types`` (symbols such as ``DDB``) and ``bearings`` (degrees; a list, or text with
-    blanks, commas or semicolons between them), each of which may be missing or empty. InputError if
-    they cannot be used or do not fit each other.
-    """
-    types, bearings = row_value(row, "types"), row_value(row, "bearings")
-    if isinstance(bearings, str):
-        bearings = [float(part) for part in re.split(r"[\s,;]+", bearings.strip()) if part]
-    elif isinstance(bearings, (int, float)):
-        bearings = [bearings]
-    symbols = None if types is None else str(types).strip()
-    if not symbols and not bearings:
-        return None
-    return Signature.parse(symbols or None, bearings or None, taxonomy=taxonomy)
 
 
 def row_value(row: Row, name: str) -> Any:  # noqa: ANN401 - any value of JSON

@@ -11,13 +11,11 @@ from hypothesis import strategies as st
 from sentences import refused
 
 from semsig_gis.core.errors import InputError
-from semsig_gis.sources.catalog import paper_taxonomy
-from semsig_gis.storage.rows import parse_rows, read_rows, row_signature
+from semsig_gis.storage.rows import parse_rows, read_rows
 
 if TYPE_CHECKING:
     from pathlib import Path
 
-TAXONOMY = paper_taxonomy()
 WORDS = st.text(st.characters(codec="utf-8", exclude_characters="\x00"), max_size=6)
 
 
@@ -36,31 +34,12 @@ def test_cells_of_a_table_may_hold_commas_and_line_breaks(tmp_path: Path) -> Non
 
 
 @pytest.mark.parametrize(
-    "bearings", [[360, -10, -360], "360;-10;-360", "360, -10,-360", " 360 -10 -360 "]
-)
-def test_bearings_in_any_shape_and_beyond_the_circle(bearings: object) -> None:
-    seen = row_signature({"types": " DBL ", "bearings": bearings}, TAXONOMY)
-    assert seen is not None
-    assert seen.bearings is not None
-    assert seen.bearings.tolist() == [0.0, 0.0, 350.0]
-
-
-@pytest.mark.parametrize("row", [{}, {"types": ""}, {"types": None, "bearings": []}])
-def test_nothing_was_seen(row: dict[str, object]) -> None:
-    assert row_signature(row, TAXONOMY) is None
-
-
-@pytest.mark.parametrize(
     ("text", "table", "words"),
     [
         ("", False, ["no rows", "one thing"]),
         ("a,b\n", True, ["no rows"]),
         ("{", False, ["line 1", "not JSON"]),
         ("\n[1]", False, ["line 2", "names and values"]),
-        ('{"types": "D", "bearings": NaN}', False, ["line 1", "nan"]),
-        ('{"types": ["D"]}', False, ["line 1"]),
-        ('{"types": "D", "bearings": {"a": 1}}', False, ["line 1", "not all numbers"]),
-        ('{"types": "D", "bearings": [[1]]}', False, ["line 1"]),
         ("[" * 100_000, False, ["line 1"]),
         ("types\n" + "D" * 200_000, True, ["not CSV"]),
     ],
@@ -74,4 +53,4 @@ def test_what_cannot_be_used_is_named(
     path = tmp_path / ("x.csv" if table else "x.jsonl")
     path.write_text(text)
     with refused(InputError, path.name, *words):
-        read_rows(path, lambda row: row_signature(row, TAXONOMY), what="thing")
+        read_rows(path, dict, what="thing")

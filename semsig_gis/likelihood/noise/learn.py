@@ -12,9 +12,9 @@ import pandas as pd
 from semsig_gis.core.errors import InputError
 from semsig_gis.core.geometry import cell_ids
 from semsig_gis.core.rtree import ObjectIndex
-from semsig_gis.core.signature import Signature
 from semsig_gis.core.taxonomy import WILDCARD
 from semsig_gis.database.database import SignatureDatabase, views_in
+from semsig_gis.database.observation import RADIUS_M, SEEN, parse_view
 from semsig_gis.database.views import views_at
 from semsig_gis.likelihood.noise.fit import (
     ALL,
@@ -26,7 +26,7 @@ from semsig_gis.likelihood.noise.fit import (
     starting_model,
 )
 from semsig_gis.likelihood.noise.model import NoiseSpec
-from semsig_gis.storage.rows import read_rows, row_signature, row_value
+from semsig_gis.storage.rows import read_rows, row_value
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -34,6 +34,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+    from semsig_gis.core.signature import Signature
     from semsig_gis.core.taxonomy import Taxonomy
     from semsig_gis.database.occlusion import Footprints
     from semsig_gis.database.views import Views
@@ -73,7 +74,7 @@ class Sample:
             raise InputError(msg)
 
 
-def read_samples(path: str | Path, *, taxonomy: Taxonomy) -> list[Sample]:
+def read_samples(path: str | Path, *, taxonomy: Taxonomy, radius: float = RADIUS_M) -> list[Sample]:
     r"""Read detections with their true places.
 
     Parameters
@@ -82,10 +83,12 @@ def read_samples(path: str | Path, *, taxonomy: Taxonomy) -> list[Sample]:
         A CSV file with the columns ``types`` (symbols such as ``DDB``), ``bearings`` (degrees,
         with blanks, commas or semicolons between them) and either ``x`` and ``y`` or
         ``cell_id``; or JSON lines with the same names (suffix ``.jsonl``, ``.ndjson`` or
-        ``.json``), where bearings may be a list. Other columns are left alone; a row without
-        detections is a sample too.
+        ``.json``), where bearings may be a list. What was seen may be told in any other way that
+        `parse_view` reads. Other columns are left alone; a row without detections is a sample too.
     taxonomy : Taxonomy
         Classes that the symbols belong to.
+    radius : float, default 30
+        Visibility range of the city in metres, of which near, middle and far are thirds.
 
     Returns
     -------
@@ -109,18 +112,17 @@ def read_samples(path: str | Path, *, taxonomy: Taxonomy) -> list[Sample]:
     >>> sample.xy, sample.signature.bearings.tolist()
     ((500000.0, 5400000.0), [200.0, 350.0])
     """
-    rows = read_rows(path, lambda row: _sample(row, taxonomy), what="sample")
+    rows = read_rows(path, lambda row: _sample(row, taxonomy, radius), what="sample")
     return [sample for _, sample in rows]
 
 
-def _sample(row: Row, taxonomy: Taxonomy) -> Sample:
+def _sample(row: Row, taxonomy: Taxonomy, radius: float) -> Sample:
+    told = {name for name in SEEN if row.get(name) is not None}
     for name in ("types", "bearings"):
-        if row.get(name) is None:
+        if told <= {"types", "bearings"} - {name}:
             msg = f"it has no {name}"
             raise InputError(msg)
-    signature = row_signature(row, taxonomy)
-    if signature is None:
-        signature = Signature(np.empty(0, np.uint8), np.empty(0))
+    signature = parse_view(row, taxonomy=taxonomy, radius=radius)
     x, y, cell = (row_value(row, name) for name in ("x", "y", "cell_id"))
     if x is not None and y is not None:
         return Sample(signature=signature, xy=(float(x), float(y)))
