@@ -246,11 +246,14 @@ def read_noise(
     drift_report: Path | None = None,
 ) -> Noise:
     """Return a noise model by its name or file, for a map of some age."""
-    from semsig_gis.likelihood.noise.age import aged_noise
     from semsig_gis.likelihood.noise.model import NOISES, named_noise, open_noise
 
     by_file = noise not in NOISES and Path(noise).suffix
     model = open_noise(noise) if by_file else named_noise(noise)
+    if map_age == 0 and drift_report is None:
+        return model
+    from semsig_gis.likelihood.noise.age import aged_noise  # what loads slowly
+
     return aged_noise(model, map_age, database=database, drift=read_drift(drift_report, map_age))
 
 
@@ -269,9 +272,10 @@ def read_drift(drift_report: Path | None, map_age: float) -> Drift | None:
 def object_store(city: City, objects: Path | None, *, needed: bool) -> ObjectStore | None:
     """Return the street objects of a database; None where there are none, unless needed."""
     from semsig_gis.database.city import ObjectStore, open_store
-    from semsig_gis.objects.table import open_objects
 
     if objects is not None and not objects.is_dir():
+        from semsig_gis.objects.table import open_objects
+
         store = ObjectStore.of(open_objects(objects))
         if store.objects.crs != city.database.crs:
             msg = (

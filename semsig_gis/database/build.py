@@ -15,7 +15,8 @@ from semsig_gis.core.rtree import PackedIndex
 from semsig_gis.core.signature import BEARING_UNITS, DISTANCE_UNITS, SignatureSpec
 from semsig_gis.database.database import SignatureDatabase, consecutive
 from semsig_gis.database.occlusion import TOLERANCE_M, Footprints
-from semsig_gis.database.views import ViewpointSpec, choose_viewpoints, clockwise_order, sightings
+from semsig_gis.database.viewpoints import choose_viewpoints
+from semsig_gis.database.views import ViewpointSpec, clockwise_order, sightings
 from semsig_gis.objects.table import licenses_of
 
 if TYPE_CHECKING:

@@ -16,15 +16,12 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol, TypeVar
 
-import geopandas as gpd
 import numpy as np
 import pyarrow as pa
 
 from semsig_gis import __version__
 from semsig_gis.core.errors import DatabaseError, InputError
 from semsig_gis.core.geometry import HALF_WIDTH, LICENSES
-from semsig_gis.core.rtree import ObjectIndex
-from semsig_gis.database.build import moved
 from semsig_gis.database.file import (
     KIND,
     Manifest,
@@ -39,7 +36,6 @@ from semsig_gis.database.file import (
     require_file,
     save_database,
 )
-from semsig_gis.database.occlusion import Footprints, buildings_near
 from semsig_gis.objects.table import licenses_of, open_objects, save_objects
 from semsig_gis.storage.geoparquet import UNREADABLE, read_geoparquet, write_geoparquet
 from semsig_gis.storage.text import parse_json, read_whole
@@ -48,11 +44,14 @@ from semsig_gis.storage.whole import alone_in, move_folder, whole_file, whole_fo
 if TYPE_CHECKING:
     from collections.abc import Callable
 
+    import geopandas as gpd
     from numpy.typing import NDArray
     from pyproj import CRS
 
+    from semsig_gis.core.rtree import ObjectIndex
     from semsig_gis.database.database import SignatureDatabase
     from semsig_gis.database.file import PartitionedDatabase
+    from semsig_gis.database.occlusion import Footprints
     from semsig_gis.objects.table import StreetObjects
 
 
@@ -113,6 +112,8 @@ class ObjectStore:
     @cached_property
     def index(self) -> ObjectIndex:
         """R-tree over the objects, in their order; made when it is first asked for."""
+        from semsig_gis.core.rtree import ObjectIndex  # noqa: PLC0415 - it loads slowly
+
         return ObjectIndex(self.objects.xy)
 
     def buildings_around(
@@ -124,6 +125,8 @@ class ObjectStore:
         """
         if self.footprints is None:
             return None
+        from semsig_gis.database.occlusion import Footprints, buildings_near  # noqa: PLC0415 - it loads slowly
+
         polygons = self.footprints.geometry.to_numpy()
         near = buildings_near(polygons, places, distance=distance)
         return Footprints(polygons[near]) if len(near) else None
@@ -131,6 +134,10 @@ class ObjectStore:
 
 def _stored(table: gpd.GeoDataFrame, crs: CRS) -> gpd.GeoDataFrame:
     """Return what the building of a database takes of a table, in a CRS."""
+    import geopandas as gpd  # noqa: PLC0415 - it loads slowly
+
+    from semsig_gis.database.build import moved  # noqa: PLC0415 - it loads slowly
+
     geometry = table.geometry
     kept = moved(table[~(geometry.isna() | geometry.is_empty)], crs)
     columns = {HALF_WIDTH: kept[HALF_WIDTH].to_numpy(float)} if HALF_WIDTH in kept else {}
@@ -306,9 +313,12 @@ def _read(folder: Path, database: Path) -> ObjectStore:
 
 
 def _table(path: Path) -> gpd.GeoDataFrame:
+    import geopandas as gpd  # noqa: PLC0415 - it loads slowly
+    import shapely  # noqa: PLC0415 - it loads slowly
+
     try:
         return gpd.read_parquet(path)
-    except UNREADABLE as error:
+    except (*UNREADABLE, shapely.errors.ShapelyError) as error:
         msg = f"{path} is damaged ({error}); build the database again."
         raise DatabaseError(msg) from error
 

@@ -22,6 +22,7 @@ from semsig_gis.core.errors import DatabaseError, InputError
 from semsig_gis.core.geometry import cell_ids
 from semsig_gis.core.signature import BEARING_UNITS, DISTANCE_UNITS, Signature, quantize
 from semsig_gis.database.views import ViewpointSpec, Views
+from semsig_gis.storage.geoparquet import whole_numbers
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
@@ -347,16 +348,18 @@ class SequenceTable:
         )
         encoded = rows.dictionary_encode()
         distinct = len(encoded.dictionary)
-        lengths = pc.binary_length(encoded.dictionary).to_numpy()
+        lengths = whole_numbers(pc.binary_length(encoded.dictionary))
         order = np.argsort(lengths, kind="stable")
         rank = np.empty(distinct, np.int64)
         rank[order] = np.arange(distinct)
         distinct_offsets = np.append(0, np.cumsum(lengths[order]))
         # An Arrow array without values may come without buffers.
-        buffer = encoded.dictionary.take(order).buffers()[2] or b""
+        # As `pa.array` loads pandas.
+        taken = pa.Array.from_buffers(pa.int64(), distinct, [None, pa.py_buffer(order)])
+        buffer = encoded.dictionary.take(taken).buffers()[2] or b""
         distinct_values = np.frombuffer(buffer, np.uint8)[: distinct_offsets[-1]].copy()
         # int64: NumPy gathers with a native index without converting it at every query.
-        inverse = rank[encoded.indices.to_numpy()]
+        inverse = rank[whole_numbers(encoded.indices)]
         counts = np.bincount(inverse, minlength=distinct).astype(np.int64, copy=False)
         return cls(*map(frozen, (distinct_values, distinct_offsets, inverse, counts)))
 

@@ -24,6 +24,7 @@ from semsig_gis.storage.geoparquet import (
     geo_metadata,
     points_to_wkb,
     read_geoparquet,
+    whole_numbers,
     write_geoparquet,
 )
 from semsig_gis.storage.text import parse_json, read_whole
@@ -160,7 +161,7 @@ def database_of(
         symbols, offsets = _text(table["types"])
         bearing_units, bearing_offsets = _numbers(table["bearings"], pa.uint16())
         distance_units, distance_offsets = _numbers(table["distances"], pa.uint8())
-        cells = table["cell_id"].to_numpy().astype(np.int64, casting="safe")
+        cells = whole_numbers(table["cell_id"]).astype(np.int64, casting="safe")
         columns, rows = split_ids(cells)
         database = SignatureDatabase(
             columns=columns.astype(np.int32),
@@ -211,7 +212,7 @@ def _text(column: pa.ChunkedArray) -> tuple[NDArray[np.uint8], NDArray[np.int64]
 def _numbers(column: pa.ChunkedArray, kind: pa.DataType) -> tuple[NDArray[Any], NDArray[np.int64]]:
     """Return the flat array and offsets of an Arrow column of lists of numbers."""
     array = _whole(column, pa.list_(kind))
-    return array.flatten().to_numpy(), _from_zero(array.offsets.to_numpy())
+    return whole_numbers(array.flatten()), _from_zero(whole_numbers(array.offsets))
 
 
 def _whole(column: pa.ChunkedArray, kind: pa.DataType) -> pa.Array:
@@ -222,7 +223,7 @@ def _whole(column: pa.ChunkedArray, kind: pa.DataType) -> pa.Array:
     return column.combine_chunks()
 
 
-def _from_zero(offsets: NDArray[np.int32]) -> NDArray[np.int64]:
+def _from_zero(offsets: NDArray[Any]) -> NDArray[np.int64]:
     return offsets.astype(np.int64) - np.int64(offsets[0])
 
 
@@ -442,7 +443,7 @@ class PartitionedDatabase:
         rows = np.zeros(len(cell_ids), np.int64)
         for file in self.files:
             table, _, _ = read_geoparquet(file, kind=KIND, columns=["cell_id"])
-            rows += np.searchsorted(table["cell_id"].to_numpy(), cell_ids)
+            rows += np.searchsorted(whole_numbers(table["cell_id"]), cell_ids)
         return rows
 
 

@@ -56,7 +56,8 @@ from semsig_gis.database.file import (
     save_database,
 )
 from semsig_gis.database.occlusion import TOLERANCE_M
-from semsig_gis.database.views import ViewpointSpec, require_surroundings
+from semsig_gis.database.viewpoints import require_surroundings
+from semsig_gis.database.views import ViewpointSpec
 from semsig_gis.objects.surroundings import read_surroundings, save_surroundings
 from semsig_gis.objects.table import open_objects, save_objects
 from semsig_gis.storage.geoparquet import CHECKING_PAGES, NOWHERE, each_bounds

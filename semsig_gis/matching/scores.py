@@ -10,7 +10,6 @@ from functools import partial
 from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
-import pandas as pd
 
 from semsig_gis.core.taxonomy import WILDCARD
 from semsig_gis.database.answer import DistanceMemo
@@ -274,7 +273,10 @@ def _cut_at(method: Method, cells: NDArray[Any]) -> np.float32:
 def _gate_of_parts(database: PartitionedDatabase, query: Signature, method: Method) -> _Gate:
     """Find the gate of all parts: of each score of the first stage, how many and the worst."""
     count = _kept(method, len(database))
-    groups = pd.DataFrame()
+    # By distance in the first stage: how many cells, and the worst of them after the second.
+    levels: NDArray[np.float32] = np.zeros(0, np.float32)
+    sizes: NDArray[np.float64] = np.zeros(0)
+    worst: NDArray[np.float32] = np.zeros(0, np.float32)
     cut = np.float32(np.inf)
     for part in database.parts():
         by_types, second_stage = _stages(part, query, method)
@@ -284,14 +286,18 @@ def _gate_of_parts(database: PartitionedDatabase, query: Signature, method: Meth
         near = np.flatnonzero(first <= cut)
         second = second_stage(part.angle_sequences.inverse[near])
         fused = _fused(method, by_types, types.inverse[near], second, np.arange(len(near)))
-        more = pd.DataFrame({"first": first[near], "size": 1, "worst": fused})
-        steps = pd.concat([groups, more]).groupby("first", as_index=False)
-        groups = steps.agg({"size": "sum", "worst": "max"})
-        enough = np.flatnonzero(groups["size"].cumsum() >= count)
+        known = np.append(worst, fused)
+        each = np.append(sizes, np.ones(len(near)))
+        levels, rows = np.unique(np.append(levels, first[near]), return_inverse=True)
+        sizes = np.bincount(rows, each).astype(np.float64, copy=False)
+        worst = np.full(len(levels), -np.inf, np.float32)
+        np.maximum.at(worst, rows, known)
+        enough = np.flatnonzero(sizes.cumsum() >= count)
         if len(enough):
-            groups = groups.head(enough[0] + 1)
-            cut = groups["first"].to_numpy()[-1]
-    return _Gate(cut, groups["worst"].to_numpy().max())
+            passed = slice(enough[0] + 1)
+            levels, sizes, worst = levels[passed], sizes[passed], worst[passed]
+            cut = levels[-1]
+    return _Gate(cut, worst.max())
 
 
 def _stages(

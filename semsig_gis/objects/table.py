@@ -7,11 +7,9 @@ import itertools
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-import geopandas as gpd
 import numpy as np
 import pyarrow as pa
 import pyarrow.compute as pc
-import shapely
 
 from semsig_gis import __version__
 from semsig_gis.core.errors import DatabaseError
@@ -35,6 +33,8 @@ from semsig_gis.storage.geoparquet import (
     hilbert_order,
     read_geoparquet,
     rows_meeting,
+    whole_numbers,
+    wkb_to_points,
     write_geoparquet,
 )
 
@@ -42,6 +42,7 @@ if TYPE_CHECKING:
     from collections.abc import Collection, Iterable, Mapping, Sequence
     from pathlib import Path
 
+    import geopandas as gpd
     from numpy.typing import NDArray
     from pyproj import CRS
 
@@ -49,6 +50,7 @@ if TYPE_CHECKING:
 
 KIND = "street objects"
 NUMBERS, TEXTS = {CLASS_CODE, COUNT}, {SOURCE, SOURCE_ID, MERGED}
+COLUMNS = (CLASS_CODE, SOURCE, SOURCE_ID, COUNT)  # which all objects have, beside their geometry
 BETWEEN_LAYERS = ", "
 BEFORE_LAYERS = ": "
 # Key of the layers that each line of ``licenses`` is about, where the line does not tell.
@@ -118,9 +120,9 @@ class StreetObjects:
     notes: tuple[str, ...] = ()
 
     def __len__(self) -> int:  # noqa: D105
-        return len(self.table)
+        return len(self.codes)
 
-    @property
+    @functools.cached_property
     def crs(self) -> CRS:
         """Metric coordinate reference system of the positions."""
         crs: CRS = self.table.crs
@@ -142,9 +144,38 @@ class StreetObjects:
     @functools.cached_property
     def xy(self) -> NDArray[np.float64]:
         """Position of every object in metres, shape (n, 2)."""
+        import shapely  # noqa: PLC0415 - it loads slowly
+
         xy: NDArray[np.float64] = shapely.get_coordinates(self.table.geometry.array)
         xy.setflags(write=False)
         return xy
+
+
+class _OpenedObjects(StreetObjects):
+    """Street objects of a file, whose table is made when it is first asked for."""
+
+    _arrow: pa.Table
+
+    @classmethod
+    def of(cls, arrow: pa.Table, **known: Any) -> _OpenedObjects:  # noqa: ANN401 - any attribute
+        """Return the objects of columns, of which all else is known."""
+        objects = cls.__new__(cls)
+        vars(objects).update(known, _arrow=arrow)
+        return objects
+
+    @functools.cached_property
+    def table(self) -> gpd.GeoDataFrame:
+        """The objects, a row each."""
+        import geopandas as gpd  # noqa: PLC0415 - it loads slowly
+        import shapely  # noqa: PLC0415 - it loads slowly
+
+        merged = [MERGED] if MERGED in self._arrow.column_names else []  # of conflated objects
+        columns = {
+            name: self._arrow[name].to_numpy() if name in NUMBERS else self._arrow[name].to_pylist()
+            for name in (*COLUMNS, *merged)
+        }
+        shapes = shapely.from_wkb(self._arrow[GEOMETRY].to_numpy(zero_copy_only=False))
+        return gpd.GeoDataFrame(columns, geometry=shapes, crs=self.crs)
 
 
 def save_objects(objects: StreetObjects, path: str | Path, *, keep_order: bool = False) -> None:
@@ -170,6 +201,8 @@ def save_objects(objects: StreetObjects, path: str | Path, *, keep_order: bool =
     ...     len(open_objects(f"{folder}/objects.parquet")) == len(demo_objects)
     True
     """
+    import shapely  # noqa: PLC0415 - it loads slowly
+
     table = objects.table
     if not keep_order:
         table = table.iloc[hilbert_order(table.geometry.array)]
@@ -295,41 +328,30 @@ def objects_of(
     damaged; without a box, a table without objects is.
     """
     try:
-        _require_types(arrow)
+        arrow.validate(full=True)
+        _require_columns(arrow)
         taxonomy = Taxonomy.from_list(specs["taxonomy"])
-        columns = {
-            CLASS_CODE: arrow[CLASS_CODE].to_numpy(),
-            SOURCE: arrow[SOURCE].to_pylist(),
-            SOURCE_ID: arrow[SOURCE_ID].to_pylist(),
-            COUNT: arrow[COUNT].to_numpy(),
-        }
-        if MERGED in arrow.column_names:  # only conflated objects have it
-            columns[MERGED] = arrow[MERGED].to_pylist()
-        table = gpd.GeoDataFrame(
-            columns,
-            geometry=shapely.from_wkb(arrow[GEOMETRY].to_numpy(zero_copy_only=False)),
-            crs=crs,
-        )
+        codes = whole_numbers(arrow[CLASS_CODE]).astype(np.uint8)
         for code in pc.unique(arrow[CLASS_CODE]).to_pylist():
             taxonomy.by_code(code)
-        licenses = _licences(specs, columns[SOURCE])
+        licenses = _licences(specs, pc.unique(arrow[SOURCE]).to_pylist())
         notes = tuple(map(str, specs.get(NOTES, ())))
-    except (
-        *(TypeError, ValueError, LookupError),
-        *(pa.ArrowException, shapely.errors.ShapelyError),
-    ) as error:
+        xy = wkb_to_points(arrow[GEOMETRY])
+    except (TypeError, ValueError, LookupError, pa.ArrowException) as error:
         msg = f"{path} is damaged ({error}); load the street objects again."
         raise DatabaseError(msg) from error
-    xy = shapely.get_coordinates(table.geometry.array)
-    points = (table.geometry.geom_type == "Point").all()
-    some = len(table) > 0 or box is not None
-    if not (some and points and len(xy) == len(table) and np.isfinite(xy).all()):
+    some = len(arrow) > 0 or box is not None
+    if not (some and len(xy) == len(arrow) and np.isfinite(xy).all()):
         msg = f"{path} is damaged (it has rows without a position); load the street objects again."
         raise DatabaseError(msg)
     if box is not None:
         inside = ((xy >= box[:2]) & (xy <= box[2:])).all(axis=1)
-        table = table[inside].reset_index(drop=True)
-    return StreetObjects(table, taxonomy, licenses, notes)
+        arrow, codes, xy = arrow.filter(pa.array(inside)), codes[inside], xy[inside]
+    for values in (codes, xy):
+        values.setflags(write=False)
+    return _OpenedObjects.of(
+        arrow, codes=codes, xy=xy, crs=crs, taxonomy=taxonomy, licenses=licenses, notes=notes
+    )
 
 
 def licenses_of(*tables: gpd.GeoDataFrame | None) -> tuple[str, ...]:
@@ -341,8 +363,9 @@ def licenses_of(*tables: gpd.GeoDataFrame | None) -> tuple[str, ...]:
     return tuple(dict.fromkeys(itertools.chain.from_iterable(lines)))
 
 
-def _require_types(arrow: pa.Table) -> None:
-    """Raise TypeError if a column of street objects holds values of another type."""
+def _require_columns(arrow: pa.Table) -> None:
+    """Raise KeyError if street objects lack a column, TypeError if one is of another type."""
+    arrow.select([*COLUMNS, GEOMETRY])
     for field in arrow.schema:
         kind = field.type
         if (field.name in NUMBERS and not pa.types.is_integer(kind)) or (

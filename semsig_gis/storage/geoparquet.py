@@ -15,11 +15,9 @@ import zlib
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, BinaryIO
 
-import geopandas as gpd
 import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
-import shapely
 from pyproj import CRS
 from pyproj.exceptions import CRSError
 
@@ -31,6 +29,7 @@ from semsig_gis.storage.whole import reason, whole_file
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Sequence
 
+    import geopandas as gpd
     from numpy.typing import ArrayLike, NDArray
 
 
@@ -54,6 +53,8 @@ def hilbert_order(geometries: NDArray[np.object_] | gpd.array.GeometryArray) -> 
     """
     if len(geometries) == 0:
         return np.empty(0, np.int64)
+    import geopandas as gpd  # noqa: PLC0415 - it loads slowly
+
     along = gpd.GeoSeries(geometries).hilbert_distance().to_numpy()
     return np.argsort(along, kind="stable")
 
@@ -127,9 +128,9 @@ def each_bounds(path: str | Path) -> Iterator[NDArray[np.float64]]:
 
 UNREADABLE = (
     *(pa.ArrowException, OSError, ValueError, LookupError, TypeError),
-    *(CRSError, shapely.errors.ShapelyError),
+    CRSError,
 )
-"""What geopandas raises for a damaged file."""
+"""What geopandas raises for a damaged file whose shapes can be read."""
 
 SPEC_KEY = b"semsig"
 COMPRESSION = 3
@@ -161,6 +162,44 @@ def points_to_wkb(xy: NDArray[np.float64]) -> pa.Array:
     fixed = pa.binary(WKB_POINT.itemsize)
     column = pa.Array.from_buffers(fixed, len(xy), [None, pa.py_buffer(points)])
     return column.cast(pa.binary())
+
+
+def whole_numbers(column: pa.Array | pa.ChunkedArray) -> NDArray[Any]:
+    """Return an Arrow column of whole numbers, none missing, without loading pandas for it.
+
+    ValueError if it holds something else.
+    """
+    array = column.combine_chunks() if isinstance(column, pa.ChunkedArray) else column
+    if array.null_count or not pa.types.is_integer(array.type):
+        msg = f"a column holds {array.type}, {array.null_count} missing"
+        raise ValueError(msg)
+    kind = np.dtype(str(array.type))
+    content = array.buffers()[1] if len(array) else b""
+    return np.frombuffer(content, kind, count=len(array), offset=array.offset * kind.itemsize)
+
+
+def wkb_to_points(column: pa.ChunkedArray) -> NDArray[np.float64]:
+    """Return the places of points in well-known binary, shape (n, 2).
+
+    They are fewer where one is missing, empty or no point; ValueError if it cannot be read.
+    """
+    binary = column.combine_chunks()
+    if binary.type == pa.binary() and not binary.null_count:
+        _, ends, flat = binary.buffers()
+        offsets = np.frombuffer(ends, np.int32)[binary.offset : binary.offset + len(binary) + 1]
+        if (np.diff(offsets) == WKB_POINT.itemsize).all():
+            content = np.frombuffer(flat, np.uint8)[offsets[0] : offsets[-1]]
+            points = content.view(WKB_POINT)
+            if (points["order"] == 1).all() and (points["type"] == 1).all():
+                return np.stack([points["x"], points["y"]], axis=1)
+    import shapely  # noqa: PLC0415 - it loads slowly
+
+    try:
+        shapes = shapely.from_wkb(column.to_numpy(zero_copy_only=False))
+    except shapely.errors.ShapelyError as error:
+        raise ValueError(str(error)) from error
+    are_points = shapely.get_type_id(shapes) == shapely.GeometryType.POINT
+    return shapely.get_coordinates(shapes[are_points])
 
 
 def write_geoparquet(

@@ -286,6 +286,24 @@ def test_version_and_help_start_without_the_gis_stack() -> None:
     assert done.stdout.splitlines() == [f"semsig {__version__}", "[]"]
 
 
+@pytest.mark.usefixtures("city")
+@pytest.mark.parametrize("options", ["--json", "--method likelihood"])
+def test_a_query_is_answered_without_what_makes_tables_and_maps(options: str) -> None:
+    code = (
+        "import sys\n"
+        "from semsig_gis.cli import main\n"
+        "try: main()\n"
+        "except SystemExit as end: assert end.code == 0\n"
+        "heavy = {'pandas', 'geopandas', 'folium', 'dask', 'fiona', 'matplotlib', 'rasterio'}\n"
+        "print(sorted(heavy & set(sys.modules)))"
+    )
+    line = f"localize city.parquet --types DD --bearings 80,200 {options}".split()
+    command = [sys.executable, "-c", code, *line]
+    done = subprocess.run(command, capture_output=True, text=True, check=True)
+    assert "city" in done.stdout or "cells" in done.stdout
+    assert (done.stdout.splitlines()[-1], done.stderr) == ("[]", "")
+
+
 def test_the_console_script_is_installed() -> None:
     script = shutil.which("semsig", path=Path(sys.executable).parent)
     if script is None:

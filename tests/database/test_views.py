@@ -15,10 +15,11 @@ from worlds import CODES, World, worlds
 from semsig_gis.core.errors import EmptyResultError, InputError
 from semsig_gis.core.geometry import GridSpec, wrap_degrees
 from semsig_gis.core.rtree import ObjectIndex
-from semsig_gis.database import views as viewpoints
+from semsig_gis.database import viewpoints
 from semsig_gis.database.database import views_in
 from semsig_gis.database.occlusion import Footprints
-from semsig_gis.database.views import ViewpointSpec, bearings, choose_viewpoints, views_at
+from semsig_gis.database.viewpoints import choose_viewpoints
+from semsig_gis.database.views import ViewpointSpec, bearings, views_at
 
 if TYPE_CHECKING:
     from semsig_gis.database.views import Mode
