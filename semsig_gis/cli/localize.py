@@ -32,10 +32,11 @@ from semsig_gis.core.errors import EmptyResultError, InputError, UnknownNameErro
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
 
-    from semsig_gis.core.signature import Signature
-    from semsig_gis.core.taxonomy import Taxonomy
+    from semsig_gis.core.view import View
     from semsig_gis.database.answer import Answer, Locator
     from semsig_gis.database.city import City
+    from semsig_gis.database.database import SignatureDatabase
+    from semsig_gis.database.file import PartitionedDatabase
     from semsig_gis.database.north import North
     from semsig_gis.matching.method import Method
     from semsig_gis.queries.file import QueryLine, Route
@@ -53,11 +54,38 @@ class QueryOptions:
     bearings: Annotated[
         str | None, typer.Option(help="Degrees clockwise from north, such as 10,80,200,310.")
     ] = None
+    ranges: Annotated[
+        str | None,
+        typer.Option(help="Rough distances: metres, near, middle, far or ?, such as 12,?,near."),
+    ] = None
+    see: Annotated[
+        str | None,
+        typer.Option(
+            help="Say it in words instead: 'bench at 40, lamp at 80 within 12 m, bus stop at 120 "
+            "far', or '20 left' and '10 right' of where the camera looks."
+        ),
+    ] = None
+    fov: Annotated[
+        float | None,
+        typer.Option(
+            min=0.001, max=360, help="Field of view of a photo, in degrees, around --look."
+        ),
+    ] = None
+    look: Annotated[
+        float | None,
+        typer.Option(min=-360, max=360, help="Bearing of the middle of the photo, in degrees."),
+    ] = None
+    sectors: Annotated[
+        str | None,
+        typer.Option(
+            help="What was looked at, if not all round: bearings clockwise, as 20-90,180-250."
+        ),
+    ] = None
     queries: Annotated[
         str | None,
         typer.Option(
-            help="Many queries: a CSV or JSON lines file with types and bearings, or - for JSON "
-            "lines from standard input; the answers are JSON lines, one for each, or its error."
+            help="Many queries: a CSV or JSON lines file with such columns, or - for JSON lines "
+            "from standard input; the answers are JSON lines, one for each, or its error."
         ),
     ] = None
     route: Annotated[
@@ -94,33 +122,46 @@ class QueryOptions:
             raise InputError(msg)
         return GRID_NORTH if self.north == "grid" else North.of(self.north, city.dataset, date=day)
 
-    def query(self, taxonomy: Taxonomy) -> Signature:
-        """Return the query of --types and --bearings."""
-        from semsig_gis.core.signature import Signature
+    def query(self, dataset: SignatureDatabase | PartitionedDatabase) -> View:
+        """Return the query of the options."""
+        from semsig_gis.database.observation import parse_view
 
-        angles = None if self.bearings is None else numbers(self.bearings, "--bearings")
-        return Signature.parse(self.types, angles, taxonomy=taxonomy)
+        told = {
+            "types": self.types,
+            "bearings": None if self.bearings is None else numbers(self.bearings, "--bearings"),
+            "ranges": self.ranges,
+            "see": self.see,
+            "fov": self.fov,
+            "heading": self.look,
+            "sectors": self.sectors,
+        }
+        if self.types is None and self.bearings is None and self.see is None:
+            msg = "nothing was asked; give --see, --types, --bearings or both, or --queries."
+            raise InputError(msg)
+        return parse_view(told, taxonomy=dataset.taxonomy, radius=dataset.spec.radius)
 
     @property
     def source(self) -> str:
         """What messages call the file of the queries."""
         return "standard input" if self.queries == "-" else str(self.queries)
 
-    def read_queries(self, taxonomy: Taxonomy) -> Iterator[QueryLine]:
+    def read_queries(self, dataset: SignatureDatabase | PartitionedDatabase) -> Iterator[QueryLine]:
         """Return the queries of --queries, each when it is needed."""
         from semsig_gis.queries.file import parse_queries, read_queries
 
+        city: dict[str, Any] = {"taxonomy": dataset.taxonomy, "radius": dataset.spec.radius}
         if self.queries == "-":
-            return parse_queries(sys.stdin.buffer, self.source, taxonomy=taxonomy)
-        return read_queries(self.source, taxonomy=taxonomy)
+            return parse_queries(sys.stdin.buffer, self.source, **city)
+        return read_queries(self.source, **city)
 
-    def read_route(self, taxonomy: Taxonomy, north: North) -> Route:
+    def read_route(self, dataset: SignatureDatabase | PartitionedDatabase, north: North) -> Route:
         """Return the views of a route with their names, and the legs between them."""
         from semsig_gis.queries.file import parse_route, read_route
 
+        city: dict[str, Any] = {"taxonomy": dataset.taxonomy, "radius": dataset.spec.radius}
         if self.queries == "-":
-            return parse_route(sys.stdin.buffer, self.source, taxonomy=taxonomy, north=north)
-        return read_route(self.source, taxonomy=taxonomy, north=north)
+            return parse_route(sys.stdin.buffer, self.source, north=north, **city)
+        return read_route(self.source, north=north, **city)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -151,12 +192,10 @@ class LocalizeOptions(SearchOptions, QueryOptions):
 
     def __post_init__(self) -> None:
         """Refuse options that do not go together."""
-        query = (self.types, self.bearings, self.map_, self.out)
-        if self.queries is not None and any(value is not None for value in query):
-            msg = (
-                "--queries was given with --types, --bearings, --map or --out; give a file or one "
-                "query."
-            )
+        single = ("types", "bearings", "ranges", "see", "fov", "look", "sectors", "map_", "out")
+        given = [f"--{name.strip('_')}" for name in single if getattr(self, name) is not None]
+        if self.queries is not None and given:
+            msg = f"--queries was given with {' and '.join(given)}; give a file or one query."
             raise InputError(msg)
         if self.out is None and (self.share is not None or self.within):
             msg = "--share and --within are for the regions of --out; give that too."
@@ -213,21 +252,20 @@ def localize(options: LocalizeOptions) -> None:
 
         method = Method.parse(options.method)
     city = open_city(options.database)
-    taxonomy = city.dataset.taxonomy
     # Queries are read before the index, which takes much longer than to find a slip in a query.
     north = options.seen_north(city)
     if options.route:
-        views, legs = options.read_route(taxonomy, north)
+        views, legs = options.read_route(city.dataset, north)
         locations = options.locator(city, north).locate_route([query for _, query in views], legs)
         for (name, _), location in zip(views, locations, strict=True):
             print_json({"id": name, **location.to_dict()}, indent=None)
         return
     locator = None if method is None else _distance_locator(options, city, method, north)
     if options.queries is None:
-        query = options.query(taxonomy)
+        query = options.query(city.dataset)
         _answer(options, city, locator or options.locator(city, north), query)
         return
-    queries = options.read_queries(taxonomy)
+    queries = options.read_queries(city.dataset)
     _answer_lines(queries, locator or options.locator(city, north), options.source)
 
 
@@ -268,7 +306,7 @@ def _answer_lines(queries: Iterable[QueryLine], locator: Locator[Any], source: s
         remark(f"{of} could not be answered; their lines say why under error.")
 
 
-def _answer(options: LocalizeOptions, city: City, locator: Locator[Any], query: Signature) -> None:
+def _answer(options: LocalizeOptions, city: City, locator: Locator[Any], query: View) -> None:
     """Answer a query, draw and write what is asked for, and print it."""
     answer = locator.locate(query)
     if options.map_ is not None:
@@ -352,6 +390,7 @@ def print_answer(result: dict[str, Any]) -> None:
         tied = result["tied_beyond"]
         more = "1 further cell ties" if tied == 1 else f"{tied:,} further cells tie"
         say(f"{more} with the last one.")
+    _print_query(result["query"])
     north = result["north"]
     if north["name"] != "grid":
         day = f" of {north['date']}" if north["date"] else ""
@@ -361,6 +400,38 @@ def print_answer(result: dict[str, Any]) -> None:
         )
     for note in result["notes"]:
         say(f"Note: {note}")
+
+
+def _print_query(query: dict[str, Any]) -> None:
+    """Say again what was seen, photo by photo, as it was understood."""
+    photos = query.get("photos", [query])
+    owners = query.get("photo", [0] * query["length"])
+    for number, photo in enumerate(photos):
+        rows = [row for row, owner in enumerate(owners) if owner == number]
+        seen = ", ".join(_object_text(query, row) for row in rows) or "nothing"
+        sectors = ", ".join(f"{start:.4g}-{end:.4g}°" for start, end in photo.get("sectors", ()))
+        looked = f"; looked at {sectors}" if sectors else ""
+        error = photo.get("heading_error")
+        north = (
+            "" if error is None else f"; north {error if error == 'unknown' else f'± {error:g}°'}"
+        )
+        of = f" of photo {number + 1}" if len(photos) > 1 else ""
+        say(f"Seen{of}: {seen}{looked}{north}.")
+
+
+def _object_text(query: dict[str, Any], row: int) -> str:
+    """Return an object of a query: ``D 80°, 7.3 m ± 56%``."""
+    parts = []
+    if scores := query.get("scores"):
+        parts.append(" or ".join(f"{name} {chance:.2g}" for name, chance in scores[row].items()))
+    elif query["types"] is not None:
+        parts.append(query["types"][row])
+    if query["bearings"] is not None:
+        parts.append(f"{query['bearings'][row]:.4g}°")
+    metres, error = ((query.get(name) or {row: None})[row] for name in ("ranges", "range_errors"))
+    if metres is not None:
+        parts.append(f"{metres:.3g} m" + (f" ± {error:.0%}" if error is not None else ""))
+    return " ".join(parts)
 
 
 def _print_known(prior: dict[str, Any]) -> None:

@@ -15,6 +15,7 @@ import numpy as np
 
 from semsig_gis.core.errors import InputError
 from semsig_gis.core.taxonomy import WILDCARD
+from semsig_gis.core.view import View
 from semsig_gis.database.north import GRID_NORTH
 
 if TYPE_CHECKING:
@@ -205,12 +206,38 @@ def query_notes(query: Signature, present: ArrayLike, taxonomy: Taxonomy) -> tup
     """Return what to say of a query to a database that sees the classes `present` alone."""
     if not len(query):
         return ("the query saw nothing, which tells little of the place.",)
+    notes = _outside_notes(query, taxonomy) if isinstance(query, View) else ()
     codes = [] if query.codes is None else query.codes[~query.among(present)].tolist()
     if not codes:
-        return ()
+        return notes
     lacking = map(taxonomy.by_code, dict.fromkeys(codes))
     legend = ", ".join(f"{item.symbol} ({item.title.lower()})" for item in lacking)
-    return (f"no cell of the database sees {legend}, so that this counts as a false detection.",)
+    note = f"no cell of the database sees {legend}, so that this counts as a false detection."
+    return (note, *notes)
+
+
+EDGE = 0.05
+"""Degrees by which a bearing may lie beyond the edge of a sector, as numbers are rounded."""
+
+
+def _outside_notes(view: View, taxonomy: Taxonomy) -> tuple[str, ...]:
+    """Return what to say of objects where their photo did not look."""
+    bearings = view.bearings
+    if bearings is None:
+        return ()
+    around = bearings + np.array([[-EDGE], [0.0], [EDGE]])
+    seen = np.stack([photo.sees(around).any(axis=0) for photo in view.photos])
+    outside = np.flatnonzero(~seen[view.photo_rows, np.arange(len(view))])
+    if not len(outside):
+        return ()
+    symbols = "?" * len(view) if view.codes is None else taxonomy.decode(view.codes)
+    listed = ", ".join(f"{symbols[row]} at {bearings[row]:.1f}°" for row in outside.tolist())
+    verb = "stands" if len(outside) == 1 else "stand"
+    note = (
+        f"{listed} {verb} outside the sectors that were looked at; the heading, the field of view "
+        "or the bearing may be wrong."
+    )
+    return (note,)
 
 
 _COMPARISON = re.compile(r"(\S)\s*(>=|<=|=)\s*(\d+)")

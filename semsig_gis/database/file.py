@@ -434,6 +434,11 @@ class PartitionedDatabase:
         return next(self.parts()).taxonomy
 
     @property
+    def spec(self) -> SignatureSpec:
+        """How the signatures of the parts were made."""
+        return next(self.parts()).spec
+
+    @property
     def crs(self) -> CRS:
         """The metric coordinate reference system of the parts."""
         return next(self.parts()).crs

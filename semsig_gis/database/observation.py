@@ -326,9 +326,14 @@ def _photo(look: Row) -> Photo:
         sigma = _number("heading_error", error)
     if fov is None:
         return Photo(sectors=_sectors(look.get("sectors", [])), north_sigma=sigma)
-    if heading is None or "sectors" in look:
-        fault = "without the heading of the camera" if heading is None else "with sectors"
-        msg = f"a field of view was given {fault}; give it with the heading, or sectors alone."
+    if "sectors" in look:
+        msg = "a field of view was given with sectors; give one of the two."
+        raise InputError(msg)
+    if heading is None:
+        msg = (
+            "a field of view was given without the heading of the camera (--look); give that, too, "
+            "or sectors alone."
+        )
         raise InputError(msg)
     heading, fov = _number("heading", heading), _number("fov", fov)
     return Photo.looking(heading=heading, fov=fov, north_sigma=sigma)

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from semsig_gis.core.errors import EmptyResultError
+from semsig_gis.core.view import View
 from semsig_gis.database.answer import (
     Answer,
     Ranking,
@@ -134,7 +135,11 @@ class DistanceLocator:
             crs=part.crs,
             taxonomy=part.taxonomy,
             licenses=part.licenses,
-            notes=(*query_notes(query, present, part.taxonomy), *self.north.notes),
+            notes=(
+                *query_notes(query, present, part.taxonomy),
+                *_unused_notes(query, self.method),
+                *self.north.notes,
+            ),
             north=self.north,
         )
 
@@ -175,6 +180,22 @@ class DistanceLocator:
             scores = next(rows)
             seconds = time.perf_counter() - start + (memo.spared - spared if memo else 0.0)
             yield Ranking(scores=scores, best_score=float(scores.min()), seconds=seconds)
+
+
+def _unused_notes(query: Signature, method: Method) -> tuple[str, ...]:
+    """Return what to say of what is known of a view but means nothing to a measure of distance."""
+    if not isinstance(query, View):
+        return ()
+    known = {
+        "ranges": query.ranges is not None,
+        "scores": query.scores is not None,
+        "sectors": any(photo.sectors for photo in query.photos),
+        "errors of north": any(photo.north_sigma for photo in query.photos),
+    }
+    unused = [name for name, there in known.items() if there]
+    if not unused:
+        return ()
+    return (f"{method} makes no use of {' and '.join(unused)}; the method likelihood does.",)
 
 
 class Shortlist:

@@ -339,6 +339,40 @@ def test_many_queries_are_answered_line_by_line(
     assert len(done("localize city.parquet --queries - --require 2D").splitlines()) == 2
 
 
+@pytest.mark.usefixtures("city")
+@pytest.mark.parametrize("method", ["edit+edit", "likelihood"])
+def test_what_a_photo_shows_is_said_in_words_and_repeated(done: Done, method: str) -> None:
+    words = "lamp at 80 within 12 m, crossing at 120 far, street light at 200"
+    query = (
+        "localize city.parquet --top 2 --method",
+        method,
+        "--see",
+        words,
+        "--fov",
+        70,
+        "--look",
+        90,
+    )
+    answer = json.loads(done(*query, "--json"))
+    seen = answer["query"]
+    assert (seen["types"], seen["bearings"]) == ("DXD", [80.0, 120.0, 200.0])
+    assert seen["ranges"] == [pytest.approx(7.3, abs=0.1), pytest.approx(25, abs=1), None]
+    assert seen["sectors"] == [[55.0, 125.0]]
+    notes = ["D at 200.0° stands outside the sectors"]
+    notes += ["edit+edit makes no use of ranges and sectors"] if method == "edit+edit" else []
+    for note, words in zip(answer["notes"], notes, strict=True):
+        assert words in note
+    out = done(*query)
+    assert "Seen: D 80° 7.28 m ± 56%, X 120° 25.2 m ± 28%, D 200°; looked at 55-125°." in out
+    line = json.dumps(seen | {"id": "again"})
+    Path("queries.jsonl").write_text(line)
+    again = json.loads(
+        done("localize city.parquet --queries queries.jsonl --top 2 --method", method)
+    )
+    assert again["query"] == seen
+    assert again["candidates"] == answer["candidates"]
+
+
 @pytest.mark.parametrize("method", ["edit+edit", "likelihood"])
 def test_every_line_of_a_batch_has_an_answer_or_an_error(city: Path, run: Run, method: str) -> None:
     rows = ['{"types": "DX"}', "{", '{"id": "\\ud800", "types": "D!"}', '{"bearings": []}']
