@@ -26,9 +26,11 @@ import numpy as np
 
 from semsig_gis.core.errors import InputError
 from semsig_gis.core.geometry import signed_degrees
+from semsig_gis.core.view import View
 from semsig_gis.database.database import views_in
-from semsig_gis.likelihood.index import CellScores
-from semsig_gis.likelihood.noise.table import database_tables, place_loglik
+from semsig_gis.likelihood.index import CellScores, own_sigma
+from semsig_gis.likelihood.noise.table import database_tables
+from semsig_gis.likelihood.photo import PhotoTable, photo_loglik
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -155,27 +157,27 @@ RERANKED = 1000
 """How many cells are re-ranked unless said otherwise."""
 FIRST = 100  # cells that are re-ranked whatever comes out
 HOPELESS = 20.0  # nats below the best of them, at which the others are not looked at
-# Turns around the likeliest one of the index, which knows it to five degrees.
+# Turns around the likeliest one of the scan, which knows it to less than six degrees.
 TURNS = np.arange(-7.5, 7.6, 1.5)
 
 
 def align_cells(
     database: SignatureDatabase,
-    query: Signature,
+    photo: Signature,
     noise: Noise,
     cells: NDArray[np.int64],
     *,
     turns: NDArray[np.float64] | None = None,
 ) -> NDArray[np.float64]:
-    """Return the log-likelihood of a query in some cells, summed over one-to-one associations.
+    """Return the log-likelihood of a photo in some cells, summed over one-to-one associations.
 
-    As `place_loglik`: the shape is (c,), or (c, r) if `turns`, the degrees to turn the
-    query by for each cell, are given.
+    As `photo_loglik`: the shape is (c,), or (c, r) if `turns`, the degrees to turn the photo by for
+    each cell, are given.
     """
-    models = database_tables(database, noise)
-    ways = np.zeros((len(cells), 1)) if turns is None else np.asarray(turns, dtype=np.float64)
-    views = views_in(database, cells)
-    loglik = place_loglik(query, views, *models, turns=ways, reach=database.reach)
+    tables, weights = database_tables(database, noise)
+    ways = np.zeros((len(cells), 1)) if turns is None else turns
+    asked = PhotoTable.of(View.of(photo), tables[0])
+    loglik = photo_loglik(asked, views_in(database, cells), tables, weights, turns=ways)
     return loglik[:, 0] if turns is None else loglik
 
 
@@ -200,7 +202,8 @@ def rerank(
     if count < 1:
         msg = f"{count} cells were to be re-ranked; give a whole number from 1."
         raise InputError(msg)
-    if query.bearings is None:
+    view = View.of(query)
+    if view.bearings is None:
         return scores
     old = scores.loglik.astype(np.float64)
     total = old if log_prior is None else old + log_prior
@@ -209,39 +212,46 @@ def rerank(
     cells = cells[np.argsort(-total[cells], kind="stable")][:count]
     cells = cells[total[cells] > -np.inf]
     first, rest = cells[:FIRST], cells[FIRST:]
-    new, turn = _aligned(index, query, first, scores.heading, north_sigma)
+    new, turns = _aligned(index, view, first, scores, north_sigma)
     if len(rest):
         # At best, the others change by as much as any of these did.
         hope = (new - old[first]).max()
         best = (new - old[first] + total[first]).max()
         rest = rest[total[rest] + hope > best - HOPELESS]
-        more, more_turn = _aligned(index, query, rest, scores.heading, north_sigma)
-        new, turn = np.append(new, more), np.append(turn, more_turn)
+        more, more_turns = _aligned(index, view, rest, scores, north_sigma)
+        new = np.append(new, more)
+        turns = [np.append(*both) for both in zip(turns, more_turns, strict=True)]
     cells = np.append(first, rest)
     worse = slice(len(cells) // 2, None)
     moved = np.logaddexp.reduce(new[worse]) - np.logaddexp.reduce(old[cells[worse]])
     loglik = old + moved if len(cells) else old
     loglik[cells] = new
-    if scores.heading is None:
-        return CellScores(loglik=loglik)
-    heading = scores.heading.copy()
-    heading[cells] = signed_degrees(turn)
-    return CellScores(loglik=loglik, heading=heading)
+    headings = []
+    for before, turn in zip(scores.headings, turns, strict=True):
+        heading = before
+        if before is not None:
+            heading = before.copy()
+            heading[cells] = signed_degrees(turn)
+        headings.append(heading)
+    return CellScores(loglik=loglik, headings=tuple(headings))
 
 
 def _aligned(
     index: LikelihoodIndex,
-    query: Signature,
+    view: View,
     cells: NDArray[np.int64],
-    heading: NDArray[np.float32] | None,
+    scores: CellScores,
     north_sigma: float,
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return the log-likelihood in some cells, and the turn that is likeliest in each."""
-    turns = np.zeros((len(cells), 1)) if heading is None else heading[cells, None] + TURNS
-    database = index.database
-    views = views_in(database, cells)
-    logliks = place_loglik(query, views, *index.models, turns=turns, reach=database.reach)
-    if heading is not None:
-        logliks += turn_logs(turns, TURNS[1] - TURNS[0], north_sigma)
-    likeliest = turns[np.arange(len(cells)), logliks.argmax(axis=1)]
-    return np.logaddexp.reduce(logliks, axis=1), likeliest
+) -> tuple[NDArray[np.float64], list[NDArray[np.float64]]]:
+    """Return the log-likelihood in some cells, and the likeliest turns of the photos in each."""
+    views = views_in(index.database, cells)
+    total, likeliest = np.zeros(len(cells)), []
+    for photo, heading in zip(view.split(), scores.headings, strict=True):
+        turns = np.zeros((len(cells), 1)) if heading is None else heading[cells, None] + TURNS
+        asked = PhotoTable.of(photo, index.table)
+        logliks = photo_loglik(asked, views, *index.models, turns=turns)
+        if heading is not None:
+            logliks += turn_logs(turns, TURNS[1] - TURNS[0], own_sigma(photo, north_sigma))
+        likeliest.append(turns[np.arange(len(cells)), logliks.argmax(axis=1)])
+        total += np.logaddexp.reduce(logliks, axis=1)
+    return total, likeliest

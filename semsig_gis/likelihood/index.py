@@ -1,42 +1,29 @@
-"""The likelihood index: what each symbol adds to the score of every cell, in memory and in a file.
+"""Every cell's likelihood of a view, from the database as it is: no index, no file.
 
-A column holds, for a class t and a step of bearings, ``log(1 + sum_i o_i C(i, t) N / lambda(t))``:
-what a detection there adds, less ``log(lambda(t))``, which is the same for all cells. N is the mean
-density over the step.
-
-The file lies beside its database, is mapped into memory, and renewed when stale. A line of JSON,
-padded to whole pages, tells what it belongs to; then come the constants (float32), the CRC-32 of
-every column and the columns (uint8), so that a query touches only the pages of its own columns, and
-checks those.
+A first sum over the detections one by one, in which one lamp may explain three; the best cells are
+ranked again by one-to-one associations (`likelihood.association`). Errors of bearings and ranges
+are taken at `LEVELS` distances and `BINS` bearings, which is next to nothing beside the errors.
 """
 
 from __future__ import annotations
 
-import functools
 import hashlib
 import json
 import math
-import os
-import zlib
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
-from pathlib import Path
+from functools import cached_property, partial
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from semsig_gis.core.errors import DatabaseError, InputError
-from semsig_gis.core.scratch import remove_abandoned
-from semsig_gis.core.signature import BEARING_UNITS
-from semsig_gis.core.view import check_north
-from semsig_gis.database.city import City
+from semsig_gis.core.geometry import FULL_TURN
+from semsig_gis.core.signature import DISTANCE_UNITS
+from semsig_gis.core.threads import share_rows
+from semsig_gis.core.view import View, check_north
 from semsig_gis.likelihood.noise.table import database_tables, mean_table
-from semsig_gis.storage.text import parse_json
-from semsig_gis.storage.whole import whole_file
+from semsig_gis.likelihood.photo import PhotoTable
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
-
     from numpy.typing import NDArray
 
     from semsig_gis.core.signature import Signature
@@ -44,73 +31,46 @@ if TYPE_CHECKING:
     from semsig_gis.likelihood.noise.model import Noise
     from semsig_gis.likelihood.noise.table import NoiseTable
 
-BINS = 72
-"""Bearing steps of five degrees."""
-BIN_DEGREES = 360.0 / BINS
-"""Width of one."""
-BIN_UNITS = BEARING_UNITS // BINS
+BINS = 512
+"""Bearing steps of an object."""
+FINE = 8 * BINS
+"""Bearing steps of a detection."""
+LEVELS = 32
+"""Distances at which errors are taken."""
+TURN_BINS = 8
+"""Steps between two turns of a photo whose north is uncertain: 5.625 degrees."""
 
-LEVELS = 128  # of bearing noise, where it depends on the distance
-LINES_A_TASK = 64
-VERSION = 2  # of the index: raised whenever the same database and noise give other columns
-MOST_OBJECTS = 257  # whose bytes add up within 16 bits
+VERSION = 3  # raised whenever the same database and noise give other likelihoods
 LEAST_PRIOR = 1e-7  # turns that are less likely than this, against the likeliest, are left out
-LEAST_MASS = 1e-6  # below which a turn adds nothing to the sum
-
-KIND = "semsig likelihood index"
-PARQUET = b"PAR1"
-PAGE = 4096
-HEADER_PAGES = 4
+LEAST_DENSITY = 1e-12
+LAPS = np.arange(-3, 4)  # 180 degrees of deviation reach three turns
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class CellScores:
-    """The log-likelihood (natural logarithm) of a query in every cell, and the likeliest headings.
+    """The log-likelihood (natural logarithm) of a view in every cell, and the likeliest headings.
 
-    `heading` is in degrees clockwise, in [-180, 180), to add to the bearings of the query; None if
-    north was known or the query has no bearings.
+    `headings` has one item a photo: degrees clockwise, in [-180, 180), to add to its bearings in
+    each cell; None where its north is known or it has no bearings.
     """
 
     loglik: NDArray[np.floating]
-    heading: NDArray[np.float32] | None = None
+    headings: tuple[NDArray[np.float32] | None, ...] = (None,)
 
-
-@dataclass(frozen=True, eq=False, kw_only=True)
-class IndexFile:
-    """A file that columns are mapped from, and their sums, which the first use of each checks."""
-
-    path: Path
-    sums: NDArray[np.uint32]
-    checked: NDArray[np.bool_]
-
-    def require_intact(self, columns: NDArray[np.uint8], numbers: NDArray[np.int64]) -> None:
-        """Raise DatabaseError if a column of these numbers is not the one that was written."""
-        new = numbers[~self.checked[numbers]]
-        for number in {*new.tolist()}:
-            if zlib.crc32(columns[number].data) != self.sums[number]:
-                msg = f"{self.path} is damaged; delete it, and the index is built again."
-                raise DatabaseError(msg)
-            self.checked[number] = True
+    @property
+    def heading(self) -> NDArray[np.float32] | None:
+        """The headings of the first photo."""
+        return self.headings[0]
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class LikelihoodIndex:
-    """What the cells of a database add to the likelihood of each symbol.
+    """The cells of a database and a noise model: what views are compared with.
 
     Parameters
     ----------
     database, noise : SignatureDatabase, and NoiseSpec or NoiseMixture
-        The cells and the noise model; the columns hold the mean of a mixture.
-    columns : ndarray of uint8, shape (k + 1, 72, n)
-        Inner logarithms in steps, by class and bearing; the last class is "not known".
-    constants : ndarray of float32, shape (n,)
-        What each cell adds to any query.
-    step : float
-        Size of a step.
-    fingerprint : str
-        Stands for the database, the noise model and the version of the index.
-    file : IndexFile, optional
-        Where the columns are mapped from.
+        The cells and the noise model.
 
     Examples
     --------
@@ -123,96 +83,86 @@ class LikelihoodIndex:
 
     database: SignatureDatabase
     noise: Noise
-    columns: NDArray[np.uint8]
-    constants: NDArray[np.float32]
-    step: float
-    fingerprint: str
-    file: IndexFile | None = None
 
-    @functools.cached_property
+    @cached_property
     def models(self) -> tuple[tuple[NoiseTable, ...], NDArray[np.float64]]:
         """The noise model in numbers, or each model of the mixture, and the chance of each."""
         return database_tables(self.database, self.noise)
 
-    @functools.cached_property
+    @cached_property
     def table(self) -> NoiseTable:
-        """The noise model that the columns hold."""
+        """The mean of the models, by which all cells are compared."""
         return mean_table(*self.models)
 
-    def flat_columns(self, symbols: NDArray[np.int64] | None = None) -> NDArray[np.uint8]:
-        """Return the columns, shape ((k + 1) * 72, n), of which some, or all, will be looked at.
+    @cached_property
+    def fingerprint(self) -> str:
+        """What stands for the database, the noise model and the version of the method."""
+        return index_fingerprint(self.database, self.noise)
 
-        DatabaseError if one of those is not the one that was written.
-        """
-        flat = self.columns.reshape(-1, len(self.constants))
-        if self.file is not None:
-            self.file.require_intact(flat, np.arange(len(flat)) if symbols is None else symbols)
-        return flat
+    @cached_property
+    def _levels(self) -> _Levels:
+        return _Levels.of(self.table)
 
     def scores(self, query: Signature, *, north_sigma: float = 0.0) -> CellScores:
-        """Return the log-likelihood of a query in every cell, and the likeliest turn for each.
+        """Return the log-likelihood of a view in every cell, and the likeliest turns of its photos.
 
         Types may be unknown, all or those of code 0; bearings may be unknown, and then the order of
         the types plays no part. `north_sigma` is the standard deviation in degrees of the north of
-        the query, infinite where it is not known at all; the likelihood is summed over its turns in
-        steps of five degrees. Raises `InputError` if the query is empty or has a class that no cell
-        sees, or `north_sigma` is negative.
+        photos that do not tell their own, infinite where it is not known at all; the likelihood is
+        summed over turns of 5.6 degrees. Raises `InputError` if the view has a class that no cell
+        sees, or `north_sigma` is out of range.
         """
         check_north(north_sigma)
-        rows = self.table.query_rows(query)
-        if query.bearings is None:
-            return CellScores(loglik=self._by_counts(rows))
-        base = float(np.log(self.table.density[rows]).sum())
-        bins = np.floor(query.bearings / BIN_DEGREES).astype(np.int64)
-        if north_sigma > 0:
-            return self._turned(rows, bins, base, north_sigma)
+        view = View.of(query)
+        if view.bearings is None:
+            return CellScores(loglik=self._by_counts(self.table.query_rows(view)))
+        loglik = np.zeros(len(self.database), np.float32)
+        headings = []
+        for photo in view.split():
+            own, heading = self._of_photo(photo, own_sigma(photo, north_sigma))
+            loglik += own
+            headings.append(heading)
+        return CellScores(loglik=loglik, headings=tuple(headings))
+
+    def _of_photo(
+        self, photo: View, north_sigma: float
+    ) -> tuple[NDArray[np.float32], NDArray[np.float32] | None]:
+        """Return the log-likelihood of one photo in every cell, and its likeliest turns."""
         from semsig_gis.likelihood.kernels import scan  # noqa: PLC0415 - numba loads slowly
 
-        symbols = rows * BINS + bins
-        flat = self.flat_columns(symbols)
-        scores = np.empty(len(self.constants), np.float32)
-        constants = self.constants
-        for low in range(0, len(symbols), MOST_OBJECTS):
-            scan(flat, symbols[low : low + MOST_OBJECTS], constants, base, self.step, scores)
-            constants, base = scores, 0.0
-        return CellScores(loglik=scores)
-
-    def _turned(
-        self, rows: NDArray[np.int64], bins: NDArray[np.int64], base: float, north_sigma: float
-    ) -> CellScores:
-        """Return the scores of a query whose north is uncertain, and its likeliest turns."""
-        from semsig_gis.likelihood.kernels import scan_turned  # noqa: PLC0415
-
-        turns = np.arange(-BINS // 2, BINS // 2)
-        priors = np.exp(-0.5 * (turns * BIN_DEGREES / north_sigma) ** 2)
-        likely = priors > LEAST_PRIOR * priors.max()
-        turns, priors = turns[likely], priors[likely] / priors[likely].sum()
-        # Likelier turns first, so that sums are rarely rescaled.
-        order = np.argsort(-priors, kind="stable")
-        turns, priors = turns[order], priors[order].astype(np.float32)
-        symbols = rows * BINS + (bins + turns[:, None]) % BINS
-        if symbols.shape[1] > MOST_OBJECTS:
-            msg = (
-                f"the query has {symbols.shape[1]} objects and its north is not known; give at "
-                f"most {MOST_OBJECTS} objects."
-            )
-            raise InputError(msg)
-        decay = np.exp(-self.step * np.arange(math.ceil(-math.log(LEAST_MASS) / self.step)))
-        scores = np.empty(len(self.constants), np.float32)
-        best = np.empty(len(self.constants), np.int16)
-        scan_turned(
-            self.flat_columns(symbols),
-            symbols,
-            turns,
-            priors,
-            decay.astype(np.float32),
-            self.constants,
-            base,
-            self.step,
-            scores,
-            best,
+        database, table, levels = self.database, self.table, self._levels
+        asked = PhotoTable.of(photo, table)
+        density = asked.density(table)
+        turns, log_turns = _turns(north_sigma)
+        scores = np.empty(len(database), np.float32)
+        best = np.empty(len(database), np.int16)
+        work = partial(
+            scan,
+            offsets=database.offsets,
+            codes=database.codes,
+            bearing_units=database.bearing_units,
+            distance_units=database.distance_units,
+            row_of=table.row_of,
+            group_of=levels.group_of,
+            level_of=levels.level_of,
+            rows=levels.rows(asked, table),
+            masses=levels.masses(asked),
+            width=asked.width,
+            named=levels.named(asked, table, density),
+            disc=levels.padded(asked.disc / FULL_TURN),
+            detected=levels.detected,
+            seen=table.seen.astype(np.float32),
+            left=table.left.astype(np.float32),
+            base=float(np.log(density).sum() - table.clutter.sum() * asked.width),
+            turns=turns,
+            log_turns=log_turns,
+            scores=scores,
+            best=best,
         )
-        return CellScores(loglik=scores, heading=best * np.float32(BIN_DEGREES))
+        share_rows(work, len(database))
+        if north_sigma == 0:
+            return scores, None
+        return scores, best * np.float32(FULL_TURN / BINS)
 
     def _by_counts(self, rows: NDArray[np.int64]) -> NDArray[np.float32]:
         """Return the scores of a query without bearings."""
@@ -225,7 +175,7 @@ class LikelihoodIndex:
             types.values,
             self.table.row_of,
             np.bincount(rows, minlength=len(self.table.codes) + 1),
-            1.0 - self.table.missed,
+            self.table.detected,
             self.table.named,
             self.table.clutter,
             distinct,
@@ -233,15 +183,124 @@ class LikelihoodIndex:
         return distinct[types.inverse]
 
 
-def build_index(
-    database: SignatureDatabase,
-    noise: Noise,
-    *,
-    out: NDArray[np.uint8] | None = None,
-    progress: Callable[[int, int], None] | None = None,
-    threads: int = 1,
-) -> LikelihoodIndex:
-    """Work out the index of a database for a noise model.
+def own_sigma(photo: View, north_sigma: float) -> float:
+    """Return the standard deviation of the north of a photo, its own or that of all."""
+    own = photo.photos[0].north_sigma
+    return north_sigma if own is None else own
+
+
+def _turns(north_sigma: float) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+    """Return the turns of a photo, in bins, and the logarithm of the chance of each."""
+    if north_sigma == 0:
+        return np.zeros(1, np.int64), np.zeros(1)
+    turns = np.arange(-BINS // 2, BINS // 2, TURN_BINS)
+    logs = -0.5 * (turns * (FULL_TURN / BINS) / north_sigma) ** 2
+    likely = logs > math.log(LEAST_PRIOR)
+    turns, logs = turns[likely], logs[likely]
+    return turns, logs - np.logaddexp.reduce(logs)
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class _Levels:
+    """A noise table at some distances, for classes grouped by their errors.
+
+    `group_of` is by class row, `level_of` by distance unit; `sigma`, shape (groups, levels), is the
+    deviation of bearings, `range_sigma` (groups,) and `blur` (levels,) that of logarithms of ranges
+    by the detector and by the place, and `fine` the density of a deviation.
+    """
+
+    group_of: NDArray[np.int64]
+    level_of: NDArray[np.int64]
+    sigma: NDArray[np.float64]
+    range_sigma: NDArray[np.float64]
+    distances: NDArray[np.float64]
+    blur: NDArray[np.float64]
+    fine: NDArray[np.float32]
+    detected: NDArray[np.float32]
+
+    @classmethod
+    def of(cls, table: NoiseTable) -> _Levels:
+        """Return the levels of a table."""
+        units = np.maximum(np.arange(DISTANCE_UNITS + 1), 1)
+        level_of = np.rint((LEVELS - 1) * np.log(units) / math.log(DISTANCE_UNITS)).astype(np.int64)
+        count = np.maximum(np.bincount(level_of, minlength=LEVELS), 1)
+        logs = np.bincount(level_of, np.log(table.distances), LEVELS) / count
+        distances = np.exp(logs)
+        kinds = np.stack([table.sigma, table.range_sigma], axis=1)
+        groups, group_of = np.unique(kinds, axis=0, return_inverse=True)
+        turned = np.degrees(table.position_sigma / distances)
+        sigma = np.minimum(np.hypot(groups[:, :1], turned), FULL_TURN / 2.0)
+        away = np.arange(FINE) * (FULL_TURN / FINE)
+        fine = np.zeros((*sigma.shape, FINE))
+        for lap in LAPS:
+            fine += np.exp(-0.5 * ((away + FULL_TURN * lap) / sigma[..., None]) ** 2)
+        fine /= sigma[..., None] * math.sqrt(2.0 * math.pi)
+        fine[fine < LEAST_DENSITY] = 0.0  # products of them would be slow to work out
+        # Without draws that depend on the length of a signature, one row does for all.
+        detected = table.detected
+        same = (detected == detected[0]).all() and (table.misnamed == table.misnamed[0]).all()
+        return cls(
+            group_of=group_of.reshape(-1),
+            level_of=level_of,
+            sigma=sigma,
+            range_sigma=groups[:, 1],
+            distances=distances,
+            blur=table.position_sigma / distances,
+            fine=fine.astype(np.float32),
+            detected=(detected[:1] if same else detected).astype(np.float32),
+        )
+
+    def padded(self, values: NDArray[np.float64]) -> NDArray[np.float32]:
+        """Return values, the last axis filled up to whole blocks with zeros."""
+        from semsig_gis.likelihood.kernels import LANES  # noqa: PLC0415
+
+        size = values.shape[-1]
+        more = [(0, 0)] * (values.ndim - 1) + [(0, -size % LANES)]
+        return np.pad(values, more).astype(np.float32)
+
+    def rows(self, asked: PhotoTable, table: NoiseTable) -> NDArray[np.float32]:
+        """Return the density of each detection by group, level and bearing of an object."""
+        from semsig_gis.likelihood.kernels import LANES, profile_rows  # noqa: PLC0415
+
+        near = np.ones((*self.sigma.shape, len(asked.bearings)))
+        known = ~np.isnan(asked.ranges)
+        if known.any():
+            errors = np.stack(
+                [
+                    asked.range_sigma(table)[self.group_of == group][0]
+                    for group in range(len(self.sigma))
+                ]
+            )
+            error = np.hypot(errors[:, None, known], self.blur[:, None])
+            away = np.log(asked.ranges[known] / self.distances[:, None]) / error
+            near[..., known] = np.exp(-0.5 * away**2) / (error * math.sqrt(2.0 * math.pi))
+        blocks = -(-len(asked.bearings) // LANES)
+        rows = np.zeros((blocks, *self.sigma.shape, BINS, LANES), np.float32)
+        shifts = np.rint(asked.bearings * (FINE / FULL_TURN)).astype(np.int64)
+        near[near < LEAST_DENSITY] = 0.0
+        profile_rows(self.fine, shifts, near.astype(np.float32), rows)
+        return rows
+
+    def masses(self, asked: PhotoTable) -> NDArray[np.float32]:
+        """Return the chance that an object is in the sectors, by group, level and bearing."""
+        from semsig_gis.likelihood.kernels import mass_rows  # noqa: PLC0415
+
+        levels = LEVELS if len(asked.sectors) else 0
+        masses = np.empty((len(self.sigma), levels, BINS), np.float32)
+        if levels:
+            mass_rows(self.sigma, asked.sectors, masses)
+        return masses
+
+    def named(
+        self, asked: PhotoTable, table: NoiseTable, density: NDArray[np.float64]
+    ) -> NDArray[np.float32]:
+        """Return the chance of what is said of each detection over that of a false one."""
+        lengths = len(self.detected)
+        return self.padded(asked.named(table)[:lengths] / density)
+
+
+def build_index(database: SignatureDatabase, noise: Noise) -> LikelihoodIndex:
+    """Return what views are compared with: the cells of a database, by a noise model.
 
     Parameters
     ----------
@@ -249,17 +308,11 @@ def build_index(
         The cells.
     noise : NoiseSpec or NoiseMixture
         The noise model.
-    out : ndarray of uint8, shape (k + 1, 72, n), optional
-        Where to put the columns, such as a mapped file.
-    progress : callable, optional
-        Called with the number of cells done and in all.
-    threads : int, default 1
-        How many blocks of cells are worked out at once.
 
     Returns
     -------
     LikelihoodIndex
-        The index.
+        Both, ready for queries.
 
     Raises
     ------
@@ -273,17 +326,9 @@ def build_index(
     >>> len(index.database) == len(demo_database)
     True
     """
-    table = mean_table(*database_tables(database, noise))
-    unseen = table.nothing_seen(database.offsets, table.row_of[database.codes])
-    columns = np.empty(_shape(database), np.uint8) if out is None else out
-    return LikelihoodIndex(
-        database=database,
-        noise=noise,
-        columns=columns,
-        constants=unseen.astype(np.float32),
-        step=_write_columns(database, table, columns, progress, threads),
-        fingerprint=index_fingerprint(database, noise),
-    )
+    index = LikelihoodIndex(database=database, noise=noise)
+    _ = index.models
+    return index
 
 
 def index_fingerprint(database: SignatureDatabase, noise: Noise) -> str:
@@ -300,266 +345,3 @@ def index_fingerprint(database: SignatureDatabase, noise: Noise) -> str:
     ):
         digest.update(np.ascontiguousarray(array).data)
     return digest.hexdigest()
-
-
-def _shape(database: SignatureDatabase) -> tuple[int, int, int]:
-    """Return the shape of the columns: classes seen and one for unknown, bearing steps, cells."""
-    return len(database.present_codes) + 1, BINS, len(database)
-
-
-def _write_columns(
-    database: SignatureDatabase,
-    table: NoiseTable,
-    columns: NDArray[np.uint8],
-    progress: Callable[[int, int], None] | None,
-    threads: int,
-) -> float:
-    """Fill `columns`, perhaps a mapped file, and return the size of their steps."""
-    from semsig_gis.likelihood.kernels import LINE, fill_columns  # noqa: PLC0415
-
-    spread_of, spread = _spreads(database, table)
-    # 255 steps reach what four objects in one direction add.
-    peak = float(spread.max() * (table.odds[:, :, None] * table.naming).max())
-    step = math.log1p(4.0 * peak) / 255.0
-    arguments = (
-        database.offsets,
-        table.row_of.astype(np.uint8)[database.codes],
-        database.bearing_units,
-        spread_of,
-        spread,
-        table.odds.astype(np.float32),
-        table.naming.astype(np.float32),
-        _logs(step),
-        columns,
-    )
-    cells = len(database)
-    lines = -(-cells // LINE)
-    parts = [
-        np.array([low, min(low + LINES_A_TASK, lines)]) for low in range(0, lines, LINES_A_TASK)
-    ]
-    with ThreadPoolExecutor(threads) as pool:
-        tasks = [pool.submit(fill_columns, part, *arguments) for part in parts]
-        for part, task in zip(parts, tasks, strict=True):
-            task.result()
-            if progress is not None:
-                progress(min(int(part[1]) * LINE, cells), cells)
-    return step
-
-
-def _spreads(
-    database: SignatureDatabase, table: NoiseTable
-) -> tuple[NDArray[np.uint8], NDArray[np.float32]]:
-    """Return which bearing noise each entry has, and the density of each in every bin."""
-    sigma = table.sigmas(database.reach)
-    if table.position_sigma == 0:
-        levels, level = np.unique(sigma, return_inverse=True)
-    else:
-        levels = np.geomspace(sigma.min(), sigma.max(), LEVELS)
-        middle = np.sqrt(levels[1:] * levels[:-1])
-        level = np.searchsorted(middle, sigma)
-    level_of = np.zeros((256, 256), np.uint8)
-    level_of[table.codes] = level.reshape(sigma.shape)
-    spread_of = level_of[database.codes, database.distance_units]
-    inside = (np.arange(BIN_UNITS) + 0.5) * (BIN_DEGREES / BIN_UNITS)
-    edges = np.arange(BINS + 1) * BIN_DEGREES
-    away = edges[None, None, :] - inside[None, :, None]
-    below = np.zeros((len(levels), BIN_UNITS, BINS + 1))
-    erf = np.vectorize(math.erf, otypes=[np.float64])
-    for turn in range(-3, 4):  # 180 degrees of deviation reach three turns
-        deviations = (away + 360.0 * turn) / levels[:, None, None]
-        below += 0.5 * (1.0 + erf(deviations / math.sqrt(2.0)))
-    return spread_of, (np.diff(below, axis=2) / BIN_DEGREES).astype(np.float32)
-
-
-def _logs(step: float) -> NDArray[np.uint8]:
-    """Return the logarithm in steps, by the leading bits of a float32 from 1 up."""
-    from semsig_gis.likelihood.kernels import MANTISSA_BITS  # noqa: PLC0415
-
-    octaves = math.ceil(255 * step / math.log(2.0))
-    octave, part = np.divmod(np.arange(octaves << MANTISSA_BITS), 1 << MANTISSA_BITS)
-    value = np.log((1.0 + (part + 0.5) / (1 << MANTISSA_BITS)) * 2.0**octave)
-    value[0] = 0.0  # where nothing is near, exactly nothing is added
-    return np.minimum(np.rint(value / step), 255).astype(np.uint8)
-
-
-# --- The file ---------------------------------------------------------------------------------
-
-
-def ready_index(
-    database: SignatureDatabase,
-    noise: Noise,
-    path: str | Path,
-    *,
-    note: Callable[[str], None] | None = None,
-    progress: Callable[[int, int], None] | None = None,
-    threads: int = 1,
-) -> LikelihoodIndex:
-    """Open the index of a database, and build and save it first where that is needed.
-
-    Parameters
-    ----------
-    database : SignatureDatabase
-        The cells.
-    noise : NoiseSpec or NoiseMixture
-        The noise model.
-    path : str or Path
-        File of the index, such as `City.index_path` gives.
-    note : callable, optional
-        Called with a sentence where the index is built or cannot be saved.
-    progress : callable, optional
-        Called with the number of cells done and in all while it is built.
-    threads : int, default 1
-        How many blocks of cells are worked out at once.
-
-    Returns
-    -------
-    LikelihoodIndex
-        The index; mapped from the file, or in memory where no file can be written.
-
-    Raises
-    ------
-    InputError
-        If the file is a database, which the index would replace.
-
-    Examples
-    --------
-    >>> import tempfile
-    >>> from semsig_gis import named_noise, ready_index
-    >>> with tempfile.TemporaryDirectory() as folder:
-    ...     path = f"{folder}/city.likelihood"
-    ...     index = ready_index(demo_database, named_noise("light"), path, note=print)
-    ...     again = ready_index(demo_database, named_noise("light"), path, note=print)
-    The likelihood index does not exist yet and is built.
-    """
-    _keep_database(path, noise)
-    remove_abandoned(Path(path).parent)  # else only who writes does
-    say = note or (lambda _: None)
-    fingerprint = index_fingerprint(database, noise)
-    if not Path(path).exists():
-        say("The likelihood index does not exist yet and is built.")
-    else:
-        try:
-            return open_index(database, noise, path, fingerprint=fingerprint)
-        except DatabaseError as error:
-            say(f"The likelihood index is built again: {error}")
-    try:
-        save_index(database, noise, path, progress=progress, threads=threads)
-        return open_index(database, noise, path, fingerprint=fingerprint)
-    except (InputError, OSError) as error:
-        say(f"The likelihood index is kept in memory only: {error}")
-        return build_index(database, noise, progress=progress, threads=threads)
-
-
-def save_index(
-    database: SignatureDatabase,
-    noise: Noise,
-    path: str | Path,
-    *,
-    progress: Callable[[int, int], None] | None = None,
-    threads: int = 1,
-) -> None:
-    """Build an index straight into its file, which appears whole, by rename.
-
-    Raises `InputError` if the file is a database, which the index would replace, or not writable.
-    """
-    _keep_database(path, noise)
-    shape = _shape(database)
-    start = _columns_start(shape)
-    with whole_file(path) as partial:
-        with partial.open("wb") as file:
-            file.truncate(start + math.prod(shape))
-            if hasattr(os, "posix_fallocate"):  # where there is no room, a mapped file crashes
-                os.posix_fallocate(file.fileno(), 0, start + math.prod(shape))
-        columns = np.memmap(partial, np.uint8, "r+", offset=start, shape=shape)
-        index = build_index(database, noise, out=columns, progress=progress, threads=threads)
-        columns.flush()
-        flat = columns.reshape(-1, shape[-1])
-        sums = np.array([zlib.crc32(column.data) for column in flat], np.uint32)
-        del flat, columns
-        header = {
-            "kind": KIND,
-            "fingerprint": index.fingerprint,
-            "shape": list(shape),
-            "step": index.step,
-            "sum": _sum(index.step, index.constants, sums),
-        }
-        with partial.open("r+b") as file:
-            file.write(json.dumps(header).encode().ljust(HEADER_PAGES * PAGE - 1) + b"\n")
-            file.write(index.constants.tobytes() + sums.tobytes())
-
-
-def open_index(
-    database: SignatureDatabase,
-    noise: Noise,
-    path: str | Path,
-    *,
-    fingerprint: str | None = None,
-) -> LikelihoodIndex:
-    """Map a file that `save_index` wrote; its columns are read when a query needs them.
-
-    Raises `DatabaseError` if the file is missing or damaged, or belongs to another database, noise
-    model or version, which the `fingerprint` tells.
-    """
-    fingerprint = fingerprint or index_fingerprint(database, noise)
-    shape = _shape(database)
-    start = _columns_start(shape)
-    try:
-        with Path(path).open("rb") as file:
-            header = parse_json(file.read(HEADER_PAGES * PAGE), finite=True)
-            constants = np.fromfile(file, np.float32, shape[-1])
-            sums = np.fromfile(file, np.uint32, math.prod(shape[:-1]))
-        same = header["fingerprint"] == fingerprint
-        step = float(header["step"])
-        whole = (
-            header["kind"] == KIND
-            and header["shape"] == list(shape)
-            and Path(path).stat().st_size == start + math.prod(shape)
-            and header["sum"] == _sum(step, constants, sums)
-            and 0 < step < math.inf
-        )
-        columns = np.memmap(path, np.uint8, "r", offset=start, shape=shape) if whole else None
-    except (OSError, KeyError, TypeError, ValueError) as error:
-        reason = error.strerror if isinstance(error, OSError) and error.strerror else error
-        msg = f"{path} is missing or damaged ({reason}); build the index again."
-        raise DatabaseError(msg) from error
-    if not same:
-        msg = f"{path} belongs to another database, noise model or version; build it again."
-        raise DatabaseError(msg)
-    if columns is None:
-        msg = f"{path} is damaged (its parts do not fit each other); build the index again."
-        raise DatabaseError(msg)
-    return LikelihoodIndex(
-        database=database,
-        noise=noise,
-        columns=np.asarray(columns),
-        constants=constants,
-        step=step,
-        fingerprint=fingerprint,
-        file=IndexFile(path=Path(path), sums=sums, checked=np.zeros(len(sums), np.bool_)),
-    )
-
-
-def _keep_database(path: str | Path, noise: Noise) -> None:
-    """Refuse to put an index in the place of a database: both are named by one argument."""
-    try:
-        with Path(path).open("rb") as file:
-            begin = file.read(len(PARQUET))
-    except OSError:
-        return  # nothing there, or nothing that can be replaced
-    if begin == PARQUET:
-        msg = (
-            f"{path} is a Parquet file, such as a database, and no likelihood index; "
-            f"give a place of its own, such as {City(path).index_path(noise)}."
-        )
-        raise InputError(msg)
-
-
-def _sum(step: float, constants: NDArray[np.float32], sums: NDArray[np.uint32]) -> int:
-    """Return the CRC-32 of what stands before the columns."""
-    return zlib.crc32(sums.data, zlib.crc32(constants.data, zlib.crc32(repr(step).encode())))
-
-
-def _columns_start(shape: tuple[int, int, int]) -> int:
-    """Return the byte at which the columns begin: a whole page."""
-    sums, cells = math.prod(shape[:-1]), shape[-1]
-    return HEADER_PAGES * PAGE + -(-4 * (cells + sums) // PAGE) * PAGE

@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 _TURN = 360.0
+_ROOT = math.sqrt(2.0 * math.pi)
 _REACH = 4.5  # deviations beyond which a detection is not taken for an object
 _WIDE = 45.0  # deviation in degrees from which on the tails meet behind the observer
 _LARGE = 1e200
@@ -20,15 +21,25 @@ _LARGE = 1e200
 _ROUNDS, _SETTLED = 30, 1e-2
 _PAIR_ROUNDS, _PAIR_SETTLED = 60, 1e-5
 
-LINE = 64
-"""Cells that are worked out together: as many as a cache line has bytes."""
-MANTISSA_BITS = 9
-"""Of a float32, how many the table of logarithms looks at."""
-_SHIFT = 23 - MANTISSA_BITS
-_ONE = 127 << MANTISSA_BITS  # where the bits of 1.0 begin
-_BLOCK = 4096  # cells whose sums stay in the fastest cache
+LANES = 8
+"""Detections that are added up together."""
+UNITS = 7200  # bearing units of a turn
+FARS = 256  # distance units
 _BINS = 1024  # scores are counted in so many bins to find the best of them
 _BINS_A_NAT = np.float32(16.0)
+
+
+@compiled
+def _mass(start: float, width: float, spread: float) -> float:
+    """Return how much of a wrapped normal distribution lies in a sector."""
+    start -= _TURN * math.floor(start / _TURN + 0.5)
+    scale = 1.0 / (spread * math.sqrt(2.0))
+    laps = 1 if spread < _WIDE else 3
+    total = 0.0
+    for lap in range(-laps - 1, laps + 1):
+        low = (start + _TURN * lap) * scale
+        total += math.erf(low + width * scale) - math.erf(low)
+    return 0.5 * total
 
 
 @compiled
@@ -38,94 +49,151 @@ def align(  # noqa: C901, PLR0912, PLR0915, PLR0917 - a kernel takes no keywords
     bearing_units: NDArray[np.uint16],
     distance_units: NDArray[np.uint8],
     unit: float,
-    names: NDArray[np.int64],
     bearings: NDArray[np.float64],
+    ranges: NDArray[np.float64],
+    range_sigma: NDArray[np.float64],
+    own: NDArray[np.float64],
+    other: NDArray[np.float64],
+    density: NDArray[np.float64],
+    disc: NDArray[np.float64],
+    sectors: NDArray[np.float64],
+    width: float,
     turns: NDArray[np.float64],
-    odds: NDArray[np.float64],
-    naming: NDArray[np.float64],
+    detected: NDArray[np.float64],
+    misnamed: NDArray[np.float64],
+    clutter: NDArray[np.float64],
+    seen: NDArray[np.float64],
+    left: NDArray[np.float64],
     sigma: NDArray[np.float64],
+    blur: NDArray[np.float64],
+    distances: NDArray[np.float64],
     totals: NDArray[np.float64],
 ) -> None:
-    """Sum over the one-to-one associations of a query with what is seen from some places.
+    """Sum over the one-to-one associations of a photo with what is seen from some places.
 
-    Fills `totals`, shape (models, places, turns), with logarithms; the empty association counts as
-    one. Objects seen have class rows `kinds` and bearings of `unit` degrees a unit, those of the
-    query class rows `names` and `bearings` in degrees, turned by `turns`, shape (places, turns). By
-    model, signature length and class, `odds` are of detection over a miss and `naming`, by name,
-    the chance of the name over the density of such clutter; `sigma`, shape (models, k, 256), is the
-    deviation of a bearing in degrees by distance.
+    Fills `totals`, shape (models, places, turns), with log-likelihoods. Objects of the places have
+    class rows `kinds` and bearings of `unit` degrees a unit. The photo, turned by `turns`, shape
+    (places, turns), has detections by `bearings`, `ranges` (NaN if unknown) and, by model and
+    class, `range_sigma`; it saw `sectors`, shape (s, 2), or all round, `width` of the turn. What
+    speaks for a class is `own`, shape (k, n), and `other` if it is misnamed, shape (models, k, n);
+    `density` (models, n) is of false detections, in which `disc` (n,) is that of the range. By
+    model, `detected` and `misnamed` are by length and class, `clutter` is the sum of false
+    detections, and by class and distance unit `seen` and `left` are the chances that what is in
+    range of the place is seen by the observer, and that it has left the range, and `sigma` the
+    deviation of a bearing. `blur` is that of the observer's place in metres, `distances` the metres
+    of a unit.
     """
-    models, longest = odds.shape[0], odds.shape[1] - 1
-    size = len(names)
+    models, longest = detected.shape[0], detected.shape[1] - 1
+    size = len(bearings)
     most = 0
     for place in range(len(offsets) - 1):
         most = max(most, offsets[place + 1] - offsets[place])
     pairs = most * size
-    left = np.empty(pairs, np.int64)
-    right = np.empty(pairs, np.int64)
+    one_of = np.empty(pairs, np.int64)
+    other_of = np.empty(pairs, np.int64)
     weight = np.empty(pairs)
     forth = np.empty(pairs)  # messages from the objects of the place to those of the query
     back = np.empty(pairs)
     at_left = np.empty(most)
     at_right = np.empty(size)
+    floor = np.empty(size)
+    named = np.empty((most, size))
     for place in range(len(offsets) - 1):
         low = offsets[place]
         count = offsets[place + 1] - low
         length = min(count, longest)
-        for way in range(turns.shape[1]):
-            turn = turns[place, way]
-            for model in range(models):
+        for model in range(models):
+            gone = 0.0
+            for one in range(size):
+                floor[one] = density[model, one]
+            for one in range(count):
+                kind = kinds[low + one]
+                wrong = misnamed[model, length, kind]
+                far = distance_units[low + one]
+                leaving = detected[model, length, kind] * left[model, kind, far]
+                gone += leaving
+                for two in range(size):
+                    name = (1.0 - wrong) * own[kind, two] + wrong * other[model, kind, two]
+                    named[one, two] = name
+                    # As many objects come into range as leave it, in any direction.
+                    floor[two] += leaving * name * disc[two] / _TURN
+            start = -(clutter[model] + gone) * width
+            for two in range(size):
+                start += math.log(floor[two])
+            for way in range(turns.shape[1]):
+                turn = turns[place, way]
+                total = start
                 edges = 0
                 for one in range(count):
-                    kind = kinds[low + one]
-                    spread = sigma[model, kind, distance_units[low + one]]
-                    factor = odds[model, length, kind] / (spread * math.sqrt(2.0 * math.pi))
+                    kind, far = kinds[low + one], distance_units[low + one]
+                    bearing = (bearing_units[low + one] + 0.5) * unit
+                    spread = sigma[model, kind, far]
+                    chance = detected[model, length, kind] * seen[model, kind, far]
+                    inside = 1.0
+                    if len(sectors):
+                        inside = 0.0
+                        for part in range(len(sectors)):
+                            inside += _mass(
+                                sectors[part, 0] + turn - bearing,
+                                sectors[part, 1] - sectors[part, 0],
+                                spread,
+                            )
+                    missed = 1.0 - chance * inside
+                    total += math.log(missed)
+                    if chance == 0.0:
+                        continue
+                    factor = chance / (missed * spread * _ROOT)
                     reach = min(_REACH * spread, 180.0)
-                    shift = turn - (bearing_units[low + one] + 0.5) * unit
-                    for other in range(size):
-                        away = bearings[other] + shift
+                    away_m = distances[far]
+                    for two in range(size):
+                        away = bearings[two] + turn - bearing
                         away -= _TURN * math.floor(away / _TURN + 0.5)
                         if abs(away) > reach:
                             continue
-                        density = math.exp(-0.5 * (away / spread) ** 2)
+                        near = math.exp(-0.5 * (away / spread) ** 2)
                         if spread > _WIDE:
                             for lap in range(1, 4):
-                                density += math.exp(-0.5 * ((away + _TURN * lap) / spread) ** 2)
-                                density += math.exp(-0.5 * ((away - _TURN * lap) / spread) ** 2)
-                        left[edges] = one
-                        right[edges] = other
-                        weight[edges] = factor * density * naming[model, length, kind, names[other]]
-                        back[edges] = 1.0
-                        edges += 1
+                                near += math.exp(-0.5 * ((away + _TURN * lap) / spread) ** 2)
+                                near += math.exp(-0.5 * ((away - _TURN * lap) / spread) ** 2)
+                        if not math.isnan(ranges[two]):
+                            error = math.hypot(range_sigma[model, kind, two], blur[model] / away_m)
+                            ratio = math.log(ranges[two] / away_m) / error
+                            near *= math.exp(-0.5 * ratio**2) / (error * _ROOT)
+                        value = factor * near * named[one, two] / floor[two]
+                        if value > 0.0:
+                            one_of[edges] = one
+                            other_of[edges] = two
+                            weight[edges] = value
+                            back[edges] = 1.0
+                            edges += 1
                 # Belief propagation, as in `associate`; as a function of its own it is slower.
                 for _ in range(_ROUNDS):
                     at_left[:count] = 1.0
                     for edge in range(edges):
-                        at_left[left[edge]] += weight[edge] * back[edge]
+                        at_left[one_of[edge]] += weight[edge] * back[edge]
                     at_right[:] = 1.0
                     for edge in range(edges):
-                        rest = at_left[left[edge]] - weight[edge] * back[edge]
+                        rest = at_left[one_of[edge]] - weight[edge] * back[edge]
                         forth[edge] = weight[edge] / max(rest, 1.0)
-                        at_right[right[edge]] += forth[edge]
+                        at_right[other_of[edge]] += forth[edge]
                     change = 0.0
                     for edge in range(edges):
-                        new = 1.0 / max(at_right[right[edge]] - forth[edge], 1.0)
+                        new = 1.0 / max(at_right[other_of[edge]] - forth[edge], 1.0)
                         change = max(change, abs(new - back[edge]) / new)
                         back[edge] = new
                     if change < _SETTLED:
                         break
                 at_left[:count] = 1.0
                 for edge in range(edges):
-                    at_left[left[edge]] += weight[edge] * back[edge]
-                total = 0.0
+                    at_left[one_of[edge]] += weight[edge] * back[edge]
                 product = 1.0
                 for one in range(count):
                     product *= at_left[one]
                     if product > _LARGE:
                         total += math.log(product)
                         product = 1.0
-                for other in range(size):
-                    product *= at_right[other]
+                for two in range(size):
+                    product *= at_right[two]
                     if product > _LARGE:
                         total += math.log(product)
                         product = 1.0
@@ -194,179 +262,183 @@ def associate(  # noqa: C901, PLR0917
 
 
 @compiled
-def fill_columns(  # noqa: C901, PLR0912, PLR0917 - a kernel takes no keywords
-    lines: NDArray[np.int64],
+def profile_rows(
+    fine: NDArray[np.float32],
+    shifts: NDArray[np.int64],
+    nearness: NDArray[np.float32],
+    rows: NDArray[np.float32],
+) -> None:
+    """Fill `rows`, shape (blocks, groups, levels, bins, LANES), with the density of each detection.
+
+    `fine`, shape (groups, levels, f), is the density of a deviation in steps of a turn over f,
+    `shifts` (n,) the bearing of each detection in such steps, and `nearness`, shape
+    (groups, levels, n), the density of its range. What is beyond the last detection stays 0.
+    """
+    groups, levels, steps = fine.shape
+    bins = rows.shape[3]
+    wide = steps // bins
+    for two in range(len(shifts)):
+        block, lane = two // LANES, two % LANES
+        for group in range(groups):
+            for level in range(levels):
+                near = nearness[group, level, two]
+                place = (wide // 2 - shifts[two]) % steps
+                for one in range(bins):
+                    rows[block, group, level, one, lane] = near * fine[group, level, place]
+                    place += wide
+                    if place >= steps:
+                        place -= steps
+
+
+@compiled
+def mass_rows(
+    sigma: NDArray[np.float64], sectors: NDArray[np.float64], masses: NDArray[np.float32]
+) -> None:
+    """Fill `masses`, shape (groups, levels, bins), with the chance that a bearing is in sectors.
+
+    `sigma`, shape (groups, levels), is its deviation in degrees.
+    """
+    groups, levels, bins = masses.shape
+    for group in range(groups):
+        for level in range(levels):
+            for one in range(bins):
+                bearing = (one + 0.5) * _TURN / bins
+                total = 0.0
+                for part in range(len(sectors)):
+                    width = sectors[part, 1] - sectors[part, 0]
+                    total += _mass(sectors[part, 0] - bearing, width, sigma[group, level])
+                masses[group, level, one] = total
+
+
+@compiled
+def scan(  # noqa: C901, PLR0912, PLR0915, PLR0917
+    part: NDArray[np.int64],
     offsets: NDArray[np.int64],
-    rows: NDArray[np.uint8],
+    codes: NDArray[np.uint8],
     bearing_units: NDArray[np.uint16],
-    spread_of: NDArray[np.uint8],
-    spread: NDArray[np.float32],
-    odds: NDArray[np.float32],
-    naming: NDArray[np.float32],
-    logs: NDArray[np.uint8],
-    columns: NDArray[np.uint8],
-) -> None:
-    """Write the columns of some cells: the log of what each symbol adds, in whole steps.
-
-    Fills the cells of ``lines[0]`` to ``lines[1] - 1``, each `LINE` cells, in `columns`, shape
-    (symbols, bins, n). `rows` are the class rows of the entries and `spread_of` their rows of
-    `spread`, shape (levels, units, bins): the density per degree in each bin for an object at a
-    unit of bin 0. `odds` and `naming` are as in `align`, without models; `logs` is the logarithm in
-    steps, by the leading bits of a float32 from 1.
-    """
-    cells = len(offsets) - 1
-    kinds = odds.shape[1]
-    symbols, bins = columns.shape[0], columns.shape[1]
-    units = spread.shape[1]
-    heard = np.zeros((kinds, bins), np.float32)
-    present = np.zeros(kinds, np.bool_)
-    inner = np.empty(bins, np.float32)
-    bits = inner.view(np.int32)
-    top = len(logs) - 1
-    buffer = np.empty((symbols, bins, LINE), np.uint8)
-    for line in range(lines[0], lines[1]):
-        first = line * LINE
-        last = min(first + LINE, cells)
-        for cell in range(first, last):
-            low, high = offsets[cell], offsets[cell + 1]
-            length = min(high - low, len(odds) - 1)
-            present[:] = False
-            for entry in range(low, high):
-                kind = rows[entry]
-                if not present[kind]:
-                    present[kind] = True
-                    heard[kind, :] = np.float32(0.0)
-                level = spread_of[entry]
-                shift = bearing_units[entry] // units
-                unit = bearing_units[entry] - shift * units
-                factor = odds[length, kind]
-                for place in range(bins - shift):
-                    heard[kind, place + shift] += factor * spread[level, unit, place]
-                for place in range(bins - shift, bins):
-                    heard[kind, place + shift - bins] += factor * spread[level, unit, place]
-            for symbol in range(symbols):
-                for place in range(bins):
-                    inner[place] = np.float32(1.0)
-                for kind in range(kinds):
-                    if present[kind]:
-                        share = naming[length, kind, symbol]
-                        for place in range(bins):
-                            inner[place] += share * heard[kind, place]
-                for place in range(bins):
-                    index = (bits[place] >> _SHIFT) - _ONE
-                    buffer[symbol, place, cell - first] = logs[min(index, top)]
-        for symbol in range(symbols):
-            for place in range(bins):
-                for cell in range(first, last):
-                    columns[symbol, place, cell] = buffer[symbol, place, cell - first]
-
-
-@compiled
-def _add_up(
-    columns: NDArray[np.uint8],
-    symbols: NDArray[np.int64],
-    low: int,
-    size: int,
-    sums: NDArray[np.uint16],
-) -> None:
-    """Fill the sums of some columns over a block of cells."""
-    for cell in range(size):
-        sums[cell] = 0
-    # Four columns in one go: a sum is fetched and put back a quarter as often.
-    fours = len(symbols) - len(symbols) % 4
-    for place in range(0, fours, 4):
-        first = columns[symbols[place], low : low + size]
-        second = columns[symbols[place + 1], low : low + size]
-        third = columns[symbols[place + 2], low : low + size]
-        fourth = columns[symbols[place + 3], low : low + size]
-        for cell in range(size):
-            sums[cell] += (
-                np.uint16(first[cell])
-                + np.uint16(second[cell])
-                + np.uint16(third[cell])
-                + np.uint16(fourth[cell])
-            )
-    for symbol in symbols[fours:]:
-        column = columns[symbol, low : low + size]
-        for cell in range(size):
-            sums[cell] += column[cell]
-
-
-@compiled
-def scan(  # noqa: PLR0917
-    columns: NDArray[np.uint8],
-    symbols: NDArray[np.int64],
-    constants: NDArray[np.float32],
+    distance_units: NDArray[np.uint8],
+    row_of: NDArray[np.int64],
+    group_of: NDArray[np.int64],
+    level_of: NDArray[np.int64],
+    rows: NDArray[np.float32],
+    masses: NDArray[np.float32],
+    width: float,
+    named: NDArray[np.float32],
+    disc: NDArray[np.float32],
+    detected: NDArray[np.float32],
+    seen: NDArray[np.float32],
+    left: NDArray[np.float32],
     base: float,
-    step: float,
-    scores: NDArray[np.float32],
-) -> None:
-    """Fill `scores`, shape (n,), with the sums of one column for each object of a query.
-
-    `symbols` are the rows of `columns`, shape (s, n), to add: at most 257, or 16 bits overflow.
-    `constants` are what each cell adds to any query, `base` what the query adds in any cell, and
-    `step` is the size of a step of the columns.
-    """
-    cells = len(constants)
-    sums = np.empty(_BLOCK, np.uint16)
-    start, scale = np.float32(base), np.float32(step)
-    for low in range(0, cells, _BLOCK):
-        size = min(_BLOCK, cells - low)
-        _add_up(columns, symbols, low, size, sums)
-        for cell in range(size):
-            scores[low + cell] = constants[low + cell] + (start + scale * np.float32(sums[cell]))
-
-
-@compiled
-def scan_turned(  # noqa: PLR0917
-    columns: NDArray[np.uint8],
-    symbols: NDArray[np.int64],
     turns: NDArray[np.int64],
-    priors: NDArray[np.float32],
-    decay: NDArray[np.float32],
-    constants: NDArray[np.float32],
-    base: float,
-    step: float,
+    log_turns: NDArray[np.float64],
     scores: NDArray[np.float32],
     best: NDArray[np.int16],
 ) -> None:
-    """Add up columns for a query turned in several ways, and sum over the turns.
+    """Fill `scores` of the cells ``part[0]`` to ``part[1] - 1`` by the objects of each.
 
-    As `scan`, with `symbols` of shape (turns, objects), the chance of each turn in `priors`, and
-    ``exp(-step * i)`` in `decay`, beyond whose end nothing counts. Fills `scores` with the
-    logarithms of the sums and `best` with the number in `turns` of the likeliest turn of each cell.
+    The sum over the detections of a photo of the logarithm of a sum over the objects, and over its
+    `turns`, in bins, with `log_turns`; `best` gets the likeliest turn. By class row of a code
+    (`row_of`), group of classes of like error (`group_of`) and level of a distance unit
+    (`level_of`), `rows` are those of `profile_rows` and `masses` those of `mass_rows`, without a
+    level where all round was seen. `named`, shape (longest + 1, k, blocks * LANES), is the chance
+    of a name over the density of such false detections, `disc` the factor of their range, and
+    `detected`, `seen` and `left` are as in `align`; `base` is what all cells get.
     """
-    cells = len(constants)
-    sums = np.empty(_BLOCK, np.uint16)
-    peak = np.empty(_BLOCK, np.int32)
-    mass = np.empty(_BLOCK, np.float32)
-    first = np.empty(_BLOCK, np.float32)
-    reach = len(decay)
-    for low in range(0, cells, _BLOCK):
-        size = min(_BLOCK, cells - low)
-        peak[:] = 0
-        mass[:] = 0.0
-        first[:] = 0.0
-        for turn in range(len(turns)):
-            _add_up(columns, symbols[turn], low, size, sums)
-            prior = priors[turn]
-            for cell in range(size):
-                rise = np.int32(sums[cell]) - peak[cell]
-                if rise > 0:
-                    scale = decay[rise] if rise < reach else np.float32(0.0)
-                    mass[cell] *= scale
-                    first[cell] *= scale
-                    peak[cell] += rise
-                    part = prior
-                else:
-                    part = prior * decay[-rise] if -rise < reach else np.float32(0.0)
-                mass[cell] += part
-                if part > first[cell]:
-                    first[cell] = part
-                    best[low + cell] = turns[turn]
-        for cell in range(size):
-            total = base + step * peak[cell] + math.log(mass[cell])
-            scores[low + cell] = constants[low + cell] + np.float32(total)
+    blocks, levels, bins = rows.shape[0], rows.shape[2], rows.shape[3]
+    longest, classes = len(detected) - 1, detected.shape[1]
+    # Flat arrays and unsigned numbers: else each look-up is checked and worked out anew.
+    block_size = rows.shape[1] * levels * bins
+    flat_rows, flat_named = rows.ravel(), named.ravel()
+    flat_detected, flat_seen, flat_left = detected.ravel(), seen.ravel(), left.ravel()
+    flat_masses = masses.ravel()
+    partial, moving = len(flat_masses) > 0, left.max() > 0.0
+    ways = len(turns)
+    totals = np.empty(ways)
+    most = 0
+    for cell in range(part[0], part[1]):
+        most = max(most, offsets[cell + 1] - offsets[cell])
+    names = np.empty(most, np.uint32)
+    starts = np.empty(most, np.uint32)
+    places = np.empty(most, np.uint32)
+    chances = np.empty(most, np.float32)
+    odds = np.empty(most, np.float32)
+    floors = np.empty(blocks * LANES, np.float32)
+    one_f = np.float32(1.0)
+    around = np.uint32(bins - 1)
+    for cell in range(part[0], part[1]):
+        low = offsets[cell]
+        count = offsets[cell + 1] - low
+        length = min(count, longest)
+        gone = 0.0
+        whole = 1.0
+        if moving:
+            floors[:] = one_f
+        for one in range(count):
+            kind, far = row_of[codes[low + one]], distance_units[low + one]
+            names[one] = length * classes + kind
+            starts[one] = (group_of[kind] * levels + level_of[far]) * bins
+            places[one] = (np.uint32(bearing_units[low + one]) * np.uint32(bins)) // np.uint32(UNITS)
+            sure = flat_detected[names[one]]
+            chance = sure * flat_seen[kind * FARS + far]
+            chances[one] = chance
+            odds[one] = chance / (one_f - chance)
+            whole *= one_f - chance
+            if moving:
+                leaving = sure * flat_left[kind * FARS + far]
+                if leaving > 0.0:
+                    gone += leaving
+                    name = np.uint64(names[one]) * np.uint64(len(floors))
+                    for two in range(len(floors)):
+                        floors[two] += leaving * flat_named[name + np.uint64(two)] * disc[two]
+        peak = -np.inf
+        for way in range(ways):
+            turn = np.uint32(turns[way] & (bins - 1))
+            total = base - gone * width + log_turns[way]
+            product = whole
+            if partial:
+                product = 1.0
+                for one in range(count):
+                    place = (places[one] - turn) & around
+                    missed = one_f - chances[one] * flat_masses[starts[one] + place]
+                    odds[one] = chances[one] / missed
+                    product *= missed
+            for block in range(blocks):
+                a0 = a1 = a2 = a3 = a4 = a5 = a6 = a7 = one_f
+                first = block * LANES
+                if moving:
+                    a0, a1, a2, a3 = floors[first], floors[first + 1], floors[first + 2], floors[first + 3]
+                    a4, a5, a6, a7 = floors[first + 4], floors[first + 5], floors[first + 6], floors[first + 7]
+                above = np.uint64(block) * np.uint64(block_size)
+                for one in range(count):
+                    place = (places[one] - turn) & around
+                    row = (above + np.uint64(starts[one] + place)) * np.uint64(LANES)
+                    name = np.uint64(names[one]) * np.uint64(blocks * LANES) + np.uint64(first)
+                    factor = odds[one]
+                    a0 += factor * flat_rows[row] * flat_named[name]
+                    a1 += factor * flat_rows[row + np.uint64(1)] * flat_named[name + np.uint64(1)]
+                    a2 += factor * flat_rows[row + np.uint64(2)] * flat_named[name + np.uint64(2)]
+                    a3 += factor * flat_rows[row + np.uint64(3)] * flat_named[name + np.uint64(3)]
+                    a4 += factor * flat_rows[row + np.uint64(4)] * flat_named[name + np.uint64(4)]
+                    a5 += factor * flat_rows[row + np.uint64(5)] * flat_named[name + np.uint64(5)]
+                    a6 += factor * flat_rows[row + np.uint64(6)] * flat_named[name + np.uint64(6)]
+                    a7 += factor * flat_rows[row + np.uint64(7)] * flat_named[name + np.uint64(7)]
+                product *= float(a0) * float(a1) * float(a2) * float(a3)
+                product *= float(a4) * float(a5) * float(a6) * float(a7)
+                if product > _LARGE or product < 1.0 / _LARGE:
+                    total += math.log(product)
+                    product = 1.0
+            total += math.log(product)
+            totals[way] = total
+            if total > peak:
+                peak = total
+                best[cell] = turns[way]
+        if ways == 1:
+            scores[cell] = peak
+        else:
+            mass = 0.0
+            for way in range(ways):
+                mass += math.exp(totals[way] - peak)
+            scores[cell] = peak + math.log(mass)
 
 
 @compiled

@@ -16,6 +16,7 @@ import numpy as np
 
 from semsig_gis.core.errors import InputError
 from semsig_gis.core.geometry import cell_ids, signed_degrees
+from semsig_gis.core.view import View
 from semsig_gis.database.answer import (
     REGION_SHARE,
     Answer,
@@ -27,7 +28,7 @@ from semsig_gis.database.answer import (
 from semsig_gis.database.north import GRID_NORTH
 from semsig_gis.likelihood.association import align_cells, rerank
 from semsig_gis.likelihood.explain import explain, explain_cell
-from semsig_gis.likelihood.index import CellScores
+from semsig_gis.likelihood.index import CellScores, own_sigma
 from semsig_gis.likelihood.noise.model import cell_noise, place_noise
 from semsig_gis.likelihood.posterior import (
     DEFAULT_RULE,
@@ -329,10 +330,7 @@ class LikelihoodLocator:
 
     def _scores(self, query: Signature, log_prior: NDArray[np.float64] | None) -> CellScores:
         """Return the scores of all cells, the best ones by one-to-one associations."""
-        query = self._known(query)
-        if not len(query):
-            return CellScores(loglik=self.index.constants)
-        sigma = self.north_sigma
+        query, sigma = self._known(query), self.north_sigma
         scores = self.index.scores(query, north_sigma=sigma)
         return rerank(self.index, query, scores, north_sigma=sigma, log_prior=log_prior)
 
@@ -363,7 +361,7 @@ class LikelihoodLocator:
         estimate = None
         if parts is not None:
             xy = answer.x, answer.y
-            estimate = refined_estimate(parts, xy, radius=radius, turned=sigma > 0)
+            estimate = refined_estimate(parts, xy, radius=radius, turned=scores.heading is not None)
         if estimate is None:
             estimate = cell_estimate(
                 known, noise, posterior, answer.cell, radius=radius, north_sigma=sigma
@@ -413,7 +411,7 @@ class LikelihoodLocator:
             step=database.grid.step,
             radius=database.spec.radius,
             north_sigma=self.north_sigma,
-            headings=None if scores.heading is None else scores.heading[cells],
+            headings=[None if one is None else one[cells] for one in scores.headings],
             # All that is known of the cells but for what this query tells.
             log_prior=np.log(chances[cells]) - scores.loglik[cells],
             footprints=store.buildings_around(
@@ -608,7 +606,8 @@ def _with_parts(
         heading = heading.copy()
         order = np.argsort(parts.chances, kind="stable")  # the likeliest part comes last
         heading[owners[order]] = parts.headings[order]
-    return CellScores(loglik=loglik, heading=heading), Posterior(database=database, chances=chances)
+    parted = CellScores(loglik=loglik, headings=(heading, *scores.headings[1:]))
+    return parted, Posterior(database=database, chances=chances)
 
 
 def _owners(parts: Refinement, database: SignatureDatabase) -> NDArray[np.int64]:
@@ -637,11 +636,14 @@ def cell_estimate(
     inside = np.flatnonzero((np.hypot(away[:, 0], away[:, 1]) <= radius) & (chances > 0))
     inside = inside[np.argsort(-chances[inside], kind="stable")[:MOST_CELLS]]
     headings = heading_sigmas = np.zeros(len(inside))
-    turned = north_sigma > 0 and query.bearings is not None and len(query) > 0
+    view = View.of(query)
+    photo = view.split()[0]
+    north_sigma = own_sigma(photo, north_sigma)
+    turned = north_sigma > 0 and view.bearings is not None and len(view) > 0
     if turned:
         turns = np.arange(-180.0, 180.0, TURN)
         each = np.broadcast_to(turns, (len(inside), len(turns)))
-        logs = align_cells(database, query, noise, inside, turns=each)
+        logs = align_cells(database, photo, noise, inside, turns=each)
         logs -= 0.5 * (turns / north_sigma) ** 2
         shares = np.exp(logs - np.logaddexp.reduce(logs, axis=1)[:, None])
         headings = np.degrees(np.angle(shares @ np.exp(1j * np.radians(turns))))

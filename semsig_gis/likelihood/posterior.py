@@ -19,15 +19,17 @@ import numpy as np
 from semsig_gis.core.errors import InputError
 from semsig_gis.core.geometry import cell_ids, signed_degrees
 from semsig_gis.core.statistics import binomial_tail
-from semsig_gis.core.view import check_north
+from semsig_gis.core.view import View, check_north
 from semsig_gis.database.views import views_at
 from semsig_gis.likelihood.association import turn_logs
-from semsig_gis.likelihood.noise.table import LONGEST_TABLE, noise_tables, place_loglik
+from semsig_gis.likelihood.index import own_sigma
+from semsig_gis.likelihood.noise.table import LONGEST_TABLE, noise_tables
+from semsig_gis.likelihood.photo import PhotoTable, photo_loglik
 from semsig_gis.storage.text import parse_json, read_whole
 from semsig_gis.storage.whole import whole_file
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Mapping, Sequence
     from pathlib import Path
 
     from numpy.typing import ArrayLike, NDArray
@@ -493,7 +495,7 @@ def refine(
     step: float = 10.0,
     radius: float = 30.0,
     north_sigma: float = 0.0,
-    headings: NDArray[np.floating] | None = None,
+    headings: Sequence[NDArray[np.floating] | None] | None = None,
     log_prior: NDArray[np.float64] | None = None,
     footprints: Footprints | None = None,
 ) -> Refinement:
@@ -501,60 +503,79 @@ def refine(
 
     The query needs bearings; its types may be unknown. `cells`, shape (c, 2), are the middles in
     metres of the likeliest cells, likeliest first; some hundred will do. `noise` is for a known
-    place. `step` and `radius` are in metres, `north_sigma` in degrees; where it is not 0,
-    `headings`, the likeliest one in each cell, are needed. `log_prior` is what else is known of the
+    place. `step` and `radius` are in metres, `north_sigma`, of photos that do not tell their own, in
+    degrees; where it is not 0, `headings`, by photo the likeliest one in each cell, are needed.
+    Those of the parts are of the first photo. `log_prior` is what else is known of the
     cells.
     """
     check_north(north_sigma)
-    if len(cells) == 0 or (headings is None and north_sigma > 0):
+    photos = View.of(query).split()
+    looked_for = [own_sigma(photo, north_sigma) for photo in photos]
+    before = (None,) * len(photos) if headings is None else headings
+    if len(cells) == 0 or any(
+        sigma > 0 and heading is None for sigma, heading in zip(looked_for, before, strict=True)
+    ):
         msg = (
             f"{len(cells)} cells and {'no' if headings is None else 'some'} headings were given; "
             "give at least one cell, and headings where north is not known."
         )
         raise InputError(msg)
     tables, weights = noise_tables(
-        noise, taxonomy=objects.taxonomy, codes=np.unique(objects.codes), longest=LONGEST_TABLE
+        noise,
+        taxonomy=objects.taxonomy,
+        codes=np.unique(objects.codes),
+        longest=LONGEST_TABLE,
+        radius=radius,
     )
-    reach = float(objects.taxonomy.ranges(radius).max())
+    asked = [PhotoTable.of(photo, tables[0]) for photo in photos]
     size = float(step)
     parts = np.asarray(cells[: KEPT[0]], dtype=np.float64)
     prior = np.zeros(len(parts)) if log_prior is None else np.asarray(log_prior)[: KEPT[0]]
-    turned = np.zeros(len(parts)) if headings is None else np.asarray(headings)[: KEPT[0]]
+    turned = np.stack(
+        [
+            np.zeros(len(parts)) if heading is None else np.asarray(heading)[: KEPT[0]]
+            for heading in before
+        ]
+    )
     finished: list[tuple[NDArray[np.float64], ...]] = []
     for level, turn in enumerate(TURNS):
         parts = (parts[:, None] + CORNERS * (size / 4.0)).reshape(-1, 2)
-        prior, turned = np.repeat(prior, 4), np.repeat(turned, 4)
+        prior, turned = np.repeat(prior, 4), np.repeat(turned, 4, axis=1)
         size /= 2.0
         views = views_at(objects, parts, index=index, radius=radius, footprints=footprints)
         wide = [
             replace(table, position_sigma=math.hypot(table.position_sigma, size / math.sqrt(12.0)))
             for table in tables
         ]
-        steps = np.linspace(-turn, turn, 2 * TURNS_A_SIDE + 1) if north_sigma > 0 else np.zeros(1)
-        turns = turned[:, None] + steps
-        by_turn = place_loglik(query, views, wide, weights, turns=turns, reach=reach)
-        if north_sigma > 0:
-            by_turn += turn_logs(turns, steps[1] - steps[0], north_sigma)
-        loglik = np.logaddexp.reduce(by_turn, axis=1)
-        shares = np.exp(by_turn - loglik[:, None])
-        turned = (shares * turns).sum(axis=1)
-        sigmas = np.sqrt((shares * (turns - turned[:, None]) ** 2).sum(axis=1))
+        loglik, sigmas = np.zeros(len(parts)), np.zeros(len(parts))
+        for number in reversed(range(len(photos))):  # what is told of headings is the first one's
+            sigma = looked_for[number]
+            steps = np.linspace(-turn, turn, 2 * TURNS_A_SIDE + 1) if sigma > 0 else np.zeros(1)
+            turns = turned[number][:, None] + steps
+            by_turn = photo_loglik(asked[number], views, wide, weights, turns=turns)
+            if sigma > 0:
+                by_turn += turn_logs(turns, steps[1] - steps[0], sigma)
+            own = np.logaddexp.reduce(by_turn, axis=1)
+            shares = np.exp(by_turn - own[:, None])
+            turned[number] = (shares * turns).sum(axis=1)
+            sigmas = np.sqrt((shares * (turns - turned[number][:, None]) ** 2).sum(axis=1))
+            loglik += own
         total = loglik + prior
         divided = np.zeros(len(parts), np.bool_)
         if level + 1 < len(TURNS):
             best = np.argsort(-total, kind="stable")[: KEPT[level + 1]]
             divided[best] = total[best] > total[best[0]] + math.log(LEAST_CHANCE)
-        columns = parts, np.full(len(parts), size), loglik, prior, turned, sigmas
+        columns = parts, np.full(len(parts), size), loglik, prior, turned[0], sigmas
         finished.append(tuple(column[~divided] for column in columns))
-        parts, prior, turned = parts[divided], prior[divided], turned[divided]
-    places, sizes, loglik, prior, turned, sigmas = map(np.concatenate, zip(*finished, strict=True))
+        parts, prior, turned = parts[divided], prior[divided], turned[:, divided]
+    places, sizes, loglik, prior, first, sigmas = map(np.concatenate, zip(*finished, strict=True))
     weight = loglik + prior + 2.0 * np.log(sizes)
     chances = np.exp(weight - weight.max())
     return Refinement(
         places=places,
         sizes=sizes,
         loglik=loglik,
-        headings=signed_degrees(turned),
+        headings=signed_degrees(first),
         heading_sigmas=sigmas,
         chances=chances / chances.sum(),
         near=NEAR,

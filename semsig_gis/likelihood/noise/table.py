@@ -13,8 +13,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from semsig_gis.core.errors import InputError, nearest_name
-from semsig_gis.core.signature import BEARING_UNITS, DISTANCE_UNITS
+from semsig_gis.core.signature import DISTANCE_UNITS
 from semsig_gis.core.taxonomy import WILDCARD
+from semsig_gis.likelihood.noise.model import ALL
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -24,7 +25,6 @@ if TYPE_CHECKING:
     from semsig_gis.core.signature import Signature
     from semsig_gis.core.taxonomy import Taxonomy
     from semsig_gis.database.database import SignatureDatabase
-    from semsig_gis.database.views import Views
     from semsig_gis.likelihood.noise.model import Noise, NoiseSpec
 
 # No chance is quite nought or one: a model that excludes something is wrong one day, and then
@@ -44,8 +44,10 @@ class NoiseTable:
     By length and class, shape (longest + 1, k), `missed` is the chance that an object is missed and
     `misnamed` that it is given another class, once detected. `others`, shape (k, k), says which:
     rows sum to one, the diagonal is zero. `clutter` is in false objects per signature by class,
-    `sigma` the standard deviation of a bearing in degrees by class, and `position_sigma` that of
-    the observer's place in metres.
+    `sigma` the standard deviation of a bearing in degrees by class, `range_sigma` that of the
+    logarithm of a rough distance, and `position_sigma` that of the observer's place in metres.
+    `ranges` is from how far a class is seen, in metres, and `fading`, shape (k, 256), what is left
+    of its detection at each distance unit, of which 255 are `reach` metres.
     """
 
     codes: NDArray[np.uint8]
@@ -54,12 +56,47 @@ class NoiseTable:
     others: NDArray[np.float64]
     clutter: NDArray[np.float64]
     sigma: NDArray[np.float64]
+    range_sigma: NDArray[np.float64]
     position_sigma: float
+    ranges: NDArray[np.float64]
+    fading: NDArray[np.float64]
+    reach: float
+
+    @cached_property
+    def distances(self) -> NDArray[np.float64]:
+        """Metres of each distance unit, shape (256,); what is nearest is not at the very place."""
+        return np.asarray(np.maximum(np.arange(256), 0.5) * (self.reach / DISTANCE_UNITS))
+
+    @cached_property
+    def inside(self) -> NDArray[np.float64]:
+        """Chance that an object in range of the place is in range of the observer, shape (k, 256).
+
+        Who stands elsewhere in the cell sees other objects at the edge of range than its middle.
+        """
+        if self.position_sigma == 0:
+            return np.ones((len(self.codes), DISTANCE_UNITS + 1))
+        beyond = (self.distances - self.ranges[:, None]) / (self.position_sigma * math.sqrt(2.0))
+        return np.asarray(0.5 * np.vectorize(math.erfc, otypes=[np.float64])(beyond))
+
+    @cached_property
+    def seen(self) -> NDArray[np.float64]:
+        """What is left of the detection of an object by class and distance unit, shape (k, 256)."""
+        return np.asarray(self.fading * self.inside)
+
+    @cached_property
+    def left(self) -> NDArray[np.float64]:
+        """What the observer does not see as it is out of range, shape (k, 256)."""
+        return np.asarray(self.fading * (1.0 - self.inside))
 
     @cached_property
     def density(self) -> NDArray[np.float64]:
         """False objects a degree by class, and of any class, shape (k + 1,)."""
         return np.append(self.clutter, self.clutter.sum()) / FULL_TURN
+
+    @cached_property
+    def detected(self) -> NDArray[np.float64]:
+        """Chance of detection of what is near, shape (longest + 1, k)."""
+        return 1.0 - self.missed
 
     @cached_property
     def odds(self) -> NDArray[np.float64]:
@@ -88,31 +125,15 @@ class NoiseTable:
         rows[WILDCARD] = len(self.codes)
         return rows
 
-    def sigmas(self, reach: float) -> NDArray[np.float64]:
-        """Return the deviation of a bearing by class and distance unit, shape (k, 256).
-
-        In degrees, at most 180; `reach` is the distance in metres of 255 units.
-        """
-        distances = np.maximum(np.arange(256), 0.5) * (reach / 255.0)
-        turned = np.degrees(self.position_sigma / distances)
+    @cached_property
+    def sigmas(self) -> NDArray[np.float64]:
+        """Deviation of a bearing in degrees, at most 180, by class and distance unit, (k, 256)."""
+        turned = np.degrees(self.position_sigma / self.distances)
         return np.asarray(np.minimum(np.hypot(self.sigma[:, None], turned), WIDEST_SIGMA))
 
     def length_rows(self, lengths: NDArray[np.int64]) -> NDArray[np.int64]:
         """Return the row of each signature length; lengths beyond the longest take the last."""
         return np.minimum(lengths, len(self.missed) - 1)
-
-    def nothing_seen(
-        self, offsets: NDArray[np.int64], kinds: NDArray[np.int64]
-    ) -> NDArray[np.float64]:
-        """Return the log-likelihood that nothing is detected of the objects of each place.
-
-        It is ``sum_i log(missed_i) - sum_t clutter_t``; the objects of place i have class rows
-        ``kinds[offsets[i]:offsets[i + 1]]``.
-        """
-        lengths = np.diff(offsets)
-        owners = np.repeat(np.arange(len(lengths)), lengths)
-        each = np.log(self.missed)[self.length_rows(lengths)[owners], kinds]
-        return np.asarray(np.bincount(owners, each, len(lengths)) - self.clutter.sum())
 
     def query_rows(self, query: Signature) -> NDArray[np.int64]:
         """Return the class row of each object of a query, k if unknown; InputError without any."""
@@ -133,17 +154,20 @@ class NoiseTable:
 
 
 def noise_tables(
-    noise: Noise, *, taxonomy: Taxonomy, codes: NDArray[np.uint8], longest: int
+    noise: Noise, *, taxonomy: Taxonomy, codes: NDArray[np.uint8], longest: int, radius: float
 ) -> tuple[tuple[NoiseTable, ...], NDArray[np.float64]]:
     """Return one table for each model of a mixture, or for the only model, and the chance of each.
 
-    Only classes in `codes` count. Raises `InputError` if the model names a class that the taxonomy
+    Only classes in `codes` count; those without a range of their own are seen from `radius` metres.
+    Raises `InputError` if the model names a class that the taxonomy
     does not have, or gives a class no chance at all of being named as one that counts.
     """
     # What a model says of classes that do not count goes to a row after the last, and is dropped.
     rows = {item.name: len(codes) for item in taxonomy.classes}
     rows |= {taxonomy.by_code(code).name: row for row, code in enumerate(codes.tolist())}
-    tables = tuple(_table(spec, rows, codes, longest) for spec in noise.specs)
+    ranges = taxonomy.ranges(radius)
+    reach = float(ranges.max())
+    tables = tuple(_table(spec, rows, codes, longest, ranges[codes], reach) for spec in noise.specs)
     return tables, np.asarray(noise.weights, dtype=np.float64)
 
 
@@ -156,6 +180,7 @@ def database_tables(
         taxonomy=database.taxonomy,
         codes=database.present_codes,
         longest=min(int(database.lengths.max()), LONGEST_TABLE),
+        radius=database.spec.radius,
     )
 
 
@@ -183,50 +208,12 @@ def mean_table(tables: tuple[NoiseTable, ...], weights: NDArray[np.float64]) -> 
         others=np.divide(named, totals, out=plain, where=totals > 0),
         clutter=mean("clutter"),
         sigma=mean("sigma", 2),
+        range_sigma=mean("range_sigma", 2),
         position_sigma=float(position) ** 0.5,
+        ranges=tables[0].ranges,
+        fading=mean("fading"),
+        reach=tables[0].reach,
     )
-
-
-def place_loglik(
-    query: Signature,
-    views: Views,
-    tables: Sequence[NoiseTable],
-    weights: NDArray[np.float64],
-    *,
-    turns: NDArray[np.float64],
-    reach: float,
-) -> NDArray[np.float64]:
-    """Return the log-likelihood of a query by place and turn, shape (v, r).
-
-    The query needs bearings; its types may be unknown. `weights` are the chances of the tables,
-    `turns` the degrees to turn the query by at each place, and `reach` the largest visibility range
-    of any class in metres. The scale is that of `likelihood.index`.
-    """
-    from semsig_gis.likelihood.kernels import align  # noqa: PLC0415 - numba loads slowly
-
-    bearings = query_bearings(query)
-    rows, kinds = tables[0].query_rows(query), tables[0].row_of[views.codes]
-    bearing_units = np.minimum(views.bearings * (BEARING_UNITS / 360.0), BEARING_UNITS - 1)
-    distance_units = np.rint(views.distances * (DISTANCE_UNITS / reach))
-    logliks = np.empty((len(tables), *turns.shape))
-    align(
-        views.offsets,
-        kinds,
-        bearing_units.astype(np.uint16),
-        distance_units.astype(np.uint8),
-        360.0 / BEARING_UNITS,
-        rows,
-        bearings,
-        turns,
-        np.stack([table.odds for table in tables]),
-        np.stack([table.naming for table in tables]),
-        np.stack([table.sigmas(reach) for table in tables]),
-        logliks,
-    )
-    for model, (table, weight) in enumerate(zip(tables, weights.tolist(), strict=True)):
-        logliks[model] += table.nothing_seen(views.offsets, kinds)[:, None]
-        logliks[model] += float(np.log(table.density[rows]).sum()) + math.log(weight)
-    return np.asarray(np.logaddexp.reduce(logliks, axis=0))
 
 
 def query_bearings(query: Signature) -> NDArray[np.float64]:
@@ -237,8 +224,13 @@ def query_bearings(query: Signature) -> NDArray[np.float64]:
     return query.bearings
 
 
-def _table(
-    spec: NoiseSpec, rows: Mapping[str, int], codes: NDArray[np.uint8], longest: int
+def _table(  # noqa: PLR0917 - a private helper of one caller
+    spec: NoiseSpec,
+    rows: Mapping[str, int],
+    codes: NDArray[np.uint8],
+    longest: int,
+    ranges: NDArray[np.float64],
+    reach: float,
 ) -> NoiseTable:
     """Return the table of one model, given the row of each class that the taxonomy has."""
     count = len(codes)
@@ -281,8 +273,30 @@ def _table(
         others=others,
         clutter=np.maximum(clutter, LEAST_CLUTTER / count),
         sigma=by_class(spec.bearing_sigma, spec.bearing_sigma_by_class),
+        range_sigma=by_class(spec.range_sigma, spec.range_sigma_by_class),
         position_sigma=spec.position_sigma,
+        ranges=ranges,
+        fading=_fading(spec, rows, count, reach),
+        reach=reach,
     )
+
+
+def _fading(
+    spec: NoiseSpec, rows: Mapping[str, int], count: int, reach: float
+) -> NDArray[np.float64]:
+    """Return what is left of the detection of each class by distance unit, shape (count, 256)."""
+    metres = np.arange(DISTANCE_UNITS + 1) * (reach / DISTANCE_UNITS)
+
+    def shares(points: Sequence[Sequence[float]]) -> NDArray[np.float64]:
+        return np.interp(metres, *np.transpose(np.asarray(points, dtype=np.float64)))
+
+    faded = np.ones((count + 1, len(metres)))
+    if ALL in spec.fading:
+        faded[:] = shares(spec.fading[ALL])
+    for name, points in spec.fading.items():
+        if name != ALL:
+            faded[_row(name, rows)] = shares(points)
+    return faded[:count]
 
 
 def _row(name: str, rows: Mapping[str, int]) -> int:

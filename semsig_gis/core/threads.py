@@ -1,0 +1,45 @@
+"""Loops over rows, shared by the cores of this machine; their kernels leave the interpreter free."""
+
+from __future__ import annotations
+
+import functools
+import os
+from concurrent.futures import ThreadPoolExecutor
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from numpy.typing import NDArray
+
+ROWS_A_PART = 8192
+"""Rows that are worth a thread of their own."""
+
+
+def cores() -> int:
+    """Return how many cores this process may use."""
+    if hasattr(os, "sched_getaffinity"):
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1
+
+
+@functools.cache
+def _pool() -> ThreadPoolExecutor:
+    return ThreadPoolExecutor(cores())
+
+
+if hasattr(os, "register_at_fork"):  # the threads stay behind
+    os.register_at_fork(after_in_child=_pool.cache_clear)
+
+
+def share_rows(work: Callable[[NDArray[np.int64]], object], rows: int) -> None:
+    """Call `work` with the first row of each part and the one after its last, all parts at once."""
+    parts = min(2 * cores(), rows // ROWS_A_PART)
+    if parts <= 1 or cores() == 1:
+        work(np.array([0, rows]))
+        return
+    ends = np.linspace(0, rows, parts + 1).astype(np.int64)
+    for done in [_pool().submit(work, ends[part : part + 2]) for part in range(parts)]:
+        done.result()

@@ -1,0 +1,155 @@
+"""One photo as numbers, beside the noise tables it is compared by, and its likelihood in places.
+
+With objects i of a place (class ``t_i``, bearing ``b_i``, distance ``d_i``) and detections j of a
+photo that saw the sectors S (bearing ``a_j``, rough range ``r_j``, scores ``c_j``), the likelihood
+sums over all one-to-one associations A of objects and detections:
+
+    L = prod_i (1 - w_i p_i) * exp(-clutter |S|) * prod_j lambda_j
+        * sum_A prod_(i,j in A) p_i / (1 - w_i p_i) C_ij N(a_j - b_i) R(r_j; d_i) / lambda_j
+
+with ``p_i`` the chance of detection at its distance, ``w_i`` that its bearing comes out in S,
+``C_ij`` the chance of what is said of its class, R a log-normal density, 1 where no range is given,
+and ``lambda_j`` the density of false detections: uniform over the turn and, for a range, the disc.
+
+At the edge of range, who stands elsewhere in a cell misses objects that its middle sees, and sees
+as many others of the same class: ``p_i`` falls there, and ``lambda_j`` rises by what has left.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from semsig_gis.core.errors import InputError
+from semsig_gis.core.geometry import FULL_TURN
+from semsig_gis.core.signature import BEARING_UNITS, DISTANCE_UNITS
+from semsig_gis.core.taxonomy import WILDCARD
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.typing import NDArray
+
+    from semsig_gis.core.view import View
+    from semsig_gis.database.views import Views
+    from semsig_gis.likelihood.noise.table import NoiseTable
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class PhotoTable:
+    """The n detections of one photo beside noise tables of k classes.
+
+    `ranges` and `range_errors` are NaN where nothing is known. `scores`, shape (k, n), is what is
+    said of each class. `disc` is the density of the logarithm of the range of a false detection, 1
+    without a range. `sectors` has shape (s, 2), none for the full turn, of which `width` is the
+    share that was seen.
+    """
+
+    bearings: NDArray[np.float64]
+    ranges: NDArray[np.float64]
+    range_errors: NDArray[np.float64]
+    scores: NDArray[np.float64]
+    disc: NDArray[np.float64]
+    sectors: NDArray[np.float64]
+    width: float
+
+    @classmethod
+    def of(cls, photo: View, table: NoiseTable) -> PhotoTable:
+        """Return the table of a view of one photo, whose objects may all be of classes known."""
+        if photo.bearings is None:
+            msg = "the query has no bearings, on which its place rests; give them."
+            raise InputError(msg)
+        size = len(photo)
+        unknown = np.full(size, math.nan)
+        ranges = unknown if photo.ranges is None else photo.ranges
+        known = ~np.isnan(ranges)
+        disc = np.where(known, 2.0 * (np.where(known, ranges, 1.0) / table.reach) ** 2, 1.0)
+        if photo.scores is None:
+            if size:
+                table.query_rows(photo)  # refuses classes that are not known
+            codes = np.zeros(size, np.uint8) if photo.codes is None else photo.codes
+            scores = (table.codes[:, None] == codes) | (codes == WILDCARD)
+        else:
+            any_class = photo.scores[:, WILDCARD]
+            shared = np.where(any_class < 1.0, any_class / len(table.codes), 1.0)
+            scores = photo.scores[:, table.codes].T + shared
+        errors = unknown if photo.range_errors is None else photo.range_errors
+        (look,) = photo.photos
+        return cls(
+            bearings=photo.bearings,
+            ranges=ranges,
+            range_errors=errors,
+            scores=scores.astype(np.float64),
+            disc=disc,
+            sectors=np.array(look.sectors, dtype=np.float64).reshape(-1, 2),
+            width=look.width / FULL_TURN,
+        )
+
+    def range_sigma(self, table: NoiseTable) -> NDArray[np.float64]:
+        """Return the relative error of each range by class, shape (k, n)."""
+        known = ~np.isnan(self.range_errors)
+        return np.where(known, self.range_errors, table.range_sigma[:, None])
+
+    def density(self, table: NoiseTable) -> NDArray[np.float64]:
+        """Return the density of false detections like each, by the degree, shape (n,)."""
+        return np.asarray(table.clutter @ self.scores * self.disc / FULL_TURN)
+
+    def named(self, table: NoiseTable) -> NDArray[np.float64]:
+        """Return the chance of what is said of each detection, by length and class, (l, k, n)."""
+        wrong = table.misnamed[:, :, None]
+        return np.asarray((1.0 - wrong) * self.scores + wrong * (table.others @ self.scores))
+
+
+def photo_loglik(
+    photo: PhotoTable,
+    views: Views,
+    tables: Sequence[NoiseTable],
+    weights: NDArray[np.float64],
+    *,
+    turns: NDArray[np.float64],
+) -> NDArray[np.float64]:
+    """Return the log-likelihood of a photo by place and turn, shape (v, r).
+
+    `weights` are the chances of the tables, `turns` the degrees to turn the photo by at each place.
+    """
+    from semsig_gis.likelihood.kernels import align  # noqa: PLC0415 - numba loads slowly
+
+    first = tables[0]
+    bearing_units = np.minimum(views.bearings * (BEARING_UNITS / FULL_TURN), BEARING_UNITS - 1)
+    distance_units = np.rint(views.distances * (DISTANCE_UNITS / first.reach))
+    logliks = np.empty((len(tables), *turns.shape))
+
+    def stacked(name: str) -> NDArray[np.float64]:
+        return np.stack([getattr(table, name) for table in tables])
+
+    align(
+        views.offsets,
+        first.row_of[views.codes],
+        bearing_units.astype(np.uint16),
+        distance_units.astype(np.uint8),
+        FULL_TURN / BEARING_UNITS,
+        photo.bearings,
+        photo.ranges,
+        np.stack([photo.range_sigma(table) for table in tables]),
+        photo.scores,
+        np.stack([table.others @ photo.scores for table in tables]),
+        np.stack([photo.density(table) for table in tables]),
+        photo.disc,
+        photo.sectors,
+        photo.width,
+        np.ascontiguousarray(turns, dtype=np.float64),
+        stacked("detected"),
+        stacked("misnamed"),
+        np.array([table.clutter.sum() for table in tables]),
+        stacked("seen"),
+        stacked("left"),
+        stacked("sigmas"),
+        np.array([table.position_sigma for table in tables]),
+        first.distances,
+        logliks,
+    )
+    logliks += np.log(weights)[:, None, None]
+    return np.asarray(np.logaddexp.reduce(logliks, axis=0))
