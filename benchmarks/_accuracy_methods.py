@@ -202,9 +202,7 @@ def ask_routes(
         logliks, spent = [], []
         for query in walk.queries:
             start = time.thread_time()
-            # That nothing was detected tells something too.
-            found_any = len(query.seen) > 0
-            logliks.append(_loglik(index, query, way) if found_any else index.constants)
+            logliks.append(_loglik(index, query, way))
             spent.append(time.thread_time() - start)
         outcomes = []
         for count, sigma in cases:

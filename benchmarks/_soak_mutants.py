@@ -25,7 +25,6 @@ import osmium
 import semsig_gis as sg
 from benchmarks._contents import digest
 from semsig_gis.evaluation.identify.result import open_identifiability
-from semsig_gis.likelihood.index import open_index
 from semsig_gis.likelihood.noise.model import open_noise
 from semsig_gis.objects.surroundings import read_area
 from semsig_gis.queries.file import read_queries, read_route
@@ -42,7 +41,6 @@ _RESPELT = 0.6  # of the damages to texts
 _SMALL = 30  # objects in files that others write
 _MEMORY = 6 * 2**30  # bytes more than there are at the beginning
 
-_NOISE = sg.cell_noise(sg.named_noise("generic"), 10.0)  # as `semsig localize` takes it
 _CATALOG = """
 name = "fuzz"
 title = "Fuzz"
@@ -103,12 +101,6 @@ def _store(path: Path) -> str:
     return f"{store.objects.table.to_csv()}"
 
 
-def _index(path: Path) -> str:
-    database = sg.open_database(path.parent / "known.parquet")
-    index = open_index(database, _NOISE, path)
-    return digest(index.flat_columns().tobytes() + index.constants.tobytes())
-
-
 def _loaded(path: Path) -> None:
     catalog = sg.load_catalog(path.parent / "fuzz.toml")
     layers, _ = sg.read_files(catalog.layers, [path])
@@ -140,7 +132,6 @@ FORMATS = (
     Format(name="street objects", file="objects.parquet", read=_objects, ours=True),
     Format(name="object store", file="known.objects/objects.parquet", read=_store, ours=True),
     Format(name="object store, manifest", file="known.objects/manifest.json", read=_store),
-    Format(name="likelihood index", file="known.likelihood", read=_index, ours=True),
     Format(
         name="tiles, manifest",
         file="tiles/_manifest.json",
@@ -222,8 +213,6 @@ def made_corpus(world: World, folder: Path) -> None:
     shutil.copytree(here / "known.objects", folder / "known.objects")
     shutil.copytree(here / "tiles", folder / "tiles")
     shutil.copytree(here / "known_evaluation", folder / "evaluation")
-    index = sg.open_city(here / "known.parquet").index_path(_NOISE)
-    shutil.copy2(index, folder / "known.likelihood")
     for name in ("objects", "buildings"):
         shutil.copy2(here / "in" / f"{name}.parquet", folder / f"{name}.parquet")
     (folder / "fuzz.toml").write_text(_CATALOG, encoding="utf-8")

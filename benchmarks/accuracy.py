@@ -124,7 +124,7 @@ def _cities(size: _Size, geodata: Path | None) -> Iterator[City]:
 
 def _rows(city: City, size: _Size, threads: int) -> Iterator[Row]:
     queries = {level: on_grid(city, level, size.queries) for level in LEVELS}
-    generic = build_index(city.database, named_noise("generic"), threads=threads)
+    generic = build_index(city.database, named_noise("generic"))
     reranked: dict[str, Row] = {}
     for level in LEVELS:
         best = 0.0
@@ -246,7 +246,7 @@ def _off_grid_rows(city: City, generic: LikelihoodIndex, count: int, threads: in
     )
     noise = named_noise("generic")
     way = Way(radius=25.0)
-    wide = build_index(city.database, cell_noise(noise, city.database.grid.step), threads=threads)
+    wide = build_index(city.database, cell_noise(noise, city.database.grid.step))
     shares = []
     for method, outcomes in (
         (RERANKED, ask_likelihood(city, queries, generic, way, threads=threads)),
@@ -269,7 +269,7 @@ def _off_grid_rows(city: City, generic: LikelihoodIndex, count: int, threads: in
 def _told_rows(city: City, queries: Sequence[Query], threads: int) -> Iterator[Row]:
     """Tell the right level of noise, and wrong ones."""
     for told in ("medium", "light", "strong"):
-        index = build_index(city.database, named_noise(told), threads=threads)
+        index = build_index(city.database, named_noise(told))
         outcomes = ask_likelihood(city, queries, index, Way(), threads=threads)
         row = Row(
             city=city,

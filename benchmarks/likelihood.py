@@ -1,4 +1,4 @@
-"""The likelihood method: its queries, its index, and a process that starts cold."""
+"""The likelihood method: its queries, and a process that starts cold."""
 
 from __future__ import annotations
 
@@ -34,9 +34,7 @@ __all__ = ["growth_of_likelihood", "likelihood_rows"]
 
 _NOISE = named_noise("generic")
 _PEER = "rapidfuzz.process.cdist([query], cells), edit distance of types"
-_FASTER = 20.0
-_THREADS = 2
-_HELD = 20  # scores of so many queries are held at once
+_FASTER = 15.0
 _IMPORTS = "import numba, numpy, pandas, geopandas, pyarrow.parquet, typer, rich"
 _MOST_COLD_MS, _MOST_HELP_MS = 2500.0, 500.0
 
@@ -49,7 +47,7 @@ def likelihood_rows(
     many: _Peer,
     repeats: int,
 ) -> Iterator[Comparison]:
-    """Measure the index of a database, queries, and a process that answers one from cold.
+    """Measure queries of a database, and a process that answers one from cold.
 
     Parameters
     ----------
@@ -68,56 +66,44 @@ def likelihood_rows(
         One result after the other.
     """
     cells = f"{len(database):,} cells"
+    index = build_index(database, _NOISE)
+
+    def batch(_: int) -> None:
+        for query in queries:
+            index.scores(query)
+
+    yield compare(
+        f"{len(queries):,} likelihood queries, {cells}",
+        batch,
+        many,
+        peer_name="rapidfuzz.process.cdist(queries, cells), edit distance of types",
+        repeats=1,
+    )
+
+    def scored(repeat: int) -> None:
+        index.scores(queries[repeat])
+
+    def reranked(repeat: int) -> None:
+        rerank(index, queries[repeat], index.scores(queries[repeat]))
+
+    def answered(repeat: int) -> None:
+        locate(index, queries[repeat])
+
+    for what, ours, bar in (
+        ("", scored, None),
+        (" with re-ranking", reranked, None),
+        (" with re-ranking, chances and answer", answered, _FASTER),
+    ):
+        name = f"one likelihood query{what}, {cells}"
+        yield compare(name, ours, one, peer_name=_PEER, repeats=repeats, bar=bar)
     with tempfile.TemporaryDirectory() as folder:
         city = Path(folder) / "city.parquet"
         save_database(database, city)
-        yield from _index_rows(database, city)
-        index = open_index(database, _NOISE, City(city).index_path(_NOISE))
-
-        def batch(threads: int, _: int) -> None:
-            with ThreadPoolExecutor(threads) as pool:
-                for low in range(0, len(queries), _HELD):
-                    deque(pool.map(index.scores, queries[low : low + _HELD]), maxlen=0)
-
-        yield compare(
-            f"{len(queries):,} likelihood queries, {cells}",
-            partial(batch, 1),
-            many,
-            peer_name="rapidfuzz.process.cdist(queries, cells), edit distance of types",
-            repeats=1,
-        )
-        yield compare(
-            f"{len(queries):,} likelihood queries by {_THREADS} threads, {cells}",
-            partial(batch, _THREADS),
-            partial(batch, 1),
-            peer_name="by 1 thread",
-            repeats=1,
-        )
-        # The columns are in memory from here on, like the peer's texts; for the first touch see the
-        # cold process.
-
-        def scored(repeat: int) -> None:
-            index.scores(queries[repeat])
-
-        def reranked(repeat: int) -> None:
-            rerank(index, queries[repeat], index.scores(queries[repeat]))
-
-        def answered(repeat: int) -> None:
-            locate(index, queries[repeat])
-
-        for what, ours, bar in (
-            ("", scored, _FASTER),
-            (" with re-ranking", reranked, None),
-            (" with re-ranking, chances and answer", answered, None),
-        ):
-            name = f"one likelihood query{what}, {cells}"
-            yield compare(name, ours, one, peer_name=_PEER, repeats=repeats, bar=bar)
-
         yield from _cold_rows(city, database, queries[0], max(1, repeats // 3))
 
 
 def growth_of_likelihood(database: SignatureDatabase, one: _Peer, *, repeats: int) -> Comparison:
-    """Measure a query against a database of another size, its index in memory.
+    """Measure a query against a database of another size.
 
     Parameters
     ----------
@@ -133,37 +119,13 @@ def growth_of_likelihood(database: SignatureDatabase, one: _Peer, *, repeats: in
     Comparison
         The result.
     """
-    index = build_index(database, _NOISE, threads=os.cpu_count() or 1)
+    index = build_index(database, _NOISE)
     return compare(
         f"growth: a likelihood query, {len(database):,} cells",
         lambda repeat: index.scores(database.signature(repeat)),
         one,
         peer_name=_PEER,
         repeats=repeats,
-    )
-
-
-def _index_rows(database: SignatureDatabase, city: Path) -> Iterator[Comparison]:
-    """Measure how long the index takes to build, beside the bare writing, and its size."""
-    path = City(city).index_path(_NOISE)
-    save_index(database, _NOISE, path)  # kernels are loaded
-    size = path.stat().st_size
-    zeros, copy = np.zeros(size, np.uint8), path.with_suffix(".copy")
-    yield compare(
-        f"building and saving the likelihood index of {len(database):,} cells",
-        lambda _: save_index(database, _NOISE, path),
-        lambda _: zeros.tofile(copy),
-        peer_name="numpy.ndarray.tofile of as many bytes",
-        repeats=1,
-    )
-    copy.unlink()
-    yield Comparison(
-        name=f"likelihood index of {len(database):,} cells",
-        unit="MB",
-        ours=size / 1e6,
-        peer=city.stat().st_size / 1e6,
-        peer_name="the database file",
-        bar=None,
     )
 
 
@@ -181,7 +143,7 @@ def _cold_rows(
         subprocess.run(command, check=True, capture_output=True)  # noqa: S603
 
     yield compare(
-        f"cold: semsig localize by likelihood, {len(database):,} cells, index built",
+        f"cold: semsig localize by likelihood, {len(database):,} cells",
         partial(process, localize),
         partial(process, ["-c", _IMPORTS]),
         peer_name="python that imports numba, pandas, geopandas, pyarrow, typer and rich",

@@ -81,7 +81,6 @@ from .likelihood.posterior import (
 from .likelihood.index import (
     LikelihoodIndex as LikelihoodIndex,
     build_index as build_index,
-    ready_index as ready_index,
 )
 from .likelihood.locate import (
     Location as Location,

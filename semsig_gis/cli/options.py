@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any, get_type_hints
 
 import typer
 
-from semsig_gis.cli.console import app, progress, remark
+from semsig_gis.cli.console import app, remark
 from semsig_gis.core.errors import CrsError, DatabaseError, InputError
 
 if TYPE_CHECKING:
@@ -230,12 +230,10 @@ class SearchOptions:
 
 
 def prepared_index(city: City, model: Noise) -> LikelihoodIndex:
-    """Return the likelihood index beside a database; it is built where it is not there."""
-    from semsig_gis.likelihood.index import ready_index
+    """Return what queries to a database are compared with."""
+    from semsig_gis.likelihood.index import build_index
 
-    with progress("preparing the likelihood index") as advance:
-        path = city.index_path(model)
-        return ready_index(city.database, model, path, note=remark, progress=advance)
+    return build_index(city.database, model)
 
 
 def read_noise(

@@ -1,4 +1,4 @@
-"""Loops over rows, shared by the cores of this machine; their kernels leave the interpreter free."""
+"""Loops over rows in kernels, shared by the cores of this machine."""
 
 from __future__ import annotations
 

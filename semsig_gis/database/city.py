@@ -10,11 +10,10 @@ from __future__ import annotations
 import contextlib
 import json
 import os
-import zlib
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Protocol, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 import pyarrow as pa
@@ -395,15 +394,6 @@ BUILT_DIGEST = "built_digest"
 GEOMETRY = "geometry"
 
 
-class Model(Protocol):
-    """A noise model, as far as it names the file of its likelihood index."""
-
-    @property
-    def name(self) -> str: ...  # noqa: D102
-
-    def to_dict(self) -> dict[str, Any]: ...  # noqa: D102
-
-
 _Part = TypeVar("_Part")
 
 
@@ -504,16 +494,6 @@ class City:
     def object_counts(self) -> dict[int, int] | None:
         """How many objects there are by class code; None where the store cannot be used."""
         return None if self.objects is None else self.objects.class_counts
-
-    def index_path(self, noise: Model) -> Path:
-        """Return the path of the likelihood index for a noise model, to give to `ready_index`.
-
-        For ``city.parquet`` and generic noise that is ``city.parquet.generic-8d47.likelihood``.
-        """
-        content = json.dumps(noise.to_dict(), sort_keys=True)
-        plain = "".join(letter if letter.isalnum() else "_" for letter in noise.name)
-        mark = f"{zlib.crc32(content.encode()) & 0xFFFF:04x}"
-        return self.path.with_name(f"{self.path.name}.{plain}-{mark}.likelihood")
 
     @property
     def has_columns(self) -> bool:

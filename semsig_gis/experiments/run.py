@@ -37,7 +37,7 @@ from semsig_gis.evaluation.figures import district_labels
 from semsig_gis.evaluation.file import open_evaluation, save_evaluation
 from semsig_gis.evaluation.methods import make_locator
 from semsig_gis.evaluation.spec import Case, parse_experiment
-from semsig_gis.likelihood.index import ready_index
+from semsig_gis.likelihood.index import build_index
 from semsig_gis.queries.draw import check_count, draw_queries
 from semsig_gis.reports.evaluation import experiment_figures, experiment_markdown
 from semsig_gis.storage.geoparquet import CHECKING_PAGES, require_intact, seal
@@ -179,7 +179,6 @@ class ExperimentWork:
     ) -> None:
         self.spec, self.folder, self.note = spec, folder, note
         self._cities: dict[str, City] = {}
-        self._indexes: dict[Path, LikelihoodIndex] = {}
         self._locators: dict[str, Locator[Answer]] = {}
 
     def digests(self) -> dict[str, str]:
@@ -352,10 +351,7 @@ class ExperimentWork:
         return self._cities.setdefault(name, City(self.folder / name))
 
     def _index(self, noise: Noise) -> LikelihoodIndex:
-        path = self._city(self.spec.database).index_path(noise)
-        if path not in self._indexes:
-            self._indexes[path] = ready_index(self.database, noise, path, note=self.note)
-        return self._indexes[path]
+        return build_index(self.database, noise)
 
 
 def _part_file(place: Path, part: Part, method: str) -> Path:

@@ -121,7 +121,7 @@ def explain(
     place = np.array([[x, y]])
     view = views_at(objects, place, index=index, radius=radius, footprints=footprints)
     codes = np.unique(objects.codes)
-    scene = _Scene((x, y), view, codes, objects.taxonomy, objects.crs, objects)
+    scene = _Scene((x, y), view, codes, objects.taxonomy, objects.crs, radius, objects)
     return scene.explanation(query, noise, heading)
 
 
@@ -140,7 +140,8 @@ def explain_cell(
     """
     x, y = database.xy[cell].tolist()
     view = views_in(database, np.array([cell]))
-    scene = _Scene((x, y), view, database.present_codes, database.taxonomy, database.crs)
+    codes, radius = database.present_codes, database.spec.radius
+    scene = _Scene((x, y), view, codes, database.taxonomy, database.crs, radius)
     return scene.explanation(query, noise, heading)
 
 
@@ -153,6 +154,7 @@ class _Scene:
     codes: NDArray[np.uint8]
     taxonomy: Taxonomy
     crs: CRS
+    radius: float
     objects: StreetObjects | None = None
 
     def explanation(self, query: Signature, noise: Noise, heading: float) -> Explanation:
@@ -180,7 +182,11 @@ class _Scene:
         """Return the chance that each object is each detection, and the log-likelihood of all."""
         view = self.view
         tables, weights = noise_tables(
-            noise, taxonomy=self.taxonomy, codes=self.codes, longest=LONGEST_TABLE
+            noise,
+            taxonomy=self.taxonomy,
+            codes=self.codes,
+            longest=LONGEST_TABLE,
+            radius=self.radius,
         )
         known = np.flatnonzero(query.among(self.codes))
         names = tables[0].query_rows(query.select(known))

@@ -35,7 +35,7 @@ BINS = 512
 """Bearing steps of an object."""
 FINE = 8 * BINS
 """Bearing steps of a detection."""
-LEVELS = 32
+LEVELS = 64
 """Distances at which errors are taken."""
 TURN_BINS = 8
 """Steps between two turns of a photo whose north is uncertain: 5.625 degrees."""

@@ -377,7 +377,8 @@ def scan(  # noqa: C901, PLR0912, PLR0915, PLR0917
             kind, far = row_of[codes[low + one]], distance_units[low + one]
             names[one] = length * classes + kind
             starts[one] = (group_of[kind] * levels + level_of[far]) * bins
-            places[one] = (np.uint32(bearing_units[low + one]) * np.uint32(bins)) // np.uint32(UNITS)
+            bearing = np.uint32(bearing_units[low + one])
+            places[one] = bearing * np.uint32(bins) // np.uint32(UNITS)
             sure = flat_detected[names[one]]
             chance = sure * flat_seen[kind * FARS + far]
             chances[one] = chance
@@ -406,8 +407,10 @@ def scan(  # noqa: C901, PLR0912, PLR0915, PLR0917
                 a0 = a1 = a2 = a3 = a4 = a5 = a6 = a7 = one_f
                 first = block * LANES
                 if moving:
-                    a0, a1, a2, a3 = floors[first], floors[first + 1], floors[first + 2], floors[first + 3]
-                    a4, a5, a6, a7 = floors[first + 4], floors[first + 5], floors[first + 6], floors[first + 7]
+                    a0, a1 = floors[first], floors[first + 1]
+                    a2, a3 = floors[first + 2], floors[first + 3]
+                    a4, a5 = floors[first + 4], floors[first + 5]
+                    a6, a7 = floors[first + 6], floors[first + 7]
                 above = np.uint64(block) * np.uint64(block_size)
                 for one in range(count):
                     place = (places[one] - turn) & around

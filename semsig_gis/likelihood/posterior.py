@@ -503,8 +503,8 @@ def refine(
 
     The query needs bearings; its types may be unknown. `cells`, shape (c, 2), are the middles in
     metres of the likeliest cells, likeliest first; some hundred will do. `noise` is for a known
-    place. `step` and `radius` are in metres, `north_sigma`, of photos that do not tell their own, in
-    degrees; where it is not 0, `headings`, by photo the likeliest one in each cell, are needed.
+    place. `step` and `radius` are in metres, `north_sigma`, of photos that do not tell their own,
+    in degrees; where it is not 0, `headings`, by photo the likeliest one in each cell, are needed.
     Those of the parts are of the first photo. `log_prior` is what else is known of the
     cells.
     """

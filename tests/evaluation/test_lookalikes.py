@@ -288,7 +288,7 @@ def test_a_column_is_what_an_object_in_its_step_adds(
     table, kinds = columns.table, columns.kinds
     symbol = int(np.random.default_rng(seed).integers(len(columns.values)))
     name, place = divmod(symbol, 72)
-    sigma = table.sigmas(database.reach)[kinds, database.distance_units]
+    sigma = table.sigmas[kinds, database.distance_units]
     low = 5.0 * place - (database.bearings + 0.025) + 360.0 * np.arange(-3, 4)[:, None]
     inside = (ndtr((low + 5.0) / sigma) - ndtr(low / sigma)).sum(axis=0) / 5.0
     owner = np.repeat(np.arange(cells), database.lengths)

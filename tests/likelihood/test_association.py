@@ -22,6 +22,7 @@ from noisy_cells import (
     random_query,
     turned_query,
 )
+from view_oracle import bearing_density, cell_loglik
 from worlds import CODES, World
 
 from semsig_gis.core.rtree import ObjectIndex
@@ -117,37 +118,28 @@ def test_problems_do_not_touch_each_other() -> None:
 
 
 def slow_weights(
-    table: NoiseTable, database: SignatureDatabase, query: Signature, cell: int, tails: float = 4.5
+    table: NoiseTable, database: SignatureDatabase, query: Signature, cell: int
 ) -> np.ndarray:
     """Return what each pair of an object and a detection adds."""
     part = slice(database.offsets[cell], database.offsets[cell + 1])
     kinds = table.row_of[database.codes[part]]
-    sigmas = table.sigmas(database.reach)[kinds, database.distance_units[part]]
+    sigmas = table.sigmas[kinds, database.distance_units[part]]
     names, length = table.query_rows(query), len(kinds)
     weights = np.zeros((length, len(query)))
     for one, other in np.ndindex(weights.shape):
         bearing = database.bearings[part][one] + 0.025
-        away = (query_bearings(query)[other] - bearing + 180.0) % 360.0 - 180.0
-        if abs(away) <= tails * sigmas[one]:
-            laps = away + 360.0 * np.arange(-4, 5)
-            weights[one, other] = (
-                table.odds[length, kinds[one]]
-                * table.naming[length, kinds[one], names[other]]
-                * np.exp(-0.5 * (laps / sigmas[one]) ** 2).sum()
-                / (sigmas[one] * math.sqrt(2 * math.pi))
-            )
+        weights[one, other] = (
+            table.odds[length, kinds[one]]
+            * table.naming[length, kinds[one], names[other]]
+            * bearing_density(float(query_bearings(query)[other] - bearing), float(sigmas[one]))
+        )
     return weights
 
 
-def slow_loglik(database: SignatureDatabase, query: Signature, noise: Noise, cell: int) -> float:
-    """Return the likelihood by going through all associations."""
-    total = 0.0
-    for table, share in zip(*database_tables(database, noise), strict=True):
-        unseen = table.nothing_seen(database.offsets, table.row_of[database.codes])[cell]
-        clutter = np.log(table.density[table.query_rows(query)]).sum()
-        pairs, _ = every_association(slow_weights(table, database, query, cell))
-        total += share * math.exp(unseen + clutter + pairs)
-    return math.log(total)
+def nothing_seen(table: NoiseTable, database: SignatureDatabase, cell: int) -> float:
+    """Return the log-likelihood that nothing is detected in a cell."""
+    kinds = table.row_of[database.codes[database.offsets[cell] : database.offsets[cell + 1]]]
+    return float(np.log(table.missed[len(kinds), kinds]).sum() - table.clutter.sum())
 
 
 # Where tails hardly meet behind the observer, or count there.
@@ -171,10 +163,10 @@ def test_pairs_weigh_as_one_at_a_time(seed: int, size: int, noise: NoiseSpec, si
         lengths=np.repeat(views.lengths, views.lengths),
         names=names,
     )
-    weights = slow_weights(table, database, query, 0, tails=math.inf)
+    weights = slow_weights(table, database, query, 0)
     expected, (total,) = associate_pairs(pairs, weights[pairs.objects, pairs.detections])
     assert chances == pytest.approx(expected, abs=1e-4)
-    alone = table.nothing_seen(views.offsets, kinds)[0] + np.log(table.density[names]).sum()
+    alone = nothing_seen(table, database, 0) + np.log(table.density[names]).sum()
     assert loglik == pytest.approx(total + alone, abs=1e-4)
 
 
@@ -188,7 +180,7 @@ def test_the_sum_over_associations_is_close_and_never_too_large(
     cells = np.arange(len(database))
     found = align_cells(database, query, noise, cells)
     for cell in cells.tolist():
-        exact = slow_loglik(database, query, noise, cell)
+        exact = cell_loglik(database, query, noise, cell)
         assert found[cell] <= exact + 1e-3
         # Half the logarithm of two for each object is the most that loops can cost.
         loops = min(len(query), int(database.lengths[cell]))
@@ -206,7 +198,7 @@ def test_it_is_exact_where_pairs_form_no_loop(seed: int, away: float) -> None:
     bearings = (np.repeat(places, 2)[:5] + np.array([0.0, 1.0, -2.0, 3.0, away])) % 360.0
     query = Signature(rng.choice(database.present_codes, 5), bearings)
     found = align_cells(database, query, noise, np.zeros(1, np.int64))[0]
-    assert found == pytest.approx(slow_loglik(database, query, noise, 0), abs=1e-3)
+    assert found == pytest.approx(cell_loglik(database, query, noise, 0), abs=1e-3)
 
 
 def test_turns_are_those_of_a_turned_query() -> None:
@@ -232,7 +224,8 @@ def test_re_ranking_replaces_the_best_and_moves_the_rest_together() -> None:
     assert found[inside] == pytest.approx(exact[inside])
     moved = np.logaddexp.reduce(found[worse]) - np.logaddexp.reduce(scores.loglik[worse])
     assert found[outside] - scores.loglik[outside] == pytest.approx(moved, abs=1e-4)
-    assert rerank(index, query, scores, count=10_000).loglik == pytest.approx(exact)
+    found, near = rerank(index, query, scores, count=10_000).loglik, exact > exact.max() - 10.0
+    assert found[near] == pytest.approx(exact[near])
     # A prior chooses what is re-ranked; without bearings nothing is.
     prior = np.where(np.arange(300) < 5, 0.0, -np.inf)
     found = rerank(index, query, scores, count=40, log_prior=prior).loglik
@@ -243,7 +236,7 @@ def test_re_ranking_replaces_the_best_and_moves_the_rest_together() -> None:
 
 
 @pytest.mark.parametrize("north_sigma", [10.0, math.inf])
-def test_the_heading_is_found_finer_than_the_index_has_it(north_sigma: float) -> None:
+def test_the_heading_is_found_finer_than_the_scan_has_it(north_sigma: float) -> None:
     database = random_database(3, cells=100, longest=20)
     cell = int(database.lengths.argmax())
     query = turned_query(database.signature(cell), -7.0)
@@ -255,7 +248,7 @@ def test_the_heading_is_found_finer_than_the_index_has_it(north_sigma: float) ->
     assert abs(found.heading[cell] - 7.0) <= 1.5
 
 
-def test_it_finds_more_than_the_index_alone() -> None:
+def test_it_finds_more_than_the_scan_alone() -> None:
     database = random_database(7, cells=400, longest=10, classes=2)
     index = build_index(database, GENERIC)
     right = np.zeros(2, int)

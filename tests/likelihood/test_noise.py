@@ -113,7 +113,7 @@ NAMES = ["alignment_tree", "street_light", "indicator"]
 
 
 def tables_of(noise: Noise, longest: int) -> tuple[tuple[NoiseTable, ...], np.ndarray]:
-    return noise_tables(noise, taxonomy=TAXONOMY, codes=CODES, longest=longest)
+    return noise_tables(noise, taxonomy=TAXONOMY, codes=CODES, longest=longest, radius=30.0)
 
 
 def slow_named(spec: NoiseSpec, kind: int, name: int, length: int) -> float:
@@ -182,7 +182,7 @@ def test_a_mean_lies_between_its_models(one: NoiseSpec, other: NoiseSpec) -> Non
 def test_a_position_that_is_not_known_turns_near_objects_most() -> None:
     spec = NoiseSpec(bearing_sigma=5.0, position_sigma=3.0)
     (table,), _ = tables_of(spec, 9)
-    sigmas = table.sigmas(30.0)
+    sigmas = table.sigmas
     assert (np.diff(sigmas, axis=1) <= 0).all()
     assert sigmas[0, 255] == pytest.approx(math.hypot(5.0, math.degrees(3.0 / 30.0)))
     assert sigmas[0, 0] == 180.0

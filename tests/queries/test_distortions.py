@@ -450,7 +450,11 @@ def test_how_often_sectors_are_blocked(
 
 def table_of(noise: Noise) -> NoiseTable:
     (table, *_), _ = noise_tables(
-        noise, taxonomy=CITY.taxonomy, codes=CITY.codes, longest=LONGEST_TABLE
+        noise,
+        taxonomy=CITY.taxonomy,
+        codes=CITY.codes,
+        longest=LONGEST_TABLE,
+        radius=CITY.reach,
     )
     return table
 

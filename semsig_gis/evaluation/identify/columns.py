@@ -60,7 +60,10 @@ class SymbolColumns:
 def symbol_columns(index: LikelihoodIndex, *, threads: int = 1) -> SymbolColumns:
     """Work out the columns of the cells and the mean noise model of an index."""
     database, table = index.database, index.table
-    unseen = table.nothing_seen(database.offsets, table.row_of[database.codes])
+    owners = np.repeat(np.arange(len(database)), database.lengths)
+    rows = table.length_rows(database.lengths)[owners]
+    missed = np.log(table.missed)[rows, table.row_of[database.codes]]
+    unseen = np.bincount(owners, missed, len(database)) - table.clutter.sum()
     values = np.empty((len(table.codes), BINS, len(database)), np.uint8)
     return SymbolColumns(
         database=database,
@@ -108,7 +111,7 @@ def _spreads(
     database: SignatureDatabase, table: NoiseTable
 ) -> tuple[NDArray[np.uint8], NDArray[np.float32]]:
     """Return which bearing noise each entry has, and the density of each in every bin."""
-    sigma = table.sigmas(database.reach)
+    sigma = table.sigmas
     if table.position_sigma == 0:
         levels, level = np.unique(sigma, return_inverse=True)
     else:

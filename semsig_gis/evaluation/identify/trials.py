@@ -227,7 +227,7 @@ def try_without_classes(
         if len(left):
             noise = _without_class(index.noise, names[code], len(codes))
             trials = try_cells(
-                build_index(without, noise, threads=threads),
+                build_index(without, noise),
                 rows[cells[left]],
                 queries=[_without_code(queries[one], code) for one in left.tolist()],
                 radius=radius,

@@ -15,6 +15,7 @@ import numpy as np
 import pandas as pd
 
 from semsig_gis.core.errors import InputError
+from semsig_gis.core.signature import DISTANCE_UNITS
 from semsig_gis.core.statistics import log_interval, poisson_interval, wilson_interval
 from semsig_gis.likelihood.association import associate, near_pairs
 from semsig_gis.likelihood.noise.table import NoiseTable
@@ -129,7 +130,11 @@ def starting_model(evidence: Evidence, *, position_sigma: float) -> NoiseTable:
         others=_others(count),
         clutter=np.full(count, 1.0 / count),
         sigma=np.full(count, 8.0),
+        range_sigma=np.full(count, 0.25),
         position_sigma=position_sigma,
+        ranges=np.full(count, math.inf),
+        fading=np.ones((count, DISTANCE_UNITS + 1)),
+        reach=math.inf,
     )
 
 

@@ -288,7 +288,8 @@ def _fading(
     metres = np.arange(DISTANCE_UNITS + 1) * (reach / DISTANCE_UNITS)
 
     def shares(points: Sequence[Sequence[float]]) -> NDArray[np.float64]:
-        return np.interp(metres, *np.transpose(np.asarray(points, dtype=np.float64)))
+        known, left = np.transpose(np.asarray(points, dtype=np.float64))
+        return np.asarray(np.interp(metres, known, left))
 
     faded = np.ones((count + 1, len(metres)))
     if ALL in spec.fading:
