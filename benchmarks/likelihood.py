@@ -2,29 +2,24 @@
 
 from __future__ import annotations
 
-import os
 import subprocess
 import sys
 import tempfile
-from collections import deque
-from concurrent.futures import ThreadPoolExecutor
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-import numpy as np
-
-from benchmarks.comparison import Comparison, compare
-from semsig_gis.database.city import City
+from benchmarks.comparison import compare
 from semsig_gis.database.file import save_database
 from semsig_gis.likelihood.association import rerank
-from semsig_gis.likelihood.index import build_index, open_index, save_index
+from semsig_gis.likelihood.index import build_index
 from semsig_gis.likelihood.locate import locate
 from semsig_gis.likelihood.noise.model import named_noise
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
 
+    from benchmarks.comparison import Comparison
     from semsig_gis.core.signature import Signature
     from semsig_gis.database.database import SignatureDatabase
 

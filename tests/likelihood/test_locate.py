@@ -299,7 +299,7 @@ def parts(places: np.ndarray, headings: list[float], chances: list[float]) -> Re
         places=places,
         sizes=np.full(count, 2.0),
         loglik=np.zeros(count),
-        headings=(np.array(headings),),
+        headings=np.array(headings),
         heading_sigmas=np.ones(count),
         chances=np.array(chances),
         near=25.0,
@@ -362,7 +362,7 @@ def test_the_heading_is_as_good_as_it_says(north_sigma: float) -> None:
     xy = CORNER + np.array([103.0, 98.0])
     query = turned_query(detected(world, xy, 3), -12.0)
     headings = np.full(len(world.database), 10.0)
-    found = refined(query, world, north_sigma=north_sigma, headings=headings)
+    found = refined(query, world, north_sigma=north_sigma, headings=[headings])
     away = np.array([*(np.array(found.xy) - xy), found.heading - 12.0])
     assert away @ np.linalg.inv(found.covariance) @ away < 16.3  # 99.9 %
     assert found.heading == pytest.approx(12.0, abs=6.0)
