@@ -114,6 +114,8 @@ class LikelihoodIndex:
         """
         check_north(north_sigma)
         view = View.of(query)
+        if view.bearings is None and not len(view):
+            view = View(np.empty(0, np.uint8), np.empty(0))
         if view.bearings is None:
             return CellScores(loglik=self._by_counts(self.table.query_rows(view)))
         loglik = np.zeros(len(self.database), np.float32)

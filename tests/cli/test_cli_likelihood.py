@@ -79,8 +79,8 @@ SEEN = seen_from(PLACE)
 
 def test_the_likelihood_answers_or_cannot_tell(city: Path, run: Run) -> None:
     query = "localize", city, *options(SEEN), *BY
-    code, out, told = run(*query, "--json", "--top", 3)
-    assert (code, "is built" in told) == (0, True)
+    code, out, _ = run(*query, "--json", "--top", 3)
+    assert code == 0
     answer = json.loads(out)
     assert (answer["noise"], len(answer["candidates"])) == ("generic", 3)
     assert answer["answered"]
@@ -89,8 +89,8 @@ def test_the_likelihood_answers_or_cannot_tell(city: Path, run: Run) -> None:
     out = run(*query, "--noise", "medium", "--heading", "unknown", "--top", 2)[1]
     for words in ("2 best of", "Estimated position: x", "North of the query: "):
         assert words in out
-    code, out, told = run("localize", city, "--types", SEEN["types"][:1], *BY)
-    assert (code, "is built" in told) == (0, False)
+    code, out, _ = run("localize", city, "--types", SEEN["types"][:1], *BY)
+    assert code == 0
     assert "Cannot tell: the best place is" in out
     assert "of the chance is in" in out
     x, y = PLACE
@@ -301,24 +301,21 @@ def test_a_rule_is_calibrated_and_used(city: Path, run: Run) -> None:
     sentence(run(*calibrate[:-1], 1.5), "--precision was given as 1.5", "from 0.01 to 0.9999")
 
 
-def test_an_index_is_kept_and_built_again_for_another_city(city: Path, run: Run) -> None:
-    query = "localize", city, *options(SEEN), *BY, "--json"
-    assert "does not exist yet and is built" in run(*query)[2]
-    assert run(*query)[2] == ""
-    save_with_store(CITY.select(slice(0, 300)), STORE, city)
-    assert "is built again" in run(*query)[2]
-    assert run(*query)[2] == ""
+def test_a_query_writes_nothing(city: Path, run: Run) -> None:
+    before = sorted(city.parent.rglob("*"))
+    code, _, told = run("localize", city, *options(SEEN), *BY, "--json")
+    assert (code, told) == (0, "")
+    assert sorted(city.parent.rglob("*")) == before
 
 
 def test_a_query_longer_than_any_signature(city: Path, run: Run) -> None:
     symbols = CITY.taxonomy.decode(CITY.present_codes) * 60
     angles = ",".join(str(number * 360 / len(symbols)) for number in range(len(symbols)))
     query = "localize", city, "--types", symbols, "--bearings", angles, "--json"
-    for more in (BY, (*BY, "--no-refine"), ()):
+    for more in (BY, (*BY, "--no-refine"), (*BY, "--no-refine", "--heading", "unknown"), ()):
         code, out, _ = run(*query, *more)
         assert code == 0
-        assert json.loads(out)["query"]["length"] == len(symbols) > 257
-    sentence(run(*query, *BY, "--heading", "unknown"), "257 objects")
+        assert json.loads(out)["query"]["length"] == len(symbols)
 
 
 def test_bearings_of_360_and_minus_10(city: Path, run: Run) -> None:
