@@ -6,6 +6,7 @@ kernel imports its module when the first one is needed.
 
 from __future__ import annotations
 
+import sys
 from typing import TYPE_CHECKING, ParamSpec, TypeVar
 
 from semsig_gis.core.memory import require_address_space
@@ -15,6 +16,16 @@ COMPILER_BYTES = 400_000_000
 require_address_space(COMPILER_BYTES, "the compiler of number loops")
 
 import numba  # noqa: E402
+
+# Where SciPy is, numba looks whether it has a linear algebra, which no kernel needs and which takes
+# nearly as long to load as numba itself.
+LINEAR_ALGEBRA = "scipy.linalg"
+if LINEAR_ALGEBRA not in sys.modules:
+    sys.modules[LINEAR_ALGEBRA] = None  # type: ignore[assignment] # importing it fails
+    try:
+        import numba.np.arraymath
+    finally:
+        del sys.modules[LINEAR_ALGEBRA]
 
 if TYPE_CHECKING:
     from collections.abc import Callable

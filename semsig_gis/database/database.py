@@ -37,6 +37,7 @@ if TYPE_CHECKING:
 
 WORD_BITS = 64
 HISTOGRAM_BLOCK = 1 << 22  # counters in one step of the histogram: 32 MB of temporaries
+CODES_A_BLOCK = 1 << 16  # as counting makes each of them a number of eight bytes
 LONGEST_VALUE = 80
 
 # What two databases that were made in the same way have in common, and what it is called.
@@ -162,7 +163,10 @@ class SignatureDatabase:
     @cached_property
     def occurrences(self) -> NDArray[np.int64]:
         """How often each class code occurs over all signatures, shape (256,)."""
-        return frozen(np.bincount(self.codes, minlength=256))
+        starts = range(0, len(self.codes), CODES_A_BLOCK)
+        blocks = (self.codes[start : start + CODES_A_BLOCK] for start in starts)
+        counts = (np.bincount(block, minlength=256) for block in blocks)
+        return frozen(np.asarray(sum(counts, np.zeros(256, np.int64))))
 
     @cached_property
     def present_codes(self) -> NDArray[np.uint8]:

@@ -45,6 +45,9 @@ NOWHERE = (math.inf, math.inf, -math.inf, -math.inf)
 GROUP_ROWS = 8192
 """Rows that are read together: the street objects of about two square kilometres of Paris."""
 
+BATCH_ROWS = 1 << 15
+"""Rows of a whole file that are unpacked at once."""
+
 
 def hilbert_order(geometries: NDArray[np.object_] | gpd.array.GeometryArray) -> NDArray[np.int64]:
     """Return the permutation along a Hilbert curve, so that neighbours mostly are rows nearby.
@@ -354,7 +357,9 @@ def read_geoparquet(
         raise DatabaseError(msg)
     try:
         if box is None:
-            table = parquet.read(columns)
+            # Not in one piece: the memory of a batch serves the next one, too.
+            batches = list(parquet.iter_batches(BATCH_ROWS, columns=columns))
+            table = pa.Table.from_batches(batches) if batches else parquet.read(columns)
         else:
             table = parquet.read_row_groups(groups_meeting(parquet, box), columns)
     except (pa.ArrowException, OSError, ValueError) as error:
