@@ -28,6 +28,7 @@ if TYPE_CHECKING:
 LEAST_TURN = 0.001
 MOST_RANGE_ERROR = 3.0
 ROUNDING = 1e-6  # of sums of scores
+EDGE = 0.05  # degrees, of bearings and sectors that others rounded
 CLASSES = MAX_CODE + 1
 
 Sector = tuple[float, float]
@@ -291,6 +292,14 @@ class View(Signature):
             replace(self.select(rows == number), photo=None, photos=(photo,))
             for number, photo in enumerate(self.photos)
         )
+
+    def outside(self) -> NDArray[np.int64]:
+        """Return the rows of the objects where their photo did not look, but for rounding."""
+        if self.bearings is None:
+            return np.empty(0, np.int64)
+        around = self.bearings + np.array([[-EDGE], [0.0], [EDGE]])
+        seen = np.stack([photo.sees(around).any(axis=0) for photo in self.photos])
+        return np.flatnonzero(~seen[self.photo_rows, np.arange(len(self))])
 
     def class_scores(self) -> NDArray[np.float64]:
         """Return the chance of each class code for each object, shape (n, 256)."""

@@ -216,22 +216,13 @@ def query_notes(query: Signature, present: ArrayLike, taxonomy: Taxonomy) -> tup
     return (note, *notes)
 
 
-EDGE = 0.05
-"""Degrees by which a bearing may lie beyond the edge of a sector, as numbers are rounded."""
-
-
 def _outside_notes(view: View, taxonomy: Taxonomy) -> tuple[str, ...]:
     """Return what to say of objects where their photo did not look."""
-    bearings = view.bearings
-    if bearings is None:
-        return ()
-    around = bearings + np.array([[-EDGE], [0.0], [EDGE]])
-    seen = np.stack([photo.sees(around).any(axis=0) for photo in view.photos])
-    outside = np.flatnonzero(~seen[view.photo_rows, np.arange(len(view))])
-    if not len(outside):
+    outside = view.outside().tolist()
+    if not outside or view.bearings is None:
         return ()
     symbols = "?" * len(view) if view.codes is None else taxonomy.decode(view.codes)
-    listed = ", ".join(f"{symbols[row]} at {bearings[row]:.1f}°" for row in outside.tolist())
+    listed = ", ".join(f"{symbols[row]} at {view.bearings[row]:.1f}°" for row in outside)
     verb = "stands" if len(outside) == 1 else "stand"
     note = (
         f"{listed} {verb} outside the sectors that were looked at; the heading, the field of view "

@@ -211,13 +211,15 @@ class _Drawings:
     def candidates(self) -> list[list[Any]]:
         """Return the candidates, likeliest first."""
         rows = self.location.candidates
-        query = query_signature(self.location.grid_query, self.database.taxonomy)
+        query = self.location.grid_query
+        asked = query_signature(query, self.database.taxonomy, radius=self.database.spec.radius)
         records = []
         places = self.latlon(rows[["x", "y"]].to_numpy())
         for place, row in zip(places, rows.to_dict("records"), strict=True):
+            turn = row.get("heading") or 0.0
             details = [
-                query,
-                cell_signature(self.database, row["cell"]),
+                asked,
+                cell_signature(self.database, row["cell"], query, turn),
                 f"{row['chance']:.2%}",
                 f"{row['loglik']:.2f}",
                 _north(row.get("heading")),
@@ -385,14 +387,15 @@ def _candidate_records(
     distances = candidates["distance"].to_numpy(np.float64)
     spread = np.ptp(distances) or 1.0
     colours = mixed((distances - distances.min()) / spread, CANDIDATE_RAMP)
-    query = query_signature(localization.grid_query, database.taxonomy)
+    query = localization.grid_query
+    asked = query_signature(query, database.taxonomy, radius=database.spec.radius)
     records = []
     for number, candidate in enumerate(candidates.to_dict("records")):
         rank = ranks_text(candidate["rank_low"], candidate["rank_high"])
         place = places[number].tolist()
         details = [
-            query,
-            cell_signature(database, int(rows[number])),
+            asked,
+            cell_signature(database, int(rows[number]), query),
             f"{rank} of {len(database):,}{ties_text(candidate['tied'])}",
             f"{candidate['distance']:.4f}",
             str(candidate["cell_id"]),

@@ -20,8 +20,9 @@ from pyproj import Transformer
 
 from semsig_gis import __version__
 from semsig_gis.core.errors import InputError
-from semsig_gis.core.geometry import across_180
+from semsig_gis.core.geometry import FULL_TURN, across_180
 from semsig_gis.core.signs import SHADES
+from semsig_gis.core.view import View
 from semsig_gis.database.database import SignatureDatabase
 from semsig_gis.maps.image import city_image, script_json
 
@@ -35,6 +36,7 @@ if TYPE_CHECKING:
     from semsig_gis.core.signature import Signature
     from semsig_gis.core.signs import ClassSign
     from semsig_gis.core.taxonomy import Taxonomy
+    from semsig_gis.core.view import Photo, Sector
     from semsig_gis.objects.table import StreetObjects
 
 
@@ -222,23 +224,50 @@ def class_titles(database: SignatureDatabase) -> dict[str, str]:
     return {item.symbol: item.title for item in database.taxonomy.classes}
 
 
-def popup_signature(types: str | None, bearings: ArrayLike | None) -> list[Any]:
-    """Return a signature for the popup: symbols and whole degrees."""
+def popup_signature(types: str | None, bearings: ArrayLike | None, **look: Any) -> list[Any]:  # noqa: ANN401
+    """Return a signature for the popup: symbols, whole degrees and, if anything, its look."""
     if bearings is None:
         return [types, None]
     degrees = np.rint(np.asarray(bearings, np.float64)).astype(int) % 360
-    return [types, degrees.tolist()]
+    return [types, degrees.tolist(), look] if look else [types, degrees.tolist()]
 
 
-def query_signature(query: Signature, taxonomy: Taxonomy) -> list[Any]:
-    """Return a query for the popup."""
+def query_signature(query: Signature, taxonomy: Taxonomy, *, radius: float) -> list[Any]:
+    """Return a query for the popup; `radius` is the visibility range in metres."""
     types = None if query.codes is None else taxonomy.decode(query.codes)
-    return popup_signature(types, query.bearings)
+    look: dict[str, Any] = {}
+    if isinstance(query, View):
+        if query.ranges is not None:
+            look |= {"reach": radius, "metres": _whole_metres(query.ranges)}
+        if all(photo.sectors for photo in query.photos):
+            look |= {"sectors": _sectors(query.photos), "outside": query.outside().tolist()}
+    return popup_signature(types, query.bearings, **look)
 
 
-def cell_signature(database: SignatureDatabase, cell: int) -> list[Any]:
-    """Return what a cell sees for the popup."""
-    return popup_signature(database.types(cell), database.signature(cell).bearings)
+def cell_signature(
+    database: SignatureDatabase, cell: int, query: Signature | None = None, turn: float = 0.0
+) -> list[Any]:
+    """Return what a cell sees for the popup, in the look of a query that is turned by degrees."""
+    bearings, look = database.signature(cell).bearings, dict[str, Any]()
+    if isinstance(query, View) and bearings is not None:
+        if query.ranges is not None:
+            metres = _whole_metres(database.select(slice(cell, cell + 1)).distances)
+            look |= {"reach": database.spec.radius, "metres": metres}
+        photos = [photo.turned(turn) for photo in query.photos]
+        # Photos that are turned each by itself have no look in common.
+        together = len(photos) == 1 or not any(photo.north_sigma for photo in photos)
+        if together and all(photo.sectors for photo in photos):
+            seen = np.any([photo.sees(bearings) for photo in photos], axis=0)
+            look |= {"sectors": _sectors(photos), "outside": np.flatnonzero(~seen).tolist()}
+    return popup_signature(database.types(cell), bearings, **look)
+
+
+def _whole_metres(ranges: NDArray[np.float64]) -> list[int | None]:
+    return [None if np.isnan(one) else round(one) for one in ranges.tolist()]
+
+
+def _sectors(photos: Iterable[Photo]) -> list[Sector]:
+    return [sector for photo in photos for sector in photo.sectors]
 
 
 def ranks_text(low: int, high: int) -> str:
@@ -335,6 +364,13 @@ def query_text(query: Signature, taxonomy: Taxonomy) -> str:
     if query.bearings is not None:
         degrees = (round(bearing) % 360 for bearing in query.bearings.tolist())
         lines.append(f"Bearings: {' '.join(f'{value}°' for value in degrees)}<br>")
+    if isinstance(query, View):
+        if query.ranges is not None:
+            metres = ("?" if one is None else f"{one} m" for one in _whole_metres(query.ranges))
+            lines.append(f"Ranges: {', '.join(metres)}<br>")
+        if all(photo.sectors for photo in query.photos):
+            edges = (f"{low:.0f}-{high % FULL_TURN:.0f}°" for low, high in _sectors(query.photos))
+            lines.append(f"Looked at: {', '.join(edges)}<br>")
     return "".join(lines)
 
 

@@ -14,6 +14,7 @@ from worlds import random_town
 
 from semsig_gis.core.signature import Signature
 from semsig_gis.core.signs import CANDIDATE_RAMP, FAILED, SUCCESSFUL, VERDICTS
+from semsig_gis.core.view import Photo, View
 from semsig_gis.database.city import ObjectStore
 from semsig_gis.likelihood.index import build_index
 from semsig_gis.likelihood.locate import locate
@@ -103,6 +104,33 @@ def test_clicks_tell_of_places_and_objects(page: MapPage) -> None:
         assert said in popup
     page.ask("circles('#ffffff').find((one) => one.getTooltip()).openPopup()")
     assert page.popup().startswith("Rank 5 of")
+
+
+def test_wheels_show_where_a_view_looked_and_how_far(page: MapPage) -> None:
+    seen = CITY.signature(LONGEST)
+    assert seen.bearings is not None
+    metres = CITY.distances[CITY.offsets[LONGEST] : CITY.offsets[LONGEST + 1]]
+    photo = Photo.looking(heading=float(seen.bearings[0]), fov=120)
+    view = View.of(seen, ranges=np.append(metres[:-1], np.nan), photos=(photo,))
+    outside = ~photo.sees(seen.bearings)
+    assert 0 < outside.sum() < len(view)
+    page.open(localization_map(localize(CITY, view, top=1), CITY))
+    assert "Looked at: " in page.one(LEGEND).text
+    page.ask("shown((one) => one instanceof L.CircleMarker)[0].openPopup()")
+    asked, cell = page.all(".semsig-wheels figure")
+    assert asked.text.endswith("Query, to 30 m")
+    for wheel in (asked, cell):
+        assert len(wheel.find_elements(By.CSS_SELECTOR, "path.looked")) == 1
+        signs = wheel.find_elements(By.TAG_NAME, "text")
+        pale = [str(sign.get_attribute("class")).strip() == "pale" for sign in signs]
+        assert pale == outside.tolist()
+        told = str(wheel.find_element(By.TAG_NAME, "svg").get_attribute("aria-label"))
+        assert told.count("(outside)") == outside.sum()
+        places = [[float(str(sign.get_attribute(one))) for one in "xy"] for sign in signs]
+        out = np.hypot(*np.transpose(places))
+        assert np.corrcoef(out[:-1], metres[:-1])[0, 1] > 0.8
+    assert len(asked.find_elements(By.CSS_SELECTOR, "line.ray")) == 1
+    assert cell.find_elements(By.CSS_SELECTOR, "line.ray") == []
 
 
 def test_what_cannot_be_told_is_shown_from_afar(page: MapPage) -> None:
