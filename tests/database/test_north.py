@@ -16,6 +16,7 @@ from worlds import random_town
 from semsig_gis.core.errors import InputError, UnknownNameError
 from semsig_gis.core.geometry import GridSpec, grid_convergence
 from semsig_gis.core.signature import Signature
+from semsig_gis.core.view import Photo, View
 from semsig_gis.database.file import PartitionedDatabase, save_database
 from semsig_gis.database.north import GRID_NORTH, North, declination
 from semsig_gis.likelihood.index import build_index
@@ -99,6 +100,15 @@ def test_bearings_are_turned_and_told_in_their_north() -> None:
     ranked = localize(CITY, query, north=north)
     assert ranked.candidates["cell"][0] == CELL
     assert ranked.candidates["distance"][0] == 0.0
+    # A view is turned with all that is known of it.
+    photo = Photo.looking(heading=float(bearings[0]), fov=200)
+    view = View.of(CITY.signature(CELL), ranges=np.full(len(codes), 12.0), photos=(photo,))
+    here, there, other = (
+        answer.candidates["loglik"].to_numpy()
+        for answer in (locate(index, view), locate(index, view.turned(-12.0), north=north), plain)
+    )
+    assert np.allclose(here, there)
+    assert not np.allclose(here, other)
     # What was turned on purpose is found as a heading in the north of the query.
     turned = locate(index, query.turned(-30.0), north=north, north_sigma=float("inf"))
     assert turned.estimate.heading == pytest.approx(30.0, abs=3.0)

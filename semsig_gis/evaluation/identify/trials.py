@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from semsig_gis.core.signature import Signature
 from semsig_gis.evaluation.identify.lookalikes import city_extent
 from semsig_gis.likelihood.association import rerank
 from semsig_gis.likelihood.index import build_index
@@ -23,6 +22,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+    from semsig_gis.core.signature import Signature
     from semsig_gis.database.database import SignatureDatabase
     from semsig_gis.likelihood.index import LikelihoodIndex
     from semsig_gis.likelihood.noise.model import Noise, NoiseSpec
@@ -241,10 +241,7 @@ def try_without_classes(
 
 def _without_code(query: Signature, code: int) -> Signature:
     """Return the detections of a query that do not bear the name of a class."""
-    if query.codes is None or query.bearings is None:
-        return query
-    kept = query.codes != code
-    return Signature(query.codes[kept], query.bearings[kept])
+    return query if query.codes is None else query.select(query.codes != code)
 
 
 def _without_class(noise: Noise, name: str, classes: int) -> Noise:
