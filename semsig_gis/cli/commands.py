@@ -17,6 +17,7 @@ from semsig_gis.cli import (  # noqa: F401
     load,
     build,
     maps,
+    view,
     localize,
     learn,
     evaluate,

@@ -20,6 +20,7 @@ MAX_CODE = 255
 WILDCARD = 0
 """The code of an object whose class is not known; no class has it."""
 MAX_RANGE_M = 6000.0
+MAX_HEIGHT_M = 500.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,11 +40,15 @@ class ObjectClass:
     range_m : float, optional
         From how far an object of the class is seen, in metres; None for the range that holds for
         all.
+    height_m, height_sigma : float, optional
+        How tall an object of the class is, from the ground to its top, and the standard deviation
+        of that, in metres; None where that tells nothing of how far it is.
 
     Raises
     ------
     CatalogError
-        If the code, the symbol or the name is not of that form, or the range is not above 0.
+        If the code, the symbol or the name is not of that form, the range is not above 0, or of
+        the height and its deviation one is missing or not above 0.
 
     Examples
     --------
@@ -56,6 +61,8 @@ class ObjectClass:
     name: str
     title: str
     range_m: float | None = None
+    height_m: float | None = None
+    height_sigma: float | None = None
 
     def __post_init__(self) -> None:  # noqa: D105
         # The type exactly: True is an int to Python, never a code.
@@ -80,6 +87,22 @@ class ObjectClass:
                 f"above 0 and up to {MAX_RANGE_M:.0f}."
             )
             raise CatalogError(msg)
+        check_height(self.height_m, self.height_sigma, f"class {self.name!r}")
+
+
+def check_height(height: float | None, sigma: float | None, what: str) -> None:
+    """Refuse a height without its deviation, a deviation alone, and what is not above 0 (metres).
+
+    CatalogError calls it the height of `what`.
+    """
+    if height is None and sigma is None:
+        return
+    if height is None or sigma is None or not 0 < sigma <= height <= MAX_HEIGHT_M:
+        msg = (
+            f"{what} has a height of {height} m and a height_sigma of {sigma} m; give height_m "
+            f"above 0 and up to {MAX_HEIGHT_M:.0f}, and height_sigma above 0 and at most as much."
+        )
+        raise CatalogError(msg)
 
 
 @dataclass(frozen=True)

@@ -20,7 +20,7 @@ from semsig_gis.core.errors import (
 )
 from semsig_gis.core.geometry import require_metric_crs
 from semsig_gis.core.plugins import installed_catalogs
-from semsig_gis.core.taxonomy import MAX_RANGE_M, ObjectClass, Taxonomy
+from semsig_gis.core.taxonomy import MAX_HEIGHT_M, MAX_RANGE_M, ObjectClass, Taxonomy
 from semsig_gis.sources.conditions import COMPARES, Condition, Value
 from semsig_gis.storage.text import read_text
 from semsig_gis.storage.toml import check_keys, metres, one_of, parse_toml, texts
@@ -399,6 +399,7 @@ CATALOG_KEYS = {
     "layers": list,
 }
 CLASS_KEYS = {"code": int, "symbol": str, "name": str, "title": str}
+MEASURES = {"range_m": MAX_RANGE_M, "height_m": MAX_HEIGHT_M, "height_sigma": MAX_HEIGHT_M}
 MAX_MERGING_M = 100.0
 
 
@@ -491,12 +492,22 @@ def catalog_names() -> tuple[str, ...]:
 
 def _sources() -> dict[str, Path | Traversable]:
     """Return the file of every catalogue by name."""
-    shipped: dict[str, Path | Traversable] = {
+    shipped = _shipped()
+    return {**shipped, **installed_catalogs(taken=shipped)}
+
+
+def _shipped() -> dict[str, Path | Traversable]:
+    """Return the file of every built-in catalogue by name."""
+    return {
         Path(item.name).stem: item
         for item in data_folder().iterdir()
         if item.name.endswith(".toml") and Path(item.name).stem not in NO_CATALOGS
     }
-    return {**shipped, **installed_catalogs(taken=shipped)}
+
+
+def built_in_taxonomy() -> Taxonomy:
+    """Return the classes of all built-in catalogues."""
+    return combine_catalogs([load_catalog(name) for name in sorted(_shipped())]).taxonomy
 
 
 def load_catalog(name: str | Path) -> Catalog:
@@ -562,8 +573,9 @@ def combine_catalogs(catalogs: Sequence[Catalog]) -> Catalog:
     -------
     Catalog
         With several, each layer's name begins with its catalogue's. The first of them that says
-        a metric CRS, how far a class is seen, or within how many metres it is merged, decides
-        that. CatalogError if they mean different classes by one name, code or symbol.
+        a metric CRS, how far a class is seen, how tall it is, or within how many metres it is
+        merged, decides that. CatalogError if they mean different classes by one name, code or
+        symbol.
 
     Examples
     --------
@@ -579,11 +591,16 @@ def combine_catalogs(catalogs: Sequence[Catalog]) -> Catalog:
     if len(catalogs) == 1:
         return catalogs[0]
     classes = [item for catalog in catalogs for item in catalog.taxonomy.classes]
-    ranges = {item.name: item.range_m for item in reversed(classes) if item.range_m is not None}
-    # Catalogues that differ in how far a class is seen mean the same class.
-    kinds = dict.fromkeys(dataclasses.replace(item, range_m=None) for item in classes)
+    # Catalogues that differ in how far a class is seen, or how tall it is, mean the same class.
+    measures: dict[ObjectClass, dict[str, Any]] = {}
+    for item in classes:
+        kind = dataclasses.replace(item, range_m=None, height_m=None, height_sigma=None)
+        said = {name: getattr(item, name) for name in MEASURES if getattr(item, name) is not None}
+        measures[kind] = {**said, **measures.get(kind, {})}
     try:
-        taxonomy = Taxonomy(tuple(kinds)).with_ranges(ranges)
+        taxonomy = Taxonomy(
+            tuple(dataclasses.replace(kind, **said) for kind, said in measures.items())
+        )
     except CatalogError as error:
         msg = f"catalogues {' and '.join(names)} do not go together: {error}"
         raise CatalogError(msg) from error
@@ -661,11 +678,14 @@ def _classes(items: list[Any], where: str) -> tuple[ObjectClass, ...]:
         if not isinstance(item, dict):
             msg = f"{place} is {item!r}; write a [[classes]] table."
             raise CatalogError(msg)
-        check_keys(item, {**CLASS_KEYS, "range_m": object}, place, CLASS_KEYS)
-        if "range_m" in item:
-            item["range_m"] = metres(item["range_m"], "range_m", place, most=MAX_RANGE_M)
+        check_keys(item, {**CLASS_KEYS, **dict.fromkeys(MEASURES, object)}, place, CLASS_KEYS)
+        lengths = {
+            key: metres(item[key], key, place, most=most)
+            for key, most in MEASURES.items()
+            if key in item
+        }
         try:
-            classes.append(ObjectClass(**item))
+            classes.append(ObjectClass(**{**item, **lengths}))
         except CatalogError as error:
             msg = f"{place}: {error}"
             raise CatalogError(msg) from error

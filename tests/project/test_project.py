@@ -87,7 +87,8 @@ def test_data_sources_hold_data_only() -> None:
 
 
 def test_the_wheel_is_complete(wheel: dict[str, str]) -> None:
-    data = {f"semsig_gis/{path.relative_to(ROOT)}" for path in ROOT.glob("data_sources/*")}
+    files = (path for path in ROOT.glob("data_sources/**/*") if path.is_file())
+    data = {f"semsig_gis/{path.relative_to(ROOT)}" for path in files}
     suffixes = {".css", ".js", ".py"}
     code = {str(path.relative_to(ROOT)) for path in PACKAGE.rglob("*") if path.suffix in suffixes}
     others = {"py.typed", "assets/manifest.toml", "templates/report.html"}

@@ -1,0 +1,226 @@
+"""`semsig view`: from what detectors write to views, which the other commands take as queries."""
+
+from __future__ import annotations
+
+import json
+import re
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Literal
+
+import typer
+
+from semsig_gis.cli.console import (
+    AsJson,
+    app,
+    keep_inputs,
+    print_json,
+    remark,
+    require_suffix,
+    say,
+)
+from semsig_gis.core.errors import InputError
+
+if TYPE_CHECKING:
+    from collections import Counter
+
+    from semsig_gis.core.taxonomy import Taxonomy
+    from semsig_gis.queries.detections.views import Tally
+
+MOST_NAMES = 8
+
+
+@app.command()
+def view(
+    files: Annotated[
+        list[Path],
+        typer.Argument(
+            help="What a detector wrote: COCO, Label Studio or Mapillary JSON, CVAT XML, YOLO "
+            ".txt with data.yaml; or a folder."
+        ),
+    ],
+    *,
+    out: Annotated[Path, typer.Option(help="Views to write (.jsonl), for --queries.")],
+    labels: Annotated[
+        list[str] | None,
+        typer.Option(
+            help="Map from labels to classes: coco, mapillary_vistas, cityscapes or a .toml file; "
+            "repeat for several, best first.  [default: the three]"
+        ),
+    ] = None,
+    database: Annotated[
+        Path | None,
+        typer.Option(
+            help="Signature database to be asked, whose classes are meant.  [default: those of "
+            "all built-in catalogues]"
+        ),
+    ] = None,
+    images: Annotated[
+        Path | None,
+        typer.Option(
+            help="Folder of the pictures, whose EXIF has focal length and heading.  [default: "
+            "beside the files]"
+        ),
+    ] = None,
+    photos: Annotated[
+        Path | None,
+        typer.Option(
+            help="What is known of single pictures: a CSV or JSON lines file with image and any of "
+            "camera, fov, heading, heading_error, pitch, roll and place."
+        ),
+    ] = None,
+    camera: Annotated[
+        Literal["pinhole", "equirectangular", "cylindrical", "fisheye"] | None,
+        typer.Option(help="How the pictures show the world.  [default: pinhole]"),
+    ] = None,
+    fov: Annotated[
+        float | None,
+        typer.Option(
+            min=0.1,
+            max=360,
+            help="Field of view over the width in degrees.  [default: by EXIF; 360 for a panorama]",
+        ),
+    ] = None,
+    heading: Annotated[
+        float | None,
+        typer.Option(
+            min=-360, max=360, help="Where the camera looks, clockwise from north; else by EXIF."
+        ),
+    ] = None,
+    heading_error: Annotated[
+        str | None,
+        typer.Option(
+            help="Standard deviation of the heading in degrees, or unknown.  [default: 10 for "
+            "EXIF; else what semsig localize is told]"
+        ),
+    ] = None,
+    pitch: Annotated[
+        float | None, typer.Option(min=-90, max=90, help="Degrees that the camera looks up.")
+    ] = None,
+    roll: Annotated[
+        float | None,
+        typer.Option(min=-180, max=180, help="Degrees that it is turned clockwise."),
+    ] = None,
+    size: Annotated[
+        str | None, typer.Option(help="Size of pictures that nobody says, as 1920x1080 pixels.")
+    ] = None,
+    place: Annotated[
+        Literal["each", "gps", "all"],
+        typer.Option(
+            help="Which pictures are one view: none, those of one GPS place (5 m), or all; a place "
+            "in --photos goes first."
+        ),
+    ] = "each",
+    min_score: Annotated[
+        float, typer.Option(min=0, max=1, help="Leave out what the detector is less sure of.")
+    ] = 0.3,
+    as_json: AsJson = False,
+) -> None:
+    """Turn the boxes of a detector, and its camera, into views to localize."""
+    from semsig_gis.queries.detections.formats import read_pictures
+    from semsig_gis.queries.detections.labels import LabelMap
+    from semsig_gis.queries.detections.pictures import Shot
+    from semsig_gis.queries.detections.views import Detector, north_sigma, read_shots
+    from semsig_gis.storage.whole import write_whole
+
+    keep_inputs(out, read=(*files, *(labels or ()), database, photos))
+    require_suffix(".jsonl", out)
+    if images is not None and not images.is_dir():
+        msg = f"--images was given as {images}, which is no folder; give that of the pictures."
+        raise InputError(msg)
+    taxonomy = _taxonomy(database)
+    known = Shot(
+        camera=camera,
+        fov=fov,
+        heading=heading,
+        heading_error=None if heading_error is None else north_sigma(heading_error),
+        pitch=pitch,
+        roll=roll,
+        size=_size(size),
+    )
+    around = [file if file.is_dir() else file.parent for file in files]
+    beside = [
+        one for folder in around for one in (folder, folder / "images", folder.parent / "images")
+    ]
+    detector = Detector(
+        labels=LabelMap.open(labels or (), taxonomy),
+        taxonomy=taxonomy,
+        min_score=min_score,
+        shot=known,
+        shots={} if photos is None else read_shots(photos),
+        folders=beside if images is None else [images],
+    )
+    views, tally = detector.views(read_pictures(files), places=place)
+    lines = [json.dumps({"id": name, **one.to_dict(taxonomy)}) + "\n" for name, one in views]
+    write_whole(out, "".join(lines))
+    if as_json:
+        print_json({"views": len(views), **tally.to_dict()})
+        return
+    say(
+        f"{out}: {_many(len(views), 'view')} of {_many(tally.photos, 'picture')} with "
+        f"{_many(tally.objects, 'object')}, {tally.ranges:,} with a range."
+    )
+    _tell(tally)
+
+
+def _taxonomy(database: Path | None) -> Taxonomy:
+    """Return the classes that are meant; built-in ones are as tall as elsewhere, if not said."""
+    from semsig_gis.sources.catalog import built_in_taxonomy
+
+    known = built_in_taxonomy()
+    if database is None:
+        return known
+    from dataclasses import replace
+
+    from semsig_gis.core.taxonomy import Taxonomy
+    from semsig_gis.database.city import open_city
+
+    tall = {item.name: (item.height_m, item.height_sigma) for item in known.classes}
+    classes = []
+    for item in open_city(database).database.taxonomy.classes:
+        own = item.height_m, item.height_sigma
+        height, sigma = tall.get(item.name, own) if item.height_m is None else own
+        classes.append(replace(item, height_m=height, height_sigma=sigma))
+    return Taxonomy(tuple(classes))
+
+
+def _size(text: str | None) -> tuple[int, int] | None:
+    if text is None:
+        return None
+    if not (match := re.fullmatch(r"(\d{1,7})[xX](\d{1,7})", text)):
+        msg = f"--size was given as {text!r}; give width and height in pixels, as 1920x1080."
+        raise InputError(msg)
+    return int(match[1]), int(match[2])
+
+
+def _tell(tally: Tally) -> None:
+    """Remark on what was left out, and on what is not known."""
+    if tally.below_min_score:
+        remark(f"left out: {_many(tally.below_min_score, 'box', 'boxes')} below --min-score")
+    if tally.no_boxes:
+        shapes = _many(tally.no_boxes, "shape")
+        remark(f"left out: {shapes} with no box or outline of one object")
+    for what, labels in (
+        ("of labels that no map knows", tally.unknown),
+        ("of what is no street object", tally.no_objects),
+        ("of classes that the city does not have", tally.not_in_city),
+    ):
+        if labels:
+            boxes = _many(labels.total(), "box", "boxes")
+            remark(f"left out: {boxes} {what}: {_listed(labels)}")
+    if tally.unknown_heading:
+        pictures = _many(tally.unknown_heading, "picture")
+        remark(f"no heading is known of {pictures}; bearings count from where the camera looks")
+    for north, count in tally.north.items():
+        headings = _many(count, "heading")
+        remark(f"counted from {north} north: {headings}; localize with --north {north}")
+
+
+def _many(number: int, one: str, several: str = "") -> str:
+    return f"{number:,} {one if number == 1 else several or one + 's'}"
+
+
+def _listed(labels: Counter[str]) -> str:
+    """Return labels with their counts, the most frequent first."""
+    shown = ", ".join(f"{label} {count:,}" for label, count in labels.most_common(MOST_NAMES))
+    more = len(labels) - MOST_NAMES
+    return f"{shown} and {more:,} more" if more > 0 else shown

@@ -1,0 +1,1 @@
+"""From what object detectors write, and the camera, to views."""

@@ -1,0 +1,138 @@
+"""`semsig view`: from the file of a detector to an answer."""
+
+from __future__ import annotations
+
+import json
+import math
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pytest
+from PIL import Image
+from rendered import Scene
+from sentences import sentence
+
+from semsig_gis.core.view import Photo, View
+from semsig_gis.queries.detections.camera import Camera
+from semsig_gis.queries.file import read_queries
+from semsig_gis.sources.catalog import built_in_taxonomy
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from conftest import Run
+
+TAXONOMY = built_in_taxonomy()
+CAMERA = Camera(width=4000, height=3000, fov=90)
+SCENE = Scene(
+    np.array([12.0, 20.0, 8.0]),
+    np.array([-20.0, 5.0, 25.0]),
+    np.array([0.85, 0.85, 0.75]),
+    np.array([0.2, 0.1, 0.1]),
+)
+NAMES = ["bench", "bench", "fire hydrant"]
+IDS = {"bench": 15, "fire hydrant": 11, "person": 1, "lion": 99}
+
+
+@pytest.fixture
+def coco(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """Return a file of boxes in a rendered photograph, among boxes that are of no use."""
+    monkeypatch.chdir(tmp_path)
+    boxes = np.round(SCENE.boxes(CAMERA)).tolist()
+    found = [
+        *zip(NAMES, boxes, [0.9, 0.8, 1.0], strict=True),
+        ("bench", [0, 0, 9, 9], 0.1),
+        ("person", [0, 0, 9, 9], 1.0),
+        ("lion", [0, 0, 9, 9], 1.0),
+    ]
+    content = {
+        "images": [{"id": 1, "file_name": "a.jpg", "width": 4000, "height": 3000}],
+        "categories": [{"id": number, "name": name} for name, number in IDS.items()],
+        "annotations": [
+            {
+                "id": number,
+                "image_id": 1,
+                "category_id": IDS[name],
+                "bbox": [left, top, right - left, bottom - top],
+                "score": score,
+            }
+            for number, (name, (left, top, right, bottom), score) in enumerate(found)
+        ],
+    }
+    path = tmp_path / "coco.json"
+    path.write_text(json.dumps(content))
+    return path
+
+
+def written(path: Path) -> tuple[str | int, View]:
+    """Return the one view of a file and its name, as other commands read them."""
+    (line,) = read_queries(path, taxonomy=TAXONOMY)
+    assert isinstance(line.query, View)
+    return line.name, line.query
+
+
+def test_boxes_become_views(coco: Path, run: Run) -> None:
+    code, out, err = run("view coco.json --fov 90 --heading 100 --heading-error 5 --out v.jsonl")
+    assert code == 0, err
+    assert out == "v.jsonl: 1 view of 1 picture with 3 objects, 3 with a range.\n"
+    assert err.splitlines() == [
+        "semsig: left out: 1 box below --min-score",
+        "semsig: left out: 1 box of labels that no map knows: lion 1",
+        "semsig: left out: 1 box of what is no street object: person 1",
+    ]
+    name, view = written(coco.with_name("v.jsonl"))
+    assert view.codes is not None
+    assert view.ranges is not None
+    assert view.range_errors is not None
+    assert view.scores is not None
+    assert name == "a.jpg"
+    assert TAXONOMY.decode(view.codes) == "LLF"
+    assert view.bearings == pytest.approx([80, 105, 125], abs=0.1)
+    assert view.ranges == pytest.approx(SCENE.distances, rel=0.02)
+    bench = TAXONOMY.by_name("bench")
+    assert bench.height_m is not None
+    assert bench.height_sigma is not None
+    spread = bench.height_sigma / bench.height_m
+    assert view.range_errors[0] == pytest.approx(spread, abs=0.01)
+    assert view.scores[:, bench.code].tolist() == [0.9, 0.8, 0.0]
+    assert view.scores[:, 0] == pytest.approx([0.1, 0.2, 0.0])
+    assert view.photos == (Photo(sectors=((55.0, 145.0),), north_sigma=5.0),)
+
+
+def test_what_is_counted_is_in_the_json(coco: Path, run: Run) -> None:
+    code, out, _ = run(f"view {coco} --fov 90 --out v.jsonl --json --min-score 0")
+    told = json.loads(out)
+    assert code == 0
+    assert (told["views"], told["objects"], told["unknown_heading"]) == (1, 4, 1)
+    assert told["left_out"]["unknown_labels"] == {"lion": 1}
+    assert written(coco.with_name("v.jsonl"))[1].photos[0].north_sigma == math.inf
+
+
+def test_the_photograph_tells_its_focal_length(coco: Path, run: Run) -> None:
+    exif = Image.Exif()
+    exif.get_ifd(0x8769)[0xA405] = 26  # millimetres of film
+    (coco.parent / "images").mkdir()
+    Image.new("L", (400, 300)).save(coco.parent / "images/a.jpg", exif=exif)
+    assert run("view coco.json --out v.jsonl")[0] == 0
+    assert written(coco.with_name("v.jsonl"))[1].photos[0].width == pytest.approx(67.3, abs=0.1)
+
+
+@pytest.mark.usefixtures("coco")
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        ("coco.json --out v.jsonl", "the field of view of the picture a.jpg is not known"),
+        ("coco.json --fov 180 --out v.jsonl", "give a number from 0.1 to 175.0 degrees"),
+        ("coco.json --fov 90 --out v.json", "the name must end in .jsonl"),
+        ("coco.json --fov 90 --out v.jsonl --labels yolo", "label map 'yolo' is unknown"),
+        ("coco.json --fov 90 --out v.jsonl --size 4000", "give width and height in pixels"),
+        ("coco.json --fov 90 --out v.jsonl --images no", "which is no folder"),
+        ("coco.json --fov 90 --out v.jsonl --heading-error big", "give degrees or 'unknown'"),
+        ("coco.json --fov 90 --out v.jsonl --heading 9 --heading-error 999", "to 360.0 degrees"),
+        ("coco.json --fov 90 --out v.jsonl --photos no.csv", "no.csv cannot be read"),
+        ("no.json --fov 90 --out v.jsonl", "no.json cannot be read"),
+        ("coco.json --fov 90 --out v.jsonl --camera phone", "phone"),
+    ],
+)
+def test_what_cannot_be_used_is_refused(arguments: str, words: str, run: Run) -> None:
+    sentence(run(f"view {arguments}"), words)
