@@ -13,7 +13,7 @@ BIOME := @biomejs/biome@2.6.8
 
 .DEFAULT_GOAL := help
 .NOTPARALLEL:
-.PHONY: help demo test lint bench accuracy views chances reproduce golden soak walks docs plugin clean
+.PHONY: help demo test lint bench accuracy views bayes chances reproduce golden soak walks docs plugin clean
 
 help: ## show this list
 	@sed -n 's/^\([a-z]*\):.*## \(.*\)/  make \1\t\2/p' $(MAKEFILE_LIST) | expand -t 14
@@ -48,6 +48,10 @@ accuracy: $(DEV) ## how well the methods localize: figures, an hour
 
 views: $(DEV) ## how well photos localize, with sectors and rough ranges: figures, hours
 	$(BIN)/python -m benchmarks.views
+	$(BIN)/python -m benchmarks.tables
+
+bayes: $(DEV) ## what no method can pass, by exact sums in a small city: figures, half an hour
+	$(BIN)/python -m benchmarks.bayes
 	$(BIN)/python -m benchmarks.tables
 
 chances: $(DEV) ## whether stated chances come true, on old maps too: figures, an hour

@@ -24,8 +24,8 @@ _SOAK = ("<!-- make soak -->\n", "<!-- end -->")
 _HEAD = """# Figures
 
 This page is written by `python -m benchmarks.tables`, which `make bench`, `make accuracy`,
-`make views`, `make chances` and `make reproduce` end with. All figures are from one machine with
-two cores that other programs share, so ratios say more than times.
+`make views`, `make bayes`, `make chances` and `make reproduce` end with. All figures are from one
+machine with two cores that other programs share, so ratios say more than times.
 """
 _ACCURACY = """## Accuracy
 
@@ -64,6 +64,15 @@ places are not refined.
 """
 _VIEW_CHANCES = """The same lines: how often the true cell is in the region of just 90 %, and how
 far off, at most, the stated chance is in a tenth of the chance with 100 queries or more.
+"""
+_BAYES = """### What no method can pass
+
+`make bayes` asks {queries} queries a line in a made-up city of {cells} cells, small enough for
+exact sums over all one-to-one associations of what is seen with what is there. With the noise and
+camera of the views, the chances that Bayes' rule gives are then known. "At most" is the mean chance
+of the best place within 50 m: no method is right more often in the long run; "by Bayes" is how
+often that place was right, beside the likelihood method, for the same queries of one to fourteen
+detections, with the chance that it states.
 """
 _VIEW_BARS = """The figures that views were to reach, and what came out.
 """
@@ -105,7 +114,8 @@ def main() -> None:
         *("accuracy.json", "results.json", "reproduction.json", "chances.json"),
         "views.json",
     )
-    PAGE.write_text(page(*map(_results, names)), encoding="utf-8")
+    results = map(_results, names)
+    PAGE.write_text(page(*results, bayes=_results("bayes.json")), encoding="utf-8")
     TRUST.write_text(
         trust_page(TRUST.read_text(encoding="utf-8"), _results("soak.json")), encoding="utf-8"
     )
@@ -119,14 +129,16 @@ def page(
     paper: Sequence[dict[str, Any]],
     chances: Sequence[dict[str, Any]],
     views: Sequence[dict[str, Any]],
+    *,
+    bayes: Sequence[dict[str, Any]],
 ) -> str:
     """Return the page.
 
     Parameters
     ----------
-    accuracy, speed, paper, chances, views : sequence of dict
-        Rows of ``accuracy.json``, ``results.json``, ``reproduction.json``, ``chances.json`` and
-        ``views.json``.
+    accuracy, speed, paper, chances, views, bayes : sequence of dict
+        Rows of ``accuracy.json``, ``results.json``, ``reproduction.json``, ``chances.json``,
+        ``views.json`` and ``bayes.json``.
 
     Returns
     -------
@@ -152,6 +164,7 @@ def page(
         (_views_text(views), list(views), _view_table),
         (_VIEW_CHANCES, list(views), _view_chance_table),
         (_VIEW_BARS, view_bars, _bar_table),
+        (_bayes_text(bayes), list(bayes), _bayes_table),
         (_each_level(_REAL, real), real, _real_table),
         (_each_level(_OLD, old), old, _old_table),
         (_BARS, bars, _bar_table),
@@ -255,6 +268,30 @@ def _view_chance_table(rows: Iterable[dict[str, Any]]) -> str:
         rows,
         lambda row: (
             _share(row["in_region"]) + (f", off {_share(row['off'])}" if row["off"] else "")
+        ),
+    )
+
+
+def _bayes_text(rows: Sequence[dict[str, Any]]) -> str:
+    """Fill in how many queries a line has, and how many cells the city."""
+    if not rows:
+        return ""
+    return _BAYES.format(**{name: f"{rows[0][name]:,}" for name in ("queries", "cells")})
+
+
+def _bayes_table(rows: Iterable[dict[str, Any]]) -> str:
+    return _table(
+        "degrees | ranges | detections | at most | by Bayes | the likelihood method | interval | "
+        "stated",
+        (
+            (
+                *(str(row["degrees"]), "yes" if row["ranges"] else "no"),
+                f"{row['detections']:.1f}",
+                f"{_share(row['limit'])} ± {_share(row['limit_error'])}",
+                *(_share(row["bayes"]), _share(row["ours"]), _interval(row)),
+                _share(row["stated"]),
+            )
+            for row in rows
         ),
     )
 

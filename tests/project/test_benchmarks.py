@@ -7,9 +7,16 @@ import sys
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from noisy_cells import every_association, random_database
+from view_oracle import cell_loglik, random_view
 
-from benchmarks import chances, tables, views
+from benchmarks import bayes, chances, tables, views
+from benchmarks.views import NOISE
+from semsig_gis.core.view import Photo, View
 from semsig_gis.maps import page
 
 MEASURES = ("edit", "jaccard", "histogram")
@@ -113,10 +120,11 @@ def test_the_page_of_figures_is_that_of_the_results() -> None:
         json.loads((tables.FOLDER / name).read_text(encoding="utf-8"))
         for name in (
             *("accuracy.json", "results.json", "reproduction.json", "chances.json"),
-            "views.json",
+            *("views.json", "bayes.json"),
         )
     )
-    assert tables.PAGE.read_text(encoding="utf-8") == tables.page(*results)
+    *others, limit = results
+    assert tables.PAGE.read_text(encoding="utf-8") == tables.page(*others, bayes=limit)
     trials = json.loads((tables.FOLDER / "soak.json").read_text(encoding="utf-8"))
     page_of_trust = tables.TRUST.read_text(encoding="utf-8")
     assert page_of_trust == tables.trust_page(page_of_trust, trials)
@@ -185,6 +193,50 @@ def test_views_are_measured_and_kept(
     out.write_text(json.dumps(rows[:-1]), encoding="utf-8")
     views.main()  # goes on where it was
     assert json.loads(out.read_text(encoding="utf-8"))[:-1] == rows[:-1]
-    page = tables.page([], [], [], [], rows)
+    page = tables.page([], [], [], [], rows, bayes=[])
     assert "as a full turn | sectors | sectors and ranges |" in page
     assert all(bar.what in page for _, bar in views.bars(rows))
+
+
+def test_the_limit_by_bayes_is_measured(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    out = tmp_path / "bayes.json"
+    monkeypatch.setattr(sys, "argv", f"bayes --size small --out {out}".split())
+    bayes.main()
+    rows = json.loads(out.read_text(encoding="utf-8"))
+    told = [(row["degrees"], row["ranges"]) for row in rows]
+    assert told == [(one, ranges) for one in (360, 120, 70) for ranges in (False, True)]
+    for row in rows:
+        assert 0.0 < row["limit"] <= 1.0
+        assert row["queries"] == 5
+    assert "| 360 | no |" in tables.page([], [], [], [], [], bayes=rows)
+    assert (tables.FOLDER / "bayes.json").exists()
+
+
+@given(st.integers(0, 10_000), st.integers(1, 4), st.integers(0, 4))
+def test_associations_are_summed_exactly(seed: int, objects: int, detections: int) -> None:
+    rng = np.random.default_rng(seed)
+    weights = np.exp(rng.normal(0, 3, (objects, detections))) * (rng.random((1, detections)) < 0.8)
+    expected, _ = every_association(weights)
+    assert bayes.association_sum(weights) == pytest.approx(expected)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_the_exact_likelihood_is_that_of_the_oracle(seed: int) -> None:
+    database = random_database(seed, cells=12, longest=4)
+    view = random_view(
+        database, np.random.default_rng(seed), size=3, photos=(Photo(sectors=((300, 60),)),)
+    )
+    plain = View(
+        np.where(view.class_scores()[:, 0] > 0, 1, view.class_scores().argmax(axis=1)),
+        view.bearings,
+        ranges=None if view.ranges is None else np.where(np.isnan(view.ranges), 9.0, view.ranges),
+        photos=view.photos,
+    )
+    found = bayes.ExactPosterior(database).loglik(plain)
+    best = found.max()
+    for cell in range(len(database)):
+        exact = cell_loglik(database, plain, NOISE, cell)
+        if np.isfinite(found[cell]):
+            assert found[cell] == pytest.approx(exact, abs=1e-3)
+        else:
+            assert exact < best - 30.0
