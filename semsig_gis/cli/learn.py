@@ -43,8 +43,8 @@ if TYPE_CHECKING:
 Samples = Annotated[
     Path,
     typer.Option(
-        help="Detections of known places: a CSV or JSON lines file with types, bearings, and x "
-        "and y (metres) or cell_id (its middle)."
+        help="Detections of known places: a CSV or JSON lines file of views with x and y "
+        "(metres) or cell_id (its middle)."
     ),
 ]
 
@@ -145,7 +145,10 @@ def _rate(row: dict[Hashable, Any]) -> list[str]:
     own = (
         [f"{row['own']:.3f}", f"{row['low_95']:.3f} to {high:.3f}"] if row["samples"] else ["", ""]
     )
-    return [row["quantity"], row["class"], f"{row['value']:.3f}", *own, f"{row['samples']:.0f}"]
+    quantity, metres = row["quantity"], row["distance"]
+    if quantity in {"detection", "fading"} and not math.isnan(metres):
+        quantity = f"detection at {metres:g} m"
+    return [quantity, row["class"], f"{row['value']:.3f}", *own, f"{row['samples']:.0f}"]
 
 
 @app.command()

@@ -356,6 +356,7 @@ def _write(
 
 
 VERDICTS = ("matched", "misnamed", "missed", "false")
+ORDER = (*VERDICTS, "outside")
 EXPLANATION = (
     *("verdict", "chance", "seen", "at", "object", "at", "off by", "distance", "source", "id"),
 )
@@ -498,7 +499,7 @@ def _print_explanations(candidates: list[dict[str, Any]]) -> None:
                     one["verdict"],
                     f"{one['chance']:.2f}",
                     one["query_class"] or "",
-                    _measure(one["query_bearing"], "°"),
+                    _seen_at(one["query_bearing"], one["query_range"]),
                     one["object_class"] or "",
                     _measure(one["object_bearing"], "°"),
                     _measure(one["bearing_error"], "°", sign="+"),
@@ -506,9 +507,14 @@ def _print_explanations(candidates: list[dict[str, Any]]) -> None:
                     one["source"] or "",
                     one["source_id"] or "",
                 ]
-                for one in sorted(why["rows"], key=lambda one: VERDICTS.index(one["verdict"]))
+                for one in sorted(why["rows"], key=lambda one: ORDER.index(one["verdict"]))
             ],
         )
+
+
+def _seen_at(bearing: float | None, metres: float | None) -> str:
+    told = "" if metres is None else f", {metres:.1f} m"
+    return _measure(bearing, "°") + told
 
 
 def _measure(value: float | None, unit: str, *, sign: str = "") -> str:

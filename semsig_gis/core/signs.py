@@ -147,7 +147,13 @@ CHANCES: Mapping[float, str] = MappingProxyType({0.5: "#00441b", 0.9: "#41ab5d",
 """Colour of the fewest cells that hold a share of the chance."""
 
 VERDICTS: Mapping[str, str] = MappingProxyType(
-    {"matched": "#009e73", "misnamed": "#cc79a7", "missed": "#ffffff", "false": "#d55e00"}
+    {
+        "matched": "#009e73",
+        "misnamed": "#cc79a7",
+        "missed": "#ffffff",
+        "false": "#d55e00",
+        "outside": "#bdbdbd",
+    }
 )
 """Colour of what became of an object."""
 

@@ -20,12 +20,14 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from semsig_gis.core.errors import InputError
-from semsig_gis.core.geometry import signed_degrees
+from semsig_gis.core.geometry import FULL_TURN, HALF_TURN, signed_degrees
+from semsig_gis.core.signature import DISTANCE_UNITS
 from semsig_gis.core.view import View
 from semsig_gis.database.database import views_in
 from semsig_gis.likelihood.index import CellScores, own_sigma
@@ -33,10 +35,13 @@ from semsig_gis.likelihood.noise.table import database_tables
 from semsig_gis.likelihood.photo import PhotoTable, photo_loglik
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from numpy.typing import NDArray
 
     from semsig_gis.core.signature import Signature
     from semsig_gis.database.database import SignatureDatabase
+    from semsig_gis.database.views import Views
     from semsig_gis.likelihood.index import LikelihoodIndex
     from semsig_gis.likelihood.noise.model import Noise
     from semsig_gis.likelihood.noise.table import NoiseTable
@@ -44,6 +49,9 @@ if TYPE_CHECKING:
 
 WIDE = 45.0  # degrees of deviation from which on the tails meet behind the observer
 LAPS = 360.0 * np.arange(-3, 4)
+FARTHEST = 8.0  # deviations, beyond which a normal distribution is over
+LEAST_MASS = 1e-12
+ROOT = math.sqrt(2.0 * math.pi)
 
 
 def turn_logs(turns: NDArray[np.float64], step: float, north_sigma: float) -> NDArray[np.float64]:
@@ -94,39 +102,197 @@ def near_pairs(
     return Pairs(starts=starts, objects=objects[near], detections=detections[near], away=away[near])
 
 
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Detections:
+    """What some photos show, one photo after the other.
+
+    The detections of photo i are ``starts[i]:starts[i + 1]``; the arrays are those of all photos
+    joined, by detection last.
+    """
+
+    photos: tuple[PhotoTable, ...]
+    starts: NDArray[np.int64]
+    bearings: NDArray[np.float64]
+    ranges: NDArray[np.float64]
+    range_errors: NDArray[np.float64]
+    scores: NDArray[np.float64]
+    disc: NDArray[np.float64]
+
+    @classmethod
+    def of(cls, views: Sequence[Signature], table: NoiseTable) -> Detections:
+        """Return the photos of views with bearings, beside the classes of a table."""
+        parts = [part for view in views for part in View.of(view).split()]
+        photos = tuple(PhotoTable.of(part, table) for part in parts)
+        names = ("bearings", "ranges", "range_errors", "scores", "disc")
+        joined = {
+            name: np.concatenate([getattr(photo, name) for photo in photos], axis=-1)
+            for name in names
+        }
+        return cls(photos=photos, starts=np.cumsum([0, *map(len, parts)]), **joined)
+
+    @cached_property
+    def givers(self) -> NDArray[np.int64]:
+        """The photo of each detection."""
+        return np.repeat(np.arange(len(self.photos)), np.diff(self.starts))
+
+    @cached_property
+    def turns(self) -> NDArray[np.float64]:
+        """How much of a full turn each photo sees."""
+        return np.array([photo.width for photo in self.photos])
+
+    def inside(
+        self,
+        owners: NDArray[np.int64],
+        bearings: NDArray[np.float64],
+        spreads: NDArray[np.float64],
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Return how much of the wrapped normal of some objects lies in the sectors of their photo.
+
+        Object i, of photo ``owners[i]``, has its bearing and spread in degrees. The second array is
+        the mean square of the deviations inside, in squares of the spread.
+        """
+        sectors = np.concatenate([photo.sectors for photo in self.photos])
+        counts = np.array([len(photo.sectors) for photo in self.photos])
+        many = counts[owners]
+        row = np.repeat(np.arange(len(owners)), many)
+        within = np.arange(len(row)) - np.repeat(np.cumsum(many) - many, many)
+        own = sectors[(np.cumsum(counts) - counts)[owners[row]] + within]
+        low = signed_degrees(own[:, 0] - bearings[row])[:, None] + LAPS
+        high = low + (own[:, 1] - own[:, 0])[:, None]
+        below, bent = _normal(np.stack([low, high]) / spreads[row, None])
+        sums, bend = (
+            np.bincount(row, (part[1] - part[0]).sum(axis=1), len(owners)) for part in (below, bent)
+        )
+        mass = np.where(many == 0, 1.0, np.clip(sums, 0.0, 1.0))
+        squares = np.maximum(1.0 - bend / np.maximum(mass, LEAST_MASS), 0.0)
+        return np.asarray(mass, np.float64), np.asarray(squares, np.float64)
+
+
+def _normal(
+    deviations: NDArray[np.float64],
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return the normal distribution up to some deviations, and there its density times them."""
+    mass = (deviations > 0).astype(np.float64)
+    near = np.abs(deviations) < FARTHEST
+    mass[near] = [0.5 * math.erfc(-one * math.sqrt(0.5)) for one in deviations[near].tolist()]
+    bent = np.zeros(deviations.shape)
+    bent[near] = deviations[near] * np.exp(-0.5 * deviations[near] ** 2) / ROOT
+    return mass, bent
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Association:
+    """Which detection is which object, by chances.
+
+    By pair, `chances` that it is one thing. By object, its chance of detection `detection` at its
+    distance, and `inside` and `squares` as in `Detections.inside`. By detection, `clutter` is the
+    share of clutter in what is none of the objects; the rest came into range with the observer.
+    `loglik` is the log-likelihood of each photo.
+    """
+
+    chances: NDArray[np.float64]
+    detection: NDArray[np.float64]
+    inside: NDArray[np.float64]
+    squares: NDArray[np.float64]
+    clutter: NDArray[np.float64]
+    loglik: NDArray[np.float64]
+
+
 def associate(
     table: NoiseTable,
+    views: Views,
+    seen: Detections,
     pairs: Pairs,
     *,
+    lengths: NDArray[np.int64],
+) -> Association:
+    """Return the chance that each pair is one thing, and the log-likelihood of each photo.
+
+    `views` is what there is to see in each photo, of classes that the table has; `lengths`, by
+    photo, is how many objects, by which the table is looked up.
+    """
+    rows, kinds = table.length_rows(lengths), table.row_of[views.codes]
+    owners = np.repeat(np.arange(len(views)), views.lengths)
+    distances = at_distances(table, views)
+    units = np.rint(distances * (DISTANCE_UNITS / table.reach)).astype(np.int64)
+    spreads = np.hypot(table.sigma[kinds], np.degrees(table.position_sigma / distances))
+    spreads = np.minimum(spreads, HALF_TURN)
+    inside, squares = seen.inside(owners, views.bearings, spreads)
+    near = table.detected[rows[owners], kinds]
+    detection = near * table.seen[kinds, units]
+    unseen = 1.0 - detection * inside
+    used, row = np.unique(rows, return_inverse=True)
+    named = table.named[used] @ seen.scores
+    # As many objects come into range as leave it, in any direction.
+    leaving = near * table.left[kinds, units]
+    gone = np.zeros((len(views), len(table.codes)))
+    np.add.at(gone, (owners, kinds), leaving)
+    names = named[row[seen.givers], :, np.arange(len(seen.givers))]
+    come = (gone[seen.givers] * names).sum(axis=1)
+    clutter = table.clutter @ seen.scores
+    floor = (clutter + come) * seen.disc / FULL_TURN
+    one, other = pairs.objects, pairs.detections
+    weights = (detection / unseen)[one] * _bearing_densities(pairs.away, spreads[one])
+    weights *= named[row[owners[one]], kinds[one], other] / floor[other]
+    ranged = np.flatnonzero(~np.isnan(seen.ranges[other]))
+    if len(ranged):
+        weights[ranged] *= _range_densities(
+            table, seen, kinds[one[ranged]], distances[one[ranged]], other[ranged]
+        )
+    chances, log_sums = associate_pairs(pairs, weights)
+    return Association(
+        chances=chances,
+        detection=detection,
+        inside=inside,
+        squares=squares,
+        clutter=clutter / (clutter + come),
+        loglik=log_sums
+        + np.bincount(owners, np.log(unseen), len(views))
+        + np.bincount(seen.givers, np.log(floor), len(views))
+        - seen.turns * (table.clutter.sum() + gone.sum(axis=1)),
+    )
+
+
+def at_distances(table: NoiseTable, views: Views) -> NDArray[np.float64]:
+    """Return the distances of objects in metres; what is nearest is not at the very place."""
+    return np.asarray(np.maximum(views.distances, table.distances[0]))
+
+
+def _bearing_densities(
+    away: NDArray[np.float64], spread: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Return the density of the wrapped normal, a degree."""
+    density = np.exp(-0.5 * (away / spread) ** 2)
+    wide = spread > WIDE
+    laps = (away[wide, None] + LAPS) / spread[wide, None]
+    density[wide] = np.exp(-0.5 * laps**2).sum(axis=1)
+    return np.asarray(density / (spread * ROOT))
+
+
+def range_spreads(
+    table: NoiseTable,
+    seen: Detections,
     kinds: NDArray[np.int64],
     distances: NDArray[np.float64],
-    lengths: NDArray[np.int64],
-    names: NDArray[np.int64],
-) -> tuple[NDArray[np.float64], float]:
-    """Return the chance that each pair is one thing, and the log-likelihood of all detections.
+    detections: NDArray[np.int64],
+) -> NDArray[np.float64]:
+    """Return the deviation of the logarithm of the range of pairs, by class and distance."""
+    own = seen.range_errors[detections]
+    errors = np.where(np.isnan(own), table.range_sigma[kinds], own)
+    return np.hypot(errors, table.position_sigma / distances)
 
-    By object, `kinds` is the row of its class in the table, `distances` its distance in metres and
-    `lengths` how many objects are seen together with it, itself included. `names` is the class row
-    of each detection, k if it is unknown.
-    """
-    rows = table.length_rows(lengths)
-    kind, length = kinds[pairs.objects], rows[pairs.objects]
-    turned = np.degrees(table.position_sigma / np.maximum(distances[pairs.objects], 1e-3))
-    spread = np.minimum(np.hypot(table.sigma[kind], turned), 180.0)
-    density = np.exp(-0.5 * (pairs.away / spread) ** 2)
-    wide = spread > WIDE
-    laps = (pairs.away[wide, None] + LAPS) / spread[wide, None]
-    density[wide] = np.exp(-0.5 * laps**2).sum(axis=1)
-    density /= spread * np.sqrt(2.0 * np.pi)
-    naming = table.naming[length, kind, names[pairs.detections]]
-    chances, log_sums = associate_pairs(pairs, table.odds[length, kind] * naming * density)
-    loglik = (
-        log_sums.sum()
-        + np.log(table.missed[rows, kinds]).sum()
-        + np.log(table.density[names]).sum()
-        - len(log_sums) * table.clutter.sum()
-    )
-    return chances, float(loglik)
+
+def _range_densities(
+    table: NoiseTable,
+    seen: Detections,
+    kinds: NDArray[np.int64],
+    distances: NDArray[np.float64],
+    detections: NDArray[np.int64],
+) -> NDArray[np.float64]:
+    """Return the density of the logarithms of the ranges of pairs."""
+    spread = range_spreads(table, seen, kinds, distances, detections)
+    away = np.log(seen.ranges[detections] / distances) / spread
+    return np.asarray(np.exp(-0.5 * away**2) / (spread * ROOT))
 
 
 def associate_pairs(

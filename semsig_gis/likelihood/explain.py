@@ -1,23 +1,30 @@
-"""Why a place: which detections are which street objects, which were missed, which look false."""
+"""Why a place: which detections are which street objects, which were missed, which look false.
+
+What stands outside the sectors of all photos is neither.
+"""
 
 from __future__ import annotations
 
+import math
 from collections import Counter
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from semsig_gis.core.geometry import SOURCE, SOURCE_ID, signed_degrees
+from semsig_gis.core.geometry import SOURCE, SOURCE_ID, signed_degrees, wrap_degrees
 from semsig_gis.core.taxonomy import WILDCARD
+from semsig_gis.core.view import Photo, View
 from semsig_gis.database.database import views_in
 from semsig_gis.database.north import GRID_NORTH
 from semsig_gis.database.views import views_at
-from semsig_gis.likelihood.association import associate, near_pairs
+from semsig_gis.likelihood.association import Detections, associate, near_pairs
 from semsig_gis.likelihood.noise.table import LONGEST_TABLE, noise_tables, query_bearings
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     import geopandas as gpd
     from numpy.typing import NDArray
     from pyproj import CRS
@@ -34,11 +41,14 @@ if TYPE_CHECKING:
 
 UNKNOWN_NAME = "unknown"
 LEAST_CHANCE = 0.01  # of two things being one, to be set beside each other
+LEAST_SEEN = 0.5  # of an object's bearing in a sector, that it is in it
 VERDICTS = ("matched", "misnamed", "missed", "false")
-NUMBERS = ("query", "object")  # of rows
+OUTSIDE = "outside"
+NUMBERS = ("query", "photo", "object")  # of rows
 COLUMNS = [
-    *("verdict", "chance", "query", "query_class", "query_bearing", "object", "source"),
-    *("source_id", "object_class", "object_bearing", "distance", "bearing_error"),
+    *("verdict", "chance", "query", "photo", "query_class", "query_bearing", "query_range"),
+    *("object", "source", "source_id", "object_class", "object_bearing", "distance"),
+    "bearing_error",
 ]
 
 
@@ -48,18 +58,24 @@ class Explanation:
 
     `rows` has one for each object of the query, then one for each street object that none of them
     is likely to be; `table` is the table of them. `verdict` is ``"matched"`` (more likely an object
-    than not), ``"misnamed"`` (the same, but of another class), ``"false"`` or ``"missed"``;
-    `chance` is that it holds. `query` and `object` are row numbers, `distance` is in metres,
-    `bearing_error` in degrees clockwise from object to detection, and `place` that of the street
-    object. What does not apply is None. `place` and `xy` are in metres in `crs`, `heading` is the
-    degrees added to the bearings of the query.
+    than not), ``"misnamed"`` (the same, but of another class), ``"false"``, ``"missed"`` or, for
+    street objects in the sectors of no photo, ``"outside"``; `chance` is that it holds. `query`,
+    `photo` and `object` are row numbers, `distance` and `query_range`, as far as it was told, are
+    in metres, `bearing_error` in degrees clockwise from object to detection, and `place` that of
+    the street object. What does not apply is None. `place` and `xy` are in metres in `crs`,
+    `headings` are the degrees added to the bearings of each photo.
     """
 
     rows: tuple[dict[str, Any], ...]
     xy: tuple[float, float]
-    heading: float
+    headings: tuple[float, ...]
     loglik: float
     crs: CRS
+
+    @property
+    def heading(self) -> float:
+        """The degrees added to the bearings of the first photo."""
+        return self.headings[0]
 
     @cached_property
     def table(self) -> gpd.GeoDataFrame:
@@ -75,7 +91,7 @@ class Explanation:
 
     @property
     def counts(self) -> dict[str, int]:
-        """How many rows there are of each verdict."""
+        """How many rows there are of each verdict, but for what stands outside."""
         counts = Counter(row["verdict"] for row in self.rows)
         return {verdict: counts[verdict] for verdict in VERDICTS}
 
@@ -92,6 +108,7 @@ class Explanation:
             "x": self.xy[0],
             "y": self.xy[1],
             "heading": self.heading,
+            **({"headings": list(self.headings)} if len(self.headings) > 1 else {}),
             "loglik": self.loglik,
             "counts": self.counts,
             "rows": rows,
@@ -106,16 +123,16 @@ def explain(
     objects: StreetObjects,
     index: ObjectIndex,
     radius: float = 30.0,
-    heading: float = 0.0,
+    heading: float | Sequence[float] = 0.0,
     footprints: Footprints | None = None,
 ) -> Explanation:
     """Say which objects of a query are which street objects, if it was seen from a place.
 
-    The query needs bearings; its types may be unknown. `xy` and `radius` are in metres, `heading`
-    is in degrees to add to the bearings, and what `footprints` hide is not seen. Chances are those
-    of all one-to-one associations together, each model of a mixture counting as much as the query
-    speaks for it here. An object of a class that the city does not have is false; a query without
-    any other raises `InputError`.
+    The query, perhaps a `View`, needs bearings; its types may be unknown. `xy` and `radius` are in
+    metres, `heading` is in degrees to add to the bearings, one for all or one for each photo, and
+    what `footprints` hide is not seen. Chances are those of all one-to-one associations together,
+    each model of a mixture counting as much as the query speaks for it here. An object of a class
+    that the city does not have is false; a query without any other raises `InputError`.
     """
     x, y = map(float, xy)
     place = np.array([[x, y]])
@@ -131,7 +148,7 @@ def explain_cell(
     noise: Noise,
     *,
     database: SignatureDatabase,
-    heading: float = 0.0,
+    heading: float | Sequence[float] = 0.0,
 ) -> Explanation:
     """Say which objects of a query are which objects of a cell, by the database alone.
 
@@ -143,6 +160,19 @@ def explain_cell(
     codes, radius = database.present_codes, database.spec.radius
     scene = _Scene((x, y), view, codes, database.taxonomy, database.crs, radius)
     return scene.explanation(query, noise, heading)
+
+
+ENTRIES = ("objects", "codes", "bearings", "distances")
+
+
+@dataclass(frozen=True, slots=True)
+class _Chances:
+    """Chances that objects, in rows, are detections; of being missed, and of being in a sector."""
+
+    chances: NDArray[np.float64]
+    missed: NDArray[np.float64]
+    seen: NDArray[np.float64]
+    loglik: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -157,30 +187,43 @@ class _Scene:
     radius: float
     objects: StreetObjects | None = None
 
-    def explanation(self, query: Signature, noise: Noise, heading: float) -> Explanation:
+    def explanation(
+        self, query: Signature, noise: Noise, heading: float | Sequence[float]
+    ) -> Explanation:
         """Return the verdicts on the objects of a query and those of the scene."""
-        bearings = (query_bearings(query) + heading) % 360.0
-        chances, loglik = self._chances(query, bearings, noise)
-        partners = _partners(chances)
-        rows = self._detections(query, bearings, chances, partners)
-        for entry, whole in enumerate(chances.sum(axis=1).tolist()):
+        view = View.of(query)
+        turns = np.broadcast_to(heading, len(view.photos)).astype(np.float64)
+        # Kept in its order, in which the rows are told.
+        view = replace(
+            view,
+            bearings=wrap_degrees(query_bearings(query) + turns[view.photo_rows]),
+            photos=tuple(map(Photo.turned, view.photos, turns.tolist())),
+        )
+        found = self._associated(view, noise)
+        partners: dict[int, int] = {}
+        for number in range(len(view.photos)):
+            own = np.flatnonzero(view.photo_rows == number)
+            places = _partners(found.chances[:, own])
+            partners |= {int(own[place]): entry for place, entry in places.items()}
+        rows = self._detections(view, found.chances, partners)
+        for entry, (missed, seen) in enumerate(
+            zip(found.missed.tolist(), found.seen.tolist(), strict=True)
+        ):
             if entry not in partners.values():
-                chance = max(1.0 - whole, 0.0)
-                rows.append({"verdict": "missed", "chance": chance, **self._object(entry)})
+                verdict = ("missed", missed) if seen >= LEAST_SEEN else (OUTSIDE, 1.0 - seen)
+                facts = dict(zip(("verdict", "chance"), verdict, strict=True))
+                rows.append(facts | self._object(entry))
         blank = dict.fromkeys([*COLUMNS, "place"])
         return Explanation(
             rows=tuple(blank | row for row in rows),
             xy=self.xy,
-            heading=heading,
-            loglik=loglik,
+            headings=tuple(turns.tolist()),
+            loglik=found.loglik,
             crs=self.crs,
         )
 
-    def _chances(
-        self, query: Signature, bearings: NDArray[np.float64], noise: Noise
-    ) -> tuple[NDArray[np.float64], float]:
-        """Return the chance that each object is each detection, and the log-likelihood of all."""
-        view = self.view
+    def _associated(self, query: View, noise: Noise) -> _Chances:
+        """Return the chance that each object is each detection."""
         tables, weights = noise_tables(
             noise,
             taxonomy=self.taxonomy,
@@ -189,42 +232,50 @@ class _Scene:
             radius=self.radius,
         )
         known = np.flatnonzero(query.among(self.codes))
-        names = tables[0].query_rows(query.select(known))
-        kinds = tables[0].row_of[view.codes]
-        pairs = near_pairs(view.offsets, view.bearings, np.array([0, len(known)]), bearings[known])
-        logliks = np.log(weights)
-        each = np.zeros((len(tables), len(view.codes), len(query)))
-        for number, table in enumerate(tables):
-            chances, loglik = associate(
-                table,
-                pairs,
-                kinds=kinds,
-                distances=view.distances,
-                lengths=np.full(len(kinds), len(kinds)),
-                names=names,
-            )
-            each[number, pairs.objects, known[pairs.detections]] = chances
-            logliks[number] += loglik
+        tables[0].query_rows(query.select(known))  # refuses a query without any
+        # Every photo sees the same objects; its detections come one photo after the other.
+        photos, size = len(query.photos), len(self.view.codes)
+        known = known[np.argsort(query.photo_rows[known], kind="stable")]
+        seen = Detections.of([query.select(known)], tables[0])
+        views = replace(
+            self.view,
+            offsets=np.arange(photos + 1) * size,
+            **{name: np.tile(getattr(self.view, name), photos) for name in ENTRIES},
+        )
+        pairs = near_pairs(views.offsets, views.bearings, seen.starts, seen.bearings)
+        logliks, inside = np.log(weights), np.zeros((photos, size))
+        each = np.zeros((len(tables), size, len(query)))
+        lengths = np.full(photos, size)
+        for number, (table, weight) in enumerate(zip(tables, weights.tolist(), strict=True)):
+            found = associate(table, views, seen, pairs, lengths=lengths)
+            each[number, pairs.objects % max(size, 1), known[pairs.detections]] = found.chances
+            logliks[number] += found.loglik.sum()
+            inside += weight * found.inside.reshape(photos, size)
         total = float(np.logaddexp.reduce(logliks))
-        return np.tensordot(np.exp(logliks - total), each, axes=1), total
+        chances = np.tensordot(np.exp(logliks - total), each, axes=1)
+        missed = np.ones(size)
+        for number in range(photos):
+            missed *= 1.0 - chances[:, query.photo_rows == number].sum(axis=1)
+        seen_at_all = inside.max(axis=0)
+        return _Chances(chances, np.maximum(missed, 0.0), seen_at_all, total)
 
     def _detections(
-        self,
-        query: Signature,
-        bearings: NDArray[np.float64],
-        chances: NDArray[np.float64],
-        partners: dict[int, int],
+        self, query: View, chances: NDArray[np.float64], partners: dict[int, int]
     ) -> list[dict[str, Any]]:
         """Return one row for each object of the query."""
-        codes = np.full(len(query), WILDCARD) if query.codes is None else query.codes
+        bearings = query_bearings(query)
+        codes = query.class_scores().argmax(axis=1)
+        ranges = np.full(len(query), np.nan) if query.ranges is None else query.ranges
         rows = []
-        for number, code in enumerate(codes.tolist()):
+        for number, (code, metres) in enumerate(zip(codes.tolist(), ranges.tolist(), strict=True)):
             row: dict[str, Any] = {
                 "verdict": "false",
                 "chance": max(1.0 - float(chances[:, number].sum()), 0.0),
                 "query": number,
+                "photo": int(query.photo_rows[number]) if len(query.photos) > 1 else None,
                 "query_class": self._class_name(code),
                 "query_bearing": float(bearings[number]),
+                "query_range": None if math.isnan(metres) else metres,
             }
             if number in partners:
                 entry = partners[number]

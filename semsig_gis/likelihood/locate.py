@@ -425,14 +425,14 @@ class LikelihoodLocator:
         """Return what speaks for a cell: at the likeliest part of it, or at its middle."""
         query = self.north.to_grid(query)
         database, noise = self.index.database, self.index.noise
-        heading = 0.0 if scores.heading is None else float(scores.heading[cell])
+        headings = [0.0 if one is None else float(one[cell]) for one in scores.headings]
         if self.store is None:
-            return explain_cell(query, cell, noise, database=database, heading=heading)
+            return explain_cell(query, cell, noise, database=database, heading=headings)
         x, y = database.xy[cell].tolist()
         if parts is not None and len(inside := np.flatnonzero(_owners(parts, database) == cell)):
             best = inside[parts.loglik[inside].argmax()]
             x, y = parts.places[best].tolist()
-            heading = float(parts.headings[best])
+            headings[0] = float(parts.headings[best])
             noise = cell_noise(place_noise(noise, database.grid.step), float(parts.sizes[best]))
         return explain(
             query,
@@ -441,7 +441,7 @@ class LikelihoodLocator:
             objects=self.store.objects,
             index=self.store.index,
             radius=database.spec.radius,
-            heading=heading,
+            heading=headings,
             footprints=self.store.buildings_around(np.array([[x, y]]), distance=database.reach),
         )
 

@@ -18,6 +18,7 @@ from semsig_gis.core.signs import (
 )
 from semsig_gis.database.database import rows_of_result
 from semsig_gis.database.north import GRID_NORTH
+from semsig_gis.likelihood.explain import VERDICTS as COUNTED
 from semsig_gis.maps.image import level_image
 from semsig_gis.maps.parts import (
     FLIPPING,
@@ -71,6 +72,10 @@ RAYS: dict[str, tuple[str, dict[str, object]]] = {
         {"color": "#808080", "weight": 1, "opacity": 0.9, "dashArray": "3 5"},
     ),
     "false": ("no street object", {"weight": 2, "opacity": 0.9, "dashArray": "3 5"}),
+    "outside": (
+        "a street object outside the photos",
+        {"weight": 1, "opacity": 0.5, "dashArray": "1 5"},
+    ),
 }
 BEST_PLACE = "The best place is where most of the chance is around it; ranks are of single cells."
 SURROUNDINGS_M = 45.0  # to see around the answer
@@ -239,7 +244,8 @@ class _Drawings:
         for row, shape in zip(explanation.to_dict()["rows"], shapes, strict=True):
             verdict = row["verdict"]
             seen_at, object_at = row["query_bearing"], row["object_bearing"]
-            distance = self.database.reach if row["distance"] is None else row["distance"]
+            told = row["query_range"], row["distance"], self.database.reach
+            distance = next(metres for metres in told if metres is not None)
             bearing = np.radians(object_at if seen_at is None else seen_at)
             end = here + distance * np.array([np.sin(bearing), np.cos(bearing)])
             rays[verdict].append(self.latlon(np.stack([here, end])))
@@ -247,7 +253,7 @@ class _Drawings:
             details = [
                 f"{row['chance']:.2f}",
                 self._title(row["query_class"]),
-                _degrees(seen_at),
+                _degrees(seen_at, row["query_range"]),
                 self._title(row["object_class"]),
                 _degrees(object_at, row["distance"]),
                 None if row["bearing_error"] is None else f"{row['bearing_error']:+.1f}°",
@@ -259,6 +265,7 @@ class _Drawings:
         lines: list[list[Any]] = [
             [{"color": VERDICTS[verdict], **look}, rays[verdict]]
             for verdict, (_, look) in RAYS.items()
+            if rays[verdict] or verdict in explanation.counts
         ]
         return [["lines", lines], ["points", OBJECT_FIELDS, {}, records]]
 
@@ -308,8 +315,11 @@ def location_legend(location: Location) -> str:
         f"<span style='white-space:nowrap'>{swatch(shade, FLIPPING)}{100.0 * least:g}+</span>"
         for least, shade in sorted(CELL_CHANCES.items(), reverse=True)
     )
+    told = {row["verdict"] for one in location.explanations for row in one.rows} | set(COUNTED)
     kinds = "".join(
-        f"<br>{swatch(VERDICTS[verdict])}{verdict}: {text}" for verdict, (text, _) in RAYS.items()
+        f"<br>{swatch(VERDICTS[verdict])}{verdict}: {text}"
+        for verdict, (text, _) in RAYS.items()
+        if verdict in told
     )
     rays = f"<p>Objects of the query, as rays where they were seen{kinds}</p>"
     return (

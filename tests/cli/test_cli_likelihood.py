@@ -229,6 +229,31 @@ def test_noise_is_learnt_and_used(city: Path, run: Run) -> None:
     assert math.dist((answer["place"]["x"], answer["place"]["y"]), PLACE) < 1.0
 
 
+def test_ranges_and_fading_are_learnt_and_told(city: Path, run: Run) -> None:
+    rng, rows = np.random.default_rng(1), []
+    for place in CORNER + rng.uniform(20, 180, (250, 2)):
+        view = views_at(STORE.objects, place[None], index=STORE.index, radius=30.0)
+        chances = np.interp(view.distances, [6.0, 30.0], [0.95, 0.1])
+        kept = rng.random(len(view.codes)) < chances
+        ranges = view.distances[kept] * np.exp(rng.normal(0, 0.2, int(kept.sum())))
+        seen = {"types": CITY.taxonomy.decode(view.codes[kept]), "ranges": ranges.tolist()}
+        rows.append(
+            {"x": place[0], "y": place[1], "bearings": view.bearings[kept].tolist(), **seen}
+        )
+    file, out = written(city.with_name("s.jsonl"), rows), city.with_name("noise.toml")
+    code, printed, told = run("learn", city, "--samples", file, "--out", out)
+    assert code == 0, told
+    for words in ("range_sigma", "detection at 6 m", "detection at 30 m"):
+        assert words in printed
+    noise = open_noise(out).to_dict()
+    assert noise["range_sigma"] == pytest.approx(0.2, abs=0.02)
+    shares = [share for _, share in noise["fading"]["all"]]
+    assert shares == sorted(shares, reverse=True)
+    assert shares[-1] < 0.3
+    query = "localize", city, *options(SEEN), *BY, "--json", "--noise", out
+    assert json.loads(run(*query)[1])["noise"] == "noise"
+
+
 def test_the_age_of_the_map_is_told_and_taken_off_what_is_learnt(city: Path, run: Run) -> None:
     fewer = city.with_name("fewer.parquet")
     objects = WORLD.street_objects

@@ -22,13 +22,15 @@ from noisy_cells import (
     random_query,
     turned_query,
 )
-from view_oracle import bearing_density, cell_loglik
+from view_oracle import bearing_density, cell_loglik, random_view
 from worlds import CODES, World
 
 from semsig_gis.core.rtree import ObjectIndex
 from semsig_gis.core.signature import Signature
+from semsig_gis.core.view import FULL_VIEW, Photo, View
 from semsig_gis.database.database import views_in
 from semsig_gis.likelihood.association import (
+    Detections,
     Pairs,
     align_cells,
     associate,
@@ -38,11 +40,12 @@ from semsig_gis.likelihood.association import (
 )
 from semsig_gis.likelihood.explain import explain, explain_cell
 from semsig_gis.likelihood.index import build_index
-from semsig_gis.likelihood.noise.model import NoiseSpec, named_noise
+from semsig_gis.likelihood.noise.model import NoiseMixture, NoiseSpec, named_noise
 from semsig_gis.likelihood.noise.table import database_tables, query_bearings
 
 if TYPE_CHECKING:
     from semsig_gis.database.database import SignatureDatabase
+    from semsig_gis.likelihood.association import Association
     from semsig_gis.likelihood.explain import Explanation
     from semsig_gis.likelihood.noise.model import Noise
     from semsig_gis.likelihood.noise.table import NoiseTable
@@ -154,20 +157,73 @@ def test_pairs_weigh_as_one_at_a_time(seed: int, size: int, noise: NoiseSpec, si
     (table,), _ = database_tables(database, noise)
     views, starts = views_in(database, np.array([0])), np.array([0, size])
     pairs = near_pairs(views.offsets, views.bearings, starts, query_bearings(query))
-    kinds, names = table.row_of[views.codes], table.query_rows(query)
-    chances, loglik = associate(
-        table,
-        pairs,
-        kinds=kinds,
-        distances=views.distances,
-        lengths=np.repeat(views.lengths, views.lengths),
-        names=names,
-    )
+    found = associated_views(database, query, noise)
     weights = slow_weights(table, database, query, 0)
     expected, (total,) = associate_pairs(pairs, weights[pairs.objects, pairs.detections])
-    assert chances == pytest.approx(expected, abs=1e-4)
+    assert found.chances == pytest.approx(expected, abs=1e-4)
+    names = table.query_rows(query)
     alone = nothing_seen(table, database, 0) + np.log(table.density[names]).sum()
-    assert loglik == pytest.approx(total + alone, abs=1e-4)
+    assert found.loglik.sum() == pytest.approx(total + alone, abs=1e-4)
+
+
+def associated_views(
+    database: SignatureDatabase, query: Signature, noise: NoiseSpec
+) -> Association:
+    """Associate what the photos of a query show with what the first cell sees."""
+    (table,), _ = database_tables(database, noise)
+    seen = Detections.of([query], table)
+    views = views_in(database, np.zeros(len(seen.photos), np.int64))
+    return associate(
+        table,
+        views,
+        seen,
+        near_pairs(views.offsets, views.bearings, seen.starts, seen.bearings),
+        lengths=views.lengths,
+    )
+
+
+PHOTOS = (Photo.looking(heading=15, fov=70), Photo(sectors=((100, 130), (200, 320))), FULL_VIEW)
+FADING = {"all": ((5.0, 1.0), (30.0, 0.1)), "street_light": ((10.0, 0.9), (20.0, 0.3))}
+
+
+@settings(max_examples=60)
+@given(SEEDS, noise_specs(), CLEAR_SIGMAS, st.integers(1, 4), st.sampled_from([0.0, 2.5]))
+def test_views_are_associated_as_by_the_oracle(
+    seed: int, noise: NoiseSpec, sigma: float, size: int, position: float
+) -> None:
+    noise = replace(
+        noise,
+        bearing_sigma=sigma,
+        position_sigma=position,
+        fading=FADING,
+        range_sigma=0.4,
+        range_sigma_by_class={"indicator": 0.2},
+    )
+    database = random_database(seed, cells=8, longest=4)
+    view = random_view(database, np.random.default_rng(seed), size=size, photos=PHOTOS)
+    found = associated_views(database, view, noise).loglik
+    exact = [cell_loglik(database, part, noise, 0) for part in view.split()]
+    if size == 1:
+        assert found == pytest.approx(exact, abs=1e-4)
+    assert (found <= np.array(exact) + 1e-3).all()
+    assert (found >= np.array(exact) - 0.35 * size - 1e-3).all()
+
+
+def test_the_deviations_inside_a_sector_are_those_of_draws() -> None:
+    photos = (Photo(sectors=((350, 10), (30, 33))), FULL_VIEW)
+    query = View(np.array([3], np.uint8), np.array([5.0]), photos=photos)
+    table = database_tables(random_database(0), NoiseSpec())[0][0]
+    seen = Detections.of([query], table)
+    bearings, spreads = np.array([0.0, 12.0, 31.0, 180.0, 7.0]), np.array([4.0, 8.0, 3.0, 3.0, 9.0])
+    inside, squares = seen.inside(np.array([0, 0, 0, 0, 1]), bearings, spreads)
+    rng = np.random.default_rng(0)
+    for row, (bearing, spread) in enumerate(zip(bearings[:3], spreads[:3], strict=True)):
+        away = rng.normal(0.0, spread, 200_000)
+        kept = photos[0].sees(bearing + away)
+        assert inside[row] == pytest.approx(kept.mean(), abs=0.005)
+        assert squares[row] == pytest.approx(((away[kept] / spread) ** 2).mean(), abs=0.02)
+    assert inside[3:].tolist() == [0.0, 1.0]
+    assert squares[4] == 1.0
 
 
 @settings(max_examples=40)
@@ -339,3 +395,57 @@ def test_a_cell_is_explained_without_the_street_objects() -> None:
     assert found.table["object"].isna().all()
     assert found.table.geometry.distance(exact.table.geometry).max() < 0.2
     assert found.table.crs == WORLD.street_objects.crs
+
+
+def test_what_is_outside_the_photo_is_neither_missed_nor_counted() -> None:
+    east = Photo.looking(heading=100, fov=60)
+    query = View(np.array([LAMP]), np.array([92.0]), ranges=np.array([18.0]), photos=(east,))
+    found = explained(query)
+    rows = found.to_dict()["rows"]
+    assert [(row["verdict"], row["object"]) for row in rows] == [
+        ("matched", 1),
+        ("outside", 0),
+        ("outside", 2),
+    ]
+    assert (rows[0]["query_range"], rows[0]["distance"]) == (18.0, pytest.approx(20.0))
+    assert rows[0]["photo"] is None
+    assert found.counts == {"matched": 1, "misnamed": 0, "missed": 0, "false": 0}
+    assert all(row["chance"] > 0.99 for row in rows)
+    blind = View(np.array([LAMP]), np.array([60.0]), photos=(Photo.looking(heading=30, fov=80),))
+    assert explained(blind).counts["missed"] == 1  # the tree in the north
+
+
+def test_photos_have_their_own_headings() -> None:
+    photos = (Photo.looking(heading=10, fov=60), Photo.looking(heading=70, fov=60))
+    query = View(
+        np.array([LAMP, TREE]), np.array([70.0, 10.0]), photo=np.array([1, 0]), photos=photos
+    )
+    found = explained(query, heading=(-10.0, 20.0))
+    rows = found.to_dict()["rows"]
+    assert [(row["verdict"], row["object"], row["photo"]) for row in rows] == [
+        ("matched", 1, 1),
+        ("matched", 0, 0),
+        ("outside", 2, None),
+    ]
+    assert (found.heading, found.headings) == (-10.0, (-10.0, 20.0))
+    assert found.to_dict()["headings"] == [-10.0, 20.0]
+
+
+def test_ranges_tell_objects_in_a_row_apart() -> None:
+    row = World(((0.0, 8.0, LAMP), (0.1, 25.0, LAMP)))
+    for metres, entry in ((7.0, 0), (28.0, 1)):
+        query = View(np.array([LAMP]), np.array([0.0]), ranges=np.array([metres]))
+        (seen, missed) = explained(query, row).rows
+        assert (seen["object"], missed["verdict"]) == (entry, "missed")
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_the_likelihood_of_a_view_is_that_of_the_oracle(seed: int) -> None:
+    database = random_database(seed, cells=8, longest=4)
+    view = random_view(database, np.random.default_rng(seed), size=1, photos=PHOTOS)
+    noise = NoiseMixture(
+        specs=(NoiseSpec(fading=FADING, position_sigma=2.0), NoiseSpec(detection=0.5)),
+        weights=(0.4, 0.6),
+    )
+    found = explain_cell(view, 0, noise, database=database)
+    assert found.loglik == pytest.approx(cell_loglik(database, view, noise, 0), abs=1e-4)

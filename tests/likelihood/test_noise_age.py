@@ -106,6 +106,20 @@ def test_learning_leaves_out_what_the_age_explains() -> None:
     assert fresh_noise(spec, 0.0, database=CITY) is spec
 
 
+def test_ranges_and_fading_do_not_age() -> None:
+    fading = {"all": ((10.0, 1.0), (30.0, 0.4)), NAMES[0]: ((5.0, 0.9), (30.0, 0.1))}
+    kept: dict[str, Any] = {
+        "fading": fading,
+        "range_sigma": 0.3,
+        "range_sigma_by_class": {NAMES[1]: 0.5},
+    }
+    spec = NoiseSpec(detection=0.8, clutter=2.0, **kept)
+    aged = aged_noise(spec, 3.0, database=CITY)
+    assert isinstance(aged, NoiseSpec)
+    for one in (aged, fresh_noise(aged, 3.0, database=CITY), cell_noise(aged, 10.0)):
+        assert {name: getattr(one, name) for name in kept} == kept
+
+
 def test_the_shipped_drift_is_of_classes_of_the_catalogue() -> None:
     drift = named_drift()
     known = {item.name for item in load_catalog("openstreetmap").taxonomy.classes}

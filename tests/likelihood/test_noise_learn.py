@@ -17,6 +17,7 @@ from worlds import CODES, World
 from semsig_gis.core.errors import InputError
 from semsig_gis.core.signature import Signature
 from semsig_gis.core.statistics import wilson_interval
+from semsig_gis.core.view import Photo, View
 from semsig_gis.database.database import views_in
 from semsig_gis.likelihood.noise.fit import (
     ALL,
@@ -26,7 +27,6 @@ from semsig_gis.likelihood.noise.fit import (
     gather_evidence,
     model_change,
     next_model,
-    starting_model,
 )
 from semsig_gis.likelihood.noise.learn import Sample, learn_noise, read_samples
 from semsig_gis.likelihood.noise.model import noise_from_dict
@@ -171,6 +171,95 @@ def test_one_class_alone() -> None:
     assert found.spec.confusion == {"alignment_tree": {"alignment_tree": 1.0}}
 
 
+# --- Views ------------------------------------------------------------------------------------
+
+LEFT = (1.0, 0.9, 0.7, 0.45, 0.3)  # of the detection, at fifths of 30 m
+METRES = (6.0, 12.0, 18.0, 24.0, 30.0)
+RANGE_SIGMA = {1: 0.2, 2: 0.4, 3: 0.25, 4: 0.3}
+
+
+def left(distance: float) -> float:
+    return float(np.interp(distance, METRES, LEFT))
+
+
+def photographer(seed: int, seen: list[tuple[int, float, float]]) -> View:
+    """Take two photos of things with their bearings and distances, by a plain loop."""
+    dice = random.Random(seed)  # noqa: S311
+    photos = tuple(
+        Photo.looking(heading=dice.uniform(0, 360), fov=fov)
+        for fov in dice.sample((60, 90, 120), 2)
+    )
+    rows: list[tuple[float, int, float, int]] = []
+    for number, photo in enumerate(photos):
+        found = []
+        for code, bearing, distance in seen:
+            if dice.random() < DETECTION[code] * left(distance):
+                name = code
+                if dice.random() < MISNAMED[code]:
+                    name = dice.choice([other for other in DETECTION if other != code])
+                metres = max(distance, 0.1) * math.exp(dice.gauss(0, RANGE_SIGMA[code]))
+                found.append(((bearing + dice.gauss(0, SIGMA[code])) % 360, name, metres))
+        for code, rate in CLUTTER.items():
+            alive = dice.random()
+            while alive > math.exp(-3 * rate):
+                found.append((dice.uniform(0, 360), code, 30 * math.sqrt(dice.random())))
+                alive *= dice.random()
+        rows += [(*one, number) for one in found if photo.sees(one[0])]
+    scores = np.zeros((len(rows), 256))
+    for row, (_, name, _, _) in enumerate(rows):
+        both = [name, dice.choice([other for other in DETECTION if other != name])]
+        # The truth is as likely as it scores; half are sure.
+        scores[row, both if dice.random() < 0.75 else both[::-1]] = 0.75, 0.25
+        if dice.random() < 0.5:
+            scores[row] = np.eye(256)[name]
+    columns = np.array(rows, np.float64).reshape(-1, 4).T
+    told = [dice.random() < 0.7 for _ in rows]
+    return View(
+        columns[1].astype(np.uint8),
+        columns[0],
+        ranges=np.where(told, columns[2], np.nan),
+        scores=scores,
+        photo=columns[3].astype(np.int64),
+        photos=photos,
+    )
+
+
+def photographed(count: int, *, seed: int = 0) -> NoiseEstimate:
+    """Learn from photos from the cells of a random city."""
+    database = random_database(seed, cells=100, longest=14)
+    views = views_in(database, np.arange(len(database)))
+    samples = []
+    for number in range(count):
+        cell = number % len(database)
+        part = slice(views.offsets[cell], views.offsets[cell + 1])
+        columns = (views.codes, views.bearings, views.distances)
+        seen = list(zip(*(column[part].tolist() for column in columns), strict=True))
+        view = photographer(seed * 100_000 + number, seen)
+        samples.append(Sample(signature=view, cell_id=int(database.cell_ids[cell])))
+    return learn_noise(samples, database)
+
+
+def photo_truth(quantity: str, code: int, distance: float) -> float:
+    if quantity in {"detection", "fading"}:
+        return DETECTION[code] * left(distance)
+    if quantity == "clutter":
+        return 3 * CLUTTER[code]
+    return {**TRUTH, "range_sigma": RANGE_SIGMA}[quantity][code]
+
+
+def test_photos_teach_what_panoramas_teach_and_ranges_and_fading() -> None:
+    codes = {item.name: item.code for item in TAXONOMY.classes}
+    inside = []
+    for seed in range(3):
+        found = photographed(900, seed=seed)
+        rows = found.rates[found.rates["class"] != ALL].to_dict("records")
+        assert len(rows) == 4 * (5 + 4)
+        for one in rows:
+            true = photo_truth(one["quantity"], codes[one["class"]], one["distance"])
+            inside.append(one["low_95"] <= true <= one["high_95"])
+    assert np.mean(inside) >= 0.87
+
+
 def test_csv_and_json_lines_say_the_same(tmp_path: Path) -> None:
     (tmp_path / "seen.CSV").write_text(
         'note,cell_id,types,bearings,x,y\nfirst,7,DB,"10, 350",,\nnothing,8,,,,\n,,D,-10,1.5,2\n'
@@ -232,15 +321,17 @@ def test_counts_add_up(seed: int) -> None:
         query = random_query(database, seed + cell, size=cell % 7)
         codes, bearings = parts_of(query)
         detected.append(Signature(codes[codes > 0], bearings[codes > 0]))
-    evidence = gather_evidence(views_in(database, np.arange(20)), detected, taxonomy=TAXONOMY)
-    model = starting_model(evidence, position_sigma=2.0)
+    views = views_in(database, np.arange(20))
+    evidence = gather_evidence(views, detected, taxonomy=TAXONOMY, position_sigma=2.0)
+    model = evidence.start
     counts = expected_counts(evidence, model)
-    assert evidence.present.sum() == len(database.codes)
     hits = counts.named.sum()
     assert hits == pytest.approx(counts.chances.sum())
-    assert hits + counts.false.sum() == pytest.approx(len(evidence.labels), abs=0.05)
-    assert (counts.named.sum(axis=1) <= evidence.present + 0.05).all()
-    assert (counts.squares >= 0).all()
+    # What is neither an object nor clutter came into range with the observer.
+    assert 0.8 * len(evidence.seen.bearings) < hits + counts.false.sum()
+    assert hits + counts.false.sum() <= len(evidence.seen.bearings) + 0.05
+    assert (counts.named.sum(axis=1) <= counts.trials.sum() + 0.05).all()
+    assert (counts.turns >= 0).all()
     new = next_model(evidence, counts, model)
     assert new.clutter.sum() * 20 == pytest.approx(counts.false.sum(), rel=0.02)
     assert new.named.sum(axis=2) == pytest.approx(1.0)
@@ -251,7 +342,7 @@ def test_rounds_raise_the_likelihood() -> None:
     rng = np.random.default_rng(0)
     detected = [distorted(database, cell, rng) for cell in range(60)]
     evidence = gather_evidence(views_in(database, np.arange(60)), detected, taxonomy=TAXONOMY)
-    model = starting_model(evidence, position_sigma=0.0)
+    model = evidence.start
     before = -math.inf
     for _ in range(8):
         counts = expected_counts(evidence, model)
@@ -274,7 +365,7 @@ def test_where_every_association_is_certain_the_intervals_are_the_text_books() -
     ]
     evidence = gather_evidence(views, seen, taxonomy=TAXONOMY)
     model = replace(
-        starting_model(evidence, position_sigma=0.0),
+        evidence.start,
         missed=np.array([[0.1]]),
         clutter=np.array([1e-6]),
         sigma=np.array([1.0]),

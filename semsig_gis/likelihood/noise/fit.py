@@ -1,14 +1,16 @@
 """Fit a noise model to detections: one round of expectation-maximisation.
 
 The E step works out the chances of all one-to-one associations under the present model, the M step
-takes the model that the expected counts speak for.
+takes the model that the expected counts speak for. What lies outside the sectors of a photo is
+neither missed nor false; at a sector's edge an object counts as far as its bearing may have been
+inside.
 """
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from functools import partial
+from functools import cached_property, partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -17,7 +19,14 @@ import pandas as pd
 from semsig_gis.core.errors import InputError
 from semsig_gis.core.signature import DISTANCE_UNITS
 from semsig_gis.core.statistics import log_interval, poisson_interval, wilson_interval
-from semsig_gis.likelihood.association import associate, near_pairs
+from semsig_gis.core.taxonomy import WILDCARD
+from semsig_gis.core.view import View
+from semsig_gis.likelihood.association import (
+    Detections,
+    associate,
+    at_distances,
+    near_pairs,
+)
 from semsig_gis.likelihood.noise.table import NoiseTable
 
 if TYPE_CHECKING:
@@ -28,7 +37,7 @@ if TYPE_CHECKING:
     from semsig_gis.core.signature import Signature
     from semsig_gis.core.taxonomy import Taxonomy
     from semsig_gis.database.views import Views
-    from semsig_gis.likelihood.association import Pairs
+    from semsig_gis.likelihood.association import Association, Pairs
 
 
 ALL = "all"
@@ -37,94 +46,125 @@ PRIOR_SAMPLES = 8.0  # that the overall value counts for, against those of a cla
 REACH = 75.0  # degrees beyond which a detection is never taken for an object
 LEAST, MOST = 1e-3, 1.0 - 1e-3
 LEAST_SIGMA, MOST_SIGMA = 0.05, 60.0
+LEAST_ERROR, MOST_ERROR = 0.01, 3.0  # of ranges
 LEAST_INFORMATION = 0.05
 PERCENTS = (90, 95)  # of the intervals
+KNOTS = np.array([0.2, 0.4, 0.6, 0.8, 1.0])
+"""Where the chance of detection is learnt, if it falls: shares of the range of a class."""
+FADES = -3.0  # standard deviations of the trend with distance, below which detection falls
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Evidence:
-    """What was there and what was detected, over all samples (signatures).
+    """What was there and what was detected, photo by photo.
 
-    `names` and `codes` list the k classes that occur. Each object has a class (`kinds`, its number
-    among the k), a sample (`owners`) and a distance in metres; each detection a class (`labels`)
-    and a sample (`givers`). `pairs` are objects and detections that may be one thing.
+    `names` are those of the k classes that occur, in the order of their codes in `start`, a usual
+    detector as the first model. `views` is what there was to see in each photo, `seen` what was
+    detected, and `pairs` are objects and detections that may be one thing.
     """
 
     names: list[str]
-    codes: NDArray[np.uint8]
-    samples: int
-    kinds: NDArray[np.int64]
-    owners: NDArray[np.int64]
-    distances: NDArray[np.float64]
-    labels: NDArray[np.int64]
-    givers: NDArray[np.int64]
+    start: NoiseTable
+    views: Views
+    seen: Detections
     pairs: Pairs
 
-    @property
-    def present(self) -> NDArray[np.float64]:
-        """Number of objects by class, shape (k,)."""
-        return np.bincount(self.kinds, minlength=len(self.codes)).astype(np.float64)
+    @cached_property
+    def kinds(self) -> NDArray[np.int64]:
+        """The class row of each object."""
+        return self.start.row_of[self.views.codes]
 
-    @property
+    @cached_property
+    def owners(self) -> NDArray[np.int64]:
+        """The photo of each object."""
+        return np.repeat(np.arange(len(self.views)), self.views.lengths)
+
+    @cached_property
+    def distances(self) -> NDArray[np.float64]:
+        """The distance of each object in metres, above 0."""
+        return at_distances(self.start, self.views)
+
+    @cached_property
     def pair_kinds(self) -> NDArray[np.int64]:
         """The class of the object of each pair."""
         return self.kinds[self.pairs.objects]
 
-    @property
-    def pair_labels(self) -> NDArray[np.int64]:
-        """The class of the detection of each pair."""
-        return self.labels[self.pairs.detections]
+    def by_kind(self, amounts: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Add up what each pair has by the class of its object, shape (k,)."""
+        return np.asarray(np.bincount(self.pair_kinds, amounts, len(self.names)), np.float64)
+
+    @cached_property
+    def knots(self) -> NDArray[np.float64]:
+        """How near each object is to each of `KNOTS`; rows sum to one."""
+        place = self.distances / self.start.ranges[self.kinds]
+        hats = [np.interp(place, KNOTS, row) for row in np.eye(len(KNOTS))]
+        return np.stack(hats, axis=1)
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Counts:
     """The expected counts, given the detections and a model.
 
-    By pair, `chances` that it is one thing and `squares` of the bearing noise if it is, in square
-    degrees; `false`, the chance that each detection is clutter; `named`, shape (k, k), detected
-    objects by class and label; `log_likelihood` of all detections.
+    By pair, `chances` that it is one thing, and `right` that it is named as what it is, too;
+    `turns` and `ranges`, of shape (2, pairs), are squares of the errors of bearings, in square
+    degrees, and of logarithms of ranges, and how many errors they count for. By object and knot,
+    `hits` were detected of `trials`. `false`, by detection and class, is the chance that it is
+    clutter. `named`, shape (k, k), counts detected objects by class and label; `log_likelihood` is
+    of all detections.
     """
 
     chances: NDArray[np.float64]
-    squares: NDArray[np.float64]
+    right: NDArray[np.float64]
+    turns: NDArray[np.float64]
+    ranges: NDArray[np.float64]
+    hits: NDArray[np.float64]
+    trials: NDArray[np.float64]
     false: NDArray[np.float64]
     named: NDArray[np.float64]
     log_likelihood: float
 
 
-def gather_evidence(views: Views, detected: Sequence[Signature], *, taxonomy: Taxonomy) -> Evidence:
-    """Join what there was to see in each sample with what was detected, with types and bearings.
+def gather_evidence(
+    views: Views,
+    detected: Sequence[Signature],
+    *,
+    taxonomy: Taxonomy,
+    radius: float = 30.0,
+    position_sigma: float = 0.0,
+) -> Evidence:
+    """Join what there was to see in each photo of some samples with what was detected.
 
-    Raises `InputError` if there was nothing to see at all, or nothing was detected.
+    What was detected has bearings and types or scores. Raises `InputError` if there was nothing to
+    see at all, or nothing was detected.
     """
-    codes = np.concatenate([np.asarray(one.codes, dtype=np.uint8) for one in detected])
-    bearings = np.concatenate([np.asarray(one.bearings, dtype=np.float64) for one in detected])
-    if len(views.codes) == 0 or len(codes) == 0:
+    named = [np.flatnonzero(View.of(one).class_scores().any(axis=0)) for one in detected]
+    count = sum(map(len, detected))
+    if len(views.codes) == 0 or count == 0:
         msg = (
-            f"the {len(detected)} samples have {len(views.codes)} objects to see and {len(codes)} "
+            f"the {len(detected)} samples have {len(views.codes)} objects to see and {count} "
             "detections; give samples with some of both."
         )
         raise InputError(msg)
-    classes = np.union1d(views.codes, codes)
-    starts = np.concatenate([[0], np.cumsum([len(one) for one in detected])])
+    codes = np.unique(np.concatenate([views.codes, *named])).astype(np.uint8)
+    codes = codes[codes != WILDCARD]
+    start = _starting_model(codes, taxonomy.ranges(radius), position_sigma)
+    seen = Detections.of(detected, start)
     return Evidence(
-        names=[taxonomy.by_code(int(code)).name for code in classes],
-        codes=classes,
-        samples=len(detected),
-        kinds=np.searchsorted(classes, views.codes),
-        owners=np.repeat(np.arange(len(detected)), views.lengths),
-        distances=views.distances,
-        labels=np.searchsorted(classes, codes),
-        givers=np.repeat(np.arange(len(detected)), np.diff(starts)),
-        pairs=near_pairs(views.offsets, views.bearings, starts, bearings, reach=REACH),
+        names=[taxonomy.by_code(code).name for code in codes.tolist()],
+        start=start,
+        views=views,
+        seen=seen,
+        pairs=near_pairs(views.offsets, views.bearings, seen.starts, seen.bearings, reach=REACH),
     )
 
 
-def starting_model(evidence: Evidence, *, position_sigma: float) -> NoiseTable:
-    """Return a usual detector as the first model, with the known deviation of places in metres."""
-    count = len(evidence.codes)
+def _starting_model(
+    codes: NDArray[np.uint8], ranges: NDArray[np.float64], position_sigma: float
+) -> NoiseTable:
+    """Return a usual detector, with the known deviation of places in metres."""
+    count = len(codes)
     return NoiseTable(
-        codes=evidence.codes,
+        codes=codes,
         missed=np.full((1, count), 0.25),
         misnamed=np.full((1, count), 0.1 if count > 1 else 0.0),
         others=_others(count),
@@ -132,9 +172,9 @@ def starting_model(evidence: Evidence, *, position_sigma: float) -> NoiseTable:
         sigma=np.full(count, 8.0),
         range_sigma=np.full(count, 0.25),
         position_sigma=position_sigma,
-        ranges=np.full(count, math.inf),
+        ranges=ranges[codes],
         fading=np.ones((count, DISTANCE_UNITS + 1)),
-        reach=math.inf,
+        reach=float(ranges.max()),
     )
 
 
@@ -143,50 +183,172 @@ def expected_counts(evidence: Evidence, model: NoiseTable) -> Counts:
 
     The model must be the same for signatures of all lengths.
     """
-    pairs, size = evidence.pairs, len(evidence.codes)
-    chances, loglik = associate(
-        model,
-        pairs,
-        kinds=evidence.kinds,
-        distances=evidence.distances,
-        lengths=np.zeros(len(evidence.kinds), np.int64),
-        names=evidence.labels,
-    )
-    kind = evidence.pair_kinds
-    # Of a difference, the place and the bearing noise have their shares by their variances.
-    place = np.degrees(model.position_sigma / np.maximum(evidence.distances[pairs.objects], 1e-3))
-    own = model.sigma[kind] ** 2
-    share = own / (own + place**2)
-    true = np.bincount(pairs.detections, chances, len(evidence.labels))
-    named = np.zeros((size, size))
-    np.add.at(named, (kind, evidence.pair_labels), chances)
+    pairs, seen = evidence.pairs, evidence.seen
+    lengths = np.zeros(len(evidence.views), np.int64)
+    found = associate(model, evidence.views, seen, pairs, lengths=lengths)
+    chances, kind = found.chances, evidence.pair_kinds
+    # What is said of a detection may be the name of several classes.
+    labels = model.named[0][:, :, None] * seen.scores
+    said = labels.sum(axis=1)[kind, pairs.detections]
+    own = model.named[0].diagonal()[kind] * seen.scores[kind, pairs.detections]
+    by_detection = np.bincount(
+        kind * len(seen.bearings) + pairs.detections,
+        chances / said,
+        len(evidence.names) * len(seen.bearings),
+    ).reshape(len(evidence.names), -1)
+    true = np.bincount(pairs.detections, chances, len(seen.bearings))
+    clutter = seen.scores * model.clutter[:, None]
+    false = np.clip(1.0 - true, 0.0, 1.0) * found.clutter * clutter / clutter.sum(axis=0)
+    hits, trials = _detections(evidence, found, model)
     return Counts(
         chances=chances,
-        squares=(pairs.away * share) ** 2 + place**2 * share,
-        false=np.clip(1.0 - true, 0.0, 1.0),
-        named=named,
-        log_likelihood=loglik,
+        right=chances * own / said,
+        turns=_turns(evidence, found, model),
+        ranges=_ranges(evidence, found, model),
+        hits=hits,
+        trials=trials,
+        false=false.T,
+        named=model.named[0] * (by_detection @ seen.scores.T),
+        log_likelihood=float(found.loglik.sum()),
     )
 
 
-def next_model(evidence: Evidence, counts: Counts, model: NoiseTable) -> NoiseTable:
-    """Return the model that the counts speak for, classes drawn to the whole: the M step."""
-    size = len(evidence.codes)
+def _detections(
+    evidence: Evidence, found: Association, model: NoiseTable
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return how often each object was detected of how often it was in sight, by knot."""
+    kinds, near = evidence.kinds, model.detected[0, evidence.kinds]
+    units = np.rint(evidence.distances * (DISTANCE_UNITS / model.reach)).astype(np.int64)
+    hits = np.bincount(evidence.pairs.objects, found.chances, len(kinds))
+    hits = np.clip(hits, 0.0, 1.0)
+    # Of what was not detected, so much was in range and in the sectors.
+    sight = found.inside * model.inside[kinds, units] * (1.0 - near * model.fading[kinds, units])
+    misses = (1.0 - hits) * sight / (1.0 - found.detection * found.inside)
+    shares = near[:, None] * fading_at_knots(model)[kinds]
+    of_hits, of_misses = (evidence.knots * part for part in (shares, 1.0 - shares))
+    hit = hits[:, None] * of_hits / of_hits.sum(axis=1, keepdims=True)
+    return hit, hit + misses[:, None] * of_misses / of_misses.sum(axis=1, keepdims=True)
+
+
+def fading_at_knots(model: NoiseTable) -> NDArray[np.float64]:
+    """Return what is left of the detection of each class at each knot, shape (k, knots)."""
+    units = np.rint(model.ranges[:, None] * KNOTS * (DISTANCE_UNITS / model.reach))
+    return np.take_along_axis(model.fading, units.astype(np.int64), axis=1)
+
+
+def _turns(evidence: Evidence, found: Association, model: NoiseTable) -> NDArray[np.float64]:
+    """Return the squares of the bearing noise of pairs, and for how many draws they count."""
+    one, kind = evidence.pairs.objects, evidence.pair_kinds
+    # Of a difference, the place and the bearing noise have their shares by their variances.
+    place = np.degrees(model.position_sigma / evidence.distances[one])
+    own = model.sigma[kind] ** 2
+    share = own / (own + place**2)
+    squares = (evidence.pairs.away * share) ** 2 + place**2 * share
+    # At a sector's edge, large errors went out of sight.
+    whole = share * found.squares[one] + 1.0 - share
+    return np.stack([squares, whole]) * found.chances
+
+
+def _ranges(evidence: Evidence, found: Association, model: NoiseTable) -> NDArray[np.float64]:
+    """Return the squares of the errors of the logarithms of ranges, and for how many they count."""
+    one, other = evidence.pairs.objects, evidence.pairs.detections
+    seen, distances = evidence.seen, evidence.distances[one]
+    told = ~np.isnan(seen.ranges[other]) & np.isnan(seen.range_errors[other])
+    place = model.position_sigma / distances
+    own = model.range_sigma[evidence.pair_kinds] ** 2
+    share = own / (own + place**2)
+    away = np.log(np.where(told, seen.ranges[other], 1.0) / distances)
+    squares = (away * share) ** 2 + place**2 * share
+    return np.stack([squares, np.ones(len(one))]) * (found.chances * told)
+
+
+def next_model(
+    evidence: Evidence, counts: Counts, model: NoiseTable, *, fading: bool = False
+) -> NoiseTable:
+    """Return the model that the counts speak for, classes drawn to the whole: the M step.
+
+    Detection falls with distance if `fading` says so.
+    """
+    size = len(evidence.names)
     detected = counts.named.sum(axis=1)
     wrong = counts.named * (1.0 - np.eye(size))
     misnamed = np.clip(drawn_rates(wrong.sum(axis=1), detected), LEAST, MOST)
     spread = wrong + PRIOR_SAMPLES * misnamed[:, None] * _others(size)
-    squares = np.bincount(evidence.pair_kinds, counts.chances * counts.squares, size)
-    false = np.bincount(evidence.labels, counts.false, size)
+    false = counts.false.sum(axis=0)
     shares = (false + PRIOR_SAMPLES / size) / (false.sum() + PRIOR_SAMPLES)
+    seen = np.clip(_seen_by_knot(evidence, counts, fading=fading), LEAST, MOST)
+    metres = np.arange(DISTANCE_UNITS + 1) * (model.reach / DISTANCE_UNITS)
+    faded = [
+        np.interp(metres, KNOTS * limit, row / row[0])
+        for limit, row in zip(model.ranges.tolist(), seen, strict=True)
+    ]
+    turns, ranges = (
+        [evidence.by_kind(row) for row in part] for part in (counts.turns, counts.ranges)
+    )
     return replace(
         model,
-        missed=1.0 - np.clip(drawn_rates(detected, evidence.present), LEAST, MOST)[None],
+        missed=1.0 - seen[None, :, 0],
         misnamed=misnamed[None] if size > 1 else np.zeros((1, 1)),
         others=spread / np.maximum(spread.sum(axis=1, keepdims=True), 1e-12),
-        clutter=np.maximum(false.sum() / evidence.samples * shares, LEAST / size),
-        sigma=np.clip(np.sqrt(drawn_rates(squares, detected)), LEAST_SIGMA, MOST_SIGMA),
+        clutter=np.maximum(false.sum() / evidence.seen.turns.sum() * shares, LEAST / size),
+        sigma=np.clip(np.sqrt(drawn_rates(*turns)), LEAST_SIGMA, MOST_SIGMA),
+        range_sigma=np.clip(np.sqrt(drawn_rates(*ranges)), LEAST_ERROR, MOST_ERROR)
+        if ranges[1].any()
+        else model.range_sigma,
+        fading=np.stack(faded) if fading else model.fading,
     )
+
+
+def _seen_by_knot(evidence: Evidence, counts: Counts, *, fading: bool) -> NDArray[np.float64]:
+    """Return the chance of detection by class and knot, shape (k, knots)."""
+    hits, trials = _by_knot(evidence, counts)
+    if not fading:
+        rates = drawn_rates(hits.sum(axis=1), trials.sum(axis=1))
+        return np.broadcast_to(rates[:, None], hits.shape)
+    # A class falls as all do, so far as its own samples do not speak against it.
+    overall = falling(hits.sum(axis=0), trials.sum(axis=0))
+    expected = trials @ overall
+    mean = PRIOR_SAMPLES * hits.sum() / trials.sum()
+    level = (hits.sum(axis=1) + mean) / (expected + mean)
+    drawn = np.clip(level[:, None] * overall, LEAST, MOST)
+    rows = zip(hits + PRIOR_SAMPLES * drawn, trials + PRIOR_SAMPLES, strict=True)
+    return np.stack([falling(*row) for row in rows])
+
+
+def _by_knot(evidence: Evidence, counts: Counts) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return the hits and trials by class and knot, shape (k, knots)."""
+    kinds = np.eye(len(evidence.names))[evidence.kinds]
+    hits, trials = (kinds.T @ part for part in (counts.hits, counts.trials))
+    return hits, trials
+
+
+def falling(hits: NDArray[np.float64], trials: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the likeliest rates that never rise from one group to the next."""
+    groups: list[tuple[float, float, int]] = []
+    for hit, trial in zip(hits.tolist(), trials.tolist(), strict=True):
+        groups.append((hit, trial, 1))
+        while len(groups) > 1 and groups[-1][0] * groups[-2][1] > groups[-2][0] * groups[-1][1]:
+            last, before = groups.pop(), groups.pop()
+            groups.append((last[0] + before[0], last[1] + before[1], last[2] + before[2]))
+    return np.repeat(
+        [hit / max(trial, 1e-9) for hit, trial, _ in groups], [count for *_, count in groups]
+    )
+
+
+def fades(evidence: Evidence, counts: Counts) -> bool:
+    """Tell whether the samples speak for a chance of detection that falls with distance.
+
+    The counts are those of a model in which it does not. Where the true places are known roughly,
+    distances are so, too, and nothing is said.
+    """
+    if evidence.start.position_sigma > 0:
+        return False
+    hits, trials = _by_knot(evidence, counts)
+    rates = hits.sum(axis=1) / np.maximum(trials.sum(axis=1), 1e-9)
+    places = KNOTS - (trials @ KNOTS / np.maximum(trials.sum(axis=1), 1e-9))[:, None]
+    trend = ((hits - trials * rates[:, None]) * places).sum()
+    variance = (trials * (rates * (1.0 - rates))[:, None] * places**2).sum()
+    return bool(trend < FADES * math.sqrt(variance))
 
 
 def drawn_rates(hits: NDArray[np.number], trials: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -203,7 +365,9 @@ def model_change(old: NoiseTable, new: NoiseTable) -> float:
     moves = [
         np.log(new.odds) - np.log(old.odds),
         np.log(new.sigma) - np.log(old.sigma),
+        np.log(new.range_sigma) - np.log(old.range_sigma),
         np.log(new.clutter) - np.log(old.clutter),
+        np.log(fading_at_knots(new)) - np.log(fading_at_knots(old)),
     ]
     if len(old.codes) > 1:
         moves.append(np.log(new.misnamed) - np.log(old.misnamed))
@@ -215,46 +379,129 @@ def _others(size: int) -> NDArray[np.float64]:
     return np.asarray((1.0 - np.eye(size)) / max(size - 1, 1))
 
 
-def estimated_rates(evidence: Evidence, counts: Counts, model: NoiseTable) -> pd.DataFrame:
+def estimated_rates(
+    evidence: Evidence, counts: Counts, model: NoiseTable, *, fading: bool = False
+) -> pd.DataFrame:
     """Return the rates by class and overall with their intervals, as in `NoiseEstimate.rates`.
 
     Intervals are Wilson's for chances, the equivalent for Poisson rates, and symmetric in the
     logarithm for deviations. For uncertain association, the effective number of samples follows
-    from the information matrix: the sum over the samples of the outer products of their expected
+    from the information matrix: the sum over the photos of the outer products of their expected
     scores (Fisher's identity). Where many objects stand close together, the clutter comes out some
     per cent too large.
     """
-    size = len(evidence.codes)
-    detected = counts.named.sum(axis=1)
-    squares = np.bincount(evidence.pair_kinds, counts.chances * counts.squares, size)
-    false = np.bincount(evidence.labels, counts.false, size)
-    sums = {  # what is counted, of how many by class and in all, and what the model has
-        "detection": (detected, evidence.present, 1.0 - model.missed[0]),
-        "misnamed": (detected - np.diag(counts.named), detected, model.misnamed[0]),
-        "clutter": (false, np.full(size, float(evidence.samples)), model.clutter),
-        "bearing_sigma": (squares, detected, model.sigma),
-    }
-    scores = _scores(evidence, counts, {name: part[2] for name, part in sums.items()})
-    single = _deviations(scores.reshape(evidence.samples, -1)).reshape(len(sums), size)
+    quantities = _quantities(evidence, counts, model, fading=fading)
+    scores = np.stack([one.scores for one in quantities], axis=1)
+    single = _deviations(scores.reshape(len(scores), -1)).reshape(scores.shape[1:])
     pooled = _deviations(scores.sum(axis=2))
     rows = []
-    for number, (quantity, (hits, trials, values)) in enumerate(sums.items()):
-        total = trials[0] if quantity == "clutter" else trials.sum()
-        rows.append(_row(quantity, ALL, hits.sum(), total, pooled[number]))
+    for number, one in enumerate(quantities):
+        everywhere = {"distance": one.distance}
+        rows.append(_row(one, ALL, one.hits.sum(), one.total, pooled[number]) | everywhere)
         for kind, name in enumerate(evidence.names):
-            own = _row(quantity, name, hits[kind], trials[kind], single[number, kind])
-            rows.append({**own, "value": float(values[kind])})
+            own = _row(one, name, one.hits[kind], one.trials[kind], single[number, kind])
+            distance = one.distances[kind]
+            rows.append({**own, "value": float(one.values[kind]), "distance": float(distance)})
     return pd.DataFrame(rows)
 
 
-def _row(quantity: str, name: str, hits: float, trials: float, deviation: float) -> dict[str, Any]:
+@dataclass(frozen=True, eq=False, kw_only=True)
+class _Quantity:
+    """What is counted, of how many by class and in all, what the model has, and the scores.
+
+    Scores have the shape (photos, k): chances are taken as log-odds, rates and deviations as
+    logarithms. `distances` are metres, NaN where it is for all of them.
+    """
+
+    name: str
+    hits: NDArray[np.float64]
+    trials: NDArray[np.float64]
+    values: NDArray[np.float64]
+    scores: NDArray[np.float64]
+    total: float
+    distances: NDArray[np.float64]
+
+    @property
+    def distance(self) -> float:
+        """Its distance if that is the same for all classes, otherwise NaN."""
+        first = float(self.distances[0])
+        return first if (self.distances == first).all() else math.nan
+
+
+def _quantities(
+    evidence: Evidence, counts: Counts, model: NoiseTable, *, fading: bool
+) -> list[_Quantity]:
+    """Return all that is learnt."""
+    size, photos = len(evidence.names), len(evidence.views)
+    sample = evidence.owners[evidence.pairs.objects]
+
+    def by_photo(
+        owner: NDArray[np.int64], group: NDArray[np.int64], amount: NDArray[np.float64]
+    ) -> NDArray[np.float64]:
+        counted = np.bincount(owner * size + group, amount, photos * size)
+        return np.asarray(counted.reshape(photos, size))
+
+    def quantity(
+        name: str,
+        hits: NDArray[np.float64],
+        trials: NDArray[np.float64],
+        values: NDArray[np.float64],
+        *,
+        logarithm: bool = False,
+        total: float | None = None,
+        distances: NDArray[np.float64] | None = None,
+    ) -> _Quantity:
+        scores = hits / values**2 - trials if logarithm else hits - trials * values
+        sums = trials.sum(axis=0)
+        return _Quantity(
+            name=name,
+            hits=hits.sum(axis=0),
+            trials=sums,
+            values=values,
+            scores=scores,
+            total=float(sums.sum()) if total is None else total,
+            distances=np.full(size, np.nan) if distances is None else distances,
+        )
+
+    found, rows = [], (evidence.owners, evidence.kinds)
+    chances = model.detected[0][:, None] * fading_at_knots(model)
+    for number, knot in enumerate(KNOTS if fading else KNOTS[:1]):
+        parts = slice(number, number + 1) if fading else slice(None)
+        hits, trials = (
+            by_photo(*rows, part[:, parts].sum(axis=1)) for part in (counts.hits, counts.trials)
+        )
+        metres = knot * model.ranges if fading else None
+        name = "fading" if number else "detection"
+        found.append(quantity(name, hits, trials, chances[:, number], distances=metres))
+    pairs = sample, evidence.pair_kinds
+    false = np.zeros((photos, size))
+    np.add.at(false, evidence.seen.givers, counts.false)
+    turns = float(evidence.seen.turns.sum())
+    exposed = np.repeat(evidence.seen.turns[:, None], size, axis=1)
+    wrong = by_photo(*pairs, np.maximum(counts.chances - counts.right, 0.0))
+    found += [
+        quantity("misnamed", wrong, by_photo(*pairs, counts.chances), model.misnamed[0]),
+        quantity("clutter", false, exposed, model.clutter, total=turns),
+    ]
+    deviations = {"bearing_sigma": (counts.turns, model.sigma)}
+    if counts.ranges[1].any():
+        deviations["range_sigma"] = counts.ranges, model.range_sigma
+    for name, (errors, values) in deviations.items():
+        squares, whole = (by_photo(*pairs, part) for part in errors)
+        found.append(quantity(name, squares, whole, values, logarithm=True))
+    return found
+
+
+def _row(
+    quantity: _Quantity, name: str, hits: float, trials: float, deviation: float
+) -> dict[str, Any]:
     """Return what the samples say of a rate: `deviation` is that of its log-odds or logarithm."""
     rate = hits / trials if trials > 0 else 0.0
-    if quantity == "bearing_sigma":
+    if quantity.name in {"bearing_sigma", "range_sigma"}:
         own = math.sqrt(rate)
         least = 1.0 / math.sqrt(2.0 * trials) if trials > 0 else math.inf
         interval = partial(log_interval, max(own, 1e-6), max(deviation, least))
-    elif quantity == "clutter":
+    elif quantity.name == "clutter":
         own = rate
         worth = min(trials, 1.0 / max(own * deviation**2, 1e-12))
         interval = partial(poisson_interval, own, worth)
@@ -262,43 +509,10 @@ def _row(quantity: str, name: str, hits: float, trials: float, deviation: float)
         own = min(rate, 1.0)
         worth = min(trials, 1.0 / max(own * (1.0 - own) * deviation**2, 1e-12))
         interval = partial(wilson_interval, own, worth)
-    row: dict[str, Any] = {"quantity": quantity, "class": name, "value": own, "own": own}
+    row: dict[str, Any] = {"quantity": quantity.name, "class": name, "value": own, "own": own}
     for percent in PERCENTS:
         row[f"low_{percent}"], row[f"high_{percent}"] = interval(percent=percent)
     return row | {"samples": trials}
-
-
-def _scores(
-    evidence: Evidence, counts: Counts, values: dict[str, NDArray[np.float64]]
-) -> NDArray[np.float64]:
-    """Return the score of each sample by quantity and class, shape (samples, 4, k).
-
-    Chances are taken as log-odds, rates and deviations as logarithms.
-    """
-    size, kind = len(evidence.codes), evidence.pair_kinds
-    sample = evidence.owners[evidence.pairs.objects]
-
-    def by_sample(
-        owner: NDArray[np.int64], group: NDArray[np.int64], amount: NDArray[np.float64]
-    ) -> NDArray[np.float64]:
-        counted = np.bincount(owner * size + group, amount, evidence.samples * size)
-        return np.asarray(counted.reshape(evidence.samples, size))
-
-    chances = counts.chances
-    detected = by_sample(sample, kind, chances)
-    wrong = by_sample(sample, kind, chances * (kind != evidence.pair_labels))
-    present = by_sample(evidence.owners, evidence.kinds, np.ones(len(evidence.kinds)))
-    false = by_sample(evidence.givers, evidence.labels, counts.false)
-    squares = by_sample(sample, kind, chances * counts.squares)
-    return np.stack(
-        [
-            detected - present * values["detection"],
-            wrong - detected * values["misnamed"],
-            false - values["clutter"],
-            squares / values["bearing_sigma"] ** 2 - detected,
-        ],
-        axis=1,
-    )
 
 
 def _deviations(scores: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -13,17 +13,21 @@ from semsig_gis.core.errors import InputError
 from semsig_gis.core.geometry import cell_ids
 from semsig_gis.core.rtree import ObjectIndex
 from semsig_gis.core.taxonomy import WILDCARD
+from semsig_gis.core.view import View
 from semsig_gis.database.database import SignatureDatabase, views_in
 from semsig_gis.database.observation import RADIUS_M, SEEN, parse_view
 from semsig_gis.database.views import views_at
 from semsig_gis.likelihood.noise.fit import (
     ALL,
+    KNOTS,
+    LEAST,
     estimated_rates,
     expected_counts,
+    fades,
+    fading_at_knots,
     gather_evidence,
     model_change,
     next_model,
-    starting_model,
 )
 from semsig_gis.likelihood.noise.model import NoiseSpec
 from semsig_gis.storage.rows import read_rows, row_value
@@ -52,7 +56,8 @@ class Sample:
     """What was detected, perhaps nothing, at a known place.
 
     The place is either `xy`, in metres in the CRS of the city, or `cell_id` (see
-    `core.geometry.cell_ids`). The signature must have types, all known, and bearings.
+    `core.geometry.cell_ids`). The signature, which may be a `View`, must have types, all known, or
+    scores, and bearings; how far north is off in it counts as bearing noise.
     """
 
     signature: Signature
@@ -66,11 +71,15 @@ class Sample:
         if self.xy is not None and not np.isfinite(self.xy).all():
             msg = f"the place of a sample is {self.xy}; give two finite coordinates in metres."
             raise InputError(msg)
-        if self.signature.codes is None or self.signature.bearings is None:
+        view = View.of(self.signature)
+        if (view.codes is None and view.scores is None) or view.bearings is None:
             msg = "a sample needs the types and the bearings of its detections; give both."
             raise InputError(msg)
-        if (self.signature.codes == WILDCARD).any():
+        if (view.class_scores()[:, WILDCARD] == 1).any():
             msg = "a sample has a detection of unknown class; give its class, or leave it out."
+            raise InputError(msg)
+        if any(math.isinf(photo.north_sigma or 0.0) for photo in view.photos):
+            msg = "a sample has a photo of unknown heading; give it, or leave the sample out."
             raise InputError(msg)
 
 
@@ -134,9 +143,11 @@ class NoiseEstimate:
     """A noise model that was learnt, and how well it is known.
 
     `rates` has one row for each quantity (``detection``, ``misnamed``, ``clutter`` in false objects
-    per signature, ``bearing_sigma`` in degrees) and each class, and ``"all"`` together: ``value``
-    as in the model, ``own``, what the samples of the class alone say, with the intervals ``low_90``
-    to ``high_95``, and how many ``samples`` it rests on. `confusion` holds the expected number of
+    a full turn, ``bearing_sigma`` in degrees and, with ranges, ``range_sigma``) and each class, and
+    ``"all"`` together: ``value`` as in the model, ``own``, what the samples of the class alone say,
+    with the intervals ``low_90`` to ``high_95``, and how many ``samples`` it rests on. Where
+    detection falls with distance, it is the chance at ``distance`` metres, with rows ``fading`` for
+    the chances farther away. `confusion` holds the expected number of
     detected objects by true class (rows) and given class (columns). Nothing is in sight of the
     places of `skipped` samples. `log_likelihood` is of all detections under the model.
     """
@@ -154,9 +165,10 @@ class NoiseEstimate:
     def to_dict(self) -> dict[str, Any]:
         """Return plain values for JSON; ``confusion`` is by true class, then given class."""
         values = {field.name: getattr(self, field.name) for field in fields(self)}
+        plain = self.rates.astype(object).where(self.rates.notna(), None)
         return values | {
             "spec": self.spec.to_dict(),
-            "rates": self.rates.to_dict("records"),
+            "rates": plain.to_dict("records"),
             "confusion": self.confusion.to_dict("index"),
         }
 
@@ -225,26 +237,39 @@ def learn_noise(
         raise InputError(msg)
     views, used = _true_views(samples, city, radius, footprints)
     detected = [samples[row].signature for row in used]
-    evidence = gather_evidence(views, detected, taxonomy=city.taxonomy)
-    model = starting_model(evidence, position_sigma=position_sigma)
-    rounds, change = 0, math.inf
-    while change >= SETTLED and rounds < MOST_ROUNDS:
-        old, model = model, next_model(evidence, expected_counts(evidence, model), model)
-        change = model_change(old, model)
-        rounds += 1
+    reach = city.spec.radius if isinstance(city, SignatureDatabase) else radius
+    evidence = gather_evidence(
+        views, detected, taxonomy=city.taxonomy, radius=reach, position_sigma=position_sigma
+    )
+    model, rounds = _fitted(evidence, evidence.start, fading=False)
     counts = expected_counts(evidence, model)
-    rates = estimated_rates(evidence, counts, model)
+    fading = fades(evidence, counts)
+    if fading:
+        model, more = _fitted(evidence, model, fading=True)
+        counts, rounds = expected_counts(evidence, model), rounds + more
+    rates = estimated_rates(evidence, counts, model, fading=fading)
     return NoiseEstimate(
-        spec=_spec(evidence, rates, model, name),
+        spec=_spec(evidence, rates, model, name, radius=reach, fading=fading),
         rates=rates,
         confusion=pd.DataFrame(counts.named, index=evidence.names, columns=evidence.names),
         samples=len(used),
-        objects=len(evidence.kinds),
-        detections=len(evidence.labels),
+        objects=len(views.codes),
+        detections=len(evidence.seen.bearings),
         skipped=len(samples) - len(used),
         rounds=rounds,
         log_likelihood=counts.log_likelihood,
     )
+
+
+def _fitted(evidence: Evidence, model: NoiseTable, *, fading: bool) -> tuple[NoiseTable, int]:
+    """Return the model that rounds of the fit settle on, and how many there were."""
+    rounds, change = 0, math.inf
+    while change >= SETTLED and rounds < MOST_ROUNDS:
+        counts = expected_counts(evidence, model)
+        old, model = model, next_model(evidence, counts, model, fading=fading)
+        change = model_change(old, model)
+        rounds += 1
+    return model, rounds
 
 
 def _true_views(
@@ -253,25 +278,31 @@ def _true_views(
     radius: float,
     footprints: Footprints | None,
 ) -> tuple[Views, list[int]]:
-    """Return what there was to see in the samples that can be used, and which these are."""
+    """Return what there was to see in the photos of samples that can be used, and which these are.
+
+    A sample of several photos sees all there is in each of them.
+    """
     if not samples:
         msg = "there are no samples to learn from; give detections with their true places."
         raise InputError(msg)
+    photos = np.array([len(View.of(sample.signature).photos) for sample in samples])
     if isinstance(city, SignatureDatabase):
         true_ids = np.array([_cell_id(sample, city) for sample in samples])
         cells = np.minimum(np.searchsorted(city.cell_ids, true_ids), len(city) - 1)
         used = np.flatnonzero(city.cell_ids[cells] == true_ids)
-        views = views_in(city, cells[used])
+        views = views_in(city, np.repeat(cells[used], photos[used]))
     else:
         xy = np.array([sample.xy for sample in samples if sample.xy is not None])
         if len(xy) < len(samples):
             msg = "a sample gives its cell alone; give x and y, or a database instead of objects."
             raise InputError(msg)
         index = ObjectIndex(city.xy)
-        views = views_at(city, xy, index=index, radius=radius, footprints=footprints)
+        looks = np.repeat(xy, photos, axis=0)
+        views = views_at(city, looks, index=index, radius=radius, footprints=footprints)
         # Where nothing is seen is left out, as a cell that sees nothing is not in a database.
-        used = np.flatnonzero(views.lengths)
-        views = replace(views, offsets=np.append(0, views.offsets[used + 1]))
+        full = np.flatnonzero(views.lengths)
+        used = np.unique(np.repeat(np.arange(len(samples)), photos)[full])
+        views = replace(views, offsets=np.append(0, views.offsets[full + 1]))
     if len(used) == 0:
         msg = (
             f"none of the {len(samples)} samples lies where an object of the city is in sight; "
@@ -288,16 +319,28 @@ def _cell_id(sample: Sample, database: SignatureDatabase) -> int:
     return int(cell_ids(*database.grid.cells_at(np.array([sample.xy])))[0])
 
 
-def _spec(evidence: Evidence, rates: pd.DataFrame, model: NoiseTable, name: str) -> NoiseSpec:
-    """Return the model as a specification."""
-    overall = rates[rates["class"] == ALL].set_index("quantity")["value"].to_dict()
+def _spec(
+    evidence: Evidence,
+    rates: pd.DataFrame,
+    model: NoiseTable,
+    name: str,
+    *,
+    radius: float,
+    fading: bool,
+) -> NoiseSpec:
+    """Return the model as a specification; `radius` is the range of classes that have none."""
+    pooled = rates[rates["class"] == ALL].drop_duplicates("quantity")
+    overall = pooled.set_index("quantity")["value"].to_dict()
 
     def by_class(values: NDArray[np.float64]) -> dict[str, float]:
         return dict(zip(evidence.names, values.tolist(), strict=True))
 
     clutter = float(model.clutter.sum())
-    return NoiseSpec(
-        detection=overall["detection"],
+    trials = rates[(rates["class"] != ALL) & (rates["quantity"] == "detection")]["samples"]
+    weights = np.maximum(trials.to_numpy(), LEAST)
+    near = np.average(1.0 - model.missed[0], weights=weights)
+    spec = NoiseSpec(
+        detection=float(near) if fading else overall["detection"],
         detection_by_class=by_class(1.0 - model.missed[0]),
         misnamed=overall["misnamed"],
         confusion={
@@ -311,3 +354,16 @@ def _spec(evidence: Evidence, rates: pd.DataFrame, model: NoiseTable, name: str)
         position_sigma=model.position_sigma,
         name=name,
     )
+    if "range_sigma" in overall:
+        errors = by_class(model.range_sigma)
+        spec = replace(spec, range_sigma=overall["range_sigma"], range_sigma_by_class=errors)
+    if fading:
+        shares = fading_at_knots(model)
+        tables = {ALL: (radius, np.average(shares, axis=0, weights=weights))}
+        tables |= dict(zip(evidence.names, zip(model.ranges, shares, strict=True), strict=True))
+        points = {
+            name: tuple(zip((KNOTS * limit).tolist(), row.tolist(), strict=True))
+            for name, (limit, row) in tables.items()
+        }
+        spec = replace(spec, fading=points)
+    return spec
