@@ -1,11 +1,11 @@
-"""`semsig build` and `semsig info`: street objects become a signature database."""
+"""`semsig build`, `info` and `clean`: street objects become a signature database."""
 
 from __future__ import annotations
 
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
@@ -20,6 +20,7 @@ from semsig_gis.cli.console import (
     known_identifiability,
     numbers,
     print_json,
+    print_rows,
     print_tables,
     progress,
     remark,
@@ -27,6 +28,11 @@ from semsig_gis.cli.console import (
     say,
 )
 from semsig_gis.core.errors import InputError
+
+if TYPE_CHECKING:
+    from semsig_gis.database.beside import Companion
+
+MB = 1e6
 
 
 @app.command()
@@ -209,6 +215,7 @@ def info(database: Database, *, as_json: AsJson = False) -> None:
     if as_json:
         print_json(_info(database))
         return
+    from semsig_gis.database.beside import companions
     from semsig_gis.database.city import open_city
     from semsig_gis.reports.database import database_tables
     from semsig_gis.reports.identifiability import identifiability_tables
@@ -219,11 +226,15 @@ def info(database: Database, *, as_json: AsJson = False) -> None:
     columns = known_identifiability(city)
     if columns is not None:
         print_tables(identifiability_tables(columns, object_counts=counts))
+    beside = companions(database)
+    if beside:
+        print_rows("Beside the database", ("File", "What", "MB"), map(_companion_row, beside))
     for line in city.licenses:
         say(line)
 
 
 def _info(path: Path) -> dict[str, Any]:
+    from semsig_gis.database.beside import companions
     from semsig_gis.database.city import open_city
     from semsig_gis.database.properties import database_summary
 
@@ -233,4 +244,46 @@ def _info(path: Path) -> dict[str, Any]:
     columns = known_identifiability(city)
     if columns is not None:
         summary["identifiability"] = columns.summary(object_counts=counts)
+    summary["beside"] = [one.to_dict() for one in companions(path)]
     return summary
+
+
+def _companion_row(one: Companion) -> tuple[str, str, str]:
+    return one.path.name, one.what, f"{one.bytes / MB:,.1f}"
+
+
+@app.command()
+def clean(
+    database: Database,
+    *,
+    objects: Annotated[
+        bool,
+        typer.Option(
+            "--objects",
+            help="Remove the street objects, too, which updates and refined places need.",
+        ),
+    ] = False,
+    dry_run: Annotated[
+        bool, typer.Option("--dry-run", help="Tell what would be removed, and remove nothing.")
+    ] = False,
+    as_json: AsJson = False,
+) -> None:
+    """Remove what lies beside a database and nothing reads any more.
+
+    That is what older versions and runs that were killed left; the database stays as it is.
+    """
+    from semsig_gis.database.beside import remove_companions
+
+    removed = remove_companions(database, objects=objects, dry_run=dry_run)
+    total = sum(one.bytes for one in removed)
+    if as_json:
+        print_json(
+            {"dry_run": dry_run, "bytes": total, "removed": [one.to_dict() for one in removed]}
+        )
+        return
+    if not removed:
+        say(f"There is nothing to remove beside {database}.")
+        return
+    title = "Would be removed" if dry_run else "Removed"
+    print_rows(title, ("File", "What", "MB"), map(_companion_row, removed))
+    say(f"{total / MB:,.1f} MB in all.")

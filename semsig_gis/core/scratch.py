@@ -57,17 +57,40 @@ def remove_abandoned(parent: Path) -> None:
     for folder in folders:
         with contextlib.suppress(OSError):
             try:
-                owner = os.open(folder / OWNER, os.O_RDWR)
+                owner = _freed(folder)
             except FileNotFoundError:
                 folder.rmdir()  # if it is empty
                 continue
-            if not locked(owner, wait=False):
-                os.close(owner)
+            if owner is None:
                 continue
             for kept in (folder / ASIDE).glob("*"):
                 if not os.path.lexists(parent / kept.name):
                     kept.rename(parent / kept.name)
             _remove(folder, owner)
+
+
+def is_abandoned(folder: Path) -> bool:
+    """Tell whether a hidden folder is one of a process of this machine that was killed."""
+    if not folder.name.startswith(MACHINE):
+        return False
+    try:
+        owner = _freed(folder)
+    except FileNotFoundError:
+        return True
+    except OSError:
+        return False
+    if owner is not None:
+        os.close(owner)
+    return owner is not None
+
+
+def _freed(folder: Path) -> int | None:
+    """Return the open, locked file that says whose a folder is; None where its process holds it."""
+    owner = os.open(folder / OWNER, os.O_RDWR)
+    if locked(owner, wait=False):
+        return owner
+    os.close(owner)
+    return None
 
 
 def locked(file: int, *, wait: bool) -> bool:

@@ -262,6 +262,11 @@ def store_path(database: str | Path) -> Path:
     return file.with_suffix(STORE_SUFFIX)
 
 
+def waiting_store(database: str | Path) -> Path:
+    """Return where a new object store waits until its database is in place."""
+    return _waiting(store_path(database))
+
+
 def built_digest(path: str | Path) -> str:
     """Return the SHA-256 digest that a database file had before columns were put into it.
 

@@ -304,6 +304,24 @@ def test_a_query_is_answered_without_what_makes_tables_and_maps(options: str) ->
     assert (done.stdout.splitlines()[-1], done.stderr) == ("[]", "")
 
 
+def test_what_lies_beside_a_database_is_told_and_removed(city: Path, done: Done) -> None:
+    old = city / "city.parquet.generic-8d47.likelihood"
+    old.write_bytes(b"1" * 300_000)
+    assert "likelihood index of an older version" in done("info city.parquet")
+    beside = json.loads(done("info city.parquet --json"))["beside"]
+    assert [(one["what"], one["needed"]) for one in beside] == [
+        ("street objects", True),
+        ("likelihood index of an older version", False),
+    ]
+    assert "0.3 MB in all" in done("clean city.parquet --dry-run")
+    told = json.loads(done("clean city.parquet --json"))
+    assert (told["dry_run"], told["bytes"], told["removed"]) == (False, 300_000, beside[1:])
+    assert not old.exists()
+    assert "nothing to remove beside city.parquet" in done("clean city.parquet")
+    assert "street objects" in done("clean city.parquet --objects")
+    assert not (city / "city.objects").exists()
+
+
 def test_the_console_script_is_installed() -> None:
     script = shutil.which("semsig", path=Path(sys.executable).parent)
     if script is None:
