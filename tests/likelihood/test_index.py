@@ -69,7 +69,12 @@ def test_scores_are_the_formula(
     sectors: list[tuple[tuple[float, float], ...]],
 ) -> None:
     database = random_database(seed, cells=8)
-    noise = replace(noise, fading=fading or {}, position_sigma=position_sigma)
+    noise = replace(
+        noise,
+        fading=fading or {},
+        position_sigma=position_sigma,
+        bearing_sigma=max(noise.bearing_sigma, 3.0),  # against steps of 0.7 degrees
+    )
     photos = [Photo(sectors=some) for some in sectors]
     view = random_view(database, np.random.default_rng(seed), size=3, photos=photos)
     scores = build_index(database, noise).scores(view)
