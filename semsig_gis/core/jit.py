@@ -27,6 +27,9 @@ if LINEAR_ALGEBRA not in sys.modules:
     finally:
         del sys.modules[LINEAR_ALGEBRA]
 
+# Sums of neighbouring numbers in one go.
+numba.config.SLP_VECTORIZE = 1  # type: ignore[attr-defined]
+
 if TYPE_CHECKING:
     from collections.abc import Callable
 

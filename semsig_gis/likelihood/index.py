@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from semsig_gis.core.geometry import FULL_TURN
-from semsig_gis.core.signature import DISTANCE_UNITS
+from semsig_gis.core.signature import BEARING_UNITS, DISTANCE_UNITS
 from semsig_gis.core.threads import share_rows
 from semsig_gis.core.view import View, check_north
 from semsig_gis.likelihood.noise.table import database_tables, mean_table
@@ -43,6 +43,7 @@ TURN_BINS = 8
 VERSION = 3  # raised whenever the same database and noise give other likelihoods
 LEAST_PRIOR = 1e-7  # turns that are less likely than this, against the likeliest, are left out
 LEAST_DENSITY = 1e-12
+LEAST_PART = 1e-3  # of the density of false detections, that an object must add to count
 LAPS = np.arange(-3, 4)  # 180 degrees of deviation reach three turns
 
 
@@ -103,6 +104,14 @@ class LikelihoodIndex:
     def _levels(self) -> _Levels:
         return _Levels.of(self.table)
 
+    @cached_property
+    def _entries(self) -> tuple[NDArray[np.uint8], NDArray[np.uint16]]:
+        """The class row of every entry of the database, and its level of distance and bearing."""
+        database, table = self.database, self.table
+        bins = database.bearing_units.astype(np.uint32) * np.uint32(BINS) // BEARING_UNITS
+        places = (self._levels.level_of * BINS).astype(np.uint16)[database.distance_units]
+        return table.row_of.astype(np.uint8)[database.codes], places + bins.astype(np.uint16)
+
     def scores(self, query: Signature, *, north_sigma: float = 0.0) -> CellScores:
         """Return the log-likelihood of a view in every cell, and the likeliest turns of its photos.
 
@@ -138,23 +147,23 @@ class LikelihoodIndex:
         turns, log_turns = _turns(north_sigma)
         scores = np.empty(len(database), np.float32)
         best = np.empty(len(database), np.int16)
+        kinds, places = self._entries
+        rows = levels.rows(asked, table)
+        named = levels.named(asked, table, density)
         work = partial(
             scan,
             offsets=database.offsets,
-            codes=database.codes,
-            bearing_units=database.bearing_units,
-            distance_units=database.distance_units,
-            row_of=table.row_of,
+            kinds=kinds,
+            places=places,
             group_of=levels.group_of,
-            level_of=levels.level_of,
-            rows=levels.rows(asked, table),
+            rows=rows,
+            near=levels.near(rows, named),
             masses=levels.masses(asked),
             width=asked.width,
-            named=levels.named(asked, table, density),
+            named=named,
             disc=levels.padded(asked.disc / FULL_TURN),
-            detected=levels.detected,
-            seen=table.seen.astype(np.float32),
-            left=table.left.astype(np.float32),
+            chances=levels.chances,
+            leaving=levels.leaving,
             base=float(np.log(density).sum() - table.clutter.sum() * asked.width),
             turns=turns,
             log_turns=log_turns,
@@ -208,7 +217,8 @@ class _Levels:
 
     `group_of` is by class row, `level_of` by distance unit; `sigma`, shape (groups, levels), is the
     deviation of bearings, `range_sigma` (groups,) and `blur` (levels,) that of logarithms of ranges
-    by the detector and by the place, and `fine` the density of a deviation.
+    by the detector and by the place, and `fine` the density of a deviation. By length of a
+    signature, class and level, `chances` are of detection, and of having left the range, `leaving`.
     """
 
     group_of: NDArray[np.int64]
@@ -218,7 +228,8 @@ class _Levels:
     distances: NDArray[np.float64]
     blur: NDArray[np.float64]
     fine: NDArray[np.float32]
-    detected: NDArray[np.float32]
+    chances: NDArray[np.float32]
+    leaving: NDArray[np.float32]
 
     @classmethod
     def of(cls, table: NoiseTable) -> _Levels:
@@ -241,6 +252,12 @@ class _Levels:
         # Without draws that depend on the length of a signature, one row does for all.
         detected = table.detected
         same = (detected == detected[0]).all() and (table.misnamed == table.misnamed[0]).all()
+        detected = detected[:1] if same else detected
+
+        def by_level(shares: NDArray[np.float64]) -> NDArray[np.float32]:
+            each = np.stack([np.bincount(level_of, row, LEVELS) / count for row in shares])
+            return np.asarray(detected[:, :, None] * each, dtype=np.float32)
+
         return cls(
             group_of=group_of.reshape(-1),
             level_of=level_of,
@@ -249,7 +266,8 @@ class _Levels:
             distances=distances,
             blur=table.position_sigma / distances,
             fine=fine.astype(np.float32),
-            detected=(detected[:1] if same else detected).astype(np.float32),
+            chances=by_level(table.seen),
+            leaving=by_level(table.left),
         )
 
     def padded(self, values: NDArray[np.float64]) -> NDArray[np.float32]:
@@ -283,6 +301,12 @@ class _Levels:
         profile_rows(self.fine, shifts, near.astype(np.float32), rows)
         return rows
 
+    def near(self, rows: NDArray[np.float32], named: NDArray[np.float32]) -> NDArray[np.bool_]:
+        """Return which rows may add anything to speak of to the density of any detection."""
+        most = named.max(axis=(0, 1)) * (self.chances.max() / (1.0 - self.chances.max()))
+        blocks, _, _, _, lanes = rows.shape
+        return np.asarray((rows * most.reshape(blocks, 1, 1, 1, lanes)).max(axis=-1) > LEAST_PART)
+
     def masses(self, asked: PhotoTable) -> NDArray[np.float32]:
         """Return the chance that an object is in the sectors, by group, level and bearing."""
         from semsig_gis.likelihood.kernels import mass_rows  # noqa: PLC0415
@@ -297,7 +321,7 @@ class _Levels:
         self, asked: PhotoTable, table: NoiseTable, density: NDArray[np.float64]
     ) -> NDArray[np.float32]:
         """Return the chance of what is said of each detection over that of a false one."""
-        lengths = len(self.detected)
+        lengths = len(self.chances)
         return self.padded(asked.named(table)[:lengths] / density)
 
 

@@ -23,8 +23,6 @@ _PAIR_ROUNDS, _PAIR_SETTLED = 60, 1e-5
 
 LANES = 8
 """Detections that are added up together."""
-UNITS = 7200  # bearing units of a turn
-FARS = 256  # distance units
 _BINS = 1024  # scores are counted in so many bins to find the best of them
 _BINS_A_NAT = np.float32(16.0)
 
@@ -314,20 +312,17 @@ def mass_rows(
 def scan(  # noqa: C901, PLR0912, PLR0915, PLR0917
     part: NDArray[np.int64],
     offsets: NDArray[np.int64],
-    codes: NDArray[np.uint8],
-    bearing_units: NDArray[np.uint16],
-    distance_units: NDArray[np.uint8],
-    row_of: NDArray[np.int64],
+    kinds: NDArray[np.uint8],
+    places: NDArray[np.uint16],
     group_of: NDArray[np.int64],
-    level_of: NDArray[np.int64],
     rows: NDArray[np.float32],
+    near: NDArray[np.bool_],
     masses: NDArray[np.float32],
     width: float,
     named: NDArray[np.float32],
     disc: NDArray[np.float32],
-    detected: NDArray[np.float32],
-    seen: NDArray[np.float32],
-    left: NDArray[np.float32],
+    chances: NDArray[np.float32],
+    leaving: NDArray[np.float32],
     base: float,
     turns: NDArray[np.int64],
     log_turns: NDArray[np.float64],
@@ -337,96 +332,98 @@ def scan(  # noqa: C901, PLR0912, PLR0915, PLR0917
     """Fill `scores` of the cells ``part[0]`` to ``part[1] - 1`` by the objects of each.
 
     The sum over the detections of a photo of the logarithm of a sum over the objects, and over its
-    `turns`, in bins, with `log_turns`; `best` gets the likeliest turn. By class row of a code
-    (`row_of`), group of classes of like error (`group_of`) and level of a distance unit
-    (`level_of`), `rows` are those of `profile_rows` and `masses` those of `mass_rows`, without a
-    level where all round was seen. `named`, shape (longest + 1, k, blocks * LANES), is the chance
-    of a name over the density of such false detections, `disc` the factor of their range, and
-    `detected`, `seen` and `left` are as in `align`; `base` is what all cells get.
+    `turns`, in bins, with `log_turns`; `best` gets the likeliest turn. An object has a class row in
+    `kinds` and a level of its distance and a bin of its bearing in `places`. By the group of its
+    class (`group_of`) and its place, `rows` are those of `profile_rows`, of which only those count
+    that are `near`, and `masses` those of `mass_rows`, without a level where all round was seen.
+    `named`, shape (longest + 1, k, blocks * LANES), is the chance of a name over the density of
+    such false detections, `disc` the factor of their range. By length, class and level, `chances`
+    are of detection, and of having left the range, `leaving`. `base` is what all cells get.
     """
-    blocks, levels, bins = rows.shape[0], rows.shape[2], rows.shape[3]
-    longest, classes = len(detected) - 1, detected.shape[1]
+    blocks, groups, levels, bins = rows.shape[0], rows.shape[1], rows.shape[2], rows.shape[3]
+    longest, classes = len(chances) - 1, chances.shape[1]
     # Flat arrays and unsigned numbers: else each look-up is checked and worked out anew.
-    block_size = rows.shape[1] * levels * bins
-    flat_rows, flat_named = rows.ravel(), named.ravel()
-    flat_detected, flat_seen, flat_left = detected.ravel(), seen.ravel(), left.ravel()
-    flat_masses = masses.ravel()
-    partial, moving = len(flat_masses) > 0, left.max() > 0.0
+    one_u, lanes = np.uint64(1), np.uint64(LANES)
+    step, width_u = np.uint64(levels * bins), np.uint64(blocks * LANES)
+    flat_rows, flat_near, flat_named = rows.ravel(), near.ravel(), named.ravel()
+    flat_chances, flat_leaving, flat_masses = chances.ravel(), leaving.ravel(), masses.ravel()
+    partial, moving = len(flat_masses) > 0, leaving.max() > 0.0
     ways = len(turns)
     totals = np.empty(ways)
     most = 0
     for cell in range(part[0], part[1]):
         most = max(most, offsets[cell + 1] - offsets[cell])
-    names = np.empty(most, np.uint32)
-    starts = np.empty(most, np.uint32)
-    places = np.empty(most, np.uint32)
-    chances = np.empty(most, np.float32)
+    names = np.empty(most, np.uint64)
+    starts = np.empty(most, np.uint64)
+    angles = np.empty(most, np.uint64)
+    sure = np.empty(most, np.float32)
     odds = np.empty(most, np.float32)
     floors = np.empty(blocks * LANES, np.float32)
+    left = np.zeros(classes, np.float32)
     one_f = np.float32(1.0)
-    around = np.uint32(bins - 1)
+    shift, around = np.uint64(int(math.log2(bins) + 0.5)), np.uint64(bins - 1)
     for cell in range(part[0], part[1]):
         low = offsets[cell]
         count = offsets[cell + 1] - low
-        length = min(count, longest)
-        gone = 0.0
+        length = np.uint64(min(count, longest) * classes)
+        gone = np.float32(0.0)
         whole = 1.0
-        if moving:
-            floors[:] = one_f
         for one in range(count):
-            kind, far = row_of[codes[low + one]], distance_units[low + one]
-            names[one] = length * classes + kind
-            starts[one] = (group_of[kind] * levels + level_of[far]) * bins
-            bearing = np.uint32(bearing_units[low + one])
-            places[one] = bearing * np.uint32(bins) // np.uint32(UNITS)
-            sure = flat_detected[names[one]]
-            chance = sure * flat_seen[kind * FARS + far]
-            chances[one] = chance
+            kind, place = np.uint64(kinds[low + one]), np.uint64(places[low + one])
+            name = length + kind
+            at = name * np.uint64(levels) + (place >> shift)
+            chance = flat_chances[at]
+            names[one] = name * width_u
+            starts[one] = np.uint64(group_of[kind]) * step + (place & ~around)
+            angles[one] = place & around
+            sure[one] = chance
             odds[one] = chance / (one_f - chance)
             whole *= one_f - chance
             if moving:
-                leaving = sure * flat_left[kind * FARS + far]
-                if leaving > 0.0:
-                    gone += leaving
-                    name = np.uint64(names[one]) * np.uint64(len(floors))
-                    for two in range(len(floors)):
-                        floors[two] += leaving * flat_named[name + np.uint64(two)] * disc[two]
+                left[kind] += flat_leaving[at]
+        floors[:] = one_f
+        if moving:
+            for row in range(classes):
+                if left[row] > 0.0:
+                    gone += left[row]
+                    name = (length + np.uint64(row)) * width_u
+                    for two in range(blocks * LANES):
+                        floors[two] += left[row] * flat_named[name + np.uint64(two)] * disc[two]
+                    left[row] = 0.0
         peak = -np.inf
         for way in range(ways):
-            turn = np.uint32(turns[way] & (bins - 1))
+            turn = np.uint64(turns[way] & (bins - 1))
             total = base - gone * width + log_turns[way]
             product = whole
             if partial:
                 product = 1.0
                 for one in range(count):
-                    place = (places[one] - turn) & around
-                    missed = one_f - chances[one] * flat_masses[starts[one] + place]
-                    odds[one] = chances[one] / missed
+                    place = starts[one] + ((angles[one] - turn) & around)
+                    missed = one_f - sure[one] * flat_masses[place]
+                    odds[one] = sure[one] / missed
                     product *= missed
             for block in range(blocks):
-                a0 = a1 = a2 = a3 = a4 = a5 = a6 = a7 = one_f
-                first = block * LANES
-                if moving:
-                    a0, a1 = floors[first], floors[first + 1]
-                    a2, a3 = floors[first + 2], floors[first + 3]
-                    a4, a5 = floors[first + 4], floors[first + 5]
-                    a6, a7 = floors[first + 6], floors[first + 7]
-                above = np.uint64(block) * np.uint64(block_size)
+                first = np.uint64(block * LANES)
+                a0, a1 = floors[first], floors[first + one_u]
+                a2, a3 = floors[first + np.uint64(2)], floors[first + np.uint64(3)]
+                a4, a5 = floors[first + np.uint64(4)], floors[first + np.uint64(5)]
+                a6, a7 = floors[first + np.uint64(6)], floors[first + np.uint64(7)]
+                above = np.uint64(block * groups) * step
                 for one in range(count):
-                    place = (places[one] - turn) & around
-                    row = (above + np.uint64(starts[one] + place)) * np.uint64(LANES)
-                    name = np.uint64(names[one]) * np.uint64(blocks * LANES) + np.uint64(first)
+                    place = above + starts[one] + ((angles[one] - turn) & around)
+                    if not flat_near[place]:
+                        continue
+                    at, name = place * lanes, names[one] + first
                     factor = odds[one]
-                    a0 += factor * flat_rows[row] * flat_named[name]
-                    a1 += factor * flat_rows[row + np.uint64(1)] * flat_named[name + np.uint64(1)]
-                    a2 += factor * flat_rows[row + np.uint64(2)] * flat_named[name + np.uint64(2)]
-                    a3 += factor * flat_rows[row + np.uint64(3)] * flat_named[name + np.uint64(3)]
-                    a4 += factor * flat_rows[row + np.uint64(4)] * flat_named[name + np.uint64(4)]
-                    a5 += factor * flat_rows[row + np.uint64(5)] * flat_named[name + np.uint64(5)]
-                    a6 += factor * flat_rows[row + np.uint64(6)] * flat_named[name + np.uint64(6)]
-                    a7 += factor * flat_rows[row + np.uint64(7)] * flat_named[name + np.uint64(7)]
-                product *= float(a0) * float(a1) * float(a2) * float(a3)
-                product *= float(a4) * float(a5) * float(a6) * float(a7)
+                    a0 += factor * flat_rows[at] * flat_named[name]
+                    a1 += factor * flat_rows[at + one_u] * flat_named[name + one_u]
+                    a2 += factor * flat_rows[at + np.uint64(2)] * flat_named[name + np.uint64(2)]
+                    a3 += factor * flat_rows[at + np.uint64(3)] * flat_named[name + np.uint64(3)]
+                    a4 += factor * flat_rows[at + np.uint64(4)] * flat_named[name + np.uint64(4)]
+                    a5 += factor * flat_rows[at + np.uint64(5)] * flat_named[name + np.uint64(5)]
+                    a6 += factor * flat_rows[at + np.uint64(6)] * flat_named[name + np.uint64(6)]
+                    a7 += factor * flat_rows[at + np.uint64(7)] * flat_named[name + np.uint64(7)]
+                product *= float(a0 * a1) * float(a2 * a3) * float(a4 * a5) * float(a6 * a7)
                 if product > _LARGE or product < 1.0 / _LARGE:
                     total += math.log(product)
                     product = 1.0
