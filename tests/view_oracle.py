@@ -43,7 +43,10 @@ LAPS = range(-4, 5)
 
 @dataclass(frozen=True, kw_only=True)
 class Thing:
-    """An object in sight; `names` is the chance of each name if it is detected, by class row."""
+    """An object in sight; `names` is the chance of each name if it is detected, by class row.
+
+    Detections more than `tails` deviations away are none of it: engines leave such pairs out.
+    """
 
     chance: float
     names: Sequence[float]
@@ -53,6 +56,7 @@ class Thing:
     range_sigma: float
     distance_sigma: float = 0.0
     leaving: float = 0.0
+    tails: float = math.inf
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -114,6 +118,9 @@ def false_density(seen: Seen, scene: Scene) -> float:
 
 def hit_density(seen: Seen, thing: Thing) -> float:
     """Return the density of an object being detected so: hit_ij."""
+    away = abs((seen.bearing - thing.bearing + 180.0) % 360.0 - 180.0)
+    if away > min(thing.tails * thing.bearing_sigma, 180.0):
+        return 0.0
     return (
         thing.chance
         * float(np.dot(seen.weights, thing.names))
@@ -201,7 +208,14 @@ def in_range(distance: float, limit: float, sigma: float) -> float:
     return 0.5 * math.erfc((distance - limit) / (sigma * math.sqrt(2.0))) if sigma else 1.0
 
 
-def scene_of(database: SignatureDatabase, cell: int, spec: NoiseSpec, table: NoiseTable) -> Scene:
+def scene_of(
+    database: SignatureDatabase,
+    cell: int,
+    spec: NoiseSpec,
+    table: NoiseTable,
+    *,
+    tails: float = math.inf,
+) -> Scene:
     """Return what a cell sees by a noise model."""
     limits = database.taxonomy.ranges(database.spec.radius)
     views = views_in(database, np.array([cell]))
@@ -225,6 +239,7 @@ def scene_of(database: SignatureDatabase, cell: int, spec: NoiseSpec, table: Noi
                 range_sigma=spec.range_sigma_by_class.get(name, spec.range_sigma),
                 distance_sigma=spec.position_sigma,
                 leaving=seen * (1.0 - inside),
+                tails=tails,
             )
         )
     return Scene(things=things, clutter=table.clutter.tolist(), reach=database.reach)
@@ -257,6 +272,7 @@ def cell_loglik(
     *,
     headings: Iterable[Sequence[tuple[float, float]]] | None = None,
     form: Callable[[Scene, Sequence[Seen], Photo], float] = exact_loglik,
+    tails: float = math.inf,
 ) -> float:
     """Return the log-likelihood of a view in a cell; `form` is `exact_loglik` or `set_loglik`.
 
@@ -268,7 +284,7 @@ def cell_loglik(
     codes = database.present_codes.tolist()
     each = []
     for spec, table, chance in zip(noise.specs, *database_tables(database, noise), strict=True):
-        scene = scene_of(database, cell, spec, table)
+        scene = scene_of(database, cell, spec, table, tails=tails)
         each.append(math.log(chance) + turned_loglik(scene, view, codes, turns, form))
     return float(np.logaddexp.reduce(each))
 
