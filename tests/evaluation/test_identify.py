@@ -29,7 +29,7 @@ from semsig_gis.evaluation.identify import result as identifiability_file
 from semsig_gis.evaluation.identify.check import check_identifiability
 from semsig_gis.evaluation.identify.columns import symbol_columns
 from semsig_gis.evaluation.identify.identify import identify
-from semsig_gis.evaluation.identify.lookalikes import compare_without_classes, find_lookalikes
+from semsig_gis.evaluation.identify.lookalikes import find_lookalikes
 from semsig_gis.evaluation.identify.result import (
     open_identifiability,
     save_identifiability,
@@ -307,7 +307,6 @@ ELSEWHERE = build_index(random_database(6, cells=90), TOLD.noise)
 ask = functools.partial(identify, INDEX)
 check = functools.partial(check_identifiability, TOLD, index=INDEX)
 alike = functools.partial(find_lookalikes, COLUMNS)
-without = functools.partial(compare_without_classes, COLUMNS)
 
 
 @pytest.mark.parametrize(
@@ -327,9 +326,6 @@ without = functools.partial(compare_without_classes, COLUMNS)
         (alike, {"temperature": 0.0}, ["temperature of 0.0", "above 0"]),
         (alike, {"temperature": math.nan}, ["temperature", "above 0"]),
         (alike, {"temperature": 0.4, "radius": -1.0}, ["radius is -1.0", "from 0"]),
-        (without, {"temperature": 0.0}, ["temperature of 0.0", "above 0"]),
-        (without, {"temperature": math.nan}, ["temperature", "above 0"]),
-        (without, {"temperature": 0.4, "radius": -1.0}, ["radius is -1.0", "from 0"]),
     ],
 )
 def test_what_is_refused(

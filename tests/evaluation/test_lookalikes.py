@@ -16,7 +16,7 @@ from scipy.special import ndtr
 from semsig_gis.core.signature import Signature
 from semsig_gis.evaluation.identify import lookalikes
 from semsig_gis.evaluation.identify.columns import symbol_columns
-from semsig_gis.evaluation.identify.lookalikes import compare_without_classes, find_lookalikes
+from semsig_gis.evaluation.identify.lookalikes import find_lookalikes
 from semsig_gis.evaluation.identify.trials import (
     draw_trials,
     leave_class_out,
@@ -36,11 +36,16 @@ if TYPE_CHECKING:
 COLUMNS = symbol_columns(build_index(random_database(5, cells=300), named_noise("medium")))
 
 
+def bytes_of(columns: SymbolColumns) -> np.ndarray:
+    """Return what each symbol adds to each cell, in steps."""
+    return columns.of(np.arange(len(columns.database)))
+
+
 def ratios(columns: SymbolColumns, cell: int, temperature: float) -> np.ndarray:
     """Return the tempered ratios of all cells, from the columns of what the cell sees."""
     seen = slice(*columns.database.offsets[cell : cell + 2].tolist())
-    sums = columns.values[columns.symbols[seen]].sum(axis=0, dtype=np.int64)
-    loglik = columns.constants + columns.step * sums
+    sums = bytes_of(columns)[columns.symbols[seen]].sum(axis=0, dtype=np.int64)
+    loglik = columns.constants[0] + columns.step * sums
     octaves = temperature * (loglik - loglik[cell]) / math.log(2.0)
     return np.asarray(2.0 ** np.clip(octaves, -100.0, 100.0))
 
@@ -114,12 +119,8 @@ def test_threads_and_a_choice_of_cells_change_nothing() -> None:
         COLUMNS, temperature=0.4, cells=two, progress=lambda *step: seen.append(step)
     )
     assert seen == [(2, 2)]
-    for name in ("near", "far", "cells", "sums"):
+    for name in ("near", "far", "cells", "sums", "rise"):
         assert getattr(some, name).tolist() == getattr(whole, name)[two].tolist()
-    rise = compare_without_classes(COLUMNS, temperature=0.4, threads=3)
-    assert (
-        compare_without_classes(COLUMNS, temperature=0.4, cells=two).tolist() == rise[two].tolist()
-    )
 
 
 @settings(max_examples=15, deadline=None)
@@ -127,11 +128,13 @@ def test_threads_and_a_choice_of_cells_change_nothing() -> None:
 def test_without_a_class(noise: NoiseSpec, seed: int, radius: float) -> None:
     database = random_database(seed, cells=60)
     index = symbol_columns(build_index(database, noise))
-    rise = compare_without_classes(index, temperature=0.4, radius=radius)
-    table, flat = index.table, index.values
+    rise = find_lookalikes(index, temperature=0.4, radius=radius).rise
+    table, flat = index.table, bytes_of(index)
     owner = np.repeat(np.arange(len(database)), database.lengths)
     length = np.minimum(database.lengths, len(table.missed) - 1)[owner]
-    missed = np.log(table.missed)[length, table.row_of[database.codes]]
+    kinds, far = table.row_of[database.codes], database.distance_units
+    sure = table.detected[length, kinds]
+    missed = np.log1p(-sure * table.seen[kinds, far]) - sure * table.left[kinds, far]
     for cell in range(0, len(database), 13):
         far = apart(index, cell) > radius
         sums = []
@@ -141,18 +144,30 @@ def test_without_a_class(noise: NoiseSpec, seed: int, radius: float) -> None:
             symbols = kinds * 72 + database.bearing_units[seen] // 100
             scores = index.step * flat[symbols[kinds != left_out]].astype(float).sum(axis=0)
             gone = table.row_of[database.codes] == left_out
-            scores += index.constants - np.bincount(owner[gone], missed[gone], len(database))
+            scores += index.constants[0] - np.bincount(owner[gone], missed[gone], len(database))
             sums.append(np.exp(0.4 * (scores - scores[cell]))[far].sum())
         if sums[0] > 1e-3:
             expected = np.log(np.array(sums[1:]) / sums[0])
             assert np.allclose(rise[cell], expected, atol=2e-2)
 
 
-def test_a_sample_of_the_cells_will_do(monkeypatch: pytest.MonkeyPatch) -> None:
-    whole = compare_without_classes(COLUMNS, temperature=0.3)
+@pytest.mark.parametrize("temperature", [0.2, 0.6])
+def test_a_sample_stands_for_cells_that_are_not_likely(
+    temperature: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    columns = symbol_columns(build_index(random_database(7, cells=400), named_noise("medium")))
+    some = np.arange(0, 400, 5)
+    whole = find_lookalikes(columns, temperature=temperature, cells=some)
     monkeypatch.setattr(lookalikes, "SAMPLE", 200)
-    some = compare_without_classes(COLUMNS, temperature=0.3)
-    assert 0.0 < np.abs(whole - some).mean() < 0.2
+    monkeypatch.setattr(lookalikes, "LIKELY", 100)
+    found = find_lookalikes(columns, temperature=temperature, cells=some)
+    # What is likely is not drawn: the lookalikes are the same, and what is near them.
+    for name in ("near", "cells", "sums"):
+        assert getattr(found, name).tolist() == getattr(whole, name).tolist()
+    off = np.log(found.far / whole.far)
+    assert 0.0 < np.abs(off).max() < 0.3
+    assert abs(off.mean()) < 0.03
+    assert np.abs(found.rise - whole.rise).mean() < 0.1
 
 
 def test_a_signature_longer_than_the_sums_of_bytes() -> None:
@@ -162,7 +177,7 @@ def test_a_signature_longer_than_the_sums_of_bytes() -> None:
     found = find_lookalikes(index, temperature=0.2, radius=0.0)
     for cell in range(6):
         powers = ratios(index, cell, 0.2)
-        assert math.isclose(found.near[cell] + found.far[cell], powers.sum(), rel_tol=2e-3)
+        assert math.isclose(found.near[cell] + found.far[cell], powers.sum(), rel_tol=5e-3)
 
 
 @pytest.mark.parametrize("noise", ["light", "generic"])
@@ -285,17 +300,21 @@ def test_a_column_is_what_an_object_in_its_step_adds(
     database = random_database(seed, cells=cells)
     assume(not noise.confusion or np.isin(database.present_codes, [1, 3]).any())
     columns = symbol_columns(build_index(database, noise), threads=2)
+    values = bytes_of(columns)
     table, kinds = columns.table, columns.kinds
-    symbol = int(np.random.default_rng(seed).integers(len(columns.values)))
+    symbol = int(np.random.default_rng(seed).integers(len(values)))
     name, place = divmod(symbol, 72)
     sigma = table.sigmas[kinds, database.distance_units]
     low = 5.0 * place - (database.bearings + 0.025) + 360.0 * np.arange(-3, 4)[:, None]
     inside = (ndtr((low + 5.0) / sigma) - ndtr(low / sigma)).sum(axis=0) / 5.0
     owner = np.repeat(np.arange(cells), database.lengths)
     length = np.minimum(database.lengths, len(table.missed) - 1)[owner]
-    heard = table.odds[length, kinds] * table.named[length, kinds, name] * inside
+    sure, far = table.detected[length, kinds], database.distance_units
+    chance = sure * table.seen[kinds, far]
+    heard = chance / (1.0 - chance) * inside + sure * table.left[kinds, far] / 360.0
+    heard *= table.named[length, kinds, name]
     expected = np.log1p(np.bincount(owner, heard, cells) / table.density[name])
     # A byte holds no more than 255 steps; deviations come in levels where they differ.
     expected = np.minimum(expected, 255 * columns.step)
     slack = 0.5 * columns.step + 2.0**-9 + (0.2 if table.position_sigma else 1e-3)
-    assert np.abs(expected - columns.step * columns.values[symbol]).max() < slack
+    assert np.abs(expected - columns.step * values[symbol]).max() < slack

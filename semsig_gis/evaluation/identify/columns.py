@@ -1,8 +1,9 @@
 """What each thing that a detector may tell adds to the log-likelihood of every cell.
 
-A column holds, for a class t and a step of bearings, ``log(1 + sum_i o_i C(i, t) N / lambda(t))``:
-what a detection there adds, less ``log(lambda(t))``, which is the same for all cells. N is the mean
-density over the step.
+A column holds, for a class t and a step of bearings, ``log(1 + sum_i (o_i N + g_i / 360) C(i, t) /
+lambda(t))``: what a detection there adds, less ``log(lambda(t))``, which is the same for all cells.
+Of object i, o are the odds of detection, N is the mean density over the step, and g the chance that
+another of its class is detected in its stead, as it is out of range (`likelihood.photo`).
 """
 
 from __future__ import annotations
@@ -10,10 +11,12 @@ from __future__ import annotations
 import math
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from semsig_gis.core.geometry import FULL_TURN
 from semsig_gis.core.signature import BEARING_UNITS
 
 if TYPE_CHECKING:
@@ -34,54 +37,74 @@ LINES_A_TASK = 64
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class SymbolColumns:
-    """What each symbol, a class in a step of bearings, adds to the score of each cell.
+    """What each symbol, a class in a step of bearings, adds to the score of each of n cells.
 
-    `values`, shape (k * 72, n), are in steps of `step`, with the rows of a class of the `table`
-    together; `constants` (n,) is what each cell adds to any query.
+    `values`, shape (blocks, k * 72, cells a block), are in steps of `step`: the rows of a class of
+    the `table` are together, the cells of both halves of a block in turn. By direction of a look,
+    `constants` (d, n) is what each cell adds to whatever is seen, and `missed` (d, k, n) what the
+    objects of a class have in that, none of which is detected.
     """
 
     database: SignatureDatabase
     table: NoiseTable
     values: NDArray[np.uint8]
-    constants: NDArray[np.float32]
     step: float
+    constants: NDArray[np.float32]
+    missed: NDArray[np.float32]
 
-    @property
+    @cached_property
     def kinds(self) -> NDArray[np.int64]:
         """The class row of every entry of the database."""
         return self.table.row_of[self.database.codes]
 
-    @property
+    @cached_property
     def symbols(self) -> NDArray[np.int64]:
-        """The row of `values` of every entry of the database."""
+        """The row of the values of every entry of the database."""
         return self.kinds * BINS + self.database.bearing_units // BIN_UNITS
+
+    def of(self, cells: NDArray[np.int64]) -> NDArray[np.uint8]:
+        """Return what each symbol adds to some of the cells, shape (k * 72, c)."""
+        half = self.values.shape[2] // 2
+        block, inside = np.divmod(cells, 2 * half)
+        return self.values[block, :, 2 * (inside % half) + inside // half].T
 
 
 def symbol_columns(index: LikelihoodIndex, *, threads: int = 1) -> SymbolColumns:
     """Work out the columns of the cells and the mean noise model of an index."""
+    from semsig_gis.evaluation.identify.kernels import BLOCK  # noqa: PLC0415 - numba loads slowly
+
     database, table = index.database, index.table
-    owners = np.repeat(np.arange(len(database)), database.lengths)
-    rows = table.length_rows(database.lengths)[owners]
-    missed = np.log(table.missed)[rows, table.row_of[database.codes]]
-    unseen = np.bincount(owners, missed, len(database)) - table.clutter.sum()
-    values = np.empty((len(table.codes), BINS, len(database)), np.uint8)
+    cells, classes = len(database), len(table.codes)
+    owners = np.repeat(np.arange(cells), database.lengths)
+    kinds, far = table.row_of[database.codes], database.distance_units
+    sure = table.detected[table.length_rows(database.lengths)[owners], kinds]
+    chances, leaving = sure * table.seen[kinds, far], sure * table.left[kinds, far]
+    missed = np.log1p(-chances) - leaving
+    by_class = np.bincount(kinds * cells + owners, missed, classes * cells)
+    by_class = by_class.reshape(1, classes, cells)
+    values = np.zeros((-(-cells // BLOCK), classes, BINS, BLOCK), np.uint8)
+    odds = chances / (1.0 - chances)
+    step = _write_columns(database, table, odds, leaving / FULL_TURN, values, threads)
     return SymbolColumns(
         database=database,
         table=table,
-        step=_write_columns(database, table, values, threads),
-        values=values.reshape(-1, len(database)),
-        constants=unseen.astype(np.float32),
+        values=values.reshape(len(values), -1, BLOCK),
+        step=step,
+        constants=(by_class.sum(axis=1) - table.clutter.sum()).astype(np.float32),
+        missed=by_class.astype(np.float32),
     )
 
 
-def _write_columns(
+def _write_columns(  # noqa: PLR0917 - a private helper of one caller
     database: SignatureDatabase,
     table: NoiseTable,
+    odds: NDArray[np.float64],
+    leaving: NDArray[np.float64],
     columns: NDArray[np.uint8],
     threads: int,
 ) -> float:
-    """Fill `columns`, shape (k, 72, n), and return the size of their steps."""
-    from semsig_gis.evaluation.identify.kernels import LINE, fill_columns  # noqa: PLC0415 - numba loads slowly
+    """Fill `columns`, shape (blocks, k, 72, BLOCK), and return the size of their steps."""
+    from semsig_gis.evaluation.identify.kernels import LINE, fill_columns  # noqa: PLC0415
 
     spread_of, spread = _spreads(database, table)
     # 255 steps reach what four objects in one direction add.
@@ -93,7 +116,8 @@ def _write_columns(
         database.bearing_units,
         spread_of,
         spread,
-        table.odds.astype(np.float32),
+        odds.astype(np.float32),
+        leaving.astype(np.float32),
         table.naming.astype(np.float32),
         _logs(step),
         columns,

@@ -20,7 +20,6 @@ from semsig_gis.evaluation.identify.columns import symbol_columns
 from semsig_gis.evaluation.identify.lookalikes import (
     LEAST_SUM,
     check_radius,
-    compare_without_classes,
     find_lookalikes,
 )
 from semsig_gis.evaluation.identify.result import ClassGain, Identifiability
@@ -49,8 +48,8 @@ TEMPERATURES = (0.15, 0.2, 0.25, 0.3, 0.35, 0.4, 0.5, 0.6, 0.8, 1.0)
 TEMPERATURE_TRIALS = 300
 DECIMALS = 3  # of all numbers: more than they are sure to, and short in a file
 
-# Seconds that a trial, and a pair of cells, takes: for telling how long and how far the work is.
-PAIR_S, SAMPLED_S = 2.7e-9, 2.5e-4
+# Seconds that a pair of cells takes: for telling how long and how far the work is.
+PAIR_S = 5e-10
 
 
 def identify(
@@ -130,7 +129,6 @@ def identify(
     seconds = (
         trials * TRIAL_S,
         cells**2 * PAIR_S,
-        cells * SAMPLED_S,
         len(again) * len(index.table.codes) * TRIAL_S,
     )
     announce(sum(seconds) / threads, "comparing cells")
@@ -143,22 +141,15 @@ def identify(
         temperature=temperature,
         radius=radius,
         places=PLACES,
+        seed=seed,
         threads=threads,
         progress=stages[1],
     )
-    rise = compare_without_classes(
-        columns,
-        temperature=temperature,
-        radius=radius,
-        seed=seed,
-        threads=threads,
-        progress=stages[2],
-    )
     without = try_without_classes(
-        index, again, radius=radius, seed=seed, threads=threads, progress=stages[3]
+        index, again, radius=radius, seed=seed, threads=threads, progress=stages[2]
     )
     shares = _expected(tried, like, database.lengths)
-    gains, classes = _gains(index, tried, like, rise=rise, again=again, without=without)
+    gains, classes = _gains(index, tried, like, again=again, without=without)
     rest = (1.0 - shares["near"]) / np.maximum(like.far, LEAST_SUM)
     return Identifiability(
         database=database,
@@ -247,20 +238,18 @@ def _gains(
     tried: Trials,
     like: Lookalikes,
     *,
-    rise: NDArray[np.float64],
     again: NDArray[np.int64],
     without: tuple[NDArray[np.float64], NDArray[np.float64]],
 ) -> tuple[NDArray[np.float64], tuple[ClassGain, ...]]:
     """Return what each class adds to the chance of the place, by cell and for the city.
 
-    `without` is what came of the cells `again` (`try_without_classes`), `rise` is that of
-    `compare_without_classes`.
+    `without` is what came of the cells `again` (`try_without_classes`).
     """
     database, codes = index.database, index.table.codes
     starts = database.offsets[:-1]
     seen = [np.add.reduceat(database.codes == code, starts, dtype=np.int64) for code in codes]
     left = database.lengths[:, None] - np.stack(seen, axis=1)
-    features = _features(like, database.lengths, rise, left)
+    features = _features(like, database.lengths, like.rise, left)
     whole = _features(like, database.lengths, np.zeros((len(left), 1)), database.lengths[:, None])
     whole = whole[:, 0]
     # What is left of cells that see nothing else needs no fit.

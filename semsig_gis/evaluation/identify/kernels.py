@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -11,20 +11,25 @@ from semsig_gis.core.jit import compiled
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+BLOCK = 1024
+"""Cells whose columns stay in the second cache."""
 LINE = 64
 """Cells that are worked out together: as many as a cache line has bytes."""
 MANTISSA_BITS = 9
 """Of a float32, how many the table of logarithms looks at."""
-_LEFT = 23 - MANTISSA_BITS
-_BEGIN = 127 << MANTISSA_BITS  # where the bits of 1.0 begin
+_SHIFT = 23 - MANTISSA_BITS
+_ONE = 127 << MANTISSA_BITS  # where the bits of 1.0 begin
 _MOST_OBJECTS = 257  # whose bytes add up within 16 bits
-_BLOCK = 4096  # cells whose powers stay in the fastest cache
+_BYTE = np.uint16(8)
+_MOST = np.float32(1e33)  # so that sums stay finite
 _CANDIDATES = 24  # likest cells among which places are chosen
-_OCTAVES = np.float32(100.0)  # powers of two beyond this are not told from it
-_OCTAVES_A_NAT = 1.4426950408889634
-# Of 2 ** x for x from 0 to 1, to 1 part in 10,000.
-_FIRST, _SECOND, _THIRD = np.float32(0.69606564), np.float32(0.22449434), np.float32(0.07944024)
-_ONE, _BIAS, _SHIFT = np.float32(1.0), np.float32(127.0), np.int32(23)
+
+
+@compiled
+def _byte(inside: int) -> int:
+    """Return where the byte of a cell is in a block: pairs are of one half and the other."""
+    half = BLOCK // 2
+    return 2 * (inside % half) + inside // half
 
 
 @compiled
@@ -36,6 +41,7 @@ def fill_columns(  # noqa: C901, PLR0912, PLR0917 - a kernel takes no keywords
     spread_of: NDArray[np.uint8],
     spread: NDArray[np.float32],
     odds: NDArray[np.float32],
+    leaving: NDArray[np.float32],
     naming: NDArray[np.float32],
     logs: NDArray[np.uint8],
     columns: NDArray[np.uint8],
@@ -43,15 +49,15 @@ def fill_columns(  # noqa: C901, PLR0912, PLR0917 - a kernel takes no keywords
     """Write the columns of some cells: the log of what each symbol adds, in whole steps.
 
     Fills the cells of ``lines[0]`` to ``lines[1] - 1``, each `LINE` cells, in `columns`, shape
-    (symbols, bins, n). `rows` are the class rows of the entries and `spread_of` their rows of
-    `spread`, shape (levels, units, bins): the density per degree in each bin for an object at a
-    unit of bin 0. By length and class, `odds` are of detection over a miss and `naming`, by name,
-    the chance of the name over the density of such clutter; `logs` is the logarithm in steps, by
-    the leading bits of a float32 from 1.
+    (blocks, k, bins, BLOCK). By entry, `rows` are class rows, `spread_of` rows of `spread`, shape
+    (levels, units, bins), the density per degree in each bin for an object at a unit of bin 0, `odds` of detection over a miss,
+    and `leaving` the density of others in its stead. `naming` is, by length, class and name, the chance of the name
+    over the density of such clutter; `logs` is the logarithm in steps, by the leading bits of a
+    float32 from 1.
     """
     cells = len(offsets) - 1
-    kinds = odds.shape[1]
-    symbols, bins = columns.shape[0], columns.shape[1]
+    kinds, longest = naming.shape[1], len(naming) - 1
+    symbols, bins = columns.shape[1], columns.shape[2]
     units = spread.shape[1]
     heard = np.zeros((kinds, bins), np.float32)
     present = np.zeros(kinds, np.bool_)
@@ -64,7 +70,7 @@ def fill_columns(  # noqa: C901, PLR0912, PLR0917 - a kernel takes no keywords
         last = min(first + LINE, cells)
         for cell in range(first, last):
             low, high = offsets[cell], offsets[cell + 1]
-            length = min(high - low, len(odds) - 1)
+            length = min(high - low, longest)
             present[:] = False
             for entry in range(low, high):
                 kind = rows[entry]
@@ -74,7 +80,10 @@ def fill_columns(  # noqa: C901, PLR0912, PLR0917 - a kernel takes no keywords
                 level = spread_of[entry]
                 shift = bearing_units[entry] // units
                 unit = bearing_units[entry] - shift * units
-                factor = odds[length, kind]
+                factor = odds[entry]
+                if leaving[entry] > 0:
+                    for place in range(bins):
+                        heard[kind, place] += leaving[entry]
                 for place in range(bins - shift):
                     heard[kind, place + shift] += factor * spread[level, unit, place]
                 for place in range(bins - shift, bins):
@@ -88,109 +97,65 @@ def fill_columns(  # noqa: C901, PLR0912, PLR0917 - a kernel takes no keywords
                         for place in range(bins):
                             inner[place] += share * heard[kind, place]
                 for place in range(bins):
-                    index = (bits[place] >> _LEFT) - _BEGIN
+                    index = (bits[place] >> _SHIFT) - _ONE
                     buffer[symbol, place, cell - first] = logs[min(index, top)]
         for symbol in range(symbols):
             for place in range(bins):
                 for cell in range(first, last):
-                    columns[symbol, place, cell] = buffer[symbol, place, cell - first]
+                    block, inside = divmod(cell, BLOCK)
+                    columns[block, symbol, place, _byte(inside)] = buffer[
+                        symbol, place, cell - first
+                    ]
 
 
 @compiled
 def _add_up(
-    columns: NDArray[np.uint8],
+    columns: NDArray[np.uint16],
     symbols: NDArray[np.int64],
-    low: int,
-    size: int,
-    sums: NDArray[np.uint16],
+    base: NDArray[np.uint16],
+    words: NDArray[np.uint16],
+    sums: NDArray[np.uint32],
 ) -> None:
-    """Fill the sums of some columns over a block of cells."""
-    for cell in range(size):
-        sums[cell] = 0
-    # Four columns in one go: a sum is fetched and put back a quarter as often.
-    fours = len(symbols) - len(symbols) % 4
-    for place in range(0, fours, 4):
-        first = columns[symbols[place], low : low + size]
-        second = columns[symbols[place + 1], low : low + size]
-        third = columns[symbols[place + 2], low : low + size]
-        fourth = columns[symbols[place + 3], low : low + size]
-        for cell in range(size):
-            sums[cell] += (
-                np.uint16(first[cell])
-                + np.uint16(second[cell])
-                + np.uint16(third[cell])
-                + np.uint16(fourth[cell])
-            )
-    for symbol in symbols[fours:]:
-        column = columns[symbol, low : low + size]
-        for cell in range(size):
-            sums[cell] += column[cell]
+    """Fill `sums` (n,) with those of some columns, bytes in pairs (s, n / 2), and of a base.
 
-
-@compiled
-def _scan(
-    columns: NDArray[np.uint8],
-    symbols: NDArray[np.int64],
-    constants: NDArray[np.float32],
-    step: float,
-    scores: NDArray[np.float32],
-) -> None:
-    """Fill `scores`, shape (n,), with the sums of one column for each object of a query.
-
-    `symbols` are the rows of `columns`, shape (s, n), to add: at most 257, or 16 bits overflow.
-    `constants` are what each cell adds to any query, `step` is the size of a step of the columns.
+    The first half of the sums is that of the lower bytes, the second that of the higher ones.
+    `words` (2, n / 2) are working memory. A sum of the pairs as numbers is that of the lower bytes
+    and 256 times that of the higher ones, so that only the latter have to be set apart.
     """
-    cells = len(constants)
-    sums = np.empty(_BLOCK, np.uint16)
-    scale = np.float32(step)
-    for low in range(0, cells, _BLOCK):
-        size = min(_BLOCK, cells - low)
-        _add_up(columns, symbols, low, size, sums)
-        for cell in range(size):
-            scores[low + cell] = constants[low + cell] + scale * np.float32(sums[cell])
+    half = columns.shape[1]
+    whole, high = words[0, :half], words[1, :half]
+    for place in range(2 * half):
+        sums[place] = base[place]
+    for low in range(0, len(symbols), _MOST_OBJECTS):
+        part = symbols[low : low + _MOST_OBJECTS]
+        whole[:] = 0
+        high[:] = 0
+        # Four columns in one go: a sum is fetched and put back a quarter as often.
+        fours = len(part) - len(part) % 4
+        for place in range(0, fours, 4):
+            first, second = columns[part[place]], columns[part[place + 1]]
+            third, fourth = columns[part[place + 2]], columns[part[place + 3]]
+            for pair in range(half):
+                whole[pair] += first[pair] + second[pair] + third[pair] + fourth[pair]
+                high[pair] += (
+                    (first[pair] >> _BYTE)
+                    + (second[pair] >> _BYTE)
+                    + (third[pair] >> _BYTE)
+                    + (fourth[pair] >> _BYTE)
+                )
+        for symbol in part[fours:]:
+            column = columns[symbol]
+            for pair in range(half):
+                whole[pair] += column[pair]
+                high[pair] += column[pair] >> _BYTE
+        for pair in range(half):
+            sums[pair] += np.uint16(whole[pair] - (high[pair] << _BYTE))
+        for pair in range(half):
+            sums[half + pair] += high[pair]
 
 
 @compiled
-def _score(
-    symbols: NDArray[np.int64],
-    flat: NDArray[np.uint8],
-    constants: NDArray[np.float32],
-    step: float,
-    scores: NDArray[np.float32],
-) -> None:
-    """Score every cell by a signature of any length."""
-    first = min(len(symbols), _MOST_OBJECTS)
-    _scan(flat, symbols[:first], constants, step, scores)
-    for low in range(first, len(symbols), _MOST_OBJECTS):
-        _scan(flat, symbols[low : low + _MOST_OBJECTS], scores, step, scores)
-
-
-@compiled
-def _powers(
-    scores: NDArray[np.float32],
-    own: np.float32,
-    factor: np.float32,
-    bits: NDArray[np.int32],
-    powers: NDArray[np.float32],
-) -> np.int32:
-    """Fill the powers of two of the differences to one score; return the largest of the `bits`."""
-    whole = bits.view(np.float32)
-    top = np.int32(0)
-    for place in range(len(scores)):
-        value = min(max((scores[place] - own) * factor, -_OCTAVES), _OCTAVES)
-        floor = np.floor(value)
-        rest = value - floor
-        powers[place] = _ONE + rest * (_FIRST + rest * (_SECOND + rest * _THIRD))
-        bits[place] = np.int32(floor + _BIAS) << _SHIFT
-    for place in range(len(scores)):
-        top = max(top, bits[place])
-    for place in range(len(scores)):
-        powers[place] *= whole[place]
-    return top
-
-
-@compiled
-def _sum(values: NDArray[np.float32]) -> float:
+def _total(values: NDArray[np.float32]) -> float:
     """Return the sum of values, which are lost: halves are added up, many numbers at once."""
     size = len(values)
     while size > 1:
@@ -202,188 +167,312 @@ def _sum(values: NDArray[np.float32]) -> float:
 
 
 @compiled
-def _sum_around(  # noqa: PLR0917 - a kernel takes no keywords
-    middle: int,
-    scores: NDArray[np.float32],
-    own: np.float32,
-    octaves: float,
-    ids: NDArray[np.int64],
-    circle: NDArray[np.int64],
-) -> float:
-    """Return the sum of the powers of the cells around the one of a number."""
-    total = 0.0
-    for line in range(len(circle)):
-        last = middle + circle[line, 1]
-        for cell in range(np.searchsorted(ids, middle + circle[line, 0]), len(ids)):
-            if ids[cell] > last:
-                break
-            total += 2.0 ** min(max((scores[cell] - own) * octaves, -_OCTAVES), _OCTAVES)
-    return total
+def _high(sums: NDArray[np.uint32], rank: int, best: NDArray[np.int64]) -> int:
+    """Return the sum of a rank, the highest being 1; `best` is working memory."""
+    best[:rank] = 0
+    last = np.int64(0)
+    for one in sums:
+        if one > last:
+            at = rank - 1
+            while at > 0 and one > best[at - 1]:
+                best[at] = best[at - 1]
+                at -= 1
+            best[at] = one
+            last = best[rank - 1]
+    return int(last)
 
 
 @compiled
 def _blot_out(
-    middle: int, scores: NDArray[np.float32], ids: NDArray[np.int64], circle: NDArray[np.int64]
+    middle: int, sums: NDArray[np.uint32], ids: NDArray[np.int64], circle: NDArray[np.int64]
 ) -> None:
-    """Take all likelihood from the cells around the one of a number."""
+    """Take the sums from the cells around the one of a number."""
     for line in range(len(circle)):
         last = middle + circle[line, 1]
         for cell in range(np.searchsorted(ids, middle + circle[line, 0]), len(ids)):
             if ids[cell] > last:
                 break
-            scores[cell] = -np.inf
+            sums[cell] = 0
 
 
 @compiled
-def compare_signatures(  # noqa: C901, PLR0915, PLR0917 - a kernel takes no keywords
-    cells: NDArray[np.int64],
-    offsets: NDArray[np.int64],
-    symbols: NDArray[np.int64],
-    flat: NDArray[np.uint8],
+def _sum_at(values: NDArray[np.uint8], symbols: NDArray[np.int64], cell: int) -> int:
+    """Return the sum of some columns in one cell."""
+    block, inside = divmod(cell, BLOCK)
+    place = _byte(inside)
+    total = 0
+    for symbol in symbols:
+        total += values[block, symbol, place]
+    return total
+
+
+class Places(NamedTuple):
+    """Where the n cells are: rising numbers, columns and rows (n, 2), and the circle around each.
+
+    `circle` (a, 2) is that of `cell_circle`, `limit` its squared radius in cells.
+    """
+
+    ids: NDArray[np.int64]
+    at: NDArray[np.int64]
+    circle: NDArray[np.int64]
+    limit: int
+
+
+class Entries(NamedTuple):
+    """What the cells see: where each begins (n + 1,), and symbols, class rows and bearings (m,)."""
+
+    offsets: NDArray[np.int64]
+    symbols: NDArray[np.int64]
+    kinds: NDArray[np.int64]
+    bearing_units: NDArray[np.uint16]
+
+
+class Bases(NamedTuple):
+    """What cells have before anything is added, by direction (d), in n cells or a sample of them.
+
+    `levels` (d, n) is in whole steps from 1, `trims` (d, n) are the powers of what that leaves,
+    `lifts` those of not missing the objects of each class: (d, n, k), of a sample (d, k, n).
+    """
+
+    levels: NDArray[np.uint16]
+    trims: NDArray[np.float32]
+    lifts: NDArray[np.float32]
+
+
+class Sample(NamedTuple):
+    """Cells that stand for all that are not likely, (s,) rising row numbers, `weight` for each.
+
+    `pairs` (symbols, s / 2) are their bytes in twos, of one half and the other. Likely is who has
+    at least the sum of a `rank` among them; all are if there is no sample. Of class k, it is
+    ``seeing[starts[k]:starts[k + 1]]`` of them that see it.
+    """
+
+    cells: NDArray[np.int64]
+    ids: NDArray[np.int64]
+    pairs: NDArray[np.uint16]
+    bases: Bases
+    starts: NDArray[np.int64]
+    seeing: NDArray[np.int64]
+    rank: int
+    weight: float
+
+
+@compiled
+def _sum_circle(  # noqa: PLR0917 - a kernel takes no keywords
+    middle: int,
+    own: int,
+    left_out: int,
+    direction: int,
+    shown: NDArray[np.int64],
+    values: NDArray[np.uint8],
+    bases: Bases,
+    powers: NDArray[np.float32],
+    places: Places,
+) -> float:
+    """Return the sum of the powers of the cells around one, but for those around another."""
+    top = len(powers) // 2
+    total = 0.0
+    for line in range(len(places.circle)):
+        last = places.ids[middle] + places.circle[line, 1]
+        first = places.ids[middle] + places.circle[line, 0]
+        for cell in range(np.searchsorted(places.ids, first), len(places.ids)):
+            if places.ids[cell] > last:
+                break
+            if left_out >= 0:
+                across = places.at[cell, 0] - places.at[left_out, 0]
+                along = places.at[cell, 1] - places.at[left_out, 1]
+                if across * across + along * along <= places.limit:
+                    continue
+            rise = bases.levels[direction, cell] + _sum_at(values, shown, cell) - own
+            total += powers[top + min(max(rise, -top), top)] * bases.trims[direction, cell]
+    return total
+
+
+@compiled
+def compare_cells(  # noqa: C901, PLR0912, PLR0915, PLR0917 - a kernel takes no keywords
+    looks: NDArray[np.int64],
+    entries: Entries,
+    inside: NDArray[np.bool_],
+    values: NDArray[np.uint8],
     constants: NDArray[np.float32],
     step: float,
-    temperature: float,
-    ids: NDArray[np.int64],
-    places: NDArray[np.int64],
-    circle: NDArray[np.int64],
-    limit: int,
+    bases: Bases,
+    powers: NDArray[np.float32],
+    sample: Sample,
+    places: Places,
+    buffer: NDArray[np.uint32],
     near: NDArray[np.float64],
     far: NDArray[np.float64],
     like: NDArray[np.int64],
     share: NDArray[np.float64],
+    rest: NDArray[np.float64],
 ) -> None:
-    """Compare cells with all others, by the likelihood of their own signature there.
+    """Compare looks from cells with all cells, by the likelihood of what each shows there.
 
-    `cells` (c,) are row numbers. The entries of a cell begin at its item of `offsets` (n + 1,) in
-    `symbols` (m,), which are rows of `flat` (s, n), the columns of the index in steps of `step`;
-    `constants` (n,) is what each cell adds to them. `ids` (n,) are the rising numbers of the cells,
-    `places` (n, 2) their columns and rows, `circle` (a, 2) that of `cell_circle`, `limit` its
-    squared radius in cells. It fills `near`, `far` (c,), `like` and `share` (c, k), unsorted.
+    `looks` (q,) are ``row * d + direction``, and `inside` (d, units) tells which bearings are seen
+    in each of d directions. `values` (blocks, symbols, BLOCK), `constants` (d, n) and `step` are
+    those of `SymbolColumns`, `powers` (2 l + 1,) those of -l to l steps. `buffer` (3, s), at least
+    a block wide, is working memory. It fills `near`, `far` (q,), `like` and `share` (q, p),
+    unsorted, and `rest` (q, k), what `far` would be without the detections of each class.
     """
-    count = len(constants)
-    scores = np.empty(count, np.float32)
-    octaves = temperature * _OCTAVES_A_NAT
-    factor = np.float32(octaves)
-    bits = np.empty(_BLOCK, np.int32)
-    powers = np.empty(_BLOCK, np.float32)
-    sums = np.empty(_BLOCK, np.float32)
-    best = np.empty(_CANDIDATES, np.float32)
-    apart = np.empty(_CANDIDATES, np.int64)
-    whose = np.empty(_CANDIDATES, np.int64)
-    for number in range(len(cells)):
-        cell = cells[number]
-        _score(symbols[offsets[cell] : offsets[cell + 1]], flat, constants, step, scores)
-        own = scores[cell]
-        near[number] = _sum_around(ids[cell], scores, own, octaves, ids, circle)
-        # A difference of sums would drown what is far from a cell that is like no other.
-        _blot_out(ids[cell], scores, ids, circle)
-        sums[:] = 0.0
-        best[:] = -np.inf
-        last = best[_CANDIDATES - 1]
-        least = np.int32(0)
-        found = 0
-        for low in range(0, count, _BLOCK):
-            size = min(_BLOCK, count - low)
-            block = scores[low : low + size]
-            top = _powers(block, own, factor, bits[:size], powers[:size])
-            for place in range(size):
-                sums[place] += powers[place]
-            if top < least:
+    directions = len(constants)
+    asked, classes, size = len(looks), rest.shape[1], len(sample.cells)
+    top, scale = np.int32(len(powers) // 2), np.float32(step)
+    starts = np.zeros(asked + 1, np.int64)
+    for look in range(asked):
+        cell, direction = divmod(looks[look], directions)
+        starts[look + 1] = starts[look]
+        for entry in range(entries.offsets[cell], entries.offsets[cell + 1]):
+            starts[look + 1] += inside[direction, entries.bearing_units[entry]]
+    symbols = np.empty(starts[asked], np.int64)
+    kinds = np.empty(starts[asked], np.int64)
+    own = np.zeros(asked, np.int64)
+    level = np.ones(asked, np.int64)
+    highest = np.empty(max(sample.rank, 1), np.int64)
+    words = np.empty((2, max(size, BLOCK) // 2), np.uint16)
+    weights, terms = np.empty(size, np.float32), np.empty(size, np.float32)
+    sees, nothing = np.zeros((asked, classes), np.bool_), np.zeros(size, buffer.dtype)
+    far[:] = 0.0
+    rest[:] = 0.0
+    for look in range(asked):
+        cell, direction = divmod(looks[look], directions)
+        at = starts[look]
+        for entry in range(entries.offsets[cell], entries.offsets[cell + 1]):
+            if inside[direction, entries.bearing_units[entry]]:
+                symbols[at], kinds[at] = entries.symbols[entry], entries.kinds[entry]
+                sees[look, kinds[at]] = True
+                at += 1
+        shown, named = symbols[starts[look] : at], kinds[starts[look] : at]
+        own[look] = bases.levels[direction, cell] + _sum_at(values, shown, cell)
+        if size == 0 or len(shown) == 0:
+            continue
+        sums, part = buffer[0, :size], buffer[1, :size]
+        _add_up(sample.pairs, shown, sample.bases.levels[direction], words, sums)
+        _blot_out(places.ids[cell], sums, sample.ids, places.circle)
+        level[look] = max(_high(sums, sample.rank, highest), 1)
+        trims, mine, least = sample.bases.trims[direction], np.int32(own[look]), level[look]
+        for other in range(size):
+            rise = min(max(np.int32(sums[other]) - mine, -top), top)
+            weight = powers[top + rise] * trims[other]
+            counts = (sums[other] > 0) & (sums[other] < least)
+            weights[other] = weight if counts else np.float32(0.0)
+        terms[:] = weights
+        far[look] = _total(terms)
+        for left_out in range(classes):
+            lifts = sample.bases.lifts[direction, left_out]
+            if not sees[look, left_out]:
+                for place in range(sample.starts[left_out], sample.starts[left_out + 1]):
+                    other = sample.seeing[place]
+                    rest[look, left_out] += weights[other] * (lifts[other] - 1.0)
                 continue
-            for other in range(low, low + size):
-                score = scores[other]
-                if score < last:
+            _add_up(sample.pairs, shown[named == left_out], nothing, words, part)
+            for other in range(size):
+                fall = min(np.int32(part[other]), top)
+                lift = lifts[other] * powers[top - fall]
+                terms[other] = min(weights[other] * lift, _MOST)
+            rest[look, left_out] = _total(terms)
+        far[look] *= sample.weight
+        rest[look] *= sample.weight
+    pairs = values.view(np.uint16)
+    best = np.full((asked, _CANDIDATES), -np.inf, np.float32)
+    apart = np.zeros((asked, _CANDIDATES), np.int64)
+    whose = np.full((asked, _CANDIDATES), -1, np.int64)
+    found = np.zeros(asked, np.int64)
+    tops = np.empty(LINE, buffer.dtype)
+    falls = np.empty(classes, np.int64)
+    for block in range(len(values)):
+        low = block * BLOCK
+        for look in range(asked):
+            shown = symbols[starts[look] : starts[look + 1]]
+            if len(shown) == 0:
+                continue
+            cell, direction = divmod(looks[look], directions)
+            sums = buffer[0, :BLOCK]
+            _add_up(pairs[block], shown, bases.levels[direction, low : low + BLOCK], words, sums)
+            tops[:] = sums[:LINE]
+            for line in range(LINE, BLOCK, LINE):
+                for place in range(LINE):
+                    tops[place] = max(tops[place], sums[line + place])
+            for place in range(LINE):
+                if tops[place] < level[look]:
                     continue
-                across = places[other, 0] - places[cell, 0]
-                along = places[other, 1] - places[cell, 1]
-                away = across * across + along * along
-                # Of equals the nearer comes first.
-                if away <= limit or (score == last and away >= apart[_CANDIDATES - 1]):
-                    continue
-                at = min(found, _CANDIDATES - 1)
-                while at > 0 and (
-                    score > best[at - 1] or (score == best[at - 1] and away < apart[at - 1])
-                ):
-                    best[at], apart[at], whose[at] = best[at - 1], apart[at - 1], whose[at - 1]
-                    at -= 1
-                best[at], apart[at], whose[at] = score, away, other
-                found = min(found + 1, _CANDIDATES)
-                last = best[_CANDIDATES - 1]
-            value = min(max((last - own) * factor, -_OCTAVES), _OCTAVES)
-            least = np.int32(np.floor(value) + _BIAS) << _SHIFT
-        far[number] = _sum(sums)
-        like[number] = -1
+                for inner in range(place, BLOCK, LINE):
+                    if sums[inner] < level[look]:
+                        continue
+                    other = low + inner
+                    across = places.at[other, 0] - places.at[cell, 0]
+                    along = places.at[other, 1] - places.at[cell, 1]
+                    away = across * across + along * along
+                    if away <= places.limit:
+                        continue
+                    rise = min(max(np.int64(sums[inner]) - own[look], -top), top)
+                    weight = powers[top + rise] * bases.trims[direction, other]
+                    far[look] += weight
+                    falls[:] = 0
+                    byte = _byte(inner)
+                    for entry in range(starts[look], starts[look + 1]):
+                        falls[kinds[entry]] += values[block, symbols[entry], byte]
+                    for left_out in range(classes):
+                        lift = np.float64(bases.lifts[direction, other, left_out])
+                        lift *= powers[top - min(falls[left_out], top)]
+                        if not sees[look, left_out]:
+                            lift -= 1.0
+                        rest[look, left_out] += weight * lift
+                    added = sums[inner] - bases.levels[direction, other]
+                    score = constants[direction, other] + scale * np.float32(added)
+                    last = _CANDIDATES - 1
+                    # Of equals the nearer comes first.
+                    if score < best[look, last] or (
+                        score == best[look, last] and away >= apart[look, last]
+                    ):
+                        continue
+                    at = min(found[look], last)
+                    while at > 0 and (
+                        score > best[look, at - 1]
+                        or (score == best[look, at - 1] and away < apart[look, at - 1])
+                    ):
+                        best[look, at] = best[look, at - 1]
+                        apart[look, at] = apart[look, at - 1]
+                        whose[look, at] = whose[look, at - 1]
+                        at -= 1
+                    best[look, at], apart[look, at], whose[look, at] = score, away, other
+                    found[look] = min(found[look] + 1, _CANDIDATES)
+    like[:] = -1
+    share[:] = 0.0
+    near[:] = 0.0
+    for look in range(asked):
+        shown = symbols[starts[look] : starts[look + 1]]
+        if len(shown) == 0:
+            continue
+        cell, direction = divmod(looks[look], directions)
+        trim = bases.trims[direction, cell]
+        falls[:] = 0
+        for entry in range(starts[look], starts[look + 1]):
+            falls[kinds[entry]] += _sum_at(values, symbols[entry : entry + 1], cell)
+        for left_out in range(classes):
+            lift = bases.lifts[direction, cell, left_out] * powers[top - min(falls[left_out], top)]
+            if not sees[look, left_out]:
+                rest[look, left_out] += far[look]
+            rest[look, left_out] /= lift * trim
+        far[look] /= trim
+        near[look] = (
+            _sum_circle(cell, own[look], -1, direction, shown, values, bases, powers, places) / trim
+        )
         chosen = 0
-        for candidate in range(found):
+        for candidate in range(found[look]):
             if chosen == like.shape[1]:
                 break
-            new = whose[candidate]
+            new = whose[look, candidate]
             free = True
             for place in range(chosen):
-                old = like[number, place]
-                across = places[old, 0] - places[new, 0]
-                along = places[old, 1] - places[new, 1]
-                free = free and across * across + along * along > 4 * limit
+                old = like[look, place]
+                across = places.at[old, 0] - places.at[new, 0]
+                along = places.at[old, 1] - places.at[new, 1]
+                free = free and across * across + along * along > 4 * places.limit
             if free:
-                like[number, chosen] = new
-                share[number, chosen] = _sum_around(ids[new], scores, own, octaves, ids, circle)
+                like[look, chosen] = new
+                total = _sum_circle(
+                    new, own[look], cell, direction, shown, values, bases, powers, places
+                )
+                share[look, chosen] = total / trim
                 chosen += 1
-
-
-@compiled
-def compare_without(  # noqa: PLR0917 - a kernel takes no keywords
-    cells: NDArray[np.int64],
-    offsets: NDArray[np.int64],
-    symbols: NDArray[np.int64],
-    kinds: NDArray[np.int64],
-    flat: NDArray[np.uint8],
-    constants: NDArray[np.float32],
-    step: float,
-    temperature: float,
-    ids: NDArray[np.int64],
-    circle: NDArray[np.int64],
-    sample: NDArray[np.int64],
-    sampled: NDArray[np.uint8],
-    far: NDArray[np.float64],
-) -> None:
-    """Compare cells with a sample of others, with all classes and without each of them.
-
-    As `compare_signatures`, but `kinds` (m,) has the class row of each entry, and `constants`
-    (k + 1, n) is for all classes first, then without each. `sample` (d,) are the rising row numbers
-    of the others, `sampled` (s, d) their part of `flat`. It fills `far` (c, k + 1).
-    """
-    count = len(sample)
-    factor = np.float32(temperature * _OCTAVES_A_NAT)
-    numbers = ids[sample]
-    nothing = np.zeros(count, np.float32)
-    bases = np.empty((len(constants), count), np.float32)
-    for left_out in range(len(constants)):
-        for other in range(count):
-            bases[left_out, other] = constants[left_out, sample[other]]
-    total = np.empty(count, np.float32)
-    part = np.empty(count, np.float32)
-    scores = np.empty(count, np.float32)
-    bits = np.empty(count, np.int32)
-    powers = np.empty(count, np.float32)
-    for number in range(len(cells)):
-        cell = cells[number]
-        low, high = offsets[cell], offsets[cell + 1]
-        seen, whose = symbols[low:high], kinds[low:high]
-        _score(seen, sampled, nothing, step, total)
-        for left_out in range(len(constants)):
-            base = bases[left_out]
-            others = 0
-            for entry in range(low, high):
-                if kinds[entry] != left_out - 1:
-                    others += flat[symbols[entry], cell]
-            own = np.float32(step * others) + constants[left_out, cell]
-            for other in range(count):
-                scores[other] = base[other] + total[other]
-            mine = seen[whose == left_out - 1]
-            if len(mine):
-                _score(mine, sampled, nothing, step, part)
-                for other in range(count):
-                    scores[other] -= part[other]
-            _blot_out(ids[cell], scores, numbers, circle)
-            _powers(scores, own, factor, bits, powers)
-            far[number, left_out] = _sum(powers)

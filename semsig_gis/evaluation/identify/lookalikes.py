@@ -17,6 +17,7 @@ import numpy as np
 from semsig_gis.core.errors import InputError
 from semsig_gis.core.geometry import cell_ids
 from semsig_gis.core.ranges import MOST_METRES, require_number
+from semsig_gis.core.signature import BEARING_UNITS
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -25,10 +26,14 @@ if TYPE_CHECKING:
 
     from semsig_gis.database.database import SignatureDatabase
     from semsig_gis.evaluation.identify.columns import SymbolColumns
+    from semsig_gis.evaluation.identify.kernels import Bases, Sample
 
-CELLS_A_TASK = 256
+CELLS_A_TASK = 1024
 LEAST_SUM = 1e-30  # of ratios, so that it has a logarithm
-SAMPLE = 16_384  # cells with which each is compared where classes are left out
+LIKELY = 300  # cells that are compared one by one with each, about
+SAMPLE = 4096  # cells that stand for the others
+LEVELS = 20_000  # steps between cells before anything is added
+MOST_OCTAVES = 100.0  # powers of two beyond this are not told from it
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -39,12 +44,15 @@ class Lookalikes:
     `far` (c,) that over all other cells. `cells` (c, k) are row numbers of the likest cells outside
     the circle whose own circles do not overlap, by falling sum, -1 where there are no more; `sums`
     (c, k) is the sum over the circle of each, without what is in the circle of the compared cell.
+    `rise` (c, classes) is by how much the logarithm of `far` would rise without each class: without
+    its objects and the detections of its name. That some are detected under another is neglected.
     """
 
     near: NDArray[np.float64]
     far: NDArray[np.float64]
     cells: NDArray[np.int64]
     sums: NDArray[np.float64]
+    rise: NDArray[np.float64]
 
 
 def cell_circle(radius: float, step: float) -> NDArray[np.int64]:
@@ -71,6 +79,7 @@ def find_lookalikes(
     radius: float = 50.0,
     cells: NDArray[np.int64] | None = None,
     places: int = 3,
+    seed: int = 0,
     threads: int = 1,
     progress: Callable[[int, int], None] | None = None,
 ) -> Lookalikes:
@@ -78,109 +87,129 @@ def find_lookalikes(
 
     `temperature` (above 0) is 1 for a query that is just the signature of the cell, less for one
     that is spoiled; `radius` is what counts as near, in metres; InputError if one is out of range.
-    A ratio beyond 2 to the power of 100, or below its inverse, counts as that.
+    A ratio beyond 2 to the power of 100, or below its inverse, counts as that. Of the cells that
+    are not among the likeliest three hundred or so, a sample is added up, which `seed` draws.
     """
-    from semsig_gis.evaluation.identify.kernels import compare_signatures  # noqa: PLC0415 - numba loads slowly
+    from semsig_gis.evaluation.identify.kernels import (  # noqa: PLC0415 - numba loads slowly
+        BLOCK,
+        Entries,
+        Places,
+        compare_cells,
+    )
 
     database = columns.database
     _check(temperature, radius)
     rows = np.arange(len(database)) if cells is None else np.asarray(cells, dtype=np.int64)
-    step = database.grid.step
     radius = min(radius, city_extent(database))
-    where = np.stack([database.columns, database.rows], axis=1).astype(np.int64)
-    ids, symbols = database.cell_ids, columns.symbols
-    circle = cell_circle(radius, step)
+    powers = _powers(columns, temperature)
+    # Sums within 16 bits are added up twice as fast, but hold no cells with very many objects.
+    wide = database.lengths * 255 + LEVELS >= 2**16
+    wide |= (columns.constants < columns.constants.max() - LEVELS * columns.step).any(axis=0)
+    all_bases = {much: _bases(columns, temperature, wide=much) for much in {*wide[rows].tolist()}}
+    samples = {much: _sample(columns, bases, seed) for much, bases in all_bases.items()}
+    around = Places(
+        ids=database.cell_ids,
+        at=np.stack([database.columns, database.rows], axis=1).astype(np.int64),
+        circle=cell_circle(radius, database.grid.step),
+        limit=math.floor((radius / database.grid.step + 1e-9) ** 2),
+    )
+    entries = Entries(
+        offsets=database.offsets,
+        symbols=columns.symbols,
+        kinds=columns.kinds,
+        bearing_units=database.bearing_units,
+    )
+    inside = np.ones((1, BEARING_UNITS), np.bool_)
     like = Lookalikes(
         near=np.empty(len(rows)),
         far=np.empty(len(rows)),
         cells=np.empty((len(rows), places), np.int64),
         sums=np.zeros((len(rows), places)),
+        rise=np.empty((len(rows), len(columns.table.codes))),
     )
 
     def compare(part: slice) -> None:
-        compare_signatures(
+        much = bool(wide[rows[part]].any())
+        sample = samples[much]
+        compare_cells(
             rows[part],
-            database.offsets,
-            symbols,
+            entries,
+            inside,
             columns.values,
             columns.constants,
             columns.step,
-            temperature,
-            ids,
-            where,
-            circle,
-            math.floor((radius / step + 1e-9) ** 2),
+            all_bases[much],
+            powers,
+            sample,
+            around,
+            np.empty((2, max(BLOCK, len(sample.cells))), np.uint32 if much else np.uint16),
             like.near[part],
             like.far[part],
             like.cells[part],
             like.sums[part],
+            like.rise[part],
         )
 
     _in_parts(compare, len(rows), threads, progress)
     order = np.argsort(-like.sums, axis=1, kind="stable")
+    logs = np.log(np.maximum(like.rise, LEAST_SUM))
     return replace(
         like,
         cells=np.take_along_axis(like.cells, order, axis=1),
         sums=np.take_along_axis(like.sums, order, axis=1),
+        rise=logs - np.log(np.maximum(like.far, LEAST_SUM))[:, None],
     )
 
 
-def compare_without_classes(
-    columns: SymbolColumns,
-    *,
-    temperature: float,
-    radius: float = 50.0,
-    cells: NDArray[np.int64] | None = None,
-    seed: int = 0,
-    threads: int = 1,
-    progress: Callable[[int, int], None] | None = None,
-) -> NDArray[np.float64]:
-    """Compare cells with a sample of the others as if a class were not published.
+def _bases(columns: SymbolColumns, temperature: float, *, wide: bool) -> Bases:
+    """Return what cells have before anything is added to it."""
+    from semsig_gis.evaluation.identify.kernels import Bases  # noqa: PLC0415
 
-    As `find_lookalikes`; `seed` draws the sample. The result (c, k) is by how much the logarithm of
-    `Lookalikes.far` would rise without each class of ``columns.table.codes``: without its objects
-    and the detections of its name. That some objects are detected under another name is neglected.
-    """
-    from semsig_gis.evaluation.identify.kernels import compare_without  # noqa: PLC0415
+    constants = columns.constants.astype(np.float64) - columns.constants.max()
+    lowest = 1.0 - np.rint(constants.min() / columns.step) if wide else LEVELS
+    levels = np.maximum(np.rint(constants / columns.step) + lowest, 1.0)
+    trims = np.exp(temperature * (constants - columns.step * (levels - lowest)))
+    lifted = -temperature * columns.missed.transpose(0, 2, 1).astype(np.float64)
+    more = columns.values.shape[0] * columns.values.shape[2] - len(columns.database)
+    return Bases(
+        levels=np.pad(levels, [(0, 0), (0, more)]).astype(np.uint32 if wide else np.uint16),
+        trims=np.maximum(trims, LEAST_SUM).astype(np.float32),
+        lifts=np.exp(np.minimum(lifted, MOST_OCTAVES * math.log(2.0))).astype(np.float32),
+    )
 
-    database = columns.database
-    _check(temperature, radius)
-    rows = np.arange(len(database)) if cells is None else np.asarray(cells, dtype=np.int64)
-    symbols, kinds = columns.symbols, columns.kinds
-    count, classes = len(database), len(columns.table.codes)
-    rng = np.random.default_rng([seed, 1])
-    sample = np.sort(rng.permutation(count)[:SAMPLE])
-    owner = np.repeat(np.arange(count), database.lengths)
-    lengths = np.minimum(database.lengths, len(columns.table.missed) - 1)[owner]
-    missed = np.log(columns.table.missed)[lengths, kinds]
-    by_class = np.bincount(kinds * count + owner, missed, classes * count).reshape(classes, count)
-    constants = columns.constants - np.concatenate([np.zeros((1, count)), by_class])
-    constants = constants.astype(np.float32)
-    sampled = np.ascontiguousarray(columns.values[:, sample])
-    ids = database.cell_ids
-    circle = cell_circle(min(radius, city_extent(database)), database.grid.step)
-    far = np.empty((len(rows), classes + 1))
 
-    def compare(part: slice) -> None:
-        compare_without(
-            rows[part],
-            database.offsets,
-            symbols,
-            kinds,
-            columns.values,
-            constants,
-            columns.step,
-            temperature,
-            ids,
-            circle,
-            sample,
-            sampled,
-            far[part],
-        )
+def _powers(columns: SymbolColumns, temperature: float) -> NDArray[np.float32]:
+    """Return the ratios of likelihood that whole steps make, the same number down and up."""
+    nats = MOST_OCTAVES * math.log(2.0)
+    steps = math.ceil(nats / (temperature * columns.step))
+    exponents = temperature * columns.step * np.arange(-steps, steps + 1)
+    return np.asarray(np.exp(np.clip(exponents, -nats, nats)), dtype=np.float32)
 
-    _in_parts(compare, len(rows), threads, progress)
-    logs = np.log(np.maximum(far, LEAST_SUM))
-    return logs[:, 1:] - logs[:, :1]
+
+def _sample(columns: SymbolColumns, bases: Bases, seed: int) -> Sample:
+    """Draw the cells that stand for those that are not likely."""
+    from semsig_gis.evaluation.identify.kernels import Bases, Sample  # noqa: PLC0415
+
+    count = len(columns.database)
+    size = SAMPLE if count > SAMPLE else 0
+    cells = np.sort(np.random.default_rng([seed, 1]).permutation(count)[:size])
+    turns = np.stack([cells[: size // 2], cells[size // 2 :]], axis=1).ravel()
+    lifts = np.ascontiguousarray(bases.lifts[:, cells].transpose(0, 2, 1))
+    kind, seeing = np.nonzero((lifts != 1.0).any(axis=0))
+    return Sample(
+        cells=cells,
+        ids=columns.database.cell_ids[cells],
+        pairs=np.ascontiguousarray(columns.of(turns)).view(np.uint16),
+        bases=Bases(
+            levels=np.ascontiguousarray(bases.levels[:, cells]),
+            trims=np.ascontiguousarray(bases.trims[:, cells]),
+            lifts=lifts,
+        ),
+        starts=np.searchsorted(kind, np.arange(lifts.shape[1] + 1)),
+        seeing=seeing,
+        rank=math.ceil(LIKELY * size / count),
+        weight=count / max(size, 1),
+    )
 
 
 def _check(temperature: float, radius: float) -> None:
