@@ -136,7 +136,7 @@ def test_without_a_class(noise: NoiseSpec, seed: int, radius: float) -> None:
     sure = table.detected[length, kinds]
     missed = np.log1p(-sure * table.seen[kinds, far]) - sure * table.left[kinds, far]
     for cell in range(0, len(database), 13):
-        far = apart(index, cell) > radius
+        beyond = apart(index, cell) > radius
         sums = []
         for left_out in [-1, *range(len(table.codes))]:
             seen = slice(database.offsets[cell], database.offsets[cell + 1])
@@ -145,7 +145,7 @@ def test_without_a_class(noise: NoiseSpec, seed: int, radius: float) -> None:
             scores = index.step * flat[symbols[kinds != left_out]].astype(float).sum(axis=0)
             gone = table.row_of[database.codes] == left_out
             scores += index.constants[0] - np.bincount(owner[gone], missed[gone], len(database))
-            sums.append(np.exp(0.4 * (scores - scores[cell]))[far].sum())
+            sums.append(np.exp(0.4 * (scores - scores[cell]))[beyond].sum())
         if sums[0] > 1e-3:
             expected = np.log(np.array(sums[1:]) / sums[0])
             assert np.allclose(rise[cell], expected, atol=2e-2)

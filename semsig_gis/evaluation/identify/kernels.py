@@ -50,10 +50,10 @@ def fill_columns(  # noqa: C901, PLR0912, PLR0917 - a kernel takes no keywords
 
     Fills the cells of ``lines[0]`` to ``lines[1] - 1``, each `LINE` cells, in `columns`, shape
     (blocks, k, bins, BLOCK). By entry, `rows` are class rows, `spread_of` rows of `spread`, shape
-    (levels, units, bins), the density per degree in each bin for an object at a unit of bin 0, `odds` of detection over a miss,
-    and `leaving` the density of others in its stead. `naming` is, by length, class and name, the chance of the name
-    over the density of such clutter; `logs` is the logarithm in steps, by the leading bits of a
-    float32 from 1.
+    (levels, units, bins), the density per degree in each bin for an object at a unit of bin 0,
+    `odds` those of detection over a miss, and `leaving` the density of others in its stead.
+    `naming` is, by length, class and name, the chance of the name over the density of such clutter;
+    `logs` is the logarithm in steps, by the leading bits of a float32 from 1.
     """
     cells = len(offsets) - 1
     kinds, longest = naming.shape[1], len(naming) - 1
@@ -112,9 +112,9 @@ def fill_columns(  # noqa: C901, PLR0912, PLR0917 - a kernel takes no keywords
 def _add_up(
     columns: NDArray[np.uint16],
     symbols: NDArray[np.int64],
-    base: NDArray[np.uint16],
+    base: NDArray[np.unsignedinteger],
     words: NDArray[np.uint16],
-    sums: NDArray[np.uint32],
+    sums: NDArray[np.unsignedinteger],
 ) -> None:
     """Fill `sums` (n,) with those of some columns, bytes in pairs (s, n / 2), and of a base.
 
@@ -230,11 +230,11 @@ class Entries(NamedTuple):
 class Bases(NamedTuple):
     """What cells have before anything is added, by direction (d), in n cells or a sample of them.
 
-    `levels` (d, n) is in whole steps from 1, `trims` (d, n) are the powers of what that leaves,
+    `levels` (d, n) are whole steps from 1, `trims` (d, n) are the powers of what that leaves,
     `lifts` those of not missing the objects of each class: (d, n, k), of a sample (d, k, n).
     """
 
-    levels: NDArray[np.uint16]
+    levels: NDArray[np.unsignedinteger]
     trims: NDArray[np.float32]
     lifts: NDArray[np.float32]
 
@@ -300,7 +300,7 @@ def compare_cells(  # noqa: C901, PLR0912, PLR0915, PLR0917 - a kernel takes no 
     powers: NDArray[np.float32],
     sample: Sample,
     places: Places,
-    buffer: NDArray[np.uint32],
+    buffer: NDArray[np.unsignedinteger],
     near: NDArray[np.float64],
     far: NDArray[np.float64],
     like: NDArray[np.int64],
