@@ -12,7 +12,7 @@ import json
 import math
 from dataclasses import dataclass
 from functools import cached_property, partial
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -37,8 +37,8 @@ FINE = 8 * BINS
 """Bearing steps of a detection."""
 LEVELS = 64
 """Distances at which errors are taken."""
-TURN_BINS = 8
-"""Steps between two turns of a photo whose north is uncertain: 5.625 degrees."""
+TURNS = 64
+"""Turns of a photo whose north is uncertain: steps of 5.625 degrees."""
 
 VERSION = 3  # raised whenever the same database and noise give other likelihoods
 LEAST_PRIOR = 1e-7  # turns that are less likely than this, against the likeliest, are left out
@@ -139,41 +139,55 @@ class LikelihoodIndex:
         self, photo: View, north_sigma: float
     ) -> tuple[NDArray[np.float32], NDArray[np.float32] | None]:
         """Return the log-likelihood of one photo in every cell, and its likeliest turns."""
-        from semsig_gis.likelihood.kernels import scan  # noqa: PLC0415 - numba loads slowly
+        from semsig_gis.likelihood.kernels import scan, scan_turned  # noqa: PLC0415 - slow to load
 
-        database, table, levels = self.database, self.table, self._levels
+        table, levels = self.table, self._levels
         asked = PhotoTable.of(photo, table)
         density = asked.density(table)
-        turns, log_turns = _turns(north_sigma)
-        scores = np.empty(len(database), np.float32)
-        best = np.empty(len(database), np.int16)
         kinds, places = self._entries
-        rows = levels.rows(asked, table)
-        named = levels.named(asked, table, density)
+        rows, masses = levels.rows(asked, table), levels.masses(asked)
+        named = asked.named(table)[: len(levels.chances)] / density
+        scores = np.empty(len(self.database), np.float32)
+        what: dict[str, Any] = {
+            "offsets": self.database.offsets,
+            "kinds": kinds,
+            "places": places,
+            "group_of": levels.group_of,
+            "width": asked.width,
+            "chances": levels.chances,
+            "leaving": levels.leaving,
+            "base": float(np.log(density).sum() - table.clutter.sum() * asked.width),
+            "scores": scores,
+        }
+        if north_sigma == 0:
+            names = _padded(named)
+            work = partial(
+                scan,
+                **what,
+                rows=rows,
+                near=levels.near(rows, names),
+                masses=masses,
+                named=names,
+                disc=_padded(asked.disc / FULL_TURN),
+            )
+            share_rows(work, len(self.database))
+            return scores, None
+        first, priors = _turns(north_sigma)
+        best = np.empty(len(self.database), np.int16)
+        by_detection = np.moveaxis(rows, 4, 1).reshape(-1, *rows.shape[1:4])[: len(density)]
         work = partial(
-            scan,
-            offsets=database.offsets,
-            kinds=kinds,
-            places=places,
-            group_of=levels.group_of,
-            rows=rows,
-            near=levels.near(rows, named),
-            masses=levels.masses(asked),
-            width=asked.width,
-            named=named,
-            disc=levels.padded(asked.disc / FULL_TURN),
-            chances=levels.chances,
-            leaving=levels.leaving,
-            base=float(np.log(density).sum() - table.clutter.sum() * asked.width),
-            turns=turns,
-            log_turns=log_turns,
-            scores=scores,
+            scan_turned,
+            **what,
+            rows=_turned(by_detection),
+            masses=_turned(masses),
+            named=named.astype(np.float32),
+            disc=(asked.disc / FULL_TURN).astype(np.float32),
+            first=first,
+            priors=priors,
             best=best,
         )
-        share_rows(work, len(database))
-        if north_sigma == 0:
-            return scores, None
-        return scores, best * np.float32(FULL_TURN / BINS)
+        share_rows(work, len(self.database))
+        return scores, best * np.float32(FULL_TURN / TURNS)
 
     def _by_counts(self, rows: NDArray[np.int64]) -> NDArray[np.float32]:
         """Return the scores of a query without bearings."""
@@ -200,15 +214,40 @@ def own_sigma(photo: View, north_sigma: float) -> float:
     return north_sigma if own is None else own
 
 
-def _turns(north_sigma: float) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
-    """Return the turns of a photo, in bins, and the logarithm of the chance of each."""
-    if north_sigma == 0:
-        return np.zeros(1, np.int64), np.zeros(1)
-    turns = np.arange(-BINS // 2, BINS // 2, TURN_BINS)
-    logs = -0.5 * (turns * (FULL_TURN / BINS) / north_sigma) ** 2
-    likely = logs > math.log(LEAST_PRIOR)
-    turns, logs = turns[likely], logs[likely]
-    return turns, logs - np.logaddexp.reduce(logs)
+def _turns(north_sigma: float) -> tuple[int, NDArray[np.float64]]:
+    """Return the first turn of a photo, in steps, and the chances of that and the next ones."""
+    turns = np.arange(-TURNS // 2, TURNS // 2)
+    chances = np.exp(-0.5 * (turns * (FULL_TURN / TURNS) / north_sigma) ** 2)
+    likely = np.flatnonzero(chances > LEAST_PRIOR)
+    return int(turns[likely[0]]), chances[likely] / chances[likely].sum()
+
+
+def _turned(rows: NDArray[np.float32]) -> NDArray[np.float32]:
+    """Return rows, shape (..., bins), with all turns of an object side by side."""
+    from semsig_gis.likelihood.kernels import turned_rows  # noqa: PLC0415 - numba loads slowly
+
+    turned = np.empty((*rows.shape[:-1], BINS // TURNS, 2 * TURNS), np.float32)
+    turned_rows(
+        np.ascontiguousarray(rows.reshape(-1, BINS)),
+        turned.reshape(-1, BINS // TURNS, 2 * TURNS),
+    )
+    return turned
+
+
+def _padded(values: NDArray[np.float64]) -> NDArray[np.float32]:
+    """Return values, the last axis filled up to whole blocks with zeros."""
+    from semsig_gis.likelihood.kernels import LANES  # noqa: PLC0415
+
+    size = values.shape[-1]
+    more = [(0, 0)] * (values.ndim - 1) + [(0, _blocks(size) * LANES - size)]
+    return np.pad(values, more).astype(np.float32)
+
+
+def _blocks(size: int) -> int:
+    """Return how many blocks hold so many detections: at least one."""
+    from semsig_gis.likelihood.kernels import LANES  # noqa: PLC0415
+
+    return max(1, -(-size // LANES))
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -270,14 +309,6 @@ class _Levels:
             leaving=by_level(table.left),
         )
 
-    def padded(self, values: NDArray[np.float64]) -> NDArray[np.float32]:
-        """Return values, the last axis filled up to whole blocks with zeros."""
-        from semsig_gis.likelihood.kernels import LANES  # noqa: PLC0415
-
-        size = values.shape[-1]
-        more = [(0, 0)] * (values.ndim - 1) + [(0, -size % LANES)]
-        return np.pad(values, more).astype(np.float32)
-
     def rows(self, asked: PhotoTable, table: NoiseTable) -> NDArray[np.float32]:
         """Return the density of each detection by group, level and bearing of an object."""
         from semsig_gis.likelihood.kernels import LANES, profile_rows  # noqa: PLC0415
@@ -294,8 +325,7 @@ class _Levels:
             error = np.hypot(errors[:, None, known], self.blur[:, None])
             away = np.log(asked.ranges[known] / self.distances[:, None]) / error
             near[..., known] = np.exp(-0.5 * away**2) / (error * math.sqrt(2.0 * math.pi))
-        blocks = -(-len(asked.bearings) // LANES)
-        rows = np.zeros((blocks, *self.sigma.shape, BINS, LANES), np.float32)
+        rows = np.zeros((_blocks(len(asked.bearings)), *self.sigma.shape, BINS, LANES), np.float32)
         shifts = np.rint(asked.bearings * (FINE / FULL_TURN)).astype(np.int64)
         near[near < LEAST_DENSITY] = 0.0
         profile_rows(self.fine, shifts, near.astype(np.float32), rows)
@@ -316,13 +346,6 @@ class _Levels:
         if levels:
             mass_rows(self.sigma, asked.sectors, masses)
         return masses
-
-    def named(
-        self, asked: PhotoTable, table: NoiseTable, density: NDArray[np.float64]
-    ) -> NDArray[np.float32]:
-        """Return the chance of what is said of each detection over that of a false one."""
-        lengths = len(self.chances)
-        return self.padded(asked.named(table)[:lengths] / density)
 
 
 def build_index(database: SignatureDatabase, noise: Noise) -> LikelihoodIndex:

@@ -14,7 +14,8 @@ if TYPE_CHECKING:
 
 _TURN = 360.0
 _ROOT = math.sqrt(2.0 * math.pi)
-_REACH = 4.5  # deviations beyond which a detection is not taken for an object
+_REACH = 6.0  # deviations beyond which a detection is not taken for an object
+_LEAST = 1e-6  # weight of a pair against a miss and a false detection, from which it counts
 _WIDE = 45.0  # deviation in degrees from which on the tails meet behind the observer
 _LARGE = 1e200
 # How often messages are sent, and the relative change at which they are taken for settled.
@@ -158,7 +159,7 @@ def align(  # noqa: C901, PLR0912, PLR0915, PLR0917 - a kernel takes no keywords
                             ratio = math.log(ranges[two] / away_m) / error
                             near *= math.exp(-0.5 * ratio**2) / (error * _ROOT)
                         value = factor * near * named[one, two] / floor[two]
-                        if value > 0.0:
+                        if value > _LEAST:
                             one_of[edges] = one
                             other_of[edges] = two
                             weight[edges] = value
@@ -309,7 +310,7 @@ def mass_rows(
 
 
 @compiled
-def scan(  # noqa: C901, PLR0912, PLR0915, PLR0917
+def scan(  # noqa: C901, PLR0915, PLR0917
     part: NDArray[np.int64],
     offsets: NDArray[np.int64],
     kinds: NDArray[np.uint8],
@@ -324,21 +325,17 @@ def scan(  # noqa: C901, PLR0912, PLR0915, PLR0917
     chances: NDArray[np.float32],
     leaving: NDArray[np.float32],
     base: float,
-    turns: NDArray[np.int64],
-    log_turns: NDArray[np.float64],
     scores: NDArray[np.float32],
-    best: NDArray[np.int16],
 ) -> None:
     """Fill `scores` of the cells ``part[0]`` to ``part[1] - 1`` by the objects of each.
 
-    The sum over the detections of a photo of the logarithm of a sum over the objects, and over its
-    `turns`, in bins, with `log_turns`; `best` gets the likeliest turn. An object has a class row in
-    `kinds` and a level of its distance and a bin of its bearing in `places`. By the group of its
-    class (`group_of`) and its place, `rows` are those of `profile_rows`, of which only those count
-    that are `near`, and `masses` those of `mass_rows`, without a level where all round was seen.
-    `named`, shape (longest + 1, k, blocks * LANES), is the chance of a name over the density of
-    such false detections, `disc` the factor of their range. By length, class and level, `chances`
-    are of detection, and of having left the range, `leaving`. `base` is what all cells get.
+    The sum over the detections of a photo of the logarithm of a sum over the objects. An object has
+    a class row in `kinds` and a level of its distance and a bin of its bearing in `places`. By the
+    group of its class (`group_of`) and its place, `rows` are those of `profile_rows`, of which only
+    those count that are `near`, and `masses` those of `mass_rows`, without a level where all round
+    was seen. `named`, shape (longest + 1, k, blocks * LANES), is the chance of a name over the
+    density of such false detections, `disc` the factor of their range. By length, class and level,
+    `chances` are of detection, and of having left the range, `leaving`. `base` is what all get.
     """
     blocks, groups, levels, bins = rows.shape[0], rows.shape[1], rows.shape[2], rows.shape[3]
     longest, classes = len(chances) - 1, chances.shape[1]
@@ -348,41 +345,21 @@ def scan(  # noqa: C901, PLR0912, PLR0915, PLR0917
     flat_rows, flat_near, flat_named = rows.ravel(), near.ravel(), named.ravel()
     flat_chances, flat_leaving, flat_masses = chances.ravel(), leaving.ravel(), masses.ravel()
     partial, moving = len(flat_masses) > 0, leaving.max() > 0.0
-    ways = len(turns)
-    totals = np.empty(ways)
-    most = 0
-    for cell in range(part[0], part[1]):
-        most = max(most, offsets[cell + 1] - offsets[cell])
-    names = np.empty(most, np.uint64)
-    starts = np.empty(most, np.uint64)
-    angles = np.empty(most, np.uint64)
-    sure = np.empty(most, np.float32)
-    odds = np.empty(most, np.float32)
+    starts = group_of * (levels * bins)
     floors = np.empty(blocks * LANES, np.float32)
     left = np.zeros(classes, np.float32)
     one_f = np.float32(1.0)
-    shift, around = np.uint64(int(math.log2(bins) + 0.5)), np.uint64(bins - 1)
+    shift = np.uint64(int(math.log2(bins) + 0.5))
     for cell in range(part[0], part[1]):
-        low = offsets[cell]
-        count = offsets[cell + 1] - low
-        length = np.uint64(min(count, longest) * classes)
+        low, high = offsets[cell], offsets[cell + 1]
+        length = np.uint64(min(high - low, longest) * classes)
         gone = np.float32(0.0)
-        whole = 1.0
-        for one in range(count):
-            kind, place = np.uint64(kinds[low + one]), np.uint64(places[low + one])
-            name = length + kind
-            at = name * np.uint64(levels) + (place >> shift)
-            chance = flat_chances[at]
-            names[one] = name * width_u
-            starts[one] = np.uint64(group_of[kind]) * step + (place & ~around)
-            angles[one] = place & around
-            sure[one] = chance
-            odds[one] = chance / (one_f - chance)
-            whole *= one_f - chance
-            if moving:
-                left[kind] += flat_leaving[at]
+        product = 1.0
         floors[:] = one_f
         if moving:
+            for one in range(low, high):
+                kind, place = np.uint64(kinds[one]), np.uint64(places[one])
+                left[kind] += flat_leaving[(length + kind) * np.uint64(levels) + (place >> shift)]
             for row in range(classes):
                 if left[row] > 0.0:
                     gone += left[row]
@@ -390,55 +367,157 @@ def scan(  # noqa: C901, PLR0912, PLR0915, PLR0917
                     for two in range(blocks * LANES):
                         floors[two] += left[row] * flat_named[name + np.uint64(two)] * disc[two]
                     left[row] = 0.0
-        peak = -np.inf
-        for way in range(ways):
-            turn = np.uint64(turns[way] & (bins - 1))
-            total = base - gone * width + log_turns[way]
-            product = whole
-            if partial:
-                product = 1.0
-                for one in range(count):
-                    place = starts[one] + ((angles[one] - turn) & around)
-                    missed = one_f - sure[one] * flat_masses[place]
-                    odds[one] = sure[one] / missed
+        total = base - gone * width
+        for block in range(blocks):
+            first = np.uint64(block * LANES)
+            a0, a1 = floors[first], floors[first + one_u]
+            a2, a3 = floors[first + np.uint64(2)], floors[first + np.uint64(3)]
+            a4, a5 = floors[first + np.uint64(4)], floors[first + np.uint64(5)]
+            a6, a7 = floors[first + np.uint64(6)], floors[first + np.uint64(7)]
+            above = np.uint64(block * groups) * step
+            for one in range(low, high):
+                kind, place = np.uint64(kinds[one]), np.uint64(places[one])
+                name = length + kind
+                chance = flat_chances[name * np.uint64(levels) + (place >> shift)]
+                place += np.uint64(starts[kind])
+                missed = one_f - chance
+                if partial:
+                    missed = one_f - chance * flat_masses[place]
+                if block == 0:
                     product *= missed
-            for block in range(blocks):
-                first = np.uint64(block * LANES)
-                a0, a1 = floors[first], floors[first + one_u]
-                a2, a3 = floors[first + np.uint64(2)], floors[first + np.uint64(3)]
-                a4, a5 = floors[first + np.uint64(4)], floors[first + np.uint64(5)]
-                a6, a7 = floors[first + np.uint64(6)], floors[first + np.uint64(7)]
-                above = np.uint64(block * groups) * step
-                for one in range(count):
-                    place = above + starts[one] + ((angles[one] - turn) & around)
-                    if not flat_near[place]:
-                        continue
-                    at, name = place * lanes, names[one] + first
-                    factor = odds[one]
-                    a0 += factor * flat_rows[at] * flat_named[name]
-                    a1 += factor * flat_rows[at + one_u] * flat_named[name + one_u]
-                    a2 += factor * flat_rows[at + np.uint64(2)] * flat_named[name + np.uint64(2)]
-                    a3 += factor * flat_rows[at + np.uint64(3)] * flat_named[name + np.uint64(3)]
-                    a4 += factor * flat_rows[at + np.uint64(4)] * flat_named[name + np.uint64(4)]
-                    a5 += factor * flat_rows[at + np.uint64(5)] * flat_named[name + np.uint64(5)]
-                    a6 += factor * flat_rows[at + np.uint64(6)] * flat_named[name + np.uint64(6)]
-                    a7 += factor * flat_rows[at + np.uint64(7)] * flat_named[name + np.uint64(7)]
-                product *= float(a0 * a1) * float(a2 * a3) * float(a4 * a5) * float(a6 * a7)
-                if product > _LARGE or product < 1.0 / _LARGE:
-                    total += math.log(product)
-                    product = 1.0
-            total += math.log(product)
-            totals[way] = total
-            if total > peak:
-                peak = total
-                best[cell] = turns[way]
-        if ways == 1:
-            scores[cell] = peak
-        else:
-            mass = 0.0
+                place += above
+                if not flat_near[place]:
+                    continue
+                at, name = place * lanes, name * width_u + first
+                factor = chance / missed
+                a0 += factor * flat_rows[at] * flat_named[name]
+                a1 += factor * flat_rows[at + one_u] * flat_named[name + one_u]
+                a2 += factor * flat_rows[at + np.uint64(2)] * flat_named[name + np.uint64(2)]
+                a3 += factor * flat_rows[at + np.uint64(3)] * flat_named[name + np.uint64(3)]
+                a4 += factor * flat_rows[at + np.uint64(4)] * flat_named[name + np.uint64(4)]
+                a5 += factor * flat_rows[at + np.uint64(5)] * flat_named[name + np.uint64(5)]
+                a6 += factor * flat_rows[at + np.uint64(6)] * flat_named[name + np.uint64(6)]
+                a7 += factor * flat_rows[at + np.uint64(7)] * flat_named[name + np.uint64(7)]
+            product *= float(a0 * a1) * float(a2 * a3) * float(a4 * a5) * float(a6 * a7)
+            if product > _LARGE or product < 1.0 / _LARGE:
+                total += math.log(product)
+                product = 1.0
+        scores[cell] = total + math.log(product)
+
+
+@compiled
+def turned_rows(rows: NDArray[np.float32], turned: NDArray[np.float32]) -> None:
+    """Fill `turned`, shape (..., bins // turns, 2 * turns), with rows of shape (..., bins).
+
+    What an object in bin ``turns * q + r`` has when the photo is turned by t steps stands at
+    ``[r, t - q]``, modulo the turns, so that all turns stand side by side.
+    """
+    bins = rows.shape[1]
+    inside, twice = turned.shape[1], turned.shape[2]
+    for row in range(len(rows)):
+        for part in range(inside):
+            for turn in range(twice):
+                turned[row, part, turn] = rows[row, (part - turn * inside) % bins]
+
+
+@compiled
+def scan_turned(  # noqa: C901, PLR0912, PLR0915, PLR0917
+    part: NDArray[np.int64],
+    offsets: NDArray[np.int64],
+    kinds: NDArray[np.uint8],
+    places: NDArray[np.uint16],
+    group_of: NDArray[np.int64],
+    rows: NDArray[np.float32],
+    masses: NDArray[np.float32],
+    width: float,
+    named: NDArray[np.float32],
+    disc: NDArray[np.float32],
+    chances: NDArray[np.float32],
+    leaving: NDArray[np.float32],
+    base: float,
+    first: int,
+    priors: NDArray[np.float64],
+    scores: NDArray[np.float32],
+    best: NDArray[np.int16],
+) -> None:
+    """Fill `scores` as `scan`, summed over turns of the photo, and `best` with the likeliest turn.
+
+    Turns are steps from `first` on, with their chances in `priors`. `rows`, shape (n, groups,
+    levels, bins // turns, 2 * turns), and `masses` are those of `turned_rows`; `named` has shape
+    (longest + 1, k, n).
+    """
+    size, groups, levels, inside = rows.shape[0], rows.shape[1], rows.shape[2], rows.shape[3]
+    twice = rows.shape[4]
+    turns, ways = twice // 2, len(priors)
+    longest, classes = len(chances) - 1, chances.shape[1]
+    flat_rows, flat_named, flat_masses = rows.ravel(), named.ravel(), masses.ravel()
+    partial, moving = len(flat_masses) > 0, leaving.max() > 0.0
+    one_size = groups * levels * inside * twice
+    sums = np.empty((size, ways), np.float32)
+    odds = np.empty(ways, np.float32)
+    product = np.empty(ways)
+    floors = np.empty(size, np.float32)
+    left = np.zeros(classes, np.float32)
+    one_f = np.float32(1.0)
+    bins = inside * turns
+    for cell in range(part[0], part[1]):
+        low, high = offsets[cell], offsets[cell + 1]
+        length = min(high - low, longest)
+        gone = np.float32(0.0)
+        floors[:] = one_f
+        if moving:
+            for one in range(low, high):
+                left[kinds[one]] += leaving[length, kinds[one], places[one] // bins]
+            for row in range(classes):
+                if left[row] > 0.0:
+                    gone += left[row]
+                    for two in range(size):
+                        floors[two] += left[row] * named[length, row, two] * disc[two]
+                    left[row] = 0.0
+        for two in range(size):
             for way in range(ways):
-                mass += math.exp(totals[way] - peak)
-            scores[cell] = peak + math.log(mass)
+                sums[two, way] = floors[two]
+        for way in range(ways):
+            product[way] = priors[way]
+        for one in range(low, high):
+            kind, place = kinds[one], places[one]
+            level, place = place // bins, place % bins
+            chance = chances[length, kind, level]
+            start = (first - place // inside) % turns
+            start += ((group_of[kind] * levels + level) * inside + place % inside) * twice
+            if partial:
+                for way in range(ways):
+                    missed = one_f - chance * flat_masses[start + way]
+                    odds[way] = chance / missed
+                    product[way] *= missed
+            else:
+                missed = one_f - chance
+                for way in range(ways):
+                    odds[way] = chance / missed
+                    product[way] *= missed
+            name = (length * classes + kind) * size
+            for two in range(size):
+                factor = flat_named[name + two]
+                if factor > 0.0:
+                    at = two * one_size + start
+                    for way in range(ways):
+                        sums[two, way] += odds[way] * factor * flat_rows[at + way]
+        total = base - gone * width
+        for two in range(size):
+            for way in range(ways):
+                product[way] *= sums[two, way]
+            if two % LANES == LANES - 1:
+                peak = product.max()
+                total += math.log(peak)
+                for way in range(ways):
+                    product[way] /= peak
+        peak, mass = 0.0, 0.0
+        for way in range(ways):
+            mass += product[way]
+            if product[way] > peak:
+                peak = product[way]
+                best[cell] = first + way
+        scores[cell] = total + math.log(mass)
 
 
 @compiled
