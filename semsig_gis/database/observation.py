@@ -56,7 +56,8 @@ _METRES = re.compile(
     r"(?:\s+away)?",
     re.IGNORECASE,
 )
-_SECTOR = re.compile(rf"({_NUMBER})\s*°?\s*-\s*({_NUMBER})\s*°?")
+_SECTOR = rf"({_NUMBER})\s*°?\s*-\s*({_NUMBER})\s*°?"
+_SECTORS = re.compile(rf"{_SECTOR}(?:[\s,;]+{_SECTOR})*")
 
 
 def parse_view(row: Row, *, taxonomy: Taxonomy, radius: float = RADIUS_M) -> View:
@@ -164,6 +165,10 @@ def _column_view(told: Row, taxonomy: Taxonomy, radius: float) -> View:
     plain = Signature(codes, bearings)
     look = {name: told[name] for name in LOOK if name in told}
     photos = [_photo(look | one) for one in _mappings(told, "photos")] or [_photo(look)]
+    owners = [_number("photo", one) for one in _values(told.get("photo", []))]
+    if any(one not in range(len(photos)) for one in owners):
+        msg = f"photo was given as {told['photo']!r}; give numbers from 0 to {len(photos) - 1}."
+        raise InputError(msg)
     if len(photos) > 1 and "photo" not in told:
         msg = "several photos were given, but not which one each object is in; give photo, too."
         raise InputError(msg)
@@ -174,7 +179,7 @@ def _column_view(told: Row, taxonomy: Taxonomy, radius: float) -> View:
         ranges=ranges,
         range_errors=errors,
         scores=scores,
-        photo=told.get("photo"),
+        photo=np.array(owners, np.int64) if "photo" in told else None,
         photos=tuple(photos),
     ).turned(0.0)
 
@@ -217,7 +222,7 @@ def _columns(items: Sequence[Row], told: Row, taxonomy: Taxonomy) -> Row:
 def _said(text: str) -> list[Row]:
     """Return the detections that a sentence tells of."""
     found = []
-    for part in filter(None, map(str.strip, re.split(r"[,;\n]", text))):
+    for part in filter(None, map(_spaced, re.split(r"[,;\n]", text))):
         match = _PLACED.fullmatch(part)
         if match is None:
             found.append({"class": part})
@@ -292,7 +297,7 @@ def _range(told: object, furthest: float) -> tuple[float, float]:
         return math.nan, math.nan
     if isinstance(told, (int, float)):
         return float(told), math.nan
-    text = str(told).strip().lower()
+    text = _spaced(str(told)).lower()
     if third := THIRDS.get(text):
         return _spread(*(furthest * edge / 3.0 for edge in third))
     match = _METRES.fullmatch(text)
@@ -342,8 +347,9 @@ def _photo(look: Row) -> Photo:
 def _sectors(told: object) -> tuple[tuple[float, float], ...]:
     """Return sectors from text such as ``20-90,180-250``, or from pairs."""
     if isinstance(told, str):
-        pairs = _SECTOR.findall(told)
-        if not _SECTOR.sub("", told).strip(" ,;"):
+        text = _spaced(told)
+        if _SECTORS.fullmatch(text):
+            pairs = re.findall(_SECTOR, text)
             return tuple((float(start), float(end)) for start, end in pairs)
     elif isinstance(told, list) and all(
         isinstance(pair, list) and len(pair) == PAIR for pair in told
@@ -356,10 +362,16 @@ def _sectors(told: object) -> tuple[tuple[float, float], ...]:
     raise InputError(msg)
 
 
+def _spaced(text: str) -> str:
+    """Return text with one blank where there were several, which expressions read for ever."""
+    return " ".join(text.split())
+
+
 def _values(told: Any) -> list[Any]:  # noqa: ANN401 - any value of JSON
     """Return the values of a list, which in text stand between commas, semicolons or blanks."""
     if isinstance(told, str):
-        return re.split(r"\s*[,;]\s*" if re.search("[,;]", told) else r"\s+", told.strip())
+        text = _spaced(told)
+        return re.split(" ?[,;] ?" if re.search("[,;]", text) else " ", text)
     return told if isinstance(told, list) else [told]
 
 

@@ -213,7 +213,10 @@ REFUSED: list[tuple[dict[str, Any], str]] = [
     ({"types": "D", "bearings": [1], "heading_error": "some"}, "'some'"),
     ({"types": "D", "bearings": [1], "heading_error": 400}, "deviation of north is 400"),
     ({"types": "D", "bearings": [1], "photos": [{}, {}]}, "give photo"),
-    ({"types": "D", "bearings": [1], "photos": [{}], "photo": [1]}, "not there"),
+    ({"types": "D", "bearings": [1], "photos": [{}], "photo": [1]}, "from 0 to 0"),
+    ({"types": "D", "bearings": [1], "photo": [0.5]}, "photo was given as [0.5]"),
+    ({"types": "D", "bearings": [1], "photo": "here"}, "'here'"),
+    ({"types": "D", "bearings": [1], "photo": [0, 0]}, "2 photo were given for 1 objects"),
     ({"photos": []}, "photos"),
     ({"photos": [{"see": "lamp"}, {"see": "lamp at 5"}]}, "lack bearings"),
 ]
