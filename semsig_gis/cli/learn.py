@@ -34,6 +34,7 @@ from semsig_gis.cli.options import (
 if TYPE_CHECKING:
     from collections.abc import Hashable, Sequence
 
+    import pandas as pd
     from numpy.typing import NDArray
 
     from semsig_gis.database.city import City
@@ -92,7 +93,7 @@ def learn(
         f"Learnt from {estimate.detections:,} detections at {estimate.samples:,} places that see "
         f"{estimate.objects:,} objects{nowhere}",
         ("quantity", "class", "value", "its own samples say", "95% interval", "samples"),
-        map(_rate, estimate.rates.to_dict("records")),
+        _rates(estimate.rates),
     )
     if map_age:
         say(
@@ -139,16 +140,25 @@ def _places(database: SignatureDatabase, samples: Sequence[Sample]) -> NDArray[A
     return np.array(places)
 
 
+def _rates(rates: pd.DataFrame) -> list[list[str]]:
+    """Return rates as rows of a table; those of classes far away are in the file alone."""
+    from semsig_gis.likelihood.noise.fit import ALL
+
+    told = rates[(rates["quantity"] != "fading") | (rates["class"] == ALL)]
+    return [_rate(row) for row in told.to_dict("records")]
+
+
 def _rate(row: dict[Hashable, Any]) -> list[str]:
     """Return a rate as a row of a table; a class without samples has nothing of its own."""
+    samples = f"{row['samples']:.0f}"
     high = min(row["high_95"], 180.0)  # no error of a bearing is larger
     own = (
-        [f"{row['own']:.3f}", f"{row['low_95']:.3f} to {high:.3f}"] if row["samples"] else ["", ""]
+        [f"{row['own']:.3f}", f"{row['low_95']:.3f} to {high:.3f}"] if samples != "0" else ["", ""]
     )
     quantity, metres = row["quantity"], row["distance"]
     if quantity in {"detection", "fading"} and not math.isnan(metres):
         quantity = f"detection at {metres:g} m"
-    return [quantity, row["class"], f"{row['value']:.3f}", *own, f"{row['samples']:.0f}"]
+    return [quantity, row["class"], f"{row['value']:.3f}", *own, samples]
 
 
 @app.command()

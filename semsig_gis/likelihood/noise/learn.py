@@ -359,7 +359,8 @@ def _spec(
         spec = replace(spec, range_sigma=overall["range_sigma"], range_sigma_by_class=errors)
     if fading:
         shares = fading_at_knots(model)
-        tables = {ALL: (radius, np.average(shares, axis=0, weights=weights))}
+        mean = np.minimum(np.average(shares, axis=0, weights=weights), 1.0)
+        tables = {ALL: (radius, mean)}
         tables |= dict(zip(evidence.names, zip(model.ranges, shares, strict=True), strict=True))
         points = {
             name: tuple(zip((KNOTS * limit).tolist(), row.tolist(), strict=True))
