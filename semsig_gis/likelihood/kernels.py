@@ -398,7 +398,9 @@ def scan(  # noqa: C901, PLR0915, PLR0917
                 a5 += factor * flat_rows[at + np.uint64(5)] * flat_named[name + np.uint64(5)]
                 a6 += factor * flat_rows[at + np.uint64(6)] * flat_named[name + np.uint64(6)]
                 a7 += factor * flat_rows[at + np.uint64(7)] * flat_named[name + np.uint64(7)]
-            product *= float(a0 * a1) * float(a2 * a3) * float(a4 * a5) * float(a6 * a7)
+            # Each pair is below 1e38, all eight together may not be.
+            product *= np.float64(a0 * a1) * np.float64(a2 * a3)
+            product *= np.float64(a4 * a5) * np.float64(a6 * a7)
             if product > _LARGE or product < 1.0 / _LARGE:
                 total += math.log(product)
                 product = 1.0

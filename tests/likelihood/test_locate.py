@@ -11,11 +11,12 @@ import pytest
 import shapely
 from hypothesis import given
 from hypothesis import strategies as st
-from noisy_cells import noisy_town, parts_of, random_database, turned_query
+from noisy_cells import database_of, noisy_town, parts_of, random_database, turned_query
 from worlds import CODES, CORNER, World, random_town
 
 from semsig_gis.core.rtree import ObjectIndex
 from semsig_gis.core.signature import Signature
+from semsig_gis.core.view import View
 from semsig_gis.database.city import ObjectStore
 from semsig_gis.database.occlusion import Footprints
 from semsig_gis.database.views import views_at
@@ -389,3 +390,13 @@ def test_parts_fill_the_cells() -> None:
     found = refined(detected(world, CORNER + 100.0, 5), world, cells=cells)
     assert (found.sizes**2).sum() == pytest.approx(7 * 100.0)
     assert np.abs(found.places[:, None] - cells).max(axis=2).min(axis=1).max() < 5.0
+
+
+def test_many_detections_that_clutter_hardly_explains_do_not_overflow() -> None:
+    bearings = np.arange(8) * 45.0
+    database = database_of([("DDDDDDDD", bearings.tolist()), ("D", [10.0])])
+    noise = NoiseSpec(detection=0.999, clutter=0.0, bearing_sigma=0.5)
+    view = View(np.full(8, 3), bearings, ranges=np.full(8, 11.8), range_errors=np.full(8, 0.05))
+    found = build_index(database, noise).scores(view).loglik
+    assert np.isfinite(found).all()
+    assert found[0] > found[1] + 90.0
