@@ -236,7 +236,7 @@ def test_the_sum_over_associations_is_close_and_never_too_large(
     cells = np.arange(len(database))
     found = align_cells(database, query, noise, cells)
     for cell in cells.tolist():
-        exact = cell_loglik(database, query, noise, cell, tails=4.5)
+        exact = cell_loglik(database, query, noise, cell, tails=6.0)
         assert found[cell] <= exact + 1e-3
         # Half the logarithm of two for each object is the most that loops can cost.
         loops = min(len(query), int(database.lengths[cell]))

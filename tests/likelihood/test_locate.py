@@ -393,7 +393,7 @@ def test_parts_fill_the_cells() -> None:
 
 
 def test_many_detections_that_clutter_hardly_explains_do_not_overflow() -> None:
-    bearings = np.arange(8) * 45.0
+    bearings = np.linspace(0.0, 315.0, 8)
     database = database_of([("DDDDDDDD", bearings.tolist()), ("D", [10.0])])
     noise = NoiseSpec(detection=0.999, clutter=0.0, bearing_sigma=0.5)
     view = View(np.full(8, 3), bearings, ranges=np.full(8, 11.8), range_errors=np.full(8, 0.05))
