@@ -74,6 +74,17 @@ def test_a_class_has_a_byte_a_letter_and_an_identifier(
         dataclasses.replace(OTHER, **{attribute: value})  # type: ignore[arg-type]
 
 
+@pytest.mark.parametrize(
+    ("height", "sigma"),
+    [(2.0, None), (None, 1.0), (0.0, 1.0), (2.0, 0.0), (2.0, 3.0), (999.0, 1.0)],
+)
+def test_a_height_has_a_deviation(height: float | None, sigma: float | None) -> None:
+    with refused(CatalogError, "'tree'", f"height of {height} m", f"height_sigma of {sigma} m"):
+        dataclasses.replace(OTHER, height_m=height, height_sigma=sigma)
+    tall = Taxonomy((dataclasses.replace(OTHER, height_m=9.0, height_sigma=4.0),))
+    assert Taxonomy.from_list(tall.to_list()) == tall
+
+
 @pytest.mark.parametrize("attribute", ["code", "symbol", "name"])
 def test_what_stands_twice_is_named(attribute: str) -> None:
     value = getattr(TREE, attribute)

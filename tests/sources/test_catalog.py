@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 import json
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 from unittest.mock import Mock
 
 import pyogrio
@@ -82,6 +82,12 @@ def test_ranges_go_into_the_taxonomy(town: Town) -> None:
     assert ranges_of(taxonomy) == {"bus_stop": 50.0, "kiosk": 12.5}
     ranges = taxonomy.ranges(30.0)
     assert (ranges[11], ranges[30], ranges[3]) == (50.0, 12.5, 30.0)
+
+
+def test_heights_go_into_the_taxonomy(town: Town) -> None:
+    text = 'title = "Kiosk"\nheight_m = 3\nheight_sigma = 0.5'
+    kiosk = load_catalog(town('title = "Kiosk"', text)).taxonomy.by_name("kiosk")
+    assert (kiosk.height_m, kiosk.height_sigma) == (3.0, 0.5)
 
 
 def test_streets_say_how_wide_they_are(town: Town) -> None:
@@ -178,6 +184,18 @@ def test_the_first_radius_and_range_hold() -> None:
     assert ranges_of(both.taxonomy) == {"bench": 20.0, "bus_stop": 50.0, "kiosk": 40.0}
     assert [item.name for item in both.taxonomy.classes] == [item.name for item in kiosk.classes]
     assert combine_catalogs([second, first]).taxonomy.by_name("bench").range_m == 25.0
+
+
+def test_the_first_height_holds() -> None:
+    sizes: list[dict[str, Any]] = [{}, {"height_m": 3.0, "height_sigma": 0.5}]
+    sizes += [{"range_m": 9.0, "height_m": 2.0, "height_sigma": 0.1}]
+    kiosks = [dataclasses.replace(ObjectClass(30, "Z", "kiosk", "Kiosk"), **size) for size in sizes]
+    catalogs = [
+        catalog_of(name=f"c{number}", taxonomy=paper_taxonomy().extended([kiosk]))
+        for number, kiosk in enumerate(kiosks)
+    ]
+    both = combine_catalogs(catalogs).taxonomy.by_name("kiosk")
+    assert (both.range_m, both.height_m, both.height_sigma) == (9.0, 3.0, 0.5)
 
 
 def test_catalogues_that_do_not_go_together() -> None:

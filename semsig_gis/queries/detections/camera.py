@@ -27,8 +27,8 @@ MOST_PIXELS = 1_000_000
 MOST_FOV = {"pinhole": 175.0}  # a flat picture cannot hold half a turn
 
 # Bearings at which the edges of a picture are looked for, and how often each is then halved.
-STEPS = 1440
-HALVINGS = 30
+STEPS, HALVINGS = 1440, 20
+
 # Of a search for the upright thing whose outline has a given box.
 ROUNDS = 20
 NUDGE = 1e-6
