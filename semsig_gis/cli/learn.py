@@ -98,7 +98,7 @@ def learn(
     if map_age:
         say(
             f"Without what a map of {map_age:g} years explains: detection {noise.detection:.3f} "
-            f"(was {learnt.detection:.3f}), {noise.clutter:.3f} false objects a signature (was "
+            f"(was {learnt.detection:.3f}), {noise.clutter:.3f} false objects a full turn (was "
             f"{learnt.clutter:.3f})."
         )
     say(f"noise model: {out}")

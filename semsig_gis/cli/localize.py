@@ -356,7 +356,6 @@ def _write(
 
 
 VERDICTS = ("matched", "misnamed", "missed", "false")
-ORDER = (*VERDICTS, "outside")
 EXPLANATION = (
     *("verdict", "chance", "seen", "at", "object", "at", "off by", "distance", "source", "id"),
 )
@@ -486,7 +485,9 @@ def _print_explanations(candidates: list[dict[str, Any]]) -> None:
         if "explanation" not in row:
             break
         why = row["explanation"]
+        outside = sum(one["verdict"] not in VERDICTS for one in why["rows"])
         counts = ", ".join(f"{why['counts'][verdict]} {verdict}" for verdict in VERDICTS)
+        counts += f"; {outside} outside the photos" if outside else ""
         title = f"Rank {row['rank']}, at x {why['x']:.1f}, y {why['y']:.1f}: {counts}"
         if row["rank"] > 1:
             say(title)
@@ -507,7 +508,9 @@ def _print_explanations(candidates: list[dict[str, Any]]) -> None:
                     one["source"] or "",
                     one["source_id"] or "",
                 ]
-                for one in sorted(why["rows"], key=lambda one: ORDER.index(one["verdict"]))
+                for verdict in VERDICTS
+                for one in why["rows"]
+                if one["verdict"] == verdict
             ],
         )
 

@@ -372,3 +372,17 @@ def test_nobody_stands_where_nothing_is_possible(city: Path, run: Run) -> None:
     assert code == 0
     best = json.loads(out)["place"]
     assert shapely.Point(best["x"], best["y"]).within(corner)
+
+
+def test_what_stands_outside_the_photo_is_counted_apart(city: Path, run: Run) -> None:
+    seen = "--types", "D", "--bearings", "90", "--ranges", "12", "--fov", "60", "--look", "90"
+    query = "localize", city, *seen, *BY, "--refine", "--explain"
+    printed = run(*query)[1]
+    assert "outside the photos" in printed
+    assert "90.0°, 12.0 m" in printed
+    (first, *_) = json.loads(run(*query, "--json")[1])["candidates"]
+    rows = first["explanation"]["rows"]
+    assert rows[0]["query_range"] == 12.0
+    outside = [row for row in rows if row["verdict"] == "outside"]
+    assert f"{len(outside)} outside" in printed
+    assert all(not 45.0 < row["object_bearing"] < 135.0 for row in outside)
