@@ -6,7 +6,7 @@ import argparse
 import json
 from pathlib import Path
 
-from benchmarks import building, country, maps, matching, occlusion, osm
+from benchmarks import answers, building, country, maps, matching, occlusion, osm
 
 
 def main() -> None:
@@ -18,7 +18,7 @@ def main() -> None:
     )
     options = parser.parse_args()
     results = []
-    for module in (matching, building, occlusion, country, osm, maps):
+    for module in (matching, answers, building, occlusion, country, osm, maps):
         for comparison in module.comparisons(options.size):
             print(comparison, flush=True)
             results.append(comparison.to_dict())

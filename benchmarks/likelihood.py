@@ -1,16 +1,10 @@
-"""The likelihood method: its queries, and a process that starts cold."""
+"""The likelihood method: its queries over random cells."""
 
 from __future__ import annotations
 
-import subprocess
-import sys
-import tempfile
-from functools import partial
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 from benchmarks.comparison import compare
-from semsig_gis.database.file import save_database
 from semsig_gis.likelihood.association import rerank
 from semsig_gis.likelihood.index import build_index
 from semsig_gis.likelihood.locate import locate
@@ -29,9 +23,6 @@ __all__ = ["growth_of_likelihood", "likelihood_rows"]
 
 _NOISE = named_noise("generic")
 _PEER = "rapidfuzz.process.cdist([query], cells), edit distance of types"
-_FASTER = 15.0
-_IMPORTS = "import numba, numpy, pandas, geopandas, pyarrow.parquet, typer, rich"
-_MOST_COLD_MS, _MOST_HELP_MS = 2500.0, 500.0
 
 
 def likelihood_rows(
@@ -42,7 +33,7 @@ def likelihood_rows(
     many: _Peer,
     repeats: int,
 ) -> Iterator[Comparison]:
-    """Measure queries of a database, and a process that answers one from cold.
+    """Measure queries of a database.
 
     Parameters
     ----------
@@ -84,17 +75,13 @@ def likelihood_rows(
     def answered(repeat: int) -> None:
         locate(index, queries[repeat])
 
-    for what, ours, bar in (
-        ("", scored, None),
-        (" with re-ranking", reranked, None),
-        (" with re-ranking, chances and answer", answered, _FASTER),
+    for what, ours in (
+        ("", scored),
+        (" with re-ranking", reranked),
+        (" with re-ranking, chances and answer", answered),
     ):
         name = f"one likelihood query{what}, {cells}"
-        yield compare(name, ours, one, peer_name=_PEER, repeats=repeats, bar=bar)
-    with tempfile.TemporaryDirectory() as folder:
-        city = Path(folder) / "city.parquet"
-        save_database(database, city)
-        yield from _cold_rows(city, database, queries[0], max(1, repeats // 3))
+        yield compare(name, ours, one, peer_name=_PEER, repeats=repeats)
 
 
 def growth_of_likelihood(database: SignatureDatabase, one: _Peer, *, repeats: int) -> Comparison:
@@ -122,32 +109,3 @@ def growth_of_likelihood(database: SignatureDatabase, one: _Peer, *, repeats: in
         peer_name=_PEER,
         repeats=repeats,
     )
-
-
-def _cold_rows(
-    city: Path, database: SignatureDatabase, query: Signature, repeats: int
-) -> Iterator[Comparison]:
-    """Measure whole processes of the command, beside Python with the same packages."""
-    asked = query.to_dict(database.taxonomy)
-    bearings = ",".join(map(str, asked["bearings"]))
-    options = ["--types", asked["types"], "--bearings", bearings, "--method", "likelihood"]
-    localize = ["-m", "semsig_gis.cli", "localize", str(city), *options]
-
-    def process(arguments: Sequence[str], _: int) -> None:
-        command = [sys.executable, *arguments]
-        subprocess.run(command, check=True, capture_output=True)  # noqa: S603
-
-    yield compare(
-        f"cold: semsig localize by likelihood, {len(database):,} cells",
-        partial(process, localize),
-        partial(process, ["-c", _IMPORTS]),
-        peer_name="python that imports numba, pandas, geopandas, pyarrow, typer and rich",
-        repeats=repeats,
-    ).at_most(_MOST_COLD_MS)
-    yield compare(
-        "cold: semsig --help",
-        partial(process, ["-m", "semsig_gis.cli", "--help"]),
-        partial(process, ["-c", "import typer, rich"]),
-        peer_name="python that imports typer and rich",
-        repeats=repeats,
-    ).at_most(_MOST_HELP_MS)

@@ -286,9 +286,9 @@ def test_version_and_help_start_without_the_gis_stack() -> None:
     assert done.stdout.splitlines() == [f"semsig {__version__}", "[]"]
 
 
-@pytest.mark.usefixtures("city")
 @pytest.mark.parametrize("options", ["--json", "--method likelihood"])
-def test_a_query_is_answered_without_what_makes_tables_and_maps(options: str) -> None:
+def test_a_query_loads_no_tables_or_maps_and_writes_nothing(city: Path, options: str) -> None:
+    before = sorted(city.rglob("*"))
     code = (
         "import sys\n"
         "from semsig_gis.cli import main\n"
@@ -302,6 +302,7 @@ def test_a_query_is_answered_without_what_makes_tables_and_maps(options: str) ->
     done = subprocess.run(command, capture_output=True, text=True, check=True)
     assert "city" in done.stdout or "cells" in done.stdout
     assert (done.stdout.splitlines()[-1], done.stderr) == ("[]", "")
+    assert sorted(city.rglob("*")) == before
 
 
 def test_what_lies_beside_a_database_is_told_and_removed(city: Path, done: Done) -> None:

@@ -1,0 +1,227 @@
+"""Whole answers over a city like Paris: warm, in a batch, and from a process that starts cold."""
+
+from __future__ import annotations
+
+import json
+import statistics
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+from rapidfuzz.distance import Levenshtein
+from rapidfuzz.process import cdist
+
+from benchmarks.comparison import Comparison, compare
+from semsig_gis.database.build import build_database
+from semsig_gis.database.city import ObjectStore
+from semsig_gis.database.file import save_database
+from semsig_gis.database.views import ViewpointSpec
+from semsig_gis.likelihood.index import build_index
+from semsig_gis.likelihood.locate import locate
+from semsig_gis.likelihood.noise.model import cell_noise, named_noise
+from semsig_gis.objects.load import build_objects
+from semsig_gis.sources.catalog import paper_taxonomy
+from semsig_gis.sources.synthetic.city import (
+    PARIS_LIKE,
+    CitySpec,
+    synthetic_city,
+    synthetic_surroundings,
+)
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Sequence
+
+    from semsig_gis.core.signature import Signature
+    from semsig_gis.database.database import SignatureDatabase
+
+__all__ = ["comparisons"]
+
+# The city, the queries of a batch, and how often a single query is timed.
+_SIZES = {"full": (PARIS_LIKE, 1000, 15), "small": (CitySpec(size=600.0), 20, 2)}
+_SEED = 20
+_WARM, _WARM_REFINED = 15.0, 4.0
+_COLD, _MEMORY = 1 / 1.3, 1 / 1.5  # of what edit+edit takes
+_LOADING = 1 / 0.7
+_MOST_HELP_MS = 500.0
+_EXPLAINED = 3
+_IMPORTS = "import numba, pandas, geopandas, pyarrow, typer, rich"
+_LIKELIHOOD = ("--method", "likelihood")
+# The command, which tells at last how many seconds it answered and how many MB it needed.
+_TOLD = """
+import sys, time
+from benchmarks.memory import own_peak
+from semsig_gis.cli import main
+from semsig_gis.cli import localize as command
+seconds = 0.0
+def timed(*given):
+    global seconds
+    start = time.perf_counter()
+    answer(*given)
+    seconds = time.perf_counter() - start
+answer, command._answer = command._answer, timed
+try:
+    main()
+finally:
+    print(seconds, own_peak(), file=sys.stderr)
+"""
+
+
+def comparisons(size: str) -> Iterator[Comparison]:
+    """Measure whole answers, warm and cold, and what a process needs beside answering.
+
+    Parameters
+    ----------
+    size : str
+        ``"full"`` or ``"small"``.
+
+    Yields
+    ------
+    Comparison
+        One result after the other.
+    """
+    spec, batch, repeats = _SIZES[size]
+    layers = synthetic_city(spec)
+    objects, _ = build_objects(layers, taxonomy=paper_taxonomy(), crs=layers[0].table.crs)
+    _, streets = synthetic_surroundings(spec)
+    viewpoints = ViewpointSpec(mode="streets")
+    database = build_database(objects, viewpoints=viewpoints, streets=streets.table)
+    picked = np.random.default_rng(_SEED).integers(0, len(database), batch).tolist()
+    queries = [database.signature(cell) for cell in picked]
+    yield from _warm_rows(database, ObjectStore.of(objects), queries[:repeats])
+    with tempfile.TemporaryDirectory() as folder:
+        city = Path(folder) / "city.parquet"
+        save_database(database, city)
+        yield _batch_row(city, database, queries)
+        yield from _cold_rows(city, database, queries[0], max(1, repeats // 3))
+
+
+def _texts(database: SignatureDatabase) -> list[str]:
+    return list(map(database.types, range(len(database))))
+
+
+def _warm_rows(
+    database: SignatureDatabase, store: ObjectStore, queries: Sequence[Signature]
+) -> Iterator[Comparison]:
+    """Measure answers to single queries, all that can be kept being there."""
+    noise = cell_noise(named_noise("generic"), database.grid.step)  # as the command does
+    index = build_index(database, noise)
+    texts = _texts(database)
+    asked = [database.taxonomy.decode(query.codes) for query in queries if query.codes is not None]
+
+    def peer(repeat: int) -> None:
+        cdist([asked[repeat]], texts, scorer=Levenshtein.distance, dtype=np.uint8)
+
+    def answered(repeat: int) -> None:
+        locate(index, queries[repeat])
+
+    def refined(repeat: int) -> None:
+        locate(index, queries[repeat], store=store, refined=True, explained=_EXPLAINED)
+
+    for what, ours, bar in (
+        ("", answered, _WARM),
+        (" with refinement and explanations", refined, _WARM_REFINED),
+    ):
+        yield compare(
+            f"the whole answer by likelihood{what}, {len(database):,} cells",
+            ours,
+            peer,
+            peer_name="rapidfuzz.process.cdist([query], cells), edit distance of types",
+            repeats=len(queries),
+            bar=bar,
+        )
+
+
+def _batch_row(city: Path, database: SignatureDatabase, queries: Sequence[Signature]) -> Comparison:
+    """Measure a process that answers a file of queries."""
+    file = city.with_name("queries.jsonl")
+    lines = [json.dumps(query.to_dict(database.taxonomy)) for query in queries]
+    file.write_text("\n".join(lines), encoding="utf-8")
+    texts = _texts(database)
+    asked = [json.loads(line)["types"] for line in lines]
+    return compare(
+        f"a process that answers {len(queries):,} queries by likelihood, {len(database):,} cells",
+        lambda _: _process(*_localize(city), "--queries", str(file), *_LIKELIHOOD),
+        lambda _: cdist(asked, texts, scorer=Levenshtein.distance, dtype=np.uint8),
+        peer_name="rapidfuzz.process.cdist(queries, cells), edit distance of types",
+        repeats=1,
+    )
+
+
+def _cold_rows(
+    city: Path, database: SignatureDatabase, query: Signature, repeats: int
+) -> Iterator[Comparison]:
+    """Measure whole processes of the command."""
+    asked = query.to_dict(database.taxonomy)
+    options = "--types", asked["types"], "--bearings", ",".join(map(str, asked["bearings"]))
+    cells = f"{len(database):,} cells"
+    plain = *_localize(city), *options
+    before = sorted(city.parent.iterdir())
+    yield compare(
+        f"cold: semsig localize by likelihood, {cells}",
+        lambda _: _process(*plain, *_LIKELIHOOD),
+        lambda _: _process(*plain),
+        peer_name="semsig localize by edit+edit",
+        repeats=repeats,
+        bar=_COLD,
+    )
+    told = [[_told(*plain[2:], *method) for _ in range(repeats)] for method in (_LIKELIHOOD, ())]
+    by_likelihood, by_distance = (statistics.median(peak for _, peak in runs) for runs in told)
+    yield Comparison(
+        name=f"peak memory of semsig localize by likelihood, {cells}",
+        unit="MB",
+        ours=by_likelihood,
+        peer=by_distance,
+        peer_name="semsig localize by edit+edit",
+        bar=_MEMORY,
+    )
+    yield Comparison(
+        name=f"files beside a database after queries by likelihood, {cells}",
+        unit="files",
+        ours=len(list(city.parent.iterdir())),
+        peer=len(before),
+        peer_name="before",
+        bar=1.0,
+    )
+    whole = compare(
+        f"cold: semsig localize by edit+edit but for answering, {cells}",
+        lambda _: _process(*plain),
+        lambda _: _process("-c", _IMPORTS),
+        peer_name="python that imports numba, pandas, geopandas, pyarrow, typer and rich",
+        repeats=repeats,
+    )
+    answering = 1e3 * statistics.median(seconds for seconds, _ in told[1])
+    yield Comparison(
+        name=whole.name,
+        unit=whole.unit,
+        ours=whole.ours - answering,
+        peer=whole.peer,
+        peer_name=whole.peer_name,
+        bar=_LOADING,
+    )
+    yield compare(
+        "cold: semsig --help",
+        lambda _: _process("-m", "semsig_gis.cli", "--help"),
+        lambda _: _process("-c", "import typer, rich"),
+        peer_name="python that imports typer and rich",
+        repeats=repeats,
+    ).at_most(_MOST_HELP_MS)
+
+
+def _localize(city: Path) -> tuple[str, ...]:
+    return "-m", "semsig_gis.cli", "localize", str(city)
+
+
+def _process(*arguments: str) -> str:
+    """Run Python, and return what it says on standard error."""
+    command = [sys.executable, *arguments]
+    done = subprocess.run(command, check=True, capture_output=True, text=True)  # noqa: S603
+    return done.stderr
+
+
+def _told(*arguments: str) -> tuple[float, float]:
+    """Return how many seconds the command answered, and its peak memory in MB."""
+    seconds, peak = _process("-c", _TOLD, *arguments).splitlines()[-1].split()
+    return float(seconds), float(peak)
