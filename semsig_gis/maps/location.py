@@ -16,6 +16,7 @@ from semsig_gis.core.signs import (
     VERDICTS,
     mixed,
 )
+from semsig_gis.core.view import View
 from semsig_gis.database.database import rows_of_result
 from semsig_gis.database.north import GRID_NORTH
 from semsig_gis.likelihood.explain import VERDICTS as COUNTED
@@ -77,6 +78,7 @@ RAYS: dict[str, tuple[str, dict[str, object]]] = {
         {"weight": 1, "opacity": 0.5, "dashArray": "1 5"},
     ),
 }
+SECTOR = {"color": "#404040", "weight": 1.5, "opacity": 0.9, "dashArray": None}
 BEST_PLACE = "The best place is where most of the chance is around it; ranks are of single cells."
 SURROUNDINGS_M = 45.0  # to see around the answer
 CLOSEST_ZOOM = 20
@@ -267,7 +269,21 @@ class _Drawings:
             for verdict, (_, look) in RAYS.items()
             if rays[verdict] or verdict in explanation.counts
         ]
+        lines += [[SECTOR, sectors] for sectors in [self._sectors(explanation)] if sectors]
         return [["lines", lines], ["points", OBJECT_FIELDS, {}, records]]
+
+    def _sectors(self, explanation: Explanation) -> list[list[list[float]]]:
+        """Return the outlines of what was looked at from a place, as far as is seen."""
+        photos = View.of(self.location.grid_query).photos
+        outlines = []
+        for photo, turn in zip(photos, explanation.headings, strict=True):
+            for low, high in photo.turned(turn).sectors:
+                bearings = np.radians(np.linspace(low, high, ELLIPSE_STEPS))
+                arc = np.stack([np.sin(bearings), np.cos(bearings)], axis=1)
+                corners = np.concatenate([[[0.0, 0.0]], arc, [[0.0, 0.0]]])
+                away = self.database.spec.radius * corners
+                outlines.append(self.latlon(np.array(explanation.xy) + away))
+        return outlines
 
     def _title(self, name: str | None) -> str | None:
         """Return the title of a class; "unknown" and nothing stay what they are."""

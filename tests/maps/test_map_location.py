@@ -19,7 +19,7 @@ from semsig_gis.database.city import ObjectStore
 from semsig_gis.likelihood.index import build_index
 from semsig_gis.likelihood.locate import locate
 from semsig_gis.likelihood.noise.model import cell_noise, named_noise
-from semsig_gis.maps.location import localization_map, location_map
+from semsig_gis.maps.location import SECTOR, localization_map, location_map
 from semsig_gis.matching.search import localize
 
 if TYPE_CHECKING:
@@ -131,6 +131,23 @@ def test_wheels_show_where_a_view_looked_and_how_far(page: MapPage) -> None:
         assert np.corrcoef(out[:-1], metres[:-1])[0, 1] > 0.8
     assert len(asked.find_elements(By.CSS_SELECTOR, "line.ray")) == 1
     assert cell.find_elements(By.CSS_SELECTOR, "line.ray") == []
+
+
+def test_an_explanation_shows_what_was_looked_at(page: MapPage) -> None:
+    photos = tuple(Photo.looking(heading=heading, fov=70) for heading in (10, 200))
+    seen = CITY.signature(LONGEST)
+    assert seen.bearings is not None
+    owners = photos[1].sees(seen.bearings).astype(int)
+    view = View.of(seen, photo=owners, photos=photos)
+    view = view.select(photos[0].sees(seen.bearings) | photos[1].sees(seen.bearings))
+    index = build_index(CITY, named_noise("light"))
+    page.open(location_map(locate(index, view, explained=1)))
+    outlines = """
+    const sectors = lines((one) => one.options.color === arguments[0])[0].getLatLngs();
+    return sectors.map((one) => map.distance(one[0], one[1]));
+    """
+    reach = page.ask(outlines, SECTOR["color"])
+    assert reach == pytest.approx([30.0, 30.0], abs=0.2)
 
 
 def test_what_cannot_be_told_is_shown_from_afar(page: MapPage) -> None:
