@@ -183,6 +183,22 @@ def test_the_file_of_a_picture_tells_its_size(tmp_path: Path) -> None:
     assert view.ranges[0] == pytest.approx(0.85 * 500 / 80, abs=0.01)
 
 
+def test_a_size_that_is_said_is_for_pictures_of_unknown_size(tmp_path: Path) -> None:
+    Image.new("L", (1000, 800)).save(tmp_path / "a.jpg")
+    detector = replace(DETECTOR, shot=Shot(fov=90.0, size=(100, 80)))
+    known, bare = picture(box()), Picture(name="a", boxes=(box(),))
+    for taken, folders in ((known, []), (bare, [tmp_path])):
+        view = one(replace(detector, folders=folders), taken)
+        assert view.bearings is not None
+        assert view.bearings.tolist() == [0.0]
+    assert one(detector, replace(bare, boxes=())).photos[0].width == 90
+
+
+def test_a_table_of_other_pictures_is_refused() -> None:
+    with refused(InputError, "--photos names b.jpg, but none", "name them as a.jpg"):
+        replace(DETECTOR, shots={"b.jpg": Shot()}).views([picture()])
+
+
 def test_a_photograph_of_unknown_field_of_view_is_refused() -> None:
     with refused(InputError, "the field of view of the picture a.jpg is not known; give --fov"):
         replace(DETECTOR, shot=Shot()).views([picture()])

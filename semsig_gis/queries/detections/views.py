@@ -112,8 +112,11 @@ class Detector:
         """Return the view of each place with the name of its first picture, and what was counted.
 
         Pictures that are of one place by their table are one view anyway. InputError if the size or
-        the field of view of a picture is not known, or a number is out of its range.
+        the field of view of a picture is not known, a number is out of its range, or what is known
+        of single pictures is of none of these.
         """
+        pictures = list(pictures)
+        self._require_known(pictures)
         tally = Tally()
         groups: dict[str, list[View]] = {}
         names: dict[str, str] = {}
@@ -139,15 +142,28 @@ class Detector:
         ]
         return views, tally
 
+    def _require_known(self, pictures: Sequence[Picture]) -> None:
+        """Refuse a table of other pictures, without which every heading would be unknown."""
+        if (
+            self.shots
+            and pictures
+            and not self.shots.keys() & {name for picture in pictures for name in _names(picture)}
+        ):
+            msg = (
+                f"--photos names {next(iter(self.shots))}, but none of the pictures with boxes; "
+                f"name them as {pictures[0].name}."
+            )
+            raise InputError(msg)
+
     def _shot(self, picture: Picture) -> Shot:
         """Return all that is known of how a picture was taken."""
-        names = picture.name, PurePosixPath(picture.name).name, PurePosixPath(picture.name).stem
-        own = next((self.shots[name] for name in names if name in self.shots), Shot())
+        own = next((self.shots[name] for name in _names(picture) if name in self.shots), Shot())
         if own.heading_error is None:
             own = replace(own, heading_error=self.shot.heading_error)
-        shot = own.filled(self.shot).filled(picture.shot)
-        file = _file_of(picture.name, self.folders)
-        return shot if file is None else shot.filled(read_exif(file))
+        shot = own.filled(replace(self.shot, size=None)).filled(picture.shot)
+        if file := _file_of(picture.name, self.folders):
+            shot = shot.filled(read_exif(file))
+        return shot.filled(Shot(size=self.shot.size))
 
     def _camera(self, picture: Picture, shot: Shot) -> Camera:
         if shot.size is None:
@@ -316,6 +332,12 @@ def north_sigma(error: str | float) -> float:
     except ValueError as fault:
         msg = f"the error of a heading is {error!r}; give degrees or 'unknown'."
         raise InputError(msg) from fault
+
+
+def _names(picture: Picture) -> tuple[str, str, str]:
+    """Return the names by which others may call a picture."""
+    path = PurePosixPath(picture.name)
+    return picture.name, path.name, path.stem
 
 
 def _file_of(name: str, folders: Iterable[Path]) -> Path | None:
