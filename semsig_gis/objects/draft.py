@@ -492,8 +492,9 @@ def _classes(drafts: Sequence[_Draft]) -> Iterator[str]:
         comment = "" if name in sure else "# "
         yield from [""] if name in sure else ["", "# For class_by below:"]
         yield f"{comment}[[classes]]"
-        for key in ("code", "symbol", "name", "title"):
-            yield f"{comment}{key} = {json.dumps(getattr(item, key), ensure_ascii=False)}"
+        for key in ("code", "symbol", "name", "title", "height_m", "height_sigma"):
+            if (value := getattr(item, key)) is not None:
+                yield f"{comment}{key} = {json.dumps(value, ensure_ascii=False)}"
 
 
 def _new_class(name: str, taken: Sequence[ObjectClass]) -> ObjectClass:
