@@ -18,6 +18,7 @@ _REACH = 6.0  # deviations beyond which a detection is not taken for an object
 _LEAST = 1e-6  # weight of a pair against a miss and a false detection, from which it counts
 _WIDE = 45.0  # deviation in degrees from which on the tails meet behind the observer
 _LARGE = 1e200
+_MISSES = 32  # chances of a miss that are multiplied before the product is brought back to one
 # How often messages are sent, and the relative change at which they are taken for settled.
 _ROUNDS, _SETTLED = 30, 1e-2
 _PAIR_ROUNDS, _PAIR_SETTLED = 60, 1e-5
@@ -310,7 +311,7 @@ def mass_rows(
 
 
 @compiled
-def scan(  # noqa: C901, PLR0915, PLR0917
+def scan(  # noqa: C901, PLR0912, PLR0915, PLR0917
     part: NDArray[np.int64],
     offsets: NDArray[np.int64],
     kinds: NDArray[np.uint8],
@@ -385,6 +386,9 @@ def scan(  # noqa: C901, PLR0915, PLR0917
                     missed = one_f - chance * flat_masses[place]
                 if block == 0:
                     product *= missed
+                    if product < 1.0 / _LARGE:
+                        total += math.log(product)
+                        product = 1.0
                 place += above
                 if not flat_near[place]:
                     continue
@@ -481,6 +485,7 @@ def scan_turned(  # noqa: C901, PLR0912, PLR0915, PLR0917
                 sums[two, way] = floors[two]
         for way in range(ways):
             product[way] = priors[way]
+        total = base - gone * width
         for one in range(low, high):
             kind, place = kinds[one], places[one]
             level, place = place // bins, place % bins
@@ -504,7 +509,11 @@ def scan_turned(  # noqa: C901, PLR0912, PLR0915, PLR0917
                     at = two * one_size + start
                     for way in range(ways):
                         sums[two, way] += odds[way] * factor * flat_rows[at + way]
-        total = base - gone * width
+            if (one - low) % _MISSES == _MISSES - 1:
+                peak = product.max()
+                total += math.log(peak)
+                for way in range(ways):
+                    product[way] /= peak
         for two in range(size):
             for way in range(ways):
                 product[way] *= sums[two, way]

@@ -400,3 +400,15 @@ def test_many_detections_that_clutter_hardly_explains_do_not_overflow() -> None:
     found = build_index(database, noise).scores(view).loglik
     assert np.isfinite(found).all()
     assert found[0] > found[1] + 90.0
+
+
+@pytest.mark.parametrize("north_sigma", [0.0, 10.0, math.inf])
+def test_hundreds_of_objects_that_are_hardly_ever_missed_do_not_underflow(
+    north_sigma: float,
+) -> None:
+    bearings = np.linspace(0.0, 359.0, 200)
+    database = database_of([("D" * 200, bearings.tolist()), ("DB", [10.0, 20.0])])
+    noise = NoiseSpec(detection=0.999, clutter=1.0)
+    query = database.signature(0).select(np.arange(0, 200, 2))
+    found = build_index(database, noise).scores(query, north_sigma=north_sigma).loglik
+    assert np.isfinite(found).all()
