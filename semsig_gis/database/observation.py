@@ -16,7 +16,6 @@ from semsig_gis.core.geometry import wrap_degrees
 from semsig_gis.core.signature import Signature, SignatureSpec, wrapped_bearings
 from semsig_gis.core.taxonomy import MAX_RANGE_M, WILDCARD
 from semsig_gis.core.view import CLASSES, ROUNDING, Photo, View
-from semsig_gis.objects.keywords import class_code
 from semsig_gis.storage.rows import row_value
 
 if TYPE_CHECKING:
@@ -243,11 +242,15 @@ def _class(told: object, taxonomy: Taxonomy) -> str | Row:
     if not isinstance(told, str):
         msg = f"the class of a detection is {told!r}; give a symbol, a word or scores by word."
         raise InputError(msg)
+    from semsig_gis.objects.keywords import class_code  # noqa: PLC0415 - it loads slowly
+
     return taxonomy.decode([class_code(told, taxonomy)])
 
 
 def _scores(told: Row, taxonomy: Taxonomy) -> NDArray[np.float64]:
     """Return the chance of each class code; what is left to one is for any class."""
+    from semsig_gis.objects.keywords import class_code  # noqa: PLC0415 - it loads slowly
+
     scores = np.zeros(CLASSES)
     for word, chance in told.items():
         scores[class_code(word, taxonomy)] += _number(f"the score of {word!r}", chance)
