@@ -188,8 +188,7 @@ def expected_counts(evidence: Evidence, model: NoiseTable) -> Counts:
     found = associate(model, evidence.views, seen, pairs, lengths=lengths)
     chances, kind = found.chances, evidence.pair_kinds
     # What is said of a detection may be the name of several classes.
-    labels = model.named[0][:, :, None] * seen.scores
-    said = labels.sum(axis=1)[kind, pairs.detections]
+    said = (model.named[0] @ seen.scores)[kind, pairs.detections]
     own = model.named[0].diagonal()[kind] * seen.scores[kind, pairs.detections]
     by_detection = np.bincount(
         kind * len(seen.bearings) + pairs.detections,
@@ -317,8 +316,11 @@ def _seen_by_knot(evidence: Evidence, counts: Counts, *, fading: bool) -> NDArra
 
 def _by_knot(evidence: Evidence, counts: Counts) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Return the hits and trials by class and knot, shape (k, knots)."""
-    kinds = np.eye(len(evidence.names))[evidence.kinds]
-    hits, trials = (kinds.T @ part for part in (counts.hits, counts.trials))
+    size = len(evidence.names)
+    hits, trials = (
+        np.stack([np.bincount(evidence.kinds, column, size) for column in part.T], axis=1)
+        for part in (counts.hits, counts.trials)
+    )
     return hits, trials
 
 
