@@ -317,11 +317,12 @@ def _seen_by_knot(evidence: Evidence, counts: Counts, *, fading: bool) -> NDArra
 def _by_knot(evidence: Evidence, counts: Counts) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Return the hits and trials by class and knot, shape (k, knots)."""
     size = len(evidence.names)
-    hits, trials = (
-        np.stack([np.bincount(evidence.kinds, column, size) for column in part.T], axis=1)
-        for part in (counts.hits, counts.trials)
-    )
-    return hits, trials
+
+    def by_class(amounts: NDArray[np.float64]) -> NDArray[np.float64]:
+        sums = [np.bincount(evidence.kinds, column, size) for column in amounts.T]
+        return np.stack(sums, axis=1).astype(np.float64)
+
+    return by_class(counts.hits), by_class(counts.trials)
 
 
 def falling(hits: NDArray[np.float64], trials: NDArray[np.float64]) -> NDArray[np.float64]:
