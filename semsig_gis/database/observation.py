@@ -39,7 +39,7 @@ THIRDS = {"near": (0, 1), "middle": (1, 2), "far": (2, 3)}
 """Rings around the viewpoint, in thirds of the range that a class is seen from."""
 NORTHS = {"known": 0.0, "unknown": math.inf}
 PAIR = 2
-UNKNOWN = (None, "", "?")
+UNKNOWN = (None, "", "?", "nan")
 
 _NUMBER = r"[-+]?\d+(?:\.\d*)?"
 _PLACED = re.compile(

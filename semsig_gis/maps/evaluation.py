@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from semsig_gis.core.signs import ERROR_RAMP, FAILED, SUCCESSFUL, mixed
+from semsig_gis.database.observation import parse_view
 from semsig_gis.evaluation.result import Evaluation
 from semsig_gis.maps.image import mercator, packed
 from semsig_gis.maps.parts import (
@@ -22,6 +23,7 @@ from semsig_gis.maps.parts import (
     isolated,
     popup_signature,
     prepared_map,
+    query_signature,
     ramp_bar,
     ranks_text,
     shades,
@@ -38,6 +40,7 @@ if TYPE_CHECKING:
     import folium
     from numpy.typing import NDArray
 
+    from semsig_gis.core.view import View
     from semsig_gis.database.database import SignatureDatabase
 
 QUERY_FIELDS = (
@@ -150,11 +153,15 @@ def _query_records(
     records = []
     for number, query in enumerate(queries.itertuples(index=False)):
         located = query.tied > 0
+        view = _view(query, database) if query.query_ranges or query.query_sectors else None
+        plain = popup_signature(query.query_types, bearings[number])
+        radius_m = database.spec.radius
+        asked = plain if view is None else query_signature(view, database.taxonomy, radius=radius_m)
         details = [
-            cell_signature(database, rows[number]) if rows[number] >= 0 else "no such cell",
-            popup_signature(query.query_types, bearings[number])
-            if query.query_length
-            else "nothing left of it",
+            cell_signature(database, rows[number], view, query.heading)
+            if rows[number] >= 0
+            else "no such cell",
+            asked if query.query_length else "nothing left of it",
             _metres(query.error_m),
             f"{getattr(query, f'p{Evaluation.success_metres}'):.2f}",
             f"{ranks_text(query.rank_low, query.rank_high)} of {len(database):,}",
@@ -170,6 +177,13 @@ def _query_records(
         name = f"Query {number + 1:,}: {outcome}"
         records.append([places[number].tolist(), colour, radius, best, name, details])
     return records
+
+
+def _view(query: Any, database: SignatureDatabase) -> View:  # noqa: ANN401 - a named row
+    """Return what was asked and told of ranges and sectors."""
+    names = ("types", "bearings", "ranges", "sectors")
+    told = {name: getattr(query, f"query_{name}") for name in names}
+    return parse_view(told, taxonomy=database.taxonomy)
 
 
 def _next_cells(

@@ -16,6 +16,7 @@ from small_city import small_city, small_evaluation
 
 from semsig_gis.core.errors import InputError
 from semsig_gis.core.signs import ERROR_RAMP, FAILED, SUCCESSFUL
+from semsig_gis.evaluation.evaluate import evaluate
 from semsig_gis.maps.evaluation import evaluation_map
 from semsig_gis.maps.page import page_of_map
 
@@ -134,6 +135,21 @@ def test_a_popup_draws_signatures_as_wheels(evaluated: MapPage) -> None:
             turn = (np.degrees(np.arctan2(x, -y)) - one + 180.0) % 360.0 - 180.0
             assert abs(turn) <= 0.51  # north up, clockwise, whole degrees
             assert np.hypot(x, y) < 54.0
+
+
+def test_wheels_show_what_queries_looked_at(page: MapPage) -> None:
+    seen = evaluate(CITY, queries=3, distortion="view:120, ranges:25")
+    longest = int(seen.queries["query_length"].argmax())
+    page.open(evaluation_map(seen, CITY))
+    page.search(f"Query {longest + 1:,}: ", Keys.ENTER)
+    cell, asked, _ = page.all(".semsig-wheels figure")
+    pale = []
+    for wheel in (cell, asked):
+        assert len(wheel.find_elements(By.CSS_SELECTOR, "path.looked")) == 1
+        pale.append(len(wheel.find_elements(By.CSS_SELECTOR, "text.pale")))
+    row = seen.queries.iloc[longest]
+    assert pale == [row["length"] - row["query_length"], 0]
+    assert asked.text.endswith("Query, to 30 m")
 
 
 def test_queries_of_which_nothing_is_left() -> None:
