@@ -183,16 +183,19 @@ def test_views_are_measured_and_kept(
 ) -> None:
     monkeypatch.delenv("SEMSIG_GEODATA", raising=False)
     out = tmp_path / "views.json"
+    some = [*views.lines()]
+    some = [*some[:16:5], *some[16:-2:7], some[-1]]
+    monkeypatch.setattr(views, "lines", lambda: iter(some))
     words = f"views --size small --queries 2 --processes 1 --out {out}"
     monkeypatch.setattr(sys, "argv", words.split())
     views.main()
     assert "Real cities are left out" in capsys.readouterr().out
     rows = json.loads(out.read_text(encoding="utf-8"))
-    assert len(rows) == len(list(views.lines()))
+    assert len(rows) == len(some)
     for row in rows:
         assert 0.0 <= row["p50_low"] <= row["p50"] <= row["p50_high"] <= 1.0
         assert row["queries"] == sum(tenth["n"] for tenth in row["bins"]) == 2
-    assert [row["photos"] for row in rows if "alone" in row] == [5, 5]
+    assert [row["photos"] for row in rows if "alone" in row] == [5]
     out.write_text(json.dumps(rows[:-1]), encoding="utf-8")
     views.main()  # goes on where it was
     assert json.loads(out.read_text(encoding="utf-8"))[:-1] == rows[:-1]
