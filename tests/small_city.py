@@ -66,6 +66,7 @@ def chances_of(database: SignatureDatabase, *, seed: int = 0) -> Identifiability
         database=database,
         noise=named_noise("medium"),
         radius=30.0,
+        view=360.0,
         itself=chances[0],
         near=chances[1],
         found=np.where(rng.random(cells) < 0.5, rng.choice([*BANDS, 1.0], cells), chances[2]),

@@ -296,6 +296,14 @@ def identify(
         float,
         typer.Option(min=0, max=MOST_METRES, help="Distance in metres that counts as found."),
     ] = 50.0,
+    view: Annotated[
+        float,
+        typer.Option(
+            min=10,
+            max=360,
+            help="Degrees that a query sees: a photo in any direction; default: all round.",
+        ),
+    ] = 360.0,
     seed: Annotated[
         int, typer.Option(min=0, max=MOST_SEED, help="Seed of the simulated queries.")
     ] = 0,
@@ -338,15 +346,18 @@ def identify(
     if not on_grid:
         model = cell_noise(model, city.database.grid.step)
     columns = known_identifiability(city)
-    settings = (model, radius, seed)
-    if columns is not None and (columns.noise, columns.radius, columns.seed) != settings:
-        columns = None
+    settings = (model, radius, view, seed)
+    if columns is not None:
+        known = (columns.noise, columns.radius, columns.view, columns.seed)
+        columns = columns if known == settings else None
     workers = (os.cpu_count() or 1) if threads is None else threads
     if columns is None or check is not None:
         index = prepared_index(city, model)
     if columns is None:
         with progress("comparing cells") as advance:
-            columns = run(index, radius=radius, seed=seed, threads=workers, progress=advance)
+            columns = run(
+                index, radius=radius, view=view, seed=seed, threads=workers, progress=advance
+            )
         save_identifiability(columns, database)
     else:
         remark("The database has these columns already; they are kept.")

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from semsig_gis.core.errors import InputError
+from semsig_gis.core.geometry import FULL_TURN
 from semsig_gis.core.signs import FOUND_RAMP, GROUP_COLOURS, SAME_LEVELS, SAME_TYPES
 from semsig_gis.maps.image import level_image, packed, place_lattices, steps
 from semsig_gis.maps.parts import (
@@ -284,7 +285,8 @@ def ambiguity_legend(sizes: Mapping[str, NDArray[np.int64]], *, licenses: Sequen
 def identifiability_legend(identifiability: Identifiability) -> str:
     """Return the legend of a map of where a query can be placed, as HTML with data escaped."""
     facts = identifiability.summary()
-    within = f"within {facts['radius_m']:g} m"
+    within, view = f"within {facts['radius_m']:g} m", facts["view_degrees"]
+    asked = "query" if view == FULL_TURN else f"photo of {view:g} degrees"
     bands = "<br>".join(
         f"{band['from']:.0%} to {band['to']:.0%}: {band['share']:.1%} of the cells"
         for band in reversed(facts["bands"])
@@ -297,7 +299,7 @@ def identifiability_legend(identifiability: Identifiability) -> str:
     return (
         "<summary>Where a query can be placed</summary>"
         f"<p>{facts['cells']:,} cells, {isolated(facts['noise'])} noise</p>"
-        f"<p>Chance that the answer to a query is {within}; {facts['chance_found']:.1%} for the "
+        f"<p>Chance that the answer to a {asked} is {within}; {facts['chance_found']:.1%} for the "
         f"mean cell{ramp_bar(FOUND_RAMP, '0 %', '100 %', sign='ramp semsig-lift')}</p>"
         f"<p>{bands}</p>"
         f"<p>What each class adds to the chance {within}</p><table>{classes}</table>"

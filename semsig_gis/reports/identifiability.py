@@ -6,6 +6,7 @@ import math
 from typing import TYPE_CHECKING, Any
 
 from semsig_gis import __version__
+from semsig_gis.core.geometry import FULL_TURN
 from semsig_gis.evaluation.result import machine
 from semsig_gis.reports.database import class_label
 from semsig_gis.reports.parts import Curve, Number, Plot, Report, Section
@@ -25,6 +26,11 @@ SCORES = {
 }
 
 
+def shot(view: float) -> str:
+    """Return what a query of so many degrees is called."""
+    return "query" if view == FULL_TURN else f"photo of {view:g} degrees"
+
+
 def identifiability_tables(
     identifiability: Identifiability, *, object_counts: Mapping[int, int] | None = None
 ) -> tuple[Table, ...]:
@@ -42,7 +48,7 @@ def identifiability_tables(
     }
     whole = Table(
         title=f"Identifiability, {facts['noise']} noise",
-        columns=("A query from the mean cell", ""),
+        columns=(f"A {shot(facts['view_degrees'])} from the mean cell", ""),
         rows=tuple({**cells, **bits, **bands}.items()),
         note=f"Expected before any query, by {facts['trials']:,} simulated ones.",
     )
@@ -103,7 +109,8 @@ def identifiability_page(
         title=f"Where a query can be placed in {name}",
         text=(
             (
-                "Before any query, every cell is told the chance that one from it will be placed "
+                "Before any query, every cell is told the chance that a "
+                f"{shot(facts['view_degrees'])} from it will be placed "
                 f"within {facts['radius_m']:g} m, by {facts['trials']:,} simulated queries and by "
                 f"how like the other cells are. {check.queries:,} fresh queries tell whether the "
                 "chances come true."
@@ -113,6 +120,7 @@ def identifiability_page(
             ("Database", name),
             ("Cells", f"{facts['cells']:,}"),
             ("Noise model", facts["noise"]),
+            ("Field of view", f"{facts['view_degrees']:g} degrees"),
             ("Seeds", f"{facts['seed']} and, of the check, {check.seed}"),
             ("semsig_gis", __version__),
         ),

@@ -42,7 +42,6 @@ def test_the_columns_are_printed_drawn_and_exported(run: Run, done: Done) -> Non
                   "bits left", "Do the chances come true?", "Rank correlation",
                   "columns: "):  # fmt: skip
         assert words in out
-    assert "is built" in err
     cells = gpd.read_parquet("city.parquet")
     assert cells["chance_found"].between(0, 1).all()
     assert len(open_store("city.parquet").objects) == len(WORLD.street_objects)
@@ -70,11 +69,23 @@ def test_another_noise_seed_or_radius_is_worked_out_anew(run: Run, done: Done) -
         f"{IDENTIFY} {options} --seed 3",
         f"{IDENTIFY} {options} --radius 20",
         f"{IDENTIFY} {options} --noise light",
+        f"{IDENTIFY} {options} --view 70",
         f"identify city.parquet --noise medium --json {options}",
     ):
         code, out, err = run(line)
         assert (code, "already" in err) == (0, False)
         assert json.loads(out) != first
+
+
+def test_photos_are_told_where_they_are_shown(done: Done) -> None:
+    assert "A photo of 70 degrees from the mean cell" in done(
+        "identify city.parquet --noise medium --view 70 --check 20 --out report"
+    )
+    assert json.loads(done("info city.parquet --json"))["identifiability"]["view_degrees"] == 70.0
+    assert "photo of 70 degrees" in done("info city.parquet")
+    done("map city.parquet --identifiability --out map.html")
+    for page in ("map.html", "report/report.html"):
+        assert "photo of 70 degrees" in Path(page).read_text(encoding="utf-8")
 
 
 def test_a_database_in_parts(done: Done) -> None:

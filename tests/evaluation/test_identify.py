@@ -23,18 +23,19 @@ from small_city import chances_of
 
 from semsig_gis.core.errors import DatabaseError, InputError
 from semsig_gis.core.statistics import wilson_interval
+from semsig_gis.core.view import Photo
 from semsig_gis.database.city import City
 from semsig_gis.database.file import open_database, save_database
 from semsig_gis.evaluation.identify import result as identifiability_file
 from semsig_gis.evaluation.identify.check import check_identifiability
 from semsig_gis.evaluation.identify.columns import symbol_columns
-from semsig_gis.evaluation.identify.identify import identify
+from semsig_gis.evaluation.identify.identify import _places, identify
 from semsig_gis.evaluation.identify.lookalikes import find_lookalikes
 from semsig_gis.evaluation.identify.result import (
     open_identifiability,
     save_identifiability,
 )
-from semsig_gis.evaluation.identify.trials import trial_cells, try_cells
+from semsig_gis.evaluation.identify.trials import draw_trials, trial_cells, try_cells
 from semsig_gis.likelihood.index import build_index
 from semsig_gis.likelihood.noise.model import NoiseSpec, named_noise
 
@@ -103,6 +104,50 @@ def test_cities_of_any_size(cells: int, classes: int, radius: float) -> None:
     check_ranges(told, cells, len(database.present_codes))
     if radius == 1e6:
         assert (told.lookalikes == -1).all()
+
+
+def test_chances_of_photos_are_those_of_very_many_photos() -> None:
+    database = random_database(11, cells=80, longest=14)
+    index = build_index(database, SHARP)
+    told = identify(index, radius=20.0, view=90.0, trials=600, class_trials=4)
+    check_ranges(told, 80, len(database.present_codes))
+    assert told.view == 90.0
+    cells = np.tile(np.arange(80), REPEATS)
+    headings = np.random.default_rng(1).uniform(0.0, 360.0, len(cells)).tolist()
+    photos = [Photo.looking(heading=heading, fov=90.0) for heading in headings]
+    queries = draw_trials(index, cells, photos=photos, seed=99)
+    tried = try_cells(index, cells, queries=queries, radius=20.0)
+    for name in ("itself", "near", "found"):
+        truth = getattr(tried, name).reshape(REPEATS, 80).mean(axis=0)
+        assert abs(getattr(told, name).mean() - truth.mean()) < 0.06
+        assert np.sqrt(((getattr(told, name) - truth) ** 2).mean()) < 0.15
+    whole = identify(index, radius=20.0, trials=200, class_trials=4)
+    assert told.found.mean() < whole.found.mean()
+    check = check_identifiability(told, index, queries=300)
+    assert sum(one.queries for one in check.bins) == 300
+    assert abs(check.found - told.found.mean()) < 0.1
+
+
+def test_places_of_several_looks_become_few() -> None:
+    database = random_database(3, cells=40)
+    at = np.stack([database.columns, database.rows], axis=1) * 10.0
+    rng = np.random.default_rng(2)
+    found = rng.integers(-1, 40, (120, 3))
+    chances = rng.random((120, 3))
+    named, sums = _places(database, found, chances, radius=20.0)
+    for cell in range(40):
+        of_cell = slice(3 * cell, 3 * cell + 3)
+        some = found[of_cell] >= 0
+        places, masses = found[of_cell][some], chances[of_cell][some] / 3.0
+        for one, total in zip(named[cell].tolist(), sums[cell].tolist(), strict=True):
+            if one < 0:
+                assert (total, len(places)) == (0.0, 0)
+                continue
+            near = np.hypot(*(at[places][:, None] - at[places]).transpose(2, 0, 1)) <= 20.0
+            around = (near * masses).sum(axis=1)
+            assert total == pytest.approx(around.max())
+            far = np.hypot(*(at[places] - at[one]).T) > 40.0
+            places, masses = places[far], masses[far]
 
 
 def test_a_noise_that_leaves_nothing() -> None:
@@ -316,6 +361,7 @@ alike = functools.partial(find_lookalikes, COLUMNS)
         (ask, {"class_trials": -1}, ["trials without a class", "-1", "from 1"]),
         (ask, {"threads": 0}, ["threads", "is 0", "from 1"]),
         (ask, {"seed": -1}, ["seed", "is -1", "from 0"]),
+        (ask, {"view": 5.0}, ["view is 5.0", "from 10 to 360"]),
         (ask, {"radius": -5.0}, ["radius is -5.0", "from 0"]),
         (ask, {"radius": math.nan}, ["radius is nan", "from 0"]),
         (check, {"queries": 0}, ["queries is 0", "from 1"]),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import functools
 import math
 from typing import TYPE_CHECKING
 
@@ -14,6 +15,7 @@ from noisy_cells import mixtures, noise_specs, parts_of, random_database
 from scipy.special import ndtr
 
 from semsig_gis.core.signature import Signature
+from semsig_gis.core.view import Photo, View
 from semsig_gis.evaluation.identify import lookalikes
 from semsig_gis.evaluation.identify.columns import symbol_columns
 from semsig_gis.evaluation.identify.lookalikes import find_lookalikes
@@ -116,7 +118,7 @@ def test_threads_and_a_choice_of_cells_change_nothing() -> None:
     seen: list[tuple[int, int]] = []
     two = np.array([250, 3])
     some = find_lookalikes(
-        COLUMNS, temperature=0.4, cells=two, progress=lambda *step: seen.append(step)
+        COLUMNS, temperature=0.4, looks=two, progress=lambda *step: seen.append(step)
     )
     assert seen == [(2, 2)]
     for name in ("near", "far", "cells", "sums", "rise"):
@@ -157,10 +159,10 @@ def test_a_sample_stands_for_cells_that_are_not_likely(
 ) -> None:
     columns = symbol_columns(build_index(random_database(7, cells=400), named_noise("medium")))
     some = np.arange(0, 400, 5)
-    whole = find_lookalikes(columns, temperature=temperature, cells=some)
+    whole = find_lookalikes(columns, temperature=temperature, looks=some)
     monkeypatch.setattr(lookalikes, "SAMPLE", 200)
     monkeypatch.setattr(lookalikes, "LIKELY", 100)
-    found = find_lookalikes(columns, temperature=temperature, cells=some)
+    found = find_lookalikes(columns, temperature=temperature, looks=some)
     # What is likely is not drawn: the lookalikes are the same, and what is near them.
     for name in ("near", "cells", "sums"):
         assert getattr(found, name).tolist() == getattr(whole, name).tolist()
@@ -186,7 +188,8 @@ def test_outcomes_are_those_of_the_whole_method(noise: str, radius: float) -> No
     database = random_database(8, cells=120, longest=6)
     index = build_index(database, named_noise(noise))
     cells = trial_cells(len(database), 60, seed=2)
-    trials = try_cells(index, cells, radius=radius, seed=3)
+    columns = symbol_columns(index)
+    trials = try_cells(index, cells, columns=columns, radius=radius, seed=3)
     for row, query in enumerate(draw_trials(index, cells, seed=3)):
         if not len(query):
             assert trials.near[row] == 0
@@ -199,7 +202,7 @@ def test_outcomes_are_those_of_the_whole_method(noise: str, radius: float) -> No
         assert math.isclose(trials.bits[row], found.entropy, abs_tol=1e-4)
         best, _ = found.best_place(radius)
         assert trials.found[row] == (away[best] <= radius)
-        own = index.scores(database.signature(cell)).loglik
+        own = columns.loglik(cell, 0, np.arange(120))
         lean = found.chances @ (own - own[cell])
         assert math.isclose(trials.lean[row], lean, abs_tol=1e-3)
 
@@ -278,6 +281,15 @@ def test_a_class_tells_something(noise: Noise) -> None:
         index, cells, radius=20.0, progress=lambda done, all_: told.append((done, all_))
     )
     assert near.shape == bits.shape == (80, 3)
+    # Nothing is asked again where the class plays no part.
+    sees = [
+        np.add.reduceat(database.codes == code, database.offsets[:-1]) > 0 for code in (1, 2, 3)
+    ]
+    assert (np.isfinite(near) == np.isfinite(bits)).all()
+    assert np.isfinite(near)[np.stack(sees, axis=1)].all()
+    assert np.isnan(near).any() or (index.table.clutter > 1.0).any()
+    asked, blank = np.isfinite(near), np.broadcast_to(whole.near[:, None], near.shape)
+    near, bits = np.where(asked, near, blank), np.where(asked, bits, whole.bits[:, None])
     assert told[-1] == (240, 240)
     assert (near.mean(axis=0) < whole.near.mean()).all()
     assert (bits.mean(axis=0) > whole.bits.mean()).all()
@@ -318,3 +330,30 @@ def test_a_column_is_what_an_object_in_its_step_adds(
     expected = np.minimum(expected, 255 * columns.step)
     slack = 0.5 * columns.step + 2.0**-9 + (0.2 if table.position_sigma else 1e-3)
     assert np.abs(expected - columns.step * values[symbol]).max() < slack
+
+
+def test_photos_are_compared_by_what_each_shows() -> None:
+    database = random_database(5, cells=150, longest=20)
+    looks = tuple(Photo.looking(heading=heading, fov=70.0) for heading in (0.0, 120.0, 240.0))
+    index = build_index(database, named_noise("medium"))
+    columns = symbol_columns(index, looks=looks)
+    found = find_lookalikes(columns, temperature=0.5, radius=20.0)
+    away_from = functools.partial(apart, columns)
+    off = []
+    for number in range(0, 450, 11):
+        cell, look = divmod(number, 3)
+        seen = View.of(database.signature(cell), photos=(looks[look],))
+        seen = seen.select(looks[look].sees(parts_of(seen)[1]))
+        assert columns.counts[look, :, cell].sum() == len(seen)
+        if not len(seen):
+            assert (found.near[number], found.far[number]) == (0.0, 0.0)
+            assert (found.cells[number] == -1).all()
+            continue
+        loglik = index.scores(seen).loglik.astype(np.float64)
+        powers = np.exp(0.5 * (loglik - loglik[cell]))
+        beyond = away_from(cell) > 20.0
+        # Of objects at the very edge, the scan takes the odds that they are in the picture.
+        off.append(np.log(found.far[number] / powers[beyond].sum()))
+        assert np.corrcoef(columns.loglik(cell, look, np.arange(150)), loglik)[0, 1] > 0.85
+    assert np.abs(off).mean() < 0.15
+    assert np.abs(np.mean(off)) < 0.1

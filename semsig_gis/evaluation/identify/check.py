@@ -11,9 +11,17 @@ import pandas as pd
 
 from semsig_gis.core.effort import announce
 from semsig_gis.core.errors import InputError
+from semsig_gis.core.geometry import FULL_TURN
 from semsig_gis.core.ranges import MOST_SEED, MOST_WORKERS, require_number
+from semsig_gis.core.view import Photo
 from semsig_gis.evaluation.figures import calibration_bins, finite_or_none
-from semsig_gis.evaluation.identify.trials import MOST_TRIALS, TRIAL_S, trial_cells, try_cells
+from semsig_gis.evaluation.identify.trials import (
+    MOST_TRIALS,
+    TRIAL_S,
+    draw_trials,
+    trial_cells,
+    try_cells,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
@@ -146,8 +154,17 @@ def check_identifiability(
         raise InputError(msg)
     announce(queries * TRIAL_S / threads, "checking")
     cells = trial_cells(len(database), queries, seed=seed)
+    photos = None
+    if identifiability.view < FULL_TURN:
+        headings = np.random.default_rng([seed, 2]).uniform(0.0, FULL_TURN, queries).tolist()
+        photos = (Photo.looking(heading=one, fov=identifiability.view) for one in headings)
     tried = try_cells(
-        index, cells, radius=identifiability.radius, seed=seed, threads=threads, progress=progress
+        index,
+        cells,
+        queries=draw_trials(index, cells, photos=photos, seed=seed),
+        radius=identifiability.radius,
+        threads=threads,
+        progress=progress,
     )
     stated, success = identifiability.found[cells], tried.found.astype(np.float64)
     scores = {

@@ -12,16 +12,18 @@ import math
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from semsig_gis.core.geometry import FULL_TURN
 from semsig_gis.core.signature import BEARING_UNITS
+from semsig_gis.core.view import FULL_VIEW
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+    from semsig_gis.core.view import Photo
     from semsig_gis.database.database import SignatureDatabase
     from semsig_gis.likelihood.index import LikelihoodIndex
     from semsig_gis.likelihood.noise.table import NoiseTable
@@ -40,9 +42,10 @@ class SymbolColumns:
     """What each symbol, a class in a step of bearings, adds to the score of each of n cells.
 
     `values`, shape (blocks, k * 72, cells a block), are in steps of `step`: the rows of a class of
-    the `table` are together, the cells of both halves of a block in turn. By direction of a look,
-    `constants` (d, n) is what each cell adds to whatever is seen, and `missed` (d, k, n) what the
-    objects of a class have in that, none of which is detected.
+    the `table` are together, the cells of both halves of a block in turn. By the d `looks`, photos
+    in several directions or one full turn, `constants` (d, n) is what each cell adds to whatever is
+    seen, `missed` (d, k, n) what the objects of a class have in that, none of which is detected,
+    and `counts` (d, k, n) tells how many of them there are.
     """
 
     database: SignatureDatabase
@@ -50,7 +53,9 @@ class SymbolColumns:
     values: NDArray[np.uint8]
     step: float
     constants: NDArray[np.float32]
+    looks: tuple[Photo, ...]
     missed: NDArray[np.float32]
+    counts: NDArray[np.int32]
 
     @cached_property
     def kinds(self) -> NDArray[np.int64]:
@@ -62,6 +67,22 @@ class SymbolColumns:
         """The row of the values of every entry of the database."""
         return self.kinds * BINS + self.database.bearing_units // BIN_UNITS
 
+    @cached_property
+    def inside(self) -> NDArray[np.bool_]:
+        """Which bearings are seen by look, shape (d, units)."""
+        middles = (np.arange(BEARING_UNITS) + 0.5) * (FULL_TURN / BEARING_UNITS)
+        return np.stack([look.sees(middles) for look in self.looks])
+
+    def loglik(self, cell: int, look: int, cells: NDArray[np.int64]) -> NDArray[np.float64]:
+        """Return the log-likelihood of what a look from a cell shows, in some, up to a constant."""
+        entries = np.arange(*self.database.offsets[cell : cell + 2].tolist())
+        seen = entries[self.inside[look, self.database.bearing_units[entries]]]
+        half = self.values.shape[2] // 2
+        block, inside = np.divmod(cells, 2 * half)
+        place = 2 * (inside % half) + inside // half
+        added = self.values[block[:, None], self.symbols[seen], place[:, None]].sum(axis=1)
+        return np.asarray(self.constants[look, cells] + self.step * added.astype(np.float64))
+
     def of(self, cells: NDArray[np.int64]) -> NDArray[np.uint8]:
         """Return what each symbol adds to some of the cells, shape (k * 72, c)."""
         half = self.values.shape[2] // 2
@@ -69,8 +90,10 @@ class SymbolColumns:
         return self.values[block, :, 2 * (inside % half) + inside // half].T
 
 
-def symbol_columns(index: LikelihoodIndex, *, threads: int = 1) -> SymbolColumns:
-    """Work out the columns of the cells and the mean noise model of an index."""
+def symbol_columns(
+    index: LikelihoodIndex, *, looks: tuple[Photo, ...] = (FULL_VIEW,), threads: int = 1
+) -> SymbolColumns:
+    """Work out the columns of the cells and the mean noise model of an index, for some looks."""
     from semsig_gis.evaluation.identify.kernels import BLOCK  # noqa: PLC0415 - numba loads slowly
 
     database, table = index.database, index.table
@@ -79,25 +102,55 @@ def symbol_columns(index: LikelihoodIndex, *, threads: int = 1) -> SymbolColumns
     kinds, far = table.row_of[database.codes], database.distance_units
     sure = table.detected[table.length_rows(database.lengths)[owners], kinds]
     chances, leaving = sure * table.seen[kinds, far], sure * table.left[kinds, far]
-    missed = np.log1p(-chances) - leaving
-    by_class = np.bincount(kinds * cells + owners, missed, classes * cells)
-    by_class = by_class.reshape(1, classes, cells)
+    spread_of, spread = _spreads(database, table)
+    bins, units = np.divmod(database.bearing_units, BIN_UNITS)
+
+    def by_class(values: NDArray[Any]) -> NDArray[np.float64]:
+        sums = np.bincount(kinds * cells + owners, values, classes * cells)
+        return np.asarray(sums.reshape(classes, cells), dtype=np.float64)
+
+    missed = np.empty((len(looks), classes, cells), np.float32)
+    counts = np.empty((len(looks), classes, cells), np.int32)
+    for number, look in enumerate(looks):
+        inside = _masses(spread, look)[spread_of, units, bins] if look.sectors else 1.0
+        missed[number] = by_class(np.log1p(-chances * inside) - leaving * (look.width / FULL_TURN))
+        counts[number] = by_class(look.sees(database.bearings))
+    clutter = table.clutter.sum() * np.array([look.width / FULL_TURN for look in looks])
     values = np.zeros((-(-cells // BLOCK), classes, BINS, BLOCK), np.uint8)
-    odds = chances / (1.0 - chances)
-    step = _write_columns(database, table, odds, leaving / FULL_TURN, values, threads)
+    step = _write_columns(
+        database,
+        table,
+        (spread_of, spread),
+        chances / (1.0 - chances),
+        leaving / FULL_TURN,
+        values,
+        threads,
+    )
     return SymbolColumns(
         database=database,
         table=table,
         values=values.reshape(len(values), -1, BLOCK),
         step=step,
-        constants=(by_class.sum(axis=1) - table.clutter.sum()).astype(np.float32),
-        missed=by_class.astype(np.float32),
+        looks=looks,
+        constants=(missed.sum(axis=1, dtype=np.float64) - clutter[:, None]).astype(np.float32),
+        missed=missed,
+        counts=counts,
     )
+
+
+def _masses(spread: NDArray[np.float32], look: Photo) -> NDArray[np.float32]:
+    """Return the chance that an object comes out in a look, by level, unit and bin of it."""
+    inside = (np.arange(BEARING_UNITS) + 0.5) * (FULL_TURN / BEARING_UNITS)
+    shares = look.sees(inside).reshape(BINS, -1).mean(axis=1) * BIN_DEGREES
+    # An object of a bin has its spread so many bins on.
+    turned = np.stack([np.roll(shares, -place) for place in range(BINS)], axis=1)
+    return np.asarray(np.clip(spread @ turned, 0.0, 1.0), dtype=np.float32)
 
 
 def _write_columns(  # noqa: PLR0917 - a private helper of one caller
     database: SignatureDatabase,
     table: NoiseTable,
+    spreads: tuple[NDArray[np.uint8], NDArray[np.float32]],
     odds: NDArray[np.float64],
     leaving: NDArray[np.float64],
     columns: NDArray[np.uint8],
@@ -106,7 +159,7 @@ def _write_columns(  # noqa: PLR0917 - a private helper of one caller
     """Fill `columns`, shape (blocks, k, 72, BLOCK), and return the size of their steps."""
     from semsig_gis.evaluation.identify.kernels import LINE, fill_columns  # noqa: PLC0415
 
-    spread_of, spread = _spreads(database, table)
+    spread_of, spread = spreads
     # 255 steps reach what four objects in one direction add.
     peak = float(spread.max() * (table.odds[:, :, None] * table.naming).max())
     step = math.log1p(4.0 * peak) / 255.0

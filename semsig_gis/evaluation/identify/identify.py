@@ -7,6 +7,7 @@ so that a curve through the trials gives the chances of all of them.
 
 from __future__ import annotations
 
+import math
 from functools import partial
 from itertools import pairwise
 from typing import TYPE_CHECKING
@@ -14,8 +15,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from semsig_gis.core.effort import announce
+from semsig_gis.core.geometry import FULL_TURN
 from semsig_gis.core.ranges import MOST_SEED, MOST_WORKERS, require_number
 from semsig_gis.core.statistics import fit_shares
+from semsig_gis.core.view import FULL_VIEW, Photo
 from semsig_gis.evaluation.identify.columns import symbol_columns
 from semsig_gis.evaluation.identify.lookalikes import (
     LEAST_SUM,
@@ -36,6 +39,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+    from semsig_gis.database.database import SignatureDatabase
     from semsig_gis.evaluation.identify.columns import SymbolColumns
     from semsig_gis.evaluation.identify.lookalikes import Lookalikes
     from semsig_gis.evaluation.identify.trials import Trials
@@ -44,10 +48,14 @@ if TYPE_CHECKING:
 TRIALS = 3000
 CLASS_TRIALS = 400  # without each class
 PLACES = 3  # that are named for each cell
+LEAST_VIEW, MOST_VIEW = 10, 360  # degrees
+DIRECTIONS = 8  # in which photos are looked at from each cell, at least
+CELLS_A_PART = 4096
 TEMPERATURES = (0.15, 0.2, 0.25, 0.3, 0.35, 0.4, 0.5, 0.6, 0.8, 1.0)
 TEMPERATURE_TRIALS = 300
 DECIMALS = 3  # of all numbers: more than they are sure to, and short in a file
 
+TOUCHED_CLASSES = 4  # that the mean trial tells of
 # Seconds that a pair of cells takes: for telling how long and how far the work is.
 PAIR_S = 5e-10
 
@@ -56,6 +64,7 @@ def identify(
     index: LikelihoodIndex,
     *,
     radius: float = 50.0,
+    view: float = FULL_TURN,
     trials: int = TRIALS,
     class_trials: int = CLASS_TRIALS,
     seed: int = 0,
@@ -70,6 +79,8 @@ def identify(
         The cells, and how the detector fails; the answers know that, too.
     radius : float, default 50
         Metres that count as near, 0 to 1,000,000.
+    view : float, default 360
+        Degrees that a query sees at once, 10 to 360: a photo in any direction, or all round.
     trials : int, default 3000
         How many simulated queries to ask, 1 to 1,000,000.
     class_trials : int, default 400
@@ -101,6 +112,10 @@ def identify(
     came of the trials is fitted as a share that depends on F and on the logarithm of the number
     of objects (`core.statistics`). The rest of the chance is divided by the same powers.
 
+    A photo of fewer than 360 degrees is looked at from every cell in directions that are 45 degrees
+    apart or closer, and fitted as a query of its own; the results are means over the directions. In
+    a direction in which a cell sees nothing it cannot be found.
+
     For the gains, trials are asked again without each class, and the fit takes the logarithm of
     the number of objects that are left as a third feature.
 
@@ -123,18 +138,29 @@ def identify(
     ):
         require_number(what, count, least=least, most=most)
     check_radius(radius)
-    database = index.database
-    cells, sample = len(database), trial_cells(len(index.database), trials, seed=seed)
-    again = sample[:class_trials]
+    require_number("view", view, least=LEAST_VIEW, most=MOST_VIEW, unit="degrees")
+    database, photos = index.database, _looks(view)
+    cells, sample = len(database), trial_cells(len(database), trials, seed=seed)
+    looks = np.random.default_rng([seed, 2]).integers(len(photos), size=trials)
+    again = slice(class_trials)
     seconds = (
         trials * TRIAL_S,
-        cells**2 * PAIR_S,
-        len(again) * len(index.table.codes) * TRIAL_S,
+        cells**2 * len(photos) * PAIR_S,
+        len(sample[again]) * TOUCHED_CLASSES * TRIAL_S,
     )
     announce(sum(seconds) / threads, "comparing cells")
     stages = _stages(progress, *seconds)
-    tried = try_cells(index, sample, radius=radius, seed=seed, threads=threads, progress=stages[0])
-    columns = symbol_columns(index, threads=threads)
+    columns = symbol_columns(index, looks=photos, threads=threads)
+    tried = try_cells(
+        index,
+        sample,
+        columns=columns,
+        looks=looks,
+        radius=radius,
+        seed=seed,
+        threads=threads,
+        progress=stages[0],
+    )
     temperature = _temperature(columns, tried, radius=radius, threads=threads)
     like = find_lookalikes(
         columns,
@@ -146,26 +172,86 @@ def identify(
         progress=stages[1],
     )
     without = try_without_classes(
-        index, again, radius=radius, seed=seed, threads=threads, progress=stages[2]
+        index,
+        sample[again],
+        photos=[photos[look] for look in looks[again].tolist()],
+        radius=radius,
+        seed=seed,
+        threads=threads,
+        progress=stages[2],
     )
-    shares = _expected(tried, like, database.lengths)
-    gains, classes = _gains(index, tried, like, again=again, without=without)
+    shares = _expected(columns, tried, like)
+    gains, classes = _gains(columns, tried, like, without=without)
     rest = (1.0 - shares["near"]) / np.maximum(like.far, LEAST_SUM)
+    chances = rest[:, None] * like.sums
+    mean = {name: _by_cell(values, cells) for name, values in shares.items()}
+    named, sums = _places(database, like.cells, chances, radius=radius)
     return Identifiability(
         database=database,
         noise=index.noise,
         radius=radius,
-        itself=shares["itself"].round(DECIMALS),
-        near=shares["near"].round(DECIMALS),
-        found=shares["found"].round(DECIMALS),
-        bits=shares["bits"].round(DECIMALS),
-        lookalikes=like.cells,
-        lookalike_chances=(rest[:, None] * like.sums).round(DECIMALS),
+        view=view,
+        itself=mean["itself"].round(DECIMALS),
+        near=mean["near"].round(DECIMALS),
+        found=mean["found"].round(DECIMALS),
+        bits=mean["bits"].round(DECIMALS),
+        lookalikes=named,
+        lookalike_chances=sums.round(DECIMALS),
         gains=gains.round(DECIMALS) + 0.0,  # no -0.0
         classes=classes,
         trials=trials,
         seed=seed,
     )
+
+
+def _looks(view: float) -> tuple[Photo, ...]:
+    """Return the photos that are looked at from every cell."""
+    if view == FULL_TURN:
+        return (FULL_VIEW,)
+    count = max(DIRECTIONS, math.ceil(FULL_TURN / view))
+    headings = (np.arange(count) * (FULL_TURN / count)).tolist()
+    return tuple(Photo.looking(heading=heading, fov=view) for heading in headings)
+
+
+def _by_cell(values: NDArray[np.float64], cells: int) -> NDArray[np.float64]:
+    """Return means over the looks from each cell, shape (n, ...)."""
+    return np.asarray(values.reshape(cells, -1, *values.shape[1:]).mean(axis=1))
+
+
+def _places(
+    database: SignatureDatabase,
+    found: NDArray[np.int64],
+    chances: NDArray[np.float64],
+    *,
+    radius: float,
+) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+    """Return the places of all looks from each cell as few, and the mean chance of each.
+
+    `found` and `chances` (looks, k) are row numbers, -1 for none, and the chance of each. Places
+    within the radius of each other are one, and those named are farther apart than twice that.
+    """
+    cells, count = len(database), found.shape[1]
+    looks = len(found) // cells
+    if looks == 1:
+        return found, chances
+    at = np.stack([database.columns, database.rows], axis=1).astype(np.float64)
+    steps = radius / database.grid.step + 1e-9
+    named = np.full((cells, count), -1)
+    sums = np.zeros((cells, count))
+    for low in range(0, cells, CELLS_A_PART):
+        part = slice(low * looks, (low + CELLS_A_PART) * looks)
+        one = found[part].reshape(-1, looks * count)
+        mass = np.where(one < 0, 0.0, chances[part].reshape(one.shape)) / looks
+        apart = np.hypot(*np.moveaxis(at[one][:, :, None] - at[one][:, None], -1, 0))
+        rows = np.arange(len(one))
+        for place in range(count):
+            total = np.where(mass > 0, ((apart <= steps) * mass[:, None]).sum(axis=2), 0.0)
+            best = total.argmax(axis=1)
+            some = total[rows, best] > 0
+            named[low + rows[some], place] = one[rows, best][some]
+            sums[low + rows, place] = total[rows, best]
+            mass[apart[rows, best] <= 2.0 * steps] = 0.0
+    return named, sums
 
 
 def _stages(
@@ -184,7 +270,8 @@ def _stages(
 
 def _temperature(columns: SymbolColumns, tried: Trials, *, radius: float, threads: int) -> float:
     """Return the power that brings the likelihoods of signatures nearest to the answers."""
-    some = np.flatnonzero(np.isfinite(tried.lean))[:TEMPERATURE_TRIALS]
+    shown = columns.counts.sum(axis=1)[tried.looks, tried.cells]
+    some = np.flatnonzero(np.isfinite(tried.lean) & (shown > 0))[:TEMPERATURE_TRIALS]
     if not len(some):
         return 1.0
     fits = []
@@ -193,7 +280,7 @@ def _temperature(columns: SymbolColumns, tried: Trials, *, radius: float, thread
             columns,
             temperature=power,
             radius=radius,
-            cells=tried.cells[some],
+            looks=tried.cells[some] * len(columns.looks) + tried.looks[some],
             places=1,
             threads=threads,
         )
@@ -209,67 +296,90 @@ def _most_bits(cells: int) -> float:
     return max(float(np.log2(cells)), LEAST_SUM)
 
 
+def _seen(columns: SymbolColumns) -> NDArray[np.int64]:
+    """Return how many objects of each class each look shows, shape (looks, k)."""
+    return np.asarray(columns.counts.transpose(2, 0, 1).reshape(-1, columns.counts.shape[1]))
+
+
 def _expected(
-    tried: Trials, like: Lookalikes, lengths: NDArray[np.int64]
+    columns: SymbolColumns, tried: Trials, like: Lookalikes
 ) -> dict[str, NDArray[np.float64]]:
-    """Return what to expect of every cell, by what came of the trials."""
-    objects = np.log(lengths)
+    """Return what to expect of every look, by what came of the trials."""
+    shown = _seen(columns).sum(axis=1)
+    objects = np.log(np.maximum(shown, 1))
     beyond = np.stack([_log(like.far), objects], axis=1)
     others = np.stack([_log(like.far + np.maximum(like.near - 1.0, 0.0)), objects], axis=1)
-    most = _most_bits(len(lengths))
-    shares = {
-        name: fit_shares(features[tried.cells], values).predict(features)
-        for name, features, values in (
-            ("itself", others, tried.itself),
-            ("near", beyond, tried.near),
-            ("found", beyond, tried.found),
-            ("bits", others, np.clip(tried.bits / most, 0.0, 1.0)),
-        )
-    }
+    most = _most_bits(len(columns.database))
+    looks = tried.cells * len(columns.looks) + tried.looks
+    some = shown[looks] > 0
+
+    def fitted(
+        features: NDArray[np.float64], values: NDArray[np.float64], blank: float
+    ) -> NDArray[np.float64]:
+        # `blank` is what comes of a look that shows nothing.
+        if not some.any():
+            return np.full(len(shown), blank)
+        fit = fit_shares(features[looks[some]], values[some])
+        return np.where(shown > 0, fit.predict(features), blank)
+
+    near = fitted(beyond, tried.near, 0.0)
     return {
-        **shares,
-        "itself": np.minimum(shares["itself"], shares["near"]),
-        "bits": most * shares["bits"],
+        "itself": np.minimum(fitted(others, tried.itself, 0.0), near),
+        "near": near,
+        "found": fitted(beyond, tried.found.astype(np.float64), 0.0),
+        "bits": most * fitted(others, np.clip(tried.bits / most, 0.0, 1.0), 1.0),
     }
 
 
 def _gains(
-    index: LikelihoodIndex,
+    columns: SymbolColumns,
     tried: Trials,
     like: Lookalikes,
     *,
-    again: NDArray[np.int64],
     without: tuple[NDArray[np.float64], NDArray[np.float64]],
 ) -> tuple[NDArray[np.float64], tuple[ClassGain, ...]]:
     """Return what each class adds to the chance of the place, by cell and for the city.
 
-    `without` is what came of the cells `again` (`try_without_classes`).
+    `without` is what came of the first trials without each class (`try_without_classes`).
     """
-    database, codes = index.database, index.table.codes
-    starts = database.offsets[:-1]
-    seen = [np.add.reduceat(database.codes == code, starts, dtype=np.int64) for code in codes]
-    left = database.lengths[:, None] - np.stack(seen, axis=1)
-    features = _features(like, database.lengths, like.rise, left)
-    whole = _features(like, database.lengths, np.zeros((len(left), 1)), database.lengths[:, None])
-    whole = whole[:, 0]
-    # What is left of cells that see nothing else needs no fit.
-    some = left[again] > 0
-    examples = np.concatenate([whole[again], features[again][some]])
+    codes, cells = columns.table.codes, len(columns.database)
+    seen = _seen(columns)
+    shown = seen.sum(axis=1)
+    left = shown[:, None] - seen
+    far, objects = _log(like.far), np.log(np.maximum(shown, 1))
+    again = slice(len(without[0]))
+    looks = (tried.cells * len(columns.looks) + tried.looks)[again]
+    whole = np.stack([far, objects, objects], axis=1)
+
+    def features(number: int, rows: NDArray[np.int64] | slice) -> NDArray[np.float64]:
+        fewer = np.log(np.maximum(left[rows, number], 1))
+        return np.stack([(far + like.rise[:, number])[rows], objects[rows], fewer], axis=1)
+
+    # What is left of looks that show nothing else needs no fit.
+    some = (left[looks] > 0) & np.isfinite(without[0])
+    full = shown[looks] > 0
+    examples = [features(number, looks[some[:, number]]) for number in range(len(codes))]
+    examples = [whole[looks[full]], *examples]
 
     def gained(
         with_all: NDArray[np.float64], values: NDArray[np.float64], *, blank: float
     ) -> NDArray[np.float64]:
-        # `blank` is what comes of a cell that sees nothing.
-        fit = fit_shares(examples, np.concatenate([with_all[: len(again)], values[some]]))
-        before = fit.predict(whole)
-        after = [
-            np.where(left[:, number] > 0, fit.predict(features[:, number]), blank)
-            for number in range(left.shape[1])
-        ]
-        return np.asarray(before[:, None] - np.stack(after, axis=1))
+        # `blank` is what comes of a look that shows nothing.
+        told = [values[some[:, number], number] for number in range(len(codes))]
+        told = [with_all[again][full], *told]
+        if not len(np.concatenate(told)):
+            return np.zeros((cells, len(codes)))
+        fit = fit_shares(np.concatenate(examples), np.concatenate(told))
+        before = np.where(shown > 0, fit.predict(whole), blank)
+        gains = np.empty((cells, len(codes)))
+        for number in range(len(codes)):
+            after = fit.predict(features(number, slice(None)))
+            after = np.where(left[:, number] > 0, after, blank)
+            gains[:, number] = _by_cell(before - after, cells)
+        return gains
 
     near, bits = without
-    most = _most_bits(len(database))
+    most = _most_bits(cells)
     near_gains = gained(tried.near, near, blank=0.0)
     bit_gains = gained(np.clip(tried.bits / most, 0, 1), np.clip(bits / most, 0, 1), blank=1.0)
     of_city = zip(
@@ -279,18 +389,3 @@ def _gains(
         ClassGain(code=code, near=float(near_gain), bits=-float(bit_gain))
         for code, near_gain, bit_gain in of_city
     )
-
-
-def _features(
-    like: Lookalikes,
-    lengths: NDArray[np.int64],
-    rise: NDArray[np.float64],
-    left: NDArray[np.int64],
-) -> NDArray[np.float64]:
-    """Return what decides over a cell without each class, shape (n, c, 3)."""
-    parts = (
-        _log(like.far)[:, None] + rise,
-        np.broadcast_to(np.log(lengths)[:, None], rise.shape),
-        np.log(np.maximum(left, 1)),
-    )
-    return np.stack(parts, axis=2)

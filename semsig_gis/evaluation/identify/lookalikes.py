@@ -17,7 +17,6 @@ import numpy as np
 from semsig_gis.core.errors import InputError
 from semsig_gis.core.geometry import cell_ids
 from semsig_gis.core.ranges import MOST_METRES, require_number
-from semsig_gis.core.signature import BEARING_UNITS
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -38,7 +37,7 @@ MOST_OCTAVES = 100.0  # powers of two beyond this are not told from it
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Lookalikes:
-    """How like other cells are to each of c cells.
+    """How like other cells are to each of c looks from cells.
 
     `near` (c,) is the sum of the tempered ratios of likelihood over the circle around each cell,
     `far` (c,) that over all other cells. `cells` (c, k) are row numbers of the likest cells outside
@@ -77,14 +76,15 @@ def find_lookalikes(
     *,
     temperature: float,
     radius: float = 50.0,
-    cells: NDArray[np.int64] | None = None,
+    looks: NDArray[np.int64] | None = None,
     places: int = 3,
     seed: int = 0,
     threads: int = 1,
     progress: Callable[[int, int], None] | None = None,
 ) -> Lookalikes:
-    """Compare cells (row numbers, all by default) with all others, and name the likest `places`.
+    """Compare looks from cells with all other cells, and name the likest `places`.
 
+    Of d looks of the columns, number l from cell c has the number ``c * d + l``; all by default.
     `temperature` (above 0) is 1 for a query that is just the signature of the cell, less for one
     that is spoiled; `radius` is what counts as near, in metres; InputError if one is out of range.
     A ratio beyond 2 to the power of 100, or below its inverse, counts as that. Of the cells that
@@ -99,13 +99,19 @@ def find_lookalikes(
 
     database = columns.database
     _check(temperature, radius)
-    rows = np.arange(len(database)) if cells is None else np.asarray(cells, dtype=np.int64)
+    directions = len(columns.looks)
+    if looks is None:
+        looks = np.arange(len(database) * directions)
+    rows = np.asarray(looks, dtype=np.int64)
+    seen_from = rows // directions
     radius = min(radius, city_extent(database))
     powers = _powers(columns, temperature)
     # Sums within 16 bits are added up twice as fast, but hold no cells with very many objects.
     wide = database.lengths * 255 + LEVELS >= 2**16
     wide |= (columns.constants < columns.constants.max() - LEVELS * columns.step).any(axis=0)
-    all_bases = {much: _bases(columns, temperature, wide=much) for much in {*wide[rows].tolist()}}
+    all_bases = {
+        much: _bases(columns, temperature, wide=much) for much in {*wide[seen_from].tolist()}
+    }
     samples = {much: _sample(columns, bases, seed) for much, bases in all_bases.items()}
     around = Places(
         ids=database.cell_ids,
@@ -119,7 +125,6 @@ def find_lookalikes(
         kinds=columns.kinds,
         bearing_units=database.bearing_units,
     )
-    inside = np.ones((1, BEARING_UNITS), np.bool_)
     like = Lookalikes(
         near=np.empty(len(rows)),
         far=np.empty(len(rows)),
@@ -129,12 +134,12 @@ def find_lookalikes(
     )
 
     def compare(part: slice) -> None:
-        much = bool(wide[rows[part]].any())
+        much = bool(wide[seen_from[part]].any())
         sample = samples[much]
         compare_cells(
             rows[part],
             entries,
-            inside,
+            columns.inside,
             columns.values,
             columns.constants,
             columns.step,

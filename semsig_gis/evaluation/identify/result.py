@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
 
 NAME = "identifiability"
-FORMAT = 1  # raised whenever the same cells and noise give other numbers, or are written otherwise
+FORMAT = 2  # raised whenever the same cells and noise give other numbers, or are written otherwise
 
 BANDS = (0.0, 0.1, 0.5, 0.9)  # lower ends of the chances to be found by which cells are counted
 
@@ -56,6 +56,8 @@ class Identifiability:
         How the detector fails.
     radius : float
         Metres that count as near.
+    view : float
+        Degrees that a query sees at once: 360, or those of a photo in any direction.
     itself, near : ndarray of float64, shape (n,)
         Expected chances that the answer to a query from the cell gives to the cell itself, and to
         the cells within the radius.
@@ -87,6 +89,7 @@ class Identifiability:
     database: SignatureDatabase
     noise: Noise
     radius: float
+    view: float
     itself: NDArray[np.float64]
     near: NDArray[np.float64]
     found: NDArray[np.float64]
@@ -135,6 +138,7 @@ class Identifiability:
             "belongs_to": index_fingerprint(self.database, self.noise),
             "noise": self.noise.to_dict(),
             "radius": self.radius,
+            "view": self.view,
             "trials": self.trials,
             "seed": self.seed,
             "classes": [asdict(gain) for gain in self.classes],
@@ -167,6 +171,7 @@ class Identifiability:
             "cells": cells,
             "noise": self.noise.name,
             "radius_m": self.radius,
+            "view_degrees": self.view,
             "trials": self.trials,
             "seed": self.seed,
             "chance_itself": float(self.itself.mean()),
@@ -307,6 +312,7 @@ def _parsed(
         database=database,
         noise=noise,
         radius=float(facts["radius"]),
+        view=float(facts["view"]),
         itself=table["chance_itself"].to_numpy(),
         near=table["chance_near"].to_numpy(),
         found=table["chance_found"].to_numpy(),

@@ -5,10 +5,12 @@ from __future__ import annotations
 import math
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
+from itertools import repeat
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from semsig_gis.core.view import FULL_VIEW, View
 from semsig_gis.evaluation.identify.lookalikes import city_extent
 from semsig_gis.likelihood.association import rerank
 from semsig_gis.likelihood.index import build_index
@@ -18,12 +20,14 @@ from semsig_gis.queries.distortions import Detector
 from semsig_gis.queries.sight import CitySights, Sight
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Iterator
+    from collections.abc import Callable, Iterable, Iterator, Sequence
 
     from numpy.typing import NDArray
 
     from semsig_gis.core.signature import Signature
+    from semsig_gis.core.view import Photo
     from semsig_gis.database.database import SignatureDatabase
+    from semsig_gis.evaluation.identify.columns import SymbolColumns
     from semsig_gis.likelihood.index import LikelihoodIndex
     from semsig_gis.likelihood.noise.model import Noise, NoiseSpec
 
@@ -35,13 +39,15 @@ HOPELESS = 20.0  # nats below the likeliest cell, at which a cell is left out of
 class Trials:
     """What came of simulated queries, arrays of one item a query.
 
-    The answer gave the chance `itself` to the true cell (a row number of `cells`) and `near` to all
-    cells near it; `found` tells whether the best place is near, `bits` the entropy of all chances.
-    `lean` is the mean, by these chances, of the log-likelihood of the true cell's own signature in
-    a cell less that in the true one; NaN where nothing was detected.
+    The answer to a query from a cell (a row number of `cells`), in one of the `looks`, gave the
+    chance `itself` to that cell and `near` to all cells near it; `found` tells whether the best
+    place is near, `bits` the entropy of all chances. `lean` is the mean, by these chances, of the
+    log-likelihood of what the look shows in a cell less that in the true one; NaN where nothing was
+    detected, or no columns were given.
     """
 
     cells: NDArray[np.int64]
+    looks: NDArray[np.int64]
     itself: NDArray[np.float64]
     near: NDArray[np.float64]
     found: NDArray[np.bool_]
@@ -64,16 +70,25 @@ def trial_cells(cells: int, count: int, *, seed: int = 0) -> NDArray[np.int64]:
 
 
 def draw_trials(
-    index: LikelihoodIndex, cells: NDArray[np.int64], *, seed: int = 0
+    index: LikelihoodIndex,
+    cells: NDArray[np.int64],
+    *,
+    photos: Iterable[Photo] | None = None,
+    seed: int = 0,
 ) -> Iterator[Signature]:
     """Yield what a detector tells of cells, if it fails as the noise model of the index says.
 
-    `cells` are row numbers. Query number i is the same whatever the number of queries.
+    `cells` are row numbers, `photos` what is looked at from each, a full turn by default. Query
+    number i is the same whatever the number of queries.
     """
     detector = Detector(noise=index.noise)
     spoil = ready_chain((detector,), CitySights.of(index.database))
-    for number, cell in enumerate(cells.tolist()):
-        yield spoil(Sight.of_cell(index.database, cell), seed, number).signature
+    looks = repeat(FULL_VIEW) if photos is None else photos
+    for number, (cell, photo) in enumerate(zip(cells.tolist(), looks, strict=False)):
+        query = spoil(Sight.of_cell(index.database, cell), seed, number).signature
+        if photo.sectors and query.bearings is not None:
+            query = View.of(query.select(photo.sees(query.bearings)), photos=(photo,))
+        yield query
 
 
 def try_cells(
@@ -81,6 +96,8 @@ def try_cells(
     cells: NDArray[np.int64],
     *,
     queries: Iterable[Signature] | None = None,
+    columns: SymbolColumns | None = None,
+    looks: NDArray[np.int64] | None = None,
     radius: float = 50.0,
     seed: int = 0,
     threads: int = 1,
@@ -89,25 +106,35 @@ def try_cells(
     """Ask one query from each of some cells, given by row number; by default simulated ones.
 
     The noise model of the index is that of the detector and of the answer alike; `radius` is what
-    counts as near, in metres. A query without objects is not answered: its chances are 0.
+    counts as near, in metres. A query without objects is not answered: its chances are 0. `columns`
+    are what `Trials.lean` is worked out by; `looks` are the numbers of the looks of simulated
+    queries, the first by default.
     """
+    numbers = np.zeros(len(cells), np.int64) if looks is None else looks
     if queries is None:
-        queries = draw_trials(index, cells, seed=seed)
+        photos = None if columns is None else [columns.looks[look] for look in numbers.tolist()]
+        queries = draw_trials(index, cells, photos=photos, seed=seed)
     places = _without_signatures(index.database)
     radius = min(radius, city_extent(places))
 
-    def ask(cell: int, query: Signature) -> tuple[float, ...]:
-        return _outcome(index, places, cell, query, radius)
+    def ask(cell: int, look: int, query: Signature) -> tuple[float, ...]:
+        def own(others: NDArray[np.int64]) -> NDArray[np.float64]:
+            if columns is None:
+                return np.full(len(others), np.nan)
+            return columns.loglik(cell, look, others)
+
+        return _outcome(index, places, cell, query, radius, own)
 
     rows: list[tuple[float, ...]] = []
     with ThreadPoolExecutor(threads) as pool:
-        for row in pool.map(ask, cells.tolist(), queries):
+        for row in pool.map(ask, cells.tolist(), numbers.tolist(), queries):
             rows.append(row)
             if progress is not None:
                 progress(len(rows), len(cells))
     itself, near, found, bits, lean = np.array(rows, dtype=np.float64).reshape(-1, 5).T
     return Trials(
         cells=np.asarray(cells),
+        looks=numbers,
         itself=itself,
         near=near,
         found=found.astype(np.bool_),
@@ -128,12 +155,13 @@ def _without_signatures(database: SignatureDatabase) -> SignatureDatabase:
     )
 
 
-def _outcome(
+def _outcome(  # noqa: PLR0917 - a private helper of one caller
     index: LikelihoodIndex,
     places: SignatureDatabase,
     cell: int,
     query: Signature,
     radius: float,
+    own: Callable[[NDArray[np.int64]], NDArray[np.float64]],
 ) -> tuple[float, ...]:
     """Return what comes of one query, in the order of `Trials`."""
     if not len(query):
@@ -150,13 +178,13 @@ def _outcome(
         int(places.columns[cells[best]]) - int(places.columns[cell]),
         int(places.rows[cells[best]]) - int(places.rows[cell]),
     )
-    own = index.scores(index.database.signature(cell)).loglik
+    alike = own(cells)
     return (
         min(float(answer.chances[true]), near),
         near,
         float(apart <= radius + 1e-6),
         answer.entropy,
-        float(answer.chances @ own[cells] - own[cell]),
+        float(answer.chances @ alike - alike[true]),
     )
 
 
@@ -205,6 +233,7 @@ def try_without_classes(
     index: LikelihoodIndex,
     cells: NDArray[np.int64],
     *,
+    photos: Sequence[Photo] | None = None,
     radius: float = 50.0,
     seed: int = 0,
     threads: int = 1,
@@ -213,17 +242,22 @@ def try_without_classes(
     """Ask simulated queries once more for each class, as if it had not been published.
 
     The queries are those of `try_cells`, without detections of the class; the results (m, k) are
-    `Trials.near` and `Trials.bits` by class of ``index.table.codes``. A cell that sees nothing else
-    cannot be found: no chance, and all bits are left.
+    `Trials.near` and `Trials.bits` by class of ``index.table.codes``, NaN where neither the cell
+    sees the class nor the query tells of it. A cell that sees nothing else cannot be found: no
+    chance, and all bits are left.
     """
     codes = index.table.codes.tolist()
-    queries = list(draw_trials(index, cells, seed=seed))
+    queries = list(draw_trials(index, cells, photos=photos, seed=seed))
     near = np.zeros((len(cells), len(codes)))
     bits = np.full((len(cells), len(codes)), np.log2(len(index.database)))
     names = {item.code: item.name for item in index.database.taxonomy.classes}
     for number, code in enumerate(codes):
         without, rows = leave_class_out(index.database, code)
-        left = np.flatnonzero(rows[cells] >= 0)
+        sees = np.add.reduceat(index.database.codes == code, index.database.offsets[:-1])[cells]
+        told = [bool((query.codes == code).any()) for query in queries]
+        touched = np.array(told, np.bool_) | (sees > 0)
+        near[~touched, number] = bits[~touched, number] = np.nan
+        left = np.flatnonzero(touched & (rows[cells] >= 0))
         if len(left):
             noise = _without_class(index.noise, names[code], len(codes))
             trials = try_cells(
