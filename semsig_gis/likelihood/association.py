@@ -29,7 +29,7 @@ from semsig_gis.core.errors import InputError
 from semsig_gis.core.geometry import FULL_TURN, HALF_TURN, signed_degrees
 from semsig_gis.core.signature import DISTANCE_UNITS
 from semsig_gis.core.view import View
-from semsig_gis.database.database import views_in
+from semsig_gis.database.database import views_aside, views_in
 from semsig_gis.likelihood.index import CellScores, own_sigma
 from semsig_gis.likelihood.noise.table import database_tables
 from semsig_gis.likelihood.photo import PhotoTable, photo_loglik
@@ -322,6 +322,8 @@ def associate_pairs(
 RERANKED = 1000
 """How many cells are re-ranked unless said otherwise."""
 FIRST = 100  # cells that are re-ranked whatever comes out
+NEGLIGIBLE = 30.0  # nats below the best, at which cells hold nothing together
+POOL, SAMPLE, WINDOW = 4096, 256, 32  # of the cells that are not re-ranked
 HOPELESS = 20.0  # nats below the best of them, at which the others are not looked at
 # Turns around the likeliest one of the scan, which knows it to less than six degrees.
 TURNS = np.arange(-7.5, 7.6, 1.5)
@@ -359,9 +361,9 @@ def rerank(
     """Replace the scores of the best cells by their one-to-one likelihoods.
 
     Up to `count` cells are re-ranked; after the first hundred, only those that may still matter.
-    The others are moved by as much as the likelihood of the worse half of these moved, so that the
-    masses of both fit each other. `log_prior` helps to choose the cells and is not part of the
-    result. Without bearings the scores are returned as they are.
+    Of the others, a sample is looked at, too, and each is moved by as much as those of the sample
+    with scores like its own, so that all masses fit each other. `log_prior` helps to choose the
+    cells and is not part of the result. Without bearings the scores are returned as they are.
     """
     from semsig_gis.likelihood.kernels import promising_cells  # noqa: PLC0415 - numba loads slowly
 
@@ -388,9 +390,9 @@ def rerank(
         new = np.append(new, more)
         turns = [np.append(*both) for both in zip(turns, more_turns, strict=True)]
     cells = np.append(first, rest)
-    worse = slice(len(cells) // 2, None)
-    moved = np.logaddexp.reduce(new[worse]) - np.logaddexp.reduce(old[cells[worse]])
-    loglik = old + moved if len(cells) else old
+    loglik = old
+    if len(cells) < len(old):
+        loglik = old + _shift(index, view, scores, north_sigma, total=total, ranked=cells)
     loglik[cells] = new
     headings = []
     for before, turn in zip(scores.headings, turns, strict=True):
@@ -402,6 +404,36 @@ def rerank(
     return CellScores(loglik=loglik, headings=tuple(headings))
 
 
+def _shift(
+    index: LikelihoodIndex,
+    view: View,
+    scores: CellScores,
+    north_sigma: float,
+    *,
+    total: NDArray[np.float64],
+    ranked: NDArray[np.int64],
+) -> NDArray[np.float64]:
+    """Return by how much the likelihood of cells changes that are not among those `ranked`."""
+    rest = np.ones(len(total), np.bool_)
+    rest[ranked] = False
+    rest &= total > total.max() - NEGLIGIBLE
+    tail = np.flatnonzero(rest)
+    if not len(tail):
+        return np.zeros(len(total))
+    tail = np.random.default_rng(0).permutation(tail)[:POOL]
+    tail = tail[np.argsort(-total[tail], kind="stable")]
+    ranks = np.unique(np.geomspace(1, len(tail), SAMPLE).astype(np.int64)) - 1
+    sample = tail[ranks]
+    new, _ = _aligned(index, view, sample, scores, north_sigma)
+    old = scores.loglik[sample].astype(np.float64)
+    moves, levels = [], []
+    for low in range(0, len(sample), WINDOW):
+        part = slice(low, low + WINDOW)
+        moves.append(np.logaddexp.reduce(new[part]) - np.logaddexp.reduce(old[part]))
+        levels.append(total[sample[part]].mean())
+    return np.asarray(np.interp(total, levels[::-1], moves[::-1]))
+
+
 def _aligned(
     index: LikelihoodIndex,
     view: View,
@@ -410,14 +442,16 @@ def _aligned(
     north_sigma: float,
 ) -> tuple[NDArray[np.float64], list[NDArray[np.float64]]]:
     """Return the log-likelihood in some cells, and the likeliest turns of the photos in each."""
-    views = views_in(index.database, cells)
-    total, likeliest = np.zeros(len(cells)), []
+    models, places = index.stands
+    seen = views_aside(index.database, cells, places)
+    total, likeliest = np.zeros((len(places), len(cells))), []
     for photo, heading in zip(view.split(), scores.headings, strict=True):
         turns = np.zeros((len(cells), 1)) if heading is None else heading[cells, None] + TURNS
         asked = PhotoTable.of(photo, index.table)
-        logliks = photo_loglik(asked, views, *index.models, turns=turns)
+        logliks = np.stack([photo_loglik(asked, one, *models, turns=turns) for one in seen])
         if heading is not None:
             logliks += turn_logs(turns, TURNS[1] - TURNS[0], own_sigma(photo, north_sigma))
-        likeliest.append(turns[np.arange(len(cells)), logliks.argmax(axis=1)])
-        total += np.logaddexp.reduce(logliks, axis=1)
-    return total, likeliest
+        best = np.logaddexp.reduce(logliks, axis=0).argmax(axis=1)
+        likeliest.append(turns[np.arange(len(cells)), best])
+        total += np.logaddexp.reduce(logliks, axis=2)
+    return np.logaddexp.reduce(total, axis=0) - math.log(len(places)), likeliest

@@ -20,6 +20,7 @@ from semsig_gis.core.geometry import FULL_TURN
 from semsig_gis.core.signature import BEARING_UNITS, DISTANCE_UNITS
 from semsig_gis.core.threads import share_rows
 from semsig_gis.core.view import View, check_north
+from semsig_gis.likelihood.noise.model import ROUNDING, cell_noise, place_noise
 from semsig_gis.likelihood.noise.table import database_tables, mean_table
 from semsig_gis.likelihood.photo import PhotoTable
 
@@ -42,6 +43,7 @@ TURNS = 64
 
 VERSION = 3  # raised whenever the same database and noise give other likelihoods
 LEAST_PRIOR = 1e-7  # turns that are less likely than this, against the likeliest, are left out
+STANDS = 3  # places a side of a cell, at which the best cells are compared
 LEAST_DENSITY = 1e-12
 LEAST_PART = 1e-3  # of the density of false detections, that an object must add to count
 LAPS = np.arange(-3, 4)  # 180 degrees of deviation reach three turns
@@ -94,6 +96,22 @@ class LikelihoodIndex:
     def table(self) -> NoiseTable:
         """The mean of the models, by which all cells are compared."""
         return mean_table(*self.models)
+
+    @cached_property
+    def stands(
+        self,
+    ) -> tuple[tuple[tuple[NoiseTable, ...], NDArray[np.float64]], NDArray[np.float64]]:
+        """Where in a cell observers may stand, metres from its middle, and the models for each.
+
+        For a noise model that is for the middles of cells, that is the middle alone.
+        """
+        step = self.database.grid.step
+        if any(spec.position_sigma**2 < step**2 / 12.0 - ROUNDING for spec in self.noise.specs):
+            return self.models, np.zeros((1, 2))
+        side = (np.arange(STANDS) - (STANDS - 1) / 2.0) * step / STANDS
+        places = np.stack(np.meshgrid(side, side), axis=-1).reshape(-1, 2)
+        noise = cell_noise(place_noise(self.noise, step), step / STANDS)
+        return database_tables(self.database, noise), places
 
     @cached_property
     def fingerprint(self) -> str:

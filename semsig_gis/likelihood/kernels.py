@@ -48,6 +48,7 @@ def align(  # noqa: C901, PLR0912, PLR0915, PLR0917 - a kernel takes no keywords
     kinds: NDArray[np.int64],
     bearing_units: NDArray[np.uint16],
     distance_units: NDArray[np.uint8],
+    beyond: NDArray[np.bool_],
     unit: float,
     bearings: NDArray[np.float64],
     ranges: NDArray[np.float64],
@@ -72,15 +73,16 @@ def align(  # noqa: C901, PLR0912, PLR0915, PLR0917 - a kernel takes no keywords
     """Sum over the one-to-one associations of a photo with what is seen from some places.
 
     Fills `totals`, shape (models, places, turns), with log-likelihoods. Objects of the places have
-    class rows `kinds` and bearings of `unit` degrees a unit. The photo, turned by `turns`, shape
-    (places, turns), has detections by `bearings`, `ranges` (NaN if unknown) and, by model and
-    class, `range_sigma`; it saw `sectors`, shape (s, 2), or all round, `width` of the turn. What
-    speaks for a class is `own`, shape (k, n), and `other` if it is misnamed, shape (models, k, n);
-    `density` (models, n) is of false detections, in which `disc` (n,) is that of the range. By
-    model, `detected` and `misnamed` are by length and class, `clutter` is the sum of false
-    detections, and by class and distance unit `seen` and `left` are the chances that what is in
-    range of the place is seen by the observer, and that it has left the range, and `sigma` the
-    deviation of a bearing. `blur` is that of the observer's place in metres, `distances` the metres
+    class rows `kinds` and bearings of `unit` degrees a unit; some are `beyond` the range. The
+    photo, turned by `turns`, shape (places, turns), has detections by `bearings`, `ranges` (NaN if
+    unknown) and, by model and class, `range_sigma`; it saw `sectors`, shape (s, 2), or all round,
+    `width` of the turn. What speaks for a class is `own`, shape (k, n), and `other` if it is
+    misnamed, shape (models, k, n); `density` (models, n) is of false detections, in which `disc`
+    (n,) is that of the range. By model, `detected` and `misnamed` are by length and class,
+    `clutter` is the sum of false detections, and by class and distance unit `seen` and `left` are
+    the chances that what is in range of the place is seen by the observer, and that it has left the
+    range, and `sigma` the deviation of a bearing. `blur` is that of the observer's place in metres,
+    `distances` the metres
     of a unit.
     """
     models, longest = detected.shape[0], detected.shape[1] - 1
@@ -111,6 +113,8 @@ def align(  # noqa: C901, PLR0912, PLR0915, PLR0917 - a kernel takes no keywords
                 wrong = misnamed[model, length, kind]
                 far = distance_units[low + one]
                 leaving = detected[model, length, kind] * left[model, kind, far]
+                if beyond[low + one]:
+                    leaving += detected[model, length, kind] * seen[model, kind, far]
                 gone += leaving
                 for two in range(size):
                     name = (1.0 - wrong) * own[kind, two] + wrong * other[model, kind, two]
@@ -125,6 +129,8 @@ def align(  # noqa: C901, PLR0912, PLR0915, PLR0917 - a kernel takes no keywords
                 total = start
                 edges = 0
                 for one in range(count):
+                    if beyond[low + one]:
+                        continue
                     kind, far = kinds[low + one], distance_units[low + one]
                     bearing = (bearing_units[low + one] + 0.5) * unit
                     spread = sigma[model, kind, far]

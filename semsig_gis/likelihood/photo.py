@@ -119,7 +119,10 @@ def photo_loglik(
 
     first = tables[0]
     bearing_units = np.minimum(views.bearings * (BEARING_UNITS / FULL_TURN), BEARING_UNITS - 1)
+    kinds = first.row_of[views.codes]
     distance_units = np.rint(views.distances * (DISTANCE_UNITS / first.reach))
+    # Half a unit is rounding.
+    beyond = views.distances > first.ranges[kinds] + first.reach / DISTANCE_UNITS / 2.0
     logliks = np.empty((len(tables), *turns.shape))
 
     def stacked(name: str) -> NDArray[np.float64]:
@@ -127,9 +130,10 @@ def photo_loglik(
 
     align(
         views.offsets,
-        first.row_of[views.codes],
+        kinds,
         bearing_units.astype(np.uint16),
-        distance_units.astype(np.uint8),
+        np.minimum(distance_units, DISTANCE_UNITS).astype(np.uint8),
+        beyond,
         FULL_TURN / BEARING_UNITS,
         photo.bearings,
         photo.ranges,
