@@ -504,14 +504,15 @@ def views_aside(
         views = views_in(database, found[there])
         owners = np.repeat(np.flatnonzero(there), views.lengths)
         angles = np.radians(views.bearings)
-        east = views.distances * np.sin(angles) + aside * step
-        north = views.distances * np.cos(angles) + up * step
+        # What is nearest is not at the very place.
+        metres = np.maximum(views.distances, database.reach / DISTANCE_UNITS / 2.0)
+        east, north = metres * np.sin(angles) + aside * step, metres * np.cos(angles) + up * step
         return there, _Entries(owners, views.codes, east, north)
 
     def seen_from(dx: float, dy: float) -> Views:
-        own = around(0, 0)[1]
         if dx == 0 and dy == 0:
-            return own.views(len(cells), dx, dy)
+            return views_in(database, cells)
+        own = around(0, 0)[1]
         aside, up = int(np.sign(dx)), int(np.sign(dy))
         whole = np.ones(len(cells), np.bool_)
         parts, before = [], [(0, 0)]

@@ -10,13 +10,13 @@ import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from sentences import refused
-from worlds import CODES, World, worlds
+from worlds import CODES, TOWN, World, worlds
 
 from semsig_gis.core.errors import EmptyResultError, InputError
-from semsig_gis.core.geometry import GridSpec, wrap_degrees
+from semsig_gis.core.geometry import GridSpec, cell_ids, wrap_degrees
 from semsig_gis.core.rtree import ObjectIndex
 from semsig_gis.database import viewpoints
-from semsig_gis.database.database import views_in
+from semsig_gis.database.database import views_aside, views_in
 from semsig_gis.database.occlusion import Footprints
 from semsig_gis.database.viewpoints import choose_viewpoints
 from semsig_gis.database.views import ViewpointSpec, bearings, views_at
@@ -171,3 +171,27 @@ def test_buildings_hide() -> None:
     )
     assert seen.objects.tolist() == [1]
     assert seen.bearings.tolist() == [270.0]
+
+
+def test_cells_tell_what_is_seen_between_their_middles() -> None:
+    database, objects = TOWN.database, TOWN.street_objects
+    aside, up = (part.ravel() for part in np.meshgrid([-1, 0, 1], [-1, 0, 1]))
+    ids = cell_ids(database.columns[:, None] + aside, database.rows[:, None] + up)
+    cells = np.flatnonzero(np.isin(ids, database.cell_ids).all(axis=1))
+    assert len(cells) > 20
+    index = ObjectIndex(objects.xy)
+    places = np.array([[0.0, 0.0], [3.0, 0.0], [-3.0, 2.0], [0.0, -4.0]])
+    for place, found in zip(places, views_aside(database, cells, places), strict=True):
+        true = views_at(objects, database.xy[cells] + place, index=index, radius=30.0)
+        # Places are good to some decimetres, by which an object may be in range or not.
+        same = found.lengths == true.lengths
+        assert same.mean() > 0.9
+        for cell in np.flatnonzero(same).tolist():
+            parts = [slice(one.offsets[cell], one.offsets[cell + 1]) for one in (found, true)]
+            near, expected = (
+                np.lexsort((one.distances[part], one.codes[part]))
+                for one, part in zip((found, true), parts, strict=True)
+            )
+            assert (found.codes[parts[0]][near] == true.codes[parts[1]][expected]).all()
+            metres = found.distances[parts[0]][near] - true.distances[parts[1]][expected]
+            assert np.abs(metres).max() < 0.3
