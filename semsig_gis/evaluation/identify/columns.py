@@ -19,10 +19,12 @@ import numpy as np
 from semsig_gis.core.geometry import FULL_TURN
 from semsig_gis.core.signature import BEARING_UNITS
 from semsig_gis.core.view import FULL_VIEW
+from semsig_gis.likelihood.noise.table import query_bearings
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+    from semsig_gis.core.signature import Signature
     from semsig_gis.core.view import Photo
     from semsig_gis.database.database import SignatureDatabase
     from semsig_gis.likelihood.index import LikelihoodIndex
@@ -72,6 +74,26 @@ class SymbolColumns:
         """Which bearings are seen by look, shape (d, units)."""
         middles = (np.arange(BEARING_UNITS) + 0.5) * (FULL_TURN / BEARING_UNITS)
         return np.stack([look.sees(middles) for look in self.looks])
+
+    def scores(
+        self, query: Signature, look: int, *, left_out: int | None = None
+    ) -> NDArray[np.float32]:
+        """Return the first sum of the log-likelihood of a query of a look in every cell.
+
+        Without a class row that is `left_out`, objects of it are nowhere; that the detector may
+        have given them another name is neglected. The query has bearings and known types.
+        """
+        from semsig_gis.evaluation.identify.kernels import score_cells  # noqa: PLC0415
+
+        rows = self.table.query_rows(query)
+        base = np.log(self.table.density[rows]).sum()
+        constants = self.constants[look] + np.float32(base)
+        if left_out is not None:
+            constants -= self.missed[look, left_out]
+        scores = np.empty(len(constants), np.float32)
+        bins = np.floor(query_bearings(query) / BIN_DEGREES).astype(np.int64) % BINS
+        score_cells(rows * BINS + bins, self.values, constants, self.step, scores)
+        return scores
 
     def loglik(self, cell: int, look: int, cells: NDArray[np.int64]) -> NDArray[np.float64]:
         """Return the log-likelihood of what a look from a cell shows, in some, up to a constant."""

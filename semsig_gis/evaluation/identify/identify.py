@@ -174,7 +174,8 @@ def identify(
     without = try_without_classes(
         index,
         sample[again],
-        photos=[photos[look] for look in looks[again].tolist()],
+        columns=columns,
+        looks=looks[again],
         radius=radius,
         seed=seed,
         threads=threads,

@@ -155,6 +155,25 @@ def _add_up(
 
 
 @compiled
+def score_cells(
+    symbols: NDArray[np.int64],
+    values: NDArray[np.uint8],
+    constants: NDArray[np.float32],
+    step: float,
+    scores: NDArray[np.float32],
+) -> None:
+    """Fill the scores of all cells (n,), a sum of columns and of a constant of each."""
+    pairs, scale = values.view(np.uint16), np.float32(step)
+    nothing, words = np.zeros(BLOCK, np.uint32), np.empty((2, BLOCK // 2), np.uint16)
+    sums = np.empty(BLOCK, np.uint32)
+    for block in range(len(values)):
+        _add_up(pairs[block], symbols, nothing, words, sums)
+        low = block * BLOCK
+        for inside in range(min(BLOCK, len(scores) - low)):
+            scores[low + inside] = constants[low + inside] + scale * np.float32(sums[inside])
+
+
+@compiled
 def _total(values: NDArray[np.float32]) -> float:
     """Return the sum of values, which are lost: halves are added up, many numbers at once."""
     size = len(values)

@@ -5,22 +5,24 @@ from __future__ import annotations
 import math
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
+from functools import partial
 from itertools import repeat
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from semsig_gis.core.view import FULL_VIEW, View
+from semsig_gis.evaluation.identify.columns import symbol_columns
 from semsig_gis.evaluation.identify.lookalikes import city_extent
 from semsig_gis.likelihood.association import rerank
-from semsig_gis.likelihood.index import build_index
+from semsig_gis.likelihood.index import CellScores, build_index
 from semsig_gis.likelihood.posterior import posterior
 from semsig_gis.queries.chain import ready_chain
 from semsig_gis.queries.distortions import Detector
 from semsig_gis.queries.sight import CitySights, Sight
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Iterator, Sequence
+    from collections.abc import Callable, Iterable, Iterator
 
     from numpy.typing import NDArray
 
@@ -98,6 +100,7 @@ def try_cells(
     queries: Iterable[Signature] | None = None,
     columns: SymbolColumns | None = None,
     looks: NDArray[np.int64] | None = None,
+    left_out: tuple[int, NDArray[np.int64]] | None = None,
     radius: float = 50.0,
     seed: int = 0,
     threads: int = 1,
@@ -118,12 +121,17 @@ def try_cells(
     radius = min(radius, city_extent(places))
 
     def ask(cell: int, look: int, query: Signature) -> tuple[float, ...]:
-        def own(others: NDArray[np.int64]) -> NDArray[np.float64]:
-            if columns is None:
-                return np.full(len(others), np.nan)
-            return columns.loglik(cell, look, others)
-
-        return _outcome(index, places, cell, query, radius, own)
+        if not len(query):
+            return 0.0, 0.0, 0.0, float(np.log2(len(places))), np.nan
+        if columns is None:
+            return _outcome(index, places, cell, query, radius, index.scores(query))
+        if left_out is not None:
+            number, rows = left_out
+            first = columns.scores(query, look, left_out=number)[rows]
+            return _outcome(index, places, cell, query, radius, CellScores(loglik=first))
+        first = columns.scores(query, look)
+        own = partial(columns.loglik, cell, look)
+        return _outcome(index, places, cell, query, radius, CellScores(loglik=first), own)
 
     rows: list[tuple[float, ...]] = []
     with ThreadPoolExecutor(threads) as pool:
@@ -161,12 +169,11 @@ def _outcome(  # noqa: PLR0917 - a private helper of one caller
     cell: int,
     query: Signature,
     radius: float,
-    own: Callable[[NDArray[np.int64]], NDArray[np.float64]],
+    scores: CellScores,
+    own: Callable[[NDArray[np.int64]], NDArray[np.float64]] | None = None,
 ) -> tuple[float, ...]:
     """Return what comes of one query, in the order of `Trials`."""
-    if not len(query):
-        return 0.0, 0.0, 0.0, float(np.log2(len(places))), np.nan
-    loglik = rerank(index, query, index.scores(query)).loglik
+    loglik = rerank(index, query, scores).loglik
     kept = loglik > loglik.max() - HOPELESS
     kept[cell] = True
     cells = np.flatnonzero(kept)
@@ -178,7 +185,7 @@ def _outcome(  # noqa: PLR0917 - a private helper of one caller
         int(places.columns[cells[best]]) - int(places.columns[cell]),
         int(places.rows[cells[best]]) - int(places.rows[cell]),
     )
-    alike = own(cells)
+    alike = np.full(len(cells), np.nan) if own is None else own(cells)
     return (
         min(float(answer.chances[true]), near),
         near,
@@ -233,7 +240,8 @@ def try_without_classes(
     index: LikelihoodIndex,
     cells: NDArray[np.int64],
     *,
-    photos: Sequence[Photo] | None = None,
+    columns: SymbolColumns | None = None,
+    looks: NDArray[np.int64] | None = None,
     radius: float = 50.0,
     seed: int = 0,
     threads: int = 1,
@@ -247,6 +255,9 @@ def try_without_classes(
     chance, and all bits are left.
     """
     codes = index.table.codes.tolist()
+    columns = symbol_columns(index, threads=threads) if columns is None else columns
+    numbers = np.zeros(len(cells), np.int64) if looks is None else looks
+    photos = [columns.looks[look] for look in numbers.tolist()]
     queries = list(draw_trials(index, cells, photos=photos, seed=seed))
     near = np.zeros((len(cells), len(codes)))
     bits = np.full((len(cells), len(codes)), np.log2(len(index.database)))
@@ -264,6 +275,9 @@ def try_without_classes(
                 build_index(without, noise),
                 rows[cells[left]],
                 queries=[_without_code(queries[one], code) for one in left.tolist()],
+                columns=columns,
+                looks=numbers[left],
+                left_out=(number, np.flatnonzero(rows >= 0)),
                 radius=radius,
                 threads=threads,
             )
