@@ -211,7 +211,8 @@ class SignatureDatabase:
 
     def select(self, cells: slice | NDArray[np.int64] | NDArray[np.bool_]) -> SignatureDatabase:
         """Return a database of some of the cells, by rows in their order or by True for each."""
-        kept = np.arange(len(self))[cells]
+        rows = isinstance(cells, np.ndarray) and cells.dtype.kind == "i"
+        kept = cells if rows else np.arange(len(self))[cells]
         lengths = self.lengths[kept]
         entries = consecutive(self.offsets[kept], lengths)
         return replace(

@@ -44,6 +44,7 @@ def _mass(start: float, width: float, spread: float) -> float:
 
 @compiled
 def align(  # noqa: C901, PLR0912, PLR0915, PLR0917 - a kernel takes no keywords
+    part: NDArray[np.int64],
     offsets: NDArray[np.int64],
     kinds: NDArray[np.int64],
     bearing_units: NDArray[np.uint16],
@@ -72,7 +73,8 @@ def align(  # noqa: C901, PLR0912, PLR0915, PLR0917 - a kernel takes no keywords
 ) -> None:
     """Sum over the one-to-one associations of a photo with what is seen from some places.
 
-    Fills `totals`, shape (models, places, turns), with log-likelihoods. Objects of the places have
+    Fills `totals`, shape (models, places, turns), with log-likelihoods, for the places ``part[0]``
+    to ``part[1] - 1``. Objects of the places have
     class rows `kinds` and bearings of `unit` degrees a unit; some are `beyond` the range. The
     photo, turned by `turns`, shape (places, turns), has detections by `bearings`, `ranges` (NaN if
     unknown) and, by model and class, `range_sigma`; it saw `sectors`, shape (s, 2), or all round,
@@ -88,7 +90,7 @@ def align(  # noqa: C901, PLR0912, PLR0915, PLR0917 - a kernel takes no keywords
     models, longest = detected.shape[0], detected.shape[1] - 1
     size = len(bearings)
     most = 0
-    for place in range(len(offsets) - 1):
+    for place in range(part[0], part[1]):
         most = max(most, offsets[place + 1] - offsets[place])
     pairs = most * size
     one_of = np.empty(pairs, np.int64)
@@ -100,7 +102,7 @@ def align(  # noqa: C901, PLR0912, PLR0915, PLR0917 - a kernel takes no keywords
     at_right = np.empty(size)
     floor = np.empty(size)
     named = np.empty((most, size))
-    for place in range(len(offsets) - 1):
+    for place in range(part[0], part[1]):
         low = offsets[place]
         count = offsets[place + 1] - low
         length = min(count, longest)
@@ -138,10 +140,10 @@ def align(  # noqa: C901, PLR0912, PLR0915, PLR0917 - a kernel takes no keywords
                     inside = 1.0
                     if len(sectors):
                         inside = 0.0
-                        for part in range(len(sectors)):
+                        for sector in range(len(sectors)):
                             inside += _mass(
-                                sectors[part, 0] + turn - bearing,
-                                sectors[part, 1] - sectors[part, 0],
+                                sectors[sector, 0] + turn - bearing,
+                                sectors[sector, 1] - sectors[sector, 0],
                                 spread,
                             )
                     missed = 1.0 - chance * inside

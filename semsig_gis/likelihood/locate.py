@@ -632,8 +632,12 @@ def cell_estimate(
     is in degrees. Headings are tried every two degrees all round, cell by cell.
     """
     database, chances = posterior.database, posterior.chances
-    away = database.xy - database.xy[cell]
-    inside = np.flatnonzero((np.hypot(away[:, 0], away[:, 1]) <= radius) & (chances > 0))
+    # The cells are ordered by column: those of the next columns are one run.
+    aside = math.ceil(radius / database.grid.step)
+    ends = database.columns[cell] + np.array([-aside, aside + 1])
+    near = np.arange(*np.searchsorted(database.columns, ends))
+    away = database.xy[near] - database.xy[cell]
+    inside = near[(np.hypot(away[:, 0], away[:, 1]) <= radius) & (chances[near] > 0)]
     inside = inside[np.argsort(-chances[inside], kind="stable")[:MOST_CELLS]]
     headings = heading_sigmas = np.zeros(len(inside))
     view = View.of(query)

@@ -19,6 +19,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -27,6 +28,7 @@ from semsig_gis.core.errors import InputError
 from semsig_gis.core.geometry import FULL_TURN
 from semsig_gis.core.signature import BEARING_UNITS, DISTANCE_UNITS
 from semsig_gis.core.taxonomy import WILDCARD
+from semsig_gis.core.threads import share_rows
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -36,6 +38,8 @@ if TYPE_CHECKING:
     from semsig_gis.core.view import View
     from semsig_gis.database.views import Views
     from semsig_gis.likelihood.noise.table import NoiseTable
+
+PLACES_A_PART = 32  # that are worth a thread
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -128,32 +132,34 @@ def photo_loglik(
     def stacked(name: str) -> NDArray[np.float64]:
         return np.stack([getattr(table, name) for table in tables])
 
-    align(
-        views.offsets,
-        kinds,
-        bearing_units.astype(np.uint16),
-        np.minimum(distance_units, DISTANCE_UNITS).astype(np.uint8),
-        beyond,
-        FULL_TURN / BEARING_UNITS,
-        photo.bearings,
-        photo.ranges,
-        np.stack([photo.range_sigma(table) for table in tables]),
-        photo.scores,
-        np.stack([table.others @ photo.scores for table in tables]),
-        np.stack([photo.density(table) for table in tables]),
-        photo.disc,
-        photo.sectors,
-        photo.width,
-        np.ascontiguousarray(turns, dtype=np.float64),
-        stacked("detected"),
-        stacked("misnamed"),
-        np.array([table.clutter.sum() for table in tables]),
-        stacked("seen"),
-        stacked("left"),
-        stacked("sigmas"),
-        np.array([table.position_sigma for table in tables]),
-        first.distances,
-        logliks,
+    work = partial(
+        align,
+        offsets=views.offsets,
+        kinds=kinds,
+        bearing_units=bearing_units.astype(np.uint16),
+        distance_units=np.minimum(distance_units, DISTANCE_UNITS).astype(np.uint8),
+        beyond=beyond,
+        unit=FULL_TURN / BEARING_UNITS,
+        bearings=photo.bearings,
+        ranges=photo.ranges,
+        range_sigma=np.stack([photo.range_sigma(table) for table in tables]),
+        own=photo.scores,
+        other=np.stack([table.others @ photo.scores for table in tables]),
+        density=np.stack([photo.density(table) for table in tables]),
+        disc=photo.disc,
+        sectors=photo.sectors,
+        width=photo.width,
+        turns=np.ascontiguousarray(turns, dtype=np.float64),
+        detected=stacked("detected"),
+        misnamed=stacked("misnamed"),
+        clutter=np.array([table.clutter.sum() for table in tables]),
+        seen=stacked("seen"),
+        left=stacked("left"),
+        sigma=stacked("sigmas"),
+        blur=np.array([table.position_sigma for table in tables]),
+        distances=first.distances,
+        totals=logliks,
     )
+    share_rows(work, len(turns), least=PLACES_A_PART)
     logliks += np.log(weights)[:, None, None]
     return np.asarray(np.logaddexp.reduce(logliks, axis=0))
