@@ -543,16 +543,19 @@ def scan_turned(  # noqa: C901, PLR0912, PLR0915, PLR0917
 def promising_cells(scores: NDArray[np.float32], count: int) -> NDArray[np.int64]:
     """Return the cells of the `count` highest scores and a few more, ascending, without sorting.
 
-    Every cell left out is worse than `count` that are in. Scores must not be NaN.
+    Every cell left out is worse than `count` that are in; scores that are no numbers are the last.
     """
-    top = scores[0]
+    last_bin = np.float32(_BINS - 1)
+    top = np.float32(-np.inf)
     for score in scores:
-        top = max(top, score)
+        if score > top:
+            top = score
     if top == -np.inf:
         return np.arange(len(scores))
     counts = np.zeros(_BINS, np.int64)
     for score in scores:
-        counts[int(min((top - score) * _BINS_A_NAT, np.float32(_BINS - 1)))] += 1
+        below = (top - score) * _BINS_A_NAT
+        counts[int(below) if below < last_bin else _BINS - 1] += 1  # NaN is not below
     last, inside = 0, counts[0]
     while inside < count:
         last += 1
@@ -560,8 +563,8 @@ def promising_cells(scores: NDArray[np.float32], count: int) -> NDArray[np.int64
     best = np.empty(inside, np.int64)
     filled = 0
     for cell in range(len(scores)):
-        place = int(min((top - scores[cell]) * _BINS_A_NAT, np.float32(_BINS - 1)))
-        if place <= last:
+        below = (top - scores[cell]) * _BINS_A_NAT
+        if (int(below) if below < last_bin else _BINS - 1) <= last:
             best[filled] = cell
             filled += 1
     return best

@@ -164,3 +164,10 @@ def test_promising_cells_hold_the_best(scores: list[float], count: int) -> None:
     assert (np.diff(cells) > 0).all()
     worst = np.sort(array[cells])[-count]
     assert worst > np.delete(array, cells).max(initial=-math.inf) or len(cells) == len(array)
+
+
+def test_promising_cells_bear_scores_that_are_no_numbers() -> None:
+    scores = np.array([math.nan, -3.0, math.inf, -1.0, -math.inf], np.float32)
+    for top in (scores, scores[[0, 1, 3, 4]], scores[:1]):
+        cells = promising_cells(top, min(2, len(top)))
+        assert set(cells.tolist()) <= set(range(len(top)))
