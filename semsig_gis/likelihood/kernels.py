@@ -548,8 +548,7 @@ def promising_cells(scores: NDArray[np.float32], count: int) -> NDArray[np.int64
     last_bin = np.float32(_BINS - 1)
     top = np.float32(-np.inf)
     for score in scores:
-        if score > top:
-            top = score
+        top = max(top, score)
     if top == -np.inf:
         return np.arange(len(scores))
     counts = np.zeros(_BINS, np.int64)
