@@ -34,6 +34,7 @@ if TYPE_CHECKING:
     from semsig_gis.likelihood.noise.model import Noise, NoiseSpec
 
 
+RERANKED = 300  # cells of a trial, whose answer counts among thousands
 HOPELESS = 20.0  # nats below the likeliest cell, at which a cell is left out of the sums
 
 
@@ -173,7 +174,7 @@ def _outcome(  # noqa: PLR0917 - a private helper of one caller
     own: Callable[[NDArray[np.int64]], NDArray[np.float64]] | None = None,
 ) -> tuple[float, ...]:
     """Return what comes of one query, in the order of `Trials`."""
-    loglik = rerank(index, query, scores).loglik
+    loglik = rerank(index, query, scores, count=RERANKED).loglik
     kept = loglik > loglik.max() - HOPELESS
     kept[cell] = True
     cells = np.flatnonzero(kept)
