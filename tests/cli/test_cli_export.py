@@ -109,5 +109,6 @@ def test_the_number_of_cells_that_tie_is_printed(
     tied: int, words: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
     found = {"used": "types", "cells": 5000, "candidates": [], "tied_beyond": tied}
-    print_answer({**found, "notes": [], "north": {"name": "grid"}})
+    query = {"types": "D", "bearings": None, "length": 1}
+    print_answer({**found, "query": query, "notes": [], "north": {"name": "grid"}})
     assert f"\n{words}" in capsys.readouterr().out

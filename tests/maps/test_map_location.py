@@ -117,6 +117,7 @@ def test_wheels_show_where_a_view_looked_and_how_far(page: MapPage) -> None:
     page.open(localization_map(localize(CITY, view, top=1), CITY))
     assert "Looked at: " in page.one(LEGEND).text
     page.ask("shown((one) => one instanceof L.CircleMarker)[0].openPopup()")
+    assert page.popup()
     asked, cell = page.all(".semsig-wheels figure")
     assert asked.text.endswith("Query, to 30 m")
     for wheel in (asked, cell):
