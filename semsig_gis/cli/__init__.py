@@ -15,6 +15,7 @@ import platform
 import sys
 import tempfile
 import threading
+import time
 import traceback
 import warnings
 from typing import TextIO
@@ -111,11 +112,18 @@ def _require_place() -> None:
 def _pass_over(unraisable: sys.UnraisableHookArgs) -> None:
     """Tell of an error where Python cannot stop, as in a callback; let an interrupt come again."""
     if unraisable.exc_type is KeyboardInterrupt:
-        again = threading.Timer(AGAIN_S, _thread.interrupt_main)
-        again.daemon = True
-        again.start()
+        passed = threading.Event()
+        threading.Thread(target=_interrupt_again, args=(passed,), daemon=True).start()
+        passed.set()  # here it would be passed over again
     elif isinstance(unraisable.exc_value, Exception):
         _remark(f"a library passed over an error ({_brief(unraisable.exc_value)})")
+
+
+def _interrupt_again(passed: threading.Event) -> None:
+    """Interrupt the main thread a moment after it has passed over an interrupt."""
+    passed.wait()
+    time.sleep(AGAIN_S)
+    _thread.interrupt_main()
 
 
 def _show_warning(message: Warning | str, *_: object, **__: object) -> None:
