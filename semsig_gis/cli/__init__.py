@@ -12,6 +12,7 @@ import _thread
 import contextlib
 import os
 import platform
+import signal
 import sys
 import tempfile
 import threading
@@ -123,7 +124,11 @@ def _interrupt_again(passed: threading.Event) -> None:
     """Interrupt the main thread a moment after it has passed over an interrupt."""
     passed.wait()
     time.sleep(AGAIN_S)
-    _thread.interrupt_main()
+    main_thread = threading.main_thread().ident
+    if hasattr(signal, "pthread_kill") and main_thread is not None:
+        signal.pthread_kill(main_thread, signal.SIGINT)  # wakes what waits for the system, too
+    else:
+        _thread.interrupt_main()
 
 
 def _show_warning(message: Warning | str, *_: object, **__: object) -> None:
