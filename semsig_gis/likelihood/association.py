@@ -357,6 +357,7 @@ def rerank(
     north_sigma: float = 0.0,
     log_prior: NDArray[np.float64] | None = None,
     count: int = RERANKED,
+    aside: bool = True,
 ) -> CellScores:
     """Replace the scores of the best cells by their one-to-one likelihoods.
 
@@ -364,6 +365,8 @@ def rerank(
     Of the others, a sample is looked at, too, and each is moved by as much as those of the sample
     with scores like its own, so that all masses fit each other. `log_prior` helps to choose the
     cells and is not part of the result. Without bearings the scores are returned as they are.
+    Where queries are from anywhere, places `aside` of the middles are looked at, too, which takes
+    nine times as long.
     """
     from semsig_gis.likelihood.kernels import promising_cells  # noqa: PLC0415 - numba loads slowly
 
@@ -380,19 +383,21 @@ def rerank(
     cells = cells[np.argsort(-total[cells], kind="stable")][:count]
     cells = cells[total[cells] > -np.inf]
     first, rest = cells[:FIRST], cells[FIRST:]
-    new, turns = _aligned(index, view, first, scores, north_sigma)
+    new, turns = _aligned(index, view, first, scores, north_sigma, aside=aside)
     if len(rest):
         # At best, the others change by as much as any of these did.
         hope = (new - old[first]).max()
         best = (new - old[first] + total[first]).max()
         rest = rest[total[rest] + hope > best - HOPELESS]
-        more, more_turns = _aligned(index, view, rest, scores, north_sigma)
+        more, more_turns = _aligned(index, view, rest, scores, north_sigma, aside=aside)
         new = np.append(new, more)
         turns = [np.append(*both) for both in zip(turns, more_turns, strict=True)]
     cells = np.append(first, rest)
     loglik = old
     if len(cells) < len(old):
-        loglik = old + _shift(index, view, scores, north_sigma, total=total, ranked=cells)
+        loglik = old + _shift(
+            index, view, scores, north_sigma, total=total, ranked=cells, aside=aside
+        )
     loglik[cells] = new
     headings = []
     for before, turn in zip(scores.headings, turns, strict=True):
@@ -412,6 +417,7 @@ def _shift(
     *,
     total: NDArray[np.float64],
     ranked: NDArray[np.int64],
+    aside: bool,
 ) -> NDArray[np.float64]:
     """Return by how much the likelihood of cells changes that are not among those `ranked`."""
     rest = np.ones(len(total), np.bool_)
@@ -424,7 +430,7 @@ def _shift(
     tail = tail[np.argsort(-total[tail], kind="stable")]
     ranks = np.unique(np.geomspace(1, len(tail), SAMPLE).astype(np.int64)) - 1
     sample = tail[ranks]
-    new, _ = _aligned(index, view, sample, scores, north_sigma)
+    new, _ = _aligned(index, view, sample, scores, north_sigma, aside=aside)
     old = scores.loglik[sample].astype(np.float64)
     moves, levels = [], []
     for low in range(0, len(sample), WINDOW):
@@ -440,9 +446,11 @@ def _aligned(
     cells: NDArray[np.int64],
     scores: CellScores,
     north_sigma: float,
+    *,
+    aside: bool,
 ) -> tuple[NDArray[np.float64], list[NDArray[np.float64]]]:
     """Return the log-likelihood in some cells, and the likeliest turns of the photos in each."""
-    models, places = index.stands
+    models, places = index.stands if aside else (index.models, np.zeros((1, 2)))
     seen = views_aside(index.database, cells, places)
     total, likeliest = np.zeros((len(places), len(cells))), []
     for photo, heading in zip(view.split(), scores.headings, strict=True):

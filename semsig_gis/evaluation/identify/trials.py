@@ -174,7 +174,7 @@ def _outcome(  # noqa: PLR0917 - a private helper of one caller
     own: Callable[[NDArray[np.int64]], NDArray[np.float64]] | None = None,
 ) -> tuple[float, ...]:
     """Return what comes of one query, in the order of `Trials`."""
-    loglik = rerank(index, query, scores, count=RERANKED).loglik
+    loglik = rerank(index, query, scores, count=RERANKED, aside=False).loglik
     kept = loglik > loglik.max() - HOPELESS
     kept[cell] = True
     cells = np.flatnonzero(kept)
