@@ -78,7 +78,7 @@ def test_each_end_has_a_code(
 
 
 CALLBACK = """
-import ctypes, sys, time
+import ctypes, signal, sys, time
 from semsig_gis import cli
 from semsig_gis.cli import commands
 
@@ -92,6 +92,7 @@ def run():
     return 0
 
 commands.run = run
+signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell's jobs may ignore it
 cli.main()
 """
 
