@@ -14,22 +14,14 @@ import numpy as np
 from rapidfuzz.distance import Levenshtein
 from rapidfuzz.process import cdist
 
+from benchmarks._cities import made_up, made_up_streets
 from benchmarks.comparison import Comparison, compare
-from semsig_gis.database.build import build_database
 from semsig_gis.database.city import ObjectStore
 from semsig_gis.database.file import save_database
-from semsig_gis.database.views import ViewpointSpec
 from semsig_gis.likelihood.index import build_index
 from semsig_gis.likelihood.locate import locate
 from semsig_gis.likelihood.noise.model import cell_noise, named_noise
-from semsig_gis.objects.load import build_objects
-from semsig_gis.sources.catalog import paper_taxonomy
-from semsig_gis.sources.synthetic.city import (
-    PARIS_LIKE,
-    CitySpec,
-    synthetic_city,
-    synthetic_surroundings,
-)
+from semsig_gis.sources.synthetic.city import PARIS_LIKE, CitySpec
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -83,11 +75,8 @@ def comparisons(size: str) -> Iterator[Comparison]:
         One result after the other.
     """
     spec, batch, repeats = _SIZES[size]
-    layers = synthetic_city(spec)
-    objects, _ = build_objects(layers, taxonomy=paper_taxonomy(), crs=layers[0].table.crs)
-    _, streets = synthetic_surroundings(spec)
-    viewpoints = ViewpointSpec(mode="streets")
-    database = build_database(objects, viewpoints=viewpoints, streets=streets.table)
+    objects = made_up(spec)
+    database = made_up_streets(spec, objects)
     picked = np.random.default_rng(_SEED).integers(0, len(database), batch).tolist()
     queries = [database.signature(cell) for cell in picked]
     yield from _warm_rows(database, ObjectStore.of(objects), queries[:repeats])

@@ -10,18 +10,11 @@ import numpy as np
 import pyarrow.parquet as pq
 from scipy.spatial import cKDTree
 
+from benchmarks._cities import made_up, made_up_streets
 from benchmarks.comparison import Comparison, compare
 from semsig_gis.database.build import build_database
 from semsig_gis.database.file import open_database, save_database
-from semsig_gis.database.views import ViewpointSpec
-from semsig_gis.objects.load import build_objects
-from semsig_gis.sources.catalog import paper_taxonomy
-from semsig_gis.sources.synthetic.city import (
-    PARIS_LIKE,
-    CitySpec,
-    synthetic_city,
-    synthetic_surroundings,
-)
+from semsig_gis.sources.synthetic.city import PARIS_LIKE, CitySpec
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -53,19 +46,11 @@ def comparisons(size: str) -> Iterator[Comparison]:
     """
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "city.parquet"
-        yield _building(_objects(_BUILT[size]), path, repeats=_REPEATS[size])
+        yield _building(made_up(_BUILT[size]), path, repeats=_REPEATS[size])
         city = _STORED[size]
-        _, streets = synthetic_surroundings(city)
-        database = build_database(
-            _objects(city), viewpoints=ViewpointSpec(mode="streets"), streets=streets.table
-        )
+        database = made_up_streets(city, made_up(city))
         save_database(database, path)
         yield from _storing(database, path, repeats=_REPEATS[size])
-
-
-def _objects(city: CitySpec) -> StreetObjects:
-    layers = synthetic_city(city)
-    return build_objects(layers, taxonomy=paper_taxonomy(), crs="EPSG:32631")[0]
 
 
 def _building(objects: StreetObjects, path: Path, *, repeats: int) -> Comparison:

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from benchmarks._cities import made_up
 from benchmarks.comparison import Comparison
 from semsig_gis.database.build import build_database
 from semsig_gis.database.views import ViewpointSpec
@@ -19,13 +20,10 @@ from semsig_gis.maps.drift import drift_map
 from semsig_gis.maps.evaluation import evaluation_map
 from semsig_gis.maps.page import available, save_map
 from semsig_gis.matching.method import Method
-from semsig_gis.objects.load import build_objects
 from semsig_gis.objects.table import StreetObjects
-from semsig_gis.sources.catalog import paper_taxonomy
 from semsig_gis.sources.synthetic.city import (
     PARIS_LIKE,
     CitySpec,
-    synthetic_city,
     synthetic_surroundings,
 )
 
@@ -119,7 +117,7 @@ def comparisons(size: str) -> Iterator[Comparison]:
 
 def _maps(city: CitySpec, queries: int) -> Iterator[tuple[str, folium.Map]]:
     """Yield what a map shows, and the map; the one with most points last."""
-    objects = build_objects(synthetic_city(city), taxonomy=paper_taxonomy(), crs="EPSG:32631")[0]
+    objects = made_up(city)
     streets = synthetic_surroundings(city)[1].table
     kept = np.random.default_rng(_SEED).random(len(objects)) >= _GONE
     later = StreetObjects(objects.table[kept], objects.taxonomy, objects.licenses)

@@ -7,12 +7,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 import shapely
 
+from benchmarks._cities import made_up
 from benchmarks.comparison import Comparison, compare
 from semsig_gis.core.geometry import GridSpec, cells_near
 from semsig_gis.database.occlusion import GAP_M, TOLERANCE_M, Footprints, hidden
-from semsig_gis.objects.load import build_objects
-from semsig_gis.sources.catalog import paper_taxonomy
-from semsig_gis.sources.synthetic.city import CitySpec, synthetic_city, synthetic_surroundings
+from semsig_gis.sources.synthetic.city import CitySpec, synthetic_surroundings
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -39,7 +38,7 @@ def comparisons(size: str) -> Iterator[Comparison]:
         The footprints, the pairs, and the mean length with and without buildings.
     """
     city = CitySpec(size=_SIDES[size])
-    objects, _ = build_objects(synthetic_city(city), taxonomy=paper_taxonomy(), crs="EPSG:32631")
+    objects = made_up(city)
     houses, _ = synthetic_surroundings(city)
     polygons = houses.table.geometry.to_numpy()
     footprints = Footprints(polygons)
