@@ -33,7 +33,6 @@ from semsig_gis.cli.options import (
     MapAge,
     NoiseName,
     OnGrid,
-    prepared_index,
     read_noise,
 )
 from semsig_gis.core.errors import InputError
@@ -93,6 +92,7 @@ def evaluate(
     from semsig_gis.database.city import open_city
     from semsig_gis.evaluation.evaluate import evaluate as run
     from semsig_gis.evaluation.file import save_evaluation
+    from semsig_gis.likelihood.index import build_index
     from semsig_gis.matching.method import Method
     from semsig_gis.queries.chain import parse_chain
     from semsig_gis.queries.distortions import Distortion
@@ -110,8 +110,9 @@ def evaluate(
     ]
     city = open_city(database)
     measured = (
-        prepared_index(
-            city, read_noise(noise, city.database, map_age=map_age, drift_report=drift_report)
+        build_index(
+            city.database,
+            read_noise(noise, city.database, map_age=map_age, drift_report=drift_report),
         )
         if method == LIKELIHOOD
         else Method.parse(method)
@@ -332,6 +333,7 @@ def identify(
     from semsig_gis.evaluation.identify.check import check_identifiability
     from semsig_gis.evaluation.identify.identify import identify as run
     from semsig_gis.evaluation.identify.result import save_identifiability
+    from semsig_gis.likelihood.index import build_index
     from semsig_gis.likelihood.noise.model import cell_noise
     from semsig_gis.reports.identifiability import (
         check_tables,
@@ -352,7 +354,7 @@ def identify(
         columns = columns if known == settings else None
     workers = (os.cpu_count() or 1) if threads is None else threads
     if columns is None or check is not None:
-        index = prepared_index(city, model)
+        index = build_index(city.database, model)
     if columns is None:
         with progress("comparing cells") as advance:
             columns = run(

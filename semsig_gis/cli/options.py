@@ -21,7 +21,6 @@ if TYPE_CHECKING:
     from semsig_gis.database.city import City, ObjectStore
     from semsig_gis.database.database import SignatureDatabase
     from semsig_gis.database.north import North
-    from semsig_gis.likelihood.index import LikelihoodIndex
     from semsig_gis.likelihood.locate import LikelihoodLocator
     from semsig_gis.likelihood.noise.age import Drift
     from semsig_gis.likelihood.noise.model import Noise
@@ -156,6 +155,7 @@ class SearchOptions:
     def locator(self, city: City, north: North | None = None) -> LikelihoodLocator:
         """Return what answers queries by likelihood, whose bearings count from a north."""
         from semsig_gis.database.north import GRID_NORTH
+        from semsig_gis.likelihood.index import build_index
         from semsig_gis.likelihood.locate import LikelihoodLocator
         from semsig_gis.likelihood.noise.model import cell_noise
         from semsig_gis.likelihood.posterior import DEFAULT_RULE, open_rule
@@ -185,7 +185,7 @@ class SearchOptions:
         needed = bool(self.refine)
         store = object_store(city, self.objects, needed=needed) if needs_objects else None
         return LikelihoodLocator(
-            index=prepared_index(city, noise),
+            index=build_index(city.database, noise),
             north_sigma=sigma,
             log_prior=log_prior,
             rule=rule,
@@ -227,13 +227,6 @@ class SearchOptions:
             parts.append(weight_prior(database, met.astype(float)))
             known["require"] = {"text": self.require, "cells": int(met.sum())}
         return (sum(parts[1:], parts[0]) if parts else None), known
-
-
-def prepared_index(city: City, model: Noise) -> LikelihoodIndex:
-    """Return what queries to a database are compared with."""
-    from semsig_gis.likelihood.index import build_index
-
-    return build_index(city.database, model)
 
 
 def read_noise(

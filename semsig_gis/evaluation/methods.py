@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from semsig_gis.likelihood.index import build_index
 from semsig_gis.likelihood.locate import LikelihoodLocator
 from semsig_gis.likelihood.method import LIKELIHOOD, LikelihoodMethod
 from semsig_gis.likelihood.noise.model import NOISES, cell_noise
@@ -16,7 +17,6 @@ if TYPE_CHECKING:
     from semsig_gis.database.answer import Answer, Locator
     from semsig_gis.database.city import ObjectStore
     from semsig_gis.database.database import SignatureDatabase
-    from semsig_gis.likelihood.index import LikelihoodIndex
     from semsig_gis.likelihood.noise.model import Noise
 
 AnyMethod = Method | LikelihoodMethod
@@ -56,15 +56,14 @@ def make_locator(
     database: SignatureDatabase,
     method: AnyMethod,
     *,
-    index: Callable[[Noise], LikelihoodIndex],
     store: Callable[[], ObjectStore],
 ) -> Locator[Answer]:
-    """Return a method with all that it needs; of `index` and `store`, it calls those it needs."""
+    """Return a method with all that it needs; `store` is called if it is needed."""
     if isinstance(method, Method):
         return DistanceLocator(database=database, method=method)
     noise = method.noise if method.on_grid else cell_noise(method.noise, database.grid.step)
     return LikelihoodLocator(
-        index=index(noise),
+        index=build_index(database, noise),
         north_sigma=method.north_sigma,
         store=store() if method.refined else None,
         refined=method.refined,

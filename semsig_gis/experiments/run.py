@@ -37,7 +37,6 @@ from semsig_gis.evaluation.figures import district_labels
 from semsig_gis.evaluation.file import open_evaluation, save_evaluation
 from semsig_gis.evaluation.methods import make_locator
 from semsig_gis.evaluation.spec import Case, parse_experiment
-from semsig_gis.likelihood.index import build_index
 from semsig_gis.queries.draw import check_count, draw_queries
 from semsig_gis.reports.evaluation import experiment_figures, experiment_markdown
 from semsig_gis.storage.geoparquet import CHECKING_PAGES, require_intact, seal
@@ -53,8 +52,6 @@ if TYPE_CHECKING:
     from semsig_gis.database.database import SignatureDatabase
     from semsig_gis.evaluation.result import Evaluation
     from semsig_gis.evaluation.spec import ExperimentSpec
-    from semsig_gis.likelihood.index import LikelihoodIndex
-    from semsig_gis.likelihood.noise.model import Noise
     from semsig_gis.queries.draw import Query
 
     # Experiments and the folders where their parts are put, by the folders for their results.
@@ -342,16 +339,12 @@ class ExperimentWork:
             self._locators[name] = make_locator(
                 self.database,
                 self.spec.methods[name],
-                index=self._index,
                 store=lambda: self._city(self.spec.database).store,
             )
         return self._locators[name]
 
     def _city(self, name: str) -> City:
         return self._cities.setdefault(name, City(self.folder / name))
-
-    def _index(self, noise: Noise) -> LikelihoodIndex:
-        return build_index(self.database, noise)
 
 
 def _part_file(place: Path, part: Part, method: str) -> Path:

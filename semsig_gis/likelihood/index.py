@@ -114,11 +114,6 @@ class LikelihoodIndex:
         return database_tables(self.database, noise), places
 
     @cached_property
-    def fingerprint(self) -> str:
-        """What stands for the database, the noise model and the version of the method."""
-        return index_fingerprint(self.database, self.noise)
-
-    @cached_property
     def _levels(self) -> _Levels:
         return _Levels.of(self.table)
 

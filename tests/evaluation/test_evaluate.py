@@ -239,10 +239,7 @@ def test_the_likelihood_method_answers_as_it_locates(text: str) -> None:
     town = random_town()
     database, store = town.database, ObjectStore.of(town.street_objects)
     index = build_index(database, cell_noise(method.noise, database.grid.step))
-    ready = {repr(index.noise): index}
-    locator = make_locator(
-        database, method, index=lambda noise: ready[repr(noise)], store=lambda: store
-    )
+    locator = make_locator(database, method, store=lambda: store)
     spec = QuerySpec(number=6, seen_from="anywhere")
     drawn = [query.asked.signature for query in draw_queries(database, spec, store=store)]
     queries = [query for query in drawn if len(query)]
