@@ -20,7 +20,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -35,7 +35,7 @@ from semsig_gis.likelihood.noise.table import database_tables
 from semsig_gis.likelihood.photo import PhotoTable, photo_loglik
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Callable, Sequence
 
     from numpy.typing import NDArray
 
@@ -383,21 +383,20 @@ def rerank(
     cells = cells[np.argsort(-total[cells], kind="stable")][:count]
     cells = cells[total[cells] > -np.inf]
     first, rest = cells[:FIRST], cells[FIRST:]
-    new, turns = _aligned(index, view, first, scores, north_sigma, aside=aside)
+    aligned = partial(_aligned, index, view, scores=scores, north_sigma=north_sigma, aside=aside)
+    new, turns = aligned(first)
     if len(rest):
         # At best, the others change by as much as any of these did.
         hope = (new - old[first]).max()
         best = (new - old[first] + total[first]).max()
         rest = rest[total[rest] + hope > best - HOPELESS]
-        more, more_turns = _aligned(index, view, rest, scores, north_sigma, aside=aside)
+        more, more_turns = aligned(rest)
         new = np.append(new, more)
         turns = [np.append(*both) for both in zip(turns, more_turns, strict=True)]
     cells = np.append(first, rest)
     loglik = old
     if len(cells) < len(old):
-        loglik = old + _shift(
-            index, view, scores, north_sigma, total=total, ranked=cells, aside=aside
-        )
+        loglik = old + _shift(lambda some: aligned(some)[0], old, total, cells)
     loglik[cells] = new
     headings = []
     for before, turn in zip(scores.headings, turns, strict=True):
@@ -410,16 +409,15 @@ def rerank(
 
 
 def _shift(
-    index: LikelihoodIndex,
-    view: View,
-    scores: CellScores,
-    north_sigma: float,
-    *,
+    rank: Callable[[NDArray[np.int64]], NDArray[np.float64]],
+    old: NDArray[np.float64],
     total: NDArray[np.float64],
     ranked: NDArray[np.int64],
-    aside: bool,
 ) -> NDArray[np.float64]:
-    """Return by how much the likelihood of cells changes that are not among those `ranked`."""
+    """Return by how much the likelihood of cells changes that are not among those `ranked`.
+
+    `rank` gives the new likelihood of some cells, `old` is that of all, and `total` with the prior.
+    """
     rest = np.ones(len(total), np.bool_)
     rest[ranked] = False
     rest &= total > total.max() - NEGLIGIBLE
@@ -430,12 +428,11 @@ def _shift(
     tail = tail[np.argsort(-total[tail], kind="stable")]
     ranks = np.unique(np.geomspace(1, len(tail), SAMPLE).astype(np.int64)) - 1
     sample = tail[ranks]
-    new, _ = _aligned(index, view, sample, scores, north_sigma, aside=aside)
-    old = scores.loglik[sample].astype(np.float64)
+    new, before = rank(sample), old[sample]
     moves, levels = [], []
     for low in range(0, len(sample), WINDOW):
         part = slice(low, low + WINDOW)
-        moves.append(np.logaddexp.reduce(new[part]) - np.logaddexp.reduce(old[part]))
+        moves.append(np.logaddexp.reduce(new[part]) - np.logaddexp.reduce(before[part]))
         levels.append(total[sample[part]].mean())
     return np.asarray(np.interp(total, levels[::-1], moves[::-1]))
 
@@ -444,9 +441,9 @@ def _aligned(
     index: LikelihoodIndex,
     view: View,
     cells: NDArray[np.int64],
+    *,
     scores: CellScores,
     north_sigma: float,
-    *,
     aside: bool,
 ) -> tuple[NDArray[np.float64], list[NDArray[np.float64]]]:
     """Return the log-likelihood in some cells, and the likeliest turns of the photos in each."""
