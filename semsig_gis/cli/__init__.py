@@ -9,6 +9,7 @@ Heavy modules are imported by the commands that need them, so that the help appe
 from __future__ import annotations
 
 import _thread
+import atexit
 import contextlib
 import os
 import platform
@@ -57,6 +58,9 @@ def main() -> None:
             _remark(said)
     for stream in _streams():
         _settle(stream)
+    if threading.current_thread() is threading.main_thread():
+        # The work is done; an interrupt of what Python tidies up now would only show its lines.
+        atexit.register(signal.signal, signal.SIGINT, signal.SIG_IGN)
     sys.exit(code)
 
 

@@ -115,6 +115,25 @@ def test_what_a_library_cannot_raise(error: str, seconds: int, code: int, said: 
     assert (done.returncode, done.stderr) == (code, said)
 
 
+TIDYING = """
+import atexit, signal
+from semsig_gis import cli
+from semsig_gis.cli import commands
+
+signal.signal(signal.SIGINT, signal.default_int_handler)
+atexit.register(signal.raise_signal, signal.SIGINT)  # as when Python closes what is open
+commands.run = lambda: 0
+cli.main()
+"""
+
+
+def test_an_interrupt_after_the_work_is_done() -> None:
+    done = subprocess.run(
+        [sys.executable, "-c", TIDYING], capture_output=True, check=False, text=True, timeout=300
+    )
+    assert (done.returncode, done.stderr) == (0, "")
+
+
 @pytest.mark.parametrize(
     ("line", "words"),
     [
