@@ -6,7 +6,6 @@ sequence once, and `SequenceTable.inverse` spreads the results over the cells.
 
 from __future__ import annotations
 
-import functools
 import operator
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -22,7 +21,7 @@ from semsig_gis import __version__
 from semsig_gis.core.errors import DatabaseError, InputError
 from semsig_gis.core.geometry import cell_ids
 from semsig_gis.core.signature import BEARING_UNITS, DISTANCE_UNITS, Signature, quantize
-from semsig_gis.database.views import ViewpointSpec, Views, bearings
+from semsig_gis.database.views import ViewpointSpec, Views
 from semsig_gis.storage.geoparquet import whole_numbers
 
 if TYPE_CHECKING:
@@ -483,91 +482,3 @@ def views_in(database: SignatureDatabase, cells: NDArray[np.int64]) -> Views:
         bearings=part.bearings + 180.0 / BEARING_UNITS,
         distances=part.distances,
     )
-
-
-def views_aside(
-    database: SignatureDatabase, cells: NDArray[np.int64], places: NDArray[np.float64]
-) -> list[Views]:
-    """Return what is seen from some cells at places other than their middles, by the cells alone.
-
-    For each of the places, shape (p, 2), metres to the east and north of the middle and less than a
-    cell away, the views from all cells. What comes into range there is known from the cells on that
-    side; where one of these is missing, what has left the range is kept, at its distance.
-    """
-    step, ranges = database.grid.step, database.taxonomy.ranges(database.spec.radius)
-    columns, rows = database.columns[cells].astype(np.int64), database.rows[cells].astype(np.int64)
-
-    @functools.cache
-    def around(aside: int, up: int) -> tuple[NDArray[np.bool_], _Entries]:
-        ids = cell_ids(columns + aside, rows + up)
-        found = np.minimum(np.searchsorted(database.cell_ids, ids), len(database) - 1)
-        there = database.cell_ids[found] == ids
-        views = views_in(database, found[there])
-        owners = np.repeat(np.flatnonzero(there), views.lengths)
-        angles = np.radians(views.bearings)
-        # What is nearest is not at the very place.
-        metres = np.maximum(views.distances, database.reach / DISTANCE_UNITS / 2.0)
-        east, north = metres * np.sin(angles) + aside * step, metres * np.cos(angles) + up * step
-        return there, _Entries(owners, views.codes, east, north)
-
-    def seen_from(dx: float, dy: float) -> Views:
-        if dx == 0 and dy == 0:
-            return views_in(database, cells)
-        own = around(0, 0)[1]
-        aside, up = int(np.sign(dx)), int(np.sign(dy))
-        whole = np.ones(len(cells), np.bool_)
-        parts, before = [], [(0, 0)]
-        for cell in dict.fromkeys([(aside, 0), (0, up), (aside, up)]):
-            if cell == (0, 0):
-                continue
-            there, entries = around(*cell)
-            whole &= there
-            reach = ranges[entries.codes]
-            new = entries.distances(dx, dy) <= reach
-            for other in before:  # what these see, too, is known already
-                known = around(*other)[0][entries.owners]
-                new &= ~known | (entries.distances(other[0] * step, other[1] * step) > reach)
-            parts.append(entries.only(new))
-            before.append(cell)
-        near = own.distances(dx, dy) <= ranges[own.codes]
-        return _Entries.joined([own.only(near | ~whole[own.owners]), *parts]).views(
-            len(cells), dx, dy
-        )
-
-    return [seen_from(*place) for place in places.tolist()]
-
-
-@dataclass(frozen=True, eq=False, slots=True)
-class _Entries:
-    """Objects of some cells, by the row of the cell, in metres from its middle."""
-
-    owners: NDArray[np.int64]
-    codes: NDArray[np.uint8]
-    east: NDArray[np.float64]
-    north: NDArray[np.float64]
-
-    def distances(self, dx: float, dy: float) -> NDArray[np.float64]:
-        """Return how far they are from a place in each cell, in metres."""
-        return np.hypot(self.east - dx, self.north - dy)
-
-    def only(self, kept: NDArray[np.bool_] | NDArray[np.int64]) -> _Entries:
-        """Return some of them, by a mask or in an order."""
-        return _Entries(self.owners[kept], self.codes[kept], self.east[kept], self.north[kept])
-
-    @classmethod
-    def joined(cls, parts: list[_Entries]) -> _Entries:
-        """Return all of several, by cell."""
-        names = ("owners", "codes", "east", "north")
-        whole = cls(*(np.concatenate([getattr(part, name) for part in parts]) for name in names))
-        return whole.only(np.argsort(whole.owners, kind="stable"))
-
-    def views(self, cells: int, dx: float, dy: float) -> Views:
-        """Return what is seen from a place in each cell."""
-        counts = np.bincount(self.owners, minlength=cells)
-        return Views(
-            offsets=np.concatenate([[0], np.cumsum(counts)]),
-            objects=np.full(len(self.codes), -1),
-            codes=self.codes,
-            bearings=bearings(self.east - dx, self.north - dy),
-            distances=self.distances(dx, dy),
-        )

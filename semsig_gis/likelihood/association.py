@@ -29,7 +29,7 @@ from semsig_gis.core.errors import InputError
 from semsig_gis.core.geometry import FULL_TURN, HALF_TURN, signed_degrees
 from semsig_gis.core.signature import DISTANCE_UNITS
 from semsig_gis.core.view import View
-from semsig_gis.database.database import views_aside, views_in
+from semsig_gis.database.database import views_in
 from semsig_gis.likelihood.index import CellScores, own_sigma
 from semsig_gis.likelihood.noise.table import database_tables
 from semsig_gis.likelihood.photo import PhotoTable, photo_loglik
@@ -424,7 +424,8 @@ def _shift(
     tail = np.flatnonzero(rest)
     if not len(tail):
         return np.zeros(len(total))
-    tail = np.random.default_rng(0).permutation(tail)[:POOL]
+    if len(tail) > POOL:
+        tail = np.random.default_rng(0).choice(tail, POOL, replace=False, shuffle=False)
     tail = tail[np.argsort(-total[tail], kind="stable")]
     ranks = np.unique(np.geomspace(1, len(tail), SAMPLE).astype(np.int64)) - 1
     sample = tail[ranks]
@@ -447,13 +448,17 @@ def _aligned(
     aside: bool,
 ) -> tuple[NDArray[np.float64], list[NDArray[np.float64]]]:
     """Return the log-likelihood in some cells, and the likeliest turns of the photos in each."""
+    from semsig_gis.database.aside import views_aside  # noqa: PLC0415 - numba loads slowly
+
     models, places = index.stands if aside else (index.models, np.zeros((1, 2)))
     seen = views_aside(index.database, cells, places)
     total, likeliest = np.zeros((len(places), len(cells))), []
     for photo, heading in zip(view.split(), scores.headings, strict=True):
         turns = np.zeros((len(cells), 1)) if heading is None else heading[cells, None] + TURNS
         asked = PhotoTable.of(photo, index.table)
-        logliks = np.stack([photo_loglik(asked, one, *models, turns=turns) for one in seen])
+        everywhere = np.tile(turns, (len(places), 1))
+        logliks = photo_loglik(asked, seen, *models, turns=everywhere)
+        logliks = logliks.reshape(len(places), *turns.shape)
         if heading is not None:
             logliks += turn_logs(turns, TURNS[1] - TURNS[0], own_sigma(photo, north_sigma))
         best = np.logaddexp.reduce(logliks, axis=0).argmax(axis=1)

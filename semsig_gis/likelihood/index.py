@@ -45,7 +45,6 @@ VERSION = 3  # raised whenever the same database and noise give other likelihood
 LEAST_PRIOR = 1e-7  # turns that are less likely than this, against the likeliest, are left out
 STANDS = 3  # places a side of a cell, at which the best cells are compared
 LEAST_DENSITY = 1e-12
-LEAST_PART = 1e-3  # of the density of false detections, that an object must add to count
 LAPS = np.arange(-3, 4)  # 180 degrees of deviation reach three turns
 
 
@@ -173,14 +172,12 @@ class LikelihoodIndex:
             "scores": scores,
         }
         if north_sigma == 0:
-            names = _padded(named)
             work = partial(
                 scan,
                 **what,
                 rows=rows,
-                near=levels.near(rows, names),
                 masses=masses,
-                named=names,
+                named=_padded(named),
                 disc=_padded(asked.disc / FULL_TURN),
             )
             share_rows(work, len(self.database))
@@ -343,12 +340,6 @@ class _Levels:
         near[near < LEAST_DENSITY] = 0.0
         profile_rows(self.fine, shifts, near.astype(np.float32), rows)
         return rows
-
-    def near(self, rows: NDArray[np.float32], named: NDArray[np.float32]) -> NDArray[np.bool_]:
-        """Return which rows may add anything to speak of to the density of any detection."""
-        most = named.max(axis=(0, 1)) * (self.chances.max() / (1.0 - self.chances.max()))
-        blocks, _, _, _, lanes = rows.shape
-        return np.asarray((rows * most.reshape(blocks, 1, 1, 1, lanes)).max(axis=-1) > LEAST_PART)
 
     def masses(self, asked: PhotoTable) -> NDArray[np.float32]:
         """Return the chance that an object is in the sectors, by group, level and bearing."""

@@ -93,7 +93,7 @@ def align(  # noqa: C901, PLR0912, PLR0915, PLR0917 - a kernel takes no keywords
     for place in range(part[0], part[1]):
         most = max(most, offsets[place + 1] - offsets[place])
     pairs = most * size
-    one_of = np.empty(pairs, np.int64)
+    ends = np.empty(most + 1, np.int64)  # the pairs of an object are ends[one]:ends[one + 1]
     other_of = np.empty(pairs, np.int64)
     weight = np.empty(pairs)
     forth = np.empty(pairs)  # messages from the objects of the place to those of the query
@@ -131,6 +131,7 @@ def align(  # noqa: C901, PLR0912, PLR0915, PLR0917 - a kernel takes no keywords
                 total = start
                 edges = 0
                 for one in range(count):
+                    ends[one] = edges
                     if beyond[low + one]:
                         continue
                     kind, far = kinds[low + one], distance_units[low + one]
@@ -169,31 +170,33 @@ def align(  # noqa: C901, PLR0912, PLR0915, PLR0917 - a kernel takes no keywords
                             near *= math.exp(-0.5 * ratio**2) / (error * _ROOT)
                         value = factor * near * named[one, two] / floor[two]
                         if value > _LEAST:
-                            one_of[edges] = one
                             other_of[edges] = two
                             weight[edges] = value
                             back[edges] = 1.0
                             edges += 1
+                ends[count] = edges
                 # Belief propagation, as in `associate`; as a function of its own it is slower.
                 for _ in range(_ROUNDS):
-                    at_left[:count] = 1.0
-                    for edge in range(edges):
-                        at_left[one_of[edge]] += weight[edge] * back[edge]
                     at_right[:] = 1.0
-                    for edge in range(edges):
-                        rest = at_left[one_of[edge]] - weight[edge] * back[edge]
-                        forth[edge] = weight[edge] / max(rest, 1.0)
-                        at_right[other_of[edge]] += forth[edge]
-                    change = 0.0
+                    for one in range(count):
+                        here = 1.0
+                        for edge in range(ends[one], ends[one + 1]):
+                            here += weight[edge] * back[edge]
+                        for edge in range(ends[one], ends[one + 1]):
+                            rest = max(here - weight[edge] * back[edge], 1.0)
+                            forth[edge] = weight[edge] / rest
+                            at_right[other_of[edge]] += forth[edge]
+                    settled = True
                     for edge in range(edges):
                         new = 1.0 / max(at_right[other_of[edge]] - forth[edge], 1.0)
-                        change = max(change, abs(new - back[edge]) / new)
+                        settled &= abs(new - back[edge]) < _SETTLED * new
                         back[edge] = new
-                    if change < _SETTLED:
+                    if settled:
                         break
-                at_left[:count] = 1.0
-                for edge in range(edges):
-                    at_left[one_of[edge]] += weight[edge] * back[edge]
+                for one in range(count):
+                    at_left[one] = 1.0
+                    for edge in range(ends[one], ends[one + 1]):
+                        at_left[one] += weight[edge] * back[edge]
                 product = 1.0
                 for one in range(count):
                     product *= at_left[one]
@@ -319,14 +322,13 @@ def mass_rows(
 
 
 @compiled
-def scan(  # noqa: C901, PLR0912, PLR0915, PLR0917
+def scan(  # noqa: C901, PLR0915, PLR0917
     part: NDArray[np.int64],
     offsets: NDArray[np.int64],
     kinds: NDArray[np.uint8],
     places: NDArray[np.uint16],
     group_of: NDArray[np.int64],
     rows: NDArray[np.float32],
-    near: NDArray[np.bool_],
     masses: NDArray[np.float32],
     width: float,
     named: NDArray[np.float32],
@@ -340,55 +342,38 @@ def scan(  # noqa: C901, PLR0912, PLR0915, PLR0917
 
     The sum over the detections of a photo of the logarithm of a sum over the objects. An object has
     a class row in `kinds` and a level of its distance and a bin of its bearing in `places`. By the
-    group of its class (`group_of`) and its place, `rows` are those of `profile_rows`, of which only
-    those count that are `near`, and `masses` those of `mass_rows`, without a level where all round
-    was seen. `named`, shape (longest + 1, k, blocks * LANES), is the chance of a name over the
-    density of such false detections, `disc` the factor of their range. By length, class and level,
-    `chances` are of detection, and of having left the range, `leaving`. `base` is what all get.
+    group of its class (`group_of`) and its place, `rows` are those of `profile_rows`, and `masses`
+    those of `mass_rows`, without a level where all round was seen. `named`, shape (longest + 1, k,
+    blocks * LANES), is the chance of a name over the density of such false detections, `disc` the
+    factor of their range. By length, class and level, `chances` are of detection, and of having
+    left the range, `leaving`. `base` is what all get.
     """
     blocks, groups, levels, bins = rows.shape[0], rows.shape[1], rows.shape[2], rows.shape[3]
     longest, classes = len(chances) - 1, chances.shape[1]
-    # Flat arrays and unsigned numbers: else each look-up is checked and worked out anew.
-    one_u, lanes = np.uint64(1), np.uint64(LANES)
-    step, width_u = np.uint64(levels * bins), np.uint64(blocks * LANES)
-    flat_rows, flat_near, flat_named = rows.ravel(), near.ravel(), named.ravel()
-    flat_chances, flat_leaving, flat_masses = chances.ravel(), leaving.ravel(), masses.ravel()
+    # Flat arrays and unsigned numbers, or each look-up is checked and worked out anew; eight sums
+    # that are stored side by side, or they are not added up in one go.
+    lanes, width_u, levels_u = np.uint64(LANES), np.uint64(blocks * LANES), np.uint64(levels)
+    flat_rows, flat_named, flat_masses = rows.ravel(), named.ravel(), masses.ravel()
+    flat_chances, flat_leaving = chances.ravel(), leaving.ravel()
     partial, moving = len(flat_masses) > 0, leaving.max() > 0.0
-    starts = group_of * (levels * bins)
-    floors = np.empty(blocks * LANES, np.float32)
-    left = np.zeros(classes, np.float32)
-    one_f = np.float32(1.0)
+    starts = (group_of * (levels * bins)).astype(np.uint64)
     shift = np.uint64(int(math.log2(bins) + 0.5))
+    one_f = np.float32(1.0)
+    sums = np.empty(LANES, np.float32)
     for cell in range(part[0], part[1]):
-        low, high = offsets[cell], offsets[cell + 1]
-        length = np.uint64(min(high - low, longest) * classes)
-        gone = np.float32(0.0)
-        product = 1.0
-        floors[:] = one_f
-        if moving:
-            for one in range(low, high):
-                kind, place = np.uint64(kinds[one]), np.uint64(places[one])
-                left[kind] += flat_leaving[(length + kind) * np.uint64(levels) + (place >> shift)]
-            for row in range(classes):
-                if left[row] > 0.0:
-                    gone += left[row]
-                    name = (length + np.uint64(row)) * width_u
-                    for two in range(blocks * LANES):
-                        floors[two] += left[row] * flat_named[name + np.uint64(two)] * disc[two]
-                    left[row] = 0.0
-        total = base - gone * width
-        for block in range(blocks):
-            first = np.uint64(block * LANES)
-            a0, a1 = floors[first], floors[first + one_u]
-            a2, a3 = floors[first + np.uint64(2)], floors[first + np.uint64(3)]
-            a4, a5 = floors[first + np.uint64(4)], floors[first + np.uint64(5)]
-            a6, a7 = floors[first + np.uint64(6)], floors[first + np.uint64(7)]
-            above = np.uint64(block * groups) * step
+        low, high = np.uint64(offsets[cell]), np.uint64(offsets[cell + 1])
+        length = min(high - low, np.uint64(longest)) * np.uint64(classes)
+        total, product, gone = base, 1.0, np.float32(0.0)
+        for block in range(np.uint64(blocks)):
+            first = block * lanes
+            above = block * np.uint64(groups * levels * bins)
+            a0 = a1 = a2 = a3 = a4 = a5 = a6 = a7 = one_f
             for one in range(low, high):
                 kind, place = np.uint64(kinds[one]), np.uint64(places[one])
                 name = length + kind
-                chance = flat_chances[name * np.uint64(levels) + (place >> shift)]
-                place += np.uint64(starts[kind])
+                level = name * levels_u + (place >> shift)
+                place += starts[kind]
+                chance = flat_chances[level]
                 missed = one_f - chance
                 if partial:
                     missed = one_f - chance * flat_masses[place]
@@ -397,26 +382,52 @@ def scan(  # noqa: C901, PLR0912, PLR0915, PLR0917
                     if product < 1.0 / _LARGE:
                         total += math.log(product)
                         product = 1.0
-                place += above
-                if not flat_near[place]:
-                    continue
-                at, name = place * lanes, name * width_u + first
-                factor = chance / missed
-                a0 += factor * flat_rows[at] * flat_named[name]
-                a1 += factor * flat_rows[at + one_u] * flat_named[name + one_u]
-                a2 += factor * flat_rows[at + np.uint64(2)] * flat_named[name + np.uint64(2)]
-                a3 += factor * flat_rows[at + np.uint64(3)] * flat_named[name + np.uint64(3)]
-                a4 += factor * flat_rows[at + np.uint64(4)] * flat_named[name + np.uint64(4)]
-                a5 += factor * flat_rows[at + np.uint64(5)] * flat_named[name + np.uint64(5)]
-                a6 += factor * flat_rows[at + np.uint64(6)] * flat_named[name + np.uint64(6)]
-                a7 += factor * flat_rows[at + np.uint64(7)] * flat_named[name + np.uint64(7)]
+                    if moving:
+                        gone += flat_leaving[level]
+                odds = chance / missed
+                at, name = (place + above) * lanes, name * width_u + first
+                if moving:
+                    left = flat_leaving[level]
+                    b0 = odds * flat_rows[at] + left * disc[first]
+                    a0 += b0 * flat_named[name]
+                    b1 = odds * flat_rows[at + np.uint64(1)] + left * disc[first + np.uint64(1)]
+                    a1 += b1 * flat_named[name + np.uint64(1)]
+                    b2 = odds * flat_rows[at + np.uint64(2)] + left * disc[first + np.uint64(2)]
+                    a2 += b2 * flat_named[name + np.uint64(2)]
+                    b3 = odds * flat_rows[at + np.uint64(3)] + left * disc[first + np.uint64(3)]
+                    a3 += b3 * flat_named[name + np.uint64(3)]
+                    b4 = odds * flat_rows[at + np.uint64(4)] + left * disc[first + np.uint64(4)]
+                    a4 += b4 * flat_named[name + np.uint64(4)]
+                    b5 = odds * flat_rows[at + np.uint64(5)] + left * disc[first + np.uint64(5)]
+                    a5 += b5 * flat_named[name + np.uint64(5)]
+                    b6 = odds * flat_rows[at + np.uint64(6)] + left * disc[first + np.uint64(6)]
+                    a6 += b6 * flat_named[name + np.uint64(6)]
+                    b7 = odds * flat_rows[at + np.uint64(7)] + left * disc[first + np.uint64(7)]
+                    a7 += b7 * flat_named[name + np.uint64(7)]
+                else:
+                    a0 += odds * flat_rows[at] * flat_named[name]
+                    a1 += odds * flat_rows[at + np.uint64(1)] * flat_named[name + np.uint64(1)]
+                    a2 += odds * flat_rows[at + np.uint64(2)] * flat_named[name + np.uint64(2)]
+                    a3 += odds * flat_rows[at + np.uint64(3)] * flat_named[name + np.uint64(3)]
+                    a4 += odds * flat_rows[at + np.uint64(4)] * flat_named[name + np.uint64(4)]
+                    a5 += odds * flat_rows[at + np.uint64(5)] * flat_named[name + np.uint64(5)]
+                    a6 += odds * flat_rows[at + np.uint64(6)] * flat_named[name + np.uint64(6)]
+                    a7 += odds * flat_rows[at + np.uint64(7)] * flat_named[name + np.uint64(7)]
+            sums[0] = a0
+            sums[1] = a1
+            sums[2] = a2
+            sums[3] = a3
+            sums[4] = a4
+            sums[5] = a5
+            sums[6] = a6
+            sums[7] = a7
             # Each pair is below 1e38, all eight together may not be.
-            product *= np.float64(a0 * a1) * np.float64(a2 * a3)
-            product *= np.float64(a4 * a5) * np.float64(a6 * a7)
+            for lane in range(0, LANES, 2):
+                product *= np.float64(sums[lane] * sums[lane + 1])
             if product > _LARGE or product < 1.0 / _LARGE:
                 total += math.log(product)
                 product = 1.0
-        scores[cell] = total + math.log(product)
+        scores[cell] = total - gone * width + math.log(product)
 
 
 @compiled

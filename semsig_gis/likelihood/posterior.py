@@ -81,11 +81,10 @@ class Posterior:
         if not 0 < share <= 1:
             msg = f"a region of a share of {share} was asked for; give a number above 0, at most 1."
             raise InputError(msg)
-        cells = np.flatnonzero(self.chances)
         # Most of the cells hold next to nothing together and need not be sorted.
         level = 0.5 * (1.0 - share) / len(self.chances)
-        likely = cells[self.chances[cells] >= level]
-        cells = likely[np.argsort(-self.chances[likely], kind="stable")]
+        some = self.chances >= level if level > 0 else self.chances > 0
+        cells = _likeliest_first(self.chances, np.flatnonzero(some))
         total = np.cumsum(self.chances[cells])
         # The small term keeps a sum of 0.9 - 1e-17 from asking for one cell more.
         return cells[: int(np.searchsorted(total, share * (1.0 - 1e-12))) + 1]
@@ -131,6 +130,20 @@ class Posterior:
         mass = np.round(self.mass_within(radius, cells), 9)
         best = np.lexsort((-self.chances[cells], -mass))[0]
         return int(cells[best]), float(mass[best])
+
+
+def _likeliest_first(chances: NDArray[np.float64], cells: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Return some cells by falling chance, equal ones by row."""
+    # One number for each, the row behind all but the last digits of the chance: plain numbers are
+    # sorted ten times faster than pairs.
+    bits = int(cells.max(initial=0)).bit_length()
+    numbers = ~chances[cells].view(np.int64) >> bits << bits | cells
+    numbers.sort()
+    cells = numbers & ((1 << bits) - 1)
+    if (np.diff(chances[cells]) > 0).any():
+        cells.sort()
+        cells = cells[np.argsort(-chances[cells], kind="stable")]
+    return cells
 
 
 def posterior(
