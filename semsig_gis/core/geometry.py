@@ -318,6 +318,12 @@ def split_ids(ids: ArrayLike) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     return columns, numbers - columns * ROW_SPAN
 
 
+def consecutive(first: NDArray[np.int64], size: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Return the whole numbers of some ranges, one range after the other."""
+    ends = np.cumsum(size)
+    return np.repeat(first - ends + size, size) + np.arange(size.sum())
+
+
 def cells_near(
     xy: NDArray[np.float64], *, grid: GridSpec, radius: float
 ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:

@@ -13,12 +13,14 @@ import shapely
 from rtree import index as rtree_index
 
 from semsig_gis.core.errors import InputError
+from semsig_gis.core.geometry import consecutive
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
 # More than the distance between neighbouring floats anywhere on Earth.
 ROUNDING_M = 1e-6
+BLOCKS = 3  # a radius: places in one block ask the tree together
 
 
 class ObjectIndex:
@@ -44,9 +46,13 @@ class ObjectIndex:
         """
         places = np.ascontiguousarray(viewpoints, dtype=np.float64)
         reach = _a_touch_more(radius)
-        found, counts = self._tree.intersection_v(places - reach, places + reach)
-        viewpoint = np.repeat(np.arange(len(places)), counts.astype(np.int64))
-        return _near(viewpoint, found.astype(np.int64), places, self._xy, radius)
+        side = reach / BLOCKS
+        corners, block = np.unique(np.floor(places / side) * side, axis=0, return_inverse=True)
+        found, counts = self._tree.intersection_v(corners - reach, corners + (reach + side))
+        sizes = counts.astype(np.int64)
+        point = found[consecutive((np.cumsum(sizes) - sizes)[block], sizes[block])]
+        viewpoint = np.repeat(np.arange(len(places)), sizes[block])
+        return _near(viewpoint, point.astype(np.int64), places, self._xy, radius)
 
 
 class PackedIndex:

@@ -10,10 +10,10 @@ import numpy as np
 
 from semsig_gis.core.effort import announce, require_memory
 from semsig_gis.core.errors import CrsError, EmptyResultError, InputError
-from semsig_gis.core.geometry import GridSpec, cell_ids, cells_near, split_ids
+from semsig_gis.core.geometry import GridSpec, cell_ids, cells_near, consecutive, split_ids
 from semsig_gis.core.rtree import PackedIndex
 from semsig_gis.core.signature import BEARING_UNITS, DISTANCE_UNITS, SignatureSpec
-from semsig_gis.database.database import SignatureDatabase, consecutive
+from semsig_gis.database.database import SignatureDatabase
 from semsig_gis.database.occlusion import TOLERANCE_M, Footprints
 from semsig_gis.database.viewpoints import choose_viewpoints
 from semsig_gis.database.views import ViewpointSpec, clockwise_order, sightings

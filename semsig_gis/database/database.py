@@ -19,7 +19,7 @@ from pyproj import CRS
 
 from semsig_gis import __version__
 from semsig_gis.core.errors import DatabaseError, InputError
-from semsig_gis.core.geometry import cell_ids
+from semsig_gis.core.geometry import cell_ids, consecutive
 from semsig_gis.core.signature import BEARING_UNITS, DISTANCE_UNITS, Signature, quantize
 from semsig_gis.database.views import ViewpointSpec, Views
 from semsig_gis.storage.geoparquet import whole_numbers
@@ -455,12 +455,6 @@ def checked_sequence(values: NDArray[np.uint8]) -> NDArray[np.uint8]:
         )
         raise InputError(msg)
     return array
-
-
-def consecutive(first: NDArray[np.int64], size: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Return the whole numbers of some ranges, one range after the other."""
-    ends = np.cumsum(size)
-    return np.repeat(first - ends + size, size) + np.arange(size.sum())
 
 
 def frozen(array: _Array) -> _Array:

@@ -30,6 +30,7 @@ from semsig_gis.core.geometry import (
     GridSpec,
     cell_ids,
     cells_near,
+    consecutive,
     require_step,
     split_ids,
 )
@@ -44,7 +45,6 @@ from semsig_gis.database.build import (
     expected_pairs,
     require_room,
 )
-from semsig_gis.database.database import consecutive
 from semsig_gis.database.file import (
     MANIFEST,
     Manifest,
