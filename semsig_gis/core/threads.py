@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import functools
 import os
+import threading
 from concurrent.futures import ThreadPoolExecutor
 from typing import TYPE_CHECKING
 
@@ -34,17 +35,28 @@ if hasattr(os, "register_at_fork"):  # the threads stay behind
     os.register_at_fork(after_in_child=_pool.cache_clear)
 
 
+_here = threading.local()
+
+
 def share_rows(
     work: Callable[[NDArray[np.int64]], object], rows: int, *, least: int = ROWS_A_PART
 ) -> None:
     """Call `work` with the first row of each part and the one after its last, all parts at once.
 
-    A part has at least so many rows.
+    A part has at least so many rows. What is shared within a part is done by its own thread.
     """
     parts = min(2 * cores(), rows // least)
-    if parts <= 1 or cores() == 1:
+    if parts <= 1 or cores() == 1 or getattr(_here, "sharing", False):
         work(np.array([0, rows]))
         return
+
+    def do(part: NDArray[np.int64]) -> None:
+        _here.sharing = True
+        try:
+            work(part)
+        finally:
+            _here.sharing = False
+
     ends = np.linspace(0, rows, parts + 1).astype(np.int64)
-    for done in [_pool().submit(work, ends[part : part + 2]) for part in range(parts)]:
+    for done in [_pool().submit(do, ends[part : part + 2]) for part in range(parts)]:
         done.result()

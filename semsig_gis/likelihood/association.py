@@ -46,6 +46,8 @@ if TYPE_CHECKING:
     from semsig_gis.likelihood.noise.model import Noise
     from semsig_gis.likelihood.noise.table import NoiseTable
 
+    _Ranks = tuple[NDArray[np.float64], list[NDArray[np.float64]]]
+
 
 WIDE = 45.0  # degrees of deviation from which on the tails meet behind the observer
 LAPS = 360.0 * np.arange(-3, 4)
@@ -319,12 +321,15 @@ def associate_pairs(
     return chances, log_sums
 
 
-RERANKED = 1000
+RERANKED = 500
 """How many cells are re-ranked unless said otherwise."""
-FIRST = 100  # cells that are re-ranked whatever comes out
+FIRST = 100  # cells that are re-ranked whatever comes out; then as many again, twice as many, ...
+SAMPLE = 256  # of the others
+# Cells that are looked at from aside before, the first of them whatever comes out.
+ASIDE, FIRST_ASIDE, SAMPLE_ASIDE = 8192, 2048, 1024
+HOPELESS = math.log(1e-3)  # of the chance, that the last of them hold, from which the rest are not
 NEGLIGIBLE = 30.0  # nats below the best, at which cells hold nothing together
-POOL, SAMPLE, WINDOW = 4096, 256, 32  # of the cells that are not re-ranked
-HOPELESS = 20.0  # nats below the best of them, at which the others are not looked at
+POOL, WINDOWS = 16, 8  # times a sample, that it is taken from; parts of it, by likelihood
 # Turns around the likeliest one of the scan, which knows it to less than six degrees.
 TURNS = np.arange(-7.5, 7.6, 1.5)
 
@@ -361,43 +366,37 @@ def rerank(
 ) -> CellScores:
     """Replace the scores of the best cells by their one-to-one likelihoods.
 
-    Up to `count` cells are re-ranked; after the first hundred, only those that may still matter.
+    Up to `count` cells are re-ranked, until some hundred hold next to nothing of the chance.
     Of the others, a sample is looked at, too, and each is moved by as much as those of the sample
     with scores like its own, so that all masses fit each other. `log_prior` helps to choose the
     cells and is not part of the result. Without bearings the scores are returned as they are.
-    Where queries are from anywhere, places `aside` of the middles are looked at, too, which takes
-    nine times as long.
+    Where queries are from anywhere, places `aside` of the middles are looked at, too: four in each
+    of some thousand cells by the plain sum, to choose the cells, and then nine in each.
     """
-    from semsig_gis.likelihood.kernels import promising_cells  # noqa: PLC0415 - numba loads slowly
-
     if count < 1:
         msg = f"{count} cells were to be re-ranked; give a whole number from 1."
         raise InputError(msg)
     view = View.of(query)
     if view.bearings is None:
         return scores
-    old = scores.loglik.astype(np.float64)
-    total = old if log_prior is None else old + log_prior
-    count = min(count, len(old))
-    cells = promising_cells(total.astype(np.float32), count)
-    cells = cells[np.argsort(-total[cells], kind="stable")][:count]
-    cells = cells[total[cells] > -np.inf]
-    first, rest = cells[:FIRST], cells[FIRST:]
-    aligned = partial(_aligned, index, view, scores=scores, north_sigma=north_sigma, aside=aside)
-    new, turns = aligned(first)
-    if len(rest):
-        # At best, the others change by as much as any of these did.
-        hope = (new - old[first]).max()
-        best = (new - old[first] + total[first]).max()
-        rest = rest[total[rest] + hope > best - HOPELESS]
-        more, more_turns = aligned(rest)
-        new = np.append(new, more)
-        turns = [np.append(*both) for both in zip(turns, more_turns, strict=True)]
-    cells = np.append(first, rest)
-    loglik = old
-    if len(cells) < len(old):
-        loglik = old + _shift(lambda some: aligned(some)[0], old, total, cells)
-    loglik[cells] = new
+    loglik = scores.loglik.astype(np.float64)
+    if aside and len(index.stands[1]) > 1:
+        loglik, _, _ = _replaced(
+            lambda some: (index.scores_aside(view, some, north_sigma=north_sigma), []),
+            loglik,
+            log_prior,
+            count=ASIDE,
+            first=FIRST_ASIDE,
+            sample=SAMPLE_ASIDE,
+        )
+    loglik, cells, turns = _replaced(
+        partial(_aligned, index, view, scores=scores, north_sigma=north_sigma, aside=aside),
+        loglik,
+        log_prior,
+        count=count,
+        first=FIRST,
+        sample=SAMPLE,
+    )
     headings = []
     for before, turn in zip(scores.headings, turns, strict=True):
         heading = before
@@ -408,31 +407,71 @@ def rerank(
     return CellScores(loglik=loglik, headings=tuple(headings))
 
 
+def _replaced(
+    rank: Callable[[NDArray[np.int64]], _Ranks],
+    old: NDArray[np.float64],
+    log_prior: NDArray[np.float64] | None,
+    *,
+    count: int,
+    first: int,
+    sample: int,
+) -> tuple[NDArray[np.float64], NDArray[np.int64], list[NDArray[np.float64]]]:
+    """Return better log-likelihoods of all cells, the best cells, and their turns.
+
+    `rank` gives them for some cells, with the turns: for the `first` ones, then more and more up to
+    `count`. By a `sample` of the others, these are moved.
+    """
+    from semsig_gis.likelihood.kernels import promising_cells  # noqa: PLC0415 - numba loads slowly
+
+    total = old if log_prior is None else old + log_prior
+    count = min(count, len(old))
+    cells = promising_cells(total.astype(np.float32), count)
+    cells = cells[np.argsort(-total[cells], kind="stable")][:count]
+    cells = cells[total[cells] > -np.inf]
+    parts, done = [rank(cells[:first])], min(first, len(cells))
+    while done < len(cells):
+        known = np.concatenate([part for part, _ in parts]) + (total - old)[cells[:done]]
+        last = known[-len(parts[-1][0]) :]
+        if np.logaddexp.reduce(last) < np.logaddexp.reduce(known) + HOPELESS:
+            break
+        parts.append(rank(cells[done : 2 * done]))
+        done = min(2 * done, len(cells))
+    cells, new = cells[:done], np.concatenate([part for part, _ in parts])
+    turns = [np.concatenate(each) for each in zip(*(turn for _, turn in parts), strict=True)]
+    loglik = old.copy()
+    if len(cells) < len(old):
+        loglik += _shift(lambda some: rank(some)[0], old, total, cells, sample)
+    loglik[cells] = new
+    return loglik, cells, turns
+
+
 def _shift(
     rank: Callable[[NDArray[np.int64]], NDArray[np.float64]],
     old: NDArray[np.float64],
     total: NDArray[np.float64],
     ranked: NDArray[np.int64],
-) -> NDArray[np.float64]:
+    size: int,
+) -> NDArray[np.float64] | float:
     """Return by how much the likelihood of cells changes that are not among those `ranked`.
 
-    `rank` gives the new likelihood of some cells, `old` is that of all, and `total` with the prior.
+    `rank` gives the new likelihood of some cells, `old` is that of all, and `total` with the prior;
+    so many are tried.
     """
-    rest = np.ones(len(total), np.bool_)
+    rest = total > total.max() - NEGLIGIBLE
     rest[ranked] = False
-    rest &= total > total.max() - NEGLIGIBLE
     tail = np.flatnonzero(rest)
     if not len(tail):
-        return np.zeros(len(total))
-    if len(tail) > POOL:
-        tail = np.random.default_rng(0).choice(tail, POOL, replace=False, shuffle=False)
+        return 0.0
+    if len(tail) > POOL * size:
+        random = np.random.default_rng(0)
+        tail = random.choice(tail, POOL * size, replace=False, shuffle=False)
     tail = tail[np.argsort(-total[tail], kind="stable")]
-    ranks = np.unique(np.geomspace(1, len(tail), SAMPLE).astype(np.int64)) - 1
+    ranks = np.unique(np.geomspace(1, len(tail), size).astype(np.int64)) - 1
     sample = tail[ranks]
-    new, before = rank(sample), old[sample]
+    new, before, window = rank(sample), old[sample], size // WINDOWS
     moves, levels = [], []
-    for low in range(0, len(sample), WINDOW):
-        part = slice(low, low + WINDOW)
+    for low in range(0, len(sample), window):
+        part = slice(low, low + window)
         moves.append(np.logaddexp.reduce(new[part]) - np.logaddexp.reduce(before[part]))
         levels.append(total[sample[part]].mean())
     return np.asarray(np.interp(total, levels[::-1], moves[::-1]))

@@ -32,6 +32,8 @@ if TYPE_CHECKING:
     from semsig_gis.likelihood.noise.model import Noise
     from semsig_gis.likelihood.noise.table import NoiseTable
 
+    _Models = tuple[tuple[NoiseTable, ...], NDArray[np.float64]]
+
 BINS = 512
 """Bearing steps of an object."""
 FINE = 8 * BINS
@@ -45,6 +47,7 @@ VERSION = 3  # raised whenever the same database and noise give other likelihood
 LEAST_PRIOR = 1e-7  # turns that are less likely than this, against the likeliest, are left out
 STANDS = 3  # places a side of a cell, at which the best cells are compared
 LEAST_DENSITY = 1e-12
+CELLS_A_PART = 256  # that are worth a thread, looked at from aside
 LAPS = np.arange(-3, 4)  # 180 degrees of deviation reach three turns
 
 
@@ -87,7 +90,7 @@ class LikelihoodIndex:
     noise: Noise
 
     @cached_property
-    def models(self) -> tuple[tuple[NoiseTable, ...], NDArray[np.float64]]:
+    def models(self) -> _Models:
         """The noise model in numbers, or each model of the mixture, and the chance of each."""
         return database_tables(self.database, self.noise)
 
@@ -97,9 +100,7 @@ class LikelihoodIndex:
         return mean_table(*self.models)
 
     @cached_property
-    def stands(
-        self,
-    ) -> tuple[tuple[tuple[NoiseTable, ...], NDArray[np.float64]], NDArray[np.float64]]:
+    def stands(self) -> tuple[_Models, NDArray[np.float64]]:
         """Where in a cell observers may stand, metres from its middle, and the models for each.
 
         For a noise model that is for the middles of cells, that is the middle alone.
@@ -107,22 +108,32 @@ class LikelihoodIndex:
         step = self.database.grid.step
         if any(spec.position_sigma**2 < step**2 / 12.0 - ROUNDING for spec in self.noise.specs):
             return self.models, np.zeros((1, 2))
-        side = (np.arange(STANDS) - (STANDS - 1) / 2.0) * step / STANDS
-        places = np.stack(np.meshgrid(side, side), axis=-1).reshape(-1, 2)
-        noise = cell_noise(place_noise(self.noise, step), step / STANDS)
+        return self._parts(STANDS)
+
+    def _parts(self, side: int) -> tuple[_Models, NDArray[np.float64]]:
+        """Return the middles of the parts of a cell, so many a side, and the models for a part."""
+        step = self.database.grid.step
+        along = (np.arange(side) - (side - 1) / 2.0) * step / side
+        places = np.stack(np.meshgrid(along, along), axis=-1).reshape(-1, 2)
+        noise = cell_noise(place_noise(self.noise, step), step / side)
         return database_tables(self.database, noise), places
+
+    @cached_property
+    def _quarters(self) -> tuple[_Levels, NDArray[np.float64]]:
+        models, places = self._parts(2)
+        return _Levels.of(mean_table(*models)), places
 
     @cached_property
     def _levels(self) -> _Levels:
         return _Levels.of(self.table)
 
     @cached_property
-    def _entries(self) -> tuple[NDArray[np.uint8], NDArray[np.uint16]]:
-        """The class row of every entry of the database, and its level of distance and bearing."""
-        database, table = self.database, self.table
+    def _entries(self) -> _Entries:
+        database = self.database
         bins = database.bearing_units.astype(np.uint32) * np.uint32(BINS) // BEARING_UNITS
-        places = (self._levels.level_of * BINS).astype(np.uint16)[database.distance_units]
-        return table.row_of.astype(np.uint8)[database.codes], places + bins.astype(np.uint16)
+        return self._levels.entries(
+            database.offsets, database.codes, bins.astype(np.uint16), database.distance_units
+        )
 
     def scores(self, query: Signature, *, north_sigma: float = 0.0) -> CellScores:
         """Return the log-likelihood of a view in every cell, and the likeliest turns of its photos.
@@ -142,62 +153,38 @@ class LikelihoodIndex:
         loglik = np.zeros(len(self.database), np.float32)
         headings = []
         for photo in view.split():
-            own, heading = self._of_photo(photo, own_sigma(photo, north_sigma))
+            sigma = own_sigma(photo, north_sigma)
+            own, heading = _of_photo(photo, self._levels, self._entries, sigma)
             loglik += own
             headings.append(heading)
         return CellScores(loglik=loglik, headings=tuple(headings))
 
-    def _of_photo(
-        self, photo: View, north_sigma: float
-    ) -> tuple[NDArray[np.float32], NDArray[np.float32] | None]:
-        """Return the log-likelihood of one photo in every cell, and its likeliest turns."""
-        from semsig_gis.likelihood.kernels import scan, scan_turned  # noqa: PLC0415 - slow to load
+    def scores_aside(
+        self, view: View, cells: NDArray[np.int64], *, north_sigma: float
+    ) -> NDArray[np.float64]:
+        """Return the log-likelihood of a view in some cells, summed over four places in each.
 
-        table, levels = self.table, self._levels
-        asked = PhotoTable.of(photo, table)
-        density = asked.density(table)
-        kinds, places = self._entries
-        rows, masses = levels.rows(asked, table), levels.masses(asked)
-        named = asked.named(table)[: len(levels.chances)] / density
-        scores = np.empty(len(self.database), np.float32)
-        what: dict[str, Any] = {
-            "offsets": self.database.offsets,
-            "kinds": kinds,
-            "places": places,
-            "group_of": levels.group_of,
-            "width": asked.width,
-            "chances": levels.chances,
-            "leaving": levels.leaving,
-            "base": float(np.log(density).sum() - table.clutter.sum() * asked.width),
-            "scores": scores,
-        }
-        if north_sigma == 0:
-            work = partial(
-                scan,
-                **what,
-                rows=rows,
-                masses=masses,
-                named=_padded(named),
-                disc=_padded(asked.disc / FULL_TURN),
-            )
-            share_rows(work, len(self.database))
-            return scores, None
-        first, priors = _turns(north_sigma)
-        best = np.empty(len(self.database), np.int16)
-        by_detection = np.moveaxis(rows, 4, 1).reshape(-1, *rows.shape[1:4])[: len(density)]
-        work = partial(
-            scan_turned,
-            **what,
-            rows=_turned(by_detection),
-            masses=_turned(masses),
-            named=named.astype(np.float32),
-            disc=(asked.disc / FULL_TURN).astype(np.float32),
-            first=first,
-            priors=priors,
-            best=best,
-        )
-        share_rows(work, len(self.database))
-        return scores, best * np.float32(FULL_TURN / TURNS)
+        It is the sum of `scores`, but who stands aside sees all objects aside.
+        """
+        from semsig_gis.database.aside import views_aside  # noqa: PLC0415 - numba loads slowly
+
+        levels, places = self._quarters
+        loglik = np.empty(len(cells))
+
+        def look(part: NDArray[np.int64]) -> None:
+            seen = views_aside(self.database, cells[slice(*part)], places)
+            bins = (seen.bearings * (BINS / FULL_TURN)).astype(np.uint16) % np.uint16(BINS)
+            units = np.rint(seen.distances * (DISTANCE_UNITS / levels.table.reach))
+            units = np.minimum(units, DISTANCE_UNITS).astype(np.uint8)
+            entries = levels.entries(seen.offsets, seen.codes, bins, units)
+            total = np.zeros(len(seen))
+            for photo in view.split():
+                total += _of_photo(photo, levels, entries, own_sigma(photo, north_sigma))[0]
+            by_place = total.reshape(len(places), -1)
+            loglik[slice(*part)] = np.logaddexp.reduce(by_place, axis=0) - math.log(len(places))
+
+        share_rows(look, len(cells), least=CELLS_A_PART)
+        return loglik
 
     def _by_counts(self, rows: NDArray[np.int64]) -> NDArray[np.float32]:
         """Return the scores of a query without bearings."""
@@ -216,6 +203,59 @@ class LikelihoodIndex:
             distinct,
         )
         return distinct[types.inverse]
+
+
+def _of_photo(
+    photo: View, levels: _Levels, entries: _Entries, north_sigma: float
+) -> tuple[NDArray[np.float32], NDArray[np.float32] | None]:
+    """Return the log-likelihood of one photo in every place, and its likeliest turns."""
+    from semsig_gis.likelihood.kernels import scan, scan_turned  # noqa: PLC0415 - slow to load
+
+    table = levels.table
+    asked = PhotoTable.of(photo, table)
+    density = asked.density(table)
+    rows, masses = levels.rows(asked), levels.masses(asked)
+    named = asked.named(table)[: len(levels.chances)] / density
+    size = len(entries.offsets) - 1
+    scores = np.empty(size, np.float32)
+    what: dict[str, Any] = {
+        "offsets": entries.offsets,
+        "kinds": entries.kinds,
+        "places": entries.places,
+        "group_of": levels.group_of,
+        "width": asked.width,
+        "chances": levels.chances,
+        "leaving": levels.leaving,
+        "base": float(np.log(density).sum() - table.clutter.sum() * asked.width),
+        "scores": scores,
+    }
+    if north_sigma == 0:
+        work = partial(
+            scan,
+            **what,
+            rows=rows,
+            masses=masses,
+            named=_padded(named),
+            disc=_padded(asked.disc / FULL_TURN),
+        )
+        share_rows(work, size)
+        return scores, None
+    first, priors = _turns(north_sigma)
+    best = np.empty(size, np.int16)
+    by_detection = np.moveaxis(rows, 4, 1).reshape(-1, *rows.shape[1:4])[: len(density)]
+    work = partial(
+        scan_turned,
+        **what,
+        rows=_turned(by_detection),
+        masses=_turned(masses),
+        named=named.astype(np.float32),
+        disc=(asked.disc / FULL_TURN).astype(np.float32),
+        first=first,
+        priors=priors,
+        best=best,
+    )
+    share_rows(work, size)
+    return scores, best * np.float32(FULL_TURN / TURNS)
 
 
 def own_sigma(photo: View, north_sigma: float) -> float:
@@ -260,6 +300,15 @@ def _blocks(size: int) -> int:
     return max(1, -(-size // LANES))
 
 
+@dataclass(frozen=True, eq=False, slots=True)
+class _Entries:
+    """What is seen from some places, one after the other: class rows, and levels and bearings."""
+
+    offsets: NDArray[np.int64]
+    kinds: NDArray[np.uint8]
+    places: NDArray[np.uint16]
+
+
 @dataclass(frozen=True, eq=False, kw_only=True)
 class _Levels:
     """A noise table at some distances, for classes grouped by their errors.
@@ -270,6 +319,7 @@ class _Levels:
     signature, class and level, `chances` are of detection, and of having left the range, `leaving`.
     """
 
+    table: NoiseTable
     group_of: NDArray[np.int64]
     level_of: NDArray[np.int64]
     sigma: NDArray[np.float64]
@@ -308,6 +358,7 @@ class _Levels:
             return np.asarray(detected[:, :, None] * each, dtype=np.float32)
 
         return cls(
+            table=table,
             group_of=group_of.reshape(-1),
             level_of=level_of,
             sigma=sigma,
@@ -319,7 +370,19 @@ class _Levels:
             leaving=by_level(table.left),
         )
 
-    def rows(self, asked: PhotoTable, table: NoiseTable) -> NDArray[np.float32]:
+    def entries(
+        self,
+        offsets: NDArray[np.int64],
+        codes: NDArray[np.uint8],
+        bins: NDArray[np.uint16],
+        units: NDArray[np.uint8],
+    ) -> _Entries:
+        """Return what is seen, by class code, bearing in bins and distance unit."""
+        places = (self.level_of * BINS).astype(np.uint16)[units]
+        places += bins
+        return _Entries(offsets, self.table.row_of.astype(np.uint8)[codes], places)
+
+    def rows(self, asked: PhotoTable) -> NDArray[np.float32]:
         """Return the density of each detection by group, level and bearing of an object."""
         from semsig_gis.likelihood.kernels import LANES, profile_rows  # noqa: PLC0415
 
@@ -328,7 +391,7 @@ class _Levels:
         if known.any():
             errors = np.stack(
                 [
-                    asked.range_sigma(table)[self.group_of == group][0]
+                    asked.range_sigma(self.table)[self.group_of == group][0]
                     for group in range(len(self.sigma))
                 ]
             )

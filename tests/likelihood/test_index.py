@@ -12,13 +12,16 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from noisy_cells import NOTHING, noise_specs, parts_of, random_database, random_query
 from scipy.stats import binom, poisson
-from view_oracle import cell_loglik, random_view, set_loglik
+from view_oracle import cell_loglik, random_view, scene_of, set_loglik, turned_loglik
+from worlds import random_town
 
 from semsig_gis.core.signature import Signature
 from semsig_gis.core.view import Photo, View
+from semsig_gis.database.aside import views_aside
 from semsig_gis.likelihood.index import TURNS, build_index, index_fingerprint
 from semsig_gis.likelihood.kernels import promising_cells
-from semsig_gis.likelihood.noise.model import named_noise
+from semsig_gis.likelihood.noise.model import cell_noise, named_noise
+from semsig_gis.likelihood.noise.table import database_tables
 
 if TYPE_CHECKING:
     from semsig_gis.likelihood.index import LikelihoodIndex
@@ -27,6 +30,7 @@ if TYPE_CHECKING:
 SEEDS = st.integers(0, 10_000)
 NOISE = named_noise("generic")
 TURN = 360.0 / TURNS
+TOWN = random_town()
 
 
 def slow_counts(index: LikelihoodIndex, query: list[int], cell: int) -> float:
@@ -108,6 +112,45 @@ def test_turns_are_summed_over_with_their_chances(
     rows = np.rint((found.heading + 180.0) / TURN).astype(int)
     reached = each[rows, np.arange(len(database))]
     assert reached == pytest.approx(each.max(axis=0), abs=2e-2)
+
+
+@settings(max_examples=10)
+@given(SEEDS, noise_specs(), SECTORS)
+def test_places_aside_are_summed_over(
+    seed: int, noise: NoiseSpec, sectors: tuple[tuple[float, float], ...]
+) -> None:
+    town = TOWN.database
+    noise = replace(noise, bearing_sigma=max(noise.bearing_sigma, 8.0), position_sigma=0.0)
+    view = random_view(town, np.random.default_rng(seed), size=3, photos=[Photo(sectors=sectors)])
+    view = replace(view, ranges=None, range_errors=None)
+    cells = np.random.default_rng(seed).choice(len(town), 8, replace=False)
+    step = town.grid.step
+    places = np.array([[east, north] for north in (-1, 1) for east in (-1, 1)]) * step / 4.0
+    seen = views_aside(town, cells, places)
+    (spec,) = cell_noise(noise, step / 2.0).specs
+    (table,), _ = database_tables(town, spec)
+    codes = town.present_codes.tolist()
+    # What is seen there, as if it were in the middle of the cells.
+    units = np.rint(seen.distances * 255.0 / town.reach).clip(0, 255)
+    each = []
+    for first in range(0, len(seen), len(cells)):
+        ends = seen.offsets[first : first + len(cells) + 1]
+        part = slice(ends[0], ends[-1])
+        there = replace(
+            town.select(cells),
+            offsets=ends - ends[0],
+            codes=seen.codes[part],
+            bearing_units=np.floor(seen.bearings[part] * 20.0).astype(np.uint16),
+            distance_units=units[part].astype(np.uint8),
+        )
+        scenes = [scene_of(there, row, spec, table) for row in range(len(cells))]
+        north = [[(0.0, 1.0)]]
+        each.append([turned_loglik(scene, view, codes, north, set_loglik) for scene in scenes])
+    expected = np.logaddexp.reduce(each, axis=0) - math.log(4)
+    found = build_index(town, cell_noise(noise, step)).scores_aside(view, cells, north_sigma=0.0)
+    # Who stands at the edge of range of an object is taken in steps, too.
+    assert found == pytest.approx(expected, abs=0.8 * len(view))
+    assert np.median(np.abs(found - expected)) < 0.1 * len(view)
 
 
 @settings(max_examples=20)
