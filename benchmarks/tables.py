@@ -53,7 +53,7 @@ The figures that accuracy was to reach, and what came out.
 """
 _VIEWS = """## Views
 
-`make views` asks {queries} queries a line of a camera that sees 70, 120 or 360 degrees. The
+`make views` asks up to {queries} queries a line of a camera that sees 70, 120 or 360 degrees. The
 detector finds 80 % of the objects, misnames 10 % of these, is 4 degrees out and makes up one object
 in a full turn; the likelihood method has this noise model. The queries of a line are the same for
 all columns: taken for a full turn, with the sector told, or with rough distances, 25 % off, told,
@@ -299,14 +299,16 @@ def _bayes_table(rows: Iterable[dict[str, Any]]) -> str:
 def _of_views(rows: Iterable[dict[str, Any]], cell: Callable[[Mapping[str, Any]], str]) -> str:
     """Return a table with a line for each view, and a column for each thing that is told."""
     columns = (NOT_TOLD, SECTORS, RANGES)
-    names = ("city", "seen_from", "photos", "degrees", "least", "heading")
+    names = ("city", "seen_from", "photos", "degrees", "queries", "least", "heading")
     lines: dict[tuple[Any, ...], dict[str, str]] = {}
     for row in rows:
         lines.setdefault(tuple(row[name] for name in names), {})[row["told"]] = cell(row)
     return _table(
-        " | ".join(["city", "from", "photos", "degrees", "detections", "heading", *columns]),
+        " | ".join(
+            ["city", "from", "photos", "degrees", "queries", "detections", "heading", *columns]
+        ),
         (
-            [*map(str, key[:4]), f"{key[4]} or more", key[5]]
+            [*map(str, key[:4]), f"{key[4]:,}", f"{key[5]} or more", key[6]]
             + [values.get(column, "") for column in columns]
             for key, values in lines.items()
         ),

@@ -46,7 +46,7 @@ from semsig_gis.sources.synthetic.city import PARIS_LIKE as LIKE_PARIS
 from semsig_gis.sources.synthetic.city import CitySpec
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator, Sequence
+    from collections.abc import Iterable, Iterator, Mapping, Sequence
 
     from semsig_gis.core.signature import Signature
     from semsig_gis.database.database import SignatureDatabase
@@ -105,7 +105,7 @@ def main() -> None:
     """Read the options, measure, print and write."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks.views", description=__doc__)
     parser.add_argument("--size", choices=["full", "small"], default="full")
-    parser.add_argument("--queries", type=int, metavar="N", help="of each line (default: 2,000)")
+    parser.add_argument("--queries", type=int, metavar="N", help="of each line (default: by line)")
     parser.add_argument("--out", type=Path, default=Path(__file__).with_name("views.json"))
     parser.add_argument(
         "--geodata",
@@ -122,16 +122,22 @@ def main() -> None:
     if options.geodata is None:
         names = [name for name in names if name == PARIS_LIKE]
         print("Real cities are left out: SEMSIG_GEODATA does not name the folder of open data.")
-    wanted = options.queries or (10 if small else 2000)
     rows = json.loads(options.out.read_text("utf-8")) if options.out.exists() else []
     for name in names:
-        cases = [{"city": name, **asdict(line), "wanted": wanted} for line in lines()]
-        missing = [
-            line
+        cases = [
+            {
+                "city": name,
+                **asdict(line),
+                "wanted": options.queries or (10 if small else _number(name, line)),
+            }
+            for line in lines()
+        ]
+        missing = {
+            line: case["wanted"]
             for line, case in zip(lines(), cases, strict=True)
             if not any(case.items() <= row.items() for row in rows)
-        ]
-        for row in _rows(name, options.geodata, missing, wanted, options.processes, small=small):
+        }
+        for row in _rows(name, options.geodata, missing, options.processes, small=small):
             print(_text(row), flush=True)
             rows.append(row)
             options.out.write_text(json.dumps(rows, indent=2) + "\n", encoding="utf-8")
@@ -166,16 +172,24 @@ def lines() -> Iterator[Line]:
         )
 
 
+def _number(city: str, line: Line) -> int:
+    """Return how many queries a line has, fewer where each takes longer or says less."""
+    if line.photos > 1:
+        return 100
+    if line.seen_from == "anywhere":
+        return 300
+    return {KNOWN: 2000 if city == PARIS_LIKE else 500, OFF: 200, UNKNOWN: 100}[line.heading]
+
+
 def _rows(
     name: str,
     geodata: Path | None,
-    lines: Sequence[Line],
-    wanted: int,
+    lines: Mapping[Line, int],
     processes: int,
     *,
     small: bool,
 ) -> Iterator[dict[str, Any]]:
-    """Yield what came of lines, one after the other."""
+    """Yield what came of lines with so many queries, one after the other."""
     if not lines:
         return
     if name == PARIS_LIKE or geodata is None:
@@ -192,7 +206,7 @@ def _rows(
     ):
         file = f"{folder}/city.parquet"
         save_database(database, file)
-        for line in lines:
+        for line, wanted in lines.items():
             questions = _questions(database, store, line, wanted)
             parts = [questions[start::PARTS] for start in range(min(PARTS, len(questions)))]
             answer = functools.partial(_answers, file, line.seen_from, line.heading)
