@@ -2,14 +2,9 @@
 
 A detection is one of the objects or clutter, an object is detected once or missed. Each pair has a
 weight, how much likelier the two are one thing than a miss and clutter. The likelihood sums over
-all associations A; in the notation of `likelihood.index`,
-
-    L = prod_i (1 - p_i) * prod_j lambda(t_j)
-        * sum_A prod_(i,j in A) o_i C(i, t_j) N(a_j - theta_i) / lambda(t_j)
-
-The index adds up over the detections one by one, so that one lamp may explain three; its best cells
-are ranked again by this sum. An alignment that keeps the order would lose one query in twenty, as
-bearing noise swaps neighbours.
+all associations, as `likelihood.photo` has it. The index adds up over the detections one by one, so
+that one lamp may explain three; its best cells are ranked again by this sum. An alignment that
+keeps the order would lose one query in twenty, as bearing noise swaps neighbours.
 
 The sum is the Bethe approximation that belief propagation settles on (Williams and Lau,
 "Approximate evaluation of marginal association probabilities with belief propagation", 2014): exact
