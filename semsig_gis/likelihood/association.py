@@ -319,7 +319,7 @@ def associate_pairs(
 RERANKED = 500
 """How many cells are re-ranked unless said otherwise."""
 FIRST = 100  # cells that are re-ranked whatever comes out; then as many again, twice as many, ...
-SAMPLE = 256  # of the others
+SAMPLE = 2304  # places in the others, of which a sample is looked at
 # Cells that are looked at from aside before, the first of them whatever comes out.
 ASIDE, FIRST_ASIDE, SAMPLE_ASIDE = 8192, 2048, 1024
 HOPELESS = math.log(1e-3)  # of the chance, that the last of them hold, from which the rest are not
@@ -390,7 +390,7 @@ def rerank(
         log_prior,
         count=count,
         first=FIRST,
-        sample=SAMPLE,
+        sample=SAMPLE // (len(index.stands[1]) if aside else 1),
     )
     headings = []
     for before, turn in zip(scores.headings, turns, strict=True):

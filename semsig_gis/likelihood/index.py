@@ -130,10 +130,9 @@ class LikelihoodIndex:
     @cached_property
     def _entries(self) -> _Entries:
         database = self.database
-        bins = database.bearing_units.astype(np.uint32) * np.uint32(BINS) // BEARING_UNITS
-        return self._levels.entries(
-            database.offsets, database.codes, bins.astype(np.uint16), database.distance_units
-        )
+        bin_of = (np.arange(BEARING_UNITS) * BINS // BEARING_UNITS).astype(np.uint16)
+        bins = bin_of[database.bearing_units]
+        return self._levels.entries(database.offsets, database.codes, bins, database.distance_units)
 
     def scores(self, query: Signature, *, north_sigma: float = 0.0) -> CellScores:
         """Return the log-likelihood of a view in every cell, and the likeliest turns of its photos.
