@@ -162,7 +162,6 @@ def experiment(
             folder=spec.parent,
             workers=workers,
             scheduler=scheduler,
-            note=remark,
             progress=advance,
         )
     if as_json:

@@ -166,15 +166,10 @@ class Part(NamedTuple):
 
 
 class ExperimentWork:
-    """An experiment with the files that it names, which are looked for in a folder.
+    """An experiment with the files that it names, which are looked for in a folder."""
 
-    `note` is called with a sentence where an index is built or a file was put right.
-    """
-
-    def __init__(
-        self, spec: ExperimentSpec, folder: Path, note: Callable[[str], None] | None = None
-    ) -> None:
-        self.spec, self.folder, self.note = spec, folder, note
+    def __init__(self, spec: ExperimentSpec, folder: Path) -> None:
+        self.spec, self.folder = spec, folder
         self._cities: dict[str, City] = {}
         self._locators: dict[str, Locator[Answer]] = {}
 
@@ -369,7 +364,6 @@ def run_experiment(
     folder: str | Path = ".",
     workers: int = 0,
     scheduler: str | None = None,
-    note: Callable[[str], None] | None = None,
     progress: Callable[[int, int], None] | None = None,
 ) -> dict[str, Evaluation]:
     """Run an experiment, or what is left of it.
@@ -388,8 +382,6 @@ def run_experiment(
     scheduler : str, optional
         Address of a dask scheduler, such as ``tcp://10.0.0.5:8786``, whose workers see the same
         files under the same paths; then `workers` stays 0.
-    note : callable, optional
-        Called with a sentence where an index is built.
     progress : callable, optional
         Called with the number of answers done and in all.
 
@@ -435,7 +427,6 @@ def run_experiment(
         folder=folder,
         workers=workers,
         scheduler=scheduler,
-        note=note,
         progress=progress,
     )[place]
 
@@ -446,7 +437,6 @@ def run_experiments(
     folder: str | Path = ".",
     workers: int = 0,
     scheduler: str | None = None,
-    note: Callable[[str], None] | None = None,
     progress: Callable[[int, int], None] | None = None,
 ) -> dict[Path, dict[str, Evaluation]]:
     """Run several experiments at once, or what is left of them.
@@ -455,7 +445,7 @@ def run_experiments(
     ----------
     specs : mapping of Path to ExperimentSpec
         The experiments by the folders for their results.
-    folder, workers, scheduler, note, progress : optional
+    folder, workers, scheduler, progress : optional
         As in `run_experiment`.
 
     Returns
@@ -483,7 +473,7 @@ def run_experiments(
     check_workers(workers, scheduler)
     running: dict[Path, tuple[ExperimentWork, Path]] = {}
     for out, spec in specs.items():
-        work = ExperimentWork(spec, Path(folder), note)
+        work = ExperimentWork(spec, Path(folder))
         recipe = {**spec.to_dict(), "inputs": work.digests(), "versions": versions()}
         target, partial_out = Path(os.path.realpath(out)), partial_folder(out)
         if target.exists():

@@ -305,7 +305,6 @@ def reproduce(
         {folder / EXPERIMENTS / name: spec for name, spec in specs.items()},
         folder=folder / VARIANTS,
         workers=workers,
-        note=note,
         progress=show("answering queries"),
     )
     if not (folder / TIMES).is_file():
