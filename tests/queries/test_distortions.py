@@ -320,9 +320,9 @@ def test_a_view_tells_where_it_looked(degrees: float, turn: float, one: Sight, s
     assert rows(there) == rows(untold)
     assert untold.photo == FULL_VIEW
     assert there.photo.width == pytest.approx(degrees)
-    middle = np.deg2rad(there.photo.turned(turn).sectors[0]).mean() if degrees < 360.0 else 0.0
+    middle = np.deg2rad(there.photo.turned(turn).sectors[0]).mean() if there.photo.sectors else 0.0
     turned = there.turned(turn)
-    if degrees < 360.0:  # its sectors turn with the objects in it
+    if there.photo.sectors:  # they turn with the objects in them
         found = np.deg2rad(turned.photo.sectors[0]).mean()
         assert np.exp(1j * found) == pytest.approx(np.exp(1j * middle), abs=1e-9)
         view = turned.signature
