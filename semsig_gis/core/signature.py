@@ -73,6 +73,12 @@ def quantize(bearings: ArrayLike, levels: int) -> NDArray[np.uint8]:
     return np.minimum(scaled, levels - 1).astype(np.uint8)
 
 
+def distance_units_of(distances: NDArray[np.float64], reach: float) -> NDArray[np.uint8]:
+    """Return the nearest whole units of distances in metres; `reach` and beyond are all of them."""
+    units = np.rint(distances * (DISTANCE_UNITS / reach))
+    return np.minimum(units, DISTANCE_UNITS).astype(np.uint8)
+
+
 def wrapped_bearings(bearings: Sequence[float] | NDArray[np.float64]) -> NDArray[np.float64]:
     """Return degrees clockwise from north, -360 to 360, on one turn; InputError for any other."""
     try:

@@ -12,7 +12,7 @@ from semsig_gis.core.effort import announce, require_memory
 from semsig_gis.core.errors import CrsError, EmptyResultError, InputError
 from semsig_gis.core.geometry import GridSpec, cell_ids, cells_near, consecutive, split_ids
 from semsig_gis.core.rtree import PackedIndex
-from semsig_gis.core.signature import BEARING_UNITS, DISTANCE_UNITS, SignatureSpec
+from semsig_gis.core.signature import BEARING_UNITS, SignatureSpec, distance_units_of
 from semsig_gis.database.database import SignatureDatabase
 from semsig_gis.database.occlusion import TOLERANCE_M, Footprints
 from semsig_gis.database.viewpoints import choose_viewpoints
@@ -178,13 +178,12 @@ def build_cells(
     ):
         order = clockwise_order(seen, codes)
         turned = np.floor(seen.bearing * (BEARING_UNITS / 360.0))
-        away = np.rint(seen.distance * (DISTANCE_UNITS / ranges.max()))
         blocks.append(
             (
                 np.bincount(seen.viewpoint, minlength=cells.stop - cells.start),
                 codes[seen.object][order],
                 np.minimum(turned, BEARING_UNITS - 1).astype(np.uint16)[order],
-                away.astype(np.uint8)[order],
+                distance_units_of(seen.distance, ranges.max())[order],
             )
         )
         if progress is not None:

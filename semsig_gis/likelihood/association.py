@@ -22,7 +22,7 @@ import numpy as np
 
 from semsig_gis.core.errors import InputError
 from semsig_gis.core.geometry import FULL_TURN, HALF_TURN, signed_degrees
-from semsig_gis.core.signature import DISTANCE_UNITS
+from semsig_gis.core.signature import distance_units_of
 from semsig_gis.core.view import View
 from semsig_gis.database.database import views_in
 from semsig_gis.likelihood.index import CellScores, own_sigma
@@ -211,7 +211,7 @@ def associate(
     rows, kinds = table.length_rows(lengths), table.row_of[views.codes]
     owners = np.repeat(np.arange(len(views)), views.lengths)
     distances = at_distances(table, views)
-    units = np.rint(distances * (DISTANCE_UNITS / table.reach)).astype(np.int64)
+    units = distance_units_of(distances, table.reach)
     spreads = np.hypot(table.sigma[kinds], np.degrees(table.position_sigma / distances))
     spreads = np.minimum(spreads, HALF_TURN)
     inside, squares = seen.inside(owners, views.bearings, spreads)
@@ -425,9 +425,11 @@ def _replaced(
     cells = cells[total[cells] > -np.inf]
     parts, done = [rank(cells[:first])], min(first, len(cells))
     while done < len(cells):
-        known = np.concatenate([part for part, _ in parts]) + (total - old)[cells[:done]]
-        last = known[-len(parts[-1][0]) :]
-        if np.logaddexp.reduce(last) < np.logaddexp.reduce(known) + HOPELESS:
+        logs = np.concatenate([part for part, _ in parts])
+        if log_prior is not None:
+            logs += log_prior[cells[:done]]
+        last = logs[-len(parts[-1][0]) :]
+        if np.logaddexp.reduce(last) < np.logaddexp.reduce(logs) + HOPELESS:
             break
         parts.append(rank(cells[done : 2 * done]))
         done = min(2 * done, len(cells))

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from semsig_gis.core.geometry import FULL_TURN
-from semsig_gis.core.signature import BEARING_UNITS, DISTANCE_UNITS
+from semsig_gis.core.signature import BEARING_UNITS, DISTANCE_UNITS, distance_units_of
 from semsig_gis.core.threads import share_rows
 from semsig_gis.core.view import View, check_north
 from semsig_gis.likelihood.noise.model import ROUNDING, cell_noise, place_noise
@@ -173,8 +173,7 @@ class LikelihoodIndex:
         def look(part: NDArray[np.int64]) -> None:
             seen = views_aside(self.database, cells[slice(*part)], places)
             bins = (seen.bearings * (BINS / FULL_TURN)).astype(np.uint16) % np.uint16(BINS)
-            units = np.rint(seen.distances * (DISTANCE_UNITS / levels.table.reach))
-            units = np.minimum(units, DISTANCE_UNITS).astype(np.uint8)
+            units = distance_units_of(seen.distances, levels.table.reach)
             entries = levels.entries(seen.offsets, seen.codes, bins, units)
             total = np.zeros(len(seen))
             for photo in view.split():

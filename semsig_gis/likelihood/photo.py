@@ -26,7 +26,7 @@ import numpy as np
 
 from semsig_gis.core.errors import InputError
 from semsig_gis.core.geometry import FULL_TURN
-from semsig_gis.core.signature import BEARING_UNITS, DISTANCE_UNITS
+from semsig_gis.core.signature import BEARING_UNITS, DISTANCE_UNITS, distance_units_of
 from semsig_gis.core.taxonomy import WILDCARD
 from semsig_gis.core.threads import share_rows
 
@@ -124,7 +124,6 @@ def photo_loglik(
     first = tables[0]
     bearing_units = np.minimum(views.bearings * (BEARING_UNITS / FULL_TURN), BEARING_UNITS - 1)
     kinds = first.row_of[views.codes]
-    distance_units = np.rint(views.distances * (DISTANCE_UNITS / first.reach))
     # Half a unit is rounding.
     beyond = views.distances > first.ranges[kinds] + first.reach / DISTANCE_UNITS / 2.0
     logliks = np.empty((len(tables), *turns.shape))
@@ -137,7 +136,7 @@ def photo_loglik(
         offsets=views.offsets,
         kinds=kinds,
         bearing_units=bearing_units.astype(np.uint16),
-        distance_units=np.minimum(distance_units, DISTANCE_UNITS).astype(np.uint8),
+        distance_units=distance_units_of(views.distances, first.reach),
         beyond=beyond,
         unit=FULL_TURN / BEARING_UNITS,
         bearings=photo.bearings,

@@ -17,7 +17,7 @@ import numpy as np
 from semsig_gis.core.errors import InputError, UnknownNameError, nearest_name
 from semsig_gis.core.geometry import FULL_TURN, angular_distance, wrap_degrees
 from semsig_gis.core.ranges import require_number
-from semsig_gis.core.signature import DISTANCE_UNITS, Signature
+from semsig_gis.core.signature import Signature, distance_units_of
 from semsig_gis.core.taxonomy import MAX_RANGE_M
 from semsig_gis.core.view import CLASSES, Photo
 from semsig_gis.database.views import bearings
@@ -274,9 +274,8 @@ class Detector:
         """Return the objects that are detected, under the names and bearings they are given."""
         length = min(len(sight), len(table.missed) - 1)
         chances = 1.0 - table.missed[length, table.row_of[sight.codes]]
-        units = np.rint(sight.distances * (DISTANCE_UNITS / table.reach)).astype(np.int64)
         kinds = table.row_of[sight.codes]
-        chances *= table.fading[kinds, np.minimum(units, DISTANCE_UNITS)]
+        chances *= table.fading[kinds, distance_units_of(sight.distances, table.reach)]
         chances *= np.exp2(-((sight.distances / self.half) ** 2))
         seen = sight.only(rng.random(len(sight)) < chances)
         kinds = table.row_of[seen.codes]

@@ -17,7 +17,7 @@ import numpy as np
 import pandas as pd
 
 from semsig_gis.core.errors import InputError
-from semsig_gis.core.signature import DISTANCE_UNITS
+from semsig_gis.core.signature import DISTANCE_UNITS, distance_units_of
 from semsig_gis.core.statistics import log_interval, poisson_interval, wilson_interval
 from semsig_gis.core.taxonomy import WILDCARD
 from semsig_gis.core.view import View
@@ -217,7 +217,7 @@ def _detections(
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Return how often each object was detected of how often it was in sight, by knot."""
     kinds, near = evidence.kinds, model.detected[0, evidence.kinds]
-    units = np.rint(evidence.distances * (DISTANCE_UNITS / model.reach)).astype(np.int64)
+    units = distance_units_of(evidence.distances, model.reach)
     hits = np.bincount(evidence.pairs.objects, found.chances, len(kinds))
     hits = np.clip(hits, 0.0, 1.0)
     # Of what was not detected, so much was in range and in the sectors.
