@@ -98,7 +98,6 @@ def align(  # noqa: C901, PLR0912, PLR0915, PLR0917 - a kernel takes no keywords
     weight = np.empty(pairs)
     forth = np.empty(pairs)  # messages from the objects of the place to those of the query
     back = np.empty(pairs)
-    at_left = np.empty(most)
     at_right = np.empty(size)
     floor = np.empty(size)
     named = np.empty((most, size))
@@ -193,13 +192,12 @@ def align(  # noqa: C901, PLR0912, PLR0915, PLR0917 - a kernel takes no keywords
                         back[edge] = new
                     if settled:
                         break
-                for one in range(count):
-                    at_left[one] = 1.0
-                    for edge in range(ends[one], ends[one + 1]):
-                        at_left[one] += weight[edge] * back[edge]
                 product = 1.0
                 for one in range(count):
-                    product *= at_left[one]
+                    here = 1.0
+                    for edge in range(ends[one], ends[one + 1]):
+                        here += weight[edge] * back[edge]
+                    product *= here
                     if product > _LARGE:
                         total += math.log(product)
                         product = 1.0
@@ -322,7 +320,7 @@ def mass_rows(
 
 
 @compiled
-def scan(  # noqa: C901, PLR0915, PLR0917
+def scan(  # noqa: PLR0915, PLR0917
     part: NDArray[np.int64],
     offsets: NDArray[np.int64],
     kinds: NDArray[np.uint8],
@@ -355,7 +353,7 @@ def scan(  # noqa: C901, PLR0915, PLR0917
     lanes, width_u, levels_u = np.uint64(LANES), np.uint64(blocks * LANES), np.uint64(levels)
     flat_rows, flat_named, flat_masses = rows.ravel(), named.ravel(), masses.ravel()
     flat_chances, flat_leaving = chances.ravel(), leaving.ravel()
-    partial, moving = len(flat_masses) > 0, leaving.max() > 0.0
+    partial = len(flat_masses) > 0
     starts = (group_of * (levels * bins)).astype(np.uint64)
     shift = np.uint64(int(math.log2(bins) + 0.5))
     one_f = np.float32(1.0)
@@ -373,7 +371,7 @@ def scan(  # noqa: C901, PLR0915, PLR0917
                 name = length + kind
                 level = name * levels_u + (place >> shift)
                 place += starts[kind]
-                chance = flat_chances[level]
+                chance, left = flat_chances[level], flat_leaving[level]
                 missed = one_f - chance
                 if partial:
                     missed = one_f - chance * flat_masses[place]
@@ -382,37 +380,25 @@ def scan(  # noqa: C901, PLR0915, PLR0917
                     if product < 1.0 / _LARGE:
                         total += math.log(product)
                         product = 1.0
-                    if moving:
-                        gone += flat_leaving[level]
+                    gone += left
                 odds = chance / missed
                 at, name = (place + above) * lanes, name * width_u + first
-                if moving:
-                    left = flat_leaving[level]
-                    b0 = odds * flat_rows[at] + left * disc[first]
-                    a0 += b0 * flat_named[name]
-                    b1 = odds * flat_rows[at + np.uint64(1)] + left * disc[first + np.uint64(1)]
-                    a1 += b1 * flat_named[name + np.uint64(1)]
-                    b2 = odds * flat_rows[at + np.uint64(2)] + left * disc[first + np.uint64(2)]
-                    a2 += b2 * flat_named[name + np.uint64(2)]
-                    b3 = odds * flat_rows[at + np.uint64(3)] + left * disc[first + np.uint64(3)]
-                    a3 += b3 * flat_named[name + np.uint64(3)]
-                    b4 = odds * flat_rows[at + np.uint64(4)] + left * disc[first + np.uint64(4)]
-                    a4 += b4 * flat_named[name + np.uint64(4)]
-                    b5 = odds * flat_rows[at + np.uint64(5)] + left * disc[first + np.uint64(5)]
-                    a5 += b5 * flat_named[name + np.uint64(5)]
-                    b6 = odds * flat_rows[at + np.uint64(6)] + left * disc[first + np.uint64(6)]
-                    a6 += b6 * flat_named[name + np.uint64(6)]
-                    b7 = odds * flat_rows[at + np.uint64(7)] + left * disc[first + np.uint64(7)]
-                    a7 += b7 * flat_named[name + np.uint64(7)]
-                else:
-                    a0 += odds * flat_rows[at] * flat_named[name]
-                    a1 += odds * flat_rows[at + np.uint64(1)] * flat_named[name + np.uint64(1)]
-                    a2 += odds * flat_rows[at + np.uint64(2)] * flat_named[name + np.uint64(2)]
-                    a3 += odds * flat_rows[at + np.uint64(3)] * flat_named[name + np.uint64(3)]
-                    a4 += odds * flat_rows[at + np.uint64(4)] * flat_named[name + np.uint64(4)]
-                    a5 += odds * flat_rows[at + np.uint64(5)] * flat_named[name + np.uint64(5)]
-                    a6 += odds * flat_rows[at + np.uint64(6)] * flat_named[name + np.uint64(6)]
-                    a7 += odds * flat_rows[at + np.uint64(7)] * flat_named[name + np.uint64(7)]
+                b0 = odds * flat_rows[at] + left * disc[first]
+                a0 += b0 * flat_named[name]
+                b1 = odds * flat_rows[at + np.uint64(1)] + left * disc[first + np.uint64(1)]
+                a1 += b1 * flat_named[name + np.uint64(1)]
+                b2 = odds * flat_rows[at + np.uint64(2)] + left * disc[first + np.uint64(2)]
+                a2 += b2 * flat_named[name + np.uint64(2)]
+                b3 = odds * flat_rows[at + np.uint64(3)] + left * disc[first + np.uint64(3)]
+                a3 += b3 * flat_named[name + np.uint64(3)]
+                b4 = odds * flat_rows[at + np.uint64(4)] + left * disc[first + np.uint64(4)]
+                a4 += b4 * flat_named[name + np.uint64(4)]
+                b5 = odds * flat_rows[at + np.uint64(5)] + left * disc[first + np.uint64(5)]
+                a5 += b5 * flat_named[name + np.uint64(5)]
+                b6 = odds * flat_rows[at + np.uint64(6)] + left * disc[first + np.uint64(6)]
+                a6 += b6 * flat_named[name + np.uint64(6)]
+                b7 = odds * flat_rows[at + np.uint64(7)] + left * disc[first + np.uint64(7)]
+                a7 += b7 * flat_named[name + np.uint64(7)]
             sums[0] = a0
             sums[1] = a1
             sums[2] = a2
