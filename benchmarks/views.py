@@ -124,19 +124,12 @@ def main() -> None:
         print("Real cities are left out: SEMSIG_GEODATA does not name the folder of open data.")
     rows = json.loads(options.out.read_text("utf-8")) if options.out.exists() else []
     for name in names:
-        cases = [
-            {
-                "city": name,
-                **asdict(line),
-                "wanted": options.queries or (10 if small else _number(name, line)),
-            }
-            for line in lines()
-        ]
-        missing = {
-            line: case["wanted"]
-            for line, case in zip(lines(), cases, strict=True)
-            if not any(case.items() <= row.items() for row in rows)
-        }
+        missing = {}
+        for line in lines():
+            wanted = options.queries or (10 if small else _number(name, line))
+            case = {"city": name, **asdict(line), "wanted": wanted}
+            if not any(case.items() <= row.items() for row in rows):
+                missing[line] = wanted
         for row in _rows(name, options.geodata, missing, options.processes, small=small):
             print(_text(row), flush=True)
             rows.append(row)

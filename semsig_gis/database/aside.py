@@ -38,11 +38,11 @@ def views_aside(
     columns, rows = database.columns[cells].astype(np.int64), database.rows[cells].astype(np.int64)
     ids, around = database.cell_ids, np.full((len(cells), len(AROUND)), -1)
     for aside in np.unique(np.append(np.sign(places[:, 0]), 0)).astype(np.int64).tolist():
-        found = np.searchsorted(ids, cell_ids(columns + aside, rows - 1))
+        number = np.searchsorted(ids, cell_ids(columns + aside, rows - 1))
         for up in (-1, 0, 1):  # the cells of a column follow each other
-            there = ids[np.minimum(found, len(ids) - 1)] == cell_ids(columns + aside, rows + up)
-            around[there, AROUND.index((aside, up))] = found[there]
-            found += there
+            there = ids[np.minimum(number, len(ids) - 1)] == cell_ids(columns + aside, rows + up)
+            around[there, AROUND.index((aside, up))] = number[there]
+            number += there
     angles = np.radians((np.arange(BEARING_UNITS) + 0.5) * (FULL_TURN / BEARING_UNITS))
     metre = database.reach / DISTANCE_UNITS
     ranges = database.taxonomy.ranges(database.spec.radius)
@@ -110,21 +110,21 @@ def _look(  # noqa: C901, PLR0912, PLR0917 - a kernel takes no keywords
     """
     counting = len(codes) == 0
     sources = np.empty(4, np.int64)
-    for cell in range(part[0], part[1]):
-        for place in range(len(places)):
-            dx, dy = places[place, 0], places[place, 1]
-            aside, up = int(np.sign(dx)), int(np.sign(dy))
-            sources[0] = OWN
-            size = 1
-            if aside != 0:
-                sources[size] = OWN + 3 * aside
-                size += 1
-            if up != 0:
-                sources[size] = OWN + up
-                size += 1
-            if aside != 0 and up != 0:
-                sources[size] = OWN + 3 * aside + up
-                size += 1
+    for place in range(len(places)):
+        dx, dy = places[place, 0], places[place, 1]
+        aside, up = int(np.sign(dx)), int(np.sign(dy))
+        sources[0] = OWN
+        size = 1
+        if aside != 0:
+            sources[size] = OWN + 3 * aside
+            size += 1
+        if up != 0:
+            sources[size] = OWN + up
+            size += 1
+        if aside != 0 and up != 0:
+            sources[size] = OWN + 3 * aside + up
+            size += 1
+        for cell in range(part[0], part[1]):
             whole = True
             for one in range(size):
                 whole &= around[cell, sources[one]] >= 0
@@ -143,13 +143,13 @@ def _look(  # noqa: C901, PLR0912, PLR0917 - a kernel takes no keywords
                     away = (x - dx) ** 2 + (y - dy) ** 2
                     if away > reach and not (one == 0 and (size == 1 or not whole)):
                         continue
-                    known = False
-                    for other in range(one):  # what these see, too, is known already
+                    twice = False
+                    for other in range(one):  # what these see, too, is there already
                         if around[cell, sources[other]] >= 0:
                             there_x = (sources[other] // 3 - 1) * step
                             there_y = (sources[other] % 3 - 1) * step
-                            known |= (x - there_x) ** 2 + (y - there_y) ** 2 <= reach
-                    if known:
+                            twice |= (x - there_x) ** 2 + (y - there_y) ** 2 <= reach
+                    if twice:
                         continue
                     if not counting:
                         turn = math.degrees(math.atan2(x - dx, y - dy))
