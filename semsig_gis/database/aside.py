@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -23,6 +22,7 @@ CELLS_A_PART = 64  # that are worth a thread
 # The cells around a cell, at 3 * (columns + 1) + (rows + 1).
 AROUND = tuple((aside, up) for aside in (-1, 0, 1) for up in (-1, 0, 1))
 OWN = AROUND.index((0, 0))
+FIRST_ROOM = 4096  # entries
 
 
 def views_aside(
@@ -31,7 +31,7 @@ def views_aside(
     """Return what is seen from some cells at places other than their middles, by the cells alone.
 
     The places, shape (p, 2), are metres to the east and north of the middle and less than a cell
-    away; that of place i and cell j is view ``i * len(cells) + j``. What comes into range there is
+    away; that of cell i and place j is view ``i * len(places) + j``. What comes into range there is
     known from the cells on that side; where one of these is missing, what has left the range is
     kept, at its distance.
     """
@@ -45,117 +45,138 @@ def views_aside(
             number += there
     angles = np.radians((np.arange(BEARING_UNITS) + 0.5) * (FULL_TURN / BEARING_UNITS))
     metre = database.reach / DISTANCE_UNITS
-    ranges = database.taxonomy.ranges(database.spec.radius)
-    codes, turns, distances = np.empty(0, np.uint8), np.empty(0), np.empty(0)
-    starts = np.zeros(len(places) * len(cells) + 1, np.int64)
-    for counted in (False, True):
-        if counted:
-            np.cumsum(starts, out=starts)
-            codes = np.empty(starts[-1], np.uint8)
-            turns, distances = np.empty(starts[-1]), np.empty(starts[-1])
-        work = partial(
-            _look,
-            around=around,
-            places=np.ascontiguousarray(places, dtype=np.float64),
-            step=float(database.grid.step),
-            offsets=database.offsets,
-            seen_codes=database.codes,
-            bearing_units=database.bearing_units,
-            distance_units=database.distance_units,
-            ranges=ranges,
+    parts = {}
+
+    def look(part: NDArray[np.int64]) -> None:
+        parts[int(part[0])] = _look(
+            part,
+            around,
+            np.ascontiguousarray(places, dtype=np.float64),
+            float(database.grid.step),
+            database.offsets,
+            database.codes,
+            database.bearing_units,
+            database.distance_units,
+            database.taxonomy.ranges(database.spec.radius),
             # What is nearest is not at the very place.
-            metres=np.maximum(np.arange(DISTANCE_UNITS + 1), 0.5) * metre,
-            east=np.sin(angles),
-            north=np.cos(angles),
-            starts=starts,
-            codes=codes,
-            turns=turns,
-            distances=distances,
+            np.maximum(np.arange(DISTANCE_UNITS + 1), 0.5) * metre,
+            np.sin(angles),
+            np.cos(angles),
         )
-        share_rows(work, len(cells), least=CELLS_A_PART)
+
+    share_rows(look, len(cells), least=CELLS_A_PART)
+    lengths, codes, bearings, distances = (
+        np.concatenate(values)
+        for values in zip(*(parts[first] for first in sorted(parts)), strict=True)
+    )
     return Views(
-        offsets=starts,
+        offsets=np.append(0, np.cumsum(lengths)),
         objects=np.full(len(codes), -1),
         codes=codes,
-        bearings=turns,
+        bearings=bearings,
         distances=distances,
     )
 
 
 @compiled
-def _look(  # noqa: C901, PLR0912, PLR0917 - a kernel takes no keywords
+def _longer(
+    codes: NDArray[np.uint8], turns: NDArray[np.float64], distances: NDArray[np.float64], size: int
+) -> tuple[NDArray[np.uint8], NDArray[np.float64], NDArray[np.float64]]:
+    """Return the arrays with room for so many."""
+    more = np.empty(size, np.uint8), np.empty(size), np.empty(size)
+    more[0][: len(codes)] = codes
+    more[1][: len(codes)] = turns
+    more[2][: len(codes)] = distances
+    return more
+
+
+@compiled
+def _look(  # noqa: C901, PLR0912, PLR0914, PLR0915, PLR0917 - a kernel takes no keywords
     part: NDArray[np.int64],
     around: NDArray[np.int64],
     places: NDArray[np.float64],
     step: float,
     offsets: NDArray[np.int64],
-    seen_codes: NDArray[np.uint8],
+    codes: NDArray[np.uint8],
     bearing_units: NDArray[np.uint16],
     distance_units: NDArray[np.uint8],
     ranges: NDArray[np.float64],
     metres: NDArray[np.float64],
     east: NDArray[np.float64],
     north: NDArray[np.float64],
-    starts: NDArray[np.int64],
-    codes: NDArray[np.uint8],
-    turns: NDArray[np.float64],
-    distances: NDArray[np.float64],
-) -> None:
+) -> tuple[NDArray[np.int64], NDArray[np.uint8], NDArray[np.float64], NDArray[np.float64]]:
     """Look around at all places of the cells ``part[0]`` to ``part[1] - 1``.
 
-    `around` has the rows of the cells around each, -1 where there is none. Without room in `codes`,
-    what is seen in view i is counted in ``starts[i + 1]``; else it is written from ``starts[i]`` on
-    to `codes`, `turns` (degrees) and `distances`. `metres` is by distance unit, `east` and `north`
-    of a metre by bearing unit, `ranges` by class code.
+    `around` has the rows of the cells around each, -1 where there is none. `metres` is by distance
+    unit, `east` and `north` of a metre by bearing unit, `ranges` by class code. Returns how much is
+    seen from each place, and the class code, bearing in degrees and distance of all that is.
     """
-    counting = len(codes) == 0
+    here = np.empty(len(AROUND) + 1, np.int64)  # where the entries of each cell around start
+    most = len(AROUND) * np.max(offsets[1:] - offsets[:-1])
+    x, y, reach = np.empty(most), np.empty(most), np.empty(most)
+    kinds = np.empty(most, np.uint8)
     sources = np.empty(4, np.int64)
-    for place in range(len(places)):
-        dx, dy = places[place, 0], places[place, 1]
-        aside, up = int(np.sign(dx)), int(np.sign(dy))
-        sources[0] = OWN
-        size = 1
-        if aside != 0:
-            sources[size] = OWN + 3 * aside
-            size += 1
-        if up != 0:
-            sources[size] = OWN + up
-            size += 1
-        if aside != 0 and up != 0:
-            sources[size] = OWN + 3 * aside + up
-            size += 1
-        for cell in range(part[0], part[1]):
-            whole = True
-            for one in range(size):
+    lengths = np.empty((part[1] - part[0]) * len(places), np.int64)
+    seen, turns, distances = np.empty(0, np.uint8), np.empty(0), np.empty(0)
+    view = at = 0
+    for cell in range(part[0], part[1]):
+        size = 0
+        for source in range(len(AROUND)):
+            here[source] = size
+            row = around[cell, source]
+            if row < 0:
+                continue
+            right, above = (source // 3 - 1) * step, (source % 3 - 1) * step
+            for entry in range(offsets[row], offsets[row + 1]):
+                metre, angle = metres[distance_units[entry]], bearing_units[entry]
+                x[size], y[size] = metre * east[angle] + right, metre * north[angle] + above
+                kinds[size] = codes[entry]
+                reach[size] = ranges[codes[entry]] ** 2
+                # What the cell itself sees, too, is there already.
+                if source == OWN or x[size] ** 2 + y[size] ** 2 > reach[size]:
+                    size += 1
+        here[len(AROUND)] = size
+        if at + size * len(places) > len(seen):
+            room = 2 * len(seen) + size * len(places) + FIRST_ROOM
+            seen, turns, distances = _longer(seen, turns, distances, room)
+        for place in range(len(places)):
+            dx, dy = places[place, 0], places[place, 1]
+            aside, up = int(np.sign(dx)), int(np.sign(dy))
+            sources[0] = OWN
+            used = 1
+            if aside != 0:
+                sources[used] = OWN + 3 * aside
+                used += 1
+            if up != 0:
+                sources[used] = OWN + up
+                used += 1
+            if aside != 0 and up != 0:
+                sources[used] = OWN + 3 * aside + up
+                used += 1
+            whole = used > 1
+            for one in range(used):
                 whole &= around[cell, sources[one]] >= 0
-            view = place * len(around) + cell
-            at = 0 if counting else starts[view]
-            for one in range(size):
-                row = around[cell, sources[one]]
-                if row < 0:
-                    continue
-                right = (sources[one] // 3 - 1) * step
-                above = (sources[one] % 3 - 1) * step
-                for entry in range(offsets[row], offsets[row + 1]):
-                    metre, angle = metres[distance_units[entry]], bearing_units[entry]
-                    x, y = metre * east[angle] + right, metre * north[angle] + above
-                    reach = ranges[seen_codes[entry]] ** 2
-                    away = (x - dx) ** 2 + (y - dy) ** 2
-                    if away > reach and not (one == 0 and (size == 1 or not whole)):
+            first = at
+            for one in range(used):
+                kept = one == 0 and not whole
+                for entry in range(here[sources[one]], here[sources[one] + 1]):
+                    away_x, away_y = x[entry] - dx, y[entry] - dy
+                    away = away_x**2 + away_y**2
+                    if away > reach[entry] and not kept:
                         continue
                     twice = False
-                    for other in range(one):  # what these see, too, is there already
+                    for other in range(1, one):
                         if around[cell, sources[other]] >= 0:
-                            there_x = (sources[other] // 3 - 1) * step
-                            there_y = (sources[other] % 3 - 1) * step
-                            twice |= (x - there_x) ** 2 + (y - there_y) ** 2 <= reach
+                            there_x = x[entry] - (sources[other] // 3 - 1) * step
+                            there_y = y[entry] - (sources[other] % 3 - 1) * step
+                            twice |= there_x**2 + there_y**2 <= reach[entry]
                     if twice:
                         continue
-                    if not counting:
-                        turn = math.degrees(math.atan2(x - dx, y - dy))
-                        codes[at] = seen_codes[entry]
-                        turns[at] = turn if turn >= 0.0 else turn + FULL_TURN
-                        distances[at] = math.sqrt(away)
+                    turn = math.degrees(math.atan2(away_x, away_y))
+                    seen[at] = kinds[entry]
+                    turns[at] = turn if turn >= 0.0 else turn + FULL_TURN
+                    distances[at] = math.sqrt(away)
                     at += 1
-            if counting:
-                starts[view + 1] = at
+            lengths[view] = at - first
+            view += 1
+    return lengths, seen[:at], turns[:at], distances[:at]

@@ -376,8 +376,9 @@ def rerank(
         return scores
     loglik = scores.loglik.astype(np.float64)
     if aside and len(index.stands[1]) > 1:
+        scorer = index.scorer_aside(view, north_sigma=north_sigma)
         loglik, _, _ = _replaced(
-            lambda some: (index.scores_aside(view, some, north_sigma=north_sigma), []),
+            lambda some: (scorer(some), []),
             loglik,
             log_prior,
             count=ASIDE,
@@ -488,16 +489,17 @@ def _aligned(
 
     models, places = index.stands if aside else (index.models, np.zeros((1, 2)))
     seen = views_aside(index.database, cells, places)
-    total, likeliest = np.zeros((len(places), len(cells))), []
+    total, likeliest = np.zeros((len(cells), len(places))), []
     for photo, heading in zip(view.split(), scores.headings, strict=True):
         turns = np.zeros((len(cells), 1)) if heading is None else heading[cells, None] + TURNS
         asked = PhotoTable.of(photo, index.table)
-        everywhere = np.tile(turns, (len(places), 1))
+        everywhere = np.repeat(turns, len(places), axis=0)
         logliks = photo_loglik(asked, seen, *models, turns=everywhere)
-        logliks = logliks.reshape(len(places), *turns.shape)
+        logliks = logliks.reshape(len(cells), len(places), -1)
         if heading is not None:
-            logliks += turn_logs(turns, TURNS[1] - TURNS[0], own_sigma(photo, north_sigma))
-        best = np.logaddexp.reduce(logliks, axis=0).argmax(axis=1)
+            chances = turn_logs(turns, TURNS[1] - TURNS[0], own_sigma(photo, north_sigma))
+            logliks += chances[:, None]
+        best = np.logaddexp.reduce(logliks, axis=1).argmax(axis=1)
         likeliest.append(turns[np.arange(len(cells)), best])
         total += np.logaddexp.reduce(logliks, axis=2)
-    return np.logaddexp.reduce(total, axis=0) - math.log(len(places)), likeliest
+    return np.logaddexp.reduce(total, axis=1) - math.log(len(places)), likeliest

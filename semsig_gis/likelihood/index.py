@@ -25,6 +25,8 @@ from semsig_gis.likelihood.noise.table import database_tables, mean_table
 from semsig_gis.likelihood.photo import PhotoTable
 
 if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+
     from numpy.typing import NDArray
 
     from semsig_gis.core.signature import Signature
@@ -33,6 +35,7 @@ if TYPE_CHECKING:
     from semsig_gis.likelihood.noise.table import NoiseTable
 
     _Models = tuple[tuple[NoiseTable, ...], NDArray[np.float64]]
+    _Scorer = Callable[["_Entries"], tuple[NDArray[np.float32], NDArray[np.float32] | None]]
 
 BINS = 512
 """Bearing steps of an object."""
@@ -153,21 +156,31 @@ class LikelihoodIndex:
         headings = []
         for photo in view.split():
             sigma = own_sigma(photo, north_sigma)
-            own, heading = _of_photo(photo, self._levels, self._entries, sigma)
+            own, heading = _scorer(photo, self._levels, sigma)(self._entries)
             loglik += own
             headings.append(heading)
         return CellScores(loglik=loglik, headings=tuple(headings))
 
-    def scores_aside(
-        self, view: View, cells: NDArray[np.int64], *, north_sigma: float
-    ) -> NDArray[np.float64]:
-        """Return the log-likelihood of a view in some cells, summed over four places in each.
+    def scorer_aside(
+        self, view: View, *, north_sigma: float
+    ) -> Callable[[NDArray[np.int64]], NDArray[np.float64]]:
+        """Return what gives the log-likelihood of a view in some cells, at four places in each.
 
         It is the sum of `scores`, but who stands aside sees all objects aside.
         """
+        levels, places = self._quarters
+        scorers = [_scorer(one, levels, own_sigma(one, north_sigma)) for one in view.split()]
+        return partial(self._aside, scorers, levels, places)
+
+    def _aside(
+        self,
+        scorers: Sequence[_Scorer],
+        levels: _Levels,
+        places: NDArray[np.float64],
+        cells: NDArray[np.int64],
+    ) -> NDArray[np.float64]:
         from semsig_gis.database.aside import views_aside  # noqa: PLC0415 - numba loads slowly
 
-        levels, places = self._quarters
         loglik = np.empty(len(cells))
 
         def look(part: NDArray[np.int64]) -> None:
@@ -175,11 +188,9 @@ class LikelihoodIndex:
             bins = (seen.bearings * (BINS / FULL_TURN)).astype(np.uint16) % np.uint16(BINS)
             units = distance_units_of(seen.distances, levels.table.reach)
             entries = levels.entries(seen.offsets, seen.codes, bins, units)
-            total = np.zeros(len(seen))
-            for photo in view.split():
-                total += _of_photo(photo, levels, entries, own_sigma(photo, north_sigma))[0]
-            by_place = total.reshape(len(places), -1)
-            loglik[slice(*part)] = np.logaddexp.reduce(by_place, axis=0) - math.log(len(places))
+            total = sum(scorer(entries)[0] for scorer in scorers)
+            by_place = np.asarray(total, np.float64).reshape(-1, len(places))
+            loglik[slice(*part)] = np.logaddexp.reduce(by_place, axis=1) - math.log(len(places))
 
         share_rows(look, len(cells), least=CELLS_A_PART)
         return loglik
@@ -203,10 +214,8 @@ class LikelihoodIndex:
         return distinct[types.inverse]
 
 
-def _of_photo(
-    photo: View, levels: _Levels, entries: _Entries, north_sigma: float
-) -> tuple[NDArray[np.float32], NDArray[np.float32] | None]:
-    """Return the log-likelihood of one photo in every place, and its likeliest turns."""
+def _scorer(photo: View, levels: _Levels, north_sigma: float) -> _Scorer:
+    """Return what gives the log-likelihood of a photo in every place, and its likeliest turns."""
     from semsig_gis.likelihood.kernels import scan, scan_turned  # noqa: PLC0415 - slow to load
 
     table = levels.table
@@ -214,46 +223,44 @@ def _of_photo(
     density = asked.density(table)
     rows, masses = levels.rows(asked), levels.masses(asked)
     named = asked.named(table)[: len(levels.chances)] / density
-    size = len(entries.offsets) - 1
-    scores = np.empty(size, np.float32)
     what: dict[str, Any] = {
-        "offsets": entries.offsets,
-        "kinds": entries.kinds,
-        "places": entries.places,
         "group_of": levels.group_of,
         "width": asked.width,
         "chances": levels.chances,
         "leaving": levels.leaving,
         "base": float(np.log(density).sum() - table.clutter.sum() * asked.width),
-        "scores": scores,
     }
-    if north_sigma == 0:
-        work = partial(
-            scan,
-            **what,
-            rows=rows,
-            masses=masses,
-            named=_padded(named),
-            disc=_padded(asked.disc / FULL_TURN),
-        )
-        share_rows(work, size)
-        return scores, None
-    first, priors = _turns(north_sigma)
-    best = np.empty(size, np.int16)
-    by_detection = np.moveaxis(rows, 4, 1).reshape(-1, *rows.shape[1:4])[: len(density)]
-    work = partial(
-        scan_turned,
-        **what,
-        rows=_turned(by_detection),
-        masses=_turned(masses),
-        named=named.astype(np.float32),
-        disc=(asked.disc / FULL_TURN).astype(np.float32),
-        first=first,
-        priors=priors,
-        best=best,
-    )
-    share_rows(work, size)
-    return scores, best * np.float32(FULL_TURN / TURNS)
+    turned = north_sigma != 0.0
+    if turned:
+        by_detection = np.moveaxis(rows, 4, 1).reshape(-1, *rows.shape[1:4])[: len(density)]
+        first, priors = _turns(north_sigma)
+        what |= {
+            "rows": _turned(by_detection),
+            "masses": _turned(masses),
+            "named": named.astype(np.float32),
+            "disc": (asked.disc / FULL_TURN).astype(np.float32),
+            "first": first,
+            "priors": priors,
+        }
+    else:
+        what |= {
+            "rows": rows,
+            "masses": masses,
+            "named": _padded(named),
+            "disc": _padded(asked.disc / FULL_TURN),
+        }
+
+    def score(seen: _Entries) -> tuple[NDArray[np.float32], NDArray[np.float32] | None]:
+        size = len(seen.offsets) - 1
+        scores, best = np.empty(size, np.float32), np.empty(size if turned else 0, np.int16)
+        places = {"offsets": seen.offsets, "kinds": seen.kinds, "places": seen.places}
+        if not turned:
+            share_rows(partial(scan, **places, **what, scores=scores), size)
+            return scores, None
+        share_rows(partial(scan_turned, **places, **what, scores=scores, best=best), size)
+        return scores, best * np.float32(FULL_TURN / TURNS)
+
+    return score
 
 
 def own_sigma(photo: View, north_sigma: float) -> float:

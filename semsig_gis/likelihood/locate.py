@@ -398,10 +398,8 @@ class LikelihoodLocator:
     ) -> Refinement:
         """Return the chances of the parts of the likeliest cells."""
         database, chances = posterior.database, posterior.chances
-        count = min(KEPT[0], len(chances))
-        cells = np.argpartition(-chances, count - 1)[:count]
+        cells = posterior.likeliest(KEPT[0])
         cells = cells[chances[cells] > 0]
-        cells = cells[np.argsort(-chances[cells], kind="stable")]
         return refine(
             query,
             database.xy[cells],
@@ -566,8 +564,7 @@ def _prior_notes(ratio: float | None) -> tuple[str, ...]:
 def _columns(scores: CellScores, posterior: Posterior, count: int) -> dict[str, NDArray[Any]]:
     """Return the likeliest cells, by column."""
     database, chances = posterior.database, posterior.chances
-    likely = np.argpartition(-chances, count - 1)[:count]
-    listed = likely[np.lexsort((likely, -chances[likely]))]
+    listed = posterior.likeliest(count)
     columns = {
         "rank": np.arange(1, count + 1),
         **candidate_columns(database, listed),

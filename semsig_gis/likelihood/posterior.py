@@ -43,6 +43,7 @@ if TYPE_CHECKING:
 
 
 LEAST_LOG = -700.0  # whose exponential is a number
+LEAST_MASS = 1e-9  # of the chance, in cells that need not be sorted
 PLACES = 1000
 """Likeliest cells among which the best place is looked for."""
 
@@ -66,6 +67,22 @@ class Posterior:
     database: SignatureDatabase
     chances: NDArray[np.float64]
 
+    @cached_property
+    def _likely(self) -> NDArray[np.int64]:
+        """The cells that hold all the chance but `LEAST_MASS`, likeliest first."""
+        level = LEAST_MASS / len(self.chances)
+        return _likeliest_first(self.chances, np.flatnonzero(self.chances >= level))
+
+    def likeliest(self, count: int) -> NDArray[np.int64]:
+        """Return the row numbers of so many cells, likeliest first, or all if there are fewer.
+        """
+        if count <= len(self._likely):
+            return self._likely[:count]
+        cells = np.arange(len(self.chances))
+        if count < len(cells):
+            cells = np.argpartition(-self.chances, count - 1)[:count]
+        return _likeliest_first(self.chances, cells)
+
     @property
     def entropy(self) -> float:
         """How much is not known of the cell, in bits: 0 for one cell, 1 for two alike, ..."""
@@ -81,10 +98,8 @@ class Posterior:
         if not 0 < share <= 1:
             msg = f"a region of a share of {share} was asked for; give a number above 0, at most 1."
             raise InputError(msg)
-        # Most of the cells hold next to nothing together and need not be sorted.
-        level = 0.5 * (1.0 - share) / len(self.chances)
-        some = self.chances >= level if level > 0 else self.chances > 0
-        cells = _likeliest_first(self.chances, np.flatnonzero(some))
+        cells = self._likely if share <= 1.0 - LEAST_MASS else self.likeliest(len(self.chances))
+        cells = cells[self.chances[cells] > 0]
         total = np.cumsum(self.chances[cells])
         # The small term keeps a sum of 0.9 - 1e-17 from asking for one cell more.
         return cells[: int(np.searchsorted(total, share * (1.0 - 1e-12))) + 1]
@@ -124,8 +139,7 @@ class Posterior:
         Of the thousand likeliest cells it is the one with most of the chance within `radius`
         metres, of equals the likeliest.
         """
-        count = min(PLACES, len(self.chances))
-        cells = np.sort(np.argpartition(-self.chances, count - 1)[:count])
+        cells = np.sort(self.likeliest(PLACES))
         # In steps, so that rounding does not choose among equals.
         mass = np.round(self.mass_within(radius, cells), 9)
         best = np.lexsort((-self.chances[cells], -mass))[0]

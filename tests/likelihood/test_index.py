@@ -15,6 +15,7 @@ from scipy.stats import binom, poisson
 from view_oracle import cell_loglik, random_view, scene_of, set_loglik, turned_loglik
 from worlds import random_town
 
+from semsig_gis.core.geometry import consecutive
 from semsig_gis.core.signature import Signature
 from semsig_gis.core.view import Photo, View
 from semsig_gis.database.aside import views_aside
@@ -135,12 +136,12 @@ def test_places_aside_are_summed_over(
     # What is seen there, as if it were in the middle of the cells.
     units = np.rint(seen.distances * 255.0 / town.reach).clip(0, 255)
     each = []
-    for first in range(0, len(seen), len(cells)):
-        ends = seen.offsets[first : first + len(cells) + 1]
-        part = slice(ends[0], ends[-1])
+    for place in range(len(places)):
+        views = np.arange(len(cells)) * len(places) + place
+        part = consecutive(seen.offsets[views], seen.lengths[views])
         there = replace(
             town.select(cells),
-            offsets=ends - ends[0],
+            offsets=np.append(0, np.cumsum(seen.lengths[views])),
             codes=seen.codes[part],
             bearing_units=np.floor(seen.bearings[part] * 20.0).astype(np.uint16),
             distance_units=units[part].astype(np.uint8),
@@ -149,7 +150,7 @@ def test_places_aside_are_summed_over(
         north = [[(0.0, 1.0)]]
         each.append([turned_loglik(scene, view, codes, north, set_loglik) for scene in scenes])
     expected = np.logaddexp.reduce(each, axis=0) - math.log(4)
-    found = build_index(town, cell_noise(noise, step)).scores_aside(view, cells, north_sigma=0.0)
+    found = build_index(town, cell_noise(noise, step)).scorer_aside(view, north_sigma=0.0)(cells)
     assert found == pytest.approx(expected, abs=0.5 * len(view))
     assert np.median(np.abs(found - expected)) < 0.1 * len(view)
 
