@@ -91,7 +91,7 @@ def _longer(
 
 
 @compiled
-def _look(  # noqa: C901, PLR0912, PLR0914, PLR0915, PLR0917 - a kernel takes no keywords
+def _look(  # noqa: C901, PLR0912, PLR0915, PLR0917 - a kernel takes no keywords
     part: NDArray[np.int64],
     around: NDArray[np.int64],
     places: NDArray[np.float64],

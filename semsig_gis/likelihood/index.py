@@ -253,7 +253,11 @@ def _scorer(photo: View, levels: _Levels, north_sigma: float) -> _Scorer:
     def score(seen: _Entries) -> tuple[NDArray[np.float32], NDArray[np.float32] | None]:
         size = len(seen.offsets) - 1
         scores, best = np.empty(size, np.float32), np.empty(size if turned else 0, np.int16)
-        places = {"offsets": seen.offsets, "kinds": seen.kinds, "places": seen.places}
+        places: dict[str, Any] = {
+            "offsets": seen.offsets,
+            "kinds": seen.kinds,
+            "places": seen.places,
+        }
         if not turned:
             share_rows(partial(scan, **places, **what, scores=scores), size)
             return scores, None

@@ -74,8 +74,7 @@ class Posterior:
         return _likeliest_first(self.chances, np.flatnonzero(self.chances >= level))
 
     def likeliest(self, count: int) -> NDArray[np.int64]:
-        """Return the row numbers of so many cells, likeliest first, or all if there are fewer.
-        """
+        """Return the row numbers of so many cells, likeliest first, or all if there are fewer."""
         if count <= len(self._likely):
             return self._likely[:count]
         cells = np.arange(len(self.chances))
