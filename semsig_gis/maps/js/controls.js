@@ -28,6 +28,7 @@ semsig.colours = (map) => {
       L.DomEvent.stop(event);
       choice = remembered(semsig.isDark(map) ? "light" : "dark");
       show();
+      map.fire("semsig-state");
     });
     L.DomEvent.on(button, "keydown", (event) => {
       if (event.key !== " ") return;
@@ -35,6 +36,10 @@ semsig.colours = (map) => {
       button.click();
     });
     dark.addEventListener("change", show);
+    semsig.remember(map, "colours", () => choice, (text) => {
+      choice = text === "dark" ? "dark" : "light";
+      show();
+    });
     show();
     return bar;
   };
@@ -102,4 +107,7 @@ semsig.furnish = (map, layers, area, credits) => {
       paddingTopLeft: [left, 10], paddingBottomRight: [right, 10], maxZoom: zoom, animate: false,
     });
   }
+  semsig.rememberLayers(map, layers);
+  semsig.rememberPlace(map);
+  semsig.rememberTold(map);
 };

@@ -1,0 +1,101 @@
+"""The address of a page: what is seen of its map, as far as a link can tell."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+from urllib.parse import parse_qs, urlsplit
+
+import pytest
+from selenium.webdriver.support.wait import WebDriverWait
+from small_city import small_city
+
+from semsig_gis.maps.cells import ambiguity_map
+
+if TYPE_CHECKING:
+    from map_pages import MapPage
+
+SEEN = """
+return [map.getCenter().lat, map.getCenter().lng, map.getZoom(),
+  semsig.isDark(map), shown((layer) => layer instanceof L.ImageOverlay).length];
+"""
+
+
+@pytest.fixture
+def alike(page: MapPage) -> MapPage:
+    page.open(ambiguity_map(small_city()[0]))
+    return page
+
+
+def state(page: MapPage) -> dict[str, str]:
+    fragment = urlsplit(page.browser.current_url).fragment
+    return {key: values[0] for key, values in parse_qs(fragment).items()}
+
+
+def wait_for(page: MapPage, **parts: str | None) -> None:
+    """Wait until the address tells these parts, and not those that are None."""
+
+    def told(_: object) -> bool:
+        return all(state(page).get(key) == text for key, text in parts.items())
+
+    WebDriverWait(page.browser, 10.0).until(told)
+
+
+def follow(page: MapPage, address: str) -> None:
+    """Open an address as a link from elsewhere does."""
+    page.browser.get("about:blank")
+    page.browser.execute_cdp_cmd(
+        "Storage.clearDataForOrigin", {"origin": "file://", "storageTypes": "local_storage"}
+    )
+    for log in ("browser", "performance"):
+        page.browser.get_log(log)
+    page.browser.get(address)
+
+
+def test_a_link_shows_what_was_seen_when_it_was_copied(alike: MapPage) -> None:
+    assert state(alike) == {}
+    alike.switch("Same types and angle levels")
+    alike.switch("Tell of a cell when clicked")
+    wait_for(alike, layers="Same-types-and-angle-levels,~Tell-of-a-cell-when-clicked")
+    alike.ask("map.setView([43.5, 3.25], 15.25, {animate: false})")
+    alike.one(".semsig-colours").click()
+    wait_for(alike, place="43.50000,3.25000,15.25", colours="dark")
+    seen, link = alike.ask(SEEN), alike.browser.current_url
+    assert seen[2:] == [15.25, True, 2]
+    follow(alike, link)
+    assert alike.ask(SEEN) == pytest.approx(seen)
+    alike.switch("Same types and angle levels")
+    alike.switch("Tell of a cell when clicked")
+    wait_for(alike, layers=None)
+
+
+@pytest.mark.parametrize(
+    "fragment", ["place=north,3,x&layers=~~,No-such&told=nobody:1", "colours=x&&=&told=", "what"]
+)
+def test_a_link_that_tells_nothing_of_the_map_shows_it_as_it_is(
+    alike: MapPage, fragment: str
+) -> None:
+    seen = alike.ask(SEEN)
+    follow(alike, f"{alike.browser.current_url}#{fragment}")
+    assert alike.ask(SEEN) == pytest.approx(seen)
+
+
+def test_another_part_of_the_same_page_is_shown_by_its_address(alike: MapPage) -> None:
+    alike.ask("location.hash = 'place=43,3,14&colours=dark&other=kept'")
+    WebDriverWait(alike.browser, 10.0).until(lambda _: alike.ask(SEEN)[2] == 14)
+    assert alike.ask(SEEN)[:4] == pytest.approx([43, 3, 14, True])
+    wait_for(alike, other="kept", place="43.00000,3.00000,14")
+
+
+def test_what_was_told_is_told_again(alike: MapPage) -> None:
+    told: list[Any] = []
+    for key in ("query:17:b", "query:18", None):
+        alike.ask("map.fire('semsig-told', {key: arguments[0]})", key)
+        wait_for(alike, told=key)
+        if key:
+            told.append(alike.browser.current_url)
+    alike.ask(
+        "semsig.openers.query = (one, rest) => { window.asked = [one === map, rest]; return true; }"
+    )
+    alike.ask("location.hash = arguments[0]", urlsplit(told[0]).fragment)
+    asked = WebDriverWait(alike.browser, 10.0).until(lambda _: alike.ask("return window.asked"))
+    assert asked == [True, "17:b"]
