@@ -174,20 +174,25 @@ def experiment(
 @app.command()
 def compare(first: Results, second: Results, *, as_json: AsJson = False) -> None:
     """Compare two results of queries from the same places."""
-    from semsig_gis.evaluation.compare import common_cases, compare_evaluations
+    from semsig_gis.evaluation.compare import (
+        changed_successes,
+        common_cases,
+        compare_evaluations,
+    )
     from semsig_gis.evaluation.figures import plain_records
     from semsig_gis.experiments.run import open_results
-    from semsig_gis.reports.evaluation import comparison_table
+    from semsig_gis.reports.evaluation import comparison_sentence, comparison_table
 
     pairs = common_cases(open_results(first), open_results(second))
     tables = {name: compare_evaluations(*pair) for name, pair in pairs.items()}
     if as_json:
         print_json({name: plain_records(table) for name, table in tables.items()})
         return
-    print_tables(
-        comparison_table(table, f"{name}: " * bool(name) + f"{first} and {second}")
-        for name, table in tables.items()
-    )
+    for name, table in tables.items():
+        case = f"{name}: " * bool(name)
+        changed = changed_successes(*pairs[name])
+        say(case + comparison_sentence(table, changed, names=(str(first), str(second))))
+        print_tables([comparison_table(table, f"{case}{first} and {second}")])
 
 
 NUMBER_KEYS = ("row", "column", "unit", "ours", "low", "high", "paper")

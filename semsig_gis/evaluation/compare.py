@@ -105,6 +105,13 @@ def compare_evaluations(
     )
 
 
+def changed_successes(first: Evaluation, second: Evaluation) -> tuple[int, int]:
+    """Return how many queries only the second one answers well, and how many only the first one."""
+    _require_pairs(first, second)
+    before, after = first.successful, second.successful
+    return int((after & ~before).sum()), int((before & ~after).sum())
+
+
 def common_cases(
     first: Mapping[str, Evaluation], second: Mapping[str, Evaluation]
 ) -> dict[str, tuple[Evaluation, Evaluation]]:

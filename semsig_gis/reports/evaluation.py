@@ -9,6 +9,7 @@ import numpy as np
 import pandas as pd
 
 from semsig_gis.evaluation.figures import percentile
+from semsig_gis.evaluation.result import Evaluation
 from semsig_gis.likelihood.posterior import DEFAULT_RULE
 from semsig_gis.matching.ties import NEAR_METRES, NEAR_PLACES
 from semsig_gis.queries.chain import chain_text
@@ -19,7 +20,6 @@ from semsig_gis.reports.tables import Table, figure, interval
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from semsig_gis.evaluation.result import Evaluation
     from semsig_gis.evaluation.spec import ExperimentSpec
 
 
@@ -258,6 +258,31 @@ def experiment_markdown(spec: ExperimentSpec, results: Mapping[str, Evaluation])
     """Return the tables of an experiment as Markdown, the same whenever it is repeated."""
     sections = [table.markdown() for table in experiment_tables(spec, results, times=False)]
     return "\n".join(["## Experiment\n", *sections])
+
+
+def comparison_sentence(
+    comparison: pd.DataFrame, changed: tuple[int, int], *, names: tuple[str, str]
+) -> str:
+    """Return in words what a comparison measured: the difference within 50 m, and if it is chance.
+
+    `changed` counts the queries gained and lost (`evaluation.compare.changed_successes`); `names`
+    are what the first and the second results are called.
+    """
+    figures = comparison.set_index("figure")
+    points = figures.loc["p50", ["difference", "low", "high"]].to_numpy(np.float64) * 100.0
+    first, second = names
+    within, word = f"queries within {Evaluation.success_metres} m", "more"
+    if points[0] < 0.0:
+        points, word = -points[[0, 2, 1]], "fewer"
+    if not points.any():
+        return f"{second} places as many {within} as {first}."
+    more, low, high = (f"{round(point, 1) + 0.0:.1f}" for point in points)  # no -0
+    chance = "" if points[1] > 0.0 else ", which may be chance"
+    gained, lost = changed
+    return (
+        f"{second} places {more} points {word} {within} than {first}{chance} "
+        f"(95 %: {low} to {high}): {gained:,} queries gained, {lost:,} lost."
+    )
 
 
 def comparison_table(comparison: pd.DataFrame, title: str) -> Table:

@@ -13,7 +13,7 @@ from worlds import random_town
 
 from semsig_gis.core.errors import InputError, SemsigError
 from semsig_gis.database.city import ObjectStore
-from semsig_gis.evaluation.compare import common_cases, compare_evaluations
+from semsig_gis.evaluation.compare import changed_successes, common_cases, compare_evaluations
 from semsig_gis.evaluation.evaluate import evaluate
 from semsig_gis.evaluation.methods import make_locator, parse_method
 from semsig_gis.likelihood.index import build_index
@@ -386,6 +386,14 @@ def test_turned_round_the_differences_change_their_sign() -> None:
     assert (itself[["difference", "low", "high"]] == 0).all(axis=None)
 
 
+def test_queries_that_are_gained_and_lost_are_counted() -> None:
+    gained, lost = changed_successes(FIRST, SECOND)
+    assert (lost, gained) == changed_successes(SECOND, FIRST)
+    assert gained - lost == SECOND.successful.sum() - FIRST.successful.sum()
+    assert gained > 0 < lost
+    assert changed_successes(FIRST, FIRST) == (0, 0)
+
+
 def test_the_interval_is_that_of_pairs() -> None:
     table = compare_evaluations(FIRST, SECOND).set_index("figure")
     first, second = (one.queries["p50"].to_numpy() for one in PAIR)
@@ -428,6 +436,8 @@ def test_queries_from_other_places_are_refused() -> None:
     for queries in (SECOND.queries.head(99), moved):
         with refused(InputError, "other queries", f"(100 and {len(queries)})", "same places"):
             compare_evaluations(FIRST, replace(SECOND, queries=queries))
+        with refused(InputError, "other queries"):
+            changed_successes(FIRST, replace(SECOND, queries=queries))
 
 
 def test_cases_in_common() -> None:

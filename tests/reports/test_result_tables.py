@@ -37,6 +37,7 @@ from semsig_gis.queries.chain import parse_chain
 from semsig_gis.queries.draw import QuerySpec
 from semsig_gis.reports.database import database_tables
 from semsig_gis.reports.evaluation import (
+    comparison_sentence,
     comparison_table,
     evaluation_tables,
     experiment_figures,
@@ -294,6 +295,25 @@ def test_a_comparison_says_what_is_proven() -> None:
         ("p10", "0.5000", "0.3000", "-0.2000", "-0.3000 to -0.1000", "less"),
         ("error_p90", "infinite", "5.0000", "", "", ""),
     )
+
+
+@pytest.mark.parametrize(
+    ("difference", "low", "high", "said"),
+    [
+        (0.041, 0.019, 0.063, "B places 4.1 points more queries within 50 m than A (95 %: 1.9 to"),
+        (-0.041, -0.063, -0.019, "4.1 points fewer queries within 50 m than A (95 %: 1.9 to 6.3)"),
+        (0.01, -0.02, 0.04, "than A, which may be chance (95 %: -2.0 to 4.0)"),
+        (-0.01, -0.0401, 0.0001, "fewer queries within 50 m than A, which may be chance"),
+        (0.0, -0.01, 0.01, "0.0 points more"),
+        (0.0, 0.0, 0.0, "B places as many queries within 50 m as A."),
+    ],
+)  # fmt: skip
+def test_a_comparison_in_words(difference: float, low: float, high: float, said: str) -> None:
+    row = {"figure": "p50", "first": 0.5, "second": 0.5 + difference, "difference": difference}
+    comparison = pd.DataFrame([{**row, "low": low, "high": high}])
+    sentence = comparison_sentence(comparison, (1120, 79), names=("A", "B"))
+    assert said in sentence
+    assert (": 1,120 queries gained, 79 lost." in sentence) == any((difference, low, high))
 
 
 def test_tables_of_identifiability_have_its_numbers() -> None:
