@@ -138,6 +138,12 @@ def grid_convergence(crs: CRS, xy: ArrayLike) -> NDArray[np.float64]:
     return signed_degrees(azimuth)
 
 
+def crs_label(crs: CRS) -> str:
+    """Return a short name for messages: the code where there is one."""
+    code = crs.to_epsg()
+    return crs.name if code is None else f"EPSG:{code}"
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Distortion:
     """How a metric CRS differs from the ground over an extent.

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from semsig_gis.core.display import Displayed
 from semsig_gis.core.errors import CatalogError, UnknownNameError, nearest_name
 
 if TYPE_CHECKING:
@@ -105,8 +106,8 @@ def check_height(height: float | None, sigma: float | None, what: str) -> None:
         raise CatalogError(msg)
 
 
-@dataclass(frozen=True)
-class Taxonomy:
+@dataclass(frozen=True, repr=False)
+class Taxonomy(Displayed):
     """An immutable list of object classes without double codes, symbols or names.
 
     Parameters
@@ -142,6 +143,10 @@ class Taxonomy:
                     )
                     raise CatalogError(msg)
                 seen[value] = item.name
+
+    def _facts(self) -> dict[str, object]:
+        symbols = "".join(item.symbol for item in self.classes)
+        return {"classes": len(self.classes), "symbols": symbols}
 
     @classmethod
     def from_list(cls, items: Iterable[Mapping[str, Any]]) -> Taxonomy:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import re
 import time
-from abc import ABC, abstractmethod
+from abc import abstractmethod
 from dataclasses import dataclass, field
 from functools import cached_property
 from itertools import pairwise
@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any, Protocol, Self, TypeVar
 
 import numpy as np
 
+from semsig_gis.core.display import Displayed
 from semsig_gis.core.errors import InputError
 from semsig_gis.core.taxonomy import WILDCARD
 from semsig_gis.core.view import View
@@ -36,8 +37,8 @@ REGION_SHARE = 0.9
 """Of the chance, that the region of an answer holds."""
 
 
-@dataclass(frozen=True, eq=False, kw_only=True)
-class Answer(ABC):
+@dataclass(frozen=True, eq=False, repr=False, kw_only=True)
+class Answer(Displayed):
     """The best cells for a query, whatever ranked them.
 
     `columns` tell of the cells by name, best first: the rank, ``cell`` (row in the database),

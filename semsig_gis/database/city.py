@@ -19,8 +19,9 @@ import numpy as np
 import pyarrow as pa
 
 from semsig_gis import __version__
+from semsig_gis.core.display import Displayed
 from semsig_gis.core.errors import DatabaseError, InputError
-from semsig_gis.core.geometry import HALF_WIDTH, LICENSES
+from semsig_gis.core.geometry import HALF_WIDTH, LICENSES, crs_label
 from semsig_gis.database.file import (
     KIND,
     Manifest,
@@ -66,8 +67,8 @@ STREETS = "streets.parquet"
 NEXT = ".next"
 
 
-@dataclass(frozen=True, eq=False, kw_only=True)
-class ObjectStore:
+@dataclass(frozen=True, eq=False, repr=False, kw_only=True)
+class ObjectStore(Displayed):
     """What a signature database was built from.
 
     Parameters
@@ -88,6 +89,14 @@ class ObjectStore:
     objects: StreetObjects
     footprints: gpd.GeoDataFrame | None = None
     streets: gpd.GeoDataFrame | None = None
+
+    def _facts(self) -> dict[str, object]:
+        return {
+            "objects": len(self.objects),
+            "buildings": "none" if self.footprints is None else len(self.footprints),
+            "streets": "none" if self.streets is None else len(self.streets),
+            "CRS": crs_label(self.objects.crs),
+        }
 
     @classmethod
     def of(
@@ -402,7 +411,7 @@ GEOMETRY = "geometry"
 _Part = TypeVar("_Part")
 
 
-class City:
+class City(Displayed):
     """A signature database with what lies beside its file; made by `open_city`.
 
     Each part is opened when it is first looked at, and then kept.
@@ -426,6 +435,9 @@ class City:
     def __init__(self, path: str | Path) -> None:
         self.path = Path(path)
         self._read_state: tuple[int, ...] | None = None
+
+    def _facts(self) -> dict[str, object]:
+        return {"file": self.path}
 
     @cached_property
     def database(self) -> SignatureDatabase:

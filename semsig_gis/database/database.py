@@ -18,8 +18,9 @@ import pyarrow.compute as pc
 from pyproj import CRS
 
 from semsig_gis import __version__
+from semsig_gis.core.display import Displayed, bounds_text
 from semsig_gis.core.errors import DatabaseError, InputError
-from semsig_gis.core.geometry import cell_ids, consecutive
+from semsig_gis.core.geometry import cell_ids, consecutive, crs_label
 from semsig_gis.core.signature import BEARING_UNITS, DISTANCE_UNITS, Signature, quantize
 from semsig_gis.database.views import ViewpointSpec, Views
 from semsig_gis.storage.geoparquet import whole_numbers
@@ -54,8 +55,8 @@ CELL_ARRAYS = ("columns", "rows")
 ENTRY_ARRAYS = ("codes", "bearing_units", "distance_units")
 
 
-@dataclass(frozen=True, eq=False)
-class SignatureDatabase:
+@dataclass(frozen=True, eq=False, repr=False)
+class SignatureDatabase(Displayed):
     """The signatures of all cells of a city that see at least one object.
 
     Cell i owns the entries ``offsets[i]:offsets[i + 1]`` of the flat arrays, clockwise from north.
@@ -120,6 +121,17 @@ class SignatureDatabase:
 
     def __len__(self) -> int:  # noqa: D105
         return len(self.columns)
+
+    def _facts(self) -> dict[str, object]:
+        return {
+            "cells": len(self),
+            "objects seen": f"{len(self.codes) / max(len(self), 1):.1f} a cell",
+            "classes": len(self.present_codes),
+            "range": f"{self.spec.radius:g} m",
+            "step": f"{self.grid.step:g} m",
+            "CRS": crs_label(self.crs),
+            "bounds": bounds_text(self.xy),
+        }
 
     @cached_property
     def cell_ids(self) -> NDArray[np.int64]:

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pyarrow as pa
 
+from semsig_gis.core.display import Displayed
 from semsig_gis.core.errors import DatabaseError, SemsigError
 from semsig_gis.core.geometry import NOTES, GridSpec, split_ids
 from semsig_gis.core.scratch import remove_abandoned
@@ -389,8 +390,8 @@ def part_files(folder: str | Path) -> tuple[Path, ...]:
     return tuple(folder / part.file for part in manifest.parts)
 
 
-@dataclass(frozen=True, slots=True)
-class PartitionedDatabase:
+@dataclass(frozen=True, repr=False, slots=True)
+class PartitionedDatabase(Displayed):
     """A signature database of which one part at a time is in memory.
 
     Parameters
@@ -417,6 +418,9 @@ class PartitionedDatabase:
 
     def __len__(self) -> int:  # noqa: D105
         return self.cells
+
+    def _facts(self) -> dict[str, object]:
+        return {"cells": self.cells, "parts": len(self.files)}
 
     def parts(self) -> Iterator[SignatureDatabase]:
         """Open the parts one after the other; DatabaseError where they were made differently."""

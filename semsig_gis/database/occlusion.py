@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import shapely
 
+from semsig_gis.core.display import Displayed
 from semsig_gis.core.errors import InputError
 
 if TYPE_CHECKING:
@@ -25,7 +26,7 @@ PAIRS_A_BLOCK = 1 << 17
 POLYGONAL = 2  # dimensions
 
 
-class Footprints:
+class Footprints(Displayed):
     """The footprints of the buildings of a city, ready to be looked at many times.
 
     Parameters
@@ -72,6 +73,13 @@ class Footprints:
 
     def __len__(self) -> int:  # noqa: D105
         return len(self._polygons)
+
+    def _facts(self) -> dict[str, object]:
+        return {
+            "buildings": len(self),
+            "repaired": self.repaired,
+            "tolerance": f"{self.tolerance:g} m",
+        }
 
     @functools.cached_property
     def interiors(self) -> NDArray[np.object_]:

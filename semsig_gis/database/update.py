@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from semsig_gis import __version__
+from semsig_gis.core.display import Displayed
 from semsig_gis.core.errors import DatabaseError, EmptyResultError, InputError
 from semsig_gis.core.geometry import SOURCE, cell_ids, cells_near
 from semsig_gis.core.rtree import PackedIndex
@@ -33,8 +34,8 @@ if TYPE_CHECKING:
     _Cells = tuple[NDArray[np.int64], NDArray[np.int64]]  # columns and rows
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class UpdateReport:
+@dataclass(frozen=True, repr=False, slots=True, kw_only=True)
+class UpdateReport(Displayed):
     """How far a city has drifted.
 
     `replaced` layers were loaded anew, `kept` ones were not. Of the cells, `recomputed` ones lie
@@ -52,6 +53,16 @@ class UpdateReport:
     appeared: int
     vanished: int
     notes: tuple[str, ...] = ()
+
+    def _facts(self) -> dict[str, object]:
+        return {
+            "cells": self.cells,
+            "before": self.cells_before,
+            "changed": self.changed,
+            "appeared": self.appeared,
+            "vanished": self.vanished,
+            "share": f"{self.share:.2%}",
+        }
 
     @property
     def share(self) -> float:

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
+from semsig_gis.core.display import Displayed
 from semsig_gis.core.errors import InputError
 from semsig_gis.database.database import rows_of_result
 from semsig_gis.evaluation.figures import (
@@ -66,8 +67,8 @@ def machine() -> dict[str, Any]:
     }
 
 
-@dataclass(frozen=True, eq=False, kw_only=True)
-class Evaluation:
+@dataclass(frozen=True, eq=False, repr=False, kw_only=True)
+class Evaluation(Displayed):
     """The outcome of many queries and all that is needed to repeat or redraw it.
 
     Parameters
@@ -140,6 +141,20 @@ class Evaluation:
     versions: Mapping[str, str]
     city: str | None = None
     machine: Mapping[str, Any] = field(default_factory=machine)
+
+    def _facts(self) -> dict[str, object]:
+        means = self.means()
+        near, low, high = means.loc[f"p{self.success_metres}", ["value", "low", "high"]]
+        return {
+            "queries": len(self.queries),
+            "cells": self.database["cells"],
+            "method": self.method,
+            "distortion": chain_text(self.asked.distortions) or "none",
+            "best of": self.top,
+            f"within {self.success_metres} m": f"{near:.1%} ({low:.1%} to {high:.1%})",
+            "recall@10 %": f"{means['value']['recall10']:.1%}",
+            "CRS": self.database["crs"],
+        }
 
     @functools.cached_property
     def figures(self) -> pd.DataFrame:

@@ -19,8 +19,17 @@ from pyogrio.errors import DataLayerError, DataSourceError, FeatureError
 from pyproj import CRS
 from pyproj.exceptions import CRSError
 
+from semsig_gis.core.display import Displayed
 from semsig_gis.core.errors import DatabaseError, InputError
-from semsig_gis.core.geometry import CLASS_CODE, COUNT, GEOMETRY, MERGED, SOURCE, SOURCE_ID
+from semsig_gis.core.geometry import (
+    CLASS_CODE,
+    COUNT,
+    GEOMETRY,
+    MERGED,
+    SOURCE,
+    SOURCE_ID,
+    crs_label,
+)
 from semsig_gis.core.signature import BEARING_UNITS, DISTANCE_UNITS
 from semsig_gis.core.taxonomy import Taxonomy
 from semsig_gis.database.file import database_of
@@ -68,8 +77,8 @@ WHERE table_name = ?
 """
 
 
-@dataclass(frozen=True, eq=False, kw_only=True)
-class GeopackageContents:
+@dataclass(frozen=True, eq=False, repr=False, kw_only=True)
+class GeopackageContents(Displayed):
     """What a GeoPackage holds of a city.
 
     Parameters
@@ -98,6 +107,15 @@ class GeopackageContents:
     objects: StreetObjects | None
     identifiability: Identifiability | None
     notes: tuple[str, ...]
+
+    def _facts(self) -> dict[str, object]:
+        return {
+            "cells": len(self.database),
+            "objects": "none" if self.objects is None else len(self.objects),
+            "identifiability": "no" if self.identifiability is None else "yes",
+            "CRS": crs_label(self.database.crs),
+            "notes": len(self.notes),
+        }
 
 
 def read_geopackage(path: str | Path) -> GeopackageContents:

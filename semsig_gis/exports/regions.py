@@ -10,6 +10,7 @@ import geopandas as gpd
 import numpy as np
 import shapely
 
+from semsig_gis.core.display import Displayed
 from semsig_gis.core.errors import InputError
 from semsig_gis.database.answer import REGION_SHARE
 from semsig_gis.likelihood.posterior import Posterior
@@ -23,8 +24,8 @@ if TYPE_CHECKING:
 CHANCES = ["chance", "searched_chance"]  # which the likelihood method alone tells
 
 
-@dataclass(frozen=True, eq=False)
-class SearchRegions:
+@dataclass(frozen=True, eq=False, repr=False)
+class SearchRegions(Displayed):
     """The regions of a city in which a query may have been seen.
 
     Parameters
@@ -46,6 +47,12 @@ class SearchRegions:
     """
 
     table: gpd.GeoDataFrame
+
+    def _facts(self) -> dict[str, object]:
+        told = self.to_dict()
+        chance = {"chance": f"{told['chance']:.1%}"} if "chance" in told else {}
+        area = f"{told['km2']:.3f} km² ({told['percent']:.2g} %)"
+        return {"regions": told["regions"], "cells": told["cells"], "area": area, **chance}
 
     def to_dict(self) -> dict[str, Any]:
         """Return what is to be searched in all; ``percent`` is of the area of all cells."""

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from semsig_gis.core.display import Displayed
 from semsig_gis.core.geometry import SOURCE, SOURCE_ID, signed_degrees, wrap_degrees
 from semsig_gis.core.taxonomy import WILDCARD
 from semsig_gis.core.view import Photo, View
@@ -52,8 +53,8 @@ COLUMNS = [
 ]
 
 
-@dataclass(frozen=True, eq=False, kw_only=True)
-class Explanation:
+@dataclass(frozen=True, eq=False, repr=False, kw_only=True)
+class Explanation(Displayed):
     """What a query and a place have in common, and what not.
 
     `rows` has one for each object of the query, then one for each street object that none of them
@@ -71,6 +72,13 @@ class Explanation:
     headings: tuple[float, ...]
     loglik: float
     crs: CRS
+
+    def _facts(self) -> dict[str, object]:
+        return {
+            **self.counts,
+            "place": f"{self.xy[0]:.1f}, {self.xy[1]:.1f}",
+            "heading": ", ".join(f"{heading:.1f}°" for heading in self.headings),
+        }
 
     @property
     def heading(self) -> float:

@@ -16,7 +16,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from semsig_gis.core.geometry import FULL_TURN
+from semsig_gis.core.display import Displayed
+from semsig_gis.core.geometry import FULL_TURN, crs_label
 from semsig_gis.core.signature import BEARING_UNITS, DISTANCE_UNITS, distance_units_of
 from semsig_gis.core.threads import share_rows
 from semsig_gis.core.view import View, check_north
@@ -71,8 +72,8 @@ class CellScores:
         return self.headings[0]
 
 
-@dataclass(frozen=True, eq=False, kw_only=True)
-class LikelihoodIndex:
+@dataclass(frozen=True, eq=False, repr=False, kw_only=True)
+class LikelihoodIndex(Displayed):
     """The cells of a database and a noise model: what views are compared with.
 
     Parameters
@@ -91,6 +92,14 @@ class LikelihoodIndex:
 
     database: SignatureDatabase
     noise: Noise
+
+    def _facts(self) -> dict[str, object]:
+        return {
+            "cells": len(self.database),
+            "noise": self.noise.name,
+            "classes": len(self.database.present_codes),
+            "CRS": crs_label(self.database.crs),
+        }
 
     @cached_property
     def models(self) -> _Models:

@@ -14,8 +14,9 @@ from typing import TYPE_CHECKING, Any, TypedDict, Unpack
 
 import numpy as np
 
+from semsig_gis.core.display import Displayed
 from semsig_gis.core.errors import InputError
-from semsig_gis.core.geometry import cell_ids, signed_degrees
+from semsig_gis.core.geometry import cell_ids, crs_label, signed_degrees
 from semsig_gis.core.view import View
 from semsig_gis.database.answer import (
     REGION_SHARE,
@@ -66,8 +67,8 @@ TINY = np.finfo(np.float64).tiny
 TURN = 2.0  # degrees between the headings that are tried
 
 
-@dataclass(frozen=True, eq=False, slots=True, kw_only=True)
-class PlaceEstimate:
+@dataclass(frozen=True, eq=False, repr=False, slots=True, kw_only=True)
+class PlaceEstimate(Displayed):
     """A mean place in metres and a heading, each with its uncertainty.
 
     `heading` is in degrees to add to the bearings of the query, in [-180, 180), or None if they are
@@ -80,6 +81,15 @@ class PlaceEstimate:
     heading: float | None
     covariance: NDArray[np.float64]
     refined: bool
+
+    def _facts(self) -> dict[str, object]:
+        turned = self.heading is not None
+        return {
+            "place": f"{self.x:.1f}, {self.y:.1f}",
+            "give or take": f"{self.sigma:.1f} m",
+            "heading": f"{self.heading:.1f}° ±{self.heading_sigma:.1f}°" if turned else "known",
+            "refined": "yes" if self.refined else "no",
+        }
 
     @property
     def sigma(self) -> float:
@@ -119,7 +129,7 @@ class PlaceEstimate:
         }
 
 
-@dataclass(frozen=True, eq=False, kw_only=True)
+@dataclass(frozen=True, eq=False, repr=False, kw_only=True)
 class Location(Answer):
     """The answer of the likelihood method to a query.
 
@@ -175,6 +185,18 @@ class Location(Answer):
     explanations: tuple[Explanation, ...] = ()
     known: Mapping[str, Any] = field(default_factory=dict)
     prior_ratio: float | None = None
+
+    def _facts(self) -> dict[str, object]:
+        return {
+            "answer": "yes" if self.answer.given else "cannot tell",
+            "place": f"{self.estimate.x:.1f}, {self.estimate.y:.1f}",
+            "give or take": f"{self.estimate.sigma:.1f} m",
+            f"within {self.rule.radius:g} m": f"{self.answer.mass:.1%}",
+            "region": f"{len(self.region):,} of {self.cells:,} cells",
+            "candidates": len(self.columns["cell"]),
+            "noise": self.noise,
+            "CRS": crs_label(self.crs),
+        }
 
     @property
     def region_km2(self) -> float:

@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any, TypeGuard
 
 import numpy as np
 
+from semsig_gis.core.display import Displayed
 from semsig_gis.core.errors import InputError
 from semsig_gis.core.geometry import cell_ids, signed_degrees
 from semsig_gis.core.statistics import binomial_tail
@@ -48,8 +49,8 @@ PLACES = 1000
 """Likeliest cells among which the best place is looked for."""
 
 
-@dataclass(frozen=True, eq=False, kw_only=True)
-class Posterior:
+@dataclass(frozen=True, eq=False, repr=False, kw_only=True)
+class Posterior(Displayed):
     """The chance that a query was seen from each cell of a database.
 
     Parameters
@@ -66,6 +67,15 @@ class Posterior:
 
     database: SignatureDatabase
     chances: NDArray[np.float64]
+
+    def _facts(self) -> dict[str, object]:
+        (best,) = self.likeliest(1).tolist()
+        return {
+            "cells": len(self.chances),
+            "entropy": f"{self.entropy:.1f} bits",
+            "likeliest cell": self.database.cell_ids[best],
+            "its chance": f"{self.chances[best]:.1%}",
+        }
 
     @cached_property
     def _likely(self) -> NDArray[np.int64]:

@@ -13,7 +13,7 @@ import html
 import json
 import re
 import tomllib
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from importlib import resources
 from pathlib import PurePosixPath
 from typing import TYPE_CHECKING
@@ -180,7 +180,7 @@ def _default_icon() -> str:
 class MapFrame:
     """A map as a notebook shows it: its HTML page, in a frame ``height`` pixels high."""
 
-    page: str
+    page: str = field(repr=False)
     height: int
 
     def _repr_html_(self) -> str:

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from semsig_gis.core.errors import EmptyResultError
+from semsig_gis.core.geometry import crs_label
 from semsig_gis.core.view import View
 from semsig_gis.database.answer import (
     Answer,
@@ -40,7 +41,7 @@ if TYPE_CHECKING:
     from semsig_gis.matching.method import Method
 
 
-@dataclass(frozen=True, eq=False, kw_only=True)
+@dataclass(frozen=True, eq=False, repr=False, kw_only=True)
 class Localization(Answer):
     """The best cells for a query, by distance.
 
@@ -71,6 +72,24 @@ class Localization(Answer):
 
     method: Method
     used: str
+
+    def _facts(self) -> dict[str, object]:
+        columns = self.columns
+        best: dict[str, object] = {}
+        if len(columns["cell"]):
+            best = {
+                "best cell": columns["cell_id"][0],
+                "place": f"{columns['x'][0]:.1f}, {columns['y'][0]:.1f}",
+                "distance": f"{columns['distance'][0]:.3f}",
+                "as good": columns["tied"][0],
+            }
+        return {
+            **best,
+            "candidates": len(columns["cell"]),
+            "cells": self.cells,
+            "method": self.method,
+            "CRS": crs_label(self.crs),
+        }
 
     def region_cells(self, database: SignatureDatabase, share: float) -> NDArray[np.int64]:  # noqa: ARG002
         """Return the rows of the candidates in the database that was searched."""

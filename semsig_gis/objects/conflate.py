@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 import pandas as pd
 
+from semsig_gis.core.display import Displayed
 from semsig_gis.core.errors import InputError
 from semsig_gis.core.geometry import COUNT, GEOMETRY, MERGED, SOURCE, SOURCE_ID
 from semsig_gis.core.rtree import ObjectIndex
@@ -44,14 +45,17 @@ class ConflatedPair:
     largest_m: float
 
 
-@dataclass(frozen=True, slots=True)
-class ConflationReport:
+@dataclass(frozen=True, repr=False, slots=True)
+class ConflationReport(Displayed):
     """What was merged, for every class and pair of sources with something in common.
 
     Classes stand in the order in which their radii were given, sources in that of the objects.
     """
 
     pairs: tuple[ConflatedPair, ...]
+
+    def _facts(self) -> dict[str, object]:
+        return {"merged": self.count, "pairs of sources": len(self.pairs)}
 
     @property
     def count(self) -> int:

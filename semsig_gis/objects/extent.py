@@ -21,13 +21,14 @@ from semsig_gis.core.errors import CrsError, EmptyResultError, InputError
 from semsig_gis.core.geometry import (
     FULL_TURN,
     cell_ids,
+    crs_label,
     plane_distortion,
     require_metric_crs,
     signed_degrees,
     split_ids,
     wrap_degrees,
 )
-from semsig_gis.sources.raw_layer import LATITUDE_LIMIT, WGS84, crs_label, fits_the_globe
+from semsig_gis.sources.raw_layer import LATITUDE_LIMIT, WGS84, fits_the_globe
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

@@ -12,6 +12,7 @@ import numpy as np
 import pandas as pd
 import shapely
 
+from semsig_gis.core.display import Displayed
 from semsig_gis.core.errors import CrsError, EmptyResultError, InputError
 from semsig_gis.core.geometry import (
     CLASS_CODE,
@@ -73,12 +74,21 @@ class UnreadLayer:
     objects: int | None = None
 
 
-@dataclass(frozen=True, slots=True)
-class LoadReport:
+@dataclass(frozen=True, repr=False, slots=True)
+class LoadReport(Displayed):
     """What became of every layer, in the order they were given, and which were not read."""
 
     layers: tuple[LayerReport, ...]
     unread: tuple[UnreadLayer, ...] = ()
+
+    def _facts(self) -> dict[str, object]:
+        return {
+            "layers": len(self.layers),
+            "rows read": sum(layer.counts.read for layer in self.layers),
+            "kept": sum(layer.counts.kept for layer in self.layers),
+            "not read": f"{len(self.unread)} layers",
+            "notes": len(self.notes),
+        }
 
     @property
     def notes(self) -> tuple[str, ...]:
@@ -259,8 +269,8 @@ def _first_at_place(
     return first[order], counts[order]
 
 
-@dataclass(frozen=True, eq=False, kw_only=True)
-class Loaded:
+@dataclass(frozen=True, eq=False, repr=False, kw_only=True)
+class Loaded(Displayed):
     """What came of a load.
 
     Parameters
@@ -290,6 +300,16 @@ class Loaded:
     buildings: gpd.GeoDataFrame | None = None
     streets: gpd.GeoDataFrame | None = None
     notes: tuple[str, ...] = ()
+
+    def _facts(self) -> dict[str, object]:
+        return {
+            "objects": len(self.objects),
+            "layers": len(self.report.layers),
+            "merged": self.conflation.count,
+            "buildings": "none" if self.buildings is None else len(self.buildings),
+            "streets": "none" if self.streets is None else len(self.streets),
+            "notes": len(self.objects.notes),
+        }
 
 
 # Which layers are read where none is named.

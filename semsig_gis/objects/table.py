@@ -12,6 +12,7 @@ import pyarrow as pa
 import pyarrow.compute as pc
 
 from semsig_gis import __version__
+from semsig_gis.core.display import Displayed, bounds_text
 from semsig_gis.core.errors import DatabaseError
 from semsig_gis.core.geometry import (
     CLASS_CODE,
@@ -22,6 +23,7 @@ from semsig_gis.core.geometry import (
     NOTES,
     SOURCE,
     SOURCE_ID,
+    crs_label,
 )
 from semsig_gis.core.taxonomy import Taxonomy
 from semsig_gis.storage.geoparquet import (
@@ -91,8 +93,8 @@ def layer_licences(layers: Iterable[RawLayer]) -> tuple[Licence, ...]:
     return join_licences(Licence(layer.spec.terms, (layer.spec.name,)) for layer in layers)
 
 
-@dataclass(frozen=True, eq=False)
-class StreetObjects:
+@dataclass(frozen=True, eq=False, repr=False)
+class StreetObjects(Displayed):
     """The street objects of a city.
 
     Parameters
@@ -121,6 +123,14 @@ class StreetObjects:
 
     def __len__(self) -> int:  # noqa: D105
         return len(self.codes)
+
+    def _facts(self) -> dict[str, object]:
+        return {
+            "objects": len(self),
+            "classes": len(self.class_counts),
+            "CRS": crs_label(self.crs),
+            "bounds": bounds_text(self.xy),
+        }
 
     @functools.cached_property
     def crs(self) -> CRS:

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from semsig_gis.core.display import Displayed
 from semsig_gis.core.geometry import FULL_TURN, wrap_degrees
 from semsig_gis.core.signature import BEARING_UNITS, DISTANCE_UNITS, Signature
 from semsig_gis.core.view import CLASSES, FULL_VIEW, View
@@ -33,8 +34,8 @@ NEAREST_M = 0.01  # that anything stands, so that its width is an angle
 _BY_OBJECT = ("codes", "bearings", "distances", "false", "ranges", "scores")
 
 
-@dataclass(frozen=True, eq=False, slots=True, kw_only=True)
-class Sight:
+@dataclass(frozen=True, eq=False, repr=False, slots=True, kw_only=True)
+class Sight(Displayed):
     """What is seen from a place, or seems to be.
 
     Parameters
@@ -79,6 +80,14 @@ class Sight:
 
     def __len__(self) -> int:  # noqa: D105
         return len(self.codes)
+
+    def _facts(self) -> dict[str, object]:
+        return {
+            "objects": len(self),
+            "classes": len(np.unique(self.codes)),
+            "farthest": f"{self.distances.max(initial=0.0):.1f} m",
+            "heading": f"{self.heading:.1f}°",
+        }
 
     @property
     def signature(self) -> Signature:

@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import KW_ONLY, dataclass, field
 from typing import TYPE_CHECKING, Any
 
+from semsig_gis.core.display import Displayed
+
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
@@ -110,8 +112,8 @@ class SceneObject:
     north: float
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Scene:
+@dataclass(frozen=True, repr=False, slots=True, kw_only=True)
+class Scene(Displayed):
     """A viewpoint with the street objects around it; its files are called ``name``.
 
     ``lon`` and ``lat`` are in degrees (WGS 84), ``radius`` in metres; ``types`` are the symbols of
@@ -129,6 +131,15 @@ class Scene:
     others: tuple[SceneObject, ...] = ()
     answer: tuple[float, float] | None = None
     error_m: float | None = None
+
+    def _facts(self) -> dict[str, object]:
+        return {
+            "title": self.title,
+            "types": self.types or "none",
+            "place": f"{self.lon:.6f}°, {self.lat:.6f}°",
+            "radius": f"{self.radius:g} m",
+            "error": "not asked" if self.error_m is None else f"{self.error_m:,.1f} m",
+        }
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

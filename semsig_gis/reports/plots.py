@@ -10,7 +10,7 @@ import math
 import textwrap
 import unicodedata
 import warnings
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 from xml.sax.saxutils import escape
 
@@ -60,8 +60,8 @@ SETTINGS = {
 class Picture:
     """A picture in two formats; ``description`` tells what is seen to those who cannot see it."""
 
-    svg: bytes
-    png: bytes
+    svg: bytes = field(repr=False)
+    png: bytes = field(repr=False)
     description: str
 
     def _repr_svg_(self) -> str:

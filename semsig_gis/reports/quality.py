@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import shapely
 
+from semsig_gis.core.display import Displayed
 from semsig_gis.core.geometry import COUNT, degree_bounds, plane_distortion
 from semsig_gis.reports.tables import Table, brief_notes, distortion_rows, note_tables
 from semsig_gis.sources import RowCounts
@@ -52,8 +53,8 @@ class ClassQuality:
     nearest_m: float | None
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class QualityReport:
+@dataclass(frozen=True, repr=False, slots=True, kw_only=True)
+class QualityReport(Displayed):
     """The quality report of a load.
 
     `classes` are those with objects in the order of the taxonomy, `absent` those without; `sources`
@@ -77,6 +78,17 @@ class QualityReport:
     licenses: tuple[str, ...]
     unread: tuple[UnreadLayer, ...] = ()
     notes: tuple[str, ...] = ()
+
+    def _facts(self) -> dict[str, object]:
+        return {
+            "objects": self.objects,
+            "classes": len(self.classes),
+            "absent": len(self.absent),
+            "sources": len(self.sources),
+            "hull": f"{self.hull_km2:.2f} km²",
+            "CRS": self.crs,
+            "notes": len(self.notes),
+        }
 
     @property
     def objects(self) -> int:

@@ -8,6 +8,7 @@ from fnmatch import fnmatchcase
 from pathlib import Path
 from typing import TYPE_CHECKING, Protocol
 
+from semsig_gis.core.display import Displayed
 from semsig_gis.core.errors import SourceError, UnknownNameError, nearest_name
 from semsig_gis.core.plugins import installed_readers
 
@@ -67,8 +68,8 @@ class RowCounts:
         return self.read - dropped
 
 
-@dataclass(frozen=True, eq=False, kw_only=True)
-class RawLayer:
+@dataclass(frozen=True, eq=False, repr=False, kw_only=True)
+class RawLayer(Displayed):
     """One layer as its reader found it.
 
     Parameters
@@ -102,6 +103,16 @@ class RawLayer:
     errors: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()
     extent: Area | None = None
+
+    def _facts(self) -> dict[str, object]:
+        return {
+            "layer": self.spec.name,
+            "holds": self.spec.class_name or self.spec.role,
+            "rows read": self.counts.read,
+            "kept": self.counts.kept,
+            "unreadable": self.counts.unreadable,
+            "notes": len(self.notes),
+        }
 
 
 class Reader(Protocol):

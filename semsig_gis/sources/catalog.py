@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, Literal, get_args
 from pyproj import CRS
 from pyproj.exceptions import CRSError
 
+from semsig_gis.core.display import Displayed
 from semsig_gis.core.errors import (
     CatalogError,
     CrsError,
@@ -403,8 +404,8 @@ MEASURES = {"range_m": MAX_RANGE_M, "height_m": MAX_HEIGHT_M, "height_sigma": MA
 MAX_MERGING_M = 100.0
 
 
-@dataclass(frozen=True, kw_only=True)
-class Catalog:
+@dataclass(frozen=True, repr=False, kw_only=True)
+class Catalog(Displayed):
     """A source of open data: its classes, its layers and its licence.
 
     Parameters
@@ -452,6 +453,15 @@ class Catalog:
     conflate: tuple[tuple[str, float], ...] = ()
     license: str = "unknown"
     attribution: str = ""
+
+    def _facts(self) -> dict[str, object]:
+        return {
+            "name": self.name,
+            "title": self.title,
+            "layers": len(self.layers),
+            "classes": len(self.taxonomy.classes),
+            "licence": self.license,
+        }
 
     def layer(self, name: str) -> LayerSpec:
         """Return the layer of that name; UnknownNameError, with the nearest, if there is none."""

@@ -18,7 +18,7 @@ from pyproj import CRS
 from pyproj.exceptions import CRSError
 
 from semsig_gis.core.errors import CatalogError, CrsError, nearest_name
-from semsig_gis.core.geometry import CLASS_NAME, GEOMETRY, HALF_WIDTH, SOURCE_ID
+from semsig_gis.core.geometry import CLASS_NAME, GEOMETRY, HALF_WIDTH, SOURCE_ID, crs_label
 from semsig_gis.sources import RawLayer, RowCounts
 from semsig_gis.sources.catalog import MAX_WIDTH_M, MIN_WIDTH_M
 from semsig_gis.sources.conditions import Condition, as_text, matches, pattern_of
@@ -77,12 +77,6 @@ def usable_crs(wkt: str) -> CRS | None:
         if epsg.equals(crs, ignore_axis_order=True):
             return epsg
     return crs
-
-
-def crs_label(crs: CRS) -> str:
-    """Return a short name for messages: the code where there is one."""
-    code = crs.to_epsg()
-    return crs.name if code is None else f"EPSG:{code}"
 
 
 def settle_crs(

@@ -23,6 +23,7 @@ import shapely.geometry
 from fiona.errors import DriverError
 
 from semsig_gis.core.errors import SourceError, UnknownNameError, nearest_name
+from semsig_gis.core.geometry import crs_label
 from semsig_gis.sources import require_file
 from semsig_gis.sources.csv_layer import NO_GEOMETRY, csv_table, read_csv_layer
 from semsig_gis.sources.packed import bomb, swells
@@ -31,7 +32,6 @@ from semsig_gis.sources.raw_layer import (
     BadFeatureError,
     RowRules,
     Rows,
-    crs_label,
     fits_the_globe,
     raw_layer,
     settle_crs,

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pandas as pd
 
+from semsig_gis.core.display import Displayed
 from semsig_gis.core.effort import announce
 from semsig_gis.core.errors import InputError
 from semsig_gis.core.geometry import FULL_TURN
@@ -48,8 +49,8 @@ class ChanceBin:
     true_high: float
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class IdentifiabilityCheck:
+@dataclass(frozen=True, repr=False, slots=True, kw_only=True)
+class IdentifiabilityCheck(Displayed):
     """How the chances of cells compare with what came of queries.
 
     Parameters
@@ -83,6 +84,15 @@ class IdentifiabilityCheck:
     correlations: Mapping[str, float]
     attainable: float
     bins: tuple[ChanceBin, ...]
+
+    def _facts(self) -> dict[str, object]:
+        return {
+            "queries": self.queries,
+            "found": f"{self.found:.1%}",
+            "correlation": f"{self.correlations['found']:.2f}",
+            "attainable": f"{self.attainable:.2f}",
+            "seed": self.seed,
+        }
 
     def to_dict(self) -> dict[str, Any]:
         """Return the fields as plain values for JSON; None for a correlation that there is not."""

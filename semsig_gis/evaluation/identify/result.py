@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pyarrow as pa
 
+from semsig_gis.core.display import Displayed
 from semsig_gis.core.errors import DatabaseError, InputError, SemsigError
 from semsig_gis.database.city import City
 from semsig_gis.likelihood.index import index_fingerprint
@@ -44,8 +45,8 @@ class ClassGain:
     bits: float
 
 
-@dataclass(frozen=True, eq=False, kw_only=True)
-class Identifiability:
+@dataclass(frozen=True, eq=False, repr=False, kw_only=True)
+class Identifiability(Displayed):
     """How well a query from each of the n cells of a database will be placed.
 
     Parameters
@@ -100,6 +101,17 @@ class Identifiability:
     classes: tuple[ClassGain, ...]
     trials: int
     seed: int
+
+    def _facts(self) -> dict[str, object]:
+        return {
+            "cells": len(self.database),
+            "noise": self.noise.name,
+            f"found within {self.radius:g} m": f"{self.found.mean():.1%} for the mean cell",
+            "bits left": f"{self.bits.mean():.1f} of {np.log2(len(self.database)):.1f}",
+            "view": f"{self.view:g}°",
+            "trials": self.trials,
+            "seed": self.seed,
+        }
 
     def require_cells_of(self, database: SignatureDatabase) -> None:
         """Raise InputError where another database has other cells."""

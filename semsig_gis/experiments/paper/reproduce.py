@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any, Literal, get_args
 
 import numpy as np
 
+from semsig_gis.core.display import Displayed
 from semsig_gis.core.errors import DatabaseError, InputError
 from semsig_gis.core.parallel import check_workers
 from semsig_gis.database.build import build_database
@@ -176,8 +177,8 @@ RUN = RunKind(
 )
 
 
-@dataclass(frozen=True, eq=False, kw_only=True)
-class Reproduction:
+@dataclass(frozen=True, eq=False, repr=False, kw_only=True)
+class Reproduction(Displayed):
     """What the experiments of the paper find on a city.
 
     Parameters
@@ -214,6 +215,14 @@ class Reproduction:
     seconds: Mapping[str, float]
     settings: Mapping[str, Any]
     missing: tuple[str, ...] = ()
+
+    def _facts(self) -> dict[str, object]:
+        return {
+            "cells": len(self.database),
+            "queries": self.settings["queries"],
+            "experiments": ", ".join(self.experiments) or "none",
+            "missing": len(self.missing),
+        }
 
 
 def reproduce(

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pandas as pd
 
+from semsig_gis.core.display import Displayed
 from semsig_gis.core.errors import InputError
 from semsig_gis.core.geometry import cell_ids
 from semsig_gis.core.rtree import ObjectIndex
@@ -138,8 +139,8 @@ def _sample(row: Row, taxonomy: Taxonomy, radius: float) -> Sample:
     return Sample(signature=signature, cell_id=None if cell is None else int(cell))
 
 
-@dataclass(frozen=True, eq=False, kw_only=True)
-class NoiseEstimate:
+@dataclass(frozen=True, eq=False, repr=False, kw_only=True)
+class NoiseEstimate(Displayed):
     """A noise model that was learnt, and how well it is known.
 
     `rates` has one row for each quantity (``detection``, ``misnamed``, ``clutter`` in false objects
@@ -161,6 +162,18 @@ class NoiseEstimate:
     skipped: int
     rounds: int
     log_likelihood: float
+
+    def _facts(self) -> dict[str, object]:
+        return {
+            "samples": self.samples,
+            "objects": self.objects,
+            "detections": self.detections,
+            "skipped": self.skipped,
+            "detection": f"{self.spec.detection:.3g}",
+            "misnamed": f"{self.spec.misnamed:.3g}",
+            "clutter": f"{self.spec.clutter:.3g}",
+            "bearing": f"±{self.spec.bearing_sigma:.3g}°",
+        }
 
     def to_dict(self) -> dict[str, Any]:
         """Return plain values for JSON; ``confusion`` is by true class, then given class."""

@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from semsig_gis.core.display import Displayed
 from semsig_gis.core.errors import InputError, UnknownNameError, nearest_name
 from semsig_gis.core.geometry import HALF_TURN
 from semsig_gis.storage.toml import read_values, toml_text
@@ -35,8 +36,8 @@ ALL = "all"
 ROUNDING = 1e-6  # of sums of shares, and of squares of metres
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class NoiseSpec:
+@dataclass(frozen=True, repr=False, slots=True, kw_only=True)
+class NoiseSpec(Displayed):
     """How a detector fails.
 
     Parameters
@@ -123,6 +124,21 @@ class NoiseSpec:
         if _table("clutter_shares", self.clutter_shares):
             _check_shares("clutter_shares", self.clutter_shares)
 
+    def _facts(self) -> dict[str, object]:
+        tables = (*BY_CLASS, "confusion", "clutter_shares", "fading")
+        return {
+            "name": self.name,
+            "detection": f"{self.detection:.3g}",
+            "misnamed": f"{self.misnamed:.3g}",
+            "clutter": f"{self.clutter:.3g}",
+            "bearing": f"±{self.bearing_sigma:.3g}°",
+            "place": f"±{self.position_sigma:.3g} m",
+            "range": f"±{100 * self.range_sigma:.3g} %",
+            "missed each": f"{self.missed_each:.3g}",
+            "misnamed each": f"{self.misnamed_each:.3g}",
+            "by class": ", ".join(name for name in tables if getattr(self, name)) or "nothing",
+        }
+
     @property
     def specs(self) -> tuple[NoiseSpec, ...]:
         """The model itself, the only one, as in a mixture of one."""
@@ -143,8 +159,8 @@ class NoiseSpec:
         return values
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class NoiseMixture:
+@dataclass(frozen=True, repr=False, slots=True, kw_only=True)
+class NoiseMixture(Displayed):
     """Noise of which only is known that it follows one of several models.
 
     The likelihood of a cell is the weighted sum over the models: the level is as unknown as the
@@ -184,6 +200,13 @@ class NoiseMixture:
         if not all(weight > 0 for weight in self.weights):
             msg = f"weights of the mixture are {self.weights}; leave models of no weight out."
             raise InputError(msg)
+
+    def _facts(self) -> dict[str, object]:
+        models = zip(self.specs, self.weights, strict=True)
+        return {
+            "name": self.name,
+            "models": ", ".join(f"{spec.name} {weight:.0%}" for spec, weight in models),
+        }
 
     def changed(self, change: Callable[[NoiseSpec], NoiseSpec]) -> NoiseMixture:
         """Return the mixture after a change of each of its models."""

@@ -1,0 +1,147 @@
+from __future__ import annotations
+
+import dataclasses
+from typing import TYPE_CHECKING
+
+import folium
+import pytest
+from html_pages import HtmlPage
+from map_pages import HOSTILE
+from worlds import random_town
+
+from semsig_gis import (
+    City,
+    Footprints,
+    GeopackageContents,
+    LikelihoodIndex,
+    ObjectStore,
+    PartitionedDatabase,
+    Reproduction,
+    Sight,
+    build_index,
+    cell_scene,
+    check_identifiability,
+    draw_scene,
+    evaluate,
+    identify,
+    load_catalog,
+    localize,
+    locate,
+    named_noise,
+    quality_report,
+    search_regions,
+    show_map,
+    synthetic_city,
+    update_database,
+)
+from semsig_gis.core.display import Displayed
+from semsig_gis.objects.load import assemble
+from semsig_gis.sources.synthetic.city import CitySpec
+
+if TYPE_CHECKING:
+    from semsig_gis.database.database import SignatureDatabase
+
+LONGEST_LINE = 250
+
+
+@dataclasses.dataclass(repr=False)
+class Town(Displayed):
+    name: str
+
+    def _facts(self) -> dict[str, object]:
+        return {"name": self.name, "cells": 312_806}
+
+
+@pytest.fixture(scope="module")
+def results() -> dict[str, object]:
+    town = random_town()
+    database = town.database
+    index = build_index(database, named_noise("generic"))
+    query, store = database.signature(3), ObjectStore.of(town.street_objects)
+    location = locate(index, query, store=store, explained=1)
+    told = identify(index, trials=5, class_trials=2)
+    layers = synthetic_city(CitySpec(size=100.0))
+    loaded = assemble(layers, load_catalog("openstreetmap"))
+    return {
+        "SignatureDatabase": database,
+        "StreetObjects": store.objects,
+        "ObjectStore": store,
+        "City": City("city.parquet"),
+        "Footprints": Footprints([location.to_geodataframe().geometry.buffer(9).iloc[0]]),
+        "LikelihoodIndex": index,
+        "NoiseMixture": index.noise,
+        "NoiseSpec": named_noise("light"),
+        "Location": location,
+        "PlaceEstimate": location.estimate,
+        "Posterior": location.posterior,
+        "Explanation": location.explanations[0],
+        "Localization": localize(database, query),
+        "SearchRegions": search_regions(location, database),
+        "Evaluation": evaluate(database, queries=5),
+        "Identifiability": told,
+        "IdentifiabilityCheck": check_identifiability(told, index, queries=5),
+        "Sight": Sight.of_cell(database, 3),
+        "Scene": cell_scene(database, 3),
+        "Taxonomy": database.taxonomy,
+        "Catalog": load_catalog("montpellier"),
+        "RawLayer": layers[0],
+        "Loaded": loaded,
+        "LoadReport": loaded.report,
+        "ConflationReport": loaded.conflation,
+        "PartitionedDatabase": PartitionedDatabase((), 5),
+        "GeopackageContents": GeopackageContents(
+            database=database, objects=None, identifiability=None, notes=()
+        ),
+        "Reproduction": Reproduction(
+            database=database,
+            summary={},
+            variants={},
+            experiments={},
+            seconds={},
+            settings={"queries": 300},
+        ),
+        "UpdateReport": update_database(database, store, store.objects)[2],
+        "QualityReport": quality_report(loaded.objects, loaded.report, loaded.conflation),
+    }
+
+
+def test_every_result_is_told_on_one_line_and_as_a_table(results: dict[str, object]) -> None:
+    for name, result in results.items():
+        assert isinstance(result, Displayed)
+        line = repr(result)
+        assert line.startswith(f"<{name}: ")
+        assert line.isprintable()
+        assert len(line) < LONGEST_LINE
+        page = HtmlPage(result._repr_html_())
+        assert page.text_of["caption"] == [name]
+        told = zip(page.text_of["th"], page.text_of["td"], strict=True)
+        assert f"<{name}: {'; '.join(' '.join(fact) for fact in told)}>" == line
+
+
+def test_what_a_database_and_an_answer_tell(results: dict[str, object]) -> None:
+    index = results["LikelihoodIndex"]
+    assert isinstance(index, LikelihoodIndex)
+    database = index.database
+    assert f"cells {len(database):,}; objects seen " in repr(database)
+    assert "CRS EPSG:2154; bounds x 765,175 to " in repr(database)
+    assert "answer " in repr(results["Location"])
+    assert "bounds none" in repr(nothing_of(database))
+
+
+def nothing_of(database: SignatureDatabase) -> SignatureDatabase:
+    return database.select(slice(0))
+
+
+@pytest.mark.parametrize("text", [HOSTILE, "two\nlines\0", "long " * 100])
+def test_text_from_data_breaks_nothing(text: str) -> None:
+    town = Town(text)
+    assert repr(town).isprintable()
+    assert len(repr(town)) < 100
+    assert repr(town).endswith("; cells 312,806>")
+    assert HtmlPage(town._repr_html_()).tags <= {"table", "caption", "tbody", "tr", "th", "td"}
+
+
+def test_pictures_and_maps_do_not_print_their_files(results: dict[str, object]) -> None:
+    scene, taxonomy = results["Scene"], results["Taxonomy"]
+    assert len(repr(draw_scene(scene, taxonomy))) < 1000  # type: ignore[arg-type]
+    assert repr(show_map(folium.Map(tiles=None))) == "MapFrame(height=520)"
