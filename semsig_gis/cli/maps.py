@@ -88,7 +88,7 @@ def map_(
     ] = None,
     out: Annotated[Path, typer.Option(help="Map to write (.html).")],
 ) -> None:
-    """Draw an evaluation, cells, changes or street objects on a map."""
+    """Draw an evaluation, cells, changes and street objects on one map."""
     import numpy as np
 
     from semsig_gis.database.city import open_city
@@ -101,11 +101,10 @@ def map_(
     from semsig_gis.maps.page import save_map
     from semsig_gis.objects.table import open_objects
 
-    given = sum((evaluation is not None, identifiability, ambiguity, drift is not None))
-    if given > 1 or (given == 0 and objects is None):
+    if not (identifiability or ambiguity) and evaluation is drift is objects is None:
         msg = (
-            "a map shows --evaluation, --identifiability, --ambiguity or --drift, with --objects "
-            "or without, or --objects alone; give one of them."
+            "there is nothing to show on the map; give --evaluation, --ambiguity, "
+            "--identifiability, --drift or --objects, or several of them."
         )
         raise InputError(msg)
     keep_inputs(out, read=(database, drift, objects, buildings, streets))
@@ -124,18 +123,24 @@ def map_(
         require_same_place(opened, np.stack([places.x, places.y], axis=1), "street objects")
     with progress("drawing the map"):
         drawn: Any = None  # a map of folium, which the command line does not know
-        if ambiguity:
-            drawn = ambiguity_map(opened, identifiability=columns)
-        elif columns is not None:
-            drawn = identifiability_map(columns)
-        elif results is not None:
+        if results is not None:
             drawn = evaluation_map(results, opened)
-        elif newer is not None:
+        if ambiguity:
+            drawn = ambiguity_map(opened, identifiability=columns, map_=drawn)
+        if columns is not None and identifiability:
+            drawn = identifiability_map(columns, map_=drawn)
+        if newer is not None:
             before, after = city.objects, newer.objects
             if before is None or after is None:
                 remark("street objects of both databases were not found; drawing cells only")
                 before = after = None
-            drawn = drift_map(opened, newer.database, objects_before=before, objects_after=after)
+            drawn = drift_map(
+                opened,
+                newer.database,
+                objects_before=before,
+                objects_after=after,
+                map_=drawn,
+            )
         if seen is not None:
             drawn = objects_map(seen, database=opened if drawn is None else None, map_=drawn)
         draw_ground(drawn, city, buildings=buildings, streets=streets)

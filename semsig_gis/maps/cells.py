@@ -18,12 +18,14 @@ from semsig_gis.maps.parts import (
     NAMED_CLASSES,
     PAGE_FILES,
     Drawing,
-    add_image,
+    cell_image,
     class_titles,
+    colour_cells,
     corners_of,
     finished_map,
     free_name,
     isolated,
+    layers_of,
     prepared_map,
     ramp_bar,
     sources,
@@ -55,17 +57,33 @@ class CellFacts:
     settings: Mapping[str, Any]
 
 
+class Cells(Drawing):
+    """A layer without signs of its own that tells what is known of a cell when clicked."""
+
+    def __init__(
+        self, name: str | None, database: SignatureDatabase, facts: Sequence[CellFacts]
+    ) -> None:
+        arrays, grid = _cells(database)
+        for part in facts:
+            arrays |= part.arrays
+            grid |= part.settings
+        parts = [part.name for part in facts]
+        super().__init__(name, "cells", arrays, grid, class_titles(database), parts, group="ground")
+        self.files = (*PAGE_FILES, "cells.css", "cells.js", *(f"{part}.js" for part in parts))
+        self.database, self.facts = database, facts
+
+
 def add_cells(map_: folium.Map, database: SignatureDatabase, facts: Sequence[CellFacts]) -> None:
-    """Add a layer without signs of its own that tells what is known of a cell when clicked."""
-    arrays, grid = _cells(database)
-    for part in facts:
-        arrays |= part.arrays
-        grid |= part.settings
-    parts = [part.name for part in facts]
-    name = free_name(map_, "Tell of a cell when clicked")
-    layer = Drawing(name, "cells", arrays, grid, class_titles(database), parts)
-    layer.files = (*PAGE_FILES, "cells.css", "cells.js", *(f"{part}.js" for part in parts))
-    layer.add_to(map_)
+    """Add a layer that tells of a cell when clicked; one that the map has of them tells more."""
+    name = "Tell of a cell when clicked"
+    children = layers_of(map_)
+    for key, child in list(children.items()):
+        if not isinstance(child, Cells) or child.layer_name != name:
+            continue
+        if np.array_equal(child.database.cell_ids, database.cell_ids):
+            del children[key]
+            facts = list({part.name: part for part in (*child.facts, *facts)}.values())
+    Cells(free_name(map_, name), database, facts).add_to(map_)
 
 
 def city_view(database: SignatureDatabase) -> NDArray[np.float64]:
@@ -161,7 +179,8 @@ def ambiguity_map(
     for name, size in sizes.items():
         levels = np.digitize(size, list(GROUP_COLOURS)).astype(np.uint8)
         image = level_image(database, levels, list(GROUP_COLOURS.values()))
-        add_image(page, *image, name=name, dark="lift", show=name == "Same types")
+        show = name == "Same types"
+        colour_cells(page, name, cell_image(page, *image, dark="lift"), show=show)
     more = [] if identifiability is None else [_lookalike_facts(identifiability)]
     add_cells(page, database, [_group_facts(database), *more])
     legend = ambiguity_legend(sizes, licenses=database.licenses)
@@ -201,7 +220,7 @@ def identifiability_map(
     steps = len(FOUND_RAMP)
     levels = np.minimum(np.floor(identifiability.found * steps), steps - 1).astype(np.uint8)
     image = level_image(database, levels + np.uint8(1), FOUND_RAMP)
-    add_image(page, *image, name="Chance to be found", dark="lift")
+    colour_cells(page, "Chance to be found", cell_image(page, *image, dark="lift"))
     add_cells(page, database, [_group_facts(database), _lookalike_facts(identifiability)])
     legend = identifiability_legend(identifiability)
     return finished_map(page, database, legend=legend, view=view if map_ is None else None)

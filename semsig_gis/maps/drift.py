@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 import pandas as pd
@@ -13,13 +13,14 @@ from semsig_gis.core.geometry import SOURCE, SOURCE_ID
 from semsig_gis.core.signs import DRIFT_COLOURS, OBJECT_COLOURS
 from semsig_gis.database.database import join_databases, require_same_place
 from semsig_gis.database.update import compare_cells
-from semsig_gis.maps.cells import CellFacts, add_cells, city_view, packed_signatures
+from semsig_gis.maps.cells import CellFacts, Cells, city_view, packed_signatures
 from semsig_gis.maps.image import level_image, packed
 from semsig_gis.maps.parts import (
     FLIPPING,
     LIFTING,
     NAMED_CLASSES,
-    add_image,
+    cell_image,
+    colour_cells,
     draw,
     finished_map,
     isolated,
@@ -105,12 +106,13 @@ def drift_map(
     kinds = _kinds(city, old, new, cells)
     page = prepared_map(map_, tiles, title="What has changed")
     colours, same = list(DRIFT_COLOURS.values()), kinds == 1
-    if same.any():
-        image = level_image(city.select(same), kinds[same], colours)
-        add_image(page, *image, name="Cells that are the same", dark="flip")
-    if not same.all():
-        image = level_image(city.select(~same), kinds[~same], colours)
-        add_image(page, *image, name="Cells that differ", dark="lift")
+    looks: tuple[tuple[NDArray[np.bool_], Literal["flip", "lift"]], ...]
+    looks = (same, "flip"), (~same, "lift")
+    images = [
+        cell_image(page, *level_image(city.select(some), kinds[some], colours), dark=dark)
+        for some, dark in looks
+        if some.any()
+    ]
     differing = old.select(np.sort(np.concatenate([cells.changed[:, 0], cells.vanished])))
     arrays = {
         "kind": packed(kinds),
@@ -118,7 +120,9 @@ def drift_map(
         **_signatures("now", new, city),
     }
     facts = CellFacts(name="change", arrays=arrays, settings={"kinds": list(DRIFT_COLOURS)})
-    add_cells(page, city, [facts])
+    cells_now = Cells(None, city, [facts])
+    cells_now.add_to(page)
+    colour_cells(page, "What has changed", *images, cells_now)
     objects = None
     if objects_before is not None and objects_after is not None:
         for some in (objects_before, objects_after):
@@ -130,7 +134,7 @@ def drift_map(
                 raise CrsError(msg)
         objects = compare_objects(objects_before, objects_after)
         for name, drawings in _object_drawings(objects_before, objects_after, objects):
-            draw(page, name, "drawings", drawings)
+            draw(page, name, "drawings", drawings, group="objects")
     legend = drift_legend(cells, objects, taxonomy=taxonomy, licenses=city.licenses)
     return finished_map(page, city, legend=legend, view=view if map_ is None else None)
 

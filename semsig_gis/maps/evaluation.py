@@ -14,9 +14,11 @@ from semsig_gis.database.observation import parse_view
 from semsig_gis.evaluation.result import Evaluation
 from semsig_gis.maps.image import mercator, packed
 from semsig_gis.maps.parts import (
+    Drawing,
     add_city,
     cell_signature,
     class_titles,
+    colour_cells,
     corners_of,
     draw,
     finished_map,
@@ -114,9 +116,11 @@ def evaluation_map(
     # How far two random cells lie apart (root mean square).
     guess = math.sqrt(2.0 * float(database.xy.var(axis=0).sum())) or database.grid.step
     page = prepared_map(map_, tiles, title="Localization errors")
-    add_city(page, database)
+    city = add_city(page, database)
     errors = np.minimum(queries["error_m"].to_numpy(np.float64) / guess, 1.0)
-    draw(page, "Expected errors", "heat", *_heat(xy, errors, database))
+    field = Drawing(None, "heat", *_heat(xy, errors, database), group="cells")
+    field.add_to(page)
+    colour_cells(page, "Expected errors", city, field)
     outcomes = {
         "Failed": (~evaluation.successful, FAILED),
         "Successful": (evaluation.successful, SUCCESSFUL),
@@ -126,11 +130,11 @@ def evaluation_map(
     lines = [
         [{"color": colour}, pairs[some & located].tolist()] for some, colour in outcomes.values()
     ]
-    draw(page, "Lines from true to estimated places", "lines", lines, show=False)
+    draw(page, "Lines from true to estimated places", "lines", lines, group="queries", show=False)
     for outcome, (some, _) in outcomes.items():
         name = f"{outcome} queries ({int(some.sum()):,})"
         points = list(itertools.compress(records, some))
-        draw(page, name, "points", QUERY_FIELDS, class_titles(database), points)
+        draw(page, name, "points", QUERY_FIELDS, class_titles(database), points, group="queries")
     legend = evaluation_legend(evaluation, error_limit=_metres(guess), licenses=database.licenses)
     view = corners_of(database) if map_ is None else None
     return finished_map(page, database, legend=legend, view=view)

@@ -24,9 +24,10 @@ from semsig_gis.maps.image import level_image
 from semsig_gis.maps.parts import (
     FLIPPING,
     add_city,
-    add_image,
+    cell_image,
     cell_signature,
     class_titles,
+    colour_cells,
     draw,
     finished_map,
     isolated,
@@ -116,30 +117,34 @@ def location_map(
     database = location.posterior.database
     drawings = _Drawings(location)
     page = prepared_map(map_, tiles, title="Where it was seen")
-    add_city(page, database)
-    _add_chances(page, location)
+    _colour_chances(page, location)
     for number, explanation in enumerate(location.explanations, start=1):
         parts = drawings.explanation(explanation)
-        draw(page, f"Objects from rank {number}", "drawings", parts, show=number == 1)
+        draw(
+            page, f"Objects from rank {number}", "drawings", parts, group="answer", show=number == 1
+        )
     candidates = drawings.candidates()
     name = f"Candidates ({len(candidates):,})"
     # The best last, so that they lie on top.
-    draw(page, name, "points", CANDIDATE_FIELDS, class_titles(database), candidates[::-1])
-    draw(page, "Best place", "drawings", drawings.place())
+    titles = class_titles(database)
+    draw(page, name, "points", CANDIDATE_FIELDS, titles, candidates[::-1], group="answer")
+    draw(page, "Best place", "drawings", drawings.place(), group="answer")
     legend, view = location_legend(location), drawings.view() if map_ is None else None
     return finished_map(page, database, legend=legend, view=view, zoom=CLOSEST_ZOOM)
 
 
-def _add_chances(map_: folium.Map, location: Location) -> None:
-    """Add images of the chances: from near those of the cells, from afar those around them."""
+def _colour_chances(map_: folium.Map, location: Location) -> None:
+    """Colour cells by their chances: from near those of the cells, from afar those around them."""
+    city = add_city(map_, location.posterior.database)
     posterior, radius, near = location.posterior, location.rule.radius, location.answer.given
     around, cell = posterior.mass_within(radius), posterior.chances
-    for name, image, show in (
+    for name, picture, show in (
         (f"Chance within {radius:g} m", _chances(posterior, around), not near),
         ("Chance of a cell", _chances(posterior, cell), near),
         ("Regions of 50, 90 and 99 %", _regions(posterior), False),
     ):
-        add_image(map_, *image, name=name, opacity=0.85, dark="flip", show=show)
+        image = cell_image(map_, *picture, dark="flip", opacity=0.85)
+        colour_cells(map_, name, city, image, show=show)
 
 
 def _chances(posterior: Posterior, chances: NDArray[np.float64]) -> Image:
@@ -399,7 +404,8 @@ def localization_map(
     add_city(page, database)
     name = f"Candidates ({len(records):,})"
     # The best last, so that they lie on top.
-    draw(page, name, "points", RANK_FIELDS, class_titles(database), records[::-1])
+    titles = class_titles(database)
+    draw(page, name, "points", RANK_FIELDS, titles, records[::-1], group="answer")
     legend = localization_legend(localization)
     return finished_map(page, database, legend=legend, view=places if map_ is None else None)
 

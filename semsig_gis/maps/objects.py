@@ -102,7 +102,7 @@ def ground_map(
         msg = "there are no streets or buildings to show; give some that are in the city."
         raise EmptyResultError(msg)
     page = prepared_map(map_, None, title="Streets and buildings")
-    draw(page, "Streets and buildings", "ground", *_ground(shapes, systems[0]))
+    draw(page, "Streets and buildings", "ground", *_ground(shapes, systems[0]), group="ground")
     legend, view = "", None
     if map_ is None:
         bounds = shapely.total_bounds(np.concatenate(list(shapes.values()))).reshape(2, 2)
@@ -207,7 +207,7 @@ def objects_map(
         title = isolated(signs[code].title)
         # The layer control reads it as HTML; a brace could begin what folium renders once more.
         name = f"{sign_svg(signs[code])} {title} ({count:,})".replace("{", "&#123;")
-        draw(page, name, "classLayer", key, number, show=map_ is None)
+        draw(page, name, "classLayer", key, number, group="objects", show=map_ is None)
     return finished_map(
         page,
         objects if database is None else database,

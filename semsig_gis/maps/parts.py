@@ -86,16 +86,51 @@ class Call(MacroElement):
         return super().render(**kwargs)  # type: ignore[no-untyped-call]
 
 
+GROUPS = {
+    "cells": "Colour cells by",
+    "queries": "Queries",
+    "answer": "Answer",
+    "objects": "Street objects",
+    "ground": "Ground",
+}
+"""What the layers of a map are about; of the cells, one layer is on at a time."""
+
+
 class Drawing(Call, Layer):
-    """A layer that a function of the page's script makes."""
+    """A layer that a function of the page's script makes, in one of the `GROUPS` of layers.
+
+    One without a name is a part of another.
+    """
 
     _template = Template(
         "{% macro script(this, kwargs) %}var {{ this.get_name() }} = "
         "semsig.{{ this.function }}({{ this.arguments }});{% endmacro %}"
     )
 
-    def __init__(self, name: str, function: str, *arguments: object, show: bool = True) -> None:
-        super().__init__(function, *arguments, name=name, overlay=True, show=show)
+    def __init__(
+        self,
+        name: str | None,
+        function: str,
+        *arguments: object,
+        group: str,
+        show: bool = True,
+    ) -> None:
+        whole = name is not None
+        look = {"name": name, "overlay": True, "control": whole, "show": whole and show}
+        super().__init__(function, *arguments, **look)
+        self.group = group
+
+
+class LayerGroups(Call):
+    """The groups of the layers in the layer control of a map."""
+
+    def __init__(self, map_: folium.Map, layers: folium.LayerControl) -> None:
+        groups = {
+            child.layer_name: child.group
+            for child in layers_of(map_).values()
+            if isinstance(child, Drawing) and child.control
+        }
+        super().__init__("layerGroups", map_, layers, GROUPS, groups)
 
 
 class Surroundings(Call):
@@ -134,9 +169,16 @@ def prepared_map(map_: folium.Map | None, tiles: str | None, *, title: str) -> f
     return made
 
 
-def draw(map_: folium.Map, name: str, function: str, *arguments: object, show: bool = True) -> None:
+def draw(
+    map_: folium.Map,
+    name: str,
+    function: str,
+    *arguments: object,
+    group: str,
+    show: bool = True,
+) -> None:
     """Add a layer that a function of the page's script makes."""
-    Drawing(free_name(map_, name), function, *arguments, show=show).add_to(map_)
+    Drawing(free_name(map_, name), function, *arguments, group=group, show=show).add_to(map_)
 
 
 def finished_map(
@@ -163,10 +205,11 @@ def finished_map(
             names = child.names + names
             if area is None or area["grid"] is None:
                 area = child.area or area
-        if isinstance(child, folium.LayerControl | Surroundings):
+        if isinstance(child, folium.LayerControl | LayerGroups | Surroundings):
             del children[name]
     layers = folium.LayerControl(collapsed=cast("bool", JsCode("semsig.small.matches")))
     layers.add_to(map_)
+    LayerGroups(map_, layers).add_to(map_)
     Surroundings(map_, layers, area, tuple(dict.fromkeys(names))).add_to(map_)
     return map_
 
@@ -287,38 +330,57 @@ def free_name(map_: folium.Map, name: str) -> str:
     return next(one for one in itertools.chain([name], numbered) if one not in taken)
 
 
-def add_city(map_: folium.Map, database: SignatureDatabase, *, show: bool = True) -> None:
-    """Add the cells as an image, unless the map shows them already."""
+def add_city(map_: folium.Map, database: SignatureDatabase, *, show: bool = True) -> ImageOverlay:
+    """Add how many objects cells see, unless the map has it already; return the image.
+
+    It is shown where the cells have no other colours.
+    """
     picture = city_image(database, SHADES)
-    shown = {child.url for child in layers_of(map_).values() if isinstance(child, ImageOverlay)}
-    if _data_url(picture[0]) not in shown:
-        # In the pane of tiles, below everything else.
-        add_image(map_, *picture, name="Objects seen from a cell", dark="flip", show=show)
+    for child in layers_of(map_).values():
+        if isinstance(child, ImageOverlay) and child.url == _data_url(picture[0]):
+            return child
+    image = cell_image(map_, *picture, dark="flip")
+    show = show and not any(one.show for one in cell_colours(map_))
+    colour_cells(map_, "Objects seen from a cell", image, show=show)
+    return image
 
 
-def add_image(
+def cell_image(
     map_: folium.Map,
     image: bytes,
     bounds: list[list[float]],
     *,
-    name: str,
-    opacity: float = 1.0,
     dark: Literal["flip", "lift"],
-    show: bool = True,
-) -> None:
-    """Add a PNG below everything that is drawn.
+    opacity: float = 1.0,
+) -> ImageOverlay:
+    """Return a PNG that a layer of `colour_cells` shows below everything that is drawn.
 
     In the dark, shades that begin near the colour of paper flip, and the dark end of ramps lifts.
     """
-    ImageOverlay(
+    overlay = ImageOverlay(
         _data_url(image),
         bounds,
-        name=free_name(map_, name),
-        pane="tilePane",
+        pane="tilePane",  # below everything else
         opacity=opacity,
         class_name=f"semsig-{dark}",
-        show=show,
-    ).add_to(map_)
+        control=False,
+        show=False,
+    )
+    overlay.add_to(map_)
+    return overlay
+
+
+def cell_colours(map_: folium.Map) -> list[Drawing]:
+    """Return the choices of how cells are coloured."""
+    layers = (child for child in layers_of(map_).values() if isinstance(child, Drawing))
+    return [layer for layer in layers if layer.control and layer.group == "cells"]
+
+
+def colour_cells(map_: folium.Map, name: str, *layers: Layer, show: bool = True) -> None:
+    """Add layers together as one choice of how cells are coloured; the last shown is shown."""
+    for other in cell_colours(map_) if show else ():
+        other.show = False
+    draw(map_, name, "together", *layers, group="cells", show=show)
 
 
 def _data_url(image: bytes) -> str:

@@ -83,8 +83,14 @@ def test_openstreetmap_is_named_for_its_buildings(tmp_path: Path, done: Done) ->
     assert "OpenStreetMap contributors (ODbL" in page
 
 
-def test_a_map_of_cells_that_look_the_same(done: Done) -> None:
-    assert "Cells that look the same" in drawn(done, "--ambiguity")
+def test_everything_on_one_map(done: Done) -> None:
+    done("evaluate city.parquet --queries 5 --out evaluation")
+    done("identify city.parquet")
+    options = "--evaluation evaluation --ambiguity --identifiability --drift city.parquet"
+    page = drawn(done, f"{options} --objects objects.parquet")
+    for name in ("Expected errors", "Same types", "Chance to be found", "What has changed"):
+        assert page.count(f'"{name}" :') == 1
+    assert DRAWN_OBJECTS in page
 
 
 def test_a_map_of_what_has_changed(run: Run) -> None:

@@ -45,9 +45,10 @@ def test_an_evaluation_in_a_browser(evaluated: MapPage) -> None:
     assert len(evaluated.all("canvas.semsig-heat")) == 1
     evaluated.ask("map.setZoom(20, {animate: false})")
     assert evaluated.all("input:disabled") == []
-    evaluated.switch("Expected errors")
-    assert evaluated.all("canvas.semsig-heat") == []
     evaluated.switch("Objects seen")
+    assert evaluated.all("canvas.semsig-heat") == []
+    assert evaluated.all(IMAGES) == [image]
+    evaluated.switch("Nothing")
     assert evaluated.all(IMAGES) == []
     evaluated.switch("Lines")
     count = "return lines(() => true).reduce((sum, one) => sum + one.getLatLngs().length, 0)"

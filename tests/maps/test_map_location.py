@@ -76,7 +76,7 @@ def test_a_location_in_a_browser(page: MapPage) -> None:
     for layer, matched, images in (
         ("Objects from rank 1", 0, 2),
         ("Objects from rank 2", other, 2),
-        ("Chance of a cell", other, 1),
+        ("Objects seen from a cell", other, 1),
         ("Regions of 50, 90 and 99 %", other, 2),
     ):
         page.switch(layer)

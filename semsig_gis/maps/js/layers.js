@@ -61,6 +61,44 @@ window.semsig = {
       pane: "shadowPane", interactive: false, weight: 1, opacity: 0.6, ...look,
     })));
   },
+  together: (...layers) => L.layerGroup(layers),
+  // The layer control in groups. Cells have one colour at a time, or none.
+  layerGroups(map, control, titles, groups) {
+    const rankOf = ({name}) => [...Object.keys(titles), undefined].indexOf(groups[name]);
+    const nothing = {layer: L.layerGroup(), name: "Nothing"};
+    const colours = control._layers.filter(({name}) => groups[name] === "cells");
+    if (colours.length) {
+      groups[nothing.name] = "cells";
+      control.addOverlay(nothing.layer, nothing.name);
+      if (!colours.some(({layer}) => map.hasLayer(layer))) map.addLayer(nothing.layer);
+      colours.push(nothing);
+    }
+    control._layers.sort((one, other) => rankOf(one) - rankOf(other));
+    control._addItem = (item) => {
+      const label = L.Control.Layers.prototype._addItem.call(control, item);
+      const group = groups[item.name];
+      if (!group) return label;
+      const list = control._overlaysList;
+      let box = list.querySelector(`[data-group="${group}"]`);
+      if (!box) {
+        box = L.DomUtil.create("fieldset", "", list);
+        box.dataset.group = group;
+        semsig.text(box, "legend", titles[group]);
+      }
+      box.append(label);
+      if (group === "cells") {
+        const input = label.querySelector("input");
+        input.type = "radio";
+        input.name = `semsig-cells-${L.stamp(control)}`;
+      }
+      return label;
+    };
+    map.on("overlayadd", ({layer}) => {
+      if (!colours.some((one) => one.layer === layer)) return;
+      for (const one of colours) if (one.layer !== layer) map.removeLayer(one.layer);
+    });
+    control.remove().addTo(map);
+  },
   drawings(parts) {
     const group = L.featureGroup();
     for (const [name, ...values] of parts) {

@@ -1,0 +1,83 @@
+"""Several things on one map: layers in groups, and one colour of the cells at a time."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from map_pages import IMAGES
+from small_city import chances_of, small_city, small_evaluation, small_location
+
+from semsig_gis.maps.cells import ambiguity_map, identifiability_map
+from semsig_gis.maps.drift import drift_map
+from semsig_gis.maps.evaluation import evaluation_map
+from semsig_gis.maps.location import location_map
+from semsig_gis.maps.objects import objects_map
+
+if TYPE_CHECKING:
+    import folium
+    from map_pages import MapPage
+
+CITY, OBJECTS = small_city()
+EVALUATION = small_evaluation("medium")
+
+
+def story() -> folium.Map:
+    """Return a map of everything that is known of a city."""
+    drawn = evaluation_map(EVALUATION, CITY)
+    ambiguity_map(CITY, map_=drawn)
+    identifiability_map(chances_of(CITY), map_=drawn)
+    drift_map(CITY, CITY.select(slice(900)), map_=drawn)
+    location_map(small_location(), map_=drawn)
+    return objects_map(OBJECTS, map_=drawn)
+
+
+def checked(page: MapPage) -> list[str]:
+    """Return the colours of the cells that are chosen."""
+    boxes = page.all("[data-group=cells] label")
+    return [
+        one.text.strip() for one in boxes if one.find_element("css selector", "input").is_selected()
+    ]
+
+
+def test_layers_are_in_groups_and_cells_have_one_colour(page: MapPage) -> None:
+    page.open(story())
+    groups = [one.text.splitlines()[0] for one in page.all("fieldset[data-group]")]
+    assert groups == ["Colour cells by", "Queries", "Answer", "Street objects", "Ground"]
+    names = [one.text.strip() for one in page.all("[data-group=cells] label")]
+    assert names == [
+        *("Objects seen from a cell", "Expected errors", "Same types"),
+        *("Same types and angle levels", "Chance to be found", "What has changed"),
+        *("Chance within 50 m", "Chance of a cell", "Regions of 50, 90 and 99 %", "Nothing"),
+    ]
+    seen = {}
+    for name in names:
+        page.switch(name)
+        assert checked(page) == [name]
+        seen[name] = tuple(one.get_attribute("src") for one in page.all(IMAGES))
+        assert len(page.all(".semsig-heat")) == (name == "Expected errors")
+    (city,) = seen["Objects seen from a cell"]
+    assert seen["Expected errors"] == (city,)
+    assert seen["Regions of 50, 90 and 99 %"][0] == city
+    assert {name: len(images) for name, images in seen.items() if len(images) != 2} == {
+        **dict.fromkeys(names[:5], 1),
+        "Nothing": 0,
+    }
+    # By the keyboard, and by whatever else puts a layer on the map.
+    page.one("[data-group=cells] input:checked").send_keys("\ue013")  # arrow up
+    assert checked(page) == ["Regions of 50, 90 and 99 %"]
+    page.ask("shown((one) => one.getLayers?.().length === 2)[0].remove().addTo(map)")
+    assert checked(page) == ["Regions of 50, 90 and 99 %"]
+
+
+def test_a_click_tells_of_what_is_coloured(page: MapPage) -> None:
+    page.open(story())
+    page.switch("Chance to be found")
+    page.switch("Best place")
+    cell = 400
+    both = page.click(CITY, cell)
+    assert {"It sees", "Found within 30 m"} <= set(both)
+    assert any(line.startswith("Same types: ") for line in page.jumps())
+    page.switch("What has changed")
+    assert page.click(CITY, 950)["title"] == "A cell that sees nothing any more"
+    page.switch("Same types")
+    assert page.click(CITY, 950)["title"] == both["title"]
