@@ -257,10 +257,11 @@ def known_identifiability(city: City) -> Identifiability | None:
         return None
 
 
-def tell_if_online(offline: bool) -> None:  # noqa: FBT001
+def tell_if_online(offline: bool, *, tiles: str | None = None) -> None:  # noqa: FBT001
     """Remark that a map needs a network, where it does."""
     if not offline:
-        remark("the map takes Leaflet from the web, so it needs a network to be seen")
+        what = "Leaflet" if tiles is None else "its tiles"
+        remark(f"the map takes {what} from the web, so it needs a network to be seen")
 
 
 def print_tables(tables: Iterable[Table]) -> None:

@@ -56,6 +56,11 @@ def draw_ground(
             raise
 
 
+def _below(drawn: folium.Map | None, tiles: str | None) -> dict[str, Any]:
+    """Return what a map is drawn on: what was drawn before, or online tiles, if any."""
+    return {"tiles": tiles} if drawn is None else {"map_": drawn}
+
+
 @app.command(name="map")
 def map_(
     database: Database,
@@ -85,6 +90,13 @@ def map_(
     streets: Annotated[
         Path | None,
         typer.Option(help="Centre lines to draw below the map; default: those of the database."),
+    ] = None,
+    tiles: Annotated[
+        str | None,
+        typer.Option(
+            help="Draw online tiles below the map, of a provider of xyzservices that needs no key, "
+            "such as OpenStreetMap.Mapnik."
+        ),
     ] = None,
     out: Annotated[Path, typer.Option(help="Map to write (.html).")],
 ) -> None:
@@ -124,11 +136,11 @@ def map_(
     with progress("drawing the map"):
         drawn: Any = None  # a map of folium, which the command line does not know
         if results is not None:
-            drawn = evaluation_map(results, opened)
+            drawn = evaluation_map(results, opened, **_below(drawn, tiles))
         if ambiguity:
-            drawn = ambiguity_map(opened, identifiability=columns, map_=drawn)
+            drawn = ambiguity_map(opened, identifiability=columns, **_below(drawn, tiles))
         if columns is not None and identifiability:
-            drawn = identifiability_map(columns, map_=drawn)
+            drawn = identifiability_map(columns, **_below(drawn, tiles))
         if newer is not None:
             before, after = city.objects, newer.objects
             if before is None or after is None:
@@ -139,11 +151,13 @@ def map_(
                 newer.database,
                 objects_before=before,
                 objects_after=after,
-                map_=drawn,
+                **_below(drawn, tiles),
             )
         if seen is not None:
-            drawn = objects_map(seen, database=opened if drawn is None else None, map_=drawn)
+            drawn = objects_map(
+                seen, database=opened if drawn is None else None, **_below(drawn, tiles)
+            )
         draw_ground(drawn, city, buildings=buildings, streets=streets)
         offline = save_map(drawn, out)
     say(f"map: {out}")
-    tell_if_online(offline)
+    tell_if_online(offline, tiles=tiles)

@@ -78,8 +78,8 @@ def evaluation_map(
     map_ : folium.Map, optional
         Map to add the layers to; a new one by default.
     tiles : str, optional
-        Online background of a new map, by a name that folium knows, such as
-        ``"OpenStreetMap"``; none by default.
+        Online background of a new map: a provider of xyzservices that needs no key, such as
+        ``"OpenStreetMap.Mapnik"``; none by default.
 
     Returns
     -------
@@ -92,7 +92,7 @@ def evaluation_map(
     Raises
     ------
     InputError
-        If the evaluation was made with another database, `tiles` is not known to folium, or
+        If the evaluation was made with another database, `tiles` is not known or needs a key, or
         both `tiles` and `map_` are given.
 
     Notes

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, Literal, cast
 
 import folium
 import numpy as np
+import xyzservices
 from branca.element import Element, MacroElement
 from folium.map import Layer
 from folium.raster_layers import ImageOverlay
@@ -19,7 +20,7 @@ from folium.utilities import JsCode
 from pyproj import Transformer
 
 from semsig_gis import __version__
-from semsig_gis.core.errors import InputError
+from semsig_gis.core.errors import InputError, nearest_name
 from semsig_gis.core.geometry import FULL_TURN, across_180
 from semsig_gis.core.signs import SHADES
 from semsig_gis.core.view import View
@@ -47,6 +48,7 @@ PAGE_FILES = (
     *("page.css", "layers.js", "state.js", "popup.js", "search.js", "controls.js", "arrays.js"),
     *("board.js", "heat.js", "objects.js", "ground.js"),
 )
+WITHOUT_KEY = "a provider such as 'OpenStreetMap.Mapnik' or 'CyclOSM'"
 POWERS = 4  # of x and y, which tell a place within millimetres in a city
 LATTICE = 9
 
@@ -154,19 +156,31 @@ def prepared_map(map_: folium.Map | None, tiles: str | None, *, title: str) -> f
             msg = f"Tiles {tiles!r} were given with a map of your own; add them to that map."
             raise InputError(msg)
         return map_
-    try:
-        made = folium.Map(tiles=tiles, prefer_canvas=True, control_scale=True)
-    except ValueError as error:
-        msg = (
-            f"Tiles {tiles!r} are not known to folium; give a name such as 'OpenStreetMap' or "
-            "'CartoDB positron', or add a tile layer to a map of your own."
-        )
-        raise InputError(msg) from error
-    if tiles is None:
+    provider = None if tiles is None else _tile_provider(tiles)
+    made = folium.Map(tiles=provider, prefer_canvas=True, control_scale=True)
+    if provider is None:
         # Only tiles tell Leaflet where to stop, and only they look bad between whole zooms.
         made.options |= {"maxZoom": MAX_ZOOM, "zoomSnap": 0.25}
     cast("Figure", made.get_root()).title = title
     return made
+
+
+def _tile_provider(name: str) -> xyzservices.TileProvider:
+    """Return the provider of online tiles that xyzservices knows by a name."""
+    known = xyzservices.providers
+    plain = name.lower() == "openstreetmap"
+    try:
+        provider = known.query_name("OpenStreetMap.Mapnik" if plain else name)
+    except ValueError as error:
+        msg = (
+            f"Tiles {name!r} are not known to xyzservices{nearest_name(name, known.flatten())}; "
+            f"give {WITHOUT_KEY}."
+        )
+        raise InputError(msg) from error
+    if provider.requires_token():
+        msg = f"Tiles {name!r} need a key of their provider; give {WITHOUT_KEY}."
+        raise InputError(msg)
+    return provider
 
 
 def draw(

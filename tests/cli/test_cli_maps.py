@@ -93,6 +93,12 @@ def test_everything_on_one_map(done: Done) -> None:
     assert DRAWN_OBJECTS in page
 
 
+def test_online_tiles_are_drawn_and_told_of(run: Run) -> None:
+    code, _, err = run("map city.parquet --ambiguity --tiles openstreetmap.mapnik --out tiled.html")
+    assert (code, "takes its tiles from the web" in err) == (0, True)
+    assert "tile.openstreetmap.org" in Path("tiled.html").read_text(encoding="utf-8")
+
+
 def test_a_map_of_what_has_changed(run: Run) -> None:
     save_with_store(build_database(FEWER), ObjectStore.of(FEWER), "new.parquet")
     line = "map city.parquet --drift new.parquet --out drift.html"

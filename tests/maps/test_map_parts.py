@@ -130,11 +130,27 @@ def test_a_map_of_ones_own_is_drawn_on_twice_and_keeps_its_view(name: str) -> No
 @pytest.mark.parametrize("name", sorted(MAPS.keys() - {"ground"}))
 def test_tiles_are_those_of_folium_and_of_a_new_map(name: str) -> None:
     draw = MAPS[name]
-    assert "tile.openstreetmap.org" in draw(tiles="OpenStreetMap").get_root().render()
-    with refused(InputError, "Openstreetmop", "OpenStreetMap"):
-        draw(tiles="Openstreetmop")
+    body = draw(tiles="openstreetmap.mapnik").get_root().render()
+    assert "tile.openstreetmap.org" in body
+    assert "contributors" in body
     with refused(InputError, "OpenStreetMap"):
         draw(tiles="OpenStreetMap", map_=folium.Map(tiles=None))
+
+
+@pytest.mark.parametrize(
+    ("tiles", "words"),
+    [
+        ("Openstreetmop", "not known"),
+        ("CartoDB.Positron", "need a key"),
+        ("Thunderforest Outdoors", "need a key"),
+        ("https://tiles.example/{z}/{x}/{y}.png", "not known"),
+    ],
+)
+def test_tiles_that_nobody_can_see_are_refused_with_some_that_can(tiles: str, words: str) -> None:
+    with refused(InputError, tiles, words, "'OpenStreetMap.Mapnik'"):
+        MAPS["ambiguity"](tiles=tiles)
+    draw = MAPS["ambiguity"](tiles="CyclOSM")
+    assert len([one for one in layers_of(draw).values() if isinstance(one, folium.TileLayer)]) == 1
 
 
 @pytest.mark.parametrize(
