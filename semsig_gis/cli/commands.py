@@ -19,6 +19,7 @@ from semsig_gis.cli import (  # noqa: F401
     maps,
     view,
     localize,
+    serve,
     learn,
     evaluate,
     export,

@@ -172,8 +172,8 @@ class LocalizeOptions(SearchOptions, QueryOptions):
     out: Annotated[
         Path | None,
         typer.Option(
-            help="Search regions to write: with candidates for QGIS (.gpkg) or alone (.parquet, "
-            ".csv); or the chance of every cell (.tif)."
+            help="Search regions to write: with candidates for QGIS (.gpkg) or in degrees "
+            "(.geojson, .kml), or alone (.parquet, .csv); or the chance of every cell (.tif)."
         ),
     ] = None
     share: Annotated[

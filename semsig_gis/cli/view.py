@@ -164,23 +164,14 @@ def view(
 
 def _taxonomy(database: Path | None) -> Taxonomy:
     """Return the classes that are meant; built-in ones are as tall as elsewhere, if not said."""
-    from semsig_gis.sources.catalog import built_in_taxonomy
-
-    known = built_in_taxonomy()
     if database is None:
-        return known
-    from dataclasses import replace
+        from semsig_gis.sources.catalog import built_in_taxonomy
 
-    from semsig_gis.core.taxonomy import Taxonomy
+        return built_in_taxonomy()
     from semsig_gis.database.city import open_city
+    from semsig_gis.queries.detections.views import with_heights
 
-    tall = {item.name: (item.height_m, item.height_sigma) for item in known.classes}
-    classes = []
-    for item in open_city(database).database.taxonomy.classes:
-        own = item.height_m, item.height_sigma
-        height, sigma = tall.get(item.name, own) if item.height_m is None else own
-        classes.append(replace(item, height_m=height, height_sigma=sigma))
-    return Taxonomy(tuple(classes))
+    return with_heights(open_city(database).database.taxonomy)
 
 
 def _size(text: str | None) -> tuple[int, int] | None:

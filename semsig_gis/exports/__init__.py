@@ -1,7 +1,8 @@
 """Files for other programs, by their suffix.
 
 ``.gpkg`` (`exports.geopackage`) holds many layers, with styles for QGIS; ``.parquet`` and ``.csv``
-(`exports.files`) hold one; ``.tif`` (`exports.files`) holds one number a cell.
+(`exports.files`) hold one; ``.tif`` (`exports.files`) holds one number a cell; ``.geojson`` and
+``.kml`` (`exports.files`) hold an answer in degrees.
 """
 
 from __future__ import annotations
@@ -15,7 +16,13 @@ from semsig_gis.core.errors import EmptyResultError, InputError, UnknownNameErro
 from semsig_gis.database.answer import REGION_SHARE
 from semsig_gis.database.database import require_same_place
 from semsig_gis.exports import geopackage
-from semsig_gis.exports.files import cell_errors, export_geotiff, write_csv, write_geoparquet
+from semsig_gis.exports.files import (
+    cell_errors,
+    export_geotiff,
+    write_csv,
+    write_degrees,
+    write_geoparquet,
+)
 from semsig_gis.exports.layers import answer_layers, cells_layer, evaluation_layers, objects_layer
 
 if TYPE_CHECKING:
@@ -39,6 +46,7 @@ RASTERS = ("ambiguity", "identifiability", "error")
 
 _ONE_LAYER: Mapping[str, Callable[..., None]] = {".parquet": write_geoparquet, ".csv": write_csv}
 _RASTER = frozenset({".tif", ".tiff"})
+_DEGREES = frozenset({".geojson", ".kml"})
 # What a layer or a raster is made from, beside the cells.
 _NEEDS = {
     "objects": "objects",
@@ -231,8 +239,9 @@ def export_answer(
     database : SignatureDatabase
         The database that was searched.
     path : str or Path
-        File to write: ``.gpkg`` holds the regions to search and the candidates, ``.parquet`` and
-        ``.csv`` the regions, ``.tif`` the chance of every cell, of the likelihood method only.
+        File to write: ``.gpkg`` holds the regions to search and the candidates, as do ``.geojson``
+        and ``.kml`` in degrees (WGS 84); ``.parquet`` and ``.csv`` hold the regions, ``.tif`` the
+        chance of every cell, of the likelihood method only.
     share, within : float, optional
         Which cells the regions hold (see `exports.regions.search_regions`).
 
@@ -256,7 +265,7 @@ def export_answer(
     ...     export_answer(answer, demo_database, f"{folder}/regions.gpkg").to_dict()["cells"]
     5
     """
-    suffix = _suffix(path)
+    suffix = _suffix(path, *sorted(_DEGREES))
     if suffix in _RASTER and answer.chances is None:
         msg = (
             f"{path} is to hold the chance of every cell, which the method does not tell; use the "
@@ -272,18 +281,18 @@ def export_answer(
         export_geotiff(database, answer.chances, path, name="posterior", facts=facts)
     elif suffix == ".gpkg":
         geopackage.write_layers(answer_layers(answer, regions), path)
+    elif suffix in _DEGREES:
+        write_degrees({"region": regions.table, "candidate": answer.to_geodataframe()}, path)
     else:
         _ONE_LAYER[suffix](answer_layers(answer, regions)[0], path)
     return regions
 
 
-def _suffix(path: str | Path) -> str:
-    """Return the suffix of a file, in lower case."""
+def _suffix(path: str | Path, *more: str) -> str:
+    """Return the suffix of a file, in lower case; some formats are for a few kinds of data."""
     suffix = Path(path).suffix.lower()
-    if suffix not in {".gpkg", *_ONE_LAYER, *_RASTER}:
-        msg = (
-            f"{path} does not end in .gpkg, .parquet, .csv or .tif; give a name that says the "
-            "format."
-        )
+    if suffix not in {".gpkg", *_ONE_LAYER, *_RASTER, *more}:
+        names = ", ".join((".gpkg", ".parquet", *more, ".csv"))
+        msg = f"{path} does not end in {names} or .tif; give a name that says the format."
         raise InputError(msg)
     return suffix

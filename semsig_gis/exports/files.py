@@ -1,4 +1,4 @@
-"""One layer a file: GeoParquet 1.1, GeoTIFF, and CSV that is safe to open in a spreadsheet.
+"""One layer a file: GeoParquet, GeoTIFF, GeoJSON, KML, and CSV that is safe in a spreadsheet.
 
 Spreadsheets run a cell that begins with ``=``, ``+``, ``-``, ``@``, a tab or a line end as a
 formula. A text from open data may begin so, or have such a part after a sign that the spreadsheet
@@ -12,6 +12,7 @@ import re
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+import pandas as pd
 import pyarrow as pa
 import pyarrow.compute as pc
 import shapely
@@ -34,6 +35,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping
     from pathlib import Path
 
+    import geopandas as gpd
     from numpy.typing import ArrayLike, NDArray
 
     from semsig_gis.database.database import SignatureDatabase
@@ -125,6 +127,23 @@ def write_geoparquet(
             yield block.append_column(BBOX, bounds_column(shapely.bounds(shapes)))
 
     write_geoparquet_blocks(blocks(), path, geo=geo, specs=specs)
+
+
+def write_degrees(tables: Mapping[str, gpd.GeoDataFrame], path: str | Path) -> None:
+    """Write the rows of several tables, which have a rank first, as one GeoJSON or KML file.
+
+    Coordinates are longitude and latitude (WGS 84); ``layer`` names the table of a row, and
+    ``Name`` says it with the rank. The file appears whole, by rename.
+    """
+    parts = [
+        table.assign(Name=[f"{name} {rank}" for rank in table.iloc[:, 0]], layer=name)
+        for name, table in tables.items()
+    ]
+    joined = pd.concat([part.to_crs("EPSG:4326") for part in parts], ignore_index=True)
+    driver = "KML" if str(path).lower().endswith(".kml") else "GeoJSON"
+    options = {} if driver == "KML" else {"RFC7946": "YES"}
+    with whole_file(path) as partial:
+        joined.to_file(partial, driver=driver, engine="pyogrio", **options)
 
 
 def export_geotiff(

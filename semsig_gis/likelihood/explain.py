@@ -97,6 +97,22 @@ class Explanation(Displayed):
         table = pd.DataFrame(self.rows, columns=COLUMNS).astype(dict.fromkeys(NUMBERS, "Int64"))
         return gpd.GeoDataFrame(table, geometry=points, crs=self.crs)
 
+    def ends(self, reach: float) -> NDArray[np.float64]:
+        """Return where the line to each row ends, shape (n, 2): as far as was told, or `reach`.
+
+        It goes where a detection was seen, and else where the street object stands.
+        """
+        seen = [row["query_bearing"] for row in self.rows]
+        stands = [row["object_bearing"] for row in self.rows]
+        bearings = [there if at is None else at for at, there in zip(seen, stands, strict=True)]
+        metres = [
+            next(one for one in (row["query_range"], row["distance"], reach) if one is not None)
+            for row in self.rows
+        ]
+        angles = np.radians(np.array(bearings, dtype=np.float64))
+        away = np.stack([np.sin(angles), np.cos(angles)], axis=1)
+        return np.asarray(np.array(self.xy) + np.array(metres)[:, None] * away)
+
     @property
     def counts(self) -> dict[str, int]:
         """How many rows there are of each verdict, but for what stands outside."""

@@ -64,6 +64,7 @@ MOST_CELLS = 200
 """Likeliest cells near the answer that are averaged; the others hold next to nothing."""
 LARGE_POWER = 4  # of ten, from which on a number is told as a power
 TINY = np.finfo(np.float64).tiny
+ELLIPSE_STEPS = 72
 TURN = 2.0  # degrees between the headings that are tried
 
 
@@ -112,6 +113,15 @@ class PlaceEstimate(Displayed):
         shorter, longer = (scale * np.sqrt(np.maximum(values, 0.0))).tolist()
         bearing = math.degrees(math.atan2(*vectors[:, 1].tolist())) % 180.0
         return longer, shorter, bearing
+
+    def outline(self, share: float = 0.9) -> NDArray[np.float64]:
+        """Return points on that ellipse in metres, shape (n, 2), the last of them the first."""
+        longer, shorter, bearing = self.ellipse(share)
+        turn, angle = math.radians(bearing), np.linspace(0.0, 2.0 * np.pi, ELLIPSE_STEPS + 1)
+        along, across = longer * np.cos(angle), shorter * np.sin(angle)
+        x = self.x + along * math.sin(turn) + across * math.cos(turn)
+        y = self.y + along * math.cos(turn) - across * math.sin(turn)
+        return np.column_stack([x, y])
 
     def to_dict(self) -> dict[str, Any]:
         """Return plain values for JSON; the covariance has two rows if the heading is known."""

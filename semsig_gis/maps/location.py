@@ -83,7 +83,7 @@ SECTOR = {"color": "#404040", "weight": 1.5, "opacity": 0.9, "dashArray": None}
 BEST_PLACE = "The best place is where most of the chance is around it; ranks are of single cells."
 SURROUNDINGS_M = 45.0  # to see around the answer
 CLOSEST_ZOOM = 20
-ELLIPSE_STEPS = 72
+ARC_STEPS = 72
 
 
 def location_map(
@@ -141,7 +141,7 @@ def _colour_chances(map_: folium.Map, location: Location) -> None:
     for name, picture, show in (
         (f"Chance within {radius:g} m", _chances(posterior, around), not near),
         ("Chance of a cell", _chances(posterior, cell), near),
-        ("Regions of 50, 90 and 99 %", _regions(posterior), False),
+        ("Regions of 50, 90 and 99 %", regions_image(posterior), False),
     ):
         image = cell_image(map_, *picture, dark="flip", opacity=0.85)
         colour_cells(map_, name, city, image, show=show)
@@ -153,7 +153,7 @@ def _chances(posterior: Posterior, chances: NDArray[np.float64]) -> Image:
     return _image(posterior, levels, list(CELL_CHANCES.values()))
 
 
-def _regions(posterior: Posterior) -> Image:
+def regions_image(posterior: Posterior) -> Image:
     """Return an image of the fewest cells that hold each share of the chance."""
     shares = sorted(CHANCES, reverse=True)
     levels = np.zeros(len(posterior.database), np.int64)
@@ -196,10 +196,6 @@ class _Drawings:
         """Return the best place and its ellipse."""
         location, place = self.location, self.location.estimate
         longer, shorter, bearing = place.ellipse()
-        turn, angle = np.radians(bearing), np.linspace(0.0, 2.0 * np.pi, ELLIPSE_STEPS + 1)
-        along, across = longer * np.cos(angle), shorter * np.sin(angle)
-        x = place.x + along * np.sin(turn) + across * np.cos(turn)
-        y = place.y + along * np.cos(turn) - across * np.sin(turn)
         (centre,) = self.latlon([place.x, place.y])
         name, colour = (
             ("The answer", SUCCESSFUL)
@@ -216,7 +212,7 @@ class _Drawings:
         ]
         outline = {"color": colour, "weight": 3, "opacity": 0.9}
         return [
-            ["lines", [[outline, [self.latlon(np.column_stack([x, y]))]]]],
+            ["lines", [[outline, [self.latlon(place.outline())]]]],
             ["points", PLACE_FIELDS, {}, [[centre, colour, 6, None, name, details]]],
         ]
 
@@ -248,13 +244,10 @@ class _Drawings:
         rays: dict[str, list[list[list[float]]]] = {verdict: [] for verdict in VERDICTS}
         records = []
         shapes = explanation.table.geometry
-        for row, shape in zip(explanation.to_dict()["rows"], shapes, strict=True):
+        ends = explanation.ends(self.database.reach)
+        for row, shape, end in zip(explanation.to_dict()["rows"], shapes, ends, strict=True):
             verdict = row["verdict"]
             seen_at, object_at = row["query_bearing"], row["object_bearing"]
-            told = row["query_range"], row["distance"], self.database.reach
-            distance = next(metres for metres in told if metres is not None)
-            bearing = np.radians(object_at if seen_at is None else seen_at)
-            end = here + distance * np.array([np.sin(bearing), np.cos(bearing)])
             rays[verdict].append(self.latlon(np.stack([here, end])))
             place = end if shape is None else np.array([shape.x, shape.y])
             details = [
@@ -283,7 +276,7 @@ class _Drawings:
         outlines = []
         for photo, turn in zip(photos, explanation.headings, strict=True):
             for low, high in photo.turned(turn).sectors:
-                bearings = np.radians(np.linspace(low, high, ELLIPSE_STEPS))
+                bearings = np.radians(np.linspace(low, high, ARC_STEPS))
                 arc = np.stack([np.sin(bearings), np.cos(bearings)], axis=1)
                 corners = np.concatenate([[[0.0, 0.0]], arc, [[0.0, 0.0]]])
                 away = self.database.spec.radius * corners

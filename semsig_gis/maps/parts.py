@@ -351,7 +351,7 @@ def add_city(map_: folium.Map, database: SignatureDatabase, *, show: bool = True
     """
     picture = city_image(database, SHADES)
     for child in layers_of(map_).values():
-        if isinstance(child, ImageOverlay) and child.url == _data_url(picture[0]):
+        if isinstance(child, ImageOverlay) and child.url == data_url(picture[0]):
             return child
     image = cell_image(map_, *picture, dark="flip")
     show = show and not any(one.show for one in cell_colours(map_))
@@ -372,7 +372,7 @@ def cell_image(
     In the dark, shades that begin near the colour of paper flip, and the dark end of ramps lifts.
     """
     overlay = ImageOverlay(
-        _data_url(image),
+        data_url(image),
         bounds,
         pane="tilePane",  # below everything else
         opacity=opacity,
@@ -397,7 +397,8 @@ def colour_cells(map_: folium.Map, name: str, *layers: Layer, show: bool = True)
     draw(map_, name, "together", *layers, group="cells", show=show)
 
 
-def _data_url(image: bytes) -> str:
+def data_url(image: bytes) -> str:
+    """Return the address of a PNG that holds it."""
     return f"data:image/png;base64,{base64.b64encode(image).decode('ascii')}"
 
 

@@ -118,7 +118,7 @@ REFUSALS: list[tuple[Callable[[Path], object], str, tuple[str, ...]]] = [
     (city(geometry="point"), "city.tif", ("ambiguity alone", "no geometry")),
     (city(layers="objects", geometry="point", **OF_OBJECTS), "city.csv", ("no geometry",)),
     (answer(small_localization()), "a.tif", ("a.tif", "likelihood")),
-    (answer(small_location()), "a.geojson", ("a.geojson", ".gpkg")),
+    (answer(small_location()), "a.shp", ("a.shp", ".gpkg")),
     (answer(small_localization(), share=7), "a.gpkg", ("share of 7",)),
     # What is of another city, or of none.
     *((city(slice(0)), f"city{suffix}", ("city.", "no cell")) for suffix in ALL),

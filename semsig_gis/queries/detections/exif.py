@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import math
 import struct
 import warnings
@@ -22,6 +23,11 @@ COMPASS_ERROR = 10.0
 
 FILM_MM = math.hypot(36.0, 24.0)
 UNIT_MM = {2: 25.4, 3: 10.0, 4: 1.0, 5: 0.001}
+SHOWN = ("JPEG", "MPO", "PNG", "WEBP", "GIF")
+"""Formats that browsers show."""
+HEIC_BRANDS = frozenset({b"heic", b"heix", b"hevc", b"heim", b"heis", b"mif1", b"msf1"})
+THUMBNAIL = (256, 256)
+UNREADABLE = (OSError, ValueError, SyntaxError, struct.error, Image.DecompressionBombError)
 SIDEWAYS = frozenset({5, 6, 7, 8})  # orientations that change width and height
 
 
@@ -34,14 +40,42 @@ def read_exif(path: str | Path) -> Shot:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # about sizes, and tags that are damaged
             with Image.open(path) as image:
-                width, height = image.size
-                exif = image.getexif()
-                tags, gps = exif.get_ifd(IFD.Exif), exif.get_ifd(IFD.GPSInfo)
-                sideways = exif.get(Base.Orientation) in SIDEWAYS
-    except (OSError, ValueError, SyntaxError, struct.error, Image.DecompressionBombError) as error:
+                return _shot_of(image)
+    except UNREADABLE as error:
         reason = getattr(error, "strerror", None) or "it is no picture"
         msg = f"{path} cannot be read ({reason}); give a picture, or leave it out."
         raise InputError(msg) from error
+
+
+def picture_shot(content: bytes, name: str) -> Shot:
+    """Return what a picture that a browser can show says of how it was taken, as `read_exif` does.
+
+    It is decoded, too: InputError if it is of another format, damaged, or larger than Pillow takes.
+    """
+    if content[4:8] == b"ftyp" and content[8:12] in HEIC_BRANDS:
+        msg = f"{name} is a HEIC picture, which is not read; save it as JPEG and give that."
+        raise InputError(msg)
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            with Image.open(io.BytesIO(content), formats=SHOWN) as image:
+                shot = _shot_of(image)
+                image.draft("L", THUMBNAIL)  # of JPEG; all of it is read in any case
+                image.load()
+    except Image.DecompressionBombError as error:
+        msg = f"{name} has too many pixels to be decoded safely; give a smaller copy of it."
+        raise InputError(msg) from error
+    except UNREADABLE as error:
+        msg = f"{name} is no picture that can be read; give JPEG, PNG, WebP or GIF."
+        raise InputError(msg) from error
+    return shot
+
+
+def _shot_of(image: Image.Image) -> Shot:
+    width, height = image.size
+    exif = image.getexif()
+    tags, gps = exif.get_ifd(IFD.Exif), exif.get_ifd(IFD.GPSInfo)
+    sideways = exif.get(Base.Orientation) in SIDEWAYS
     heading = _number(gps.get(GPS.GPSImgDirection))
     return Shot(
         size=(height, width) if sideways else (width, height),

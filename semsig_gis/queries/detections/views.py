@@ -13,11 +13,12 @@ import numpy as np
 from semsig_gis.core.errors import InputError, UnknownNameError
 from semsig_gis.core.geometry import FULL_TURN, wrap_degrees
 from semsig_gis.core.ranges import require_number
-from semsig_gis.core.taxonomy import MAX_RANGE_M, WILDCARD
+from semsig_gis.core.taxonomy import MAX_RANGE_M, WILDCARD, Taxonomy
 from semsig_gis.core.view import CLASSES, MOST_RANGE_ERROR, Photo, View
 from semsig_gis.queries.detections.camera import USUAL_FOV, Camera, Projection
 from semsig_gis.queries.detections.exif import read_exif
 from semsig_gis.queries.detections.pictures import Shot
+from semsig_gis.sources.catalog import built_in_taxonomy
 from semsig_gis.storage.rows import read_rows, row_value
 
 if TYPE_CHECKING:
@@ -26,7 +27,6 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from semsig_gis.core.taxonomy import Taxonomy
     from semsig_gis.queries.detections.labels import LabelMap, Meaning
     from semsig_gis.queries.detections.pictures import Box, Picture
     from semsig_gis.storage.rows import Row
@@ -79,6 +79,31 @@ class Tally:
         }
 
 
+@dataclass(frozen=True, eq=False, slots=True, kw_only=True)
+class Sightings:
+    """What stands in a picture, box by box.
+
+    `corners`, shape (n, 4), are in pixels, `bearings` in degrees clockwise from where the camera
+    looks, `ranges` in metres with their relative `range_errors`, NaN where they are not known, and
+    `scores`, shape (n, 256), the chance of each class code.
+    """
+
+    camera: Camera
+    shot: Shot
+    corners: NDArray[np.float64]
+    bearings: NDArray[np.float64]
+    ranges: NDArray[np.float64]
+    range_errors: NDArray[np.float64]
+    scores: NDArray[np.float64]
+
+    @property
+    def codes(self) -> NDArray[np.uint8]:
+        """The likeliest class of each, any class where none is named."""
+        named = self.scores[:, 1:]
+        codes = np.where(named.any(axis=1), 1 + named.argmax(axis=1), WILDCARD)
+        return codes.astype(np.uint8)
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Detector:
     """What turns pictures with boxes into views.
@@ -124,7 +149,7 @@ class Detector:
         for number, picture in enumerate(pictures):
             shot = self._shot(picture)
             tally.no_boxes += picture.others
-            view = self._view(picture, shot, tally)
+            view = self._view(picture, tally)
             key = f"{number}"
             if shot.place is not None:
                 key = f"place {shot.place}"
@@ -173,13 +198,7 @@ class Detector:
             )
             raise InputError(msg)
         width, height = shot.size
-        projection = shot.camera or "pinhole"
-        fov = shot.fov
-        if fov is None and shot.focal and projection in {"pinhole", "fisheye"}:
-            half = width / 2.0 / (shot.focal * max(width, height))
-            fov = math.degrees(2.0 * (math.atan(half) if projection == "pinhole" else half))
-            fov = min(fov, FULL_TURN)
-        fov = fov or USUAL_FOV.get(projection)
+        fov = field_of_view(shot)
         if fov is None:
             msg = (
                 f"the field of view of the picture {picture.name} is not known; give --fov in "
@@ -190,49 +209,57 @@ class Detector:
             width=width,
             height=height,
             fov=fov,
-            projection=projection,
+            projection=shot.camera or "pinhole",
             pitch=shot.pitch or 0.0,
             roll=shot.roll or 0.0,
         )
 
-    def _view(self, picture: Picture, shot: Shot, tally: Tally) -> View:
-        """Return what is in a picture."""
+    def sightings(self, picture: Picture, tally: Tally) -> Sightings:
+        """Return what stands in a picture, and count it; raises as `views` does."""
+        shot = self._shot(picture)
         camera = self._camera(picture, shot)
         kept = [(box, meaning) for box in picture.boxes if (meaning := self._kept(box, tally))]
         scale = np.array([camera.width, camera.height] * 2, dtype=float)
         corners = np.array([box.corners for box, _ in kept], dtype=float).reshape(-1, 4)
         corners = np.clip(corners * (scale if picture.shares else 1.0), 0.0, scale)
-        standing = camera.standing(corners)
-        margin = np.maximum(EDGE_PIXELS, EDGE_SHARE * scale)
-        whole = np.array([box.whole for box, _ in kept], dtype=bool)
-        whole &= ((corners > margin) | (np.arange(4) >= 2)).all(axis=1)  # noqa: PLR2004
-        whole &= ((corners < scale - margin) | (np.arange(4) < 2)).all(axis=1)  # noqa: PLR2004
-        heights = np.array([self._height(meaning) for _, meaning in kept]).reshape(-1, 2)
-        ranges: NDArray[np.float64] = np.where(whole, heights[:, 0] / standing.rises, np.nan)
-        ranges[~(ranges <= MAX_RANGE_M)] = np.nan
-        errors: NDArray[np.float64] = np.hypot(
-            heights[:, 1] / heights[:, 0], EDGE_ERROR_PIXELS / standing.pixels
+        bearings, ranges, errors = placed(
+            camera,
+            corners,
+            heights=np.array([self._height(meaning) for _, meaning in kept]).reshape(-1, 2),
+            whole=np.array([box.whole for box, _ in kept], dtype=bool),
         )
-        errors = np.where(np.isnan(ranges), np.nan, np.minimum(errors, MOST_RANGE_ERROR))
-        scores = np.array([self._scores(*one) for one in kept]).reshape(-1, CLASSES)
         tally.photos += 1
         tally.objects += len(kept)
         tally.ranges += int(np.isfinite(ranges).sum())
-        heading, error = shot.heading, shot.heading_error
+        return Sightings(
+            camera=camera,
+            shot=shot,
+            corners=corners,
+            bearings=bearings,
+            ranges=ranges,
+            range_errors=errors,
+            scores=np.array([self._scores(*one) for one in kept]).reshape(-1, CLASSES),
+        )
+
+    def _view(self, picture: Picture, tally: Tally) -> View:
+        """Return what is in a picture."""
+        seen = self.sightings(picture, tally)
+        ranges, errors, scores = seen.ranges, seen.range_errors, seen.scores
+        heading, error = seen.shot.heading, seen.shot.heading_error
         if heading is None:
             tally.unknown_heading += 1
             heading, error = 0.0, math.inf
-        elif shot.north is not None:
-            tally.north[shot.north] += 1
+        elif seen.shot.north is not None:
+            tally.north[seen.shot.north] += 1
         sure = bool((scores.max(axis=1, initial=0.0) == 1.0).all())
         any_range = bool(np.isfinite(ranges).any())
-        bearings = wrap_degrees(heading + standing.bearings)
+        bearings = wrap_degrees(heading + seen.bearings)
         bearings = np.round(bearings, DEGREE_DIGITS) % FULL_TURN
         sectors = [
-            (float(wrap_degrees(low + heading)), high - low) for low, high in camera.sectors()
+            (float(wrap_degrees(low + heading)), high - low) for low, high in seen.camera.sectors()
         ]
         return View(
-            np.where(scores[:, 1:].any(axis=1), 1 + scores[:, 1:].argmax(axis=1), WILDCARD),
+            seen.codes,
             bearings,
             ranges=np.round(ranges, METRE_DIGITS) if any_range else None,
             range_errors=np.round(errors, ERROR_DIGITS) if any_range else None,
@@ -284,6 +311,55 @@ class Detector:
             if item.height_m is not None and item.height_sigma is not None:
                 known = item.height_m, item.height_sigma
         return known or (math.nan, math.nan)
+
+
+def field_of_view(shot: Shot) -> float | None:
+    """Return over how many degrees the width of a picture reaches, None where nobody says."""
+    projection = shot.camera or "pinhole"
+    if shot.fov is None and shot.focal and shot.size and projection in {"pinhole", "fisheye"}:
+        half = shot.size[0] / 2.0 / (shot.focal * max(shot.size))
+        fov = math.degrees(2.0 * (math.atan(half) if projection == "pinhole" else half))
+        return min(fov, FULL_TURN)
+    return shot.fov or USUAL_FOV.get(projection)
+
+
+def placed(
+    camera: Camera,
+    corners: NDArray[np.float64],
+    *,
+    heights: NDArray[np.float64],
+    whole: NDArray[np.bool_],
+) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+    """Return where the things in boxes stand: bearings, ranges and their relative errors.
+
+    `corners`, shape (n, 4), are in pixels; `heights`, shape (n, 2), how tall the things are and the
+    deviation of that in metres, NaN where that is not known; `whole` tells which boxes hide
+    nothing. Bearings are degrees clockwise from where the camera looks. Ranges are NaN where the
+    picture does not tell.
+    """
+    standing = camera.standing(corners)
+    scale = np.array([camera.width, camera.height] * 2, dtype=float)
+    margin = np.maximum(EDGE_PIXELS, EDGE_SHARE * scale)
+    whole = whole & ((corners > margin) | (np.arange(4) >= 2)).all(axis=1)  # noqa: PLR2004
+    whole &= ((corners < scale - margin) | (np.arange(4) < 2)).all(axis=1)  # noqa: PLR2004
+    ranges: NDArray[np.float64] = np.where(whole, heights[:, 0] / standing.rises, np.nan)
+    ranges[~(ranges <= MAX_RANGE_M)] = np.nan
+    errors: NDArray[np.float64] = np.hypot(
+        heights[:, 1] / heights[:, 0], EDGE_ERROR_PIXELS / standing.pixels
+    )
+    errors = np.where(np.isnan(ranges), np.nan, np.minimum(errors, MOST_RANGE_ERROR))
+    return standing.bearings, ranges, errors
+
+
+def with_heights(taxonomy: Taxonomy) -> Taxonomy:
+    """Return classes with the heights of the built-in ones of their names, where not said."""
+    tall = {item.name: (item.height_m, item.height_sigma) for item in built_in_taxonomy().classes}
+    classes = []
+    for item in taxonomy.classes:
+        own = item.height_m, item.height_sigma
+        height, sigma = tall.get(item.name, own) if item.height_m is None else own
+        classes.append(replace(item, height_m=height, height_sigma=sigma))
+    return Taxonomy(tuple(classes))
 
 
 def read_shots(path: str | Path) -> dict[str, Shot]:

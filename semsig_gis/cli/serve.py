@@ -1,0 +1,70 @@
+"""`semsig serve`: the workbench, a page in the browser to ask a city with."""
+
+from __future__ import annotations
+
+import secrets
+import webbrowser
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from semsig_gis.cli.console import Database, app, remark, say
+from semsig_gis.cli.options import NoiseName, Objects, object_store, read_noise
+from semsig_gis.core.errors import InputError
+
+MOST_PORT = 65535
+
+
+@app.command()
+def serve(
+    database: Database,
+    *,
+    port: Annotated[
+        int, typer.Option(min=0, max=MOST_PORT, help="Port of this machine; 0 for any free one.")
+    ] = 0,
+    no_browser: Annotated[
+        bool, typer.Option("--no-browser", help="Print the address, but open no browser.")
+    ] = False,
+    noise: NoiseName = "generic",
+    objects: Objects = None,
+) -> None:
+    """Open a page in the browser to ask with photos, on this machine alone.
+
+    Nothing leaves the machine. The page is closed to others: its address holds a secret.
+    """
+    try:
+        from semsig_gis.serve import server
+    except ModuleNotFoundError as error:
+        if error.name not in {"anyio", "starlette", "uvicorn"}:
+            raise
+        msg = (
+            f"the workbench needs {error.name}, which is not installed; install it with pip "
+            "install 'semsig_gis[serve]'."
+        )
+        raise InputError(msg) from error
+    from semsig_gis.database.city import open_city
+    from semsig_gis.likelihood.noise.model import NOISES
+    from semsig_gis.serve.workbench import Workbench
+
+    city = open_city(database)
+    model = read_noise(noise, city.database)
+    store = object_store(city, objects, needed=False)
+    name = noise if noise in NOISES else Path(noise).stem
+    noises = {name: model} | {one: spec for one, spec in NOISES.items() if one != name}
+    common = [str(database), *(["--objects", str(objects)] if objects is not None else [])]
+    given = {one: noise if one == name else one for one in noises}
+    options = {
+        one: common if words == "generic" else [*common, "--noise", words]
+        for one, words in given.items()
+    }
+    bench = Workbench(city=city, store=store, noises=noises, options=options)
+    token = secrets.token_urlsafe(32)
+    with server.listening(port) as listener:
+        address = server.address(listener, token)
+        say(f"The workbench of {city.path.name} is at {address}")
+        remark("it runs until you press Ctrl-C")
+        if not no_browser:
+            webbrowser.open(address)
+        server.served(bench, listener, token=token).run(sockets=[listener])
+    remark("the workbench is closed")

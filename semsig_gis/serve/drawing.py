@@ -1,0 +1,196 @@
+"""An answer as the page of the workbench draws it: plain values, places in degrees."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from semsig_gis.core.signs import CHANCES
+from semsig_gis.likelihood.explain import UNKNOWN_NAME
+from semsig_gis.maps.location import regions_image
+from semsig_gis.maps.parts import cell_signature, data_url, to_latlon
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike, NDArray
+
+    from semsig_gis.database.database import SignatureDatabase
+    from semsig_gis.likelihood.explain import Explanation
+    from semsig_gis.likelihood.index import LikelihoodIndex
+    from semsig_gis.likelihood.locate import Location
+    from semsig_gis.serve.question import MarkNumber, Question
+
+LEAST_SHARE = 1e-6
+LEAST_BITS = 0.05  # of what is told
+LEAST_CHANCE = 0.05  # of a verdict, that it speaks for or against a place
+
+
+def class_shares(database: SignatureDatabase) -> NDArray[np.float64]:
+    """Return the share of the cells that see each class code, shape (256,)."""
+    types = database.type_sequences
+    cells = np.bincount(types.inverse, minlength=len(types))
+    shares = np.zeros(256)
+    seen = cells @ (types.histogram > 0)
+    shares[: len(seen)] = seen / len(database)
+    return shares
+
+
+def answer_drawing(
+    location: Location, question: Question, *, index: LikelihoodIndex
+) -> dict[str, Any]:
+    """Return what the page draws of an answer."""
+    database, estimate = location.posterior.database, location.estimate
+    image, bounds = regions_image(location.posterior)
+    entropy = location.posterior.entropy
+    drawer = _Drawer(location, question, index)
+    return {
+        "given": location.answer.given,
+        "mass": location.answer.mass,
+        "radius": location.rule.radius,
+        "entropy": entropy,
+        "places_left": 2.0**entropy,
+        "region": {
+            "image": data_url(image),
+            "bounds": bounds,
+            "counts": {
+                f"{share:g}": len(location.posterior.credible_cells(share)) for share in CHANCES
+            },
+            "colours": {f"{share:g}": colour for share, colour in CHANCES.items()},
+        },
+        "candidates": drawer.candidates(),
+        "estimate": {
+            "place": drawer.latlon([[estimate.x, estimate.y]])[0],
+            "sigma": estimate.sigma,
+            "heading": estimate.heading,
+            "heading_sigma": None if estimate.heading is None else estimate.heading_sigma,
+            "ellipse": drawer.latlon(estimate.outline()),
+        },
+        "truth": None if question.truth is None else drawer.truth(question.truth),
+        "notes": list(location.notes),
+        "cells": len(database),
+    }
+
+
+class _Drawer:
+    """What an answer is drawn by."""
+
+    def __init__(self, location: Location, question: Question, index: LikelihoodIndex) -> None:
+        self.location, self.table = location, index.table
+        self.database = location.posterior.database
+        self.marks: tuple[MarkNumber, ...] = question.marks[question.shown]
+        self.titles = {item.name: item.title for item in self.database.taxonomy.classes}
+        self.codes = {item.name: item.code for item in self.database.taxonomy.classes}
+        self.shares = class_shares(self.database)
+
+    def latlon(self, xy: ArrayLike) -> list[list[float]]:
+        """Return places in degrees."""
+        places = np.asarray(xy, dtype=np.float64).reshape(-1, 2)
+        degrees: list[list[float]] = to_latlon(places, self.database.crs, digits=7).tolist()
+        return degrees
+
+    def truth(self, place: tuple[float, float]) -> dict[str, Any]:
+        """Return how far the answer is from the true place."""
+        from pyproj import Transformer  # noqa: PLC0415
+
+        lat, lon = place
+        crs = self.database.crs
+        x, y = Transformer.from_crs("EPSG:4326", crs, always_xy=True).transform(lon, lat)
+        metres = math.hypot(x - self.location.estimate.x, y - self.location.estimate.y)
+        cell = int(self.database.cells_at(np.array([[x, y]]))[0])
+        chances = self.location.chances
+        better = int((chances > chances[cell]).sum()) if cell >= 0 else None
+        return {
+            "place": list(place),
+            "metres": metres,
+            "found": metres <= self.location.rule.radius,
+            "rank": None if better is None else better + 1,
+            "chance": None if cell < 0 else float(chances[cell]),
+        }
+
+    def candidates(self) -> list[dict[str, Any]]:
+        """Return the candidates, likeliest first."""
+        location, database = self.location, self.database
+        columns = location.columns
+        places = self.latlon(np.stack([columns["x"], columns["y"]], axis=1))
+        rows = zip(*(columns[name].tolist() for name in ("cell", "cell_id", "chance")), strict=True)
+        found = []
+        for number, ((cell, cell_id, chance), place) in enumerate(zip(rows, places, strict=True)):
+            heading = float(columns["heading"][number]) if "heading" in columns else None
+            seen = database.select(slice(cell, cell + 1))
+            types, bearings, *_ = cell_signature(database, cell)
+            found.append(
+                {
+                    "rank": number + 1,
+                    "cell": cell_id,
+                    "place": place,
+                    "chance": chance,
+                    "heading": heading,
+                    "signature": [types, bearings, np.round(seen.distances, 1).tolist()],
+                    "rays": [],
+                    "for_against": [],
+                }
+            )
+        for candidate, explanation in zip(found, location.explanations, strict=False):
+            candidate["rays"] = self._rays(explanation)
+            candidate["for_against"] = self._reasons(explanation)
+        return found
+
+    def _rays(self, explanation: Explanation) -> list[dict[str, Any]]:
+        here = self.latlon([explanation.xy])[0]
+        ends = self.latlon(explanation.ends(self.database.reach))
+        return [
+            {
+                "verdict": row["verdict"],
+                "class": row["object_class"] or row["query_class"],
+                "title": self._title(row["object_class"] or row["query_class"]),
+                "seen_class": row["query_class"],
+                "seen_title": self._title(row["query_class"]),
+                "bearing": row["object_bearing"],
+                "distance": row["distance"],
+                "from": here,
+                "to": end,
+                "chance": row["chance"],
+                "mark": None if row["query"] is None else list(self.marks[row["query"]]),
+            }
+            for row, end in zip(explanation.rows, ends, strict=True)
+        ]
+
+    def _reasons(self, explanation: Explanation) -> list[dict[str, Any]]:
+        """Return what speaks for a place and against it, in bits, the weightiest first.
+
+        For it: how few cells see such a class. Against it: how seldom a detector fails so.
+        """
+        length = min(int(explanation.counts["matched"]), len(self.table.missed) - 1)
+        reasons = []
+        for row in explanation.rows:
+            verdict, chance = row["verdict"], row["chance"]
+            kind = row["object_class"] or row["query_class"]
+            class_row = int(self.table.row_of[self.codes.get(kind, 0)])
+            title = self._title(kind) or ""
+            known = 0 <= class_row < len(self.table.codes)
+            if chance < LEAST_CHANCE or verdict == "outside":
+                continue
+            if verdict == "matched":
+                share = max(float(self.shares[self.codes[kind]]), LEAST_SHARE)
+                weight = -chance * math.log2(share)
+                text = f"{title}: it is where one stands, and {share:.1%} of the cells see one"
+            elif verdict == "misnamed":
+                odds = float(self.table.misnamed[length, class_row])
+                weight = chance * math.log2(max(odds, LEAST_SHARE))
+                text = f"{self._title(row['query_class'])}: a {title.lower()} stands there"
+            elif verdict == "missed":
+                odds = float(self.table.missed[length, class_row])
+                weight = chance * math.log2(max(odds, LEAST_SHARE))
+                text = f"{title}: one stands there, {row['distance']:.0f} m away, but is not marked"
+            else:
+                clutter = self.table.clutter
+                odds = float(clutter[class_row] if known else clutter.sum())
+                weight = chance * math.log2(min(max(odds, LEAST_SHARE), 1.0))
+                text = f"{title}: none stands there"
+            if abs(weight) >= LEAST_BITS:
+                reasons.append({"text": text, "weight": round(weight, 3), "verdict": verdict})
+        return sorted(reasons, key=lambda reason: -abs(reason["weight"]))
+
+    def _title(self, name: str | None) -> str | None:
+        return "Something" if name == UNKNOWN_NAME else self.titles.get(name or "", name)

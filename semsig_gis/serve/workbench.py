@@ -1,0 +1,405 @@
+"""What the page of the workbench asks of a city, answered in plain values for JSON."""
+
+from __future__ import annotations
+
+import hashlib
+import math
+import tempfile
+import time
+from collections import Counter
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from pathlib import Path, PurePosixPath
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from pyproj import Transformer
+
+from semsig_gis.core.errors import InputError, SemsigError, UnknownNameError, nearest_name
+from semsig_gis.core.geometry import FULL_TURN, wrap_degrees
+from semsig_gis.core.signs import SHADES, class_signs
+from semsig_gis.database.north import North
+from semsig_gis.database.views import views_at
+from semsig_gis.exports import export_answer
+from semsig_gis.likelihood.index import build_index
+from semsig_gis.likelihood.locate import LikelihoodLocator
+from semsig_gis.likelihood.noise.model import NOISES, cell_noise
+from semsig_gis.maps.image import city_image
+from semsig_gis.maps.parts import MAX_ZOOM, OUTLINES, corners_of, data_url
+from semsig_gis.queries.chain import ready_chain
+from semsig_gis.queries.detections.exif import picture_shot
+from semsig_gis.queries.detections.formats import read_pictures
+from semsig_gis.queries.detections.labels import LabelMap
+from semsig_gis.queries.detections.pictures import Shot
+from semsig_gis.queries.detections.views import Detector, Tally, field_of_view, with_heights
+from semsig_gis.queries.distortions import Detector as FailingDetector
+from semsig_gis.queries.sight import CitySights, Sight
+from semsig_gis.serve.drawing import answer_drawing, class_shares
+from semsig_gis.serve.question import Question, camera_of, degrees, number
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+    from semsig_gis.core.taxonomy import Taxonomy
+    from semsig_gis.database.city import City, ObjectStore
+    from semsig_gis.database.database import SignatureDatabase
+    from semsig_gis.likelihood.locate import Location
+    from semsig_gis.likelihood.noise.model import Noise
+
+MOST_UPLOAD = 25 * 2**20
+"""Bytes of a picture, or of a question."""
+FORMATS = {
+    "gpkg": "application/geopackage+sqlite3",
+    "geojson": "application/geo+json",
+    "kml": "application/vnd.google-earth.kml+xml",
+}
+PANORAMA = 2  # times as wide as high
+
+
+@dataclass(eq=False, kw_only=True)
+class Workbench:
+    """A city, and what answers the questions of a page about it.
+
+    Parameters
+    ----------
+    city : City
+        The city.
+    store : ObjectStore or None
+        Its street objects, if they are at hand.
+    noises : mapping of str to Noise
+        The noise models that the page may choose from, the default first.
+    options : sequence of str
+        The database and its options, as `semsig localize` takes them, by noise model.
+    """
+
+    city: City
+    store: ObjectStore | None
+    noises: Mapping[str, Noise] = field(default_factory=lambda: NOISES)
+    options: Mapping[str, Sequence[str]] = field(default_factory=dict)
+    _locators: dict[tuple[str, str], LikelihoodLocator] = field(default_factory=dict)
+    _last: tuple[object, tuple[Location, ...]] | None = None
+
+    @property
+    def database(self) -> SignatureDatabase:
+        """The cells."""
+        return self.city.database
+
+    @cached_property
+    def taxonomy(self) -> Taxonomy:
+        """The classes of the city, with the heights of the built-in ones."""
+        return with_heights(self.database.taxonomy)
+
+    def about(self) -> dict[str, Any]:
+        """Return what the page shows of the city before anything is asked."""
+        database = self.database
+        image, bounds = city_image(database, SHADES)
+        shares = class_shares(database)
+        signs = class_signs(database.taxonomy)
+        ranges = database.taxonomy.ranges(database.spec.radius)
+        # A class that half of the cells see tells most, seen or not.
+        present = set(database.present_codes.tolist())
+        kinds = sorted(
+            (item for item in self.taxonomy.classes if item.code in present),
+            key=lambda item: abs(shares[item.code] - 0.5),
+        )
+        return {
+            "name": self.city.path.stem,
+            "fingerprint": self.city.digest,
+            "cells": len(database),
+            "crs": database.crs.to_string(),
+            "radius": database.spec.radius,
+            "reach": database.reach,
+            "method": "likelihood",
+            "noise": list(self.noises),
+            "licences": list(map(str, database.licenses)),
+            "bounds": corners_of(database).tolist(),
+            "image": {"url": data_url(image), "bounds": bounds},
+            "classes": [
+                {
+                    "code": item.code,
+                    "symbol": item.symbol,
+                    "name": item.name,
+                    "title": item.title,
+                    "colour": signs[item.code].colour,
+                    "ink": signs[item.code].ink,
+                    "drop": signs[item.code].drop,
+                    "shape": signs[item.code].shape,
+                    "outline": OUTLINES[signs[item.code].shape],
+                    "range": float(ranges[item.code]),
+                    "share": float(shares[item.code]),
+                }
+                for item in kinds
+            ],
+            "max_zoom": MAX_ZOOM,
+            "max_upload": MOST_UPLOAD,
+            "has_objects": self.store is not None,
+        }
+
+    def photo(self, content: bytes, name: str) -> dict[str, Any]:
+        """Return what a picture says of its camera; InputError if it is none."""
+        shot = picture_shot(content, name)
+        width, height = shot.size or (0, 0)
+        panorama = shot.focal is None and width == PANORAMA * height
+        if panorama:
+            shot = replace(shot, camera="equirectangular")
+        fov = field_of_view(shot)
+        notes = []
+        if panorama:
+            notes.append("It is twice as wide as high, so it is taken for a panorama all round.")
+        heading = shot.heading
+        if heading is not None and shot.north is not None:
+            north = North.of("magnetic" if shot.north == "magnetic" else "true", self.database)
+            heading = float(wrap_degrees(heading + north.turn))
+            notes.append(
+                f"Its compass says that it looks at {shot.heading:.0f}° from {shot.north} north, "
+                f"give or take {shot.heading_error:g}°."
+            )
+        return {
+            "sha256": hashlib.sha256(content).hexdigest(),
+            "name": name,
+            "width": width,
+            "height": height,
+            "projection": shot.camera or "pinhole",
+            "fov": None if fov is None else round(fov, 2),
+            "heading": None if heading is None else round(heading, 2),
+            "heading_error": None if heading is None else shot.heading_error,
+            "place": None if shot.position is None else list(shot.position),
+            "notes": notes,
+        }
+
+    def boxes(self, told: Mapping[str, Any]) -> dict[str, Any]:
+        """Return the boxes of a detector's file, as marks of the photos that the page shows."""
+        name = PurePosixPath(str(told.get("name") or "boxes.json")).name or "boxes.json"
+        photos = {str(photo.get("name")): photo for photo in told.get("photos") or []}
+        shots = {key: _shot(photo) for key, photo in photos.items()}
+        stems = {PurePosixPath(key).stem: key for key in photos}
+        with tempfile.TemporaryDirectory() as folder:
+            file = Path(folder, name)
+            file.write_text(str(told.get("text") or ""), encoding="utf-8")
+            if names := told.get("classes"):
+                Path(folder, "classes.txt").write_text(str(names), encoding="utf-8")
+            try:
+                pictures = read_pictures([file])
+            except SemsigError as error:
+                raise InputError(str(error).replace(f"{folder}/", "")) from error
+        tally = Tally()
+        detector = Detector(
+            labels=LabelMap.open(told.get("labels") or (), self.taxonomy),
+            taxonomy=self.taxonomy,
+            shots=shots | {stem: shots[key] for stem, key in stems.items()},
+        )
+        found: dict[str, list[dict[str, Any]]] = {}
+        for picture in pictures:
+            key = stems.get(PurePosixPath(picture.name).stem)
+            if key is not None:
+                found.setdefault(key, []).extend(self._marks(detector, picture, tally))
+        if not found:
+            listed = ", ".join(sorted({picture.name for picture in pictures})[:3]) or "no picture"
+            msg = f"{name} has boxes of {listed}, and none of the photos here; give those."
+            raise InputError(msg)
+        return {"photos": found, "notes": _left_out(tally)}
+
+    def _marks(self, detector: Detector, picture: Any, tally: Tally) -> list[dict[str, Any]]:  # noqa: ANN401
+        seen = detector.sightings(picture, tally)
+        names = {item.code: item.name for item in self.taxonomy.classes}
+        turn = seen.shot.heading or 0.0
+        return [
+            {
+                "box": [round(side, 1) for side in corners],
+                "class": names.get(code, "?"),
+                "score": float(scores[code]),
+                "bearing": round((turn + bearing) % FULL_TURN, 2),
+                "range": None if math.isnan(metres) else round(metres, 2),
+                "range_error": None if math.isnan(metres) else round(error, 3),
+            }
+            for corners, code, scores, bearing, metres, error in zip(
+                seen.corners.tolist(),
+                seen.codes.tolist(),
+                seen.scores,
+                seen.bearings.tolist(),
+                seen.ranges.tolist(),
+                seen.range_errors.tolist(),
+                strict=True,
+            )
+        ]
+
+    def answer(self, told: object) -> dict[str, Any]:
+        """Return the answer to a question, and all that the page draws of it."""
+        start = time.perf_counter()
+        question, location = self._located(told)
+        drawing = answer_drawing(location, question, index=self._locator(question).index)
+        options = self.options.get(self._noise(question), [str(self.city.path)])
+        return drawing | {
+            "command": question.command(self.taxonomy, options=options),
+            "views": question.rows(self.taxonomy),
+            "seconds": time.perf_counter() - start,
+        }
+
+    def export(self, told: object, suffix: str) -> bytes:
+        """Return the answer to a question as a file."""
+        if suffix not in FORMATS:
+            msg = f"the format {suffix!r} is unknown; give one of {', '.join(FORMATS)}."
+            raise UnknownNameError(msg)
+        _, location = self._located(told)
+        with tempfile.TemporaryDirectory() as folder:
+            file = Path(folder, f"answer.{suffix}")
+            export_answer(location, self.database, file)
+            return file.read_bytes()
+
+    def _noise(self, question: Question) -> str:
+        """Return the name of the noise model of a question."""
+        name = next(iter(self.noises)) if question.noise is None else question.noise
+        if name not in self.noises:
+            hint = nearest_name(str(name), self.noises)
+            msg = f"{name!r} is no noise model here; give one of {', '.join(self.noises)}{hint}."
+            raise UnknownNameError(msg)
+        return name
+
+    def _locator(self, question: Question) -> LikelihoodLocator:
+        """Return what answers a question."""
+        key = self._noise(question), question.seen_from
+        if key not in self._locators:
+            noise = self.noises[key[0]]
+            if question.seen_from == "anywhere":
+                noise = cell_noise(noise, self.database.grid.step)
+            self._locators[key] = LikelihoodLocator(
+                index=build_index(self.database, noise),
+                store=self.store,
+                refined=None if question.seen_from == "anywhere" else False,
+            )
+        return replace(self._locators[key], top=question.top, explained=question.top)
+
+    def _located(self, told: object) -> tuple[Question, Location]:
+        """Return a question and its answer, which is found once."""
+        question = Question.parse(told, taxonomy=self.taxonomy, radius=self.database.spec.radius)
+        key = question.rows(self.taxonomy), self._noise(question), question.seen_from, question.top
+        if self._last is None or self._last[0] != key:
+            locator = self._locator(question)
+            if question.legs:
+                locations = locator.locate_route(question.views, question.legs)
+            else:
+                locations = (locator.locate(question.views[0]),)
+            self._last = key, locations
+        return question, self._last[1][question.shown]
+
+    def suggest(self, told: object) -> list[dict[str, Any]]:
+        """Return what to look for next, what is expected to tell most first."""
+        question, location = self._located(told)
+        database, table = self.database, self._locator(question).index.table
+        types = database.type_sequences
+        weights = np.bincount(types.inverse, location.chances, minlength=len(types))
+        lengths = table.length_rows(types.lengths)
+        view = question.views[question.shown]
+        marked = Counter([] if view.codes is None else view.codes.tolist())
+        found = []
+        for row, code in enumerate(table.codes.tolist()):
+            more = types.histogram[:, code] > marked[code]
+            false = 1.0 - math.exp(-float(table.clutter[row]))
+            detected = 1.0 - (1.0 - table.detected[lengths, row]) * (1.0 - false)
+            yes = np.where(more, detected, false)
+            gain = _bits(float(weights @ yes)) - float(weights @ _bits(yes))
+            item = database.taxonomy.by_code(code)
+            metres = database.spec.radius if item.range_m is None else item.range_m
+            title = item.title.lower()
+            article = "another" if marked[code] else "an" if title[0] in "aeiou" else "a"
+            found.append(
+                {
+                    "class": item.name,
+                    "title": item.title,
+                    "symbol": item.symbol,
+                    "gain": round(max(gain, 0.0), 4),
+                    "question": f"Is there {article} {title} within {metres:g} m?",
+                }
+            )
+        return sorted(found, key=lambda one: -one["gain"])
+
+    def simulate(self, told: Mapping[str, Any]) -> dict[str, Any]:
+        """Return what would be seen from a place, and spoiled as a noise model says, as a view."""
+        database = self.database
+        lat, lon = degrees(told.get("place"))
+        to_metres = Transformer.from_crs("EPSG:4326", database.crs, always_xy=True)
+        place = np.array([to_metres.transform(lon, lat)])
+        cell = int(database.cells_at(place)[0])
+        if cell < 0:
+            msg = "no cell of the city is there; choose a place in one that is shaded."
+            raise InputError(msg)
+        sight = self._sight(place, cell)
+        look: dict[str, Any] = {"sectors": None}
+        if (fov := told.get("fov")) is not None:
+            heading = number(told.get("heading") or 0.0, "a heading", most=FULL_TURN)
+            photo = type(sight.photo).looking(
+                heading=heading, fov=number(fov, "a field of view", most=FULL_TURN)
+            )
+            sight = replace(sight, photo=photo)
+            look = {"sectors": [[low, high % FULL_TURN] for low, high in photo.sectors] or None}
+        noise = told.get("noise")
+        chain = []
+        if noise is not None:
+            if noise not in self.noises:
+                msg = f"{noise!r} is no noise model here; give one of {', '.join(self.noises)}."
+                raise UnknownNameError(msg)
+            chain.append(FailingDetector(noise=self.noises[noise]))
+        seed = told.get("seed", 0)
+        if not isinstance(seed, int) or not 0 <= seed <= 10**18:
+            msg = f"a seed was given as {seed!r}; give a whole number from 0 to 10**18."
+            raise InputError(msg)
+        seen = ready_chain(chain, CitySights.of(database))(sight, seed, 0)
+        names = {item.code: item.name for item in database.taxonomy.classes}
+        return {
+            "view": {
+                "compass": [
+                    {"class": names[code], "bearing": round(bearing, 2) % FULL_TURN, "range": None}
+                    for code, bearing in zip(
+                        seen.codes.tolist(), seen.bearings.tolist(), strict=True
+                    )
+                ],
+                "heading_error": None,
+                "step": None,
+                **look,
+            },
+            "cell": int(database.cell_ids[cell]),
+            "objects": len(sight),
+            "truth": {"place": [lat, lon]},
+        }
+
+    def _sight(self, place: np.ndarray[Any, np.dtype[np.float64]], cell: int) -> Sight:
+        """Return what is seen from a place, or from the middle of its cell."""
+        if self.store is None:
+            return Sight.of_cell(self.database, cell)
+        views = views_at(
+            self.store.objects,
+            place,
+            index=self.store.index,
+            radius=self.database.spec.radius,
+            footprints=self.store.buildings_around(place, distance=self.database.reach),
+        )
+        return Sight(codes=views.codes, bearings=views.bearings, distances=views.distances)
+
+
+def _bits(chance: Any) -> Any:  # noqa: ANN401 - a number, or an array of them
+    """Return the entropy of a question that is answered with yes by chance."""
+    sure = np.clip(chance, 1e-12, 1.0 - 1e-12)
+    return -(sure * np.log2(sure) + (1.0 - sure) * np.log2(1.0 - sure))
+
+
+def _shot(photo: Mapping[str, Any]) -> Shot:
+    """Return what the page knows of a photo."""
+    camera = camera_of(photo)
+    heading = photo.get("heading")
+    return Shot(
+        camera=camera.projection,
+        fov=camera.fov,
+        heading=None if heading is None else number(heading, "a heading", most=FULL_TURN),
+        size=(camera.width, camera.height),
+    )
+
+
+def _left_out(tally: Tally) -> list[str]:
+    """Return what there is to say of boxes that are no marks."""
+    told = (
+        (tally.below_min_score, "that the detector is hardly sure of"),
+        (tally.unknown.total(), "of labels that no map knows"),
+        (tally.no_objects.total(), "of what is no street object"),
+        (tally.not_in_city.total(), "of classes that the city does not have"),
+    )
+    return [f"Left out: {count:,} boxes {what}." for count, what in told if count]

@@ -1,0 +1,117 @@
+from __future__ import annotations
+
+import json
+import re
+import socket
+from typing import TYPE_CHECKING
+
+import pytest
+from sentences import refused
+
+from semsig_gis.core.errors import InputError
+from semsig_gis.serve import server
+
+if TYPE_CHECKING:
+    from workbench import Page
+
+
+@pytest.mark.parametrize("path", ["/", "/api/city", "/api/answer", "/static/x", "/?token=wrong"])
+@pytest.mark.parametrize("token", ["", "wrong", "the-token-of-the-testt"])
+def test_who_has_not_the_token_gets_nothing(page: Page, path: str, token: str) -> None:
+    code, text = page.refused(path, X_Semsig_Token=token)
+    assert (code, "token" in text) == (403, True)
+
+
+@pytest.mark.parametrize(
+    ("headers", "code"),
+    [
+        ({"Host": "evil.example"}, 421),
+        ({"Host": "127.0.0.1"}, 421),
+        ({"Host": "127.0.0.1:1"}, 421),
+        ({"Origin": "http://evil.example"}, 403),
+        ({"Origin": "null"}, 403),
+        ({"Origin": "https://127.0.0.1:{port}"}, 403),
+        ({"Sec_Fetch_Site": "cross-site"}, 403),
+        ({"Sec_Fetch_Site": "same-site"}, 403),
+    ],
+)
+@pytest.mark.parametrize("path", ["/?token=the-token-of-the-tests", "/api/city"])
+def test_pages_of_other_sites_may_not_ask(
+    page: Page, path: str, headers: dict[str, str], code: int
+) -> None:
+    told = {name: value.format(port=page.port) for name, value in headers.items()}
+    assert page.refused(path, **told)[0] == code
+
+
+def test_its_own_page_may_ask(page: Page) -> None:
+    for host in ("127.0.0.1", "localhost"):
+        here = f"{host}:{page.port}"
+        own = {"Host": here, "Origin": f"http://{here}", "Sec_Fetch_Site": "same-origin"}
+        assert page.ask("/api/city", **own)["name"] == "town"
+
+
+def test_the_page_runs_its_own_scripts_alone(page: Page, carried: None) -> None:  # noqa: ARG001
+    seen = set()
+    for _ in range(2):
+        code, headers, content = page.send(f"/?token={page.token}", X_Semsig_Token="")
+        html, rules = content.decode(), headers["content-security-policy"]
+        assert code == 200
+        assert (headers["x-content-type-options"], headers["referrer-policy"]) == (
+            "nosniff",
+            "no-referrer",
+        )
+        nonce = re.search(r"script-src 'nonce-([\w-]{22})'", rules)
+        assert nonce
+        seen.add(nonce[1])
+        assert "default-src 'none'" in rules
+        assert "unsafe" not in rules
+        assert re.findall("<(?:script|style)[^>]*>", html)
+        for element in re.findall("<(?:script|style)[^>]*>", html):
+            assert f'nonce="{nonce[1]}"' in element
+        assert not re.search(r"<(link|script)\b[^>]*\b(href|src)=", html)
+        assert page.token not in html
+        assert "town" not in html
+    assert len(seen) == 2
+
+
+@pytest.mark.parametrize(
+    ("path", "body", "code", "word"),
+    [
+        ("/api/answer", b"{", 422, "JSON"),
+        ("/api/answer", b"[]", 422, "mapping"),
+        ("/api/answer", b'{"views": NaN}', 422, "JSON"),
+        ("/api/answer", b"[" * 100_000, 422, "JSON"),
+        ("/api/nothing", b"{}", 404, "nothing at POST /api/nothing"),
+        ("/api/city", b"{}", 405, "nothing at POST /api/city"),
+        ("/api/export?format=exe", b'{"views": []}', 422, "exe"),
+    ],
+)
+def test_a_request_that_makes_no_sense_gets_one_sentence(
+    page: Page, path: str, body: bytes, code: int, word: str
+) -> None:
+    found, text = page.refused(path, body)
+    assert (found, word in text) == (code, True), text
+
+
+@pytest.mark.parametrize("told", [True, False])
+def test_a_body_that_is_too_long_is_not_read(page: Page, told: bool) -> None:  # noqa: FBT001
+    with socket.create_connection(("127.0.0.1", page.port)) as line:
+        size = "Content-Length: 104857600" if told else "Transfer-Encoding: chunked"
+        line.sendall(
+            f"POST /api/photo?name=big.jpg HTTP/1.1\r\nHost: 127.0.0.1:{page.port}\r\n"
+            f"X-Semsig-Token: {page.token}\r\n{size}\r\n\r\n".encode()
+        )
+        piece = b"x" * 2**20
+        for _ in range(0 if told else 26):
+            line.sendall(b"100000\r\n" + piece + b"\r\n")
+        answer = line.recv(65536)
+        while b"}" not in answer:
+            answer += line.recv(65536)
+    assert answer.startswith(b"HTTP/1.1 413")
+    error = json.loads(answer.partition(b"\r\n\r\n")[2])["error"]
+    assert error == "the file is too large; give one of at most 25 MB."
+
+
+def test_a_port_that_another_program_has_is_told() -> None:
+    with server.listening(0) as taken, refused(InputError, "--port"):
+        server.listening(taken.getsockname()[1])

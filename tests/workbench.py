@@ -1,0 +1,57 @@
+"""What a page of the workbench asks its server, over HTTP."""
+
+from __future__ import annotations
+
+import http.client
+import json
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from semsig_gis.serve.workbench import Workbench
+
+TOKEN = "the-token-of-the-tests"  # noqa: S105 - of a server that lives for a test
+
+
+@dataclass(frozen=True, kw_only=True)
+class Page:
+    """A page, with its server."""
+
+    bench: Workbench
+    port: int
+    token: str = TOKEN
+    headers: dict[str, str] = field(default_factory=dict)
+
+    @property
+    def url(self) -> str:
+        return f"http://127.0.0.1:{self.port}/?token={self.token}"
+
+    def send(
+        self, path: str, body: bytes | None = None, **headers: str
+    ) -> tuple[int, dict[str, str], bytes]:
+        """Return the code, the headers and the body of the answer to a request."""
+        own = {"X-Semsig-Token": self.token, **self.headers}
+        own |= {name.replace("_", "-"): value for name, value in headers.items()}
+        connection = http.client.HTTPConnection("127.0.0.1", self.port, timeout=60)
+        connection.request("GET" if body is None else "POST", path, body, own)
+        answer = connection.getresponse()
+        content = answer.read()
+        connection.close()
+        return answer.status, {key.lower(): value for key, value in answer.getheaders()}, content
+
+    def ask(self, path: str, told: object = None, **headers: str) -> Any:  # noqa: ANN401 - any JSON
+        """Return the JSON of an answer that must succeed."""
+        body = None if told is None else json.dumps(told).encode()
+        code, _, content = self.send(path, body, **headers)
+        assert code == 200, content
+        return json.loads(content)
+
+    def refused(self, path: str, told: object = None, **headers: str) -> tuple[int, str]:
+        """Return the code and the sentence with which a request is refused."""
+        body = told if told is None or isinstance(told, bytes) else json.dumps(told).encode()
+        code, kept, content = self.send(path, body, **headers)
+        assert kept["content-type"] == "application/json"
+        text = json.loads(content)["error"]
+        assert text.endswith(".")
+        assert "\n" not in text
+        return code, text
