@@ -152,6 +152,12 @@ from .exports.geopackage import (
 )
 from .exports.files import export_geotiff as export_geotiff
 from .exports.regions import SearchRegions as SearchRegions, search_regions as search_regions
+from .reports.axes import (
+    plot_answer as plot_answer,
+    plot_database as plot_database,
+    plot_identifiability as plot_identifiability,
+    plot_objects as plot_objects,
+)
 from .reports.evaluation import evaluation_tables as evaluation_tables
 from .reports.parts import Curve as Curve, Plot as Plot
 from .reports.quality import quality_tables as quality_tables

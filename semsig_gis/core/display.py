@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from html import escape
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from semsig_gis.core.signs import one_line
 
@@ -15,6 +15,10 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 LONGEST_FACT = 60  # letters
+
+# What the packages of pictures and of maps alone import, for readers of a signature.
+Axes = Any  # of matplotlib
+MapFrame = Any  # of `maps.page`
 
 
 class Displayed(ABC):

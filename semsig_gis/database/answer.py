@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any, Protocol, Self, TypeVar
 
 import numpy as np
 
+import semsig_gis
 from semsig_gis.core.display import Displayed
 from semsig_gis.core.errors import InputError
 from semsig_gis.core.taxonomy import WILDCARD
@@ -27,6 +28,7 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
     from pyproj import CRS, Transformer
 
+    from semsig_gis.core.display import Axes
     from semsig_gis.core.signature import Signature
     from semsig_gis.core.taxonomy import Taxonomy
     from semsig_gis.database.database import SequenceTable, SignatureDatabase
@@ -93,6 +95,10 @@ class Answer(Displayed):
 
         points = gpd.points_from_xy(self.candidates["x"], self.candidates["y"])
         return gpd.GeoDataFrame(self.candidates.copy(), geometry=points, crs=self.crs)
+
+    def plot(self, *, ax: Axes | None = None, legend: bool = True) -> Axes:
+        """Draw where the query may have been seen (see `plot_answer`)."""
+        return semsig_gis.plot_answer(self, ax=ax, legend=legend)
 
     @cached_property
     def _to_degrees(self) -> Transformer:

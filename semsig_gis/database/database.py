@@ -17,6 +17,7 @@ import pyarrow as pa
 import pyarrow.compute as pc
 from pyproj import CRS
 
+import semsig_gis
 from semsig_gis import __version__
 from semsig_gis.core.display import Displayed, bounds_text
 from semsig_gis.core.errors import DatabaseError, InputError
@@ -30,6 +31,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import ArrayLike, NDArray
 
+    from semsig_gis.core.display import Axes, MapFrame
     from semsig_gis.core.geometry import GridSpec
     from semsig_gis.core.signature import SignatureSpec
     from semsig_gis.core.taxonomy import Taxonomy
@@ -236,6 +238,20 @@ class SignatureDatabase(Displayed):
     def types(self, cell: int) -> str:
         """Return the type sequence of the cell in a row, one symbol an object."""
         return self.taxonomy.decode(self.codes[self.offsets[cell] : self.offsets[cell + 1]])
+
+    def plot(
+        self,
+        column: str | ArrayLike | None = None,
+        *,
+        ax: Axes | None = None,
+        **look: Any,  # noqa: ANN401 - whatever matplotlib takes
+    ) -> Axes:
+        """Draw the objects that every cell sees, or another number (see `plot_database`)."""
+        return semsig_gis.plot_database(self, column, ax=ax, **look)
+
+    def explore(self) -> MapFrame:
+        """Show the cells on a map in a notebook, by how many look the same."""
+        return semsig_gis.show_map(semsig_gis.ambiguity_map(self))
 
 
 def join_databases(parts: Sequence[SignatureDatabase]) -> SignatureDatabase:

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any, TypedDict, Unpack
 
 import numpy as np
 
+import semsig_gis
 from semsig_gis.core.display import Displayed
 from semsig_gis.core.errors import InputError
 from semsig_gis.core.geometry import cell_ids, crs_label, signed_degrees
@@ -47,6 +48,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+    from semsig_gis.core.display import MapFrame
     from semsig_gis.core.signature import Signature
     from semsig_gis.database.answer import DistanceMemo
     from semsig_gis.database.city import ObjectStore
@@ -231,6 +233,10 @@ class Location(Answer):
             msg = "the answer was found in another database; give the database that was searched."
             raise InputError(msg)
         return cells
+
+    def explore(self) -> MapFrame:
+        """Show where it may have been seen on a map in a notebook (see `location_map`)."""
+        return semsig_gis.show_map(semsig_gis.location_map(self))
 
     def to_dict(self) -> dict[str, Any]:
         """Return everything but the chances of all cells as plain values that JSON can hold.

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+import semsig_gis
 from semsig_gis.core.errors import EmptyResultError
 from semsig_gis.core.geometry import crs_label
 from semsig_gis.core.view import View
@@ -34,6 +35,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+    from semsig_gis.core.display import MapFrame
     from semsig_gis.core.signature import Signature
     from semsig_gis.database.answer import DistanceMemo, Requirement
     from semsig_gis.database.database import SignatureDatabase
@@ -95,6 +97,10 @@ class Localization(Answer):
         """Return the rows of the candidates in the database that was searched."""
         ids, types = self.columns["cell_id"], self.columns["types"]
         return rows_of_result(database, ids, types, what="localization")
+
+    def explore(self, database: SignatureDatabase) -> MapFrame:
+        """Show the candidates on a map in a notebook (see `localization_map`)."""
+        return semsig_gis.show_map(semsig_gis.localization_map(self, database))
 
     def to_dict(self) -> dict[str, Any]:
         """Return everything as plain values that JSON can hold, candidates as a list of records.

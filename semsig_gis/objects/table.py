@@ -11,6 +11,7 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.compute as pc
 
+import semsig_gis
 from semsig_gis import __version__
 from semsig_gis.core.display import Displayed, bounds_text
 from semsig_gis.core.errors import DatabaseError
@@ -48,6 +49,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
     from pyproj import CRS
 
+    from semsig_gis.core.display import Axes, MapFrame
     from semsig_gis.sources import RawLayer
 
 KIND = "street objects"
@@ -159,6 +161,14 @@ class StreetObjects(Displayed):
         xy: NDArray[np.float64] = shapely.get_coordinates(self.table.geometry.array)
         xy.setflags(write=False)
         return xy
+
+    def plot(self, *, ax: Axes | None = None, legend: bool = True) -> Axes:
+        """Draw the objects with the signs of their classes (see `plot_objects`)."""
+        return semsig_gis.plot_objects(self, ax=ax, legend=legend)
+
+    def explore(self) -> MapFrame:
+        """Show the objects on a map in a notebook (see `objects_map`)."""
+        return semsig_gis.show_map(semsig_gis.objects_map(self))
 
 
 class _OpenedObjects(StreetObjects):

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pyarrow as pa
 
+import semsig_gis
 from semsig_gis.core.display import Displayed
 from semsig_gis.core.errors import DatabaseError, InputError, SemsigError
 from semsig_gis.database.city import City
@@ -23,6 +24,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+    from semsig_gis.core.display import Axes, MapFrame
     from semsig_gis.database.database import SignatureDatabase
     from semsig_gis.likelihood.noise.model import Noise
 
@@ -112,6 +114,14 @@ class Identifiability(Displayed):
             "trials": self.trials,
             "seed": self.seed,
         }
+
+    def plot(self, *, ax: Axes | None = None, legend: bool = True) -> Axes:
+        """Draw the chance of every cell to be found (see `plot_identifiability`)."""
+        return semsig_gis.plot_identifiability(self, ax=ax, legend=legend)
+
+    def explore(self) -> MapFrame:
+        """Show the chances and what is taken for what on a map (see `identifiability_map`)."""
+        return semsig_gis.show_map(semsig_gis.identifiability_map(self))
 
     def require_cells_of(self, database: SignatureDatabase) -> None:
         """Raise InputError where another database has other cells."""

@@ -1,0 +1,403 @@
+"""Results drawn into axes of matplotlib, to be laid over one another or set side by side.
+
+Maps are in metres of the coordinate system of their data: a table of geopandas in the same system
+can be plotted into the same axes.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Any, cast
+
+import numpy as np
+from matplotlib.colors import LinearSegmentedColormap, ListedColormap
+from matplotlib.lines import Line2D
+from matplotlib.patches import Ellipse
+from matplotlib.ticker import MaxNLocator
+from mpl_toolkits.axes_grid1.anchored_artists import AnchoredSizeBar
+
+from semsig_gis.core.errors import EmptyResultError, InputError, UnknownNameError, nearest_name
+from semsig_gis.core.signs import (
+    CANDIDATE_RAMP,
+    CELL_CHANCES,
+    FAILED,
+    FOUND_RAMP,
+    GROUP_COLOURS,
+    SHADES,
+    SUCCESSFUL,
+    class_signs,
+)
+from semsig_gis.likelihood.locate import Location
+from semsig_gis.reports.plots import INK, WHITE, label
+from semsig_gis.reports.scenes import MARKERS
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping, Sequence
+
+    from matplotlib.axes import Axes
+    from matplotlib.cm import ScalarMappable
+    from matplotlib.colorbar import Colorbar
+    from matplotlib.figure import Figure
+    from matplotlib.image import AxesImage
+    from numpy.typing import ArrayLike, NDArray
+
+    from semsig_gis.database.answer import Answer
+    from semsig_gis.database.database import SignatureDatabase
+    from semsig_gis.evaluation.identify.result import Identifiability
+    from semsig_gis.objects.table import StreetObjects
+
+SIZE = (7.5, 6.0)  # inches of a new figure
+MOST_PIXELS = 4000  # of an image along a side
+KILOMETRE = 1000
+LONGEST_LABEL = 40
+
+# Columns of the cells, as files call them: what they are, their colours on all maps, the numbers.
+COLUMNS: Mapping[
+    str, tuple[str, Mapping[int, str], Callable[[SignatureDatabase], NDArray[np.int64]]]
+] = {
+    "length": ("objects seen", SHADES, lambda database: database.lengths),
+    "type_group_size": (
+        "cells with the same types",
+        GROUP_COLOURS,
+        lambda database: database.type_group_sizes,
+    ),
+    "angle_group_size": (
+        "cells with the same angle levels",
+        GROUP_COLOURS,
+        lambda database: database.angle_group_sizes,
+    ),
+}
+COLOUR_OPTIONS = {"cmap", "norm", "vmin", "vmax"}
+
+
+def plot_database(
+    database: SignatureDatabase,
+    column: str | ArrayLike | None = None,
+    *,
+    ax: Axes | None = None,
+    legend: bool = True,
+    **look: Any,  # noqa: ANN401 - whatever matplotlib takes
+) -> Axes:
+    """Draw a number of every cell.
+
+    Parameters
+    ----------
+    database : SignatureDatabase
+        The cells.
+    column : str or array_like, shape (n,), optional
+        ``"length"`` (objects seen, the default), ``"type_group_size"`` or ``"angle_group_size"``
+        (cells that look the same), or a number for each cell, NaN for those to leave out.
+    ax : matplotlib.axes.Axes, optional
+        Where to draw; in a new figure by default.
+    legend : bool, default True
+        Whether to tell what the colours mean.
+    **look
+        Options of `matplotlib.axes.Axes.imshow`, such as ``cmap`` or ``vmax``. Unless these ask for
+        others, a column that has a name has the colours of the maps.
+
+    Returns
+    -------
+    matplotlib.axes.Axes
+        The axes, in metres of the CRS of the database.
+
+    Raises
+    ------
+    InputError
+        If there is no such column (`UnknownNameError`), or not one number for each cell.
+    EmptyResultError
+        If there is no cell.
+
+    Examples
+    --------
+    >>> ax = plot_database(demo_database, "type_group_size")
+    >>> plot_database(demo_database, demo_database.lengths > 9, ax=ax, legend=False) is ax
+    True
+    """
+    if column is None or isinstance(column, str):
+        name = column or "length"
+        if name not in COLUMNS:
+            msg = (
+                f"{name!r} is no column of the cells; give {', '.join(COLUMNS)} or a number for "
+                f"each cell{nearest_name(name, COLUMNS)}."
+            )
+            raise UnknownNameError(msg)
+        title, colours, numbers = COLUMNS[name]
+        values = numbers(database).astype(np.float64)
+        if not COLOUR_OPTIONS & look.keys():
+            axes = _draw_steps(database, values, colours, title=title, ax=ax, legend=legend, **look)
+            axes.set_title(f"{len(database):,} cells, by {title}")
+            _frame(axes)
+            return axes
+    else:
+        values, title = np.asarray(column, np.float64), str(getattr(column, "name", None) or "")
+        if values.shape != (len(database),):
+            msg = f"{values.size} numbers were given for {len(database)} cells; give one for each."
+            raise InputError(msg)
+    axes = map_axes(ax)
+    image = _draw_cells(axes, database, values, **look)
+    if legend:
+        _add_bar(axes, image, title)
+    _frame(axes)
+    return axes
+
+
+def plot_identifiability(
+    identifiability: Identifiability,
+    *,
+    ax: Axes | None = None,
+    legend: bool = True,
+) -> Axes:
+    """Draw the chance that a query from each cell will be found.
+
+    Parameters
+    ----------
+    identifiability : Identifiability
+        What to draw.
+    ax, legend : optional
+        As in `plot_database`.
+
+    Returns
+    -------
+    matplotlib.axes.Axes
+        The axes, in metres of the CRS of the database.
+
+    Examples
+    --------
+    >>> from semsig_gis import build_index, identify, named_noise
+    >>> index = build_index(demo_database, named_noise("light"))
+    >>> ax = plot_identifiability(identify(index, trials=20, class_trials=5))
+    >>> ax.get_title()
+    'Chance to be found within 50 m'
+    """
+    look = {"cmap": LinearSegmentedColormap.from_list("found", FOUND_RAMP), "vmin": 0, "vmax": 1}
+    axes = plot_database(
+        identifiability.database, identifiability.found, ax=ax, legend=legend, **look
+    )
+    axes.set_title(f"Chance to be found within {identifiability.radius:g} m")
+    return axes
+
+
+def plot_objects(objects: StreetObjects, *, ax: Axes | None = None, legend: bool = True) -> Axes:
+    """Draw street objects with the shapes and colours of their classes.
+
+    Parameters
+    ----------
+    objects : StreetObjects
+        What to draw.
+    ax : matplotlib.axes.Axes, optional
+        Where to draw; in a new figure by default.
+    legend : bool, default True
+        Whether to name the classes, with their numbers, beside the map.
+
+    Returns
+    -------
+    matplotlib.axes.Axes
+        The axes, in metres of the CRS of the objects.
+
+    Raises
+    ------
+    EmptyResultError
+        If there is no object.
+
+    Examples
+    --------
+    >>> ax = plot_objects(demo_objects)
+    >>> ax.get_legend().get_texts()[0].get_text()
+    'B Alignment tree (120)'
+    """
+    if not len(objects):
+        msg = "there is no street object to show; look at what was loaded."
+        raise EmptyResultError(msg)
+    axes = map_axes(ax)
+    signs, counts = class_signs(objects.taxonomy), objects.class_counts
+    keys = []
+    for code, count in counts.items():
+        marker, share = MARKERS[signs[code].shape]
+        title = plain(f"{signs[code].symbol} {signs[code].title} ({count:,})")
+        look: dict[str, Any] = {"linestyle": "", "marker": marker, "color": signs[code].colour}
+        look |= {"markeredgecolor": WHITE, "markeredgewidth": 0.0 if count >= MANY else 0.5}
+        size = share * next(size for least, size in SIZES if count >= least)
+        # The rare ones last, so that they lie on top.
+        below: dict[str, Any] = {"zorder": 3 - count / len(objects), "rasterized": count >= MANY}
+        axes.plot(*objects.xy[objects.codes == code].T, markersize=size, **look, **below)
+        keys.append(Line2D([], [], markersize=7 * share, label=title, **look))
+    axes.set_title(f"{len(objects):,} street objects")
+    _frame(axes)
+    if legend:
+        axes.legend(handles=keys, loc="upper left", bbox_to_anchor=(1.01, 1.0), frameon=False)
+    return axes
+
+
+MANY = 2000
+SIZES = ((MANY, 2.0), (200, 3.5), (0, 6.5))  # of markers, by how many there are of a class
+
+
+def plot_answer(answer: Answer, *, ax: Axes | None = None, legend: bool = True) -> Axes:
+    """Draw where a query may have been seen.
+
+    Parameters
+    ----------
+    answer : Location or Localization
+        The answer. That of the likelihood method shows the chance of every cell in the region of
+        90 %, the place and its ellipse of 90 %; others show the candidates by their rank.
+    ax, legend : optional
+        As in `plot_database`.
+
+    Returns
+    -------
+    matplotlib.axes.Axes
+        The axes, in metres of the CRS of the database.
+
+    Examples
+    --------
+    >>> from semsig_gis import localize
+    >>> plot_answer(localize(demo_database, demo_database.signature(0), top=5)).get_title()
+    'The best 5 of 955 cells'
+    """
+    if isinstance(answer, Location):
+        return _draw_location(answer, ax=ax, legend=legend)
+    axes = map_axes(ax)
+    columns = answer.columns
+    ranks = np.arange(1, len(columns["cell"]) + 1)
+    # The best last, so that it lies on top.
+    shown = axes.scatter(
+        columns["x"][::-1],
+        columns["y"][::-1],
+        c=ranks[::-1],
+        cmap=LinearSegmentedColormap.from_list("ranks", CANDIDATE_RAMP).reversed(),
+        edgecolors=INK,
+        linewidths=0.5,
+        zorder=3,
+    )
+    axes.plot(columns["x"][:1], columns["y"][:1], **_place_look(SUCCESSFUL))
+    axes.set_title(f"The best {len(ranks):,} of {answer.cells:,} cells")
+    _frame(axes)
+    if legend:
+        _add_bar(axes, shown, "place in the list")
+    return axes
+
+
+AROUND_M = 150.0  # that is shown around an answer at least
+
+
+def _draw_location(location: Location, *, ax: Axes | None, legend: bool) -> Axes:
+    database, place = location.posterior.database, location.estimate
+    _draw_cells(axes := map_axes(ax), database, np.ones(len(database)), cmap=_paint(GROUND))
+    chances = np.where(location.chances >= min(CELL_CHANCES), location.chances, np.nan)
+    title = "chance of a cell"
+    _draw_steps(database, chances, CELL_CHANCES, title=title, ax=axes, legend=legend)
+    colour = SUCCESSFUL if location.answer.given else FAILED
+    longer, shorter, bearing = place.ellipse()
+    # An ellipse of matplotlib is turned against the clock from the east.
+    size: dict[str, Any] = {"width": 2 * shorter, "height": 2 * longer, "angle": -bearing}
+    axes.add_patch(Ellipse((place.x, place.y), **size, fill=False, edgecolor=colour, linewidth=1.5))
+    axes.plot(place.x, place.y, **_place_look(colour))
+    region = np.vstack([database.xy[location.region], [[place.x, place.y]]])
+    low, high = region.min(axis=0) - AROUND_M, region.max(axis=0) + AROUND_M
+    axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]))
+    verdict = "The answer" if location.answer.given else "Cannot tell; the best guess"
+    within = f"within {location.rule.radius:g} m with a chance of {location.answer.mass:.0%}"
+    axes.set_title(f"{verdict}: {within}")
+    _frame(axes)
+    return axes
+
+
+GROUND = "#ececea"
+
+
+def _place_look(colour: str) -> dict[str, Any]:
+    ring = {"markerfacecolor": "none", "markeredgecolor": colour, "markeredgewidth": 2.5}
+    return {"linestyle": "", "marker": "o", "markersize": 16, "zorder": 4, **ring}
+
+
+def _paint(colour: str) -> ListedColormap:
+    return ListedColormap([colour])
+
+
+def _draw_steps(
+    database: SignatureDatabase,
+    values: NDArray[np.float64],
+    colours: Mapping[int, str] | Mapping[float, str],
+    *,
+    title: str,
+    ax: Axes | None,
+    legend: bool,
+    **look: Any,  # noqa: ANN401 - whatever matplotlib takes
+) -> Axes:
+    """Draw numbers in the colours of their ranges, which are given by where each begins."""
+    axes, starts = map_axes(ax), list(colours)
+    levels = np.where(np.isnan(values), np.nan, np.digitize(values, starts) - 1.0)
+    scale = {"cmap": ListedColormap([*colours.values()]), "vmin": -0.5, "vmax": len(starts) - 0.5}
+    image = _draw_cells(axes, database, levels, **scale, **look)
+    if legend:
+        bar = _add_bar(axes, image, title)
+        bar.set_ticks(range(len(starts)), labels=_range_labels(starts))
+        bar.ax.tick_params(length=0)
+    return axes
+
+
+def _add_bar(axes: Axes, shown: ScalarMappable, title: str) -> Colorbar:
+    """Tell beside axes what colours mean."""
+    figure = cast("Figure", axes.figure)
+    return figure.colorbar(shown, ax=axes, shrink=0.7, label=plain(title))
+
+
+def _range_labels(starts: Sequence[float]) -> list[str]:
+    """Return what each range of whole numbers, or of chances, is called."""
+    if starts[0] < 1:
+        return [f"{start:.3%}".rstrip("0%").rstrip(".") + " % or more" for start in starts]
+    ends = [int(start) - 1 for start in starts[1:]]
+    names = [
+        f"{low:,}" if low == high else f"{low:,} to {high:,}"
+        for low, high in zip(starts, ends, strict=False)
+    ]
+    return [*names, f"{starts[-1]:,} or more"]
+
+
+def _draw_cells(
+    axes: Axes,
+    database: SignatureDatabase,
+    values: NDArray[np.float64],
+    **look: Any,  # noqa: ANN401 - whatever matplotlib takes
+) -> AxesImage:
+    """Draw numbers of cells as an image; of cells that share a pixel in a large city, one."""
+    if not len(database):
+        msg = "the database has no cells to show; give one with at least one cell."
+        raise EmptyResultError(msg)
+    columns, rows = (one - one.min() for one in (database.columns, database.rows))
+    cells = math.ceil((max(columns.max(), rows.max()) + 1) / MOST_PIXELS)
+    columns, rows = columns // cells, rows // cells
+    image = np.full((rows.max() + 1, columns.max() + 1), np.nan)
+    image[rows, columns] = values
+    side = cells * database.grid.step
+    west, south = (database.xy.min(axis=0) - database.grid.step / 2).tolist()
+    box = (west, west + side * image.shape[1], south, south + side * image.shape[0])
+    options = {"origin": "lower", "extent": box, "interpolation": "none", **look}
+    return axes.imshow(image, **options)
+
+
+def map_axes(ax: Axes | None) -> Axes:
+    """Return axes for a map: those given, or those of a new figure."""
+    if ax is not None:
+        return ax
+    from matplotlib import pyplot as plt  # noqa: PLC0415 - it looks for a screen
+
+    return plt.subplots(figsize=SIZE, layout="constrained")[1]
+
+
+def _frame(axes: Axes) -> None:
+    """Make a map of axes: as long as wide, with a scale bar in place of coordinates."""
+    axes.set(aspect="equal", xticks=[], yticks=[])
+    if any(isinstance(artist, AnchoredSizeBar) for artist in axes.artists):
+        return
+    west, east = axes.get_xlim()
+    metres = MaxNLocator(nbins=6, steps=[1, 2, 5, 10]).tick_values(0, abs(east - west))[1]
+    text = f"{metres / KILOMETRE:g} km" if metres >= KILOMETRE else f"{metres:g} m"
+    bar = AnchoredSizeBar(axes.transData, metres, text, "lower left", borderpad=0.4, color=INK)
+    bar.patch.set(facecolor=WHITE, alpha=0.8, edgecolor="none")
+    axes.add_artist(bar)
+
+
+def plain(text: str) -> str:
+    """Return text from data that matplotlib shows as it is."""
+    return label(text, LONGEST_LABEL).replace("$", r"\$")

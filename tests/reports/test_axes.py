@@ -1,0 +1,212 @@
+"""What is drawn into axes of matplotlib is where it is, and means what the legend says."""
+
+from __future__ import annotations
+
+import ast
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pandas as pd
+import pytest
+from map_pages import HOSTILE, hostile_taxonomy
+from matplotlib import pyplot as plt
+from matplotlib.colors import to_hex
+from mpl_toolkits.axes_grid1.anchored_artists import AnchoredSizeBar
+from sentences import refused
+from worlds import random_town
+
+import semsig_gis
+from semsig_gis import build_index, identify, localize, locate, named_noise
+from semsig_gis.core.errors import EmptyResultError, InputError, UnknownNameError
+from semsig_gis.core.signs import CELL_CHANCES, GROUP_COLOURS, SHADES, class_signs
+from semsig_gis.maps.page import MapFrame
+from semsig_gis.reports import axes as drawing
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from matplotlib.axes import Axes
+    from matplotlib.image import AxesImage
+    from numpy.typing import NDArray
+
+TOWN = random_town()
+CITY, OBJECTS = TOWN.database, TOWN.street_objects
+INDEX = build_index(CITY, named_noise("light"))
+
+
+@pytest.fixture(autouse=True)
+def ax() -> Iterator[Axes]:
+    yield plt.subplots()[1]
+    plt.close("all")
+
+
+def colour_at(ax: Axes, x: float, y: float) -> str:
+    """Return the colour of the last image at a place."""
+    image = ax.images[-1]
+    west, _, south, _ = image.get_extent()
+    step = CITY.grid.step
+    pixel = pixels(image)[int((y - south) // step), int((x - west) // step)]
+    return to_hex(image.to_rgba(np.array([pixel]))[0])
+
+
+def pixels(image: AxesImage) -> NDArray[np.float64]:
+    array = image.get_array()
+    assert array is not None
+    return array
+
+
+def bar_of(ax: Axes) -> Axes:
+    """Return the axes of the bar that tells what the colours of the last image mean."""
+    bar = ax.images[-1].colorbar
+    assert bar is not None
+    return bar.ax
+
+
+@pytest.mark.parametrize(
+    ("column", "numbers", "colours"),
+    [
+        (None, CITY.lengths, SHADES),
+        ("length", CITY.lengths, SHADES),
+        ("type_group_size", CITY.type_group_sizes, GROUP_COLOURS),
+        ("angle_group_size", CITY.angle_group_sizes, GROUP_COLOURS),
+    ],
+)
+def test_cells_have_the_colours_of_the_maps(
+    ax: Axes, column: str | None, numbers: np.ndarray, colours: dict[int, str]
+) -> None:
+    assert CITY.plot(column, ax=ax) is ax
+    for (x, y), number in zip(CITY.xy[::37].tolist(), numbers[::37].tolist(), strict=True):
+        expected = next(look for low, look in reversed(colours.items()) if number >= low)
+        assert colour_at(ax, x, y) == expected
+    labels = [text.get_text() for text in bar_of(ax).get_yticklabels()]
+    assert len(labels) == len(colours)
+    assert labels[-1].endswith(" or more")
+    assert bar_of(ax).get_ylabel() in ax.get_title()
+
+
+def test_any_number_of_the_cells_is_drawn(ax: Axes) -> None:
+    share = pd.Series(CITY.lengths / CITY.lengths.max(), name="share of $most$")
+    CITY.plot(share, ax=ax, cmap="magma", vmax=1)
+    assert bar_of(ax).get_ylabel() == r"share of \$most\$"
+    assert ax.images[-1].get_clim() == (share.min(), 1)
+    assert CITY.plot("length", ax=ax, cmap="magma").images[-1].get_cmap().name == "magma"
+    assert CITY.plot(ax=ax, legend=False).images[-1].colorbar is None
+    # All on one place: one scale bar is enough.
+    assert sum(isinstance(one, AnchoredSizeBar) for one in ax.artists) == 1
+    ax.figure.canvas.draw()
+
+
+def test_large_cities_are_drawn_small(ax: Axes, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(drawing, "MOST_PIXELS", 10)
+    CITY.plot(ax=ax)
+    assert max(pixels(ax.images[-1]).shape) <= 10
+    west, east, south, north = ax.images[-1].get_extent()
+    assert (CITY.xy > (west, south)).all()
+    assert (CITY.xy < (east, north)).all()
+
+
+def test_what_cannot_be_drawn_is_refused() -> None:
+    with refused(UnknownNameError, "'lenght'", "length, type_group_size", "'length'"):
+        CITY.plot("lenght")
+    with refused(InputError, "2 numbers", f"{len(CITY)} cells"):
+        CITY.plot([1.0, 2.0])
+    with refused(EmptyResultError, "no cells"):
+        CITY.select(slice(0)).plot()
+    nothing = replace(OBJECTS, table=OBJECTS.table.iloc[:0])
+    with refused(EmptyResultError, "no street object"):
+        nothing.plot()
+
+
+def test_objects_have_the_signs_of_their_classes(ax: Axes) -> None:
+    assert OBJECTS.plot(ax=ax) is ax
+    signs, counts = class_signs(OBJECTS.taxonomy), OBJECTS.class_counts
+    assert [line.get_color() for line in ax.lines] == [signs[code].colour for code in counts]
+    assert [len(line.get_xdata()) for line in ax.lines] == [*counts.values()]
+    for line, code in zip(ax.lines, counts, strict=True):
+        assert np.array_equal(line.get_xydata(), OBJECTS.xy[OBJECTS.codes == code])
+    told = [text.get_text() for text in ax.get_legend().get_texts()]
+    assert told == [f"{signs[code].symbol} {signs[code].title} ({n})" for code, n in counts.items()]
+    assert OBJECTS.plot(legend=False).get_legend() is None
+
+
+def test_titles_from_data_break_nothing(ax: Axes) -> None:
+    harmful = replace(OBJECTS, taxonomy=hostile_taxonomy(OBJECTS.taxonomy, f"$\\frac{{$ {HOSTILE}"))
+    harmful.plot(ax=ax).figure.canvas.draw()
+
+
+@pytest.mark.parametrize("cell", [int(CITY.lengths.argmax()), int(CITY.type_group_sizes.argmax())])
+def test_an_answer_by_likelihood_shows_chances_and_the_place(ax: Axes, cell: int) -> None:
+    location = locate(INDEX, CITY.signature(cell))
+    assert location.plot(ax=ax) is ax
+    assert ax.get_title().startswith("The answer" if location.answer.given else "Cannot tell")
+    best = int(location.chances.argmax())
+    expected = next(
+        look for low, look in reversed([*CELL_CHANCES.items()]) if location.chances[best] >= low
+    )
+    assert colour_at(ax, *CITY.xy[best]) == expected
+    place = (location.estimate.x, location.estimate.y)
+    assert ax.lines[-1].get_xydata().tolist() == [[*place]]
+    (ellipse,) = ax.patches
+    assert ellipse.center == place
+    # The longer axis points where it should, clockwise from north.
+    longer, _, bearing = location.estimate.ellipse()
+    turn = np.radians(bearing)
+    end = ellipse.get_patch_transform().transform((0.0, 1.0))
+    assert end == pytest.approx(place + longer * np.array([np.sin(turn), np.cos(turn)]))
+    west, east = ax.get_xlim()
+    assert west < place[0] < east
+    ax.figure.canvas.draw()
+
+
+def test_an_answer_by_distance_shows_the_candidates(ax: Axes) -> None:
+    localization = localize(CITY, CITY.signature(3), top=7)
+    localization.plot(ax=ax)
+    points = np.asarray(ax.collections[0].get_offsets())[::-1]
+    assert np.array_equal(points, localization.candidates[["x", "y"]])
+    assert ax.get_title() == f"The best 7 of {len(CITY):,} cells"
+    assert localization.plot(legend=False) is not ax
+
+
+def test_chances_to_be_found(ax: Axes) -> None:
+    told = identify(INDEX, trials=5, class_trials=2)
+    told.plot(ax=ax)
+    assert ax.images[-1].get_clim() == (0, 1)
+
+
+@pytest.mark.usefixtures("carried")
+def test_results_are_shown_on_maps() -> None:
+    location, localization = locate(INDEX, CITY.signature(3)), localize(CITY, CITY.signature(3))
+    told = identify(INDEX, trials=5, class_trials=2)
+    for frame, title in (
+        (CITY.explore(), "Cells that look the same"),
+        (OBJECTS.explore(), "Street objects"),
+        (location.explore(), "Where it was seen"),
+        (localization.explore(CITY), "Candidates"),
+        (told.explore(), "Where a query can be placed"),
+    ):
+        assert isinstance(frame, MapFrame)
+        assert title in frame.page
+
+
+PACKAGE = Path(semsig_gis.__file__).parent
+
+
+def test_only_what_draws_itself_asks_for_public_names() -> None:
+    """A result hands itself to pictures and maps, which import it, and to nothing else."""
+    public = set(dir(semsig_gis))
+    for path in PACKAGE.rglob("*.py"):
+        tree = ast.parse(path.read_text(encoding="utf-8"))
+        drawn = {
+            id(node)
+            for function in ast.walk(tree)
+            if isinstance(function, ast.FunctionDef) and function.name in {"plot", "explore"}
+            for node in ast.walk(function)
+        }
+        for node in ast.walk(tree):
+            if isinstance(node, ast.Attribute) and node.attr in public:
+                by_name = isinstance(node.value, ast.Name) and node.value.id == "semsig_gis"
+                assert not by_name or id(node) in drawn, path
+            if isinstance(node, ast.ImportFrom) and node.module == "semsig_gis":
+                assert not public & {one.name for one in node.names}, path
