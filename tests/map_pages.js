@@ -13,11 +13,17 @@ const circles = (colour) =>
 
 const lines = (test) => shown((layer) => layer.getLatLngs && test(layer));
 
-// The text of the popup of a circle, which need not be open.
-const content = (circle) => circle.getPopup().getContent()(circle);
+// What the panel says.
+const panel = () => document.querySelector(".semsig-panel").innerText;
 
-// What the newest popup says; one before it may still fade away.
-const popup = () => [...document.querySelectorAll(".semsig-details")].pop()?.innerText ?? "";
+// What a circle says when it is clicked.
+const content = (circle) => {
+  circle.fire("click");
+  return panel();
+};
+
+// The place that the panel tells of.
+const toldPlace = () => map.semsigPanel.told.place;
 
 const height = (element) => element.getBoundingClientRect().height;
 
@@ -67,7 +73,7 @@ const placesOfObjects = (count, done) => {
         .find((other) => other.name === String(one));
       if (!name) return setTimeout(look, 50);
       name.show(map);
-      const place = map._popup.getLatLng();
+      const place = toldPlace();
       places.push([place.lat, place.lng]);
     }
     return done(places);
@@ -75,13 +81,13 @@ const placesOfObjects = (count, done) => {
   look();
 };
 
-// Open a popup, of which the sign is at a share of the half width from the middle.
-const openAt = (marker, side) => {
+// Click a sign that is at a share of the half width from the middle.
+const clickAt = (marker, side) => {
   const pan = map.panBy;
   map.panBy = (offset) => pan.call(map, offset, { animate: false });
   map.setView(marker.getLatLng(), 18, { animate: false });
   pan.call(map, [(side * map.getSize().x) / 2, 0], { animate: false });
-  marker.openPopup();
+  marker.fire("click");
 };
 
 // How many offers of the search are covered by something else.

@@ -94,21 +94,21 @@ class MapPage:
             box.send_keys(key)
         return offered
 
-    def popup(self) -> str:
-        """Return what the newest popup says, if any; one before it may still fade away."""
+    def panel(self) -> str:
+        """Return what the panel says, nothing if it is closed."""
         time.sleep(0.4)  # arrays are unpacked once
-        return str(self.ask("return popup()"))
+        return str(self.ask("return panel()"))
 
     def told(self) -> dict[str, str]:
-        """Return what the popup says by its labels, its ``title``, and all of it as ``text``."""
-        text = self.popup()
+        """Return what the panel says by its labels, its ``title``, and all of it as ``text``."""
+        text = self.panel()
         title, *lines = text.splitlines()
         pairs = (line.split("\t", 1) for line in lines if "\t" in line)
         labels = {label.strip(): value.strip() for label, value in pairs}
         return {"text": text, "title": title.strip(), **labels}
 
     def click(self, database: SignatureDatabase, cell: int) -> dict[str, str]:
-        """Click the middle of a cell; return what its popup says."""
+        """Click the middle of a cell; return what the panel says."""
         to_degrees = Transformer.from_crs(database.crs, "EPSG:4326")
         self.click_at(to_degrees.transform(*database.xy[cell].tolist()))
         return self.told()
@@ -116,10 +116,10 @@ class MapPage:
     def click_at(self, latlon: Sequence[float]) -> None:
         self.ask("map.fire('click', {latlng: L.latLng(...arguments)})", *latlon)
 
-    def popup_of(self, colour: str) -> str:
-        """Open the popup of the first circle of a colour; return what it says."""
-        self.ask("circles(arguments[0])[0].openPopup()", colour)
-        return self.popup()
+    def panel_of(self, colour: str) -> str:
+        """Click the first circle of a colour; return what the panel says."""
+        self.ask("circles(arguments[0])[0].fire('click')", colour)
+        return self.panel()
 
     def point_at(self, circle: str, *arguments: object) -> None:
         """Click a circle, which a script returns, with the mouse, from close to."""
@@ -135,11 +135,11 @@ class MapPage:
         mouse.perform()
 
     def jumps(self) -> list[str]:
-        """Return the lines with buttons of the popup."""
+        """Return the lines with buttons of the panel."""
         return [line.text.replace("\n", " ").strip() for line in self.all(".semsig-jumps")]
 
     def press(self, text: str) -> dict[str, str]:
-        """Press the first button of the popup with a text or hint; return what the next says."""
+        """Press the first button of the panel with a text or hint; return what it says then."""
         for button in self.all(".semsig-jumps button"):
             if text in f"{button.text} {button.get_attribute('title')}":
                 button.click()
@@ -163,7 +163,7 @@ class MapPage:
     def assert_text_stays_text(self) -> None:
         """Check that no text from data became an element of the page."""
         for element in ("script", "img"):
-            assert self.all(f"{LEGEND} {element}, .semsig-details {element}") == []
+            assert self.all(f"{LEGEND} {element}, .semsig-panel {element}") == []
 
 
 def assert_quiet(browser: Chrome) -> None:

@@ -42,6 +42,9 @@ if TYPE_CHECKING:
     from semsig_gis.evaluation.identify.result import Identifiability
 
 
+BESIDE_M = 50.0  # from a cell, where a click tells of it
+
+
 @dataclass(frozen=True, eq=False, kw_only=True)
 class CellFacts:
     """A part of what a click on a cell tells, with numbers and a JavaScript function of its own.
@@ -117,6 +120,7 @@ def _cells(database: SignatureDatabase) -> tuple[dict[str, list[str]], dict[str,
     grid = {
         "levels": database.spec.levels,
         "step": database.grid.step,
+        "beside": BESIDE_M,
         "origin": list(database.grid.origin),
         "firstColumn": int(database.columns[0]),
         "mercatorBox": lattices.mercator_box,

@@ -74,7 +74,7 @@ def drift_map(
         The map, with these layers: the cells that are the same, and those that have changed,
         appeared or vanished, as images; a layer without signs of its own that tells of a cell by a
         click; and, where the objects are given, those that were removed, added, moved, or are of
-        another class, with popups.
+        another class, told of by a click.
 
     Raises
     ------

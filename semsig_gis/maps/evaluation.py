@@ -86,8 +86,8 @@ def evaluation_map(
     folium.Map
         The map, with these layers: the cells as an image (darker where more objects are seen), a
         heatmap of the expected errors (at every zoom, the mean of the queries around a pixel), the
-        failed and the successful queries with popups, and lines from the true to the estimated
-        places (hidden at first).
+        failed and the successful queries, of which a click tells, and lines from the true to the
+        estimated places (hidden at first).
 
     Raises
     ------

@@ -105,7 +105,7 @@ def location_map(
         the fewest cells that hold 50, 90 and 99 % of the chance, as images of which the most
         telling is shown at first; the candidates with their ranks, the best place with its
         ellipse of 90 %, and for each candidate that was explained the rays of the query and the
-        street objects; all with popups.
+        street objects; a click tells of each in the panel.
 
     Examples
     --------
@@ -376,7 +376,7 @@ def localization_map(
     -------
     folium.Map
         The map: the cells as an image, and the candidates, coloured by their distance to the
-        query, with popups. The best candidates are larger.
+        query, told of by a click. The best candidates are larger.
 
     Raises
     ------

@@ -45,8 +45,8 @@ MAX_ZOOM = 20
 CLOSE_ZOOM = 17  # the closest that a new map shows by itself
 # Files of the folder ``js`` that every page has, in this order.
 PAGE_FILES = (
-    *("page.css", "layers.js", "state.js", "popup.js", "search.js", "controls.js", "arrays.js"),
-    *("board.js", "heat.js", "objects.js", "ground.js"),
+    *("page.css", "panel.css", "layers.js", "state.js", "panel.js", "search.js", "controls.js"),
+    *("arrays.js", "board.js", "heat.js", "objects.js", "ground.js"),
 )
 WITHOUT_KEY = "a provider such as 'OpenStreetMap.Mapnik' or 'CyclOSM'"
 POWERS = 4  # of x and y, which tell a place within millimetres in a city

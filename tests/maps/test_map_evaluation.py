@@ -80,7 +80,7 @@ def test_a_click_shows_the_signature_and_the_place_found(evaluated: MapPage) -> 
     assert evaluated.all(".semsig-details") == []
     last = """
     [...circles(arguments[1]), ...circles(arguments[2])].find(
-      (one) => content(one).firstChild.textContent.startsWith(arguments[0]))
+      (one) => content(one).startsWith(arguments[0]))
     """
     evaluated.point_at(last, f"Query {len(EVALUATION.queries)}:", SUCCESSFUL, FAILED)
     outline = "return circles(arguments[0])[0].options.color"
@@ -88,23 +88,23 @@ def test_a_click_shows_the_signature_and_the_place_found(evaluated: MapPage) -> 
     evaluated.one(".semsig-colours").click()
     assert evaluated.ask(outline, SUCCESSFUL) == "#e9e9e6"  # light on dark
     evaluated.ask("localStorage.clear()")
-    popup = evaluated.popup().replace("\u00a0", " ")
+    text = evaluated.panel().replace("\u00a0", " ")
     legend = f"{row['types'][0]} {CITY.taxonomy.by_symbol(row['types'][0]).title}"
     for said in (row["types"], row["query_types"], legend, str(row["cell_id"])):
-        assert said in popup
-    assert f"of {len(CITY):,}" in popup
+        assert said in text
+    assert f"of {len(CITY):,}" in text
     following = np.searchsorted(CITY.cell_ids, EVALUATION.next_cell_ids[-1])
     off = np.hypot(*(CITY.xy[following] - [row.geometry.x, row.geometry.y]).T)
-    assert ", ".join(f"{metres:,.0f} m off" for metres in off) in popup
+    assert ", ".join(f"{metres:,.0f} m off" for metres in off) in text
     dashed = "return lines((one) => one.options.dashArray).length"
     assert evaluated.ask(dashed) == 1  # to the best place
     empty = "return shown((one) => one instanceof L.CircleMarker && !one.options.fill).length"
     assert evaluated.ask(empty) == 1 + len(EVALUATION.next_cell_ids[-1])
-    evaluated.ask("map.closePopup()")
+    evaluated.ask("semsig.hide(map)")
     assert evaluated.ask(dashed) == 0
 
 
-def test_a_popup_draws_signatures_as_wheels(evaluated: MapPage) -> None:
+def test_the_panel_draws_signatures_as_wheels(evaluated: MapPage) -> None:
     lengths = EVALUATION.queries["query_length"]
     letters = """
     return [...document.querySelectorAll(".semsig-wheels text")].map((one) =>
@@ -113,7 +113,7 @@ def test_a_popup_draws_signatures_as_wheels(evaluated: MapPage) -> None:
     for query in (int(lengths.argmin()), int(lengths.argmax())):
         name = f"Query {query + 1:,}: "
         assert evaluated.search(name, Keys.ENTER)[0].startswith(name)
-        assert evaluated.popup().startswith(name)
+        assert evaluated.panel().startswith(name)
         assert min(evaluated.ask(letters)) >= 9.0
     wheels = evaluated.all(".semsig-wheels figure")
     row = EVALUATION.queries.iloc[query]

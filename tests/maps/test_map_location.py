@@ -92,18 +92,18 @@ def test_clicks_tell_of_places_and_objects(page: MapPage) -> None:
     location = found()
     page.open(location_map(location))
     page.point_at("circles(arguments[0])[0]", SUCCESSFUL)
-    popup = page.popup()
-    assert popup.startswith("The answer")
-    assert f"{location.answer.mass:.1%} within 50 m" in popup
-    assert f"± {location.estimate.heading_sigma:.1f}°" in popup
-    popup = page.popup_of(VERDICTS["matched"])
+    said = page.panel()
+    assert said.startswith("The answer")
+    assert f"{location.answer.mass:.1%} within 50 m" in said
+    assert f"± {location.estimate.heading_sigma:.1f}°" in said
+    said = page.panel_of(VERDICTS["matched"])
     rows = location.explanations[0].to_dict()["rows"]
     matched = next(row for row in rows if row["verdict"] == "matched")
     title = CITY.taxonomy.by_name(matched["object_class"]).title
-    for said in ("Matched", title, matched["source_id"], f"{matched['distance']:.1f} m"):
-        assert said in popup
-    page.ask("circles('#ffffff').find((one) => one.getTooltip()).openPopup()")
-    assert page.popup().startswith("Rank 5 of")
+    for fact in ("Matched", title, matched["source_id"], f"{matched['distance']:.1f} m"):
+        assert fact in said
+    page.ask("circles('#ffffff').find((one) => one.getTooltip()).fire('click')")
+    assert page.panel().startswith("Rank 5 of")
 
 
 def test_wheels_show_where_a_view_looked_and_how_far(page: MapPage) -> None:
@@ -116,8 +116,8 @@ def test_wheels_show_where_a_view_looked_and_how_far(page: MapPage) -> None:
     assert 0 < outside.sum() < len(view)
     page.open(localization_map(localize(CITY, view, top=1), CITY))
     assert "Looked at: " in page.one(LEGEND).text
-    page.ask("shown((one) => one instanceof L.CircleMarker)[0].openPopup()")
-    assert page.popup()
+    page.ask("shown((one) => one instanceof L.CircleMarker)[0].fire('click')")
+    assert page.panel()
     asked, cell = page.all(".semsig-wheels figure")
     assert asked.text.endswith("Query, to 30 m")
     for wheel in (asked, cell):
@@ -172,20 +172,20 @@ def test_a_localization_in_a_browser(page: MapPage) -> None:
     page.open(localization_map(localize(CITY, CITY.signature(LONGEST), top=50), CITY))
     assert page.browser.title == "Candidate places"
     texts = """
-    return shown((one) => one instanceof L.CircleMarker).map((one) => content(one).textContent);
+    return shown((one) => one instanceof L.CircleMarker).map((one) => content(one));
     """
-    popups = page.ask(texts)
-    assert len(popups) == 50
-    best = popups[-1]  # drawn last, on top
+    told = page.ask(texts)
+    assert len(told) == 50
+    best = told[-1]  # drawn last, on top
     assert best.startswith("Rank 1")
-    assert "Rank1 of " in best
+    assert "Rank\t1 of " in best
     assert str(CITY.cell_ids[LONGEST]) in best
     assert CITY.types(LONGEST) in best
     # The query and what the cell sees, side by side.
-    page.ask("circles(arguments[0])[0].openPopup()", CANDIDATE_RAMP[0])
+    page.ask("circles(arguments[0])[0].fire('click')", CANDIDATE_RAMP[0])
     captions = [one.get_property("innerText") for one in page.all("figcaption")]
     assert captions == ["Query", "Signature"]
-    page.ask("map.closePopup()")
+    page.ask("semsig.hide(map)")
     assert f"Types: {CITY.types(LONGEST)}" in page.one(LEGEND).text
     page.switch("Candidates")
     assert page.ask(texts) == []

@@ -49,10 +49,10 @@ def place_of(number: int) -> list[float]:
 
 
 def click(page: MapPage, number: int) -> str:
-    """Click an object from close to; return what the popup says."""
+    """Click an object from close to; return what the panel says."""
     page.ask("map.setView(arguments[0], 20, {animate: false})", place_of(number))
     page.click_at(place_of(number))
-    return page.popup()
+    return page.panel()
 
 
 def test_objects_in_a_browser(page: MapPage) -> None:
@@ -82,19 +82,19 @@ def test_a_click_tells_of_the_nearest_object(page: MapPage) -> None:
     table = OBJECTS.table.assign(count=3, merged="osm:node/9")
     objects = dataclasses.replace(OBJECTS, table=table)
     page.open(objects_map(objects))
-    popup = click(page, NUMBER)
-    assert popup.startswith(TITLE)
+    text = click(page, NUMBER)
+    assert text.startswith(TITLE)
     for said in ("world", "3 rows of its source", "osm:node/9"):
-        assert said in popup
+        assert said in text
     # Whoever lies on it may be told of instead.
     there = np.hypot(*(OBJECTS.xy - OBJECTS.xy[NUMBER]).T) < 0.5
     ids = OBJECTS.table["source_id"][there]
-    assert any(f"Identifier\t{one}" in popup for one in ids)
+    assert any(f"Identifier\t{one}" in text for one in ids)
     assert len(page.all(".leaflet-shadow-pane canvas")) == 1
-    page.ask("map.closePopup()")
+    page.ask("semsig.hide(map)")
     corner = OBJECTS.xy.min(axis=0) - 50.0
     page.click_at(to_latlon(corner[None], OBJECTS.crs)[0].tolist())
-    assert page.ask("return map._popup === null || !map._popup.isOpen()")
+    assert page.told()["title"] == "A place on the map"
 
 
 def test_the_script_has_every_object_where_it_is(page: MapPage) -> None:
@@ -115,7 +115,7 @@ def test_the_search_finds_names_cells_and_places(page: MapPage) -> None:
     assert page.ask("return arguments[0].every((at) => map.getBounds().contains(at))", every)
     offered = page.search(str(len(OBJECTS) - 1), Keys.ENTER)
     assert offered[0].startswith(f"{len(OBJECTS) - 1}\n")
-    assert f"Identifier\t{len(OBJECTS) - 1}" in page.popup()
+    assert f"Identifier\t{len(OBJECTS) - 1}" in page.panel()
     assert page.ask("return map.getZoom()") >= 18
     middle = len(CITY) // 2
     x, y = CITY.xy[middle].tolist()
@@ -123,7 +123,7 @@ def test_the_search_finds_names_cells_and_places(page: MapPage) -> None:
     centre = "const place = map.getCenter(); return [place.lat, place.lng];"
     cell = str(CITY.cell_ids[middle])
     degrees = "latitude, longitude"
-    for text, said in (
+    for typed, said in (
         (cell, f"Cell {cell}"),
         (f"{CITY.cell_ids[middle]:,}", f"Cell {cell}"),
         (f"{latitude}, {longitude}", degrees),
@@ -134,16 +134,16 @@ def test_the_search_finds_names_cells_and_places(page: MapPage) -> None:
         (f"{x} {y}", "x, y in EPSG:2154"),
     ):
         page.ask("map.setZoom(14, {animate: false})")
-        (offer,) = page.search(text, Keys.ENTER)
+        (offer,) = page.search(typed, Keys.ENTER)
         assert said in offer
-        popup = page.popup()
-        assert re.findall(r"Cell\D*(\d+)", popup) == [cell]
+        text = page.panel()
+        assert re.findall(r"Cell\D*(\d+)", text) == [cell]
         for label, place in (("Latitude, longitude", (latitude, longitude)),
                              ("x, y in EPSG:2154", (x, y))):  # fmt: skip
-            (numbers,) = re.findall(rf"{label}\t(.*), (.*)", popup)
+            (numbers,) = re.findall(rf"{label}\t(.*), (.*)", text)
             assert [float(one) for one in numbers] == pytest.approx(place, abs=0.1, rel=1e-7)
-        # Popups near the edge move the map a little.
-        page.ask("map.setView(map._popup.getLatLng(), 19, {animate: false})")
+        # What is near the edge moves the map a little.
+        page.ask("map.setView(toldPlace(), 19, {animate: false})")
         assert page.ask(centre) == pytest.approx([latitude, longitude], abs=2e-6)
 
 
@@ -208,13 +208,12 @@ def test_a_narrow_screen(page: MapPage) -> None:
         layers = page.one(".leaflet-control-layers").rect
         assert box["x"] + box["width"] <= layers["x"]
         assert page.search("3", Keys.ENTER)
-        popup = page.one(".leaflet-popup-content-wrapper")
-        assert popup.rect["x"] >= 0
-        assert popup.rect["x"] + popup.rect["width"] <= 390
-        for hidden in (".semsig-search", LEGEND):
-            assert not page.one(hidden).is_displayed()
-        page.ask("map.closePopup()")
-        assert page.one(".semsig-search").is_displayed()
+        panel = page.one(".semsig-panel").rect
+        assert (panel["x"], panel["width"]) == (0, 390)
+        assert panel["y"] >= 844 / 2
+        assert not page.one(LEGEND).is_displayed()
+        page.ask("semsig.hide(map)")
+        assert page.one(LEGEND).is_displayed()
 
 
 def test_hostile_data_is_shown_and_never_run(page: MapPage) -> None:
@@ -231,11 +230,11 @@ def test_hostile_data_is_shown_and_never_run(page: MapPage) -> None:
     assert all(page.text(f"{alone} bdi").endswith(harm) for alone in (credit, layers))
     highest = "return Math.max(...[...document.querySelectorAll(arguments[0])].map(height))"
     click(page, NUMBER)
-    assert page.text(".semsig-details").count(harm) == 5
-    for tall, most in ((f"{layers} label", 90), (f"{LEGEND} tr", 90), (".semsig-details > b", 90),
+    assert page.text(".semsig-panel").count(harm) == 5
+    for tall, most in ((f"{layers} label", 90), (f"{LEGEND} tr", 90), (".semsig-panel h2", 90),
                        (".semsig-details tr", 200)):  # fmt: skip
         assert page.ask(highest, tall) <= most
-    page.ask("map.closePopup()")
+    page.ask("semsig.hide(map)")
     assert len(page.search("alert")) == 8
     assert page.text(".semsig-search ul").count(harm) == 8
     for element in ("script", "img"):

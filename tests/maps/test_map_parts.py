@@ -207,7 +207,7 @@ HELPED = int(np.flatnonzero((chances_of(CITY).gains > 0.1).any(axis=1))[0])
 
 
 @pytest.mark.parametrize(
-    ("name", "popup", "counts"),
+    ("name", "subject", "counts"),
     [
         ("evaluation", FAILED, (3, 5)),
         ("localization", CANDIDATE_RAMP[0], (2, 1)),
@@ -218,14 +218,14 @@ HELPED = int(np.flatnonzero((chances_of(CITY).gains > 0.1).any(axis=1))[0])
     ],
 )
 def test_hostile_data_is_shown_word_for_word_and_never_run(
-    page: MapPage, name: str, popup: str | int, counts: tuple[int, int]
+    page: MapPage, name: str, subject: str | int, counts: tuple[int, int]
 ) -> None:
     page.open(HARMFUL_MAPS[name]())
-    if isinstance(popup, str):
-        page.popup_of(popup)
+    if isinstance(subject, str):
+        page.panel_of(subject)
     else:
-        page.click(HARMFUL, popup)
-    texts = (page.text(LEGEND), page.text(".semsig-details"))
+        page.click(HARMFUL, subject)
+    texts = (page.text(LEGEND), page.text(".semsig-panel"))
     assert tuple(text.count(HOSTILE) for text in texts) == counts
     page.assert_text_stays_text()
 
@@ -271,13 +271,12 @@ def test_nothing_lies_below_the_boxes(evaluated: MapPage) -> None:
     across = evaluated.ask(places, SUCCESSFUL, FAILED)
     assert left <= min(across) <= max(across) <= right
     for side in (-0.95, 0.95):
-        evaluated.ask("openAt(circles(arguments[0])[0], arguments[1])", FAILED, side)
-        box = evaluated.one(".leaflet-popup-content-wrapper").rect
-        assert left <= box["x"]
-        assert box["x"] + box["width"] <= right
-        labels = [line.partition("\t")[0] for line in evaluated.popup().splitlines()]
+        evaluated.ask("clickAt(circles(arguments[0])[0], arguments[1])", FAILED, side)
+        where = evaluated.ask("return map.latLngToContainerPoint(toldPlace()).x")
+        assert left <= where <= evaluated.one(".semsig-panel").rect["x"]
+        labels = [line.partition("\t")[0] for line in evaluated.panel().splitlines()]
         assert labels[1:4] == ["Expected error", "P(error ≤ 50 m)", "True rank"]
-        evaluated.ask("map.closePopup()")
+        evaluated.ask("semsig.hide(map)")
 
 
 def test_the_search_offers_the_best_match_first(evaluated: MapPage) -> None:
@@ -290,9 +289,9 @@ def test_the_search_offers_the_best_match_first(evaluated: MapPage) -> None:
     assert evaluated.search("query")[0].startswith("Query")
     assert evaluated.search(f"of {60}") == []
     evaluated.search("Query 3", Keys.ENTER)
-    assert evaluated.popup().startswith("Query 3: ")
+    assert evaluated.panel().startswith("Query 3: ")
     evaluated.browser.switch_to.active_element.send_keys(Keys.ESCAPE)
-    assert evaluated.ask("return map._popup.isOpen()") is False
+    assert evaluated.ask("return panel() === ''")
 
 
 @settings(max_examples=20)

@@ -1,10 +1,10 @@
-// A place in a box, by the values at the crossings of a lattice over it.
+// A place in a box, or beside it, by the values at the crossings of a lattice over it.
 semsig.between = (lattice, [west, south, east, north], x, y) => {
   const lines = Math.sqrt(lattice.length / 2) - 1;
   const [[column, right], [row, up]] = [[x, west, east], [y, south, north]].map(
     ([value, low, high]) => {
-      const place = Math.min(Math.max((value - low) / (high - low), 0), 1) * lines;
-      const line = Math.min(Math.floor(place), lines - 1);
+      const place = (value - low) / (high - low) * lines;
+      const line = Math.min(Math.max(Math.floor(place), 0), lines - 1);
       return [line, place - line];
     });
   return [0, 1].map((part) => {
@@ -50,7 +50,8 @@ semsig.City = class {
     const [column, row] = this.placeOf(cell);
     return String(BigInt(this.grid.firstColumn + column) * 100000000n + BigInt(row));
   }
-  nearest(map, clicked) {
+  // The nearest cell and how far away its middle is, in metres, as far as `reach`.
+  nearest(map, clicked, reach) {
     const {step, origin, firstColumn, mercatorBox} = this.grid;
     const point = L.CRS.EPSG3857.project(clicked);
     const [x, y] = semsig.between(this.data.metres, mercatorBox, point.x, point.y);
@@ -58,16 +59,23 @@ semsig.City = class {
     const row = Math.floor((y - origin[1]) / step);
     // From afar a cell is smaller than a finger.
     const beside = map.containerPointToLatLng(map.latLngToContainerPoint(clicked).add([8, 0]));
-    const reach = Math.min(Math.floor(map.distance(clicked, beside) / step), 20);
+    const finger = Math.min(map.distance(clicked, beside), 20 * step);
+    const steps = Math.floor(Math.max(finger, reach) / step);
     let [best, least] = [-1, Infinity];
-    for (let across = -reach; across <= reach; across += 1) {
-      for (let along = -reach; along <= reach; along += 1) {
+    for (let across = -steps; across <= steps; across += 1) {
+      for (let along = -steps; along <= steps; along += 1) {
         const away = across * across + along * along;
         const cell = away < least ? this.cellAt(column + across, row + along) : -1;
         if (cell >= 0) [best, least] = [cell, away];
       }
     }
-    return best;
+    return [best, Math.sqrt(least) * step <= finger ? 0 : Math.sqrt(least) * step];
+  }
+  // The cell of a number as it is told, or -1.
+  called(id) {
+    if (!/^-?\d{1,19}$/.test(id)) return -1;
+    const [column, row] = semsig.columnAndRow(BigInt(id));
+    return this.cellAt(column - this.grid.firstColumn, row);
   }
   metres(cell, other) {
     const [[x, y], [u, v]] = [this.placeOf(cell), this.placeOf(other)];
@@ -101,7 +109,7 @@ semsig.cellFacts = {};
 semsig.cells = (packed, grid, titles, names) => {
   const group = L.layerGroup();
   const ready = semsig.arrays(packed).then((data) => new semsig.City(data, grid));
-  const buttons = (city, map, cell, box, jumps) => {
+  const buttons = (city, map, box, jumps) => {
     // Below the title, so that they are in sight however much there is to tell.
     const lines = jumps.map(([label, goals]) => {
       const line = L.DomUtil.create("div", "semsig-jumps");
@@ -112,10 +120,6 @@ semsig.cells = (packed, grid, titles, names) => {
         button.title = title;
         button.setAttribute("aria-label", title === "near" ? text : title);
         L.DomEvent.on(button, "click", () => {
-          // The map moves, so that the next click finds the button where it was.
-          const [from, to] = [cell, other].map(
-            (one) => map.latLngToContainerPoint(city.middle(one)));
-          map.panBy(to.subtract(from), {animate: false});
           const at = [...box.querySelectorAll("button")].indexOf(button);
           show(city, map, other).querySelectorAll("button")[at]?.focus();
         });
@@ -124,9 +128,9 @@ semsig.cells = (packed, grid, titles, names) => {
     });
     box.firstChild.after(...lines);
   };
-  const show = (city, map, cell) => {
-    map.closePopup();
-    const drawn = L.layerGroup();
+  let drawn = null;
+  const show = (city, map, cell, away = 0) => {
+    drawn = L.layerGroup();
     const [column, row] = city.placeOf(cell);
     const middle = city.middle(cell);
     const look = {pane: "shadowPane", interactive: false, color: "#d55e00", weight: 3};
@@ -158,33 +162,41 @@ semsig.cells = (packed, grid, titles, names) => {
     // The page has the level of a bearing, whose middle is told.
     const half = `\u00b1${Math.round(180 / grid.levels)}\u00b0, middles of levels`;
     const rows = [
+      ...(away ? [["Nearest cell", `${Math.round(away)} m from the click`]] : []),
       ...parts.flatMap((part) => part.rows), ["Cell", city.id(cell)], ["Bearings", half]];
     const title = parts.map((part) => part.title).filter(Boolean).pop();
     const box = semsig.details(
       title, rows.map((one) => one[0]), rows.map((one) => one[1]), titles);
-    buttons(city, map, cell, box, parts.flatMap((part) => part.jumps));
-    const narrow = Math.min(340, map.getSize().x - 70);
-    const popup = L.popup({maxWidth: narrow, minWidth: 220});
-    popup.setLatLng(middle).setContent(box);
-    popup.on("remove", () => group.removeLayer(drawn));
-    group.addLayer(drawn);
-    popup.openOn(map);
+    buttons(city, map, box, parts.flatMap((part) => part.jumps));
+    semsig.show(map, box, middle, {key: `cell:${city.id(cell)}`, corners, drawn});
     return box;
   };
-  const click = async (event) => {
-    const map = event.target;
+  const answer = (map) => async (event) => {
     const city = await ready;
-    const cell = city.nearest(map, event.latlng);
-    if (cell >= 0) show(city, map, cell);
+    const [cell, away] = city.nearest(map, event.latlng, grid.beside);
+    if (cell >= 0) show(city, map, cell, away);
+    else {
+      semsig.tellPlace(map, event.latlng, "No cell here", [["Seen", "nothing from this place"]]);
+    }
+    return true;
   };
+  semsig.addOpener("cell", (map, id) => {
+    if (!map.hasLayer(group)) return false;
+    ready.then((city) => {
+      const cell = city.called(id);
+      if (cell >= 0) show(city, map, cell);
+    });
+    return true;
+  });
+  let silence = null;
   group.onAdd = (map) => {
     L.LayerGroup.prototype.onAdd.call(group, map);
-    map.on("click", click);
+    silence = semsig.answers(map, 1, answer(map));
     map.getContainer().classList.add("semsig-cells");
   };
   group.onRemove = (map) => {
-    map.off("click", click);
-    map.closePopup();
+    silence();
+    if (drawn && drawn === map.semsigPanel?.told?.drawn) semsig.hide(map);
     map.getContainer().classList.remove("semsig-cells");
     L.LayerGroup.prototype.onRemove.call(group, map);
   };

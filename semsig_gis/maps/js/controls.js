@@ -62,20 +62,9 @@ semsig.margins = (map, least) => {
     return width + 10;
   });
 };
-// Popups open beside the boxes, as high as the map allows.
-semsig.makeRoom = (map) => {
-  const [left, right] = semsig.margins(map, 360);
-  L.Popup.mergeOptions({
-    autoPanPaddingTopLeft: [left, 10], autoPanPaddingBottomRight: [right, 10],
-    maxHeight: Math.max(240, map.getSize().y - 140),
-  });
-};
 semsig.folding = (map, layers) => {
   const box = map.getContainer();
-  const fit = () => {
-    box.classList.toggle("semsig-small", semsig.small.matches);
-    semsig.makeRoom(map);
-  };
+  const fit = () => box.classList.toggle("semsig-small", semsig.small.matches);
   semsig.small.addEventListener("change", ({matches}) => {
     // Leaflet asks only when the control is made whether it opens by itself.
     layers.options.collapsed = matches;
@@ -84,8 +73,6 @@ semsig.folding = (map, layers) => {
     if (matches) box.querySelectorAll(".semsig-legend").forEach((one) => { one.open = false; });
     fit();
   });
-  map.on("resize", fit);
-  box.addEventListener("toggle", fit, true);  // of a legend
   fit();
 };
 semsig.furnish = (map, layers, area, credits) => {
@@ -95,8 +82,9 @@ semsig.furnish = (map, layers, area, credits) => {
     text.textContent = credit;
     map.attributionControl.addAttribution(text.outerHTML);
   }
-  const mark = (is) => () => map.getContainer().classList.toggle("semsig-told", is);
-  map.on("popupopen", mark(true)).on("popupclose", mark(false));
+  map.semsigArea = area;
+  semsig.panel(map);
+  semsig.answers(map, 2, (event) => semsig.tellPlace(map, event.latlng));
   semsig.colours(map);
   semsig.search(map, area);
   semsig.folding(map, layers);

@@ -1,33 +1,34 @@
 window.semsig = {
   // Fields that say what a thing is called; the search knows it by them, too.
   naming: new Set(["Class", "Class before", "Seen as", "Street object", "Identifier"]),
+  layers: 0,  // of points, so far
   points(fields, titles, records) {
     const group = L.featureGroup();
     const markers = [];
+    const layer = semsig.layers++;
+    // By its number, where it has one.
+    const keyOf = (at) => {
+      const [, kind, number] = /^(\w+) (\d[\d,]*)/.exec(records[at][4]) || [];
+      return kind ? `${kind.toLowerCase()}:${number.replaceAll(",", "")}` : `sign:${layer}/${at}`;
+    };
     for (const [place, colour, radius, places, name, values, label] of records) {
       const marker = L.circleMarker(place, {
         pane: "markerPane", radius: radius, color: "#222", weight: 1,
         fillColor: colour, fillOpacity: 0.95,
       });
-      marker.bindPopup(() => semsig.details(name, fields, values, titles),
-        {maxWidth: 340, minWidth: 220});
       if (label) {
         const text = L.DomUtil.create("b", "");
         text.textContent = label;
         const look = {permanent: true, direction: "center", className: "semsig-number"};
         marker.bindTooltip(text, look);
       }
-      if (places !== null) {
-        const look = {pane: "shadowPane", interactive: false, color: "#d55e00", weight: 2};
-        const hint = L.layerGroup([
-          L.polyline([place, places[0]], {...look, dashArray: "5 5"}),
-          ...places.map((one, at) => L.circleMarker(one, {
-            ...look, radius: at ? 5 : 8, weight: at ? 1 : 2, fill: false,
-          })),
-        ]);
-        marker.on("popupopen", (event) => hint.addTo(event.popup._map));
-        marker.on("popupclose", () => hint.remove());
-      }
+      const hint = places === null ? null : semsig.hint(place, places);
+      marker.on("click", (event) => {
+        L.DomEvent.stop(event);
+        semsig.show(marker._map, semsig.details(name, fields, values, titles), place, {
+          corners: places ?? [], key: keyOf(markers.indexOf(marker)), drawn: hint,
+        });
+      });
       marker.addTo(group);
       markers.push(marker);
     }
@@ -37,6 +38,20 @@ window.semsig = {
       outline();
     });
     group.on("remove", () => group._map.off("semsig-colours", outline));
+    const tell = (map, at) => {
+      semsig.reveal(map, group, markers[at].getLatLng());
+      markers[at].fire("click");
+    };
+    const keys = new Map(records.map((_, at) => [keyOf(at), at]));
+    for (const kind of new Set([...keys.keys()].map((key) => key.split(":")[0]))) {
+      semsig.addOpener(kind, (map, rest) => {
+        const at = keys.get(`${kind}:${rest}`);
+        if (at === undefined) return false;
+        semsig.whole(group).addTo(map);
+        markers[at].fire("click");
+        return true;
+      });
+    }
     const named = [...fields.keys()].filter((at) => semsig.naming.has(fields[at]));
     const hint = (values) => [...new Set(named.map((at) => values[at]))].filter(Boolean).join(", ");
     let names = null;
@@ -48,13 +63,20 @@ window.semsig = {
         rank,
         name: records[at][4],
         hint: hint(records[at][5]),
-        show: (map) => {
-          semsig.reveal(map, group, markers[at].getLatLng());
-          markers[at].openPopup();
-        },
+        show: (map) => tell(map, at),
       }));
     });
     return group;
+  },
+  // What joins a sign to the places found for it, the best first.
+  hint(place, places) {
+    const look = {pane: "shadowPane", interactive: false, color: "#d55e00", weight: 2};
+    return L.layerGroup([
+      L.polyline([place, places[0]], {...look, dashArray: "5 5"}),
+      ...places.map((one, at) => L.circleMarker(one, {
+        ...look, radius: at ? 5 : 8, weight: at ? 1 : 2, fill: false,
+      })),
+    ]);
   },
   lines(bundles) {
     return L.featureGroup(bundles.map(([look, lines]) => L.polyline(lines, {

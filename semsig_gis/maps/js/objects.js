@@ -7,8 +7,9 @@ semsig.streetObjects = (key, packed, about) => {
   let data = null;
   let board = null;
   let layers = [];
+  let silence = null;
   const sprites = {};
-  semsig.arrays(packed).then((arrays) => {
+  const ready = semsig.arrays(packed).then((arrays) => {
     data = arrays;
     for (const one of classes) {
       const starts = [];
@@ -101,6 +102,8 @@ semsig.streetObjects = (key, packed, about) => {
   const placeOf = (one) => L.CRS.EPSG3857.unproject(L.point(
     about.origin[0] + data.x[one] * about.quantum, about.origin[1] + data.y[one] * about.quantum));
   const classOf = (one) => classes.findIndex(({start, end}) => start <= one && one < end);
+  // The number of the layer, if there are several, and of the object.
+  const keyOf = (one) => `${key.replace("objects", "")}/${one}`;
   const tell = (map, one) => {
     const {title, symbol} = classes[classOf(one)];
     const place = placeOf(one);
@@ -111,15 +114,25 @@ semsig.streetObjects = (key, packed, about) => {
       `${place.lat.toFixed(6)}, ${place.lng.toFixed(6)}`,
     ];
     const mark = L.circleMarker(place, {pane: "shadowPane", interactive: false, fill: false,
-      radius: 13, color: "#d55e00", weight: 3}).addTo(map);
-    const popup = L.popup({maxWidth: 340, minWidth: 200}).setLatLng(place);
-    popup.setContent(semsig.details(title, fields, values, {}));
-    popup.on("remove", () => mark.remove());
-    popup.openOn(map);
+      radius: 13, color: "#d55e00", weight: 3});
+    semsig.show(map, semsig.details(title, fields, values, {}), place, {
+      key: `object:${keyOf(one)}`, drawn: mark,
+    });
   };
-  const click = (event) => {
-    const map = event.target;
-    if (data === null || event.semsigSearch) return;
+  semsig.addOpener("object", (map, rest) => {
+    const [layer, one] = rest.split("/");
+    const number = Number(one);
+    const known = `objects${layer}` === key && classOf(number) >= 0;
+    if (known) {
+      ready.then(() => {
+        map.addLayer(layers[classOf(number)]);
+        tell(map, number);
+      });
+    }
+    return known;
+  });
+  const answer = (map) => (event) => {
+    if (data === null) return false;
     const point = map.latLngToLayerPoint(event.latlng);
     const frame = semsig.frame(map, about);
     const reach = Math.max(10, sizeAt(map.getZoom()));
@@ -131,24 +144,24 @@ semsig.streetObjects = (key, packed, about) => {
           if (away <= least) [best, least] = [one, away];
         });
     }
-    // After what else hears of the click, so that the object is told of.
-    if (best >= 0) setTimeout(() => tell(map, best), 0);
+    if (best >= 0) tell(map, best);
+    return best >= 0;
   };
   const layerOf = (number) => {
     const layer = new L.Layer();
     layer.onAdd = (map) => {
       if (!shown.size) {
         board = semsig.board(map, "overlayPane", paint(map));
-        map.on("click", click);
+        silence = semsig.answers(map, 0, answer(map));
       }
       shown.add(number);
       board.redraw();
     };
-    layer.onRemove = (map) => {
+    layer.onRemove = () => {
       shown.delete(number);
       board.redraw();
       if (!shown.size) {
-        map.off("click", click);
+        silence();
         board.remove();
       }
     };

@@ -14,10 +14,10 @@ semsig.matches = (names, words, limit) => {
   });
   return ranked.flat().slice(0, limit);
 };
+// The layer that is switched on and off with a part of it.
+semsig.whole = (layer) => (layer.semsigWhole ? semsig.whole(layer.semsigWhole) : layer);
 semsig.reveal = (map, layer, place) => {
-  let outermost = layer;
-  while (outermost.semsigWhole) outermost = outermost.semsigWhole;
-  map.addLayer(outermost);
+  map.addLayer(semsig.whole(layer));
   map.setView(place, Math.max(map.getZoom(), 18), {animate: false});
 };
 // Latitude and longitude of a place in the coordinate system of the data.
@@ -51,12 +51,10 @@ semsig.whereabouts = (area, place, xy) => {
 semsig.point = (map, name, place, facts, corners) => {
   const look = {pane: "shadowPane", interactive: false, color: "#d55e00", weight: 3, fill: false};
   const mark = corners ? L.polygon(corners, look) : L.circleMarker(place, {...look, radius: 10});
-  const popup = L.popup({maxWidth: 300, minWidth: 180}).setLatLng(place).setContent(
-    semsig.details(name, facts.map((fact) => fact[0]), facts.map((fact) => fact[1]), {}));
-  popup.on("remove", () => mark.remove());
   map.setView(place, Math.max(map.getZoom(), 18), {animate: false});
-  mark.addTo(map);
-  popup.openOn(map);
+  semsig.show(
+    map, semsig.details(name, facts.map((fact) => fact[0]), facts.map((fact) => fact[1]), {}),
+    place, {corners, drawn: mark});
 };
 semsig.within = ({columns, rows}, cell) =>
   [columns, rows].every(([low, high], at) => low <= cell[at] && cell[at] <= high);
@@ -68,13 +66,16 @@ semsig.cellAround = (area, xy) => {
   const number = BigInt(cell[0]) * 100000000n + BigInt(cell[1]);
   return semsig.within(area.grid, cell) ? [["Cell", String(number)]] : [];
 };
+semsig.columnAndRow = (number) => {
+  const [span, half] = [100000000n, 50000000n];
+  const row = (((number + half) % span) + span) % span - half;
+  return [(number - row) / span, row].map(Number);
+};
 semsig.cellsCalled = (typed, area) => {
   if (!area?.grid || !/^-?(\d{1,19}|\d{1,3}(,\d{3}){1,6})$/.test(typed)) return [];
   const {step, origin} = area.grid;
-  const [span, half] = [100000000n, 50000000n];
   const number = BigInt(typed.replaceAll(",", ""));
-  const row = (((number + half) % span) + span) % span - half;
-  const cell = [(number - row) / span, row].map(Number);
+  const cell = semsig.columnAndRow(number);
   if (!semsig.within(area.grid, cell)) return [];
   const at = ([across, along]) => [
     origin[0] + step * (cell[0] + across), origin[1] + step * (cell[1] + along)];
@@ -85,7 +86,7 @@ semsig.cellsCalled = (typed, area) => {
     const place = semsig.latlng(area, ...middle);
     semsig.point(map, name, place, semsig.whereabouts(area, place, middle), latlngs);
     // A layer that knows the cell tells of it instead.
-    map.fire("click", {latlng: L.latLng(place), semsigSearch: true});
+    semsig.openers.cell?.(map, String(number));
   };
   return [{rank: 0, name, hint: "", show}];
 };

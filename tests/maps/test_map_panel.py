@@ -1,0 +1,169 @@
+"""The panel of a map: what it says, where it lies, and how it opens and closes."""
+
+from __future__ import annotations
+
+from contextlib import contextmanager
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pytest
+from selenium.webdriver.common.action_chains import ActionChains
+from selenium.webdriver.common.actions.action_builder import ActionBuilder
+from selenium.webdriver.common.keys import Keys
+from selenium.webdriver.support.wait import WebDriverWait
+from small_city import small_city, small_evaluation
+from worlds import random_town
+
+from semsig_gis.core.signs import FAILED
+from semsig_gis.maps.cells import ambiguity_map
+from semsig_gis.maps.evaluation import evaluation_map
+from semsig_gis.maps.objects import objects_map
+from semsig_gis.maps.parts import to_latlon
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from map_pages import MapPage
+
+CITY = random_town().database
+OBJECTS = random_town().street_objects
+PLACES = to_latlon(CITY.xy, CITY.crs)
+SCREENS = [(1440, 900), (390, 844)]
+# Where places are on the screen, and whether the map is on top there.
+ON_TOP = """
+return arguments[0].map((place) => {
+  const {x, y} = map.latLngToContainerPoint(place);
+  const top = document.elementFromPoint(Math.round(x), Math.round(y));
+  return [x, y, Boolean(top) && !top.closest(".semsig-panel, .leaflet-control")];
+});
+"""
+
+
+@contextmanager
+def still(page: MapPage, width: int, height: int) -> Iterator[None]:
+    """Make the window as large as a screen, whose owner wants nothing to move by itself."""
+    with page.screen(width, height, mobile=False):
+        features = [{"name": "prefers-reduced-motion", "value": "reduce"}]
+        page.browser.execute_cdp_cmd("Emulation.setEmulatedMedia", {"features": features})
+        yield
+        page.browser.execute_cdp_cmd("Emulation.setEmulatedMedia", {"features": []})
+
+
+def press(page: MapPage, x: float, y: float) -> None:
+    mouse = ActionBuilder(page.browser)
+    mouse.pointer_action.move_to_location(round(x), round(y)).click()
+    mouse.perform()
+
+
+def wait_for(page: MapPage, key: str | None) -> None:
+    told = "return map.semsigPanel.told?.key ?? null"
+    WebDriverWait(page.browser, 10.0, 0.02).until(lambda _: page.ask(told) == key, str(key))
+
+
+def is_beside_the_panel(page: MapPage) -> bool:
+    x, y = page.ask("const {x, y} = map.latLngToContainerPoint(toldPlace()); return [x, y];")
+    box = page.one(".semsig-panel").rect
+    width, height = page.ask("return [innerWidth, innerHeight]")
+    inside = 0 <= x <= width and 0 <= y <= height
+    return inside and not (box["x"] <= x and box["y"] <= y)
+
+
+@pytest.mark.parametrize("screen", SCREENS)
+def test_every_click_on_a_cell_is_answered(page: MapPage, screen: tuple[int, int]) -> None:
+    rng = np.random.default_rng(7)
+    with still(page, *screen):
+        page.open(ambiguity_map(CITY))
+        page.ask("map.setView(arguments[0], 18, {animate: false})", PLACES.mean(axis=0).tolist())
+        for _ in range(40):
+            some = rng.permutation(len(CITY))[:60]
+            where = page.ask(ON_TOP, PLACES[some].tolist())
+            at = next(at for at, (_, _, on_top) in enumerate(where) if on_top)
+            cell = int(some[at])
+            press(page, *where[at][:2])
+            wait_for(page, f"cell:{CITY.cell_ids[cell]}")
+            assert is_beside_the_panel(page)
+
+
+@pytest.mark.parametrize("screen", SCREENS)
+def test_what_is_told_of_is_never_covered(page: MapPage, screen: tuple[int, int]) -> None:
+    with still(page, *screen):
+        page.open(evaluation_map(small_evaluation("medium"), small_city()[0]))
+        count = page.ask("return circles(arguments[0]).length", FAILED)
+        for query in range(0, count, max(1, count // 12)):
+            page.ask("circles(arguments[1])[arguments[0]].fire('click')", query, FAILED)
+            assert is_beside_the_panel(page)
+
+
+def test_a_click_beside_the_cells_is_answered_too(page: MapPage) -> None:
+    page.open(ambiguity_map(CITY))
+    page.ask("map.setZoom(19, {animate: false})")
+    outermost = int(CITY.xy[:, 0].argmin())
+    x, y = CITY.xy[outermost].tolist()
+    for away, title in ((30.0, "Cells that look the same"), (90.0, "No cell here")):
+        (place,) = to_latlon(np.array([[x - away, y]]), CITY.crs).tolist()
+        page.click_at(place)
+        said = page.told()
+        assert said["title"] == title
+        if away < 50.0:
+            assert said["Nearest cell"] == "30 m from the click"
+            assert said["Cell"] == str(CITY.cell_ids[outermost])
+        else:
+            assert said["Seen"] == "nothing from this place"
+            numbers = [float(one) for one in said["Latitude, longitude"].split(", ")]
+            assert numbers == pytest.approx(place, abs=2e-6)
+
+
+def test_the_panel_is_named_and_closes_in_three_ways(page: MapPage) -> None:
+    with still(page, 390, 844):
+        page.open(ambiguity_map(CITY))
+        panel = page.one(".semsig-panel")
+        names = [panel.get_attribute(name) for name in ("role", "aria-live", "aria-label")]
+        assert names == ["region", "polite", "What is known of this place"]
+        number = str(CITY.cell_ids[0])
+        key = f"cell:{number}"
+        # By keyboard it gets the focus, and gives it back.
+        page.search(number, Keys.ENTER)
+        wait_for(page, key)
+        focused = "return document.activeElement.className.split(' ')[0]"
+        assert page.ask(focused) == "semsig-panel"
+        page.browser.switch_to.active_element.send_keys(Keys.ESCAPE)
+        wait_for(page, None)
+        assert page.ask(focused) == "folium-map"
+        page.click(CITY, 0)
+        button = page.one(".semsig-panel-head button")
+        assert min(button.size.values()) >= 44
+        button.click()
+        wait_for(page, None)
+        head = ".semsig-panel-head"
+        for far, open_ in ((20, True), (120, False)):
+            page.click(CITY, 0)
+            swipe = ActionChains(page.browser).click_and_hold(page.one(head))
+            swipe.move_by_offset(0, far).release().perform()
+            wait_for(page, key if open_ else None)
+        page.ask("semsig.hide(map)")  # which is closed
+    with still(page, 1440, 900):
+        page.click(CITY, 0)
+        swipe = ActionChains(page.browser).click_and_hold(page.one(head))
+        swipe.move_by_offset(100, 0).release().perform()
+        wait_for(page, None)
+
+
+def test_what_a_key_names_is_told_again(page: MapPage) -> None:
+    city, evaluation = small_city()[0], small_evaluation("medium")
+    map_ = evaluation_map(evaluation, city)
+    for some in (OBJECTS, OBJECTS):
+        objects_map(some, map_=map_)
+    page.open(map_)
+    opened = "return [semsig.openers[arguments[0]](map, arguments[1]), panel().split('\\n')[0]]"
+    for kind, rest, title in (("query", "17", "Query 17: "), ("place", "48.1,2.1", "A place")):
+        known, said = page.ask(opened, kind, rest)
+        assert known
+        assert said.startswith(title)
+        wait_for(page, {"place": "place:48.100000,2.100000"}.get(kind, f"{kind}:{rest}"))
+    layers = page.ask("return Object.keys(semsig.held).map((name) => name.slice(7))")
+    assert len(layers) == 2
+    for layer in layers:
+        assert page.ask("return semsig.openers.object(map, arguments[0])", f"{layer}/3")
+        wait_for(page, f"object:{layer}/3")
+    for kind, rest in (("query", "0"), ("place", "nowhere"), ("object", "x/1"), ("object", "/-1")):
+        assert not page.ask(opened, kind, rest)[0]
