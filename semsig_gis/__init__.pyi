@@ -162,7 +162,11 @@ from .reports.evaluation import evaluation_tables as evaluation_tables
 from .reports.parts import Curve as Curve, Plot as Plot
 from .reports.quality import quality_tables as quality_tables
 from .reports.plots import draw_plot as draw_plot
-from .reports.scenes import cell_scene as cell_scene, draw_scene as draw_scene
+from .reports.scenes import (
+    cell_scene as cell_scene,
+    draw_scene as draw_scene,
+    draw_scenes as draw_scenes,
+)
 from .reports.tables import Table as Table
 from .experiments.run import open_results as open_results
 from .experiments.paper.reproduce import Reproduction as Reproduction, reproduce as reproduce

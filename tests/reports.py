@@ -43,7 +43,7 @@ def scene(name: str = "place", *, objects: int = 3, **options: Any) -> Scene:  #
     others = (SceneObject(code=3, east=-30.0, north=20.0),)
     types = paper_taxonomy().decode([item.code for item in seen])
     given: dict[str, Any] = {"title": "A place", "error_m": 12.0, "types": types}
-    place = {"lon": 2.3, "lat": 48.8, "radius": 30.0}
+    place = {"lon": 2.3, "lat": 48.8, "radius": 30.0, "taxonomy": paper_taxonomy()}
     return Scene(name=name, objects=seen, others=others, **{**given, **place, **options})
 
 
@@ -73,6 +73,7 @@ def ordinary_report() -> Report:
 def hostile_report(harm: str = HARM) -> Report:
     """Return a report in which every text that can come from data tries to do harm."""
     curve = Curve(label=harm, x=(0.0, 1.0), y=(0.5, float("nan")))
+    taxonomy = hostile_taxonomy(paper_taxonomy(), harm)
     shown = plot(title=harm, x_label=harm, y_label=harm)
     section = Section(
         name="all",
@@ -84,13 +85,15 @@ def hostile_report(harm: str = HARM) -> Report:
             Number("b", "b", 1.0, paper=2.0, unit=harm),
         ),
         plots=(dataclasses.replace(shown, curves=(curve,), paper=((0.5, 0.5, harm),)),),
-        scenes=(scene(title=harm, types=harm, objects=11, error_m=float("inf")),),
+        scenes=(
+            scene(title=harm, types=harm, objects=11, taxonomy=taxonomy, error_m=float("inf")),
+        ),
     )
     return report(
         section,
         title=harm,
         text=(harm,),
         settings=((harm, harm),),
-        taxonomy=hostile_taxonomy(paper_taxonomy(), harm),
+        taxonomy=taxonomy,
         facts={"path": harm},
     )

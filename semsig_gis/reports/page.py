@@ -118,7 +118,7 @@ def write_report(report: Report, folder: str | Path) -> None:
             pictures[plot.name] = draw_plot(plot)
             write_whole(place / FIGURES / f"{plot.name}.csv", _csv(POINT_COLUMNS, _points(plot)))
         for scene in section.scenes:
-            pictures[scene.name] = draw_scene(scene, report.taxonomy)
+            pictures[scene.name] = draw_scene(scene)
     for name, picture in pictures.items():
         write_whole(place / FIGURES / f"{name}.svg", picture.svg)
         write_whole(place / FIGURES / f"{name}.png", picture.png)
@@ -180,7 +180,7 @@ def _json(report: Report) -> str:
         "settings": [{"name": name, "value": value} for name, value in report.settings],
         "sections": [
             {
-                **asdict(section),
+                **asdict(section, dict_factory=_without_classes),
                 "numbers": [
                     {**asdict(number), "difference": number.difference}
                     for number in section.numbers
@@ -193,6 +193,11 @@ def _json(report: Report) -> str:
         "version": __version__,
     }
     return json.dumps(_finite(content), indent=1, allow_nan=False) + "\n"
+
+
+def _without_classes(items: list[tuple[str, Any]]) -> dict[str, Any]:
+    """Return a part of a report without the classes of its scenes, which stand beside the parts."""
+    return {name: value for name, value in items if name != "taxonomy"}
 
 
 def _finite(value: Any) -> Any:  # noqa: ANN401 - whatever JSON holds

@@ -117,8 +117,9 @@ class Scene(Displayed):
     """A viewpoint with the street objects around it; its files are called ``name``.
 
     ``lon`` and ``lat`` are in degrees (WGS 84), ``radius`` in metres; ``types`` are the symbols of
-    the signature, clockwise from north. ``others`` are not seen from there. ``answer`` is metres
-    east and north to the place that was answered; ``error_m`` is None where nothing was asked.
+    the signature, clockwise from north, and ``taxonomy`` has their classes. ``others`` are not seen
+    from there. ``answer`` is metres east and north to the place that was answered; ``error_m`` is
+    None where nothing was asked.
     """
 
     name: str
@@ -127,6 +128,7 @@ class Scene(Displayed):
     lat: float
     radius: float
     types: str
+    taxonomy: Taxonomy
     objects: tuple[SceneObject, ...]
     others: tuple[SceneObject, ...] = ()
     answer: tuple[float, float] | None = None

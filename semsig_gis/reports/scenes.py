@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import textwrap
 from collections import Counter
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -15,15 +15,17 @@ from matplotlib.patches import Circle
 from matplotlib.path import Path
 from pyproj import Transformer
 
+from semsig_gis.core.errors import InputError
 from semsig_gis.core.signs import ClassSign, class_signs, one_line
 from semsig_gis.queries.sight import Sight
 from semsig_gis.reports.parts import Scene, SceneObject
 from semsig_gis.reports.plots import INK, WHITE, blank_figure, draw_legend, label, saved
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from matplotlib.axes import Axes
 
-    from semsig_gis.core.taxonomy import Taxonomy
     from semsig_gis.database.database import SignatureDatabase
     from semsig_gis.evaluation.result import Evaluation
     from semsig_gis.reports.plots import Picture
@@ -65,6 +67,7 @@ def cell_scene(database: SignatureDatabase, cell: int, *, title: str = "") -> Sc
         lat=lat,
         radius=database.spec.radius,
         types=database.types(cell),
+        taxonomy=database.taxonomy,
         objects=own,
         others=_seen_around(database, cell, own),
     )
@@ -158,15 +161,13 @@ HALO = {"facecolor": WHITE, "alpha": 0.85, "edgecolor": "none", "pad": 1}  # beh
 _IN_FRONT: dict[str, Any] = {"ha": "center", "bbox": HALO}
 
 
-def draw_scene(scene: Scene, taxonomy: Taxonomy) -> Picture:
+def draw_scene(scene: Scene) -> Picture:
     """Draw a scene, north up.
 
     Parameters
     ----------
     scene : Scene
         A viewpoint and what is around. The answer is a cross, or an arrow to it at the edge.
-    taxonomy : Taxonomy
-        The classes of its objects; a class looks the same in all scenes.
 
     Returns
     -------
@@ -175,31 +176,84 @@ def draw_scene(scene: Scene, taxonomy: Taxonomy) -> Picture:
 
     Examples
     --------
-    >>> from semsig_gis.sources.catalog import paper_taxonomy
-    >>> from semsig_gis.reports.parts import Scene, SceneObject
-    >>> lamp = SceneObject(code=3, east=10.0, north=0.0)
-    >>> scene = Scene(name="a", title="A lamp", lon=2.3, lat=48.8, radius=30.0, types="D",
-    ...               objects=(lamp,), error_m=12.0)
-    >>> draw_scene(scene, paper_taxonomy()).description
-    'A lamp. Signature D, seen from 2.300000, 48.800000: street light (1). Error 12.0 m.'
+    >>> draw_scene(cell_scene(demo_database, 0, title="A corner")).description
+    'A corner. Signature DB, seen from 2.997619, 48.751799: alignment tree (1), street light (1).'
     """
-    signs = class_signs(taxonomy)
-    titles = textwrap.wrap(label(scene.title, 2 * TITLE_LETTERS), TITLE_LETTERS)
-    lines = _lines(scene)
-    keys = _keys(scene, signs)
-    above = LINE * len(titles) + 0.14
-    below = LINE * (len(lines) + math.ceil(len(keys) / 2)) + 0.3
-    height = above + MAP + below
-    with blank_figure(WIDTH, height) as figure:
-        axes = figure.add_axes((MARGIN / WIDTH, below / height, MAP / WIDTH, MAP / height))
-        _draw_map(axes, scene, signs)
-        left, top = MARGIN / WIDTH, 1 - 0.07 / height
-        figure.text(left, top, "\n".join(titles), va="top", weight="bold", size=10)
-        top = (below - 0.1) / height
-        figure.text(left, top, "\n".join(lines), va="top", size=9, linespacing=1.3)
-        place = (left, (below - 0.2 - LINE * len(lines)) / height, 1.0)
-        draw_legend(figure, keys, place=place, columns=2, size=8.5, sign_width=1)
-        return saved(figure, title=scene.title, description=_described(scene, signs))
+    return draw_scenes([scene])
+
+
+def draw_scenes(scenes: Sequence[Scene]) -> Picture:
+    """Draw scenes side by side in one picture, north up.
+
+    Parameters
+    ----------
+    scenes : sequence of Scene
+        Viewpoints, at least one, each with what is around; see `cell_scene`. A class looks the same
+        in all of them.
+
+    Returns
+    -------
+    Picture
+        The same bytes for the same scenes.
+
+    Raises
+    ------
+    InputError
+        If there is no scene.
+
+    Examples
+    --------
+    >>> here, there = (cell_scene(demo_database, cell) for cell in (0, 9))
+    >>> draw_scenes([here, there]).description.count("Signature")
+    2
+    """
+    if not scenes:
+        msg = "there is no scene to draw; give at least one."
+        raise InputError(msg)
+    columns = [_Column.of(scene) for scene in scenes]
+    above, below = (max(sizes) for sizes in zip(*(one.sizes for one in columns), strict=True))
+    width, height = WIDTH * len(columns), above + MAP + below
+    with blank_figure(width, height) as figure:
+        for number, column in enumerate(columns):
+            left = number * WIDTH + MARGIN
+            axes = figure.add_axes((left / width, below / height, MAP / width, MAP / height))
+            _draw_map(axes, column.scene, column.signs)
+            top = 1 - 0.07 / height
+            titles, lines = "\n".join(column.titles), "\n".join(column.lines)
+            figure.text(left / width, top, titles, va="top", weight="bold", size=10)
+            top = (below - 0.1) / height
+            figure.text(left / width, top, lines, va="top", size=9, linespacing=1.3)
+            top = (below - 0.2 - LINE * len(column.lines)) / height
+            place = (left / width, top, WIDTH / width)
+            draw_legend(figure, column.keys, place=place, columns=2, size=8.5, sign_width=1)
+        return saved(
+            figure,
+            title="; ".join(scene.title for scene in scenes),
+            description=" ".join(_described(one.scene, one.signs) for one in columns),
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class _Column:
+    """A scene with what is written above and below its map."""
+
+    scene: Scene
+    signs: dict[int, ClassSign]
+    titles: list[str]
+    lines: list[str]
+    keys: list[tuple[Line2D, str]]
+
+    @classmethod
+    def of(cls, scene: Scene) -> _Column:
+        signs = class_signs(scene.taxonomy)
+        titles = textwrap.wrap(label(scene.title, 2 * TITLE_LETTERS), TITLE_LETTERS)
+        return cls(scene, signs, titles, _lines(scene), _keys(scene, signs))
+
+    @property
+    def sizes(self) -> tuple[float, float]:
+        """Inches above and below the map."""
+        rows = len(self.lines) + math.ceil(len(self.keys) / 2)
+        return LINE * len(self.titles) + 0.14, LINE * rows + 0.3
 
 
 def _draw_map(axes: Axes, scene: Scene, signs: dict[int, ClassSign]) -> None:

@@ -36,6 +36,7 @@ from semsig_gis import (
 )
 from semsig_gis.core.display import Displayed
 from semsig_gis.objects.load import assemble
+from semsig_gis.reports.parts import Scene
 from semsig_gis.sources.synthetic.city import CitySpec
 
 if TYPE_CHECKING:
@@ -142,6 +143,7 @@ def test_text_from_data_breaks_nothing(text: str) -> None:
 
 
 def test_pictures_and_maps_do_not_print_their_files(results: dict[str, object]) -> None:
-    scene, taxonomy = results["Scene"], results["Taxonomy"]
-    assert len(repr(draw_scene(scene, taxonomy))) < 1000  # type: ignore[arg-type]
+    scene = results["Scene"]
+    assert isinstance(scene, Scene)
+    assert len(repr(draw_scene(scene))) < 1000
     assert repr(show_map(folium.Map(tiles=None))) == "MapFrame(height=520)"

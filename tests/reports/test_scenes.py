@@ -8,12 +8,20 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from reports import HARM, LONG, hostile_report, scene, texts
+from sentences import refused
 from worlds import random_town
 
+from semsig_gis.core.errors import InputError
 from semsig_gis.core.signs import class_signs
 from semsig_gis.evaluation.evaluate import evaluate
 from semsig_gis.reports.parts import SceneObject
-from semsig_gis.reports.scenes import _round_length, cell_scene, draw_scene, example_scenes
+from semsig_gis.reports.scenes import (
+    _round_length,
+    cell_scene,
+    draw_scene,
+    draw_scenes,
+    example_scenes,
+)
 from semsig_gis.sources.catalog import paper_taxonomy
 
 CLASSES = paper_taxonomy()
@@ -72,8 +80,8 @@ def nearest(x: float, y: float, code: int) -> float:
 @pytest.mark.parametrize("objects", [0, 2, 60])
 def test_a_scene_shows_its_objects(objects: int) -> None:
     made = scene(objects=objects)
-    picture = draw_scene(made, CLASSES)
-    assert draw_scene(made, CLASSES) == picture  # to the byte
+    picture = draw_scene(made)
+    assert draw_scene(made) == picture  # to the byte
     shown = texts(picture.svg)
     for symbol in set(made.types):
         assert shown.count(symbol) == made.types.count(symbol)
@@ -86,24 +94,24 @@ def test_a_scene_shows_its_objects(objects: int) -> None:
 
 
 def test_an_answer_is_drawn_or_pointed_to() -> None:
-    assert "answer" not in texts(draw_scene(scene(), CLASSES).svg)
-    near = texts(draw_scene(scene(answer=(40.0, -30.0)), CLASSES).svg)
+    assert "answer" not in texts(draw_scene(scene()).svg)
+    near = texts(draw_scene(scene(answer=(40.0, -30.0))).svg)
     assert "answer" in near
     assert "50 m" not in near
-    assert {"answer", "5,000 m"} <= set(texts(draw_scene(scene(answer=(4e3, 3e3)), CLASSES).svg))
+    assert {"answer", "5,000 m"} <= set(texts(draw_scene(scene(answer=(4e3, 3e3))).svg))
 
 
 def test_places_that_were_not_found_and_that_nobody_asked_for() -> None:
-    lost = draw_scene(scene(error_m=float("inf")), CLASSES)
+    lost = draw_scene(scene(error_m=float("inf")))
     assert "2.300000°, 48.800000° · not localized" in texts(lost.svg)
     assert lost.description.endswith("Not localized.")
-    shown = draw_scene(scene(error_m=None), CLASSES)
+    shown = draw_scene(scene(error_m=None))
     assert "2.300000°, 48.800000°" in texts(shown.svg)
     assert "rror" not in shown.description
 
 
 def test_objects_have_the_signs_of_their_classes() -> None:
-    made = draw_scene(scene(objects=11), CLASSES).svg.decode("utf-8")
+    made = draw_scene(scene(objects=11)).svg.decode("utf-8")
     for sign in class_signs(CLASSES).values():
         assert f"fill: {sign.colour}" in made
         (style,) = re.findall(rf'<text style="([^"]*)"[^>]*>{sign.symbol}</text>', made)
@@ -111,14 +119,33 @@ def test_objects_have_the_signs_of_their_classes() -> None:
         assert ("fill: #ffffff" in style) == (sign.ink == "#ffffff")
 
 
+def test_scenes_side_by_side() -> None:
+    made = [scene(title="Here"), scene(title="There", objects=11, answer=(9.0, 2.0))]
+    picture = draw_scenes(made)
+    together = texts(picture.svg)
+    for one in made:
+        assert {*texts(draw_scene(one).svg)} <= {*together}
+        assert draw_scene(one).description in picture.description
+    sizes = [
+        float(re.findall(rb' width="([.\d]+)pt"', one.svg)[0])
+        for one in (picture, draw_scene(made[0]))
+    ]
+    assert sizes[0] == pytest.approx(2 * sizes[1])
+    assert draw_scenes(made[:1]) == draw_scene(made[0])
+    with refused(InputError, "no scene"):
+        draw_scenes([])
+
+
 def test_an_object_of_no_class() -> None:
     odd = dataclasses.replace(scene(), objects=(SceneObject(code=0, east=1.0, north=2.0),))
-    assert "? unknown class (1)" in texts(draw_scene(odd, CLASSES).svg)
+    assert "? unknown class (1)" in texts(draw_scene(odd).svg)
 
 
 @pytest.mark.parametrize("text", [HARM, LONG, "$", ""])
 def test_text_from_data_breaks_nothing(text: str) -> None:
-    made = draw_scene(scene(title=text, types=text, objects=11), hostile_report(text).taxonomy)
+    made = draw_scene(
+        scene(title=text, types=text, objects=11, taxonomy=hostile_report(text).taxonomy)
+    )
     assert b"<script>" not in made.svg
     assert max(map(len, texts(made.svg))) < 80
 
