@@ -25,10 +25,11 @@ from semsig_gis.core.signs import (
     GROUP_COLOURS,
     SHADES,
     SUCCESSFUL,
+    WHITE,
     class_signs,
 )
 from semsig_gis.likelihood.locate import Location
-from semsig_gis.reports.plots import INK, WHITE, label
+from semsig_gis.reports.plots import INK, label
 from semsig_gis.reports.scenes import MARKERS
 
 if TYPE_CHECKING:
