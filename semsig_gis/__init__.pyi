@@ -159,6 +159,8 @@ from .reports.axes import (
     plot_objects as plot_objects,
 )
 from .reports.evaluation import evaluation_tables as evaluation_tables
+from .reports.evaluation_page import evaluation_page as evaluation_page
+from .reports.page import write_page as write_page
 from .reports.parts import Curve as Curve, Plot as Plot
 from .reports.quality import quality_tables as quality_tables
 from .reports.plots import draw_plot as draw_plot

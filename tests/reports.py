@@ -6,9 +6,20 @@ import dataclasses
 import xml.etree.ElementTree as ET
 from typing import Any
 
+import numpy as np
 from map_pages import HOSTILE, hostile_taxonomy
 
-from semsig_gis.reports.parts import Curve, Number, Plot, Report, Scene, SceneObject, Section
+from semsig_gis.reports.parts import (
+    Curve,
+    Number,
+    OutcomeMap,
+    Pair,
+    Plot,
+    Report,
+    Scene,
+    SceneObject,
+    Section,
+)
 from semsig_gis.sources.catalog import paper_taxonomy
 
 FORMULA = '=cmd|"/C calc"!A0'
@@ -47,6 +58,18 @@ def scene(name: str = "place", *, objects: int = 3, **options: Any) -> Scene:  #
     return Scene(name=name, objects=seen, others=others, **{**given, **place, **options})
 
 
+def outcome_map(name: str = "where", *, places: int = 5, **options: Any) -> OutcomeMap:  # noqa: ANN401
+    """Return a map of places on a strip of cells, every other one of a successful query."""
+    given: dict[str, Any] = {
+        "title": "Places",
+        "step": 10.0,
+        "ground": np.ones((2, 3), np.bool_),
+        "places": np.linspace((1.0, 1.0), (29.0, 19.0), places),
+        "successful": np.arange(places) % 2 == 0,
+    }
+    return OutcomeMap(name=name, **{**given, **options})
+
+
 def report(*sections: Section, **options: Any) -> Report:  # noqa: ANN401
     given = {"title": "Report", "taxonomy": paper_taxonomy(), "sections": sections}
     return Report(**{**given, **options})
@@ -64,6 +87,14 @@ def ordinary_report() -> Report:
     return report(
         Section(name="range", title="Range", text=("Words.",), numbers=numbers, plots=(drawn,)),
         Section(name="places", title="Places", scenes=(scene(), scene("other", answer=(9.0, 2.0)))),
+        Section(
+            name="lost",
+            title="Lost",
+            maps=(outcome_map(),),
+            pairs=(Pair(title="One", text="Two lamps.", scenes=(scene("true"), scene("taken"))),),
+        ),
+        headline="Half of it.",
+        command="semsig evaluate city.parquet",
         text=("What it is.",),
         settings=(("Database", "city.parquet"),),
         facts={"versions": {"numpy": "2"}, "share": float("nan")},
@@ -85,13 +116,17 @@ def hostile_report(harm: str = HARM) -> Report:
             Number("b", "b", 1.0, paper=2.0, unit=harm),
         ),
         plots=(dataclasses.replace(shown, curves=(curve,), paper=((0.5, 0.5, harm),)),),
+        maps=(outcome_map(title=harm),),
         scenes=(
             scene(title=harm, types=harm, objects=11, taxonomy=taxonomy, error_m=float("inf")),
         ),
+        pairs=(Pair(title=harm, text=harm, scenes=(scene("a", title=harm), scene("b"))),),
     )
     return report(
         section,
         title=harm,
+        headline=harm,
+        command=harm,
         text=(harm,),
         settings=((harm, harm),),
         taxonomy=taxonomy,

@@ -6,6 +6,7 @@ import contextlib
 import functools
 import json
 import os
+import shlex
 import signal
 import sys
 import threading
@@ -210,6 +211,11 @@ Workers = Annotated[
 ]
 Scheduler = Annotated[str | None, typer.Option(help="Dask scheduler, as tcp://HOST:PORT.")]
 LIKELIHOOD = "likelihood"  # as a value of --method
+
+
+def command_line() -> str:
+    """Return the command that is run, as a shell would read it."""
+    return shlex.join(["semsig", *sys.argv[1:]])
 
 
 def keep_inputs(*written: Path | None, read: Iterable[str | Path | None]) -> None:

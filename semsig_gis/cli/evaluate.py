@@ -20,12 +20,15 @@ from semsig_gis.cli.console import (
     Scheduler,
     Workers,
     app,
+    command_line,
+    keep_inputs,
     known_identifiability,
     print_json,
     print_rows,
     print_tables,
     progress,
     remark,
+    require_suffix,
     say,
 )
 from semsig_gis.cli.options import (
@@ -75,9 +78,15 @@ def evaluate(
     ] = 1,
     seed: Seed = 0,
     out: Annotated[Path | None, typer.Option(help="Folder to write the results to.")] = None,
+    report: Annotated[
+        Path | None,
+        typer.Option(help="Write a page with curves, a map and the worst failures (.html)."),
+    ] = None,
     as_json: AsJson = False,
 ) -> None:
     """Ask queries from known places and measure the errors."""
+    require_suffix(".html", report)
+    keep_inputs(report, read=[database, drift_report])
     if method != LIKELIHOOD:
         given = {
             "--noise": noise != "generic",
@@ -96,7 +105,7 @@ def evaluate(
     from semsig_gis.matching.method import Method
     from semsig_gis.queries.chain import parse_chain
     from semsig_gis.queries.distortions import Distortion
-    from semsig_gis.reports.evaluation import evaluation_tables
+    from semsig_gis.reports.evaluation import evaluation_headline, evaluation_tables
 
     chain = [
         dataclasses.replace(
@@ -129,12 +138,24 @@ def evaluate(
         )
     if out is not None:
         save_evaluation(evaluation, out)
+    if report is not None:
+        from semsig_gis.reports.evaluation_page import evaluation_page  # it loads what draws
+        from semsig_gis.reports.page import write_page
+
+        with progress("drawing the report"):
+            page = evaluation_page(
+                evaluation, city.database, name=database.name, command=command_line()
+            )
+            write_page(page, report)
     if as_json:
         print_json(evaluation.summary())
         return
+    say(evaluation_headline(evaluation))
     print_tables(evaluation_tables(evaluation))
     if out is not None:
         say(f"results: {out}")
+    if report is not None:
+        say(f"report: {report}  (open it in a browser)")
 
 
 Results = Annotated[Path, typer.Argument(help="Folder of an experiment or of an evaluation.")]

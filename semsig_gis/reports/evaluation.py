@@ -40,6 +40,32 @@ GROUPED = {
 }
 
 
+def evaluation_headline(evaluation: Evaluation) -> str:
+    """Return the result in one sentence: the share within 50 m and, by likelihood, of answers."""
+    means = evaluation.means()
+    p50, low, high = (100.0 * float(means[name]["p50"]) for name in ("value", "low", "high"))
+    near = f"within {evaluation.success_metres} m"
+    best = "" if evaluation.top == 1 else f" by the best of {evaluation.top:,} candidates"
+    said = (
+        f"{_percent(p50)} of {len(evaluation.queries):,} queries were placed {near}{best} "
+        f"(95 %: {_percent(low, '')} to {_percent(high)})"
+    )
+    if "coverage" not in means.index:
+        return f"{said}."
+    answered, right = (100.0 * float(means["value"][name]) for name in ("coverage", "precision"))
+    if not answered:
+        return f"{said}; the method was sure enough of none to answer it."
+    return (
+        f"{said}; the method was sure enough to answer {_percent(answered)}, and {_percent(right)} "
+        "of these answers were right."
+    )
+
+
+def _percent(share: float, unit: str = " %") -> str:
+    """Return per cent as short as can be: ``82 %``, ``8.3 %``, ``0.4 %``."""
+    return f"{round(share, 0 if 9.95 <= share <= 99 else 1):g}{unit}"  # noqa: PLR2004
+
+
 def evaluation_tables(evaluation: Evaluation) -> tuple[Table, ...]:
     """Return the settings and the figures of an evaluation, in all and group by group.
 
@@ -62,7 +88,7 @@ def evaluation_tables(evaluation: Evaluation) -> tuple[Table, ...]:
     ('Method', 'edit+edit')
     """
     tables = (
-        _setting_table(evaluation),
+        Table("Settings", ("Setting", "Value"), tuple(evaluation_settings(evaluation).items())),
         _figure_table(evaluation),
         _group_table(evaluation.by_length(), "By length of the true signature", "Objects"),
         _group_table(evaluation.by_ambiguity(), "By ambiguity", "Cells of the same types"),
@@ -95,11 +121,12 @@ def evaluation_tables(evaluation: Evaluation) -> tuple[Table, ...]:
     )
 
 
-def _setting_table(evaluation: Evaluation) -> Table:
+def evaluation_settings(evaluation: Evaluation) -> dict[str, str]:
+    """Return what was asked of what, by name."""
     asked, database = evaluation.asked, evaluation.database
     megabytes = database["mb_per_km2"]
     elsewhere = "" if evaluation.city is None else f" of {evaluation.city}"
-    settings = {
+    return {
         "Method": str(evaluation.method),
         "Best candidates that count (t)": f"{evaluation.top:,}",
         "Distortions": chain_text(asked.distortions) or "none",
@@ -113,13 +140,12 @@ def _setting_table(evaluation: Evaluation) -> Table:
         "Angle levels": str(database["levels"]),
         **({} if megabytes is None else {"Size": f"{megabytes:.3f} MB a km²"}),
     }
-    return Table("Settings", ("Setting", "Value"), tuple(settings.items()))
 
 
 def _figure_table(evaluation: Evaluation) -> Table:
     """Return the figures, the paper's beside those that it has."""
     means = evaluation.means()
-    p50, recall10 = _paris_accuracy(evaluation)
+    p50, recall10 = paris_accuracy(evaluation)
     theirs = {"p50": p50, "recall10": recall10}
     rows = []
     for name in [name for name in FIGURES if name in means.index]:
@@ -163,7 +189,7 @@ def _group_table(groups: pd.DataFrame, title: str, heading: str) -> Table:
     return Table.of_columns(title, {heading: labels, "Queries": numbers, **figures})
 
 
-def _paris_accuracy(evaluation: Evaluation) -> tuple[float | None, float | None]:
+def paris_accuracy(evaluation: Evaluation) -> tuple[float | None, float | None]:
     """Return the paper's P(error <= 50 m) and recall@10 % if it ran these settings."""
     asked, database = evaluation.asked, evaluation.database
     # The paper does not say whether it normalised, sorted again or drew classes by frequency.

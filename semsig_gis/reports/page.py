@@ -13,12 +13,14 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
 from jinja2 import Environment, PackageLoader, StrictUndefined
 
 from semsig_gis import __version__
 from semsig_gis.core.errors import InputError
 from semsig_gis.core.signs import escaped, one_line
-from semsig_gis.reports.plots import draw_plot
+from semsig_gis.reports.outcomes import draw_map
+from semsig_gis.reports.plots import draw_plot, in_the_dark
 from semsig_gis.reports.scenes import draw_scene
 from semsig_gis.reports.tables import Table, markdown_rows, number_table
 from semsig_gis.storage.whole import write_whole
@@ -26,17 +28,21 @@ from semsig_gis.storage.whole import write_whole
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Sequence
 
-    from semsig_gis.reports.parts import Plot, Report
+    from semsig_gis.reports.parts import OutcomeMap, Plot, Report, Scene
     from semsig_gis.reports.plots import Picture
 
 
 # What has a meaning to Markdown anywhere, besides what `escaped` knows, and at the beginning.
 MARKS = re.compile(r"([\\`*_\[\]{}~$])")
+RUN = "What was run"
 FIRST_MARKS = re.compile(r"^(\d*)([-+=>#.)])")
 
 
-def html_page(report: Report, pictures: Mapping[str, Picture]) -> str:
-    """Return a report as one page of HTML with its pictures in it, which loads nothing."""
+def html_page(report: Report, pictures: Mapping[str, Picture], *, alone: bool = False) -> str:
+    """Return a report as one page of HTML with its pictures in it, which loads nothing.
+
+    Unless it stands `alone`, it names the files beside it.
+    """
     environment = Environment(
         loader=PackageLoader("semsig_gis"),
         autoescape=True,
@@ -49,29 +55,46 @@ def html_page(report: Report, pictures: Mapping[str, Picture]) -> str:
     return environment.get_template("report.html").render(
         report=report,
         tables=_tables(report),
-        images={name: base64.b64encode(one.svg).decode("ascii") for name, one in pictures.items()},
+        images={name: _encoded(one) for name, one in pictures.items()},
         alts={name: picture.description for name, picture in pictures.items()},
+        alone=alone,
+        run=RUN,
         version=__version__,
     )
 
 
+def _encoded(picture: Picture) -> str:
+    return base64.b64encode(in_the_dark(picture.svg)).decode("ascii")
+
+
 def markdown_page(report: Report, pictures: Mapping[str, Picture]) -> str:
     """Return a report as Markdown, with its pictures shown from the folder ``figures``."""
-    blocks = [f"# {_inline(report.title)}", *map(_paragraph, report.text)]
-    if report.settings:
-        settings = Table("", ("Setting", "Value"), report.settings, labels=2)
-        blocks.append(markdown_rows(settings, _inline))
+    blocks = [f"# {_inline(report.title)}"]
+    blocks += [f"**{_inline(report.headline)}**"] if report.headline else []
+    blocks += map(_paragraph, report.text)
     tables = _tables(report)
+
+    def shown(part: Plot | OutcomeMap | Scene) -> str:
+        return f"![{_inline(pictures[part.name].description)}](figures/{part.name}.svg)"
+
     for section in report.sections:
         blocks += [f"## {_inline(section.title)}", *map(_paragraph, section.text)]
+        drawn: tuple[Plot | OutcomeMap | Scene, ...]
+        drawn = (*section.plots, *section.maps, *section.scenes)
+        blocks += map(shown, drawn)
+        for pair in section.pairs:
+            blocks += [f"### {_inline(pair.title)}", _paragraph(pair.text)]
+            blocks += map(shown, pair.scenes)
         if section.name in tables:
             table = tables[section.name]
             blocks.append(markdown_rows(table, _inline))
             blocks += [_paragraph(table.note)] if table.note else []
-        blocks += [
-            f"![{_inline(pictures[part.name].description)}](figures/{part.name}.svg)"
-            for part in section.drawn
-        ]
+    if report.settings or report.command:
+        blocks.append(f"## {RUN}")
+    if report.settings:
+        settings = Table("", ("Setting", "Value"), report.settings, labels=2)
+        blocks.append(markdown_rows(settings, _inline))
+    blocks += [_paragraph(report.command)] if report.command else []
     return "\n\n".join(blocks) + "\n"
 
 
@@ -101,6 +124,35 @@ NUMBER_COLUMNS = ("section", "row", "column", "unit", "ours", "low", "high", "pa
 POINT_COLUMNS = ("source", "label", "x", "y", "low", "high")
 
 
+def write_page(report: Report, file: str | Path) -> None:
+    """Write a report as one page of HTML with its pictures in it.
+
+    Parameters
+    ----------
+    report : Report
+        What to write.
+    file : str or Path
+        File to write; it loads nothing when it is opened.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be written.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> from pathlib import Path
+    >>> from semsig_gis import evaluate, evaluation_page
+    >>> page = evaluation_page(evaluate(demo_database, queries=5), demo_database, name="a city")
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     write_page(page, f"{folder}/report.html")
+    ...     Path(folder, "report.html").read_text("utf-8")[:15]
+    '<!DOCTYPE html>'
+    """
+    write_whole(file, html_page(report, _drawn(report), alone=True))
+
+
 def write_report(report: Report, folder: str | Path) -> None:
     """Write a report into a folder, which is made if need be; files of the same names are replaced.
 
@@ -111,14 +163,9 @@ def write_report(report: Report, folder: str | Path) -> None:
     """
     _require_names([section.name for section in report.sections])
     _require_names([part.name for section in report.sections for part in section.drawn])
-    place = Path(folder)
-    pictures: dict[str, Picture] = {}
-    for section in report.sections:
-        for plot in section.plots:
-            pictures[plot.name] = draw_plot(plot)
-            write_whole(place / FIGURES / f"{plot.name}.csv", _csv(POINT_COLUMNS, _points(plot)))
-        for scene in section.scenes:
-            pictures[scene.name] = draw_scene(scene)
+    place, pictures = Path(folder), _drawn(report)
+    for plot in (plot for section in report.sections for plot in section.plots):
+        write_whole(place / FIGURES / f"{plot.name}.csv", _csv(POINT_COLUMNS, _points(plot)))
     for name, picture in pictures.items():
         write_whole(place / FIGURES / f"{name}.svg", picture.svg)
         write_whole(place / FIGURES / f"{name}.png", picture.png)
@@ -126,6 +173,18 @@ def write_report(report: Report, folder: str | Path) -> None:
     write_whole(place / "report.json", _json(report))
     write_whole(place / "report.md", markdown_page(report, pictures))
     write_whole(place / "report.html", html_page(report, pictures))
+
+
+def _drawn(report: Report) -> dict[str, Picture]:
+    """Return all pictures of a report by name."""
+    pictures: dict[str, Picture] = {}
+    for section in report.sections:
+        pictures |= {plot.name: draw_plot(plot) for plot in section.plots}
+        pictures |= {one.name: draw_map(one) for one in section.maps}
+        paired = (scene for pair in section.pairs for scene in pair.scenes)
+        for scene in (*section.scenes, *paired):
+            pictures[scene.name] = draw_scene(scene)
+    return pictures
 
 
 def _require_names(names: Sequence[str]) -> None:
@@ -176,8 +235,10 @@ def _points(plot: Plot) -> Iterator[tuple[str | float | None, ...]]:
 def _json(report: Report) -> str:
     content = {
         "title": report.title,
+        "headline": report.headline,
         "text": report.text,
         "settings": [{"name": name, "value": value} for name, value in report.settings],
+        "command": report.command,
         "sections": [
             {
                 **asdict(section, dict_factory=_without_classes),
@@ -202,6 +263,8 @@ def _without_classes(items: list[tuple[str, Any]]) -> dict[str, Any]:
 
 def _finite(value: Any) -> Any:  # noqa: ANN401 - whatever JSON holds
     """Return a value without what JSON has no word for."""
+    if isinstance(value, np.ndarray):
+        return _finite(value.tolist())
     if isinstance(value, Mapping):
         return {name: _finite(one) for name, one in value.items()}
     if isinstance(value, (list, tuple)):

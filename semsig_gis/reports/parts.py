@@ -1,4 +1,4 @@
-"""What a report is made of: numbers beside the paper's, curves, scenes, in sections."""
+"""What a report is made of: numbers beside the paper's, curves, maps, scenes, in sections."""
 
 from __future__ import annotations
 
@@ -9,6 +9,9 @@ from semsig_gis.core.display import Displayed
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
+
+    import numpy as np
+    from numpy.typing import NDArray
 
     from semsig_gis.core.taxonomy import Taxonomy
 
@@ -83,6 +86,10 @@ class Plot:
         Points x, y that the paper's text tells, each with what it is of.
     y_range : tuple of float
         Ends of the y axis.
+    log : bool, default False
+        Whether the x axis is logarithmic, from the least x above 0 on.
+    ticks : tuple of (float, str), optional
+        What stands at which x, in place of numbers.
     diagonal : bool, default False
         Whether the line y = x is drawn, on which chances come true.
 
@@ -100,6 +107,8 @@ class Plot:
     curves: tuple[Curve, ...]
     paper: tuple[tuple[float, float, str], ...] = ()
     y_range: tuple[float, float] = (0.0, 1.0)
+    log: bool = False
+    ticks: tuple[tuple[float, str], ...] = ()
     diagonal: bool = False
 
 
@@ -118,8 +127,8 @@ class Scene(Displayed):
 
     ``lon`` and ``lat`` are in degrees (WGS 84), ``radius`` in metres; ``types`` are the symbols of
     the signature, clockwise from north, and ``taxonomy`` has their classes. ``others`` are not seen
-    from there. ``answer`` is metres east and north to the place that was answered; ``error_m`` is
-    None where nothing was asked.
+    from there. ``asked`` are class and bearing of what a query told. ``answer`` is metres east and
+    north to the place that was answered; ``error_m`` is None where nothing was asked.
     """
 
     name: str
@@ -131,6 +140,7 @@ class Scene(Displayed):
     taxonomy: Taxonomy
     objects: tuple[SceneObject, ...]
     others: tuple[SceneObject, ...] = ()
+    asked: tuple[tuple[int, float], ...] = ()
     answer: tuple[float, float] | None = None
     error_m: float | None = None
 
@@ -145,6 +155,32 @@ class Scene(Displayed):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class Pair:
+    """Two scenes to look at side by side, with a heading and a sentence about both."""
+
+    title: str
+    text: str
+    scenes: tuple[Scene, Scene]
+
+
+@dataclass(frozen=True, eq=False, slots=True, kw_only=True)
+class OutcomeMap:
+    """A map of where queries were asked, and which were successful; its files are called ``name``.
+
+    ``ground`` tells which squares of ``step`` metres have cells, the first row in the south;
+    ``places`` are metres east and north of its south-west corner, shape (n, 2), and ``successful``
+    (n,) tells the outcome of each.
+    """
+
+    name: str
+    title: str
+    step: float
+    ground: NDArray[np.bool_]
+    places: NDArray[np.float64]
+    successful: NDArray[np.bool_]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Section:
     """A part of a report; ``name`` consists of letters, digits and ``-``.
 
@@ -156,25 +192,31 @@ class Section:
     text: tuple[str, ...] = ()
     numbers: tuple[Number, ...] = ()
     plots: tuple[Plot, ...] = ()
+    maps: tuple[OutcomeMap, ...] = ()
     scenes: tuple[Scene, ...] = ()
+    pairs: tuple[Pair, ...] = ()
 
     @property
-    def drawn(self) -> tuple[Plot | Scene, ...]:
+    def drawn(self) -> tuple[Plot | OutcomeMap | Scene, ...]:
         """Everything of which there is a picture."""
-        return (*self.plots, *self.scenes)
+        paired = (scene for pair in self.pairs for scene in pair.scenes)
+        return (*self.plots, *self.maps, *self.scenes, *paired)
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Report:
     """A report, which `reports.page.write_report` writes.
 
-    ``settings`` tells what was run on what, as names and values; ``taxonomy`` has the classes of
-    the objects in the scenes; ``facts`` holds specs, versions and machine as plain values for JSON.
+    ``headline`` is the result in one sentence. ``settings`` tells what was run on what, as names
+    and values, and ``command`` how; ``taxonomy`` has the classes of the objects in the scenes;
+    ``facts`` holds specs, versions and machine as plain values for JSON.
     """
 
     title: str
+    headline: str = ""
     text: tuple[str, ...] = ()
     settings: tuple[tuple[str, str], ...] = ()
+    command: str = ""
     sections: tuple[Section, ...]
     taxonomy: Taxonomy
     facts: Mapping[str, Any] = field(default_factory=dict)

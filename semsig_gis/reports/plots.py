@@ -11,6 +11,7 @@ import textwrap
 import unicodedata
 import warnings
 from dataclasses import dataclass, field
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 from xml.sax.saxutils import escape
 
@@ -23,7 +24,7 @@ from matplotlib.patches import Patch
 from semsig_gis.core.signs import one_line
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
+    from collections.abc import Iterator, Mapping, Sequence
 
     from matplotlib.axes import Axes
 
@@ -36,7 +37,23 @@ COLOURS = (
 )
 """Colours that colour-blind people tell apart: those of Okabe and Ito, and two of Tol."""
 
-INK, WHITE = "#222222", "#ffffff"
+# Of what is drawn and what it is drawn on; a letter on a sign is just black or white.
+INK, GROUND = "#222222", "#fefefe"
+AXIS, TICK, GRID, SOFT = "#777777", "#555555", "#dddddd", "#999999"
+DARK: Mapping[str, str] = MappingProxyType(
+    {
+        INK: "#e6e6e3",
+        GROUND: "#18181b",
+        AXIS: "#8b8b8f",
+        TICK: "#a5a5a0",
+        GRID: "#3a3a3f",
+        SOFT: "#7c7c80",
+        "#333333": "#c9c9c4",
+        "#882255": "#d77ba6",
+    }
+)
+"""What colours become in the dark; all others are seen on both grounds."""
+
 DOTS_PER_INCH = 200
 # Text stays text in an SVG: a reader can search it, copy it and read it in any script.
 SETTINGS = {
@@ -46,12 +63,13 @@ SETTINGS = {
     "font.size": 9.5,
     "text.color": INK,
     "axes.labelcolor": INK,
-    "axes.edgecolor": "#777777",
-    "xtick.color": "#555555",
-    "ytick.color": "#555555",
+    "axes.edgecolor": AXIS,
+    "axes.facecolor": GROUND,
+    "xtick.color": TICK,
+    "ytick.color": TICK,
     "xtick.labelcolor": INK,
     "ytick.labelcolor": INK,
-    "grid.color": "#dddddd",
+    "grid.color": GRID,
     "grid.linewidth": 0.7,
 }
 
@@ -71,14 +89,14 @@ class Picture:
 
 @contextlib.contextmanager
 def blank_figure(width: float, height: float) -> Iterator[Figure]:
-    """Give an empty white figure (inches) with settings of our own, until the block ends."""
+    """Give an empty figure (inches) with settings of our own, until the block ends."""
     # The backend stays as it is: it is the one of whoever draws on a screen.
     settings: dict[Any, Any] = {**mpl.rcParamsDefault, **SETTINGS}
     del settings["backend"]
     with mpl.rc_context(settings), warnings.catch_warnings():
         # A PNG shows boxes for what its font does not have; a browser has fonts of its own.
         warnings.filterwarnings("ignore", message=r"Glyph \d+")
-        yield Figure(figsize=(width, height), facecolor=WHITE)
+        yield Figure(figsize=(width, height), facecolor=GROUND)
 
 
 def saved(figure: Figure, *, title: str, description: str) -> Picture:
@@ -96,6 +114,18 @@ def saved(figure: Figure, *, title: str, description: str) -> Picture:
     text = f"<title>{escape(one_line(title))}</title>\n<desc>{escape(one_line(description))}</desc>"
     page = f'<?xml version="1.0" encoding="utf-8"?>\n{opened}role="img" {head}>\n{text}{body}'
     return Picture(page.encode("utf-8"), png.getvalue(), one_line(description))
+
+
+def in_the_dark(svg: bytes) -> bytes:
+    """Return a drawing of `saved` that is dark on a screen where its reader likes that."""
+    rules = "".join(
+        f'[style*="{part}: {light}"]{{{part}:{dark}!important}}'
+        for light, dark in DARK.items()
+        for part in ("fill", "stroke")
+    )
+    style = f"<style>@media screen and (prefers-color-scheme:dark){{{rules}}}</style>"
+    head, end, body = svg.partition(b"</desc>")
+    return head + end + style.encode("ascii") + body
 
 
 def label(text: str, length: int) -> str:
@@ -148,7 +178,8 @@ DASHES = ("-", (0, (5, 1.6)), (0, (6, 1.6, 1.2, 1.6)), (0, (1.4, 1.2)))
 MARKERS = (("o", 5.2), ("s", 5.0), ("^", 6.4), ("D", 4.8), ("v", 6.4), ("P", 7.0), ("X", 7.0))
 BAND_SHADE, MANY_BANDS = 0.16, 4
 FEW_POINTS = 12
-FEW_TICKS = 6
+FEW_TICKS, MANY_TICKS = 6, 12
+RIGHT_END = 0.9  # share of the width
 MARKERS_APART = 0.14  # share of the diagonal
 # Inches.
 WIDTH = 6.2
@@ -209,8 +240,11 @@ def _draw_frame(axes: Axes, plot: Plot) -> None:
     xs = itertools.chain(*(curve.x for curve in plot.curves), (x for x, _, _ in plot.paper))
     values = sorted({x for x in xs if math.isfinite(x)}) or [0.0, 1.0]
     left, right = values[0], values[-1]
-    margin = 0.015 * (right - left) or 0.5
-    axes.set_xlim(left - margin, right + margin)
+    if plot.log:
+        _draw_log_axis(axes, values)
+    else:
+        margin = 0.015 * (right - left) or 0.5
+        axes.set_xlim(left - margin, right + margin)
     low, high = plot.y_range
     margin = 0.02 * (high - low) or 0.5
     axes.set_ylim(low - margin, high + margin)
@@ -219,10 +253,35 @@ def _draw_frame(axes: Axes, plot: Plot) -> None:
     axes.grid(visible=True)
     axes.set_axisbelow(True)
     axes.spines[["top", "right"]].set_visible(False)
-    if len(values) <= FEW_TICKS:
+    if plot.ticks:
+        places = [x for x, _ in plot.ticks]
+        axes.set_xticks(places, [label(text, 20) for _, text in plot.ticks])
+        axes.set_xlim(min(places) - 0.4, max(places) + 0.4)
+    elif len(values) <= FEW_TICKS and not plot.log:
         axes.set_xticks(values, [f"{x:g}" for x in values])
     if plot.diagonal:
-        axes.axline((0, 0), slope=1, color="#888888", linewidth=1, dashes=(4, 3), zorder=1.5)
+        axes.axline((0, 0), slope=1, color=SOFT, linewidth=1, dashes=(4, 3), zorder=1.5)
+
+
+def _draw_log_axis(axes: Axes, values: Sequence[float]) -> None:
+    """Scale the x axis by the logarithm; a 0 stands a little before the least x above it."""
+    above = [x for x in values if x > 0.0] or [1.0]
+    least, most = above[0], above[-1]
+    with_zero = values[0] <= 0.0
+    if with_zero:
+        axes.set_xscale("symlog", linthresh=least, linscale=0.25)
+    else:
+        axes.set_xscale("log")
+    decades = range(math.floor(math.log10(least)), math.ceil(math.log10(most)) + 1)
+    ticks = [step * 10.0**power for power in decades for step in (1, 2, 5)]
+    ticks = [tick for tick in ticks if least * 0.999 <= tick <= most * 1.001]
+    if len(ticks) > MANY_TICKS:
+        ticks = [tick for tick in ticks if round(math.log10(tick), 9).is_integer()]
+    ticks = [*([0.0] if with_zero else []), *ticks]
+    axes.set_xticks(ticks, [f"{tick:,g}" for tick in ticks])
+    axes.set_xticks([], minor=True)
+    margin = max((most / least) ** 0.015, 1.05)
+    axes.set_xlim(-0.1 * least if with_zero else least / margin, most * margin)
 
 
 def _draw_curve(axes: Axes, curve: Curve, number: int, curves: int) -> None:
@@ -251,18 +310,18 @@ def _look(number: int) -> dict[str, Any]:
         "marker": marker,
         "linewidth": 1.6,
         "markersize": size,
-        "markeredgecolor": WHITE,
+        "markeredgecolor": GROUND,
         "markeredgewidth": 0.6,
     }
 
 
 def _draw_paper(axes: Axes, points: Sequence[tuple[float, float, str]]) -> None:
-    left, right = axes.get_xlim()
+    across = axes.transScale + axes.transLimits
     for number, (x, y, _) in enumerate(points, 1):
         axes.plot([x], [y], clip_on=False, zorder=5, **_PAPER_LOOK)
         if len(points) > 1:
-            side = -1 if x > left + 0.9 * (right - left) else 1
-            halo = {"facecolor": WHITE, "alpha": 0.8, "edgecolor": "none", "pad": 0.6}
+            side = -1 if across.transform((x, y))[0] > RIGHT_END else 1
+            halo = {"facecolor": GROUND, "alpha": 0.8, "edgecolor": "none", "pad": 0.6}
             look: dict[str, Any] = {"va": "center", "weight": "bold", "size": 9, "bbox": halo}
             look |= {"xytext": (7 * side, -4), "ha": "left" if side > 0 else "right"}
             axes.annotate(str(number), (x, y), textcoords="offset points", **look, zorder=6)
@@ -290,10 +349,10 @@ def _other_keys(plot: Plot) -> Keys:
     """Return what the legend says below the curves."""
     keys: Keys = []
     if any(curve.low for curve in plot.curves):
-        keys.append((Patch(color="#999999", alpha=0.4, linewidth=0), "interval of 95 %"))
+        keys.append((Patch(color=SOFT, alpha=0.4, linewidth=0), "interval of 95 %"))
     if plot.diagonal:
         dashes = (0, (4, 3))
-        keys.append((Line2D([], [], color="#888888", linewidth=1, linestyle=dashes), "y = x"))
+        keys.append((Line2D([], [], color=SOFT, linewidth=1, linestyle=dashes), "y = x"))
     several = len(plot.paper) > 1
     for number, (_, _, text) in enumerate(plot.paper, 1):
         sign = Line2D([], [], **_PAPER_LOOK)
@@ -309,9 +368,11 @@ def _columns(keys: Keys) -> int:
 
 def _described(plot: Plot) -> str:
     lines = [f"{plot.title}.", f"{_capital(plot.y_label)} by {plot.x_label}."]
+    names = dict(plot.ticks)
     for curve in plot.curves:
-        ends = dict.fromkeys([(curve.x[at], curve.y[at]) for at in (0, -1) if curve.x])
-        points = ", ".join(f"{y:.4g} at {x:.4g}" for x, y in ends)
+        ends = range(len(curve.x)) if plot.ticks else [at for at in (0, -1) if curve.x]
+        told = dict.fromkeys((curve.x[at], curve.y[at]) for at in ends)
+        points = ", ".join(f"{y:.4g} at {names.get(x, f'{x:.4g}')}" for x, y in told)
         lines.append(f"{_capital(curve.label)}: {points or 'no points'}.")
     lines += [f"The paper, {text}: {y:.4g} at {x:.4g}." for x, y, text in plot.paper]
     return " ".join(lines)

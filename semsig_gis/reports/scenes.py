@@ -18,14 +18,16 @@ from pyproj import Transformer
 from semsig_gis.core.errors import InputError
 from semsig_gis.core.signs import ClassSign, class_signs, one_line
 from semsig_gis.queries.sight import Sight
-from semsig_gis.reports.parts import Scene, SceneObject
-from semsig_gis.reports.plots import INK, WHITE, blank_figure, draw_legend, label, saved
+from semsig_gis.reports.parts import Pair, Scene, SceneObject
+from semsig_gis.reports.plots import GROUND, INK, SOFT, blank_figure, draw_legend, label, saved
+from semsig_gis.reports.tables import length
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from matplotlib.axes import Axes
 
+    from semsig_gis.core.taxonomy import Taxonomy
     from semsig_gis.database.database import SignatureDatabase
     from semsig_gis.evaluation.result import Evaluation
     from semsig_gis.reports.plots import Picture
@@ -79,13 +81,14 @@ def example_scenes(
     """Return the first queries from cells of the database that were answered well, or not."""
     queries = evaluation.queries
     examples = queries[(evaluation.successful == successful) & (queries["cell"] >= 0)].head(count)
-    kind = "found" if successful else "lost"
+    kind = "successful" if successful else "failed"
     scenes = []
-    for place, row in enumerate(examples.to_dict("records"), start=1):
+    rows = zip(examples.index, examples.to_dict("records"), strict=True)
+    for place, (number, row) in enumerate(rows, start=1):
         cell = int(row["cell"])
         x, y = database.xy[cell].tolist()
         aside = (float(row["best_x"]) - x, float(row["best_y"]) - y)
-        title = f"{'Found' if successful else 'Not found'}: query {int(row['number']):,}"
+        title = f"{kind.capitalize()}: query {number + 1:,}"
         scenes.append(
             replace(
                 cell_scene(database, cell, title=title),
@@ -95,6 +98,52 @@ def example_scenes(
             )
         )
     return tuple(scenes)
+
+
+def failure_pairs(
+    evaluation: Evaluation, database: SignatureDatabase, *, count: int = 6
+) -> tuple[Pair, ...]:
+    """Return the failed queries with the largest errors: the true cell and what it was taken for.
+
+    They are of queries from cells of the database that were answered at all.
+    """
+    queries = evaluation.queries
+    told = np.isfinite(queries["error_m"].to_numpy(np.float64)) & queries["best_cell_id"].notna()
+    failed = queries[~evaluation.successful & (queries["cell"] >= 0) & told]
+    worst = failed.sort_values("error_m", ascending=False, kind="stable").head(count)
+    pairs = []
+    rows = zip(worst.index, worst.to_dict("records"), strict=True)
+    for place, (number, row) in enumerate(rows, start=1):
+        taken = int(np.searchsorted(database.cell_ids, int(row["best_cell_id"])))
+        bearings = map(float, filter(None, row["query_bearings"].split(",")))
+        codes = database.taxonomy.encode(row["query_types"]).tolist()
+        asked = tuple(zip(codes, bearings, strict=True))
+        true, other = (
+            replace(cell_scene(database, cell, title=title), name=f"{name}-{place}", asked=asked)
+            for cell, title, name in (
+                (int(row["cell"]), "Where it was", "true"),
+                (taken, "What it was taken for", "taken"),
+            )
+        )
+        equals = int(row["tied"])
+        alike = "" if equals == 1 else f" {equals:,} cells fit it as well as the one shown."
+        pairs.append(
+            Pair(
+                title=f"Query {number + 1:,}: off by {length(float(row['error_m']))}",
+                text=f"The spoiled query told {_told(codes, database.taxonomy)}.{alike}",
+                scenes=(true, other),
+            )
+        )
+    return tuple(pairs)
+
+
+def _told(codes: list[int], taxonomy: Taxonomy) -> str:
+    """Return classes in words, each with its symbol and how often it comes."""
+    known = {code: taxonomy.by_code(code) for code in codes}
+    return ", ".join(
+        f"{known[code].title.lower()} ({known[code].symbol}{f', {count}' * (count > 1)})"
+        for code, count in Counter(codes).items()
+    )
 
 
 def _seen_from(database: SignatureDatabase, cell: int) -> tuple[SceneObject, ...]:
@@ -157,7 +206,8 @@ TITLE_LETTERS = 46
 TYPE_LETTERS, TYPE_LINES = 42, 3
 CLASS_LETTERS = 21
 MANY_OBJECTS = 40
-HALO = {"facecolor": WHITE, "alpha": 0.85, "edgecolor": "none", "pad": 1}  # behind letters
+RIM = 1.13  # where letters stand of what a query told, in visibility ranges
+HALO = {"facecolor": GROUND, "alpha": 0.85, "edgecolor": "none", "pad": 1}  # behind letters
 _IN_FRONT: dict[str, Any] = {"ha": "center", "bbox": HALO}
 
 
@@ -262,12 +312,9 @@ def _draw_map(axes: Axes, scene: Scene, signs: dict[int, ClassSign]) -> None:
     farthest = max((math.hypot(item.east, item.north) for item in scene.objects), default=0.0)
     reach = max(AROUND * scene.radius, 1.08 * farthest, 1.12 * near)
     axes.set(xlim=(-reach, reach), ylim=(-reach, reach), xticks=[], yticks=[], aspect="equal")
-    axes.set_facecolor("#fafaf8")
-    axes.add_patch(
-        Circle((0, 0), scene.radius, facecolor=WHITE, edgecolor="#999999", linestyle="--")
-    )
+    axes.add_patch(Circle((0, 0), scene.radius, facecolor=GROUND, edgecolor=SOFT, linestyle="--"))
     lines = [[(0.0, 0.0), (item.east, item.north)] for item in scene.objects]
-    axes.add_collection(LineCollection(lines, colors="#999999", linewidths=0.5, zorder=2))
+    axes.add_collection(LineCollection(lines, colors=SOFT, linewidths=0.5, zorder=2))
     for item in scene.others:
         look = _shape(signs.get(item.code, UNKNOWN), 5)
         axes.plot(item.east, item.north, **look, alpha=0.25, markeredgewidth=0, zorder=1.5)
@@ -275,12 +322,14 @@ def _draw_map(axes: Axes, scene: Scene, signs: dict[int, ClassSign]) -> None:
     # The nearest last, so that they lie on top.
     for item in sorted(scene.objects, key=lambda one: -math.hypot(one.east, one.north)):
         _draw_object(axes, item, signs.get(item.code, UNKNOWN), size)
-    edge: dict[str, Any] = {"markeredgecolor": WHITE, "markeredgewidth": 1.5}
+    edge: dict[str, Any] = {"markeredgecolor": GROUND, "markeredgewidth": 1.5}
     axes.plot(0, 0, color=INK, marker="o", markersize=7, **edge, zorder=6)
+    for code, bearing in scene.asked:
+        _draw_asked(axes, signs.get(code, UNKNOWN), bearing, scene.radius)
     if scene.answer:
         _draw_answer(axes, scene.answer, away, reach)
-    _draw_north(axes)
-    _draw_scale(axes, reach)
+    draw_north(axes)
+    draw_scale(axes, reach)
 
 
 def _shape(sign: ClassSign, size: float) -> dict[str, Any]:
@@ -289,7 +338,7 @@ def _shape(sign: ClassSign, size: float) -> dict[str, Any]:
 
 
 def _draw_object(axes: Axes, item: SceneObject, sign: ClassSign, size: float) -> None:
-    edge: dict[str, Any] = {"markeredgecolor": WHITE, "markeredgewidth": 0.7}
+    edge: dict[str, Any] = {"markeredgecolor": GROUND, "markeredgewidth": 0.7}
     axes.plot(item.east, item.north, **_shape(sign, size), **edge, zorder=4)
     axes.annotate(
         sign.symbol,
@@ -304,6 +353,16 @@ def _draw_object(axes: Axes, item: SceneObject, sign: ClassSign, size: float) ->
         zorder=4,
         clip_on=True,
     )
+
+
+def _draw_asked(axes: Axes, sign: ClassSign, bearing: float, radius: float) -> None:
+    """Draw what a query told as a letter outside of what is in range, where it was told to be."""
+    turn = math.radians(bearing)
+    ends = [(share * math.sin(turn), share * math.cos(turn)) for share in (1.0, 1.06, RIM)]
+    inner, outer, place = ((radius * east, radius * north) for east, north in ends)
+    axes.plot(*zip(inner, outer, strict=True), color=INK, linewidth=1.2, zorder=3)
+    look: dict[str, Any] = {"size": 8.5, "weight": "bold", "color": INK}
+    axes.text(*place, sign.symbol, ha="center", va="center", **look, zorder=5, clip_on=True)
 
 
 def _draw_answer(axes: Axes, answer: tuple[float, float], away: float, reach: float) -> None:
@@ -325,19 +384,21 @@ _ANSWER_LOOK: dict[str, Any] = {
     "linestyle": "",
     "marker": "X",
     "markersize": 9.5,
-    "markeredgecolor": WHITE,
+    "markeredgecolor": GROUND,
     "markeredgewidth": 1,
 }
 
 
-def _draw_north(axes: Axes) -> None:
+def draw_north(axes: Axes) -> None:
+    """Draw an arrow to the north in the upper right corner."""
     share = dict.fromkeys(("xycoords", "textcoords"), "axes fraction")
     arrow = {"arrowstyle": "-|>", "color": INK, "linewidth": 1.2, "shrinkB": 0}
     look: dict[str, Any] = {"va": "center", "weight": "bold", "size": 9, **share, **_IN_FRONT}
     axes.annotate("N", (0.955, 0.985), xytext=(0.955, 0.885), arrowprops=arrow, **look, zorder=8)
 
 
-def _draw_scale(axes: Axes, reach: float) -> None:
+def draw_scale(axes: Axes, reach: float) -> None:
+    """Draw a scale bar in the lower left corner of a map that reaches so many metres each way."""
     metres = _round_length(0.5 * reach)
     start = 0.03
     end = start + metres / (2 * reach)
@@ -345,7 +406,7 @@ def _draw_scale(axes: Axes, reach: float) -> None:
     ends = [start, start, end, end], [0.045, 0.03, 0.03, 0.045]
     axes.plot(*ends, transform=axes.transAxes, **look)
     text: dict[str, Any] = {"va": "bottom", "size": 8.5, "transform": axes.transAxes, **_IN_FRONT}
-    axes.text((start + end) / 2, 0.045, f"{metres:g} m", **text, zorder=8)
+    axes.text((start + end) / 2, 0.045, length(metres), **text, zorder=8)
 
 
 def _round_length(longest: float) -> float:
@@ -359,7 +420,8 @@ def _lines(scene: Scene) -> list[str]:
     types = label(scene.types, TYPE_LETTERS * TYPE_LINES)
     signature = textwrap.wrap(types, TYPE_LETTERS) or ["sees nothing"]
     place = f"{scene.lon:.6f}°, {scene.lat:.6f}°"
-    return [*signature, " · ".join(part for part in (place, _error(scene)) if part)]
+    rim = ["around the circle: what the query told"] if scene.asked else []
+    return [*signature, *rim, " · ".join(part for part in (place, _error(scene)) if part)]
 
 
 def _error(scene: Scene) -> str:
@@ -384,6 +446,7 @@ def _keys(scene: Scene, signs: dict[int, ClassSign]) -> list[tuple[Line2D, str]]
 
 
 def _described(scene: Scene, signs: dict[int, ClassSign]) -> str:
+    told = "".join(signs.get(code, UNKNOWN).symbol for code, _ in scene.asked)
     seen = Counter(item.code for item in scene.objects)
     counts = ", ".join(
         f"{one_line(signs.get(code, UNKNOWN).title).lower()} ({number})"
@@ -391,5 +454,10 @@ def _described(scene: Scene, signs: dict[int, ClassSign]) -> str:
     )
     types = f"Signature {scene.types}, seen" if scene.types else "Nothing is seen"
     place = f"from {scene.lon:.6f}, {scene.lat:.6f}"
-    parts = (scene.title, f"{types} {place}{f': {counts}' if counts else ''}", _error(scene))
+    parts = (
+        scene.title,
+        f"{types} {place}{f': {counts}' if counts else ''}",
+        f"The query told {told}" if told else "",
+        _error(scene),
+    )
     return " ".join(f"{part[:1].upper()}{part[1:]}." for part in parts if part)

@@ -145,11 +145,21 @@ def percent(share: float) -> str:
     return f"{100 * share:.1f} %"
 
 
+KILOMETRE = 1000.0
+
+
 def figure(value: float | None, form: str = ".4f") -> str:
     """Return a number as text, empty where it is None or NaN."""
     if value is None or math.isnan(value):
         return ""
     return "infinite" if math.isinf(value) else format(value, form)
+
+
+def length(metres: float) -> str:
+    """Return a length as text: ``2.5 m``, ``340 m``, ``11.2 km``."""
+    if metres < 10.0:  # noqa: PLR2004
+        return f"{metres:.2g} m"
+    return f"{metres:,.0f} m" if metres < KILOMETRE else f"{metres / KILOMETRE:,.3g} km"
 
 
 def interval(low: float, high: float, form: str = ".4f") -> str:

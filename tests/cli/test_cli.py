@@ -83,7 +83,12 @@ def test_evaluate_map_and_export(done: Done) -> None:
     assert summary["settings"]["method"] == "edit+edit:20%"
     assert summary.pop("timing")["seconds_per_query"] > 0
     assert json.loads(text("eval/evaluation.json")) == summary
-    assert "recall" in done(line)
+    out = done(line, "--report", "eval.html")
+    assert out.startswith(f"{summary['results']['p_error_within_m']['50']:.0%}".rstrip("%"))
+    assert "report: eval.html" in out
+    page = text("eval.html")
+    assert f"semsig {line} --report eval.html" in page
+    assert "queries were placed within 50 m" in page
     assert "map.html" in done("map city.parquet --evaluation eval --out map.html")
     assert Path("map.html").stat().st_size > 1000
 

@@ -11,18 +11,20 @@ import tempfile
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
 import pytest
 from html_pages import HtmlPage
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from map_pages import HOSTILE, MapPage, assert_quiet
+from PIL import Image
 from reports import HARM, LONG, hostile_report, ordinary_report, plot, report, scene
 from sentences import refused
 
 from semsig_gis import __version__
 from semsig_gis.core.errors import InputError
 from semsig_gis.core.signs import one_line
-from semsig_gis.reports.page import html_page, markdown_page, write_report
+from semsig_gis.reports.page import html_page, markdown_page, write_page, write_report
 from semsig_gis.reports.parts import Number, Section
 
 if TYPE_CHECKING:
@@ -78,13 +80,15 @@ def test_what_is_written(tmp_path: Path, snapshot: Callable[[str, str], None]) -
     for name in texts:
         text = files[name].decode().replace(__version__, "VERSION")
         snapshot(f"ordinary-{Path(name).name}", text)
-    figures = {f"figures/{one}.{kind}" for one in ("errors", "place", "other")
+    drawn = ("errors", "place", "other", "where", "true", "taken")
+    figures = {f"figures/{one}.{kind}" for one in drawn
                for kind in ("png", "svg")}  # fmt: skip
     assert set(files) == texts | figures | {"report.html"}
     page = harmless(files["report.html"].decode())
-    for text in ("Report", "What it is.", "city.parquet", "Range", "0.2100", "0.1793", "infinite"):
+    for text in ("Report", "What it is.", "city.parquet", "Range", "0.2100", "0.1793", "infinite",
+                 "Half of it.", "Two lamps.", "semsig evaluate city.parquet"):  # fmt: skip
         assert text in page.text
-    assert sum(one.startswith("data:image/svg+xml;base64,") for one in page.loaded) == 3
+    assert sum(one.startswith("data:image/svg+xml;base64,") for one in page.loaded) == len(drawn)
     assert all(name.encode() in files["report.html"] for name in figures)
 
 
@@ -99,6 +103,15 @@ def test_text_from_data_stays_text(harm: str, tmp_path: Path) -> None:
         if name.endswith(".csv"):
             cells = [cell for line in csv.reader(io.StringIO(content.decode())) for cell in line]
             assert not any(cell.startswith("=") for cell in cells)
+
+
+def test_a_page_alone_names_no_files(tmp_path: Path) -> None:
+    write_page(ordinary_report(), tmp_path / "page.html")
+    assert list(contents(tmp_path)) == ["page.html"]
+    text = (tmp_path / "page.html").read_text("utf-8")
+    assert 'href="figures' not in text
+    assert "numbers.csv" not in text
+    assert "0.1793" in harmless(text).text
 
 
 def test_text_is_shown_as_it_is() -> None:
@@ -127,10 +140,10 @@ def test_markdown_keeps_its_shape(harm: str, tmp_path: Path) -> None:
     bare = re.sub(r"\\.", "", text.replace("![", "").replace("](figures/", ""))
     assert not set(bare) & set("`[]{}~$_\0\r\u202e")
     lines = [re.sub(r"\\.", "", line).count("|") for line in text.splitlines() if line[0:1] == "|"]
-    assert lines == [3] * 3 + [lines[3]] * 5
+    assert lines == [lines[0]] * 5 + [3] * 3
     assert len(text.splitlines()) == len([*text.split("\n")]) - 1
     headings = [line for line in text.splitlines() if line.startswith("#")]
-    assert len(headings) == 2
+    assert len(headings) == 4
 
 
 def test_markdown_begins_no_list_by_chance() -> None:
@@ -235,7 +248,19 @@ def test_a_page_in_a_browser(page: MapPage, width: int) -> None:
         assert max(image.size["width"] for image in page.all("figure img")) <= width
         overflow = "return document.documentElement.scrollWidth - window.innerWidth"
         assert page.browser.execute_script(overflow) <= 0
-        assert_only_its_pictures(page, 3)
+        assert_only_its_pictures(page, 6)
+
+
+def test_a_page_is_dark_where_that_is_liked(page: MapPage) -> None:
+    write_page(ordinary_report(), page.folder / "report.html")
+    for mode, most in (("light", 256), ("dark", 90)):
+        liked = {"features": [{"name": "prefers-color-scheme", "value": mode}]}
+        page.browser.execute_cdp_cmd("Emulation.setEmulatedMedia", liked)
+        page.browser.get((page.folder / "report.html").as_uri())
+        for image in page.all("img"):
+            pixels = np.asarray(Image.open(io.BytesIO(image.screenshot_as_png)).convert("L"))
+            assert most - 90 < np.median(pixels) < most
+    page.browser.execute_cdp_cmd("Emulation.setEmulatedMedia", {"features": []})
 
 
 @pytest.mark.parametrize(("width", "media"), [(900, "screen"), (680, "print")])  # A4 has 680
@@ -268,6 +293,6 @@ def test_harm_in_a_browser(page: MapPage, harm: str) -> None:
     page.browser.get((page.folder / "report.html").as_uri())
     assert page.all("script") == []
     assert one_line(HOSTILE) in page.browser.execute_script("return document.body.textContent")
-    assert_only_its_pictures(page, 2)
+    assert_only_its_pictures(page, 5)
     page.browser.get((page.folder / "figures" / "errors.svg").as_uri())
     assert page.all("script") == []

@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import dataclasses
+import re
 import struct
 import xml.etree.ElementTree as ET
 from typing import TYPE_CHECKING
@@ -15,12 +16,16 @@ from reports import HARM, LONG, plot, texts
 from semsig_gis.reports.parts import Curve, Plot
 from semsig_gis.reports.plots import (
     COLOURS,
-    WHITE,
+    DARK,
+    GRID,
+    GROUND,
+    INK,
     _draw_curve,
     _look,
     blank_figure,
     draw_legend,
     draw_plot,
+    in_the_dark,
     label,
     saved,
 )
@@ -111,7 +116,7 @@ def test_no_two_curves_look_alike() -> None:
     without_colour = [(str(one["linestyle"]), one["marker"]) for one in looks[:28]]
     assert len(set(without_colour)) == 28
     assert len({(str(one["color"]), str(one["linestyle"]), one["marker"]) for one in looks}) == 100
-    assert len(set(COLOURS) - {WHITE}) == len(COLOURS)
+    assert len(set(COLOURS) - {GROUND}) == len(COLOURS)
 
 
 def test_points_of_the_paper_are_numbered_where_there_are_several() -> None:
@@ -140,6 +145,49 @@ def test_ticks_are_the_values_where_they_are_few() -> None:
     shown = texts(draw_plot(dataclasses.replace(plot(), curves=(curve,))).svg)
     assert {"8", "16", "24", "32"} <= set(shown)
     assert "20" not in shown
+
+
+def test_ticks_may_have_names() -> None:
+    ticks = ((0.0, "few"), (1.0, "some"), (2.0, "many"))
+    curve = Curve(label="P", x=(0.0, 2.0), y=(0.3, 0.4))
+    made = draw_plot(dataclasses.replace(plot(), curves=(curve,), ticks=ticks))
+    assert {"few", "some", "many"} <= set(texts(made.svg))
+    assert "P: 0.3 at few, 0.4 at many." in made.description
+
+
+@pytest.mark.parametrize(
+    ("x", "shown", "hidden"),
+    [
+        ((0.0, 5.0, 50.0, 5000.0), {"0", "5", "100", "5,000"}, {"1"}),
+        ((0.01, 1.0, 100.0), {"0.01", "0.1", "1", "10", "100"}, {"0", "50"}),
+        ((2.0, 3.0), {"2"}, {"5"}),
+        ((7.0,), set(), {"0"}),
+        ((0.0,), {"0"}, {"5"}),
+    ],
+)
+def test_an_axis_may_be_logarithmic(
+    x: tuple[float, ...], shown: set[str], hidden: set[str]
+) -> None:
+    curve = Curve(label="P", x=x, y=(0.33,) * len(x))
+    paper = ((x[-1], 0.33, "one"), (x[0], 0.32, "two"))
+    given = dataclasses.replace(plot(), curves=(curve,), log=True, y_range=(0.31, 0.35))
+    drawn = texts(draw_plot(given).svg)
+    assert shown <= set(drawn)
+    assert hidden.isdisjoint(drawn)
+    assert {"1", "2"} <= set(texts(draw_plot(dataclasses.replace(given, paper=paper)).svg))
+
+
+def test_a_drawing_has_other_colours_in_the_dark() -> None:
+    made = draw_plot(plot(curves=9, diagonal=True)).svg
+    dark = in_the_dark(made).decode()
+    ET.fromstring(dark)  # noqa: S314
+    style = dark.partition("<style>")[2].partition("</style>")[0]
+    assert dark.replace(f"<style>{style}</style>", "") == made.decode()
+    for light, other in DARK.items():
+        assert f'[style*="fill: {light}"]{{fill:{other}!important}}' in style
+    assert {f"fill: {GROUND}", f"fill: {INK}", f"stroke: {GRID}"} <= set(
+        re.findall(r"(?:fill|stroke): #[0-9a-f]{6}", made.decode())
+    )
 
 
 @pytest.mark.parametrize("value", [float("nan"), float("inf")])

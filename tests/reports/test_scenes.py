@@ -4,6 +4,7 @@ import dataclasses
 import math
 import re
 
+import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -21,6 +22,7 @@ from semsig_gis.reports.scenes import (
     draw_scene,
     draw_scenes,
     example_scenes,
+    failure_pairs,
 )
 from semsig_gis.sources.catalog import paper_taxonomy
 
@@ -41,7 +43,9 @@ def test_scenes_show_what_is_there(successful: bool) -> None:  # noqa: FBT001
         assert shown.error_m == row["error_m"]
         codes = [CITY.taxonomy.by_code(one.code).symbol for one in shown.objects]
         assert "".join(codes) == row["types"]
-        assert (shown.radius, shown.name.split("-")[0]) == (30.0, "found" if successful else "lost")
+        kind = "successful" if successful else "failed"
+        assert (shown.radius, shown.name.split("-")[0]) == (30.0, kind)
+        assert shown.title == f"{kind.capitalize()}: query {row['number'] + 1}"
         for one in shown.objects:
             assert math.hypot(one.east, one.north) <= 30.1
         # Bearings are kept to 1/20 degree and distances to 1/8 metre: all is within 20 cm.
@@ -58,6 +62,34 @@ def test_scenes_show_what_is_there(successful: bool) -> None:  # noqa: FBT001
             assert (x + east, y + north) == pytest.approx((row["best_x"], row["best_y"]))
 
 
+def test_the_worst_failures_are_shown_in_pairs() -> None:
+    pairs = failure_pairs(FOUND, CITY, count=3)
+    told = FOUND.queries[~FOUND.successful & np.isfinite(FOUND.queries["error_m"])]
+    worst = told.sort_values("error_m", ascending=False, kind="stable").head(3)
+    assert len({scene.name for pair in pairs for scene in pair.scenes}) == 6
+    for pair, (number, row) in zip(pairs, worst.iterrows(), strict=True):
+        true, taken = pair.scenes
+        assert pair.title.startswith(f"Query {number + 1:,}: off by ")
+        assert true.types == row["types"]
+        best = int(np.flatnonzero(CITY.cell_ids == row["best_cell_id"])[0])
+        assert taken.types == CITY.types(best)
+        assert true.asked == taken.asked
+        assert CITY.taxonomy.decode([code for code, _ in true.asked]) == row["query_types"]
+        bearings = [f"{bearing:.6g}" for _, bearing in true.asked]
+        assert bearings == [f"{float(one):.6g}" for one in row["query_bearings"].split(",")]
+        assert ("fit it as well" in pair.text) == (row["tied"] > 1)
+        for symbol in row["query_types"]:
+            assert CITY.taxonomy.by_symbol(symbol).title.lower() in pair.text
+
+
+def test_what_a_query_told_stands_around_the_circle() -> None:
+    made = draw_scene(scene(objects=0, asked=((3, 90.0), (3, 180.0), (1, 0.0))))
+    shown = texts(made.svg)
+    assert (shown.count("D"), shown.count("B")) == (2, 1)
+    assert "around the circle: what the query told" in shown
+    assert "The query told DDB." in made.description
+
+
 def test_a_scene_of_a_cell() -> None:
     shown = cell_scene(CITY, 3)
     assert shown.types == CITY.types(3)
@@ -70,6 +102,7 @@ def test_a_scene_of_a_cell() -> None:
 def test_no_examples() -> None:
     perfect = evaluate(CITY, queries=3, distortion="none", top=len(CITY))
     assert example_scenes(perfect, CITY, successful=False) == ()
+    assert failure_pairs(perfect, CITY) == ()
 
 
 def nearest(x: float, y: float, code: int) -> float:

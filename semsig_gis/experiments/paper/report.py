@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from semsig_gis.evaluation.result import machine
+from semsig_gis.experiments.paper.cases import case_of, is_alone, level_case, reweighted
 from semsig_gis.experiments.paper.reproduce import (
     BEST,
     FIRST_STAGE,
@@ -20,33 +21,30 @@ from semsig_gis.experiments.paper.reproduce import (
     SINGLES,
     WEIGHTS,
 )
-from semsig_gis.experiments.paper.shares import (
+from semsig_gis.queries.distortions import DISTORTIONS
+from semsig_gis.reports import paris
+from semsig_gis.reports.paris import READ_OFF
+from semsig_gis.reports.parts import Number, Report, Section
+from semsig_gis.reports.scenes import example_scenes
+from semsig_gis.reports.shares import (
     COLUMNS,
     P10,
     P50,
     RECALL10,
     Share,
-    case_of,
+    calibration_plot,
     curve_of,
-    is_alone,
-    level_case,
     plot_of,
-    reweighted,
     share_of,
 )
-from semsig_gis.queries.distortions import DISTORTIONS
-from semsig_gis.reports import paris
-from semsig_gis.reports.paris import READ_OFF
-from semsig_gis.reports.parts import Curve, Number, Plot, Report, Section
-from semsig_gis.reports.scenes import example_scenes
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping
 
     from semsig_gis.evaluation.result import Evaluation
     from semsig_gis.experiments.paper.reproduce import Reproduction
-    from semsig_gis.experiments.paper.shares import Figure, Points
-    from semsig_gis.reports.parts import Scene
+    from semsig_gis.reports.parts import Plot, Scene
+    from semsig_gis.reports.shares import Figure, Points
 
 JUST_5 = "recall@10 %, just 5 % kept"
 GROUP_KEYS = ("count", "mean", "std", "min", "25%", "50%", "75%", "max")
@@ -576,19 +574,6 @@ def _likelihood_section(results: Reproduction) -> Section:
                 "error",
                 [curve_of(case, name, "error") for name, case in cases.items()],
             ),
-            Plot(
-                name="likelihood-calibration",
-                title="How often stated chances come true",
-                x_label="chance stated",
-                y_label="share that came true",
-                curves=tuple(_calibration(case, name) for name, case in cases.items()),
-                diagonal=True,
-            ),
+            calibration_plot("likelihood", cases),
         ),
     )
-
-
-def _calibration(case: Evaluation, label: str) -> Curve:
-    table = case.calibration().dropna(subset=["true"])
-    x, y, low, high = (tuple(table[name].tolist()) for name in ("stated", "true", "low", "high"))
-    return Curve(label=label, x=x, y=y, low=low, high=high)

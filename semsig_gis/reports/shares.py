@@ -10,9 +10,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from semsig_gis.core.statistics import wilson_interval
-from semsig_gis.experiments.paper.reproduce import BEST
 from semsig_gis.matching.ties import THRESHOLDS, expected_recall
-from semsig_gis.reports import paris
 from semsig_gis.reports.parts import Curve, Number, Plot
 
 if TYPE_CHECKING:
@@ -21,7 +19,6 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from semsig_gis.evaluation.result import Evaluation
-    from semsig_gis.experiments.paper.reproduce import Reproduction
 
     Points = tuple[tuple[float, float, str], ...]
 
@@ -29,7 +26,7 @@ Figure = tuple[str, float]  # the kind of a figure, and how many metres or per c
 
 # What plots show: metres and per cent.
 STEPS: Mapping[str, tuple[float, ...]] = {
-    "error": tuple(one for one in THRESHOLDS if one <= 500),  # noqa: PLR2004
+    "error": THRESHOLDS,
     "recall": (0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1, 2, 3, 5, 7, *range(10, 101, 5)),
 }
 AXES: Mapping[str, tuple[str, str]] = {
@@ -65,26 +62,14 @@ class Share(NamedTuple):
         return Number(row, column, self.ours, low=self.low, high=self.high, paper=paper)
 
 
-def case_of(
-    results: Reproduction, experiment: str, method: str, distortion: str = "", *, top: int = 1
-) -> Evaluation:
-    """Return an evaluation; the distortion is by default that of the experiment's name."""
-    return results.experiments[experiment][f"{distortion or experiment}/{method}-top{top}"]
-
-
-def level_case(results: Reproduction, name: str) -> Evaluation:
-    """Return the evaluation of the recommended method at a level of distortion."""
-    return case_of(results, name if name in results.experiments else "levels", BEST, name)
-
-
 def share_of(
     case: Evaluation, figure: Figure, some: NDArray[np.bool_] | slice = slice(None)
 ) -> Share:
     """Return the share of the queries, or of some, that are right by a figure."""
-    return Share.of(_values(case, figure)[some])
+    return Share.of(share_values(case, figure)[some])
 
 
-def _values(case: Evaluation, figure: Figure) -> NDArray[np.float64]:
+def share_values(case: Evaluation, figure: Figure) -> NDArray[np.float64]:
     """Return the chance of each query to be right."""
     kind, at = figure
     if kind == "error":
@@ -118,21 +103,23 @@ def plot_of(name: str, title: str, kind: str, curves: Iterable[Curve], paper: Po
         y_label=y_label,
         curves=tuple(one for one in curves if one.x),
         paper=paper,
+        log=True,
     )
 
 
-def is_alone(case: Evaluation) -> NDArray[np.bool_]:
-    """Return which queries come from a cell that shares its types with no other."""
-    return np.asarray(case.queries["type_group"] == 1)
+def calibration_plot(name: str, cases: Mapping[str, Evaluation]) -> Plot:
+    """Return a plot of how often the chances that a method states come true."""
+    return Plot(
+        name=f"{name}-calibration",
+        title="How often stated chances come true",
+        x_label="chance stated",
+        y_label="share that came true",
+        curves=tuple(_calibration(case, label) for label, case in cases.items()),
+        diagonal=True,
+    )
 
 
-def reweighted(case: Evaluation, figure: Figure) -> Share:
-    """Return a share if as many queries were unambiguous as in the paper."""
-    values, alone = _values(case, figure), is_alone(case)
-    if alone.all() or not alone.any():
-        return Share.of(values)
-    parts = ((paris.ALONE, values[alone]), (1.0 - paris.ALONE, values[~alone]))
-    mean = sum(weight * float(some.mean()) for weight, some in parts)
-    variance = sum(weight**2 * float(some.var()) / len(some) for weight, some in parts)
-    off = 1.96 * float(np.sqrt(variance))
-    return Share(mean, max(mean - off, 0.0), min(mean + off, 1.0))
+def _calibration(case: Evaluation, label: str) -> Curve:
+    table = case.calibration().dropna(subset=["true"])
+    x, y, low, high = (tuple(table[name].tolist()) for name in ("stated", "true", "low", "high"))
+    return Curve(label=label, x=x, y=y, low=low, high=high)

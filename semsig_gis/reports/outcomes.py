@@ -1,0 +1,104 @@
+"""A small map of where queries were asked, and which of them were successful."""
+
+from __future__ import annotations
+
+import math
+import textwrap
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from matplotlib.colors import to_rgba
+from matplotlib.lines import Line2D
+
+from semsig_gis.core.signs import FAILED, SUCCESSFUL
+from semsig_gis.reports.parts import OutcomeMap
+from semsig_gis.reports.plots import GROUND, SOFT, blank_figure, draw_legend, label, saved
+from semsig_gis.reports.scenes import draw_north, draw_scale
+
+if TYPE_CHECKING:
+    from semsig_gis.database.database import SignatureDatabase
+    from semsig_gis.evaluation.result import Evaluation
+    from semsig_gis.reports.plots import Picture
+
+MOST_SQUARES = 400  # along a side
+MANY_PLACES = 2000  # which are drawn as pixels
+# Inches.
+WIDTH, MARGIN = 6.2, 0.1
+LEAST_HEIGHT, MOST_HEIGHT = 2.4, 4.0
+TITLE_LETTERS, TITLE_LINE, LEGEND = 70, 0.22, 0.34
+
+
+def outcome_map(
+    evaluation: Evaluation, database: SignatureDatabase, *, name: str, title: str
+) -> OutcomeMap:
+    """Return a map of the queries of an evaluation on the cells of the database."""
+    columns, rows = (values - values.min() for values in (database.columns, database.rows))
+    merged = math.ceil((max(columns.max(), rows.max()) + 1) / MOST_SQUARES)
+    columns, rows = columns // merged, rows // merged
+    ground = np.zeros((rows.max() + 1, columns.max() + 1), np.bool_)
+    ground[rows, columns] = True
+    corner = database.xy.min(axis=0) - database.grid.step / 2
+    points = evaluation.queries.geometry
+    return OutcomeMap(
+        name=name,
+        title=title,
+        step=merged * database.grid.step,
+        ground=ground,
+        places=np.column_stack([points.x, points.y]) - corner,
+        successful=evaluation.successful,
+    )
+
+
+def draw_map(shown: OutcomeMap) -> Picture:
+    """Draw a map, north up: the same bytes for the same map."""
+    extent = shown.step * np.array(shown.ground.shape[::-1])
+    low = np.minimum(shown.places.min(axis=0, initial=0.0), 0.0)
+    high = np.maximum(shown.places.max(axis=0, initial=0.0), extent)
+    margin = 0.03 * (high - low).max()
+    across, up = (high - low + 2 * margin).tolist()
+    titles = textwrap.wrap(label(shown.title, 2 * TITLE_LETTERS), TITLE_LETTERS)
+    above = TITLE_LINE * len(titles) + 0.12
+    inside = WIDTH - 2 * MARGIN
+    tall = min(max(inside * up / across, LEAST_HEIGHT), MOST_HEIGHT)
+    reach = np.array([inside, tall]) / 2 * max(across / inside, up / tall)
+    (left, bottom), (right, top) = (low + high) / 2 - reach, (low + high) / 2 + reach
+    height = above + tall + LEGEND
+    kinds = {
+        "failed": (~shown.successful, _look("X", FAILED, len(shown.places))),
+        "successful": (shown.successful, _look("o", SUCCESSFUL, len(shown.places))),
+    }
+    with blank_figure(WIDTH, height) as figure:
+        place = (MARGIN / WIDTH, LEGEND / height, inside / WIDTH, tall / height)
+        axes = figure.add_axes(place)
+        axes.spines[:].set_visible(False)
+        pixels = np.where(shown.ground[..., None], to_rgba(SOFT, 0.35), to_rgba(SOFT, 0.0))
+        ends = (0.0, extent[0], 0.0, extent[1])
+        axes.imshow(pixels, origin="lower", extent=ends, interpolation="nearest", aspect="auto")
+        axes.set(xlim=(left, right), ylim=(bottom, top), xticks=[], yticks=[])
+        many = len(shown.places) > MANY_PLACES
+        for some, look in kinds.values():
+            axes.plot(*shown.places[some].T, **look, rasterized=many)
+        draw_north(axes)
+        draw_scale(axes, float(reach[0]))
+        heading: dict[str, Any] = {"va": "top", "weight": "bold", "size": 10.5}
+        figure.text(MARGIN / WIDTH, 1 - 0.08 / height, "\n".join(titles), **heading)
+        counts = {kind: f"{kind}: {int(some.sum()):,}" for kind, (some, _) in kinds.items()}
+        keys = [
+            (Line2D([], [], **{**kinds[kind][1], "markersize": 7}), counts[kind])
+            for kind in ("successful", "failed")
+        ]
+        place_of_keys = (MARGIN / WIDTH, 0.24 / height, (WIDTH - MARGIN) / WIDTH)
+        draw_legend(figure, keys, place=place_of_keys, columns=2, size=9, sign_width=1)
+        description = f"{shown.title}. North is up. Queries {', '.join(counts.values())}."
+        return saved(figure, title=shown.title, description=description)
+
+
+def _look(marker: str, colour: str, places: int) -> dict[str, Any]:
+    return {
+        "linestyle": "",
+        "marker": marker,
+        "color": colour,
+        "markersize": 6.0 if places <= MANY_PLACES / 4 else 4.0 if places <= MANY_PLACES else 2.5,
+        "markeredgecolor": GROUND,
+        "markeredgewidth": 0.5 if places <= MANY_PLACES else 0.0,
+    }

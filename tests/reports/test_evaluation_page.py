@@ -1,0 +1,142 @@
+"""The report of an evaluation: its headline, its parts, and the page in a browser."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pytest
+from html_pages import HtmlPage
+from map_pages import MapPage, assert_quiet
+from sentences import refused
+from worlds import random_town
+
+from semsig_gis.core.errors import InputError
+from semsig_gis.evaluation.evaluate import evaluate
+from semsig_gis.likelihood.index import build_index
+from semsig_gis.likelihood.noise.model import named_noise
+from semsig_gis.matching.method import Method
+from semsig_gis.reports.evaluation import evaluation_headline
+from semsig_gis.reports.evaluation_page import evaluation_page
+from semsig_gis.reports.page import write_page
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from selenium.webdriver import Chrome
+
+    from semsig_gis.reports.parts import Section
+
+CITY = random_town().database
+BY_DISTANCE = evaluate(CITY, queries=60, method=Method.parse("edit+edit:5%"))
+BY_LIKELIHOOD = evaluate(CITY, queries=60, method=build_index(CITY, named_noise("generic")))
+
+
+def sections(evaluation: object) -> dict[str, Section]:
+    page = evaluation_page(evaluation, CITY, name="town")  # type: ignore[arg-type]
+    return {section.name: section for section in page.sections}
+
+
+@pytest.mark.parametrize(
+    ("near", "chance", "top", "said"),
+    [
+        (0.824, None, 1, "82 % of 60 queries were placed within 50 m (95 %: 71 to 90 %)."),
+        (0.083, None, 1, "8.3 % of 60 queries were placed within 50 m (95 %: 3.6 to 18 %)."),
+        (1.0, None, 5, "100 % of 60 queries were placed within 50 m by the best of 5 candidates "),
+        (0.5, 0.95, 1, "; the method was sure enough to answer 100 %, and 75 % of these answers "),
+        (0.5, 0.1, 1, "; the method was sure enough of none to answer it."),
+    ],
+)
+def test_the_headline(near: float, chance: float | None, top: int, said: str) -> None:
+    told = {"chance": np.nan if chance is None else chance, "right": 0.75}
+    queries = BY_DISTANCE.queries.assign(p50=near, **told)
+    assert said in evaluation_headline(replace(BY_DISTANCE, queries=queries, top=top))
+
+
+@pytest.mark.parametrize("evaluation", [BY_DISTANCE, BY_LIKELIHOOD])
+def test_curves_and_numbers_are_those_of_the_evaluation(evaluation: object) -> None:
+    parts = sections(evaluation)
+    assert isinstance(evaluation, type(BY_DISTANCE))
+    errors, groups = parts["errors"], parts["groups"]
+    (curve,) = errors.plots[0].curves
+    assert errors.plots[0].log
+    shares = dict(zip(curve.x, curve.y, strict=True))
+    assert shares[50.0] == pytest.approx(evaluation.cdf([50])[0])
+    bands = zip(curve.low, curve.y, curve.high, strict=True)
+    assert all(low <= y <= high for low, y, high in bands)
+    shown = {number.row: number for number in errors.numbers}
+    means = evaluation.means()
+    assert shown["P(error ≤ 50 m)"].ours == means["value"]["p50"]
+    assert shown["recall@10 %"].high == means["high"]["recall10"]
+    asked = [one.ours or 0 for one in groups.numbers if one.column == "queries"]
+    assert sum(asked) == 2 * 60  # by objects seen, and by cells alike
+    for plot, table in zip(
+        groups.plots, (evaluation.by_length(), evaluation.by_ambiguity()), strict=True
+    ):
+        assert [name for _, name in plot.ticks] == table.iloc[:, 0].tolist()
+        known = table["p50"].dropna()
+        assert plot.curves[0].x == tuple(map(float, known.index))
+        assert plot.curves[0].y == tuple(known)
+    assert errors.maps[0].successful.sum() == evaluation.successful.sum()
+    assert [len(pair.scenes) for pair in parts["failures"].pairs] == [2] * 6
+
+
+def test_the_paper_stands_beside_the_same_settings() -> None:
+    (plot,) = sections(BY_DISTANCE)["errors"].plots
+    assert [point[:2] for point in plot.paper] == [(50.0, 0.3733)]
+    shown = {number.row: number.paper for number in sections(BY_DISTANCE)["errors"].numbers}
+    assert (shown["P(error ≤ 50 m)"], shown["recall@10 %"]) == (0.3733, 0.6462)
+    assert sections(BY_LIKELIHOOD)["errors"].plots[0].paper == ()
+
+
+def test_chances_are_told_where_a_method_states_them() -> None:
+    assert "chances" not in sections(BY_DISTANCE)
+    chances = sections(BY_LIKELIHOOD)["chances"]
+    calibration, coverage = chances.plots
+    assert calibration.diagonal
+    bins = BY_LIKELIHOOD.calibration().dropna(subset="true")
+    assert calibration.curves[0].y == tuple(bins["true"])
+    answered, right = coverage.curves
+    assert answered.y[0] == pytest.approx(BY_LIKELIHOOD.queries["chance"].notna().mean())
+    assert len(right.y) == len(answered.y)
+
+
+def test_queries_of_which_nothing_was_left_and_none_failed() -> None:
+    lost = BY_LIKELIHOOD.queries.assign(
+        query_length=0, error_m=np.inf, chance=np.nan, right=np.nan, best_cell_id=None
+    )
+    page = evaluation_page(replace(BY_LIKELIHOOD, queries=lost), CITY, name="town")
+    assert "Of 60 the distortion left nothing" in page.sections[0].text[0]
+    assert "failures" not in [section.name for section in page.sections]
+
+
+def test_another_database_is_refused() -> None:
+    with refused(InputError, "searched", "give the database"):
+        evaluation_page(BY_DISTANCE, CITY.select(slice(5)), name="town")
+
+
+@pytest.mark.parametrize(("width", "height"), [(1440, 900), (390, 844)])
+def test_the_page_in_a_browser(browser: Chrome, tmp_path: Path, width: int, height: int) -> None:
+    page = evaluation_page(BY_LIKELIHOOD, CITY, name="town <1>", command="semsig evaluate 'a b'")
+    file = tmp_path / "report.html"
+    write_page(page, file)
+    parsed = HtmlPage(file.read_text("utf-8"))
+    assert all(one.startswith("data:") for one in parsed.loaded)
+    for text in ("town <1>", page.headline, "semsig evaluate 'a b'", "processors"):
+        assert text in parsed.text
+    shown = MapPage(browser, tmp_path)
+    with shown.screen(width, height, mobile=width < 500):
+        browser.get(file.as_uri())
+        images = shown.all("img")
+        assert len(images) == 1 + 1 + 2 + 2 + 12
+        assert all(image.get_attribute("alt") for image in images)
+        first = browser.execute_script(
+            "return document.querySelector('.headline').getBoundingClientRect().bottom"
+        )
+        assert first < height
+        overflow = "return document.documentElement.scrollWidth - window.innerWidth"
+        assert browser.execute_script(overflow) <= 0
+        names = "return performance.getEntriesByType('resource').map((entry) => entry.name)"
+        assert all(name.startswith("data:") for name in browser.execute_script(names))
+        assert_quiet(browser)
