@@ -277,7 +277,7 @@ def reproduce(
             progress=show,
         )
     with progress("drawing the report"):
-        report = reproduction_report(reproduction)
+        report = reproduction_report(reproduction, command=command_line())
         write_report(report, out)
     numbers = [
         (section, number)
@@ -301,6 +301,7 @@ def reproduce(
         )
         for section, one in numbers
     ]
+    say(report.headline)
     print_rows(report.title, ("Section", "What", "", "Ours", "95 %", "Paper"), rows)
     say(f"report: {out / 'report.html'}  (open it in a browser)")
     say(f"numbers: {out / 'numbers.csv'}")

@@ -15,7 +15,7 @@ from semsig_gis.matching.ties import NEAR_METRES, NEAR_PLACES
 from semsig_gis.queries.chain import chain_text
 from semsig_gis.queries.distortions import DISTORTIONS, FalseClass
 from semsig_gis.reports import paris
-from semsig_gis.reports.tables import Table, figure, interval
+from semsig_gis.reports.tables import Table, figure, interval, short_percent
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -43,27 +43,22 @@ GROUPED = {
 def evaluation_headline(evaluation: Evaluation) -> str:
     """Return the result in one sentence: the share within 50 m and, by likelihood, of answers."""
     means = evaluation.means()
-    p50, low, high = (100.0 * float(means[name]["p50"]) for name in ("value", "low", "high"))
+    p50, low, high = (float(means[name]["p50"]) for name in ("value", "low", "high"))
     near = f"within {evaluation.success_metres} m"
     best = "" if evaluation.top == 1 else f" by the best of {evaluation.top:,} candidates"
     said = (
-        f"{_percent(p50)} of {len(evaluation.queries):,} queries were placed {near}{best} "
-        f"(95 %: {_percent(low, '')} to {_percent(high)})"
+        f"{short_percent(p50)} of {len(evaluation.queries):,} queries were placed {near}{best} "
+        f"(95 %: {short_percent(low, unit='')} to {short_percent(high)})"
     )
     if "coverage" not in means.index:
         return f"{said}."
-    answered, right = (100.0 * float(means["value"][name]) for name in ("coverage", "precision"))
+    answered, right = (float(means["value"][name]) for name in ("coverage", "precision"))
     if not answered:
         return f"{said}; the method was sure enough of none to answer it."
     return (
-        f"{said}; the method was sure enough to answer {_percent(answered)}, and {_percent(right)} "
-        "of these answers were right."
+        f"{said}; the method was sure enough to answer {short_percent(answered)}, and "
+        f"{short_percent(right)} of these answers were right."
     )
-
-
-def _percent(share: float, unit: str = " %") -> str:
-    """Return per cent as short as can be: ``82 %``, ``8.3 %``, ``0.4 %``."""
-    return f"{round(share, 0 if 9.95 <= share <= 99 else 1):g}{unit}"  # noqa: PLR2004
 
 
 def evaluation_tables(evaluation: Evaluation) -> tuple[Table, ...]:

@@ -148,6 +148,11 @@ def percent(share: float) -> str:
 KILOMETRE = 1000.0
 
 
+def short_percent(share: float, *, unit: str = " %") -> str:
+    """Return a share from 0 to 1 for a sentence: ``82 %``, ``8.3 %``, ``0.4 %``."""
+    return f"{round(100 * share, 0 if 0.0995 <= share <= 0.99 else 1):g}{unit}"  # noqa: PLR2004
+
+
 def figure(value: float | None, form: str = ".4f") -> str:
     """Return a number as text, empty where it is None or NaN."""
     if value is None or math.isnan(value):

@@ -18,10 +18,12 @@ def test_a_finished_run_is_reported_again(reproduced: Path, done: Done) -> None:
     database = reproduced.parent / "city.parquet"
     options = ("--out", reproduced, "--queries", QUERIES)
     out = done("reproduce", database, *options)
+    assert out.startswith("At medium distortion the method that the paper recommends places ")
     assert "0.3733" in out
     assert f"report: {reproduced / 'report.html'}" in out
     for name in ("report.html", "report.md", "numbers.csv", "report.json"):
         assert (reproduced / name).stat().st_size > 1000
+    assert f"semsig reproduce {database}" in (reproduced / "report.html").read_text("utf-8")
     rows = json.loads(done("reproduce", database, *options, "--json"))
     assert {"section", "row", "column", "unit", "ours", "low", "high", "paper"} == set(rows[0])
     assert any(row["paper"] == 0.3861 for row in rows)

@@ -304,6 +304,33 @@ def test_curves_end_where_they_must(report: Report) -> None:
                 assert curve.y[-1] == pytest.approx(1.0)
 
 
+def test_the_headline_tells_the_papers_figure_and_ours(
+    report: Report, reproduction: Reproduction
+) -> None:
+    ours = reproduction.experiments["ours"]["medium/likelihood-top1"].cdf([50])[0]
+    assert (
+        f"within 50 m (the paper, on Paris: 37 %); the likelihood method places {100 * ours:.0f}"
+        in (report.headline)
+    )
+    assert "recommended" in report.sections[0].title
+
+
+def test_the_papers_values_are_drawn_beside_ours(report: Report) -> None:
+    plots = {plot.name: plot for part in report.sections for plot in part.plots}
+    ours, theirs, _, recalls = plots["ranges-shares"].curves
+    assert theirs.x == recalls.x == (20.0, 30.0, 40.0)
+    assert theirs.y == (0.1793, 0.3733, 0.4946)
+    assert recalls.y == (0.5110, 0.6462, 0.7269)
+    assert all(low <= y <= high for low, y, high in zip(ours.low, ours.y, ours.high, strict=True))
+    _, theirs = plots["scales-shares"].curves
+    assert (theirs.x, theirs.y) == ((8.0, 16.0, 24.0, 32.0), (0.3243, 0.3733, 0.3861, 0.3766))
+    drawn = {name: {(x, y) for x, y, _ in plot.paper} for name, plot in plots.items()}
+    assert drawn["levels-error"] == {(50.0, 0.3733), (10.0, 0.70), (10.0, 0.25)}
+    assert drawn["levels-recall"] == {(10.0, 0.6462), (10.0, 0.90), (10.0, 0.50)}
+    assert drawn["fusion-none-error"] == {(0.0, 0.93)}
+    assert all(plot.log for name, plot in plots.items() if name.endswith(("error", "recall")))
+
+
 def test_parts_that_could_not_be_run_are_left_out(reproduction: Reproduction) -> None:
     less = {k: v for k, v in reproduction.experiments.items() if not k.startswith("range")}
     found = replace(reproduction, experiments=less, variants={}, missing=("No ranges.",))

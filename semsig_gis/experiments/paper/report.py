@@ -2,29 +2,24 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from semsig_gis.evaluation.result import machine
 from semsig_gis.experiments.paper.cases import case_of, is_alone, level_case, reweighted
+from semsig_gis.experiments.paper.comparisons import COMPARISONS, NAMES
 from semsig_gis.experiments.paper.reproduce import (
     BEST,
     FIRST_STAGE,
-    FUSIONS,
     LEVELS,
-    MANY,
     OURS,
-    PERCENTS,
     READINGS,
-    SINGLES,
-    WEIGHTS,
 )
 from semsig_gis.queries.distortions import DISTORTIONS
 from semsig_gis.reports import paris
 from semsig_gis.reports.paris import READ_OFF
-from semsig_gis.reports.parts import Number, Report, Section
+from semsig_gis.reports.parts import Curve, Number, Plot, Report, Section
 from semsig_gis.reports.scenes import example_scenes
 from semsig_gis.reports.shares import (
     COLUMNS,
@@ -37,13 +32,14 @@ from semsig_gis.reports.shares import (
     plot_of,
     share_of,
 )
+from semsig_gis.reports.tables import short_percent
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping
 
     from semsig_gis.evaluation.result import Evaluation
     from semsig_gis.experiments.paper.reproduce import Reproduction
-    from semsig_gis.reports.parts import Plot, Scene
+    from semsig_gis.reports.parts import Scene
     from semsig_gis.reports.shares import Figure, Points
 
 JUST_5 = "recall@10 %, just 5 % kept"
@@ -63,12 +59,16 @@ MIDDLING_SEEN = f"{COLUMNS[P50]} of queries that see {MIDDLING[0]} to {MIDDLING[
 PARIS_P50, PARIS_RECALL10 = paris.ACCURACY[30.0, 16]
 
 
-def reproduction_report(results: Reproduction) -> Report:
-    """Put together what was found: the paper's figures, what it leaves open, the likelihood."""
+def reproduction_report(results: Reproduction, *, command: str = "") -> Report:
+    """Put together what was found: the paper's figures, what it leaves open, the likelihood.
+
+    `command` is what was run.
+    """
     settings = results.settings
     first = next(iter(results.experiments["none"].values()))
     return Report(
         title=f"The paper's experiments on {settings['database']}",
+        headline=reproduction_headline(results),
         text=(
             (
                 "Semantic signatures tell where in a city a view was taken from the street "
@@ -89,14 +89,15 @@ def reproduction_report(results: Reproduction) -> Report:
             ("Seed", str(settings["seed"])),
             *first.versions.items(),
         ),
+        command=command,
         sections=(
+            _level_section(results),
             _object_section(results),
             _database_section(results),
             *_example_sections(results),
             _distortion_section(results),
             *(comparison.section(results) for comparison in COMPARISONS),
             _time_section(results),
-            _level_section(results),
             _alone_section(results),
             *_range_sections(results),
             _scale_section(results),
@@ -105,6 +106,18 @@ def reproduction_report(results: Reproduction) -> Report:
         ),
         taxonomy=results.database.taxonomy,
         facts={"settings": dict(settings), "versions": dict(first.versions), "machine": machine()},
+    )
+
+
+def reproduction_headline(results: Reproduction) -> str:
+    """Return in one sentence how the recommended method does, the paper's figure and ours."""
+    best, ours = case_of(results, "medium", BEST), case_of(results, "ours", OURS, "medium")
+    shares = [short_percent(share_of(case, P50).ours or 0.0) for case in (best, ours)]
+    return (
+        f"At medium distortion the method that the paper recommends places {shares[0]} of "
+        f"{len(best.queries):,} queries within {P50[1]} m (the paper, on Paris: "
+        f"{short_percent(PARIS_P50)}); the likelihood method places {shares[1]} of "
+        f"{len(ours.queries):,}."
     )
 
 
@@ -198,16 +211,16 @@ def _database_section(results: Reproduction) -> Section:
 def _example_sections(results: Reproduction) -> Iterator[Section]:
     evaluation = case_of(results, "medium", BEST)
     yield _section(
-        "found",
-        "Places that were found",
+        "successful",
+        "Successful queries",
         "The first queries of the two-stage fusion at 5 %, medium distortion, whose "
         "answer is right within 50 m. Signatures are as the database has them, before "
         "the distortion.",
         scenes=example_scenes(evaluation, results.database, successful=True),
     )
     yield _section(
-        "lost",
-        "Places that were not found",
+        "failed",
+        "Failed queries",
         "The first ones whose answer is not. They see few objects, and of common classes.",
         scenes=example_scenes(evaluation, results.database, successful=False),
     )
@@ -237,135 +250,7 @@ def _distortion_section(results: Reproduction) -> Section:
     )
 
 
-# --- Measures, fusions and stages ---------------------------------------------------------------
-
-
-@dataclass(frozen=True, kw_only=True)
-class Comparison:
-    """A section in which some methods are compared.
-
-    `figures` are columns: a distortion, metres and per cent. `best` are rows with the best of some
-    methods beside what the paper says of its best: row, methods, distortion, metres and the paper's
-    share. `plots` are kinds of a distortion, with the paper's points. `top` candidates count, but
-    for recalls.
-    """
-
-    name: str
-    title: str
-    text: str
-    subject: str
-    labels: Mapping[str, str]
-    top: int = MANY
-    figures: tuple[tuple[str, int, int], ...]
-    best: tuple[tuple[str, Iterable[str], str, int, float], ...] = ()
-    plots: tuple[tuple[str, str, Points], ...]
-
-    def section(self, results: Reproduction) -> Section:
-        """Return the section of a reproduction."""
-        numbers = (*self._numbers(results), *self._best_numbers(results))
-        plots = (self._plot(results, *plot) for plot in self.plots)
-        return _section(self.name, self.title, self.text, numbers=numbers, plots=plots)
-
-    def _numbers(self, results: Reproduction) -> Iterator[Number]:
-        for distortion, metres, percent in self.figures:
-            level = "no distortion" if distortion == "none" else distortion
-            for method, label in self.labels.items():
-                case = case_of(results, distortion, method, top=self.top)
-                error, recall = f"P(error ≤ {metres} m)", f"recall@{percent} %"
-                yield share_of(case, ("error", metres)).number(label, f"{level}: {error}")
-                yield share_of(case, ("recall", percent)).number(label, f"{level}: {recall}")
-
-    def _best_numbers(self, results: Reproduction) -> Iterator[Number]:
-        for row, methods, distortion, metres, paper in self.best:
-            cases = [case_of(results, distortion, method, top=self.top) for method in methods]
-            shares = [share_of(case, ("error", metres)) for case in cases]
-            best = max(shares, key=lambda share: share.ours or 0.0)
-            level = "no distortion" if distortion == "none" else distortion
-            yield best.number(row, f"{level}: P(error ≤ {metres} m)", paper)
-
-    def _plot(self, results: Reproduction, distortion: str, kind: str, paper: Points) -> Plot:
-        top = self.top if kind == "error" else 1
-        level = "no" if distortion == "none" else distortion
-        which = "first candidate" if top == 1 else f"best of {top} candidates"
-        shown = f"error of the {which}" if kind == "error" else "recall"
-        curves = (
-            curve_of(case_of(results, distortion, method, top=top), label, kind, band=False)
-            for method, label in self.labels.items()
-        )
-        title = f"{self.subject}, {level} distortion: {shown}"
-        return plot_of(f"{self.name}-{distortion}", title, kind, curves, paper)
-
-
-NAMES = {"jaccard": "Jaccard", "histogram": "histogram", "edit": "edit"}
-FUSION_LABELS = {name: f"edit + {NAMES[name.split('-')[1]]}" for name in FUSIONS}
-EDIT_LABELS = {"types-edit": "edit, types", "angles-edit": "edit, angles"}
-
-COMPARISONS = (
-    Comparison(
-        name="single",
-        title="One measure of one part",
-        text=(
-            "The paper's text reads more than 0.90 off its plots without distortion, and 0.50 at "
-            "most after the medium one: of the best measure, without saying how exactly. Errors "
-            f"are those of the best of {MANY} candidates, as in its plots."
-        ),
-        subject="One measure",
-        labels={name: f"{NAMES[name.split('-')[1]]}, {name.split('-')[0]}" for name in SINGLES},
-        figures=(("none", 10, 10), ("medium", 0, 20)),
-        best=(
-            ("best of these", SINGLES, "none", 10, READ_OFF["single_none_p10"]),
-            ("best of these", SINGLES, "medium", 0, READ_OFF["single_medium_p0"]),
-        ),
-        plots=(
-            ("none", "error", ((10.0, READ_OFF["single_none_p10"], "more than 0.90 (text)"),)),
-            ("medium", "error", ((0.0, READ_OFF["single_medium_p0"], "at most 0.50 (text)"),)),
-            ("none", "recall", ((10.0, 1.0, "all but Jaccard of types (text)"),)),
-            ("medium", "recall", ((20.0, READ_OFF["single_medium_recall20"], "good ones (text)"),)),
-        ),
-    ),
-    Comparison(
-        name="fusion",
-        title="Fusion of types and angles",
-        text=(
-            "Half of the edit distance of the types and half of a distance of the angles. The "
-            f"paper's text tells 0.92 and 0.93 without distortion. Best of {MANY} candidates."
-        ),
-        subject="Fusion",
-        labels={**FUSION_LABELS, **EDIT_LABELS},
-        figures=(("none", 0, 10), ("medium", 0, 10)),
-        best=(
-            ("best of one part", EDIT_LABELS, "none", 0, READ_OFF["single_none_p0"]),
-            ("best fusion", FUSION_LABELS, "none", 0, READ_OFF["fusion_none_p0"]),
-        ),
-        plots=(("none", "error", ()), ("medium", "error", ()), ("medium", "recall", ())),
-    ),
-    Comparison(
-        name="weights",
-        title="Weights of a fusion",
-        text=(
-            "Edit distances, medium distortion. The paper finds 0.3 or 0.5 of types best, and 0.9 "
-            f"bad. Best of {MANY} candidates."
-        ),
-        subject="Weights",
-        labels={name: f"types {share:g}, angles {1 - share:g}" for share, name in WEIGHTS.items()},
-        figures=(("medium", 50, 10),),
-        plots=(("medium", "error", ()),),
-    ),
-    Comparison(
-        name="stages",
-        title="Fusion in two stages",
-        text=(
-            "The edit distance of the types keeps so many per cent of the cells, and the fusion "
-            "ranks these. 100 % is the fusion. The first candidate alone counts. The paper finds "
-            "the errors of up to 10 % almost those of 100 %, and the recall lower."
-        ),
-        subject="Two stages",
-        labels={name: f"{percent} %" for percent, name in PERCENTS.items()},
-        top=1,
-        figures=(("none", 50, 10), ("medium", 50, 10)),
-        plots=(("none", "error", ()), ("medium", "recall", ())),
-    ),
-)
+# --- Times --------------------------------------------------------------------------------------
 
 
 def _time_section(results: Reproduction) -> Section:
@@ -408,7 +293,11 @@ def _level_section(results: Reproduction) -> Section:
             (10.0, READ_OFF["light_small_error"], "highest at small errors (text)"),
             (10.0, READ_OFF["strong_small_error"], "lowest at small errors (text)"),
         ),
-        "recall": ((10.0, PARIS_RECALL10 or 0.0, "medium (table)"),),
+        "recall": (
+            (10.0, PARIS_RECALL10 or 0.0, "medium (table)"),
+            (10.0, READ_OFF["light_recall"], "highest of top ranks, more than 0.90 (text)"),
+            (10.0, READ_OFF["strong_recall"], "lowest of top ranks (text)"),
+        ),
     }
     return _section(
         "levels",
@@ -483,6 +372,7 @@ def _range_sections(results: Reproduction) -> Iterator[Section]:
             Number(row, "mean length", facts[radius]["mean_length"], decimals=2),
             share_of(case, P50, middling).number(row, MIDDLING_SEEN),
         ]
+    ranges = {f"R = {radius:g} m": radius for radius in sorted(names)}
     yield _section(
         "ranges",
         "Visibility range",
@@ -496,6 +386,7 @@ def _range_sections(results: Reproduction) -> Iterator[Section]:
             "range, and a difference from the paper is one of the cities."
         ),
         numbers=numbers,
+        plots=[_parameter_plot("ranges", "visibility range in metres", numbers, ranges)],
     )
 
 
@@ -509,11 +400,37 @@ def _scale_section(results: Reproduction) -> Section:
     for levels, case in sorted(cases.items()):
         paper, _ = paris.ACCURACY.get((spec.radius, levels), (None, None))
         numbers.append(share_of(case, P50).number(f"Q = {levels}", COLUMNS[P50], paper))
+    rows = {f"Q = {levels}": float(levels) for levels in cases}
     return _section(
         "scales",
         "Angle levels",
         "The same with bearings in so many levels.",
         numbers=numbers,
+        plots=[_parameter_plot("scales", "angle levels", numbers, rows)],
+    )
+
+
+def _parameter_plot(
+    name: str, x_label: str, numbers: Iterable[Number], rows: Mapping[str, float]
+) -> Plot:
+    """Return ours and the paper's shares by a parameter, whose values are given by row."""
+    curves = []
+    for column in (COLUMNS[P50], COLUMNS[RECALL10]):
+        shown = [one for one in numbers if one.column == column and one.ours is not None]
+        known = [one for one in shown if one.paper is not None]
+        if shown:
+            ours = {end: tuple(getattr(one, end) for one in shown) for end in ("low", "high")}
+            x, y = (tuple(rows[one.row] for one in shown), tuple(one.ours or 0.0 for one in shown))
+            curves.append(Curve(label=f"ours, {column}", x=x, y=y, **ours))
+        if known:
+            x, y = (tuple(rows[one.row] for one in known), tuple(one.paper or 0.0 for one in known))
+            curves.append(Curve(label=f"paper, {column}", x=x, y=y))
+    return Plot(
+        name=f"{name}-shares",
+        title=f"The recommended method by {x_label}",
+        x_label=x_label,
+        y_label="share of the queries",
+        curves=tuple(curves),
     )
 
 
