@@ -155,6 +155,7 @@ from .exports.regions import SearchRegions as SearchRegions, search_regions as s
 from .reports.axes import (
     plot_answer as plot_answer,
     plot_database as plot_database,
+    plot_evaluation as plot_evaluation,
     plot_identifiability as plot_identifiability,
     plot_objects as plot_objects,
 )

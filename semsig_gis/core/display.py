@@ -33,10 +33,15 @@ class Displayed(ABC):
     def _facts(self) -> Mapping[str, object]:
         """Return the main facts by what they are called, without looking into files."""
 
+    @property
+    def _public_name(self) -> str:
+        kinds = (kind.__name__ for kind in type(self).__mro__)
+        return next(name for name in kinds if not name.startswith("_"))
+
     def __repr__(self) -> str:
         """Return the facts on one line."""
         facts = "; ".join(f"{name} {_brief(fact)}" for name, fact in self._facts().items())
-        return f"<{type(self).__name__.lstrip('_')}: {facts}>"
+        return f"<{self._public_name}: {facts}>"
 
     def _repr_html_(self) -> str:
         """Return the facts as a table, with texts from data escaped."""
@@ -45,7 +50,7 @@ class Displayed(ABC):
             f'<td style="text-align: left">{escape(_brief(fact))}</td></tr>'
             for name, fact in self._facts().items()
         )
-        title = f'<caption style="text-align: left">{type(self).__name__.lstrip("_")}</caption>'
+        title = f'<caption style="text-align: left">{self._public_name}</caption>'
         return f"<table>{title}<tbody>{rows}</tbody></table>"
 
 

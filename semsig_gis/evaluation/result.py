@@ -7,10 +7,11 @@ import math
 import os
 import platform
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
 import numpy as np
 
+import semsig_gis
 from semsig_gis.core.display import Displayed
 from semsig_gis.core.errors import InputError
 from semsig_gis.database.database import rows_of_result
@@ -40,6 +41,7 @@ if TYPE_CHECKING:
     import pandas as pd
     from numpy.typing import NDArray
 
+    from semsig_gis.core.display import Axes, MapFrame
     from semsig_gis.database.database import SignatureDatabase
     from semsig_gis.evaluation.methods import AnyMethod
     from semsig_gis.queries.draw import QuerySpec
@@ -53,6 +55,9 @@ QUERY_COLUMNS = (
     *("rank_low", "rank_high", "chance", "right", "in_region", "heading_error"),
 )
 """Columns of the table of queries, in their order; ``geometry`` comes last."""
+
+PlotKind = Literal["errors", "recall", "map"]
+"""What can be drawn of an evaluation."""
 
 
 def machine() -> dict[str, Any]:
@@ -160,6 +165,16 @@ class Evaluation(Displayed):
     def figures(self) -> pd.DataFrame:
         """What each query adds to each figure (see `evaluation.figures.query_figures`)."""
         return query_figures(self.queries, cells=self.database["cells"])
+
+    def plot(
+        self, kind: PlotKind = "errors", *, ax: Axes | None = None, label: str | None = None
+    ) -> Axes:
+        """Draw the curve of errors or of recall, or where queries failed (`plot_evaluation`)."""
+        return semsig_gis.plot_evaluation(self, kind, ax=ax, label=label)
+
+    def explore(self, database: SignatureDatabase) -> MapFrame:
+        """Show the queries on a map in a notebook (see `evaluation_map`)."""
+        return semsig_gis.show_map(semsig_gis.evaluation_map(self, database))
 
     @property
     def query_bearings(self) -> list[list[float]]:

@@ -7,7 +7,7 @@ can be plotted into the same axes.
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any, cast
+from typing import TYPE_CHECKING, Any, cast, get_args
 
 import numpy as np
 from matplotlib.colors import LinearSegmentedColormap, ListedColormap
@@ -28,9 +28,12 @@ from semsig_gis.core.signs import (
     WHITE,
     class_signs,
 )
+from semsig_gis.evaluation.result import PlotKind
 from semsig_gis.likelihood.locate import Location
-from semsig_gis.reports.plots import INK, label
+from semsig_gis.queries.chain import chain_text
+from semsig_gis.reports.plots import INK, draw_curve, draw_frame, label
 from semsig_gis.reports.scenes import MARKERS
+from semsig_gis.reports.shares import curve_of, plot_of
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
@@ -45,6 +48,7 @@ if TYPE_CHECKING:
     from semsig_gis.database.answer import Answer
     from semsig_gis.database.database import SignatureDatabase
     from semsig_gis.evaluation.identify.result import Identifiability
+    from semsig_gis.evaluation.result import Evaluation
     from semsig_gis.objects.table import StreetObjects
 
 SIZE = (7.5, 6.0)  # inches of a new figure
@@ -188,7 +192,7 @@ def plot_objects(objects: StreetObjects, *, ax: Axes | None = None, legend: bool
     ax : matplotlib.axes.Axes, optional
         Where to draw; in a new figure by default.
     legend : bool, default True
-        Whether to name the classes, with their numbers, beside the map.
+        Whether to name the classes, with their numbers: beside the map, on given axes in a corner.
 
     Returns
     -------
@@ -203,7 +207,7 @@ def plot_objects(objects: StreetObjects, *, ax: Axes | None = None, legend: bool
     Examples
     --------
     >>> ax = plot_objects(demo_objects)
-    >>> ax.get_legend().get_texts()[0].get_text()
+    >>> ax.figure.legends[0].get_texts()[0].get_text()
     'B Alignment tree (120)'
     """
     if not len(objects):
@@ -211,25 +215,29 @@ def plot_objects(objects: StreetObjects, *, ax: Axes | None = None, legend: bool
         raise EmptyResultError(msg)
     axes = map_axes(ax)
     signs, counts = class_signs(objects.taxonomy), objects.class_counts
+    smaller = min(max(CROWD / len(objects), 1 / 16), 1.0) ** 0.5
+    room = smaller == 1.0
     keys = []
     for code, count in counts.items():
         marker, share = MARKERS[signs[code].shape]
         title = plain(f"{signs[code].symbol} {signs[code].title} ({count:,})")
         look: dict[str, Any] = {"linestyle": "", "marker": marker, "color": signs[code].colour}
-        look |= {"markeredgecolor": WHITE, "markeredgewidth": 0.0 if count >= MANY else 0.5}
-        size = share * next(size for least, size in SIZES if count >= least)
+        look |= {"markeredgecolor": WHITE, "markeredgewidth": 0.5 if count < MANY and room else 0.0}
+        size = smaller * share * next(size for least, size in SIZES if count >= least)
         # The rare ones last, so that they lie on top.
         below: dict[str, Any] = {"zorder": 3 - count / len(objects), "rasterized": count >= MANY}
         axes.plot(*objects.xy[objects.codes == code].T, markersize=size, **look, **below)
         keys.append(Line2D([], [], markersize=7 * share, label=title, **look))
     axes.set_title(f"{len(objects):,} street objects")
     _frame(axes)
-    if legend:
-        axes.legend(handles=keys, loc="upper left", bbox_to_anchor=(1.01, 1.0), frameon=False)
+    if legend and ax is None:
+        cast("Figure", axes.figure).legend(handles=keys, loc="outside right upper", frameon=False)
+    elif legend:
+        axes.legend(handles=keys, loc="upper right", fontsize="small")
     return axes
 
 
-MANY = 2000
+MANY, CROWD = 2000, 10_000  # objects of a class, and of all, from which on they are drawn smaller
 SIZES = ((MANY, 2.0), (200, 3.5), (0, 6.5))  # of markers, by how many there are of a class
 
 
@@ -278,6 +286,94 @@ def plot_answer(answer: Answer, *, ax: Axes | None = None, legend: bool = True) 
     return axes
 
 
+def plot_evaluation(
+    evaluation: Evaluation,
+    kind: PlotKind = "errors",
+    *,
+    ax: Axes | None = None,
+    label: str | None = None,
+) -> Axes:
+    """Draw how well queries were answered.
+
+    Parameters
+    ----------
+    evaluation : Evaluation
+        What to draw.
+    kind : {"errors", "recall", "map"}
+        The share of the queries with an error of at most so many metres (the default), the share
+        of those whose true cell is among the best so many per cent of the cells, both with bands of
+        95 %, or where they were asked and which failed.
+    ax : matplotlib.axes.Axes, optional
+        Where to draw; in a new figure by default. Curves of several evaluations may share axes.
+    label : str, optional
+        What the legend calls a curve; the method and the distortion by default.
+
+    Returns
+    -------
+    matplotlib.axes.Axes
+        The axes; of a map, in metres of the CRS of the database.
+
+    Raises
+    ------
+    UnknownNameError
+        If there is no such kind.
+
+    Examples
+    --------
+    >>> from semsig_gis import evaluate
+    >>> evaluation = evaluate(demo_database, queries=20)
+    >>> ax = plot_evaluation(evaluation, "recall", label="20 queries")
+    >>> ax.get_legend().get_texts()[0].get_text()
+    '20 queries'
+    """
+    if kind not in get_args(PlotKind):
+        kinds = ", ".join(get_args(PlotKind))
+        msg = f"{kind!r} is no drawing of an evaluation; give {kinds}{nearest_name(kind, CURVES)}."
+        raise UnknownNameError(msg)
+    if kind == "map":
+        return _draw_outcomes(evaluation, map_axes(ax))
+    axes = new_axes(CURVE_SIZE) if ax is None else ax
+    distortions = chain_text(evaluation.asked.distortions) or "no distortion"
+    name = f"{evaluation.method}, {distortions}" if label is None else label
+    curve = curve_of(evaluation, name, CURVES[kind])
+    before = len(axes.get_legend_handles_labels()[0])
+    draw_frame(axes, plot_of(kind, "", CURVES[kind], [curve]))
+    draw_curve(axes, curve, before, MOST_CURVES)
+    axes.lines[-1].set_label(plain(name))
+    axes.legend(frameon=False, loc="lower right")
+    return axes
+
+
+CURVES = {"errors": "error", "recall": "recall"}
+CURVE_SIZE = (6.2, 4.2)  # inches
+MOST_CURVES = 7  # whose markers stand apart
+
+
+def _draw_outcomes(evaluation: Evaluation, axes: Axes) -> Axes:
+    places = evaluation.queries.geometry
+    for name, some, marker, colour in (
+        ("failed", ~evaluation.successful, "X", FAILED),
+        ("successful", evaluation.successful, "o", SUCCESSFUL),
+    ):
+        axes.plot(
+            places.x[some],
+            places.y[some],
+            linestyle="",
+            marker=marker,
+            color=colour,
+            markersize=2.5 if len(places) >= MANY else 6.0,
+            markeredgecolor=WHITE,
+            markeredgewidth=0.0 if len(places) >= MANY else 0.5,
+            label=f"{name} ({int(some.sum()):,})",
+        )
+    within = f"{evaluation.success_metres} m"
+    axes.set_title(f"{len(places):,} queries: successful are those placed within {within}")
+    _frame(axes)
+    axes.legend(loc="upper right", fontsize="small")
+    return axes
+
+
+DOT = 4.0  # square points
 AROUND_M = 150.0  # that is shown around an answer at least
 
 
@@ -287,6 +383,12 @@ def _draw_location(location: Location, *, ax: Axes | None, legend: bool) -> Axes
     chances = np.where(location.chances >= min(CELL_CHANCES), location.chances, np.nan)
     title = "chance of a cell"
     _draw_steps(database, chances, CELL_CHANCES, title=title, ax=axes, legend=legend)
+    # So that single cells are seen from afar; the likeliest last, so that they lie on top.
+    seen = location.region[~np.isnan(chances[location.region])][::-1]
+    levels = np.digitize(chances[seen], [*CELL_CHANCES]) - 1
+    colours = np.array([*CELL_CHANCES.values()])[levels]
+    x, y = database.xy[seen].T
+    axes.scatter(x, y, c=colours, s=DOT, linewidths=0, marker="s", zorder=2)
     colour = SUCCESSFUL if location.answer.given else FAILED
     longer, shorter, bearing = place.ellipse()
     # An ellipse of matplotlib is turned against the clock from the east.
@@ -297,8 +399,8 @@ def _draw_location(location: Location, *, ax: Axes | None, legend: bool) -> Axes
     low, high = region.min(axis=0) - AROUND_M, region.max(axis=0) + AROUND_M
     axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]))
     verdict = "The answer" if location.answer.given else "Cannot tell; the best guess"
-    within = f"within {location.rule.radius:g} m with a chance of {location.answer.mass:.0%}"
-    axes.set_title(f"{verdict}: {within}")
+    chance = f"{100 * location.answer.mass:.1f} %"
+    axes.set_title(f"{verdict}: within {location.rule.radius:g} m with a chance of {chance}")
     _frame(axes)
     return axes
 
@@ -373,7 +475,8 @@ def _draw_cells(
     side = cells * database.grid.step
     west, south = (database.xy.min(axis=0) - database.grid.step / 2).tolist()
     box = (west, west + side * image.shape[1], south, south + side * image.shape[0])
-    options = {"origin": "lower", "extent": box, "interpolation": "none", **look}
+    # Where several cells come to a pixel of the screen, it has the mean of their colours.
+    options = {"origin": "lower", "extent": box, "interpolation_stage": "rgba", **look}
     return axes.imshow(image, **options)
 
 
@@ -381,9 +484,14 @@ def map_axes(ax: Axes | None) -> Axes:
     """Return axes for a map: those given, or those of a new figure."""
     if ax is not None:
         return ax
+    return new_axes(SIZE)
+
+
+def new_axes(size: tuple[float, float]) -> Axes:
+    """Return the axes of a new figure of so many inches."""
     from matplotlib import pyplot as plt  # noqa: PLC0415 - it looks for a screen
 
-    return plt.subplots(figsize=SIZE, layout="constrained")[1]
+    return plt.subplots(figsize=size, layout="constrained")[1]
 
 
 def _frame(axes: Axes) -> None:

@@ -223,9 +223,9 @@ def draw_plot(plot: Plot) -> Picture:
     with blank_figure(WIDTH, height) as figure:
         across = (WIDTH - LEFT - RIGHT) / WIDTH
         axes = figure.add_axes((LEFT / WIDTH, below / height, across, AXES_HEIGHT / height))
-        _draw_frame(axes, plot)
+        draw_frame(axes, plot)
         for number, curve in enumerate(plot.curves):
-            _draw_curve(axes, curve, number, len(plot.curves))
+            draw_curve(axes, curve, number, len(plot.curves))
         _draw_paper(axes, plot.paper)
         look: dict[str, Any] = {"va": "top", "weight": "bold", "size": 10.5, "linespacing": 1.25}
         figure.text(0.1 / WIDTH, 1 - 0.08 / height, "\n".join(titles), **look)
@@ -236,7 +236,8 @@ def draw_plot(plot: Plot) -> Picture:
         return saved(figure, title=plot.title, description=_described(plot))
 
 
-def _draw_frame(axes: Axes, plot: Plot) -> None:
+def draw_frame(axes: Axes, plot: Plot) -> None:
+    """Draw the axes of a plot: what they show, from where to where."""
     xs = itertools.chain(*(curve.x for curve in plot.curves), (x for x, _, _ in plot.paper))
     values = sorted({x for x in xs if math.isfinite(x)}) or [0.0, 1.0]
     left, right = values[0], values[-1]
@@ -284,7 +285,8 @@ def _draw_log_axis(axes: Axes, values: Sequence[float]) -> None:
     axes.set_xlim(-0.1 * least if with_zero else least / margin, most * margin)
 
 
-def _draw_curve(axes: Axes, curve: Curve, number: int, curves: int) -> None:
+def draw_curve(axes: Axes, curve: Curve, number: int, curves: int) -> None:
+    """Draw one of so many curves, with its band or bars; its line is the last of the axes."""
     look = _look(number)
     x, y = np.asarray(curve.x, np.float64), np.asarray(curve.y, np.float64)
     few = int((np.isfinite(x) & np.isfinite(y)).sum()) <= FEW_POINTS

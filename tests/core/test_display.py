@@ -18,6 +18,7 @@ from semsig_gis import (
     PartitionedDatabase,
     Reproduction,
     Sight,
+    StreetObjects,
     build_index,
     cell_scene,
     check_identifiability,
@@ -28,7 +29,9 @@ from semsig_gis import (
     localize,
     locate,
     named_noise,
+    open_objects,
     quality_report,
+    save_objects,
     search_regions,
     show_map,
     synthetic_city,
@@ -40,6 +43,8 @@ from semsig_gis.reports.parts import Scene
 from semsig_gis.sources.synthetic.city import CitySpec
 
 if TYPE_CHECKING:
+    from pathlib import Path
+
     from semsig_gis.database.database import SignatureDatabase
 
 LONGEST_LINE = 250
@@ -127,6 +132,13 @@ def test_what_a_database_and_an_answer_tell(results: dict[str, object]) -> None:
     assert "CRS EPSG:2154; bounds x 765,175 to " in repr(database)
     assert "answer " in repr(results["Location"])
     assert "bounds none" in repr(nothing_of(database))
+
+
+def test_objects_of_a_file_are_street_objects(results: dict[str, object], tmp_path: Path) -> None:
+    objects = results["StreetObjects"]
+    assert isinstance(objects, StreetObjects)
+    save_objects(objects, tmp_path / "objects.parquet")
+    assert repr(open_objects(tmp_path / "objects.parquet")) == repr(objects)
 
 
 def nothing_of(database: SignatureDatabase) -> SignatureDatabase:

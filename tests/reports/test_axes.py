@@ -18,7 +18,7 @@ from sentences import refused
 from worlds import random_town
 
 import semsig_gis
-from semsig_gis import build_index, identify, localize, locate, named_noise
+from semsig_gis import build_index, evaluate, identify, localize, locate, named_noise
 from semsig_gis.core.errors import EmptyResultError, InputError, UnknownNameError
 from semsig_gis.core.signs import CELL_CHANCES, GROUP_COLOURS, SHADES, class_signs
 from semsig_gis.maps.page import MapFrame
@@ -31,8 +31,11 @@ if TYPE_CHECKING:
     from matplotlib.image import AxesImage
     from numpy.typing import NDArray
 
+    from semsig_gis.evaluation.result import PlotKind
+
 TOWN = random_town()
 CITY, OBJECTS = TOWN.database, TOWN.street_objects
+FOUND, WORSE = (evaluate(CITY, queries=40, distortion=level) for level in ("light", "strong"))
 INDEX = build_index(CITY, named_noise("light"))
 
 
@@ -126,9 +129,13 @@ def test_objects_have_the_signs_of_their_classes(ax: Axes) -> None:
     assert [len(line.get_xdata()) for line in ax.lines] == [*counts.values()]
     for line, code in zip(ax.lines, counts, strict=True):
         assert np.array_equal(line.get_xydata(), OBJECTS.xy[OBJECTS.codes == code])
-    told = [text.get_text() for text in ax.get_legend().get_texts()]
+    keys = ax.get_legend()
+    assert keys is not None
+    told = [text.get_text() for text in keys.get_texts()]
     assert told == [f"{signs[code].symbol} {signs[code].title} ({n})" for code, n in counts.items()]
-    assert OBJECTS.plot(legend=False).get_legend() is None
+    (beside,) = OBJECTS.plot().figure.legends
+    assert [text.get_text() for text in beside.get_texts()] == told
+    assert OBJECTS.plot(legend=False).figure.legends == []
 
 
 def test_titles_from_data_break_nothing(ax: Axes) -> None:
@@ -175,6 +182,33 @@ def test_chances_to_be_found(ax: Axes) -> None:
     assert ax.images[-1].get_clim() == (0, 1)
 
 
+@pytest.mark.parametrize("kind", ["errors", "recall"])
+def test_curves_of_evaluations_share_axes(ax: Axes, kind: PlotKind) -> None:
+    for evaluation, label in ((FOUND, None), (WORSE, "wor$e")):
+        assert evaluation.plot(kind, ax=ax, label=label) is ax
+    _, told = ax.get_legend_handles_labels()
+    assert told == ["edit+edit, light", r"wor\$e"]
+    first, second = (line for line in ax.lines if not str(line.get_label()).startswith("_"))
+    assert first.get_color() != second.get_color()
+    for line, evaluation in ((first, FOUND), (second, WORSE)):
+        at = dict(np.asarray(line.get_xydata()).tolist())
+        share = evaluation.cdf([50])[0] if kind == "errors" else evaluation.recall(10)
+        assert at[50 if kind == "errors" else 10] == pytest.approx(share)
+    ax.figure.canvas.draw()
+
+
+def test_where_queries_failed(ax: Axes) -> None:
+    assert FOUND.plot("map", ax=ax) is ax
+    drawn = {str(line.get_label()).split(" ")[0]: line for line in ax.lines}
+    for name, some in (("failed", ~FOUND.successful), ("successful", FOUND.successful)):
+        places = FOUND.queries.geometry[some]
+        assert np.array_equal(drawn[name].get_xydata(), np.column_stack([places.x, places.y]))
+    looks = {(line.get_marker(), line.get_color()) for line in drawn.values()}
+    assert len({marker for marker, _ in looks}) == len({colour for _, colour in looks}) == 2
+    with refused(UnknownNameError, "'error'", "errors, recall, map", "'errors'"):
+        FOUND.plot("error")  # type: ignore[arg-type]
+
+
 @pytest.mark.usefixtures("carried")
 def test_results_are_shown_on_maps() -> None:
     location, localization = locate(INDEX, CITY.signature(3)), localize(CITY, CITY.signature(3))
@@ -184,6 +218,7 @@ def test_results_are_shown_on_maps() -> None:
         (OBJECTS.explore(), "Street objects"),
         (location.explore(), "Where it was seen"),
         (localization.explore(CITY), "Candidates"),
+        (FOUND.explore(CITY), "Localization errors"),
         (told.explore(), "Where a query can be placed"),
     ):
         assert isinstance(frame, MapFrame)

@@ -20,9 +20,9 @@ from semsig_gis.reports.plots import (
     GRID,
     GROUND,
     INK,
-    _draw_curve,
     _look,
     blank_figure,
+    draw_curve,
     draw_legend,
     draw_plot,
     in_the_dark,
@@ -132,7 +132,7 @@ def test_intervals_are_drawn_where_they_are() -> None:
     for curve, kind in ((few, "LineCollection"), (many, "FillBetweenPolyCollection")):
         with blank_figure(3, 3) as figure:
             axes = figure.add_subplot()
-            _draw_curve(axes, curve, 0, 1)
+            draw_curve(axes, curve, 0, 1)
             drawn = axes.collections[0]
             assert type(drawn).__name__ in {kind, "PolyCollection"}
             corners = drawn.get_datalim(axes.transData)
