@@ -13,11 +13,12 @@ if TYPE_CHECKING:
     from selenium.webdriver import Chrome
 
 SCRIPTS = {
-    file.name: file.read_text(encoding="utf-8")
-    for file in resources.files("semsig_gis.maps").joinpath("js").iterdir()
+    f"{folder}{file.name}": file.read_text(encoding="utf-8")
+    for package, folder in (("maps", ""), ("serve", "serve/"))
+    for file in resources.files(f"semsig_gis.{package}").joinpath("js").iterdir()
     if file.name.endswith(".js")
 }
-# The name that `maps.parts.page_element` gives the script in a page.
+# The name that `maps.parts.page_element` and `serve.page` give the script in a page.
 FOLDER = "semsig/"
 
 
@@ -43,7 +44,7 @@ class BrowserCoverage:
     def take(self, browser: Chrome) -> None:
         """Add what the page of a browser ran."""
         for script in browser.execute_cdp_cmd("Profiler.takePreciseCoverage", {})["result"]:
-            if script["url"].startswith(FOLDER):
+            if script["url"].removeprefix(FOLDER) in SCRIPTS:
                 file = script["url"].removeprefix(FOLDER)
                 self.lines[file] |= _lines_run(SCRIPTS[file], script["functions"])
 
@@ -63,7 +64,7 @@ class BrowserCoverage:
         terminalreporter.section("browser code that the tests ran")
         for file, text in sorted(SCRIPTS.items()):
             ran, code = len(self.lines[file]), len(_code(text))
-            terminalreporter.write_line(f"{file:16}{ran:4} of {code:4} lines{ran / code:5.0%}")
+            terminalreporter.write_line(f"{file:20}{ran:4} of {code:4} lines{ran / code:5.0%}")
 
 
 def _code(text: str) -> list[tuple[int, int]]:

@@ -132,6 +132,7 @@ class _Drawer:
                 }
             )
         for candidate, explanation in zip(found, location.explanations, strict=False):
+            candidate["headings"] = list(explanation.headings)
             candidate["rays"] = self._rays(explanation)
             candidate["for_against"] = self._reasons(explanation)
         return found

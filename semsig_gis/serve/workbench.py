@@ -17,7 +17,7 @@ from pyproj import Transformer
 
 from semsig_gis.core.errors import InputError, SemsigError, UnknownNameError, nearest_name
 from semsig_gis.core.geometry import FULL_TURN, wrap_degrees
-from semsig_gis.core.signs import SHADES, class_signs
+from semsig_gis.core.signs import SHADES, VERDICTS, class_signs
 from semsig_gis.database.north import North
 from semsig_gis.database.views import views_at
 from semsig_gis.exports import export_answer
@@ -25,6 +25,7 @@ from semsig_gis.likelihood.index import build_index
 from semsig_gis.likelihood.locate import LikelihoodLocator
 from semsig_gis.likelihood.noise.model import NOISES, cell_noise
 from semsig_gis.maps.image import city_image
+from semsig_gis.maps.location import RAYS
 from semsig_gis.maps.parts import MAX_ZOOM, OUTLINES, corners_of, data_url
 from semsig_gis.queries.chain import ready_chain
 from semsig_gis.queries.detections.exif import picture_shot
@@ -130,6 +131,10 @@ class Workbench:
                 }
                 for item in kinds
             ],
+            "verdicts": {
+                verdict: {"colour": VERDICTS[verdict], "text": text, **look}
+                for verdict, (text, look) in RAYS.items()
+            },
             "max_zoom": MAX_ZOOM,
             "max_upload": MOST_UPLOAD,
             "has_objects": self.store is not None,

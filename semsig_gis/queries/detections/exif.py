@@ -23,7 +23,7 @@ COMPASS_ERROR = 10.0
 
 FILM_MM = math.hypot(36.0, 24.0)
 UNIT_MM = {2: 25.4, 3: 10.0, 4: 1.0, 5: 0.001}
-SHOWN = ("JPEG", "MPO", "PNG", "WEBP", "GIF")
+SHOWN = ("JPEG", "PNG", "WEBP", "GIF")
 """Formats that browsers show."""
 HEIC_BRANDS = frozenset({b"heic", b"heix", b"hevc", b"heim", b"heis", b"mif1", b"msf1"})
 THUMBNAIL = (256, 256)

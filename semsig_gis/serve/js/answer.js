@@ -1,0 +1,196 @@
+// The answer: in words, on the map, as wheels, and what speaks for and against each candidate.
+semsig.rounded = (count) => {
+  const unit = 10 ** Math.max(Math.floor(Math.log10(Math.max(count, 1))) - 1, 0);
+  return (Math.round(count / unit) * unit).toLocaleString("en");
+};
+semsig.coordinates = (place) => place.map((part) => part.toFixed(5)).join(", ");
+semsig.away = (metres) => (metres < 1000
+  ? `${Math.round(metres)} m` : `${(metres / 1000).toFixed(1)} km`);
+semsig.percent = (share) => {
+  if (share > 0.995) return "more than 99\u00a0%";
+  return share < 0.01 ? "less than 1\u00a0%" : `${Math.round(100 * share)}\u00a0%`;
+};
+// What the answer says, in a sentence.
+semsig.sentence = ({answer, scenes}) => {
+  if (!scenes.length) return "Nothing was seen yet: add a photo, a compass, or simulate a view.";
+  if (answer?.error) return answer.error;
+  if (!answer?.estimate) return "Nothing is marked yet: click what you see.";
+  const {given, mass, radius, estimate, places_left: left} = answer;
+  const told = given
+    ? `Within ${radius} m of ${semsig.coordinates(estimate.place)} with a chance of `
+      + `${semsig.percent(mass)}.`
+    : `Cannot tell yet: ${left < 1.5 ? "one place is" : `about ${semsig.rounded(left)} places are`}`
+      + ` left, and the best has a chance of ${semsig.percent(mass)}.`;
+  if (!answer.truth) return told;
+  const {found, metres, rank} = answer.truth;
+  const verdict = given ? (found ? "Found" : "Wrong") : "Not found";
+  return `${verdict}: the best place is ${semsig.away(metres)} from the true one, whose cell has `
+    + `rank ${rank.toLocaleString("en")}. ${told}`;
+};
+semsig.Answer = class {
+  constructor(session, map) {
+    Object.assign(this, {session, map, drawn: L.layerGroup().addTo(map), region: null});
+    session.addEventListener("answer", () => this.show());
+  }
+  async show() {
+    const {session, map} = this;
+    const {answer, truth, city, answeredAt} = session;
+    const asked = answer?.estimate ? answer : null;
+    const box = document.getElementById("answer");
+    box.className = !asked ? "" : asked.given ? "given" : "open";
+    document.getElementById("sentence").textContent = semsig.sentence(session);
+    document.getElementById("notes").textContent = (asked?.notes || []).join(" ");
+    this.showRegions(asked);
+    this.choose(0);
+    if (asked) {
+      const {image, bounds} = asked.region;
+      const region = L.imageOverlay(image, bounds, {
+        pane: "tilePane", opacity: 0.85, className: "semsig-flip"});
+      await new Promise((done) => {
+        region.once("load", done).once("error", done).addTo(map);
+      });
+      this.region?.remove();
+      this.region = region;
+      if (session.answer !== answer) return;
+      this.look(asked, truth);
+    } else this.region = this.region?.remove() && null;
+    await new Promise((done) => { requestAnimationFrame(done); });
+    if (asked && answeredAt) {
+      performance.measure("semsig-answer", {start: answeredAt, end: performance.now()});
+    }
+    document.body.dataset.answered = answeredAt || 0;
+    if (asked) box.dataset.city = city.name;
+  }
+  // The map goes where the answer is, unless that is in sight.
+  look({given, estimate, candidates, region}, truth) {
+    const places = given ? [estimate.place] : candidates.map((one) => one.place);
+    if (truth) places.push(truth);
+    const bounds = L.latLngBounds(places);
+    const near = given ? L.latLngBounds(candidates[0].rays.map((ray) => ray.to)) : null;
+    if (near?.isValid()) bounds.extend(near.pad(0.3));
+    this.map.invalidateSize({pan: false});
+    if (this.map.getBounds().contains(bounds) && (!given || this.map.getZoom() > 17)) return;
+    this.map.fitBounds(given ? bounds : bounds.extend(region.bounds), {
+      maxZoom: 19, padding: [30, 30], animate: false});
+  }
+  showRegions(answer) {
+    const line = document.getElementById("regions");
+    line.replaceChildren();
+    for (const [share, count] of Object.entries(answer?.region.counts || {}).sort()) {
+      const part = L.DomUtil.create("span", "", line);
+      const swatch = L.DomUtil.create("i", "semsig-flip", part);
+      swatch.style.background = answer.region.colours[share];
+      part.append(`${100 * share} %${line.children.length > 1 ? "" : " of the chance"} in `
+        + `${count.toLocaleString("en")} cell${count === 1 ? "" : "s"}`);
+    }
+  }
+  choose(number) {
+    this.session.chosen = number;
+    this.draw();
+    this.showCandidates();
+    this.showReasons();
+    this.showWheels();
+  }
+  get candidate() {
+    return this.session.answer?.candidates?.[this.session.chosen];
+  }
+  draw() {
+    const {session, map, drawn} = this;
+    drawn.clearLayers();
+    const {candidates = [], estimate} = session.answer || {};
+    const dark = semsig.outline(map);
+    if (estimate) {
+      L.polygon(estimate.ellipse, {color: dark, weight: 2, fill: false, interactive: false})
+        .addTo(drawn);
+    }
+    for (const ray of this.candidate?.rays || []) {
+      const {colour, text, ...look} = session.city.verdicts[ray.verdict];
+      L.polyline([ray.from, ray.to], {color: colour, ...look, interactive: false}).addTo(drawn);
+      const one = session.city.classes.find(({name}) => name === ray.class) || semsig.unnamed;
+      const html = L.DomUtil.create("div", `at ${ray.verdict}`);
+      html.append(semsig.sign(one));
+      L.marker(ray.to, {
+        icon: L.divIcon({html, className: "", iconSize: [22, 22]}), keyboard: false,
+      }).bindTooltip(`${ray.title}: ${text}`).addTo(drawn);
+    }
+    for (const [at, one] of [...candidates.entries()].reverse()) {
+      const chosen = at === session.chosen;
+      const html = L.DomUtil.create("b", chosen ? "rank chosen" : "rank");
+      html.textContent = one.rank;
+      L.marker(one.place, {
+        icon: L.divIcon({html, className: "", iconSize: [26, 26]}), zIndexOffset: 1000 - at,
+        title: `Candidate ${one.rank}`, alt: `Candidate ${one.rank}`,
+      }).on("click", () => this.choose(at)).addTo(drawn);
+    }
+    if (session.truth) {
+      L.circleMarker(session.truth, {
+        radius: 15, color: "#d55e00", weight: 4, fill: false, interactive: false,
+      }).bindTooltip("the true place", {permanent: true, direction: "bottom", offset: [0, 14]})
+        .addTo(drawn);
+    }
+  }
+  showCandidates() {
+    const line = document.getElementById("candidates");
+    line.replaceChildren(...(this.session.answer?.candidates || []).map((one, at) => {
+      const button = L.DomUtil.create("button", "");
+      button.type = "button";
+      semsig.text(button, "b", one.rank);
+      button.append(` ${one.chance < 0.01 ? "<1" : Math.round(100 * one.chance)} %`);
+      button.title = semsig.coordinates(one.place);
+      button.setAttribute("aria-pressed", String(at === this.session.chosen));
+      button.addEventListener("click", () => {
+        this.choose(at);
+        document.querySelectorAll("#candidates button")[at].focus();
+        this.map.setView(one.place, Math.max(this.map.getZoom(), 18), {animate: false});
+      });
+      return button;
+    }));
+  }
+  showReasons() {
+    const box = document.getElementById("speaks");
+    const reasons = this.candidate?.for_against || [];
+    box.replaceChildren();
+    for (const [title, sign] of [["for", 1], ["against", -1]]) {
+      const counts = new Map();
+      for (const {text, weight} of reasons) {
+        if (sign * weight > 0.05) counts.set(text, (counts.get(text) || 0) + 1);
+      }
+      if (!counts.size) continue;
+      const part = L.DomUtil.create("div", "", box);
+      semsig.text(part, "h2", `Speaks ${title} candidate ${this.candidate.rank}`);
+      const list = L.DomUtil.create("ul", "", part);
+      for (const [text, count] of counts) {
+        semsig.text(list, "li", count > 1 ? `${count} \u00d7 ${text}` : text);
+      }
+    }
+  }
+  // What was seen, turned as the candidate has it, beside what stands there.
+  showWheels() {
+    const {session, candidate} = this;
+    const box = document.getElementById("wheels");
+    box.replaceChildren();
+    const at = session.views.indexOf(session.scene && session.viewOf(session.scene));
+    const view = session.answer?.views?.[at];
+    if (!view || !candidate) return;
+    const {reach} = session.city;
+    const whole = (metres) => (metres === null ? null : Math.round(metres));
+    const photos = view.photos || [view];
+    const marked = session.views[at].photos?.filter((one) => one.marks.length);
+    const own = marked ? marked.indexOf(session.scene) : 0;
+    if (photos[own]) {
+      const turn = candidate.headings?.[own] ?? 0;
+      const rows = view.bearings.map((_, row) => row).filter(
+        (row) => (view.photo?.[row] ?? 0) === own);
+      const turned = (degrees) => (degrees + turn + 720) % 360;
+      const sectors = (photos[own].sectors || []).map(([from, to]) => [
+        turned(from), turned(from) + ((to - from + 360) % 360 || 360)]);
+      box.append(semsig.wheel(9, "Marked", rows.map((row) => view.types[row]).join(""),
+        rows.map((row) => Math.round(turned(view.bearings[row])) % 360),
+        {reach, sectors, metres: rows.map((row) => whole(view.ranges?.[row] ?? null))}));
+    }
+    const [types, bearings, metres] = candidate.signature;
+    box.append(semsig.wheel(9, `At candidate ${candidate.rank}`, types,
+      bearings.map((degrees) => Math.round(degrees) % 360),
+      {reach, metres: metres ? metres.map(whole) : null}));
+  }
+};

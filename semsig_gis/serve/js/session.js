@@ -1,0 +1,140 @@
+// What was seen, and the answer to it: the state of the workbench, and its talk with the server.
+semsig.api = async (path, body) => {
+  const token = new URLSearchParams(location.search).get("token");
+  const plain = body === undefined || body instanceof Blob;
+  let response;
+  try {
+    response = await fetch(`/api/${path}`, {
+      method: body === undefined ? "GET" : "POST",
+      headers: {"X-Semsig-Token": token, ...(plain ? {} : {"Content-Type": "application/json"})},
+      body: plain ? body : JSON.stringify(body),
+    });
+  } catch {
+    throw new Error("The server does not answer; is semsig serve still running?");
+  }
+  if (response.ok) return response;
+  const told = await response.json().catch(() => ({}));
+  throw Object.assign(new Error(told.error || `The server says ${response.status}.`),
+    {status: response.status});
+};
+semsig.Session = class extends EventTarget {
+  constructor(city) {
+    super();
+    Object.assign(this, {city, noise: null, seenFrom: "anywhere", brush: "?", asking: false});
+    this.clear();
+  }
+  // A view is of one place: of photos, or a compass. A scene is one of either.
+  clear() {
+    Object.assign(this, {
+      views: [], scene: null, mark: null, answer: null, truth: null, chosen: 0, changedAt: 0});
+  }
+  get scenes() {
+    return this.views.flatMap((view) => view.photos || [view]);
+  }
+  get entries() {
+    return this.scene ? this.scene.marks || this.scene.compass : [];
+  }
+  viewOf(scene) {
+    return this.views.find((view) => view === scene || view.photos?.includes(scene));
+  }
+  show(scene, mark = null) {
+    const moved = scene && this.scene && this.viewOf(scene) !== this.viewOf(this.scene);
+    Object.assign(this, {scene, mark});
+    this.tell("scene");
+    if (moved) this.askAgain();
+  }
+  // A scene joins the place of the last one, unless it is a compass or some steps on.
+  add(scene, {on = false} = {}) {
+    const last = this.views.at(-1);
+    const step = this.views.length ? {bearing: 0, metres: 20} : null;
+    if (scene.compass) this.views.push({...scene, step});
+    else if (last?.photos && !on) last.photos.push(scene);
+    else this.views.push({photos: [scene], step});
+    this.show(this.scenes.at(-1));
+    this.changed();
+  }
+  remove(scene) {
+    const view = this.viewOf(scene);
+    if (view.photos) view.photos.splice(view.photos.indexOf(scene), 1);
+    if (!view.photos?.length) this.views.splice(this.views.indexOf(view), 1);
+    if (this.views.length) this.views[0].step = null;
+    this.truth = null;
+    this.show(this.scenes.at(-1) ?? null);
+    this.changed();
+  }
+  tell(what) {
+    this.dispatchEvent(new Event(what));
+  }
+  changed() {
+    this.tell("change");
+    this.askAgain();
+  }
+  askAgain() {
+    this.changedAt = performance.now();
+    this.ask();
+  }
+  body() {
+    const kept = ({url, notes, place, told, ...photo}) => photo;
+    const views = this.views.map(
+      (view) => (view.photos ? {...view, photos: view.photos.map(kept)} : view));
+    // The answer is where the scene is that is shown.
+    const view = this.scene ? views.findIndex((_, at) => this.views[at] === this.viewOf(this.scene))
+      : null;
+    return {
+      views, view, top: 10, seen_from: this.seenFrom, noise: this.noise, truth: this.truth};
+  }
+  // One request at a time; what changes meanwhile is asked next, so that the last one wins.
+  async ask() {
+    if (this.asking) return;
+    this.asking = true;
+    let asked = null;
+    while (asked !== this.changedAt) {
+      asked = this.changedAt;
+      const question = this.views;
+      let answer = {};
+      try {
+        if (this.scenes.some((scene) => (scene.marks || scene.compass).length)) {
+          answer = await (await semsig.api("answer", this.body())).json();
+        }
+      } catch (error) {
+        answer = {error: error.message};
+      }
+      if (this.views !== question) continue;
+      Object.assign(this, {answer, chosen: 0, answeredAt: asked});
+      this.tell("answer");
+    }
+    this.asking = false;
+  }
+  saved() {
+    const {name, fingerprint} = this.city;
+    return {
+      semsig: "session", version: 1, city: {name, fingerprint}, ...this.body(),
+      answer: this.answer,
+    };
+  }
+  // Take what a file holds, of which the photos are elsewhere.
+  restore(saved) {
+    const whole = (view) => (view?.photos || [view]).every(
+      (scene) => Array.isArray(scene?.marks || scene?.compass));
+    if (saved?.semsig !== "session" || saved.version !== 1
+      || !Array.isArray(saved.views) || !saved.views.every(whole)) {
+      throw new Error("This file is no session of the workbench; open one that it saved.");
+    }
+    if (saved.city?.fingerprint !== this.city.fingerprint) {
+      throw new Error(`This session is about ${saved.city?.name}, and the server has `
+        + `${this.city.name}; start semsig serve with that database.`);
+    }
+    this.clear();
+    Object.assign(this, {
+      views: saved.views, truth: saved.truth, noise: saved.noise, seenFrom: saved.seen_from});
+    this.show(this.scenes[0] ?? null);
+    this.changed();
+  }
+};
+// Hand a file to whoever sits at the browser.
+semsig.download = (name, blob) => {
+  const link = L.DomUtil.create("a", "");
+  Object.assign(link, {href: URL.createObjectURL(blob), download: name});
+  link.click();
+  setTimeout(() => URL.revokeObjectURL(link.href), 10000);
+};

@@ -1,0 +1,389 @@
+// The page: palette, scenes, editor, and what the buttons do.
+semsig.element = (id) => document.getElementById(id);
+semsig.notice = (text) => {
+  const box = semsig.element("notice");
+  box.replaceChildren();
+  box.hidden = !text;
+  if (!text) return;
+  semsig.text(box, "span", text);
+  const close = L.DomUtil.create("button", "", box);
+  Object.assign(close, {type: "button", textContent: "Close"});
+  close.addEventListener("click", () => semsig.notice(""));
+};
+// Errors of what people do are told on the page.
+semsig.trying = (call) => async (...given) => {
+  semsig.notice("");
+  document.body.setAttribute("aria-busy", "true");
+  try {
+    await call(...given);
+  } catch (error) {
+    semsig.notice(error.message);
+  }
+  document.body.removeAttribute("aria-busy");
+};
+semsig.rename = (session, name) => {
+  session.brush = name;
+  if (session.mark) {
+    session.mark.class = name;
+    session.changed();
+  } else session.tell("change");
+};
+semsig.button = (parent, text, call, label) => {
+  const button = L.DomUtil.create("button", "", parent);
+  Object.assign(button, {type: "button", textContent: text});
+  if (label) button.setAttribute("aria-label", label);
+  button.addEventListener("click", call);
+  return button;
+};
+// The classes of the city, those first that tell most.
+semsig.palette = (session) => {
+  const box = semsig.element("palette");
+  const seen = session.city.classes.filter(({share}) => share > 0);
+  box.replaceChildren(...[...seen, semsig.unnamed].map((one) => {
+    const button = L.DomUtil.create("button", "class");
+    button.type = "button";
+    button.append(semsig.sign(one));
+    semsig.text(button, "span", one.title);
+    button.setAttribute("aria-keyshortcuts", one.symbol);
+    button.title = `Key ${one.symbol}`;
+    button.dataset.name = one.name;
+    // It is what the next mark is, and the last one if that has no name yet.
+    button.addEventListener("click", () => {
+      if (session.mark?.class !== "?") session.mark = null;
+      semsig.rename(session, one.name);
+    });
+    return button;
+  }));
+  const chosen = () => {
+    for (const button of box.children) {
+      button.setAttribute("aria-pressed", String(button.dataset.name === session.brush));
+    }
+  };
+  session.addEventListener("change", chosen);
+  chosen();
+};
+semsig.showScenes = (session) => {
+  const box = semsig.element("scenes");
+  box.replaceChildren();
+  session.views.forEach((view, place) => {
+    const group = L.DomUtil.create("span", "view", box);
+    if (session.views.length > 1) semsig.text(group, "small", `Place ${place + 1}`);
+    for (const scene of view.photos || [view]) {
+      const one = scene.marks ? scene.name : session.truth ? "Simulated view" : "Compass";
+      const tab = semsig.button(group, one, () => session.show(scene));
+      tab.className = "tab";
+      tab.setAttribute("aria-pressed", String(scene === session.scene));
+      semsig.button(group, "\u00d7", () => session.remove(scene), `Remove ${one}`);
+    }
+  });
+  const chooser = (id, text, call) => {
+    const label = L.DomUtil.create("label", "button", box);
+    label.htmlFor = id;
+    label.textContent = text;
+    const input = L.DomUtil.create("input", "", label);
+    Object.assign(input, {type: "file", id, multiple: true});
+    input.addEventListener("change", semsig.trying(() => {
+      const files = [...input.files];
+      input.value = "";  // so that the same file can be chosen again
+      return call(files);
+    }));
+    return input;
+  };
+  const photos = {accept: "image/*"};
+  const joins = session.views.at(-1)?.photos;
+  Object.assign(chooser("photo", joins ? "+ Photo of this place" : "+ Photo",
+    (files) => semsig.readPhotos(session, files)), photos);
+  if (joins) {
+    Object.assign(chooser("photo-on", "+ Photo some steps on",
+      (files) => semsig.readPhotos(session, files, {on: true})), photos);
+    chooser("boxes", "+ Boxes of a detector", (files) => semsig.readBoxes(session, files));
+  }
+  semsig.button(box, "+ Compass", () => session.add(
+    {compass: [], sectors: null, heading_error: null})).id = "add-compass";
+};
+semsig.readBoxes = async (session, files) => {
+  const photos = session.scenes.filter((scene) => scene.marks);
+  const told = ({name, width, height, fov, heading, projection}) => (
+    {name, width, height, fov, heading, projection});
+  for (const file of files) {
+    const body = {text: await file.text(), name: file.name, photos: photos.map(told)};
+    const read = (await (await semsig.api("boxes", body)).json()).photos;
+    for (const photo of photos) {
+      for (const {box, class: name} of read[photo.name] || []) {
+        photo.marks.push({box, class: name, range: null});
+      }
+    }
+  }
+  session.show(session.scene);
+  session.changed();
+};
+semsig.showScene = (session) => {
+  const {scene} = session;
+  semsig.element("welcome").hidden = Boolean(scene);
+  semsig.element("scene").hidden = semsig.element("marking").hidden = !scene;
+  if (!scene) return;
+  const focused = document.activeElement;
+  const again = focused === document.body || focused.matches("#picture .mark");
+  semsig.element("picture").replaceChildren(
+    (scene.marks ? semsig.photo : semsig.compass)(session, scene));
+  const mark = document.querySelector("#picture .mark[aria-pressed=true]");
+  if (again && mark) mark.focus({preventScroll: true});
+  semsig.showMarks(session);
+  semsig.showEditor(session);
+};
+semsig.showMarks = (session) => {
+  const line = semsig.element("marks");
+  line.replaceChildren(...session.entries.map((entry) => {
+    const {title} = semsig.classNamed(session, entry.class);
+    const button = L.DomUtil.create("button", "");
+    button.type = "button";
+    button.append(semsig.sign(semsig.classNamed(session, entry.class)));
+    semsig.text(button, "span", [title, semsig.metres(entry.range)].filter(Boolean).join(", "));
+    button.setAttribute("aria-pressed", String(entry === session.mark));
+    button.addEventListener("click", () => session.show(
+      session.scene, entry === session.mark ? null : entry));
+    return button;
+  }));
+  const {scene} = session;
+  semsig.button(line, "+ Mark in the middle", () => semsig.addMark(
+    session, scene.marks ? {x: scene.width / 2, y: scene.height / 2} : {bearing: 0})).id = "add-mark";
+};
+// The mark that is chosen: its class, and how far away it is.
+semsig.showEditor = (session) => {
+  const box = semsig.element("editor");
+  const {mark, city: {reach}} = session;
+  box.replaceChildren();
+  if (!mark) return;
+  const label = (text) => {
+    const line = L.DomUtil.create("label", "", box);
+    semsig.text(line, "span", text);
+    return line;
+  };
+  const titles = [...session.city.classes, semsig.unnamed].map((one) => [one.name, one.title]);
+  semsig.select(label("It is"), Object.fromEntries(titles), mark.class,
+    (value) => semsig.rename(session, value)).id = "class";
+  const choices = {
+    "": mark.box ? "as its box tells" : "unknown", near: `near, up to ${Math.round(reach / 3)} m`,
+    middle: "midway", far: `far, up to ${Math.round(reach)} m`};
+  if (typeof mark.range === "number") choices[mark.range] = `about ${semsig.metres(mark.range)}`;
+  semsig.select(label("Distance"), choices, mark.range ?? "", (value) => {
+    mark.range = value in {near: 0, middle: 0, far: 0} ? value : null;
+    session.changed();
+  }).id = "range";
+  semsig.button(box, "Remove", () => semsig.removeMark(session)).id = "remove-mark";
+};
+semsig.removeMark = (session) => {
+  session.entries.splice(session.entries.indexOf(session.mark), 1);
+  session.show(session.scene);
+  session.changed();
+};
+semsig.showCamera = (session) => {
+  const {scene} = session;
+  if (!scene) return;
+  const box = semsig.element("camera");
+  box.replaceChildren();
+  const {step} = session.viewOf(scene);
+  if (step) {
+    const line = L.DomUtil.create("fieldset", "camera", box);
+    semsig.text(line, "legend", "From the place before");
+    for (const [name, text, range] of [
+      ["metres", "Metres", [0, 10000]], ["bearing", "Towards (degrees from north)", [0, 359]]]) {
+      const label = L.DomUtil.create("label", "", line);
+      semsig.text(label, "span", text);
+      semsig.number(label, step[name], range, (value) => {
+        step[name] = value;
+        session.changed();
+      }).id = `step-${name}`;
+    }
+  }
+  box.append((scene.marks ? semsig.camera : semsig.compassTurn)(session, scene));
+};
+// What to look for next: what would tell most, of what is left.
+semsig.suggest = (session) => {
+  const line = semsig.element("question");
+  let waiting = null;
+  session.addEventListener("change", () => clearTimeout(waiting));
+  session.addEventListener("answer", () => {
+    clearTimeout(waiting);
+    const {answer} = session;
+    line.replaceChildren();
+    if (!answer?.estimate) return;
+    // After a pause, so that the next answer need not wait.
+    waiting = setTimeout(async () => {
+      let offers = [];
+      try {
+        offers = await (await semsig.api("suggest", session.body())).json();
+      } catch {
+        return;  // the answer says what is wrong
+      }
+      const ask = ([one, ...others]) => {
+        line.replaceChildren();
+        if (!one || session.answer !== answer) return;
+        semsig.text(line, "b", one.question);
+        semsig.button(line, "Yes, I mark it", () => {
+          session.mark = null;
+          semsig.rename(session, one.class);
+          semsig.showScene(session);
+        });
+        semsig.button(line, "No, or not in sight", () => ask(others));
+      };
+      ask(offers);
+    }, 400);
+  });
+};
+semsig.simulate = (session, map) => {
+  const [button, panel] = ["simulate", "spoiling"].map(semsig.element);
+  let [seed, place] = [0, null];
+  const on = () => button.getAttribute("aria-pressed") === "true";
+  button.addEventListener("click", () => {
+    button.setAttribute("aria-pressed", String(!on()));
+    panel.hidden = !on();
+    map.getContainer().classList.toggle("simulating", on());
+  });
+  const spoil = semsig.element("spoil");
+  spoil.append(new Option("nothing", ""),
+    ...session.city.noise.map((name) => new Option(`${name} noise`, name)));
+  const draw = semsig.trying(async () => {
+    if (!place) throw new Error("Click a place on the map first: a view from there is simulated.");
+    if (session.views.length && !session.truth
+      && !window.confirm("A simulated view takes the place of what is marked now. Go on?")) return;
+    const turn = Number(semsig.element("turn").value);
+    const fov = turn === 360 ? null : turn;
+    const {view, truth} = await (await semsig.api("simulate", {
+      place: [place.lat, place.lng], fov, heading: fov && 0, noise: spoil.value || null, seed,
+    })).json();
+    session.clear();
+    session.truth = truth.place;
+    session.add({heading_error: null, sectors: null, ...view});
+  });
+  map.on("click", (event) => {
+    if (!on()) return;
+    place = event.latlng;
+    draw();
+  });
+  for (const one of ["turn", "spoil"].map(semsig.element)) {
+    one.addEventListener("change", () => { if (place) draw(); });
+  }
+  semsig.element("again").addEventListener("click", () => {
+    seed += 1;
+    draw();
+  });
+};
+semsig.files = (session) => {
+  const {element, trying} = semsig;
+  element("new").addEventListener("click", () => {
+    session.clear();
+    session.show(null);
+    session.changed();
+  });
+  element("save").addEventListener("click", () => semsig.download("session.semsig.json",
+    new Blob([JSON.stringify(session.saved(), null, 1)], {type: "application/json"})));
+  const open = async (file) => {
+    let saved = null;
+    try {
+      saved = JSON.parse(await file.text());
+    } catch {
+      saved = null;
+    }
+    session.restore(saved);
+  };
+  element("open").addEventListener("change", trying(async () => {
+    const [file] = element("open").files;
+    element("open").value = "";
+    if (file) await open(file);
+  }));
+  element("format").addEventListener("change", trying(async () => {
+    const format = element("format").value;
+    element("format").value = "";
+    const response = await semsig.api(`export?format=${format}`, session.body());
+    semsig.download(`answer.${format}`, await response.blob());
+  }));
+  element("command").addEventListener("click", trying(async () => {
+    const command = session.answer?.command;
+    if (!command) throw new Error("There is no answer yet, so there is no command that gives it.");
+    const dialog = element("line");
+    dialog.querySelector("textarea").value = command;
+    dialog.showModal();
+    dialog.querySelector("textarea").select();
+    dialog.querySelector("button").onclick = () => dialog.close();
+    await navigator.clipboard?.writeText(command).catch(() => {});
+  }));
+  document.addEventListener("dragover", (event) => event.preventDefault());
+  document.addEventListener("drop", trying(async (event) => {
+    event.preventDefault();
+    const files = [...event.dataTransfer.files];
+    const text = files.filter(({name}) => /\.(json|txt|xml)$/i.test(name));
+    await semsig.readPhotos(session, files.filter((file) => !text.includes(file)));
+    if (text.length) await semsig.readBoxes(session, text);
+  }));
+};
+semsig.keys = (session) => {
+  document.addEventListener("keydown", (event) => {
+    const {target, key} = event;
+    if (event.ctrlKey || event.metaKey || event.altKey || !session.scene) return;
+    if (target.closest("input, select, textarea, dialog")) return;
+    const named = [...session.city.classes, semsig.unnamed].find(
+      ({symbol}) => symbol === key) || session.city.classes.find(
+      ({symbol}) => symbol.toLowerCase() === key.toLowerCase());
+    if (named) semsig.rename(session, named.name);
+    else if (session.mark && ["Delete", "Backspace"].includes(key)) semsig.removeMark(session);
+    else if (session.mark && key === "Escape") session.show(session.scene);
+    else return;
+    event.preventDefault();
+  });
+};
+semsig.cityMap = (city) => {
+  const map = L.map("map", {
+    maxZoom: city.max_zoom, zoomSnap: 0.25, zoomControl: false, attributionControl: true});
+  L.control.zoom({position: "topleft"}).addTo(map);
+  map.fitBounds(city.bounds);
+  L.control.scale({imperial: false}).addTo(map);
+  L.imageOverlay(city.image.url, city.image.bounds, {
+    pane: "tilePane", className: "semsig-flip"}).addTo(map);
+  for (const licence of city.licences) {
+    const text = L.DomUtil.create("bdi", "");
+    text.textContent = licence;
+    map.attributionControl.addAttribution(text.outerHTML);
+  }
+  new ResizeObserver(() => map.invalidateSize({pan: false})).observe(map.getContainer());
+  // All of the page is as light or dark as its map.
+  map.on("semsig-colours", () => document.body.classList.toggle("dark", semsig.isDark(map)));
+  semsig.colours(map);
+  return map;
+};
+semsig.start = semsig.trying(async () => {
+  const city = await (await semsig.api("city")).json();
+  const session = new semsig.Session(city);
+  const map = semsig.cityMap(city);
+  const answer = new semsig.Answer(session, map);
+  semsig.element("city").textContent = `${city.name}, ${city.cells.toLocaleString("en")} cells`;
+  semsig.element("about").textContent = city.licences.join(" · ");
+  semsig.palette(session);
+  const noise = semsig.element("noise");
+  noise.append(...city.noise.map((name) => new Option(name, name)));
+  session.noise = noise.value;
+  noise.addEventListener("change", () => {
+    session.noise = noise.value;
+    session.changed();
+  });
+  semsig.element("from").addEventListener("change", (event) => {
+    session.seenFrom = event.target.value;
+    session.changed();
+  });
+  session.addEventListener("scene", () => {
+    semsig.showScenes(session);
+    semsig.showScene(session);
+    semsig.showCamera(session);
+    answer.showWheels();
+  });
+  session.addEventListener("change", () => semsig.showScene(session));
+  map.on("semsig-colours", () => answer.draw());
+  semsig.suggest(session);
+  semsig.simulate(session, map);
+  semsig.files(session);
+  semsig.keys(session);
+  session.show(null);
+  session.tell("answer");
+  Object.assign(semsig, {session, map});
+});
+semsig.start();

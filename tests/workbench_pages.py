@@ -1,0 +1,148 @@
+"""The workbench in a real browser, used as people do: by clicks, keys and files."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+from map_pages import requested
+from selenium.webdriver.common.action_chains import ActionChains
+from selenium.webdriver.common.by import By
+from selenium.webdriver.support.ui import Select
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from selenium.webdriver import Chrome
+    from selenium.webdriver.remote.webelement import WebElement
+    from street_photos import StreetPhoto
+
+STAGE = "#picture .stage"
+QUIET = """
+const {session} = semsig;
+return Boolean(session) && !session.asking && !document.body.ariaBusy
+  && Number(document.body.dataset.answered) === session.changedAt;
+"""
+PATIENCE_S = 30
+
+
+@dataclass(frozen=True)
+class WorkbenchPage:
+    """The page of a workbench, open in a browser that saves files in a folder."""
+
+    browser: Chrome
+    folder: Path
+    url: str
+
+    def open(self) -> None:
+        self.browser.get(self.url)
+        behavior = {"behavior": "allow", "downloadPath": str(self.folder)}
+        self.browser.execute_cdp_cmd("Browser.setDownloadBehavior", behavior)
+        self.settle()
+
+    def settle(self) -> str:
+        """Wait until what changed is answered; return what the answer says."""
+        self.until(QUIET)
+        return self.text("#sentence")
+
+    def ask(self, script: str, *arguments: object) -> Any:  # noqa: ANN401
+        return self.browser.execute_script(script, *arguments)
+
+    def one(self, selector: str) -> WebElement:
+        return self.browser.find_element(By.CSS_SELECTOR, selector)
+
+    def all(self, selector: str) -> list[WebElement]:
+        return self.browser.find_elements(By.CSS_SELECTOR, selector)
+
+    def text(self, selector: str) -> str:
+        """Return the text of the first such element, shown or not."""
+        return str(self.ask("return document.querySelector(arguments[0]).textContent", selector))
+
+    def press(self, selector: str) -> str:
+        self.one(selector).click()
+        return self.settle()
+
+    def choose(self, selector: str, value: str) -> str:
+        Select(self.one(selector)).select_by_value(value)
+        return self.settle()
+
+    def type(self, *keys: str) -> str:
+        ActionChains(self.browser).send_keys(*keys).perform()
+        return self.settle()
+
+    def give(self, selector: str, *files: Path) -> str:
+        """Choose files in a chooser; return what the answer says, or the notice."""
+        self.one(selector).send_keys("\n".join(map(str, files)))
+        return self.settle()
+
+    def slide(self, selector: str, value: float) -> str:
+        self.ask(
+            "const [at, value] = arguments; const input = document.querySelector(at);"
+            "input.value = value; input.dispatchEvent(new Event('input'));",
+            selector,
+            value,
+        )
+        return self.settle()
+
+    def drag(self, selector: str, start: tuple[float, float], *moves: tuple[int, int]) -> str:
+        """Press at shares of an element's width and height, move by pixels, let go."""
+        self.pull(selector, start, *moves)
+        return self.settle()
+
+    def pull(self, selector: str, start: tuple[float, float], *moves: tuple[int, int]) -> None:
+        """Do so, and wait for no answer."""
+        element = self.one(selector)
+        self.ask("arguments[0].scrollIntoView({block: 'center'})", element)
+        size = element.size
+        x, y = (
+            round((share - 0.5) * size[side])
+            for share, side in zip(start, ("width", "height"), strict=True)
+        )
+        chain = ActionChains(self.browser, duration=0)
+        chain.move_to_element_with_offset(element, x, y).click_and_hold()
+        for move in moves:
+            chain.move_by_offset(*move)
+        chain.release().perform()
+
+    def mark(self, photo: StreetPhoto, number: int) -> str:
+        """Draw the box of an object of a photo, then press the key of its class."""
+        stage = self.one(STAGE).size
+        wide, high = photo.size(number)
+        size = max(round(wide * stage["width"]), 9), max(round(high * stage["height"]), 9)
+        self.pull(STAGE, photo.corner(number), size)
+        return self.type(photo.things[number][0])
+
+    def until(self, script: str, *arguments: object) -> Any:  # noqa: ANN401
+        """Wait until a script returns something, and return that."""
+        end = time.monotonic() + PATIENCE_S
+        while not (value := self.ask(script, *arguments)):
+            assert time.monotonic() < end, f"{script}\n{self.text('#notice')}"
+            time.sleep(0.02)
+        return value
+
+    def question(self) -> str:
+        """Return what is asked next, a moment after an answer."""
+        return str(self.until("return document.querySelector('#question b')?.textContent"))
+
+    def saved(self, name: str) -> Path:
+        """Return a file that the browser saves."""
+        file = self.folder / name
+        end = time.monotonic() + PATIENCE_S
+        while not file.exists():
+            assert time.monotonic() < end, f"{name} is not saved"
+            time.sleep(0.02)
+        return file
+
+    def assert_quiet(self) -> None:
+        """Check that the page reported no error, and asked its own server alone."""
+        own = self.url.partition("?")[0]
+        errors = [
+            entry["message"]
+            for entry in self.browser.get_log("browser")
+            # A refused upload is told on the page; the browser tells of its code as well.
+            if "the server responded with a status of 4" not in entry["message"]
+        ]
+        assert not errors, errors
+        asked = requested(self.browser)
+        assert [url for url in asked if not url.startswith((own, "data:", "blob:"))] == []
