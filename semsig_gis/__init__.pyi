@@ -120,6 +120,7 @@ from .queries.distortions import (
 from .queries.sight import Sight as Sight
 from .evaluation.compare import compare_evaluations as compare_evaluations
 from .evaluation.evaluate import evaluate as evaluate
+from .evaluation.field import ErrorField as ErrorField, error_field as error_field
 from .evaluation.file import open_evaluation as open_evaluation, save_evaluation as save_evaluation
 from .evaluation.identify.check import (
     IdentifiabilityCheck as IdentifiabilityCheck,

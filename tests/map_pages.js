@@ -41,26 +41,62 @@ const drawn = (colour, selector) => {
   return count;
 };
 
-// Where places are on the screen, and the colours of the heatmap there, mixed from the four pixels
-// of the field around each.
-const heat = (places, zoom, done) => {
-  map.setZoom(map.getZoom() + zoom, { animate: false });
+// Calls back with a function that returns the pixels of the field in a box of the screen.
+const field = (call) => {
   const look = () => {
-    const canvas = document.querySelector("canvas.semsig-heat");
-    const copy = document.createElement("canvas");
-    [copy.width, copy.height] = [canvas.width, canvas.height];
-    const context = copy.getContext("2d", { willReadFrequently: true });
-    context.drawImage(canvas, 0, 0);
+    const canvas = document.querySelector("canvas.semsig-field");
+    const context = canvas.getContext("2d");
     const box = canvas.getBoundingClientRect();
     const shape = map.getContainer().getBoundingClientRect();
-    const colours = places.map((place) => {
-      const { x, y } = map.latLngToContainerPoint(place);
-      const [left, top] = [x + shape.left - box.left, y + shape.top - box.top];
-      return [x, y, ...context.getImageData(Math.round(left), Math.round(top), 1, 1).data];
-    });
-    done(colours);
+    const dots = canvas.width / box.width;
+    const [left, top] = [shape.left - box.left, shape.top - box.top];
+    call((x, y, size) =>
+      context.getImageData(
+        Math.round((x + left) * dots),
+        Math.round((y + top) * dots),
+        size,
+        size,
+      ),
+    );
   };
-  requestAnimationFrame(() => requestAnimationFrame(look));
+  setTimeout(() => requestAnimationFrame(() => requestAnimationFrame(look)), 100);
+};
+
+// The colours of the field at places, each in the middle of the map.
+const fieldAt = (places, zoom, done, told = []) => {
+  if (told.length === places.length) return done(told);
+  map.setView(places[told.length], zoom, { animate: false });
+  return field((pixels) => {
+    const { x, y } = map.latLngToContainerPoint(places[told.length]);
+    const [red, green, blue] = pixels(x, y, 1).data;
+    fieldAt(places, zoom, done, [...told, [red, green, blue]]);
+  });
+};
+
+// Which share of a square in the middle of the map the field covers.
+const fieldCover = (size, done) =>
+  field((pixels) => {
+    const { x, y } = map.getSize().divideBy(2);
+    const { data } = pixels(x - size / 2, y - size / 2, size);
+    done(data.filter((value, at) => at % 4 === 3 && value > 127).length / size ** 2);
+  });
+
+// Which share of its box a sign of a colour covers.
+const signArea = (colour) => {
+  const [{ options }] = circles(colour);
+  const canvas = document.createElement("canvas");
+  canvas.width = canvas.height = 100;
+  const ctx = canvas.getContext("2d");
+  const sign = new semsig.Sign([0, 0], { ...options, weight: 0.01 });
+  Object.assign(sign, {
+    _point: L.point(50, 50),
+    _radius: options.outline.includes("A") ? 50 : 50 / 1.2,
+    _renderer: { _ctx: ctx, _drawing: true, _bounds: L.bounds([0, 0], [100, 100]) },
+    _pxBounds: L.bounds([0, 0], [100, 100]),
+  });
+  sign._updatePath();
+  const { data } = ctx.getImageData(0, 0, 100, 100);
+  return data.filter((value, at) => at % 4 === 3 && value > 127).length / 100 ** 2;
 };
 
 // Where the first objects are that are called by their numbers.

@@ -110,7 +110,7 @@ map page for the eye.
                 optional=True,
             ),
             map_to_write(
-                "A page for the browser: an error heatmap, successful and failed queries."
+                "A page for the browser: successful and failed queries, and where they fail."
             ),
         ):
             self.addParameter(parameter)

@@ -28,7 +28,7 @@ def export(
         Path,
         typer.Option(
             help="File to write: a GeoPackage of all layers, for QGIS (.gpkg), one layer as "
-            "GeoParquet (.parquet) or CSV (.csv), or one number a cell as a Cloud-Optimised "
+            "GeoParquet (.parquet) or CSV (.csv), or numbers of places as a Cloud-Optimised "
             "GeoTIFF (.tif)."
         ),
     ],
@@ -42,7 +42,16 @@ def export(
         typer.Option(
             help="What the file holds: cells, objects, evaluation or evaluation_lines, by default "
             "the first, in a GeoPackage all that there are (give the option once for each); in a "
-            "GeoTIFF ambiguity (the default), identifiability or error."
+            "GeoTIFF ambiguity (the default), identifiability, error, or field: which share of the "
+            "queries around fails."
+        ),
+    ] = None,
+    smooth: Annotated[
+        float | None,
+        typer.Option(
+            help="Count queries within so many metres in the field, the nearer the more; by "
+            "default 250, or more where queries are few.",
+            show_default=False,
         ),
     ] = None,
     geometry: Annotated[
@@ -74,6 +83,7 @@ def export(
             evaluation=queries,
             identifiability=known_identifiability(city),
             geometry=geometry,
+            smooth=smooth,
             progress=advance,
         )
     say(f"exported: {out}")

@@ -61,12 +61,32 @@ def _below(drawn: folium.Map | None, tiles: str | None) -> dict[str, Any]:
     return {"tiles": tiles} if drawn is None else {"map_": drawn}
 
 
+def _require_content(evaluation: Path | None, smooth: float | None, *, other: bool) -> None:
+    if evaluation is None and not other:
+        msg = (
+            "there is nothing to show on the map; give --evaluation, --ambiguity, "
+            "--identifiability, --drift or --objects, or several of them."
+        )
+        raise InputError(msg)
+    if smooth is not None and evaluation is None:
+        msg = "--smooth is of the field of an evaluation; give --evaluation, too, or leave it out."
+        raise InputError(msg)
+
+
 @app.command(name="map")
 def map_(
     database: Database,
     *,
     evaluation: Annotated[
         Path | None, typer.Option(help="Folder written by `semsig evaluate --out`.")
+    ] = None,
+    smooth: Annotated[
+        float | None,
+        typer.Option(
+            help="Count queries within so many metres in the field of an evaluation, the nearer "
+            "the more; by default 250, or more where queries are few.",
+            show_default=False,
+        ),
     ] = None,
     identifiability: Annotated[
         bool,
@@ -113,12 +133,8 @@ def map_(
     from semsig_gis.maps.page import save_map
     from semsig_gis.objects.table import open_objects
 
-    if not (identifiability or ambiguity) and evaluation is drift is objects is None:
-        msg = (
-            "there is nothing to show on the map; give --evaluation, --ambiguity, "
-            "--identifiability, --drift or --objects, or several of them."
-        )
-        raise InputError(msg)
+    cells = identifiability or ambiguity or drift is not None
+    _require_content(evaluation, smooth, other=cells or objects is not None)
     keep_inputs(out, read=(database, drift, objects, buildings, streets))
     require_suffix(".html", out)
     results = None if evaluation is None else open_evaluation(evaluation)
@@ -136,7 +152,7 @@ def map_(
     with progress("drawing the map"):
         drawn: Any = None  # a map of folium, which the command line does not know
         if results is not None:
-            drawn = evaluation_map(results, opened, **_below(drawn, tiles))
+            drawn = evaluation_map(results, opened, smooth=smooth, **_below(drawn, tiles))
         if ambiguity:
             drawn = ambiguity_map(opened, identifiability=columns, **_below(drawn, tiles))
         if columns is not None and identifiability:

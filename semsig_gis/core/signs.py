@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import unicodedata
 from dataclasses import dataclass
 from types import MappingProxyType
@@ -32,9 +33,9 @@ COLOURS = (
     "#8fdcc0",
     "#6a4fd8",
     "#8a5a00",
-    "#f4b6d2",
+    "#f4a6cc",
     "#8c2d04",
-    "#b8e1f5",
+    "#b3e6ea",
     "#b4b4b4",
     "#e3b5e3",
     "#dddd99",
@@ -111,25 +112,57 @@ def _luminance(colour: str) -> float:
     return 0.2126 * red + 0.7152 * green + 0.0722 * blue
 
 
-# Blue and orange of Okabe and Ito, which colour-blind people tell apart.
-SUCCESSFUL, FAILED = "#0072b2", "#e69f00"
+@dataclass(frozen=True, slots=True)
+class Mark:
+    """What stands for one thing alone: one of `SHAPES`, coloured ``#rrggbb``."""
 
-# Both ramps change their lightness steadily, so that the hue does not matter.
-ERROR_RAMP = ("#fde0dd", "#fa9fb5", "#dd3497", "#7a0177")
+    shape: str
+    colour: str
+
+
+OUTCOMES: Mapping[str, Mark] = MappingProxyType(
+    {"successful": Mark("circle", "#4bb7f5"), "failed": Mark("triangle", "#570079")}
+)
+"""What became of a query."""
+
+ANSWERS: Mapping[str, Mark] = MappingProxyType(
+    {"given": Mark("diamond", "#00c98b"), "withheld": Mark("square", "#ff8a80")}
+)
+"""The best place for a query, whether it is given as the answer or not."""
+
+ERROR_BREAKS = (10, 25, 50, 100, 200, 500, 1000, 2000)
+"""Metres at which errors are told apart; at 50 begins what has failed."""
+
+# From the first that is seen on light and on dark, getting darker steadily.
+FAILURES: Mapping[float, str] = MappingProxyType(
+    {
+        0.0: "#fac712",
+        0.1: "#e2a622",
+        0.25: "#cb8823",
+        0.5: "#b46c1d",
+        0.75: "#9d5312",
+        0.9: "#853b02",
+    }
+)
+"""Colour of a place by the least share of the queries around it that failed."""
+
+RANK_RAMP = ("#fde0dd", "#fa9fb5", "#dd3497", "#7a0177")
+"""Colours of the places of an answer, the best the darkest."""
+
 CANDIDATE_RAMP = ("#31688e", "#35b779", "#fde725")  # of which none is lost in the dark
 
-# Ten steps of viridis, whose lightness rises steadily.
+# Its lightness rises steadily.
 FOUND_RAMP = (
-    "#440154",
-    "#482878",
-    "#3e4989",
-    "#31688e",
-    "#26828e",
-    "#1f9e89",
-    "#35b779",
-    "#6ece58",
-    "#b5de2b",
-    "#fde725",
+    "#344d35",
+    "#455631",
+    "#56612f",
+    "#686c2e",
+    "#7b7a2f",
+    "#8f8833",
+    "#a59839",
+    "#bdaa43",
+    "#d7bd50",
+    "#f3d260",
 )
 """Colour of a cell by tenths of the chance to be found."""
 
@@ -148,10 +181,10 @@ CHANCES: Mapping[float, str] = MappingProxyType({0.5: "#00441b", 0.9: "#41ab5d",
 
 VERDICTS: Mapping[str, str] = MappingProxyType(
     {
-        "matched": "#009e73",
-        "misnamed": "#cc79a7",
+        "matched": "#12b886",
+        "misnamed": "#e64980",
         "missed": "#ffffff",
-        "false": "#d55e00",
+        "false": "#ff5a1f",
         "outside": "#bdbdbd",
     }
 )
@@ -159,26 +192,34 @@ VERDICTS: Mapping[str, str] = MappingProxyType(
 
 GROUP_COLOURS: Mapping[int, str] = MappingProxyType(
     {
-        1: "#fde725",
-        2: "#7ad151",
-        10: "#22a884",
-        100: "#2a788e",
-        1_000: "#414487",
-        10_000: "#440154",
+        1: "#fcc5ad",
+        2: "#fb9d7c",
+        10: "#f0694b",
+        100: "#d5302a",
+        1_000: "#a81016",
+        10_000: "#6b000c",
     }
 )
 """Colour of a cell by the smallest number of cells with its signature, itself among them."""
 
-SAME_TYPES, SAME_LEVELS = "#ffffff", "#e69f00"
+
+def group_labels() -> list[str]:
+    """Return what is said of the cells of each of `GROUP_COLOURS`."""
+    starts = list(GROUP_COLOURS)[1:]
+    between = [f"{low:,} to {high - 1:,}" for low, high in itertools.pairwise(starts)]
+    return ["no other", *between, f"{starts[-1]:,} or more"]
+
+
+SAME_TYPES, SAME_LEVELS = "#f5f5ff", "#ffd43b"
 """Colours of the cells with the same types, and with the same angle levels, too."""
 
 DRIFT_COLOURS: Mapping[str, str] = MappingProxyType(
-    {"same": "#b3b3ad", "changed": "#f0bf5c", "appeared": "#5aa5d6", "vanished": "#8a3f66"}
+    {"same": "#b3b3ad", "changed": "#ecc980", "appeared": "#73802e", "vanished": "#9c4263"}
 )
 """Colour of a cell by what became of it."""
 
 OBJECT_COLOURS: Mapping[str, str] = MappingProxyType(
-    {"added": "#0072b2", "removed": "#6d1a47", "moved": "#e69f00", "of another class": "#ffffff"}
+    {"added": "#3d4a0c", "removed": "#6d1a47", "moved": "#c98a1b", "of another class": "#fdf6e3"}
 )
 """Colour of an object by what became of it: that of the cells, but darker."""
 

@@ -15,9 +15,11 @@ import numpy as np
 from semsig_gis.core.errors import EmptyResultError, InputError, UnknownNameError, nearest_name
 from semsig_gis.database.answer import REGION_SHARE
 from semsig_gis.database.database import require_same_place
+from semsig_gis.evaluation.field import error_field
 from semsig_gis.exports import geopackage
 from semsig_gis.exports.files import (
     cell_errors,
+    export_field,
     export_geotiff,
     write_csv,
     write_degrees,
@@ -41,8 +43,8 @@ if TYPE_CHECKING:
 LAYERS = ("cells", "objects", "evaluation", "evaluation_lines")
 """What may be written of a database as layers."""
 
-RASTERS = ("ambiguity", "identifiability", "error")
-"""What may be written of a database as one number a cell."""
+RASTERS = ("ambiguity", "identifiability", "error", "field")
+"""What may be written of a database as a raster."""
 
 _ONE_LAYER: Mapping[str, Callable[..., None]] = {".parquet": write_geoparquet, ".csv": write_csv}
 _RASTER = frozenset({".tif", ".tiff"})
@@ -50,7 +52,7 @@ _DEGREES = frozenset({".geojson", ".kml"})
 # What a layer or a raster is made from, beside the cells.
 _NEEDS = {
     "objects": "objects",
-    **dict.fromkeys(("evaluation", "evaluation_lines", "error"), "evaluation"),
+    **dict.fromkeys(("evaluation", "evaluation_lines", "error", "field"), "evaluation"),
     "identifiability": "identifiability",
 }
 
@@ -64,6 +66,7 @@ def export_database(
     identifiability: Identifiability | None = None,
     evaluation: Evaluation | None = None,
     geometry: CellGeometry | None = None,
+    smooth: float | None = None,
     progress: Progress | None = None,
 ) -> None:
     """Write a database, and what else there is of the city, in the format of the file's suffix.
@@ -85,6 +88,9 @@ def export_database(
         Queries and what was found for them.
     geometry : {"polygon", "point"}, optional
         Whether a cell is its square or its viewpoint; by default the square, in CSV the viewpoint.
+    smooth : float, optional
+        How far away a query counts in the raster ``field``, in metres (see
+        `evaluation.field.error_field`).
     progress : callable, optional
         Called with the number of rows written and in all.
 
@@ -114,8 +120,11 @@ def export_database(
 
     Layers ``evaluation``, the queries at their true places, and ``evaluation_lines``, from there
     to the best place where that is another one: the columns of `Evaluation.queries` and
-    ``outcome``: ``found`` (the best place is within 50 m with a probability of 0.5 or more),
-    ``missed`` or ``nothing seen``.
+    ``outcome``: ``successful`` (the best place is within 50 m with a probability of 0.5 or more)
+    or ``failed``.
+
+    Raster ``field``: what became of the queries around every place, in three bands: ``failed`` (the
+    share that failed), ``error`` (their mean error in metres) and ``queries`` (how many speak).
 
     Examples
     --------
@@ -135,6 +144,7 @@ def export_database(
         "identifiability": identifiability,
         "evaluation": evaluation,
         "geometry": geometry,
+        "smooth": smooth,
     }
     names = _content(
         path,
@@ -143,6 +153,9 @@ def export_database(
         given={name for name, value in options.items() if value is not None},
     )
     _require_one_city(path, database, objects, evaluation)
+    if names == ["field"] and evaluation is not None:
+        export_field(error_field(evaluation, database, radius=smooth), database, path)
+        return
     if suffix in _RASTER:
         values, unit = database.type_group_sizes.astype(np.float64), "cells"
         if names == ["error"] and evaluation is not None:
@@ -212,6 +225,7 @@ def _content(path: str | Path, names: Sequence[str], *, suffix: str, given: set[
     # Identifiability is part of a database, wherever it is not asked for.
     used = {"identifiability", *(_NEEDS[name] for name in content if name in _NEEDS)}
     used |= {"geometry"} if "cells" in content else set()
+    used |= {"smooth"} if "field" in content else set()
     unused = sorted(given - used)
     if unused:
         msg = (

@@ -39,6 +39,7 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
     from semsig_gis.database.database import SignatureDatabase
+    from semsig_gis.evaluation.field import ErrorField
     from semsig_gis.evaluation.result import Evaluation
     from semsig_gis.exports.layers import Layer
 
@@ -197,18 +198,40 @@ def export_geotiff(
         raise InputError(msg)
     write_cells(
         path,
-        numbers,
+        {name: (numbers, unit)},
         grid=database.grid,
         columns=database.columns,
         rows=database.rows,
         crs=database.crs,
-        name=name,
-        unit=unit,
-        notes={
-            "licenses": "\n".join(database.licenses),
-            "semsig_version": database.version,
-            **{key: json.dumps(value) for key, value in (facts or {}).items()},
-        },
+        notes=_notes(database, facts or {}),
+    )
+
+
+def _notes(database: SignatureDatabase, facts: Mapping[str, Any]) -> dict[str, str]:
+    return {
+        "licenses": "\n".join(database.licenses),
+        "semsig_version": database.version,
+        **{key: json.dumps(value) for key, value in facts.items()},
+    }
+
+
+def export_field(field: ErrorField, database: SignatureDatabase, path: str | Path) -> None:
+    """Write an error field as a GeoTIFF of three bands; NaN where no query is near.
+
+    ``failed`` is the share of the queries around a pixel that failed, ``error`` their mean error in
+    metres, and ``queries`` how many speak; the radius is in the tags.
+    """
+    columns, rows = np.nonzero(np.isfinite(field.failed.T))
+    unit = {"failed": "", "error": "m", "queries": "queries"}
+    bands = zip(unit, (field.failed, field.errors, field.speaking), strict=True)
+    write_cells(
+        path,
+        {name: (values[rows, columns], unit[name]) for name, values in bands},
+        grid=field.grid,
+        columns=columns.astype(np.int32),
+        rows=rows.astype(np.int32),
+        crs=database.crs,
+        notes=_notes(database, {"radius_m": field.radius}),
     )
 
 

@@ -27,7 +27,15 @@ from semsig_gis.core.geometry import (
     SOURCE_ID,
 )
 from semsig_gis.core.signature import BEARING_UNITS, DISTANCE_UNITS
-from semsig_gis.core.signs import ERROR_RAMP, FAILED, FOUND_RAMP, SUCCESSFUL, class_signs, one_line
+from semsig_gis.core.signs import (
+    FOUND_RAMP,
+    GROUP_COLOURS,
+    OUTCOMES,
+    RANK_RAMP,
+    class_signs,
+    group_labels,
+    one_line,
+)
 from semsig_gis.database.file import database_specs
 from semsig_gis.objects.table import objects_specs
 
@@ -38,7 +46,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
     from pyproj import CRS
 
-    from semsig_gis.core.signs import ClassSign
+    from semsig_gis.core.signs import ClassSign, Mark
     from semsig_gis.core.taxonomy import Taxonomy
     from semsig_gis.database.answer import Answer
     from semsig_gis.database.database import SignatureDatabase
@@ -63,15 +71,11 @@ CLASS_MARKERS = {
     "cross": ("cross_fill", 0, 0.625, 0.475),
 }
 
-OUTCOMES = {"found": SUCCESSFUL, "missed": FAILED, "nothing seen": "#777777"}
-"""Colour of a query by what became of it."""
-
 AMBIGUITY: Classes = {
-    (1, 1): ("alone", FOUND_RAMP[9]),
-    (1, 10): ("2 to 10 alike", FOUND_RAMP[7]),
-    (10, 100): ("11 to 100 alike", FOUND_RAMP[5]),
-    (100, 1000): ("101 to 1,000 alike", FOUND_RAMP[3]),
-    (1000, 1e9): ("more alike", FOUND_RAMP[0]),
+    (low, high - 1): (label, colour)
+    for (low, colour), high, label in zip(
+        GROUP_COLOURS.items(), [*list(GROUP_COLOURS)[1:], 10**9], group_labels(), strict=True
+    )
 }
 """What is said of a cell, and its colour, by how many cells have its types."""
 
@@ -82,10 +86,10 @@ IDENTIFIABILITY: Classes = {
 """What is said of a cell, and its colour, by the chance that a query from it is found."""
 
 RANKS: Classes = {
-    (1, 1): ("rank 1", ERROR_RAMP[3]),
-    (1, 3): ("rank 2 to 3", ERROR_RAMP[2]),
-    (3, 10): ("rank 4 to 10", ERROR_RAMP[1]),
-    (10, 1e9): ("rank 11 and more", ERROR_RAMP[0]),
+    (1, 1): ("rank 1", RANK_RAMP[3]),
+    (1, 3): ("rank 2 to 3", RANK_RAMP[2]),
+    (3, 10): ("rank 4 to 10", RANK_RAMP[1]),
+    (10, 1e9): ("rank 11 and more", RANK_RAMP[0]),
 }
 LABEL_LETTERS = 60
 # What lies below, such as a street map, shows through.
@@ -180,12 +184,12 @@ def by_rank(column: str, *, geometry: str) -> Style:
     for number, (_, colour) in enumerate(RANKS.values()):
         if geometry == "polygon":
             # Its edge is all that is seen of a region from far, and the palest is too pale for it.
-            edge = ERROR_RAMP[1] if colour == ERROR_RAMP[0] else colour
+            edge = RANK_RAMP[1] if colour == RANK_RAMP[0] else colour
             fill = {"color": _rgba(colour, 170), "style": "solid", "outline_color": _rgba(edge)}
             symbols.append(("SimpleFill", {**fill, "outline_style": "solid", "outline_width": 0.4}))
         else:
             # Pale places stand out from a pale map by their edges.
-            edge, metres, smallest = ERROR_RAMP[-1], 12.0 - 2.0 * number, 3.2 - 0.4 * number
+            edge, metres, smallest = RANK_RAMP[-1], 12.0 - 2.0 * number, 3.2 - 0.4 * number
             symbols.append(_marker("circle", colour, metres, smallest=smallest, outline=edge))
     entries = _ranges(RANKS, symbols)
     return Style("Rank", _document(column, entries, geometry, last_first=True))
@@ -195,22 +199,20 @@ def by_outcome(*, geometry: str) -> Style:
     """Return a style of queries by what became of them; a line ends in a mark at the best place."""
     draw = _outcome_line if geometry == "line" else _outcome_point
     entries = {
-        str(number): Entry({"value": outcome}, outcome, draw(outcome, colour))
-        for number, (outcome, colour) in enumerate(OUTCOMES.items())
-        if geometry == "point" or outcome != "nothing seen"  # which has no best place
+        str(number): Entry({"value": outcome}, outcome, draw(mark))
+        for number, (outcome, mark) in enumerate(OUTCOMES.items())
     }
     return Style("Outcome", _document("outcome", entries, geometry))
 
 
-def _outcome_point(outcome: str, colour: str) -> tuple[SymbolLayer, ...]:
-    shape = {"found": "circle", "missed": "triangle"}.get(outcome, "cross2")
-    edge = colour if shape == "cross2" else ""  # its lines are its outline
-    return (_marker(shape, colour, 12.0, smallest=1.8, outline=edge),)
+def _outcome_point(mark: Mark) -> tuple[SymbolLayer, ...]:
+    shape = CLASS_MARKERS[mark.shape][0]
+    return (_marker(shape, mark.colour, 12.0, smallest=1.8, outline="#222222"),)
 
 
-def _outcome_line(_outcome: str, colour: str) -> tuple[SymbolLayer, ...]:
-    line = {"line_color": _rgba(colour, 150), "line_width": 0.26, "line_style": "solid"}
-    end = _marker("cross2", colour, 10.0, smallest=1.4, outline=colour)
+def _outcome_line(mark: Mark) -> tuple[SymbolLayer, ...]:
+    line = {"line_color": _rgba(mark.colour, 150), "line_width": 0.26, "line_style": "solid"}
+    end = _marker("cross2", mark.colour, 10.0, smallest=1.4, outline=mark.colour)
     return ("SimpleLine", line), ("MarkerLine", {"placement": "lastvertex", "rotate": 0}, end)
 
 
@@ -464,9 +466,8 @@ def objects_layer(objects: StreetObjects) -> Layer:
 def evaluation_layers(evaluation: Evaluation, licenses: tuple[str, ...]) -> list[Layer]:
     """Return the queries at their true places, and lines from there to the best places."""
     queries = evaluation.queries
-    found, missed, empty = OUTCOMES
-    unseen = (queries["query_length"] == 0).to_numpy()
-    outcomes = np.select([unseen, evaluation.successful], [empty, found], missed)
+    successful, failed = OUTCOMES
+    outcomes = np.where(evaluation.successful, successful, failed)
     queries = queries.assign(outcome=outcomes)
     placed = queries[queries["best_x"].notna().to_numpy()]
     truth = shapely.get_coordinates(placed.geometry.array)
@@ -486,8 +487,8 @@ def evaluation_layers(evaluation: Evaluation, licenses: tuple[str, ...]) -> list
             name="evaluation",
             title="Queries",
             description=(
-                f"{len(queries)} queries at their true places; found: the best place is within "
-                f"{evaluation.success_metres} m with a probability of "
+                f"{len(queries)} queries at their true places; successful: the best place is "
+                f"within {evaluation.success_metres} m with a probability of "
                 f"{evaluation.success_probability:g} or more."
             ),
             geometry="point",

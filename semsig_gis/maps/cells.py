@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 from dataclasses import dataclass
 from html import escape
 from typing import TYPE_CHECKING, Any
@@ -11,7 +10,13 @@ import numpy as np
 
 from semsig_gis.core.errors import InputError
 from semsig_gis.core.geometry import FULL_TURN
-from semsig_gis.core.signs import FOUND_RAMP, GROUP_COLOURS, SAME_LEVELS, SAME_TYPES
+from semsig_gis.core.signs import (
+    FOUND_RAMP,
+    GROUP_COLOURS,
+    SAME_LEVELS,
+    SAME_TYPES,
+    group_labels,
+)
 from semsig_gis.maps.image import level_image, packed, place_lattices, steps
 from semsig_gis.maps.parts import (
     LIFTING,
@@ -278,11 +283,6 @@ def _chance_bytes(chances: NDArray[np.float64]) -> list[str]:
 def ambiguity_legend(sizes: Mapping[str, NDArray[np.int64]], *, licenses: Sequence[str]) -> str:
     """Return the legend of a map of how many cells look the same, by what is compared, as HTML."""
     starts = list(GROUP_COLOURS)
-    labels = [
-        "no other",
-        *(f"{low:,} to {high - 1:,}" for low, high in itertools.pairwise(starts[1:])),
-        f"{starts[-1]:,} or more",
-    ]
     shares = [
         np.bincount(np.digitize(size, starts), minlength=len(starts) + 1)[1:] / len(size)
         for size in sizes.values()
@@ -291,7 +291,9 @@ def ambiguity_legend(sizes: Mapping[str, NDArray[np.int64]], *, licenses: Sequen
         f"<tr><td>{swatch(colour, LIFTING)}{label}</td>"
         + "".join(f"<td>{share:.1%}</td>" for share in line)
         + "</tr>"
-        for colour, label, *line in zip(GROUP_COLOURS.values(), labels, *shares, strict=True)
+        for colour, label, *line in zip(
+            GROUP_COLOURS.values(), group_labels(), *shares, strict=True
+        )
     )
     head = "".join(f"<td><small>{escape(name)}</small></td>" for name in sizes)
     cells = len(next(iter(sizes.values())))

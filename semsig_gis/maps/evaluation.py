@@ -9,28 +9,30 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from semsig_gis.core.signs import ERROR_RAMP, FAILED, SUCCESSFUL, mixed
+from semsig_gis.core.signs import ERROR_BREAKS, FAILURES, OUTCOMES
 from semsig_gis.database.observation import parse_view
+from semsig_gis.evaluation.field import ENOUGH, error_field
 from semsig_gis.evaluation.result import Evaluation
-from semsig_gis.maps.image import mercator, packed
+from semsig_gis.maps.image import mercator_places, packed
 from semsig_gis.maps.parts import (
+    OUTLINES,
     Drawing,
     add_city,
     cell_signature,
+    class_bar,
     class_titles,
     colour_cells,
     corners_of,
     draw,
     finished_map,
     isolated,
+    mark_svg,
     popup_signature,
     prepared_map,
     query_signature,
-    ramp_bar,
     ranks_text,
     shades,
     sources,
-    swatch,
     ties_text,
     to_latlon,
 )
@@ -44,6 +46,7 @@ if TYPE_CHECKING:
 
     from semsig_gis.core.view import View
     from semsig_gis.database.database import SignatureDatabase
+    from semsig_gis.evaluation.field import ErrorField
 
 QUERY_FIELDS = (
     *(
@@ -57,13 +60,16 @@ QUERY_FIELDS = (
 )
 MANY = 2000  # queries, whose circles are smaller
 KILOMETRE = 1000
-THRESHOLDS = (10, 25, 50, 100)  # metres of error that the legend tells of
+THRESHOLDS = ERROR_BREAKS[:4]  # metres of error that the legend tells of
+SHARES = 250  # steps of a share in a byte, of which 0 is none
+SPOKEN = 10  # steps of a query that speaks
 
 
 def evaluation_map(
     evaluation: Evaluation,
     database: SignatureDatabase,
     *,
+    smooth: float | None = None,
     map_: folium.Map | None = None,
     tiles: str | None = None,
 ) -> folium.Map:
@@ -75,6 +81,8 @@ def evaluation_map(
         What to show.
     database : SignatureDatabase
         The database that was evaluated.
+    smooth : float, optional
+        How far away a query counts in the field, in metres (see `evaluation.field.error_field`).
     map_ : folium.Map, optional
         Map to add the layers to; a new one by default.
     tiles : str, optional
@@ -84,22 +92,20 @@ def evaluation_map(
     Returns
     -------
     folium.Map
-        The map, with these layers: the cells as an image (darker where more objects are seen), a
-        heatmap of the expected errors (at every zoom, the mean of the queries around a pixel), the
+        The map, with these layers: the cells as an image (darker where more objects are seen), the
+        share of the queries around every place that failed (hatched where few speak of it), the
         failed and the successful queries, of which a click tells, and lines from the true to the
         estimated places (hidden at first).
 
     Raises
     ------
     InputError
-        If the evaluation was made with another database, `tiles` is not known or needs a key, or
-        both `tiles` and `map_` are given.
+        If the evaluation was made with another database, `smooth` is out of range, `tiles` is not
+        known or needs a key, or both `tiles` and `map_` are given.
 
     Notes
     -----
-    A query is successful when its error is at most 50 m with probability 0.5 or more. In the
-    heatmap an error counts with at most that of a guess: the root mean square distance of two
-    random cells.
+    A query is successful when its error is at most 50 m with probability 0.5 or more.
 
     Examples
     --------
@@ -113,29 +119,27 @@ def evaluation_map(
     places = to_latlon(xy, database.crs)
     best_places = to_latlon(queries[["best_x", "best_y"]].to_numpy(np.float64), database.crs)
     records = _query_records(evaluation, database, places, best_places)
-    # How far two random cells lie apart (root mean square).
-    guess = math.sqrt(2.0 * float(database.xy.var(axis=0).sum())) or database.grid.step
+    field = error_field(evaluation, database, radius=smooth)
     page = prepared_map(map_, tiles, title="Localization errors")
     city = add_city(page, database)
-    errors = np.minimum(queries["error_m"].to_numpy(np.float64) / guess, 1.0)
-    field = Drawing(None, "heat", *_heat(xy, errors, database), group="cells")
-    field.add_to(page)
-    colour_cells(page, "Expected errors", city, field)
-    outcomes = {
-        "Failed": (~evaluation.successful, FAILED),
-        "Successful": (evaluation.successful, SUCCESSFUL),
-    }
+    around = Drawing(None, "field", *_field(field, database), group="cells")
+    around.add_to(page)
+    colour_cells(page, "Share of queries that fail", city, around)
+    outcomes = dict(zip(OUTCOMES, (evaluation.successful, ~evaluation.successful), strict=True))
     pairs = np.stack([places, best_places], axis=1)
     located = np.isfinite(best_places).all(axis=1)
     lines = [
-        [{"color": colour}, pairs[some & located].tolist()] for some, colour in outcomes.values()
+        [{"color": OUTCOMES[outcome].colour}, pairs[some & located].tolist()]
+        for outcome, some in outcomes.items()
     ]
     draw(page, "Lines from true to estimated places", "lines", lines, group="queries", show=False)
-    for outcome, (some, _) in outcomes.items():
-        name = f"{outcome} queries ({int(some.sum()):,})"
+    # The rarer last, so that they lie on top.
+    for outcome, some in sorted(outcomes.items(), key=lambda one: -one[1].sum()):
+        name = f"{outcome.capitalize()} queries ({int(some.sum()):,})"
         points = list(itertools.compress(records, some))
-        draw(page, name, "points", QUERY_FIELDS, class_titles(database), points, group="queries")
-    legend = evaluation_legend(evaluation, error_limit=_metres(guess), licenses=database.licenses)
+        look = (QUERY_FIELDS, class_titles(database), points, OUTLINES[OUTCOMES[outcome].shape])
+        draw(page, name, "points", *look, group="queries")
+    legend = evaluation_legend(evaluation, radius=field.radius, licenses=database.licenses)
     view = corners_of(database) if map_ is None else None
     return finished_map(page, database, legend=legend, view=view)
 
@@ -176,10 +180,12 @@ def _query_records(
             ", ".join(f"{_metres(error)} off" for error in next_errors[number]) or None,
             cell_signature(database, best_rows[number]) if located else None,
         ]
-        outcome, colour = ("successful", SUCCESSFUL) if successful[number] else ("failed", FAILED)
+        outcome = "successful" if successful[number] else "failed"
         best = [best_places[number].tolist(), *next_places[number]] if located else None
         name = f"Query {number + 1:,}: {outcome}"
-        records.append([places[number].tolist(), colour, radius, best, name, details])
+        records.append(
+            [places[number].tolist(), OUTCOMES[outcome].colour, radius, best, name, details]
+        )
     return records
 
 
@@ -213,21 +219,33 @@ def _metres(error: float) -> str:
     return f"{error:,.0f} m" if error < KILOMETRE else f"{error / 1000:,.2f} km"
 
 
-def _heat(
-    xy: NDArray[np.float64], errors: NDArray[np.float64], database: SignatureDatabase
+def _field(
+    field: ErrorField, database: SignatureDatabase
 ) -> tuple[dict[str, list[str]], dict[str, Any]]:
-    """Return the places and errors, as shares of a guess's, for the script."""
-    places, about = mercator(xy, database.crs)
+    """Return the field for the script: its shares as bytes, and who speaks, evenly in Mercator."""
+    height, width = field.failed.shape
+    low = np.array(field.grid.origin)
+    high = low + field.grid.step * np.array([width, height])
+    places, box = mercator_places(database, low, high, (height, width))
+    failed, speaking = field.at(places)
+    values = np.where(np.isfinite(failed), 1.0 + SHARES * np.nan_to_num(failed), 0.0)
     arrays = {
-        "x": packed(np.ascontiguousarray(places[:, 0])),
-        "y": packed(np.ascontiguousarray(places[:, 1])),
-        "error": packed(np.rint(255.0 * errors).astype(np.uint8)),
+        "values": packed(np.rint(values).astype(np.uint8)),
+        "speaking": packed(np.ceil(SPOKEN * speaking).clip(0, 255).astype(np.uint8)),
     }
-    return arrays, {**about, "colours": mixed(np.linspace(0.0, 1.0, 256), ERROR_RAMP)}
+    about = {
+        "box": box,
+        "width": width,
+        "height": height,
+        "breaks": [1.0 + SHARES * least if least else 0.0 for least in FAILURES],
+        "colours": list(FAILURES.values()),
+        "enough": SPOKEN * ENOUGH,
+    }
+    return arrays, about
 
 
-def evaluation_legend(evaluation: Evaluation, *, error_limit: str, licenses: Sequence[str]) -> str:
-    """Return the legend of a map of errors, of which the ramp ends at a limit, as escaped HTML."""
+def evaluation_legend(evaluation: Evaluation, *, radius: float, licenses: Sequence[str]) -> str:
+    """Return the legend of a map of errors, whose field is of a radius, as escaped HTML."""
     count, distortions = len(evaluation.queries), chain_text(evaluation.asked.distortions)
     successes = int(evaluation.successful.sum())
     best = "the best candidate" if evaluation.top == 1 else f"the best of {evaluation.top:,}"
@@ -235,16 +253,18 @@ def evaluation_legend(evaluation: Evaluation, *, error_limit: str, licenses: Seq
         f"<tr><td>P(error ≤ {threshold} m)</td><td>{share:.1%}</td></tr>"
         for threshold, share in zip(THRESHOLDS, evaluation.cdf(THRESHOLDS), strict=True)
     )
+    limits = [f"{least:.0%}" for least in FAILURES if least]
     return (
         "<summary>Localization errors</summary>"
+        f"<p>{mark_svg(OUTCOMES['successful'])} {successes:,} successful: within "
+        f"{Evaluation.success_metres} m with probability {Evaluation.success_probability:g} or more"
+        f"<br>{mark_svg(OUTCOMES['failed'])} {count - successes:,} failed</p>"
+        f"<p>Share of the queries within {radius:,g} m that failed, the nearer counting more"
+        f"{class_bar(list(FAILURES.values()), limits)}"
+        f'<i class="hatched"></i>fewer than {ENOUGH:g} queries speak</p>'
         f"<p>{count:,} queries among {evaluation.database['cells']:,} cells<br>"
         f"Method: {escape(str(evaluation.method))}, {best}<br>"
         f"Distortion: {isolated(distortions or 'none')}</p>"
         f"<table>{shares}</table>"
-        f"<p>{swatch(SUCCESSFUL)}{successes:,} successful: within {Evaluation.success_metres} m "
-        f"with probability {Evaluation.success_probability:g} or more<br>"
-        f"{swatch(FAILED)}{count - successes:,} failed</p>"
-        "<p>Mean expected error nearby"
-        f"{ramp_bar(ERROR_RAMP, '0 m', f'{error_limit}, as bad as a guess', sign='ramp heat')}</p>"
         f"{shades()}{sources(licenses)}"
     )

@@ -142,6 +142,23 @@ def _mercator_lattice(
     return metres, [west, south, east, north]
 
 
+def mercator_places(
+    database: SignatureDatabase,
+    low: NDArray[np.float64],
+    high: NDArray[np.float64],
+    shape: tuple[int, int],
+) -> tuple[NDArray[np.float64], list[float]]:
+    """Return places in the CRS of a database, evenly spaced in Web Mercator, with their box there.
+
+    They are the centres of so many rows and columns over an area, from north to south, shape
+    (rows, columns, 2).
+    """
+    lattice, box = _mercator_lattice(database, low, high)
+    rows, columns = shape
+    places = _between(rows) @ lattice @ _between(columns).T
+    return np.moveaxis(places[:, ::-1], 0, 2), box
+
+
 def _between(pixels: int) -> NDArray[np.float64]:
     """Return the matrix that interpolates the values of a lattice at the centres of pixels."""
     places = (np.arange(pixels) + 0.5) * (_LATTICE / pixels)

@@ -8,11 +8,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from semsig_gis.core.signs import (
+    ANSWERS,
     CANDIDATE_RAMP,
     CELL_CHANCES,
     CHANCES,
-    FAILED,
-    SUCCESSFUL,
     VERDICTS,
     mixed,
 )
@@ -23,6 +22,7 @@ from semsig_gis.likelihood.explain import VERDICTS as COUNTED
 from semsig_gis.maps.image import level_image
 from semsig_gis.maps.parts import (
     FLIPPING,
+    OUTLINES,
     add_city,
     cell_image,
     cell_signature,
@@ -31,6 +31,7 @@ from semsig_gis.maps.parts import (
     draw,
     finished_map,
     isolated,
+    mark_svg,
     prepared_map,
     query_signature,
     query_text,
@@ -197,10 +198,10 @@ class _Drawings:
         location, place = self.location, self.location.estimate
         longer, shorter, bearing = place.ellipse()
         (centre,) = self.latlon([place.x, place.y])
-        name, colour = (
-            ("The answer", SUCCESSFUL)
+        name, mark = (
+            ("The answer", ANSWERS["given"])
             if location.answer.given
-            else ("Cannot tell: the best place", FAILED)
+            else ("Cannot tell: the best place", ANSWERS["withheld"])
         )
         ellipse = f"{longer:.1f} m along {bearing:.0f}°, {shorter:.1f} m across"
         details = [
@@ -210,10 +211,11 @@ class _Drawings:
             _north(place.heading, place.heading_sigma),
             str(location.cell_id),
         ]
-        outline = {"color": colour, "weight": 3, "opacity": 0.9}
+        record = [centre, mark.colour, 6, None, name, details]
+        outline = {"color": mark.colour, "weight": 3, "opacity": 0.9}
         return [
             ["lines", [[outline, [self.latlon(place.outline())]]]],
-            ["points", PLACE_FIELDS, {}, [[centre, colour, 6, None, name, details]]],
+            ["points", PLACE_FIELDS, {}, [record], OUTLINES[mark.shape]],
         ]
 
     def candidates(self) -> list[list[Any]]:
@@ -315,10 +317,10 @@ def _notes(answer: Answer) -> str:
 def location_legend(location: Location) -> str:
     """Return the legend of a map of chances, as HTML with data escaped."""
     posterior, answer, estimate = location.posterior, location.answer, location.estimate
-    colour, verdict, note = (
-        (SUCCESSFUL, "The answer", "")
+    mark, verdict, note = (
+        (ANSWERS["given"], "The answer", "")
         if answer.given
-        else (FAILED, "Cannot tell; the best place", f"<p>{BEST_PLACE}</p>")
+        else (ANSWERS["withheld"], "Cannot tell; the best place", f"<p>{BEST_PLACE}</p>")
     )
     counts = {share: len(posterior.credible_cells(share)) for share in CHANCES}
     regions = "<br>".join(
@@ -340,8 +342,8 @@ def location_legend(location: Location) -> str:
         "<summary>Where it was seen</summary>"
         f"<p>{query_text(location.query, posterior.database.taxonomy)}"
         f"Method: likelihood, {isolated(location.noise)} noise, {len(posterior.database):,} cells"
-        f"</p><p>{swatch(colour)}<b>{verdict}</b>: within {location.rule.radius:g} m with a chance "
-        f"of {answer.mass:.1%}; if there, ±&nbsp;{estimate.sigma:.1f}&nbsp;m each way "
+        f"</p><p>{mark_svg(mark)} <b>{verdict}</b>: within {location.rule.radius:g} m with a "
+        f"chance of {answer.mass:.1%}; if there, ±&nbsp;{estimate.sigma:.1f}&nbsp;m each way "
         f"(ellipse: 90 %)</p>{note}{_notes(location)}"
         f"<p>Chance of a cell, or around it, in percent<br>{chances}</p>"
         f"<p>Regions, the fewest cells that hold<br>{regions}</p>"

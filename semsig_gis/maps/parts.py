@@ -28,14 +28,14 @@ from semsig_gis.database.database import SignatureDatabase
 from semsig_gis.maps.image import city_image, script_json
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
+    from collections.abc import Iterable, Sequence
 
     from branca.element import Figure
     from numpy.typing import ArrayLike, NDArray
     from pyproj import CRS
 
     from semsig_gis.core.signature import Signature
-    from semsig_gis.core.signs import ClassSign
+    from semsig_gis.core.signs import ClassSign, Mark
     from semsig_gis.core.taxonomy import Taxonomy
     from semsig_gis.core.view import Photo, Sector
     from semsig_gis.objects.table import StreetObjects
@@ -46,7 +46,7 @@ CLOSE_ZOOM = 17  # the closest that a new map shows by itself
 # Files of the folder ``js`` that every page has, in this order.
 PAGE_FILES = (
     *("page.css", "panel.css", "layers.js", "state.js", "panel.js", "search.js", "controls.js"),
-    *("arrays.js", "board.js", "heat.js", "objects.js", "ground.js"),
+    *("arrays.js", "board.js", "field.js", "objects.js", "ground.js"),
 )
 WITHOUT_KEY = "a provider such as 'OpenStreetMap.Mapnik' or 'CyclOSM'"
 POWERS = 4  # of x and y, which tell a place within millimetres in a city
@@ -428,6 +428,14 @@ def sign_svg(sign: ClassSign) -> str:
     )
 
 
+def mark_svg(mark: Mark) -> str:
+    """Return a mark as an element of a page."""
+    return (
+        '<svg class="semsig-sign" viewBox="-1.5 -1.5 3 3" aria-hidden="true">'
+        f'<path d="{OUTLINES[mark.shape]}" fill="{mark.colour}"/></svg>'
+    )
+
+
 def isolated(text: str) -> str:
     """Return text from data, in which signs of direction turn no other text."""
     return f"<bdi>{escape(text)}</bdi>"
@@ -462,6 +470,20 @@ def ramp_bar(colours: Iterable[str], low: str, high: str, *, sign: str = "ramp")
     return (
         f'<i class="{sign}" style="background:{gradient}"></i>'
         f'<span class="ends"><small>{low}</small><small>{high}</small></span>'
+    )
+
+
+def class_bar(colours: Sequence[str], breaks: Sequence[str]) -> str:
+    """Return a bar of colours with what parts each from the next."""
+    share = 100.0 / len(colours)
+    parts = ",".join(
+        f"{colour} {number * share:.1f}% {(number + 1) * share:.1f}%"
+        for number, colour in enumerate(colours)
+    )
+    labels = "".join(f"<small>{text}</small>" for text in breaks)
+    return (
+        f'<i class="ramp" style="background:linear-gradient(to right,{parts})"></i>'
+        f'<span class="breaks">{labels}</span>'
     )
 
 

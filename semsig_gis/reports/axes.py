@@ -18,13 +18,13 @@ from mpl_toolkits.axes_grid1.anchored_artists import AnchoredSizeBar
 
 from semsig_gis.core.errors import EmptyResultError, InputError, UnknownNameError, nearest_name
 from semsig_gis.core.signs import (
+    ANSWERS,
     CANDIDATE_RAMP,
     CELL_CHANCES,
-    FAILED,
     FOUND_RAMP,
     GROUP_COLOURS,
+    OUTCOMES,
     SHADES,
-    SUCCESSFUL,
     WHITE,
     class_signs,
 )
@@ -278,7 +278,7 @@ def plot_answer(answer: Answer, *, ax: Axes | None = None, legend: bool = True) 
         linewidths=0.5,
         zorder=3,
     )
-    axes.plot(columns["x"][:1], columns["y"][:1], **_place_look(SUCCESSFUL))
+    axes.plot(columns["x"][:1], columns["y"][:1], **_place_look(ANSWERS["given"].colour))
     axes.set_title(f"The best {len(ranks):,} of {answer.cells:,} cells")
     _frame(axes)
     if legend:
@@ -351,16 +351,13 @@ MOST_CURVES = 7  # whose markers stand apart
 
 def _draw_outcomes(evaluation: Evaluation, axes: Axes) -> Axes:
     places = evaluation.queries.geometry
-    for name, some, marker, colour in (
-        ("failed", ~evaluation.successful, "X", FAILED),
-        ("successful", evaluation.successful, "o", SUCCESSFUL),
-    ):
+    for name, some in (("failed", ~evaluation.successful), ("successful", evaluation.successful)):
         axes.plot(
             places.x[some],
             places.y[some],
             linestyle="",
-            marker=marker,
-            color=colour,
+            marker=MARKERS[OUTCOMES[name].shape][0],
+            color=OUTCOMES[name].colour,
             markersize=2.5 if len(places) >= MANY else 6.0,
             markeredgecolor=WHITE,
             markeredgewidth=0.0 if len(places) >= MANY else 0.5,
@@ -389,7 +386,7 @@ def _draw_location(location: Location, *, ax: Axes | None, legend: bool) -> Axes
     colours = np.array([*CELL_CHANCES.values()])[levels]
     x, y = database.xy[seen].T
     axes.scatter(x, y, c=colours, s=DOT, linewidths=0, marker="s", zorder=2)
-    colour = SUCCESSFUL if location.answer.given else FAILED
+    colour = ANSWERS["given" if location.answer.given else "withheld"].colour
     longer, shorter, bearing = place.ellipse()
     # An ellipse of matplotlib is turned against the clock from the east.
     size: dict[str, Any] = {"width": 2 * shorter, "height": 2 * longer, "angle": -bearing}

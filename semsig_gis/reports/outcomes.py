@@ -10,10 +10,10 @@ import numpy as np
 from matplotlib.colors import to_rgba
 from matplotlib.lines import Line2D
 
-from semsig_gis.core.signs import FAILED, SUCCESSFUL
+from semsig_gis.core.signs import OUTCOMES
 from semsig_gis.reports.parts import OutcomeMap
 from semsig_gis.reports.plots import GROUND, SOFT, blank_figure, draw_legend, label, saved
-from semsig_gis.reports.scenes import draw_north, draw_scale
+from semsig_gis.reports.scenes import MARKERS, draw_north, draw_scale
 
 if TYPE_CHECKING:
     from semsig_gis.database.database import SignatureDatabase
@@ -64,8 +64,8 @@ def draw_map(shown: OutcomeMap) -> Picture:
     (left, bottom), (right, top) = (low + high) / 2 - reach, (low + high) / 2 + reach
     height = above + tall + LEGEND
     kinds = {
-        "failed": (~shown.successful, _look("X", FAILED, len(shown.places))),
-        "successful": (shown.successful, _look("o", SUCCESSFUL, len(shown.places))),
+        "failed": (~shown.successful, _look("failed", len(shown.places))),
+        "successful": (shown.successful, _look("successful", len(shown.places))),
     }
     with blank_figure(WIDTH, height) as figure:
         place = (MARGIN / WIDTH, LEGEND / height, inside / WIDTH, tall / height)
@@ -93,11 +93,11 @@ def draw_map(shown: OutcomeMap) -> Picture:
         return saved(figure, title=shown.title, description=description)
 
 
-def _look(marker: str, colour: str, places: int) -> dict[str, Any]:
+def _look(outcome: str, places: int) -> dict[str, Any]:
     return {
         "linestyle": "",
-        "marker": marker,
-        "color": colour,
+        "marker": MARKERS[OUTCOMES[outcome].shape][0],
+        "color": OUTCOMES[outcome].colour,
         "markersize": 6.0 if places <= MANY_PLACES / 4 else 4.0 if places <= MANY_PLACES else 2.5,
         "markeredgecolor": GROUND,
         "markeredgewidth": 0.5 if places <= MANY_PLACES else 0.0,

@@ -108,20 +108,19 @@ def _chosen_band(source: rasterio.DatasetReader, path: str, band: int | None) ->
 
 def write_cells(
     path: str | Path,
-    values: NDArray[np.float64],
+    bands: Mapping[str, tuple[NDArray[np.float64], str]],
     *,
     grid: GridSpec,
     columns: NDArray[np.int32],
     rows: NDArray[np.int32],
     crs: CRS,
-    name: str,
-    unit: str = "",
     notes: Mapping[str, str],
 ) -> None:
-    """Write one number a cell as a Cloud-Optimised GeoTIFF, whole; NaN where there is none.
+    """Write numbers of cells as a Cloud-Optimised GeoTIFF, whole; NaN where there is none.
 
-    Cells, at least one, are ordered by column, and written in strips, so that memory stays flat.
-    InputError if the cells span too wide an area, or the file cannot be written.
+    Each band has a name, one number a cell and their unit. Cells, at least one, are ordered by
+    column, and written in strips, so that memory stays flat. InputError if the cells span too wide
+    an area, or the file cannot be written.
     """
     left, top = int(columns[0]), int(rows.max())
     width, height = int(columns[-1]) - left + 1, top - int(rows.min()) + 1
@@ -141,7 +140,7 @@ def write_cells(
                 driver="GTiff",
                 width=width,
                 height=height,
-                count=1,
+                count=len(bands),
                 dtype="float32",
                 nodata=np.nan,
                 crs=crs.to_wkt(),
@@ -152,14 +151,17 @@ def write_cells(
                 sparse_ok=True,
             ) as file:
                 file.update_tags(**notes)
-                file.set_band_description(1, name)
-                file.set_band_unit(1, unit)
+                for band, (name, (_, unit)) in enumerate(bands.items(), start=1):
+                    file.set_band_description(band, name)
+                    file.set_band_unit(band, unit)
                 for start in range(0, width, TILE):
                     low, high = np.searchsorted(columns, [left + start, left + start + TILE])
                     strip = np.full((height, min(TILE, width - start)), np.nan, np.float32)
+                    window = Window(start, 0, strip.shape[1], height)
                     across = columns[low:high] - left - start
-                    strip[top - rows[low:high], across] = values[low:high]
-                    file.write(strip, 1, window=Window(start, 0, strip.shape[1], height))
+                    for band, (values, _) in enumerate(bands.values(), start=1):
+                        strip[top - rows[low:high], across] = values[low:high]
+                        file.write(strip, band, window=window)
             rasterio.shutil.copy(
                 strips,
                 partial,
@@ -185,4 +187,4 @@ def _check_blocks(path: Path) -> None:
         for level in (None, *range(len(file.overviews(1)))):
             with rasterio.open(path, overview_level=level) as part:
                 for _, window in part.block_windows(1):
-                    part.read(1, window=window)
+                    part.read(window=window)

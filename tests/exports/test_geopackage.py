@@ -36,7 +36,7 @@ from worlds import CORNER, World, assert_same
 from semsig_gis.core.errors import DatabaseError, EmptyResultError, InputError
 from semsig_gis.core.geometry import GridSpec
 from semsig_gis.core.signature import SignatureSpec, quantize
-from semsig_gis.core.signs import class_signs
+from semsig_gis.core.signs import OUTCOMES, class_signs
 from semsig_gis.core.taxonomy import Taxonomy
 from semsig_gis.database.build import build_database
 from semsig_gis.database.views import ViewpointSpec
@@ -268,9 +268,8 @@ def test_queries_and_lines(file: Path, tmp_path: Path) -> None:
     results = EVALUATION
     points, lines = (gpd.read_file(file, layer=name) for name in LAYERS[2:4])
     assert points.geometry.geom_equals(results.queries.geometry.reset_index(drop=True)).all()
-    assert set(points["outcome"]) == {"found", "missed", "nothing seen"}
-    assert (points["outcome"] == "nothing seen").sum() == results.unlocalized
-    assert ((points["outcome"] == "found") == results.successful).all()
+    assert set(points["outcome"]) == set(OUTCOMES)
+    assert ((points["outcome"] == "successful") == results.successful).all()
     assert 0 < len(lines) < len(points) - results.unlocalized
     truth = shapely.get_coordinates(results.queries.geometry.array)
     best = results.queries[["best_x", "best_y"]].to_numpy(np.float64)
@@ -283,7 +282,7 @@ def test_queries_and_lines(file: Path, tmp_path: Path) -> None:
     empty, file = dataclasses.replace(results, queries=queries), tmp_path / "empty.gpkg"
     export_database(DATABASE, file, evaluation=empty)
     assert len(gpd.read_file(file, layer="evaluation_lines")) == 0
-    assert set(gpd.read_file(file, layer="evaluation")["outcome"]) == {"nothing seen"}
+    assert set(gpd.read_file(file, layer="evaluation")["outcome"]) == {"failed"}
 
 
 def test_a_debian_gdal_reads_it(file: Path) -> None:
@@ -422,8 +421,7 @@ def test_qgis_colours_the_layers_at_once(
     assert all("<script>" in label for label in labels)  # QGIS shows a legend as plain text
     assert all(label.isprintable() and "[%" not in label for label in labels)
     assert max(map(len, labels)) <= 60
-    outcomes = ["found", "missed", "nothing seen"]
-    assert [layer["labels"] for layer in drawn[1:3]] == [outcomes, outcomes[:2]]
+    assert [layer["labels"] for layer in drawn[1:3]] == [list(OUTCOMES)] * 2
     assert drawn[-1]["labels"][-1] == "found: 90 to 100 %"
     assert drawn[-1]["features"] == len(DATABASE)
     signs = class_signs(taxonomy)

@@ -15,6 +15,7 @@ from small_city import chances_of, small_city, small_evaluation, small_location
 
 from semsig_gis.core.errors import InputError
 from semsig_gis.core.geometry import GridSpec
+from semsig_gis.evaluation.field import error_field
 from semsig_gis.exports import export_answer, export_database
 from semsig_gis.exports.files import cell_errors, export_geotiff
 from semsig_gis.storage import raster
@@ -70,6 +71,34 @@ def test_layers_of_a_city(tmp_path: Path) -> None:
     with rasterio.open(tmp_path / "p.tif") as read:
         tags = {name: json.loads(read.tags()[name]) for name in ("query", "north", "prior")}
     assert tags == {name: location.to_dict()[name] for name in tags}
+
+
+@pytest.mark.parametrize("radius", [None, 40.0])
+def test_the_field_of_a_map(radius: float | None, tmp_path: Path) -> None:
+    database, evaluation, file = small_city()[0], small_evaluation(), tmp_path / "field.tif"
+    export_database(database, file, layers="field", evaluation=evaluation, smooth=radius)
+    field = error_field(evaluation, database, radius=radius)
+    assert cog_validate(file, strict=True) == (True, [], [])
+    with rasterio.open(file) as read:
+        assert read.descriptions == ("failed", "error", "queries")
+        assert read.units == (None, "m", "queries")
+        assert json.loads(read.tags()["radius_m"]) == field.radius
+        places = [(query.x, query.y) for query in evaluation.queries.geometry]
+        told = np.array(list(read.sample(places)))
+        assert read.res == (field.grid.step, field.grid.step)
+        whole = read.read(1)
+    columns, rows = field.grid.cells_at(np.array(places))
+    for band, values in enumerate((field.failed, field.errors, field.speaking)):
+        assert np.array_equal(told[:, band], values[rows, columns].astype(np.float32))
+    assert np.isfinite(whole).sum() == np.isfinite(field.failed).sum()
+
+
+def test_what_is_not_of_the_field_is_refused(tmp_path: Path) -> None:
+    database, _ = small_city()
+    with refused(InputError, "no evaluation"):
+        export_database(database, tmp_path / "a.tif", layers="field")
+    with refused(InputError, "no smooth"):
+        export_database(database, tmp_path / "a.tif", smooth=250.0)
 
 
 def test_a_large_one_is_cloud_optimised_too(tmp_path: Path) -> None:

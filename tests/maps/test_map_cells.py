@@ -14,7 +14,7 @@ from map_pages import IMAGES, LEGEND
 from small_city import chances_of
 from worlds import CODES, TAXONOMY, random_town
 
-from semsig_gis.core.signs import OBJECT_COLOURS
+from semsig_gis.core.signs import OBJECT_COLOURS, SAME_LEVELS, SAME_TYPES
 from semsig_gis.database.build import build_database
 from semsig_gis.database.update import compare_cells
 from semsig_gis.maps.cells import ambiguity_map, identifiability_map
@@ -98,9 +98,9 @@ def test_a_sign_is_a_jump_away_and_layers_are_switched(page: MapPage) -> None:
     page.click(CITY, LARGEST)
     others = [cell for cell in ALIKE if cell != LARGEST]
     twins = len(group(LARGEST, angles=True)) - 1
-    assert page.circles("#ffffff") == len(others)
-    assert page.circles("#e69f00") == twins
-    page.ask("circles('#ffffff')[0].fire('click')")
+    assert page.circles(SAME_TYPES) == len(others)
+    assert page.circles(SAME_LEVELS) == twins
+    page.ask("circles(arguments[0])[0].fire('click')", SAME_TYPES)
     other = int(np.searchsorted(CITY.cell_ids, int(page.told()["Cell"])))
     away = np.hypot(*(CITY.xy[others] - CITY.xy[LARGEST]).T)
     assert other in np.array(others)[np.isclose(away, away.max())]  # the nearest lie on top
@@ -111,7 +111,7 @@ def test_a_sign_is_a_jump_away_and_layers_are_switched(page: MapPage) -> None:
     assert page.all(IMAGES) == []
     page.switch("Tell of a cell when clicked")
     time.sleep(0.5)
-    assert page.circles("#ffffff") == 0
+    assert page.circles(SAME_TYPES) == 0
     page.ask("map.fire('click', {latlng: map.getCenter()})")
     assert page.told()["title"] == "A place on the map"
 

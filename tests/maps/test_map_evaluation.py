@@ -6,6 +6,8 @@ import dataclasses
 import re
 from typing import TYPE_CHECKING
 
+import folium
+import geopandas as gpd
 import numpy as np
 import pytest
 from map_pages import IMAGES, LEGEND
@@ -15,14 +17,18 @@ from sentences import refused
 from small_city import small_city, small_evaluation
 
 from semsig_gis.core.errors import InputError
-from semsig_gis.core.signs import ERROR_RAMP, FAILED, SUCCESSFUL
+from semsig_gis.core.signs import FAILURES, OUTCOMES
 from semsig_gis.evaluation.evaluate import evaluate
 from semsig_gis.maps.evaluation import evaluation_map
 from semsig_gis.maps.page import page_of_map
+from semsig_gis.maps.parts import OUTLINES
 
 if TYPE_CHECKING:
     from map_pages import MapPage
 
+    from semsig_gis.evaluation.result import Evaluation
+
+SUCCESSFUL, FAILED = (mark.colour for mark in OUTCOMES.values())
 CITY, EVALUATION = small_city()[0], small_evaluation("medium")
 
 
@@ -42,11 +48,11 @@ def test_an_evaluation_in_a_browser(evaluated: MapPage) -> None:
         assert evaluated.drawn(colour) == 0
         evaluated.switch(name)
         assert evaluated.drawn(colour) >= before * 0.9
-    assert len(evaluated.all("canvas.semsig-heat")) == 1
+    assert len(evaluated.all("canvas.semsig-field")) == 1
     evaluated.ask("map.setZoom(20, {animate: false})")
     assert evaluated.all("input:disabled") == []
     evaluated.switch("Objects seen")
-    assert evaluated.all("canvas.semsig-heat") == []
+    assert evaluated.all("canvas.semsig-field") == []
     assert evaluated.all(IMAGES) == [image]
     evaluated.switch("Nothing")
     assert evaluated.all(IMAGES) == []
@@ -55,24 +61,76 @@ def test_an_evaluation_in_a_browser(evaluated: MapPage) -> None:
     assert evaluated.ask(count) == int((EVALUATION.queries["tied"] > 0).sum())
 
 
-def test_the_heatmap_shows_mean_errors_at_every_zoom(evaluated: MapPage) -> None:
-    """The oracle weighs every query for every place, in pixels of the screen."""
-    guess = np.sqrt(2.0 * CITY.xy.var(axis=0).sum())
-    errors = np.minimum(EVALUATION.queries["error_m"].to_numpy() / guess, 1.0)
-    degrees = EVALUATION.queries.to_crs("EPSG:4326").geometry
-    places = np.stack([degrees.y, degrees.x], axis=1).tolist()
-    stops = np.linspace(0.0, 1.0, len(ERROR_RAMP))
-    ramp = np.array([list(bytes.fromhex(colour[1:])) for colour in ERROR_RAMP])
-    for zoom in (0, -1, 2):
-        told = np.array(evaluated.ask_later("heat(...arguments)", places, zoom))
-        away = np.hypot(*(told[:, None, :2] - told[None, :, :2]).T)
-        weights = np.maximum(0.0, 1.0 - (away / 28.0) ** 2) ** 2
-        means = (weights * errors[:, None]).sum(axis=0) / weights.sum(axis=0)
-        seen = told[:, 5] > 250  # what lies outside the canvas is clear
-        assert seen.sum() > 10
-        for part in range(3):
-            expected = np.interp(means, stops, ramp[:, part])
-            assert np.abs(told[seen, 2 + part] - expected[seen]).max() < 16
+def spread_evaluation() -> Evaluation:
+    """Return an evaluation over three kilometres, in which more fails the further east."""
+    rng = np.random.default_rng(0)
+    queries = EVALUATION.queries.iloc[np.arange(800) % len(EVALUATION.queries)]
+    east, north = rng.uniform(0.0, 3000.0, (2, len(queries)))
+    places = gpd.points_from_xy(CITY.xy[0, 0] + east, CITY.xy[0, 1] + north, crs=CITY.crs)
+    chances = (rng.uniform(0.0, 3000.0, len(queries)) > east).astype(np.float64)
+    queries = queries.reset_index(drop=True).assign(p50=chances).set_geometry(places)
+    return dataclasses.replace(EVALUATION, queries=queries)
+
+
+def test_the_field_is_the_same_at_every_zoom(page: MapPage) -> None:
+    """The oracle weighs every query for every place, in metres of the ground."""
+    spread, radius = spread_evaluation(), 400.0
+    page.open(evaluation_map(spread, CITY, smooth=radius))
+    xy = np.stack([spread.queries.geometry.x, spread.queries.geometry.y], axis=1)
+    inner = (np.abs(xy - xy.mean(axis=0)) < 1200.0).all(axis=1)
+    places = spread.queries.geometry[inner][:20]
+    here = np.stack([places.x, places.y], axis=1)
+    away = ((here[:, None] - xy) ** 2).sum(axis=2)
+    weights = np.maximum(0.0, 1.0 - away / radius**2) ** 2
+    failed = (weights @ ~spread.successful) / weights.sum(axis=1)
+    least = np.array(list(FAILURES))
+    expected = np.digitize(failed, least) - 1
+    assert len(set(expected.tolist())) >= 4
+    unsure = np.abs(failed[:, None] - least[1:]).min(axis=1) < 0.03
+    degrees = places.to_crs("EPSG:4326")
+    latlon = np.stack([degrees.y, degrees.x], axis=1).tolist()
+    colours = [list(bytes.fromhex(colour[1:])) for colour in FAILURES.values()]
+    for zoom in (12, 14, 16, 18):
+        told = page.ask_later("fieldAt(...arguments)", latlon, zoom)
+        levels = np.array([colours.index(colour) for colour in told])
+        assert np.abs(levels - expected).max() <= 1
+        assert (levels == expected)[~unsure].all() or zoom == 12
+
+
+@pytest.mark.parametrize(("count", "least", "most"), [(3, 0.3, 0.7), (60, 0.95, 1.0)])
+def test_the_field_is_hatched_where_few_speak(
+    page: MapPage, count: int, least: float, most: float
+) -> None:
+    some = dataclasses.replace(EVALUATION, queries=EVALUATION.queries[:count])
+    page.open(evaluation_map(some, CITY, smooth=60.0))
+    row = some.queries.to_crs("EPSG:4326").geometry.iloc[0]
+    page.ask("map.setView([...arguments], 19, {animate: false})", row.y, row.x)
+    assert least <= page.ask_later("fieldCover(...arguments)", 40) <= most
+    assert "fewer than 5 queries" in page.text(LEGEND)
+    page.switch("Nothing")
+    page.switch("Share of queries")
+    page.ask("map.setView([0, 0], 12, {animate: false})")  # where there is nothing to draw
+    assert page.ask_later("fieldCover(...arguments)", 40) == 0.0
+
+
+def test_outcomes_have_shapes(evaluated: MapPage) -> None:
+    page = page_of_map(evaluation_map(EVALUATION, CITY), self_contained=False)
+    signs = evaluated.all(f"{LEGEND} .semsig-sign path")
+    assert [(sign.get_attribute("d"), sign.get_attribute("fill")) for sign in signs] == [
+        (OUTLINES[mark.shape], mark.colour) for mark in OUTCOMES.values()
+    ]
+    assert all(f'"{OUTLINES[mark.shape]}"' in page for mark in OUTCOMES.values())
+    # Of a triangle, the corners of its box are clear.
+    counts = [evaluated.ask("return signArea(arguments[0])", one) for one in (SUCCESSFUL, FAILED)]
+    assert counts[0] == pytest.approx(np.pi / 4, abs=0.1)
+    assert counts[1] == pytest.approx(0.5, abs=0.1)
+
+
+def test_signs_on_a_map_of_vectors(page: MapPage) -> None:
+    page.open(evaluation_map(EVALUATION, CITY, map_=folium.Map(tiles=None)))
+    triangle = OUTLINES[OUTCOMES["failed"].shape]
+    paths = page.all(f'.leaflet-marker-pane path[d="{triangle}"]')
+    assert len(paths) == (~EVALUATION.successful).sum()
 
 
 def test_a_click_shows_the_signature_and_the_place_found(evaluated: MapPage) -> None:

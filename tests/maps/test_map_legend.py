@@ -68,11 +68,11 @@ def legends(city: SignatureDatabase, objects: StreetObjects, name: str) -> dict[
     )
     sizes = {"types": SIZES, "both": SIZES[::-1] // 3 + 1}
     return {
-        "evaluation": evaluation_legend(EVALUATION, error_limit="9 m", licenses=city.licenses),
+        "evaluation": evaluation_legend(EVALUATION, radius=250.0, licenses=city.licenses),
         "evaluation_of_classes": evaluation_legend(
-            dataclasses.replace(EVALUATION, asked=asked), error_limit="9 m", licenses=()
+            dataclasses.replace(EVALUATION, asked=asked), radius=250.0, licenses=()
         ),
-        "evaluation_without_distortion": evaluation_legend(exact, error_limit="1 m", licenses=()),
+        "evaluation_without_distortion": evaluation_legend(exact, radius=1000.0, licenses=()),
         "localization": localization_legend(by_both),
         "localization_by_types": localization_legend(dataclasses.replace(by_types, tied_beyond=1)),
         "localization_by_bearings": localization_legend(localize(city, BEARINGS, top=7)),

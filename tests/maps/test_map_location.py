@@ -13,7 +13,7 @@ from selenium.webdriver.common.by import By
 from worlds import random_town
 
 from semsig_gis.core.signature import Signature
-from semsig_gis.core.signs import CANDIDATE_RAMP, FAILED, SUCCESSFUL, VERDICTS
+from semsig_gis.core.signs import ANSWERS, CANDIDATE_RAMP, VERDICTS
 from semsig_gis.core.view import Photo, View
 from semsig_gis.database.city import ObjectStore
 from semsig_gis.likelihood.index import build_index
@@ -59,7 +59,7 @@ def test_a_location_in_a_browser(page: MapPage) -> None:
     assert "The answer: within 50 m" in legend
     assert "90% in" in legend
     assert "matched: a street object" in legend
-    assert page.circles(SUCCESSFUL) == 1
+    assert page.circles(ANSWERS["given"].colour) == 1
     counts = location.explanations[0].counts
     assert min(counts["matched"], counts["false"]) > 0
     for verdict in ("matched", "misnamed", "false"):
@@ -69,7 +69,7 @@ def test_a_location_in_a_browser(page: MapPage) -> None:
     const [ring] = rings[0].getLatLngs();
     return [rings.length, map.distance(ring[0], ring[36]), ring.length];
     """
-    rings, across, corners = page.ask(ellipse, SUCCESSFUL)
+    rings, across, corners = page.ask(ellipse, ANSWERS["given"].colour)
     assert (rings, corners) == (1, 73)
     assert across == pytest.approx(2.0 * location.estimate.ellipse()[0], abs=0.4)
     other = location.explanations[1].counts["matched"]
@@ -85,13 +85,13 @@ def test_a_location_in_a_browser(page: MapPage) -> None:
     time.sleep(0.5)  # numbers fade away
     assert page.all(".semsig-number") == []
     page.switch("Best place")
-    assert page.circles(SUCCESSFUL) == 0
+    assert page.circles(ANSWERS["given"].colour) == 0
 
 
 def test_clicks_tell_of_places_and_objects(page: MapPage) -> None:
     location = found()
     page.open(location_map(location))
-    page.point_at("circles(arguments[0])[0]", SUCCESSFUL)
+    page.point_at("circles(arguments[0])[0]", ANSWERS["given"].colour)
     said = page.panel()
     assert said.startswith("The answer")
     assert f"{location.answer.mass:.1%} within 50 m" in said
@@ -160,7 +160,7 @@ def test_what_cannot_be_told_is_shown_from_afar(page: MapPage) -> None:
     legend = page.one(LEGEND).text
     assert "Cannot tell; the best place" in legend
     assert "matched" not in legend
-    assert page.circles(FAILED) == 1
+    assert page.circles(ANSWERS["withheld"].colour) == 1
     boxes = page.all(".leaflet-control-layers-overlays label")
     on = [one.text for one in boxes if one.find_element(By.TAG_NAME, "input").is_selected()]
     assert [name.strip() for name in on if "Chance" in name] == ["Chance within 50 m"]

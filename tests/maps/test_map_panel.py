@@ -14,7 +14,7 @@ from selenium.webdriver.support.wait import WebDriverWait
 from small_city import small_city, small_evaluation
 from worlds import random_town
 
-from semsig_gis.core.signs import FAILED
+from semsig_gis.core.signs import OUTCOMES
 from semsig_gis.maps.cells import ambiguity_map
 from semsig_gis.maps.evaluation import evaluation_map
 from semsig_gis.maps.objects import objects_map
@@ -88,9 +88,13 @@ def test_every_click_on_a_cell_is_answered(page: MapPage, screen: tuple[int, int
 def test_what_is_told_of_is_never_covered(page: MapPage, screen: tuple[int, int]) -> None:
     with still(page, *screen):
         page.open(evaluation_map(small_evaluation("medium"), small_city()[0]))
-        count = page.ask("return circles(arguments[0]).length", FAILED)
+        count = page.ask("return circles(arguments[0]).length", OUTCOMES["failed"].colour)
         for query in range(0, count, max(1, count // 12)):
-            page.ask("circles(arguments[1])[arguments[0]].fire('click')", query, FAILED)
+            page.ask(
+                "circles(arguments[1])[arguments[0]].fire('click')",
+                query,
+                OUTCOMES["failed"].colour,
+            )
             assert is_beside_the_panel(page)
 
 

@@ -27,7 +27,7 @@ from worlds import TAXONOMY, random_town
 
 from semsig_gis.core.errors import CrsError, DatabaseError, EmptyResultError, InputError
 from semsig_gis.core.signature import SignatureSpec
-from semsig_gis.core.signs import CANDIDATE_RAMP, FAILED, OBJECT_COLOURS, SUCCESSFUL, VERDICTS
+from semsig_gis.core.signs import CANDIDATE_RAMP, OBJECT_COLOURS, OUTCOMES, VERDICTS
 from semsig_gis.core.taxonomy import Taxonomy
 from semsig_gis.database.build import build_database
 from semsig_gis.database.city import ObjectStore
@@ -57,6 +57,7 @@ if TYPE_CHECKING:
     from semsig_gis.likelihood.noise.model import Noise
 
 WORLD = random_town()
+SUCCESSFUL, FAILED = (mark.colour for mark in OUTCOMES.values())
 CITY, OBJECTS = WORLD.database, WORLD.street_objects
 HOUSE = gpd.GeoDataFrame(geometry=[shapely.box(765_300, 6_275_100, 765_320, 6_275_120)], crs=2154)
 NO_PLACE = gpd.GeoDataFrame(geometry=[None], crs=2154)
@@ -101,7 +102,7 @@ def maps_of(
 
 MAPS = maps_of(CITY, OBJECTS, EVALUATION, named_noise("light"))
 LAYERS = {
-    "evaluation": {"Expected errors", "Lines from true to estimated places"},
+    "evaluation": {"Share of queries that fail", "Lines from true to estimated places"},
     "localization": {"Candidates (5)"},
     "location": {"Best place", "Chance of a cell", "Candidates (5)"},
     "ambiguity": {"Same types", "Same types and angle levels"},

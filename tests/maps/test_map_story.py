@@ -45,7 +45,7 @@ def test_layers_are_in_groups_and_cells_have_one_colour(page: MapPage) -> None:
     assert groups == ["Colour cells by", "Queries", "Answer", "Street objects", "Ground"]
     names = [one.text.strip() for one in page.all("[data-group=cells] label")]
     assert names == [
-        *("Objects seen from a cell", "Expected errors", "Same types"),
+        *("Objects seen from a cell", "Share of queries that fail", "Same types"),
         *("Same types and angle levels", "Chance to be found", "What has changed"),
         *("Chance within 50 m", "Chance of a cell", "Regions of 50, 90 and 99 %", "Nothing"),
     ]
@@ -54,9 +54,9 @@ def test_layers_are_in_groups_and_cells_have_one_colour(page: MapPage) -> None:
         page.switch(name)
         assert checked(page) == [name]
         seen[name] = tuple(one.get_attribute("src") for one in page.all(IMAGES))
-        assert len(page.all(".semsig-heat")) == (name == "Expected errors")
+        assert len(page.all(".semsig-field")) == (name == "Share of queries that fail")
     (city,) = seen["Objects seen from a cell"]
-    assert seen["Expected errors"] == (city,)
+    assert seen["Share of queries that fail"] == (city,)
     assert seen["Regions of 50, 90 and 99 %"][0] == city
     assert {name: len(images) for name, images in seen.items() if len(images) != 2} == {
         **dict.fromkeys(names[:5], 1),

@@ -7,7 +7,7 @@ import pytest
 from reports import HARM, LONG, outcome_map, texts
 from worlds import random_town
 
-from semsig_gis.core.signs import FAILED, SUCCESSFUL
+from semsig_gis.core.signs import OUTCOMES
 from semsig_gis.evaluation.evaluate import evaluate
 from semsig_gis.reports import outcomes
 from semsig_gis.reports.outcomes import draw_map
@@ -40,8 +40,7 @@ def test_outcomes_differ_in_colour_and_shape(places: int) -> None:
     assert {*counts, "N", "5 m"} <= set(texts(made.svg))
     assert f"Queries failed: {failed:,}, successful: {successful:,}." in made.description
     svg = made.svg.decode()
-    assert f"fill: {SUCCESSFUL}" in svg
-    assert f"fill: {FAILED}" in svg
+    assert all(f"fill: {mark.colour}" in svg for mark in OUTCOMES.values())
     # Many are pixels.
     assert svg.count("<use") < 2000
 

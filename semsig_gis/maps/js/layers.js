@@ -2,7 +2,7 @@ window.semsig = {
   // Fields that say what a thing is called; the search knows it by them, too.
   naming: new Set(["Class", "Class before", "Seen as", "Street object", "Identifier"]),
   layers: 0,  // of points, so far
-  points(fields, titles, records) {
+  points(fields, titles, records, shape) {
     const group = L.featureGroup();
     const markers = [];
     const layer = semsig.layers++;
@@ -12,15 +12,17 @@ window.semsig = {
       return kind ? `${kind.toLowerCase()}:${number.replaceAll(",", "")}` : `sign:${layer}/${at}`;
     };
     for (const [place, colour, radius, places, name, values, label] of records) {
-      const marker = L.circleMarker(place, {
+      const look = {
         pane: "markerPane", radius: radius, color: "#222", weight: 1,
-        fillColor: colour, fillOpacity: 0.95,
-      });
+        fillColor: colour, fillOpacity: 1,
+      };
+      const marker = shape
+        ? new semsig.Sign(place, {...look, outline: shape}) : L.circleMarker(place, look);
       if (label) {
         const text = L.DomUtil.create("b", "");
         text.textContent = label;
-        const look = {permanent: true, direction: "center", className: "semsig-number"};
-        marker.bindTooltip(text, look);
+        marker.bindTooltip(
+          text, {permanent: true, direction: "center", className: "semsig-number"});
       }
       const hint = places === null ? null : semsig.hint(place, places);
       marker.on("click", (event) => {

@@ -1,0 +1,178 @@
+"""Colours: that none has two meanings, and that all people tell apart what can lie on each other.
+
+Colour blindness is simulated after Machado, Oliveira and Fernandes (2009) at full severity, and
+colours are as far apart as CIEDE2000 says.
+"""
+
+from __future__ import annotations
+
+import itertools
+import re
+import warnings
+from collections import Counter
+from importlib import resources
+from xml.etree import ElementTree as ET
+
+import numpy as np
+import pytest
+
+from semsig_gis.core.signs import (
+    ANSWERS,
+    CANDIDATE_RAMP,
+    CELL_CHANCES,
+    CHANCES,
+    COLOURS,
+    DRIFT_COLOURS,
+    FAILURES,
+    FOUND_RAMP,
+    GROUP_COLOURS,
+    OBJECT_COLOURS,
+    OUTCOMES,
+    RANK_RAMP,
+    SAME_LEVELS,
+    SAME_TYPES,
+    SHADES,
+    VERDICTS,
+    ClassSign,
+    group_labels,
+)
+from semsig_gis.exports.layers import AMBIGUITY, CLASS_MARKERS, IDENTIFIABILITY, by_outcome
+from semsig_gis.maps.parts import OUTLINES, mark_svg
+
+with warnings.catch_warnings():
+    warnings.simplefilter("ignore")  # it tells what it lacks, and of its tritanopia
+    import colour
+
+    SIGHTS = {
+        "normal": np.eye(3),
+        "deuteranopia": colour.matrix_cvd_Machado2009("Deuteranomaly", 1.0),
+        "protanopia": colour.matrix_cvd_Machado2009("Protanomaly", 1.0),
+        "tritanopia": colour.matrix_cvd_Machado2009("Tritanomaly", 1.0),
+    }
+
+APART = 15.0
+MARKS = [mark.colour for mark in OUTCOMES.values()]
+
+
+def rgb(colours: list[str]) -> np.ndarray:
+    return np.array([list(bytes.fromhex(one[1:])) for one in colours]) / 255.0
+
+
+def flipped(colours: list[str]) -> np.ndarray:
+    """Return colours as ``invert(1) hue-rotate(180deg) brightness(1.15)`` of CSS shows them."""
+    inverted = 1.0 - rgb(colours)
+    turned = 2.0 * (inverted @ [0.213, 0.715, 0.072])[:, None] - inverted
+    return np.clip(1.15 * np.clip(turned, 0.0, 1.0), 0.0, 1.0)
+
+
+def lifted(colours: list[str]) -> np.ndarray:
+    """Return colours as ``brightness(1.4)`` of CSS shows them."""
+    return np.clip(1.4 * rgb(colours), 0.0, 1.0)
+
+
+def distances(ones: np.ndarray, others: np.ndarray, sight: str) -> np.ndarray:
+    """Return how far apart colours are for a sight, shape (ones, others)."""
+    labs = []
+    for colours in (ones, others):
+        light = np.clip(colour.models.eotf_sRGB(colours) @ SIGHTS[sight].T, 0.0, 1.0)
+        seen = colour.models.eotf_inverse_sRGB(light)
+        labs.append(colour.XYZ_to_Lab(colour.sRGB_to_XYZ(seen)))
+    return np.asarray(colour.delta_E(labs[0][:, None], labs[1][None], method="CIE 2000"))
+
+
+def script(name: str) -> str:
+    return resources.files("semsig_gis.maps").joinpath("js", name).read_text(encoding="utf-8")
+
+
+LIGHT_PAPER, DARK_PAPER = re.findall(r"--paper: (#\w{6})", script("page.css"))
+GROUND = re.findall(r'dark \? "(#\w{6})" : "(#\w{6})"', script("ground.js"))
+FLIPPED, LIFTED = (
+    re.search(pattern, script("page.css"))
+    for pattern in (r"invert\(1\) hue-rotate\(180deg\) brightness\(1.15\)", r"brightness\(1.4\)")
+)
+LIGHT = rgb([LIGHT_PAPER, *SHADES.values(), *(light for _, light in GROUND)])
+DARK = np.concatenate(
+    [rgb([DARK_PAPER, *(dark for dark, _ in GROUND)]), flipped([*SHADES.values()])]
+)
+SAME, *CHANGES = DRIFT_COLOURS.values()
+FIELD = rgb([*FAILURES.values()])
+# What can lie on what, and next to it.
+PAIRS = {
+    "outcomes": (rgb(MARKS[:1]), rgb(MARKS[1:])),
+    "field, light ground": (FIELD, LIGHT),
+    "field, dark ground": (FIELD, DARK),
+    "outcomes, light ground": (rgb(MARKS), LIGHT),
+    "outcomes, dark ground": (rgb(MARKS), DARK),
+    "outcomes, field": (rgb(MARKS), FIELD),
+    **{
+        f"{what}, {name}": (ones, others)
+        for name, colours in (
+            ("cells alike", [*GROUP_COLOURS.values()]),
+            ("cells found", [*FOUND_RAMP]),
+            ("cells that differ", CHANGES),
+        )
+        for what, ones, others in (
+            ("outcomes", rgb(MARKS), rgb(colours)),
+            ("outcomes in the dark", rgb(MARKS), lifted(colours)),
+            ("light paper", rgb([LIGHT_PAPER]), rgb(colours)),
+            ("dark paper", rgb([DARK_PAPER]), lifted(colours)),
+        )
+    },
+    "outcomes, cells that are the same": (rgb(MARKS), rgb([SAME])),
+    "outcomes in the dark, cells that are the same": (rgb(MARKS), flipped([SAME])),
+    "changes": (rgb(CHANGES), rgb([SAME])),
+    "changes in the dark": (lifted(CHANGES), flipped([SAME])),
+}
+
+
+@pytest.mark.parametrize("sight", SIGHTS)
+def test_all_people_tell_apart_what_lies_on_each_other(sight: str) -> None:
+    assert FLIPPED
+    assert LIFTED
+    assert len(GROUND) == 2
+    near = {name: float(distances(*pair, sight).min()) for name, pair in PAIRS.items()}
+    assert {name: apart for name, apart in near.items() if apart < APART} == {}
+
+
+@pytest.mark.parametrize("sight", SIGHTS)
+def test_signs_of_classes_are_told_by_outlines_too(sight: str) -> None:
+    """Eighteen colours are too many for colour alone, so either the fill or the outline does it."""
+    edges = {"light": "#222222", "dark": "#e9e9e6"}
+    assert 'isDark(map) ? "#e9e9e6" : "#222"' in script("controls.js")
+    assert 'dark ? "#131518" : bright ? "#444" : "#fff"' in script("objects.js")
+    for ground, edge in edges.items():
+        for one in COLOURS:
+            bright = ClassSign("A", "a", "circle", one).ink == "#000000"
+            own = "#131518" if ground == "dark" else "#444444" if bright else "#ffffff"
+            sign, fill = rgb([one, own]), rgb([one])
+            for below in (rgb(MARKS), FIELD):
+                assert distances(sign, below, sight).max(axis=0).min() >= APART
+            for mark in MARKS:
+                assert distances(rgb([mark, edge]), fill, sight).max() >= APART
+
+
+def test_no_two_meanings_share_a_colour() -> None:
+    tables = (
+        *(COLOURS, MARKS, [mark.colour for mark in ANSWERS.values()], FAILURES.values()),
+        *(RANK_RAMP, CANDIDATE_RAMP, FOUND_RAMP, SHADES.values(), CELL_CHANCES.values()),
+        *(CHANCES.values(), VERDICTS.values(), GROUP_COLOURS.values(), DRIFT_COLOURS.values()),
+        *(OBJECT_COLOURS.values(), [SAME_TYPES, SAME_LEVELS]),
+    )
+    counts = Counter(itertools.chain(*tables))
+    assert [one for one, count in counts.items() if count > 1] == []
+
+
+def test_web_and_qgis_draw_from_the_same_tables() -> None:
+    assert len({mark.shape for mark in OUTCOMES.values()}) == len(OUTCOMES)
+    root = ET.fromstring(by_outcome(geometry="point").qml)  # noqa: S314 - our own
+    for (outcome, mark), category in zip(OUTCOMES.items(), root.iter("category"), strict=True):
+        assert (category.get("value"), category.get("label")) == (outcome, outcome)
+        symbol = root.find(f".//symbol[@name='{category.get('symbol')}']")
+        assert symbol is not None
+        options = {one.get("name"): one.get("value") for one in symbol.iter("Option")}
+        red, green, blue = bytes.fromhex(mark.colour[1:])
+        assert options["color"] == f"{red},{green},{blue},255"
+        assert options["name"] == CLASS_MARKERS[mark.shape][0]
+        assert f'd="{OUTLINES[mark.shape]}" fill="{mark.colour}"' in mark_svg(mark)
+    assert [*AMBIGUITY.values()] == [*zip(group_labels(), GROUP_COLOURS.values(), strict=True)]
+    assert [colour for _, colour in IDENTIFIABILITY.values()] == list(FOUND_RAMP)
